@@ -1,1 +1,28 @@
-//! Placeholder.
+//! The world: what stands between a scene file and a running simulation.
+//!
+//! The modules read in the direction the data flows: a scene file is parsed and checked
+//! ([`scene`]), its meshes are read, made or lifted from a surface, tools touch the bodies,
+//! [`simulation`] steps them, a local contact model and a snapshot leave for other threads,
+//! and results are written.
+//!
+//! Units are SI everywhere and stand in the names: metres, seconds, newtons, pascals, kilograms.
+
+// Each module is announced on its own line, in data-flow order.
+
+pub mod scene;
+
+// meshes in: mesh_in
+
+// the demonstration's organ: organ
+
+// rigid tools and their contact with bodies: tool
+
+// local contact model for haptics: contact_model
+
+pub mod plan;
+
+pub mod simulation;
+
+pub mod snapshot;
+
+pub mod results;

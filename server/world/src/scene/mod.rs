@@ -1,0 +1,1 @@
+//! Scene files: TOML or JSON in, checked objects out.

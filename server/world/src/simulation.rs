@@ -1,0 +1,1 @@
+//! The step: tools, cuts, contacts, deformation, in this order.

@@ -1,0 +1,1 @@
+//! What other threads see of a simulation: one coherent copy per step.
