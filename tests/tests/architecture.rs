@@ -1,0 +1,83 @@
+//! Holds the dependency arrows of the house: who may know whom.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::process::Command;
+
+/// Package → the workspace packages it may depend on (dev-dependencies excepted).
+fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
+    BTreeMap::from([
+        ("scindo-proto", BTreeSet::new()),
+        ("scindo-physics", BTreeSet::new()),
+        ("scindo-collision", BTreeSet::new()),
+        ("scindo-world", BTreeSet::from(["scindo-physics", "scindo-collision"])),
+        ("scindo-study", BTreeSet::from(["scindo-world"])),
+        ("scindo", BTreeSet::from(["scindo-world", "scindo-study", "scindo-proto", "scindo-view"])),
+        ("scindo-client", BTreeSet::from(["scindo-proto"])),
+        ("scindo-view", BTreeSet::from(["scindo-proto", "scindo-client"])),
+        ("scindo-haptic", BTreeSet::from(["scindo-proto", "scindo-client"])),
+        ("scindo-tests", BTreeSet::new()),
+    ])
+}
+
+#[test]
+fn crates_know_only_whom_they_may() {
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml");
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--format-version", "1", "--no-deps", "--manifest-path", manifest])
+        .output()
+        .expect("cargo runs");
+    let metadata: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON");
+    let allowed = allowed();
+    let packages = metadata["packages"].as_array().expect("packages");
+    let members: BTreeSet<&str> = packages.iter().filter_map(|p| p["name"].as_str()).collect();
+    let mut wrong = Vec::new();
+    for package in packages {
+        let name = package["name"].as_str().expect("name");
+        let Some(may) = allowed.get(name) else {
+            wrong.push(format!("{name} is not in the plan of the house"));
+            continue;
+        };
+        for dependency in package["dependencies"].as_array().expect("dependencies") {
+            let to = dependency["name"].as_str().expect("name");
+            if dependency["kind"] != "dev" && members.contains(to) && !may.contains(to) {
+                wrong.push(format!("{name} must not know {to}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("; "));
+}
+
+/// Clock, files, network and wire stay out of the mechanics.
+#[test]
+fn physics_and_collision_stay_pure() {
+    let banned = [
+        "std::fs",
+        "std::net",
+        "Instant::now",
+        "SystemTime",
+        "tokio",
+        "zenoh",
+        "prost",
+        "println!",
+        "eprintln!",
+    ];
+    let mut wrong = Vec::new();
+    for room in ["../server/physics/src", "../server/collision/src"] {
+        let mut open = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(room)];
+        while let Some(path) = open.pop() {
+            if path.is_dir() {
+                open.extend(std::fs::read_dir(&path).expect("readable").map(|e| e.expect("entry").path()));
+            } else {
+                let text = std::fs::read_to_string(&path).expect("readable");
+                for (number, line) in text.lines().enumerate() {
+                    let code = line.split("//").next().unwrap_or("");
+                    if banned.iter().any(|word| code.contains(word)) {
+                        wrong.push(format!("{}:{}: {}", path.display(), number + 1, line.trim()));
+                    }
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
