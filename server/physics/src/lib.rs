@@ -1,1 +1,10 @@
-//! Placeholder.
+//! Continuum mechanics of one deformable, cuttable body.
+//!
+//! Modules stand in the order of the data: a [`mesh`] says where the material is at rest.
+//!
+//! # Invariants
+//! No input or output, no clock, no thread that outlives its owner, no global state; the result of
+//! a step does not depend on the number of threads; no non-finite number leaves a body.
+//! SI units throughout. State is `f64`, kernels and solver vectors are `f32`.
+
+pub mod mesh;
