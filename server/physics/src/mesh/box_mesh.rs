@@ -17,39 +17,16 @@ pub enum BoxPattern {
 }
 
 /// Cell corner c = a + 2 b + 4 d with a, b, d ∈ {0, 1} along x, y, z.
-const TET5_EVEN: [[usize; 4]; 5] = [
-    [0, 3, 5, 6],
-    [1, 0, 3, 5],
-    [2, 0, 6, 3],
-    [4, 0, 5, 6],
-    [7, 3, 6, 5],
-];
-const TET5_ODD: [[usize; 4]; 5] = [
-    [1, 2, 4, 7],
-    [0, 1, 2, 4],
-    [3, 1, 7, 2],
-    [5, 1, 4, 7],
-    [6, 2, 7, 4],
-];
-const TET6: [[usize; 4]; 6] = [
-    [0, 1, 3, 7],
-    [0, 1, 5, 7],
-    [0, 2, 3, 7],
-    [0, 2, 6, 7],
-    [0, 4, 5, 7],
-    [0, 4, 6, 7],
-];
+const TET5_EVEN: [[usize; 4]; 5] = [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
+const TET5_ODD: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4]];
+const TET6: [[usize; 4]; 6] =
+    [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
 /// Meshes the box from `min` to `max` [m] with `cells` cells along x, y, z.
 ///
 /// Node id = i + (nx+1)·(j + (ny+1)·k); tets in cell order, x fastest. An empty or flat box gives
 /// a mesh that [`TetMesh::check`] refuses.
-pub fn box_mesh(
-    min: Vector3<f64>,
-    max: Vector3<f64>,
-    cells: [usize; 3],
-    pattern: BoxPattern,
-) -> TetMesh {
+pub fn box_mesh(min: Vector3<f64>, max: Vector3<f64>, cells: [usize; 3], pattern: BoxPattern) -> TetMesh {
     let [nx, ny, nz] = cells;
     let node = |i: usize, j: usize, k: usize| i + (nx + 1) * (j + (ny + 1) * k);
     let mut mesh = TetMesh::default();
@@ -60,11 +37,7 @@ pub fn box_mesh(
     for k in 0..=nz {
         for j in 0..=ny {
             for i in 0..=nx {
-                let s = Vector3::new(
-                    i as f64 / nx as f64,
-                    j as f64 / ny as f64,
-                    k as f64 / nz as f64,
-                );
+                let s = Vector3::new(i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64);
                 mesh.nodes.push(min + (max - min).component_mul(&s));
             }
         }
@@ -72,8 +45,7 @@ pub fn box_mesh(
     for k in 0..nz {
         for j in 0..ny {
             for i in 0..nx {
-                let corner =
-                    |c: usize| node(i + (c & 1), j + ((c >> 1) & 1), k + ((c >> 2) & 1)) as u32;
+                let corner = |c: usize| node(i + (c & 1), j + ((c >> 1) & 1), k + ((c >> 2) & 1)) as u32;
                 for tet in split(pattern, (i + j + k) % 2 == 1) {
                     let mut ids = tet.map(corner);
                     if tet_volume(&ids.map(|n| mesh.nodes[n as usize])) < 0.0 {
@@ -101,21 +73,14 @@ mod tests {
     use super::*;
 
     fn bar(pattern: BoxPattern) -> TetMesh {
-        box_mesh(
-            Vector3::zeros(),
-            Vector3::new(1.0, 0.2, 0.2),
-            [40, 8, 8],
-            pattern,
-        )
+        box_mesh(Vector3::zeros(), Vector3::new(1.0, 0.2, 0.2), [40, 8, 8], pattern)
     }
 
     #[test]
     fn every_pattern_fills_the_box_with_matching_faces() {
-        for pattern in [
-            BoxPattern::Tet5 { parity: false },
-            BoxPattern::Tet5 { parity: true },
-            BoxPattern::Tet6,
-        ] {
+        for pattern in
+            [BoxPattern::Tet5 { parity: false }, BoxPattern::Tet5 { parity: true }, BoxPattern::Tet6]
+        {
             let mesh = bar(pattern);
             mesh.check().unwrap();
             assert!((mesh.volumes().iter().sum::<f64>() - 0.04).abs() < 1e-13);
@@ -128,12 +93,7 @@ mod tests {
     fn counts_of_the_reference_problems() {
         let tet5 = bar(BoxPattern::Tet5 { parity: false });
         assert_eq!((tet5.nodes.len(), tet5.tets.len()), (3_321, 12_800));
-        let cube = box_mesh(
-            Vector3::zeros(),
-            Vector3::repeat(1.0),
-            [11; 3],
-            BoxPattern::Tet6,
-        );
+        let cube = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [11; 3], BoxPattern::Tet6);
         assert_eq!((cube.nodes.len(), cube.tets.len()), (1_728, 7_986));
     }
 
@@ -141,12 +101,7 @@ mod tests {
     #[test]
     fn numbering_of_the_drooping_bar_reference() {
         let mesh = bar(BoxPattern::Tet5 { parity: false });
-        let first = [
-            [0, 42, 410, 370],
-            [1, 0, 370, 42],
-            [41, 0, 42, 410],
-            [369, 0, 410, 370],
-        ];
+        let first = [[0, 42, 410, 370], [1, 0, 370, 42], [41, 0, 42, 410], [369, 0, 410, 370]];
         assert_eq!(mesh.tets[..4], first);
         assert_eq!(checksum(&mesh), REFERENCE_CHECKSUM);
     }
@@ -156,28 +111,16 @@ mod tests {
         mesh.tets
             .iter()
             .flatten()
-            .fold(0xcbf2_9ce4_8422_2325, |h, &n| {
-                (h ^ u64::from(n)).wrapping_mul(0x0000_0100_0000_01b3)
-            })
+            .fold(0xcbf2_9ce4_8422_2325, |h, &n| (h ^ u64::from(n)).wrapping_mul(0x0000_0100_0000_01b3))
     }
 
     const REFERENCE_CHECKSUM: u64 = 0x81dc_b64e_9084_6385;
 
     #[test]
     fn an_empty_or_flat_box_is_refused_by_check() {
-        let flat = box_mesh(
-            Vector3::zeros(),
-            Vector3::new(1.0, 1.0, 0.0),
-            [1; 3],
-            BoxPattern::Tet6,
-        );
+        let flat = box_mesh(Vector3::zeros(), Vector3::new(1.0, 1.0, 0.0), [1; 3], BoxPattern::Tet6);
         assert!(flat.check().is_err());
-        let none = box_mesh(
-            Vector3::zeros(),
-            Vector3::repeat(1.0),
-            [1, 0, 1],
-            BoxPattern::Tet6,
-        );
+        let none = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [1, 0, 1], BoxPattern::Tet6);
         assert!(none.check().is_err());
     }
 }

@@ -48,10 +48,7 @@ pub struct MeshRepairs {
 impl TetMesh {
     /// Builds a mesh from raw arrays: flips negatively oriented tets, drops unused nodes, and
     /// refuses what cannot be simulated.
-    pub fn repaired(
-        nodes: Vec<Vector3<f64>>,
-        tets: Vec<[u32; 4]>,
-    ) -> Result<(Self, MeshRepairs), MeshError> {
+    pub fn repaired(nodes: Vec<Vector3<f64>>, tets: Vec<[u32; 4]>) -> Result<(Self, MeshRepairs), MeshError> {
         let mut mesh = Self { nodes, tets };
         mesh.check_nodes_and_indices()?;
         let mut repairs = MeshRepairs::default();
@@ -74,17 +71,10 @@ impl TetMesh {
             let volume = self.volume(e);
             let least = DEGENERATE_VOLUME * self.longest_edge(e).powi(3);
             if volume.abs() <= least {
-                return Err(MeshError::Degenerate {
-                    tet: e,
-                    volume_m3: volume,
-                    least_m3: least,
-                });
+                return Err(MeshError::Degenerate { tet: e, volume_m3: volume, least_m3: least });
             }
             if volume < 0.0 {
-                return Err(MeshError::Inverted {
-                    tet: e,
-                    volume_m3: volume,
-                });
+                return Err(MeshError::Inverted { tet: e, volume_m3: volume });
             }
         }
         let mut used = vec![false; self.nodes.len()];
@@ -106,24 +96,13 @@ impl TetMesh {
             let found = self.nodes.len().max(self.tets.len());
             return Err(MeshError::TooLarge { found, limit });
         }
-        if let Some(node) = self
-            .nodes
-            .iter()
-            .position(|x| !x.iter().all(|c| c.is_finite()))
-        {
-            return Err(MeshError::NonFinite {
-                node,
-                position_m: self.nodes[node].into(),
-            });
+        if let Some(node) = self.nodes.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
+            return Err(MeshError::NonFinite { node, position_m: self.nodes[node].into() });
         }
         for (tet, nodes) in self.tets.iter().enumerate() {
             for (a, &node) in nodes.iter().enumerate() {
                 if node as usize >= self.nodes.len() {
-                    return Err(MeshError::NodeOutOfRange {
-                        tet,
-                        node,
-                        n_nodes: self.nodes.len(),
-                    });
+                    return Err(MeshError::NodeOutOfRange { tet, node, n_nodes: self.nodes.len() });
                 }
                 if nodes[..a].contains(&node) {
                     return Err(MeshError::RepeatedNode { tet, node });
@@ -180,10 +159,7 @@ impl TetMesh {
     /// Length [m] of the longest edge of tet `e`.
     pub fn longest_edge(&self, e: usize) -> f64 {
         let x = self.corners(e);
-        TET_EDGES
-            .iter()
-            .map(|&[a, b]| (x[b] - x[a]).norm())
-            .fold(0.0, f64::max)
+        TET_EDGES.iter().map(|&[a, b]| (x[b] - x[a]).norm()).fold(0.0, f64::max)
     }
 
     /// Smallest and largest corner [m] of the box around all nodes.
@@ -232,9 +208,10 @@ mod tests {
             Vector3::new(0.3, 0.1, 0.9),
         ];
         let g = tet_gradients(&x);
-        for a in 0..4 {
-            for b in 0..4 {
-                let n_a_at_b = 0.25 + g[a].dot(&(x[b] - (x[0] + x[1] + x[2] + x[3]) / 4.0));
+        let centre = (x[0] + x[1] + x[2] + x[3]) / 4.0;
+        for (a, g_a) in g.iter().enumerate() {
+            for (b, x_b) in x.iter().enumerate() {
+                let n_a_at_b = 0.25 + g_a.dot(&(x_b - centre));
                 assert!((n_a_at_b - f64::from(a == b)).abs() < 1e-14);
             }
         }
@@ -261,31 +238,17 @@ mod tests {
 
     #[test]
     fn unusable_meshes_are_refused_with_the_place() {
-        let flat = vec![
-            Vector3::zeros(),
-            Vector3::x(),
-            Vector3::y(),
-            Vector3::new(1.0, 1.0, 1e-14),
-        ];
+        let flat = vec![Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::new(1.0, 1.0, 1e-14)];
         let refused = |nodes, tets| TetMesh::repaired(nodes, tets).unwrap_err();
-        assert!(matches!(
-            refused(flat, vec![[0, 1, 2, 3]]),
-            MeshError::Degenerate { tet: 0, .. }
-        ));
+        assert!(matches!(refused(flat, vec![[0, 1, 2, 3]]), MeshError::Degenerate { tet: 0, .. }));
         assert!(matches!(refused(corner_tet(), vec![]), MeshError::Empty));
         assert!(matches!(
             refused(corner_tet(), vec![[0, 1, 2, 4]]),
             MeshError::NodeOutOfRange { node: 4, .. }
         ));
-        assert!(matches!(
-            refused(corner_tet(), vec![[0, 1, 2, 2]]),
-            MeshError::RepeatedNode { node: 2, .. }
-        ));
+        assert!(matches!(refused(corner_tet(), vec![[0, 1, 2, 2]]), MeshError::RepeatedNode { node: 2, .. }));
         let mut broken = corner_tet();
         broken[2].y = f64::NAN;
-        assert!(matches!(
-            refused(broken, vec![[0, 1, 2, 3]]),
-            MeshError::NonFinite { node: 2, .. }
-        ));
+        assert!(matches!(refused(broken, vec![[0, 1, 2, 3]]), MeshError::NonFinite { node: 2, .. }));
     }
 }

@@ -34,10 +34,7 @@ impl TetQuality {
     /// Quality of the tet with corners `x` [m].
     pub fn of(x: &[Vector3<f64>; 4]) -> Self {
         let volume = tet_volume(x);
-        let edges_squared: f64 = TET_EDGES
-            .iter()
-            .map(|&[a, b]| (x[b] - x[a]).norm_squared())
-            .sum();
+        let edges_squared: f64 = TET_EDGES.iter().map(|&[a, b]| (x[b] - x[a]).norm_squared()).sum();
         let mean_ratio = if edges_squared > 0.0 {
             volume.signum() * 12.0 * (3.0 * volume.abs()).powf(2.0 / 3.0) / edges_squared
         } else {
@@ -53,11 +50,7 @@ impl TetQuality {
             min_dihedral_rad = min_dihedral_rad.min(angle);
             max_dihedral_rad = max_dihedral_rad.max(angle);
         }
-        Self {
-            mean_ratio,
-            min_dihedral_rad,
-            max_dihedral_rad,
-        }
+        Self { mean_ratio, min_dihedral_rad, max_dihedral_rad }
     }
 }
 

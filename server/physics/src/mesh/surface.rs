@@ -23,11 +23,7 @@ impl TetMesh {
                 let nodes = face.map(|b| tet[b]);
                 let mut key = nodes;
                 key.sort_unstable();
-                let face = BoundaryFace {
-                    tet: e as u32,
-                    opposite: a as u8,
-                    nodes,
-                };
+                let face = BoundaryFace { tet: e as u32, opposite: a as u8, nodes };
                 keyed.push((key, face));
             }
         }
