@@ -1,1 +1,28 @@
-//! Placeholder.
+//! The wire of scindo: messages, keys, limits and the codec that guards them. No physics, no
+//! algorithm, no transport.
+//!
+//! # Layout
+//! * [`messages`]: the structs generated from `scindo/v1/*.proto`.
+//! * [`key`]: the key space `<realm>/@v1/<session>/…`, built and parsed in one place.
+//! * [`limits`]: how large, how many, how far; each constant with its reason.
+//! * [`check`]: what a decoded message must satisfy before anybody may use it.
+//! * [`codec`]: bytes ↔ messages; sizes and counts are checked before anything is allocated.
+
+pub mod messages;
+
+pub mod key;
+
+pub mod limits;
+
+mod check;
+
+pub mod codec;
+
+pub use codec::{DecodeError, WireMessage, decode, decode_as, encode, encoding};
+pub use key::{Chunk, KeyError, KeySpace, Role, Topic, Verb};
+
+/// Version of the wire: the `@v1` chunk of every key and `SessionInfo::wire_version`.
+pub const WIRE_VERSION: u32 = 1;
+
+/// Encoded `google.protobuf.FileDescriptorSet` of package `scindo.v1`; the answer of `rpc/schema`.
+pub const FILE_DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/scindo_v1.binpb"));

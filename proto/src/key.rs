@@ -1,0 +1,319 @@
+//! The key space: `<realm>/@v1/<session>/<topic>`.
+//!
+//! `@v1` is a verbatim chunk, so wildcards never cross versions of the wire.
+//!
+//! | topic | message | direction |
+//! |---|---|---|
+//! | `body/<id>/surface/frame` | `SurfaceFrame` | server → all |
+//! | `body/<id>/surface/topology` | `SurfaceTopology` | server → all |
+//! | `body/<id>/surface/keyframe` | `SurfaceKeyframe` | query |
+//! | `tool/<id>/pose` | `ToolSample` | client → server |
+//! | `tool/<id>/cut` | `CutCommand` | client → server |
+//! | `tool/<id>/cut_ack` | `CutAck` | server → client |
+//! | `tool/<id>/capability` | `DeviceCapability` | client → server |
+//! | `tool/<id>/contact` | `HapticContact` | server → client |
+//! | `tool/<id>/state` | `ToolState` | server → all |
+//! | `stats`, `event`, `plan` | `Stats`, `Event`, `Plan` | server → all |
+//! | `rpc/<verb>` | see [`Verb`] | query |
+//! | `live/<role>/<id>` | liveliness token | all |
+
+use std::fmt;
+
+use thiserror::Error;
+
+use crate::limits::MAX_ID_BYTES;
+
+/// Why a key or a part of it is refused.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum KeyError {
+    /// A chunk is empty, too long, or has a character outside `[a-z0-9_-]`.
+    #[error("{what} '{found}' is not a key chunk: 1 to {MAX_ID_BYTES} characters of a-z, 0-9, _ and -")]
+    Chunk {
+        /// Which part of the key.
+        what: &'static str,
+        /// What stood there (at most the first 64 characters).
+        found: String,
+    },
+    /// The key lies in another realm, session or wire version.
+    #[error("key '{found}' does not lie below '{expected}'")]
+    Foreign {
+        /// The prefix of this session.
+        expected: String,
+        /// The key.
+        found: String,
+    },
+    /// No topic has this form.
+    #[error("'{found}' is no topic of scindo.v1; the topics stand in the documentation of scindo_proto::key")]
+    Unknown {
+        /// The part of the key after the session.
+        found: String,
+    },
+}
+
+/// One validated part of a key: `[a-z0-9_-]+`, at most [`MAX_ID_BYTES`] long.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Chunk(String);
+
+impl Chunk {
+    /// Accepts `text` as a chunk; `what` names its role in the error.
+    pub fn new(what: &'static str, text: &str) -> Result<Self, KeyError> {
+        if is_chunk(text) {
+            return Ok(Self(text.to_owned()));
+        }
+        let found = text.chars().take(MAX_ID_BYTES).collect();
+        Err(KeyError::Chunk { what, found })
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for Chunk {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// True if `text` may stand as one part of a key.
+pub fn is_chunk(text: &str) -> bool {
+    (1..=MAX_ID_BYTES).contains(&text.len())
+        && text.bytes().all(|b| matches!(b, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-'))
+}
+
+/// Who a liveliness token stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Role {
+    /// The simulation server.
+    Server,
+    /// Somebody who watches, perhaps with a mouse tool.
+    Viewer,
+    /// A haptic client.
+    Haptic,
+    /// Any other program, such as a script.
+    Client,
+}
+
+impl Role {
+    /// Every role.
+    pub const ALL: [Self; 4] = [Self::Server, Self::Viewer, Self::Haptic, Self::Client];
+
+    /// The chunk in a key.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Server => "server",
+            Self::Viewer => "viewer",
+            Self::Haptic => "haptic",
+            Self::Client => "client",
+        }
+    }
+}
+
+/// What can be asked under `rpc/`. Requests and replies: `PauseRequest`, `StepRequest`,
+/// `ResetRequest`, `SetRequest` → `RpcReply`; `info` → `SessionInfo`; `schema` → `SchemaReply`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Verb {
+    /// What is running.
+    Info,
+    /// Load another scene.
+    Load,
+    /// Back to the start of the scene.
+    Reset,
+    /// Stop or continue.
+    Pause,
+    /// Advance a paused simulation.
+    Step,
+    /// Change one parameter.
+    Set,
+    /// Keep the present state.
+    Snapshot,
+    /// Go back to a kept state.
+    Restore,
+    /// Descriptors of the messages.
+    Schema,
+}
+
+impl Verb {
+    /// Every verb.
+    pub const ALL: [Self; 9] = [
+        Self::Info,
+        Self::Load,
+        Self::Reset,
+        Self::Pause,
+        Self::Step,
+        Self::Set,
+        Self::Snapshot,
+        Self::Restore,
+        Self::Schema,
+    ];
+
+    /// The chunk in a key.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Load => "load",
+            Self::Reset => "reset",
+            Self::Pause => "pause",
+            Self::Step => "step",
+            Self::Set => "set",
+            Self::Snapshot => "snapshot",
+            Self::Restore => "restore",
+            Self::Schema => "schema",
+        }
+    }
+}
+
+/// One topic of a session.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Topic {
+    /// Positions of a body's surface.
+    SurfaceFrame(Chunk),
+    /// Triangles of a body's surface.
+    SurfaceTopology(Chunk),
+    /// Both together, on query.
+    SurfaceKeyframe(Chunk),
+    /// Where a client holds a tool.
+    ToolPose(Chunk),
+    /// A cut command of a tool.
+    ToolCut(Chunk),
+    /// The answer to a cut command.
+    ToolCutAck(Chunk),
+    /// What the device behind a tool can do.
+    ToolCapability(Chunk),
+    /// The local contact model of a tool.
+    ToolContact(Chunk),
+    /// What a viewer draws of a tool.
+    ToolState(Chunk),
+    /// Rates, costs and health.
+    Stats,
+    /// What happened.
+    Event,
+    /// Which effects are on.
+    Plan,
+    /// A question or order to the server.
+    Rpc(Verb),
+    /// Liveliness token of a participant.
+    Live(Role, Chunk),
+}
+
+impl Topic {
+    /// The key below the session.
+    pub fn suffix(&self) -> String {
+        match self {
+            Self::SurfaceFrame(id) => format!("body/{id}/surface/frame"),
+            Self::SurfaceTopology(id) => format!("body/{id}/surface/topology"),
+            Self::SurfaceKeyframe(id) => format!("body/{id}/surface/keyframe"),
+            Self::ToolPose(id) => format!("tool/{id}/pose"),
+            Self::ToolCut(id) => format!("tool/{id}/cut"),
+            Self::ToolCutAck(id) => format!("tool/{id}/cut_ack"),
+            Self::ToolCapability(id) => format!("tool/{id}/capability"),
+            Self::ToolContact(id) => format!("tool/{id}/contact"),
+            Self::ToolState(id) => format!("tool/{id}/state"),
+            Self::Stats => "stats".to_owned(),
+            Self::Event => "event".to_owned(),
+            Self::Plan => "plan".to_owned(),
+            Self::Rpc(verb) => format!("rpc/{}", verb.as_str()),
+            Self::Live(role, id) => format!("live/{}/{id}", role.as_str()),
+        }
+    }
+
+    /// The topic of a key below the session.
+    pub fn from_suffix(suffix: &str) -> Result<Self, KeyError> {
+        let unknown = || KeyError::Unknown { found: suffix.chars().take(4 * MAX_ID_BYTES).collect() };
+        let body = |id| Chunk::new("body id", id);
+        let tool = |id| Chunk::new("tool id", id);
+        // No topic has more than four chunks; a fifth makes the key unknown.
+        let chunks: Vec<&str> = suffix.splitn(6, '/').collect();
+        Ok(match chunks.as_slice() {
+            ["body", id, "surface", "frame"] => Self::SurfaceFrame(body(id)?),
+            ["body", id, "surface", "topology"] => Self::SurfaceTopology(body(id)?),
+            ["body", id, "surface", "keyframe"] => Self::SurfaceKeyframe(body(id)?),
+            ["tool", id, "pose"] => Self::ToolPose(tool(id)?),
+            ["tool", id, "cut"] => Self::ToolCut(tool(id)?),
+            ["tool", id, "cut_ack"] => Self::ToolCutAck(tool(id)?),
+            ["tool", id, "capability"] => Self::ToolCapability(tool(id)?),
+            ["tool", id, "contact"] => Self::ToolContact(tool(id)?),
+            ["tool", id, "state"] => Self::ToolState(tool(id)?),
+            ["stats"] => Self::Stats,
+            ["event"] => Self::Event,
+            ["plan"] => Self::Plan,
+            ["rpc", verb] => {
+                let known = Verb::ALL.into_iter().find(|v| v.as_str() == *verb);
+                Self::Rpc(known.ok_or_else(unknown)?)
+            }
+            ["live", role, id] => {
+                let known = Role::ALL.into_iter().find(|r| r.as_str() == *role);
+                Self::Live(known.ok_or_else(unknown)?, Chunk::new("client id", id)?)
+            }
+            _ => return Err(unknown()),
+        })
+    }
+}
+
+/// The keys of one session of one realm.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeySpace {
+    /// `<realm>/@v1/<session>/`
+    prefix: String,
+}
+
+impl KeySpace {
+    /// Keys below `<realm>/@v1/<session>`.
+    pub fn new(realm: &str, session: &str) -> Result<Self, KeyError> {
+        let realm = Chunk::new("realm", realm)?;
+        let session = Chunk::new("session", session)?;
+        Ok(Self { prefix: format!("{realm}/@v1/{session}/") })
+    }
+
+    /// The full key of a topic.
+    pub fn key(&self, topic: &Topic) -> String {
+        format!("{}{}", self.prefix, topic.suffix())
+    }
+
+    /// The topic of a full key.
+    pub fn parse(&self, key: &str) -> Result<Topic, KeyError> {
+        match key.strip_prefix(&self.prefix) {
+            Some(suffix) => Topic::from_suffix(suffix),
+            None => Err(KeyError::Foreign {
+                expected: self.prefix.clone(),
+                found: key.chars().take(8 * MAX_ID_BYTES).collect(),
+            }),
+        }
+    }
+
+    /// Expression for `tool/*/pose`.
+    pub fn every_tool_pose(&self) -> String {
+        format!("{}tool/*/pose", self.prefix)
+    }
+
+    /// Expression for `tool/*/cut`.
+    pub fn every_tool_cut(&self) -> String {
+        format!("{}tool/*/cut", self.prefix)
+    }
+
+    /// Expression for `tool/*/capability`.
+    pub fn every_tool_capability(&self) -> String {
+        format!("{}tool/*/capability", self.prefix)
+    }
+
+    /// Expression for `tool/*/state`.
+    pub fn every_tool_state(&self) -> String {
+        format!("{}tool/*/state", self.prefix)
+    }
+
+    /// Expression for `rpc/*`.
+    pub fn every_rpc(&self) -> String {
+        format!("{}rpc/*", self.prefix)
+    }
+
+    /// Expression for the liveliness tokens of everybody.
+    pub fn every_live(&self) -> String {
+        format!("{}live/*/*", self.prefix)
+    }
+
+    /// Expression for the liveliness tokens of one role.
+    pub fn every_live_role(&self, role: Role) -> String {
+        format!("{}live/{}/*", self.prefix, role.as_str())
+    }
+}
