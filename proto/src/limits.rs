@@ -41,8 +41,8 @@ pub const MAX_POSE_BYTES: usize = 1024;
 /// Largest contact message [bytes]: one datagram, one zenoh batch, no fragmentation.
 pub const MAX_CONTACT_BYTES: usize = 1024;
 
-/// Most contact planes of a message: eight of them with the longest ids fill [`MAX_CONTACT_BYTES`].
-pub const MAX_CONTACTS: usize = 8;
+/// Most contact planes of a message: seven with the longest ids fill [`MAX_CONTACT_BYTES`].
+pub const MAX_CONTACTS: usize = 7;
 
 /// Fewest blade segments of a cut: two span a surface.
 pub const MIN_SWEEP_SEGMENTS: usize = 2;
