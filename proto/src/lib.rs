@@ -4,6 +4,7 @@
 //! # Layout
 //! * [`messages`]: the structs generated from `scindo/v1/*.proto`.
 //! * [`key`]: the key space `<realm>/@v1/<session>/…`, built and parsed in one place.
+//! * [`endpoint`]: where the second connection of a client goes.
 //! * [`limits`]: how large, how many, how far; each constant with its reason.
 //! * [`check`]: what a decoded message must satisfy before anybody may use it.
 //! * [`codec`]: bytes ↔ messages; sizes and counts are checked before anything is allocated.
@@ -11,6 +12,8 @@
 pub mod messages;
 
 pub mod key;
+
+pub mod endpoint;
 
 pub mod limits;
 

@@ -1,0 +1,30 @@
+//! Endpoints of the two connections: poses, contacts and cuts go to the *haptic* endpoint,
+//! surfaces and reports to the *bulk* endpoint one port above, so that a mesh never delays a
+//! force. A client that reaches the haptic endpoint alone still gets everything, relayed.
+
+/// The haptic endpoint of a server that was told nothing else.
+pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
+
+/// The bulk endpoint beside a haptic endpoint: the next port. `None` where the endpoint has no
+/// port that could be raised (`unixsock-stream/…`, port 0, port 65535).
+pub fn bulk_endpoint(haptic: &str) -> Option<String> {
+    let address_end = haptic.find(['?', '#']).unwrap_or(haptic.len());
+    let (address, options) = haptic.split_at(address_end);
+    let (host, port) = address.rsplit_once(':')?;
+    let port: u16 = port.parse().ok().filter(|&p| p != 0)?;
+    Some(format!("{host}:{}{options}", port.checked_add(1)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bulk_endpoint_is_one_port_above() {
+        assert_eq!(bulk_endpoint("tcp/127.0.0.1:7447").as_deref(), Some("tcp/127.0.0.1:7448"));
+        assert_eq!(bulk_endpoint("tls/[::1]:9?prio=1-7").as_deref(), Some("tls/[::1]:10?prio=1-7"));
+        assert_eq!(bulk_endpoint("tcp/127.0.0.1:0"), None);
+        assert_eq!(bulk_endpoint("tcp/127.0.0.1:65535"), None);
+        assert_eq!(bulk_endpoint("unixsock-stream//tmp/scindo"), None);
+    }
+}
