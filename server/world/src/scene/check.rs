@@ -1,0 +1,385 @@
+//! From a scene's tree to ready objects: what the schema cannot say is checked here.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Unit, Vector3};
+
+use super::checked::*;
+use super::problem::{Fault, nearest_word};
+use super::raw::*;
+use super::schema::{Finding, json_schema, validate};
+use super::source::Node;
+
+/// Most tetrahedra a box may have; more would not fit the memory of an ordinary machine.
+const MAX_BOX_CELLS: u64 = 8_000_000;
+
+/// Most tools of a scene.
+pub const MAX_TOOLS: usize = 16;
+
+/// Checks a tree and turns it into ready objects, or says everything that is wrong with it.
+pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
+    let findings = validate(&json_schema(), tree);
+    if !findings.is_empty() {
+        return Err(findings);
+    }
+    let raw: RawScene = serde_json::from_value(tree.to_json())
+        .map_err(|error| vec![(String::new(), Fault::Syntax { message: error.to_string() })])?;
+    let mut check = Check { raw: &raw, findings: Vec::new() };
+    let scene = check.scene();
+    if check.findings.is_empty() { Ok(scene) } else { Err(check.findings) }
+}
+
+struct Check<'a> {
+    raw: &'a RawScene,
+    findings: Vec<Finding>,
+}
+
+impl Check<'_> {
+    fn report(&mut self, path: String, fault: Fault) {
+        self.findings.push((path, fault));
+    }
+
+    fn conflict(&mut self, path: String, what: impl Into<String>, next: &str) {
+        self.report(path, Fault::Conflict { what: what.into(), next: next.to_owned() });
+    }
+
+    fn unsupported(&mut self, path: String, found: &str, supported: &[&str]) {
+        let supported = supported.iter().map(|word| (*word).to_owned()).collect();
+        self.report(path, Fault::Unsupported { found: found.to_owned(), supported });
+    }
+
+    fn scene(&mut self) -> CheckedScene {
+        let raw = self.raw;
+        self.unique("body", "bodies", raw.body.iter().map(|b| b.id.as_str()));
+        self.unique("probe", "probes", raw.probe.iter().map(|p| p.id.as_str()));
+        self.unique("tool", "tools", raw.tool.iter().map(|t| t.id.as_str()));
+        if raw.tool.len() > MAX_TOOLS {
+            let what = format!("{} tools, allowed: at most {MAX_TOOLS}", raw.tool.len());
+            self.conflict("tool".into(), what, "remove some");
+        }
+        CheckedScene {
+            name: raw.name.clone(),
+            seed: raw.seed,
+            gravity_m_s2: Vector3::from(raw.world.gravity_m_s2),
+            step_s: raw.world.step_s,
+            bodies: raw.body.iter().map(|body| self.body(body)).collect(),
+            cuts: raw.cut.iter().enumerate().map(|(i, cut)| self.cut(i, cut)).collect(),
+            probes: raw.probe.iter().map(|probe| self.probe(probe)).collect(),
+            tools: raw.tool.iter().map(|tool| self.tool(tool)).collect(),
+            effects: self.effects(),
+            publish: PublishRates {
+                surface_hz: raw.publish.surface_hz,
+                contact_hz: raw.publish.contact_hz,
+                stats_hz: raw.publish.stats_hz,
+            },
+            series_steps: raw.results.series_steps,
+        }
+    }
+
+    fn unique<'b>(&mut self, table: &str, among: &'static str, ids: impl Iterator<Item = &'b str>) {
+        let mut seen = BTreeSet::new();
+        for (index, id) in ids.enumerate() {
+            if !seen.insert(id) {
+                self.report(format!("{table}.{index}.id"), Fault::DuplicateId { id: id.to_owned(), among });
+            }
+        }
+    }
+
+    fn body(&mut self, body: &RawBody) -> BodySpec {
+        let at = format!("body.{}", body.id);
+        match body.element {
+            RawElement::Tet4 => {}
+            RawElement::Tet10 => self.unsupported(format!("{at}.element"), "tet10", &["tet4"]),
+            RawElement::Hex8 => self.unsupported(format!("{at}.element"), "hex8", &["tet4"]),
+        }
+        let law = match body.law {
+            RawLaw::Corotational => None,
+            RawLaw::Linear => Some("linear"),
+            RawLaw::Stvk => Some("stvk"),
+            RawLaw::NeoHookean => Some("neo-hookean"),
+        };
+        if let Some(found) = law {
+            self.unsupported(format!("{at}.law"), found, &["corotational"]);
+        }
+        self.integrator(&at, body.integrator);
+        self.solver(&at, &body.solver);
+        BodySpec {
+            id: body.id.clone(),
+            mesh: self.mesh(&format!("{at}.mesh"), &body.mesh),
+            law: Law::Corotational,
+            young_pa: body.young_pa,
+            poisson: body.poisson,
+            density_kg_m3: body.density_kg_m3,
+            damping_mass_1_s: body.rayleigh.mass_1_s,
+            damping_stiffness_s: body.rayleigh.stiffness_s,
+            iterations: body.solver.iterations,
+            tolerance: body.solver.tolerance,
+            fixes: self.fixes(&at, &body.fix),
+            loads: self.loads(&at, &body.load),
+        }
+    }
+
+    fn integrator(&mut self, at: &str, integrator: RawIntegrator) {
+        let found = match integrator {
+            RawIntegrator::ImplicitEuler => return,
+            RawIntegrator::Static => "static",
+            RawIntegrator::SymplecticEuler => "symplectic-euler",
+            RawIntegrator::Midpoint => "midpoint",
+            RawIntegrator::Rk4 => "rk4",
+            RawIntegrator::Bdf2 => "bdf2",
+            RawIntegrator::Newmark => "newmark",
+        };
+        self.unsupported(format!("{at}.integrator"), found, &["implicit-euler"]);
+    }
+
+    fn solver(&mut self, at: &str, solver: &RawSolver) {
+        let found = match solver.method {
+            RawMethod::Pcg => return,
+            RawMethod::Cg => "cg",
+            RawMethod::Cholesky => "cholesky",
+            RawMethod::Multigrid => "multigrid",
+            RawMethod::MgPcg => "mg-pcg",
+        };
+        self.unsupported(format!("{at}.solver.method"), found, &["pcg"]);
+    }
+
+    fn mesh(&mut self, at: &str, mesh: &RawMesh) -> MeshSource {
+        if mesh.cells.is_some() && mesh.surface.is_none() {
+            let next = "a box has its own `cells`; a volumetric file brings its elements";
+            self.conflict(format!("{at}.cells"), "`cells` only goes with `surface`", next);
+        }
+        if mesh.scale.is_some() && mesh.surface.is_none() && mesh.file.is_none() {
+            let next = "give box and organ in metres";
+            self.conflict(format!("{at}.scale"), "`scale` only goes with `file` or `surface`", next);
+        }
+        let scale = mesh.scale.unwrap_or(1.0);
+        if let Some(path) = &mesh.file {
+            return MeshSource::File { path: path.clone(), scale };
+        }
+        if let Some(path) = &mesh.surface {
+            if mesh.cells.is_none() {
+                let meaning =
+                    "lattice cells along the longest side of the surface, 16 to 48 for real time".into();
+                self.report(at.to_owned(), Fault::MissingKey { key: "cells".into(), meaning });
+            }
+            return MeshSource::Surface {
+                path: path.clone(),
+                cells: mesh.cells.unwrap_or(2) as usize,
+                scale,
+            };
+        }
+        match (&mesh.r#box, &mesh.organ) {
+            (Some(block), _) => self.block(&format!("{at}.box"), block),
+            (None, organ) => MeshSource::Organ { cells: organ.as_ref().map_or(4, |o| o.cells) as usize },
+        }
+    }
+
+    fn block(&mut self, at: &str, block: &RawBox) -> MeshSource {
+        self.rising_corners(at, block.min_m, block.max_m, true);
+        let cells: u64 = block.cells.iter().map(|n| u64::from(*n)).product();
+        if cells > MAX_BOX_CELLS {
+            let what = format!("found {cells} cells, allowed: at most {MAX_BOX_CELLS}");
+            self.conflict(format!("{at}.cells"), what, "use fewer cells");
+        }
+        let split = match block.pattern {
+            RawPattern::Tet5 => CellSplit::Five,
+            RawPattern::Tet6 => CellSplit::Six,
+            RawPattern::Hex => {
+                self.unsupported(format!("{at}.pattern"), "hex", &["tet5", "tet6"]);
+                CellSplit::Five
+            }
+        };
+        MeshSource::Box {
+            min_m: Vector3::from(block.min_m),
+            max_m: Vector3::from(block.max_m),
+            cells: block.cells.map(|n| n as usize),
+            split,
+        }
+    }
+
+    fn rising_corners(&mut self, at: &str, min: Vec3, max: Vec3, strictly: bool) {
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            if min[axis] > max[axis] || (strictly && min[axis] == max[axis]) {
+                let what = format!("max_m lies below min_m along {name}: {} and {}", max[axis], min[axis]);
+                self.conflict(at.to_owned(), what, "give the lower corner as min_m");
+            }
+        }
+    }
+
+    fn fixes(&mut self, at: &str, fixes: &[RawFix]) -> Vec<FixSpec> {
+        let fix = |(i, fix): (usize, &RawFix)| FixSpec {
+            region: self.region(&format!("{at}.fix.{i}.where"), &fix.r#where),
+            axes: held_axes(fix.axes),
+            displacement_m: Vector3::from(fix.displacement_m),
+        };
+        fixes.iter().enumerate().map(fix).collect()
+    }
+
+    fn loads(&mut self, at: &str, loads: &[RawLoad]) -> Vec<LoadSpec> {
+        let load = |(i, load): (usize, &RawLoad)| LoadSpec {
+            region: self.region(&format!("{at}.load.{i}.where"), &load.r#where),
+            force_n: Vector3::from(load.force_n),
+            share: load.share.map(|share| match share {
+                RawShare::Area => Share::Area,
+                RawShare::Volume => Share::Volume,
+            }),
+        };
+        loads.iter().enumerate().map(load).collect()
+    }
+
+    fn region(&mut self, at: &str, raw: &RawWhere) -> Region {
+        if let Some(region) = &raw.r#box {
+            self.rising_corners(&format!("{at}.box"), region.min_m, region.max_m, false);
+            return Region::Box { min_m: Vector3::from(region.min_m), max_m: Vector3::from(region.max_m) };
+        }
+        if let Some(ball) = &raw.sphere {
+            return Region::Ball { centre_m: Vector3::from(ball.centre_m), radius_m: ball.radius_m };
+        }
+        if let Some(half) = &raw.half_space {
+            let normal = self.direction(&format!("{at}.half_space.normal"), half.normal);
+            return Region::HalfSpace { point_m: Vector3::from(half.point_m), normal };
+        }
+        let (axis, from, to) = raw.slab.as_ref().map_or((0, 0.0, 1.0), |s| (s.axis as usize, s.from, s.to));
+        if from > to {
+            let what = format!("`from` {from} lies above `to` {to}");
+            self.conflict(format!("{at}.slab"), what, "swap them");
+        }
+        Region::Slab { axis, from, to }
+    }
+
+    /// A direction of any length but zero.
+    fn direction(&mut self, at: &str, raw: Vec3) -> Unit<Vector3<f64>> {
+        Unit::try_new(Vector3::from(raw), 1e-300).unwrap_or_else(|| {
+            self.conflict(at.to_owned(), "the direction has no length", "give a direction such as [0, 0, 1]");
+            Vector3::z_axis()
+        })
+    }
+
+    fn body_named(&mut self, at: String, name: &str) -> usize {
+        let bodies = &self.raw.body;
+        bodies.iter().position(|body| body.id == name).unwrap_or_else(|| {
+            let suggestion = nearest_word(name, bodies.iter().map(|body| body.id.as_str()));
+            let known = bodies.iter().map(|body| body.id.clone()).collect();
+            self.report(at, Fault::UnknownName { what: "body", found: name.to_owned(), suggestion, known });
+            0
+        })
+    }
+
+    fn cut(&mut self, index: usize, cut: &RawCut) -> CutSpec {
+        let at = format!("cut.{index}");
+        match cut.method {
+            RawCutMethod::Xfem => {}
+            RawCutMethod::Snap => self.unsupported(format!("{at}.method"), "snap", &["xfem"]),
+            RawCutMethod::Links => self.unsupported(format!("{at}.method"), "links", &["xfem"]),
+        }
+        let segments: Vec<[Vector3<f64>; 2]> =
+            cut.sweep_m.iter().map(|[tip, heel]| [Vector3::from(*tip), Vector3::from(*heel)]).collect();
+        if segments.iter().all(|[tip, heel]| tip == heel) {
+            let next = "a blade segment reaches from its tip to its heel";
+            self.conflict(format!("{at}.sweep_m"), "all blade segments have no length", next);
+        } else if segments.windows(2).all(|pair| pair[0] == pair[1]) {
+            let next = "give successive positions of the blade";
+            self.conflict(format!("{at}.sweep_m"), "the blade does not move", next);
+        }
+        if self.raw.effects.cutting == Some(false) {
+            let next = "remove the cut or effects.cutting";
+            self.conflict(at.clone(), "effects.cutting = false, but the scene has a cut", next);
+        }
+        CutSpec { body: self.body_named(format!("{at}.body"), &cut.body), at_s: cut.at_s, segments }
+    }
+
+    fn probe(&mut self, probe: &RawProbe) -> ProbeSpec {
+        let at = format!("probe.{}", probe.id);
+        ProbeSpec {
+            id: probe.id.clone(),
+            body: self.body_named(format!("{at}.body"), &probe.body),
+            point_m: Vector3::from(probe.point_m),
+            side: probe.side.map(|side| self.direction(&format!("{at}.side"), side)),
+        }
+    }
+
+    fn tool(&mut self, tool: &RawTool) -> ToolSpec {
+        let at = format!("tool.{}", tool.id);
+        let path: Vec<PathPoint> =
+            tool.path.iter().enumerate().map(|(i, point)| self.path_point(&at, i, tool, point)).collect();
+        for (i, pair) in path.windows(2).enumerate() {
+            if pair[1].at_s <= pair[0].at_s {
+                let what = format!("{} s does not come after {} s", pair[1].at_s, pair[0].at_s);
+                self.conflict(format!("{at}.path.{}.at_s", i + 1), what, "let the times of a path rise");
+            }
+        }
+        if let (Some(repeat), Some(last)) = (tool.repeat_s, path.last())
+            && repeat < last.at_s
+        {
+            let what = format!("the path ends at {} s, after repeat_s = {repeat} s", last.at_s);
+            self.conflict(format!("{at}.repeat_s"), what, "repeat after the last point");
+        }
+        if self.raw.effects.contact == Some(false) && !path.is_empty() {
+            let next = "remove the path or effects.contact";
+            self.conflict(format!("{at}.path"), "effects.contact = false, but the tool has a path", next);
+        }
+        ToolSpec {
+            id: tool.id.clone(),
+            shape: geometry(&tool.shape),
+            stiffness_n_m: tool.stiffness_n_m,
+            max_force_n: tool.max_force_n,
+            path,
+            repeat_s: tool.repeat_s,
+        }
+    }
+
+    fn path_point(&mut self, at: &str, index: usize, tool: &RawTool, point: &RawPathPoint) -> PathPoint {
+        let at = format!("{at}.path.{index}");
+        if point.mode == RawMode::Cut && tool.shape.blade.is_none() {
+            self.conflict(format!("{at}.mode"), "only a blade cuts", "give the tool the shape of a blade");
+        }
+        if point.mode == RawMode::Cut && self.raw.effects.cutting == Some(false) {
+            let next = "remove the mode or effects.cutting";
+            self.conflict(format!("{at}.mode"), "effects.cutting = false, but the tool cuts", next);
+        }
+        PathPoint {
+            at_s: point.at_s,
+            tip_m: Vector3::from(point.tip_m),
+            toward: self.direction(&format!("{at}.toward"), point.toward),
+            mode: match point.mode {
+                RawMode::Hover => ScriptMode::Hover,
+                RawMode::Touch => ScriptMode::Touch,
+                RawMode::Grab => ScriptMode::Grab,
+                RawMode::Cut => ScriptMode::Cut,
+            },
+        }
+    }
+
+    fn effects(&mut self) -> EffectSwitches {
+        let raw = &self.raw.effects;
+        if raw.self_collision == Some(true) {
+            self.unsupported("effects.self_collision".into(), "true", &["false"]);
+        }
+        EffectSwitches { cutting: raw.cutting, contact: raw.contact, energy: raw.energy }
+    }
+}
+
+fn geometry(shape: &RawShape) -> ToolGeometry {
+    match shape {
+        RawShape { blade: Some(b), .. } => {
+            ToolGeometry::Blade { length_m: b.length_m, thickness_m: b.thickness_m }
+        }
+        RawShape { sphere: Some(s), .. } => ToolGeometry::Sphere { radius_m: s.radius_m },
+        RawShape { capsule, .. } => {
+            let (radius_m, length_m) = capsule.as_ref().map_or((0.0, 0.0), |c| (c.radius_m, c.length_m));
+            ToolGeometry::Capsule { radius_m, length_m }
+        }
+    }
+}
+
+fn held_axes(axes: RawAxes) -> [bool; 3] {
+    match axes {
+        RawAxes::X => [true, false, false],
+        RawAxes::Y => [false, true, false],
+        RawAxes::Z => [false, false, true],
+        RawAxes::Xy => [true, true, false],
+        RawAxes::Xz => [true, false, true],
+        RawAxes::Yz => [false, true, true],
+        RawAxes::Xyz => [true; 3],
+    }
+}

@@ -1,0 +1,291 @@
+//! A scene as ready objects: names resolved to indices, words to types, lists to vectors.
+
+use nalgebra::{Unit, Vector3};
+
+/// A scene whose values are all in range and fit each other. Files are not opened yet.
+#[derive(Debug, Clone)]
+pub struct CheckedScene {
+    /// What the scene is called.
+    pub name: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Acceleration of free fall [m/s²].
+    pub gravity_m_s2: Vector3<f64>,
+    /// Simulated time per step [s].
+    pub step_s: f64,
+    /// Soft bodies.
+    pub bodies: Vec<BodySpec>,
+    /// Cuts by time, in the order of the file.
+    pub cuts: Vec<CutSpec>,
+    /// Recorded material points.
+    pub probes: Vec<ProbeSpec>,
+    /// Rigid tools.
+    pub tools: Vec<ToolSpec>,
+    /// Effects switched by hand.
+    pub effects: EffectSwitches,
+    /// Publication rates.
+    pub publish: PublishRates,
+    /// Write the fields every so many steps; 0: only the final state.
+    pub series_steps: u32,
+}
+
+/// A soft body.
+#[derive(Debug, Clone)]
+pub struct BodySpec {
+    /// Name.
+    pub id: String,
+    /// Where its tetrahedra come from.
+    pub mesh: MeshSource,
+    /// Constitutive law.
+    pub law: Law,
+    /// Young's modulus [Pa].
+    pub young_pa: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// Density at rest [kg/m³].
+    pub density_kg_m3: f64,
+    /// Rayleigh damping by mass [1/s].
+    pub damping_mass_1_s: f64,
+    /// Rayleigh damping by stiffness [s].
+    pub damping_stiffness_s: f64,
+    /// Most solver iterations per step.
+    pub iterations: u32,
+    /// Relative preconditioned residual at which the solver stops.
+    pub tolerance: f64,
+    /// Held parts.
+    pub fixes: Vec<FixSpec>,
+    /// Constant loads.
+    pub loads: Vec<LoadSpec>,
+}
+
+/// Where the tetrahedra of a body come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MeshSource {
+    /// A block.
+    Box {
+        /// Lower corner [m].
+        min_m: Vector3<f64>,
+        /// Upper corner [m].
+        max_m: Vector3<f64>,
+        /// Cells along x, y, z.
+        cells: [usize; 3],
+        /// How a cell is split.
+        split: CellSplit,
+    },
+    /// A volumetric mesh file.
+    File {
+        /// Path as written.
+        path: String,
+        /// Metres per length unit of the file.
+        scale: f64,
+    },
+    /// A surface file, turned into a lattice with the surface embedded.
+    Surface {
+        /// Path as written.
+        path: String,
+        /// Cells along the longest side.
+        cells: usize,
+        /// Metres per length unit of the file.
+        scale: f64,
+    },
+    /// The demonstration's organ.
+    Organ {
+        /// Cells along the longest side.
+        cells: usize,
+    },
+}
+
+/// How a cubic cell is split into tetrahedra.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellSplit {
+    /// Five, mirrored from cell to cell.
+    Five,
+    /// Six around the cell's diagonal.
+    Six,
+}
+
+/// Constitutive law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// Small strain, large rotation.
+    Corotational,
+}
+
+/// Held nodes.
+#[derive(Debug, Clone)]
+pub struct FixSpec {
+    /// Which.
+    pub region: Region,
+    /// Held axes x, y, z.
+    pub axes: [bool; 3],
+    /// Displacement from rest that is held [m].
+    pub displacement_m: Vector3<f64>,
+}
+
+/// A load.
+#[derive(Debug, Clone)]
+pub struct LoadSpec {
+    /// Which nodes.
+    pub region: Region,
+    /// Total [N].
+    pub force_n: Vector3<f64>,
+    /// How it is shared; none: by area where possible, else by volume.
+    pub share: Option<Share>,
+}
+
+/// How a total force is shared over nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Share {
+    /// By boundary area.
+    Area,
+    /// By volume.
+    Volume,
+}
+
+/// A region of rest space that selects nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Region {
+    /// An axis-aligned box, faces included.
+    Box {
+        /// Lower corner [m].
+        min_m: Vector3<f64>,
+        /// Upper corner [m].
+        max_m: Vector3<f64>,
+    },
+    /// A ball.
+    Ball {
+        /// Centre [m].
+        centre_m: Vector3<f64>,
+        /// Radius [m].
+        radius_m: f64,
+    },
+    /// One side of a plane, the plane included.
+    HalfSpace {
+        /// A point of the plane [m].
+        point_m: Vector3<f64>,
+        /// Towards the selected side.
+        normal: Unit<Vector3<f64>>,
+    },
+    /// A slice of the body's own bounding box.
+    Slab {
+        /// Axis index 0, 1, 2.
+        axis: usize,
+        /// From this fraction of the extent …
+        from: f64,
+        /// … to this one.
+        to: f64,
+    },
+}
+
+/// A cut by time.
+#[derive(Debug, Clone)]
+pub struct CutSpec {
+    /// Index of the body.
+    pub body: usize,
+    /// When [s].
+    pub at_s: f64,
+    /// Successive blade segments [tip, heel] [m].
+    pub segments: Vec<[Vector3<f64>; 2]>,
+}
+
+/// A recorded material point.
+#[derive(Debug, Clone)]
+pub struct ProbeSpec {
+    /// Name.
+    pub id: String,
+    /// Index of the body.
+    pub body: usize,
+    /// Rest position [m].
+    pub point_m: Vector3<f64>,
+    /// Towards its side of a cut.
+    pub side: Option<Unit<Vector3<f64>>>,
+}
+
+/// A rigid tool.
+#[derive(Debug, Clone)]
+pub struct ToolSpec {
+    /// Name.
+    pub id: String,
+    /// Geometry.
+    pub shape: ToolGeometry,
+    /// Spring between hand and tissue [N/m].
+    pub stiffness_n_m: f64,
+    /// Largest force [N].
+    pub max_force_n: f64,
+    /// Script, by rising time; empty: moved by a client.
+    pub path: Vec<PathPoint>,
+    /// The script starts again after this time [s].
+    pub repeat_s: Option<f64>,
+}
+
+/// Geometry of a tool; tip in the origin, shaft along +z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ToolGeometry {
+    /// Cutting edge from tip to heel.
+    Blade {
+        /// Length of the edge [m].
+        length_m: f64,
+        /// Thickness [m].
+        thickness_m: f64,
+    },
+    /// Ball around the tip.
+    Sphere {
+        /// Radius [m].
+        radius_m: f64,
+    },
+    /// Rod with round ends.
+    Capsule {
+        /// Radius [m].
+        radius_m: f64,
+        /// Length of the axis [m].
+        length_m: f64,
+    },
+}
+
+/// One pose of a script.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathPoint {
+    /// When [s].
+    pub at_s: f64,
+    /// Tip [m].
+    pub tip_m: Vector3<f64>,
+    /// From the tip along the shaft.
+    pub toward: Unit<Vector3<f64>>,
+    /// What the tool does from here on.
+    pub mode: ScriptMode,
+}
+
+/// What a scripted tool does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScriptMode {
+    /// Touches nothing.
+    Hover,
+    /// Pushes.
+    Touch,
+    /// Holds.
+    Grab,
+    /// Cuts.
+    Cut,
+}
+
+/// Effects switched by hand; none: as the scene calls for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct EffectSwitches {
+    /// Cuts by tools and clients.
+    pub cutting: Option<bool>,
+    /// Tools push bodies.
+    pub contact: Option<bool>,
+    /// Energies in every report.
+    pub energy: Option<bool>,
+}
+
+/// How often clients hear of what [Hz].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PublishRates {
+    /// Surface frames.
+    pub surface_hz: f64,
+    /// Contact models.
+    pub contact_hz: f64,
+    /// Rates and costs.
+    pub stats_hz: f64,
+}

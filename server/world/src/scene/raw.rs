@@ -1,0 +1,632 @@
+//! The scene file as written: one type per table, one field per key.
+//!
+//! These types are the single source of the file format. The JSON Schema is generated from
+//! them, and the checker enforces that schema, so documentation, editor completion and refusal
+//! cannot drift apart. Ranges stand beside the keys as JSON Schema keywords; `x-next` says what
+//! to do when a value lies outside. Every unit is SI and stands in the key.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A vector or point in world axes.
+pub type Vec3 = [f64; 3];
+
+/// A scindo scene: bodies, cuts, probes and tools, in SI units.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "scindo scene")]
+pub struct RawScene {
+    /// Version of this format.
+    #[schemars(range(min = 1, max = 1), extend("x-next" = "write schema = 1"))]
+    pub schema: u32,
+    /// What the scene is called in results and clients.
+    #[serde(default = "unnamed")]
+    pub name: String,
+    /// Seed of everything random; recorded in the results.
+    #[serde(default)]
+    pub seed: u64,
+    /// What acts on all bodies.
+    #[serde(default)]
+    pub world: RawWorld,
+    /// Soft bodies.
+    #[serde(default)]
+    pub body: Vec<RawBody>,
+    /// Cuts that happen by themselves at a given time.
+    #[serde(default)]
+    pub cut: Vec<RawCut>,
+    /// Material points whose path is recorded.
+    #[serde(default)]
+    pub probe: Vec<RawProbe>,
+    /// Rigid tools, moved by a path or by a client.
+    #[serde(default)]
+    pub tool: Vec<RawTool>,
+    /// Effects switched by hand; what is absent follows from the rest of the scene.
+    #[serde(default)]
+    pub effects: RawEffects,
+    /// How often clients hear of what.
+    #[serde(default)]
+    pub publish: RawPublish,
+    /// What is written to disk.
+    #[serde(default)]
+    pub results: RawResults,
+}
+
+fn unnamed() -> String {
+    "unnamed".into()
+}
+
+/// What acts on all bodies.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawWorld {
+    /// Acceleration of free fall [m/s²]; zero switches gravity off.
+    pub gravity_m_s2: Vec3,
+    /// Simulated time per step [s].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0, "x-next" = "0.005 to 0.04 suits real time"))]
+    pub step_s: f64,
+}
+
+impl Default for RawWorld {
+    fn default() -> Self {
+        Self { gravity_m_s2: [0.0; 3], step_s: 0.02 }
+    }
+}
+
+/// One soft body.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawBody {
+    /// Name, unique among bodies; becomes part of network keys.
+    #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
+    pub id: String,
+    /// Where its tetrahedra come from.
+    pub mesh: RawMesh,
+    /// Finite element.
+    #[serde(default)]
+    pub element: RawElement,
+    /// Constitutive law.
+    #[serde(default)]
+    pub law: RawLaw,
+    /// Young's modulus [Pa].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e15,
+        "x-next" = "soft tissue lies between 1e3 and 1e6 Pa"))]
+    pub young_pa: f64,
+    /// Poisson's ratio.
+    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5,
+        "x-next" = "0.45 to 0.49 for nearly incompressible tissue; 0.5 would need a pressure field"))]
+    pub poisson: f64,
+    /// Density in the rest state [kg/m³].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6,
+        "x-next" = "soft tissue has about 1000 kg/m3"))]
+    pub density_kg_m3: f64,
+    /// Rayleigh damping.
+    #[serde(default)]
+    pub rayleigh: RawRayleigh,
+    /// Time integration.
+    #[serde(default)]
+    pub integrator: RawIntegrator,
+    /// Linear solver.
+    #[serde(default)]
+    pub solver: RawSolver,
+    /// Held or displaced parts.
+    #[serde(default)]
+    pub fix: Vec<RawFix>,
+    /// Constant loads.
+    #[serde(default)]
+    pub load: Vec<RawLoad>,
+}
+
+/// Where the tetrahedra of a body come from: exactly one of `box`, `file`, `surface`, `organ`.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{"required": ["box"]}, {"required": ["file"]},
+    {"required": ["surface"]}, {"required": ["organ"]}]))]
+pub struct RawMesh {
+    /// An axis-aligned block.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub r#box: Option<RawBox>,
+    /// A volumetric mesh: Gmsh .msh, .vtk or .vtu; relative to the scene file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub file: Option<String>,
+    /// A closed or dirty surface: .obj, .stl or .ply; relative to the scene file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub surface: Option<String>,
+    /// The organ-like body of the demonstration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub organ: Option<RawOrgan>,
+    /// Lattice cells along the longest side of a `surface`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 2, max = 256), extend("x-next" = "16 to 48 cells run in real time"))]
+    pub cells: Option<u32>,
+    /// Factor from the file's length unit to metres: 0.001 for millimetres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "0.001 for a file in millimetres"))]
+    pub scale: Option<f64>,
+}
+
+/// An axis-aligned block of tetrahedra.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawBox {
+    /// Lower corner [m].
+    pub min_m: Vec3,
+    /// Upper corner [m].
+    pub max_m: Vec3,
+    /// Cells along x, y, z.
+    #[schemars(inner(range(min = 1, max = 1024)), extend("x-next" = "give at least one cell per axis"))]
+    pub cells: [u32; 3],
+    /// How a cell is split.
+    #[serde(default)]
+    pub pattern: RawPattern,
+}
+
+/// How a cubic cell is split into elements.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawPattern {
+    /// Five tetrahedra, mirrored from cell to cell.
+    #[default]
+    Tet5,
+    /// Six tetrahedra around the cell's diagonal (Kuhn).
+    Tet6,
+    /// Hexahedra; not supported yet.
+    Hex,
+}
+
+/// The organ-like body of the demonstration.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawOrgan {
+    /// Lattice cells along its longest side.
+    #[schemars(range(min = 4, max = 128), extend("x-next" = "20 to 24 cells run in real time"))]
+    pub cells: u32,
+}
+
+/// Finite element.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawElement {
+    /// Linear tetrahedron.
+    #[default]
+    Tet4,
+    /// Quadratic tetrahedron; not supported yet.
+    Tet10,
+    /// Trilinear hexahedron; not supported yet.
+    Hex8,
+}
+
+/// Constitutive law.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawLaw {
+    /// Small strain, small rotation.
+    Linear,
+    /// Small strain, large rotation.
+    #[default]
+    Corotational,
+    /// St. Venant-Kirchhoff; not supported yet.
+    Stvk,
+    /// Stable Neo-Hookean; not supported yet.
+    NeoHookean,
+}
+
+/// Rayleigh damping, D = mass_1_s M + stiffness_s K.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawRayleigh {
+    /// Factor of the mass matrix [1/s]: drags against the room.
+    #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "0 switches it off"))]
+    pub mass_1_s: f64,
+    /// Factor of the stiffness matrix [s]: damps deformation, not rigid motion.
+    #[schemars(range(min = 0.0, max = 1e3), extend("x-next" = "0 switches it off"))]
+    pub stiffness_s: f64,
+}
+
+/// Time integration.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawIntegrator {
+    /// Relaxation without inertia; not supported yet.
+    Static,
+    /// Not supported yet.
+    SymplecticEuler,
+    /// Not supported yet.
+    Midpoint,
+    /// Not supported yet.
+    Rk4,
+    /// Implicit Euler, linearised at the inertial predictor.
+    #[default]
+    ImplicitEuler,
+    /// Not supported yet.
+    Bdf2,
+    /// Not supported yet.
+    Newmark,
+}
+
+/// Linear solver of a step.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawSolver {
+    /// Method.
+    pub method: RawMethod,
+    /// Most iterations per step.
+    #[schemars(range(min = 1, max = 100000), extend("x-next" = "10 to 100 suits real time"))]
+    pub iterations: u32,
+    /// Stop when the preconditioned residual has fallen by this factor.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0, "x-next" = "1e-3 for speed, 1e-6 for accuracy"))]
+    pub tolerance: f64,
+}
+
+impl Default for RawSolver {
+    fn default() -> Self {
+        Self { method: RawMethod::Pcg, iterations: 50, tolerance: 1e-6 }
+    }
+}
+
+/// Method of the linear solver.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawMethod {
+    /// Conjugate gradients without preconditioner; not supported yet.
+    Cg,
+    /// Conjugate gradients with block-Jacobi preconditioner.
+    #[default]
+    Pcg,
+    /// Sparse factorisation; not supported yet.
+    Cholesky,
+    /// Not supported yet.
+    Multigrid,
+    /// Not supported yet.
+    MgPcg,
+}
+
+/// A held or displaced part of a body.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFix {
+    /// Which nodes.
+    pub r#where: RawWhere,
+    /// Which axes are held.
+    #[serde(default)]
+    pub axes: RawAxes,
+    /// Displacement from rest that is held [m].
+    #[serde(default)]
+    pub displacement_m: Vec3,
+}
+
+/// World axes that a fix holds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum RawAxes {
+    /// x only.
+    X,
+    /// y only.
+    Y,
+    /// z only.
+    Z,
+    /// x and y.
+    Xy,
+    /// x and z.
+    Xz,
+    /// y and z.
+    Yz,
+    /// All three.
+    #[default]
+    Xyz,
+}
+
+/// A constant load.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawLoad {
+    /// Which nodes.
+    pub r#where: RawWhere,
+    /// Total force [N], shared over the selected nodes.
+    pub force_n: Vec3,
+    /// How it is shared; absent: by area where the selection holds boundary faces, else by volume.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub share: Option<RawShare>,
+}
+
+/// How a total force is shared over nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawShare {
+    /// By the area of the boundary faces whose three nodes are selected.
+    Area,
+    /// By the volume around each node.
+    Volume,
+}
+
+/// A selection of nodes by rest position: exactly one key.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{"required": ["box"]}, {"required": ["sphere"]},
+    {"required": ["half_space"]}, {"required": ["slab"]}]))]
+pub struct RawWhere {
+    /// Inside an axis-aligned box, its faces included.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub r#box: Option<RawRegionBox>,
+    /// Inside a ball.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sphere: Option<RawBall>,
+    /// On the side of a plane that the normal points to, the plane included.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_space: Option<RawHalfSpace>,
+    /// Between two fractions of the body's own extent along an axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slab: Option<RawSlab>,
+}
+
+/// An axis-aligned region.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRegionBox {
+    /// Lower corner [m].
+    pub min_m: Vec3,
+    /// Upper corner [m].
+    pub max_m: Vec3,
+}
+
+/// A ball.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawBall {
+    /// Centre [m].
+    pub centre_m: Vec3,
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "give a positive radius"))]
+    pub radius_m: f64,
+}
+
+/// One side of a plane.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawHalfSpace {
+    /// A point of the plane [m].
+    pub point_m: Vec3,
+    /// Towards the selected side; any length but zero.
+    pub normal: Vec3,
+}
+
+/// A slice of a body's bounding box.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawSlab {
+    /// Axis of the slice.
+    pub axis: RawAxis,
+    /// Start as a fraction of the extent, 0 = lowest node.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-next" = "0 is the lowest node, 1 the highest"))]
+    pub from: f64,
+    /// End as a fraction of the extent, 1 = highest node.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-next" = "0 is the lowest node, 1 the highest"))]
+    pub to: f64,
+}
+
+/// One world axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum RawAxis {
+    /// x
+    X,
+    /// y
+    Y,
+    /// z
+    Z,
+}
+
+/// A cut that happens by itself.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawCut {
+    /// The body that is cut.
+    pub body: String,
+    /// Simulated time of the cut [s].
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-next" = "0 cuts before the first step"))]
+    pub at_s: f64,
+    /// How the mesh is cut.
+    #[serde(default)]
+    pub method: RawCutMethod,
+    /// Successive blade segments [tip, heel] in the deformed body [m]; they span the cut surface.
+    #[schemars(length(min = 2, max = 1024))]
+    pub sweep_m: Vec<[Vec3; 2]>,
+}
+
+/// How a mesh is cut.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawCutMethod {
+    /// Pieces and copies inside the elements; the mesh stays.
+    #[default]
+    Xfem,
+    /// Along element faces with node snapping; not supported yet.
+    Snap,
+    /// Unlinked cells of a hexahedral body; not supported yet.
+    Links,
+}
+
+/// A material point whose path is recorded.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawProbe {
+    /// Name, unique among probes.
+    #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
+    pub id: String,
+    /// The body it is bound to.
+    pub body: String,
+    /// Where it lies in the body at rest [m].
+    pub point_m: Vec3,
+    /// Towards the side it belongs to, where the point lies on a cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub side: Option<Vec3>,
+}
+
+/// A rigid tool.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawTool {
+    /// Name, unique among tools; becomes part of network keys.
+    #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
+    pub id: String,
+    /// Its geometry.
+    pub shape: RawShape,
+    /// Stiffness of the spring between hand and tissue [N/m].
+    #[serde(default = "tool_stiffness")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "200 to 2000 N/m suits haptic devices"))]
+    pub stiffness_n_m: f64,
+    /// Largest force on the tool [N].
+    #[serde(default = "tool_force")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e4, "x-next" = "desktop devices give 3 to 20 N"))]
+    pub max_force_n: f64,
+    /// Poses over time; the tool moves evenly between them. Absent: a client moves it.
+    #[serde(default)]
+    pub path: Vec<RawPathPoint>,
+    /// Start the path again after this time [s]; absent: stay at its end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "give the time of one round"))]
+    pub repeat_s: Option<f64>,
+}
+
+fn tool_stiffness() -> f64 {
+    800.0
+}
+
+fn tool_force() -> f64 {
+    8.0
+}
+
+/// Geometry of a tool, its tip in the origin and its shaft along +z: exactly one key.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{"required": ["blade"]}, {"required": ["sphere"]}, {"required": ["capsule"]}]))]
+pub struct RawShape {
+    /// A cutting edge from tip to heel.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blade: Option<RawBlade>,
+    /// A ball.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sphere: Option<RawSphere>,
+    /// A rod with round ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capsule: Option<RawCapsule>,
+}
+
+/// A blade.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawBlade {
+    /// Length of the cutting edge [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a scalpel has about 0.04 m"))]
+    pub length_m: f64,
+    /// Thickness of the blade [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0, "x-next" = "a scalpel has about 0.0005 m"))]
+    pub thickness_m: f64,
+}
+
+/// A ball.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawSphere {
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a fingertip has about 0.008 m"))]
+    pub radius_m: f64,
+}
+
+/// A rod with round ends.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawCapsule {
+    /// Radius [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a probe has about 0.002 m"))]
+    pub radius_m: f64,
+    /// Length of its axis [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a probe has about 0.1 m"))]
+    pub length_m: f64,
+}
+
+/// One pose of a scripted tool.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawPathPoint {
+    /// Simulated time [s].
+    #[schemars(range(min = 0.0), extend("x-next" = "times start at 0 and rise"))]
+    pub at_s: f64,
+    /// Where the tip is [m].
+    pub tip_m: Vec3,
+    /// Direction from the tip along the shaft; any length but zero.
+    #[serde(default = "upwards")]
+    pub toward: Vec3,
+    /// What the tool does from here on.
+    #[serde(default)]
+    pub mode: RawMode,
+}
+
+fn upwards() -> Vec3 {
+    [0.0, 0.0, 1.0]
+}
+
+/// What a tool does.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawMode {
+    /// Exists, touches nothing.
+    Hover,
+    /// Pushes what it meets.
+    #[default]
+    Touch,
+    /// Holds the tissue nearest to the tip.
+    Grab,
+    /// A blade that cuts along its path.
+    Cut,
+}
+
+/// Effects switched by hand. Absent: on when the rest of the scene calls for it.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawEffects {
+    /// `false`: cuts by tools and clients are refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cutting: Option<bool>,
+    /// `false`: tools pass through bodies.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<bool>,
+    /// Contact of a body with itself; `true` is not supported yet.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub self_collision: Option<bool>,
+    /// `true`: kinetic and elastic energy in every step report.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<bool>,
+}
+
+/// How often clients hear of what.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawPublish {
+    /// Surface frames per second [Hz].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 240.0, "x-next" = "20 to 60 Hz suits eyes"))]
+    pub surface_hz: f64,
+    /// Contact models per second [Hz].
+    #[schemars(range(min = 50.0, max = 2000.0), extend("x-next" = "200 to 1000 Hz suits hands"))]
+    pub contact_hz: f64,
+    /// Rates and costs per second [Hz].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 60.0, "x-next" = "1 to 10 Hz is plenty"))]
+    pub stats_hz: f64,
+}
+
+impl Default for RawPublish {
+    fn default() -> Self {
+        Self { surface_hz: 60.0, contact_hz: 500.0, stats_hz: 4.0 }
+    }
+}
+
+/// What is written to disk beside the summary.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawResults {
+    /// Write the fields every so many steps and a .pvd series over them; 0: only the final state.
+    #[schemars(range(min = 0, max = 1000000), extend("x-next" = "0 writes the final state only"))]
+    pub series_steps: u32,
+}

@@ -1,0 +1,185 @@
+//! Every bad scene is refused with what, where, value found, allowed range and next step.
+
+#![allow(clippy::unwrap_used)]
+
+use scindo_world::scene::{Fault, Scene};
+
+/// A scene without faults, to be spoilt.
+const GOOD: &str = r#"
+schema = 1
+name = "beam"
+[world]
+gravity_m_s2 = [0, 0, -9.81]
+[[body]]
+id = "beam"
+mesh = { box = { min_m = [0, 0, 0], max_m = [0.03, 0.06, 0.2], cells = [2, 4, 12], pattern = "tet5" } }
+young_pa = 3e5
+poisson = 0.35
+density_kg_m3 = 1070
+[[body.fix]]
+where = { box = { min_m = [-1, -1, -1e-6], max_m = [1, 1, 1e-6] } }
+[[cut]]
+body = "beam"
+sweep_m = [[[0, 0, 0.1], [0, 0.06, 0.1]], [[0.015, 0, 0.1], [0.015, 0.06, 0.1]]]
+[[probe]]
+id = "lip"
+body = "beam"
+point_m = [0, 0.03, 0.1]
+side = [0, 0, 1]
+[[tool]]
+id = "scalpel"
+shape = { blade = { length_m = 0.04, thickness_m = 0.001 } }
+"#;
+
+fn message_after(find: &str, replace: &str) -> String {
+    assert!(GOOD.contains(find), "{find}");
+    Scene::from_toml(&GOOD.replace(find, replace)).unwrap_err().to_string()
+}
+
+fn assert_says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+}
+
+#[test]
+fn the_unspoilt_scene_is_accepted() {
+    let scene = Scene::from_toml(GOOD).unwrap();
+    assert_eq!(scene.checked().bodies[0].id, "beam");
+    assert_eq!(scene.checked().cuts[0].segments.len(), 2);
+}
+
+#[test]
+fn unknown_keys_come_with_line_and_suggestion() {
+    assert_says(
+        &message_after("young_pa", "yuong_pa"),
+        &["scene:9: body.beam.yuong_pa", "did you mean `young_pa`?"],
+    );
+    assert_says(&message_after("name =", "step_s ="), &["scene:3: step_s", "did you mean `world.step_s`?"]);
+    assert_says(&message_after("cells =", "cell ="), &["body.beam.mesh.box.cell", "did you mean `cells`?"]);
+    assert_says(&message_after("name =", "zebra ="), &["unknown key `zebra`", "known here: schema, name"]);
+}
+
+#[test]
+fn values_out_of_range_name_range_and_next_step() {
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("1070", "-1070", &["scene:11: body.beam.density_kg_m3: found -1070", "above 0", "1000 kg/m3"]),
+        ("0.35", "0.5", &["scene:10: body.beam.poisson: found 0.5", "above -1 and below 0.5", "0.49"]),
+        ("0.35", "-1", &["found -1", "above -1 and below 0.5"]),
+        ("3e5", "0", &["body.beam.young_pa: found 0", "above 0"]),
+        ("3e5", "nan", &["body.beam.young_pa", "finite"]),
+        ("[0, 0, -9.81]", "[0, 0, inf]", &["world.gravity_m_s2.2", "inf", "finite"]),
+        ("[2, 4, 12]", "[2, 0, 12]", &["cells.1: found 0", "at least 1", "at least one cell per axis"]),
+        ("[2, 4, 12]", "[2, 4]", &["found 2 items", "exactly 3 items"]),
+        ("[2, 4, 12]", "[2, 4, 1.5]", &["whole number", "1.5"]),
+        ("[2, 4, 12]", "[1000, 1000, 1000]", &["1000000000 cells", "at most"]),
+        ("max_m = [0.03,", "max_m = [-0.03,", &["max_m lies below min_m along x"]),
+        ("schema = 1", "schema = 2", &["scene:2: schema: found 2", "schema = 1"]),
+        ("length_m = 0.04", "length_m = 0", &["tool.scalpel.shape.blade.length_m", "above 0"]),
+        ("side = [0, 0, 1]", "side = [0, 0, 0]", &["probe.lip.side", "no length"]),
+        ("id = \"beam\"\nmesh", "id = \"Beam 1\"\nmesh", &["a-z, 0-9"]),
+        ("3e5", "\"soft\"", &["expected a number, found \"soft\""]),
+        ("poisson = 0.35\n", "", &["key `poisson` is missing: Poisson's ratio"]),
+        ("sweep_m = [", "sweep_m = 3 #", &["cut.0.sweep_m: expected a list, found 3"]),
+    ];
+    for (find, replace, parts) in cases {
+        assert_says(&message_after(find, replace), parts);
+    }
+}
+
+#[test]
+fn what_is_not_supported_yet_is_refused_never_ignored() {
+    let with = |line: &str| message_after("young_pa", &format!("{line}\nyoung_pa"));
+    for (line, parts) in [
+        ("element = \"tet10\"", ["`tet10` is not supported yet", "supported now: tet4"]),
+        ("element = \"hex8\"", ["`hex8` is not supported yet", "supported now: tet4"]),
+        ("law = \"stvk\"", ["`stvk` is not supported yet", "supported now: corotational"]),
+        ("law = \"neo-hookean\"", ["`neo-hookean` is not supported yet", "corotational"]),
+        ("integrator = \"static\"", ["`static` is not supported yet", "implicit-euler"]),
+        ("integrator = \"bdf2\"", ["`bdf2` is not supported yet", "implicit-euler"]),
+        ("integrator = \"newmark\"", ["`newmark` is not supported yet", "implicit-euler"]),
+        ("solver = { method = \"cholesky\" }", ["`cholesky` is not supported yet", "pcg"]),
+        ("solver = { method = \"multigrid\" }", ["`multigrid` is not supported yet", "pcg"]),
+        (
+            "integrator = \"implict-euler\"",
+            ["unknown value `implict-euler`", "did you mean `implicit-euler`?"],
+        ),
+    ] {
+        assert_says(&with(line), &parts);
+    }
+    let cut = |method: &str| message_after("sweep_m =", &format!("method = \"{method}\"\nsweep_m ="));
+    assert_says(&cut("snap"), &["`snap` is not supported yet", "xfem"]);
+    assert_says(&cut("links"), &["`links` is not supported yet", "xfem"]);
+    assert_says(&message_after("tet5", "hex"), &["`hex` is not supported yet", "tet5, tet6"]);
+    let effects = message_after("[world]", "[effects]\nself_collision = true\n[world]");
+    assert_says(&effects, &["effects.self_collision", "not supported yet"]);
+}
+
+#[test]
+fn names_must_exist_and_be_unique() {
+    let cut = message_after("[[cut]]\nbody = \"beam\"", "[[cut]]\nbody = \"baem\"");
+    assert_says(&cut, &["scene:15: cut.0.body", "no body is called `baem`", "did you mean `beam`?"]);
+    let twice =
+        message_after("[[tool]]", "[[probe]]\nid = \"lip\"\nbody = \"beam\"\npoint_m = [0, 0, 0]\n[[tool]]");
+    assert_says(&twice, &["the id `lip` is taken"]);
+}
+
+#[test]
+fn mesh_needs_exactly_one_source() {
+    let both = message_after("mesh = { box", "mesh = { file = \"a.msh\", box");
+    assert_says(&both, &["exactly one of box, file, surface, organ", "found box and file"]);
+    let surface =
+        GOOD.lines().map(|l| if l.starts_with("mesh") { "mesh = { surface = \"a.obj\" }" } else { l });
+    let text = surface.collect::<Vec<_>>().join("\n");
+    assert_says(&Scene::from_toml(&text).unwrap_err().to_string(), &["key `cells` is missing", "16 to 48"]);
+}
+
+#[test]
+fn all_problems_are_told_together_in_the_order_of_lines() {
+    let text = GOOD.replace("1070", "-1").replace("0.35", "0.7").replace("young_pa", "young");
+    let error = Scene::from_toml(&text).unwrap_err();
+    assert_eq!(error.problems.len(), 4, "{error}");
+    let lines: Vec<_> = error.problems.iter().map(|p| p.place.line).collect();
+    assert!(lines.is_sorted(), "{lines:?}");
+    assert!(matches!(error.problems.last().unwrap().fault, Fault::OutOfRange { .. }));
+}
+
+#[test]
+fn missing_file_and_broken_text() {
+    let error = Scene::load(std::path::Path::new("/nowhere/scene.toml")).unwrap_err().to_string();
+    assert_says(&error, &["/nowhere/scene.toml", "cannot read", "check the path"]);
+    assert_says(&Scene::from_toml("schema = = 1").unwrap_err().to_string(), &["scene:1", "not readable"]);
+}
+
+#[test]
+fn toml_and_json_are_the_same_tree() {
+    let scene = Scene::from_toml(GOOD).unwrap();
+    let again = Scene::from_json(&scene.to_json().to_string()).unwrap();
+    assert_eq!(format!("{:?}", scene.checked()), format!("{:?}", again.checked()));
+}
+
+#[test]
+fn overrides_are_checked_like_the_file() {
+    let scene = Scene::from_toml(GOOD).unwrap();
+    assert_eq!(scene.apply_set("body.beam.young_pa=3e4").unwrap().checked().bodies[0].young_pa, 3e4);
+    assert_says(&scene.apply_set("body.beam.young_pa=-1").unwrap_err().to_string(), &["found -1", "above 0"]);
+    assert_says(
+        &scene.apply_set("body.baem.young_pa=1").unwrap_err().to_string(),
+        &["leads nowhere", "baem"],
+    );
+    assert_says(
+        &scene.apply_set("body.beam.yuong_pa=1").unwrap_err().to_string(),
+        &["did you mean `young_pa`?"],
+    );
+}
+
+#[test]
+fn tool_scripts_are_consistent() {
+    let tool = |lines: &str| message_after("[[tool]]", &format!("[[tool]]\n{lines}\n"));
+    let falling = tool("path = [{ at_s = 1, tip_m = [0, 0, 0] }, { at_s = 0.5, tip_m = [0, 0, 1] }]");
+    assert_says(&falling, &["tool.scalpel.path.1.at_s", "does not come after"]);
+    let ball =
+        GOOD.replace("blade = { length_m = 0.04, thickness_m = 0.001 }", "sphere = { radius_m = 0.01 }");
+    let text = ball + "path = [{ at_s = 0, tip_m = [0, 0, 0], mode = \"cut\" }]\n";
+    assert_says(&Scene::from_toml(&text).unwrap_err().to_string(), &["only a blade cuts"]);
+}
