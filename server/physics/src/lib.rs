@@ -8,3 +8,4 @@
 //! SI units throughout. State is `f64`, kernels and solver vectors are `f32`.
 
 pub mod mesh;
+pub mod cut;

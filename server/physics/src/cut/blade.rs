@@ -1,0 +1,99 @@
+//! What goes into a cut and what comes out of it.
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+/// Most segments one [`BladeSweep`] may have; a longer path is sent in parts.
+pub const MAX_SEGMENTS: usize = 1024;
+
+/// The surface a straight blade sweeps, sampled at successive moments.
+///
+/// Two successive segments span a quadrilateral, split into two triangles along the diagonal from
+/// the first tip to the second heel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BladeSweep {
+    /// Successive blade positions `[tip, heel]` [m], world coordinates, deformed configuration.
+    pub segments: Vec<[Vector3<f64>; 2]>,
+}
+
+impl BladeSweep {
+    /// Refuses what has no geometric meaning: no segment, too many, a non-finite coordinate.
+    pub fn check(&self) -> Result<(), CutError> {
+        if self.segments.is_empty() {
+            return Err(CutError::NoSegment);
+        }
+        if self.segments.len() > MAX_SEGMENTS {
+            return Err(CutError::TooManySegments { found: self.segments.len(), limit: MAX_SEGMENTS });
+        }
+        match self.segments.iter().position(|s| s.iter().flatten().any(|c| !c.is_finite())) {
+            Some(segment) => Err(CutError::NonFiniteBlade { segment }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A node copy made by a cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NewCopy {
+    /// Id of the new copy.
+    pub copy: u32,
+    /// The copy it was split from; position, velocity and warm start are inherited from it.
+    pub parent: u32,
+}
+
+/// What a sweep did to the topology.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CutReport {
+    /// Copies appended, in ascending order of their id.
+    pub new_copies: Vec<NewCopy>,
+    /// Elements in which material was separated by this sweep.
+    pub elements_cut: usize,
+    /// Cut faces opened by this sweep; each shows on both lips.
+    pub faces_opened: usize,
+    /// Edges that this incision crosses but that are not separated yet: the cut lags there by at
+    /// most one element.
+    pub pending_edges: usize,
+    /// Edges left whole because an element reached its cap of fragments.
+    pub refused_edges: usize,
+    /// Topology epoch after the sweep.
+    pub epoch: u32,
+}
+
+/// Why a sweep was refused; the mesh is unchanged.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum CutError {
+    /// The sweep holds no blade segment.
+    #[error("the blade sweep has no segment; give at least one [tip, heel] pair")]
+    NoSegment,
+    /// The sweep holds too many blade segments.
+    #[error("the blade sweep has {found} segments, at most {limit} are allowed; send it in parts")]
+    TooManySegments {
+        /// Count found.
+        found: usize,
+        /// Largest count allowed.
+        limit: usize,
+    },
+    /// A blade coordinate is NaN or infinite.
+    #[error("blade segment {segment} has a coordinate that is not finite")]
+    NonFiniteBlade {
+        /// Index of the segment.
+        segment: usize,
+    },
+    /// A copy position is NaN or infinite.
+    #[error("copy {copy} is at a position that is not finite; restore the body before cutting it")]
+    NonFinitePosition {
+        /// Copy id.
+        copy: usize,
+    },
+    /// The position array does not belong to this mesh.
+    #[error("{found} positions given for {expected} copies; pass one position per copy")]
+    PositionCount {
+        /// Length found.
+        found: usize,
+        /// Number of copies.
+        expected: usize,
+    },
+    /// Incision id 0 is reserved for the skin.
+    #[error("incision id 0 means skin; number incisions from 1")]
+    ReservedIncision,
+}

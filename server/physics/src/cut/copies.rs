@@ -1,0 +1,160 @@
+//! Node copies: the connected components of the pieces around a node.
+//!
+//! Around node i every piece of every element that has i is a vertex of a graph; two pieces are
+//! linked where they share a closed fragment face on an element face that contains i. Each
+//! component is one copy of i. The component that holds the node's own material keeps the copy
+//! with the node's number: the *real* copy; the others are virtual.
+
+use crate::mesh::TetMesh;
+
+use super::blade::NewCopy;
+use super::fragments::{Fragments, NONE};
+use super::pieces::PieceTable;
+
+/// The copies and the elements around every node.
+#[derive(Clone, Debug, Default)]
+pub struct CopyTable {
+    /// Mesh node of each copy.
+    pub node: Vec<u32>,
+    /// Σ over pieces of ∫ N_a dV [m³] per copy.
+    pub volume: Vec<f64>,
+    around_start: Vec<u32>,
+    around: Vec<u32>,
+    visited: Vec<u32>,
+    stamp: u32,
+    stack: Vec<u32>,
+}
+
+/// A component of the pieces around one node.
+struct Around {
+    pieces: Vec<u32>,
+    parent: u32,
+    holds_node: bool,
+}
+
+impl CopyTable {
+    /// One copy per node, before [`update`](Self::update) looked at the connectivity.
+    pub fn new(mesh: &TetMesh, pieces: &PieceTable) -> Self {
+        let n = mesh.nodes.len();
+        let mut around_start = vec![0u32; n + 1];
+        for &node in mesh.tets.iter().flatten() {
+            around_start[node as usize + 1] += 1;
+        }
+        for i in 0..n {
+            around_start[i + 1] += around_start[i];
+        }
+        let mut fill = around_start.clone();
+        let mut around = vec![0u32; 4 * mesh.tets.len()];
+        for (e, tet) in (0u32..).zip(&mesh.tets) {
+            for &node in tet {
+                around[fill[node as usize] as usize] = e;
+                fill[node as usize] += 1;
+            }
+        }
+        let mut volume = vec![0.0; n];
+        for (tet, node_volume) in mesh.tets.iter().zip(&pieces.node_volume) {
+            for (&node, v) in tet.iter().zip(node_volume) {
+                volume[node as usize] += v;
+            }
+        }
+        Self { node: (0..n as u32).collect(), volume, around_start, around, ..Self::default() }
+    }
+
+    /// Elements that have node `i`.
+    pub fn elements_around(&self, i: u32) -> &[u32] {
+        let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
+        &self.around[range]
+    }
+
+    /// Recomputes the copies of node `i` and appends what is new to `new_copies`.
+    pub fn update(
+        &mut self,
+        mesh: &TetMesh,
+        i: u32,
+        fragments: &Fragments,
+        pieces: &mut PieceTable,
+        new_copies: &mut Vec<NewCopy>,
+    ) {
+        let components = self.components_around(mesh, i, fragments, pieces);
+        for (k, component) in components.iter().enumerate() {
+            let parent = component.parent;
+            let heir = components
+                .iter()
+                .position(|c| c.parent == parent && c.holds_node)
+                .or_else(|| components.iter().position(|c| c.parent == parent));
+            let id = if heir == Some(k) {
+                self.volume[parent as usize] = 0.0;
+                parent
+            } else {
+                let copy = self.node.len() as u32;
+                self.node.push(i);
+                self.volume.push(0.0);
+                new_copies.push(NewCopy { copy, parent });
+                copy
+            };
+            for &p in &component.pieces {
+                let piece = &mut pieces.pieces[p as usize];
+                if let Some(a) = mesh.tets[piece.element as usize].iter().position(|&n| n == i) {
+                    piece.copies[a] = id;
+                    self.volume[id as usize] += pieces.node_volume[p as usize][a];
+                }
+            }
+        }
+    }
+
+    fn components_around(
+        &mut self,
+        mesh: &TetMesh,
+        i: u32,
+        fragments: &Fragments,
+        pieces: &PieceTable,
+    ) -> Vec<Around> {
+        self.stamp += 1;
+        self.visited.resize(pieces.pieces.len(), 0);
+        let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
+        let mut components = Vec::new();
+        for k in range {
+            for seed in pieces.of_element(self.around[k]) {
+                if self.visited[seed as usize] != self.stamp {
+                    components.push(self.flood(mesh, i, seed, fragments, pieces));
+                }
+            }
+        }
+        components
+    }
+
+    fn flood(
+        &mut self,
+        mesh: &TetMesh,
+        i: u32,
+        seed: u32,
+        fragments: &Fragments,
+        pieces: &PieceTable,
+    ) -> Around {
+        let first = &pieces.pieces[seed as usize];
+        let a = mesh.tets[first.element as usize].iter().position(|&n| n == i).unwrap_or(0);
+        let mut component = Around { pieces: Vec::new(), parent: first.copies[a], holds_node: false };
+        self.visited[seed as usize] = self.stamp;
+        self.stack.push(seed);
+        while let Some(p) = self.stack.pop() {
+            component.pieces.push(p);
+            for t in pieces.fragments(p, fragments) {
+                component.holds_node |= fragments.tets[t as usize].contains(&i);
+                for n in fragments.neighbour[t as usize] {
+                    if n == NONE {
+                        continue;
+                    }
+                    let q = fragments.piece[n as usize];
+                    if self.visited[q as usize] != self.stamp
+                        && mesh.tets[fragments.element[n as usize] as usize].contains(&i)
+                    {
+                        self.visited[q as usize] = self.stamp;
+                        self.stack.push(q);
+                    }
+                }
+            }
+        }
+        component.pieces.sort_unstable();
+        component
+    }
+}

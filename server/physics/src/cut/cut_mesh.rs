@@ -1,0 +1,156 @@
+//! The cut state of one body: rest mesh, fragments, pieces, copies and surface.
+
+use nalgebra::Vector3;
+
+use crate::mesh::{MeshError, TetMesh};
+
+use super::blade::{BladeSweep, CutError, CutReport};
+use super::components::Components;
+use super::copies::CopyTable;
+use super::fragments::Fragments;
+use super::pieces::{Piece, PieceTable};
+use super::surface::{Surface, SurfaceBuilder};
+
+/// A tet mesh with everything that cuts have made of it.
+///
+/// Copies 0..n_nodes are the nodes of the rest mesh, further ones are appended and never removed.
+/// A rest mesh that hangs together only in a node or an edge gets extra copies at once: material
+/// is connected through faces and through nothing else.
+#[derive(Clone, Debug)]
+pub struct CutMesh {
+    mesh: TetMesh,
+    fragments: Fragments,
+    pieces: PieceTable,
+    copies: CopyTable,
+    surface: Surface,
+    builder: SurfaceBuilder,
+    epoch: u32,
+}
+
+impl CutMesh {
+    /// The uncut state of a mesh.
+    pub fn new(mesh: TetMesh) -> Result<Self, MeshError> {
+        mesh.check()?;
+        let fragments = Fragments::new(&mesh);
+        let mut pieces = PieceTable::new(&mesh);
+        let mut copies = CopyTable::new(&mesh, &pieces);
+        let mut new_copies = Vec::new();
+        for v in mesh.nodes.len()..fragments.vertices.len() {
+            let [node, ..] = fragments.vertices[v].nodes;
+            copies.update(&mesh, node, &fragments, &mut pieces, &mut new_copies);
+        }
+        let mut builder = SurfaceBuilder::default();
+        let mut surface = Surface::default();
+        builder.build(&mesh, &fragments, &pieces, &mut surface);
+        Ok(Self { mesh, fragments, pieces, copies, surface, builder, epoch: 0 })
+    }
+
+    /// The rest mesh; no cut changes it.
+    pub fn mesh(&self) -> &TetMesh {
+        &self.mesh
+    }
+
+    /// Material pieces, one computational element each. Ids are stable; cuts append.
+    pub fn pieces(&self) -> &[Piece] {
+        &self.pieces.pieces
+    }
+
+    /// Number of node copies.
+    pub fn n_copies(&self) -> usize {
+        self.copies.node.len()
+    }
+
+    /// Mesh node of every copy; the rest position of a copy is that of its node.
+    pub fn copy_node(&self) -> &[u32] {
+        &self.copies.node
+    }
+
+    /// Σ over pieces of ∫ N_a dV [m³] per copy; its mass is density times this.
+    pub fn copy_volume(&self) -> &[f64] {
+        &self.copies.volume
+    }
+
+    /// Rises whenever the topology changes.
+    pub fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    /// Skin and cut faces, closed and 2-manifold.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// Loose parts and their rest volumes.
+    pub fn components(&self) -> Components {
+        Components::of(&self.fragments, &self.pieces)
+    }
+
+    /// Rest position [m] of every copy.
+    pub fn rest_positions(&self) -> Vec<Vector3<f64>> {
+        self.copies.node.iter().map(|&n| self.mesh.nodes[n as usize]).collect()
+    }
+
+    /// Undoes all cuts; the epoch keeps rising.
+    pub fn reset(&mut self) -> Result<(), MeshError> {
+        let epoch = self.epoch + 1;
+        *self = Self::new(std::mem::take(&mut self.mesh))?;
+        self.epoch = epoch;
+        Ok(())
+    }
+
+    /// Cuts along the surface the blade swept, given the current position [m] of every copy.
+    /// Successive sweeps with the same incision id continue one incision.
+    pub fn sweep(
+        &mut self,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<CutReport, CutError> {
+        blade.check()?;
+        if incision == 0 {
+            return Err(CutError::ReservedIncision);
+        }
+        if x.len() != self.n_copies() {
+            return Err(CutError::PositionCount { found: x.len(), expected: self.n_copies() });
+        }
+        if let Some(copy) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            return Err(CutError::NonFinitePosition { copy });
+        }
+        Ok(CutReport { epoch: self.epoch, ..CutReport::default() })
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::mesh::{BoxPattern, box_mesh};
+
+    #[test]
+    fn the_uncut_state_is_the_mesh_itself() {
+        let mesh = box_mesh(Vector3::zeros(), Vector3::new(3.0, 2.0, 1.0), [3, 2, 2], BoxPattern::Tet6);
+        let cut = CutMesh::new(mesh.clone()).unwrap();
+        assert_eq!(cut.n_copies(), mesh.nodes.len());
+        assert_eq!(cut.pieces().len(), mesh.tets.len());
+        assert!(cut.pieces().iter().zip(&mesh.tets).all(|(p, t)| p.copies == *t && p.fraction == 1.0));
+        assert_eq!(cut.surface().triangles.len(), mesh.boundary_faces().len());
+        let x = cut.rest_positions();
+        assert!((cut.surface().volume(&x) - 6.0).abs() < 1e-12);
+        assert!((cut.copy_volume().iter().sum::<f64>() - 6.0).abs() < 1e-12);
+        assert_eq!(cut.components().len(), 1);
+        assert!((cut.components().volume[0] - 6.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn tets_that_meet_only_in_an_edge_do_not_share_copies() {
+        let p = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+        let nodes =
+            vec![p(0., 0., 0.), p(0., 0., 1.), p(1., 0., 0.), p(1., 1., 0.), p(-1., 0., 0.), p(-1., -1., 0.)];
+        let (mesh, _) = TetMesh::repaired(nodes, vec![[0, 1, 2, 3], [0, 1, 4, 5]]).unwrap();
+        let cut = CutMesh::new(mesh).unwrap();
+        assert_eq!(cut.n_copies(), 8);
+        assert_eq!(cut.surface().vertices.len(), 8);
+        assert_eq!(cut.components().len(), 2);
+        assert_eq!(&cut.copy_node()[6..], &[0, 1]);
+    }
+}

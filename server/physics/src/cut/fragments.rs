@@ -1,0 +1,334 @@
+//! The fragment mesh: a conforming tet mesh inside the elements.
+//!
+//! A fragment vertex is an affine combination of the nodes of one element. Two fragments are
+//! connected through a face exactly when they name each other as neighbours; a cut removes that link
+//! and tags both sides. Vertices are shared by a face-connected star of fragments and by nothing
+//! else, so lips never share a vertex except on the crack front.
+
+use crate::mesh::{TET_FACES, TetMesh};
+
+use super::incision_sets::IncisionSets;
+
+/// No neighbour, no next entry.
+pub const NONE: u32 = u32::MAX;
+
+/// Most fragments one element may hold; a sweep that needs more is refused there.
+///
+/// One plane makes at most 6 of 1; 256 leaves room for some 20 planes through one element while a
+/// pathological sweep stays bounded in memory.
+pub const MAX_FRAGMENTS_PER_ELEMENT: u16 = 256;
+
+/// A point of the material: Σ weights · nodes, the nodes all of one element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FragmentVertex {
+    /// Mesh nodes; [`NONE`] in unused slots, which come last.
+    pub nodes: [u32; 4],
+    /// Weight of each node, Σ = 1.
+    pub weights: [f64; 4],
+}
+
+impl FragmentVertex {
+    /// The vertex at a mesh node.
+    pub fn at_node(node: u32) -> Self {
+        Self { nodes: [node, NONE, NONE, NONE], weights: [1.0, 0.0, 0.0, 0.0] }
+    }
+
+    /// The point (1 − t) a + t b; `a` and `b` must lie in one element.
+    pub fn between(a: &Self, b: &Self, t: f64) -> Self {
+        let mut v = Self { nodes: a.nodes, weights: a.weights.map(|w| (1.0 - t) * w) };
+        for (&node, &weight) in b.nodes.iter().zip(&b.weights) {
+            if node == NONE {
+                break;
+            }
+            if let Some(slot) = v.nodes.iter().position(|&n| n == node || n == NONE) {
+                v.nodes[slot] = node;
+                v.weights[slot] += t * weight;
+            }
+        }
+        v
+    }
+
+    /// Weight of local node `a` of an element with these nodes.
+    pub fn weight_of(&self, node: u32) -> f64 {
+        self.nodes.iter().position(|&n| n == node).map_or(0.0, |slot| self.weights[slot])
+    }
+}
+
+/// All fragments of a body, structure of arrays.
+#[derive(Clone, Debug, Default)]
+pub struct Fragments {
+    /// Vertices, the first n_nodes at the mesh nodes.
+    pub vertices: Vec<FragmentVertex>,
+    /// Per vertex the set of incisions it lies on.
+    pub on: Vec<u32>,
+    /// Vertex ids per fragment, positively oriented. Fragment e < n_elements is the first of
+    /// element e.
+    pub tets: Vec<[u32; 4]>,
+    /// Element each fragment lies in.
+    pub element: Vec<u32>,
+    /// Piece each fragment belongs to.
+    pub piece: Vec<u32>,
+    /// Volume of each fragment as a fraction of its element.
+    pub fraction: Vec<f64>,
+    /// Fragment across the face opposite each vertex, or [`NONE`] on the boundary.
+    pub neighbour: Vec<[u32; 4]>,
+    /// Tag of each boundary face: 0 skin, else the incision that opened it.
+    pub tag: Vec<[u32; 4]>,
+    /// Set of incisions known to run between the two sides of each face.
+    pub along: Vec<[u32; 4]>,
+    /// Next fragment of the same element.
+    pub next_in_element: Vec<u32>,
+    /// Next fragment of the same piece.
+    pub next_in_piece: Vec<u32>,
+    /// Number of fragments per element.
+    pub count: Vec<u16>,
+    visited: Vec<[u32; 4]>,
+    claimed: Vec<u32>,
+    stamp: u32,
+    stack: Vec<(u32, u8)>,
+    star: Vec<(u32, u8)>,
+}
+
+/// The two fragments an edge bisection made of one.
+#[derive(Clone, Copy, Debug)]
+pub struct Halves {
+    /// Keeps the id of the fragment that was split and the end `a` of the edge.
+    pub old: u32,
+    /// The appended fragment, at the end `b`.
+    pub new: u32,
+}
+
+impl Fragments {
+    /// One fragment per element of a checked mesh.
+    pub fn new(mesh: &TetMesh) -> Self {
+        let n = mesh.tets.len();
+        let mut fragments = Self {
+            vertices: (0..mesh.nodes.len() as u32).map(FragmentVertex::at_node).collect(),
+            on: vec![IncisionSets::EMPTY; mesh.nodes.len()],
+            tets: mesh.tets.clone(),
+            element: (0..n as u32).collect(),
+            piece: (0..n as u32).collect(),
+            fraction: vec![1.0; n],
+            neighbour: face_neighbours(&mesh.tets),
+            tag: vec![[0; 4]; n],
+            along: vec![[IncisionSets::EMPTY; 4]; n],
+            next_in_element: vec![NONE; n],
+            next_in_piece: vec![NONE; n],
+            count: vec![1; n],
+            ..Self::default()
+        };
+        let every_corner: Vec<(u32, u8)> = (0..n as u32).flat_map(|t| (0..4).map(move |k| (t, k))).collect();
+        fragments.split_stars(&every_corner, |_, _, _| {});
+        fragments
+    }
+
+    /// Fragments of element `e`.
+    pub fn of_element(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
+        std::iter::successors(Some(e), |&t| Some(self.next_in_element[t as usize]).filter(|&n| n != NONE))
+    }
+
+    /// Slot of vertex `v` in fragment `t`.
+    pub fn slot(&self, t: u32, v: u32) -> Option<usize> {
+        self.tets[t as usize].iter().position(|&w| w == v)
+    }
+
+    /// Face of fragment `n` through which `t` is its neighbour.
+    pub fn face_towards(&self, n: u32, t: u32) -> Option<usize> {
+        self.neighbour[n as usize].iter().position(|&m| m == t)
+    }
+
+    /// Collects the fragments around the edge (a, b) that are face-connected with `t`.
+    pub fn wedge(&self, t: u32, a: u32, b: u32, out: &mut Vec<u32>) {
+        out.clear();
+        out.push(t);
+        let others: Vec<u32> = self.tets[t as usize].iter().copied().filter(|&v| v != a && v != b).collect();
+        let &[c, d] = others.as_slice() else { return };
+        for (mut opposite, mut pivot) in [(c, d), (d, c)] {
+            let mut current = t;
+            // Leave through the face opposite `opposite`; it holds a, b and `pivot`.
+            while let Some(face) = self.slot(current, opposite) {
+                let next = self.neighbour[current as usize][face];
+                if next == NONE {
+                    break;
+                }
+                if next == t {
+                    return;
+                }
+                out.push(next);
+                let Some(back) = self.face_towards(next, current) else { return };
+                opposite = pivot;
+                pivot = self.tets[next as usize][back];
+                current = next;
+            }
+        }
+    }
+
+    /// Bisects the edge (a, b) at the new vertex `m` in every fragment of its `wedge`; the faces
+    /// between the halves are marked as lying `along` the given set of incisions. `halves` receives
+    /// one entry per fragment of the wedge.
+    pub fn bisect(
+        &mut self,
+        wedge: &[u32],
+        ends: [u32; 2],
+        m: (u32, f64),
+        along: u32,
+        halves: &mut Vec<Halves>,
+    ) {
+        halves.clear();
+        let first_new = self.tets.len() as u32;
+        halves.extend(wedge.iter().zip(first_new..).map(|(&old, new)| Halves { old, new }));
+        let [a, b] = ends;
+        let (m, t) = m;
+        for k in 0..wedge.len() {
+            let Halves { old, new } = halves[k];
+            let o = old as usize;
+            let (Some(ia), Some(ib)) = (self.slot(old, a), self.slot(old, b)) else { continue };
+            let mut far = self.tets[o];
+            far[ia] = m;
+            let mut neighbour = self.neighbour[o];
+            neighbour[ib] = old;
+            for (face, n) in neighbour.iter_mut().enumerate() {
+                if face != ia && face != ib && *n != NONE {
+                    *n = halves.iter().find(|h| h.old == *n).map_or(NONE, |h| h.new);
+                }
+            }
+            let (mut tag, mut along_far) = (self.tag[o], self.along[o]);
+            tag[ib] = 0;
+            along_far[ib] = along;
+            self.push(o, far, neighbour, self.fraction[o] * (1.0 - t));
+            self.tag.push(tag);
+            self.along.push(along_far);
+            let outer = neighbour[ia];
+            if outer != NONE
+                && let Some(back) = self.face_towards(outer, old)
+            {
+                self.neighbour[outer as usize][back] = new;
+            }
+            self.tets[o][ib] = m;
+            self.fraction[o] *= t;
+            self.neighbour[o][ia] = new;
+            self.tag[o][ia] = 0;
+            self.along[o][ia] = along;
+        }
+    }
+
+    /// Appends a fragment of the same element and piece as fragment `o`, right behind it.
+    fn push(&mut self, o: usize, tet: [u32; 4], neighbour: [u32; 4], fraction: f64) {
+        let id = self.tets.len() as u32;
+        self.tets.push(tet);
+        self.element.push(self.element[o]);
+        self.piece.push(self.piece[o]);
+        self.fraction.push(fraction);
+        self.neighbour.push(neighbour);
+        self.next_in_element.push(self.next_in_element[o]);
+        self.next_in_element[o] = id;
+        self.next_in_piece.push(self.next_in_piece[o]);
+        self.next_in_piece[o] = id;
+        self.count[self.element[o] as usize] += 1;
+    }
+
+    /// Opens the face of fragment `t` opposite its vertex `face`; both sides get the tag.
+    pub fn open(&mut self, t: u32, face: usize, tag: u32) {
+        let n = self.neighbour[t as usize][face];
+        if n == NONE {
+            return;
+        }
+        if let Some(back) = self.face_towards(n, t) {
+            self.neighbour[n as usize][back] = NONE;
+            self.tag[n as usize][back] = tag;
+        }
+        self.neighbour[t as usize][face] = NONE;
+        self.tag[t as usize][face] = tag;
+    }
+
+    /// Restores the rule that a vertex is shared only by a face-connected star: of the stars found at
+    /// the given corners (fragment, slot) the first keeps the vertex, each other one gets its own.
+    /// `renamed(fragments, old vertex, [fragment, new vertex])` is called for every renamed corner.
+    pub fn split_stars(&mut self, corners: &[(u32, u8)], mut renamed: impl FnMut(&Self, u32, [u32; 2])) {
+        self.stamp += 1;
+        self.visited.resize(self.tets.len(), [0; 4]);
+        self.claimed.resize(self.vertices.len(), 0);
+        for &(t, k) in corners {
+            if self.visited[t as usize][k as usize] == self.stamp {
+                continue;
+            }
+            let v = self.tets[t as usize][k as usize];
+            self.collect_star(t, k);
+            if self.claimed[v as usize] != self.stamp {
+                self.claimed[v as usize] = self.stamp;
+                continue;
+            }
+            let copy = self.vertices.len() as u32;
+            self.vertices.push(self.vertices[v as usize]);
+            self.on.push(self.on[v as usize]);
+            self.claimed.push(self.stamp);
+            for i in 0..self.star.len() {
+                let (t, k) = self.star[i];
+                self.tets[t as usize][k as usize] = copy;
+                renamed(self, v, [t, copy]);
+            }
+        }
+    }
+
+    /// Fills `self.star` with the corners at the vertex of corner (t, k) that are reached through
+    /// closed faces, and marks them visited.
+    fn collect_star(&mut self, t: u32, k: u8) {
+        let v = self.tets[t as usize][k as usize];
+        self.star.clear();
+        self.stack.clear();
+        self.visited[t as usize][k as usize] = self.stamp;
+        self.stack.push((t, k));
+        while let Some((t, k)) = self.stack.pop() {
+            self.star.push((t, k));
+            for face in (0..4).filter(|&f| f != k as usize) {
+                let n = self.neighbour[t as usize][face];
+                if n == NONE {
+                    continue;
+                }
+                if let Some(slot) = self.slot(n, v)
+                    && self.visited[n as usize][slot] != self.stamp
+                {
+                    self.visited[n as usize][slot] = self.stamp;
+                    self.stack.push((n, slot as u8));
+                }
+            }
+        }
+    }
+}
+
+/// Links tets across faces that exactly two of them use, from opposite sides.
+fn face_neighbours(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {
+    let mut faces: Vec<([u32; 3], u32, bool)> = Vec::with_capacity(4 * tets.len());
+    for (t, tet) in tets.iter().enumerate() {
+        for (k, face) in TET_FACES.iter().enumerate() {
+            let (key, even) = sorted(face.map(|c| tet[c]));
+            faces.push((key, (4 * t + k) as u32, even));
+        }
+    }
+    faces.sort_unstable();
+    let mut neighbour = vec![[NONE; 4]; tets.len()];
+    for users in faces.chunk_by(|p, q| p.0 == q.0) {
+        if let &[(_, p, p_even), (_, q, q_even)] = users
+            && p_even != q_even
+        {
+            neighbour[p as usize / 4][p as usize % 4] = q / 4;
+            neighbour[q as usize / 4][q as usize % 4] = p / 4;
+        }
+    }
+    neighbour
+}
+
+/// The ids in ascending order, and whether that took an even permutation.
+fn sorted([mut a, mut b, mut c]: [u32; 3]) -> ([u32; 3], bool) {
+    let mut even = true;
+    if a > b {
+        (a, b, even) = (b, a, !even);
+    }
+    if b > c {
+        (b, c, even) = (c, b, !even);
+    }
+    if a > b {
+        (a, b, even) = (b, a, !even);
+    }
+    ([a, b, c], even)
+}

@@ -1,0 +1,68 @@
+//! Sets of incision ids, each stored once and named by a number.
+//!
+//! Nearly every vertex and face lies on no incision or on one; a table of the few distinct sets
+//! keeps the per-vertex record at four bytes.
+
+use std::collections::BTreeMap;
+
+/// Table of distinct sets; a set is its index here.
+#[derive(Clone, Debug)]
+pub struct IncisionSets {
+    sets: Vec<Vec<u32>>,
+    ids: BTreeMap<Vec<u32>, u32>,
+}
+
+impl Default for IncisionSets {
+    fn default() -> Self {
+        Self { sets: vec![Vec::new()], ids: BTreeMap::from([(Vec::new(), Self::EMPTY)]) }
+    }
+}
+
+impl IncisionSets {
+    /// The empty set.
+    pub const EMPTY: u32 = 0;
+
+    /// Members in ascending order.
+    pub fn members(&self, set: u32) -> &[u32] {
+        &self.sets[set as usize]
+    }
+
+    /// Whether the incision is in the set.
+    pub fn contains(&self, set: u32, incision: u32) -> bool {
+        set != Self::EMPTY && self.sets[set as usize].contains(&incision)
+    }
+
+    /// The set with the incision added.
+    pub fn with(&mut self, set: u32, incision: u32) -> u32 {
+        if self.contains(set, incision) {
+            return set;
+        }
+        let mut members = self.sets[set as usize].clone();
+        members.push(incision);
+        members.sort_unstable();
+        self.id_of(members)
+    }
+
+    /// The intersection of two sets.
+    pub fn both(&mut self, p: u32, q: u32) -> u32 {
+        if p == q || p == Self::EMPTY {
+            return p;
+        }
+        if q == Self::EMPTY {
+            return q;
+        }
+        let other = &self.sets[q as usize];
+        let members = self.sets[p as usize].iter().copied().filter(|s| other.contains(s)).collect();
+        self.id_of(members)
+    }
+
+    fn id_of(&mut self, members: Vec<u32>) -> u32 {
+        if let Some(&id) = self.ids.get(&members) {
+            return id;
+        }
+        let id = self.sets.len() as u32;
+        self.sets.push(members.clone());
+        self.ids.insert(members, id);
+        id
+    }
+}

@@ -1,0 +1,36 @@
+//! Cutting: material pieces inside the elements, node copies that follow from connectivity, and
+//! the surface in between.
+//!
+//! A cut never edits the element mesh. Three layers follow from each other, each a pure function of
+//! the one before:
+//!
+//! 1. [`fragments`]: a conforming tet mesh *inside* the elements, at first one fragment per element,
+//!    refined by bisecting edges where a blade crosses them. Cut faces are opened here and nowhere
+//!    else.
+//! 2. [`pieces`]: the face-connected components of the fragments of one element. A linear element
+//!    has a constant deformation gradient per piece, so mechanics needs only its volume fraction.
+//! 3. [`copies`]: the components of the pieces around a node. Each is one set of degrees of freedom.
+//!
+//! Crack fronts, branches, crossings and re-cuts need no case analysis: they are what connectivity
+//! says they are.
+//!
+//! # Source
+//! Molino, Bao, Fedkiw 2004; Sifakis, Der, Fedkiw 2007; Wang, Jiang, Schroeder, Teran 2014 (virtual
+//! nodes). Jeřábková 2007 ch. 3 (the same space seen as an enrichment).
+
+#![allow(dead_code)]
+
+mod blade;
+mod incision_sets;
+mod fragments;
+mod pieces;
+mod copies;
+mod surface;
+mod components;
+mod cut_mesh;
+
+pub use blade::{BladeSweep, CutError, CutReport, NewCopy};
+pub use components::Components;
+pub use cut_mesh::CutMesh;
+pub use pieces::Piece;
+pub use surface::{Surface, SurfaceVertex};
