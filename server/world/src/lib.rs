@@ -11,6 +11,9 @@
 
 pub mod scene;
 
+// what comes from outside into a step
+pub mod inputs;
+
 // meshes in: mesh_in
 
 // the demonstration's organ: organ

@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Unit, Vector3};
 
+use crate::inputs::{ToolMode, ToolShape};
+
 use super::checked::*;
 use super::problem::{Fault, nearest_word};
 use super::raw::*;
@@ -342,10 +344,10 @@ impl Check<'_> {
             tip_m: Vector3::from(point.tip_m),
             toward: self.direction(&format!("{at}.toward"), point.toward),
             mode: match point.mode {
-                RawMode::Hover => ScriptMode::Hover,
-                RawMode::Touch => ScriptMode::Touch,
-                RawMode::Grab => ScriptMode::Grab,
-                RawMode::Cut => ScriptMode::Cut,
+                RawMode::Hover => ToolMode::Hover,
+                RawMode::Touch => ToolMode::Touch,
+                RawMode::Grab => ToolMode::Grab,
+                RawMode::Cut => ToolMode::Cut,
             },
         }
     }
@@ -359,15 +361,15 @@ impl Check<'_> {
     }
 }
 
-fn geometry(shape: &RawShape) -> ToolGeometry {
+fn geometry(shape: &RawShape) -> ToolShape {
     match shape {
         RawShape { blade: Some(b), .. } => {
-            ToolGeometry::Blade { length_m: b.length_m, thickness_m: b.thickness_m }
+            ToolShape::Blade { length_m: b.length_m, thickness_m: b.thickness_m }
         }
-        RawShape { sphere: Some(s), .. } => ToolGeometry::Sphere { radius_m: s.radius_m },
+        RawShape { sphere: Some(s), .. } => ToolShape::Sphere { radius_m: s.radius_m },
         RawShape { capsule, .. } => {
             let (radius_m, length_m) = capsule.as_ref().map_or((0.0, 0.0), |c| (c.radius_m, c.length_m));
-            ToolGeometry::Capsule { radius_m, length_m }
+            ToolShape::Capsule { radius_m, length_m }
         }
     }
 }

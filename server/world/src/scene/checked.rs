@@ -2,6 +2,8 @@
 
 use nalgebra::{Unit, Vector3};
 
+use crate::inputs::{ToolMode, ToolShape};
+
 /// A scene whose values are all in range and fit each other. Files are not opened yet.
 #[derive(Debug, Clone)]
 pub struct CheckedScene {
@@ -207,7 +209,7 @@ pub struct ToolSpec {
     /// Name.
     pub id: String,
     /// Geometry.
-    pub shape: ToolGeometry,
+    pub shape: ToolShape,
     /// Spring between hand and tissue [N/m].
     pub stiffness_n_m: f64,
     /// Largest force [N].
@@ -216,30 +218,6 @@ pub struct ToolSpec {
     pub path: Vec<PathPoint>,
     /// The script starts again after this time [s].
     pub repeat_s: Option<f64>,
-}
-
-/// Geometry of a tool; tip in the origin, shaft along +z.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ToolGeometry {
-    /// Cutting edge from tip to heel.
-    Blade {
-        /// Length of the edge [m].
-        length_m: f64,
-        /// Thickness [m].
-        thickness_m: f64,
-    },
-    /// Ball around the tip.
-    Sphere {
-        /// Radius [m].
-        radius_m: f64,
-    },
-    /// Rod with round ends.
-    Capsule {
-        /// Radius [m].
-        radius_m: f64,
-        /// Length of the axis [m].
-        length_m: f64,
-    },
 }
 
 /// One pose of a script.
@@ -252,20 +230,7 @@ pub struct PathPoint {
     /// From the tip along the shaft.
     pub toward: Unit<Vector3<f64>>,
     /// What the tool does from here on.
-    pub mode: ScriptMode,
-}
-
-/// What a scripted tool does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ScriptMode {
-    /// Touches nothing.
-    Hover,
-    /// Pushes.
-    Touch,
-    /// Holds.
-    Grab,
-    /// Cuts.
-    Cut,
+    pub mode: ToolMode,
 }
 
 /// Effects switched by hand; none: as the scene calls for.

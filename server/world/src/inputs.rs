@@ -1,0 +1,109 @@
+//! What goes into a step from outside: tool poses, cuts, and what is asked for.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+
+/// Geometry of a rigid tool in its own axes: tip in the origin, shaft along +z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ToolShape {
+    /// Cutting edge from the tip (origin) to the heel (0, 0, `length_m`).
+    Blade {
+        /// Length of the edge [m].
+        length_m: f64,
+        /// Thickness [m].
+        thickness_m: f64,
+    },
+    /// Ball around the tip.
+    Sphere {
+        /// Radius [m].
+        radius_m: f64,
+    },
+    /// Rod from the tip (origin) to (0, 0, `length_m`) with round ends.
+    Capsule {
+        /// Radius [m].
+        radius_m: f64,
+        /// Length of the axis [m].
+        length_m: f64,
+    },
+}
+
+/// What a hand does with a tool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ToolMode {
+    /// Exists, touches nothing.
+    #[default]
+    Hover,
+    /// Pushes what it meets.
+    Touch,
+    /// Holds the tissue nearest to the tip when the mode began.
+    Grab,
+    /// A blade that cuts along its path.
+    Cut,
+}
+
+/// The newest sample of a tool held by a client. A step reads one per held tool; a tool without
+/// a sample is let go: back to its script, or removed if the scene does not declare it.
+#[derive(Debug, Clone)]
+pub struct ToolInput {
+    /// Name of the tool, declared in the scene or brought along.
+    pub id: Arc<str>,
+    /// Name of the client that holds it.
+    pub owner: Arc<str>,
+    /// Tool axes to world axes; the translation is the tip [m].
+    pub pose: Isometry3<f64>,
+    /// Velocity of the tip [m/s].
+    pub velocity_m_s: Vector3<f64>,
+    /// What the hand does.
+    pub mode: ToolMode,
+    /// Geometry of a tool that the scene does not declare.
+    pub shape: Option<ToolShape>,
+    /// Sequence number of the sample.
+    pub seq: u64,
+    /// The client's clock at the sample [ns].
+    pub client_time_ns: u64,
+}
+
+/// A cut asked for by a client, applied once in the next step.
+#[derive(Debug, Clone)]
+pub struct CutRequest {
+    /// Number given by the caller; comes back in the [`CutOutcome`].
+    pub request: u64,
+    /// Tool that cuts; successive requests of a tool continue its incision when they connect.
+    pub tool: Arc<str>,
+    /// The body, or none for every body.
+    pub body: Option<Arc<str>>,
+    /// Successive blade segments [tip, heel] in world axes [m].
+    pub segments: Vec<[Vector3<f64>; 2]>,
+}
+
+/// What became of a [`CutRequest`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct CutOutcome {
+    /// The caller's number.
+    pub request: u64,
+    /// Elements cut, or why nothing was.
+    pub result: Result<usize, String>,
+}
+
+/// What somebody waits for; nothing else is computed.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Wants {
+    /// Surface positions in the snapshot, per body.
+    pub surface: Vec<bool>,
+    /// Contact for haptic clients: surface positions and velocities of all bodies.
+    pub contact: bool,
+    /// Kinetic and elastic energy in the report.
+    pub energy: bool,
+}
+
+/// Everything a step reads from outside.
+#[derive(Debug, Clone, Default)]
+pub struct Inputs {
+    /// Tools held by clients.
+    pub tools: Vec<ToolInput>,
+    /// Cuts to apply in this step.
+    pub cuts: Vec<CutRequest>,
+    /// What is asked for.
+    pub wants: Wants,
+}
