@@ -14,7 +14,8 @@ pub mod scene;
 // what comes from outside into a step
 pub mod inputs;
 
-// meshes in: mesh_in
+// mesh files → checked tetrahedra
+pub mod mesh_in;
 
 // the demonstration's organ: organ
 

@@ -1,0 +1,124 @@
+//! Meshes in: bytes of a file → typed mesh → checked and repaired → tetrahedra.
+//!
+//! A file holds either a *volume* (tetrahedra: `.msh`, `.vtk`, `.vtu`) or a *surface* (triangles: `.obj`,
+//! `.stl`, `.ply`, and `.vtk`, `.vtu`, `.vtp`, `.msh` without tetrahedra). Volumes are checked and
+//! repaired; surfaces, closed or dirty, are filled with a lattice of tetrahedra whose
+//! boundary follows them. Readers work on bytes in memory; [`read_mesh`] alone opens files.
+
+pub mod error;
+mod scanner;
+mod cells;
+mod gmsh;
+mod vtk_cells;
+mod vtk_legacy;
+mod vtk_array;
+mod vtk_xml;
+mod obj;
+mod stl;
+mod ply;
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+pub use error::MeshInError;
+
+/// Tetrahedra as a file gave them: not checked, not oriented.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VolumeMesh {
+    /// Name of the file, for errors and reports.
+    pub file: String,
+    /// Node positions, in the file's unit.
+    pub nodes: Vec<Vector3<f64>>,
+    /// Four node indices each; within range.
+    pub tets: Vec<[u32; 4]>,
+    /// What was read but not used.
+    pub notes: Vec<String>,
+}
+
+/// Triangles as a file gave them: not checked, not oriented, vertices not welded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceMesh {
+    /// Name of the file, for errors and reports.
+    pub file: String,
+    /// Vertex positions, in the file's unit.
+    pub vertices: Vec<Vector3<f64>>,
+    /// Three vertex indices each; within range.
+    pub triangles: Vec<[u32; 3]>,
+    /// What was read but not used.
+    pub notes: Vec<String>,
+}
+
+/// What a mesh file holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MeshFile {
+    /// Tetrahedra.
+    Volume(VolumeMesh),
+    /// A triangulated surface.
+    Surface(SurfaceMesh),
+}
+
+/// Largest mesh file that is opened [bytes].
+pub const MAX_FILE_BYTES: u64 = 2 << 30;
+
+/// Reads a mesh file; the format follows from the extension, or from the first bytes when there is none.
+pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
+    let io = |source| MeshInError::Io { path: path.to_path_buf(), source };
+    let file = path.display().to_string();
+    let length = std::fs::metadata(path).map_err(io)?.len();
+    if length > MAX_FILE_BYTES {
+        return Err(MeshInError::Limit {
+            file,
+            place: "file".into(),
+            what: "bytes".into(),
+            value: length,
+            limit: MAX_FILE_BYTES,
+            reason: "no mesh file may be larger".into(),
+        });
+    }
+    let bytes = std::fs::read(path).map_err(io)?;
+    read_mesh_bytes(&file, &bytes)
+}
+
+/// Reads a mesh from memory; `file` is its name (its extension chooses the format).
+pub fn read_mesh_bytes(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+    let extension =
+        Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let mesh = match extension.as_str() {
+        "msh" => gmsh::read(file, bytes),
+        "vtk" => vtk_legacy::read(file, bytes),
+        "vtu" | "vtp" => vtk_xml::read(file, bytes),
+        "obj" => obj::read(file, bytes),
+        "stl" => stl::read(file, bytes),
+        "ply" => ply::read(file, bytes),
+        _ if bytes.starts_with(b"$MeshFormat") || bytes.starts_with(b"$NOD") => gmsh::read(file, bytes),
+        _ if bytes.starts_with(b"# vtk DataFile") => vtk_legacy::read(file, bytes),
+        _ if bytes.starts_with(b"ply") => ply::read(file, bytes),
+        _ => return Err(MeshInError::UnknownFormat { file: file.into(), found: extension }),
+    }?;
+    all_finite(file, mesh.points())?;
+    Ok(mesh)
+}
+
+impl MeshFile {
+    /// Node or vertex positions.
+    pub fn points(&self) -> &[Vector3<f64>] {
+        match self {
+            MeshFile::Volume(volume) => &volume.nodes,
+            MeshFile::Surface(surface) => &surface.vertices,
+        }
+    }
+}
+
+fn all_finite(file: &str, points: &[Vector3<f64>]) -> Result<(), MeshInError> {
+    match points.iter().position(|p| !p.iter().all(|c| c.is_finite() && c.abs() < 1e100)) {
+        None => Ok(()),
+        Some(node) => {
+            let p = points[node];
+            Err(MeshInError::NonFinite { file: file.into(), node, x: p.x, y: p.y, z: p.z })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,64 @@
+//! `.stl` surfaces, text and binary, by `stl_io`. The format repeats every vertex; welding is in `health`.
+
+use std::io::Cursor;
+
+use nalgebra::Vector3;
+
+use super::MeshFile;
+use super::cells::{CellKind, CellSoup, zero_based};
+use super::error::MeshInError;
+
+/// Bytes of a binary header with the triangle count, and of one triangle.
+const HEADER: usize = 84;
+const TRIANGLE: usize = 50;
+
+/// Reads all facets; normals are recomputed from the corners by whoever needs them.
+pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
+    let binary_count = binary_count(bytes);
+    let fault = |number: usize, expected: &str, found: String| MeshInError::Syntax {
+        file: file.into(),
+        place: format!("triangle {number}"),
+        expected: expected.into(),
+        found,
+    };
+    if let Some(count) = binary_count
+        && count > (bytes.len() - HEADER) / TRIANGLE
+    {
+        return Err(MeshInError::Limit {
+            file: file.into(),
+            place: "byte 80".into(),
+            what: "triangles".into(),
+            value: count as u64,
+            limit: ((bytes.len() - HEADER) / TRIANGLE) as u64,
+            reason: format!("the file has {} bytes", bytes.len()),
+        });
+    }
+    // A binary file may start with "solid" all the same: its header is blanked for the reader.
+    let mut owned = bytes.to_vec();
+    if binary_count.is_some() {
+        owned[..80].fill(0);
+    } else if !bytes.starts_with(b"solid ") && bytes.starts_with(b"solid") {
+        owned.splice(5..5, [b' ']);
+    }
+    let mut cursor = Cursor::new(owned);
+    let triangles = stl_io::create_stl_reader(&mut cursor)
+        .map_err(|e| fault(0, "a text or binary STL file", e.to_string()))?;
+    let mut vertices = Vec::new();
+    let mut cells = CellSoup::default();
+    for (number, triangle) in triangles.enumerate() {
+        let triangle = triangle.map_err(|e| fault(number, "facet, loop, three vertices", e.to_string()))?;
+        let first = vertices.len() as i64;
+        vertices.extend(triangle.vertices.iter().map(|v| Vector3::from(v.0.map(f64::from))));
+        let _ = cells.add(CellKind::Triangle, &[first, first + 1, first + 2]);
+    }
+    let n = vertices.len();
+    cells.finish(file, vertices, zero_based(n))
+}
+
+/// The triangle count of a binary file; `None` for a text file.
+fn binary_count(bytes: &[u8]) -> Option<usize> {
+    let count = u32::from_le_bytes(*bytes.get(80..84)?.first_chunk::<4>()?) as usize;
+    let text = bytes.trim_ascii_start().starts_with(b"solid");
+    let fits_exactly = count.checked_mul(TRIANGLE)?.checked_add(HEADER)? == bytes.len();
+    (!text || fits_exactly).then_some(count)
+}
