@@ -1,0 +1,178 @@
+//! What is near: the closest point of a surface, and every triangle near a capsule.
+
+use crate::Capsule;
+use crate::distance::{
+    SegmentTriangle, barycentric_point, closest_point_on_triangle, closest_segment_triangle,
+};
+use crate::surface_bvh::{SurfaceBvh, node_bounds};
+use nalgebra::Vector3;
+use parry3d::partitioning::{BvhLeafCost, TraversalAction};
+
+type V = Vector3<f64>;
+
+/// The point of a surface closest to a query point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClosestPoint {
+    /// The triangle it lies on.
+    pub triangle: u32,
+    /// Its barycentric coordinates there.
+    pub barycentric: [f64; 3],
+    /// Where it is [m].
+    pub point: V,
+    /// Outward unit normal: the face's, or the angle-weighted mean at an edge or a vertex.
+    pub normal: V,
+    /// Distance to the query point [m], negative inside.
+    ///
+    /// Where two sheets of a surface overlap or coincide, as the lips of a closed cut do, the side
+    /// told by the nearest sheet may be wrong; [`SurfaceBvh::contains`] is not misled.
+    pub signed_distance: f64,
+}
+
+/// A triangle within reach of a capsule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearTriangle {
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// Closest points of the capsule's core and the triangle.
+    pub closest: SegmentTriangle,
+    /// Distance from the core to the triangle [m].
+    pub distance: f64,
+}
+
+/// A leaf's answer with its squared distance as cost.
+struct Candidate<T> {
+    cost: f32,
+    value: T,
+}
+
+impl<T> BvhLeafCost for Candidate<T> {
+    fn cost(&self) -> f32 {
+        self.cost
+    }
+}
+
+impl SurfaceBvh {
+    /// The point of the surface closest to `p` [m], no farther than `reach` [m].
+    pub fn closest_point(&self, p: V, reach: f64) -> Option<ClosestPoint> {
+        let limit = square_limit(reach);
+        let found = self.tree().find_best(
+            limit,
+            |node, _| box_distance_squared(&node_bounds(node), [p, p]) as f32,
+            |leaf, _| {
+                let triangle = self.triangle(leaf);
+                let w = closest_point_on_triangle(p, &triangle);
+                let cost = (barycentric_point(&triangle, w) - p).norm_squared() as f32;
+                Some(Candidate { cost, value: w })
+            },
+        );
+        let (triangle, Candidate { value: w, .. }) = found?;
+        let point = barycentric_point(&self.triangle(triangle), w);
+        let normal = self.normal_at(triangle, w);
+        let distance = (p - point).norm();
+        let inside = (p - point).dot(&normal) < 0.0;
+        let signed_distance = if inside { -distance } else { distance };
+        Some(ClosestPoint { triangle, barycentric: w, point, normal, signed_distance })
+    }
+
+    /// The triangle closest to the core of `capsule`, no farther from it than radius + `reach` [m].
+    pub fn closest_triangle(&self, capsule: &Capsule, reach: f64) -> Option<NearTriangle> {
+        let found = self.tree().find_best(
+            square_limit(capsule.radius + reach),
+            |node, _| box_distance_squared(&node_bounds(node), capsule.core) as f32,
+            |leaf, _| {
+                let value = closest_segment_triangle(capsule.core, &self.triangle(leaf));
+                Some(Candidate { cost: value.distance_squared as f32, value })
+            },
+        );
+        let (triangle, Candidate { value: closest, .. }) = found?;
+        Some(NearTriangle { triangle, closest, distance: closest.distance_squared.sqrt() })
+    }
+
+    /// Visits every triangle no farther from the surface of `capsule` than `reach` [m].
+    /// The order is the same in every run.
+    pub fn triangles_near(&self, capsule: &Capsule, reach: f64, mut visit: impl FnMut(NearTriangle)) {
+        let limit = capsule.radius + reach;
+        let limit_squared = limit * limit;
+        self.tree().traverse(|node| {
+            if box_distance_squared(&node_bounds(node), capsule.core) > limit_squared {
+                return TraversalAction::Prune;
+            }
+            if let Some(triangle) = node.leaf_data() {
+                let closest = closest_segment_triangle(capsule.core, &self.triangle(triangle));
+                if closest.distance_squared <= limit_squared {
+                    let distance = closest.distance_squared.sqrt();
+                    visit(NearTriangle { triangle, closest, distance });
+                }
+            }
+            TraversalAction::Continue
+        });
+    }
+
+    /// Outward unit normal at a point of a triangle: the face's inside it, the pseudo-normal on
+    /// its edges and corners, which tells inside from outside everywhere on a closed surface.
+    ///
+    /// # Source
+    /// Bærentzen and Aanæs, Signed distance computation using the angle weighted pseudonormal
+    /// (2005).
+    pub fn normal_at(&self, triangle: u32, barycentric: [f64; 3]) -> V {
+        let corners = self.corners(triangle);
+        let sum = match barycentric.map(|w| w > 0.0) {
+            [true, true, true] => self.area_normal(triangle),
+            [true, false, false] => self.vertex_normal(corners[0]),
+            [false, true, false] => self.vertex_normal(corners[1]),
+            [false, false, true] => self.vertex_normal(corners[2]),
+            [true, true, false] => self.edge_normal(corners[0], corners[1]),
+            [false, true, true] => self.edge_normal(corners[1], corners[2]),
+            _ => self.edge_normal(corners[2], corners[0]),
+        };
+        let vertex_mean = || corners.iter().map(|&v| self.vertex_normal(v)).sum::<V>();
+        unit(sum)
+            .or_else(|| unit(self.area_normal(triangle)))
+            .or_else(|| unit(vertex_mean()))
+            .unwrap_or_else(V::z)
+    }
+
+    /// Outward normal of a triangle, as long as twice its area [m²].
+    pub fn area_normal(&self, triangle: u32) -> V {
+        let [a, b, c] = self.triangle(triangle);
+        (b - a).cross(&(c - a))
+    }
+
+    fn edge_normal(&self, i: u32, j: u32) -> V {
+        self.star(i)
+            .iter()
+            .filter(|&&t| self.corners(t).contains(&j))
+            .filter_map(|&t| unit(self.area_normal(t)))
+            .sum()
+    }
+
+    fn vertex_normal(&self, v: u32) -> V {
+        let weighted = |&t: &u32| {
+            let corners = self.corners(t);
+            let at = corners.iter().position(|&c| c == v)?;
+            let p = self.triangle(t);
+            let (e, f) = (p[(at + 1) % 3] - p[at], p[(at + 2) % 3] - p[at]);
+            Some(unit(e.cross(&f))? * e.angle(&f))
+        };
+        self.star(v).iter().filter_map(weighted).sum()
+    }
+}
+
+fn unit(v: V) -> Option<V> {
+    v.try_normalize(f64::MIN_POSITIVE.sqrt())
+}
+
+fn square_limit(reach: f64) -> f32 {
+    ((reach * reach * 1.000_001) as f32).min(f32::MAX)
+}
+
+/// Lower bound of the squared distance between a box and a segment [m²].
+fn box_distance_squared([lower, upper]: &[V; 2], segment: [V; 2]) -> f64 {
+    let (from, to) = (segment[0].inf(&segment[1]), segment[0].sup(&segment[1]));
+    let apart = (lower - to).sup(&(from - upper)).sup(&V::zeros());
+    let middle = (segment[0] + segment[1]) * 0.5;
+    let off = (lower - middle).sup(&(middle - upper)).sup(&V::zeros());
+    let half_length = (segment[1] - segment[0]).norm() * 0.5;
+    let ball = (off.norm() - half_length).max(0.0);
+    apart.norm_squared().max(ball * ball)
+}
