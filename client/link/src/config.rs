@@ -1,0 +1,101 @@
+//! Whom to reach and who we are.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use scindo_proto::Role;
+use scindo_proto::endpoint::{DEFAULT_ENDPOINT, bulk_endpoint};
+
+use crate::error::LinkError;
+
+/// What [`crate::Link::connect`] needs to know.
+#[derive(Debug, Clone)]
+pub struct LinkConfig {
+    /// First chunk of every key; one per laboratory.
+    pub realm: String,
+    /// The session to join within the realm.
+    pub session: String,
+    /// Zenoh endpoints of the server (or of a router before it), tried in this order.
+    pub connect: Vec<String>,
+    /// What kind of participant we are.
+    pub role: Role,
+    /// Our id, unique in the session: `[a-z0-9_-]{1,64}`. Tools are owned by it.
+    pub id: String,
+    /// How long to try before [`crate::Link::connect`] gives up.
+    pub timeout: Duration,
+    /// A zenoh configuration (JSON5) to start from, for TLS, users and routers. Its connect
+    /// endpoints hold for both sessions if [`Self::connect`] is empty.
+    pub zenoh_file: Option<PathBuf>,
+}
+
+impl LinkConfig {
+    /// A link to the default session on this machine.
+    pub fn new(role: Role, id: &str) -> Self {
+        Self {
+            realm: "scindo".to_owned(),
+            session: "main".to_owned(),
+            connect: vec![DEFAULT_ENDPOINT.to_owned()],
+            role,
+            id: id.to_owned(),
+            timeout: Duration::from_secs(5),
+            zenoh_file: None,
+        }
+    }
+
+    /// The same link to other endpoints.
+    pub fn with_connect(mut self, endpoints: impl IntoIterator<Item = String>) -> Self {
+        self.connect = endpoints.into_iter().collect();
+        self
+    }
+
+    /// Zenoh configuration of the session for poses, contacts and cuts.
+    pub(crate) fn haptic_session(&self) -> Result<zenoh::Config, LinkError> {
+        self.session_config(&self.connect)
+    }
+
+    /// Zenoh configuration of the session for surfaces and reports: the bulk port of each
+    /// endpoint, then the endpoint itself, which relays (a router, or a closed bulk port).
+    pub(crate) fn bulk_session(&self) -> Result<zenoh::Config, LinkError> {
+        let direct = self.connect.iter().filter_map(|e| bulk_endpoint(e));
+        let endpoints: Vec<String> = direct.chain(self.connect.iter().cloned()).collect();
+        self.session_config(&endpoints)
+    }
+
+    /// No discovery: only the endpoints that were named. A client-mode session takes the first
+    /// endpoint that answers and comes back by itself after the server was away.
+    fn session_config(&self, connect: &[String]) -> Result<zenoh::Config, LinkError> {
+        let mut config = match &self.zenoh_file {
+            Some(path) => zenoh::Config::from_file(path).map_err(|e| LinkError::Config {
+                what: format!("zenoh file {}", path.display()),
+                reason: e.to_string(),
+            })?,
+            None => zenoh::Config::default(),
+        };
+        let endpoints = serde_json_list(connect);
+        let timeout_ms = self.timeout.as_millis().to_string();
+        let mut settings = vec![("mode", r#""client""#), ("connect/timeout_ms", &timeout_ms)];
+        if !connect.is_empty() {
+            settings.push(("connect/endpoints", &endpoints));
+        }
+        if self.zenoh_file.is_none() {
+            settings.extend([
+                ("scouting/multicast/enabled", "false"),
+                ("scouting/gossip/enabled", "false"),
+                ("scouting/delay", "50"),
+                ("connect/retry", "{period_init_ms:100,period_max_ms:1000,period_increase_factor:2}"),
+            ]);
+        }
+        for (key, value) in settings {
+            config
+                .insert_json5(key, value)
+                .map_err(|e| LinkError::Config { what: format!("{key} = {value}"), reason: e.to_string() })?;
+        }
+        Ok(config)
+    }
+}
+
+/// A JSON list of strings.
+fn serde_json_list(items: &[String]) -> String {
+    let quoted: Vec<String> = items.iter().map(|i| format!("{i:?}")).collect();
+    format!("[{}]", quoted.join(","))
+}

@@ -1,0 +1,166 @@
+//! The two sessions of a client, its liveliness token, and whether a server is there.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bytes::Bytes;
+use scindo_proto::{Chunk, KeySpace, Role, Topic, WireMessage, decode_as};
+use tokio::sync::watch;
+use zenoh::Session;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::{Sample, SampleKind};
+
+use crate::config::LinkConfig;
+use crate::error::LinkError;
+
+/// Whether a server of our session is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Presence {
+    /// Servers seen: 0 or 1, more only if somebody started two in one session.
+    pub servers: usize,
+    /// Rises each time a server appears, so that one that restarted is told from the old one.
+    pub generation: u64,
+}
+
+/// A connection to a session. Cheap to clone; the last clone closes it.
+#[derive(Clone)]
+pub struct Link {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    keys: KeySpace,
+    id: Chunk,
+    role: Role,
+    presence: watch::Receiver<Presence>,
+    refused: Arc<AtomicU64>,
+    _presence_subscriber: Subscriber<()>,
+    _token: LivelinessToken,
+    haptic: Session,
+    bulk: Session,
+}
+
+impl Link {
+    /// Opens both sessions and announces us. Needs a multi-threaded tokio runtime.
+    pub async fn connect(config: LinkConfig) -> Result<Self, LinkError> {
+        let keys = KeySpace::new(&config.realm, &config.session)?;
+        let id = Chunk::new("client id", &config.id)?;
+        let haptic = open(config.haptic_session()?, &config).await?;
+        let bulk = open(config.bulk_session()?, &config).await?;
+        let (presence, presence_subscriber) = watch_servers(&haptic, &keys).await?;
+        let token = haptic
+            .liveliness()
+            .declare_token(keys.key(&Topic::Live(config.role, id.clone())))
+            .await
+            .map_err(LinkError::zenoh("declare liveliness token"))?;
+        let shared = Shared {
+            keys,
+            id,
+            role: config.role,
+            presence,
+            refused: Arc::default(),
+            _presence_subscriber: presence_subscriber,
+            _token: token,
+            haptic,
+            bulk,
+        };
+        Ok(Self { shared: Arc::new(shared) })
+    }
+
+    /// The keys of the session.
+    pub fn keys(&self) -> &KeySpace {
+        &self.shared.keys
+    }
+
+    /// Our id.
+    pub fn id(&self) -> &str {
+        self.shared.id.as_str()
+    }
+
+    /// Our role.
+    pub fn role(&self) -> Role {
+        self.shared.role
+    }
+
+    /// Whether a server is there; changes wake the receiver.
+    pub fn presence(&self) -> watch::Receiver<Presence> {
+        self.shared.presence.clone()
+    }
+
+    /// Messages that arrived broken and were thrown away.
+    pub fn refused(&self) -> u64 {
+        self.shared.refused.load(Ordering::Relaxed)
+    }
+
+    /// The session of poses, contacts and cuts.
+    pub fn haptic(&self) -> &Session {
+        &self.shared.haptic
+    }
+
+    /// The session of surfaces, reports and rpc.
+    pub fn bulk(&self) -> &Session {
+        &self.shared.bulk
+    }
+
+    /// Calls `on_message` for every valid message of `key`, on zenoh's receiving thread: it must
+    /// not block. Broken messages are counted in [`Self::refused`].
+    pub(crate) async fn subscribe<M: WireMessage>(
+        &self,
+        session: &Session,
+        key: String,
+        on_message: impl Fn(M) + Send + Sync + 'static,
+    ) -> Result<Subscriber<()>, LinkError> {
+        let refused = self.shared.refused.clone();
+        session
+            .declare_subscriber(key)
+            .callback(move |sample| match decode_sample::<M>(&sample) {
+                Ok(message) => on_message(message),
+                Err(error) => {
+                    refused.fetch_add(1, Ordering::Relaxed);
+                    tracing::debug!(key = %sample.key_expr(), %error, "message refused");
+                }
+            })
+            .await
+            .map_err(LinkError::zenoh("declare subscriber"))
+    }
+}
+
+/// The message of a sample, checked.
+pub(crate) fn decode_sample<M: WireMessage>(sample: &Sample) -> Result<M, LinkError> {
+    let payload = Bytes::from(sample.payload().to_bytes().into_owned());
+    Ok(decode_as(&sample.encoding().to_string(), payload)?)
+}
+
+async fn open(session: zenoh::Config, config: &LinkConfig) -> Result<Session, LinkError> {
+    let started = std::time::Instant::now();
+    zenoh::open(session).await.map_err(|e| LinkError::Unreachable {
+        endpoints: config.connect.join(", "),
+        first: config.connect.first().cloned().unwrap_or_default(),
+        waited: started.elapsed(),
+        reason: e.to_string(),
+    })
+}
+
+async fn watch_servers(
+    session: &Session,
+    keys: &KeySpace,
+) -> Result<(watch::Receiver<Presence>, Subscriber<()>), LinkError> {
+    let (sender, receiver) = watch::channel(Presence { servers: 0, generation: 0 });
+    let subscriber = session
+        .liveliness()
+        .declare_subscriber(keys.every_live_role(Role::Server))
+        .history(true)
+        .callback(move |sample| {
+            sender.send_modify(|presence| match sample.kind() {
+                SampleKind::Put => {
+                    presence.servers += 1;
+                    presence.generation += 1;
+                }
+                SampleKind::Delete => presence.servers = presence.servers.saturating_sub(1),
+            });
+        })
+        .await
+        .map_err(LinkError::zenoh("watch server"))?;
+    Ok((receiver, subscriber))
+}

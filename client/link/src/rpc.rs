@@ -1,0 +1,99 @@
+//! Questions and orders to the server. Each waits at most [`TIMEOUT`].
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use scindo_proto::messages::{
+    Error, PauseRequest, ResetRequest, RpcReply, SchemaReply, SessionInfo, SetRequest, StepRequest,
+};
+use scindo_proto::{Topic, Verb, WireMessage, encode, encoding};
+use zenoh::query::ConsolidationMode;
+
+use crate::error::LinkError;
+use crate::link::{Link, decode_sample};
+
+/// How long an answer may take.
+pub const TIMEOUT: Duration = Duration::from_secs(2);
+
+impl Link {
+    /// What is running.
+    pub async fn info(&self) -> Result<SessionInfo, LinkError> {
+        self.call(Verb::Info, Bytes::new(), None).await
+    }
+
+    /// Descriptors of the wire messages.
+    pub async fn schema(&self) -> Result<SchemaReply, LinkError> {
+        self.call(Verb::Schema, Bytes::new(), None).await
+    }
+
+    /// Stops (`true`) or continues the simulation.
+    pub async fn pause(&self, paused: bool) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Pause, &PauseRequest { paused }).await
+    }
+
+    /// Advances a paused simulation by `count` steps (1 to 10,000).
+    pub async fn step(&self, count: u32) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Step, &StepRequest { count }).await
+    }
+
+    /// Back to the start of the scene.
+    pub async fn reset(&self) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Reset, &ResetRequest {}).await
+    }
+
+    /// Changes one parameter; key and value as in a scene file.
+    pub async fn set(&self, key: &str, value: &str) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Set, &SetRequest { key: key.to_owned(), value: value.to_owned() }).await
+    }
+
+    async fn order<M: WireMessage>(&self, verb: Verb, request: &M) -> Result<RpcReply, LinkError> {
+        let reply: RpcReply = self.call(verb, encode(request), Some(encoding::<M>())).await?;
+        match reply.error {
+            Some(error) if !reply.ok => Err(refusal(error)),
+            _ => Ok(reply),
+        }
+    }
+
+    async fn call<R: WireMessage>(
+        &self,
+        verb: Verb,
+        payload: Bytes,
+        encoding: Option<String>,
+    ) -> Result<R, LinkError> {
+        self.ask(self.keys().key(&Topic::Rpc(verb)), payload, encoding).await
+    }
+
+    /// One query on the bulk session, one answer.
+    pub(crate) async fn ask<R: WireMessage>(
+        &self,
+        key: String,
+        payload: Bytes,
+        encoding: Option<String>,
+    ) -> Result<R, LinkError> {
+        let started = std::time::Instant::now();
+        let mut query =
+            self.bulk().get(&key).payload(payload).consolidation(ConsolidationMode::None).timeout(TIMEOUT);
+        if let Some(encoding) = encoding {
+            query = query.encoding(encoding);
+        }
+        let replies = query.await.map_err(LinkError::zenoh("query"))?;
+        let Ok(reply) = replies.recv_async().await else {
+            return Err(LinkError::NoServer { key });
+        };
+        match reply.result() {
+            Ok(sample) => decode_sample(sample),
+            Err(_) if started.elapsed() >= TIMEOUT => Err(LinkError::Timeout { key, waited: TIMEOUT }),
+            Err(error) => {
+                let bytes = Bytes::from(error.payload().to_bytes().into_owned());
+                match prost::Message::decode(bytes) {
+                    Ok(error) => Err(refusal(error)),
+                    Err(_) => Err(LinkError::NoServer { key }),
+                }
+            }
+        }
+    }
+}
+
+fn refusal(error: Error) -> LinkError {
+    LinkError::Refused { code: error.code, message: error.message, hint: error.hint }
+}
