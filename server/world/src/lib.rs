@@ -21,6 +21,12 @@ pub mod mesh_in;
 
 // rigid tools and their contact with bodies: tool
 
+// scene to bodies: regions, loads, meshes
+pub mod build;
+
+// recorded material points
+pub mod probe;
+
 // local contact model for haptics: contact_model
 
 pub mod plan;

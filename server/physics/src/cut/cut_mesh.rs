@@ -8,6 +8,7 @@ use super::blade::{BladeSweep, CutError, CutReport};
 use super::components::Components;
 use super::copies::CopyTable;
 use super::fragments::Fragments;
+use super::locate::piece_at;
 use super::pieces::{Piece, PieceTable};
 use super::surface::{Surface, SurfaceBuilder};
 
@@ -88,6 +89,11 @@ impl CutMesh {
     /// Rest position [m] of every copy.
     pub fn rest_positions(&self) -> Vec<Vector3<f64>> {
         self.copies.node.iter().map(|&n| self.mesh.nodes[n as usize]).collect()
+    }
+
+    /// The piece of an element that holds the point with these barycentric coordinates.
+    pub fn piece_at(&self, element: u32, barycentric: [f64; 4]) -> u32 {
+        piece_at(&self.mesh, &self.fragments, element, barycentric)
     }
 
     /// Undoes all cuts; the epoch keeps rising.

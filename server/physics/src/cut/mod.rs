@@ -27,6 +27,7 @@ mod pieces;
 mod copies;
 mod surface;
 mod components;
+mod locate;
 mod cut_mesh;
 
 pub use blade::{BladeSweep, CutError, CutReport, NewCopy};

@@ -1,0 +1,5 @@
+//! From checked objects to bodies: meshes opened, nodes selected, forces shared.
+
+pub mod region;
+
+pub mod load;

@@ -1,0 +1,169 @@
+//! Probes: material points whose path is recorded.
+//!
+//! A probe is bound to an element and barycentric coordinates at rest. On a cut, `side` says
+//! which piece it belongs to: the one that lies next to the point in that direction.
+
+use nalgebra::{Matrix3, Vector3};
+use scindo_physics::cut::CutMesh;
+use scindo_physics::mesh::TetMesh;
+
+/// How far a point is moved towards its side before it is looked up, relative to the element.
+/// Far above rounding, far below any piece that can be seen.
+const SIDE_STEP: f64 = 1e-6;
+
+/// How far outside an element a point still counts as inside, in barycentric units.
+const INSIDE: f64 = 1e-9;
+
+/// A material point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Name.
+    pub id: String,
+    /// Index of the body.
+    pub body: usize,
+    /// Rest position [m].
+    pub rest_m: Vector3<f64>,
+    /// Element it lies in.
+    pub element: u32,
+    /// Shape functions of that element at the point; Σ = 1.
+    pub weights: [f64; 4],
+    /// Barycentric coordinates by which its piece is looked up: the point, moved to its side.
+    pub lookup: [f64; 4],
+    /// The copies it moves with; follows the topology.
+    pub copies: [u32; 4],
+}
+
+/// Where a point lies that is in no element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outside {
+    /// The nearest point of the mesh [m].
+    pub nearest_m: Vector3<f64>,
+    /// How far away that is [m].
+    pub distance_m: f64,
+}
+
+impl Probe {
+    /// Binds a point to the uncut mesh.
+    ///
+    /// # Errors
+    /// The nearest point of the mesh, if the point lies in no element.
+    pub fn bind(
+        id: &str,
+        body: usize,
+        mesh: &TetMesh,
+        rest_m: Vector3<f64>,
+        side: Option<Vector3<f64>>,
+    ) -> Result<Self, Outside> {
+        let aim = side.map_or(rest_m, |side| rest_m + side.normalize() * (SIDE_STEP * cell_size(mesh)));
+        let element = element_at(mesh, aim)
+            .or_else(|| element_at(mesh, rest_m))
+            .ok_or_else(|| nearest(mesh, rest_m))?;
+        let corners = mesh.corners(element);
+        Ok(Self {
+            id: id.to_owned(),
+            body,
+            rest_m,
+            element: element as u32,
+            weights: barycentric(&corners, rest_m),
+            lookup: barycentric(&corners, aim),
+            copies: mesh.tets[element],
+        })
+    }
+
+    /// Follows a change of topology: takes the copies of the piece the point belongs to.
+    pub fn follow(&mut self, cut: &CutMesh) {
+        self.copies = cut.pieces()[cut.piece_at(self.element, self.lookup) as usize].copies;
+    }
+
+    /// Current position [m], given the position of every copy.
+    pub fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+        self.copies.iter().zip(&self.weights).map(|(copy, weight)| x[*copy as usize] * *weight).sum()
+    }
+}
+
+/// Mean edge length [m] of an element, from the mean volume.
+fn cell_size(mesh: &TetMesh) -> f64 {
+    let volume: f64 = mesh.volumes().iter().sum();
+    (6.0 * volume / mesh.tets.len().max(1) as f64).cbrt()
+}
+
+/// The element in which a point lies deepest.
+fn element_at(mesh: &TetMesh, point: Vector3<f64>) -> Option<usize> {
+    let depth = |e: usize| barycentric(&mesh.corners(e), point).into_iter().fold(f64::INFINITY, f64::min);
+    let deepest =
+        (0..mesh.tets.len()).map(|e| (depth(e), e)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+    deepest.filter(|(depth, _)| *depth >= -INSIDE).map(|(_, e)| e)
+}
+
+fn barycentric(x: &[Vector3<f64>; 4], point: Vector3<f64>) -> [f64; 4] {
+    let edges = Matrix3::from_columns(&[x[1] - x[0], x[2] - x[0], x[3] - x[0]]);
+    let inner =
+        edges.try_inverse().map_or(Vector3::repeat(f64::NEG_INFINITY), |inverse| inverse * (point - x[0]));
+    [1.0 - inner.sum(), inner.x, inner.y, inner.z]
+}
+
+fn nearest(mesh: &TetMesh, point: Vector3<f64>) -> Outside {
+    let mut best = Outside { nearest_m: point, distance_m: f64::INFINITY };
+    for face in mesh.boundary_faces() {
+        let candidate = nearest_on_triangle(face.nodes.map(|n| mesh.nodes[n as usize]), point);
+        let distance_m = (candidate - point).norm();
+        if distance_m < best.distance_m {
+            best = Outside { nearest_m: candidate, distance_m };
+        }
+    }
+    best
+}
+
+/// Nearest point of a triangle (Ericson 2005, section 5.1.5).
+fn nearest_on_triangle([a, b, c]: [Vector3<f64>; 3], p: Vector3<f64>) -> Vector3<f64> {
+    let on_edge = |a: Vector3<f64>, b: Vector3<f64>| {
+        let t = (p - a).dot(&(b - a)) / (b - a).norm_squared();
+        a + (b - a) * t.clamp(0.0, 1.0)
+    };
+    let normal = (b - a).cross(&(c - a));
+    let foot = p - normal * ((p - a).dot(&normal) / normal.norm_squared());
+    let inside = |a: Vector3<f64>, b: Vector3<f64>| (b - a).cross(&(foot - a)).dot(&normal) >= 0.0;
+    if inside(a, b) && inside(b, c) && inside(c, a) {
+        return foot;
+    }
+    let candidates = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
+    candidates.into_iter().min_by(|q, r| (q - p).norm().total_cmp(&(r - p).norm())).unwrap_or(foot)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use scindo_physics::mesh::{BoxPattern, box_mesh};
+
+    fn block() -> TetMesh {
+        box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [2, 2, 2], BoxPattern::Tet6)
+    }
+
+    #[test]
+    fn a_probe_reproduces_its_point() {
+        let (mesh, point) = (block(), Vector3::new(0.3, 0.7, 0.2));
+        let probe = Probe::bind("p", 0, &mesh, point, None).unwrap();
+        assert!((probe.position(&mesh.nodes) - point).norm() < 1e-14);
+    }
+
+    #[test]
+    fn side_chooses_the_element_where_the_point_lies_between_two() {
+        let (mesh, point) = (block(), Vector3::new(0.25, 0.25, 0.5));
+        let centre_z = |side: Vector3<f64>| {
+            let probe = Probe::bind("p", 0, &mesh, point, Some(side)).unwrap();
+            assert!((probe.position(&mesh.nodes) - point).norm() < 1e-14);
+            mesh.corners(probe.element as usize).iter().map(|x| x.z).sum::<f64>() / 4.0
+        };
+        assert!(centre_z(Vector3::z()) > 0.5 && centre_z(-Vector3::z()) < 0.5);
+    }
+
+    #[test]
+    fn a_point_outside_is_told_the_nearest_point() {
+        let outside = Probe::bind("p", 0, &block(), Vector3::new(0.5, 0.4, 1.5), None).unwrap_err();
+        assert!((outside.nearest_m - Vector3::new(0.5, 0.4, 1.0)).norm() < 1e-12);
+        assert!((outside.distance_m - 0.5).abs() < 1e-12);
+        let corner = Probe::bind("p", 0, &block(), Vector3::new(2.0, 2.0, 2.0), None).unwrap_err();
+        assert!((corner.nearest_m - Vector3::repeat(1.0)).norm() < 1e-12);
+    }
+}
