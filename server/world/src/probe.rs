@@ -4,6 +4,7 @@
 //! which piece it belongs to: the one that lies next to the point in that direction.
 
 use nalgebra::{Matrix3, Vector3};
+use scindo_collision::{barycentric_point, closest_point_on_triangle};
 use scindo_physics::cut::CutMesh;
 use scindo_physics::mesh::TetMesh;
 
@@ -105,29 +106,14 @@ fn barycentric(x: &[Vector3<f64>; 4], point: Vector3<f64>) -> [f64; 4] {
 fn nearest(mesh: &TetMesh, point: Vector3<f64>) -> Outside {
     let mut best = Outside { nearest_m: point, distance_m: f64::INFINITY };
     for face in mesh.boundary_faces() {
-        let candidate = nearest_on_triangle(face.nodes.map(|n| mesh.nodes[n as usize]), point);
+        let triangle = face.nodes.map(|n| mesh.nodes[n as usize]);
+        let candidate = barycentric_point(&triangle, closest_point_on_triangle(point, &triangle));
         let distance_m = (candidate - point).norm();
         if distance_m < best.distance_m {
             best = Outside { nearest_m: candidate, distance_m };
         }
     }
     best
-}
-
-/// Nearest point of a triangle (Ericson 2005, section 5.1.5).
-fn nearest_on_triangle([a, b, c]: [Vector3<f64>; 3], p: Vector3<f64>) -> Vector3<f64> {
-    let on_edge = |a: Vector3<f64>, b: Vector3<f64>| {
-        let t = (p - a).dot(&(b - a)) / (b - a).norm_squared();
-        a + (b - a) * t.clamp(0.0, 1.0)
-    };
-    let normal = (b - a).cross(&(c - a));
-    let foot = p - normal * ((p - a).dot(&normal) / normal.norm_squared());
-    let inside = |a: Vector3<f64>, b: Vector3<f64>| (b - a).cross(&(foot - a)).dot(&normal) >= 0.0;
-    if inside(a, b) && inside(b, c) && inside(c, a) {
-        return foot;
-    }
-    let candidates = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
-    candidates.into_iter().min_by(|q, r| (q - p).norm().total_cmp(&(r - p).norm())).unwrap_or(foot)
 }
 
 #[cfg(test)]

@@ -1,5 +1,3 @@
 //! From checked objects to bodies: meshes opened, nodes selected, forces shared.
 
 pub mod region;
-
-pub mod load;

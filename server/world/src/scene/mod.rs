@@ -19,7 +19,10 @@ mod check;
 
 use std::path::{Path, PathBuf};
 
-pub use checked::CheckedScene;
+pub use checked::{
+    BodySpec, CellSplit, CheckedScene, CutSpec, EffectSwitches, FixSpec, Law, LoadSpec, MeshSource,
+    PathPoint, ProbeSpec, PublishRates, Region, Share, ToolSpec,
+};
 pub use problem::{Fault, Place, Problem, SceneError};
 pub use schema::{json_schema, key_reference};
 
