@@ -1,11 +1,16 @@
 //! Continuum mechanics of one deformable, cuttable body.
 //!
-//! Modules stand in the order of the data: a [`mesh`] says where the material is at rest.
+//! Modules stand in the order of the data: a [`mesh`] says where the material is at rest, a
+//! [`material`] what it is made of, an [`element`] how it resists.
 //!
 //! # Invariants
 //! No input or output, no clock, no thread that outlives its owner, no global state; the result of
 //! a step does not depend on the number of threads; no non-finite number leaves a body.
 //! SI units throughout. State is `f64`, kernels and solver vectors are `f32`.
 
+#![allow(non_snake_case)] // the symbols of the field: F, R, P, K, M
+
 pub mod mesh;
+pub mod material;
+pub mod element;
 pub mod cut;
