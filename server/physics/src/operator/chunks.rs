@@ -1,0 +1,205 @@
+//! How the pieces are shared out: chunks that fit the first-level cache, and inside them batches of
+//! eight pieces that share no copy.
+//!
+//! The division depends on the mesh only, never on the number of threads. Every chunk sums into
+//! vectors of its own; copies on the border of chunks are then added up in chunk order.
+
+use nalgebra::Vector3;
+
+use crate::cut::Piece;
+use crate::element::LANES;
+
+/// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
+/// body of a few thousand pieces still has work for several threads.
+const CHUNK_PIECES: usize = 1024;
+/// Batches that are kept open while pieces are packed; more separates neighbours better.
+const OPEN_BATCHES: usize = 12;
+
+/// No piece in this lane.
+pub const NO_PIECE: u32 = u32::MAX;
+
+/// The pieces of one chunk in batches, with local numbers for their copies.
+#[derive(Clone, Debug)]
+pub struct ChunkPlan {
+    /// Copy of every local number, ascending. One more number, `copies.len()`, is the waste bin of
+    /// unused lanes.
+    pub copies: Vec<u32>,
+    /// Piece in every lane of every batch, or [`NO_PIECE`].
+    pub pieces: Vec<[u32; LANES]>,
+    /// Local numbers of the four copies of every lane.
+    pub nodes: Vec<[[u16; LANES]; 4]>,
+}
+
+/// Divides `pieces` into chunks by recursive bisection of `centres` (rest centroid of every piece).
+pub fn plan_chunks(pieces: &[Piece], centres: &[Vector3<f64>]) -> Vec<ChunkPlan> {
+    let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
+    let n_chunks = pieces.len().div_ceil(CHUNK_PIECES);
+    let mut plans = Vec::with_capacity(n_chunks);
+    bisect(&mut order, n_chunks, centres, &mut |chunk| plans.push(plan_chunk(chunk, pieces)));
+    plans
+}
+
+fn bisect(order: &mut [u32], parts: usize, centres: &[Vector3<f64>], emit: &mut dyn FnMut(&mut [u32])) {
+    if parts <= 1 {
+        if !order.is_empty() {
+            order.sort_unstable();
+            emit(order);
+        }
+        return;
+    }
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for &p in order.iter() {
+        low = low.inf(&centres[p as usize]);
+        high = high.sup(&centres[p as usize]);
+    }
+    let axis = (high - low).imax();
+    let left = parts / 2;
+    let middle = (order.len() * left / parts).min(order.len() - 1);
+    order.select_nth_unstable_by(middle, |&a, &b| {
+        centres[a as usize][axis].total_cmp(&centres[b as usize][axis]).then(a.cmp(&b))
+    });
+    let (first, second) = order.split_at_mut(middle);
+    bisect(first, left, centres, emit);
+    bisect(second, parts - left, centres, emit);
+}
+
+fn plan_chunk(chunk: &[u32], pieces: &[Piece]) -> ChunkPlan {
+    let mut copies: Vec<u32> = chunk.iter().flat_map(|&p| pieces[p as usize].copies).collect();
+    copies.sort_unstable();
+    copies.dedup();
+    let batches = pack(chunk, pieces);
+    let waste = copies.len() as u16;
+    let local = |copy: u32| copies.binary_search(&copy).map_or(waste, |l| l as u16);
+    let nodes = batches
+        .iter()
+        .map(|batch| {
+            let mut ids = [[waste; LANES]; 4];
+            for (lane, &p) in batch.iter().enumerate() {
+                if p != NO_PIECE {
+                    for (a, id) in ids.iter_mut().enumerate() {
+                        id[lane] = local(pieces[p as usize].copies[a]);
+                    }
+                }
+            }
+            ids
+        })
+        .collect();
+    ChunkPlan { nodes, pieces: batches, copies }
+}
+
+/// First-fit packing into batches without a common copy, over a short list of open batches.
+fn pack(chunk: &[u32], pieces: &[Piece]) -> Vec<[u32; LANES]> {
+    let mut full = Vec::with_capacity(chunk.len() / LANES + OPEN_BATCHES);
+    let mut open: Vec<Vec<u32>> = Vec::with_capacity(OPEN_BATCHES);
+    let close = |batch: &[u32]| {
+        let mut lanes = [NO_PIECE; LANES];
+        lanes[..batch.len()].copy_from_slice(batch);
+        lanes
+    };
+    for &p in chunk {
+        let copies = &pieces[p as usize].copies;
+        let fits = |batch: &Vec<u32>| {
+            batch.iter().all(|&other| pieces[other as usize].copies.iter().all(|c| !copies.contains(c)))
+        };
+        match open.iter().position(fits) {
+            Some(b) => {
+                open[b].push(p);
+                if open[b].len() == LANES {
+                    full.push(close(&open.remove(b)));
+                }
+            }
+            None => {
+                if open.len() == OPEN_BATCHES {
+                    full.push(close(&open.remove(0)));
+                }
+                open.push(vec![p]);
+            }
+        }
+    }
+    full.extend(open.iter().map(|batch| close(batch)));
+    full
+}
+
+/// Where the chunks' sums of every copy lie, in chunk order.
+#[derive(Clone, Debug, Default)]
+pub struct Gather {
+    /// Slots of copy c are `slots[first[c]..first[c + 1]]`.
+    pub first: Vec<u32>,
+    /// (chunk, local number).
+    pub slots: Vec<(u32, u32)>,
+}
+
+impl Gather {
+    /// Lists the slots of every copy.
+    pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
+        let mut first = vec![0_u32; n_copies + 1];
+        for copies in chunks.clone() {
+            copies.iter().for_each(|&c| first[c as usize + 1] += 1);
+        }
+        for c in 0..n_copies {
+            first[c + 1] += first[c];
+        }
+        let mut next = first.clone();
+        let mut slots = vec![(0, 0); first[n_copies] as usize];
+        for (k, copies) in chunks.enumerate() {
+            for (l, &c) in copies.iter().enumerate() {
+                slots[next[c as usize] as usize] = (k as u32, l as u32);
+                next[c as usize] += 1;
+            }
+        }
+        Self { first, slots }
+    }
+
+    /// Slots of copy `c`.
+    #[inline(always)]
+    pub fn of(&self, c: usize) -> &[(u32, u32)] {
+        &self.slots[self.first[c] as usize..self.first[c + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{BoxPattern, box_mesh};
+
+    #[test]
+    fn every_piece_is_in_one_lane_and_lanes_of_a_batch_share_no_copy() {
+        let pattern = BoxPattern::Tet5 { parity: false };
+        let mesh = box_mesh(Vector3::zeros(), Vector3::new(1.0, 0.2, 0.2), [40, 8, 8], pattern);
+        let pieces: Vec<Piece> = (0..mesh.tets.len())
+            .map(|e| Piece { element: e as u32, fraction: 1.0, copies: mesh.tets[e] })
+            .collect();
+        let centres: Vec<_> =
+            (0..mesh.tets.len()).map(|e| mesh.corners(e).iter().sum::<Vector3<f64>>() / 4.0).collect();
+        let plans = plan_chunks(&pieces, &centres);
+        let mut seen = vec![0; pieces.len()];
+        let mut batches = 0;
+        for plan in &plans {
+            batches += plan.pieces.len();
+            for (lanes, nodes) in plan.pieces.iter().zip(&plan.nodes) {
+                let mut used: Vec<u32> = Vec::new();
+                for lane in 0..LANES {
+                    if lanes[lane] != NO_PIECE {
+                        seen[lanes[lane] as usize] += 1;
+                        for (a, ids) in nodes.iter().enumerate() {
+                            let copy = plan.copies[ids[lane] as usize];
+                            assert_eq!(copy, pieces[lanes[lane] as usize].copies[a]);
+                            assert!(!used.contains(&copy));
+                            used.push(copy);
+                        }
+                    }
+                }
+            }
+        }
+        assert!(seen.iter().all(|&n| n == 1));
+        assert!(batches * LANES < pieces.len() * 21 / 20, "{batches} batches waste too many lanes");
+        let gather = Gather::new(plans.iter().map(|p| &p.copies[..]), mesh.nodes.len());
+        for c in 0..mesh.nodes.len() {
+            for &(k, l) in gather.of(c) {
+                assert_eq!(plans[k as usize].copies[l as usize], c as u32);
+            }
+        }
+        let held: usize = plans.iter().map(|p| p.copies.len()).sum();
+        assert_eq!(held, gather.slots.len());
+    }
+}

@@ -1,0 +1,123 @@
+//! The matrix of one implicit step: A = (1 + hα) M + (h² + hβ) K̂ + h² Σ k J Jᵀ, with fixed copies
+//! filtered out.
+
+use super::{BLOCK, Block6, Elastic, LinearOperator, Padded};
+use crate::team::{Team, blocks};
+
+/// A copy whose displacement is prescribed in some directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FixedCopy {
+    /// The copy.
+    pub copy: u32,
+    /// Which of x, y, z are prescribed.
+    pub axes: [bool; 3],
+    /// Prescribed position [m]; used where `axes` says so.
+    pub position_m: [f64; 3],
+}
+
+/// Stiffness along `direction` between a material point and the world, or in all directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spring {
+    /// Copies that carry the point.
+    pub copies: [u32; 4],
+    /// Their weights, Σ = 1.
+    pub weights: [f32; 4],
+    /// Unit direction of the only stiff direction, or `None` for all three.
+    pub direction: Option<[f32; 3]>,
+    /// Factor of J Jᵀ in the operator: h² k.
+    pub stiffness: f32,
+}
+
+/// A of one step, as an operator that borrows its parts.
+#[derive(Debug)]
+pub struct SystemOperator<'a> {
+    /// (h² + hβ) K̂.
+    pub elastic: &'a mut Elastic,
+    /// Mass of every copy [kg].
+    pub mass: &'a [f32],
+    /// 1 + hα.
+    pub mass_factor: f32,
+    /// Springs that are under load in this step.
+    pub springs: &'a [Spring],
+    /// Prescribed copies.
+    pub fixed: &'a [FixedCopy],
+}
+
+impl LinearOperator for SystemOperator<'_> {
+    fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
+        self.elastic.apply_chunks(team, x);
+        let (elastic, mass, factor) = (&*self.elastic, self.mass, self.mass_factor);
+        team.for_blocks(blocks(y, BLOCK), |block, y| {
+            for (i, y) in y.iter_mut().enumerate() {
+                let c = block * BLOCK + i;
+                *y = x[c].map(|v| factor * mass[c] * v);
+                elastic.add_sums(c, y);
+            }
+        });
+        self.springs.iter().for_each(|spring| spring.add_to(x, y));
+        filter(self.fixed, y);
+    }
+}
+
+impl SystemOperator<'_> {
+    /// Adds mass and springs to the diagonal blocks of (h² + hβ) K̂, which gives those of A.
+    pub fn complete_diagonal(&self, diagonal: &mut [Block6]) {
+        for (block, &mass) in diagonal.iter_mut().zip(self.mass) {
+            for i in [0, 3, 5] {
+                block[i] += self.mass_factor * mass;
+            }
+        }
+        for spring in self.springs {
+            let n = |i: usize, j: usize| match spring.direction {
+                Some(n) => n[i] * n[j],
+                None => f32::from(u8::from(i == j)),
+            };
+            for (&copy, &w) in spring.copies.iter().zip(&spring.weights) {
+                let block = &mut diagonal[copy as usize];
+                for (entry, (i, j)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate() {
+                    block[entry] += spring.stiffness * w * w * n(i, j);
+                }
+            }
+        }
+    }
+}
+
+impl Spring {
+    /// Σ w x of the four copies.
+    pub fn point(&self, x: &[Padded]) -> [f32; 3] {
+        let mut p = [0.0; 3];
+        for (&copy, &w) in self.copies.iter().zip(&self.weights) {
+            for (p, x) in p.iter_mut().zip(&x[copy as usize]) {
+                *p += w * x;
+            }
+        }
+        p
+    }
+
+    fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
+        let p = self.point(x);
+        let f = match self.direction {
+            Some(n) => {
+                let along = self.stiffness * (n[0] * p[0] + n[1] * p[1] + n[2] * p[2]);
+                n.map(|n| along * n)
+            }
+            None => p.map(|p| self.stiffness * p),
+        };
+        for (&copy, &w) in self.copies.iter().zip(&self.weights) {
+            for (y, f) in y[copy as usize].iter_mut().zip(&f) {
+                *y += w * f;
+            }
+        }
+    }
+}
+
+/// Sets the prescribed directions of `v` to 0.
+pub fn filter(fixed: &[FixedCopy], v: &mut [Padded]) {
+    for copy in fixed {
+        for (v, fixed) in v[copy.copy as usize].iter_mut().zip(copy.axes) {
+            if fixed {
+                *v = 0.0;
+            }
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! A small team of threads that works on one step together.
+//!
+//! The caller's thread is member 0; the others spin briefly between phases and sleep between steps.
+//! Every phase is a fixed list of tasks, cut into one contiguous range per member. Tasks write only
+//! their own blocks and partial results are summed in task order, so the result does not depend on
+//! the number of members. No phase allocates.
+
+#![allow(unsafe_code)] // sharing a borrowed closure and disjoint blocks with persistent threads
+
+use std::cell::UnsafeCell;
+use std::marker::PhantomData;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::thread::JoinHandle;
+
+/// Idle members look this often for the next phase before they sleep (about 30 µs).
+const SPINS_BEFORE_SLEEP: u32 = 4_000;
+/// The caller gives up its time slice after this many looks at unfinished members.
+const SPINS_BEFORE_YIELD: u32 = 2_000;
+
+/// Persistent threads that run phases for their owner.
+#[derive(Debug)]
+pub struct Team {
+    shared: Arc<Shared>,
+    members: Vec<JoinHandle<()>>,
+}
+
+type Job = *const (dyn Fn(usize) + Sync);
+
+#[derive(Debug)]
+struct Shared {
+    /// What every member runs in the current phase; written only while all members are idle.
+    job: UnsafeCell<Option<Job>>,
+    phase: AtomicU64,
+    unfinished: AtomicUsize,
+    stop: AtomicBool,
+    panicked: AtomicBool,
+}
+
+// SAFETY: `job` is written by the owner while `unfinished` is 0, and read by members only between
+// the release store of `phase` and their release decrement of `unfinished`.
+unsafe impl Sync for Shared {}
+// SAFETY: the pointer inside `job` is only dereferenced while the owner's `run` keeps it alive.
+unsafe impl Send for Shared {}
+
+impl Team {
+    /// A team of `threads` members, at least one: the caller itself.
+    pub fn new(threads: usize) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared {
+            job: UnsafeCell::new(None),
+            phase: AtomicU64::new(0),
+            unfinished: AtomicUsize::new(0),
+            stop: AtomicBool::new(false),
+            panicked: AtomicBool::new(false),
+        });
+        let mut team = Self { shared, members: Vec::new() };
+        for member in 1..threads {
+            let shared = Arc::clone(&team.shared);
+            let thread = std::thread::Builder::new().name(format!("physics-{member}"));
+            team.members.push(thread.spawn(move || shared.serve(member))?);
+        }
+        Ok(team)
+    }
+
+    /// Number of members, the caller included.
+    pub fn threads(&self) -> usize {
+        self.members.len() + 1
+    }
+
+    /// Runs `task(t, block t of `state`)` once for every block and returns when all are done.
+    pub fn for_blocks<B: Blocks>(&mut self, state: B, task: impl Fn(usize, B::Part) + Sync) {
+        let (n, threads) = (state.count(), self.threads());
+        self.run(&|member| {
+            for t in n * member / threads..n * (member + 1) / threads {
+                // SAFETY: the ranges of the members partition 0..n, so each block is taken once.
+                task(t, unsafe { state.part(t) });
+            }
+        });
+    }
+
+    /// Runs `job(member)` on every member.
+    fn run(&mut self, job: &(dyn Fn(usize) + Sync)) {
+        if self.members.is_empty() {
+            return job(0);
+        }
+        // SAFETY: members are idle (`unfinished` is 0), so nobody reads the cell; the lifetime is
+        // only extended until this function has seen every member finish.
+        unsafe { *self.shared.job.get() = Some(std::mem::transmute::<*const (dyn Fn(usize) + Sync + '_), Job>(job)) };
+        self.shared.unfinished.store(self.members.len(), Ordering::Relaxed);
+        self.shared.phase.fetch_add(1, Ordering::Release);
+        for member in &self.members {
+            member.thread().unpark();
+        }
+        let own = catch_unwind(AssertUnwindSafe(|| job(0)));
+        let mut spins = 0_u32;
+        while self.shared.unfinished.load(Ordering::Acquire) > 0 {
+            spins += 1;
+            if spins < SPINS_BEFORE_YIELD { std::hint::spin_loop() } else { std::thread::yield_now() }
+        }
+        if let Err(panic) = own {
+            std::panic::resume_unwind(panic);
+        }
+        assert!(!self.shared.panicked.load(Ordering::Relaxed), "a physics thread panicked");
+    }
+}
+
+impl Drop for Team {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        self.shared.phase.fetch_add(1, Ordering::Release);
+        for member in self.members.drain(..) {
+            member.thread().unpark();
+            // A member that panicked has been reported by `run` already.
+            let _ = member.join();
+        }
+    }
+}
+
+impl Shared {
+    fn serve(&self, member: usize) {
+        let mut seen = 0;
+        loop {
+            seen = self.wait_for_phase_after(seen);
+            if self.stop.load(Ordering::Relaxed) {
+                return;
+            }
+            // SAFETY: the owner wrote the job before the phase it announced, keeps it alive until
+            // `unfinished` reaches 0, and the closure is Sync.
+            let done = catch_unwind(AssertUnwindSafe(|| unsafe {
+                if let Some(job) = *self.job.get() {
+                    (*job)(member);
+                }
+            }));
+            if done.is_err() {
+                self.panicked.store(true, Ordering::Relaxed);
+            }
+            self.unfinished.fetch_sub(1, Ordering::Release);
+        }
+    }
+
+    fn wait_for_phase_after(&self, seen: u64) -> u64 {
+        let mut spins = 0;
+        loop {
+            let phase = self.phase.load(Ordering::Acquire);
+            if phase != seen {
+                return phase;
+            }
+            spins += 1;
+            if spins < SPINS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::park() }
+        }
+    }
+}
+
+/// Something that can be taken apart into blocks that do not overlap.
+///
+/// # Safety
+/// Parts of different numbers must not overlap.
+pub unsafe trait Blocks: Sync {
+    /// One block.
+    type Part;
+    /// Number of blocks.
+    fn count(&self) -> usize;
+    /// Block `i`.
+    ///
+    /// # Safety
+    /// Each number below `count` is taken at most once.
+    unsafe fn part(&self, i: usize) -> Self::Part;
+}
+
+/// A slice in blocks of a fixed size (the last may be shorter).
+#[derive(Debug)]
+pub struct BlocksMut<'a, T> {
+    start: *mut T,
+    length: usize,
+    size: usize,
+    slice: PhantomData<&'a mut [T]>,
+}
+
+/// Takes `slice` apart into blocks of `size`.
+pub fn blocks<T: Send>(slice: &mut [T], size: usize) -> BlocksMut<'_, T> {
+    BlocksMut { start: slice.as_mut_ptr(), length: slice.len(), size: size.max(1), slice: PhantomData }
+}
+
+// SAFETY: a shared `BlocksMut` only hands out disjoint parts (contract of `part`).
+unsafe impl<T: Send> Sync for BlocksMut<'_, T> {}
+
+// SAFETY: blocks are [i·size, (i+1)·size) of one exclusively borrowed slice.
+unsafe impl<'a, T: Send> Blocks for BlocksMut<'a, T> {
+    type Part = &'a mut [T];
+
+    fn count(&self) -> usize {
+        self.length.div_ceil(self.size)
+    }
+
+    unsafe fn part(&self, i: usize) -> &'a mut [T] {
+        assert!(i < self.count());
+        let first = i * self.size;
+        let length = self.size.min(self.length - first);
+        // SAFETY: in bounds by the lines above, exclusive by the contract of `part`.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(first), length) }
+    }
+}
+
+macro_rules! blocks_of_tuples {
+    ($($name:ident $at:tt),+) => {
+        // SAFETY: parts are tuples of parts that do not overlap.
+        unsafe impl<$($name: Blocks),+> Blocks for ($($name,)+) {
+            type Part = ($($name::Part,)+);
+            fn count(&self) -> usize {
+                let n = self.0.count();
+                $(assert_eq!(self.$at.count(), n, "as many blocks in every slice");)+
+                n
+            }
+            unsafe fn part(&self, i: usize) -> Self::Part {
+                // SAFETY: forwarded contract.
+                unsafe { ($(self.$at.part(i),)+) }
+            }
+        }
+    };
+}
+blocks_of_tuples!(A 0, B 1);
+blocks_of_tuples!(A 0, B 1, C 2);
+blocks_of_tuples!(A 0, B 1, C 2, D 3);
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_block_is_visited_once_by_any_number_of_members() {
+        for threads in [1, 2, 3, 8] {
+            let mut team = Team::new(threads).unwrap();
+            let (mut values, mut sums) = (vec![0_u32; 1003], vec![0_u32; 101]);
+            for _ in 0..200 {
+                team.for_blocks((blocks(&mut values, 10), blocks(&mut sums, 1)), |i, (part, sum)| {
+                    part.iter_mut().for_each(|v| *v += i as u32);
+                    sum[0] = part.iter().sum();
+                });
+            }
+            assert!(values.iter().enumerate().all(|(k, &v)| v == 200 * (k as u32 / 10)));
+            assert_eq!(sums.iter().sum::<u32>(), values.iter().sum());
+        }
+    }
+
+    #[test]
+    fn a_panic_of_a_member_reaches_the_caller_and_the_team_can_be_dropped() {
+        let mut team = Team::new(2).unwrap();
+        let mut values = [0; 2];
+        let panicked = catch_unwind(AssertUnwindSafe(|| {
+            team.for_blocks(blocks(&mut values, 1), |i, _| assert!(i == 0, "expected"));
+        }));
+        assert!(panicked.is_err());
+    }
+}
