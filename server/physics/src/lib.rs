@@ -1,7 +1,9 @@
 //! Continuum mechanics of one deformable, cuttable body.
 //!
 //! Modules stand in the order of the data: a [`mesh`] says where the material is at rest, a
-//! [`material`] what it is made of, an [`element`] how it resists.
+//! [`material`] what it is made of, an [`element`] how it resists, a [`cut`] which pieces and copies
+//! there are, an [`operator`] how forces follow from displacements, a [`solver`] inverts that, an
+//! [`integrator`] makes a step of it, and a [`body`] holds all of this together for the world.
 //!
 //! # Invariants
 //! No input or output, no clock, no thread that outlives its owner, no global state; the result of
@@ -9,8 +11,14 @@
 //! SI units throughout. State is `f64`, kernels and solver vectors are `f32`.
 
 #![allow(non_snake_case)] // the symbols of the field: F, R, P, K, M
+#![allow(clippy::needless_range_loop)] // i, j, k are tensor indices and lanes
 
 pub mod mesh;
 pub mod material;
 pub mod element;
 pub mod cut;
+pub mod team;
+pub mod operator;
+pub mod solver;
+pub mod integrator;
+pub mod body;

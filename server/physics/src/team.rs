@@ -86,7 +86,9 @@ impl Team {
         }
         // SAFETY: members are idle (`unfinished` is 0), so nobody reads the cell; the lifetime is
         // only extended until this function has seen every member finish.
-        unsafe { *self.shared.job.get() = Some(std::mem::transmute::<*const (dyn Fn(usize) + Sync + '_), Job>(job)) };
+        unsafe {
+            *self.shared.job.get() = Some(std::mem::transmute::<*const (dyn Fn(usize) + Sync + '_), Job>(job))
+        };
         self.shared.unfinished.store(self.members.len(), Ordering::Relaxed);
         self.shared.phase.fetch_add(1, Ordering::Release);
         for member in &self.members {

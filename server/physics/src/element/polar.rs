@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Steps are capped at |ω| = 0.5, that is at 106° per iteration.
 const LARGEST_STEP: f64 = 0.5;
-/// Guard of the Hessian relative to ‖F‖: below it the problem is a saddle or nearly flat.
-const HESSIAN_FLOOR: f64 = 0.05;
+/// Curvatures count by size, so that every step descends, and at least this much of ‖F‖.
+const HESSIAN_FLOOR: f64 = 1e-9;
 const MOST_ITERATIONS: usize = 60;
 
 /// The rotation R that maximises tr(RᵀF), starting from `warm`.
@@ -16,8 +16,8 @@ const MOST_ITERATIONS: usize = 60;
 ///
 /// # Derivation
 /// With B = RᵀF, −tr(exp(−\[θ\])B) = −tr B + θ·g + ½ θᵀHθ + …, g_i = ε_ijk B_jk,
-/// H = tr(B) I − sym B. Newton's step θ = −H⁻¹g is applied as a Cayley rotation with ω = θ/4; H is
-/// shifted to be positive definite, and a saddle is left along its most negative direction.
+/// H = tr(B) I − sym B. Newton's step θ = −|H|⁻¹g is applied as a Cayley rotation with ω = θ/4; a
+/// saddle is left along its most negative direction.
 ///
 /// # Source
 /// Müller, Bender, Chentanez, Macklin 2016, "A robust method to extract the rotational part of
@@ -45,9 +45,9 @@ pub fn polar_rotation(F: &Matrix3<f64>, warm: &Matrix3<f64>) -> Matrix3<f64> {
             q = UnitQuaternion::new_normalize(*(q * cayley(0.4 * away)).quaternion());
             continue;
         }
-        let shift = (HESSIAN_FLOOR - least).max(0.0);
         let components = eigen.eigenvectors.transpose() * g;
-        let scaled = components.component_div(&eigen.eigenvalues.add_scalar(shift));
+        let scaled =
+            components.zip_map(&eigen.eigenvalues, |g, curvature| g / curvature.abs().max(HESSIAN_FLOOR));
         let mut omega = -0.25 * (eigen.eigenvectors * scaled);
         let length = omega.norm();
         if length > LARGEST_STEP {

@@ -47,7 +47,13 @@ pub struct ElasticUpdate {
 impl Elastic {
     /// Arranges `pieces` of `mesh` for the kernels. `rotations` has the warm start of every piece,
     /// or is empty for the identity.
-    pub fn new(simd: Simd, mesh: &TetMesh, pieces: &[Piece], n_copies: usize, rotations: &[Matrix3<f32>]) -> Self {
+    pub fn new(
+        simd: Simd,
+        mesh: &TetMesh,
+        pieces: &[Piece],
+        n_copies: usize,
+        rotations: &[Matrix3<f32>],
+    ) -> Self {
         let centres: Vec<Vector3<f64>> = pieces
             .iter()
             .map(|p| mesh.corners(p.element as usize).iter().sum::<Vector3<f64>>() / 4.0)
@@ -55,7 +61,8 @@ impl Elastic {
         let chunks: Vec<Chunk> = plan_chunks(pieces, &centres)
             .into_iter()
             .map(|plan| {
-                let rest = plan.pieces.iter().map(|lanes| rest_batch(lanes, mesh, pieces, rotations)).collect();
+                let rest =
+                    plan.pieces.iter().map(|lanes| rest_batch(lanes, mesh, pieces, rotations)).collect();
                 let live = plan.nodes.iter().map(|&nodes| Batch {
                     g: Default::default(),
                     two_mu: Lanes::default(),

@@ -286,10 +286,13 @@ fn rotate_guarded(F: &Mat3, R: &Mat3, trusted: [bool; LANES], rest: &mut RestBat
 
 /// w V (2μ ε + λ tr(ε) I) with ε = sym(RᵀF) − I, in the frame of the material.
 #[inline(always)]
-fn material_stress<I: Isa>(c: &Coefficients, R: &[[Lanes; 3]; 3], F: &Mat3, volume: Lanes) -> [[Lanes; 3]; 3] {
-    let S = |i: usize, j: usize| {
-        fma::<I>(R[0][i], F[j], fma::<I>(R[1][i], F[3 + j], R[2][i] * F[6 + j]))
-    };
+fn material_stress<I: Isa>(
+    c: &Coefficients,
+    R: &[[Lanes; 3]; 3],
+    F: &Mat3,
+    volume: Lanes,
+) -> [[Lanes; 3]; 3] {
+    let S = |i: usize, j: usize| fma::<I>(R[0][i], F[j], fma::<I>(R[1][i], F[3 + j], R[2][i] * F[6 + j]));
     let one = Lanes::splat(1.0);
     let (exx, eyy, ezz) = (S(0, 0) - one, S(1, 1) - one, S(2, 2) - one);
     let (two_exy, two_exz, two_eyz) = (S(0, 1) + S(1, 0), S(0, 2) + S(2, 0), S(1, 2) + S(2, 1));
@@ -335,8 +338,8 @@ mod avx2 {
     //! The same loops compiled for AVX2 and FMA, with transpositions in registers.
 
     use std::arch::x86_64::{
-        __m256, _mm256_castps128_ps256, _mm256_insertf128_ps, _mm256_shuffle_ps, _mm256_setzero_ps,
-        _mm256_unpackhi_ps, _mm256_unpacklo_ps, _mm_loadu_ps,
+        __m256, _mm_loadu_ps, _mm256_castps128_ps256, _mm256_insertf128_ps, _mm256_setzero_ps,
+        _mm256_shuffle_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
     };
 
     use super::{Batch, Coefficients, Isa, LANES, Lanes, Locals, Padded, RestBatch};

@@ -74,7 +74,9 @@ impl SystemOperator<'_> {
             };
             for (&copy, &w) in spring.copies.iter().zip(&spring.weights) {
                 let block = &mut diagonal[copy as usize];
-                for (entry, (i, j)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate() {
+                for (entry, (i, j)) in
+                    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate()
+                {
                     block[entry] += spring.stiffness * w * w * n(i, j);
                 }
             }

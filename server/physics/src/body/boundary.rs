@@ -1,0 +1,190 @@
+//! Constraints and loads, told by node and applied by copy.
+
+use nalgebra::Vector3;
+
+use super::{Body, BodyError};
+use crate::cut::CutMesh;
+use crate::operator::FixedCopy;
+
+/// A node whose displacement is prescribed in some directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FixedNode {
+    /// The node.
+    pub node: u32,
+    /// Which of x, y, z are prescribed.
+    pub axes: [bool; 3],
+    /// Prescribed displacement from rest [m]; used where `axes` says so.
+    pub displacement_m: Vector3<f64>,
+}
+
+/// Constraints and loads as they were asked for; cuts do not change them.
+#[derive(Clone, Debug, Default)]
+pub struct Boundary {
+    /// At most one entry per node, ascending.
+    fixed: Vec<FixedNode>,
+    /// Force on the material point of a node [N], by node; empty if there is none.
+    point_force: Vec<Vector3<f64>>,
+    /// Force spread over the material around a node [N], by node; empty if there is none.
+    spread_force: Vec<Vector3<f64>>,
+}
+
+impl Boundary {
+    /// A fixed node fixes the copy that holds the node's own material, which keeps the node's
+    /// number. Copies without that material stay free: fixing them would glue fragments to air.
+    pub fn fixed_copies(&self, mesh: &CutMesh) -> Vec<FixedCopy> {
+        let copy = |f: &FixedNode| {
+            let target = mesh.mesh().nodes[f.node as usize] + f.displacement_m;
+            FixedCopy { copy: f.node, axes: f.axes, position_m: target.into() }
+        };
+        self.fixed.iter().map(copy).collect()
+    }
+
+    /// Force on every copy [N]: point forces go to the copy with the node's material, spread ones to
+    /// all copies of the node by the volume they carry. Totals are kept.
+    pub fn copy_loads(&self, mesh: &CutMesh) -> Vec<Vector3<f64>> {
+        let mut load = vec![Vector3::zeros(); mesh.n_copies()];
+        for (load, f) in load.iter_mut().zip(&self.point_force) {
+            *load += f;
+        }
+        if !self.spread_force.is_empty() {
+            let mut node_volume = vec![0.0; mesh.mesh().nodes.len()];
+            for (&node, &volume) in mesh.copy_node().iter().zip(mesh.copy_volume()) {
+                node_volume[node as usize] += volume;
+            }
+            for (c, &node) in mesh.copy_node().iter().enumerate() {
+                let share = mesh.copy_volume()[c] / node_volume[node as usize];
+                load[c] += share * self.spread_force[node as usize];
+            }
+        }
+        load
+    }
+}
+
+impl Body {
+    /// Prescribes the displacement from rest [m] of `nodes` along `axes`. Asking again for a node
+    /// adds axes and replaces the displacement of those given.
+    pub fn fix(
+        &mut self,
+        nodes: &[u32],
+        axes: [bool; 3],
+        displacement_m: Vector3<f64>,
+    ) -> Result<(), BodyError> {
+        self.check_nodes(nodes)?;
+        check_vector("displacement_m", &displacement_m)?;
+        for &node in nodes {
+            let at = match self.boundary.fixed.binary_search_by_key(&node, |f| f.node) {
+                Ok(at) => at,
+                Err(at) => {
+                    let none = FixedNode { node, axes: [false; 3], displacement_m: Vector3::zeros() };
+                    self.boundary.fixed.insert(at, none);
+                    at
+                }
+            };
+            let fixed = &mut self.boundary.fixed[at];
+            for axis in (0..3).filter(|&axis| axes[axis]) {
+                fixed.axes[axis] = true;
+                fixed.displacement_m[axis] = displacement_m[axis];
+            }
+        }
+        self.follow_boundary();
+        Ok(())
+    }
+
+    /// Frees `nodes` again.
+    pub fn release(&mut self, nodes: &[u32]) {
+        self.boundary.fixed.retain(|f| !nodes.contains(&f.node));
+        self.follow_boundary();
+    }
+
+    /// Nodes with a prescribed displacement, ascending.
+    pub fn fixed_nodes(&self) -> &[FixedNode] {
+        &self.boundary.fixed
+    }
+
+    /// Adds a force [N] on the material point of `node`.
+    pub fn add_nodal_force(&mut self, node: u32, force_n: Vector3<f64>) -> Result<(), BodyError> {
+        self.check_nodes(&[node])?;
+        check_vector("force_n", &force_n)?;
+        self.boundary.point_force.resize(self.cut_mesh.mesh().nodes.len(), Vector3::zeros());
+        self.boundary.point_force[node as usize] += force_n;
+        self.follow_boundary();
+        Ok(())
+    }
+
+    /// Adds a total force [N] shared by area over the skin faces all of whose nodes are in `nodes`.
+    pub fn add_surface_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
+        let selected = self.selection(nodes, &force_n)?;
+        let mut area = vec![0.0; selected.len()];
+        let mesh = self.cut_mesh.mesh();
+        for face in mesh.boundary_faces() {
+            if face.nodes.iter().all(|&n| selected[n as usize]) {
+                for n in face.nodes {
+                    area[n as usize] += mesh.face_area(&face) / 3.0;
+                }
+            }
+        }
+        self.spread("surface", &area, force_n)
+    }
+
+    /// Adds a total force [N] shared by volume over the tets around `nodes`.
+    pub fn add_volume_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
+        let selected = self.selection(nodes, &force_n)?;
+        let mut volume = vec![0.0; selected.len()];
+        let mesh = self.cut_mesh.mesh();
+        for (e, tet) in mesh.tets.iter().enumerate() {
+            for &n in tet.iter().filter(|&&n| selected[n as usize]) {
+                volume[n as usize] += mesh.volume(e) / 4.0;
+            }
+        }
+        self.spread("volume", &volume, force_n)
+    }
+
+    /// Removes all loads; gravity is not one of them.
+    pub fn clear_loads(&mut self) {
+        self.boundary.point_force.clear();
+        self.boundary.spread_force.clear();
+        self.follow_boundary();
+    }
+
+    fn selection(&self, nodes: &[u32], force_n: &Vector3<f64>) -> Result<Vec<bool>, BodyError> {
+        self.check_nodes(nodes)?;
+        check_vector("force_n", force_n)?;
+        let mut selected = vec![false; self.cut_mesh.mesh().nodes.len()];
+        nodes.iter().for_each(|&n| selected[n as usize] = true);
+        Ok(selected)
+    }
+
+    fn spread(
+        &mut self,
+        carrier: &'static str,
+        weight: &[f64],
+        force_n: Vector3<f64>,
+    ) -> Result<(), BodyError> {
+        let total: f64 = weight.iter().sum();
+        if total <= 0.0 {
+            return Err(BodyError::NothingSelected { carrier, force_n: force_n.into() });
+        }
+        self.boundary.spread_force.resize(weight.len(), Vector3::zeros());
+        for (force, weight) in self.boundary.spread_force.iter_mut().zip(weight) {
+            *force += (weight / total) * force_n;
+        }
+        self.follow_boundary();
+        Ok(())
+    }
+
+    fn check_nodes(&self, nodes: &[u32]) -> Result<(), BodyError> {
+        let n_nodes = self.cut_mesh.mesh().nodes.len();
+        match nodes.iter().find(|&&n| n as usize >= n_nodes) {
+            Some(&node) => Err(BodyError::NoSuchNode { node, n_nodes }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn check_vector(quantity: &'static str, v: &Vector3<f64>) -> Result<(), BodyError> {
+    if v.iter().all(|c| c.abs() < 1e12) {
+        Ok(())
+    } else {
+        Err(BodyError::NonFinite { quantity, found: (*v).into() })
+    }
+}

@@ -1,0 +1,73 @@
+//! What a body does when its topology changes.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Body;
+use crate::cut::{BladeSweep, CutError, CutReport, Piece};
+use crate::integrator::LooseParts;
+use crate::operator::Elastic;
+
+impl Body {
+    /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were
+    /// split from, so the motion of the material does not change by the cut itself.
+    pub fn cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
+        let epoch = self.cut_mesh.epoch();
+        let pieces = self.cut_mesh.pieces().to_vec();
+        let report = self.cut_mesh.sweep(&self.state.x, blade, incision)?;
+        if report.epoch != epoch {
+            self.inherit(&report);
+            let rotations = self.inherited_rotations(&pieces);
+            self.rebuild_elastic(&rotations);
+            self.follow_topology();
+        }
+        Ok(report)
+    }
+
+    fn inherit(&mut self, report: &CutReport) {
+        let n = self.cut_mesh.n_copies();
+        self.state.x.resize(n, Vector3::zeros());
+        self.state.v.resize(n, Vector3::zeros());
+        for new in &report.new_copies {
+            let (copy, parent) = (new.copy as usize, new.parent as usize);
+            self.state.x[copy] = self.state.x[parent];
+            self.state.v[copy] = self.state.v[parent];
+        }
+    }
+
+    /// Rotation of every present piece: its own if it existed before, else that of a piece the
+    /// element had before.
+    fn inherited_rotations(&self, before: &[Piece]) -> Vec<Matrix3<f32>> {
+        let known = self.elastic.rotations();
+        let mut of_element = vec![Matrix3::identity(); self.cut_mesh.mesh().tets.len()];
+        for (piece, R) in before.iter().zip(&known).rev() {
+            of_element[piece.element as usize] = *R;
+        }
+        let rotation = |(p, piece): (usize, &Piece)| match before.get(p) {
+            Some(old) if old.element == piece.element => known[p],
+            _ => of_element[piece.element as usize],
+        };
+        self.cut_mesh.pieces().iter().enumerate().map(rotation).collect()
+    }
+
+    pub(super) fn rebuild_elastic(&mut self, rotations: &[Matrix3<f32>]) {
+        let mesh = &self.cut_mesh;
+        self.elastic = Elastic::new(self.simd, mesh.mesh(), mesh.pieces(), mesh.n_copies(), rotations);
+    }
+
+    /// Everything that is derived from pieces and copies.
+    pub(super) fn follow_topology(&mut self) {
+        let density = self.material.density_kg_m3;
+        self.mass = self.cut_mesh.copy_volume().iter().map(|v| density * v).collect();
+        self.mass_f32 = self.mass.iter().map(|&m| m as f32).collect();
+        self.integrator.resize(self.cut_mesh.n_copies());
+        self.before = self.state.clone();
+        self.follow_boundary();
+    }
+
+    /// Everything that is derived from constraints and loads.
+    pub(super) fn follow_boundary(&mut self) {
+        self.fixed = self.boundary.fixed_copies(&self.cut_mesh);
+        self.load = self.boundary.copy_loads(&self.cut_mesh);
+        self.parts = LooseParts::new(self.cut_mesh.pieces(), &self.mass, &self.fixed);
+    }
+}

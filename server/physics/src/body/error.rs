@@ -1,0 +1,74 @@
+//! Why a body cannot be made or changed as asked.
+
+use thiserror::Error;
+
+use crate::cut::CutError;
+use crate::material::MaterialError;
+use crate::mesh::MeshError;
+
+/// A refused request; the body is as it was.
+#[derive(Debug, Error)]
+pub enum BodyError {
+    /// The rest mesh cannot be simulated.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A material constant is out of range.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    /// A cut was refused.
+    #[error(transparent)]
+    Cut(#[from] CutError),
+    /// A solver setting is out of range.
+    #[error("{name} = {found} is outside {allowed}")]
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// Value found.
+        found: f64,
+        /// Allowed range in words.
+        allowed: &'static str,
+    },
+    /// The threads could not be started.
+    #[error("cannot start the physics threads: {0}; ask for fewer")]
+    Threads(std::io::Error),
+    /// A node that the mesh does not have.
+    #[error("node {node} does not exist, the mesh has nodes 0..{n_nodes}")]
+    NoSuchNode {
+        /// Node found.
+        node: u32,
+        /// Number of nodes.
+        n_nodes: usize,
+    },
+    /// A force or displacement that is NaN, infinite or absurd.
+    #[error("{quantity} = {found:?} must be finite and below 1e12 in size")]
+    NonFinite {
+        /// What it is, with its unit.
+        quantity: &'static str,
+        /// Value found.
+        found: [f64; 3],
+    },
+    /// A load without anything to carry it.
+    #[error(
+        "the selected nodes hold no {carrier}, so {force_n:?} N cannot be shared over it; select more nodes"
+    )]
+    NothingSelected {
+        /// "surface" or "volume".
+        carrier: &'static str,
+        /// Total force [N].
+        force_n: [f64; 3],
+    },
+    /// A state array of the wrong length.
+    #[error("{found} entries given for {expected} copies")]
+    StateLength {
+        /// Length found.
+        found: usize,
+        /// Number of copies.
+        expected: usize,
+    },
+    /// A state entry that is NaN, infinite or absurd.
+    #[error("position or velocity of copy {copy} is not finite or above 1e12 in size")]
+    StateValue {
+        /// Copy id.
+        copy: usize,
+    },
+}

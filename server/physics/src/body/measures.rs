@@ -1,0 +1,115 @@
+//! What can be measured on a body. Double precision throughout, nothing here is part of a step.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Body;
+use crate::cut::Piece;
+use crate::element::{deformation_gradient, piece_energy, piece_forces, polar_rotation};
+
+impl Body {
+    /// Σ m [kg].
+    pub fn total_mass(&self) -> f64 {
+        self.mass.iter().sum()
+    }
+
+    /// Σ m x / Σ m [m].
+    pub fn centre_of_mass(&self) -> Vector3<f64> {
+        self.weighted(&self.state.x) / self.total_mass()
+    }
+
+    /// Σ m v [kg m/s].
+    pub fn momentum(&self) -> Vector3<f64> {
+        self.weighted(&self.state.v)
+    }
+
+    /// Σ m (x − c) × v about the centre of mass c [kg m²/s].
+    pub fn angular_momentum(&self) -> Vector3<f64> {
+        let centre = self.centre_of_mass();
+        let spin = |((m, x), v): ((&f64, &Vector3<f64>), &Vector3<f64>)| *m * (x - centre).cross(v);
+        self.mass.iter().zip(&self.state.x).zip(&self.state.v).map(spin).sum()
+    }
+
+    /// ½ Σ m v² [J].
+    pub fn kinetic_energy(&self) -> f64 {
+        self.mass.iter().zip(&self.state.v).map(|(m, v)| 0.5 * m * v.norm_squared()).sum()
+    }
+
+    /// Σ w V ψ(F) over the pieces [J].
+    pub fn elastic_energy(&self) -> f64 {
+        let (law, lame) = (self.material.law, self.material.lame());
+        self.deformed_pieces().map(|d| piece_energy(law, lame, &d.F, &d.R, d.volume)).sum()
+    }
+
+    /// Σ w V det F, the present volume [m³].
+    pub fn volume(&self) -> f64 {
+        self.deformed_pieces().map(|d| d.volume * d.F.determinant()).sum()
+    }
+
+    /// Smallest det F of any piece [1]; ≤ 0 means inverted.
+    pub fn least_volume_ratio(&self) -> f64 {
+        self.deformed_pieces().map(|d| d.F.determinant()).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Internal force on every copy [N]; it pulls the body back, so it is subtracted from the loads.
+    pub fn internal_forces(&self) -> Vec<Vector3<f64>> {
+        let (law, lame) = (self.material.law, self.material.lame());
+        let mut f = vec![Vector3::zeros(); self.state.x.len()];
+        for d in self.deformed_pieces() {
+            let P = law.stress(&d.F, &d.R, lame);
+            for (&copy, force) in d.piece.copies.iter().zip(piece_forces(&P, &d.g, d.volume)) {
+                f[copy as usize] += force;
+            }
+        }
+        f
+    }
+
+    /// Sum of the forces [N] that hold the prescribed directions of `nodes` against elasticity,
+    /// gravity [m/s²] and loads (without the inertia of the nodes themselves).
+    pub fn reaction(&self, nodes: &[u32], gravity: Vector3<f64>) -> Vector3<f64> {
+        let f_int = self.internal_forces();
+        let mut sum = Vector3::zeros();
+        for fixed in self.fixed.iter().filter(|f| nodes.contains(&f.copy)) {
+            let c = fixed.copy as usize;
+            let held = f_int[c] - self.mass[c] * gravity - self.load[c];
+            for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
+                sum[axis] += held[axis];
+            }
+        }
+        sum
+    }
+
+    /// Position of every surface vertex [m], into `out`.
+    pub fn surface_positions(&self, out: &mut Vec<[f32; 3]>) {
+        out.clear();
+        out.extend(self.cut_mesh.surface().vertices.iter().map(|vertex| {
+            let x = vertex.position(&self.state.x);
+            [x.x as f32, x.y as f32, x.z as f32]
+        }));
+    }
+
+    fn weighted(&self, values: &[Vector3<f64>]) -> Vector3<f64> {
+        self.mass.iter().zip(values).map(|(m, v)| *m * v).sum()
+    }
+
+    fn deformed_pieces(&self) -> impl Iterator<Item = Deformed<'_>> {
+        let rotations = self.elastic.rotations();
+        let mesh = self.cut_mesh.mesh();
+        self.cut_mesh.pieces().iter().enumerate().map(move |(p, piece)| {
+            let e = piece.element as usize;
+            let g = mesh.gradients(e);
+            let F = deformation_gradient(&piece.copies.map(|c| self.state.x[c as usize]), &g);
+            let R = polar_rotation(&F, &rotations[p].map(f64::from));
+            Deformed { piece, F, R, g, volume: piece.fraction * mesh.volume(e) }
+        })
+    }
+}
+
+/// A piece in its present configuration.
+struct Deformed<'a> {
+    piece: &'a Piece,
+    F: Matrix3<f64>,
+    R: Matrix3<f64>,
+    g: [Vector3<f64>; 4],
+    /// w V [m³] at rest.
+    volume: f64,
+}

@@ -1,0 +1,28 @@
+//! One step in time.
+
+mod implicit_euler;
+mod parts;
+mod springs;
+
+pub use implicit_euler::{ImplicitEuler, StepInputs, StepOutcome};
+pub use parts::LooseParts;
+pub use springs::{PointSpring, SpringKind};
+
+use nalgebra::Vector3;
+
+/// What a body remembers from step to step, one entry per copy.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Positions [m].
+    pub x: Vec<Vector3<f64>>,
+    /// Velocities [m/s].
+    pub v: Vec<Vector3<f64>>,
+}
+
+impl State {
+    /// Copies `other` into this state without allocating, where the lengths agree.
+    pub fn copy_from(&mut self, other: &State) {
+        self.x.clone_from(&other.x);
+        self.v.clone_from(&other.v);
+    }
+}

@@ -1,0 +1,124 @@
+//! Loose parts of a body and their balance of momentum.
+//!
+//! An iterative solve that stops early leaves a residual, and the residual of a part that hangs on
+//! nothing is momentum out of thin air. Translations are null vectors of K̂, so their three
+//! equations per part can be solved exactly, before the iteration and after it: every loose part
+//! falls with g and answers to its springs exactly, however few iterations are made.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::cut::Piece;
+use crate::operator::FixedCopy;
+
+/// Connected parts of a body, by copy.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LooseParts {
+    /// Part of every copy.
+    pub of_copy: Vec<u32>,
+    /// Mass of every part [kg].
+    pub mass: Vec<f64>,
+    /// Whether no copy of the part is fixed in any direction.
+    pub free: Vec<bool>,
+}
+
+impl LooseParts {
+    /// Finds the parts that `pieces` hold together.
+    pub fn new(pieces: &[Piece], mass: &[f64], fixed: &[FixedCopy]) -> Self {
+        let n = mass.len();
+        let mut root: Vec<u32> = (0..n as u32).collect();
+        for piece in pieces {
+            let a = find(&mut root, piece.copies[0]);
+            for &copy in &piece.copies[1..] {
+                let b = find(&mut root, copy);
+                let a = find(&mut root, a);
+                root[a.max(b) as usize] = a.min(b);
+            }
+        }
+        let mut parts = Self { of_copy: vec![0; n], ..Self::default() };
+        for copy in 0..n {
+            let r = find(&mut root, copy as u32) as usize;
+            // Roots are the smallest copy of their part, so they come first.
+            if r == copy {
+                parts.of_copy[copy] = parts.mass.len() as u32;
+                parts.mass.push(0.0);
+            } else {
+                parts.of_copy[copy] = parts.of_copy[r];
+            }
+            parts.mass[parts.of_copy[copy] as usize] += mass[copy];
+        }
+        parts.free = parts.mass.iter().map(|&m| m > 0.0).collect();
+        for copy in fixed.iter().filter(|f| f.axes.contains(&true)) {
+            parts.free[parts.of_copy[copy.copy as usize] as usize] = false;
+        }
+        parts
+    }
+
+    /// Number of parts.
+    pub fn len(&self) -> usize {
+        self.mass.len()
+    }
+
+    /// Whether there is no part.
+    pub fn is_empty(&self) -> bool {
+        self.mass.is_empty()
+    }
+
+    /// Whether any part hangs on nothing.
+    pub fn any_free(&self) -> bool {
+        self.free.contains(&true)
+    }
+}
+
+fn find(root: &mut [u32], mut a: u32) -> u32 {
+    while root[a as usize] != a {
+        root[a as usize] = root[root[a as usize] as usize];
+        a = root[a as usize];
+    }
+    a
+}
+
+/// The three translation equations S t = b of every part.
+#[derive(Clone, Debug, Default)]
+pub struct Translations {
+    /// Translation of every part so far [m].
+    pub shift: Vec<Vector3<f64>>,
+    matrix: Vec<Matrix3<f64>>,
+    rhs: Vec<Vector3<f64>>,
+}
+
+impl Translations {
+    /// Starts over for `parts`: no shift.
+    pub fn restart(&mut self, parts: &LooseParts) {
+        self.shift.clear();
+        self.shift.resize(parts.len(), Vector3::zeros());
+    }
+
+    /// Starts the equations of `parts`: S = factor · mass, b = 0.
+    pub fn begin(&mut self, parts: &LooseParts, mass_factor: f64) {
+        self.matrix.clear();
+        self.matrix.extend(parts.mass.iter().map(|m| Matrix3::from_diagonal_element(m * mass_factor)));
+        self.rhs.clear();
+        self.rhs.resize(parts.len(), Vector3::zeros());
+    }
+
+    /// Adds to the right side of the part of `copy`.
+    #[inline(always)]
+    pub fn add(&mut self, parts: &LooseParts, copy: usize, b: Vector3<f64>) {
+        self.rhs[parts.of_copy[copy] as usize] += b;
+    }
+
+    /// Adds a spring on the part of `copy`: stiffness to S and force to b.
+    pub fn add_spring(&mut self, parts: &LooseParts, copy: usize, S: Matrix3<f64>, b: Vector3<f64>) {
+        self.matrix[parts.of_copy[copy] as usize] += S;
+        self.rhs[parts.of_copy[copy] as usize] += b;
+    }
+
+    /// Solves for every free part and adds the result to `shift`.
+    pub fn solve(&mut self, parts: &LooseParts) {
+        for part in (0..parts.len()).filter(|&p| parts.free[p]) {
+            if let Some(inverse) = self.matrix[part].try_inverse() {
+                self.shift[part] += inverse * self.rhs[part];
+            }
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Springs between material points and the world: contacts, grabs, tools.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::operator::Spring;
+
+/// A spring on the material point x_p = Σ weights · x\[copies\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointSpring {
+    /// Copies that carry the point; all of one piece.
+    pub copies: [u32; 4],
+    /// Their weights, Σ = 1.
+    pub weights: [f64; 4],
+    /// Where it pushes or pulls.
+    pub kind: SpringKind,
+    /// Stiffness k [N/m], ≥ 0.
+    pub stiffness_n_m: f64,
+    /// Largest force [N]; beyond it the spring pushes with just that.
+    pub max_force_n: f64,
+}
+
+/// Direction and rest position of a [`PointSpring`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SpringKind {
+    /// f = k · max(0, offset − n·x_p) n: keeps the point on the side n points to.
+    OneSided {
+        /// Unit normal n.
+        normal: Vector3<f64>,
+        /// Position of the plane along n [m].
+        offset_m: f64,
+    },
+    /// f = k (target − x_p): holds the point in all directions.
+    Hold {
+        /// Where the point is pulled to [m].
+        target_m: Vector3<f64>,
+    },
+}
+
+/// What a spring does within one linear solve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mode {
+    Off,
+    Linear,
+    /// Constant force [N] of the largest size, in the direction it had when the cap was reached.
+    Capped(Vector3<f64>),
+}
+
+/// A spring in the course of one step.
+#[derive(Clone, Copy, Debug)]
+pub struct ActiveSpring {
+    spring: PointSpring,
+    mode: Mode,
+}
+
+impl ActiveSpring {
+    /// Starts a spring at the predicted positions; `None` if it is not usable: a number that is not
+    /// finite, no normal, a copy that does not exist.
+    pub fn new(spring: &PointSpring, predicted: &[Vector3<f64>]) -> Option<Self> {
+        let mut spring = *spring;
+        let direction_ok = match &mut spring.kind {
+            SpringKind::OneSided { normal, offset_m } => {
+                let length = normal.norm();
+                *normal /= length;
+                *offset_m /= length;
+                length > 1e-12 && length.is_finite() && offset_m.is_finite()
+            }
+            SpringKind::Hold { target_m } => target_m.iter().all(|t| t.is_finite()),
+        };
+        let usable = direction_ok
+            && spring.copies.iter().all(|&c| (c as usize) < predicted.len())
+            && spring.weights.iter().all(|w| w.is_finite())
+            && (0.0..=1e15).contains(&spring.stiffness_n_m)
+            && spring.max_force_n >= 0.0;
+        if !usable {
+            return None;
+        }
+        let mut active = Self { spring, mode: Mode::Linear };
+        if active.pull(active.point(predicted)).is_none() {
+            active.mode = Mode::Off;
+        }
+        Some(active)
+    }
+
+    /// x_p = Σ w x of the four copies.
+    pub fn point(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+        let PointSpring { copies, weights, .. } = &self.spring;
+        copies.iter().zip(weights).map(|(&c, &w)| w * x[c as usize]).sum()
+    }
+
+    /// Extension vector that k is multiplied with at `point`, `None` where a one-sided spring has
+    /// no contact.
+    fn pull(&self, point: Vector3<f64>) -> Option<Vector3<f64>> {
+        match self.spring.kind {
+            SpringKind::OneSided { normal, offset_m } => {
+                let depth = offset_m - normal.dot(&point);
+                (depth > 0.0).then(|| depth * normal)
+            }
+            SpringKind::Hold { target_m } => Some(target_m - point),
+        }
+    }
+
+    /// Force on the body [N] at `point` in the present mode: what the linear solve assumes.
+    pub fn force(&self, point: Vector3<f64>) -> Vector3<f64> {
+        let PointSpring { kind, stiffness_n_m: k, .. } = self.spring;
+        match (self.mode, kind) {
+            (Mode::Off, _) => Vector3::zeros(),
+            (Mode::Linear, SpringKind::OneSided { normal, offset_m }) => {
+                k * (offset_m - normal.dot(&point)) * normal
+            }
+            (Mode::Linear, SpringKind::Hold { target_m }) => k * (target_m - point),
+            (Mode::Capped(force), _) => force,
+        }
+    }
+
+    /// Chooses the mode that fits `point`; returns whether it changed.
+    pub fn choose_mode(&mut self, point: Vector3<f64>) -> bool {
+        let before = self.mode;
+        let PointSpring { stiffness_n_m: k, max_force_n, .. } = self.spring;
+        self.mode = match self.pull(point) {
+            None => Mode::Off,
+            Some(pull) if k * pull.norm() > max_force_n => Mode::Capped(max_force_n * pull.normalize()),
+            Some(_) => Mode::Linear,
+        };
+        if matches!((self.mode, before), (Mode::Capped(_), Mode::Capped(_))) {
+            self.mode = before; // the force that the solve was made with
+        }
+        self.mode != before
+    }
+
+    /// k n nᵀ or k I [N/m] while the spring is linear, else 0.
+    pub fn stiffness(&self) -> Matrix3<f64> {
+        match (self.mode, self.spring.kind) {
+            (Mode::Linear, SpringKind::OneSided { normal, .. }) => {
+                self.spring.stiffness_n_m * normal * normal.transpose()
+            }
+            (Mode::Linear, SpringKind::Hold { .. }) => {
+                Matrix3::from_diagonal_element(self.spring.stiffness_n_m)
+            }
+            _ => Matrix3::zeros(),
+        }
+    }
+
+    /// The spring as a term h² k J Jᵀ of the operator; `None` unless it is linear.
+    pub fn term(&self, h_squared: f64) -> Option<Spring> {
+        let direction = match self.spring.kind {
+            SpringKind::OneSided { normal, .. } => Some([normal.x as f32, normal.y as f32, normal.z as f32]),
+            SpringKind::Hold { .. } => None,
+        };
+        (self.mode == Mode::Linear).then(|| Spring {
+            copies: self.spring.copies,
+            weights: self.spring.weights.map(|w| w as f32),
+            direction,
+            stiffness: (h_squared * self.spring.stiffness_n_m) as f32,
+        })
+    }
+
+    /// A copy that carries the point, to find its part by.
+    pub fn main_copy(&self) -> usize {
+        let heaviest = (0..4).fold(0, |best, a| {
+            if self.spring.weights[a].abs() > self.spring.weights[best].abs() { a } else { best }
+        });
+        self.spring.copies[heaviest] as usize
+    }
+
+    /// Copies and weights.
+    pub fn carriers(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.spring.copies.iter().map(|&c| c as usize).zip(self.spring.weights)
+    }
+}

@@ -1,0 +1,116 @@
+//! The same bits for any number of threads, and no allocation in a steady step.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, BodySettings, PointSpring, SpringKind};
+use scindo_physics::material::{Material, Rayleigh};
+
+use crate::{DOWN, SOFT, bar_mesh, left_face, settings};
+
+/// Counts allocations of the thread that asks for the count, and of the physics threads.
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+thread_local! {
+    static COUNTED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
+}
+
+#[allow(unsafe_code)]
+// SAFETY: forwards to the system allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if COUNTED.try_with(std::cell::Cell::get).unwrap_or(false) {
+            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        }
+        // SAFETY: forwarded contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: forwarded contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn bar(threads: usize, portable: bool) -> Body {
+    let material = Material { rayleigh: Rayleigh { mass_1_s: 0.1, stiffness_s: 0.002 }, ..SOFT };
+    let settings = BodySettings { threads, portable, ..settings(10, 1e-6) };
+    let mut body = Body::new(bar_mesh(), material, settings).unwrap();
+    let clamp = left_face(&body);
+    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    body
+}
+
+fn push(body: &Body, height: f64) -> PointSpring {
+    let copies = body.cut_mesh().pieces()[6_000].copies;
+    PointSpring {
+        copies,
+        weights: [0.25; 4],
+        kind: SpringKind::OneSided { normal: Vector3::y(), offset_m: height },
+        stiffness_n_m: 500.0,
+        max_force_n: 10.0,
+    }
+}
+
+/// FNV-1a over the bits of positions and velocities.
+fn hash(body: &Body) -> u64 {
+    let values = body.positions().iter().chain(body.velocities()).flat_map(|v| [v.x, v.y, v.z]);
+    values.fold(0xcbf2_9ce4_8422_2325, |h, v| (h ^ v.to_bits()).wrapping_mul(0x0000_0100_0000_01b3))
+}
+
+#[test]
+fn the_number_of_threads_does_not_change_a_bit() {
+    for portable in [false, true] {
+        let hashes: Vec<u64> = [1, 2, 3, 8]
+            .into_iter()
+            .map(|threads| {
+                let mut body = bar(threads, portable);
+                for _ in 0..15 {
+                    let spring = push(&body, 0.1);
+                    body.step(0.02, DOWN, &[spring]);
+                }
+                hash(&body)
+            })
+            .collect();
+        assert!(hashes.iter().all(|h| *h == hashes[0]), "portable {portable}: {hashes:x?}");
+    }
+}
+
+#[test]
+fn instruction_sets_agree_to_single_precision() {
+    let (mut fast, mut portable) = (bar(1, false), bar(1, true));
+    for _ in 0..10 {
+        fast.step(0.02, DOWN, &[]);
+        portable.step(0.02, DOWN, &[]);
+    }
+    let difference = fast.positions().iter().zip(portable.positions()).map(|(a, b)| (a - b).norm());
+    assert!(difference.fold(0.0, f64::max) < 1e-4);
+}
+
+#[test]
+fn a_steady_step_does_not_allocate() {
+    for threads in [1, 2] {
+        let mut body = bar(threads, false);
+        let spring = push(&body, 0.1);
+        let mut surface = Vec::new();
+        for _ in 0..3 {
+            body.step(0.02, DOWN, &[spring]);
+            body.surface_positions(&mut surface);
+        }
+        COUNTED.set(true);
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        for _ in 0..20 {
+            body.step(0.02, DOWN, &[spring]);
+            body.surface_positions(&mut surface);
+        }
+        let allocations = ALLOCATIONS.load(Ordering::Relaxed) - before;
+        COUNTED.set(false);
+        assert_eq!(allocations, 0, "with {threads} threads");
+    }
+}

@@ -1,0 +1,47 @@
+//! Mechanics of a body: invariants that hold to round-off, and energies that must not grow.
+
+#![allow(clippy::unwrap_used)]
+
+mod conservation;
+mod determinism;
+mod robustness;
+mod springs;
+
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, BodySettings, PcgSettings};
+use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
+
+/// A light, soft material.
+pub const SOFT: Material = Material {
+    young_pa: 1e5,
+    poisson: 0.33,
+    density_kg_m3: 100.0,
+    rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.0 },
+    law: Law::Corotational,
+};
+
+/// Gravity [m/s²].
+pub const DOWN: Vector3<f64> = Vector3::new(0.0, -9.81, 0.0);
+
+/// One thread, this solver.
+pub fn settings(iterations: u32, tolerance: f64) -> BodySettings {
+    BodySettings { solver: PcgSettings { iterations, tolerance }, ..BodySettings::default() }
+}
+
+/// The bar of 12 800 tets.
+pub fn bar_mesh() -> TetMesh {
+    box_mesh(Vector3::zeros(), Vector3::new(1.0, 0.2, 0.2), [40, 8, 8], BoxPattern::Tet5 { parity: false })
+}
+
+/// A cube of 0.1 m.
+pub fn cube(cells: usize, material: Material, settings: BodySettings) -> Body {
+    let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(0.1), [cells; 3], BoxPattern::Tet6);
+    Body::new(mesh, material, settings).unwrap()
+}
+
+/// The nodes at x = 0 of a bar.
+pub fn left_face(body: &Body) -> Vec<u32> {
+    let nodes = &body.cut_mesh().mesh().nodes;
+    (0..nodes.len() as u32).filter(|&n| nodes[n as usize].x == 0.0).collect()
+}

@@ -1,0 +1,101 @@
+//! Ruined starts and input without meaning.
+
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, Outcome, PointSpring, SpringKind};
+use scindo_physics::material::{Material, Rayleigh};
+
+use crate::{DOWN, SOFT, cube, settings};
+
+fn is_finite(body: &Body) -> bool {
+    body.positions().iter().chain(body.velocities()).all(|v| v.iter().all(|c| c.is_finite()))
+}
+
+/// Largest difference between present and rest edge lengths, relative to the size of the body.
+fn shape_error(body: &Body) -> f64 {
+    let (x, mesh) = (body.positions(), body.cut_mesh().mesh());
+    let length = |x: &[Vector3<f64>], a: u32, b: u32| (x[a as usize] - x[b as usize]).norm();
+    mesh.tets
+        .iter()
+        .flat_map(|t| [[t[0], t[1]], [t[0], t[2]], [t[0], t[3]], [t[1], t[2]], [t[1], t[3]], [t[2], t[3]]])
+        .map(|[a, b]| (length(x, a, b) - length(&mesh.nodes, a, b)).abs() / 0.1)
+        .fold(0.0, f64::max)
+}
+
+/// A deterministic number in [-1, 1) from a seed.
+fn noise(seed: usize) -> f64 {
+    let h = (seed as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    ((h ^ (h >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+#[test]
+fn ruined_starts_stay_finite_and_recover() {
+    let material = Material { rayleigh: Rayleigh { mass_1_s: 0.5, stiffness_s: 0.005 }, ..SOFT };
+    type Ruin = fn(usize, &Vector3<f64>) -> Vector3<f64>;
+    let ruins: [(&str, Ruin); 6] = [
+        ("inverted", |_, x| -x),
+        ("mirrored", |_, x| Vector3::new(-x.x, x.y, x.z)),
+        ("flat", |_, x| Vector3::new(x.x, x.y, 0.0)),
+        ("a point", |_, _| Vector3::zeros()),
+        ("stretched 20 times", |_, x| Vector3::new(20.0 * x.x, x.y, x.z)),
+        ("scrambled", |i, _| 0.05 * Vector3::new(noise(3 * i), noise(3 * i + 1), noise(3 * i + 2))),
+    ];
+    for (name, ruin) in ruins {
+        let mut body = cube(2, material, settings(200, 1e-6));
+        let x: Vec<_> = body.positions().iter().enumerate().map(|(i, x)| ruin(i, x)).collect();
+        body.set_state(&x, &vec![Vector3::zeros(); x.len()]).unwrap();
+        for _ in 0..500 {
+            body.step(0.01, Vector3::zeros(), &[]);
+            assert!(is_finite(&body), "{name}");
+        }
+        let error = shape_error(&body);
+        assert!(error < 1e-3, "{name}: shape error {error:e}, det F ≥ {}", body.least_volume_ratio());
+    }
+}
+
+#[test]
+fn absurd_velocities_are_survived_and_reported() {
+    let mut body = cube(2, SOFT, settings(50, 1e-6));
+    let x = body.positions().to_vec();
+    let v: Vec<_> = (0..x.len()).map(|i| Vector3::repeat(noise(i) * 9e11)).collect();
+    body.set_state(&x, &v).unwrap();
+    for _ in 0..20 {
+        body.step(0.02, DOWN, &[]);
+        assert!(is_finite(&body));
+    }
+}
+
+#[test]
+fn input_without_meaning_changes_nothing() {
+    let mut body = cube(2, SOFT, settings(50, 1e-6));
+    let x = body.positions().to_vec();
+    for h in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(body.step(h, DOWN, &[]).outcome, Outcome::Refused);
+    }
+    assert_eq!(body.step(0.01, Vector3::repeat(f64::NAN), &[]).outcome, Outcome::Refused);
+    assert_eq!(body.positions(), x);
+    let broken = PointSpring {
+        copies: [0, 1, 2, 3],
+        weights: [f64::NAN, 0.0, 0.0, 1.0],
+        kind: SpringKind::Hold { target_m: Vector3::zeros() },
+        stiffness_n_m: 10.0,
+        max_force_n: 1.0,
+    };
+    let missing = PointSpring { copies: [0, 1, 2, 9999], weights: [0.25; 4], ..broken };
+    let report = body.step(0.01, Vector3::zeros(), &[broken, missing]);
+    assert_eq!((report.outcome, report.refused_springs), (Outcome::Advanced, 2));
+    assert_eq!(body.spring_forces(), [Vector3::zeros(); 2]);
+    assert!(body.set_state(&x[1..], &x).is_err());
+    assert!(body.set_state(&vec![Vector3::repeat(f64::NAN); x.len()], &x).is_err());
+}
+
+#[test]
+fn reset_returns_to_the_start() {
+    let mut body = cube(2, SOFT, settings(50, 1e-6));
+    let rest = body.positions().to_vec();
+    let epoch = body.cut_mesh().epoch();
+    body.step(0.1, DOWN, &[]);
+    body.reset().unwrap();
+    assert_eq!(body.positions(), rest);
+    assert!(body.velocities().iter().all(|v| *v == Vector3::zeros()));
+    assert!(body.cut_mesh().epoch() > epoch);
+}
