@@ -60,10 +60,13 @@ impl CopyTable {
         Self { node: (0..n as u32).collect(), volume, around_start, around, ..Self::default() }
     }
 
-    /// Elements that have node `i`.
-    pub fn elements_around(&self, i: u32) -> &[u32] {
-        let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
-        &self.around[range]
+    /// Copies of the pieces that have this copy.
+    pub fn tets_around(&self, copy: u32, pieces: &PieceTable) -> Vec<[u32; 4]> {
+        let i = self.node[copy as usize] as usize;
+        let elements = &self.around[self.around_start[i] as usize..self.around_start[i + 1] as usize];
+        let all =
+            elements.iter().flat_map(|&e| pieces.of_element(e)).map(|p| pieces.pieces[p as usize].copies);
+        all.filter(|copies| copies.contains(&copy)).collect()
     }
 
     /// Recomputes the copies of node `i` and appends what is new to `new_copies`.

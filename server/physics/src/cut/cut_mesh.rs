@@ -1,5 +1,7 @@
 //! The cut state of one body: rest mesh, fragments, pieces, copies and surface.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 
 use crate::mesh::{MeshError, TetMesh};
@@ -7,10 +9,16 @@ use crate::mesh::{MeshError, TetMesh};
 use super::blade::{BladeSweep, CutError, CutReport};
 use super::components::Components;
 use super::copies::CopyTable;
+use super::crossings::Crossings;
+use super::detect::{Deformed, Detector, Record};
 use super::fragments::Fragments;
+use super::front::{Front, Surroundings, sweep_triangles};
+use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
 use super::pieces::{Piece, PieceTable};
+use super::separate::{Separator, Sheet};
 use super::surface::{Surface, SurfaceBuilder};
+use super::sweep_triangle::SweepTriangle;
 
 /// A tet mesh with everything that cuts have made of it.
 ///
@@ -20,11 +28,16 @@ use super::surface::{Surface, SurfaceBuilder};
 #[derive(Clone, Debug)]
 pub struct CutMesh {
     mesh: TetMesh,
-    fragments: Fragments,
+    pub(super) fragments: Fragments,
     pieces: PieceTable,
     copies: CopyTable,
     surface: Surface,
     builder: SurfaceBuilder,
+    pub(super) sets: IncisionSets,
+    pub(super) crossings: Crossings,
+    fronts: BTreeMap<u32, Front>,
+    detector: Detector,
+    separator: Separator,
     epoch: u32,
 }
 
@@ -43,7 +56,20 @@ impl CutMesh {
         let mut builder = SurfaceBuilder::default();
         let mut surface = Surface::default();
         builder.build(&mesh, &fragments, &pieces, &mut surface);
-        Ok(Self { mesh, fragments, pieces, copies, surface, builder, epoch: 0 })
+        Ok(Self {
+            mesh,
+            fragments,
+            pieces,
+            copies,
+            surface,
+            builder,
+            sets: IncisionSets::default(),
+            crossings: Crossings::default(),
+            fronts: BTreeMap::new(),
+            detector: Detector::default(),
+            separator: Separator::default(),
+            epoch: 0,
+        })
     }
 
     /// The rest mesh; no cut changes it.
@@ -122,8 +148,65 @@ impl CutMesh {
         if let Some(copy) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
             return Err(CutError::NonFinitePosition { copy });
         }
-        Ok(CutReport { epoch: self.epoch, ..CutReport::default() })
+        let triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
+        let (low, high) = bounds(&triangles, blade);
+        let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
+        self.detector.find_candidates(&body, &low, &high);
+        if let Some(last) = blade.segments.last() {
+            let near: Vec<[u32; 4]> = self.detector.nearby_tets(&self.pieces).collect();
+            let around = |copy| self.copies.tets_around(copy, &self.pieces);
+            let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
+            self.fronts.insert(incision, front);
+        }
+        let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
+        let mut record = Record { fragments, sets, crossings, incision };
+        self.detector.run(&body, &triangles, &mut record);
+        let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
+        self.separator.run(&self.detector.touched, &mut Sheet { fragments, sets, crossings, incision });
+        Ok(self.follow_separation())
     }
+
+    /// Pieces, copies and surface of what the separator changed.
+    fn follow_separation(&mut self) -> CutReport {
+        let mut report = CutReport {
+            elements_cut: self.separator.elements.len(),
+            faces_opened: self.separator.faces_opened,
+            pending_edges: self.separator.pending.len(),
+            refused_edges: self.separator.refused.len(),
+            ..CutReport::default()
+        };
+        for &e in &self.separator.elements {
+            self.pieces.update(&self.mesh, e, &mut self.fragments);
+        }
+        let mut nodes: Vec<u32> =
+            self.separator.elements.iter().flat_map(|&e| self.mesh.tets[e as usize]).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        for node in nodes {
+            self.copies.update(&self.mesh, node, &self.fragments, &mut self.pieces, &mut report.new_copies);
+        }
+        if self.separator.refined || self.separator.faces_opened > 0 {
+            self.epoch += 1;
+            self.builder.build(&self.mesh, &self.fragments, &self.pieces, &mut self.surface);
+        }
+        report.epoch = self.epoch;
+        report
+    }
+}
+
+/// Box around the sweep and the last blade segment [m].
+fn bounds(triangles: &[SweepTriangle], blade: &BladeSweep) -> (Vector3<f64>, Vector3<f64>) {
+    let mut low = Vector3::repeat(f64::INFINITY);
+    let mut high = Vector3::repeat(f64::NEG_INFINITY);
+    for triangle in triangles {
+        low = low.inf(&triangle.low);
+        high = high.sup(&triangle.high);
+    }
+    for point in blade.segments.last().into_iter().flatten() {
+        low = low.inf(point);
+        high = high.sup(point);
+    }
+    (low, high)
 }
 
 #[cfg(test)]

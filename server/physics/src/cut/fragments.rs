@@ -137,6 +137,22 @@ impl Fragments {
         self.neighbour[n as usize].iter().position(|&m| m == t)
     }
 
+    /// Collects the fragments around vertex `v` that are face-connected with `t`.
+    pub fn star(&self, t: u32, v: u32, out: &mut Vec<u32>) {
+        out.clear();
+        out.push(t);
+        let mut k = 0;
+        while k < out.len() {
+            let tet = &self.tets[out[k] as usize];
+            for (&corner, &n) in tet.iter().zip(&self.neighbour[out[k] as usize]) {
+                if corner != v && n != NONE && !out.contains(&n) {
+                    out.push(n);
+                }
+            }
+            k += 1;
+        }
+    }
+
     /// Collects the fragments around the edge (a, b) that are face-connected with `t`.
     pub fn wedge(&self, t: u32, a: u32, b: u32, out: &mut Vec<u32>) {
         out.clear();

@@ -22,11 +22,6 @@ impl IncisionSets {
     /// The empty set.
     pub const EMPTY: u32 = 0;
 
-    /// Members in ascending order.
-    pub fn members(&self, set: u32) -> &[u32] {
-        &self.sets[set as usize]
-    }
-
     /// Whether the incision is in the set.
     pub fn contains(&self, set: u32, incision: u32) -> bool {
         set != Self::EMPTY && self.sets[set as usize].contains(&incision)

@@ -18,11 +18,14 @@
 //! Molino, Bao, Fedkiw 2004; Sifakis, Der, Fedkiw 2007; Wang, Jiang, Schroeder, Teran 2014 (virtual
 //! nodes). Jeřábková 2007 ch. 3 (the same space seen as an enrichment).
 
-#![allow(dead_code)]
-
 mod blade;
+mod sweep_triangle;
+mod front;
 mod incision_sets;
+mod crossings;
 mod fragments;
+mod detect;
+mod separate;
 mod pieces;
 mod copies;
 mod surface;
@@ -35,3 +38,7 @@ pub use components::Components;
 pub use cut_mesh::CutMesh;
 pub use pieces::Piece;
 pub use surface::{Surface, SurfaceVertex};
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

@@ -1,0 +1,78 @@
+//! Where incisions cross fragment edges that are not separated yet.
+//!
+//! One parameter per edge and incision, computed once and shared by every fragment around the edge:
+//! the first crossing wins. The parameter is the same in the rest and in the deformed configuration,
+//! because the map is affine on a piece.
+
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// A crossing this close to an end of its edge, relative to the edge, is the end itself.
+///
+/// Two crossings closer than this would make slivers that carry nothing but rounding errors. It is
+/// far above rounding (1e-16) and far below what a blade resolves.
+pub const SNAP: f64 = 1e-6;
+
+/// Multiplicative hash of an edge key; keys are made by this program, so no flooding defence.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct EdgeHasher(u64);
+
+impl Hasher for EdgeHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &b in bytes {
+            self.write_u64(u64::from(b));
+        }
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        self.0 = (self.0.rotate_left(5) ^ key).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.0 ^= self.0 >> 32;
+    }
+}
+
+/// Set of edge keys.
+pub type EdgeSet = HashSet<u64, BuildHasherDefault<EdgeHasher>>;
+
+/// The key of the edge between two vertices, whichever way round.
+pub fn edge_key(a: u32, b: u32) -> u64 {
+    u64::from(a.min(b)) << 32 | u64::from(a.max(b))
+}
+
+/// Pending crossings by edge.
+#[derive(Clone, Debug, Default)]
+pub struct Crossings {
+    by_edge: HashMap<u64, Vec<(u32, f64)>, BuildHasherDefault<EdgeHasher>>,
+}
+
+impl Crossings {
+    /// Parameter, counted from `a` to `b`, at which the incision crosses the edge.
+    pub fn get(&self, a: u32, b: u32, incision: u32) -> Option<f64> {
+        let t = self.of(a, b).iter().find(|c| c.0 == incision)?.1;
+        Some(if a < b { t } else { 1.0 - t })
+    }
+
+    /// All crossings of the edge, parameters counted from the vertex with the smaller id.
+    pub fn of(&self, a: u32, b: u32) -> &[(u32, f64)] {
+        self.by_edge.get(&edge_key(a, b)).map_or(&[], Vec::as_slice)
+    }
+
+    /// Records a crossing at `t` from `a` to `b`, unless the incision has one there already.
+    pub fn insert(&mut self, a: u32, b: u32, incision: u32, t: f64) {
+        let list = self.by_edge.entry(edge_key(a, b)).or_default();
+        if list.iter().all(|c| c.0 != incision) {
+            list.push((incision, if a < b { t } else { 1.0 - t }));
+        }
+    }
+
+    /// Gives the edge (new, other) the crossings of the edge (old, other).
+    pub fn inherit(&mut self, old: u32, new: u32, other: u32) {
+        for k in 0..self.of(old, other).len() {
+            let (incision, t) = self.of(old, other)[k];
+            self.insert(new, other, incision, if old < other { t } else { 1.0 - t });
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! Where a sweep crosses fragment edges, passes through vertices and runs along faces.
+
+use nalgebra::Vector3;
+
+use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
+
+use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
+use super::fragments::{Fragments, NONE};
+use super::incision_sets::IncisionSets;
+use super::pieces::PieceTable;
+use super::sweep_triangle::SweepTriangle;
+
+/// What detection reads of the body.
+pub struct Deformed<'a> {
+    /// Rest mesh.
+    pub mesh: &'a TetMesh,
+    /// Pieces and their copies.
+    pub pieces: &'a PieceTable,
+    /// Position [m] of every copy.
+    pub x: &'a [Vector3<f64>],
+}
+
+impl Deformed<'_> {
+    /// Position [m] of fragment vertex `v`, seen from piece `p`.
+    fn vertex(&self, fragments: &Fragments, p: u32, v: u32) -> Vector3<f64> {
+        let piece = &self.pieces.pieces[p as usize];
+        let nodes = &self.mesh.tets[piece.element as usize];
+        let vertex = &fragments.vertices[v as usize];
+        let mut position = Vector3::zeros();
+        for (&node, &weight) in vertex.nodes.iter().zip(&vertex.weights) {
+            if let Some(a) = nodes.iter().position(|&n| n == node) {
+                position += self.x[piece.copies[a] as usize] * weight;
+            }
+        }
+        position
+    }
+}
+
+/// Scratch arrays of the detection, and its result: the fragments to look at.
+#[derive(Clone, Debug, Default)]
+pub struct Detector {
+    /// Fragments that the sweep touches, ascending.
+    pub touched: Vec<u32>,
+    /// Pieces whose tet may meet the sweep, with the box around it [m].
+    candidates: Vec<(u32, Vector3<f64>, Vector3<f64>)>,
+    is_touched: Vec<u32>,
+    position: Vec<Vector3<f64>>,
+    position_stamp: Vec<u32>,
+    side: Vec<f64>,
+    side_stamp: Vec<u32>,
+    tested: EdgeSet,
+    sweep_stamp: u32,
+    triangle_stamp: u32,
+}
+
+/// The record a sweep leaves on the fragment mesh.
+pub struct Record<'a> {
+    /// Fragment mesh; vertices and faces get marked.
+    pub fragments: &'a mut Fragments,
+    /// Table of incision sets.
+    pub sets: &'a mut IncisionSets,
+    /// Crossings of edges.
+    pub crossings: &'a mut Crossings,
+    /// Incision of the sweep.
+    pub incision: u32,
+}
+
+impl Record<'_> {
+    fn is_on(&self, v: u32) -> bool {
+        self.sets.contains(self.fragments.on[v as usize], self.incision)
+    }
+
+    fn mark_along(&mut self, t: u32, face: usize) {
+        let n = self.fragments.neighbour[t as usize][face];
+        let Some(back) = (n != NONE).then(|| self.fragments.face_towards(n, t)).flatten() else { return };
+        for (t, face) in [(t, face), (n, back)] {
+            let along = &mut self.fragments.along[t as usize][face];
+            *along = self.sets.with(*along, self.incision);
+        }
+    }
+}
+
+impl Detector {
+    /// Copies of the pieces near the sweep.
+    pub fn nearby_tets<'a>(&'a self, pieces: &'a PieceTable) -> impl Iterator<Item = [u32; 4]> + 'a {
+        self.candidates.iter().map(|c| pieces.pieces[c.0 as usize].copies)
+    }
+
+    /// Finds the pieces whose tet overlaps the box [m].
+    pub fn find_candidates(&mut self, body: &Deformed, low: &Vector3<f64>, high: &Vector3<f64>) {
+        self.candidates.clear();
+        for (p, piece) in (0u32..).zip(&body.pieces.pieces) {
+            let [a, b, c, d] = piece.copies.map(|c| &body.x[c as usize]);
+            let (piece_low, piece_high) = (a.inf(b).inf(&c.inf(d)), a.sup(b).sup(&c.sup(d)));
+            if (0..3).all(|k| piece_low[k] <= high[k] && low[k] <= piece_high[k]) {
+                self.candidates.push((p, piece_low, piece_high));
+            }
+        }
+    }
+
+    /// Records crossings, vertices on the sheet and faces along it; fills `touched`.
+    pub fn run(&mut self, body: &Deformed, triangles: &[SweepTriangle], record: &mut Record) {
+        self.touched.clear();
+        self.sweep_stamp += 1;
+        self.is_touched.resize(record.fragments.tets.len(), 0);
+        let n = record.fragments.vertices.len();
+        self.position.resize(n, Vector3::zeros());
+        self.position_stamp.resize(n, 0);
+        self.side.resize(n, 0.0);
+        self.side_stamp.resize(n, 0);
+        for triangle in triangles {
+            self.triangle_stamp += 1;
+            self.tested.clear();
+            for c in 0..self.candidates.len() {
+                let (p, low, high) = self.candidates[c];
+                if triangle.overlaps(&low, &high) {
+                    self.test_piece(body, triangle, p, record);
+                }
+            }
+        }
+        self.mark_faces_at_the_sheet(body, triangles, record);
+        // The order in which fragments are separated must not depend on that of the triangles.
+        self.touched.sort_unstable();
+    }
+
+    fn test_piece(&mut self, body: &Deformed, triangle: &SweepTriangle, p: u32, record: &mut Record) {
+        let mut t = body.pieces.first_fragment[p as usize];
+        while t != NONE {
+            let tet = record.fragments.tets[t as usize];
+            let side = tet.map(|v| self.side_of(body, triangle, p, v, record.fragments));
+            if !(side.iter().all(|&s| s > 0.0) || side.iter().all(|&s| s < 0.0)) {
+                self.touch(t);
+                for [i, j] in TET_EDGES {
+                    if side[i] * side[j] <= 0.0 && (side[i] != 0.0 || side[j] != 0.0) {
+                        self.test_edge(triangle, t, [tet[i], tet[j]], [side[i], side[j]], record);
+                    }
+                }
+                self.test_flat_faces(body, triangle, t, &side, record);
+            }
+            t = record.fragments.next_in_piece[t as usize];
+        }
+    }
+
+    fn touch(&mut self, t: u32) {
+        if self.is_touched[t as usize] != self.sweep_stamp {
+            self.is_touched[t as usize] = self.sweep_stamp;
+            self.touched.push(t);
+        }
+    }
+
+    fn side_of(&mut self, body: &Deformed, triangle: &SweepTriangle, p: u32, v: u32, f: &Fragments) -> f64 {
+        let k = v as usize;
+        let position = self.locate(body, f, p, v);
+        if self.side_stamp[k] != self.triangle_stamp {
+            self.side_stamp[k] = self.triangle_stamp;
+            self.side[k] = triangle.side(&position);
+        }
+        self.side[k]
+    }
+
+    /// Tests one edge whose ends lie on different sides of the plane, or one of them on it.
+    fn test_edge(
+        &mut self,
+        triangle: &SweepTriangle,
+        t: u32,
+        [a, b]: [u32; 2],
+        [side_a, side_b]: [f64; 2],
+        record: &mut Record,
+    ) {
+        if !self.tested.insert(edge_key(a, b)) || record.is_on(a) || record.is_on(b) {
+            return;
+        }
+        if record.crossings.get(a, b, record.incision).is_some()
+            || !triangle.holds_line(&self.position[a as usize], &self.position[b as usize])
+        {
+            return;
+        }
+        let s = side_a / (side_a - side_b);
+        if s <= SNAP {
+            self.put_on_sheet(t, a, record);
+        } else if s >= 1.0 - SNAP {
+            self.put_on_sheet(t, b, record);
+        } else {
+            record.crossings.insert(a, b, record.incision, s);
+        }
+    }
+
+    /// The vertex lies on the sheet: all fragments around it are touched.
+    fn put_on_sheet(&mut self, t: u32, v: u32, record: &mut Record) {
+        let on = &mut record.fragments.on[v as usize];
+        *on = record.sets.with(*on, record.incision);
+        let mut star = Vec::new();
+        record.fragments.star(t, v, &mut star);
+        for t in star {
+            self.touch(t);
+        }
+    }
+
+    /// Marks faces that lie in the plane of the triangle where the sweep passes through them.
+    fn test_flat_faces(
+        &mut self,
+        body: &Deformed,
+        triangle: &SweepTriangle,
+        t: u32,
+        side: &[f64; 4],
+        record: &mut Record,
+    ) {
+        let x = record.fragments.tets[t as usize].map(|v| self.position[v as usize]);
+        let longest = TET_EDGES.iter().map(|&[i, j]| (x[i] - x[j]).norm()).fold(0.0, f64::max);
+        let flat = side.map(|s| s.abs() <= SNAP * triangle.double_area * longest);
+        for (face, corners) in TET_FACES.iter().enumerate() {
+            if corners.iter().all(|&k| flat[k]) {
+                self.test_face(body, std::slice::from_ref(triangle), t, face, record);
+            }
+        }
+    }
+
+    /// Marks a closed face if a triangle passes between the centres of the two fragments it joins.
+    fn test_face(
+        &mut self,
+        body: &Deformed,
+        triangles: &[SweepTriangle],
+        t: u32,
+        face: usize,
+        record: &mut Record,
+    ) {
+        let n = record.fragments.neighbour[t as usize][face];
+        if n == NONE || record.sets.contains(record.fragments.along[t as usize][face], record.incision) {
+            return;
+        }
+        let tet = record.fragments.tets[t as usize];
+        let far = record.fragments.tets[n as usize];
+        let f = &*record.fragments;
+        let near_centre =
+            tet.map(|v| self.locate(body, f, f.piece[t as usize], v)).iter().sum::<Vector3<f64>>() / 4.0;
+        let far_centre =
+            far.map(|v| self.locate(body, f, f.piece[n as usize], v)).iter().sum::<Vector3<f64>>() / 4.0;
+        let face_centre =
+            TET_FACES[face].iter().map(|&k| self.position[tet[k] as usize]).sum::<Vector3<f64>>() / 3.0;
+        if triangles.iter().any(|s| s.meets(&near_centre, &face_centre) || s.meets(&face_centre, &far_centre))
+        {
+            record.mark_along(t, face);
+        }
+    }
+
+    /// A bent sheet may run through the three vertices of a face that lies in none of its planes.
+    fn mark_faces_at_the_sheet(&mut self, body: &Deformed, triangles: &[SweepTriangle], record: &mut Record) {
+        for k in 0..self.touched.len() {
+            let t = self.touched[k];
+            let on = record.fragments.tets[t as usize].map(|v| record.is_on(v));
+            if !on.contains(&true) {
+                continue;
+            }
+            for (face, corners) in TET_FACES.iter().enumerate() {
+                if corners.iter().any(|&k| on[k]) {
+                    self.test_face(body, triangles, t, face, record);
+                }
+            }
+        }
+    }
+
+    fn locate(&mut self, body: &Deformed, fragments: &Fragments, p: u32, v: u32) -> Vector3<f64> {
+        if self.position_stamp[v as usize] != self.sweep_stamp {
+            self.position_stamp[v as usize] = self.sweep_stamp;
+            self.position[v as usize] = body.vertex(fragments, p, v);
+        }
+        self.position[v as usize]
+    }
+}

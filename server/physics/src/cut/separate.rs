@@ -1,0 +1,248 @@
+//! From crossings to separated material: bisect what a sheet cuts completely, then open the faces
+//! along it.
+//!
+//! A fragment is cut completely by an incision when its vertices off the sheet fall apart once the
+//! crossed edges are taken away. Only then are the crossed edges between the parts bisected, in every
+//! fragment around them, so the fragment mesh stays conforming; the faces between the halves lie along
+//! the sheet. A fragment that the sheet has entered but not left keeps its crossings and waits: the cut
+//! lags the blade by at most one element.
+
+use std::collections::VecDeque;
+
+use crate::mesh::{TET_EDGES, TET_FACES};
+
+use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
+use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
+use super::incision_sets::IncisionSets;
+
+/// Work list and result of a separation.
+#[derive(Clone, Debug, Default)]
+pub struct Separator {
+    /// Elements with a face opened by this sweep, ascending.
+    pub elements: Vec<u32>,
+    /// Number of faces opened.
+    pub faces_opened: usize,
+    /// Whether any edge was bisected.
+    pub refined: bool,
+    /// Edges that are crossed but not separated.
+    pub pending: EdgeSet,
+    /// Edges left whole because of the cap.
+    pub refused: EdgeSet,
+    queue: VecDeque<u32>,
+    active: Vec<u32>,
+    wedge: Vec<u32>,
+    halves: Vec<Halves>,
+    corners: Vec<(u32, u8)>,
+}
+
+/// What a separation changes.
+pub struct Sheet<'a> {
+    /// Fragment mesh.
+    pub fragments: &'a mut Fragments,
+    /// Table of incision sets.
+    pub sets: &'a mut IncisionSets,
+    /// Crossings of edges.
+    pub crossings: &'a mut Crossings,
+    /// The incision that is worked off.
+    pub incision: u32,
+}
+
+impl Sheet<'_> {
+    fn is_on(&self, v: u32) -> bool {
+        self.sets.contains(self.fragments.on[v as usize], self.incision)
+    }
+
+    /// Parameter at which the incision crosses the edge (a, b), if it does and both ends are off it.
+    fn crossing(&self, a: u32, b: u32) -> Option<f64> {
+        if self.is_on(a) || self.is_on(b) { None } else { self.crossings.get(a, b, self.incision) }
+    }
+}
+
+impl Separator {
+    /// Separates what the sheet cuts completely among `touched` fragments and their neighbours.
+    pub fn run(&mut self, touched: &[u32], sheet: &mut Sheet) {
+        self.elements.clear();
+        self.pending.clear();
+        self.refused.clear();
+        self.faces_opened = 0;
+        self.refined = false;
+        self.queue.clear();
+        self.queue.extend(touched);
+        self.active.clear();
+        self.active.extend(touched);
+        while let Some(t) = self.queue.pop_front() {
+            while let Some((a, b, s)) = self.edge_to_bisect(t, sheet) {
+                if !self.bisect(t, [a, b], s, sheet) {
+                    self.refused.insert(edge_key(a, b));
+                }
+            }
+        }
+        self.active.sort_unstable();
+        self.active.dedup();
+        self.open_faces(sheet);
+        self.count_pending(sheet);
+    }
+
+    /// A crossed edge between two parts of fragment `t`, if the sheet takes it apart.
+    fn edge_to_bisect(&self, t: u32, sheet: &Sheet) -> Option<(u32, u32, f64)> {
+        let tet = sheet.fragments.tets[t as usize];
+        let mut part = [0usize, 1, 2, 3];
+        let mut crossed = [None; 6];
+        let on = tet.map(|v| sheet.is_on(v));
+        for (k, [i, j]) in TET_EDGES.into_iter().enumerate() {
+            if on[i] || on[j] {
+                continue;
+            }
+            crossed[k] = sheet.crossings.get(tet[i], tet[j], sheet.incision);
+            if crossed[k].is_none() {
+                let (keep, drop) = (part[i], part[j]);
+                part.iter_mut().filter(|p| **p == drop).for_each(|p| *p = keep);
+            }
+        }
+        TET_EDGES.into_iter().zip(crossed).find_map(|([i, j], s)| {
+            let s = s.filter(|_| part[i] != part[j])?;
+            (!self.refused.contains(&edge_key(tet[i], tet[j]))).then_some((tet[i], tet[j], s))
+        })
+    }
+
+    /// Bisects the edge (a, b) at `s` in all fragments around it, unless an element would exceed its
+    /// cap.
+    fn bisect(&mut self, t: u32, [a, b]: [u32; 2], s: f64, sheet: &mut Sheet) -> bool {
+        let fragments = &mut *sheet.fragments;
+        fragments.wedge(t, a, b, &mut self.wedge);
+        let full = |e: u32| {
+            let more = self.wedge.iter().filter(|&&w| fragments.element[w as usize] == e).count();
+            usize::from(fragments.count[e as usize]) + more > usize::from(MAX_FRAGMENTS_PER_ELEMENT)
+        };
+        if self.wedge.iter().any(|&w| full(fragments.element[w as usize])) {
+            return false;
+        }
+        let m = fragments.vertices.len() as u32;
+        let [at_a, at_b] = [a, b].map(|v| fragments.vertices[v as usize]);
+        fragments.vertices.push(FragmentVertex::between(&at_a, &at_b, s));
+        let both = sheet.sets.both(fragments.on[a as usize], fragments.on[b as usize]);
+        fragments.on.push(sheet.sets.with(both, sheet.incision));
+        let along = sheet.sets.with(IncisionSets::EMPTY, sheet.incision);
+        fragments.bisect(&self.wedge, [a, b], (m, s), along, &mut self.halves);
+        for h in &self.halves {
+            self.active.extend([h.old, h.new]);
+            self.queue.extend([h.old, h.new]);
+        }
+        self.refined = true;
+        self.pass_on_crossings([a, b], m, s, sheet);
+        true
+    }
+
+    /// Gives the crossings of *other* incisions on (a, b) to its halves, and to the new edges from `m`
+    /// into the fragments where their line across a face demands one.
+    fn pass_on_crossings(&self, [a, b]: [u32; 2], m: u32, s: f64, sheet: &mut Sheet) {
+        let incision = sheet.incision;
+        let others: Vec<u32> =
+            sheet.crossings.of(a, b).iter().map(|c| c.0).filter(|&other| other != incision).collect();
+        for other in others {
+            let Some(t) = sheet.crossings.get(a, b, other) else { continue };
+            if (t - s).abs() <= SNAP {
+                let on = &mut sheet.fragments.on[m as usize];
+                *on = sheet.sets.with(*on, other);
+            } else if t < s {
+                sheet.crossings.insert(a, m, other, t / s);
+            } else {
+                sheet.crossings.insert(m, b, other, (t - s) / (1.0 - s));
+            }
+        }
+        let mut apexes: Vec<u32> = Vec::new();
+        for h in &self.halves {
+            for v in sheet.fragments.tets[h.old as usize] {
+                if v != a && v != m && !apexes.contains(&v) {
+                    apexes.push(v);
+                }
+            }
+        }
+        for c in apexes {
+            let mut pending: Vec<u32> = Vec::new();
+            for (p, q) in [(a, m), (m, b), (a, c), (b, c)] {
+                pending.extend(sheet.crossings.of(p, q).iter().map(|x| x.0).filter(|&o| o != incision));
+            }
+            pending.sort_unstable();
+            pending.dedup();
+            for other in pending {
+                let on = |v: u32| sheet.sets.contains(sheet.fragments.on[v as usize], other);
+                if !on(m)
+                    && !on(c)
+                    && let Some(r) = crossing_of_median(sheet.crossings, [a, b, c, m], s, other)
+                {
+                    sheet.crossings.insert(m, c, other, r);
+                }
+            }
+        }
+    }
+
+    /// Opens every active face that the incision runs along and whose three vertices lie on it; then
+    /// gives every lip its own vertices.
+    fn open_faces(&mut self, sheet: &mut Sheet) {
+        self.corners.clear();
+        for &t in &self.active {
+            for (face, corners) in TET_FACES.iter().enumerate() {
+                let along = sheet.fragments.along[t as usize][face];
+                let n = sheet.fragments.neighbour[t as usize][face];
+                if n == NONE || !sheet.sets.contains(along, sheet.incision) {
+                    continue;
+                }
+                let tet = sheet.fragments.tets[t as usize];
+                if !corners.iter().all(|&k| sheet.is_on(tet[k])) {
+                    continue;
+                }
+                let back = sheet.fragments.face_towards(n, t);
+                sheet.fragments.open(t, face, sheet.incision);
+                self.faces_opened += 1;
+                for (t, face) in [(t, Some(face)), (n, back)] {
+                    self.elements.push(sheet.fragments.element[t as usize]);
+                    self.corners.extend((0..4u8).filter(|&k| Some(k as usize) != face).map(|k| (t, k)));
+                }
+            }
+        }
+        self.elements.sort_unstable();
+        self.elements.dedup();
+        let crossings = &mut *sheet.crossings;
+        sheet.fragments.split_stars(&self.corners, |fragments, old, [t, new]| {
+            for v in fragments.tets[t as usize] {
+                if v != new {
+                    crossings.inherit(old, new, v);
+                }
+            }
+        });
+    }
+
+    fn count_pending(&mut self, sheet: &Sheet) {
+        for &t in &self.active {
+            let tet = sheet.fragments.tets[t as usize];
+            for [i, j] in TET_EDGES {
+                if sheet.crossing(tet[i], tet[j]).is_some() {
+                    self.pending.insert(edge_key(tet[i], tet[j]));
+                }
+            }
+        }
+    }
+}
+
+/// Where an incision crosses the new edge (m, c) of the triangle (a, b, c), m = (1 − s) a + s b: it
+/// must if it enters through the half on the side of `a` and leaves through the half on the side of
+/// `b`. Returns the parameter from m to c of the straight line between the two crossings.
+fn crossing_of_median(crossings: &Crossings, [a, b, c, m]: [u32; 4], s: f64, incision: u32) -> Option<f64> {
+    let only = |p: Option<[f64; 3]>, q: Option<[f64; 3]>| match (p, q) {
+        (Some(x), None) | (None, Some(x)) => Some(x),
+        _ => None,
+    };
+    // Barycentric coordinates in (a, b, c).
+    let on_am = crossings.get(a, m, incision).map(|t| [1.0 - t * s, t * s, 0.0]);
+    let on_mb = crossings.get(m, b, incision).map(|t| [(1.0 - s) * (1.0 - t), s + t * (1.0 - s), 0.0]);
+    let on_ac = crossings.get(a, c, incision).map(|t| [1.0 - t, 0.0, t]);
+    let on_bc = crossings.get(b, c, incision).map(|t| [0.0, 1.0 - t, t]);
+    let (p, q) = (only(on_am, on_ac)?, only(on_mb, on_bc)?);
+    // Signed distance from the line m–c, positive on the side of a.
+    let distance = |x: &[f64; 3]| x[0] * s - x[1] * (1.0 - s);
+    let (from, to) = (distance(&p), distance(&q));
+    let ratio = from / (from - to);
+    let r = p[2] + ratio * (q[2] - p[2]);
+    (r > SNAP && r < 1.0 - SNAP).then_some(r)
+}

@@ -1,0 +1,94 @@
+//! One triangle of a swept blade and exact tests against segments.
+//!
+//! Signs come from Shewchuk's adaptive predicate, so a segment is on one side, on the other, or
+//! exactly on the plane, and every triangle of a sweep agrees about a shared border. Borders count as
+//! inside: a segment that passes through the seam of two triangles is never missed.
+
+use nalgebra::Vector3;
+use robust::Coord3D;
+
+/// A triangle in the deformed configuration [m], with its bounds.
+#[derive(Clone, Copy, Debug)]
+pub struct SweepTriangle {
+    /// Corners [m].
+    pub corners: [Vector3<f64>; 3],
+    /// Smallest corner of the bounding box [m].
+    pub low: Vector3<f64>,
+    /// Largest corner of the bounding box [m].
+    pub high: Vector3<f64>,
+    /// Twice the area [m²].
+    pub double_area: f64,
+}
+
+impl SweepTriangle {
+    /// The triangle, unless it has no area.
+    pub fn new(p: Vector3<f64>, q: Vector3<f64>, r: Vector3<f64>) -> Option<Self> {
+        let double_area = (q - p).cross(&(r - p)).norm();
+        (double_area > 0.0).then(|| Self {
+            corners: [p, q, r],
+            low: p.inf(&q).inf(&r),
+            high: p.sup(&q).sup(&r),
+            double_area,
+        })
+    }
+
+    /// Six times the signed volume spanned with `x`; its sign is exact.
+    pub fn side(&self, x: &Vector3<f64>) -> f64 {
+        let [p, q, r] = &self.corners;
+        orient(p, q, r, x)
+    }
+
+    /// Whether the line through `a` and `b`, which lie on different sides of the plane or one of
+    /// them on it, meets the triangle, its border included.
+    pub fn holds_line(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
+        let [p, q, r] = &self.corners;
+        let s = [orient(a, b, p, q), orient(a, b, q, r), orient(a, b, r, p)];
+        s.iter().all(|&v| v >= 0.0) || s.iter().all(|&v| v <= 0.0)
+    }
+
+    /// Whether the segment from `a` to `b` meets the triangle, borders included. A segment inside the
+    /// plane does not count.
+    pub fn meets(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
+        let (low, high) = (a.inf(b), a.sup(b));
+        if !self.overlaps(&low, &high) {
+            return false;
+        }
+        let (s, t) = (self.side(a), self.side(b));
+        let apart = (s <= 0.0 && t >= 0.0) || (s >= 0.0 && t <= 0.0);
+        apart && (s != 0.0 || t != 0.0) && self.holds_line(a, b)
+    }
+
+    /// Whether the bounding box overlaps another one.
+    pub fn overlaps(&self, low: &Vector3<f64>, high: &Vector3<f64>) -> bool {
+        (0..3).all(|k| self.low[k] <= high[k] && low[k] <= self.high[k])
+    }
+}
+
+fn orient(p: &Vector3<f64>, q: &Vector3<f64>, r: &Vector3<f64>, x: &Vector3<f64>) -> f64 {
+    let c = |v: &Vector3<f64>| Coord3D { x: v.x, y: v.y, z: v.z };
+    robust::orient3d(c(p), c(q), c(r), c(x))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_through_the_seam_of_two_triangles_meets_both() {
+        let p = |x: f64, y: f64| Vector3::new(x, y, 0.0);
+        let first = SweepTriangle::new(p(0.0, 0.0), p(1.0, 0.0), p(1.0, 1.0)).unwrap();
+        let second = SweepTriangle::new(p(0.0, 0.0), p(1.0, 1.0), p(0.0, 1.0)).unwrap();
+        for s in [0.0, 0.1, 1.0 / 3.0, 1.0] {
+            let (a, b) = (Vector3::new(s, s, -0.3), Vector3::new(s, s, 0.7));
+            assert!(first.meets(&a, &b) && second.meets(&a, &b), "at {s}");
+        }
+        assert!(!first.meets(&Vector3::new(0.2, 0.8, -1.0), &Vector3::new(0.2, 0.8, 1.0)));
+    }
+
+    #[test]
+    fn a_triangle_without_area_is_none() {
+        let p = Vector3::new(1.0, 2.0, 3.0);
+        assert!(SweepTriangle::new(p, p, Vector3::x()).is_none());
+    }
+}

@@ -1,0 +1,96 @@
+//! Partial cuts, cuts that grow, cuts of moving tissue, closed curves.
+
+use super::*;
+
+/// Slab cut from x = −0.1 to `to` in `n` advances, blade along y.
+fn advance(body: &mut Body, to: f64, z: f64, n: usize, incision: u32) {
+    for k in 0..n {
+        let at = |k: usize| -0.1 + (to + 0.1) * k as f64 / n as f64;
+        let blade = |x: f64| [v(x, -0.1, z), v(x, 1.1, z)];
+        body.sweep(&[blade(at(k)), blade(at(k + 1))], incision);
+    }
+}
+
+#[test]
+fn a_cut_that_ends_inside_opens_a_slit_and_separates_nothing() {
+    let mut body = Body::unit(6);
+    advance(&mut body, 0.55, 0.51, 1, 1);
+    check::everything(&body.cut);
+    assert_eq!(body.cut.components().len(), 1);
+    let lips: f64 = body.cut.surface().tags.iter().filter(|&&t| t == 1).count() as f64;
+    assert!(lips > 0.0 && body.cut.n_copies() > 343);
+}
+
+#[test]
+fn two_hundred_small_advances_equal_the_whole_cut() {
+    for (z, to) in [(0.51, 1.1), (0.51, 0.63), (0.5, 1.1), (0.5, 0.63)] {
+        let mut whole = Body::unit(6);
+        advance(&mut whole, to, z, 1, 1);
+        let mut grown = Body::unit(6);
+        let mut before = grown.topology();
+        for k in 0..200 {
+            let at = |k: usize| -0.1 + (to + 0.1) * k as f64 / 200.0;
+            let blade = |x: f64| [v(x, -0.1, z), v(x, 1.1, z)];
+            grown.sweep(&[blade(at(k)), blade(at(k + 1))], 1);
+            let now = grown.topology();
+            assert!(now.iter().zip(&before).all(|(n, b)| n >= b));
+            before = now;
+        }
+        check::everything(&grown.cut);
+        check::everything(&whole.cut);
+        assert_eq!(grown.topology(), whole.topology(), "z {z}, to {to}");
+    }
+}
+
+#[test]
+fn single_segments_continue_the_incision() {
+    let mut body = Body::unit(4);
+    for k in 0..=30 {
+        let x = -0.1 + 0.04 * f64::from(k);
+        body.sweep(&[[v(x, -0.1, 0.45), v(x, 1.1, 0.45)]], 4);
+    }
+    check::everything(&body.cut);
+    assert_eq!(body.cut.components().len(), 2);
+}
+
+/// The tissue translates at 1 m/s and turns while the blade passes: the incision stays connected, so
+/// it takes the body apart.
+#[test]
+fn an_incision_stays_connected_while_the_tissue_moves() {
+    let mut body = Body::new([0.1; 3], [6; 3], BoxPattern::Tet6);
+    let rest = body.cut.rest_positions();
+    assert_eq!(rest.len(), body.x.len());
+    for k in 0..=150 {
+        let time = f64::from(k) * 1e-3;
+        let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::y_axis(), 0.6 * (40.0 * time).sin());
+        for (x, &node) in body.x.iter_mut().zip(body.cut.copy_node()) {
+            *x = turn * (rest[node as usize] - v(0.05, 0.05, 0.05)) + v(0.0, time, 0.0) + v(0.05, 0.05, 0.05);
+        }
+        let s = -0.02 + 0.14 * f64::from(k) / 150.0;
+        body.sweep(&[[v(s, time - 0.05, 0.05), v(s, time + 0.15, 0.05)]], 1);
+    }
+    check::everything(&body.cut);
+    assert_eq!(body.cut.components().len(), 2, "{:?}", body.cut.components().volume);
+}
+
+/// A closed curve cuts a plug out of the body.
+#[test]
+fn a_closed_curve_cuts_a_plug_out() {
+    for n in [5, 16, 40] {
+        for steps in [1, n] {
+            let mut body = Body::unit(6);
+            let blade = |k: usize| {
+                let angle = std::f64::consts::TAU * (k % n) as f64 / n as f64 + 0.1;
+                let (x, y) = (0.5 + 0.3 * angle.cos(), 0.5 + 0.3 * angle.sin());
+                [v(x, y, -0.1), v(x, y, 1.1)]
+            };
+            for s in 0..steps {
+                let (from, to) = (s * n / steps, (s + 1) * n / steps);
+                let segments: Vec<_> = (from..=to).map(blade).collect();
+                body.sweep(&segments, 1);
+            }
+            check::everything(&body.cut);
+            assert_eq!(body.cut.components().len(), 2, "{n} sides in {steps} sweeps");
+        }
+    }
+}
