@@ -16,12 +16,23 @@ mod vtk_xml;
 mod obj;
 mod stl;
 mod ply;
+mod weld;
+mod connectivity;
+mod volume_health;
+mod surface_health;
+mod triangle_tree;
+mod lattice;
+#[cfg(test)]
+mod shapes;
 
 use std::path::Path;
 
 use nalgebra::Vector3;
 
 pub use error::MeshInError;
+pub use lattice::{CELLS, LatticeReport, lattice_from_surface};
+pub use surface_health::SurfaceHealth;
+pub use volume_health::{VolumeHealth, repair_volume};
 
 /// Tetrahedra as a file gave them: not checked, not oriented.
 #[derive(Clone, Debug, PartialEq)]
