@@ -22,6 +22,8 @@ mod volume_health;
 mod surface_health;
 mod triangle_tree;
 mod lattice;
+mod load;
+mod scale;
 #[cfg(test)]
 mod shapes;
 
@@ -31,6 +33,8 @@ use nalgebra::Vector3;
 
 pub use error::MeshInError;
 pub use lattice::{CELLS, LatticeReport, lattice_from_surface};
+pub use load::{MeshHealth, load_any, load_surface, load_volume};
+pub use scale::{ScaleWarning, check_scale};
 pub use surface_health::SurfaceHealth;
 pub use volume_health::{VolumeHealth, repair_volume};
 

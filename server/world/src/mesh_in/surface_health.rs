@@ -63,14 +63,10 @@ impl SurfaceHealth {
     }
 }
 
-/// A welded, consistently and outward oriented surface.
+/// A welded, consistently and outward oriented surface, ready for questions.
 pub struct CleanSurface {
     /// Name of the file.
     pub file: String,
-    /// Positions [m].
-    pub vertices: Vec<Vector3<f64>>,
-    /// Vertex indices, outward where that is defined.
-    pub triangles: Vec<[u32; 3]>,
     /// Boxes and winding numbers.
     pub tree: TriangleTree,
 }
@@ -97,7 +93,7 @@ pub fn clean_surface(
     health.volume_m3 = enclosed_volume(&scaled, &triangles, 0.5 * (low + high));
     let tree = TriangleTree::new(&scaled, &triangles);
     health.self_intersections = self_intersections(&scaled, &triangles, &tree);
-    Ok((CleanSurface { file: surface.file.clone(), vertices: scaled, triangles, tree }, health))
+    Ok((CleanSurface { file: surface.file.clone(), tree }, health))
 }
 
 fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
