@@ -19,7 +19,11 @@ pub mod mesh_in;
 
 // the demonstration's organ: organ
 
-// rigid tools and their contact with bodies: tool
+// rigid tools: where hands and scripts hold them
+pub mod tool;
+
+// tools on bodies: proxies, springs, reactions
+pub mod contact;
 
 // scene to bodies: regions, loads, meshes
 pub mod build;

@@ -1,0 +1,82 @@
+//! How far the tissue gives way under a tool, learned from the steps themselves.
+//!
+//! A one-sided spring with force f after a step stands at depth f / k, so a step tells how far the
+//! tissue moved (depth before minus depth after) for how much more force. Their ratio is the
+//! compliance that a prediction over one step needs; inertia and damping are in it.
+
+/// Force below which a step says nothing [N].
+const LEAST_CHANGE_N: f64 = 1e-4;
+/// Weight of a new sample in the running mean.
+const LEARNING: f64 = 0.2;
+/// The estimate stays within this factor of the first guess, either way.
+const LIMIT: f64 = 20.0;
+
+/// Running estimate of the compliance under one tool [m/N].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compliance {
+    guess: f64,
+    estimate: f64,
+    force_before: f64,
+}
+
+impl Compliance {
+    /// Starts from `E a` as stiffness of tissue with Young's modulus `E` [Pa] under a patch of radius
+    /// `a` [m]: within a factor of two of Boussinesq's punch, and the same for every mesh.
+    pub fn new(young_pa: f64, patch_radius_m: f64) -> Self {
+        let guess = 1.0 / (young_pa * patch_radius_m).clamp(1.0, 1e6);
+        Self { guess, estimate: guess, force_before: 0.0 }
+    }
+
+    /// The estimate [m/N].
+    pub fn value(&self) -> f64 {
+        self.estimate
+    }
+
+    /// Takes in a step: depths before and after [m] and the normal force after [N].
+    pub fn learn(&mut self, depth_before: f64, depth_after: f64, force: f64) {
+        let change = force - self.force_before;
+        self.force_before = force;
+        let sample = (depth_before - depth_after) / change;
+        if change.abs() < LEAST_CHANGE_N || !sample.is_finite() || sample <= 0.0 {
+            return;
+        }
+        let sample = sample.clamp(self.guess / LIMIT, self.guess * LIMIT);
+        self.estimate += LEARNING * (sample - self.estimate);
+    }
+
+    /// The contact is gone: the next begins without force, and with the estimate kept.
+    pub fn release(&mut self) {
+        self.force_before = 0.0;
+    }
+
+    /// Stiffness of tool and tissue in series [N/m].
+    pub fn in_series_with(&self, tool_stiffness: f64) -> f64 {
+        1.0 / (1.0 / tool_stiffness + self.estimate)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn learns_the_stiffness_of_a_spring_and_stays_within_limits() {
+        let (k_tool, k_tissue) = (800.0, 300.0);
+        let mut compliance = Compliance::new(3e5, 0.005);
+        let (mut indentation, mut force) = (0.0, 0.0);
+        for step in 1..100 {
+            let device = 1e-4 * f64::from(step);
+            let depth_before = device - indentation;
+            force = device / (1.0 / k_tool + 1.0 / k_tissue);
+            indentation = force / k_tissue;
+            compliance.learn(depth_before, device - indentation, force);
+        }
+        assert!(force > 1.0);
+        // The tissue also gave way for the step before, so the sample is the tissue's own.
+        assert!((compliance.value() * k_tissue - 1.0).abs() < 0.01);
+        compliance.learn(1.0, 0.0, force + 1e-3);
+        assert!(compliance.value() <= 20.0 / 1500.0);
+        compliance.learn(f64::NAN, 0.0, 5.0);
+        assert!(compliance.value().is_finite());
+    }
+}

@@ -1,0 +1,117 @@
+//! Tissue held by a tool: material points bound when the grip closes, pulled along by the tool.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::contact::surface::ContactSurface;
+use scindo_collision::barycentric_point;
+
+/// Most material points in one grip.
+pub const MAX_HELD: usize = 7;
+/// How far beyond the tool's radius it can take hold [m].
+const REACH_M: f64 = 0.004;
+
+/// One point of the surface in the grip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// Triangle of the surface.
+    pub triangle: u32,
+    /// Where on it.
+    pub barycentric: [f64; 3],
+    /// Where the tool holds it, in tool axes [m].
+    pub in_tool: Point3<f64>,
+    /// Where it is now [m].
+    pub point: Vector3<f64>,
+}
+
+/// What one tool holds.
+#[derive(Debug, Clone, Default)]
+pub struct Grip {
+    body: usize,
+    epoch: u32,
+    held: Vec<Held>,
+    closed: bool,
+}
+
+impl Grip {
+    /// A grip that holds nothing, with room for all it can.
+    pub fn new() -> Self {
+        Self { held: Vec::with_capacity(MAX_HELD), ..Self::default() }
+    }
+
+    /// Lets go.
+    pub fn open(&mut self) {
+        self.held.clear();
+        self.closed = false;
+    }
+
+    /// The body held and the points in the grip.
+    pub fn held(&self) -> (usize, &[Held]) {
+        (self.body, &self.held)
+    }
+
+    /// Closes on the tissue nearest to the tip, once per grip, and keeps what it holds up to
+    /// date. `radius` of the tool and of the ring of points taken [m].
+    pub fn hold(&mut self, tool: &Isometry3<f64>, radius: f64, surfaces: &[ContactSurface]) {
+        if self.closed {
+            self.refresh(radius, surfaces);
+        } else {
+            self.closed = true;
+            self.close(tool, radius, surfaces);
+        }
+    }
+
+    fn close(&mut self, tool: &Isometry3<f64>, radius: f64, surfaces: &[ContactSurface]) {
+        let tip = tool.translation.vector;
+        let nearest = surfaces
+            .iter()
+            .enumerate()
+            .filter_map(|(body, surface)| {
+                let on = surface.tree()?.closest_point(tip, radius + REACH_M)?;
+                Some((body, on))
+            })
+            .min_by(|a, b| a.1.signed_distance.abs().total_cmp(&b.1.signed_distance.abs()));
+        let Some((body, middle)) = nearest else { return };
+        self.body = body;
+        self.epoch = surfaces[body].epoch();
+        let Some(tree) = surfaces[body].tree() else { return };
+        let across = middle.normal.cross(&Vector3::ith(middle.normal.iamin(), 1.0)).normalize();
+        let along = middle.normal.cross(&across);
+        for i in 0..MAX_HELD {
+            let angle = std::f64::consts::TAU * i as f64 / (MAX_HELD - 1) as f64;
+            let ring = if i == 0 { 0.0 } else { radius.max(0.5 * REACH_M) };
+            let aside = (across * angle.cos() + along * angle.sin()) * ring;
+            let Some(on) = tree.closest_point(middle.point + aside, radius + REACH_M) else {
+                continue;
+            };
+            self.held.push(Held {
+                triangle: on.triangle,
+                barycentric: on.barycentric,
+                in_tool: tool.inverse_transform_point(&Point3::from(on.point)),
+                point: on.point,
+            });
+        }
+    }
+
+    /// Follows the held points; after a change of topology takes the nearest of the new surface.
+    fn refresh(&mut self, radius: f64, surfaces: &[ContactSurface]) {
+        let Some(surface) = surfaces.get(self.body) else { return self.held.clear() };
+        let Some(tree) = surface.tree() else { return self.held.clear() };
+        if surface.epoch() == self.epoch {
+            for held in &mut self.held {
+                held.point = barycentric_point(&tree.triangle(held.triangle), held.barycentric);
+            }
+            return;
+        }
+        self.epoch = surface.epoch();
+        self.held.retain_mut(|held| {
+            let Some(on) = tree.closest_point(held.point, radius + REACH_M) else { return false };
+            *held = Held {
+                triangle: on.triangle,
+                barycentric: on.barycentric,
+                point: on.point,
+                in_tool: held.in_tool,
+            };
+            true
+        });
+    }
+}

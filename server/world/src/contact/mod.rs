@@ -1,0 +1,254 @@
+//! Contact of tools and bodies in a step: surfaces, proxies, springs, reactions.
+//!
+//! # Order in a step
+//! 1. after all cuts, [`Contacts::update_surface`] per body with its surface positions now;
+//! 2. [`Contacts::detect`]: proxies move, touched points become springs;
+//! 3. per body, the integrator's solve with [`Contacts::springs`];
+//! 4. per body, [`Contacts::collect`] with the force of every spring from that solve;
+//! 5. [`Contacts::react`]: each tool receives exactly minus the sum of its springs' forces.
+//!
+//! Tissue force and reaction therefore come from the same solve and balance to rounding.
+//! Nothing here allocates while topologies and tools stay the same.
+
+pub mod surface;
+pub mod proxy;
+pub mod touch;
+pub mod spring;
+pub mod grab;
+pub mod compliance;
+
+use nalgebra::Vector3;
+use scindo_collision::SurfaceError;
+use scindo_physics::cut::{Surface, SurfaceVertex};
+
+use crate::inputs::ToolMode;
+use crate::tool::geometry::core_radius;
+use crate::tool::{MAX_TOOLS, Tool, Tools};
+use compliance::Compliance;
+use spring::{PointSpring, SpringKind, material_points};
+use surface::ContactSurface;
+use touch::{MAX_CONTACTS, Touch, TouchFinder};
+
+/// Springs reserved per body: every tool with all its contacts, three springs each.
+const SPRING_CAPACITY: usize = MAX_TOOLS * MAX_CONTACTS * 3;
+
+/// Springs on one body and the tools behind them.
+#[derive(Debug, Clone)]
+struct BodyContacts {
+    young_pa: f64,
+    vertices: Vec<SurfaceVertex>,
+    springs: Vec<PointSpring>,
+    /// Tool and depth before the solve [m], per spring.
+    behind: Vec<(u32, f64)>,
+}
+
+/// Sums over one tool's springs.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    force: Vector3<f64>,
+    normal_force: f64,
+    /// Stiffness times depth before and after [N], and stiffness [N/m].
+    before: f64,
+    after: f64,
+    stiffness: f64,
+}
+
+/// All contacts of a step.
+#[derive(Debug, Clone, Default)]
+pub struct Contacts {
+    surfaces: Vec<ContactSurface>,
+    bodies: Vec<BodyContacts>,
+    finder: TouchFinder,
+    sums: Vec<Sums>,
+}
+
+impl Contacts {
+    /// Registers the next body, in the order of the scene. `young_pa`: its stiffness [Pa];
+    /// `on`: whether tools touch it.
+    pub fn add_body(&mut self, young_pa: f64, on: bool) {
+        let mut surface = ContactSurface::default();
+        surface.switch(on);
+        self.surfaces.push(surface);
+        self.bodies.push(BodyContacts {
+            young_pa,
+            vertices: Vec::new(),
+            springs: Vec::with_capacity(SPRING_CAPACITY),
+            behind: Vec::with_capacity(SPRING_CAPACITY),
+        });
+        self.sums.reserve(MAX_TOOLS);
+    }
+
+    /// Takes in where the surface of `body` is now; after a change of epoch also its topology.
+    ///
+    /// # Errors
+    /// When surface and positions do not belong together.
+    pub fn update_surface(
+        &mut self,
+        body: usize,
+        epoch: u32,
+        surface: &Surface,
+        positions: &[[f32; 3]],
+    ) -> Result<(), SurfaceError> {
+        if self.surfaces[body].update(epoch, &surface.triangles, positions)? {
+            self.bodies[body].vertices.clone_from(&surface.vertices);
+        }
+        Ok(())
+    }
+
+    /// Takes `body` to have stood still since its last update, as after a reset.
+    pub fn forget_motion(&mut self, body: usize) {
+        self.surfaces[body].forget_motion();
+    }
+
+    /// Moves every proxy and turns what is touched or held into springs.
+    pub fn detect(&mut self, tools: &mut Tools) {
+        for body in &mut self.bodies {
+            body.springs.clear();
+            body.behind.clear();
+        }
+        for (index, tool) in (0u32..).zip(tools.iter_mut()) {
+            if tool.mode != ToolMode::Grab {
+                tool.grip.open();
+            }
+            if tool.touches() {
+                tool.proxy.follow(tool.shape, &tool.pose, &self.surfaces);
+                self.press(index, tool);
+            } else {
+                tool.proxy.release(&tool.pose);
+                if tool.mode == ToolMode::Grab {
+                    tool.grip.hold(&tool.pose, core_radius(tool.shape), &self.surfaces);
+                    self.pull(index, tool);
+                }
+            }
+        }
+    }
+
+    /// One-sided springs of a tool that touches.
+    fn press(&mut self, index: u32, tool: &mut Tool) {
+        let found = self.finder.find(tool.shape, tool.proxy.pose(), &tool.pose, &self.surfaces, 0.0);
+        for touch in found.iter().filter(|t| t.depth > 0.0 && t.share > 0.0) {
+            let body = &mut self.bodies[touch.body];
+            tool.compliance.get_or_insert_with(|| Compliance::new(body.young_pa, touch.patch_radius));
+            let Some(tree) = self.surfaces[touch.body].tree() else { continue };
+            let corners = tree.corners(touch.triangle);
+            let triangle = tree.triangle(touch.triangle);
+            body.press(index, tool, touch, corners, triangle);
+        }
+    }
+
+    /// Three-axis springs of a tool that holds.
+    fn pull(&mut self, index: u32, tool: &Tool) {
+        let (body, held) = tool.grip.held();
+        if held.is_empty() {
+            return;
+        }
+        let Some(tree) = self.surfaces[body].tree() else { return };
+        let body = &mut self.bodies[body];
+        let each = 1.0 / held.len() as f64;
+        for point in held {
+            let corners = tree.corners(point.triangle).map(|v| v as usize);
+            let places = tree.triangle(point.triangle);
+            let target = (tool.pose * point.in_tool).coords;
+            let pulled = target - point.point;
+            let (springs, behind) = (&mut body.springs, &mut body.behind);
+            material_points(corners.map(|v| &body.vertices[v]), point.barycentric, |vertex, share| {
+                // A corner stands in for the point: it is pulled by the same way.
+                let at = if share == 1.0 {
+                    point.point
+                } else {
+                    places[corner_of(&vertex, corners.map(|v| &body.vertices[v]))]
+                };
+                springs.push(PointSpring {
+                    copies: vertex.copies,
+                    weights: vertex.weights,
+                    kind: SpringKind::ThreeAxis { target: at + pulled },
+                    stiffness_n_m: tool.stiffness_n_m * each * share,
+                    max_force_n: tool.max_force_n * each * share,
+                });
+                behind.push((index, 0.0));
+            });
+        }
+    }
+
+    /// Springs on `body` for this step's solve.
+    pub fn springs(&self, body: usize) -> &[PointSpring] {
+        &self.bodies[body].springs
+    }
+
+    /// Takes in the force on `body` of each of its springs from the solve [N], in their order.
+    pub fn collect(&mut self, body: usize, forces: &[Vector3<f64>]) {
+        let body = &self.bodies[body];
+        for ((spring, &(tool, depth)), force) in body.springs.iter().zip(&body.behind).zip(forces) {
+            let tool = tool as usize;
+            if self.sums.len() <= tool {
+                self.sums.resize(tool + 1, Sums::default());
+            }
+            let sums = &mut self.sums[tool];
+            sums.force += force;
+            if let SpringKind::OneSided { normal, .. } = spring.kind {
+                let along = force.dot(&normal);
+                sums.normal_force += along;
+                sums.before += spring.stiffness_n_m * depth;
+                sums.after += along;
+                sums.stiffness += spring.stiffness_n_m;
+            }
+        }
+    }
+
+    /// Gives every tool the reaction to what its springs did since the last call.
+    pub fn react(&mut self, tools: &mut Tools) {
+        self.sums.resize(tools.len(), Sums::default());
+        for (tool, sums) in tools.iter_mut().zip(&self.sums) {
+            tool.force_n = -sums.force;
+            let Some(compliance) = &mut tool.compliance else { continue };
+            if sums.stiffness > 0.0 && sums.normal_force < 0.95 * tool.max_force_n {
+                let (before, after) = (sums.before / sums.stiffness, sums.after / sums.stiffness);
+                compliance.learn(before, after, sums.normal_force);
+            } else {
+                compliance.release();
+            }
+        }
+        self.sums.clear();
+    }
+
+    /// Box around the surface of `body` [m]; `None` when it has none or is switched off.
+    pub fn bounds(&self, body: usize) -> Option<[Vector3<f64>; 2]> {
+        self.surfaces[body].tree()?.bounds()
+    }
+}
+
+impl BodyContacts {
+    fn press(
+        &mut self,
+        index: u32,
+        tool: &Tool,
+        touch: &Touch,
+        corners: [u32; 3],
+        triangle: [Vector3<f64>; 3],
+    ) {
+        // From the tool into the tissue.
+        let normal = -touch.normal;
+        let corners = corners.map(|v| &self.vertices[v as usize]);
+        let (springs, behind) = (&mut self.springs, &mut self.behind);
+        material_points(corners, touch.barycentric, |vertex, share| {
+            let at = if share == 1.0 { touch.point } else { triangle[corner_of(&vertex, corners)] };
+            springs.push(PointSpring {
+                copies: vertex.copies,
+                weights: vertex.weights,
+                kind: SpringKind::OneSided { normal, offset_m: touch.depth + normal.dot(&at) },
+                stiffness_n_m: tool.stiffness_n_m * touch.share * share,
+                max_force_n: tool.max_force_n * touch.share * share,
+            });
+            behind.push((index, touch.depth));
+        });
+    }
+}
+
+/// Which of the corners a material point is.
+fn corner_of(vertex: &SurfaceVertex, corners: [&SurfaceVertex; 3]) -> usize {
+    corners.iter().position(|corner| *corner == vertex).unwrap_or(0)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

@@ -1,0 +1,115 @@
+//! From a point of a surface triangle to springs on the node copies that carry it.
+
+use nalgebra::Vector3;
+use scindo_physics::cut::SurfaceVertex;
+
+/// What a spring does to the material point it holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SpringKind {
+    /// Pushes along `normal` when the point is behind the plane n·x = `offset_m`:
+    /// f = k max(0, offset − n·x) n.
+    OneSided {
+        /// Unit, direction of the force on the body.
+        normal: Vector3<f64>,
+        /// Distance of the plane from the origin along the normal [m].
+        offset_m: f64,
+    },
+    /// Pulls towards `target` along all axes: f = k (target − x).
+    ThreeAxis {
+        /// Where the point is pulled to [m].
+        target: Vector3<f64>,
+    },
+}
+
+/// A spring on the material point x = Σ weights · x\[copies\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointSpring {
+    /// Node copies; a valid id in unused slots too.
+    pub copies: [u32; 4],
+    /// Their weights; 0 in unused slots.
+    pub weights: [f64; 4],
+    /// What it does.
+    pub kind: SpringKind,
+    /// Stiffness [N/m].
+    pub stiffness_n_m: f64,
+    /// Largest force [N].
+    pub max_force_n: f64,
+}
+
+/// Share of a point's stiffness below which a copy is left out.
+const LEAST_WEIGHT: f64 = 1e-9;
+
+/// Hands out material points that together are one point of a triangle: one of share 1 where at
+/// most four copies carry it, else one per corner with the corner's barycentric coordinate as
+/// share, so that force and moment on the tissue are the same.
+pub fn material_points(
+    corners: [&SurfaceVertex; 3],
+    barycentric: [f64; 3],
+    mut emit: impl FnMut(SurfaceVertex, f64),
+) {
+    let mut copies = [corners[0].copies[0]; 12];
+    let mut weights = [0.0; 12];
+    let mut count = 0;
+    for (vertex, w) in corners.iter().zip(barycentric) {
+        for (&copy, &weight) in vertex.copies.iter().zip(&vertex.weights) {
+            if (w * weight).abs() < LEAST_WEIGHT {
+                continue;
+            }
+            let slot = copies[..count].iter().position(|&c| c == copy).unwrap_or(count);
+            copies[slot] = copy;
+            weights[slot] += w * weight;
+            count = count.max(slot + 1);
+        }
+    }
+    if count <= 4 {
+        let first = |a: [u32; 12]| [a[0], a[1], a[2], a[3]];
+        let weights = [weights[0], weights[1], weights[2], weights[3]];
+        emit(SurfaceVertex { copies: first(copies), weights }, 1.0);
+        return;
+    }
+    for (vertex, w) in corners.into_iter().zip(barycentric) {
+        if w > LEAST_WEIGHT {
+            emit(*vertex, w);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vertex(copies: [u32; 4], weights: [f64; 4]) -> SurfaceVertex {
+        SurfaceVertex { copies, weights }
+    }
+
+    fn position(points: &[(SurfaceVertex, f64)], x: &[Vector3<f64>]) -> Vector3<f64> {
+        points.iter().map(|(vertex, share)| vertex.position(x) * *share).sum()
+    }
+
+    #[test]
+    fn the_points_together_are_the_point_of_the_triangle() {
+        let x: Vec<_> =
+            (0..12).map(|i| Vector3::new(f64::from(i).sin(), f64::from(i * i).cos(), 0.1)).collect();
+        let mesh_nodes = [
+            vertex([3, 3, 3, 3], [1.0, 0.0, 0.0, 0.0]),
+            vertex([5, 3, 5, 5], [0.5, 0.5, 0.0, 0.0]),
+            vertex([7, 7, 7, 7], [1.0, 0.0, 0.0, 0.0]),
+        ];
+        let embedded = [
+            vertex([0, 1, 2, 3], [0.1, 0.2, 0.3, 0.4]),
+            vertex([4, 5, 6, 7], [0.4, 0.3, 0.2, 0.1]),
+            vertex([8, 9, 10, 11], [0.25; 4]),
+        ];
+        for (corners, expected) in [(mesh_nodes, 1), (embedded, 3)] {
+            let w = [0.2, 0.3, 0.5];
+            let mut points = Vec::new();
+            material_points([&corners[0], &corners[1], &corners[2]], w, |v, s| points.push((v, s)));
+            assert_eq!(points.len(), expected);
+            let whole: Vector3<f64> = corners.iter().zip(w).map(|(corner, w)| corner.position(&x) * w).sum();
+            assert!((position(&points, &x) - whole).norm() < 1e-15);
+            for (point, _) in &points {
+                assert!((point.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+}

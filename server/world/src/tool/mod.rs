@@ -1,0 +1,272 @@
+//! Rigid tools: held by a client, moved by a script, or idle.
+//!
+//! # Order in a step
+//! 1. [`Tools::advance`]: poses and modes of this step, from scripts and clients.
+//! 2. [`Tools::take_sweep`] per tool: what its blade cut since it last cut; goes to `Body::cut`.
+//! 3. [`Contacts`](crate::contact::Contacts): surfaces, proxies, springs, and after the solve the
+//!    reactions, which end up in [`Tool::force_n`].
+
+pub mod blade;
+pub mod geometry;
+pub mod script;
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+use scindo_physics::cut::BladeSweep;
+
+use crate::contact::compliance::Compliance;
+use crate::contact::grab::Grip;
+use crate::contact::proxy::Proxy;
+use crate::inputs::{ToolInput, ToolMode, ToolShape};
+use crate::scene::checked::ToolSpec;
+use blade::{BladeEdge, IncisionNumbers};
+use script::Script;
+
+/// Most tools of a simulation, those of the scene and those brought by clients.
+pub const MAX_TOOLS: usize = 16;
+/// Spring of a tool that a client brought [N/m] and its largest force [N].
+const GUEST_SPRING: (f64, f64) = (800.0, 8.0);
+
+/// One rigid tool.
+#[derive(Debug, Clone)]
+pub struct Tool {
+    /// Name.
+    pub id: Arc<str>,
+    /// Geometry.
+    pub shape: ToolShape,
+    /// Client that holds it, `script`, or empty.
+    pub owner: Arc<str>,
+    /// Where the hand holds it, tool axes to world axes; the translation is the tip [m].
+    pub pose: Isometry3<f64>,
+    /// Velocity of the tip [m/s].
+    pub velocity_m_s: Vector3<f64>,
+    /// What the hand does.
+    pub mode: ToolMode,
+    /// Spring between hand and tissue [N/m].
+    pub stiffness_n_m: f64,
+    /// Largest force [N].
+    pub max_force_n: f64,
+    /// Force of the tissue on the tool from the last solve [N].
+    pub force_n: Vector3<f64>,
+    /// Sequence number of the newest sample used.
+    pub seq: u64,
+    /// The client's clock at that sample [ns].
+    pub client_time_ns: u64,
+    /// Where the tissue lets it be.
+    pub(crate) proxy: Proxy,
+    /// What it holds.
+    pub(crate) grip: Grip,
+    /// How the tissue under it gives way; none before the first touch.
+    pub(crate) compliance: Option<Compliance>,
+    edge: BladeEdge,
+    script: Option<Script>,
+    round: u64,
+    declared: bool,
+}
+
+impl Tool {
+    fn new(id: &str, shape: ToolShape, (stiffness_n_m, max_force_n): (f64, f64)) -> Self {
+        Self {
+            id: id.into(),
+            shape,
+            owner: Arc::from(""),
+            pose: Isometry3::identity(),
+            velocity_m_s: Vector3::zeros(),
+            mode: ToolMode::Hover,
+            stiffness_n_m,
+            max_force_n,
+            force_n: Vector3::zeros(),
+            seq: 0,
+            client_time_ns: 0,
+            proxy: Proxy::default(),
+            grip: Grip::new(),
+            compliance: None,
+            edge: BladeEdge::default(),
+            script: None,
+            round: 0,
+            declared: false,
+        }
+    }
+
+    /// Where the tissue lets the tool be.
+    pub fn proxy_pose(&self) -> &Isometry3<f64> {
+        self.proxy.pose()
+    }
+
+    /// Whether the tool is a blade that cuts now. It then passes through tissue: what it meets it
+    /// parts instead of pushing.
+    pub fn cuts(&self) -> bool {
+        self.mode == ToolMode::Cut && matches!(self.shape, ToolShape::Blade { .. })
+    }
+
+    /// Whether the tool pushes tissue now.
+    pub fn touches(&self) -> bool {
+        !self.cuts() && matches!(self.mode, ToolMode::Touch | ToolMode::Cut)
+    }
+
+    fn hand_over(&mut self, owner: &Arc<str>) {
+        if self.owner != *owner {
+            self.owner = Arc::clone(owner);
+            self.proxy.release(&self.pose);
+            self.grip.open();
+        }
+    }
+}
+
+/// All tools, those of the scene first.
+#[derive(Debug, Clone)]
+pub struct Tools {
+    tools: Vec<Tool>,
+    numbers: IncisionNumbers,
+    script: Arc<str>,
+    nobody: Arc<str>,
+    refused: u64,
+    time_s: Option<f64>,
+}
+
+impl Tools {
+    /// The tools of a scene.
+    pub fn new(specs: &[ToolSpec]) -> Self {
+        let declared = specs.iter().map(|spec| {
+            let mut tool = Tool::new(&spec.id, spec.shape, (spec.stiffness_n_m, spec.max_force_n));
+            tool.script = Script::new(&spec.path, spec.repeat_s);
+            tool.declared = true;
+            tool
+        });
+        Self {
+            tools: declared.collect(),
+            numbers: IncisionNumbers::default(),
+            script: Arc::from("script"),
+            nobody: Arc::from(""),
+            refused: 0,
+            time_s: None,
+        }
+    }
+
+    /// The tools, those of the scene first.
+    pub fn iter(&self) -> std::slice::Iter<'_, Tool> {
+        self.tools.iter()
+    }
+
+    /// Number of tools.
+    pub fn len(&self) -> usize {
+        self.tools.len()
+    }
+
+    /// Whether there is no tool.
+    pub fn is_empty(&self) -> bool {
+        self.tools.is_empty()
+    }
+
+    pub(crate) fn iter_mut(&mut self) -> std::slice::IterMut<'_, Tool> {
+        self.tools.iter_mut()
+    }
+
+    /// Whether any tool may touch, grab or cut in this step.
+    pub fn any_active(&self) -> bool {
+        self.tools.iter().any(|tool| tool.mode != ToolMode::Hover)
+    }
+
+    /// Samples refused so far: not finite, or a guest without shape or room.
+    pub fn refused_samples(&self) -> u64 {
+        self.refused
+    }
+
+    /// A number for an incision that does not come from a tool's blade.
+    pub fn fresh_incision(&mut self) -> u32 {
+        self.numbers.fresh()
+    }
+
+    /// Poses and modes for the step that ends at `time_s` [s]. A tool with a sample is held by its
+    /// client; one without goes back to its script, hovers where it is, or, if the scene does
+    /// not declare it, is removed. A non-finite sample leaves the tool as it was and is counted.
+    pub fn advance(&mut self, time_s: f64, samples: &[ToolInput]) {
+        let elapsed = self.time_s.map_or(0.0, |before| time_s - before);
+        self.time_s = Some(time_s);
+        self.tools.retain(|tool| tool.declared || samples.iter().any(|s| s.id == tool.id));
+        for sample in samples {
+            self.take_sample(sample);
+        }
+        for tool in &mut self.tools {
+            if samples.iter().any(|sample| sample.id == tool.id) {
+                continue;
+            }
+            match &tool.script {
+                Some(script) => {
+                    let scripted = script.at(time_s);
+                    let moved = scripted.pose.translation.vector - tool.pose.translation.vector;
+                    let held_on = tool.owner == self.script && tool.round == scripted.round;
+                    let steady = held_on && elapsed > 0.0;
+                    tool.velocity_m_s = if steady { moved / elapsed } else { Vector3::zeros() };
+                    tool.pose = scripted.pose;
+                    tool.hand_over(&self.script);
+                    if tool.round != scripted.round {
+                        tool.round = scripted.round;
+                        tool.proxy.release(&tool.pose);
+                        tool.edge = BladeEdge::default();
+                    }
+                    tool.mode = scripted.mode;
+                }
+                None => {
+                    tool.hand_over(&self.nobody);
+                    tool.mode = ToolMode::Hover;
+                    tool.velocity_m_s = Vector3::zeros();
+                }
+            }
+        }
+    }
+
+    fn take_sample(&mut self, sample: &ToolInput) {
+        let speed = sample.velocity_m_s;
+        let sane = geometry::is_sane(&sample.pose) && speed.iter().all(|v| v.is_finite());
+        let known = self.tools.iter().position(|tool| tool.id == sample.id);
+        let index = match (sane, known, sample.shape) {
+            (true, Some(index), _) => index,
+            (true, None, Some(shape)) if self.tools.len() < MAX_TOOLS => {
+                self.tools.push(Tool::new(&sample.id, shape, GUEST_SPRING));
+                self.tools.len() - 1
+            }
+            _ => {
+                self.refused += 1;
+                return;
+            }
+        };
+        let tool = &mut self.tools[index];
+        if let (false, Some(shape)) = (tool.declared, sample.shape) {
+            tool.shape = shape;
+        }
+        tool.pose = sample.pose;
+        tool.hand_over(&sample.owner);
+        tool.velocity_m_s = sample.velocity_m_s;
+        tool.mode = sample.mode;
+        tool.seq = sample.seq;
+        tool.client_time_ns = sample.client_time_ns;
+    }
+
+    /// What tool `index` cut since its last sweep, and the number of its incision; `None` while its
+    /// blade moved less than `least_m` [m]. To be asked once per step of every tool.
+    pub fn take_sweep(&mut self, index: usize, least_m: f64) -> Option<(BladeSweep, u32)> {
+        let tool = &mut self.tools[index];
+        let edge = tool.cuts().then(|| geometry::core(tool.shape, &tool.pose));
+        tool.edge.advance(edge, least_m, &mut self.numbers)
+    }
+
+    /// Back to the start of the scene: guests leave, nothing is held or touched. Incision numbers
+    /// go on rising.
+    pub fn reset(&mut self) {
+        self.tools.retain(|tool| tool.declared);
+        for tool in &mut self.tools {
+            let pose = tool.pose;
+            tool.proxy.release(&pose);
+            tool.grip.open();
+            tool.edge = BladeEdge::default();
+            tool.owner = Arc::clone(&self.nobody);
+            tool.mode = ToolMode::Hover;
+            tool.force_n = Vector3::zeros();
+            tool.compliance = None;
+            tool.round = 0;
+        }
+        self.time_s = None;
+    }
+}

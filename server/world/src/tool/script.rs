@@ -1,0 +1,140 @@
+//! A tool that follows keyframes of a scene instead of a hand.
+//!
+//! Tip positions are interpolated by cubic Hermite polynomials per axis whose slopes are the
+//! weighted harmonic means of the neighbouring differences: smooth, and never beyond the keyframes.
+//!
+//! # Source
+//! Fritsch and Butland, A method for constructing local monotone piecewise cubic interpolants
+//! (1984).
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::inputs::ToolMode;
+use crate::scene::checked::PathPoint;
+
+/// Where a scripted tool is and what it does at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScriptedPose {
+    /// Tool axes to world axes.
+    pub pose: Isometry3<f64>,
+    /// What the tool does.
+    pub mode: ToolMode,
+    /// How many rounds have been completed; the pose jumps when it rises.
+    pub round: u64,
+}
+
+/// Keyframes by rising time.
+#[derive(Debug, Clone)]
+pub struct Script {
+    path: Vec<PathPoint>,
+    repeat_s: Option<f64>,
+}
+
+impl Script {
+    /// A script; `None` without keyframes. `repeat_s`: it starts again after this time [s].
+    pub fn new(path: &[PathPoint], repeat_s: Option<f64>) -> Option<Self> {
+        (!path.is_empty()).then(|| Self { path: path.to_vec(), repeat_s })
+    }
+
+    /// Pose and mode at simulated time `time_s` [s]. Before the first keyframe the tool hovers at
+    /// it; after the last it stays.
+    pub fn at(&self, time_s: f64) -> ScriptedPose {
+        let (time_s, round) = match self.repeat_s {
+            Some(period) if period > 0.0 => (time_s.rem_euclid(period), (time_s / period) as u64),
+            _ => (time_s, 0),
+        };
+        let next = self.path.partition_point(|key| key.at_s <= time_s);
+        if next == 0 {
+            return posed(self.path[0].tip_m, self.path[0].toward.into_inner(), ToolMode::Hover, round);
+        }
+        let from = &self.path[next - 1];
+        let Some(to) = self.path.get(next) else {
+            return posed(from.tip_m, from.toward.into_inner(), from.mode, round);
+        };
+        let span = to.at_s - from.at_s;
+        let s = ((time_s - from.at_s) / span).clamp(0.0, 1.0);
+        let (m0, m1) = (self.slope(next - 1) * span, self.slope(next) * span);
+        let tip = hermite(from.tip_m, m0, to.tip_m, m1, s);
+        let toward = from.toward.slerp(&to.toward, s).into_inner();
+        posed(tip, toward, from.mode, round)
+    }
+
+    /// Velocity of the tip at keyframe `i` [m/s]; zero at both ends.
+    fn slope(&self, i: usize) -> Vector3<f64> {
+        if i == 0 || i + 1 >= self.path.len() {
+            return Vector3::zeros();
+        }
+        let [a, b, c] = [&self.path[i - 1], &self.path[i], &self.path[i + 1]];
+        let (h0, h1) = (b.at_s - a.at_s, c.at_s - b.at_s);
+        let (d0, d1) = ((b.tip_m - a.tip_m) / h0, (c.tip_m - b.tip_m) / h1);
+        d0.zip_map(&d1, |d0, d1| {
+            if d0 * d1 <= 0.0 {
+                return 0.0;
+            }
+            let (w0, w1) = (2.0 * h1 + h0, h1 + 2.0 * h0);
+            (w0 + w1) / (w0 / d0 + w1 / d1)
+        })
+    }
+}
+
+fn hermite(p0: Vector3<f64>, m0: Vector3<f64>, p1: Vector3<f64>, m1: Vector3<f64>, s: f64) -> Vector3<f64> {
+    let (s2, s3) = (s * s, s * s * s);
+    p0 * (2.0 * s3 - 3.0 * s2 + 1.0) + m0 * (s3 - 2.0 * s2 + s) + p1 * (3.0 * s2 - 2.0 * s3) + m1 * (s3 - s2)
+}
+
+fn posed(tip: Vector3<f64>, toward: Vector3<f64>, mode: ToolMode, round: u64) -> ScriptedPose {
+    // Opposite to +z any half turn across the shaft will do: tools are round about their shaft.
+    let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &toward)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
+    let pose = Isometry3::from_parts(Translation3::from(tip), rotation);
+    ScriptedPose { pose, mode, round }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use nalgebra::{Point3, Unit};
+
+    fn key(at_s: f64, tip: [f64; 3], toward: [f64; 3], mode: ToolMode) -> PathPoint {
+        let toward = Unit::new_normalize(Vector3::from(toward));
+        PathPoint { at_s, tip_m: Vector3::from(tip), toward, mode }
+    }
+
+    #[test]
+    fn passes_its_keyframes_smoothly_and_never_beyond_them() {
+        let path = [
+            key(1.0, [0.0, 0.0, 0.1], [0.0, 0.0, 1.0], ToolMode::Touch),
+            key(2.0, [0.0, 0.0, 0.02], [0.0, 1.0, 1.0], ToolMode::Cut),
+            key(3.0, [0.05, 0.0, 0.02], [0.0, 0.0, -1.0], ToolMode::Hover),
+        ];
+        let script = Script::new(&path, None).unwrap();
+        for p in &path {
+            let there = script.at(p.at_s);
+            assert!((there.pose.translation.vector - p.tip_m).norm() < 1e-12);
+            let toward = there.pose.rotation * Vector3::z();
+            assert!((toward - p.toward.into_inner()).norm() < 1e-9);
+            assert_eq!(there.mode, p.mode);
+        }
+        assert_eq!(script.at(0.5).mode, ToolMode::Hover);
+        assert_eq!(script.at(9.0).pose.translation.vector, path[2].tip_m);
+        let mut before = script.at(1.0).pose * Point3::origin();
+        for i in 1..=2000 {
+            let now = script.at(1.0 + f64::from(i) * 1e-3).pose * Point3::origin();
+            assert!((now - before).norm() < 0.25e-3, "no jumps");
+            assert!(now.z >= 0.02 - 1e-12 && now.x <= 0.05 + 1e-12, "no overshoot");
+            before = now;
+        }
+    }
+
+    #[test]
+    fn starts_again_after_its_period() {
+        let path = [
+            key(0.0, [0.0; 3], [0.0, 0.0, 1.0], ToolMode::Touch),
+            key(1.0, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], ToolMode::Touch),
+        ];
+        let script = Script::new(&path, Some(2.0)).unwrap();
+        assert_eq!(script.at(0.5).pose, script.at(2.5).pose);
+        assert_eq!((script.at(0.5).round, script.at(2.5).round), (0, 1));
+    }
+}
