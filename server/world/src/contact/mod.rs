@@ -19,13 +19,14 @@ pub mod compliance;
 
 use nalgebra::Vector3;
 use scindo_collision::SurfaceError;
+use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::{Surface, SurfaceVertex};
 
 use crate::inputs::ToolMode;
 use crate::tool::geometry::core_radius;
 use crate::tool::{MAX_TOOLS, Tool, Tools};
 use compliance::Compliance;
-use spring::{PointSpring, SpringKind, material_points};
+use spring::material_points;
 use surface::ContactSurface;
 use touch::{MAX_CONTACTS, Touch, TouchFinder};
 
@@ -161,7 +162,7 @@ impl Contacts {
                 springs.push(PointSpring {
                     copies: vertex.copies,
                     weights: vertex.weights,
-                    kind: SpringKind::ThreeAxis { target: at + pulled },
+                    kind: SpringKind::Hold { target_m: at + pulled },
                     stiffness_n_m: tool.stiffness_n_m * each * share,
                     max_force_n: tool.max_force_n * each * share,
                 });

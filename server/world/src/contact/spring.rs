@@ -1,40 +1,6 @@
 //! From a point of a surface triangle to springs on the node copies that carry it.
 
-use nalgebra::Vector3;
 use scindo_physics::cut::SurfaceVertex;
-
-/// What a spring does to the material point it holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum SpringKind {
-    /// Pushes along `normal` when the point is behind the plane n·x = `offset_m`:
-    /// f = k max(0, offset − n·x) n.
-    OneSided {
-        /// Unit, direction of the force on the body.
-        normal: Vector3<f64>,
-        /// Distance of the plane from the origin along the normal [m].
-        offset_m: f64,
-    },
-    /// Pulls towards `target` along all axes: f = k (target − x).
-    ThreeAxis {
-        /// Where the point is pulled to [m].
-        target: Vector3<f64>,
-    },
-}
-
-/// A spring on the material point x = Σ weights · x\[copies\].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PointSpring {
-    /// Node copies; a valid id in unused slots too.
-    pub copies: [u32; 4],
-    /// Their weights; 0 in unused slots.
-    pub weights: [f64; 4],
-    /// What it does.
-    pub kind: SpringKind,
-    /// Stiffness [N/m].
-    pub stiffness_n_m: f64,
-    /// Largest force [N].
-    pub max_force_n: f64,
-}
 
 /// Share of a point's stiffness below which a copy is left out.
 const LEAST_WEIGHT: f64 = 1e-9;
@@ -77,6 +43,7 @@ pub fn material_points(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     fn vertex(copies: [u32; 4], weights: [f64; 4]) -> SurfaceVertex {
         SurfaceVertex { copies, weights }

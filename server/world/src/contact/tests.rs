@@ -83,7 +83,7 @@ impl Bench {
                 SpringKind::OneSided { normal, offset_m } => {
                     normal * spring.stiffness_n_m * (offset_m - normal.dot(&x)).max(0.0)
                 }
-                SpringKind::ThreeAxis { target } => (target - x) * spring.stiffness_n_m,
+                SpringKind::Hold { target_m } => (target_m - x) * spring.stiffness_n_m,
             };
             force.cap_magnitude(spring.max_force_n)
         };
