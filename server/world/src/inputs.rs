@@ -28,6 +28,12 @@ pub enum ToolShape {
     },
 }
 
+impl Default for ToolShape {
+    fn default() -> Self {
+        Self::Sphere { radius_m: 0.005 }
+    }
+}
+
 /// What a hand does with a tool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ToolMode {

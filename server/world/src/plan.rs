@@ -1,1 +1,233 @@
 //! The plan of effects: what a scene calls for, why, and what it costs.
+//!
+//! An effect that is off costs nothing: no memory, no thread, no work in the step. What depends
+//! on who is listening (surfaces, haptic contact, energies) is decided anew at every step.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::inputs::Wants;
+use crate::scene::CheckedScene;
+
+/// Seconds per element and solver iteration: one matrix-free product with rotated gradients,
+/// vector work included. Order of magnitude on one core; [`Plan::measured`] replaces it.
+const SECONDS_PER_ELEMENT_ITERATION: f64 = 12e-9;
+
+/// Seconds per element and step: rotations, forces and preconditioner.
+const SECONDS_PER_ELEMENT: f64 = 80e-9;
+
+/// Seconds per element near a moving blade and step, and per element for the surface afterwards.
+const SECONDS_PER_ELEMENT_CUT: f64 = 200e-9;
+
+/// Seconds per surface vertex: gather four copies, write three numbers.
+const SECONDS_PER_VERTEX: f64 = 10e-9;
+
+/// Seconds per surface triangle: refit of the surface tree.
+const SECONDS_PER_TRIANGLE: f64 = 30e-9;
+
+/// One effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    /// Stable name.
+    pub name: String,
+    /// Whether it is computed.
+    pub on: bool,
+    /// Why it is on or off.
+    pub why: String,
+    /// Predicted cost per step [ms]; 0 when off.
+    pub predicted_ms: f64,
+    /// Measured mean cost per step [ms]; none before the first step or where it cannot be told apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub measured_ms: Option<f64>,
+}
+
+/// All effects, on and off.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Plan {
+    /// In the order of the step.
+    pub effects: Vec<Effect>,
+}
+
+/// Sizes of a body that its costs follow from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodySize {
+    /// Elements.
+    pub elements: usize,
+    /// Surface vertices.
+    pub vertices: usize,
+    /// Surface triangles.
+    pub triangles: usize,
+}
+
+impl Plan {
+    /// The plan of a scene whose bodies have these sizes.
+    pub fn new(scene: &CheckedScene, sizes: &[BodySize]) -> Self {
+        let mut plan = Self::default();
+        plan.external_forces(scene);
+        plan.mechanics(scene, sizes);
+        plan.cutting(scene, sizes);
+        plan.contact(scene, sizes);
+        plan.listeners(scene, sizes);
+        plan
+    }
+
+    /// Whether an effect is on.
+    pub fn is_on(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name && effect.on)
+    }
+
+    /// Enters the measured cost of the effect `name`, shared over its pairs where it has some.
+    pub fn measured(&mut self, name: &str, milliseconds: f64) {
+        let is_it = |effect: &Effect| effect.on && effect.name.split(' ').next() == Some(name);
+        let pairs = self.effects.iter().filter(|effect| is_it(effect)).count().max(1);
+        for effect in self.effects.iter_mut().filter(|effect| is_it(effect)) {
+            effect.measured_ms = Some(milliseconds / pairs as f64);
+        }
+    }
+
+    /// Switches on what somebody listens to now.
+    pub fn listening(&mut self, wants: &Wants) {
+        let surface = wants.contact || wants.surface.contains(&true);
+        let now_on = |name: &str| match name {
+            "surface publication" => surface,
+            "haptic contact" => wants.contact,
+            "energies" => wants.energy,
+            _ => false,
+        };
+        for effect in self.effects.iter_mut().filter(|effect| !effect.on && now_on(&effect.name)) {
+            effect.on = true;
+            effect.why = "somebody listens".into();
+        }
+    }
+
+    /// Predicted cost of a step [ms].
+    pub fn predicted_ms(&self) -> f64 {
+        self.effects.iter().map(|effect| effect.predicted_ms).sum()
+    }
+
+    fn push(&mut self, name: &str, on: bool, why: impl Into<String>, predicted_s: f64) {
+        let predicted_ms = if on { predicted_s * 1e3 } else { 0.0 };
+        self.effects.push(Effect { name: name.into(), on, why: why.into(), predicted_ms, measured_ms: None });
+    }
+
+    fn external_forces(&mut self, scene: &CheckedScene) {
+        let g = scene.gravity_m_s2.norm();
+        let why = if g > 0.0 {
+            format!("world.gravity_m_s2 has {g:.3} m/s2")
+        } else {
+            "world.gravity_m_s2 is zero".into()
+        };
+        self.push("gravity", g > 0.0, why, 0.0);
+        let loads: usize = scene.bodies.iter().map(|body| body.loads.len()).sum();
+        self.push("loads", loads > 0, count(loads, "load"), 0.0);
+    }
+
+    fn mechanics(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
+        let bodies = scene.bodies.len();
+        let deform: f64 =
+            scene.bodies.iter().zip(sizes).map(|(body, size)| deform_seconds(body.iterations, size)).sum();
+        let elements: usize = sizes.iter().map(|size| size.elements).sum();
+        let why = format!("{}, {elements} elements; implicit Euler", count(bodies, "body"));
+        self.push("deformation", bodies > 0, why, deform);
+        self.push("inertia", bodies > 0, "implicit Euler integrates it; no static bodies", 0.0);
+        let turning = scene.bodies.iter().filter(|body| body.law.rotates()).count();
+        self.push(
+            "large rotation",
+            turning > 0,
+            format!("{} with a corotational law", count(turning, "body")),
+            0.0,
+        );
+        let damped =
+            scene.bodies.iter().filter(|b| b.damping_mass_1_s > 0.0 || b.damping_stiffness_s > 0.0).count();
+        let why = if damped > 0 {
+            format!("{} with rayleigh", count(damped, "body"))
+        } else {
+            "no body has rayleigh".into()
+        };
+        self.push("damping", damped > 0, why, 0.0);
+    }
+
+    fn cutting(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
+        let blades = scene.tools.iter().filter(|tool| tool.cuts()).count();
+        let allowed = scene.effects.cutting != Some(false);
+        let cuts = scene.cuts.len();
+        let why = match (allowed, cuts, blades) {
+            (false, ..) => "effects.cutting = false".into(),
+            (true, 0, 0) => {
+                "no cut and no blade in the scene; clients may still cut, it costs when they do".into()
+            }
+            (true, cuts, blades) => format!(
+                "{} and {}; costs only while a blade moves",
+                count(cuts, "scheduled cut"),
+                count(blades, "blade")
+            ),
+        };
+        let seconds: f64 = sizes.iter().map(|size| size.elements as f64 * SECONDS_PER_ELEMENT_CUT).sum();
+        let always = if blades > 0 { seconds } else { 0.0 };
+        self.push("cutting", allowed, why, always);
+    }
+
+    fn contact(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
+        for tool in &scene.tools {
+            for (body, size) in scene.bodies.iter().zip(sizes) {
+                let on = scene.effects.contact != Some(false);
+                let why = match (on, tool.path.is_empty()) {
+                    (false, _) => "effects.contact = false",
+                    (true, false) => "the tool has a path",
+                    (true, true) => "while a client holds the tool",
+                };
+                let seconds = size.triangles as f64 * SECONDS_PER_TRIANGLE;
+                let scripted = if tool.path.is_empty() { 0.0 } else { seconds };
+                self.push(&format!("contact {} x {}", tool.id, body.id), on, why, scripted);
+            }
+        }
+        self.push("self-collision", false, "not supported yet", 0.0);
+        self.push("body-body contact", false, "not supported yet", 0.0);
+    }
+
+    fn listeners(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
+        let vertices: usize = sizes.iter().map(|size| size.vertices).sum();
+        self.push("probes", !scene.probes.is_empty(), count(scene.probes.len(), "probe"), 0.0);
+        let energy = scene.effects.energy == Some(true);
+        let why = if energy { "effects.energy = true" } else { "nobody asked" };
+        let elements: f64 = sizes.iter().map(|size| size.elements as f64).sum();
+        self.push("energies", energy, why, elements * SECONDS_PER_ELEMENT);
+        let rate = scene.publish.surface_hz;
+        let why = format!("on demand: {vertices} vertices, at most {rate} Hz, while somebody subscribes");
+        self.push("surface publication", false, why, vertices as f64 * SECONDS_PER_VERTEX);
+        let rate = scene.publish.contact_hz;
+        let why = format!("on demand: {rate} Hz beside the step, while a haptic client lives");
+        self.push("haptic contact", false, why, 0.0);
+    }
+}
+
+fn deform_seconds(iterations: u32, size: &BodySize) -> f64 {
+    size.elements as f64 * (SECONDS_PER_ELEMENT + f64::from(iterations) * SECONDS_PER_ELEMENT_ITERATION)
+}
+
+fn count(n: usize, what: &str) -> String {
+    match (n, what.strip_suffix('y')) {
+        (0, _) => format!("no {what}"),
+        (1, _) => format!("1 {what}"),
+        (n, Some(stem)) => format!("{n} {stem}ies"),
+        (n, None) => format!("{n} {what}s"),
+    }
+}
+
+/// A table for people.
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.effects.iter().map(|effect| effect.name.len()).max().unwrap_or(0);
+        writeln!(f, "{:width$}  on   predicted  measured  why", "effect")?;
+        for effect in &self.effects {
+            let on = if effect.on { "yes" } else { "-" };
+            let cost =
+                |ms: Option<f64>| ms.filter(|ms| *ms > 0.0).map_or(String::new(), |ms| format!("{ms:.3} ms"));
+            let predicted = cost(Some(effect.predicted_ms));
+            let measured = cost(effect.measured_ms);
+            writeln!(f, "{:width$}  {on:3}  {predicted:>9}  {measured:>8}  {}", effect.name, effect.why)?;
+        }
+        write!(f, "{:width$}       {:6.3} ms per step", "together", self.predicted_ms())
+    }
+}

@@ -8,7 +8,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::inputs::{ToolMode, ToolShape};
+use crate::inputs::{ToolMode, ToolShape, Wants};
+use crate::simulation::{BodyReport, SimBody, StepReport};
+use crate::tool::{Tool, Tools};
 
 /// The state after one step.
 #[derive(Debug, Clone, Default)]
@@ -24,11 +26,13 @@ pub struct Snapshot {
 }
 
 /// One body.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct BodySnapshot {
     /// Name.
     pub id: Arc<str>,
-    /// Triangles that the positions belong to.
+    /// Topology epoch of the body now.
+    pub epoch: u32,
+    /// Triangles that the positions belong to; of this epoch whenever there are positions.
     pub topology: Arc<SurfaceTopology>,
     /// Surface positions [m]; empty when nobody asked.
     pub positions: Vec<[f32; 3]>,
@@ -44,8 +48,75 @@ pub struct BodySnapshot {
     pub pieces: u32,
     /// Node copies, three unknowns each.
     pub copies: u32,
-    /// Volume at the last change of topology or when last asked for [m³].
-    pub volume_m3: f64,
+    /// Volume at rest [m³].
+    pub rest_volume_m3: f64,
+}
+
+impl Snapshot {
+    pub(crate) fn fill(&mut self, step: u64, time_s: f64, wants: &Wants, from: Sources<'_>) {
+        self.step = step;
+        self.time_s = time_s;
+        self.bodies.resize_with(from.bodies.len(), BodySnapshot::default);
+        for (i, (body, out)) in from.bodies.iter_mut().zip(&mut self.bodies).enumerate() {
+            let surface = wants.contact || wants.surface.get(i).copied().unwrap_or(false);
+            out.fill(body, &from.report.bodies[i], surface, wants.contact);
+        }
+        self.tools.resize_with(from.tools.len(), ToolSnapshot::default);
+        from.tools.iter().zip(&mut self.tools).for_each(|(tool, out)| out.fill(tool));
+    }
+}
+
+/// What a snapshot is taken of.
+pub(crate) struct Sources<'a> {
+    pub bodies: &'a mut [SimBody],
+    pub report: &'a StepReport,
+    pub tools: &'a Tools,
+}
+
+impl BodySnapshot {
+    fn fill(&mut self, body: &mut SimBody, report: &BodyReport, surface: bool, velocities: bool) {
+        if self.id != body.id {
+            self.id = body.id.clone();
+        }
+        let mesh = body.body.cut_mesh();
+        self.epoch = mesh.epoch();
+        self.iterations = report.solve.iterations;
+        self.residual = if report.solve.residual.is_finite() { report.solve.residual } else { f64::MAX };
+        self.elements = mesh.mesh().tets.len() as u32;
+        self.pieces = mesh.pieces().len() as u32;
+        self.copies = mesh.n_copies() as u32;
+        self.rest_volume_m3 = body.rest_volume_m3;
+        self.positions.clear();
+        self.velocities.clear();
+        if surface {
+            self.topology = body.topology();
+            self.positions.extend_from_slice(body.surface_positions());
+        }
+        if velocities {
+            body.surface_velocities(&mut self.velocities);
+        }
+    }
+}
+
+impl ToolSnapshot {
+    fn fill(&mut self, tool: &Tool) {
+        if self.id != tool.id {
+            self.id = tool.id.clone();
+        }
+        if self.owner != tool.owner {
+            self.owner = tool.owner.clone();
+        }
+        self.shape = tool.shape;
+        self.pose = tool.pose;
+        self.proxy = *tool.proxy_pose();
+        self.velocity_m_s = tool.velocity_m_s;
+        self.mode = tool.mode;
+        self.force_n = tool.force_n;
+        self.stiffness_n_m = tool.stiffness_n_m;
+        self.max_force_n = tool.max_force_n;
+        self.seq = tool.seq;
+        self.client_time_ns = tool.client_time_ns;
+    }
 }
 
 /// Triangles of a body's surface; immutable, one object per epoch.
@@ -62,7 +133,7 @@ pub struct SurfaceTopology {
 }
 
 /// One tool.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ToolSnapshot {
     /// Name.
     pub id: Arc<str>,

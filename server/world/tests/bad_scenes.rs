@@ -93,7 +93,7 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
     for (line, parts) in [
         ("element = \"tet10\"", ["`tet10` is not supported yet", "supported now: tet4"]),
         ("element = \"hex8\"", ["`hex8` is not supported yet", "supported now: tet4"]),
-        ("law = \"stvk\"", ["`stvk` is not supported yet", "supported now: corotational"]),
+        ("law = \"stvk\"", ["`stvk` is not supported yet", "supported now: linear, corotational"]),
         ("law = \"neo-hookean\"", ["`neo-hookean` is not supported yet", "corotational"]),
         ("integrator = \"static\"", ["`static` is not supported yet", "implicit-euler"]),
         ("integrator = \"bdf2\"", ["`bdf2` is not supported yet", "implicit-euler"]),

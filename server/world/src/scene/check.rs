@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{Unit, Vector3};
+use scindo_physics::material::Law;
 
 use crate::inputs::{ToolMode, ToolShape};
 
@@ -94,21 +95,13 @@ impl Check<'_> {
             RawElement::Tet10 => self.unsupported(format!("{at}.element"), "tet10", &["tet4"]),
             RawElement::Hex8 => self.unsupported(format!("{at}.element"), "hex8", &["tet4"]),
         }
-        let law = match body.law {
-            RawLaw::Corotational => None,
-            RawLaw::Linear => Some("linear"),
-            RawLaw::Stvk => Some("stvk"),
-            RawLaw::NeoHookean => Some("neo-hookean"),
-        };
-        if let Some(found) = law {
-            self.unsupported(format!("{at}.law"), found, &["corotational"]);
-        }
+        let law = self.law(&at, body.law);
         self.integrator(&at, body.integrator);
         self.solver(&at, &body.solver);
         BodySpec {
             id: body.id.clone(),
             mesh: self.mesh(&format!("{at}.mesh"), &body.mesh),
-            law: Law::Corotational,
+            law,
             young_pa: body.young_pa,
             poisson: body.poisson,
             density_kg_m3: body.density_kg_m3,
@@ -119,6 +112,17 @@ impl Check<'_> {
             fixes: self.fixes(&at, &body.fix),
             loads: self.loads(&at, &body.load),
         }
+    }
+
+    fn law(&mut self, at: &str, law: RawLaw) -> Law {
+        let found = match law {
+            RawLaw::Linear => return Law::Linear,
+            RawLaw::Corotational => return Law::Corotational,
+            RawLaw::Stvk => "stvk",
+            RawLaw::NeoHookean => "neo-hookean",
+        };
+        self.unsupported(format!("{at}.law"), found, &["linear", "corotational"]);
+        Law::Corotational
     }
 
     fn integrator(&mut self, at: &str, integrator: RawIntegrator) {

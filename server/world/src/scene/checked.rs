@@ -1,6 +1,7 @@
 //! A scene as ready objects: names resolved to indices, words to types, lists to vectors.
 
 use nalgebra::{Unit, Vector3};
+use scindo_physics::material::Law;
 
 use crate::inputs::{ToolMode, ToolShape};
 
@@ -104,13 +105,6 @@ pub enum CellSplit {
     Five,
     /// Six around the cell's diagonal.
     Six,
-}
-
-/// Constitutive law.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Law {
-    /// Small strain, large rotation.
-    Corotational,
 }
 
 /// Held nodes.
@@ -218,6 +212,13 @@ pub struct ToolSpec {
     pub path: Vec<PathPoint>,
     /// The script starts again after this time [s].
     pub repeat_s: Option<f64>,
+}
+
+impl ToolSpec {
+    /// Whether the tool can cut.
+    pub fn cuts(&self) -> bool {
+        matches!(self.shape, ToolShape::Blade { .. })
+    }
 }
 
 /// One pose of a script.

@@ -20,8 +20,8 @@ mod check;
 use std::path::{Path, PathBuf};
 
 pub use checked::{
-    BodySpec, CellSplit, CheckedScene, CutSpec, EffectSwitches, FixSpec, Law, LoadSpec, MeshSource,
-    PathPoint, ProbeSpec, PublishRates, Region, Share, ToolSpec,
+    BodySpec, CellSplit, CheckedScene, CutSpec, EffectSwitches, FixSpec, LoadSpec, MeshSource, PathPoint,
+    ProbeSpec, PublishRates, Region, Share, ToolSpec,
 };
 pub use problem::{Fault, Place, Problem, SceneError};
 pub use schema::{json_schema, key_reference};
@@ -141,6 +141,11 @@ impl Scene {
     /// The JSON Schema of scene files.
     pub fn json_schema() -> serde_json::Value {
         json_schema()
+    }
+
+    /// Puts findings of later stages at their lines.
+    pub(crate) fn located(&self, findings: Vec<(String, Fault)>) -> SceneError {
+        located(&self.file, &self.tree, findings)
     }
 
     /// The scene as the JSON tree it was read from, overrides included.

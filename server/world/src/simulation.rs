@@ -1,1 +1,0 @@
-//! The step: tools, cuts, contacts, deformation, in this order.

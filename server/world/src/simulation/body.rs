@@ -1,0 +1,115 @@
+//! A body of the simulation: mechanics plus what the world knows about it.
+
+use std::sync::Arc;
+
+use scindo_physics::body::Body;
+use scindo_physics::cut::CutMesh;
+
+use super::report::Energy;
+use crate::mesh_in::MeshHealth;
+use crate::plan::BodySize;
+use crate::snapshot::SurfaceTopology;
+
+/// A deformable body with its name and its groups of held nodes.
+#[derive(Debug)]
+pub struct SimBody {
+    /// Name.
+    pub id: Arc<str>,
+    /// Its mechanics.
+    pub body: Body,
+    /// Held nodes, one group per `fix` of the scene, ascending.
+    pub fix_groups: Vec<Vec<u32>>,
+    /// What was found and repaired in its mesh file; none for a body without a file.
+    pub health: Option<MeshHealth>,
+    /// Volume at rest [m³].
+    pub rest_volume_m3: f64,
+    topology: Option<Arc<SurfaceTopology>>,
+    surface: Vec<[f32; 3]>,
+    surface_is_old: bool,
+}
+
+impl SimBody {
+    pub(crate) fn new(id: &str, body: Body, health: Option<MeshHealth>) -> Self {
+        let rest_volume_m3 = body.cut_mesh().copy_volume().iter().sum();
+        Self {
+            id: id.into(),
+            body,
+            fix_groups: Vec::new(),
+            health,
+            rest_volume_m3,
+            topology: None,
+            surface: Vec::new(),
+            surface_is_old: true,
+        }
+    }
+
+    /// Topology epoch; rises with every cut that did something and with every reset.
+    pub fn epoch(&self) -> u32 {
+        self.body.cut_mesh().epoch()
+    }
+
+    /// The sizes that costs follow from.
+    pub fn size(&self) -> BodySize {
+        let mesh = self.body.cut_mesh();
+        BodySize {
+            elements: mesh.mesh().tets.len(),
+            vertices: mesh.surface().vertices.len(),
+            triangles: mesh.surface().triangles.len(),
+        }
+    }
+
+    /// Surface positions [m], computed when they are asked for and old.
+    pub fn surface_positions(&mut self) -> &[[f32; 3]] {
+        if self.surface_is_old {
+            self.body.surface_positions(&mut self.surface);
+            self.surface_is_old = false;
+        }
+        &self.surface
+    }
+
+    /// Surface positions [m] as last computed, with the mesh they belong to.
+    pub(crate) fn surface_now(&mut self) -> (&CutMesh, &[[f32; 3]]) {
+        self.surface_positions();
+        (self.body.cut_mesh(), &self.surface)
+    }
+
+    /// Surface velocities [m/s] into `out`.
+    pub fn surface_velocities(&self, out: &mut Vec<[f32; 3]>) {
+        let v = self.body.velocities();
+        out.clear();
+        out.extend(self.body.cut_mesh().surface().vertices.iter().map(|vertex| {
+            let v = vertex.position(v);
+            [v.x as f32, v.y as f32, v.z as f32]
+        }));
+    }
+
+    /// Kinetic and elastic energy.
+    pub fn energy(&self) -> Energy {
+        Energy { kinetic_j: self.body.kinetic_energy(), elastic_j: self.body.elastic_energy() }
+    }
+
+    /// To be told whenever the body moved.
+    pub(crate) fn has_moved(&mut self) {
+        self.surface_is_old = true;
+    }
+
+    /// To be told whenever the body was cut or reset.
+    pub(crate) fn has_changed_topology(&mut self) {
+        self.topology = None;
+        self.surface_is_old = true;
+    }
+
+    /// Triangles of the present epoch; made when first asked for.
+    pub fn topology(&mut self) -> Arc<SurfaceTopology> {
+        let mesh = self.body.cut_mesh();
+        let make = || {
+            Arc::new(SurfaceTopology {
+                epoch: mesh.epoch(),
+                vertex_count: mesh.surface().vertices.len() as u32,
+                triangles: mesh.surface().triangles.clone(),
+                tags: mesh.surface().tags.clone(),
+            })
+        };
+        self.topology.get_or_insert_with(make).clone()
+    }
+}

@@ -1,0 +1,196 @@
+//! Cuts of a step: those the scene schedules, those clients ask for, those blades make.
+//!
+//! Every incision has a number, which tags its lips. A blade keeps its number until it leaves
+//! cut mode; requests of one tool keep theirs while each begins where the last one ended.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use scindo_physics::cut::BladeSweep;
+
+use super::body::SimBody;
+use super::report::{Level, StepReport};
+use crate::inputs::{CutOutcome, CutRequest};
+use crate::scene::CutSpec;
+use crate::tool::Tools;
+
+/// Two requests connect when the gap is below this fraction of the blade's length.
+const CONNECTED: f64 = 0.02;
+
+/// A blade cuts when it moved by this fraction of a body's element.
+const LEAST_MOVE: f64 = 0.125;
+
+/// What a cut works on.
+pub(crate) struct Theatre<'a> {
+    pub bodies: &'a mut [SimBody],
+    pub tools: &'a mut Tools,
+    pub report: &'a mut StepReport,
+    /// Whether the scene allows cuts.
+    pub allowed: bool,
+}
+
+/// Pending cuts and what connects them.
+#[derive(Debug, Default)]
+pub(crate) struct Cuts {
+    /// By rising time.
+    schedule: Vec<Scheduled>,
+    next: usize,
+    /// Where the last request of each tool ended.
+    ends: Vec<RequestEnd>,
+    /// A blade cuts when it moved this far [m].
+    least_move_m: f64,
+    applied: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Scheduled {
+    at_s: f64,
+    body: usize,
+    blade: BladeSweep,
+}
+
+#[derive(Debug, Clone)]
+struct RequestEnd {
+    tool: Arc<str>,
+    edge: [Vector3<f64>; 2],
+    incision: u32,
+}
+
+impl Cuts {
+    pub fn new(cuts: &[CutSpec], bodies: &[SimBody]) -> Self {
+        let mut schedule: Vec<Scheduled> = cuts
+            .iter()
+            .map(|cut| Scheduled {
+                at_s: cut.at_s,
+                body: cut.body,
+                blade: BladeSweep { segments: cut.segments.clone() },
+            })
+            .collect();
+        schedule.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        let element_m = bodies.iter().map(element_size).fold(f64::INFINITY, f64::min);
+        let least_move_m = if element_m.is_finite() { LEAST_MOVE * element_m } else { 0.0 };
+        Self { schedule, least_move_m, ..Self::default() }
+    }
+
+    /// Back to the start of the schedule.
+    pub fn reset(&mut self) {
+        self.next = 0;
+        self.ends.clear();
+    }
+
+    /// Sweeps that changed a body so far.
+    pub fn applied(&self) -> u64 {
+        self.applied
+    }
+
+    /// Cuts that the schedule has for the time up to `time_s` [s].
+    pub fn apply_schedule(&mut self, time_s: f64, at: &mut Theatre<'_>) {
+        while let Some(due) = self.schedule.get(self.next).filter(|cut| cut.at_s <= time_s) {
+            let incision = at.tools.fresh_incision();
+            let (body, blade) = (due.body, due.blade.clone());
+            self.next += 1;
+            if let Err(reason) = self.sweep(body, &blade, incision, at) {
+                at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason);
+            }
+        }
+    }
+
+    /// Cuts that clients asked for, each with an outcome.
+    pub fn apply_requests(&mut self, requests: &[CutRequest], at: &mut Theatre<'_>) {
+        for request in requests {
+            let result = self.request(request, at);
+            at.report.cuts.push(CutOutcome { request: request.request, result });
+        }
+    }
+
+    /// Cuts that blades made by moving, through every body they meet.
+    pub fn apply_blades(&mut self, at: &mut Theatre<'_>) {
+        for tool in 0..at.tools.len() {
+            let Some((blade, incision)) = at.tools.take_sweep(tool, self.least_move_m) else { continue };
+            for body in 0..at.bodies.len() {
+                if let Err(reason) = self.sweep(body, &blade, incision, at) {
+                    at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason);
+                }
+            }
+        }
+    }
+
+    fn request(&mut self, request: &CutRequest, at: &mut Theatre<'_>) -> Result<usize, String> {
+        let wanted = |body: &SimBody| request.body.as_ref().is_none_or(|id| *id == body.id);
+        if !at.bodies.iter().any(wanted) {
+            let known: Vec<&str> = at.bodies.iter().map(|body| &*body.id).collect();
+            let name = request.body.as_deref().unwrap_or("");
+            return Err(format!("no body is called `{name}`; there are: {}", known.join(", ")));
+        }
+        let (Some(first), Some(last)) = (request.segments.first(), request.segments.last()) else {
+            return Err("the sweep is empty; give at least two blade segments".into());
+        };
+        let incision = self.incision_of(&request.tool, *first, *last, at.tools);
+        let blade = BladeSweep { segments: request.segments.clone() };
+        let mut elements = 0;
+        for body in 0..at.bodies.len() {
+            if wanted(&at.bodies[body]) {
+                elements += self.sweep(body, &blade, incision, at)?;
+            }
+        }
+        Ok(elements)
+    }
+
+    /// The number of the incision that a request of `tool` from edge `first` to `last` belongs to.
+    fn incision_of(
+        &mut self,
+        tool: &Arc<str>,
+        first: [Vector3<f64>; 2],
+        last: [Vector3<f64>; 2],
+        tools: &mut Tools,
+    ) -> u32 {
+        let reach = CONNECTED * (first[1] - first[0]).norm();
+        let joins = |end: &RequestEnd| (0..2).all(|i| (end.edge[i] - first[i]).norm() <= reach);
+        if let Some(end) = self.ends.iter_mut().find(|end| end.tool == *tool) {
+            if !joins(end) {
+                end.incision = tools.fresh_incision();
+            }
+            end.edge = last;
+            return end.incision;
+        }
+        let incision = tools.fresh_incision();
+        self.ends.push(RequestEnd { tool: tool.clone(), edge: last, incision });
+        incision
+    }
+
+    /// One sweep through one body; tells what it did if it did anything.
+    fn sweep(
+        &mut self,
+        body: usize,
+        blade: &BladeSweep,
+        incision: u32,
+        at: &mut Theatre<'_>,
+    ) -> Result<usize, String> {
+        if !at.allowed {
+            return Err("cutting is switched off by effects.cutting = false".into());
+        }
+        let body = &mut at.bodies[body];
+        let before = body.epoch();
+        let done = body.body.cut(blade, incision).map_err(|error| error.to_string())?;
+        if done.epoch != before {
+            body.has_changed_topology();
+            self.applied += 1;
+            let (elements, copies) = (done.elements_cut, done.new_copies.len());
+            let message = format!("incision {incision}: {elements} elements, {copies} new copies");
+            at.report.tell(Level::Info, "cut-applied", &body.id, message);
+        }
+        if done.refused_edges > 0 {
+            let edges = done.refused_edges;
+            let message = format!(
+                "incision {incision}: {edges} edges stay whole, their elements hold too many fragments"
+            );
+            at.report.tell(Level::Warning, "cut-incomplete", &body.id, message);
+        }
+        Ok(done.elements_cut)
+    }
+}
+
+/// Edge [m] of a lattice cell that six elements of mean volume would fill.
+fn element_size(body: &SimBody) -> f64 {
+    (6.0 * body.rest_volume_m3 / body.size().elements as f64).cbrt()
+}

@@ -1,0 +1,193 @@
+//! The step: gravity, determinism, cuts that open, probes on their side, what is off costs nothing.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use scindo_world::build::BuildOptions;
+use scindo_world::inputs::{CutRequest, Inputs, Wants};
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+use scindo_world::snapshot::Snapshot;
+
+/// The half-cut beam: 0.03 x 0.06 x 0.2 m, base held, gravity along x, cut to half its depth.
+const BEAM: &str = r#"
+schema = 1
+name = "half-cut beam"
+[world]
+gravity_m_s2 = [9.81, 0, 0]
+step_s = 0.01
+[[body]]
+id = "beam"
+mesh = { box = { min_m = [0, 0, 0], max_m = [0.03, 0.06, 0.2], cells = [3, 6, 15], pattern = "tet5" } }
+young_pa = 3e5
+poisson = 0.35
+density_kg_m3 = 1070
+rayleigh = { stiffness_s = 0.01 }
+[[body.fix]]
+where = { slab = { axis = "z", from = 0, to = 0 } }
+"#;
+
+const CUT: &str = r#"
+[[cut]]
+body = "beam"
+sweep_m = [[[-0.001, -0.001, 0.101], [-0.001, 0.061, 0.101]], [[0.015, -0.001, 0.101], [0.015, 0.061, 0.101]]]
+[[probe]]
+id = "above"
+body = "beam"
+point_m = [0, 0.03, 0.101]
+side = [0, 0, 1]
+[[probe]]
+id = "below"
+body = "beam"
+point_m = [0, 0.03, 0.101]
+side = [0, 0, -1]
+"#;
+
+fn simulation(text: &str) -> Simulation {
+    Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap()
+}
+
+fn run(simulation: &mut Simulation, steps: usize) {
+    for _ in 0..steps {
+        simulation.step(&Inputs::default());
+    }
+}
+
+/// Refusals that only show when meshes and selections are built.
+fn refusal(text: &str) -> String {
+    Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap_err().to_string()
+}
+
+#[test]
+fn a_beam_under_gravity_bends_and_comes_to_rest() {
+    let mut sim = simulation(BEAM);
+    run(&mut sim, 300);
+    let body = &sim.bodies()[0].body;
+    assert!(body.positions().iter().all(|x| x.iter().all(|c| c.is_finite())));
+    let tip = body.positions().iter().map(|x| x.x).fold(0.0, f64::max) - 0.03;
+    assert!((0.005..0.1).contains(&tip), "tip moved {tip} m");
+    let weight = body.total_mass() * 9.81;
+    let held = body.reaction(&sim.bodies()[0].fix_groups[0], sim.scene().gravity_m_s2);
+    assert!((held.x + weight).abs() < 0.02 * weight, "reaction {held:?}, weight {weight}");
+    assert!(body.kinetic_energy() < 1e-6);
+}
+
+#[test]
+fn a_half_cut_beam_opens_and_probes_stay_on_their_side() {
+    let mut sim = simulation(&format!("{BEAM}{CUT}"));
+    assert_eq!(sim.bodies()[0].epoch(), 0);
+    sim.step(&Inputs::default());
+    assert!(sim.report().events.iter().any(|event| event.name == "cut-applied"), "{:?}", sim.report().events);
+    run(&mut sim, 199);
+    let at = |i: usize| sim.probe_position(&sim.probes()[i]);
+    let gap = at(0).z - at(1).z;
+    assert!(gap > 5e-4, "the lips are {gap} m apart");
+    let surface = sim.bodies()[0].body.cut_mesh().surface();
+    assert!(surface.tags.contains(&1));
+}
+
+#[test]
+fn the_result_does_not_depend_on_threads_or_repetition() {
+    let scene = Scene::from_toml(&format!("{BEAM}{CUT}")).unwrap();
+    let state = |threads| {
+        let options = BuildOptions { threads, portable: false };
+        let mut sim = Simulation::with_options(&scene, Path::new(""), options).unwrap();
+        run(&mut sim, 40);
+        sim.bodies()[0].body.positions().to_vec()
+    };
+    let one = state(1);
+    assert_eq!(one, state(1));
+    assert_eq!(one, state(2));
+}
+
+#[test]
+fn reset_repeats_the_run_and_raises_the_epoch() {
+    let mut sim = simulation(&format!("{BEAM}{CUT}"));
+    run(&mut sim, 20);
+    let first = sim.bodies()[0].body.positions().to_vec();
+    let epoch = sim.bodies()[0].epoch();
+    sim.reset().unwrap();
+    assert_eq!((sim.steps(), sim.time_s()), (0, 0.0));
+    run(&mut sim, 20);
+    assert_eq!(first, sim.bodies()[0].body.positions());
+    assert!(sim.bodies()[0].epoch() > epoch);
+}
+
+#[test]
+fn surfaces_and_energies_are_only_computed_for_those_who_ask() {
+    let mut sim = simulation(BEAM);
+    let mut snapshot = Snapshot::default();
+    sim.step(&Inputs::default());
+    sim.snapshot_into(&mut snapshot);
+    assert!(snapshot.bodies[0].positions.is_empty() && snapshot.bodies[0].topology.triangles.is_empty());
+    assert!(sim.report().bodies[0].energy.is_none());
+    assert!(!sim.plan().is_on("surface publication") && sim.plan().is_on("gravity"));
+    let wants = Wants { surface: vec![true], contact: false, energy: true };
+    sim.step(&Inputs { wants, ..Inputs::default() });
+    sim.snapshot_into(&mut snapshot);
+    let body = &snapshot.bodies[0];
+    assert_eq!(body.positions.len(), body.topology.vertex_count as usize);
+    assert!(body.velocities.is_empty() && !body.topology.triangles.is_empty());
+    assert!(sim.report().bodies[0].energy.unwrap().kinetic_j > 0.0);
+    assert!(sim.plan().is_on("surface publication"));
+}
+
+#[test]
+fn cuts_of_clients_come_back_with_their_number() {
+    let mut sim = simulation(BEAM);
+    let edge = |x: f64| [Vector3::new(x, -0.001, 0.1), Vector3::new(x, 0.061, 0.1)];
+    let request = |request, body: &str, segments| CutRequest {
+        request,
+        tool: Arc::from("scalpel"),
+        body: Some(Arc::from(body)),
+        segments,
+    };
+    let cuts = vec![
+        request(7, "beam", vec![edge(-0.001), edge(0.01)]),
+        request(8, "beam", vec![edge(0.01), edge(0.02)]),
+        request(9, "bean", vec![edge(0.01), edge(0.02)]),
+        request(10, "beam", vec![edge(0.01), edge(f64::NAN)]),
+    ];
+    let report = sim.step(&Inputs { cuts, ..Inputs::default() });
+    let [a, b, c, d] = &report.cuts[..] else { panic!("{:?}", report.cuts) };
+    assert!(a.request == 7 && *a.result.as_ref().unwrap() > 0);
+    assert!(b.request == 8 && *b.result.as_ref().unwrap() > 0);
+    assert!(c.result.as_ref().unwrap_err().contains("there are: beam"));
+    assert!(d.result.as_ref().unwrap_err().contains("not finite"));
+    let tags = &sim.bodies()[0].body.cut_mesh().surface().tags;
+    assert_eq!(tags.iter().copied().max(), Some(1), "connected requests are one incision");
+}
+
+#[test]
+fn what_selects_nothing_or_lies_outside_is_refused_together() {
+    let text = format!(
+        "{}\n[[probe]]\nid = \"far\"\nbody = \"beam\"\npoint_m = [0, 0, 0.5]\n",
+        BEAM.replace(
+            "{ slab = { axis = \"z\", from = 0, to = 0 } }",
+            "{ sphere = { centre_m = [9, 9, 9], radius_m = 0.1 } }"
+        )
+    );
+    let message = refusal(&text);
+    for part in ["scene:15: body.beam.fix.0.where", "selects no node", "[0.03, 0.06, 0.2]"] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    for part in [
+        "probe.far.point_m",
+        "outside the body",
+        "3.000e-1 m away",
+        "nearest point inside is [0.0, 0.0, 0.2]",
+    ] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+}
+
+#[test]
+fn millimetres_with_si_stiffness_is_warned_about() {
+    let text = BEAM.replace("[0.03, 0.06, 0.2]", "[30, 60, 200]");
+    let sim = simulation(&text);
+    assert!(sim.warnings().iter().any(|w| w.contains("200.000 m long")), "{:?}", sim.warnings());
+    assert!(simulation(BEAM).warnings().is_empty());
+}
