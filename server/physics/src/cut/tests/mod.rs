@@ -4,6 +4,7 @@ mod check;
 mod planes;
 mod growth;
 mod random;
+mod refusals;
 
 use nalgebra::Vector3;
 
