@@ -17,7 +17,8 @@ pub mod inputs;
 // mesh files → checked tetrahedra
 pub mod mesh_in;
 
-// the demonstration's organ: organ
+// the organ of the demonstration
+pub mod organ;
 
 // rigid tools: where hands and scripts hold them
 pub mod tool;

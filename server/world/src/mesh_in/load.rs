@@ -129,7 +129,13 @@ impl fmt::Display for LatticeReport {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let s = &self.surface;
         let state = if s.is_clean() { "clean" } else { "dirty" };
-        writeln!(f, "surface: {} triangles, {state}, {}", s.triangles, size(&s.min_m, &s.max_m))?;
+        writeln!(
+            f,
+            "surface: {} triangles in {} sheets, {state}, {}",
+            s.triangles,
+            s.components,
+            size(&s.min_m, &s.max_m)
+        )?;
         counts(
             f,
             "repaired",
@@ -138,7 +144,7 @@ impl fmt::Display for LatticeReport {
                 (s.degenerate_triangles, "degenerate triangles removed"),
                 (s.duplicate_triangles, "duplicate triangles removed"),
                 (s.flipped_triangles, "triangles turned round"),
-                (usize::from(s.was_inside_out), "surface turned inside out"),
+                (usize::from(s.was_inside_out), "surface that faced inwards turned outwards"),
             ],
         )?;
         counts(
@@ -150,7 +156,6 @@ impl fmt::Display for LatticeReport {
                 (s.non_manifold_edges, "edges with more than two triangles"),
                 (s.one_sided_edges, "one-sided edges"),
                 (s.self_intersections, "edges through other triangles"),
-                (s.components.saturating_sub(1), "sheets beside the first"),
             ],
         )?;
         writeln!(

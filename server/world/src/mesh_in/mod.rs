@@ -22,8 +22,10 @@ mod volume_health;
 mod surface_health;
 mod triangle_tree;
 mod lattice;
+pub(crate) mod implicit;
 mod load;
 mod scale;
+mod write;
 #[cfg(test)]
 mod shapes;
 
@@ -37,6 +39,7 @@ pub use load::{MeshHealth, load_any, load_surface, load_volume};
 pub use scale::{ScaleWarning, check_scale};
 pub use surface_health::SurfaceHealth;
 pub use volume_health::{VolumeHealth, repair_volume};
+pub use write::write_mesh;
 
 /// Tetrahedra as a file gave them: not checked, not oriented.
 #[derive(Clone, Debug, PartialEq)]

@@ -117,6 +117,10 @@ pub fn check_scale(
         warnings.push(ScaleWarning::TooSmall { longest_m, suggested_scale: suggestion(longest_m, scale) });
     }
     let sag = density_kg_m3 * STANDARD_GRAVITY * longest_m / young_pa;
+    if !warnings.is_empty() {
+        // A wrong unit explains the rest.
+        return warnings;
+    }
     if sag > COLLAPSE {
         let stiff_enough_pa = 10.0 * density_kg_m3 * STANDARD_GRAVITY * longest_m;
         warnings.push(ScaleWarning::Collapses { sag, stiff_enough_pa });

@@ -1,1 +1,3 @@
 //! Results on disk: summary, probes and fields.
+
+pub mod vtu;
