@@ -42,5 +42,5 @@ pub use error::LinkError;
 pub use link::{Link, Presence};
 pub use mirror::{BodyMirror, Surface};
 pub use scindo_proto::{Role, messages};
-pub use tool::{ContactReader, Cutter, PoseSender, ReceivedContact, ToolLink};
+pub use tool::{ContactReader, ContactStream, Cutter, PoseSender, ReceivedContact, ToolLink};
 pub use watch::{EventStream, Latest, ToolStates};

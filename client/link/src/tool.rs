@@ -50,6 +50,17 @@ impl Link {
         })
     }
 
+    /// Calls `on_contact` for every contact message of tool `id`, on zenoh's receiving thread: it
+    /// must not block. For loops that count, order and time messages themselves.
+    pub async fn each_contact(
+        &self,
+        id: &str,
+        on_contact: impl Fn(HapticContact) + Send + Sync + 'static,
+    ) -> Result<ContactStream, LinkError> {
+        let key = self.keys().key(&Topic::ToolContact(Chunk::new("tool id", id)?));
+        Ok(ContactStream { _subscriber: self.subscribe(self.haptic(), key, on_contact).await? })
+    }
+
     async fn pose_sender(&self, tool: &Chunk) -> Result<PoseSender, LinkError> {
         let publisher = self
             .haptic()
@@ -184,6 +195,11 @@ impl ContactReader {
     pub fn lost(&self) -> u64 {
         self.counters.lost.load(Ordering::Relaxed)
     }
+}
+
+/// A subscription made by [`Link::each_contact`]. Dropping it unsubscribes.
+pub struct ContactStream {
+    _subscriber: Subscriber<()>,
 }
 
 #[derive(Default)]
