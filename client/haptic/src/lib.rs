@@ -1,1 +1,47 @@
-//! Placeholder.
+//! The haptic client of scindo: a 1 kHz loop beside a device, on a local contact model.
+//!
+//! The server sends, 200 times a second or more, planes with a linearised force (*contact model*);
+//! it never streams a force. This crate renders the force from the newest model at 1 kHz, so that
+//! network delay ages the model but never sits inside the stiff loop.
+//!
+//! # Layout, in the order of the data
+//! * [`device`]: where the hand is; the simulated device and the path its hand follows.
+//! * [`contact_model`]: the newest contact message, parsed, ordered and handed over without a lock.
+//! * [`contact_law`]: force of the tissue at the current tip.
+//! * [`virtual_coupling`]: stiffness and damping that the device can render passively.
+//! * [`blend`]: force continuity when the model changes.
+//! * [`safety`]: when force is allowed (watchdog, engagement), energy (passivity), clamp and slew.
+//! * [`tick`]: one millisecond, the table of contents of the client.
+//! * [`haptic_loop`]: absolute deadlines, and [`statistics`] of what was achieved.
+//! * [`recorder`]: every tick as a line of CSV, written by another thread.
+//! * [`link`]: contact messages in, poses out, on threads of their own.
+//! * [`command`]: the command line and the summary.
+//!
+//! Invariants: the tick takes no lock, allocates nothing and waits for nothing · no rule of the
+//! safety stage can be undone by a later stage · a force is never extrapolated beyond its validity.
+
+pub mod constants;
+
+pub mod device;
+
+pub mod contact_model;
+
+pub mod contact_law;
+
+pub mod virtual_coupling;
+
+pub mod blend;
+
+pub mod safety;
+
+pub mod recorder;
+
+pub mod statistics;
+
+pub mod tick;
+
+pub mod haptic_loop;
+
+pub mod link;
+
+pub mod command;

@@ -1,0 +1,366 @@
+//! The newest contact message as the loop sees it: parsed, finite, in order.
+//!
+//! [`ContactInbox`] stands on the network side: it refuses what cannot be used, drops what arrives
+//! out of order, counts what was lost and puts the newest model into a lock-free slot.
+
+use crate::constants::{DEFAULT_VALIDITY_NS, LOST_NS, MAX_VALIDITY_NS};
+use crate::statistics::{LinkReport, RoundTrips};
+use nalgebra::Vector3;
+use scindo_proto::limits::MAX_CONTACTS;
+use scindo_proto::messages::{Contact, HapticContact, Vec3, Vec3f, haptic_contact};
+
+/// Largest force of one plane that is believed [N].
+const MAX_PLANE_FORCE_N: f64 = 1.0e3;
+/// Largest stiffness of one plane that is believed [N/m].
+const MAX_PLANE_STIFFNESS_N_M: f64 = 1.0e6;
+/// Largest damping of one plane that is believed [N·s/m].
+const MAX_PLANE_DAMPING_NS_M: f64 = 1.0e4;
+/// Largest coordinate that is believed [m], also the largest velocity [m/s].
+const MAX_COORDINATE: f64 = 1.0e4;
+
+/// One plane with a linearised force; see `scindo.v1.Contact`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactPlane {
+    /// Point of the surface [m]; centre of the patch where the plane is trusted.
+    pub point_m: Vector3<f64>,
+    /// Unit, from the tissue to the tool.
+    pub normal: Vector3<f64>,
+    /// Force along the normal with the tip at the pose used [N].
+    pub force_n: f64,
+    /// Loss of that force per metre along the normal [N/m].
+    pub stiffness_n_m: f64,
+    /// Force against relative velocity along the normal [N·s/m].
+    pub damping_ns_m: f64,
+    /// Velocity of the surface [m/s].
+    pub surface_velocity_m_s: Vector3<f64>,
+    /// Radius around `point_m` where the plane is trusted [m]; zero: everywhere.
+    pub patch_radius_m: f64,
+}
+
+impl ContactPlane {
+    /// A plane without force.
+    pub const NONE: Self = Self {
+        point_m: Vector3::new(0.0, 0.0, 0.0),
+        normal: Vector3::new(0.0, 0.0, 1.0),
+        force_n: 0.0,
+        stiffness_n_m: 0.0,
+        damping_ns_m: 0.0,
+        surface_velocity_m_s: Vector3::new(0.0, 0.0, 0.0),
+        patch_radius_m: 0.0,
+    };
+}
+
+/// A contact message, ready for the loop. Fixed size: it is copied, never allocated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactModel {
+    /// Number of the message; zero: none has arrived yet.
+    pub seq: u64,
+    /// Topology it belongs to.
+    pub epoch: u32,
+    /// Step of the simulation.
+    pub sim_step: u64,
+    /// Simulated time [s].
+    pub sim_time_s: f64,
+    /// Loop clock at arrival [ns].
+    pub received_ns: u64,
+    /// Tip for which it was computed [m].
+    pub tip_used_m: Vector3<f64>,
+    /// The planes; the first `plane_count` count.
+    pub planes: [ContactPlane; MAX_CONTACTS],
+    /// How many planes count.
+    pub plane_count: usize,
+    /// Age at which the force must start to ramp down [ns].
+    pub validity_ns: u64,
+    /// The server's advice on force [N]; infinite if it gave none.
+    pub max_force_n: f64,
+    /// The server's advice on stiffness [N/m]; infinite if it gave none.
+    pub max_stiffness_n_m: f64,
+}
+
+impl ContactModel {
+    /// What the loop holds before the first message.
+    pub const NONE: Self = Self {
+        seq: 0,
+        epoch: 0,
+        sim_step: 0,
+        sim_time_s: 0.0,
+        received_ns: 0,
+        tip_used_m: Vector3::new(0.0, 0.0, 0.0),
+        planes: [ContactPlane::NONE; MAX_CONTACTS],
+        plane_count: 0,
+        validity_ns: 0,
+        max_force_n: f64::INFINITY,
+        max_stiffness_n_m: f64::INFINITY,
+    };
+
+    /// The planes that count.
+    pub fn planes(&self) -> &[ContactPlane] {
+        &self.planes[..self.plane_count]
+    }
+
+    /// Time since arrival [ns]; infinite (`u64::MAX`) before the first message.
+    pub fn age_ns(&self, now_ns: u64) -> u64 {
+        if self.seq == 0 { u64::MAX } else { now_ns.saturating_sub(self.received_ns) }
+    }
+
+    /// Whether it may still be rendered at full gain.
+    pub fn is_fresh(&self, now_ns: u64) -> bool {
+        self.age_ns(now_ns) <= self.validity_ns
+    }
+
+    /// Parses a message. `None` if anything in it is missing, not finite or beyond belief.
+    pub fn parse(message: &HapticContact, received_ns: u64) -> Option<Self> {
+        if message.seq == 0 || message.contacts.len() > MAX_CONTACTS || !message.sim_time_s.is_finite() {
+            return None;
+        }
+        let pose =
+            message.tool_pose_used.as_ref().and_then(|p| vector(p.position_m.as_ref(), MAX_COORDINATE));
+        let free = message.mode() == haptic_contact::Mode::Free || message.contacts.is_empty();
+        let mut model = Self {
+            seq: message.seq,
+            epoch: message.epoch,
+            sim_step: message.sim_step,
+            sim_time_s: message.sim_time_s,
+            received_ns,
+            tip_used_m: if free { pose.unwrap_or_default() } else { pose? },
+            validity_ns: validity_ns(message.validity_ms)?,
+            max_force_n: advice(message.max_force_n)?,
+            max_stiffness_n_m: advice(message.max_stiffness_n_m)?,
+            ..Self::NONE
+        };
+        for (slot, contact) in model.planes.iter_mut().zip(&message.contacts) {
+            *slot = parse_plane(contact)?;
+        }
+        model.plane_count = message.contacts.len();
+        Some(model)
+    }
+}
+
+fn parse_plane(contact: &Contact) -> Option<ContactPlane> {
+    let normal = vector_f32(contact.normal.as_ref(), 2.0)?;
+    let length = normal.norm();
+    let normal = ((length - 1.0).abs() < 1e-2).then(|| normal / length)?;
+    let force = vector_f32(contact.force_n.as_ref(), MAX_PLANE_FORCE_N)?;
+    Some(ContactPlane {
+        point_m: vector_f32(contact.point_m.as_ref(), MAX_COORDINATE)?,
+        normal,
+        force_n: force.dot(&normal),
+        stiffness_n_m: within(contact.stiffness_n_m, MAX_PLANE_STIFFNESS_N_M)?,
+        damping_ns_m: within(contact.damping_ns_m, MAX_PLANE_DAMPING_NS_M)?,
+        surface_velocity_m_s: match &contact.surface_velocity_m_s {
+            None => Vector3::zeros(),
+            velocity => vector_f32(velocity.as_ref(), MAX_COORDINATE)?,
+        },
+        patch_radius_m: within(contact.patch_radius_m, MAX_COORDINATE)?,
+    })
+}
+
+fn vector_f32(v: Option<&Vec3f>, limit: f64) -> Option<Vector3<f64>> {
+    let wide = v.map(|v| Vec3 { x: v.x.into(), y: v.y.into(), z: v.z.into() });
+    vector(wide.as_ref(), limit)
+}
+
+fn vector(v: Option<&Vec3>, limit: f64) -> Option<Vector3<f64>> {
+    let v = v.map(|v| Vector3::new(v.x, v.y, v.z))?;
+    v.iter().all(|c| c.abs() <= limit).then_some(v)
+}
+
+fn within(value: f32, limit: f64) -> Option<f64> {
+    let value = f64::from(value);
+    (0.0..=limit).contains(&value).then_some(value)
+}
+
+fn advice(value: f32) -> Option<f64> {
+    match f64::from(value) {
+        v if v > 0.0 && v.is_finite() => Some(v),
+        0.0 => Some(f64::INFINITY),
+        _ => None,
+    }
+}
+
+fn validity_ns(milliseconds: f32) -> Option<u64> {
+    match f64::from(milliseconds) {
+        v if v > 0.0 && v.is_finite() => Some(((v * 1e6) as u64).min(MAX_VALIDITY_NS)),
+        0.0 => Some(DEFAULT_VALIDITY_NS),
+        _ => None,
+    }
+}
+
+/// Reading end of the slot: belongs to the loop.
+pub type ContactSlot = triple_buffer::Output<ContactModel>;
+
+/// A lock-free slot that holds the newest model: writing end for the inbox, reading end for the loop.
+pub fn contact_slot() -> (triple_buffer::Input<ContactModel>, ContactSlot) {
+    triple_buffer::triple_buffer(&ContactModel::NONE)
+}
+
+/// Network side of the slot. One writer.
+pub struct ContactInbox {
+    slot: triple_buffer::Input<ContactModel>,
+    last_seq: u64,
+    last_publish_unix_ns: u64,
+    last_received_ns: u64,
+    last_tool_seq: u64,
+    first_received_ns: u64,
+    counts: LinkReport,
+    round_trips: RoundTrips,
+}
+
+impl ContactInbox {
+    /// Writes into `slot`.
+    pub fn new(slot: triple_buffer::Input<ContactModel>) -> Self {
+        Self {
+            slot,
+            last_seq: 0,
+            last_publish_unix_ns: 0,
+            last_received_ns: 0,
+            last_tool_seq: 0,
+            first_received_ns: 0,
+            counts: LinkReport::default(),
+            round_trips: RoundTrips::default(),
+        }
+    }
+
+    /// Takes one message that arrived at `now_ns` of the loop clock and at `client_ns` of the clock
+    /// that stamps poses (`tool_client_time_ns`).
+    pub fn accept(&mut self, message: &HapticContact, now_ns: u64, client_ns: u64) {
+        let Some(model) = ContactModel::parse(message, now_ns) else {
+            self.counts.contacts_refused += 1;
+            return;
+        };
+        if !self.in_order(message, now_ns) {
+            self.counts.contacts_late += 1;
+            return;
+        }
+        self.count(message, now_ns, client_ns);
+        self.slot.write(model);
+    }
+
+    /// Later than the last one. A lower number with a later send time is a server that started
+    /// anew; after a silence of half a second anything is a new beginning.
+    fn in_order(&mut self, message: &HapticContact, now_ns: u64) -> bool {
+        let silent = now_ns.saturating_sub(self.last_received_ns) > LOST_NS;
+        let restarted = message.seq <= self.last_seq && message.publish_unix_ns > self.last_publish_unix_ns;
+        if message.seq <= self.last_seq && !restarted && !silent {
+            return false;
+        }
+        let fresh_start = self.last_seq == 0 || restarted || silent;
+        if fresh_start {
+            self.counts.contact_streams += 1;
+            self.last_tool_seq = 0;
+        } else {
+            self.counts.contacts_lost += (message.seq - self.last_seq - 1).min(1_000_000);
+        }
+        true
+    }
+
+    fn count(&mut self, message: &HapticContact, now_ns: u64, client_ns: u64) {
+        if self.counts.contacts == 0 {
+            self.first_received_ns = now_ns;
+        } else {
+            let gap_ms = now_ns.saturating_sub(self.last_received_ns) as f64 * 1e-6;
+            self.counts.longest_contact_gap_ms = self.counts.longest_contact_gap_ms.max(gap_ms);
+        }
+        self.counts.contacts += 1;
+        self.last_seq = message.seq;
+        self.last_publish_unix_ns = message.publish_unix_ns;
+        self.last_received_ns = now_ns;
+        if message.tool_seq_used > self.last_tool_seq {
+            self.last_tool_seq = message.tool_seq_used;
+            self.round_trips.record(client_ns.saturating_sub(message.tool_client_time_ns));
+        }
+    }
+
+    /// Counts, rate and round trips so far.
+    pub fn report(&self) -> LinkReport {
+        let span_s = self.last_received_ns.saturating_sub(self.first_received_ns) as f64 * 1e-9;
+        let rate = if span_s > 0.0 { (self.counts.contacts - 1) as f64 / span_s } else { 0.0 };
+        LinkReport {
+            contact_rate_hz: rate,
+            round_trip_ms: self.round_trips.quantiles_ms(),
+            ..self.counts.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tick::fixture::{contact, free};
+
+    fn inbox() -> (ContactInbox, ContactSlot) {
+        let (input, output) = contact_slot();
+        (ContactInbox::new(input), output)
+    }
+
+    fn accept(inbox: &mut ContactInbox, message: &HapticContact, now_ns: u64) {
+        inbox.accept(message, now_ns, now_ns);
+    }
+
+    #[test]
+    fn the_newest_message_wins_and_gaps_are_counted() {
+        let (mut inbox, mut slot) = inbox();
+        assert_eq!(slot.read().age_ns(5), u64::MAX);
+        for (seq, now_ms) in [(1, 1), (2, 6), (5, 21), (4, 22)] {
+            accept(&mut inbox, &contact(seq, 1.0, 300.0), now_ms * 1_000_000);
+        }
+        assert_eq!(slot.read().seq, 5);
+        let report = inbox.report();
+        assert_eq!((report.contacts, report.contacts_lost, report.contacts_late), (3, 2, 1));
+        assert!((report.contact_rate_hz - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn garbage_is_refused_and_leaves_the_last_model() {
+        let (mut inbox, mut slot) = inbox();
+        accept(&mut inbox, &contact(1, 1.0, 300.0), 0);
+        let spoil: [fn(&mut HapticContact); 9] = [
+            |m| m.seq = 0,
+            |m| m.validity_ms = f32::NAN,
+            |m| m.max_force_n = -1.0,
+            |m| m.tool_pose_used = None,
+            |m| m.contacts[0].force_n = Some(Vec3f { x: f32::INFINITY, y: 0.0, z: 0.0 }),
+            |m| m.contacts[0].normal = Some(Vec3f { x: 0.0, y: 0.0, z: 0.5 }),
+            |m| m.contacts[0].stiffness_n_m = -5.0,
+            |m| m.contacts[0].point_m = Some(Vec3f { x: 1e9, y: 0.0, z: 0.0 }),
+            |m| m.contacts = vec![m.contacts[0]; 9],
+        ];
+        for spoil in spoil {
+            let mut message = contact(2, 1.0, 300.0);
+            spoil(&mut message);
+            accept(&mut inbox, &message, 1);
+        }
+        assert_eq!(inbox.report().contacts_refused, 9);
+        assert_eq!(slot.read().seq, 1);
+    }
+
+    #[test]
+    fn a_server_that_starts_anew_is_heard() {
+        let (mut inbox, mut slot) = inbox();
+        accept(&mut inbox, &free(1000), 0);
+        let mut again = free(1);
+        again.publish_unix_ns += 10_000_000_000;
+        accept(&mut inbox, &again, 1_000_000);
+        assert_eq!(slot.read().seq, 1);
+        accept(&mut inbox, &free(u64::MAX), 2_000_000);
+        accept(&mut inbox, &free(3), 3_000_000);
+        assert_eq!(slot.read().seq, u64::MAX);
+        accept(&mut inbox, &free(4), 2_000_000 + LOST_NS + 1);
+        assert_eq!(slot.read().seq, 4);
+        assert_eq!(inbox.report().contact_streams, 3);
+    }
+
+    #[test]
+    fn round_trip_is_counted_once_per_pose() {
+        let (mut inbox, _slot) = inbox();
+        for (seq, tool_seq, now_ms) in [(1, 7, 2), (2, 7, 6), (3, 8, 10)] {
+            let mut message = free(seq);
+            message.tool_seq_used = tool_seq;
+            message.tool_client_time_ns = (now_ms - 2) * 1_000_000;
+            accept(&mut inbox, &message, now_ms * 1_000_000);
+        }
+        let quantiles = inbox.report().round_trip_ms;
+        assert_eq!(quantiles.count, 2);
+        assert!((quantiles.p50 - 2.0).abs() < 0.1, "{quantiles:?}");
+    }
+}

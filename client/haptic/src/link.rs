@@ -1,0 +1,244 @@
+//! Contact messages in, poses out. Everything that may wait happens here, on threads of its own:
+//! zenoh's receiving thread fills the contact slot, the thread `haptic-pose` sends.
+
+use crate::constants::{PERIOD_S, POSE_QUEUE};
+use crate::contact_model::{ContactInbox, ContactSlot, contact_slot};
+use crate::device::{Capability, DeviceState, ToolMode};
+use crate::haptic_loop::LoopClock;
+use crate::recorder::LogRow;
+use crate::safety::flag;
+use crate::statistics::LinkReport;
+use crossbeam_channel::{Receiver, Sender, TryRecvError};
+use nalgebra::Vector3;
+use scindo_client::messages::{self, DeviceCapability, Pose, ToolSample, ToolShape, Vec3, tool_sample};
+use scindo_client::{ContactStream, Cutter, Link, LinkConfig, LinkError, PoseSender};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{JoinHandle, Thread};
+use std::time::Duration;
+
+/// Longest sleep of the sender if nobody wakes it.
+const SENDER_PARK: Duration = Duration::from_millis(5);
+
+/// One pose on its way to the server.
+#[derive(Debug, Clone, Copy)]
+struct PoseSample {
+    state: DeviceState,
+    force_n: Vector3<f64>,
+    contact_seq: u64,
+    contact_age_ms: f64,
+    energy_j: f64,
+    flags: u32,
+}
+
+/// Loop side of the pose queue.
+pub struct PoseQueue {
+    sender: Sender<PoseSample>,
+    thread: Thread,
+    period_ns: u64,
+    next_ns: u64,
+}
+
+impl PoseQueue {
+    /// Leaves a pose if one is due; `false` if there was no room. Never waits: the other end polls,
+    /// so the channel takes no lock, and waking a thread is one system call.
+    pub fn offer(&mut self, state: &DeviceState, row: &LogRow, now_ns: u64) -> bool {
+        if now_ns < self.next_ns {
+            return true;
+        }
+        self.next_ns = now_ns + self.period_ns - (PERIOD_S * 0.5e9) as u64;
+        let sample = PoseSample {
+            state: *state,
+            force_n: row.force_n,
+            contact_seq: row.contact_seq,
+            contact_age_ms: row.contact_age_ms,
+            energy_j: row.energy_j,
+            flags: row.flags,
+        };
+        let taken = self.sender.try_send(sample).is_ok();
+        self.thread.unpark();
+        taken
+    }
+}
+
+/// The tool as the wire should know it.
+#[derive(Debug, Clone)]
+pub struct ToolRequest {
+    /// Id of the tool.
+    pub id: String,
+    /// Its shape if the scene does not declare it.
+    pub shape: ToolShape,
+    /// Poses per second.
+    pub pose_hz: f64,
+    /// The device that holds it.
+    pub capability: Capability,
+}
+
+/// What the loop needs of the link.
+pub struct LoopPorts {
+    /// Newest contact.
+    pub contacts: ContactSlot,
+    /// Whether the server's token stands.
+    pub server_alive: Arc<AtomicBool>,
+    /// Poses to the server.
+    pub poses: PoseQueue,
+}
+
+/// A tool held over the network.
+pub struct HeldTool {
+    inbox: Arc<Mutex<ContactInbox>>,
+    sent: Arc<AtomicU64>,
+    sender: JoinHandle<()>,
+    _contacts: ContactStream,
+    _cutter: Cutter,
+}
+
+impl HeldTool {
+    /// Takes hold of the tool; must run inside a multi-threaded tokio runtime.
+    pub async fn hold(
+        link: &Link,
+        tool: &ToolRequest,
+        clock: LoopClock,
+    ) -> Result<(Self, LoopPorts), LinkError> {
+        let (slot, contacts) = contact_slot();
+        let inbox = Arc::new(Mutex::new(ContactInbox::new(slot)));
+        let shared = inbox.clone();
+        // Only zenoh's receiving thread and the final report lock it; the loop reads the slot.
+        let stream = link
+            .each_contact(&tool.id, move |message| {
+                let mut inbox = shared.lock().unwrap_or_else(PoisonError::into_inner);
+                inbox.accept(&message, clock.now_ns(), scindo_client::tool::unix_ns());
+            })
+            .await?;
+        let held = link.tool(&tool.id).await?;
+        held.cutter.announce(capability(&tool.capability)).await?;
+        let (sender, receiver) = crossbeam_channel::bounded(POSE_QUEUE);
+        let sent = Arc::new(AtomicU64::new(0));
+        let thread = spawn_sender(held.poses, receiver, tool.shape, sent.clone())?;
+        let poses = PoseQueue {
+            sender,
+            thread: thread.thread().clone(),
+            period_ns: (1e9 / tool.pose_hz) as u64,
+            next_ns: 0,
+        };
+        let ports = LoopPorts { contacts, server_alive: follow_presence(link), poses };
+        Ok((Self { inbox, sent, sender: thread, _contacts: stream, _cutter: held.cutter }, ports))
+    }
+
+    /// Figures of the link. Ends the sender; the loop's queue must be gone.
+    pub fn finish(self) -> LinkReport {
+        if self.sender.join().is_err() {
+            tracing::error!("the pose sender panicked");
+        }
+        let report = self.inbox.lock().unwrap_or_else(PoisonError::into_inner).report();
+        LinkReport { poses_sent: self.sent.load(Ordering::Relaxed), ..report }
+    }
+}
+
+/// A flag that follows the server's liveliness token.
+fn follow_presence(link: &Link) -> Arc<AtomicBool> {
+    let mut presence = link.presence();
+    let alive = Arc::new(AtomicBool::new(presence.borrow_and_update().servers > 0));
+    let shared = alive.clone();
+    tokio::spawn(async move {
+        while presence.changed().await.is_ok() {
+            let servers = presence.borrow_and_update().servers;
+            shared.store(servers > 0, Ordering::Relaxed);
+            tracing::info!(servers, "servers in the session");
+        }
+        shared.store(false, Ordering::Relaxed);
+    });
+    alive
+}
+
+fn spawn_sender(
+    mut poses: PoseSender,
+    queue: Receiver<PoseSample>,
+    shape: ToolShape,
+    sent: Arc<AtomicU64>,
+) -> Result<JoinHandle<()>, LinkError> {
+    let run = move || {
+        loop {
+            match queue.try_recv() {
+                Ok(sample) => match poses.send(wire_sample(&sample, shape)) {
+                    Ok(_) => drop(sent.fetch_add(1, Ordering::Relaxed)),
+                    Err(error) => tracing::debug!(%error, "pose not sent"),
+                },
+                Err(TryRecvError::Empty) => std::thread::park_timeout(SENDER_PARK),
+                Err(TryRecvError::Disconnected) => return,
+            }
+        }
+    };
+    std::thread::Builder::new()
+        .name("haptic-pose".into())
+        .spawn(run)
+        .map_err(|e| LinkError::Config { what: "thread haptic-pose".into(), reason: e.to_string() })
+}
+
+fn wire_sample(sample: &PoseSample, shape: ToolShape) -> ToolSample {
+    let PoseSample { state, .. } = sample;
+    let [qx, qy, qz, qw] = state.orientation;
+    let mode = match state.mode {
+        ToolMode::Hover => tool_sample::Mode::Hover,
+        ToolMode::Touch => tool_sample::Mode::Touch,
+        ToolMode::Grab => tool_sample::Mode::Grab,
+        ToolMode::Cut => tool_sample::Mode::Cut,
+    };
+    ToolSample {
+        pose: Some(Pose { position_m: Some(vec3(&state.position_m)), qx, qy, qz, qw }),
+        velocity_m_s: Some(vec3(&state.velocity_m_s)),
+        mode: mode.into(),
+        shape: Some(shape),
+        applied_force_n: Some(vec3(&sample.force_n)),
+        last_contact_seq_used: sample.contact_seq,
+        contact_age_ms: sample.contact_age_ms as f32,
+        passivity_energy_j: sample.energy_j,
+        fault_flags: sample.flags & flag::FAULTS,
+        ..ToolSample::default()
+    }
+}
+
+fn capability(device: &Capability) -> DeviceCapability {
+    DeviceCapability {
+        model: device.model.to_owned(),
+        max_force_n: device.max_force_n,
+        max_continuous_force_n: device.max_continuous_force_n,
+        max_stiffness_n_m: device.max_stiffness_n_m,
+        workspace_radius_m: device.workspace_radius_m,
+        loop_rate_hz: 1.0 / PERIOD_S,
+        ..DeviceCapability::default()
+    }
+}
+
+fn vec3(v: &Vector3<f64>) -> Vec3 {
+    Vec3 { x: v.x, y: v.y, z: v.z }
+}
+
+/// A body to touch: its id and the point of its surface that lies furthest against `direction`.
+pub async fn nearest_surface(
+    link: &Link,
+    body: Option<&str>,
+    direction: &Vector3<f64>,
+) -> Result<Option<(messages::BodyInfo, Vector3<f64>)>, LinkError> {
+    let info = link.info().await?;
+    let wanted = |b: &&messages::BodyInfo| body.is_none_or(|id| b.id == id);
+    let Some(info) = info.bodies.iter().find(wanted).cloned() else { return Ok(None) };
+    let mut mirror = link.mirror(&info.id).await?;
+    let surface = tokio::time::timeout(Duration::from_secs(5), mirror.next()).await.map_err(|_| {
+        LinkError::Timeout { key: format!("surface of {}", info.id), waited: Duration::from_secs(5) }
+    })??;
+    let height = |p: &Vector3<f64>| -direction.dot(p);
+    let point =
+        surface.frame.positions.chunks_exact(12).map(position).max_by(|a, b| height(a).total_cmp(&height(b)));
+    Ok(point.map(|point| (info, point)))
+}
+
+/// Three little-endian `f32`.
+fn position(bytes: &[u8]) -> Vector3<f64> {
+    Vector3::from_fn(|i, _| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|b| bytes[4 * i + b]))))
+}
+
+/// A link of role `haptic`.
+pub async fn connect(config: LinkConfig) -> Result<Link, LinkError> {
+    Link::connect(config).await
+}

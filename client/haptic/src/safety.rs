@@ -1,0 +1,40 @@
+//! The safety stage: when force is allowed, how much of it, and how fast it may change.
+//!
+//! Order: [`watchdog`] (device faults, freshness, engagement) → [`passivity`] (energy) →
+//! [`limiter`] (slew and clamp, last, so that no later stage can undo it). The passivity observer
+//! integrates the force that really left.
+
+pub mod watchdog;
+
+pub mod passivity;
+
+pub mod limiter;
+
+/// Flags of one tick. `fault_flags` of a pose carries [`FAULTS`] of them.
+pub mod flag {
+    /// Force is not allowed yet: waiting for free space.
+    pub const WAITING: u32 = 1;
+    /// The contact is older than its validity; force ramps down or is zero.
+    pub const STALE: u32 = 1 << 1;
+    /// No contact for more than half a second.
+    pub const LOST: u32 = 1 << 2;
+    /// The device reported a value that is not finite.
+    pub const NOT_FINITE: u32 = 1 << 3;
+    /// The device jumped.
+    pub const JUMP: u32 = 1 << 4;
+    /// The device moved faster than a hand that works.
+    pub const OVER_SPEED: u32 = 1 << 5;
+    /// Damping was injected to keep the output passive.
+    pub const PASSIVITY: u32 = 1 << 6;
+    /// The force was clamped.
+    pub const CLAMPED: u32 = 1 << 7;
+    /// The force was held back by the slew limit.
+    pub const SLEWED: u32 = 1 << 8;
+    /// Ticks were missed before this one.
+    pub const MISSED: u32 = 1 << 9;
+
+    /// Faults of the device: the force is cut to zero at once.
+    pub const DEVICE_FAULTS: u32 = NOT_FINITE | JUMP | OVER_SPEED;
+    /// What the server is told about.
+    pub const FAULTS: u32 = STALE | LOST | DEVICE_FAULTS;
+}

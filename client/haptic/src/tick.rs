@@ -1,0 +1,192 @@
+//! One millisecond of the haptic client.
+
+use crate::blend::Blend;
+use crate::constants::PERIOD_S;
+use crate::contact_law::ContactLaw;
+use crate::contact_model::ContactSlot;
+use crate::device::{DeviceState, HapticDevice};
+use crate::link::PoseQueue;
+use crate::recorder::{LogQueue, LogRow};
+use crate::safety::flag;
+use crate::safety::limiter::Limiter;
+use crate::safety::passivity::Passivity;
+use crate::safety::watchdog::{DeviceGuard, Permit, Watchdog};
+use crate::statistics::LoopReport;
+use crate::virtual_coupling::VirtualCoupling;
+use nalgebra::Vector3;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Injected damping of the passivity controller, in multiples of the device's own damping.
+const MAX_INJECTED_DAMPING: f64 = 2.0;
+
+/// When a tick happens.
+#[derive(Debug, Clone, Copy)]
+pub struct TickTime {
+    /// Loop clock [ns].
+    pub now_ns: u64,
+    /// Since the last tick [s]: one period, more after a stall.
+    pub elapsed_s: f64,
+}
+
+/// What the hand was given in one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TickOutput {
+    /// Force on the hand [N].
+    pub force_n: Vector3<f64>,
+    /// See [`flag`].
+    pub flags: u32,
+}
+
+/// Hard limits of the session.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Clamp [N]; the device's own limit counts too.
+    pub max_force_n: f64,
+    /// Slew limit [N/s].
+    pub slew_n_s: f64,
+}
+
+/// Where the data of a tick comes from and goes to, beside the device.
+pub struct Ports {
+    /// Newest contact.
+    pub contacts: ContactSlot,
+    /// Whether the server's liveliness token stands.
+    pub server_alive: Arc<AtomicBool>,
+    /// Poses to the server.
+    pub poses: Option<PoseQueue>,
+    /// Rows of the log.
+    pub log: Option<LogQueue>,
+}
+
+/// All state of the loop. One owner: the loop's thread.
+pub struct HapticTick {
+    device: Box<dyn HapticDevice>,
+    guard: DeviceGuard,
+    ports: Ports,
+    law: ContactLaw,
+    coupling: VirtualCoupling,
+    blend: Blend,
+    watchdog: Watchdog,
+    passivity: Passivity,
+    limiter: Limiter,
+    last_force_n: Vector3<f64>,
+    report: LoopReport,
+}
+
+impl HapticTick {
+    /// At rest, without force.
+    pub fn new(device: Box<dyn HapticDevice>, limits: Limits, ports: Ports) -> Self {
+        let capability = device.capability();
+        Self {
+            device,
+            guard: DeviceGuard::default(),
+            ports,
+            law: ContactLaw::default(),
+            coupling: VirtualCoupling::new(&capability),
+            blend: Blend::default(),
+            watchdog: Watchdog::default(),
+            passivity: Passivity::new(MAX_INJECTED_DAMPING * capability.damping_ns_m),
+            limiter: Limiter::new(limits.max_force_n.min(capability.max_force_n), limits.slew_n_s),
+            last_force_n: Vector3::zeros(),
+            report: LoopReport::default(),
+        }
+    }
+
+    /// One tick: device → contact → force of the tissue → what may leave → device, pose, log.
+    /// Takes no lock, allocates nothing, waits for nothing.
+    pub fn tick(&mut self, time: TickTime) -> TickOutput {
+        let (state, faults) = self.guard.check(self.device.read(time.elapsed_s), time.elapsed_s);
+        let model = *self.ports.contacts.read();
+        let alive = self.ports.server_alive.load(Ordering::Relaxed);
+
+        let loads = self.law.loads(&model, &state.position_m, time.now_ns);
+        let tissue_n = self.coupling.force(&state, &loads, model.max_stiffness_n_m);
+        let felt_n = self.blend.apply(tissue_n, &model, time.now_ns);
+
+        let permit = self.watchdog.judge(&model, &felt_n, alive, faults, time.now_ns);
+        let output = self.release(&permit, felt_n, &state.velocity_m_s, model.max_force_n);
+        self.device.write(output.force_n);
+
+        let row = LogRow {
+            time_s: time.now_ns as f64 * 1e-9,
+            position_m: state.position_m,
+            velocity_m_s: state.velocity_m_s,
+            tissue_n,
+            force_n: output.force_n,
+            contact_seq: model.seq,
+            contact_age_ms: (model.age_ns(time.now_ns) as f64 * 1e-6).min(1e6),
+            epoch: model.epoch,
+            energy_j: self.passivity.energy_j(),
+            flags: output.flags | if time.elapsed_s > 1.5 * PERIOD_S { flag::MISSED } else { 0 },
+        };
+        self.publish(&state, &row, time.now_ns);
+        self.account(&row);
+        output
+    }
+
+    /// What the safety stage lets through.
+    fn release(
+        &mut self,
+        permit: &Permit,
+        felt_n: Vector3<f64>,
+        v: &Vector3<f64>,
+        advice_n: f64,
+    ) -> TickOutput {
+        let (force_n, flags) = if permit.cut {
+            (self.limiter.cut(), 0)
+        } else if permit.gain == 0.0 {
+            self.passivity.rest();
+            self.limiter.limit(Vector3::zeros(), advice_n)
+        } else {
+            let (passive_n, injected) = self.passivity.correct(permit.apply(felt_n, v), v);
+            let (force_n, flags) = self.limiter.limit(passive_n, advice_n);
+            (force_n, flags | if injected { flag::PASSIVITY } else { 0 })
+        };
+        self.passivity.observe(&force_n, v);
+        TickOutput { force_n, flags: flags | permit.flags }
+    }
+
+    fn publish(&mut self, state: &DeviceState, row: &LogRow, now_ns: u64) {
+        if let Some(poses) = &mut self.ports.poses {
+            self.report.poses_dropped += u64::from(!poses.offer(state, row, now_ns));
+        }
+        if let Some(log) = &mut self.ports.log {
+            self.report.log_rows_dropped += u64::from(!log.offer(row));
+        }
+    }
+
+    fn account(&mut self, row: &LogRow) {
+        let report = &mut self.report;
+        report.ticks += 1;
+        report.max_force_n = report.max_force_n.max(row.force_n.norm());
+        if row.flags & flag::DEVICE_FAULTS == 0 {
+            let step_n = (row.force_n - self.last_force_n).norm();
+            report.max_force_step_n = report.max_force_step_n.max(step_n);
+            report.max_slew_n_s = report.max_force_step_n / PERIOD_S;
+        } else {
+            report.device_faults += 1;
+        }
+        report.touch_ticks += u64::from(row.force_n != Vector3::zeros());
+        report.stale_ticks += u64::from(row.flags & flag::STALE != 0);
+        report.min_energy_j = report.min_energy_j.min(row.energy_j);
+        self.last_force_n = row.force_n;
+    }
+
+    /// Figures of all ticks so far; the loop adds its own.
+    pub fn report(&self) -> LoopReport {
+        self.report.clone()
+    }
+
+    /// Closes the queues so that their threads can end.
+    pub fn close(self) -> LoopReport {
+        self.report
+    }
+}
+
+/// A contact stream and devices made for tests.
+#[cfg(test)]
+pub(crate) mod fixture;
+
+#[cfg(test)]
+mod tests;
