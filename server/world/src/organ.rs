@@ -1,7 +1,7 @@
 //! The body of the built-in demonstration: an organ-like shape from an implicit surface.
 //!
-//! Two blended lobes with a groove between them on top and a hollow below, about
-//! 160 × 90 × 60 mm. It lies flat: long axis along x, thickness along z, top towards +z, centred at
+//! A thick and a thin lobe, blended, with a groove and a notch between them and a hollow below, about
+//! 160 × 104 × 63 mm. It lies flat: long axis along x, thickness along z, top towards +z, centred at
 //! x = y = 0 with its underside near z = 0. The program triangulates it and fills the triangles with
 //! a lattice on the same path as a surface file of a user.
 
@@ -30,12 +30,15 @@ pub fn organ_surface() -> SurfaceMesh {
 
 /// Approximate signed distance to the organ's skin [m], negative inside.
 fn signed_distance(x: &Vector3<f64>) -> f64 {
-    let right = ellipsoid(x, Vector3::new(0.030, 0.004, 0.030), Vector3::new(0.050, 0.045, 0.031));
-    let left = ellipsoid(x, Vector3::new(-0.036, -0.006, 0.027), Vector3::new(0.044, 0.033, 0.020));
-    let lobes = smooth_union(right, left, 0.022);
-    let groove = capsule(x, Vector3::new(-0.014, -0.06, 0.060), Vector3::new(-0.006, 0.06, 0.066), 0.012);
-    let hollow = ellipsoid(x, Vector3::new(-0.01, 0.0, -0.030), Vector3::new(0.075, 0.055, 0.036));
-    smooth_cut(smooth_cut(lobes, groove, 0.020), hollow, 0.016)
+    let right = ellipsoid(x, Vector3::new(0.034, 0.004, 0.029), Vector3::new(0.046, 0.052, 0.033));
+    let middle = ellipsoid(x, Vector3::new(-0.006, 0.006, 0.027), Vector3::new(0.046, 0.046, 0.025));
+    let left = ellipsoid(x, Vector3::new(-0.046, 0.000, 0.024), Vector3::new(0.034, 0.036, 0.015));
+    let body = smooth_union(smooth_union(right, middle, 0.020), left, 0.026);
+    let groove = capsule(x, Vector3::new(-0.024, -0.08, 0.054), Vector3::new(-0.012, 0.08, 0.060), 0.010);
+    let notch = capsule(x, Vector3::new(-0.022, -0.060, -0.03), Vector3::new(-0.020, -0.056, 0.08), 0.012);
+    let hollow = ellipsoid(x, Vector3::new(-0.002, -0.020, -0.030), Vector3::new(0.080, 0.062, 0.040));
+    let grooved = smooth_cut(smooth_cut(body, groove, 0.014), notch, 0.016);
+    smooth_cut(grooved, hollow, 0.012)
 }
 
 /// Distance to an ellipsoid to first order (Quilez): exact on its surface.

@@ -154,3 +154,23 @@ fn impossible_requests_are_refused() {
     let message = lattice_from_surface(&sheet, 9, 1.0).unwrap_err().to_string();
     assert!(message.contains("c.obj") && message.contains("encloses no"), "{message}");
 }
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig { cases: 96, failure_persistence: None, ..Default::default() })]
+
+    /// Soups of triangles with no order at all: a sound mesh, or a refusal in words.
+    #[test]
+    fn any_soup_gives_a_manifold_or_an_error(
+        points in proptest::collection::vec(proptest::array::uniform3(-1.0f64..1.0), 4..14),
+        picks in proptest::collection::vec(proptest::array::uniform3(0usize..14), 4..60),
+        cells in 2usize..9,
+    ) {
+        let vertices: Vec<Vector3<f64>> = points.iter().map(|&p| Vector3::from(p)).collect();
+        let triangles = picks.iter().map(|t| t.map(|i| (i % vertices.len()) as u32)).collect();
+        let surface = SurfaceMesh { file: "soup".into(), vertices, triangles, notes: Vec::new() };
+        if let Ok((mesh, report)) = lattice_from_surface(&surface, cells, 1.0) {
+            assert_closed_manifold(&mesh);
+            assert!(report.min_dihedral_deg > 1.0, "{report:?}");
+        }
+    }
+}
