@@ -32,7 +32,8 @@ pub mod build;
 // recorded material points
 pub mod probe;
 
-// local contact model for haptics: contact_model
+// touch at the pace of a hand, for haptic clients
+pub mod contact_model;
 
 pub mod plan;
 

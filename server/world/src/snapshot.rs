@@ -113,6 +113,7 @@ impl ToolSnapshot {
         self.mode = tool.mode;
         self.force_n = tool.force_n;
         self.stiffness_n_m = tool.stiffness_n_m;
+        self.contact_stiffness_n_m = tool.contact_stiffness_n_m();
         self.max_force_n = tool.max_force_n;
         self.seq = tool.seq;
         self.client_time_ns = tool.client_time_ns;
@@ -153,6 +154,8 @@ pub struct ToolSnapshot {
     pub force_n: Vector3<f64>,
     /// Stiffness of the spring between hand and tissue [N/m].
     pub stiffness_n_m: f64,
+    /// Hand and tissue in series [N/m], for predictions about `pose`; 0: not known.
+    pub contact_stiffness_n_m: f64,
     /// Largest force [N].
     pub max_force_n: f64,
     /// Sequence number of the newest sample used.

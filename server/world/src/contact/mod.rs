@@ -112,6 +112,7 @@ impl Contacts {
                 tool.grip.open();
             }
             if tool.touches() {
+                tool.proxy.ride(tool.shape, &self.surfaces);
                 tool.proxy.follow(tool.shape, &tool.pose, &self.surfaces);
                 self.press(index, tool);
             } else {
@@ -126,7 +127,7 @@ impl Contacts {
 
     /// One-sided springs of a tool that touches.
     fn press(&mut self, index: u32, tool: &mut Tool) {
-        let found = self.finder.find(tool.shape, tool.proxy.pose(), &tool.pose, &self.surfaces, 0.0);
+        let found = self.finder.find(tool.shape, tool.proxy.pose(), &tool.pose, &self.surfaces);
         for touch in found.iter().filter(|t| t.depth > 0.0 && t.share > 0.0) {
             let body = &mut self.bodies[touch.body];
             tool.compliance.get_or_insert_with(|| Compliance::new(body.young_pa, touch.patch_radius));

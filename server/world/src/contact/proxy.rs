@@ -62,8 +62,21 @@ impl Proxy {
         self.engaged = false;
     }
 
-    /// Moves the proxy towards `device` as far as the surfaces, which may have moved since the
-    /// last call, let it.
+    /// Puts the proxy where another proxy is that met the same surfaces.
+    pub fn seat(&mut self, pose: &Isometry3<f64>) {
+        self.pose = *pose;
+        self.engaged = true;
+    }
+
+    /// Moves with surfaces that came over the resting proxy in their last motion. To be called
+    /// once per motion, before [`follow`](Self::follow).
+    pub fn ride(&mut self, shape: ToolShape, surfaces: &[ContactSurface]) {
+        if self.engaged {
+            self.carry(shape, surfaces);
+        }
+    }
+
+    /// Moves the proxy towards `device` as far as the surfaces let it.
     pub fn follow(&mut self, shape: ToolShape, device: &Isometry3<f64>, surfaces: &[ContactSurface]) {
         if !self.engaged {
             self.pose = *device;
@@ -71,7 +84,6 @@ impl Proxy {
             self.push_out(shape, surfaces);
             return;
         }
-        self.carry(shape, surfaces);
         self.push_out(shape, surfaces);
         let turn = self.pose.rotation.angle_to(&device.rotation);
         let turns = ((turn / MAX_TURN_RAD).ceil() as usize).clamp(1, MAX_TURNS);
@@ -82,7 +94,6 @@ impl Proxy {
         }
     }
 
-    /// Moves with surfaces that came over the resting proxy.
     fn carry(&mut self, shape: ToolShape, surfaces: &[ContactSurface]) {
         let start = core(shape, &self.pose);
         let mut push = Vector3::zeros();

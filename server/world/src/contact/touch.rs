@@ -63,9 +63,27 @@ impl Default for TouchFinder {
 
 impl TouchFinder {
     /// Contact points of a tool with its proxy at `proxy` and its hand at `device`, at most
-    /// [`MAX_CONTACTS`], nearest first. `reach` [m] widens the margin for those who want to know
-    /// of contacts before they happen.
+    /// [`MAX_CONTACTS`], nearest first.
     pub fn find(
+        &mut self,
+        shape: ToolShape,
+        proxy: &Isometry3<f64>,
+        device: &Isometry3<f64>,
+        surfaces: &[ContactSurface],
+    ) -> &[Touch] {
+        self.find_planes(shape, proxy, device, surfaces, 0.0);
+        if let ([middle], ToolShape::Sphere { radius_m }) = (&self.found[..], shape)
+            && middle.depth > 0.0
+        {
+            let middle = *middle;
+            self.widen(&middle, radius_m, device.translation.vector, surfaces);
+        }
+        &self.found
+    }
+
+    /// As [`find`](Self::find), but one point where a ball has a patch, and also what is not
+    /// touched but within `reach` [m]; that has no share.
+    pub fn find_planes(
         &mut self,
         shape: ToolShape,
         proxy: &Isometry3<f64>,
@@ -75,16 +93,10 @@ impl TouchFinder {
     ) -> &[Touch] {
         let at_proxy = capsule(shape, proxy);
         let at_device = capsule(shape, device);
-        let margin = (MARGIN_RADII * at_proxy.radius).max(LEAST_MARGIN_M).max(reach);
-        self.gather(&at_proxy, surfaces, margin);
+        let margin = (MARGIN_RADII * at_proxy.radius).max(LEAST_MARGIN_M);
+        self.gather(&at_proxy, surfaces, margin.max(reach));
         self.select(&at_proxy, &at_device, surfaces, core_length(shape));
         self.share(&at_proxy, margin);
-        if let ([middle], ToolShape::Sphere { radius_m }) = (&self.found[..], shape)
-            && middle.depth > 0.0
-        {
-            let middle = *middle;
-            self.widen(&middle, radius_m, at_device.core[0], surfaces);
-        }
         &self.found
     }
 

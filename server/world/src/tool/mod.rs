@@ -94,6 +94,13 @@ impl Tool {
         self.proxy.pose()
     }
 
+    /// Stiffness of hand spring and tissue in series [N/m]: how force changes with the pose within
+    /// a step. The hand's alone before the first touch.
+    pub fn contact_stiffness_n_m(&self) -> f64 {
+        let series = |compliance: Compliance| compliance.in_series_with(self.stiffness_n_m);
+        self.compliance.map_or(self.stiffness_n_m, series)
+    }
+
     /// Whether the tool is a blade that cuts now. It then passes through tissue: what it meets it
     /// parts instead of pushing.
     pub fn cuts(&self) -> bool {

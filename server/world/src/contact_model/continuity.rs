@@ -1,0 +1,75 @@
+//! No pops: a new model takes over from the last one without a step in force, and what is touched
+//! keeps its number while the tool slides.
+
+use nalgebra::Vector3;
+
+use crate::contact::touch::MAX_CONTACTS;
+
+use super::plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact};
+
+/// Difference of force below which nothing is blended [N].
+const UNFELT_N: f64 = 1e-6;
+/// Planes with normals at least this alike (cosine) may be the same feature.
+const ALIKE: f64 = 0.9;
+
+/// Gives out feature numbers.
+#[derive(Debug, Clone, Default)]
+pub struct FeatureNumbers {
+    last: u64,
+}
+
+impl FeatureNumbers {
+    /// Numbers the planes of `new`: those near a plane of `old` with a like normal keep its number.
+    pub fn carry_over(&mut self, old: &LocalContact, new: &mut LocalContact) {
+        let mut taken = [false; MAX_CONTACTS];
+        for plane in &mut new.planes {
+            let same = |candidate: &ContactPlane| {
+                candidate.feature_id != BLEND_FEATURE
+                    && candidate.normal.dot(&plane.normal) > ALIKE
+                    && (candidate.point_m - plane.point_m).norm() < 2.0 * plane.patch_radius_m
+            };
+            let known = old.planes.iter().enumerate().position(|(i, p)| !taken[i] && same(p));
+            plane.feature_id = match known {
+                Some(i) => {
+                    taken[i] = true;
+                    old.planes[i].feature_id
+                }
+                None => {
+                    self.last += 1;
+                    self.last
+                }
+            };
+        }
+    }
+}
+
+/// Adds to `new` a plane of constant force that makes up for the part of the change of force, at
+/// the pose of `new`, that exceeds `limit_n` [N]. As every model is held against the one before,
+/// the rest of a change is worked off by at most `limit_n` per model.
+pub fn limit_step(old: &LocalContact, new: &mut LocalContact, limit_n: f64) {
+    let before = old.force_at(new.pose_used.translation.vector);
+    let now = new.force_at(new.pose_used.translation.vector);
+    let change = now - before;
+    let excess = change.norm() - limit_n;
+    if excess <= UNFELT_N {
+        return;
+    }
+    let made_up: Vector3<f64> = change * (-excess / change.norm());
+    // The blend needs a seat of its own; the last plane matters least.
+    new.planes.truncate(MAX_CONTACTS - 1);
+    new.planes.push(ContactPlane {
+        point_m: new.pose_used.translation.vector,
+        normal: made_up.normalize(),
+        gap_m: 0.0,
+        force_n: made_up,
+        stiffness_n_m: 0.0,
+        tangential_stiffness_n_m: 0.0,
+        damping_ns_m: 0.0,
+        surface_velocity_m_s: Vector3::zeros(),
+        patch_radius_m: 0.0,
+        feature_id: BLEND_FEATURE,
+    });
+    if new.mode == ContactMode::Free {
+        new.mode = ContactMode::Contact;
+    }
+}

@@ -1,0 +1,362 @@
+//! The local contact model: what the contact thread makes of the newest snapshot and the newest
+//! pose of a tool, at 200 Hz or more, whatever the rate of the steps.
+//!
+//! # Order on the contact thread
+//! 1. [`ContactModels::take`] whenever there is a new snapshot: copies its surfaces and refits its
+//!    own trees;
+//! 2. [`ContactModels::evaluate`] for every held tool with its newest pose; the answer goes on the
+//!    wire as it is.
+//!
+//! # Force
+//! Let d be the depth of the newest pose behind a touched plane of the snapshot's surface and d₀ the
+//! depth of the pose the step was computed with. The step's own spring stands at k d₀, k: hand; a
+//! change of pose is answered by hand and tissue in series, k_s:
+//!
+//! f = k max(0, d₀) + k_s (d − max(0, d₀)).
+//!
+//! Between snapshots the surface is extrapolated by the velocity it has by itself: its own minus
+//! what the tool imparts, v_tool (1 − k_s / k) along the normal. A model takes over from the one
+//! before without a step in force ([`continuity`]).
+
+pub mod plane;
+pub mod continuity;
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::contact::proxy::Proxy;
+use crate::contact::surface::ContactSurface;
+use crate::contact::touch::{Touch, TouchFinder};
+use crate::inputs::{ToolMode, ToolShape};
+use crate::snapshot::{Snapshot, ToolSnapshot};
+use crate::tool::geometry::{capsule, core_radius, is_sane};
+use continuity::{FeatureNumbers, limit_step};
+pub use plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact};
+
+/// How fast force may change from model to model beyond what the planes say [N/s].
+const SLEW_N_S: f64 = 50.0;
+/// Longest time between two models that the slew limit is stretched over [s].
+const LONGEST_TICK_S: f64 = 0.01;
+/// How long after a snapshot its surface is extrapolated, in intervals between snapshots.
+const HORIZON: f64 = 1.5;
+/// Bounds of that interval [s].
+const INTERVAL_S: (f64, f64) = (1e-3, 0.1);
+/// Bounds of the validity of a model [s].
+const VALIDITY_S: (f64, f64) = (0.03, 0.2);
+/// Planes are told of this long before the tool reaches them [s], at least within this [m].
+const AHEAD_S: f64 = 0.02;
+const LEAST_AHEAD_M: f64 = 0.002;
+const MOST_AHEAD_M: f64 = 0.02;
+/// Damping per stiffness [s] and its bound [N·s/m]; well under what desktop devices absorb.
+const DAMPING_S: f64 = 1e-3;
+const MAX_DAMPING_NS_M: f64 = 2.0;
+/// Planes are trusted at least this far around their point [m].
+const LEAST_PATCH_M: f64 = 0.003;
+
+/// The newest of a tool as the contact thread knows it.
+#[derive(Debug, Clone)]
+pub struct ToolQuery {
+    /// Name.
+    pub id: Arc<str>,
+    /// Geometry.
+    pub shape: ToolShape,
+    /// Tool axes to world axes; the translation is the tip [m].
+    pub pose: Isometry3<f64>,
+    /// Velocity of the tip [m/s].
+    pub velocity_m_s: Vector3<f64>,
+    /// What the hand does.
+    pub mode: ToolMode,
+}
+
+/// Surfaces of the newest snapshot and one model per tool.
+#[derive(Debug, Clone, Default)]
+pub struct ContactModels {
+    surfaces: Vec<ContactSurface>,
+    velocities: Vec<Vec<[f32; 3]>>,
+    tools: Vec<ToolModel>,
+    finder: TouchFinder,
+    step: u64,
+    time_s: f64,
+    taken_s: Option<f64>,
+    interval_s: f64,
+    refused_poses: u64,
+    refused_surfaces: u64,
+}
+
+/// What is kept of one tool between models.
+#[derive(Debug, Clone)]
+struct ToolModel {
+    id: Arc<str>,
+    /// The tool in the newest snapshot.
+    seen: Option<ToolSnapshot>,
+    proxy: Proxy,
+    features: FeatureNumbers,
+    now: LocalContact,
+    before: LocalContact,
+    evaluated_s: f64,
+}
+
+impl ContactModels {
+    /// Takes in a snapshot at time `now_s` [s] of the caller's clock. A body without positions, or
+    /// whose positions do not belong to its topology, keeps the surface it had.
+    pub fn take(&mut self, snapshot: &Snapshot, now_s: f64) {
+        if let Some(before) = self.taken_s {
+            let interval = (now_s - before).clamp(INTERVAL_S.0, INTERVAL_S.1);
+            let first = self.interval_s == 0.0;
+            self.interval_s = if first { interval } else { 0.8 * self.interval_s + 0.2 * interval };
+        }
+        self.taken_s = Some(now_s);
+        (self.step, self.time_s) = (snapshot.step, snapshot.time_s);
+        self.surfaces.resize_with(snapshot.bodies.len(), ContactSurface::default);
+        self.velocities.resize_with(snapshot.bodies.len(), Vec::new);
+        for (body, seen) in snapshot.bodies.iter().enumerate() {
+            if seen.positions.is_empty() {
+                continue;
+            }
+            let (epoch, triangles) = (seen.topology.epoch, &seen.topology.triangles);
+            match self.surfaces[body].update(epoch, triangles, &seen.positions) {
+                Ok(_) => self.velocities[body].clone_from(&seen.velocities),
+                Err(_) => self.refused_surfaces += 1,
+            }
+        }
+        self.tools.retain(|model| snapshot.tools.iter().any(|tool| tool.id == model.id));
+        for tool in &snapshot.tools {
+            let index = self.model_of(&tool.id, now_s);
+            let model = &mut self.tools[index];
+            // The step knows on which side of the tissue the tool is; its word counts.
+            model.proxy.seat(&tool.proxy);
+            model.proxy.ride(tool.shape, &self.surfaces);
+            model.seen = Some(tool.clone());
+        }
+    }
+
+    /// The model for a tool at its newest pose, at time `now_s` [s] of the caller's clock. A pose
+    /// that is not finite is refused and counted; the answer is then for the last good one.
+    pub fn evaluate(&mut self, query: &ToolQuery, now_s: f64) -> &LocalContact {
+        let index = self.model_of(&query.id, now_s);
+        let finite = query.velocity_m_s.iter().all(|v| v.is_finite());
+        if !(is_sane(&query.pose) && finite) {
+            self.refused_poses += 1;
+            return &self.tools[index].now;
+        }
+        let since_snapshot = self.taken_s.map_or(0.0, |taken| (now_s - taken).max(0.0));
+        let frame = Frame {
+            surfaces: &self.surfaces,
+            velocities: &self.velocities,
+            ahead_s: since_snapshot.min(HORIZON * self.interval_s),
+            validity_s: (HORIZON * self.interval_s).clamp(VALIDITY_S.0, VALIDITY_S.1),
+            step: self.step,
+            time_s: self.time_s,
+        };
+        let model = &mut self.tools[index];
+        model.evaluate(query, &frame, &mut self.finder);
+        let elapsed = (now_s - model.evaluated_s).clamp(0.0, LONGEST_TICK_S);
+        model.evaluated_s = now_s;
+        limit_step(&model.before, &mut model.now, SLEW_N_S * elapsed);
+        &model.now
+    }
+
+    /// Poses refused so far.
+    pub fn refused_poses(&self) -> u64 {
+        self.refused_poses
+    }
+
+    /// Surfaces refused so far.
+    pub fn refused_surfaces(&self) -> u64 {
+        self.refused_surfaces
+    }
+
+    fn model_of(&mut self, id: &Arc<str>, now_s: f64) -> usize {
+        self.tools.iter().position(|model| model.id == *id).unwrap_or_else(|| {
+            self.tools.push(ToolModel {
+                id: Arc::clone(id),
+                seen: None,
+                proxy: Proxy::default(),
+                features: FeatureNumbers::default(),
+                now: LocalContact::default(),
+                before: LocalContact::default(),
+                evaluated_s: now_s,
+            });
+            self.tools.len() - 1
+        })
+    }
+}
+
+/// What all tools of one tick share.
+struct Frame<'a> {
+    surfaces: &'a [ContactSurface],
+    velocities: &'a [Vec<[f32; 3]>],
+    /// How far the surfaces are extrapolated [s].
+    ahead_s: f64,
+    validity_s: f64,
+    step: u64,
+    time_s: f64,
+}
+
+/// Stiffnesses about the pose the last step was computed with.
+struct Anchor {
+    pose: Isometry3<f64>,
+    velocity: Vector3<f64>,
+    /// Hand alone and hand with tissue [N/m].
+    hand: f64,
+    series: f64,
+    max_force: f64,
+}
+
+impl ToolModel {
+    fn evaluate(&mut self, query: &ToolQuery, frame: &Frame<'_>, finder: &mut TouchFinder) {
+        std::mem::swap(&mut self.now, &mut self.before);
+        let anchor = self.anchor(query);
+        let now = &mut self.now;
+        now.planes.clear();
+        now.body = None;
+        now.epoch = self.before.epoch;
+        now.mode = ContactMode::Free;
+        now.pose_used = query.pose;
+        now.validity_s = frame.validity_s;
+        now.max_force_n = anchor.max_force;
+        now.max_stiffness_n_m = anchor.hand;
+        (now.step, now.time_s) = (frame.step, frame.time_s);
+        match query.mode {
+            ToolMode::Hover => self.proxy.release(&query.pose),
+            ToolMode::Grab => {
+                self.proxy.release(&query.pose);
+                self.hold(query, &anchor);
+            }
+            ToolMode::Cut if matches!(query.shape, ToolShape::Blade { .. }) => {
+                self.proxy.release(&query.pose);
+                now.mode = ContactMode::Cutting;
+            }
+            ToolMode::Touch | ToolMode::Cut => self.touch(query, &anchor, frame, finder),
+        }
+        self.features.carry_over(&self.before, &mut self.now);
+    }
+
+    fn anchor(&self, query: &ToolQuery) -> Anchor {
+        let Some(seen) = &self.seen else {
+            return Anchor {
+                pose: query.pose,
+                velocity: Vector3::zeros(),
+                hand: 0.0,
+                series: 0.0,
+                max_force: 0.0,
+            };
+        };
+        let known = seen.contact_stiffness_n_m > 0.0;
+        Anchor {
+            pose: seen.pose,
+            velocity: seen.velocity_m_s,
+            hand: seen.stiffness_n_m,
+            series: if known { seen.contact_stiffness_n_m } else { 0.5 * seen.stiffness_n_m },
+            max_force: seen.max_force_n,
+        }
+    }
+
+    /// Planes around a tool that touches or may soon.
+    fn touch(&mut self, query: &ToolQuery, anchor: &Anchor, frame: &Frame<'_>, finder: &mut TouchFinder) {
+        self.proxy.follow(query.shape, &query.pose, frame.surfaces);
+        let ahead = (query.velocity_m_s.norm() * AHEAD_S).clamp(LEAST_AHEAD_M, MOST_AHEAD_M);
+        let proxy = self.proxy.pose();
+        let found = finder.find_planes(query.shape, proxy, &query.pose, frame.surfaces, ahead);
+        let at_anchor = capsule(query.shape, &anchor.pose);
+        // While something is touched the rest only counts once the proxy gets there: the device,
+        // behind the touched plane, may be behind untouched ones too.
+        let touched = found.iter().any(|touch| touch.share > 0.0 && touch.depth > 0.0);
+        let pressed = self.seen.as_ref().is_some_and(|seen| seen.mode == query.mode);
+        for touch in found.iter().filter(|touch| !touched || touch.share > 0.0) {
+            let before = at_anchor.core_point(touch.parameter) - touch.point;
+            let depth_before = at_anchor.radius - touch.normal.dot(&before);
+            let depth_before = if pressed { depth_before.max(0.0) } else { 0.0 };
+            self.now.planes.push(plane_of(touch, depth_before, query, anchor, frame));
+        }
+        if let Some(first) = found.first() {
+            self.now.mode = ContactMode::Contact;
+            self.now.body = Some(first.body);
+            self.now.epoch = frame.surfaces[first.body].epoch();
+        }
+    }
+
+    /// The pull of held tissue, along all axes.
+    fn hold(&mut self, query: &ToolQuery, anchor: &Anchor) {
+        let Some(seen) = &self.seen else { return };
+        if seen.mode != ToolMode::Grab {
+            return;
+        }
+        let moved = query.pose.translation.vector - anchor.pose.translation.vector;
+        let force = (seen.force_n - moved * anchor.series).cap_magnitude(anchor.max_force);
+        self.now.mode = ContactMode::Hold;
+        self.now.planes.push(ContactPlane {
+            point_m: query.pose.translation.vector,
+            normal: force.try_normalize(1e-9).unwrap_or_else(Vector3::z),
+            gap_m: 0.0,
+            force_n: force,
+            stiffness_n_m: anchor.series,
+            tangential_stiffness_n_m: anchor.series,
+            damping_ns_m: damping(anchor.series),
+            surface_velocity_m_s: Vector3::zeros(),
+            patch_radius_m: 0.0,
+            feature_id: 0,
+        });
+    }
+}
+
+fn damping(stiffness: f64) -> f64 {
+    (stiffness * DAMPING_S).min(MAX_DAMPING_NS_M)
+}
+
+/// A plane with its force at the newest pose, given the depth the last step was computed with.
+fn plane_of(
+    touch: &Touch,
+    depth_before: f64,
+    query: &ToolQuery,
+    anchor: &Anchor,
+    frame: &Frame<'_>,
+) -> ContactPlane {
+    let normal = touch.normal;
+    let surface = surface_velocity(touch, frame);
+    let imparted = if depth_before > 0.0 && anchor.hand > 0.0 {
+        normal * normal.dot(&anchor.velocity) * (1.0 - anchor.series / anchor.hand)
+    } else {
+        Vector3::zeros()
+    };
+    let by_itself = surface - imparted;
+    let shift = by_itself * frame.ahead_s;
+    let depth = touch.depth + normal.dot(&shift);
+    // What is not touched yet will have its full share when it is.
+    let share = if touch.share > 0.0 { touch.share } else { 1.0 };
+    let stiffness = share * anchor.series;
+    let force = share * anchor.hand * depth_before + stiffness * (depth - depth_before);
+    let point = touch.point + shift;
+    let tip = query.pose.translation.vector - point;
+    let aside = (tip - normal * normal.dot(&tip)).norm();
+    ContactPlane {
+        point_m: point,
+        normal,
+        gap_m: -depth,
+        force_n: normal * force.min(anchor.max_force),
+        stiffness_n_m: stiffness,
+        tangential_stiffness_n_m: 0.0,
+        damping_ns_m: damping(stiffness),
+        surface_velocity_m_s: by_itself,
+        // Clients measure from the tip, which a shaft's contact may be far from.
+        patch_radius_m: aside + (2.0 * core_radius(query.shape)).max(LEAST_PATCH_M),
+        feature_id: 0,
+    }
+}
+
+/// Velocity of the touched point of the surface [m/s]; zero where it is not known.
+fn surface_velocity(touch: &Touch, frame: &Frame<'_>) -> Vector3<f64> {
+    let Some(tree) = frame.surfaces[touch.body].tree() else { return Vector3::zeros() };
+    let velocities = &frame.velocities[touch.body];
+    let mut sum = Vector3::zeros();
+    for (vertex, weight) in tree.corners(touch.triangle).into_iter().zip(touch.barycentric) {
+        let Some(v) = velocities.get(vertex as usize) else { return Vector3::zeros() };
+        sum += Vector3::new(v[0], v[1], v[2]).cast::<f64>() * weight;
+    }
+    if sum.iter().all(|x| x.is_finite()) { sum } else { Vector3::zeros() }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

@@ -1,0 +1,109 @@
+//! What a haptic client needs to render a touch at 1 kHz on its own: planes with linearised force.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::contact::touch::MAX_CONTACTS;
+
+/// Number of the plane that hides a change of model; see [`super::continuity`].
+pub const BLEND_FEATURE: u64 = u64::MAX;
+
+/// One contact plane. Force on the tool with its tip at p:
+/// n · max(0, force·n − stiffness (p − tip used)·n).
+///
+/// Before the touch `force_n`·n is negative, −stiffness · gap, so that the client's force starts
+/// from zero in the very tick in which the tip crosses the plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactPlane {
+    /// On the surface [m].
+    pub point_m: Vector3<f64>,
+    /// Unit, from the tissue to the tool.
+    pub normal: Vector3<f64>,
+    /// Distance of the tool from the plane [m]; negative: penetration.
+    pub gap_m: f64,
+    /// Force of the tissue on the tool at the pose used [N]; along −normal: not yet touching.
+    pub force_n: Vector3<f64>,
+    /// Loss of force per metre along the normal [N/m].
+    pub stiffness_n_m: f64,
+    /// Restoring force per metre across the normal [N/m].
+    pub tangential_stiffness_n_m: f64,
+    /// Force against relative velocity along the normal [N·s/m].
+    pub damping_ns_m: f64,
+    /// How the surface moves by itself, not because the tool pushes it [m/s].
+    pub surface_velocity_m_s: Vector3<f64>,
+    /// Tip distance from the point, across the normal, within which the plane is trusted [m].
+    pub patch_radius_m: f64,
+    /// Stays the same while the tool touches the same place.
+    pub feature_id: u64,
+}
+
+/// State of a touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ContactMode {
+    /// Nothing within reach.
+    #[default]
+    Free,
+    /// Planes hold.
+    Contact,
+    /// The blade cuts; no plane holds it back.
+    Cutting,
+    /// The tool holds tissue.
+    Hold,
+}
+
+/// A local contact model of one tool.
+#[derive(Debug, Clone)]
+pub struct LocalContact {
+    /// State of the touch.
+    pub mode: ContactMode,
+    /// At most eight planes.
+    pub planes: Vec<ContactPlane>,
+    /// Index of the body of the first plane; none when there is no plane.
+    pub body: Option<usize>,
+    /// Topology epoch of that body.
+    pub epoch: u32,
+    /// The pose about which the planes are linearised.
+    pub pose_used: Isometry3<f64>,
+    /// After this the client ramps down [s].
+    pub validity_s: f64,
+    /// Largest force to render [N].
+    pub max_force_n: f64,
+    /// Largest stiffness to render [N/m].
+    pub max_stiffness_n_m: f64,
+    /// Step and simulated time [s] of the snapshot.
+    pub step: u64,
+    /// Simulated time of the snapshot [s].
+    pub time_s: f64,
+}
+
+impl Default for LocalContact {
+    fn default() -> Self {
+        Self {
+            mode: ContactMode::Free,
+            planes: Vec::with_capacity(MAX_CONTACTS),
+            body: None,
+            epoch: 0,
+            pose_used: Isometry3::identity(),
+            validity_s: 0.0,
+            max_force_n: 0.0,
+            max_stiffness_n_m: 0.0,
+            step: 0,
+            time_s: 0.0,
+        }
+    }
+}
+
+impl LocalContact {
+    /// Force of the tissue on a tool with its tip at `p` [N]: the law clients evaluate.
+    pub fn force_at(&self, p: Vector3<f64>) -> Vector3<f64> {
+        let moved = p - self.pose_used.translation.vector;
+        self.planes.iter().map(|plane| plane.force_at(moved)).sum()
+    }
+}
+
+impl ContactPlane {
+    /// Force on the tool [N] after its tip moved by `moved` [m] from the pose used.
+    pub fn force_at(&self, moved: Vector3<f64>) -> Vector3<f64> {
+        let n = &self.normal;
+        n * (self.force_n.dot(n) - self.stiffness_n_m * moved.dot(n)).max(0.0)
+    }
+}
