@@ -4,6 +4,7 @@
 
 mod conservation;
 mod determinism;
+mod reference;
 mod robustness;
 mod springs;
 
