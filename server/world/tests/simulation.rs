@@ -121,13 +121,13 @@ fn surfaces_and_energies_are_only_computed_for_those_who_ask() {
     let mut sim = simulation(BEAM);
     let mut snapshot = Snapshot::default();
     sim.step(&Inputs::default());
-    sim.snapshot_into(&mut snapshot);
+    sim.snapshot_into(&Wants::default(), &mut snapshot);
     assert!(snapshot.bodies[0].positions.is_empty() && snapshot.bodies[0].topology.triangles.is_empty());
     assert!(sim.report().bodies[0].energy.is_none());
     assert!(!sim.plan().is_on("surface publication") && sim.plan().is_on("gravity"));
     let wants = Wants { surface: vec![true], contact: false, energy: true };
-    sim.step(&Inputs { wants, ..Inputs::default() });
-    sim.snapshot_into(&mut snapshot);
+    sim.step(&Inputs { wants: wants.clone(), ..Inputs::default() });
+    sim.snapshot_into(&wants, &mut snapshot);
     let body = &snapshot.bodies[0];
     assert_eq!(body.positions.len(), body.topology.vertex_count as usize);
     assert!(body.velocities.is_empty() && !body.topology.triangles.is_empty());
@@ -190,4 +190,17 @@ fn millimetres_with_si_stiffness_is_warned_about() {
     let sim = simulation(&text);
     assert!(sim.warnings().iter().any(|w| w.contains("200.000 m long")), "{:?}", sim.warnings());
     assert!(simulation(BEAM).warnings().is_empty());
+}
+
+#[test]
+fn live_changes_pass_the_same_checks_as_the_file() {
+    let mut sim = simulation(BEAM);
+    sim.set("world.gravity_m_s2", "[0, 0, 0]").unwrap();
+    assert_eq!(sim.scene().gravity_m_s2, Vector3::zeros());
+    sim.set("body.beam.solver.iterations", "7").unwrap();
+    sim.step(&Inputs::default());
+    assert!(sim.report().bodies[0].solve.iterations <= 7);
+    assert!(sim.set("world.gravity_m_s2", "[0, nan, 0]").unwrap_err().contains("finite"));
+    assert!(sim.set("body.beam.young_pa", "1e4").unwrap_err().contains("only at a start"));
+    assert!(sim.set("world.gravty", "1").unwrap_err().contains("did you mean"));
 }

@@ -3,9 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod conservation;
-mod cutting;
 mod determinism;
-mod reference;
 mod robustness;
 mod springs;
 

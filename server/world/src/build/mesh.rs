@@ -5,6 +5,7 @@ use std::path::Path;
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 
 use crate::mesh_in::{MeshHealth, MeshInError, check_scale, load_surface, load_volume};
+use crate::organ::organ;
 use crate::scene::{BodySpec, CellSplit, Fault, MeshSource};
 
 /// A mesh and what was found and repaired in its file.
@@ -29,7 +30,9 @@ pub fn open(source: &MeshSource, base_dir: &Path) -> Result<Opened, Fault> {
         MeshSource::Surface { path, cells, scale } => load_surface(&base_dir.join(path), *cells, *scale)
             .map(|(mesh, report)| Opened { mesh, health: Some(MeshHealth::Surface(report)) })
             .map_err(fault),
-        MeshSource::Organ { .. } => Err(Fault::Mesh { reason: "the organ is not wired yet".into() }),
+        MeshSource::Organ { cells } => organ(*cells)
+            .map(|(mesh, report)| Opened { mesh, health: Some(MeshHealth::Surface(report)) })
+            .map_err(fault),
     }
 }
 

@@ -13,7 +13,7 @@ mod cuts;
 use std::path::Path;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{BodyError, Outcome};
+use scindo_physics::body::{BodyError, Outcome, PcgSettings};
 
 pub use body::SimBody;
 pub use report::{BodyReport, Energy, Event, Level, StepReport};
@@ -33,6 +33,7 @@ use stopwatch::Stopwatch;
 /// A running scene.
 #[derive(Debug)]
 pub struct Simulation {
+    source: Scene,
     scene: CheckedScene,
     bodies: Vec<SimBody>,
     tools: Tools,
@@ -62,7 +63,7 @@ impl Simulation {
     /// As [`Simulation::new`].
     pub fn with_options(scene: &Scene, base_dir: &Path, options: BuildOptions) -> Result<Self, SceneError> {
         let built = build::build(scene, base_dir, options)?;
-        let scene = scene.checked().clone();
+        let (source, scene) = (scene.clone(), scene.checked().clone());
         let sizes: Vec<BodySize> = built.bodies.iter().map(SimBody::size).collect();
         let mut contacts = Contacts::default();
         for body in &scene.bodies {
@@ -82,6 +83,7 @@ impl Simulation {
             wants: Wants::default(),
             total: StageSeconds::default(),
             report,
+            source,
             scene,
         })
     }
@@ -196,12 +198,35 @@ impl Simulation {
         Ok(())
     }
 
-    /// Fills a snapshot of the state after the last step. Surfaces are filled as the last step's
-    /// [`Wants`] say.
-    pub fn snapshot_into(&mut self, snapshot: &mut Snapshot) {
-        let time_s = self.time_s();
+    /// Fills a snapshot of the present state: surfaces only as `wants` says.
+    pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
+        let (steps, time_s) = (self.steps, self.time_s());
         let Self { bodies, report, tools, .. } = self;
-        snapshot.fill(self.steps, time_s, &self.wants, Sources { bodies, report, tools });
+        snapshot.fill(steps, time_s, wants, Sources { bodies, report, tools });
+    }
+
+    /// Changes one value of the scene while it runs, under the same checks as the file.
+    ///
+    /// # Errors
+    /// What is wrong with key or value, or that it takes effect only at a start.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        let changed = self.source.apply_set(&format!("{key}={value}")).map_err(|error| error.to_string())?;
+        let scene = changed.checked().clone();
+        let live = key == "world.gravity_m_s2" || key == "effects.energy";
+        let solver = key.starts_with("body.") && key.contains(".solver.");
+        if !live && !solver {
+            return Err(format!(
+                "`{key}` takes effect only at a start, with --set; while running: world.gravity_m_s2, \
+                 effects.energy, body.<id>.solver.iterations, body.<id>.solver.tolerance"
+            ));
+        }
+        for (body, spec) in self.bodies.iter_mut().zip(&scene.bodies) {
+            let solver = PcgSettings { iterations: spec.iterations, tolerance: spec.tolerance };
+            body.body.set_solver(solver).map_err(|error| error.to_string())?;
+        }
+        self.scene = scene;
+        self.source = changed;
+        Ok(())
     }
 }
 
@@ -279,17 +304,5 @@ impl Simulation {
     /// Seconds per stage since the start or the last reset.
     pub fn total_seconds(&self) -> StageSeconds {
         self.total
-    }
-
-    /// Changes gravity [m/s²]; non-finite values are refused.
-    ///
-    /// # Errors
-    /// The value refused, in words.
-    pub fn set_gravity(&mut self, gravity_m_s2: Vector3<f64>) -> Result<(), String> {
-        if !gravity_m_s2.iter().all(|g| g.abs() < 1e6) {
-            return Err(format!("gravity {gravity_m_s2:?} must be finite and below 1e6 m/s2"));
-        }
-        self.scene.gravity_m_s2 = gravity_m_s2;
-        Ok(())
     }
 }

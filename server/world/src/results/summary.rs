@@ -1,0 +1,314 @@
+//! `summary.json`: what a run did, in figures.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::machine::Machine;
+use crate::plan::Plan;
+use crate::simulation::{Event, Level, SimBody, Simulation, Stage, StepReport};
+
+/// Most events that a summary lists; the rest is counted.
+const MAX_EVENTS: usize = 200;
+
+/// The summary.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// `running`, `done`, or why it stopped.
+    pub status: String,
+    /// Name of the scene.
+    pub scene_name: String,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Steps done.
+    pub steps: u64,
+    /// Simulated time [s].
+    pub time_s: f64,
+    /// Simulated time per step [s].
+    pub step_s: f64,
+    /// Measured times.
+    pub timing: Timing,
+    /// Bodies in the order of the scene.
+    pub bodies: Vec<BodySummary>,
+    /// Final positions of the probes.
+    pub probes: Vec<ProbeSummary>,
+    /// Cuts that changed a body.
+    pub cuts_applied: u64,
+    /// Samples of tools that were refused.
+    pub refused_tool_samples: u64,
+    /// What happened, the first of it.
+    pub events: Vec<EventSummary>,
+    /// How many events there were.
+    pub event_count: u64,
+    /// What is odd about the scene.
+    pub warnings: Vec<String>,
+    /// Effects on and off, with costs.
+    pub plan: Plan,
+    /// What it ran on.
+    pub machine: Machine,
+    /// The scene, overrides included.
+    pub scene: Value,
+}
+
+/// Measured times of the steps [ms].
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct Timing {
+    /// Mean per step.
+    pub mean_ms: f64,
+    /// Median step.
+    pub median_ms: f64,
+    /// 99th percentile.
+    pub p99_ms: f64,
+    /// Slowest step.
+    pub max_ms: f64,
+    /// Simulated over computed time.
+    pub real_time_factor: f64,
+    /// Mean per stage.
+    pub stages: Vec<StageSummary>,
+}
+
+/// Mean time of a stage.
+#[derive(Debug, Clone, Serialize)]
+pub struct StageSummary {
+    /// Name.
+    pub name: &'static str,
+    /// Mean per step [ms].
+    pub mean_ms: f64,
+}
+
+/// One body.
+#[derive(Debug, Clone, Serialize)]
+pub struct BodySummary {
+    /// Name.
+    pub id: String,
+    /// Elements of the mesh.
+    pub elements: usize,
+    /// Nodes of the mesh.
+    pub nodes: usize,
+    /// Pieces that cuts made of the elements.
+    pub pieces: usize,
+    /// Copies of nodes, three unknowns each.
+    pub copies: usize,
+    /// Parts that hang together.
+    pub parts: usize,
+    /// Surface vertices.
+    pub surface_vertices: usize,
+    /// Surface triangles.
+    pub surface_triangles: usize,
+    /// Triangles on the lips of cuts.
+    pub lip_triangles: usize,
+    /// Incisions that left a lip.
+    pub incisions: usize,
+    /// Topology epoch.
+    pub epoch: u32,
+    /// Mass [kg].
+    pub mass_kg: f64,
+    /// Volume at rest [m³].
+    pub rest_volume_m3: f64,
+    /// Volume now [m³].
+    pub volume_m3: f64,
+    /// Smallest det F of any piece.
+    pub least_volume_ratio: f64,
+    /// Largest displacement of a node [m].
+    pub max_displacement_m: f64,
+    /// Kinetic energy [J].
+    pub kinetic_j: f64,
+    /// Elastic energy [J].
+    pub elastic_j: f64,
+    /// Force [N] that holds each group of fixed nodes, in the order of the scene.
+    pub reactions_n: Vec<[f64; 3]>,
+    /// Solver over the run.
+    pub solver: SolverSummary,
+    /// Whether every position and velocity is finite.
+    pub finite: bool,
+    /// What was found and repaired in the mesh file.
+    pub mesh: Value,
+}
+
+/// The linear solver over the run.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct SolverSummary {
+    /// Mean iterations per step.
+    pub mean_iterations: f64,
+    /// Most iterations of a step.
+    pub max_iterations: u32,
+    /// Relative preconditioned residual of the last step.
+    pub last_residual: f64,
+    /// Largest of any step.
+    pub max_residual: f64,
+    /// Why the last solve stopped.
+    pub last_stop: String,
+    /// Steps that stopped at the iteration limit.
+    pub unconverged_steps: u64,
+    /// Steps that were divided to stay finite.
+    pub divided_steps: u64,
+    /// Steps that were rolled back.
+    pub rolled_back_steps: u64,
+}
+
+/// A probe at the end.
+#[derive(Debug, Clone, Serialize)]
+pub struct ProbeSummary {
+    /// Name.
+    pub id: String,
+    /// Position [m].
+    pub position_m: [f64; 3],
+    /// Displacement from rest [m].
+    pub displacement_m: [f64; 3],
+}
+
+/// An event.
+#[derive(Debug, Clone, Serialize)]
+pub struct EventSummary {
+    /// Step it happened in.
+    pub step: u64,
+    /// `info`, `warning` or `error`.
+    pub level: &'static str,
+    /// Stable name.
+    pub name: &'static str,
+    /// The body it happened to.
+    pub body: Option<String>,
+    /// In words.
+    pub message: String,
+}
+
+/// Collects over the steps of a run.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Running {
+    step_ms: Vec<f32>,
+    solvers: Vec<(SolverSummary, u64)>,
+    events: Vec<EventSummary>,
+    event_count: u64,
+}
+
+impl Running {
+    pub fn add(&mut self, report: &StepReport) {
+        use scindo_physics::body::{Outcome, StopReason};
+        self.step_ms.push((report.seconds.total() * 1e3) as f32);
+        self.solvers.resize(report.bodies.len(), Default::default());
+        for ((solver, iterations), body) in self.solvers.iter_mut().zip(&report.bodies) {
+            let solve = &body.solve;
+            *iterations += u64::from(solve.iterations);
+            solver.max_iterations = solver.max_iterations.max(solve.iterations);
+            solver.last_residual = solve.residual;
+            solver.max_residual = solver.max_residual.max(solve.residual);
+            solver.last_stop = format!("{:?}", solve.stop);
+            solver.unconverged_steps += u64::from(solve.stop == StopReason::IterationLimit);
+            solver.divided_steps += u64::from(solve.substeps > 1);
+            solver.rolled_back_steps += u64::from(solve.outcome != Outcome::Advanced);
+        }
+        self.event_count += report.events.len() as u64;
+        let room = MAX_EVENTS.saturating_sub(self.events.len());
+        self.events.extend(report.events.iter().take(room).map(|event| event_summary(report.step, event)));
+    }
+
+    pub fn summary(&self, simulation: &Simulation, scene: Value, status: &str) -> Summary {
+        let checked = simulation.scene();
+        let steps = self.step_ms.len();
+        let body = |(i, body): (usize, &SimBody)| {
+            let (mut solver, iterations) = self.solvers.get(i).cloned().unwrap_or_default();
+            solver.mean_iterations = iterations as f64 / steps.max(1) as f64;
+            body_summary(body, simulation, solver)
+        };
+        Summary {
+            status: status.to_owned(),
+            scene_name: checked.name.clone(),
+            version: env!("CARGO_PKG_VERSION"),
+            seed: checked.seed,
+            steps: simulation.steps(),
+            time_s: simulation.time_s(),
+            step_s: checked.step_s,
+            timing: self.timing(simulation),
+            bodies: simulation.bodies().iter().enumerate().map(body).collect(),
+            probes: simulation.probes().iter().map(|probe| probe_summary(probe, simulation)).collect(),
+            cuts_applied: simulation.cuts_applied(),
+            refused_tool_samples: simulation.tools().refused_samples(),
+            events: self.events.clone(),
+            event_count: self.event_count,
+            warnings: simulation.warnings().to_vec(),
+            plan: simulation.plan(),
+            machine: Machine::here(),
+            scene,
+        }
+    }
+
+    fn timing(&self, simulation: &Simulation) -> Timing {
+        let mut sorted = self.step_ms.clone();
+        sorted.sort_by(f32::total_cmp);
+        let Some(&max) = sorted.last() else { return Timing::default() };
+        let at = |share: f64| f64::from(sorted[((sorted.len() - 1) as f64 * share).round() as usize]);
+        let n = sorted.len() as f64;
+        let mean_ms = sorted.iter().map(|ms| f64::from(*ms)).sum::<f64>() / n;
+        let total = simulation.total_seconds();
+        let per_step = 1e3 / simulation.steps().max(1) as f64;
+        Timing {
+            mean_ms,
+            median_ms: at(0.5),
+            p99_ms: at(0.99),
+            max_ms: f64::from(max),
+            real_time_factor: simulation.step_s() * 1e3 / mean_ms.max(1e-9),
+            stages: Stage::ALL
+                .iter()
+                .map(|stage| StageSummary { name: stage.name(), mean_ms: total.of(*stage) * per_step })
+                .collect(),
+        }
+    }
+}
+
+fn event_summary(step: u64, event: &Event) -> EventSummary {
+    EventSummary {
+        step,
+        level: match event.level {
+            Level::Info => "info",
+            Level::Warning => "warning",
+            Level::Error => "error",
+        },
+        name: event.name,
+        body: event.body.as_ref().map(|id| id.to_string()),
+        message: event.message.clone(),
+    }
+}
+
+fn probe_summary(probe: &crate::probe::Probe, simulation: &Simulation) -> ProbeSummary {
+    let x = simulation.probe_position(probe);
+    ProbeSummary { id: probe.id.clone(), position_m: x.into(), displacement_m: (x - probe.rest_m).into() }
+}
+
+fn body_summary(sim: &SimBody, simulation: &Simulation, solver: SolverSummary) -> BodySummary {
+    let body = &sim.body;
+    let mesh = body.cut_mesh();
+    let surface = mesh.surface();
+    let mut lips: Vec<u32> = surface.tags.iter().copied().filter(|tag| *tag > 0).collect();
+    let lip_triangles = lips.len();
+    lips.sort_unstable();
+    lips.dedup();
+    let rest = |copy: usize| mesh.mesh().nodes[mesh.copy_node()[copy] as usize];
+    let displaced = body.positions().iter().enumerate().map(|(i, x)| (x - rest(i)).norm());
+    let finite = body.positions().iter().chain(body.velocities()).all(|x| x.iter().all(|c| c.is_finite()));
+    let gravity = simulation.scene().gravity_m_s2;
+    BodySummary {
+        id: sim.id.to_string(),
+        elements: mesh.mesh().tets.len(),
+        nodes: mesh.mesh().nodes.len(),
+        pieces: mesh.pieces().len(),
+        copies: mesh.n_copies(),
+        parts: mesh.components().len(),
+        surface_vertices: surface.vertices.len(),
+        surface_triangles: surface.triangles.len(),
+        lip_triangles,
+        incisions: lips.len(),
+        epoch: mesh.epoch(),
+        mass_kg: body.total_mass(),
+        rest_volume_m3: sim.rest_volume_m3,
+        volume_m3: body.volume(),
+        least_volume_ratio: body.least_volume_ratio(),
+        max_displacement_m: displaced.fold(0.0, f64::max),
+        kinetic_j: body.kinetic_energy(),
+        elastic_j: body.elastic_energy(),
+        reactions_n: sim.fix_groups.iter().map(|nodes| body.reaction(nodes, gravity).into()).collect(),
+        solver,
+        finite,
+        mesh: serde_json::to_value(&sim.health).unwrap_or(Value::Null),
+    }
+}

@@ -1,0 +1,97 @@
+//! Every example scene runs; the demonstration dents, is cut, opens and stays finite.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use scindo_world::inputs::Inputs;
+use scindo_world::organ::organ_surface;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+
+fn scenes() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes"))
+}
+
+fn run(sim: &mut Simulation, until_s: f64) {
+    while sim.time_s() < until_s - 1e-9 {
+        sim.step(&Inputs::default());
+        for body in &sim.report().bodies {
+            assert!(body.solve.residual.is_finite());
+        }
+    }
+    for body in sim.bodies() {
+        assert!(body.body.positions().iter().all(|x| x.iter().all(|c| c.abs() < 10.0)));
+    }
+}
+
+fn start(name: &str, overrides: &[&str]) -> Simulation {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    let scene = Scene::load_with(&scenes().join(name), &overrides).unwrap();
+    Simulation::new(&scene, scene.base_dir()).unwrap()
+}
+
+#[test]
+fn the_half_cut_beam_opens() {
+    let mut sim = start("half-cut-beam.toml", &[]);
+    run(&mut sim, 1.0);
+    let at = |i: usize| sim.probe_position(&sim.probes()[i]);
+    assert!((at(0) - at(1)).norm() > 5e-4, "{} {}", at(0), at(1));
+}
+
+#[test]
+fn the_first_cut_opens_the_block() {
+    let mut sim = start("first-cut.toml", &[]);
+    run(&mut sim, 0.6);
+    let tags = &sim.bodies()[0].body.cut_mesh().surface().tags;
+    assert!(tags.contains(&1));
+}
+
+/// A user's surface file, made here so that no mesh needs to be kept.
+#[test]
+fn an_organ_from_a_surface_file_is_cut_across() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("organ.obj");
+    let surface = organ_surface();
+    let mut text = String::new();
+    for v in &surface.vertices {
+        text += &format!("v {} {} {}\n", 1e3 * v.x, 1e3 * v.y, 1e3 * v.z);
+    }
+    for [a, b, c] in &surface.triangles {
+        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    }
+    std::fs::write(&path, text).unwrap();
+    let file = format!("body.organ.mesh.surface={:?}", path.display().to_string());
+    let cut = "cut=[{ body = \"organ\", sweep_m = [[[0.02, -0.1, -0.1], [0.02, -0.1, 0.2]], [[0.02, 0.1, -0.1], [0.02, 0.1, 0.2]]] }]";
+    let mut sim =
+        start("organ-surface.toml", &[&file, "body.organ.mesh.cells=12", "body.organ.mesh.scale=0.001", cut]);
+    assert!(sim.warnings().is_empty(), "{:?}", sim.warnings());
+    run(&mut sim, 0.1);
+    assert_eq!(sim.bodies()[0].body.cut_mesh().components().len(), 2);
+    let millimetres = start("organ-surface.toml", &[&file, "body.organ.mesh.cells=8"]);
+    assert!(
+        millimetres.warnings().iter().any(|w| w.contains("scale = 0.001")),
+        "{:?}",
+        millimetres.warnings()
+    );
+}
+
+#[test]
+fn the_demonstration_dents_is_cut_and_opens() {
+    let scene = Scene::demonstration(&["body.organ.mesh.organ.cells=14".into()]).unwrap();
+    let mut sim = Simulation::new(&scene, Path::new("")).unwrap();
+    run(&mut sim, 0.9);
+    let rest = sim.probe_position(&sim.probes()[1]) - sim.probe_position(&sim.probes()[0]);
+    run(&mut sim, 2.0);
+    let finger = sim.tools().iter().next().unwrap();
+    let pressed = finger.force_n.z;
+    assert!(pressed > 0.3, "the finger feels {} N", finger.force_n);
+    run(&mut sim, 14.6);
+    let body = &sim.bodies()[0].body;
+    let lips = body.cut_mesh().surface().tags.iter().filter(|tag| **tag > 0).count();
+    assert!(lips > 50, "{lips} triangles on lips");
+    let open = sim.probe_position(&sim.probes()[1]) - sim.probe_position(&sim.probes()[0]);
+    assert!(open.norm() > rest.norm() + 5e-4, "lips were {} m apart and are {} m", rest.norm(), open.norm());
+    assert!(body.least_volume_ratio() > 0.0);
+    assert!(sim.report().events.iter().all(|event| event.name != "step-rolled-back"));
+}
