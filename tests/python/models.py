@@ -1,0 +1,120 @@
+"""Runs the real meshes through `scindo run`: the scene of each is written here: held at
+one end, pulled at the other, cut from above across its longest axis; results.py judges what comes out.
+
+    python tests/python/models.py SCINDO MODELS_DIR OUT_DIR [--steps N]
+"""
+
+import argparse
+import pathlib
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pyvista
+
+# File, kind of mesh, factor to metres (so that each is about 0.2 m long).
+MODELS = [
+    ("liver-smooth.obj", "surface", 0.03),
+    ("liver.msh", "file", 0.03),
+    ("liver.vtk", "surface", 0.001),
+    ("stanford-bunny.obj", "surface", 1.0),
+]
+
+
+def bounds(path, scale):
+    """Lowest and highest corner [m]."""
+    if path.suffix == ".msh":
+        # Gmsh 1: after $NOD the count, then lines `number x y z`.
+        lines = path.read_text().split("\n")
+        start = lines.index("$NOD") + 1
+        rows = lines[start + 1 : start + 1 + int(lines[start])]
+        points = np.array([row.split()[1:4] for row in rows], float)
+    else:
+        points = np.asarray(pyvista.read(path).points, float)
+    return points.min(axis=0) * scale, points.max(axis=0) * scale
+
+
+def scene(path, kind, scale):
+    low, high = bounds(path, scale)
+    size = high - low
+    across, along, up = np.argsort(size)[::-1]
+    margin = 0.2 * size[across]
+    middle = low[across] + 0.507 * size[across]
+    sweep = []
+    for part in np.linspace(0.0, 1.0, 9):
+        tip = np.zeros(3)
+        tip[across] = middle
+        tip[along] = low[along] - margin + part * (size[along] + 2 * margin)
+        # Not through: what is left below is a hinge.
+        tip[up] = low[up] + 0.4 * size[up]
+        heel = tip.copy()
+        heel[up] = high[up] + margin
+        sweep.append([tip.tolist(), heel.tolist()])
+    axis = "xyz"[across]
+    pull = np.zeros(3)
+    pull[across] = 0.6
+    cells = "cells = 32, " if kind == "surface" else ""
+    slabs = [(0.0, 0.12, "fix"), (0.88, 1.0, "load")]
+    held, pulled = (f'{{ slab = {{ axis = "{axis}", from = {a}, to = {b} }} }}' for a, b, _ in slabs)
+    return f"""schema = 1
+name = "{path.stem}"
+[world]
+step_s = 0.01
+[[body]]
+id = "body"
+mesh = {{ {kind} = "{path}", {cells}scale = {scale} }}
+law = "corotational"
+young_pa = 2e4
+poisson = 0.4
+density_kg_m3 = 1000.0
+rayleigh = {{ mass_1_s = 2.0, stiffness_s = 0.01 }}
+[[body.fix]]
+where = {held}
+axes = "xyz"
+# Pulls the free end away, so that the cut opens.
+[[body.load]]
+where = {pulled}
+force_n = {pull.tolist()}
+[[cut]]
+body = "body"
+at_s = 0.3
+method = "xfem"
+sweep_m = {sweep}
+[[probe]]
+id = "end"
+body = "body"
+point_m = {((low + high) / 2).tolist()}
+side = {(pull / 0.6).tolist()}
+"""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("scindo", type=pathlib.Path)
+    parser.add_argument("models", type=pathlib.Path)
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--steps", type=int, default=300)
+    parser.add_argument("--only", help="one of the models")
+    args = parser.parse_args()
+    results = pathlib.Path(__file__).with_name("results.py")
+    for name, kind, scale in MODELS:
+        if args.only and name != args.only:
+            continue
+        folder = args.out / name
+        folder.mkdir(parents=True, exist_ok=True)
+        file = folder / "scene.toml"
+        file.write_text(scene((args.models / name).resolve(), kind, scale))
+        start = time.monotonic()
+        run = [args.scindo, "run", file, "--fast", "--steps", str(args.steps), "--out", folder]
+        subprocess.run(run, check=True, timeout=600, stdout=subprocess.DEVNULL)
+        seconds = time.monotonic() - start
+        print(f"{name}: {args.steps} steps in {seconds:.0f} s", flush=True)
+        subprocess.run([sys.executable, results, folder, "--picture", folder / "cut.png"], check=True, timeout=300)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+        sys.exit(f"models.py: {error}")

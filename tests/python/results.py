@@ -1,0 +1,224 @@
+"""Reads the results of `scindo run … --out DIR` with independent readers, and draws them.
+
+Checks that summary.json, probes.csv and final.vtu are complete and finite, that meshio and pyvista
+read the same grid, that the surface is closed, and that a picture shows both lips of a cut.
+
+    python tests/python/results.py DIR [--picture FILE.png] [--no-lips]
+"""
+
+import argparse
+import csv
+import json
+import math
+import os
+import pathlib
+import sys
+
+import meshio
+import numpy as np
+
+os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+import pyvista  # noqa: E402  (reads the variable above)
+from PIL import Image  # noqa: E402
+
+PROBE_HEADER = ["step", "time_s", "id", "x_m", "y_m", "z_m", "ux_m", "uy_m", "uz_m"]
+SKIN_COLOUR, BACKGROUND = (198, 150, 135), (255, 255, 255)
+LIP_COLOURS = [(200, 30, 45), (30, 90, 200), (240, 160, 0), (20, 150, 70), (150, 40, 170), (0, 170, 180)]
+# A lip counts as visible with this many pixels of a 640 × 480 picture.
+VISIBLE_PIXELS = 20
+
+
+def check(condition, claim):
+    if not condition:
+        raise AssertionError(f"not so: {claim}")
+
+
+def numbers(value, path=""):
+    """All numbers of a JSON tree with their paths."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from numbers(inner, f"{path}.{key}")
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from numbers(inner, f"{path}[{index}]")
+    elif isinstance(value, (int, float)) and not isinstance(value, bool):
+        yield path, value
+
+
+def read_summary(folder):
+    summary = json.loads((folder / "summary.json").read_text())
+    check(summary.get("status") == "done", f"the run is done: {summary.get('status')}")
+    check(summary["steps"] > 0, "steps were made")
+    for path, value in numbers(summary):
+        check(math.isfinite(value), f"summary{path} = {value} is finite")
+    return summary
+
+
+def read_probes(folder, steps):
+    with open(folder / "probes.csv", newline="") as file:
+        rows = list(csv.reader(file))
+    check(rows[0] == PROBE_HEADER, f"header of probes.csv: {rows[0]}")
+    ids = {row[2] for row in rows[1:]}
+    check(len(rows) - 1 == len(ids) * (steps + 1), f"{len(rows) - 1} rows: one per step and probe, and the start")
+    for row in rows[1:]:
+        values = [float(v) for v in row[:2] + row[3:]]
+        check(all(map(math.isfinite, values)), f"probe row {row} is finite")
+    return ids
+
+
+def read_grid(folder):
+    """final.vtu by two readers that know nothing of each other."""
+    file = str(folder / "final.vtu")
+    grid, other = pyvista.read(file), meshio.read(file)
+    check(grid.n_points == len(other.points), "pyvista and meshio see the same points")
+    check(np.array_equal(grid.points, other.points), "pyvista and meshio see the same positions")
+    check(grid.n_cells == sum(len(block.data) for block in other.cells), "and the same number of cells")
+    check({"tetra", "triangle"} <= {block.type for block in other.cells}, "tetrahedra and surface triangles")
+    check(np.isfinite(grid.points).all(), "positions are finite")
+    check({"displacement_m", "velocity_m_s"} <= set(grid.point_data), f"point fields: {list(grid.point_data)}")
+    check({"cut_tag", "volume_fraction", "von_mises_pa"} <= set(grid.cell_data), f"cell fields: {list(grid.cell_data)}")
+    for name in [*grid.point_data, *grid.cell_data]:
+        values = grid.point_data[name] if name in grid.point_data else grid.cell_data[name]
+        check(np.isfinite(values).all(), f"field {name} is finite")
+    fraction = grid.cell_data["volume_fraction"][grid.celltypes == pyvista.CellType.TETRA]
+    check((fraction > 0).all() and (fraction <= 1 + 1e-9).all(), "fractions lie in (0, 1]")
+    return grid
+
+
+def surface_of(grid):
+    """Triangles n × 3 and their cut tags; closed."""
+    is_triangle = grid.celltypes == pyvista.CellType.TRIANGLE
+    triangles = grid.cells_dict[np.uint8(pyvista.CellType.TRIANGLE)]
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, uses = np.unique(edges, axis=0, return_counts=True)
+    check((uses == 2).all(), "two triangles at every edge: the surface is closed and 2-manifold")
+    return triangles, np.asarray(grid.cell_data["cut_tag"])[is_triangle]
+
+
+def lips_of(points, triangles, tags):
+    """Lip number per triangle (0: skin). A lip is a connected part of the faces of one cut; where
+    the two lips meet at the crack front the surface folds back, which separates them."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    by_edge = {}
+    for t in np.flatnonzero(tags > 0):
+        for i in range(3):
+            edge = tuple(sorted((triangles[t, i], triangles[t, (i + 1) % 3])))
+            by_edge.setdefault(edge, []).append(t)
+    neighbours = {}
+    for pair in by_edge.values():
+        if len(pair) == 2 and tags[pair[0]] == tags[pair[1]] and normals[pair[0]] @ normals[pair[1]] > -0.5:
+            for one, other in (pair, pair[::-1]):
+                neighbours.setdefault(one, []).append(other)
+    lip, count, sizes = np.zeros(len(triangles), int), 0, []
+    for start in np.flatnonzero(tags > 0):
+        if lip[start]:
+            continue
+        count += 1
+        stack, size = [start], 0
+        lip[start] = count
+        while stack:
+            t = stack.pop()
+            size += 1
+            for other in neighbours.get(t, []):
+                if not lip[other]:
+                    lip[other] = count
+                    stack.append(other)
+        sizes.append(size)
+    # Largest first, so that colours are stable.
+    order = np.argsort(sizes)[::-1]
+    rank = np.zeros(count + 1, int)
+    for new, old in enumerate(order):
+        rank[old + 1] = new + 1
+    return rank[lip], count
+
+
+def colours_of(lip):
+    palette = np.array([SKIN_COLOUR] + [LIP_COLOURS[i % len(LIP_COLOURS)] for i in range(lip.max(initial=0))])
+    return palette[lip].astype(np.uint8)
+
+
+class Camera:
+    """One window; unlit colours are exact."""
+
+    def __init__(self, mesh):
+        self.plotter = pyvista.Plotter(off_screen=True, window_size=(640, 480))
+        self.plotter.background_color = BACKGROUND
+        self.actor = self.plotter.add_mesh(mesh, scalars="colour", rgb=True, lighting=False)
+        self.plotter.show(auto_close=False)
+
+    def picture(self, view, focus, radius, lit=False):
+        up = (0, 1, 0) if abs(view[2]) > 0.9 else (0, 0, 1)
+        self.plotter.camera_position = [tuple(focus + 4 * radius * view), tuple(focus), up]
+        self.plotter.camera.view_angle = 32
+        self.plotter.reset_camera_clipping_range()
+        self.actor.prop.lighting = lit
+        self.plotter.render()
+        return self.plotter.screenshot(return_img=True)
+
+
+def pixels_per_lip(picture, lips):
+    return [int((picture[..., :3] == LIP_COLOURS[i]).all(axis=-1).sum()) for i in range(min(lips, len(LIP_COLOURS)))]
+
+
+def picture_of(points, triangles, lip, lips, file):
+    """Looks from all sides and keeps the view in which the second-best lip shows most."""
+    faces = np.hstack([np.full((len(triangles), 1), 3), triangles]).ravel()
+    mesh = pyvista.PolyData(points.astype(np.float32), faces)
+    mesh.cell_data["colour"] = colours_of(lip)
+    low, high = points.min(axis=0), points.max(axis=0)
+    focus, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
+    grid = [np.array(v, float) for v in np.ndindex(3, 3, 3) if v != (1, 1, 1)]
+    views = [(v - 1) / np.linalg.norm(v - 1) for v in grid]
+    close = [(focus, radius)]
+    if lips:
+        centre = points[triangles[lip > 0]].reshape(-1, 3)
+        middle = (centre.min(axis=0) + centre.max(axis=0)) / 2
+        close.append((middle, 0.6 * np.linalg.norm(centre.max(axis=0) - centre.min(axis=0))))
+    camera, best = Camera(mesh), (-1, None, None)
+    for where in close:
+        for view in views:
+            seen = sorted(pixels_per_lip(camera.picture(view, *where), lips), reverse=True)
+            score = seen[1] if len(seen) > 1 else 0
+            if score > best[0]:
+                best = (score, view, where)
+        if best[0] >= 10 * VISIBLE_PIXELS:
+            break
+    _, view, where = best
+    seen = pixels_per_lip(camera.picture(view, *where), lips)
+    picture = camera.picture(view, *where, lit=True)
+    check((picture != 255).any(axis=-1).mean() > 0.02, "the picture shows a body")
+    if file:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        Image.fromarray(picture).save(file)
+    return sum(n >= VISIBLE_PIXELS for n in seen), seen
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--picture", type=pathlib.Path, help="where to keep the picture (PNG)")
+    parser.add_argument("--no-lips", action="store_true", help="the scene cuts nothing")
+    args = parser.parse_args()
+    summary = read_summary(args.folder)
+    probes = read_probes(args.folder, summary["steps"])
+    grid = read_grid(args.folder)
+    triangles, tags = surface_of(grid)
+    lip, lips = lips_of(grid.points, triangles, tags)
+    visible, pixels = picture_of(grid.points, triangles, lip, lips, args.picture)
+    print(
+        f"{args.folder}: {summary['steps']} steps, {grid.n_points} points, {grid.n_cells} cells, "
+        f"{len(triangles)} triangles, probes {sorted(probes)}, {lips} lips, {visible} visible {pixels[:4]}"
+    )
+    if not args.no_lips:
+        check(lips >= 2, f"two or more lips: {lips}")
+        check(visible >= 2, f"two or more lips are visible: pixels {pixels}")
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except (AssertionError, KeyError, OSError, ValueError) as error:
+        print(f"results.py: {type(error).__name__}: {error}", file=sys.stderr)
+        sys.exit(1)
