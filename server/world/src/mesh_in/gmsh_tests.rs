@@ -110,3 +110,18 @@ fn errors_name_the_file_the_place_and_what_was_expected() {
         Err(MeshInError::NonFinite { node: 4, .. })
     ));
 }
+
+#[test]
+fn truncated_and_mutated_binaries_never_panic() {
+    for version in ["2.2", "4.1"] {
+        let whole = binary(version, false);
+        for at in 0..whole.len() {
+            let _ = read_mesh_bytes("a.msh", &whole[..at]);
+            for value in [0x00, 0x7f, 0x80, 0xff, b'9'] {
+                let mut bytes = whole.clone();
+                bytes[at] = value;
+                let _ = read_mesh_bytes("a.msh", &bytes);
+            }
+        }
+    }
+}

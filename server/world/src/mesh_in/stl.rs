@@ -33,14 +33,12 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
             reason: format!("the file has {} bytes", bytes.len()),
         });
     }
-    // A binary file may start with "solid" all the same: its header is blanked for the reader.
-    let mut owned = bytes.to_vec();
-    if binary_count.is_some() {
-        owned[..80].fill(0);
-    } else if !bytes.starts_with(b"solid ") && bytes.starts_with(b"solid") {
-        owned.splice(5..5, [b' ']);
-    }
-    let mut cursor = Cursor::new(owned);
+    let mut cursor = Cursor::new(match binary_count {
+        Some(_) => blank_header(bytes),
+        None => one_solid(bytes).ok_or_else(|| {
+            fault(0, "a text file that ends with endsolid, or a binary file", "another end".into())
+        })?,
+    });
     let triangles = stl_io::create_stl_reader(&mut cursor)
         .map_err(|e| fault(0, "a text or binary STL file", e.to_string()))?;
     let mut vertices = Vec::new();
@@ -55,10 +53,35 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     cells.finish(file, vertices, zero_based(n))
 }
 
+/// A binary file may start with "solid" all the same: its header is blanked, the reader goes by it.
+fn blank_header(bytes: &[u8]) -> Vec<u8> {
+    let mut owned = bytes.to_vec();
+    owned[..80].fill(0);
+    owned
+}
+
+/// The text of a file with any number of solids as that of a single one, in lower case; `None` when the
+/// last solid is not closed (the file was cut off).
+fn one_solid(bytes: &[u8]) -> Option<Vec<u8>> {
+    let text = String::from_utf8_lossy(bytes).to_ascii_lowercase();
+    let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    if !lines.last()?.starts_with("endsolid") {
+        return None;
+    }
+    let facets = lines.iter().filter(|line| !line.starts_with("solid") && !line.starts_with("endsolid"));
+    let mut joined = String::from("solid joined\n");
+    facets.for_each(|line| {
+        joined.push_str(line);
+        joined.push('\n');
+    });
+    joined.push_str("endsolid\n");
+    Some(joined.into_bytes())
+}
+
 /// The triangle count of a binary file; `None` for a text file.
 fn binary_count(bytes: &[u8]) -> Option<usize> {
     let count = u32::from_le_bytes(*bytes.get(80..84)?.first_chunk::<4>()?) as usize;
-    let text = bytes.trim_ascii_start().starts_with(b"solid");
+    let text = bytes.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     let fits_exactly = count.checked_mul(TRIANGLE)?.checked_add(HEADER)? == bytes.len();
     (!text || fits_exactly).then_some(count)
 }

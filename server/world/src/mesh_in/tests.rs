@@ -71,6 +71,9 @@ fn stl_text_and_binary_agree() {
     assert_eq!(text.vertices, binary.vertices);
     assert_eq!(text.triangles, [[0, 1, 2], [3, 4, 5]]);
     assert_eq!(text.triangles, binary.triangles);
+    let two = format!("{}\n{}", STL.to_uppercase(), STL.replace("solid wedge", "solid"));
+    assert_eq!(surface("a.stl", two.as_bytes()).triangles.len(), 4);
+    assert!(read_mesh_bytes("a.stl", STL.replace("endsolid wedge", "").as_bytes()).is_err());
     let mut short = binary_stl();
     short.truncate(170);
     let message = read_mesh_bytes("a.stl", &short).unwrap_err().to_string();

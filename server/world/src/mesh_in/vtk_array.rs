@@ -9,7 +9,7 @@ use flate2::read::ZlibDecoder;
 use super::scanner::{ByteOrder, binary_integer, binary_real};
 
 /// Largest decoded array [bytes]; a compressed block cannot announce more.
-const MAX_ARRAY_BYTES: u64 = 4 << 30;
+const MAX_ARRAY_BYTES: u64 = 2 << 30;
 
 /// How a file stores its binary arrays.
 pub struct Storage<'a> {

@@ -177,3 +177,18 @@ fn xml_damage_is_an_error() {
     let message = read_mesh_bytes("a.vtu", lz4.as_bytes()).unwrap_err().to_string();
     assert!(message.contains("vtkLZ4DataCompressor"), "{message}");
 }
+
+/// Every byte in turn takes values that break numbers, counts, tags and base64.
+#[test]
+fn mutated_xml_never_panics() {
+    for style in STYLES {
+        let whole = vtu(style);
+        for at in 0..whole.len() {
+            for value in [b'9', b'-', b'<', b'"', 0xff, 0x00] {
+                let mut bytes = whole.clone();
+                bytes[at] = value;
+                let _ = read_mesh_bytes("a.vtu", &bytes);
+            }
+        }
+    }
+}
