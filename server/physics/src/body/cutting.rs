@@ -14,7 +14,8 @@ impl Body {
         let epoch = self.cut_mesh.epoch();
         let pieces = self.cut_mesh.pieces().to_vec();
         let report = self.cut_mesh.sweep(&self.state.x, blade, incision)?;
-        if report.epoch != epoch {
+        // The surface may have changed alone, while a cut is still on its way through an element.
+        if report.epoch != epoch && self.cut_mesh.pieces() != pieces {
             self.inherit(&report);
             let rotations = self.inherited_rotations(&pieces);
             self.rebuild_elastic(&rotations);

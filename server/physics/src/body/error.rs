@@ -47,6 +47,16 @@ pub enum BodyError {
         /// Value found.
         found: [f64; 3],
     },
+    /// A static equilibrium was asked for, but a part of the body hangs on nothing.
+    #[error(
+        "part {part} ({mass_kg:.3e} kg) is fixed nowhere, so it has no static equilibrium; fix it or use dynamics"
+    )]
+    LoosePart {
+        /// Part number.
+        part: usize,
+        /// Its mass [kg].
+        mass_kg: f64,
+    },
     /// A load without anything to carry it.
     #[error(
         "the selected nodes hold no {carrier}, so {force_n:?} N cannot be shared over it; select more nodes"

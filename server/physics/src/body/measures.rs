@@ -52,15 +52,25 @@ impl Body {
 
     /// Internal force on every copy [N]; it pulls the body back, so it is subtracted from the loads.
     pub fn internal_forces(&self) -> Vec<Vector3<f64>> {
+        let mut f_int = Vec::new();
+        self.elastic_response(&mut f_int);
+        f_int
+    }
+
+    /// Elastic energy [J], and the internal force on every copy [N] into `f_int`.
+    pub(super) fn elastic_response(&self, f_int: &mut Vec<Vector3<f64>>) -> f64 {
         let (law, lame) = (self.material.law, self.material.lame());
-        let mut f = vec![Vector3::zeros(); self.state.x.len()];
+        f_int.clear();
+        f_int.resize(self.state.x.len(), Vector3::zeros());
+        let mut energy = 0.0;
         for d in self.deformed_pieces() {
+            energy += piece_energy(law, lame, &d.F, &d.R, d.volume);
             let P = law.stress(&d.F, &d.R, lame);
             for (&copy, force) in d.piece.copies.iter().zip(piece_forces(&P, &d.g, d.volume)) {
-                f[copy as usize] += force;
+                f_int[copy as usize] += force;
             }
         }
-        f
+        energy
     }
 
     /// Sum of the forces [N] that hold the prescribed directions of `nodes` against elasticity,

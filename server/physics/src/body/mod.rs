@@ -4,9 +4,11 @@ mod boundary;
 mod cutting;
 mod error;
 mod measures;
+mod statics;
 
 pub use boundary::FixedNode;
 pub use error::BodyError;
+pub use statics::{StaticReport, StaticSettings};
 
 use nalgebra::Vector3;
 

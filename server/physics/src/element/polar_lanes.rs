@@ -1,9 +1,9 @@
 //! Rotations of eight deformation gradients at once, for the ordinary case det F > 0.
 
-use super::{LANES, Lanes};
+use super::{LANES, Vector8};
 
 /// A 3×3 matrix in every lane, row by row.
-pub type Mat3 = [Lanes; 9];
+pub type Mat3<V> = [V; 9];
 
 /// Below det F / (‖F‖/√3)³ = 0.01 a lane is inverted, flat or needle-like, and Newton's inverse
 /// loses digits there: the caller takes the guarded rotation instead.
@@ -18,15 +18,15 @@ const SCALED_ITERATIONS: usize = 2;
 /// # Source
 /// Higham 1986, "Computing the polar decomposition, with applications".
 #[inline(always)]
-pub fn polar_newton<const FMA: bool>(F: &Mat3) -> (Mat3, [bool; LANES]) {
+pub fn polar_newton<V: Vector8>(F: &Mat3<V>) -> (Mat3<V>, [bool; LANES]) {
     let mut X = *F;
     let mut trusted = [true; LANES];
     for k in 0..ITERATIONS {
-        let C = cofactor::<FMA>(&X);
-        let det = X[0].mul_add::<FMA>(C[0], X[1].mul_add::<FMA>(C[1], X[2] * C[2]));
+        let C = cofactor(&X);
+        let det = X[0].mul_add(C[0], X[1].mul_add(C[1], X[2] * C[2]));
         if k == 0 {
-            let size = (norm_squared::<FMA>(&X) * Lanes::splat(1.0 / 3.0)).sqrt();
-            let cube = size * size * size;
+            let size = (norm_squared(&X) * V::splat(1.0 / 3.0)).sqrt();
+            let (det, cube) = (det.store(), (size * size * size).store());
             for lane in 0..LANES {
                 let (det, cube) = (det.0[lane], cube.0[lane]);
                 trusted[lane] = det > WELL_CONDITIONED * cube && det > 1e-30 && cube < 1e30;
@@ -34,33 +34,32 @@ pub fn polar_newton<const FMA: bool>(F: &Mat3) -> (Mat3, [bool; LANES]) {
         }
         // X⁻ᵀ = C / det
         let (keep, add) = if k < SCALED_ITERATIONS {
-            let zeta_squared =
-                (norm_squared::<FMA>(&C) * (norm_squared::<FMA>(&X) * det * det).recip()).sqrt();
+            let zeta_squared = (norm_squared(&C) * (norm_squared(&X) * det * det).recip()).sqrt();
             let zeta = zeta_squared.sqrt();
-            (Lanes::splat(0.5) * zeta, Lanes::splat(0.5) * (zeta * det).recip())
+            (V::splat(0.5) * zeta, V::splat(0.5) * (zeta * det).recip())
         } else {
-            (Lanes::splat(0.5), Lanes::splat(0.5) * det.recip())
+            (V::splat(0.5), V::splat(0.5) * det.recip())
         };
         for i in 0..9 {
-            X[i] = X[i].mul_add::<FMA>(keep, C[i] * add);
+            X[i] = X[i].mul_add(keep, C[i] * add);
         }
     }
     (X, trusted)
 }
 
 #[inline(always)]
-fn norm_squared<const FMA: bool>(X: &Mat3) -> Lanes {
+fn norm_squared<V: Vector8>(X: &Mat3<V>) -> V {
     let mut sum = X[0] * X[0];
     for x in &X[1..] {
-        sum = x.mul_add::<FMA>(*x, sum);
+        sum = x.mul_add(*x, sum);
     }
     sum
 }
 
 /// det(X) X⁻ᵀ: rows are cross products of the other two rows.
 #[inline(always)]
-fn cofactor<const FMA: bool>(X: &Mat3) -> Mat3 {
-    let minor = |a: usize, b: usize, c: usize, d: usize| X[a].mul_add::<FMA>(X[b], -(X[c] * X[d]));
+fn cofactor<V: Vector8>(X: &Mat3<V>) -> Mat3<V> {
+    let minor = |a: usize, b: usize, c: usize, d: usize| X[a].mul_add(X[b], -(X[c] * X[d]));
     [
         minor(4, 8, 5, 7),
         minor(5, 6, 3, 8),
@@ -77,7 +76,7 @@ fn cofactor<const FMA: bool>(X: &Mat3) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::polar_rotation;
+    use crate::element::{Lanes, polar_rotation};
     use nalgebra::{Matrix3, Rotation3, Vector3};
 
     #[test]
@@ -98,7 +97,7 @@ mod tests {
             for (i, lane) in lanes.iter_mut().enumerate() {
                 *lane = Lanes::splat(F[(i / 3, i % 3)] as f32);
             }
-            let (R, trusted) = polar_newton::<false>(&lanes);
+            let (R, trusted) = polar_newton(&lanes);
             let exact = polar_rotation(&F, &Matrix3::identity());
             if trusted[0] {
                 trusted_lanes += 1;
@@ -129,7 +128,7 @@ mod tests {
                 F[4 * i].0[lane] = d[i];
             }
         }
-        let (_, trusted) = polar_newton::<false>(&F);
+        let (_, trusted) = polar_newton(&F);
         assert_eq!(trusted, [true, false, false, false, false, false, false, true]);
     }
 }

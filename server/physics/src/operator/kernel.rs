@@ -10,7 +10,7 @@
 use nalgebra::Matrix3;
 
 use super::Padded;
-use crate::element::{LANES, Lanes, Mat3, Simd, polar_newton, polar_rotation};
+use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
 
 /// What [`apply`] streams per batch of eight pieces.
 #[derive(Clone, Copy, Debug)]
@@ -35,10 +35,10 @@ pub struct RestBatch {
     /// w V [m³]; 0 in unused lanes.
     pub volume: Lanes,
     /// Rotation R of the last update, also the warm start of the next.
-    pub rotation: Mat3,
+    pub rotation: Mat3<Lanes>,
 }
 
-/// Sum over the pieces around a copy of the lower triangle (xx, xy, xz, yy, yz, zz, 0, 0) of s K̂.
+/// Symmetric 3×3 block (xx, xy, xz, 0, yy, yz, zz, 0): the sum of s K̂ over the pieces around a copy.
 pub type Block6 = [f32; 8];
 
 /// Constants of one update.
@@ -71,7 +71,7 @@ pub fn apply(simd: Simd, batches: &[Batch], x: &[Padded], y: &mut [Padded]) {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
         Simd::Avx2 => unsafe { avx2::apply(batches, x, y) },
-        _ => apply_with::<Portable>(batches, x, y),
+        _ => apply_with::<Lanes>(batches, x, y),
     }
 }
 
@@ -91,47 +91,18 @@ pub fn update(
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
         Simd::Avx2 => unsafe { avx2::update(c, rest, live, locals) },
-        _ => update_with::<Portable>(c, rest, live, locals),
-    }
-}
-
-/// What differs between instruction sets.
-trait Isa {
-    const FMA: bool;
-    /// Eight registers (x, y, z, ·) to three lane vectors.
-    fn transpose(rows: [Padded; LANES]) -> [Lanes; 3];
-    /// Three lane vectors to eight registers (x, y, z, 0).
-    fn transpose_back(columns: [Lanes; 3]) -> [Padded; LANES];
-}
-
-struct Portable;
-
-impl Isa for Portable {
-    const FMA: bool = false;
-
-    #[inline(always)]
-    fn transpose(rows: [Padded; LANES]) -> [Lanes; 3] {
-        [0, 1, 2].map(|i| Lanes(rows.map(|row| row[i])))
-    }
-
-    #[inline(always)]
-    fn transpose_back([x, y, z]: [Lanes; 3]) -> [Padded; LANES] {
-        let mut rows = [[0.0; 4]; LANES];
-        for (lane, row) in rows.iter_mut().enumerate() {
-            *row = [x.0[lane], y.0[lane], z.0[lane], 0.0];
-        }
-        rows
+        _ => update_with::<Lanes>(c, rest, live, locals),
     }
 }
 
 #[inline(always)]
-fn gather<I: Isa>(x: &[Padded], ids: &[u16; LANES]) -> [Lanes; 3] {
-    I::transpose(ids.map(|id| x[id as usize]))
+fn gather<V: Vector8>(x: &[Padded], ids: &[u16; LANES]) -> [V; 3] {
+    V::transpose(std::array::from_fn(|lane| &x[ids[lane] as usize]))
 }
 
 #[inline(always)]
-fn scatter<I: Isa>(y: &mut [Padded], ids: &[u16; LANES], f: [Lanes; 3]) {
-    for (row, &id) in I::transpose_back(f).iter().zip(ids) {
+fn scatter<V: Vector8>(y: &mut [Padded], ids: &[u16; LANES], f: [V; 3]) {
+    for (row, &id) in V::transpose_back(f).iter().zip(ids) {
         let y = &mut y[id as usize];
         for i in 0..4 {
             y[i] += row[i];
@@ -140,53 +111,58 @@ fn scatter<I: Isa>(y: &mut [Padded], ids: &[u16; LANES], f: [Lanes; 3]) {
 }
 
 #[inline(always)]
-fn apply_with<I: Isa>(batches: &[Batch], x: &[Padded], y: &mut [Padded]) {
-    let half = Lanes::splat(0.5);
+fn load<V: Vector8, const N: usize>(lanes: &[Lanes; N]) -> [V; N] {
+    std::array::from_fn(|i| V::load(&lanes[i]))
+}
+
+#[inline(always)]
+fn apply_with<V: Vector8>(batches: &[Batch], x: &[Padded], y: &mut [Padded]) {
+    let half = V::splat(0.5);
     for b in batches {
-        let u0 = gather::<I>(x, &b.nodes[0]);
-        let mut H = [[Lanes::default(); 3]; 3];
+        let g: [[V; 3]; 3] = [load(&b.g[0]), load(&b.g[1]), load(&b.g[2])];
+        let u0 = gather::<V>(x, &b.nodes[0]);
+        let mut H = [[half; 3]; 3];
         for k in 0..3 {
-            let u = gather::<I>(x, &b.nodes[k + 1]);
+            let u = gather::<V>(x, &b.nodes[k + 1]);
             for i in 0..3 {
                 let d = u[i] - u0[i];
                 for j in 0..3 {
-                    H[i][j] = if k == 0 { d * b.g[0][j] } else { fma::<I>(d, b.g[k][j], H[i][j]) };
+                    H[i][j] = if k == 0 { d * g[0][j] } else { d.mul_add(g[k][j], H[i][j]) };
                 }
             }
         }
-        let pressure = b.lambda * (H[0][0] + H[1][1] + H[2][2]);
-        let mu = half * b.two_mu;
-        let sxx = fma::<I>(b.two_mu, H[0][0], pressure);
-        let syy = fma::<I>(b.two_mu, H[1][1], pressure);
-        let szz = fma::<I>(b.two_mu, H[2][2], pressure);
+        let two_mu = V::load(&b.two_mu);
+        let mu = half * two_mu;
+        let pressure = V::load(&b.lambda) * (H[0][0] + H[1][1] + H[2][2]);
+        let sxx = two_mu.mul_add(H[0][0], pressure);
+        let syy = two_mu.mul_add(H[1][1], pressure);
+        let szz = two_mu.mul_add(H[2][2], pressure);
         let sxy = mu * (H[0][1] + H[1][0]);
         let sxz = mu * (H[0][2] + H[2][0]);
         let syz = mu * (H[1][2] + H[2][1]);
         let sigma = [[sxx, sxy, sxz], [sxy, syy, syz], [sxz, syz, szz]];
-        let mut f0 = [Lanes::default(); 3];
-        for k in 0..3 {
-            let f = product::<I>(&sigma, &b.g[k]);
-            for i in 0..3 {
-                f0[i] = f0[i] - f[i];
-            }
-            scatter::<I>(y, &b.nodes[k + 1], f);
-        }
-        scatter::<I>(y, &b.nodes[0], f0);
+        let f = [product(&sigma, &g[0]), product(&sigma, &g[1]), product(&sigma, &g[2])];
+        scatter_forces(y, &b.nodes, f);
+    }
+}
+
+/// Adds f_1, f_2, f_3 and f_0 = −(f_1 + f_2 + f_3).
+#[inline(always)]
+fn scatter_forces<V: Vector8>(y: &mut [Padded], nodes: &[[u16; LANES]; 4], f: [[V; 3]; 3]) {
+    let f0 = std::array::from_fn(|i| -(f[0][i] + f[1][i] + f[2][i]));
+    scatter(y, &nodes[0], f0);
+    for (k, f) in f.into_iter().enumerate() {
+        scatter(y, &nodes[k + 1], f);
     }
 }
 
 #[inline(always)]
-fn fma<I: Isa>(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
-    if I::FMA { a.mul_add::<true>(b, c) } else { a.mul_add::<false>(b, c) }
+fn product<V: Vector8>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
+    std::array::from_fn(|i| A[i][0].mul_add(v[0], A[i][1].mul_add(v[1], A[i][2] * v[2])))
 }
 
 #[inline(always)]
-fn product<I: Isa>(A: &[[Lanes; 3]; 3], v: &[Lanes; 3]) -> [Lanes; 3] {
-    [0, 1, 2].map(|i| fma::<I>(A[i][0], v[0], fma::<I>(A[i][1], v[1], A[i][2] * v[2])))
-}
-
-#[inline(always)]
-fn update_with<I: Isa>(
+fn update_with<V: Vector8>(
     c: &Coefficients,
     rest: &mut [RestBatch],
     live: &mut [Batch],
@@ -194,45 +170,31 @@ fn update_with<I: Isa>(
 ) -> usize {
     let mut inverted = 0;
     for (rest, live) in rest.iter_mut().zip(live) {
-        let edges = [1, 2, 3].map(|a| edge::<I>(locals.x, &live.nodes[0], &live.nodes[a]));
-        let mut F = [Lanes::default(); 9];
-        for i in 0..3 {
-            for j in 0..3 {
-                F[3 * i + j] = fma::<I>(
-                    edges[0][i],
-                    rest.g[0][j],
-                    fma::<I>(edges[1][i], rest.g[1][j], edges[2][i] * rest.g[2][j]),
-                );
-            }
-        }
+        let g: [[V; 3]; 3] = [load(&rest.g[0]), load(&rest.g[1]), load(&rest.g[2])];
+        let e: [[V; 3]; 3] = std::array::from_fn(|k| edge(locals.x, &live.nodes[0], &live.nodes[k + 1]));
+        let F: Mat3<V> = std::array::from_fn(|ij| {
+            let (i, j) = (ij / 3, ij % 3);
+            e[0][i].mul_add(g[0][j], e[1][i].mul_add(g[1][j], e[2][i] * g[2][j]))
+        });
         if c.rotates {
-            inverted += rotate::<I>(&F, rest);
+            inverted += rotate(&F, rest);
         }
-        let R = [
-            [rest.rotation[0], rest.rotation[1], rest.rotation[2]],
-            [rest.rotation[3], rest.rotation[4], rest.rotation[5]],
-            [rest.rotation[6], rest.rotation[7], rest.rotation[8]],
-        ];
-        let sigma = material_stress::<I>(c, &R, &F, rest.volume);
-        let mut f0 = [Lanes::default(); 3];
-        for k in 0..3 {
-            let f = product::<I>(&R, &product::<I>(&sigma, &rest.g[k]));
-            for i in 0..3 {
-                f0[i] = f0[i] - f[i];
-            }
-            scatter::<I>(locals.f, &live.nodes[k + 1], f);
-            live.g[k] = product::<I>(&R, &rest.g[k]);
-        }
-        scatter::<I>(locals.f, &live.nodes[0], f0);
+        let r: Mat3<V> = load(&rest.rotation);
+        let R = [[r[0], r[1], r[2]], [r[3], r[4], r[5]], [r[6], r[7], r[8]]];
+        let volume = V::load(&rest.volume);
+        let sigma = material_stress(c, &R, &F, volume);
+        let f = std::array::from_fn(|k| product(&R, &product(&sigma, &g[k])));
+        scatter_forces(locals.f, &live.nodes, f);
 
-        let stiffness = rest.volume * Lanes::splat(c.scale);
-        live.two_mu = Lanes::splat(2.0 * c.mu) * stiffness;
-        live.lambda = Lanes::splat(c.lambda) * stiffness;
-        let g = &live.g;
-        let g0 = [0, 1, 2].map(|i| -(g[0][i] + g[1][i] + g[2][i]));
+        let stiffness = volume * V::splat(c.scale);
+        let (mu, lambda) = (V::splat(c.mu) * stiffness, V::splat(c.lambda) * stiffness);
+        (live.two_mu, live.lambda) = ((mu + mu).store(), lambda.store());
+        let g: [[V; 3]; 3] = std::array::from_fn(|k| product(&R, &g[k]));
+        let g0 = std::array::from_fn(|i| -(g[0][i] + g[1][i] + g[2][i]));
         for (a, g) in [g0, g[0], g[1], g[2]].iter().enumerate() {
-            scatter_block::<I>(locals.blocks, &live.nodes[a], g, live);
+            scatter_block(locals.blocks, &live.nodes[a], g, mu, lambda);
         }
+        live.g = g.map(|g| g.map(V::store));
     }
     inverted
 }
@@ -240,31 +202,28 @@ fn update_with<I: Isa>(
 /// x_a − x_0 in double precision, rounded: the rounding error is relative to the edge, not to the
 /// distance from the origin.
 #[inline(always)]
-fn edge<I: Isa>(x: &[[f64; 4]], from: &[u16; LANES], to: &[u16; LANES]) -> [Lanes; 3] {
-    let mut rows = [[0.0; 4]; LANES];
-    for lane in 0..LANES {
+fn edge<V: Vector8>(x: &[[f64; 4]], from: &[u16; LANES], to: &[u16; LANES]) -> [V; 3] {
+    let rows: [Padded; LANES] = std::array::from_fn(|lane| {
         let (p, q) = (&x[from[lane] as usize], &x[to[lane] as usize]);
-        for i in 0..4 {
-            rows[lane][i] = (q[i] - p[i]) as f32;
-        }
-    }
-    I::transpose(rows)
+        std::array::from_fn(|i| (q[i] - p[i]) as f32)
+    });
+    V::transpose(std::array::from_fn(|lane| &rows[lane]))
 }
 
 /// Updates the rotation of every used lane; returns how many have det F ≤ 0.
 #[inline(always)]
-fn rotate<I: Isa>(F: &Mat3, rest: &mut RestBatch) -> usize {
-    let (R, trusted) = if I::FMA { polar_newton::<true>(F) } else { polar_newton::<false>(F) };
+fn rotate<V: Vector8>(F: &Mat3<V>, rest: &mut RestBatch) -> usize {
+    let (R, trusted) = polar_newton(F);
     if trusted == [true; LANES] {
-        rest.rotation = R;
+        rest.rotation = R.map(V::store);
         return 0;
     }
-    rotate_guarded(F, &R, trusted, rest)
+    rotate_guarded(&F.map(V::store), &R.map(V::store), trusted, rest)
 }
 
 #[cold]
 #[inline(never)]
-fn rotate_guarded(F: &Mat3, R: &Mat3, trusted: [bool; LANES], rest: &mut RestBatch) -> usize {
+fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: [bool; LANES], rest: &mut RestBatch) -> usize {
     let mut inverted = 0;
     for (lane, trusted) in trusted.into_iter().enumerate() {
         if trusted {
@@ -286,67 +245,49 @@ fn rotate_guarded(F: &Mat3, R: &Mat3, trusted: [bool; LANES], rest: &mut RestBat
 
 /// w V (2μ ε + λ tr(ε) I) with ε = sym(RᵀF) − I, in the frame of the material.
 #[inline(always)]
-fn material_stress<I: Isa>(
-    c: &Coefficients,
-    R: &[[Lanes; 3]; 3],
-    F: &Mat3,
-    volume: Lanes,
-) -> [[Lanes; 3]; 3] {
-    let S = |i: usize, j: usize| fma::<I>(R[0][i], F[j], fma::<I>(R[1][i], F[3 + j], R[2][i] * F[6 + j]));
-    let one = Lanes::splat(1.0);
+fn material_stress<V: Vector8>(c: &Coefficients, R: &[[V; 3]; 3], F: &Mat3<V>, volume: V) -> [[V; 3]; 3] {
+    let S = |i: usize, j: usize| R[0][i].mul_add(F[j], R[1][i].mul_add(F[3 + j], R[2][i] * F[6 + j]));
+    let one = V::splat(1.0);
     let (exx, eyy, ezz) = (S(0, 0) - one, S(1, 1) - one, S(2, 2) - one);
     let (two_exy, two_exz, two_eyz) = (S(0, 1) + S(1, 0), S(0, 2) + S(2, 0), S(1, 2) + S(2, 1));
-    let mu = Lanes::splat(c.mu) * volume;
+    let mu = V::splat(c.mu) * volume;
     let two_mu = mu + mu;
-    let pressure = Lanes::splat(c.lambda) * volume * (exx + eyy + ezz);
+    let pressure = V::splat(c.lambda) * volume * (exx + eyy + ezz);
     let (sxy, sxz, syz) = (mu * two_exy, mu * two_exz, mu * two_eyz);
     [
-        [fma::<I>(two_mu, exx, pressure), sxy, sxz],
-        [sxy, fma::<I>(two_mu, eyy, pressure), syz],
-        [sxz, syz, fma::<I>(two_mu, ezz, pressure)],
+        [two_mu.mul_add(exx, pressure), sxy, sxz],
+        [sxy, two_mu.mul_add(eyy, pressure), syz],
+        [sxz, syz, two_mu.mul_add(ezz, pressure)],
     ]
 }
 
-/// Adds w V s [μ (|g|² I + g gᵀ) + λ g gᵀ], the diagonal block of one copy.
+/// Adds μ (|g|² I + g gᵀ) + λ g gᵀ, the diagonal block of one copy; μ and λ contain w V s.
 #[inline(always)]
-fn scatter_block<I: Isa>(blocks: &mut [Block6], ids: &[u16; LANES], g: &[Lanes; 3], b: &Batch) {
-    let mu = Lanes::splat(0.5) * b.two_mu;
-    let outer = mu + b.lambda;
-    let isotropic = mu * fma::<I>(g[0], g[0], fma::<I>(g[1], g[1], g[2] * g[2]));
+fn scatter_block<V: Vector8>(blocks: &mut [Block6], ids: &[u16; LANES], g: &[V; 3], mu: V, lambda: V) {
+    let outer = mu + lambda;
+    let isotropic = mu * g[0].mul_add(g[0], g[1].mul_add(g[1], g[2] * g[2]));
     let t = [outer * g[0], outer * g[1], outer * g[2]];
-    let entries = [
-        fma::<I>(t[0], g[0], isotropic),
-        t[0] * g[1],
-        t[0] * g[2],
-        fma::<I>(t[1], g[1], isotropic),
-        t[1] * g[2],
-        fma::<I>(t[2], g[2], isotropic),
-    ];
-    let low = I::transpose_back([entries[0], entries[1], entries[2]]);
-    let high = I::transpose_back([entries[3], entries[4], entries[5]]);
+    let low = V::transpose_back([t[0].mul_add(g[0], isotropic), t[0] * g[1], t[0] * g[2]]);
+    let high = V::transpose_back([t[1].mul_add(g[1], isotropic), t[1] * g[2], t[2].mul_add(g[2], isotropic)]);
     for lane in 0..LANES {
         let block = &mut blocks[ids[lane] as usize];
-        for i in 0..3 {
+        for i in 0..4 {
             block[i] += low[lane][i];
-            block[3 + i] += high[lane][i];
+            block[4 + i] += high[lane][i];
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    //! The same loops compiled for AVX2 and FMA, with transpositions in registers.
+    //! The same loops compiled for AVX2 and FMA.
 
-    use std::arch::x86_64::{
-        __m256, _mm_loadu_ps, _mm256_castps128_ps256, _mm256_insertf128_ps, _mm256_setzero_ps,
-        _mm256_shuffle_ps, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
-    };
-
-    use super::{Batch, Coefficients, Isa, LANES, Lanes, Locals, Padded, RestBatch};
+    use super::{Batch, Coefficients, Locals, Padded, RestBatch};
+    use crate::element::avx2::Register;
 
     #[target_feature(enable = "avx2,fma")]
     pub fn apply(batches: &[Batch], x: &[Padded], y: &mut [Padded]) {
-        super::apply_with::<Avx2>(batches, x, y);
+        super::apply_with::<Register>(batches, x, y);
     }
 
     #[target_feature(enable = "avx2,fma")]
@@ -356,64 +297,6 @@ mod avx2 {
         live: &mut [Batch],
         locals: &mut Locals<'_>,
     ) -> usize {
-        super::update_with::<Avx2>(c, rest, live, locals)
-    }
-
-    struct Avx2;
-
-    impl Isa for Avx2 {
-        const FMA: bool = true;
-
-        #[inline(always)]
-        fn transpose(rows: [Padded; LANES]) -> [Lanes; 3] {
-            // SAFETY: only reached from the two functions above, which enable AVX2.
-            unsafe {
-                let pair = |low: usize, high: usize| {
-                    let low = _mm256_castps128_ps256(_mm_loadu_ps(rows[low].as_ptr()));
-                    _mm256_insertf128_ps::<1>(low, _mm_loadu_ps(rows[high].as_ptr()))
-                };
-                let (r04, r15, r26, r37) = (pair(0, 4), pair(1, 5), pair(2, 6), pair(3, 7));
-                let (xy01, xy23) = (_mm256_unpacklo_ps(r04, r15), _mm256_unpacklo_ps(r26, r37));
-                let (zw01, zw23) = (_mm256_unpackhi_ps(r04, r15), _mm256_unpackhi_ps(r26, r37));
-                [
-                    lanes(_mm256_shuffle_ps::<0x44>(xy01, xy23)),
-                    lanes(_mm256_shuffle_ps::<0xEE>(xy01, xy23)),
-                    lanes(_mm256_shuffle_ps::<0x44>(zw01, zw23)),
-                ]
-            }
-        }
-
-        #[inline(always)]
-        fn transpose_back([x, y, z]: [Lanes; 3]) -> [Padded; LANES] {
-            // SAFETY: only reached from the two functions above, which enable AVX2.
-            unsafe {
-                let (x, y, z, w) = (register(x), register(y), register(z), _mm256_setzero_ps());
-                let (xy0145, xy2367) = (_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y));
-                let (zw0145, zw2367) = (_mm256_unpacklo_ps(z, w), _mm256_unpackhi_ps(z, w));
-                let [r0, r4] = halves(_mm256_shuffle_ps::<0x44>(xy0145, zw0145));
-                let [r1, r5] = halves(_mm256_shuffle_ps::<0xEE>(xy0145, zw0145));
-                let [r2, r6] = halves(_mm256_shuffle_ps::<0x44>(xy2367, zw2367));
-                let [r3, r7] = halves(_mm256_shuffle_ps::<0xEE>(xy2367, zw2367));
-                [r0, r1, r2, r3, r4, r5, r6, r7]
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn lanes(register: __m256) -> Lanes {
-        // SAFETY: both are 32 bytes of plain f32.
-        unsafe { std::mem::transmute::<__m256, Lanes>(register) }
-    }
-
-    #[inline(always)]
-    fn register(lanes: Lanes) -> __m256 {
-        // SAFETY: both are 32 bytes of plain f32.
-        unsafe { std::mem::transmute::<Lanes, __m256>(lanes) }
-    }
-
-    #[inline(always)]
-    fn halves(register: __m256) -> [Padded; 2] {
-        // SAFETY: both are 32 bytes of plain f32.
-        unsafe { std::mem::transmute::<__m256, [Padded; 2]>(register) }
+        super::update_with::<Register>(c, rest, live, locals)
     }
 }

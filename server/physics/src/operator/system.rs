@@ -63,7 +63,7 @@ impl SystemOperator<'_> {
     /// Adds mass and springs to the diagonal blocks of (h² + hβ) K̂, which gives those of A.
     pub fn complete_diagonal(&self, diagonal: &mut [Block6]) {
         for (block, &mass) in diagonal.iter_mut().zip(self.mass) {
-            for i in [0, 3, 5] {
+            for i in [0, 4, 6] {
                 block[i] += self.mass_factor * mass;
             }
         }

@@ -218,7 +218,7 @@ mod tests {
         let mut M = BlockJacobi::default();
         M.resize(n);
         let d = 2.0 + shift;
-        M.update(&mut team, &vec![[d.abs(), 0.0, 0.0, d.abs(), 0.0, d.abs(), 0.0, 0.0]; n], &[]);
+        M.update(&mut team, &vec![[d.abs(), 0.0, 0.0, 0.0, d.abs(), 0.0, d.abs(), 0.0]; n], &[]);
         let mut pcg = Pcg::default();
         pcg.resize(n);
         pcg.r.fill([1.0, -2.0, 0.5, 0.0]);

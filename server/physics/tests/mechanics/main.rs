@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 mod conservation;
+mod cutting;
 mod determinism;
+mod reference;
 mod robustness;
 mod springs;
 

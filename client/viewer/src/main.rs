@@ -1,0 +1,98 @@
+//! `scindo-view`: the browser viewer as a program of its own, on any machine that reaches a server.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use scindo_view::{ViewConfig, Viewer, page_is_built};
+
+/// Shows a running scindo session in a browser.
+#[derive(Debug, Parser)]
+#[command(name = "scindo-view", version)]
+struct Args {
+    /// Zenoh endpoint of the server, for example tcp/192.168.1.10:7447; may be given several times
+    #[arg(long, value_name = "ENDPOINT")]
+    connect: Vec<String>,
+    /// Address for browsers; port 0 takes a free one
+    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
+    listen: SocketAddr,
+    /// First part of every key; one per laboratory
+    #[arg(long, default_value = "scindo")]
+    realm: String,
+    /// Session within the realm
+    #[arg(long, default_value = "main")]
+    session: String,
+    /// Zenoh configuration to start from (TLS, users, routers)
+    #[arg(long, value_name = "FILE")]
+    zenoh: Option<PathBuf>,
+    /// Pages of another origin that may connect, for example http://lab:8080; may be given several times
+    #[arg(long, value_name = "ORIGIN")]
+    allow_origin: Vec<String>,
+    /// Most browsers at a time
+    #[arg(long, default_value_t = 32)]
+    max_browsers: usize,
+    /// Pages may watch, but not touch, cut or pause
+    #[arg(long)]
+    read_only: bool,
+    /// Serve the page from this folder, for work on the page itself
+    #[arg(long, value_name = "DIR", hide = true)]
+    page: Option<PathBuf>,
+    /// Print one JSON line with the address instead of words
+    #[arg(long)]
+    json: bool,
+}
+
+#[tokio::main]
+async fn main() -> ExitCode {
+    tracing_subscriber::fmt()
+        .with_env_filter(
+            tracing_subscriber::EnvFilter::try_from_default_env()
+                .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("scindo=info,scindo_view=info,warn")),
+        )
+        .with_writer(std::io::stderr)
+        .init();
+    let args = Args::parse();
+    match run(args).await {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("scindo-view: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+async fn run(args: Args) -> anyhow::Result<()> {
+    let json = args.json;
+    let config = config(args);
+    let upstream = config.link.connect.join(", ");
+    let viewer = Viewer::bind(config).await?;
+    let url = format!("http://{}", viewer.address());
+    if json {
+        println!("{}", serde_json::json!({ "url": url, "upstream": upstream, "page": page_is_built() }));
+    } else {
+        println!("{url}  (server: {upstream})");
+        if !page_is_built() {
+            println!("The page was not built; what is served there says what to install.");
+        }
+    }
+    tokio::select! {
+        ended = viewer.run() => Ok(ended?),
+        stopped = tokio::signal::ctrl_c() => Ok(stopped?),
+    }
+}
+
+fn config(args: Args) -> ViewConfig {
+    let mut config = ViewConfig::new(args.listen);
+    if !args.connect.is_empty() {
+        config.link.connect = args.connect;
+    }
+    config.link.realm = args.realm;
+    config.link.session = args.session;
+    config.link.zenoh_file = args.zenoh;
+    config.web.allow_origins = args.allow_origin;
+    config.web.max_browsers = args.max_browsers;
+    config.web.read_only = args.read_only;
+    config.web.page_folder = args.page;
+    config
+}

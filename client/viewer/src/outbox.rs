@@ -1,0 +1,196 @@
+//! What one browser has still to be sent: the newest of everything, never a backlog.
+//!
+//! Every state has one slot; a newer value replaces the older one that was not sent in time. Only
+//! events and answers queue, a bounded number of them. Frames wait while the browser has not
+//! acknowledged earlier ones, so that a slow link never fills with old pictures.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use bytes::Bytes;
+use tokio::sync::Notify;
+
+/// A piece of session state. The order is the order of sending: small things first, and a
+/// topology before the frame that needs it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Slot {
+    /// Whether a server is heard.
+    Link,
+    /// What is running.
+    Info,
+    /// Effects that are on and off.
+    Plan,
+    /// Rates and costs.
+    Stats,
+    /// State of one tool.
+    Tool(String),
+    /// Triangles of one body.
+    Topology(String),
+    /// Positions of one body.
+    Frame(String),
+}
+
+/// Frames on their way that the browser has not acknowledged. At 60 Hz this lets a round trip of
+/// 130 ms run at full rate.
+const MAX_FRAMES_IN_FLIGHT: u64 = 8;
+
+/// Events and answers that may wait; the oldest give way.
+const MAX_QUEUED: usize = 64;
+
+/// The queue of one browser.
+#[derive(Debug, Default)]
+pub struct Outbox {
+    queue: Mutex<Queue>,
+    wake: Notify,
+}
+
+#[derive(Debug, Default)]
+struct Queue {
+    slots: BTreeMap<Slot, Bytes>,
+    ordered: VecDeque<Bytes>,
+    frames_sent: u64,
+    frames_acked: u64,
+    frames_dropped: u64,
+    closed: bool,
+}
+
+impl Outbox {
+    /// Sets a state; an older value that still waited is gone.
+    pub fn put(&self, slot: Slot, message: Bytes) {
+        let mut queue = self.lock();
+        let is_frame = matches!(slot, Slot::Frame(_));
+        if queue.slots.insert(slot, message).is_some() && is_frame {
+            queue.frames_dropped += 1;
+        }
+        drop(queue);
+        self.wake.notify_one();
+    }
+
+    /// Adds a message that has to follow the ones before it.
+    pub fn push(&self, message: Bytes) {
+        let mut queue = self.lock();
+        if queue.ordered.len() == MAX_QUEUED {
+            queue.ordered.pop_front();
+        }
+        queue.ordered.push_back(message);
+        drop(queue);
+        self.wake.notify_one();
+    }
+
+    /// Forgets a state that no longer holds.
+    pub fn forget(&self, slot: &Slot) {
+        self.lock().slots.remove(slot);
+    }
+
+    /// The browser has taken this many frames since it connected.
+    pub fn acknowledge(&self, frames: u64) {
+        let mut queue = self.lock();
+        queue.frames_acked = frames.min(queue.frames_sent).max(queue.frames_acked);
+        drop(queue);
+        self.wake.notify_one();
+    }
+
+    /// Frames that were replaced before this browser could take them.
+    pub fn frames_dropped(&self) -> u64 {
+        self.lock().frames_dropped
+    }
+
+    /// Ends [`Outbox::next`] for good.
+    pub fn close(&self) {
+        self.lock().closed = true;
+        self.wake.notify_one();
+    }
+
+    /// Waits for the next message to send; `None` after [`Outbox::close`].
+    pub async fn next(&self) -> Option<Bytes> {
+        loop {
+            {
+                let mut queue = self.lock();
+                if queue.closed {
+                    return None;
+                }
+                if let Some(message) = queue.take() {
+                    return Some(message);
+                }
+            }
+            self.wake.notified().await;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        // Nothing inside a lock can panic halfway through a change, so a poisoned queue is whole.
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Queue {
+    fn take(&mut self) -> Option<Bytes> {
+        if let Some(message) = self.ordered.pop_front() {
+            return Some(message);
+        }
+        let (slot, _) = self.slots.first_key_value()?;
+        if matches!(slot, Slot::Frame(_)) {
+            // Frames come last in the order: when the first slot is a frame, only frames wait.
+            if self.frames_sent - self.frames_acked >= MAX_FRAMES_IN_FLIGHT {
+                return None;
+            }
+            self.frames_sent += 1;
+        }
+        self.slots.pop_first().map(|(_, message)| message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(n: u8) -> (Slot, Bytes) {
+        (Slot::Frame("liver".into()), Bytes::from(vec![n]))
+    }
+
+    fn taken(outbox: &Outbox) -> Option<u8> {
+        outbox.lock().take().map(|message| message[0])
+    }
+
+    #[test]
+    fn newest_frame_replaces_and_topology_goes_first() {
+        let outbox = Outbox::default();
+        for n in 0..5 {
+            let (slot, message) = frame(n);
+            outbox.put(slot, message);
+        }
+        outbox.put(Slot::Topology("liver".into()), Bytes::from_static(&[100]));
+        assert_eq!(taken(&outbox), Some(100));
+        assert_eq!(taken(&outbox), Some(4));
+        assert_eq!(taken(&outbox), None);
+        assert_eq!(outbox.frames_dropped(), 4);
+    }
+
+    #[test]
+    fn frames_wait_for_acknowledgement_and_small_messages_do_not() {
+        let outbox = Outbox::default();
+        for n in 0..20 {
+            let (slot, message) = frame(n);
+            outbox.put(slot, message);
+            let expected = if u64::from(n) < MAX_FRAMES_IN_FLIGHT { Some(n) } else { None };
+            assert_eq!(taken(&outbox), expected);
+        }
+        outbox.put(Slot::Stats, Bytes::from_static(&[200]));
+        assert_eq!(taken(&outbox), Some(200));
+        outbox.acknowledge(1);
+        assert_eq!(taken(&outbox), Some(19));
+        outbox.acknowledge(u64::MAX); // a page that claims too much gains no more than it was sent
+        let (slot, message) = frame(50);
+        outbox.put(slot, message);
+        assert_eq!(taken(&outbox), Some(50));
+    }
+
+    #[test]
+    fn ordered_messages_are_bounded() {
+        let outbox = Outbox::default();
+        for n in 0..=MAX_QUEUED {
+            outbox.push(Bytes::from(vec![n as u8]));
+        }
+        assert_eq!(taken(&outbox), Some(1));
+    }
+}

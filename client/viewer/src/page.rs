@@ -1,0 +1,57 @@
+//! The embedded page: what `build.rs` left in `OUT_DIR/page`.
+
+use std::path::Path;
+
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use rust_embed::RustEmbed;
+
+#[derive(RustEmbed)]
+#[folder = "$OUT_DIR/page"]
+struct Page;
+
+/// Only this page's own scripts, styles and WebSocket; it loads nothing from elsewhere.
+const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; \
+                      img-src 'self' data: blob:; frame-ancestors 'self'";
+
+/// Whether npm built the page; otherwise the one that is served says what to install.
+pub fn is_built() -> bool {
+    Page::get("viewer.js").is_some()
+}
+
+/// A file of the page: embedded, or from `folder` while somebody works on it.
+pub fn serve(name: &str, folder: Option<&Path>) -> Response {
+    let name = if name.is_empty() { "index.html" } else { name };
+    let Some(bytes) = read(name, folder) else {
+        return (StatusCode::NOT_FOUND, "no such file").into_response();
+    };
+    let headers = [
+        (header::CONTENT_TYPE, HeaderValue::from_static(media_type(name))),
+        (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
+        (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
+        (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
+    ];
+    (headers, bytes).into_response()
+}
+
+fn read(name: &str, folder: Option<&Path>) -> Option<Bytes> {
+    // The page is flat: a name with a separator or a leading dot is nobody's business.
+    if name.starts_with('.') || name.contains(['/', '\\']) {
+        return None;
+    }
+    match folder {
+        Some(folder) => std::fs::read(folder.join(name)).ok().map(Bytes::from),
+        None => Page::get(name).map(|file| Bytes::from(file.data.into_owned())),
+    }
+}
+
+fn media_type(name: &str) -> &'static str {
+    match name.rsplit('.').next() {
+        Some("html") => "text/html; charset=utf-8",
+        Some("js") => "text/javascript; charset=utf-8",
+        Some("css") => "text/css; charset=utf-8",
+        Some("svg") => "image/svg+xml",
+        _ => "text/plain; charset=utf-8",
+    }
+}

@@ -1,0 +1,123 @@
+//! The web server: `/` the page, `/ws` the stream, `/healthz` how it is.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{any, get};
+use axum::{Json, Router};
+use tokio::net::TcpListener;
+
+use crate::hub::Hub;
+use crate::{ViewError, origin, page, socket};
+
+/// How the web server behaves; part of [`crate::ViewConfig`].
+#[derive(Debug, Clone)]
+pub struct WebConfig {
+    /// Address to listen on; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Pages of other origins that may connect (`http://lab:8080`), beside this server's own.
+    pub allow_origins: Vec<String>,
+    /// Most browsers at a time.
+    pub max_browsers: usize,
+    /// Pages may watch, but not touch, cut or call.
+    pub read_only: bool,
+    /// Serve the page from this folder instead of the embedded one, for work on the page.
+    pub page_folder: Option<PathBuf>,
+}
+
+impl Default for WebConfig {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from(([127, 0, 0, 1], 8080)),
+            allow_origins: Vec::new(),
+            max_browsers: 32,
+            read_only: false,
+            page_folder: None,
+        }
+    }
+}
+
+/// A web server that has its port.
+#[derive(Debug)]
+pub struct WebServer {
+    listener: TcpListener,
+    address: SocketAddr,
+    app: Arc<App>,
+}
+
+#[derive(Debug)]
+struct App {
+    hub: Arc<Hub>,
+    config: WebConfig,
+    upstream: String,
+}
+
+impl WebServer {
+    /// Takes the port. `upstream` says in words where the server is looked for.
+    pub async fn bind(config: WebConfig, hub: Arc<Hub>, upstream: String) -> Result<Self, ViewError> {
+        let failed = |source| ViewError::Listen { address: config.listen, source };
+        let listener = TcpListener::bind(config.listen).await.map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        Ok(Self { listener, address, app: Arc::new(App { hub, config, upstream }) })
+    }
+
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Serves until the task is dropped.
+    pub async fn run(self) -> Result<(), ViewError> {
+        let address = self.address;
+        let router = Router::new()
+            .route("/", get(index))
+            .route("/ws", any(open_socket))
+            .route("/healthz", get(health))
+            .route("/{name}", get(file))
+            .with_state(self.app);
+        axum::serve(self.listener, router).await.map_err(|source| ViewError::Listen { address, source })
+    }
+}
+
+async fn index(State(app): State<Arc<App>>) -> Response {
+    page::serve("index.html", app.config.page_folder.as_deref())
+}
+
+async fn file(State(app): State<Arc<App>>, Path(name): Path<String>) -> Response {
+    page::serve(&name, app.config.page_folder.as_deref())
+}
+
+async fn health(State(app): State<Arc<App>>) -> Response {
+    Json(serde_json::json!({
+        "ok": true,
+        "version": env!("CARGO_PKG_VERSION"),
+        "connected": app.hub.connected(),
+        "upstream": app.upstream,
+        "browsers": app.hub.browsers(),
+        "page": if page::is_built() || app.config.page_folder.is_some() { "built" } else { "missing" },
+    }))
+    .into_response()
+}
+
+async fn open_socket(State(app): State<Arc<App>>, headers: HeaderMap, upgrade: WebSocketUpgrade) -> Response {
+    if !origin::is_allowed(&headers, &app.config.allow_origins, app.config.listen.ip().is_loopback()) {
+        let words = "this page comes from another origin; start the viewer with --allow-origin to admit it";
+        return (StatusCode::FORBIDDEN, words).into_response();
+    }
+    let Some(seat) = app.hub.join(app.config.max_browsers) else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "as many browsers as allowed are connected")
+            .into_response();
+    };
+    upgrade.max_message_size(socket::MAX_UP_BYTES).max_frame_size(socket::MAX_UP_BYTES).on_upgrade(
+        move |stream| {
+            let (hub, upstream, read_only) =
+                (Arc::clone(&app.hub), app.upstream.clone(), app.config.read_only);
+            socket::serve(stream, hub, seat, upstream, read_only)
+        },
+    )
+}

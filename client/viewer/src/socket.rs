@@ -1,0 +1,94 @@
+//! One browser: its WebSocket, from the hello to the good-bye.
+
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use axum::extract::ws::{Message, WebSocket};
+use bytes::Bytes;
+use futures_util::{SinkExt, StreamExt};
+use prost::Message as _;
+use scindo_proto::codec::WireMessage;
+use scindo_proto::messages::viewer_down::Message as Down;
+use scindo_proto::messages::viewer_up::Message as FromPage;
+use scindo_proto::messages::{ViewerHello, ViewerPing, ViewerPong, ViewerUp};
+
+use crate::hub::{Hub, Seat, Up, encode};
+
+/// Largest message a page may send [bytes]; a pose takes about 300.
+pub const MAX_UP_BYTES: usize = 64 * 1024;
+
+/// Messages in a row that may be malformed before the page is sent away.
+const MAX_MALFORMED: u32 = 16;
+
+/// Serves one browser until it leaves.
+pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: String, read_only: bool) {
+    let (mut sink, mut stream) = socket.split();
+    let hello = encode(&Down::Hello(ViewerHello {
+        viewer_version: env!("CARGO_PKG_VERSION").to_owned(),
+        client_id: hub.client_id().to_owned(),
+        tool_id: seat.tool_id.clone(),
+        upstream,
+        read_only,
+    }));
+    let outbox = Arc::clone(&seat.outbox);
+    let send = async {
+        if sink.send(Message::Binary(hello)).await.is_err() {
+            return;
+        }
+        while let Some(message) = outbox.next().await {
+            if sink.send(Message::Binary(message)).await.is_err() {
+                return;
+            }
+        }
+    };
+    let receive = async {
+        let mut malformed = 0;
+        while let Some(Ok(message)) = stream.next().await {
+            match message {
+                Message::Binary(bytes) => match take(bytes, &hub, &seat, read_only).await {
+                    Ok(()) => malformed = 0,
+                    Err(reason) => {
+                        malformed += 1;
+                        tracing::debug!(browser = seat.browser, reason, "message of a page refused");
+                        if malformed > MAX_MALFORMED {
+                            return;
+                        }
+                    }
+                },
+                Message::Close(_) => return,
+                Message::Text(_) | Message::Ping(_) | Message::Pong(_) => {}
+            }
+        }
+    };
+    tokio::select! { () = send => {}, () = receive => {} }
+}
+
+/// Applies one message of the page. Identity is the seat's; what the page claims is overwritten.
+async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, read_only: bool) -> Result<(), String> {
+    let up = ViewerUp::decode(bytes).map_err(|error| error.to_string())?;
+    let message = up.message.ok_or("empty message")?;
+    match message {
+        FromPage::Ping(ping) => seat.outbox.push(encode(&Down::Pong(pong(ping, hub, seat)))),
+        FromPage::FrameAck(ack) => seat.outbox.acknowledge(ack.frames),
+        _ if read_only => return Err("this viewer only watches".to_owned()),
+        FromPage::Tool(mut sample) => {
+            sample.client_id = hub.client_id().to_owned();
+            sample.tool_id.clone_from(&seat.tool_id);
+            sample.check().map_err(|error| error.to_string())?;
+            hub.send_up(Up::Tool(Box::new(sample))).await;
+        }
+        FromPage::Rpc(call) => hub.send_up(Up::Rpc { browser: seat.browser, call }).await,
+        FromPage::Release(_) => hub.send_up(Up::Release { tool_id: seat.tool_id.clone() }).await,
+    }
+    Ok(())
+}
+
+fn pong(ping: ViewerPing, hub: &Hub, seat: &Seat) -> ViewerPong {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    ViewerPong {
+        page_time_ms: ping.page_time_ms,
+        relay_unix_ns: u64::try_from(since.as_nanos()).unwrap_or(u64::MAX),
+        browsers: u32::try_from(hub.browsers()).unwrap_or(u32::MAX),
+        frames_dropped: seat.outbox.frames_dropped(),
+    }
+}

@@ -1,0 +1,271 @@
+//! The link to the server: what it says goes to the hub, what browsers want goes to it.
+//!
+//! Surfaces and tool states are subscribed only while a browser watches, so that a server whose
+//! viewers are all closed builds no surface.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use scindo_client::messages::tool_sample::Mode;
+use scindo_client::messages::viewer_down::Message as Down;
+use scindo_client::messages::viewer_rpc::Call;
+use scindo_client::messages::{Error, RpcReply, ToolSample, ToolState, ViewerRpc, ViewerToolGone};
+use scindo_client::{BodyMirror, Link, LinkConfig, LinkError, ToolLink, ToolStates};
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
+
+use crate::hub::{Hub, Up};
+
+/// Pause between two attempts to reach a server.
+const RETRY: Duration = Duration::from_millis(700);
+
+/// A tool that said nothing for this long has left.
+const TOOL_SILENCE: Duration = Duration::from_millis(1500);
+
+/// How long a server that is seen may take to say what it runs.
+const INFO_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Keeps a link for as long as the viewer lives.
+pub async fn run(hub: Arc<Hub>, mut up: mpsc::Receiver<Up>, config: LinkConfig) {
+    let place = config.connect.join(", ");
+    loop {
+        let waiting = format!("no server yet at {place}");
+        let link = tokio::select! {
+            link = Link::connect(config.clone()) => link,
+            () = refuse_calls(&hub, &mut up, &waiting) => return,
+        };
+        match link {
+            Ok(link) => match relay(&hub, &mut up, link, &place).await {
+                Ok(()) => return,
+                Err(error) => hub.set_link(false, &error.to_string()),
+            },
+            Err(error) => {
+                tracing::debug!(%error, "no link yet");
+                hub.set_link(false, &waiting);
+            }
+        }
+        tokio::select! {
+            () = sleep(RETRY) => {}
+            () = refuse_calls(&hub, &mut up, &waiting) => return,
+        }
+    }
+}
+
+/// Answers browsers while there is nobody to ask. Ends when the hub is gone.
+async fn refuse_calls(hub: &Hub, up: &mut mpsc::Receiver<Up>, words: &str) {
+    while let Some(message) = up.recv().await {
+        if let Up::Rpc { browser, call } = message {
+            hub.answer(browser, call.call_id, refused("no-server", words));
+        }
+    }
+}
+
+/// Relays over one link. `Ok` when the hub is gone.
+async fn relay(
+    hub: &Arc<Hub>,
+    up: &mut mpsc::Receiver<Up>,
+    link: Link,
+    place: &str,
+) -> Result<(), LinkError> {
+    let mut presence = link.presence();
+    let mut watched = hub.watched();
+    let mut stats = link.stats().await?;
+    let mut plan = link.plan().await?;
+    let mut events = link.events().await?;
+    let mut hands = Hands::new(link.clone());
+    let mut scene: Option<JoinSet<()>> = None;
+    let mut generation = 0;
+    refresh(hub, &link, place, &mut generation, &mut scene).await?;
+    loop {
+        tokio::select! {
+            changed = presence.changed() => {
+                changed.map_err(|_| LinkError::Closed)?;
+                refresh(hub, &link, place, &mut generation, &mut scene).await?;
+            }
+            changed = watched.changed() => {
+                if changed.is_err() { return Ok(()); }
+                refresh(hub, &link, place, &mut generation, &mut scene).await?;
+            }
+            message = stats.next() => hub.publish(Down::Stats((*message?).clone())),
+            message = plan.next() => hub.publish(Down::Plan((*message?).clone())),
+            message = events.next() => hub.publish(Down::Event(message?)),
+            message = up.recv() => match message {
+                None => return Ok(()),
+                Some(Up::Tool(sample)) => hands.move_tool(*sample).await,
+                Some(Up::Release { tool_id }) => hands.release(&tool_id),
+                Some(Up::Rpc { browser, call }) => {
+                    let (hub, link) = (Arc::clone(hub), link.clone());
+                    tokio::spawn(async move {
+                        let call_id = call.call_id;
+                        hub.answer(browser, call_id, ask(&link, call).await);
+                    });
+                }
+            },
+        }
+    }
+}
+
+/// Brings what we follow in line with who is there: a server, and a browser that watches.
+async fn refresh(
+    hub: &Arc<Hub>,
+    link: &Link,
+    place: &str,
+    generation: &mut u64,
+    scene: &mut Option<JoinSet<()>>,
+) -> Result<(), LinkError> {
+    let presence = *link.presence().borrow();
+    let watched = *hub.watched().borrow();
+    if presence.servers == 0 {
+        *scene = None;
+        hub.set_link(false, &format!("no server at {place}"));
+        return Ok(());
+    }
+    if !hub.connected() {
+        hub.set_link(true, place);
+    }
+    if !watched || *generation != presence.generation {
+        *scene = None;
+        hub.forget_scene();
+    }
+    *generation = presence.generation;
+    if watched && scene.is_none() {
+        *scene = Some(follow_scene(hub, link).await?);
+    }
+    Ok(())
+}
+
+/// Starts to follow every body and the tools of the server that is there now.
+async fn follow_scene(hub: &Arc<Hub>, link: &Link) -> Result<JoinSet<()>, LinkError> {
+    let asked = Instant::now();
+    let info = loop {
+        match link.info().await {
+            Ok(info) => break info,
+            // The server announces itself before its scene is ready.
+            Err(LinkError::NoServer { .. } | LinkError::Timeout { .. })
+                if asked.elapsed() < INFO_PATIENCE =>
+            {
+                sleep(Duration::from_millis(200)).await;
+            }
+            Err(error) => return Err(error),
+        }
+    };
+    let mut tasks = JoinSet::new();
+    for body in &info.bodies {
+        tasks.spawn(follow_body(Arc::clone(hub), link.mirror(&body.id).await?));
+    }
+    tasks.spawn(follow_tools(Arc::clone(hub), link.tool_states().await?));
+    hub.publish(Down::Info(info));
+    Ok(tasks)
+}
+
+/// Surfaces of one body: the topology when it changed, then the frame.
+async fn follow_body(hub: Arc<Hub>, mut mirror: BodyMirror) {
+    let mut shown = None;
+    while let Ok(surface) = mirror.next().await {
+        if !shown.as_ref().is_some_and(|topology| Arc::ptr_eq(topology, &surface.topology)) {
+            hub.publish(Down::Topology((*surface.topology).clone()));
+            shown = Some(Arc::clone(&surface.topology));
+        }
+        hub.publish(Down::Frame(surface.frame.clone()));
+    }
+}
+
+/// States of all tools, and word of those that fell silent.
+async fn follow_tools(hub: Arc<Hub>, mut states: ToolStates) {
+    let mut shown: BTreeMap<String, (Arc<ToolState>, Instant)> = BTreeMap::new();
+    let mut clock = interval(TOOL_SILENCE / 3);
+    clock.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        tokio::select! {
+            newest = states.next() => {
+                let Ok(newest) = newest else { return };
+                for (id, state) in newest.iter() {
+                    if shown.get(id).is_some_and(|(old, _)| Arc::ptr_eq(old, state)) {
+                        continue;
+                    }
+                    shown.insert(id.clone(), (Arc::clone(state), Instant::now()));
+                    hub.publish(Down::Tool((**state).clone()));
+                }
+            }
+            _ = clock.tick() => {
+                for (id, (_, at)) in &mut shown {
+                    if at.elapsed() > TOOL_SILENCE {
+                        hub.publish(Down::ToolGone(ViewerToolGone { tool_id: id.clone() }));
+                        // Said once; a new state shows the tool again.
+                        *at += Duration::from_secs(365 * 86_400);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The mouse tools of all browsers.
+struct Hands {
+    link: Link,
+    held: BTreeMap<String, Held>,
+}
+
+struct Held {
+    tool: ToolLink,
+    last: ToolSample,
+}
+
+impl Hands {
+    fn new(link: Link) -> Self {
+        Self { link, held: BTreeMap::new() }
+    }
+
+    async fn move_tool(&mut self, sample: ToolSample) {
+        let id = sample.tool_id.clone();
+        if !self.held.contains_key(&id) {
+            match timeout(RETRY, self.link.tool(&id)).await {
+                Ok(Ok(tool)) => {
+                    self.held.insert(id.clone(), Held { tool, last: sample.clone() });
+                }
+                Ok(Err(error)) => return tracing::warn!(%error, tool = id, "cannot take the tool"),
+                Err(_) => return tracing::warn!(tool = id, "the link is too slow to take the tool"),
+            }
+        }
+        if let Some(held) = self.held.get_mut(&id) {
+            held.last.clone_from(&sample);
+            if let Err(error) = held.tool.poses.send(sample) {
+                tracing::debug!(%error, tool = id, "pose not sent");
+            }
+        }
+    }
+
+    /// Lets go: a last sample that touches nothing, then silence, and the server forgets the tool.
+    fn release(&mut self, id: &str) {
+        let Some(mut held) = self.held.remove(id) else { return };
+        held.last.set_mode(Mode::Hover);
+        held.last.velocity_m_s = None;
+        if let Err(error) = held.tool.poses.send(held.last) {
+            tracing::debug!(%error, tool = id, "release not sent");
+        }
+    }
+}
+
+/// One call of a page.
+async fn ask(link: &Link, call: ViewerRpc) -> RpcReply {
+    let reply = match call.call {
+        Some(Call::Pause(request)) => link.pause(request.paused).await,
+        Some(Call::Step(request)) => link.step(request.count).await,
+        Some(Call::Reset(_)) => link.reset().await,
+        Some(Call::Set(request)) => link.set(&request.key, &request.value).await,
+        None => return refused("empty", "the page asked for nothing"),
+    };
+    reply.unwrap_or_else(|error| match error {
+        LinkError::Refused { code, message, hint } => {
+            RpcReply { ok: false, error: Some(Error { code, message, hint }), ..RpcReply::default() }
+        }
+        other => refused("not-answered", &other.to_string()),
+    })
+}
+
+fn refused(code: &str, message: &str) -> RpcReply {
+    let error = Error { code: code.to_owned(), message: message.to_owned(), hint: String::new() };
+    RpcReply { ok: false, error: Some(error), ..RpcReply::default() }
+}

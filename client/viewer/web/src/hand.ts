@@ -1,0 +1,319 @@
+// The mouse as a hand: hovers over the tissue, presses, holds and cuts it.
+//
+// A press fixes a plane through the touched point, parallel to the picture. Poke and grab move in
+// that plane, so that the tissue that gives way does not pull the tool after it. A blade follows
+// the skin under the cursor and stands along the line of sight, so the cut runs where one draws it.
+
+import { create } from "@bufbuild/protobuf";
+import { Group, Matrix4, Mesh, MeshBasicMaterial, Plane, Quaternion, Raycaster, TorusGeometry, Vector2, Vector3 } from "three";
+import { PoseSchema, Vec3Schema } from "../gen/scindo/v1/common_pb";
+import { ToolSample_Mode, ToolSampleSchema, ToolShapeSchema, type ToolShape } from "../gen/scindo/v1/tool_pb";
+import { parts } from "./tool";
+import { pick, type Hit } from "./pick";
+import type { Relay } from "./relay";
+import type { Stage } from "./stage";
+import type { Session } from "./main";
+
+export type HandMode = "orbit" | "poke" | "grab" | "cut";
+
+/** While moving, samples go out at this rate; at rest a tenth of it keeps the tool alive. */
+const SAMPLE_MS = 14;
+const REST_MS = 120;
+/** A press goes in over this time, as a hand does. */
+const PRESS_MS = 140;
+/** Probe radius and blade length as parts of the scene's radius. */
+const PROBE = 0.055;
+const BLADE = 0.9;
+const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.32, depthWrite: false });
+const RING = new MeshBasicMaterial({ color: 0xd7ecff, transparent: true, opacity: 0.9, depthTest: false, toneMapped: false });
+
+interface Press {
+  /** Where the tissue was touched, the picture plane through it, and the way in. */
+  anchor: Vector3;
+  plane: Plane;
+  inward: Vector3;
+  since: number;
+  /** Line-of-sight distance of the skin last seen under a blade. */
+  reach: number;
+}
+
+export class Hand {
+  mode: HandMode = "orbit";
+  /** Called when mode or depth change. */
+  onChange: () => void = () => {};
+  private readonly depth: Record<HandMode, number> = { orbit: 0, poke: 0.12, grab: 0, cut: 0.22 };
+  private readonly cursor = new Group();
+  private readonly ring = new Mesh(new TorusGeometry(1, 0.07, 8, 40), RING);
+  private readonly caster = new Raycaster();
+  private readonly pointer = new Vector2();
+  private inside = false;
+  private pointerId = -1;
+  private press: Press | null = null;
+  private held = false;
+  private readonly tip = new Vector3();
+  private readonly axis = new Vector3(0, 0, 1);
+  private readonly quaternion = new Quaternion();
+  private readonly lastTip = new Vector3();
+  private readonly velocity = new Vector3();
+  private lastSent = 0;
+  private seq = 0n;
+  private moved = false;
+  private live = false;
+  private shapeKey = "";
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly stage: Stage,
+    private readonly session: Session,
+    private readonly relay: Relay,
+  ) {
+    this.cursor.visible = false;
+    stage.scene.add(this.cursor);
+    const capture = { capture: true };
+    canvas.addEventListener("pointerdown", (e) => this.onDown(e), capture);
+    canvas.addEventListener("pointermove", (e) => this.onMove(e), capture);
+    canvas.addEventListener("pointerup", (e) => this.onUp(e), capture);
+    canvas.addEventListener("pointercancel", (e) => this.onUp(e), capture);
+    canvas.addEventListener("pointerleave", () => { if (!this.press) this.leave(); });
+    canvas.addEventListener("wheel", (e) => this.onWheel(e), { capture: true, passive: false });
+    canvas.addEventListener("contextmenu", (e) => e.preventDefault());
+  }
+
+  /** Chooses what the mouse does; another tool means putting the old one away. */
+  choose(mode: HandMode): void {
+    if (mode === this.mode) return;
+    this.drop();
+    this.mode = mode;
+    document.body.dataset["hand"] = mode;
+    this.onChange();
+    this.stage.invalidate();
+  }
+
+  /** Depth of the present tool below the skin [m]. */
+  get depthM(): number {
+    return this.depth[this.mode] * this.stage.radius;
+  }
+
+  /** Depth range as parts of the scene's radius: a grab may also pull towards the eye. */
+  get depthRange(): { value: number; min: number; max: number } {
+    return { value: this.depth[this.mode], min: this.mode === "grab" ? -0.6 : 0, max: this.mode === "cut" ? 0.7 : 0.6 };
+  }
+
+  setDepth(part: number): void {
+    const { min, max } = this.depthRange;
+    this.depth[this.mode] = Math.min(max, Math.max(min, part));
+    this.moved = true;
+    this.onChange();
+  }
+
+  /** Puts the tool away: the server forgets it. */
+  drop(): void {
+    this.press = null;
+    this.held = false;
+    this.stage.controls.enabled = true;
+    if (this.live) this.relay.send({ case: "release", value: {} });
+    this.live = false;
+    this.leave();
+  }
+
+  /** Once per picture slot: where is the tool now, and does the server know? */
+  advance(now: number): void {
+    if (this.mode === "orbit" || this.session.readOnly) return;
+    if (this.press) this.follow(now);
+    else if (this.inside && this.moved) this.hover();
+    const due = this.moved || this.press ? SAMPLE_MS : REST_MS;
+    if (this.held && now - this.lastSent >= due) this.sendSample(now);
+  }
+
+  /** Puts the cursor where the tool is held. */
+  place(): void {
+    this.cursor.visible = this.held;
+    if (!this.held) return;
+    const shape = this.shape();
+    const key = `${this.mode}${this.stage.radius}`;
+    if (key !== this.shapeKey) {
+      this.shapeKey = key;
+      this.cursor.clear();
+      this.cursor.add(...parts(shape, GHOST, false));
+      this.ring.scale.setScalar(0.05 * this.stage.radius);
+      if (this.mode === "cut") this.cursor.add(this.ring);
+    }
+    // The ring lies on the skin, the tip of the blade below it.
+    this.ring.position.set(0, 0, this.press ? this.depthM : 0);
+    this.cursor.position.copy(this.tip);
+    this.cursor.quaternion.copy(this.quaternion);
+  }
+
+  /** What lies under a point of the page. */
+  surfaceAt(x: number, y: number): Hit | null {
+    this.aim({ clientX: x, clientY: y });
+    return this.hit();
+  }
+
+  private onDown(e: PointerEvent): void {
+    this.canvas.focus({ preventScroll: true });
+    this.aim(e);
+    if (this.pointerId >= 0 && e.pointerId !== this.pointerId) {
+      this.endPress(); // a second finger turns the view
+      return;
+    }
+    if (this.mode === "orbit" || this.session.readOnly || e.button !== 0 || e.shiftKey) return;
+    const hit = this.hit();
+    if (!hit) return;
+    this.stage.controls.enabled = false;
+    this.pointerId = e.pointerId;
+    this.canvas.setPointerCapture(e.pointerId);
+    const sight = this.caster.ray.direction;
+    const inward = hit.normal.clone().negate().lerp(sight, this.mode === "poke" ? 0.35 : 1).normalize();
+    this.press = {
+      anchor: hit.point.clone(),
+      plane: new Plane().setFromNormalAndCoplanarPoint(this.stage.camera.getWorldDirection(new Vector3()), hit.point),
+      inward,
+      since: performance.now(),
+      reach: hit.distance,
+    };
+    this.held = true;
+    this.follow(performance.now());
+    this.sendSample(performance.now());
+  }
+
+  private onMove(e: PointerEvent): void {
+    if (this.pointerId >= 0 && e.pointerId !== this.pointerId) return;
+    if (!this.press && e.buttons !== 0) return; // the view is being turned
+    this.aim(e);
+    this.inside = true;
+    this.moved = true;
+  }
+
+  private onUp(e: PointerEvent): void {
+    if (e.pointerId !== this.pointerId) return;
+    this.endPress();
+    if (e.pointerType === "touch") this.drop();
+  }
+
+  private onWheel(e: WheelEvent): void {
+    if (this.mode === "orbit" || e.ctrlKey) return;
+    this.aim(e);
+    if (!this.press && !this.hit()) return;
+    e.preventDefault();
+    e.stopImmediatePropagation();
+    this.setDepth(this.depth[this.mode] - Math.sign(e.deltaY) * 0.02);
+  }
+
+  private endPress(): void {
+    if (this.pointerId >= 0 && this.canvas.hasPointerCapture(this.pointerId)) this.canvas.releasePointerCapture(this.pointerId);
+    this.pointerId = -1;
+    this.press = null;
+    this.stage.controls.enabled = true;
+    if (this.held) {
+      this.hover();
+      this.sendSample(performance.now());
+    }
+  }
+
+  private leave(): void {
+    this.inside = false;
+    if (this.held && this.live) this.relay.send({ case: "release", value: {} });
+    this.live = false;
+    this.held = false;
+    this.stage.invalidate();
+  }
+
+  private aim(e: { clientX: number; clientY: number }): void {
+    const box = this.canvas.getBoundingClientRect();
+    this.pointer.set(((e.clientX - box.left) / box.width) * 2 - 1, 1 - ((e.clientY - box.top) / box.height) * 2);
+  }
+
+  private hit(): Hit | null {
+    this.caster.setFromCamera(this.pointer, this.stage.camera);
+    return pick(this.caster.ray, this.session.bodies.values());
+  }
+
+  /** Free tool just above the skin under the cursor; nowhere when the cursor is beside the bodies. */
+  private hover(): void {
+    this.moved = false;
+    const hit = this.hit();
+    if (!hit) {
+      if (this.held) this.leave();
+      this.inside = true;
+      return;
+    }
+    const blade = this.mode === "cut";
+    const away = blade ? this.caster.ray.direction.clone().negate() : hit.normal;
+    const clearance = (blade ? 0.05 : PROBE * 1.5) * this.stage.radius;
+    this.moveTo(hit.point.addScaledVector(away, clearance), away);
+    this.held = true;
+    this.stage.invalidate();
+  }
+
+  /** Pressed tool: in the plane of the press, or along the skin for a blade. */
+  private follow(now: number): void {
+    const press = this.press!;
+    this.caster.setFromCamera(this.pointer, this.stage.camera);
+    const ray = this.caster.ray;
+    const part = Math.min(1, (now - press.since) / PRESS_MS);
+    const depth = this.depthM * part * (2 - part);
+    if (this.mode === "cut") {
+      const hit = this.hit();
+      // Lips lie deeper than the skin beside them: the blade keeps its reach over an open slit.
+      if (hit && hit.tag === 0) press.reach += 0.5 * (hit.distance - press.reach);
+      this.moveTo(ray.at(press.reach + depth, new Vector3()), ray.direction.clone().negate());
+    } else {
+      const point = ray.intersectPlane(press.plane, new Vector3()) ?? press.anchor.clone();
+      const back = this.mode === "poke" ? PROBE * this.stage.radius : 0;
+      point.addScaledVector(press.inward, depth - back);
+      this.moveTo(point, press.inward.clone().negate());
+    }
+    this.moved = false;
+    this.stage.invalidate();
+  }
+
+  private moveTo(tip: Vector3, axis: Vector3): void {
+    this.tip.copy(tip);
+    this.axis.copy(axis).normalize();
+    const side = this.stage.camera.up.clone().cross(this.axis);
+    if (side.lengthSq() < 1e-6) side.set(1, 0, 0).cross(this.axis);
+    side.normalize();
+    this.quaternion.setFromRotationMatrix(new Matrix4().makeBasis(side, this.axis.clone().cross(side), this.axis));
+  }
+
+  private shape(): ToolShape {
+    const r = this.stage.radius;
+    return create(ToolShapeSchema, {
+      kind: this.mode === "cut"
+        ? { case: "blade", value: { lengthM: BLADE * r, thicknessM: 0.004 * r } }
+        : { case: "sphere", value: { radiusM: PROBE * r } },
+    });
+  }
+
+  private sampleMode(): ToolSample_Mode {
+    if (!this.press) return ToolSample_Mode.HOVER;
+    if (this.mode === "grab") return ToolSample_Mode.GRAB;
+    return this.mode === "cut" ? ToolSample_Mode.CUT : ToolSample_Mode.TOUCH;
+  }
+
+  private sendSample(now: number): void {
+    const dt = (now - this.lastSent) / 1000;
+    if (dt > 0 && dt < 0.2) this.velocity.copy(this.tip).sub(this.lastTip).divideScalar(dt);
+    else this.velocity.setScalar(0);
+    this.lastTip.copy(this.tip);
+    this.lastSent = now;
+    this.seq += 1n;
+    const { tip, velocity, quaternion } = this;
+    const sent = this.relay.send({
+      case: "tool",
+      value: create(ToolSampleSchema, {
+        seq: this.seq,
+        clientTimeNs: BigInt(Math.round(now * 1e3)) * 1000n,
+        pose: create(PoseSchema, {
+          positionM: create(Vec3Schema, { x: tip.x, y: tip.y, z: tip.z }),
+          qx: quaternion.x, qy: quaternion.y, qz: quaternion.z, qw: quaternion.w,
+        }),
+        velocityMS: create(Vec3Schema, { x: velocity.x, y: velocity.y, z: velocity.z }),
+        mode: this.sampleMode(),
+        shape: this.shape(),
+      }),
+    });
+    this.live ||= sent;
+  }
+}

@@ -1,0 +1,92 @@
+// window.scindo: what a headless test (or a curious console) may ask and do.
+
+import { Vector3 } from "three";
+import { boundsOf, type Stage } from "./stage";
+import type { Hand, HandMode } from "./hand";
+import type { Panel } from "./panel";
+import type { Relay } from "./relay";
+import type { Session } from "./main";
+
+type Triple = [number, number, number];
+
+export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: Hand, panel: Panel): void {
+  const bodies = () => [...session.bodies.values()];
+  const hooks = {
+    /** Counters since the page opened. */
+    counts: () => ({
+      messages: relay.messages,
+      bytes: relay.bytes,
+      frames: panel.surfaceRate.total,
+      pictures: stage.pictures,
+      unmatched: bodies().reduce((sum, body) => sum + body.unmatched, 0),
+    }),
+    rates: () => ({ surfaceHz: panel.surfaceRate.value, fps: panel.pictureRate.value, latencyMs: panel.latency.value }),
+    bodies: () => bodies().map((body) => ({
+      id: body.id,
+      epoch: body.epoch,
+      vertices: body.vertexCount,
+      triangles: body.triangleCount,
+      lipTriangles: body.lipTriangles,
+      simTimeS: body.simTimeS,
+      simStep: Number(body.simStep),
+      min: body.bounds.min.toArray() as Triple,
+      max: body.bounds.max.toArray() as Triple,
+    })),
+    /** A copy of a body's surface positions [m], x y z interleaved. */
+    positions: (id: string) => Array.from(session.bodies.get(id)?.positions ?? []),
+    /** Area of all lips of a body [m²]. */
+    lipArea: (id: string) => lipArea(session, id),
+    bounds: () => {
+      const box = boundsOf(bodies());
+      return { min: box.min.toArray() as Triple, max: box.max.toArray() as Triple };
+    },
+    tools: () => [...session.tools.values()].map((tool) => ({
+      id: tool.id,
+      own: tool.id === session.toolId,
+      mode: tool.state?.mode ?? 0,
+      owner: tool.state?.owner ?? "",
+      forceN: tool.force.toArray() as Triple,
+      position: [tool.object.children[0].position.x, tool.object.children[0].position.y, tool.object.children[0].position.z] as Triple,
+    })),
+    /** Force on this page's own tool [N]. */
+    contactForceN: () => session.tools.get(session.toolId)?.force.length() ?? 0,
+    /** What lies under a point of the page, or null. */
+    surfaceAt: (x: number, y: number) => {
+      const hit = hand.surfaceAt(x, y);
+      return hit && { body: hit.body.id, point: hit.point.toArray() as Triple, normal: hit.normal.toArray() as Triple, tag: hit.tag };
+    },
+    renderer: () => (stage.software ? "software" : "hardware"),
+    stats: () => panel.stats,
+    connected: () => relay.isOpen,
+    paused: () => session.paused,
+    /** A world point in page pixels. */
+    project: (point: Triple) => stage.project(new Vector3(...point)),
+    camera: (position: Triple, target: Triple) => {
+      stage.camera.position.set(...position);
+      stage.controls.target.set(...target);
+      stage.controls.update();
+      stage.invalidate();
+    },
+    cameraState: () => ({
+      position: stage.camera.position.toArray() as Triple,
+      target: stage.controls.target.toArray() as Triple,
+      radius: stage.radius,
+    }),
+    hand: (mode: HandMode) => hand.choose(mode),
+    depth: (part: number) => hand.setDepth(part),
+  };
+  Object.assign(window, { scindo: hooks });
+}
+
+function lipArea(session: Session, id: string): number {
+  const body = session.bodies.get(id);
+  if (!body?.render) return 0;
+  const { index, source, skinTriangles } = body.render;
+  const at = (c: number) => new Vector3().fromArray(body.positions, 3 * source[index[c]]);
+  let area = 0;
+  for (let c = 3 * skinTriangles; c < index.length; c += 3) {
+    const a = at(c);
+    area += 0.5 * at(c + 1).sub(a).cross(at(c + 2).sub(a)).length();
+  }
+  return area;
+}

@@ -1,0 +1,165 @@
+// A rigid tool as the server sees it: solid where the tissue lets it be, a ghost where the hand holds it.
+
+import {
+  BufferGeometry, CapsuleGeometry, ConeGeometry, CylinderGeometry, Float32BufferAttribute, Group, Mesh, MeshBasicMaterial,
+  MeshStandardMaterial, Quaternion, SphereGeometry, Vector3, type Material,
+} from "three";
+import type { Stage } from "./stage";
+import { ToolSample_Mode, type ToolShape, type ToolState } from "../gen/scindo/v1/tool_pb";
+import type { Pose } from "../gen/scindo/v1/common_pb";
+
+/** Below this no arrow and no label [N]. */
+const QUIET_N = 0.005;
+const UP = new Vector3(0, 0, 1);
+
+const STEEL = new MeshStandardMaterial({ color: 0xb9c2cc, roughness: 0.34, metalness: 0.35 });
+const HAND = new MeshStandardMaterial({ color: 0x5a9ae6, roughness: 0.4, metalness: 0.1 });
+const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.24, depthWrite: false });
+const ARROW = new MeshBasicMaterial({ color: 0xffd35c, toneMapped: false });
+
+export class ToolVisual {
+  readonly object = new Group();
+  state: ToolState | null = null;
+  readonly force = new Vector3();
+  private readonly solid = new Group();
+  private readonly ghost = new Group();
+  private readonly arrow = arrow();
+  private readonly label = document.createElement("div");
+  private shapeKey = "";
+
+  constructor(readonly id: string, private readonly own: boolean) {
+    this.object.add(this.solid, this.ghost, this.arrow);
+    document.getElementById("labels")!.append(this.label);
+  }
+
+  update(state: ToolState): void {
+    this.state = state;
+    const f = state.forceN;
+    this.force.set(f?.x ?? 0, f?.y ?? 0, f?.z ?? 0);
+    const key = JSON.stringify(state.shape?.kind ?? null);
+    if (key === this.shapeKey || !state.shape) return;
+    this.shapeKey = key;
+    this.solid.clear();
+    this.ghost.clear();
+    // A blade of one's own points at the eye: its handle would hide the cut.
+    const shaft = !(this.own && state.shape.kind.case === "blade");
+    this.solid.add(...parts(state.shape, this.own ? HAND : STEEL, shaft));
+    this.ghost.add(...parts(state.shape, GHOST, false));
+  }
+
+  /** Puts solid, ghost, arrow and label where the newest state says. */
+  place(stage: Stage): void {
+    const state = this.state;
+    if (!state?.pose) return;
+    setPose(this.solid, state.proxyPose ?? state.pose);
+    setPose(this.ghost, state.pose);
+    const apart = this.solid.position.distanceTo(this.ghost.position);
+    this.ghost.visible = apart > 0.004 * stage.radius;
+    const newtons = this.force.length();
+    this.arrow.visible = newtons > QUIET_N;
+    this.label.hidden = newtons <= QUIET_N;
+    if (!this.arrow.visible) return;
+    // Length grows with the force and never leaves the picture: half of the reach at 2 N.
+    const length = (0.9 * stage.radius * newtons) / (newtons + 2) + 0.08 * stage.radius;
+    this.arrow.position.copy(this.solid.position);
+    this.arrow.quaternion.setFromUnitVectors(UP, this.force.clone().divideScalar(newtons));
+    this.arrow.scale.set(stage.radius, stage.radius, length);
+    const head = this.force.clone().multiplyScalar(length / newtons).add(this.solid.position);
+    const at = stage.project(head);
+    this.label.hidden = !at.visible;
+    this.label.style.transform = `translate(${(at.x + 10).toFixed(0)}px, ${(at.y - 12).toFixed(0)}px)`;
+    const text = `${newtons.toFixed(newtons < 1 ? 2 : 1)} N`;
+    if (this.label.textContent !== text) this.label.textContent = text;
+  }
+
+  dispose(): void {
+    this.object.removeFromParent();
+    this.label.remove();
+  }
+}
+
+export function modeName(mode: ToolSample_Mode): string {
+  return ["", "hover", "touch", "grab", "cut"][mode] ?? "";
+}
+
+/** Meshes of a shape in tool axes: tip at the origin, shaft along +z. */
+export function parts(shape: ToolShape, material: Material, shaft: boolean): Mesh[] {
+  const kind = shape.kind;
+  switch (kind.case) {
+    case "sphere": {
+      const r = kind.value.radiusM;
+      const ball = new Mesh(new SphereGeometry(r, 32, 20), material);
+      return shaft ? solid([ball, rod(0.32 * r, r * 0.8, 11 * r, material)]) : [ball];
+    }
+    case "capsule": {
+      const { radiusM: r, lengthM: l } = kind.value;
+      const body = new Mesh(new CapsuleGeometry(r, l, 8, 24), material);
+      body.rotation.x = Math.PI / 2;
+      body.position.z = l / 2;
+      return shaft ? solid([body]) : [body];
+    }
+    case "blade": {
+      const l = kind.value.lengthM;
+      const edge = new Mesh(bladeGeometry(l), material);
+      return shaft ? solid([edge, rod(0.055 * l, l * 1.02, 2.6 * l, material)]) : [edge];
+    }
+    default: return [];
+  }
+}
+
+function solid(meshes: Mesh[]): Mesh[] {
+  for (const mesh of meshes) mesh.castShadow = true;
+  return meshes;
+}
+
+function rod(radius: number, from: number, to: number, material: Material): Mesh {
+  const mesh = new Mesh(new CylinderGeometry(radius, radius, to - from, 20), material);
+  mesh.rotation.x = Math.PI / 2;
+  mesh.position.z = (from + to) / 2;
+  return mesh;
+}
+
+/** A thin double wedge along +z: the belly narrows to the tip; symmetric, as the edge may lead either way. */
+function bladeGeometry(length: number): BufferGeometry {
+  const w = 0.085 * length, t = 0.012 * length;
+  const rings = [[0, 0.02], [0.12, 0.55], [0.3, 0.9], [0.55, 1], [1, 0.8], [1.03, 0.5]];
+  const position: number[] = [], index: number[] = [];
+  for (const [z, s] of rings) position.push(w * s, 0, z * length, 0, t * s, z * length, -w * s, 0, z * length, 0, -t * s, z * length);
+  for (let r = 0; r + 1 < rings.length; r++) {
+    for (let k = 0; k < 4; k++) {
+      const a = 4 * r + k, b = 4 * r + ((k + 1) % 4);
+      index.push(a, b, b + 4, a, b + 4, a + 4);
+    }
+  }
+  const last = 4 * (rings.length - 1);
+  index.push(0, 2, 1, 0, 3, 2, last, last + 1, last + 2, last, last + 2, last + 3);
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new Float32BufferAttribute(position, 3));
+  geometry.setIndex(index);
+  const flat = geometry.toNonIndexed();
+  flat.computeVertexNormals();
+  return flat;
+}
+
+/** Unit arrow along +z; z is scaled to the length, x and y to the scene. */
+function arrow(): Group {
+  const shaft = new Mesh(new CylinderGeometry(0.009, 0.009, 0.8, 12), ARROW);
+  shaft.rotation.x = Math.PI / 2;
+  shaft.position.z = 0.4;
+  const head = new Mesh(new ConeGeometry(0.028, 0.22, 16), ARROW);
+  head.rotation.x = Math.PI / 2;
+  head.position.z = 0.89;
+  const group = new Group();
+  group.add(shaft, head);
+  group.visible = false;
+  return group;
+}
+
+const q = new Quaternion();
+
+function setPose(object: Group, pose: Pose): void {
+  const p = pose.positionM;
+  object.position.set(p?.x ?? 0, p?.y ?? 0, p?.z ?? 0);
+  q.set(pose.qx, pose.qy, pose.qz, pose.qw);
+  if (q.lengthSq() > 0.5) object.quaternion.copy(q.normalize());
+}

@@ -1,0 +1,170 @@
+//! Static equilibrium: f_int(x) = f_ext, solved by Newton's method with a line search.
+//!
+//! The residual is double precision, the directions come from the single-precision solver: each
+//! Newton step refines what the last one left. The tangent is K̂ (rotations held), which is
+//! positive semidefinite everywhere; it costs a few more steps than the exact one and never turns
+//! a descent direction uphill.
+
+use nalgebra::Vector3;
+
+use super::{Body, BodyError};
+use crate::operator::{BlockJacobi, ElasticUpdate, FixedCopy, SystemOperator, padded};
+use crate::solver::{Pcg, PcgSettings};
+
+/// When a static solve stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StaticSettings {
+    /// Stop at ‖f_ext − f_int‖ ≤ tolerance · ‖f_ext‖ (or the first residual, if larger).
+    pub tolerance: f64,
+    /// Most Newton steps.
+    pub newton_steps: u32,
+    /// When each linear solve stops.
+    pub linear: PcgSettings,
+}
+
+/// How a static solve went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StaticReport {
+    /// Whether the tolerance was reached; if not, the body is at the best state found.
+    pub converged: bool,
+    /// Newton steps made.
+    pub newton_steps: u32,
+    /// Solver iterations of all steps.
+    pub iterations: u32,
+    /// Final residual relative to the loads.
+    pub residual: f64,
+}
+
+impl Default for StaticSettings {
+    fn default() -> Self {
+        Self { tolerance: 1e-8, newton_steps: 200, linear: PcgSettings { iterations: 2000, tolerance: 1e-2 } }
+    }
+}
+
+/// Shortest step of the line search.
+const SHORTEST: f64 = 1.0 / 1024.0;
+
+impl Body {
+    /// Moves the body to its static equilibrium under gravity [m/s²], loads and constraints, at rest.
+    pub fn solve_static(
+        &mut self,
+        gravity: Vector3<f64>,
+        settings: &StaticSettings,
+    ) -> Result<StaticReport, BodyError> {
+        if let Some(part) = self.parts().free.iter().position(|&free| free) {
+            return Err(BodyError::LoosePart { part, mass_kg: self.parts().mass[part] });
+        }
+        let n = self.state.x.len();
+        self.state.v.fill(Vector3::zeros());
+        for fixed in &self.fixed {
+            for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
+                self.state.x[fixed.copy as usize][axis] = fixed.position_m[axis];
+            }
+        }
+        let mut f_ext: Vec<_> = (0..n).map(|c| self.mass[c] * gravity + self.load[c]).collect();
+        filter(&self.fixed, &mut f_ext);
+        let mut newton = Newton { f_ext, f_int: Vec::new(), residual: vec![Vector3::zeros(); n] };
+        let mut report = StaticReport::default();
+        let mut potential = newton.evaluate(self);
+        let reference = norm(&newton.f_ext).max(norm(&newton.residual));
+        let mut pcg = Pcg::default();
+        pcg.resize(n);
+        loop {
+            report.residual = if reference > 0.0 { norm(&newton.residual) / reference } else { 0.0 };
+            report.converged = report.residual <= settings.tolerance;
+            if report.converged || report.newton_steps == settings.newton_steps {
+                return Ok(report);
+            }
+            let (direction, iterations) = self.static_direction(&newton.residual, &mut pcg, settings.linear);
+            report.iterations += iterations;
+            report.newton_steps += 1;
+            match newton.search(self, &direction, potential) {
+                Some(lower) => potential = lower,
+                None => return Ok(report),
+            }
+        }
+    }
+
+    /// δ with K̂ δ ≈ residual at the present state, and the iterations it took.
+    fn static_direction(
+        &mut self,
+        residual: &[Vector3<f64>],
+        pcg: &mut Pcg,
+        linear: PcgSettings,
+    ) -> (Vec<Vector3<f64>>, u32) {
+        let n = residual.len();
+        let with = ElasticUpdate { lame: self.material.lame(), law: self.material.law, scale: 1.0 };
+        let (mut f, mut diagonal, mut delta) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n], vec![[0.0; 4]; n]);
+        let Self { elastic, team, state, fixed, mass_f32, .. } = self;
+        elastic.update(team, &with, &state.x, &mut f, &mut diagonal);
+        let mut M = BlockJacobi::default();
+        M.resize(n);
+        M.update(team, &diagonal, fixed);
+        // Scaled to 1, so that single precision does not mind how small the residual has become.
+        let size = norm(residual).max(f64::MIN_POSITIVE);
+        for (r, residual) in pcg.r.iter_mut().zip(residual) {
+            *r = padded(&(residual / size));
+        }
+        let r = pcg.r.clone();
+        let reference = pcg.norm(team, &M, &r);
+        let mut K = SystemOperator { elastic, mass: mass_f32, mass_factor: 0.0, springs: &[], fixed };
+        let report = pcg.solve(team, &mut K, &M, &mut delta, (reference, linear));
+        let direction = delta.iter().map(|d| size * Vector3::new(d[0], d[1], d[2]).map(f64::from)).collect();
+        (direction, report.iterations)
+    }
+}
+
+/// Loads and residual of a static solve, one entry per copy.
+struct Newton {
+    f_ext: Vec<Vector3<f64>>,
+    f_int: Vec<Vector3<f64>>,
+    residual: Vec<Vector3<f64>>,
+}
+
+impl Newton {
+    /// Residual f_ext − f_int in the free directions; returns the potential Ψ − f_ext·x [J].
+    fn evaluate(&mut self, body: &Body) -> f64 {
+        let mut potential = body.elastic_response(&mut self.f_int);
+        for (c, residual) in self.residual.iter_mut().enumerate() {
+            *residual = self.f_ext[c] - self.f_int[c];
+            potential -= self.f_ext[c].dot(&body.state.x[c]);
+        }
+        filter(&body.fixed, &mut self.residual);
+        potential
+    }
+
+    /// Moves along `direction` as far as the potential falls or, where it no longer can be told
+    /// apart, the residual; returns the new potential, or `None` with the body where it was.
+    fn search(&mut self, body: &mut Body, direction: &[Vector3<f64>], potential: f64) -> Option<f64> {
+        let start = body.state.x.clone();
+        let before = norm(&self.residual);
+        let slope: f64 = self.residual.iter().zip(direction).map(|(r, d)| r.dot(d)).sum();
+        let mut t = 1.0;
+        while t >= SHORTEST {
+            for ((x, start), d) in body.state.x.iter_mut().zip(&start).zip(direction) {
+                *x = start + t * d;
+            }
+            let next = self.evaluate(body);
+            let falls = next <= potential - 1e-4 * t * slope;
+            if falls || norm(&self.residual) < 0.5 * before {
+                return Some(next);
+            }
+            t *= 0.5;
+        }
+        body.state.x = start;
+        self.evaluate(body);
+        None
+    }
+}
+
+fn norm(v: &[Vector3<f64>]) -> f64 {
+    v.iter().map(Vector3::norm_squared).sum::<f64>().sqrt()
+}
+
+fn filter(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
+    for copy in fixed {
+        for axis in (0..3).filter(|&axis| copy.axes[axis]) {
+            v[copy.copy as usize][axis] = 0.0;
+        }
+    }
+}

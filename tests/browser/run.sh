@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# Starts the built-in demonstration on free ports and drives its page; see viewer.mjs.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+bin=${SCINDO_TEST_BIN:-target/release}/scindo
+artifacts=${SCINDO_TEST_ARTIFACTS:-$PWD/tests/artifacts}
+mkdir -p "$artifacts"
+free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
+web=$(free_port)
+zenoh=$(free_port)
+"$bin" demo --listen "tcp/127.0.0.1:$zenoh" --viewer "127.0.0.1:$web" >"$artifacts/browser-server.log" 2>&1 &
+server=$!
+trap 'kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true' EXIT
+for _ in $(seq 1 300); do
+  curl -fs "http://127.0.0.1:$web/healthz" >/dev/null 2>&1 && break
+  kill -0 "$server" 2>/dev/null || { echo "the server ended:" >&2; tail -20 "$artifacts/browser-server.log" >&2; exit 1; }
+  sleep 0.2
+done
+curl -fs "http://127.0.0.1:$web/healthz"; echo
+node tests/browser/viewer.mjs "http://127.0.0.1:$web"

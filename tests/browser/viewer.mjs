@@ -1,0 +1,229 @@
+// Drives the viewer page of a running demonstration in headless Chromium and holds what it must show.
+//
+//   node viewer.mjs URL
+//
+//   SCINDO_TEST_NODE_MODULES   folder with playwright-core (default: node_modules beside this file)
+//   SCINDO_TEST_ARTIFACTS      where screenshots go (default: ../artifacts)
+//   CHROMIUM                   browser (default: /usr/bin/chromium)
+//
+// Ends with 0 if everything held; prints one line per check and a JSON summary.
+import { createRequire } from "node:module";
+import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import os from "node:os";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = path.dirname(fileURLToPath(import.meta.url));
+const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
+const { chromium } = createRequire(path.join(modules, "anchor.js"))("playwright-core");
+
+const url = process.argv[2] ?? "http://127.0.0.1:8080";
+const artifacts = process.env.SCINDO_TEST_ARTIFACTS ?? path.join(here, "../artifacts");
+mkdirSync(artifacts, { recursive: true });
+const profile = mkdtempSync(path.join(os.tmpdir(), "scindo-browser-"));
+
+// SwiftShader on a busy two-core machine draws 6 to 20 pictures per second and takes seconds to start.
+const FLAGS = [
+  "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+  "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
+];
+const MINUTE = 60_000;
+
+const summary = { url };
+let failures = 0;
+const context = await chromium.launchPersistentContext(profile, {
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: FLAGS,
+  viewport: { width: 1280, height: 720 },
+});
+try {
+  const page = await openPage();
+  await bodyIsVisible(page);
+  await bodyDeforms(page);
+  await messagesFlow(page);
+  await incisionOpens(page);
+  await mouseTouches(page);
+  await lateJoinerSeesTheSame(page);
+} catch (error) {
+  failures += 1;
+  console.error(`FAILED  ${error.stack ?? error}`);
+} finally {
+  await context.close();
+  rmSync(profile, { recursive: true, force: true });
+}
+console.log(JSON.stringify(summary));
+process.exit(failures === 0 ? 0 : 1);
+
+/** Opens the page and waits for the first surface. */
+async function openPage() {
+  const page = await context.newPage();
+  page.on("pageerror", (error) => { failures += 1; console.error(`FAILED  script error: ${error.message}`); });
+  await page.goto(url);
+  await until(page, "a surface arrives and is drawn", MINUTE, () => {
+    const hooks = window.scindo;
+    return hooks && hooks.bodies().length > 0 && hooks.counts().pictures > 2 && hooks.bodies().every((b) => b.vertices > 0);
+  });
+  summary.renderer = await page.evaluate(() => window.scindo.renderer());
+  return page;
+}
+
+/** Pixels of tissue: reddish, away from the grey of ground and panel. */
+async function bodyIsVisible(page) {
+  const { tissue } = await colours(page, "view-1-open.png");
+  summary.tissuePixels = tissue;
+  hold(tissue > 15_000, `the body is visible (${tissue} tissue pixels)`);
+}
+
+/** Some vertex moves by more than 0.2 mm relative to the first frame seen. */
+async function bodyDeforms(page) {
+  const id = await page.evaluate(() => window.scindo.bodies()[0].id);
+  await page.evaluate((id) => { window.scindoTest = { epoch: window.scindo.bodies()[0].epoch, x: window.scindo.positions(id) }; }, id);
+  const moved = await until(page, "the body deforms", MINUTE, (id) => {
+    const start = window.scindoTest, x = window.scindo.positions(id);
+    if (x.length !== start.x.length) {
+      window.scindoTest = { x };
+      return false;
+    }
+    let most = 0;
+    for (let i = 0; i < x.length; i++) most = Math.max(most, Math.abs(x[i] - start.x[i]));
+    return most > 2e-4 && most;
+  }, id);
+  summary.movedM = moved;
+}
+
+async function messagesFlow(page) {
+  const sample = () => page.evaluate(() => ({ at: performance.now(), ...window.scindo.counts() }));
+  let best = { messages: 0, pictures: 0, frames: 0 };
+  for (let attempt = 0; attempt < 4 && (best.messages < 25 || best.pictures < 3); attempt++) {
+    const a = await sample();
+    await page.waitForTimeout(5000);
+    const b = await sample();
+    const rate = (key) => (1000 * (b[key] - a[key])) / (b.at - a.at);
+    const now = { messages: rate("messages"), pictures: rate("pictures"), frames: rate("frames") };
+    if (now.messages > best.messages) best = now;
+  }
+  Object.assign(summary, { messagesPerS: best.messages, framesPerS: best.frames, picturesPerS: best.pictures });
+  hold(best.messages >= 25, `at least 25 messages arrive per second (${best.messages.toFixed(1)})`);
+  hold(best.pictures >= 3, `at least 3 pictures are drawn per second (${best.pictures.toFixed(1)})`);
+}
+
+/** Lips appear, their number or epoch grows, and they gape: wound pixels are seen. */
+async function incisionOpens(page) {
+  const lips = () => page.evaluate(() => {
+    const body = window.scindo.bodies()[0];
+    return { epoch: body.epoch, lipTriangles: body.lipTriangles, areaM2: window.scindo.lipArea(body.id) };
+  });
+  await until(page, "an incision begins", 4 * MINUTE, () => window.scindo.bodies()[0].lipTriangles > 0);
+  const first = await lips();
+  await page.screenshot({ path: path.join(artifacts, "view-2-cut.png") });
+  await until(page, "the incision grows", 2 * MINUTE, (first) => {
+    const body = window.scindo.bodies()[0];
+    return body.lipTriangles > first.lipTriangles || body.epoch > first.epoch;
+  }, first);
+  let wound = 0;
+  for (let attempt = 0; attempt < 20 && wound < 300; attempt++) {
+    await page.waitForTimeout(1500);
+    ({ wound } = await colours(page, "view-3-open.png"));
+  }
+  Object.assign(summary, { lips: await lips(), woundPixels: wound });
+  hold(wound >= 300, `the incision opens to the eye (${wound} wound pixels)`);
+}
+
+/** Pressing with the mouse gives a contact force; letting go ends it. */
+async function mouseTouches(page) {
+  await page.keyboard.press("1");
+  const force = await pressSomewhere(page);
+  summary.mouseForceN = force;
+  hold(force > 0.005, `the mouse tool feels the tissue (${force.toFixed(3)} N)`);
+  await page.screenshot({ path: path.join(artifacts, "view-4-mouse.png") });
+  await page.mouse.up();
+  await until(page, "the force ends when the mouse lets go", MINUTE, () => window.scindo.contactForceN() < 0.005);
+  await page.keyboard.press("o");
+}
+
+/** Presses at skin seen in the picture, here and there, until a force comes back; leaves the button down. */
+async function pressSomewhere(page) {
+  for (const [u, v] of [[0.38, 0.45], [0.3, 0.5], [0.45, 0.55], [0.38, 0.6], [0.5, 0.4], [0.25, 0.45]]) {
+    const at = { x: 1280 * u, y: 720 * v };
+    const hit = await page.evaluate(({ x, y }) => window.scindo.surfaceAt(x, y), at);
+    if (!hit || hit.tag !== 0) continue;
+    await page.mouse.move(at.x, at.y);
+    await page.waitForTimeout(400);
+    await page.mouse.down();
+    for (let i = 0; i < 40; i++) {
+      await page.mouse.move(at.x + 8 * Math.sin(i / 3), at.y + 8 * Math.cos(i / 3));
+      await page.waitForTimeout(150);
+      const force = await page.evaluate(() => window.scindo.contactForceN());
+      if (force > 0.005) return force;
+    }
+    await page.mouse.up();
+  }
+  return 0;
+}
+
+/** Paused, a page that opens now shows epoch, counts and positions of the one that was there before. */
+async function lateJoinerSeesTheSame(page) {
+  await page.click("#pause");
+  await until(page, "the simulation pauses", MINUTE, () => window.scindo.paused());
+  await page.waitForTimeout(1500);
+  const seen = () => {
+    const bodies = window.scindo.bodies().map(({ id, epoch, vertices, triangles, lipTriangles }) => ({ id, epoch, vertices, triangles, lipTriangles }));
+    return { bodies, x: window.scindo.positions(bodies[0].id) };
+  };
+  const before = await page.evaluate(seen);
+  await page.reload();
+  await until(page, "the page that opened late gets the surface", MINUTE, () => window.scindo?.bodies().some((b) => b.vertices > 0));
+  await page.waitForTimeout(1500);
+  const after = await page.evaluate(seen);
+  hold(JSON.stringify(before.bodies) === JSON.stringify(after.bodies), `a late page shows the same surface (${JSON.stringify(after.bodies)})`);
+  const same = before.x.length === after.x.length && before.x.every((x, i) => x === after.x[i]);
+  hold(same, "positions agree to the last bit");
+  summary.lateJoin = after.bodies;
+  await page.screenshot({ path: path.join(artifacts, "view-5-late.png") });
+  await page.click("#pause");
+  await until(page, "the simulation goes on", MINUTE, () => !window.scindo.paused());
+}
+
+/** Counts tissue and wound pixels left of the panel in a screenshot, which is kept. */
+async function colours(page, name) {
+  const png = await page.screenshot({ path: path.join(artifacts, name) });
+  const blank = await context.newPage();
+  const counts = await blank.evaluate(async (base64) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${base64}`;
+    await image.decode();
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const draw = canvas.getContext("2d");
+    draw.drawImage(image, 0, 0);
+    const { data, width, height } = draw.getImageData(0, 0, image.width, image.height);
+    let tissue = 0, wound = 0;
+    for (let y = 50; y < height - 90; y++) {
+      for (let x = 0; x < width - 310; x++) {
+        const i = 4 * (y * width + x);
+        const r = data[i], g = data[i + 1], b = data[i + 2];
+        if (r > 60 && r > 1.25 * g) tissue += 1;
+        // Wound red has hardly any green, and more blue than green; skin has more green than blue.
+        if (r > 70 && r > 3.2 * g && b > 1.05 * g) wound += 1;
+      }
+    }
+    return { tissue, wound };
+  }, png.toString("base64"));
+  await blank.close();
+  return counts;
+}
+
+function hold(condition, words) {
+  if (!condition) failures += 1;
+  console.log(`${condition ? "ok     " : "FAILED "} ${words}`);
+}
+
+/** Polls until `check` gives something; its value. Fails the test when the time is over. */
+async function until(page, words, timeout, check, argument) {
+  try {
+    const handle = await page.waitForFunction(check, argument, { timeout, polling: 200 });
+    console.log(`ok      ${words}`);
+    return await handle.jsonValue();
+  } catch (error) {
+    await page.screenshot({ path: path.join(artifacts, "view-failed.png") }).catch(() => {});
+    throw new Error(`${words}: not within ${timeout / 1000} s (${error.message.split("\n")[0]})`);
+  }
+}
