@@ -18,6 +18,7 @@
 //! * [`mirror`]: a body's surface, kept whole across cuts and lost messages.
 //! * [`watch`]: tool states, statistics, events, the plan.
 //! * [`tool`]: poses up, contacts down, cuts acknowledged.
+//! * [`guest`]: tools held for others, such as browsers behind a viewer.
 //! * [`rpc`]: questions and orders with an answer.
 //!
 //! Nothing here blocks zenoh's receiving thread: newest state overwrites older state, and queues
@@ -35,10 +36,13 @@ pub mod watch;
 
 pub mod tool;
 
+pub mod guest;
+
 pub mod rpc;
 
 pub use config::LinkConfig;
 pub use error::LinkError;
+pub use guest::GuestTool;
 pub use link::{Link, Presence};
 pub use mirror::{BodyMirror, Surface};
 pub use scindo_proto::{Role, messages};

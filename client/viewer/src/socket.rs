@@ -72,7 +72,7 @@ async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, read_only: bool) -> Result<(
         FromPage::FrameAck(ack) => seat.outbox.acknowledge(ack.frames),
         _ if read_only => return Err("this viewer only watches".to_owned()),
         FromPage::Tool(mut sample) => {
-            sample.client_id = hub.client_id().to_owned();
+            sample.client_id.clone_from(&seat.tool_id);
             sample.tool_id.clone_from(&seat.tool_id);
             sample.check().map_err(|error| error.to_string())?;
             hub.send_up(Up::Tool(Box::new(sample))).await;

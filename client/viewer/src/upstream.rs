@@ -7,11 +7,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use scindo_client::messages::tool_sample::Mode;
 use scindo_client::messages::viewer_down::Message as Down;
 use scindo_client::messages::viewer_rpc::Call;
 use scindo_client::messages::{Error, RpcReply, ToolSample, ToolState, ViewerRpc, ViewerToolGone};
-use scindo_client::{BodyMirror, Link, LinkConfig, LinkError, ToolLink, ToolStates};
+use scindo_client::{BodyMirror, GuestTool, Link, LinkConfig, LinkError, ToolStates};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
@@ -202,15 +201,11 @@ async fn follow_tools(hub: Arc<Hub>, mut states: ToolStates) {
     }
 }
 
-/// The mouse tools of all browsers.
+/// The mouse tools of all browsers. Each has a liveliness token of its own, so that the server
+/// takes it back when its browser leaves, and all of them when the viewer does.
 struct Hands {
     link: Link,
-    held: BTreeMap<String, Held>,
-}
-
-struct Held {
-    tool: ToolLink,
-    last: ToolSample,
+    held: BTreeMap<String, GuestTool>,
 }
 
 impl Hands {
@@ -221,30 +216,21 @@ impl Hands {
     async fn move_tool(&mut self, sample: ToolSample) {
         let id = sample.tool_id.clone();
         if !self.held.contains_key(&id) {
-            match timeout(RETRY, self.link.tool(&id)).await {
-                Ok(Ok(tool)) => {
-                    self.held.insert(id.clone(), Held { tool, last: sample.clone() });
-                }
+            match timeout(RETRY, self.link.guest_tool(&id)).await {
+                Ok(Ok(tool)) => drop(self.held.insert(id.clone(), tool)),
                 Ok(Err(error)) => return tracing::warn!(%error, tool = id, "cannot take the tool"),
                 Err(_) => return tracing::warn!(tool = id, "the link is too slow to take the tool"),
             }
         }
-        if let Some(held) = self.held.get_mut(&id) {
-            held.last.clone_from(&sample);
-            if let Err(error) = held.tool.poses.send(sample) {
-                tracing::debug!(%error, tool = id, "pose not sent");
-            }
+        if let Some(tool) = self.held.get_mut(&id)
+            && let Err(error) = tool.send(sample)
+        {
+            tracing::debug!(%error, tool = id, "pose not sent");
         }
     }
 
-    /// Lets go: a last sample that touches nothing, then silence, and the server forgets the tool.
     fn release(&mut self, id: &str) {
-        let Some(mut held) = self.held.remove(id) else { return };
-        held.last.set_mode(Mode::Hover);
-        held.last.velocity_m_s = None;
-        if let Err(error) = held.tool.poses.send(held.last) {
-            tracing::debug!(%error, tool = id, "release not sent");
-        }
+        self.held.remove(id);
     }
 }
 

@@ -138,7 +138,7 @@ async fn a_browser_speaks_only_for_itself_and_its_tool_ends_with_it() {
     send(&mut browser, sample(f64::NAN)).await;
     send(&mut browser, sample(0.1)).await;
     let Some(Up::Tool(taken)) = up.recv().await else { panic!("a pose") };
-    assert_eq!((taken.client_id.as_str(), taken.tool_id.as_str()), ("view-test", "mouse-test-1"));
+    assert_eq!((taken.client_id.as_str(), taken.tool_id.as_str()), ("mouse-test-1", "mouse-test-1"));
     assert_eq!(taken.pose.unwrap().position_m.unwrap().x, 0.1, "the one that is not finite was refused");
     drop(browser);
     let ended = timeout(Duration::from_secs(20), up.recv()).await.unwrap();
