@@ -5,26 +5,13 @@
 //! repaired; surfaces, closed or dirty, are filled with a lattice of tetrahedra whose
 //! boundary follows them. Readers work on bytes in memory; [`read_mesh`] alone opens files.
 
-pub mod error;
-mod scanner;
-mod cells;
-mod gmsh;
-mod vtk_cells;
-mod vtk_legacy;
-mod vtk_array;
-mod vtk_xml;
-mod obj;
-mod stl;
-mod ply;
-mod weld;
-mod connectivity;
-mod volume_health;
-mod surface_health;
+mod error;
+mod format;
 mod triangle_tree;
+mod health;
 mod lattice;
 pub(crate) mod implicit;
 mod load;
-mod scale;
 mod write;
 #[cfg(test)]
 mod shapes;
@@ -34,11 +21,12 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 pub use error::MeshInError;
+pub use format::read_mesh_bytes;
+pub use health::scale::{ScaleWarning, check_scale};
+pub use health::surface::SurfaceHealth;
+pub use health::volume::{VolumeHealth, repair_volume};
 pub use lattice::{CELLS, LatticeReport, lattice_from_surface};
 pub use load::{MeshHealth, load_any, load_surface, load_volume};
-pub use scale::{ScaleWarning, check_scale};
-pub use surface_health::SurfaceHealth;
-pub use volume_health::{VolumeHealth, repair_volume};
 pub use write::write_mesh;
 
 /// Tetrahedra as a file gave them: not checked, not oriented.
@@ -98,26 +86,6 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
     read_mesh_bytes(&file, &bytes)
 }
 
-/// Reads a mesh from memory; `file` is its name (its extension chooses the format).
-pub fn read_mesh_bytes(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
-    let extension =
-        Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let mesh = match extension.as_str() {
-        "msh" => gmsh::read(file, bytes),
-        "vtk" => vtk_legacy::read(file, bytes),
-        "vtu" | "vtp" => vtk_xml::read(file, bytes),
-        "obj" => obj::read(file, bytes),
-        "stl" => stl::read(file, bytes),
-        "ply" => ply::read(file, bytes),
-        _ if bytes.starts_with(b"$MeshFormat") || bytes.starts_with(b"$NOD") => gmsh::read(file, bytes),
-        _ if bytes.starts_with(b"# vtk DataFile") => vtk_legacy::read(file, bytes),
-        _ if bytes.starts_with(b"ply") => ply::read(file, bytes),
-        _ => return Err(MeshInError::UnknownFormat { file: file.into(), found: extension }),
-    }?;
-    all_finite(file, mesh.points())?;
-    Ok(mesh)
-}
-
 impl MeshFile {
     /// Node or vertex positions.
     pub fn points(&self) -> &[Vector3<f64>] {
@@ -127,16 +95,3 @@ impl MeshFile {
         }
     }
 }
-
-fn all_finite(file: &str, points: &[Vector3<f64>]) -> Result<(), MeshInError> {
-    match points.iter().position(|p| !p.iter().all(|c| c.is_finite() && c.abs() < 1e100)) {
-        None => Ok(()),
-        Some(node) => {
-            let p = points[node];
-            Err(MeshInError::NonFinite { file: file.into(), node, x: p.x, y: p.y, z: p.z })
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests;

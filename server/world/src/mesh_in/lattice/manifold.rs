@@ -9,8 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use scindo_physics::mesh::TetMesh;
 
-use super::super::connectivity::components;
 use super::LatticeReport;
+use crate::mesh_in::health::connectivity::components;
 
 /// Rounds of repair; each removes tets, and two or three are typical.
 const ROUNDS: usize = 64;

@@ -16,9 +16,8 @@ use nalgebra::Vector3;
 use scindo_physics::mesh::TetMesh;
 use serde::Serialize;
 
-use super::SurfaceMesh;
-use super::error::MeshInError;
-use super::surface_health::{CleanSurface, SurfaceHealth, clean_surface};
+use super::health::surface::{CleanSurface, SurfaceHealth, clean_surface};
+use super::{MeshInError, SurfaceMesh};
 use bcc::Bcc;
 
 /// Fewest and most lattice cubes across the longest side.

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use scindo_physics::mesh::TetMesh;
 
-use super::super::surface_health::CleanSurface;
 use super::LatticeReport;
 use super::bcc::{Bcc, Edge};
+use crate::mesh_in::health::surface::CleanSurface;
 
 /// A crossing nearer to a node than this fraction of the edge pulls the node onto the surface.
 ///

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
-use super::MeshFile;
 use super::cells::{CellKind, CellSoup, zero_based};
-use super::error::MeshInError;
+use crate::mesh_in::MeshFile;
+use crate::mesh_in::MeshInError;
 
 /// One row of any element: the parser fills what a surface needs and drops the rest (colours, normals, …).
 struct Row {

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use scindo_physics::mesh::{DEGENERATE_VOLUME, TetMesh};
 use serde::Serialize;
 
-use super::error::MeshInError;
-use super::{VolumeMesh, weld};
+use super::{connectivity, weld};
+use crate::mesh_in::{MeshInError, VolumeMesh};
 
 /// Largest share of useless tetrahedra that is removed rather than refused.
 pub const MAX_DEGENERATE_TETS: f64 = 0.01;
@@ -113,7 +113,7 @@ fn measure(mesh: &TetMesh, health: &mut VolumeHealth) {
     health.volume_m3 = mesh.volumes().iter().sum();
     let [low, high] = mesh.bounds();
     (health.min_m, health.max_m) = (low.into(), high.into());
-    let connectivity = super::connectivity::of(mesh);
+    let connectivity = connectivity::of(mesh);
     health.components = connectivity.components;
     health.overfull_faces = connectivity.overfull_faces;
     health.non_manifold_edges = connectivity.non_manifold_edges;

@@ -4,9 +4,9 @@ use std::io::Cursor;
 
 use nalgebra::Vector3;
 
-use super::MeshFile;
 use super::cells::{CellKind, CellSoup, zero_based};
-use super::error::MeshInError;
+use crate::mesh_in::MeshFile;
+use crate::mesh_in::MeshInError;
 
 /// Bytes of a binary header with the triangle count, and of one triangle.
 const HEADER: usize = 84;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::error::MeshInError;
-use super::{MeshFile, SurfaceMesh, VolumeMesh};
+use crate::mesh_in::MeshInError;
+use crate::mesh_in::{MeshFile, SurfaceMesh, VolumeMesh};
 
 /// What a cell of a file contributes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

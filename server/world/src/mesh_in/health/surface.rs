@@ -9,9 +9,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::error::MeshInError;
-use super::triangle_tree::TriangleTree;
-use super::{SurfaceMesh, weld};
+use super::weld;
+use crate::mesh_in::triangle_tree::TriangleTree;
+use crate::mesh_in::{MeshInError, SurfaceMesh};
 
 /// Largest share of useless triangles that is accepted.
 pub const MAX_DEGENERATE_TRIANGLES: f64 = 0.5;
