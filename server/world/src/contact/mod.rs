@@ -12,7 +12,7 @@
 
 pub mod surface;
 pub mod proxy;
-pub mod touch;
+pub mod press;
 pub mod spring;
 pub mod grab;
 pub mod compliance;
@@ -26,12 +26,12 @@ use crate::inputs::ToolMode;
 use crate::tool::geometry::core_radius;
 use crate::tool::{MAX_TOOLS, Tool, Tools};
 use compliance::Compliance;
+use press::{Bearing, MAX_POINTS};
 use spring::material_points;
 use surface::ContactSurface;
-use touch::{MAX_CONTACTS, Touch, TouchFinder};
 
-/// Springs reserved per body: every tool with all its contacts, three springs each.
-const SPRING_CAPACITY: usize = MAX_TOOLS * MAX_CONTACTS * 3;
+/// Springs reserved per body: every tool with all its points, three springs each.
+const SPRING_CAPACITY: usize = MAX_TOOLS * MAX_POINTS * 3;
 
 /// Springs on one body and the tools behind them.
 #[derive(Debug, Clone)]
@@ -59,7 +59,6 @@ struct Sums {
 pub struct Contacts {
     surfaces: Vec<ContactSurface>,
     bodies: Vec<BodyContacts>,
-    finder: TouchFinder,
     sums: Vec<Sums>,
 }
 
@@ -117,6 +116,7 @@ impl Contacts {
                 self.press(index, tool);
             } else {
                 tool.proxy.release(&tool.pose);
+                tool.press.release();
                 if tool.mode == ToolMode::Grab {
                     tool.grip.hold(&tool.pose, core_radius(tool.shape), &self.surfaces);
                     self.pull(index, tool);
@@ -127,14 +127,17 @@ impl Contacts {
 
     /// One-sided springs of a tool that touches.
     fn press(&mut self, index: u32, tool: &mut Tool) {
-        let found = self.finder.find(tool.shape, tool.proxy.pose(), &tool.pose, &self.surfaces);
-        for touch in found.iter().filter(|t| t.depth > 0.0 && t.share > 0.0) {
-            let body = &mut self.bodies[touch.body];
-            tool.compliance.get_or_insert_with(|| Compliance::new(body.young_pa, touch.patch_radius));
-            let Some(tree) = self.surfaces[touch.body].tree() else { continue };
-            let corners = tree.corners(touch.triangle);
-            let triangle = tree.triangle(touch.triangle);
-            body.press(index, tool, touch, corners, triangle);
+        tool.press.update(tool.shape, tool.proxy.pose(), &tool.pose, &self.surfaces);
+        let Some(normal) = tool.press.normal() else { return };
+        for bearing in tool.press.bearings() {
+            let body = &mut self.bodies[bearing.body];
+            let radius = core_radius(tool.shape);
+            tool.compliance.get_or_insert_with(|| Compliance::new(body.young_pa, radius));
+            let Some(tree) = self.surfaces[bearing.body].tree() else { continue };
+            let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
+            let spring = (tool.stiffness_n_m, tool.max_force_n);
+            // From the tool into the tissue.
+            body.press(index, spring, -normal, bearing, place);
         }
     }
 
@@ -223,25 +226,24 @@ impl BodyContacts {
     fn press(
         &mut self,
         index: u32,
-        tool: &Tool,
-        touch: &Touch,
-        corners: [u32; 3],
-        triangle: [Vector3<f64>; 3],
+        (stiffness, max_force): (f64, f64),
+        normal: Vector3<f64>,
+        bearing: &Bearing,
+        (corners, triangle): ([u32; 3], [Vector3<f64>; 3]),
     ) {
-        // From the tool into the tissue.
-        let normal = -touch.normal;
         let corners = corners.map(|v| &self.vertices[v as usize]);
         let (springs, behind) = (&mut self.springs, &mut self.behind);
-        material_points(corners, touch.barycentric, |vertex, share| {
-            let at = if share == 1.0 { touch.point } else { triangle[corner_of(&vertex, corners)] };
+        material_points(corners, bearing.barycentric, |vertex, share| {
+            let at = if share == 1.0 { bearing.point } else { triangle[corner_of(&vertex, corners)] };
+            let share = share * bearing.share;
             springs.push(PointSpring {
                 copies: vertex.copies,
                 weights: vertex.weights,
-                kind: SpringKind::OneSided { normal, offset_m: touch.depth + normal.dot(&at) },
-                stiffness_n_m: tool.stiffness_n_m * touch.share * share,
-                max_force_n: tool.max_force_n * touch.share * share,
+                kind: SpringKind::OneSided { normal, offset_m: bearing.depth + normal.dot(&at) },
+                stiffness_n_m: stiffness * share,
+                max_force_n: max_force * share,
             });
-            behind.push((index, touch.depth));
+            behind.push((index, bearing.depth));
         });
     }
 }
@@ -254,3 +256,7 @@ fn corner_of(vertex: &SurfaceVertex, corners: [&SurfaceVertex; 3]) -> usize {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod press_tests;

@@ -3,9 +3,7 @@
 
 use nalgebra::Vector3;
 
-use crate::contact::touch::MAX_CONTACTS;
-
-use super::plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact};
+use super::plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact, MAX_CONTACTS};
 
 /// Difference of force below which nothing is blended [N].
 const UNFELT_N: f64 = 1e-6;

@@ -8,11 +8,11 @@
 //!    wire as it is.
 //!
 //! # Force
-//! Let d be the depth of the newest pose behind a touched plane of the snapshot's surface and d₀ the
-//! depth of the pose the step was computed with. The step's own spring stands at k d₀, k: hand; a
-//! change of pose is answered by hand and tissue in series, k_s:
+//! One plane stands for the touch: its normal n is the line from device to proxy at the newest pose.
+//! The last solve gave the force f₀ for the pose p₀; a change of pose is answered by hand and tissue
+//! in series, k_s:
 //!
-//! f = k max(0, d₀) + k_s (d − max(0, d₀)).
+//! f = f₀·n + k_s (p₀ − p)·n, and k_s d at the depth d behind the surface if there was no force.
 //!
 //! Between snapshots the surface is extrapolated by the velocity it has by itself: its own minus
 //! what the tool imparts, v_tool (1 − k_s / k) along the normal. A model takes over from the one
@@ -25,14 +25,15 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::contact::press::{Nearest, held_direction, nearest, push_direction, touched};
 use crate::contact::proxy::Proxy;
 use crate::contact::surface::ContactSurface;
-use crate::contact::touch::{Touch, TouchFinder};
 use crate::inputs::{ToolMode, ToolShape};
 use crate::snapshot::{Snapshot, ToolSnapshot};
-use crate::tool::geometry::{capsule, core_radius, is_sane};
+use crate::tool::geometry::{capsule, is_sane};
 use continuity::{FeatureNumbers, limit_step};
 pub use plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact};
+use scindo_collision::Capsule;
 
 /// How fast force may change from model to model beyond what the planes say [N/s].
 const SLEW_N_S: f64 = 50.0;
@@ -75,7 +76,6 @@ pub struct ContactModels {
     surfaces: Vec<ContactSurface>,
     velocities: Vec<Vec<[f32; 3]>>,
     tools: Vec<ToolModel>,
-    finder: TouchFinder,
     step: u64,
     time_s: f64,
     taken_s: Option<f64>,
@@ -150,7 +150,7 @@ impl ContactModels {
             time_s: self.time_s,
         };
         let model = &mut self.tools[index];
-        model.evaluate(query, &frame, &mut self.finder);
+        model.evaluate(query, &frame);
         let elapsed = (now_s - model.evaluated_s).clamp(0.0, LONGEST_TICK_S);
         model.evaluated_s = now_s;
         limit_step(&model.before, &mut model.now, SLEW_N_S * elapsed);
@@ -194,10 +194,12 @@ struct Frame<'a> {
     time_s: f64,
 }
 
-/// Stiffnesses about the pose the last step was computed with.
+/// What the last step knew of the tool.
 struct Anchor {
     pose: Isometry3<f64>,
     velocity: Vector3<f64>,
+    /// Force of the touch on the tool [N]; zero if it did not touch.
+    force: Vector3<f64>,
     /// Hand alone and hand with tissue [N/m].
     hand: f64,
     series: f64,
@@ -205,7 +207,7 @@ struct Anchor {
 }
 
 impl ToolModel {
-    fn evaluate(&mut self, query: &ToolQuery, frame: &Frame<'_>, finder: &mut TouchFinder) {
+    fn evaluate(&mut self, query: &ToolQuery, frame: &Frame<'_>) {
         std::mem::swap(&mut self.now, &mut self.before);
         let anchor = self.anchor(query);
         let now = &mut self.now;
@@ -228,7 +230,7 @@ impl ToolModel {
                 self.proxy.release(&query.pose);
                 now.mode = ContactMode::Cutting;
             }
-            ToolMode::Touch | ToolMode::Cut => self.touch(query, &anchor, frame, finder),
+            ToolMode::Touch | ToolMode::Cut => self.touch(query, &anchor, frame),
         }
         self.features.carry_over(&self.before, &mut self.now);
     }
@@ -238,43 +240,45 @@ impl ToolModel {
             return Anchor {
                 pose: query.pose,
                 velocity: Vector3::zeros(),
+                force: Vector3::zeros(),
                 hand: 0.0,
                 series: 0.0,
                 max_force: 0.0,
             };
         };
         let known = seen.contact_stiffness_n_m > 0.0;
+        let same = seen.mode == query.mode;
         Anchor {
             pose: seen.pose,
             velocity: seen.velocity_m_s,
+            force: if same { seen.force_n } else { Vector3::zeros() },
             hand: seen.stiffness_n_m,
             series: if known { seen.contact_stiffness_n_m } else { 0.5 * seen.stiffness_n_m },
             max_force: seen.max_force_n,
         }
     }
 
-    /// Planes around a tool that touches or may soon.
-    fn touch(&mut self, query: &ToolQuery, anchor: &Anchor, frame: &Frame<'_>, finder: &mut TouchFinder) {
+    /// The plane of a tool that touches or may soon.
+    fn touch(&mut self, query: &ToolQuery, anchor: &Anchor, frame: &Frame<'_>) {
         self.proxy.follow(query.shape, &query.pose, frame.surfaces);
         let ahead = (query.velocity_m_s.norm() * AHEAD_S).clamp(LEAST_AHEAD_M, MOST_AHEAD_M);
-        let proxy = self.proxy.pose();
-        let found = finder.find_planes(query.shape, proxy, &query.pose, frame.surfaces, ahead);
-        let at_anchor = capsule(query.shape, &anchor.pose);
-        // While something is touched the rest only counts once the proxy gets there: the device,
-        // behind the touched plane, may be behind untouched ones too.
-        let touched = found.iter().any(|touch| touch.share > 0.0 && touch.depth > 0.0);
-        let pressed = self.seen.as_ref().is_some_and(|seen| seen.mode == query.mode);
-        for touch in found.iter().filter(|touch| !touched || touch.share > 0.0) {
-            let before = at_anchor.core_point(touch.parameter) - touch.point;
-            let depth_before = at_anchor.radius - touch.normal.dot(&before);
-            let depth_before = if pressed { depth_before.max(0.0) } else { 0.0 };
-            self.now.planes.push(plane_of(touch, depth_before, query, anchor, frame));
-        }
-        if let Some(first) = found.first() {
-            self.now.mode = ContactMode::Contact;
-            self.now.body = Some(first.body);
-            self.now.epoch = frame.surfaces[first.body].epoch();
-        }
+        let at_proxy = capsule(query.shape, self.proxy.pose());
+        let at_device = capsule(query.shape, &query.pose);
+        let place = match touched(&at_proxy, frame.surfaces) {
+            Some(place) => {
+                let target = push_direction(&place, &at_proxy, &at_device);
+                // Where the step pressed is where the model presses, unless it has to turn.
+                let held = anchor.force.try_normalize(1e-6);
+                let normal = held.map_or(target, |held| held_direction(held, target));
+                Some(Nearest { normal, ..place })
+            }
+            None => nearest(&at_proxy, frame.surfaces, ahead),
+        };
+        let Some(place) = place else { return };
+        self.now.planes.push(plane_of(&place, &at_device, query, anchor, frame));
+        self.now.mode = ContactMode::Contact;
+        self.now.body = Some(place.body);
+        self.now.epoch = frame.surfaces[place.body].epoch();
     }
 
     /// The pull of held tissue, along all axes.
@@ -305,29 +309,32 @@ fn damping(stiffness: f64) -> f64 {
     (stiffness * DAMPING_S).min(MAX_DAMPING_NS_M)
 }
 
-/// A plane with its force at the newest pose, given the depth the last step was computed with.
+/// The plane of a place with its force at the newest pose.
 fn plane_of(
-    touch: &Touch,
-    depth_before: f64,
+    place: &Nearest,
+    at_device: &Capsule,
     query: &ToolQuery,
     anchor: &Anchor,
     frame: &Frame<'_>,
 ) -> ContactPlane {
-    let normal = touch.normal;
-    let surface = surface_velocity(touch, frame);
-    let imparted = if depth_before > 0.0 && anchor.hand > 0.0 {
-        normal * normal.dot(&anchor.velocity) * (1.0 - anchor.series / anchor.hand)
-    } else {
-        Vector3::zeros()
-    };
-    let by_itself = surface - imparted;
+    let normal = place.normal;
+    let device = at_device.core_point(place.parameter);
+    let before = capsule(query.shape, &anchor.pose).core_point(place.parameter);
+    let force_before = anchor.force.dot(&normal);
+    let pressed = force_before > 0.0;
+    let mut by_itself = surface_velocity(place, frame);
+    if pressed && anchor.hand > 0.0 {
+        let yielding = 1.0 - anchor.series / anchor.hand;
+        by_itself -= normal * normal.dot(&anchor.velocity) * yielding;
+    }
     let shift = by_itself * frame.ahead_s;
-    let depth = touch.depth + normal.dot(&shift);
-    // What is not touched yet will have its full share when it is.
-    let share = if touch.share > 0.0 { touch.share } else { 1.0 };
-    let stiffness = share * anchor.series;
-    let force = share * anchor.hand * depth_before + stiffness * (depth - depth_before);
-    let point = touch.point + shift;
+    let depth = at_device.radius - normal.dot(&(device - place.point - shift));
+    let force = if pressed {
+        force_before + anchor.series * normal.dot(&(before - device + shift))
+    } else {
+        anchor.series * depth
+    };
+    let point = place.point + shift;
     let tip = query.pose.translation.vector - point;
     let aside = (tip - normal * normal.dot(&tip)).norm();
     ContactPlane {
@@ -335,22 +342,22 @@ fn plane_of(
         normal,
         gap_m: -depth,
         force_n: normal * force.min(anchor.max_force),
-        stiffness_n_m: stiffness,
+        stiffness_n_m: anchor.series,
         tangential_stiffness_n_m: 0.0,
-        damping_ns_m: damping(stiffness),
+        damping_ns_m: damping(anchor.series),
         surface_velocity_m_s: by_itself,
         // Clients measure from the tip, which a shaft's contact may be far from.
-        patch_radius_m: aside + (2.0 * core_radius(query.shape)).max(LEAST_PATCH_M),
+        patch_radius_m: aside + (2.0 * at_device.radius).max(LEAST_PATCH_M),
         feature_id: 0,
     }
 }
 
 /// Velocity of the touched point of the surface [m/s]; zero where it is not known.
-fn surface_velocity(touch: &Touch, frame: &Frame<'_>) -> Vector3<f64> {
-    let Some(tree) = frame.surfaces[touch.body].tree() else { return Vector3::zeros() };
-    let velocities = &frame.velocities[touch.body];
+fn surface_velocity(place: &Nearest, frame: &Frame<'_>) -> Vector3<f64> {
+    let Some(tree) = frame.surfaces[place.body].tree() else { return Vector3::zeros() };
+    let velocities = &frame.velocities[place.body];
     let mut sum = Vector3::zeros();
-    for (vertex, weight) in tree.corners(touch.triangle).into_iter().zip(touch.barycentric) {
+    for (vertex, weight) in tree.corners(place.triangle).into_iter().zip(place.barycentric) {
         let Some(v) = velocities.get(vertex as usize) else { return Vector3::zeros() };
         sum += Vector3::new(v[0], v[1], v[2]).cast::<f64>() * weight;
     }

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::contact::touch::MAX_CONTACTS;
+/// Most planes of one model.
+pub const MAX_CONTACTS: usize = 8;
 
 /// Number of the plane that hides a change of model; see [`super::continuity`].
 pub const BLEND_FEATURE: u64 = u64::MAX;

@@ -133,7 +133,7 @@ fn force_starts_from_zero_and_stays_continuous_while_pressing() {
         }
         for (i, (force, truth)) in felt.iter().enumerate().skip(40) {
             assert!((force.z - truth).abs() < error * peak, "{force} for {truth} at {i} ms");
-            assert!(force.xy().norm() < 1e-6);
+            assert!(force.xy().norm() < 1e-3, "{force}");
         }
     }
 }

@@ -17,6 +17,7 @@ use scindo_physics::cut::BladeSweep;
 
 use crate::contact::compliance::Compliance;
 use crate::contact::grab::Grip;
+use crate::contact::press::Press;
 use crate::contact::proxy::Proxy;
 use crate::inputs::{ToolInput, ToolMode, ToolShape};
 use crate::scene::checked::ToolSpec;
@@ -55,6 +56,8 @@ pub struct Tool {
     pub client_time_ns: u64,
     /// Where the tissue lets it be.
     pub(crate) proxy: Proxy,
+    /// How it presses.
+    pub(crate) press: Press,
     /// What it holds.
     pub(crate) grip: Grip,
     /// How the tissue under it gives way; none before the first touch.
@@ -80,6 +83,7 @@ impl Tool {
             seq: 0,
             client_time_ns: 0,
             proxy: Proxy::default(),
+            press: Press::new(),
             grip: Grip::new(),
             compliance: None,
             edge: BladeEdge::default(),
@@ -116,6 +120,7 @@ impl Tool {
         if self.owner != *owner {
             self.owner = Arc::clone(owner);
             self.proxy.release(&self.pose);
+            self.press.release();
             self.grip.open();
         }
     }
@@ -266,6 +271,7 @@ impl Tools {
         for tool in &mut self.tools {
             let pose = tool.pose;
             tool.proxy.release(&pose);
+            tool.press.release();
             tool.grip.open();
             tool.edge = BladeEdge::default();
             tool.owner = Arc::clone(&self.nobody);

@@ -1,0 +1,266 @@
+//! How a tool presses: one direction, a fixed stencil of points on the tool, smooth shares.
+//!
+//! The tool's reaction is along the line from device to proxy, as for any god-object. The tissue
+//! is pushed against that direction where rays from a stencil on the tool meet it: eight points
+//! along a shaft, the pole and a ring around it on a ball. A point bears in proportion to its depth.
+//! Stencil, direction and shares change smoothly with pose and surface, so a steady hand feels a
+//! steady force; which triangles the proxy happens to rest on does not matter.
+
+use nalgebra::{Isometry3, Vector3};
+use scindo_collision::{Capsule, CapsuleMotion};
+
+use crate::contact::surface::ContactSurface;
+use crate::inputs::ToolShape;
+use crate::tool::geometry::{capsule, core_length};
+
+/// Most points at which one tool bears on tissue.
+pub const MAX_POINTS: usize = 8;
+/// Distance from the proxy at which a surface no longer counts as touched, in radii ...
+const MARGIN_RADII: f64 = 0.05;
+/// ... but at least this [m].
+const LEAST_MARGIN_M: f64 = 2e-5;
+/// Offset between device and proxy from which on their line is the direction [m]; below, the
+/// normal of the touched surface takes over.
+const CLEAR_OFFSET_M: f64 = 5e-5;
+/// Half angle of the cone within which the direction stays as it is (cosine), like dry friction of
+/// 0.18: a proxy on the facets of a dent wanders by as much while the hand is still.
+const STICK_COSINE: f64 = 0.984;
+/// Weight of the present step in the running direction and shares. Shares that followed at once
+/// would swing: who bears more sinks the tissue under it and then bears less.
+const FOLLOW: f64 = 0.3;
+/// Share below which a point is left out.
+const LEAST_SHARE: f64 = 1e-3;
+/// Points of a ball's ring and its radius in ball radii.
+const RING: usize = 6;
+const RING_RADIUS: f64 = 0.6;
+
+/// The nearest place of the surfaces to a tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Nearest {
+    /// Index of the body.
+    pub body: usize,
+    /// Triangle of its surface, and where on it.
+    pub triangle: u32,
+    /// Barycentric coordinates of the place.
+    pub barycentric: [f64; 3],
+    /// Where it is [m].
+    pub point: Vector3<f64>,
+    /// Unit, from the tissue to the tool.
+    pub normal: Vector3<f64>,
+    /// Distance between tool and surface [m].
+    pub gap: f64,
+    /// Where on the tool's core, 0..=1.
+    pub parameter: f64,
+}
+
+/// The surface place nearest to a capsule outside the bodies, no farther than `reach` [m].
+pub fn nearest(tool: &Capsule, surfaces: &[ContactSurface], reach: f64) -> Option<Nearest> {
+    let found = surfaces.iter().enumerate().filter_map(|(body, surface)| {
+        let tree = surface.tree()?;
+        let near = tree.closest_triangle(tool, reach)?;
+        let away = near.closest.on_segment - near.closest.on_triangle;
+        let outward = tree.normal_at(near.triangle, near.closest.barycentric);
+        Some(Nearest {
+            body,
+            triangle: near.triangle,
+            barycentric: near.closest.barycentric,
+            point: near.closest.on_triangle,
+            normal: away.try_normalize(1e-9).unwrap_or(outward),
+            gap: near.distance - tool.radius,
+            parameter: near.closest.parameter,
+        })
+    });
+    found.min_by(|a, b| a.gap.total_cmp(&b.gap))
+}
+
+/// The place a proxy touches, if it touches one.
+pub fn touched(proxy: &Capsule, surfaces: &[ContactSurface]) -> Option<Nearest> {
+    nearest(proxy, surfaces, (MARGIN_RADII * proxy.radius).max(LEAST_MARGIN_M))
+}
+
+/// Unit direction in which the touched tissue pushes the tool.
+pub fn push_direction(at: &Nearest, proxy: &Capsule, device: &Capsule) -> Vector3<f64> {
+    let offset = proxy.core_point(at.parameter) - device.core_point(at.parameter);
+    (offset + at.normal * CLEAR_OFFSET_M).try_normalize(1e-9).unwrap_or(at.normal)
+}
+
+/// The direction held so far, turned no more than it must be to have `target` in its cone.
+pub fn held_direction(held: Vector3<f64>, target: Vector3<f64>) -> Vector3<f64> {
+    let cosine = held.dot(&target);
+    if cosine >= STICK_COSINE {
+        return held;
+    }
+    let Some(aside) = (held - target * cosine).try_normalize(1e-9) else { return target };
+    target * STICK_COSINE + aside * (1.0 - STICK_COSINE * STICK_COSINE).sqrt()
+}
+
+/// One point at which a tool bears on tissue.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bearing {
+    /// Index of the body.
+    pub body: usize,
+    /// Triangle of its surface.
+    pub triangle: u32,
+    /// Where on the triangle.
+    pub barycentric: [f64; 3],
+    /// Where in space [m].
+    pub point: Vector3<f64>,
+    /// How far the tool at the device is beyond the point, against the direction [m].
+    pub depth: f64,
+    /// Share of the tool's stiffness; all shares sum to at most 1.
+    pub share: f64,
+}
+
+/// How one tool presses, from step to step.
+#[derive(Debug, Clone, Default)]
+pub struct Press {
+    direction: Option<Direction>,
+    shares: [f64; MAX_POINTS],
+    bearings: Vec<Bearing>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Direction {
+    normal: Vector3<f64>,
+    across: Vector3<f64>,
+}
+
+impl Press {
+    /// A press with room for all its points.
+    pub fn new() -> Self {
+        Self { bearings: Vec::with_capacity(MAX_POINTS), ..Self::default() }
+    }
+
+    /// Direction in which the tissue pushes the tool; none while nothing is touched.
+    pub fn normal(&self) -> Option<Vector3<f64>> {
+        self.direction.map(|direction| direction.normal)
+    }
+
+    /// Where the tool bears.
+    pub fn bearings(&self) -> &[Bearing] {
+        &self.bearings
+    }
+
+    /// The tool lets go of what it pressed.
+    pub fn release(&mut self) {
+        self.direction = None;
+        self.bearings.clear();
+    }
+
+    /// Finds where the tool bears with its proxy and its device where they are now.
+    pub fn update(
+        &mut self,
+        shape: ToolShape,
+        proxy: &Isometry3<f64>,
+        device: &Isometry3<f64>,
+        surfaces: &[ContactSurface],
+    ) {
+        let (at_proxy, at_device) = (capsule(shape, proxy), capsule(shape, device));
+        let Some(place) = touched(&at_proxy, surfaces) else { return self.release() };
+        let target = push_direction(&place, &at_proxy, &at_device);
+        let fresh = self.direction.is_none();
+        let direction = turned(self.direction, target);
+        self.direction = Some(direction);
+        self.bearings.clear();
+        let mut depths = [0.0; MAX_POINTS];
+        let mut hits = [None; MAX_POINTS];
+        for i in 0..MAX_POINTS {
+            let Some(point) = stencil(i, shape, &direction) else { continue };
+            let hit = cast(&point, (&at_proxy, &at_device), direction.normal, surfaces);
+            depths[i] = hit.map_or(0.0, |bearing: Bearing| bearing.depth.max(0.0));
+            hits[i] = hit;
+        }
+        self.follow_shares(&depths, fresh);
+        for (hit, share) in hits.iter().zip(self.shares) {
+            if let (Some(bearing), true) = (hit, share > LEAST_SHARE) {
+                self.bearings.push(Bearing { share, ..*bearing });
+            }
+        }
+    }
+
+    /// Shares go towards the proportions of the depths.
+    fn follow_shares(&mut self, depths: &[f64; MAX_POINTS], fresh: bool) {
+        let sum: f64 = depths.iter().sum();
+        if sum <= 0.0 {
+            return;
+        }
+        let follow = if fresh { 1.0 } else { FOLLOW };
+        for (share, depth) in self.shares.iter_mut().zip(depths) {
+            *share += follow * (depth / sum - *share);
+        }
+    }
+}
+
+/// The direction turned some way towards `target`, its frame carried along without twist.
+fn turned(before: Option<Direction>, target: Vector3<f64>) -> Direction {
+    let normal = match before {
+        Some(before) => {
+            let goal = held_direction(before.normal, target);
+            before.normal.lerp(&goal, FOLLOW).try_normalize(1e-3).unwrap_or(goal)
+        }
+        None => target,
+    };
+    let hint = before.map_or_else(|| Vector3::ith(normal.iamin(), 1.0), |before| before.across);
+    let across = (hint - normal * normal.dot(&hint))
+        .try_normalize(1e-3)
+        .unwrap_or_else(|| normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize());
+    Direction { normal, across }
+}
+
+/// A point of the stencil: where on the core, how far aside, how far below the core the tool's
+/// surface lies there.
+struct StencilPoint {
+    parameter: f64,
+    aside: Vector3<f64>,
+    below: f64,
+}
+
+/// Point `i` of the stencil of a shape; a ball has one less than a shaft.
+fn stencil(i: usize, shape: ToolShape, direction: &Direction) -> Option<StencilPoint> {
+    let ToolShape::Sphere { radius_m } = shape else {
+        let parameter = i as f64 / (MAX_POINTS - 1) as f64;
+        let radius = crate::tool::geometry::core_radius(shape);
+        let on_shaft = StencilPoint { parameter, aside: Vector3::zeros(), below: radius };
+        return (core_length(shape) > 0.0 || i == 0).then_some(on_shaft);
+    };
+    if i == 0 {
+        return Some(StencilPoint { parameter: 0.0, aside: Vector3::zeros(), below: radius_m });
+    }
+    let angle = std::f64::consts::TAU * (i - 1) as f64 / RING as f64;
+    let along = direction.normal.cross(&direction.across);
+    let ring = radius_m * RING_RADIUS;
+    (i <= RING).then(|| StencilPoint {
+        parameter: 0.0,
+        aside: (direction.across * angle.cos() + along * angle.sin()) * ring,
+        below: radius_m * (1.0 - RING_RADIUS * RING_RADIUS).sqrt(),
+    })
+}
+
+/// Looks from the proxy against `normal` for tissue, down to where the device has the tool.
+fn cast(
+    point: &StencilPoint,
+    (proxy, device): (&Capsule, &Capsule),
+    normal: Vector3<f64>,
+    surfaces: &[ContactSurface],
+) -> Option<Bearing> {
+    let start = proxy.core_point(point.parameter) + point.aside;
+    let lowest = device.core_point(point.parameter) + point.aside - normal * point.below;
+    let way = normal.dot(&(start - lowest));
+    if way <= 0.0 {
+        return None;
+    }
+    let ray = CapsuleMotion { start: [start; 2], end: [start - normal * way; 2], radius: 0.0 };
+    let hit = surfaces.iter().enumerate().filter_map(|(body, surface)| {
+        let impact = surface.tree()?.sweep(&ray)?;
+        Some((body, impact))
+    });
+    let (body, impact) = hit.min_by(|a, b| a.1.time.total_cmp(&b.1.time))?;
+    Some(Bearing {
+        body,
+        triangle: impact.triangle,
+        barycentric: impact.barycentric,
+        point: impact.point,
+        depth: normal.dot(&(impact.point - lowest)),
+        share: 0.0,
+    })
+}
