@@ -71,7 +71,7 @@ fn applications(threads: usize, times: usize) {
     let mesh = body.cut_mesh();
     let n = mesh.n_copies();
     let mut team = Team::new(threads).unwrap();
-    let mut elastic = Elastic::new(Simd::detect(), mesh.mesh(), mesh.pieces(), n, &[]);
+    let mut elastic = Elastic::new(Simd::detect(), mesh.mesh(), mesh.pieces(), n);
     let with = ElasticUpdate { lame: MATERIAL.lame(), law: MATERIAL.law, scale: 1.0 };
     let (mut f, mut blocks) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
     let [update, _] = timed(times, || {

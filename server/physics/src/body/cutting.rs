@@ -1,9 +1,9 @@
 //! What a body does when its topology changes.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::Body;
-use crate::cut::{BladeSweep, CutError, CutReport, Piece};
+use crate::cut::{BladeSweep, CutError, CutReport};
 use crate::integrator::LooseParts;
 use crate::operator::Elastic;
 
@@ -17,8 +17,8 @@ impl Body {
         // The surface may have changed alone, while a cut is still on its way through an element.
         if report.epoch != epoch && self.cut_mesh.pieces() != pieces {
             self.inherit(&report);
-            let rotations = self.inherited_rotations(&pieces);
-            self.rebuild_elastic(&rotations);
+            let mesh = &self.cut_mesh;
+            self.elastic.follow(mesh.mesh(), &pieces, mesh.pieces(), mesh.n_copies());
             self.follow_topology();
         }
         Ok(report)
@@ -35,24 +35,10 @@ impl Body {
         }
     }
 
-    /// Rotation of every present piece: its own if it existed before, else that of a piece the
-    /// element had before.
-    fn inherited_rotations(&self, before: &[Piece]) -> Vec<Matrix3<f32>> {
-        let known = self.elastic.rotations();
-        let mut of_element = vec![Matrix3::identity(); self.cut_mesh.mesh().tets.len()];
-        for (piece, R) in before.iter().zip(&known).rev() {
-            of_element[piece.element as usize] = *R;
-        }
-        let rotation = |(p, piece): (usize, &Piece)| match before.get(p) {
-            Some(old) if old.element == piece.element => known[p],
-            _ => of_element[piece.element as usize],
-        };
-        self.cut_mesh.pieces().iter().enumerate().map(rotation).collect()
-    }
-
-    pub(super) fn rebuild_elastic(&mut self, rotations: &[Matrix3<f32>]) {
+    /// Arranges the pieces anew, without memory of their rotations.
+    pub(super) fn rebuild_elastic(&mut self) {
         let mesh = &self.cut_mesh;
-        self.elastic = Elastic::new(self.simd, mesh.mesh(), mesh.pieces(), mesh.n_copies(), rotations);
+        self.elastic = Elastic::new(self.simd, mesh.mesh(), mesh.pieces(), mesh.n_copies());
     }
 
     /// Everything that is derived from pieces and copies.

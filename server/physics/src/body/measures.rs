@@ -50,6 +50,16 @@ impl Body {
         self.deformed_pieces().map(|d| d.F.determinant()).fold(f64::INFINITY, f64::min)
     }
 
+    /// Cauchy stress P Fᵀ / det F of every piece [Pa]; 0 where a piece is flat or inverted.
+    pub fn cauchy_stresses(&self) -> Vec<Matrix3<f64>> {
+        let (law, lame) = (self.material.law, self.material.lame());
+        let stress = |d: Deformed<'_>| {
+            let J = d.F.determinant();
+            if J > 1e-9 { law.stress(&d.F, &d.R, lame) * d.F.transpose() / J } else { Matrix3::zeros() }
+        };
+        self.deformed_pieces().map(stress).collect()
+    }
+
     /// Internal force on every copy [N]; it pulls the body back, so it is subtracted from the loads.
     pub fn internal_forces(&self) -> Vec<Vector3<f64>> {
         let mut f_int = Vec::new();

@@ -102,7 +102,7 @@ impl Body {
         settings.check()?;
         let cut_mesh = CutMesh::new(mesh)?;
         let simd = if settings.portable { Simd::Baseline } else { Simd::detect() };
-        let elastic = Elastic::new(simd, cut_mesh.mesh(), cut_mesh.pieces(), cut_mesh.n_copies(), &[]);
+        let elastic = Elastic::new(simd, cut_mesh.mesh(), cut_mesh.pieces(), cut_mesh.n_copies());
         let mut body = Self {
             state: State::default(),
             boundary: Boundary::default(),
@@ -260,7 +260,7 @@ impl Body {
     pub fn reset(&mut self) -> Result<(), BodyError> {
         self.cut_mesh.reset()?;
         self.return_to_rest();
-        self.rebuild_elastic(&[]);
+        self.rebuild_elastic();
         self.follow_topology();
         Ok(())
     }

@@ -30,19 +30,22 @@ pub struct ChunkPlan {
     pub nodes: Vec<[[u16; LANES]; 4]>,
 }
 
-/// Divides `pieces` into chunks by recursive bisection of `centres` (rest centroid of every piece).
-pub fn plan_chunks(pieces: &[Piece], centres: &[Vector3<f64>]) -> Vec<ChunkPlan> {
-    let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
-    let n_chunks = pieces.len().div_ceil(CHUNK_PIECES);
-    let mut plans = Vec::with_capacity(n_chunks);
-    bisect(&mut order, n_chunks, centres, &mut |chunk| plans.push(plan_chunk(chunk, pieces)));
-    plans
+/// Region of every element, by recursive bisection of their rest centroids `centres`; also the number
+/// of regions. Cuts do not change it: a piece is in a chunk of its element's region.
+pub fn region_of_elements(centres: &[Vector3<f64>]) -> (Vec<u32>, usize) {
+    let mut order: Vec<u32> = (0..centres.len() as u32).collect();
+    let mut chunk_of = vec![0; centres.len()];
+    let mut n_chunks = 0;
+    bisect(&mut order, centres.len().div_ceil(CHUNK_PIECES), centres, &mut |chunk| {
+        chunk.iter().for_each(|&e| chunk_of[e as usize] = n_chunks);
+        n_chunks += 1;
+    });
+    (chunk_of, n_chunks as usize)
 }
 
-fn bisect(order: &mut [u32], parts: usize, centres: &[Vector3<f64>], emit: &mut dyn FnMut(&mut [u32])) {
+fn bisect(order: &mut [u32], parts: usize, centres: &[Vector3<f64>], emit: &mut dyn FnMut(&[u32])) {
     if parts <= 1 {
         if !order.is_empty() {
-            order.sort_unstable();
             emit(order);
         }
         return;
@@ -63,7 +66,8 @@ fn bisect(order: &mut [u32], parts: usize, centres: &[Vector3<f64>], emit: &mut 
     bisect(second, parts - left, centres, emit);
 }
 
-fn plan_chunk(chunk: &[u32], pieces: &[Piece]) -> ChunkPlan {
+/// Packs the pieces `chunk`, ascending ids, into batches and numbers their copies.
+pub fn plan_chunk(chunk: &[u32], pieces: &[Piece]) -> ChunkPlan {
     let mut copies: Vec<u32> = chunk.iter().flat_map(|&p| pieces[p as usize].copies).collect();
     copies.sort_unstable();
     copies.dedup();
@@ -172,7 +176,11 @@ mod tests {
             .collect();
         let centres: Vec<_> =
             (0..mesh.tets.len()).map(|e| mesh.corners(e).iter().sum::<Vector3<f64>>() / 4.0).collect();
-        let plans = plan_chunks(&pieces, &centres);
+        let (chunk_of, n_chunks) = region_of_elements(&centres);
+        let plans: Vec<ChunkPlan> = (0..n_chunks as u32)
+            .map(|k| (0..pieces.len() as u32).filter(|&p| chunk_of[p as usize] == k).collect::<Vec<u32>>())
+            .map(|chunk| plan_chunk(&chunk, &pieces))
+            .collect();
         let mut seen = vec![0; pieces.len()];
         let (mut batches, mut shared) = (0, 0);
         for plan in &plans {

@@ -1,9 +1,11 @@
 //! K̂, the stiffness of all pieces with rotated gradients, never assembled.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Matrix3, Vector3};
 
-use super::chunks::{Gather, NO_PIECE, plan_chunks};
-use super::kernel::{self, Batch, Block6, Coefficients, Locals, RestBatch};
+use super::chunks::{Gather, NO_PIECE, plan_chunk, region_of_elements};
+use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
 use super::{BLOCK, LinearOperator, Padded};
 use crate::cut::Piece;
 use crate::element::{LANES, Lanes, Simd};
@@ -11,21 +13,28 @@ use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
 use crate::team::{Team, blocks};
 
+/// Most pieces of one chunk: four copies each must leave room in 16-bit local numbers.
+const MOST_PIECES: usize = 8192;
+
 /// s K̂ of a body, matrix-free; also its internal forces and the diagonal blocks of s K̂.
 #[derive(Debug)]
 pub struct Elastic {
     simd: Simd,
     n_pieces: usize,
+    /// Region of every element; cuts do not change it.
+    region_of_element: Vec<u32>,
+    n_regions: usize,
+    /// Ordered by region; a region has more than one only after very many cuts.
     chunks: Vec<Chunk>,
     gather: Gather,
 }
 
 #[derive(Clone, Debug)]
 struct Chunk {
+    region: usize,
     copies: Vec<u32>,
     pieces: Vec<[u32; LANES]>,
-    rest: Vec<RestBatch>,
-    live: Vec<Batch>,
+    batches: Batches,
     positions: Vec<[f64; 4]>,
     x: Vec<Padded>,
     y: Vec<Padded>,
@@ -45,46 +54,44 @@ pub struct ElasticUpdate {
 }
 
 impl Elastic {
-    /// Arranges `pieces` of `mesh` for the kernels. `rotations` has the warm start of every piece,
-    /// or is empty for the identity.
-    pub fn new(
-        simd: Simd,
-        mesh: &TetMesh,
-        pieces: &[Piece],
-        n_copies: usize,
-        rotations: &[Matrix3<f32>],
-    ) -> Self {
-        let centres: Vec<Vector3<f64>> = pieces
-            .iter()
-            .map(|p| mesh.corners(p.element as usize).iter().sum::<Vector3<f64>>() / 4.0)
-            .collect();
-        let chunks: Vec<Chunk> = plan_chunks(pieces, &centres)
-            .into_iter()
-            .map(|plan| {
-                let rest =
-                    plan.pieces.iter().map(|lanes| rest_batch(lanes, mesh, pieces, rotations)).collect();
-                let live = plan.nodes.iter().map(|&nodes| Batch {
-                    g: Default::default(),
-                    two_mu: Lanes::default(),
-                    lambda: Lanes::default(),
-                    nodes,
-                });
-                let n = plan.copies.len() + 1;
-                Chunk {
-                    rest,
-                    live: live.collect(),
-                    pieces: plan.pieces,
-                    copies: plan.copies,
-                    positions: vec![[0.0; 4]; n],
-                    x: vec![[0.0; 4]; n],
-                    y: vec![[0.0; 4]; n],
-                    blocks: vec![[0.0; 8]; n],
-                    inverted: 0,
-                }
-            })
-            .collect();
-        let gather = Gather::new(chunks.iter().map(|c| &c.copies[..]), n_copies);
-        Self { simd, n_pieces: pieces.len(), chunks, gather }
+    /// Arranges `pieces` of `mesh` for the kernels, all rotations at rest.
+    pub fn new(simd: Simd, mesh: &TetMesh, pieces: &[Piece], n_copies: usize) -> Self {
+        let centre = |e: usize| mesh.corners(e).iter().sum::<Vector3<f64>>() / 4.0;
+        let centres: Vec<Vector3<f64>> = (0..mesh.tets.len()).map(centre).collect();
+        let (region_of_element, n_regions) = region_of_elements(&centres);
+        let mut elastic = Self {
+            simd,
+            n_pieces: 0,
+            region_of_element,
+            n_regions,
+            chunks: Vec::new(),
+            gather: Gather::default(),
+        };
+        elastic.follow(mesh, &[], pieces, n_copies);
+        elastic
+    }
+
+    /// Rearranges the chunks in which pieces differ from what they were `before` a cut. A new piece
+    /// inherits its rotation from a piece its element had before.
+    pub fn follow(&mut self, mesh: &TetMesh, before: &[Piece], pieces: &[Piece], n_copies: usize) {
+        let region_of = |piece: &Piece| self.region_of_element[piece.element as usize] as usize;
+        let mut changed = vec![false; self.n_regions];
+        for (p, piece) in pieces.iter().enumerate() {
+            changed[region_of(piece)] |= before.get(p) != Some(piece);
+        }
+        let mut members = vec![Vec::new(); self.n_regions];
+        for (p, piece) in pieces.iter().enumerate().filter(|(_, piece)| changed[region_of(piece)]) {
+            members[region_of(piece)].push(p as u32);
+        }
+        let rotations = inherited(&self.rotations(), before, pieces);
+        self.chunks.retain(|chunk| !changed[chunk.region]);
+        for (region, members) in members.iter().enumerate() {
+            let build = |part| Chunk::new(region, part, mesh, pieces, &rotations);
+            self.chunks.extend(members.chunks(MOST_PIECES).map(build));
+        }
+        self.chunks.sort_by_key(|chunk| chunk.region);
+        self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
+        self.n_pieces = pieces.len();
     }
 
     /// Recomputes rotations, rotated gradients, forces and diagonal blocks at `positions` [m] (one
@@ -119,12 +126,12 @@ impl Elastic {
     pub(super) fn apply_chunks(&mut self, team: &mut Team, x: &[Padded]) {
         let simd = self.simd;
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
-            let Chunk { copies, live, x: local, y, .. } = &mut chunk[0];
+            let Chunk { copies, batches, x: local, y, .. } = &mut chunk[0];
             for (local, &copy) in local.iter_mut().zip(copies.iter()) {
                 *local = x[copy as usize];
             }
             y.fill([0.0; 4]);
-            kernel::apply(simd, live, local, y);
+            batches.apply(simd, local, y);
         });
     }
 
@@ -140,7 +147,7 @@ impl Elastic {
     pub fn rotations(&self) -> Vec<Matrix3<f32>> {
         let mut rotations = vec![Matrix3::identity(); self.n_pieces];
         for chunk in &self.chunks {
-            for (lanes, rest) in chunk.pieces.iter().zip(&chunk.rest) {
+            for (lanes, rest) in chunk.pieces.iter().zip(chunk.batches.rest()) {
                 for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
                     rotations[p as usize] = Matrix3::from_fn(|i, j| rest.rotation[3 * i + j].0[lane]);
                 }
@@ -169,6 +176,29 @@ impl LinearOperator for Elastic {
 }
 
 impl Chunk {
+    fn new(
+        region: usize,
+        members: &[u32],
+        mesh: &TetMesh,
+        pieces: &[Piece],
+        rotations: &[Matrix3<f32>],
+    ) -> Self {
+        let plan = plan_chunk(members, pieces);
+        let rest = plan.pieces.iter().map(|lanes| rest_batch(lanes, mesh, pieces, rotations)).collect();
+        let n = plan.copies.len() + 1;
+        Self {
+            region,
+            batches: Batches::new(&plan.nodes, rest, n),
+            pieces: plan.pieces,
+            copies: plan.copies,
+            positions: vec![[0.0; 4]; n],
+            x: vec![[0.0; 4]; n],
+            y: vec![[0.0; 4]; n],
+            blocks: vec![[0.0; 8]; n],
+            inverted: 0,
+        }
+    }
+
     fn update(&mut self, simd: Simd, c: &Coefficients, positions: &[Vector3<f64>]) {
         for (local, &copy) in self.positions.iter_mut().zip(&self.copies) {
             let x = &positions[copy as usize];
@@ -177,15 +207,29 @@ impl Chunk {
         self.y.fill([0.0; 4]);
         self.blocks.fill([0.0; 8]);
         let mut locals = Locals { x: &self.positions, f: &mut self.y, blocks: &mut self.blocks };
-        self.inverted = kernel::update(simd, c, &mut self.rest, &mut self.live, &mut locals);
+        self.inverted = self.batches.update(simd, c, &mut locals);
     }
 }
 
 #[inline(always)]
 fn add(sum: &mut Padded, part: &Padded) {
-    for i in 0..4 {
-        sum[i] += part[i];
+    *sum = std::array::from_fn(|i| sum[i] + part[i]);
+}
+
+/// Rotation of every present piece: its own if it existed before, else that of the first piece its
+/// element had before, else none.
+fn inherited(known: &[Matrix3<f32>], before: &[Piece], pieces: &[Piece]) -> Vec<Matrix3<f32>> {
+    let mut first = BTreeMap::new();
+    for piece in pieces.iter().skip(before.len()) {
+        first.insert(piece.element, Matrix3::identity());
     }
+    for (piece, R) in before.iter().zip(known).rev() {
+        if let Some(first) = first.get_mut(&piece.element) {
+            *first = *R;
+        }
+    }
+    let new = |piece: &Piece| first.get(&piece.element).copied().unwrap_or_else(Matrix3::identity);
+    known.iter().copied().take(before.len()).chain(pieces.iter().skip(before.len()).map(new)).collect()
 }
 
 fn coefficients(with: &ElasticUpdate) -> Coefficients {

@@ -1,5 +1,5 @@
-//! The two loops over pieces that a step spends its time in: [`update`] once, [`apply`] once per
-//! solver iteration.
+//! The two loops over pieces that a step spends its time in: [`Batches::update`] once,
+//! [`Batches::apply`] once per solver iteration.
 //!
 //! Because the law is isotropic, R K Rᵀ applied to a displacement equals: rotate the *gradients*
 //! once per step, g′_a = R g_a; then H = Σ du_a ⊗ g′_a, σ = 2μ sym H + λ tr(H) I, f_a = w V σ g′_a.
@@ -12,21 +12,21 @@ use nalgebra::Matrix3;
 use super::Padded;
 use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
 
-/// What [`apply`] streams per batch of eight pieces.
+/// What an application streams per batch of eight pieces.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct Batch {
+struct Batch {
     /// Rotated gradients g′_1, g′_2, g′_3 [1/m]; g′_0 = −(g′_1 + g′_2 + g′_3).
-    pub g: [[Lanes; 3]; 3],
+    g: [[Lanes; 3]; 3],
     /// 2 μ w V s, with s the factor of K̂ in the operator.
-    pub two_mu: Lanes,
+    two_mu: Lanes,
     /// λ w V s.
-    pub lambda: Lanes,
+    lambda: Lanes,
     /// Local numbers of the four copies.
-    pub nodes: [[u16; LANES]; 4],
+    nodes: [[u16; LANES]; 4],
 }
 
-/// What only [`update`] needs per batch.
+/// What only an update needs per batch.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct RestBatch {
@@ -64,46 +64,67 @@ pub struct Locals<'a> {
     pub blocks: &'a mut [Block6],
 }
 
-/// y += s K̂ x over `batches`. `x` and `y` have one entry per local number and the waste bin.
-pub fn apply(simd: Simd, batches: &[Batch], x: &[Padded], y: &mut [Padded]) {
-    assert_eq!(x.len(), y.len());
-    match simd {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
-        Simd::Avx2 => unsafe { avx2::apply(batches, x, y) },
-        _ => apply_with::<Lanes>(batches, x, y),
-    }
+/// The batches of one chunk. Their local numbers are checked once, here.
+#[derive(Clone, Debug)]
+pub struct Batches {
+    live: Vec<Batch>,
+    rest: Vec<RestBatch>,
+    /// Length of the local vectors, the waste bin included.
+    n_locals: usize,
 }
 
-/// Rotations, internal forces, rotated gradients and diagonal blocks at the positions in `locals`.
-///
-/// Returns the number of pieces with det F ≤ 0.
-pub fn update(
-    simd: Simd,
-    c: &Coefficients,
-    rest: &mut [RestBatch],
-    live: &mut [Batch],
-    locals: &mut Locals<'_>,
-) -> usize {
-    assert_eq!(rest.len(), live.len());
-    assert!(locals.x.len() == locals.f.len() && locals.f.len() == locals.blocks.len());
-    match simd {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
-        Simd::Avx2 => unsafe { avx2::update(c, rest, live, locals) },
-        _ => update_with::<Lanes>(c, rest, live, locals),
+impl Batches {
+    /// Batches with the local numbers `nodes`, all below `n_locals`, and their rest states.
+    pub fn new(nodes: &[[[u16; LANES]; 4]], rest: Vec<RestBatch>, n_locals: usize) -> Self {
+        assert_eq!(nodes.len(), rest.len());
+        assert!(nodes.iter().flatten().flatten().all(|&id| (id as usize) < n_locals));
+        let zero = Lanes::default();
+        let live = nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], two_mu: zero, lambda: zero, nodes });
+        Self { live: live.collect(), rest, n_locals }
+    }
+
+    /// Rest states and rotations.
+    pub fn rest(&self) -> &[RestBatch] {
+        &self.rest
+    }
+
+    /// y += s K̂ x. `x` and `y` have one entry per local number and the waste bin.
+    pub fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
+        assert!(x.len() == self.n_locals && y.len() == self.n_locals);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
+            Simd::Avx2 => unsafe { avx2::apply(&self.live, x, y) },
+            _ => apply_with::<Lanes>(&self.live, x, y),
+        }
+    }
+
+    /// Rotations, internal forces, rotated gradients and diagonal blocks at the positions in
+    /// `locals`. Returns the number of pieces with det F ≤ 0.
+    pub fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
+        let n = self.n_locals;
+        assert!(locals.x.len() == n && locals.f.len() == n && locals.blocks.len() == n);
+        let (rest, live) = (&mut self.rest[..], &mut self.live[..]);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
+            Simd::Avx2 => unsafe { avx2::update(c, rest, live, locals) },
+            _ => update_with::<Lanes>(c, rest, live, locals),
+        }
     }
 }
 
 #[inline(always)]
 fn gather<V: Vector8>(x: &[Padded], ids: &[u16; LANES]) -> [V; 3] {
-    V::transpose(std::array::from_fn(|lane| &x[ids[lane] as usize]))
+    // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+    V::transpose(std::array::from_fn(|lane| unsafe { x.get_unchecked(ids[lane] as usize) }))
 }
 
 #[inline(always)]
 fn scatter<V: Vector8>(y: &mut [Padded], ids: &[u16; LANES], f: [V; 3]) {
     for (row, &id) in V::transpose_back(f).iter().zip(ids) {
-        let y = &mut y[id as usize];
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        let y = unsafe { y.get_unchecked_mut(id as usize) };
         for i in 0..4 {
             y[i] += row[i];
         }
@@ -204,7 +225,8 @@ fn update_with<V: Vector8>(
 #[inline(always)]
 fn edge<V: Vector8>(x: &[[f64; 4]], from: &[u16; LANES], to: &[u16; LANES]) -> [V; 3] {
     let rows: [Padded; LANES] = std::array::from_fn(|lane| {
-        let (p, q) = (&x[from[lane] as usize], &x[to[lane] as usize]);
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        let (p, q) = unsafe { (x.get_unchecked(from[lane] as usize), x.get_unchecked(to[lane] as usize)) };
         std::array::from_fn(|i| (q[i] - p[i]) as f32)
     });
     V::transpose(std::array::from_fn(|lane| &rows[lane]))

@@ -8,7 +8,7 @@ mod system;
 
 pub use elastic::{Elastic, ElasticUpdate};
 pub use kernel::Block6;
-pub use preconditioner::BlockJacobi;
+pub use preconditioner::{BlockJacobi, Inverse3};
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 
 use crate::team::Team;

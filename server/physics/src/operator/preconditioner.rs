@@ -9,14 +9,28 @@ use crate::team::{Team, blocks};
 /// a stiffness that are small alike.
 #[derive(Clone, Debug, Default)]
 pub struct BlockJacobi {
-    /// Columns of the inverse blocks.
-    inverse: Vec<[Padded; 3]>,
+    inverse: Vec<Inverse3>,
+}
+
+/// The inverse of one 3×3 block, by columns.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inverse3(pub [Padded; 3]);
+
+impl Inverse3 {
+    /// M⁻¹ r.
+    #[inline(always)]
+    pub fn times(&self, r: &Padded) -> Padded {
+        // Written as three scaled columns, which is how a vector unit wants it.
+        let column = |j: usize| -> Padded { self.0[j].map(|m| m * r[j]) };
+        let (a, b, c) = (column(0), column(1), column(2));
+        std::array::from_fn(|i| a[i] + b[i] + c[i])
+    }
 }
 
 impl BlockJacobi {
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
-        self.inverse.resize(n, [[0.0; 4]; 3]);
+        self.inverse.resize(n, Inverse3::default());
     }
 
     /// Inverts `diagonal`; in the fixed directions of `fixed` the inverse is 0.
@@ -31,51 +45,49 @@ impl BlockJacobi {
         }
     }
 
-    /// z = M⁻¹ r for one copy.
+    /// Inverses of the copies of one block of the vector loops.
     #[inline(always)]
-    pub fn solve(&self, copy: usize, r: &Padded) -> Padded {
-        let [a, b, c] = &self.inverse[copy];
-        let mut z = [0.0; 4];
-        for i in 0..4 {
-            z[i] = a[i] * r[0] + b[i] * r[1] + c[i] * r[2];
-        }
-        z
+    pub fn block(&self, block: usize) -> &[Inverse3] {
+        &self.inverse[block * BLOCK..((block + 1) * BLOCK).min(self.inverse.len())]
     }
 }
 
 /// Inverse of a symmetric block by cofactors, scaled by its trace so that pieces of any size stay
 /// within single precision; a copy without mass and stiffness does not move.
-fn invert(block: &Block6, fixed: [bool; 3]) -> [Padded; 3] {
-    let [xx, xy, xz, _, yy, yz, zz, _] = *block;
-    let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| row.map(f64::from));
-    let trace = a[0][0] + a[1][1] + a[2][2];
+#[inline]
+fn invert(block: &Block6, fixed: [bool; 3]) -> Inverse3 {
+    let [xx, xy, xz, _, yy, yz, zz, _] = block.map(f64::from);
+    let trace = xx + yy + zz;
     if !(trace > 0.0 && trace.is_finite()) {
-        return [[0.0; 4]; 3];
+        return Inverse3::default();
     }
-    for i in 0..3 {
-        for j in 0..3 {
-            a[i][j] /= trace;
-            if fixed[i] || fixed[j] {
-                a[i][j] = f64::from(u8::from(i == j));
-            }
-        }
+    let s = 1.0 / trace;
+    let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [xx, xy, xz, yy, yz, zz].map(|v| v * s);
+    if fixed[0] {
+        (xx, xy, xz) = (1.0, 0.0, 0.0);
     }
-    let minor = |i: usize, j: usize| {
-        let (p, q, r, s) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
-        a[p][r] * a[q][s] - a[p][s] * a[q][r]
+    if fixed[1] {
+        (yy, xy, yz) = (1.0, 0.0, 0.0);
+    }
+    if fixed[2] {
+        (zz, xz, yz) = (1.0, 0.0, 0.0);
+    }
+    // Cofactors; a block that lost its definiteness to rounding falls back to its trace.
+    let (cxx, cxy, cxz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
+    let (cyy, cyz, czz) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
+    let det = xx * cxx + xy * cxy + xz * cxz;
+    let mut columns = if det > 1e-12 {
+        let t = s / det;
+        let [cxx, cxy, cxz, cyy, cyz, czz] = [cxx, cxy, cxz, cyy, cyz, czz].map(|c| (c * t) as f32);
+        [[cxx, cxy, cxz, 0.0], [cxy, cyy, cyz, 0.0], [cxz, cyz, czz, 0.0]]
+    } else {
+        let d = (3.0 * s) as f32;
+        [[d, 0.0, 0.0, 0.0], [0.0, d, 0.0, 0.0], [0.0, 0.0, d, 0.0]]
     };
-    let det = a[0][0] * minor(0, 0) + a[0][1] * minor(0, 1) + a[0][2] * minor(0, 2);
-    let mut columns = [[0.0; 4]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            if !(fixed[i] || fixed[j]) {
-                // A block that lost its definiteness to rounding falls back to its trace.
-                let inverse = if det > 1e-12 { minor(i, j) / det } else { 3.0 * f64::from(u8::from(i == j)) };
-                columns[j][i] = (inverse / trace) as f32;
-            }
-        }
+    for axis in (0..3).filter(|&axis| fixed[axis]) {
+        columns[axis] = [0.0; 4];
     }
-    columns
+    Inverse3(columns)
 }
 
 #[cfg(test)]
@@ -87,11 +99,11 @@ mod tests {
     fn inverts_from_planet_to_sliver_and_respects_fixed_axes() {
         for size in [1e20_f32, 1.0, 1e-25] {
             let block = [4.0, 1.0, 0.5, 0.0, 3.0, -0.2, 5.0, 0.0].map(|v| v * size);
-            let columns = invert(&block, [false; 3]);
+            let Inverse3(columns) = invert(&block, [false; 3]);
             let A = Matrix3::new(4.0, 1.0, 0.5, 1.0, 3.0, -0.2, 0.5, -0.2, 5.0);
             let B = Matrix3::from_fn(|i, j| columns[j][i] * size);
             assert!((A * B - Matrix3::identity()).norm() < 1e-6);
-            let columns = invert(&block, [true, false, false]);
+            let Inverse3(columns) = invert(&block, [true, false, false]);
             assert_eq!(columns[0], [0.0; 4]);
             let det = 3.0 * 5.0 - 0.2 * 0.2;
             assert!((columns[1][1] * size - 5.0 / det).abs() < 1e-6);
@@ -102,7 +114,7 @@ mod tests {
     #[test]
     fn nothing_and_nonsense_stay_put() {
         for block in [[0.0; 8], [f32::NAN; 8], [f32::INFINITY; 8], [-1.0; 8]] {
-            assert_eq!(invert(&block, [false; 3]), [[0.0; 4]; 3]);
+            assert_eq!(invert(&block, [false; 3]), Inverse3::default());
         }
     }
 }

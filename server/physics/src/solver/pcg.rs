@@ -76,6 +76,7 @@ impl Pcg {
     ) -> PcgReport {
         let target = settings.tolerance * reference;
         let mut report = PcgReport::default();
+        self.p.fill([0.0; 4]);
         let mut rz = self.precondition(team, M);
         let mut beta = 0.0;
         loop {
@@ -111,12 +112,14 @@ impl Pcg {
         }
     }
 
-    /// √(vᵀM⁻¹v), the norm that `reference` is to be given in. Overwrites a scratch vector.
+    /// √(vᵀM⁻¹v), the norm that `reference` is to be given in.
     pub fn norm(&mut self, team: &mut Team, M: &BlockJacobi, v: &[Padded]) -> f64 {
         team.for_blocks(blocks(&mut self.partial, 1), |block, partial| {
-            let first = block * BLOCK;
-            let v = &v[first..(first + BLOCK).min(v.len())];
-            partial[0] = v.iter().enumerate().map(|(i, v)| dot(v, &M.solve(first + i, v))).sum();
+            let mut sum = Sum::default();
+            for (v, M) in block_of(v, block).iter().zip(M.block(block)) {
+                sum.add(v, &M.times(v));
+            }
+            partial[0] = sum.total();
         });
         self.partial.iter().sum::<f64>().max(0.0).sqrt()
     }
@@ -125,14 +128,12 @@ impl Pcg {
         let r = &self.r;
         let state = (blocks(&mut self.z, BLOCK), blocks(&mut self.partial, 1));
         team.for_blocks(state, |block, (z, partial)| {
-            let first = block * BLOCK;
-            let mut sum = 0.0;
-            for (i, z) in z.iter_mut().enumerate() {
-                let r = &r[first + i];
-                *z = M.solve(first + i, r);
-                sum += dot(r, z);
+            let mut sum = Sum::default();
+            for ((z, r), M) in z.iter_mut().zip(block_of(r, block)).zip(M.block(block)) {
+                *z = M.times(r);
+                sum.add(r, z);
             }
-            partial[0] = sum;
+            partial[0] = sum.total();
         });
         self.partial.iter().sum()
     }
@@ -140,11 +141,8 @@ impl Pcg {
     fn advance_direction(&mut self, team: &mut Team, beta: f64) {
         let (z, beta) = (&self.z, beta as f32);
         team.for_blocks(blocks(&mut self.p, BLOCK), |block, p| {
-            for (p, z) in p.iter_mut().zip(&z[block * BLOCK..]) {
-                for i in 0..4 {
-                    // Not β·p alone when β = 0: p may hold anything from the last solve.
-                    p[i] = if beta == 0.0 { z[i] } else { z[i] + beta * p[i] };
-                }
+            for (p, z) in p.iter_mut().zip(block_of(z, block)) {
+                *p = std::array::from_fn(|i| z[i] + beta * p[i]);
             }
         });
     }
@@ -152,8 +150,11 @@ impl Pcg {
     fn dot_pq(&mut self, team: &mut Team) -> f64 {
         let (p, q) = (&self.p, &self.q);
         team.for_blocks(blocks(&mut self.partial, 1), |block, partial| {
-            let range = block * BLOCK..((block + 1) * BLOCK).min(p.len());
-            partial[0] = p[range.clone()].iter().zip(&q[range]).map(|(p, q)| dot(p, q)).sum();
+            let mut sum = Sum::default();
+            for (p, q) in block_of(p, block).iter().zip(block_of(q, block)) {
+                sum.add(p, q);
+            }
+            partial[0] = sum.total();
         });
         self.partial.iter().sum()
     }
@@ -167,28 +168,40 @@ impl Pcg {
             blocks(&mut self.partial, 1),
         );
         team.for_blocks(state, |block, (x, r, z, partial)| {
-            let first = block * BLOCK;
-            let mut sum = 0.0;
-            for i in 0..x.len() {
-                let (p, q) = (&p[first + i], &q[first + i]);
-                for k in 0..4 {
-                    x[i][k] += alpha * p[k];
-                    r[i][k] -= alpha * q[k];
-                }
-                z[i] = M.solve(first + i, &r[i]);
-                sum += dot(&r[i], &z[i]);
+            let mut sum = Sum::default();
+            let known = block_of(p, block).iter().zip(block_of(q, block)).zip(M.block(block));
+            for (((x, r), z), ((p, q), M)) in x.iter_mut().zip(r).zip(z).zip(known) {
+                *x = std::array::from_fn(|k| x[k] + alpha * p[k]);
+                let next: Padded = std::array::from_fn(|k| r[k] - alpha * q[k]);
+                let preconditioned = M.times(&next);
+                sum.add(&next, &preconditioned);
+                (*r, *z) = (next, preconditioned);
             }
-            partial[0] = sum;
+            partial[0] = sum.total();
         });
         self.partial.iter().sum()
     }
 }
 
-/// xᵀy in double precision.
+/// Block number `block` of a vector.
 #[inline(always)]
-fn dot(x: &Padded, y: &Padded) -> f64 {
-    (f64::from(x[0]) * f64::from(y[0]) + f64::from(x[1]) * f64::from(y[1]))
-        + f64::from(x[2]) * f64::from(y[2])
+fn block_of(v: &[Padded], block: usize) -> &[Padded] {
+    &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]
+}
+
+/// A scalar product in the making: single-precision products, double-precision sums.
+#[derive(Clone, Copy, Default)]
+struct Sum([f64; 4]);
+
+impl Sum {
+    #[inline(always)]
+    fn add(&mut self, x: &Padded, y: &Padded) {
+        self.0 = std::array::from_fn(|k| self.0[k] + f64::from(x[k] * y[k]));
+    }
+
+    fn total(&self) -> f64 {
+        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
+    }
 }
 
 #[cfg(test)]
