@@ -73,6 +73,28 @@ fn an_incision_stays_connected_while_the_tissue_moves() {
     assert_eq!(body.cut.components().len(), 2, "{:?}", body.cut.components().volume);
 }
 
+/// The tissue waves through and through, at up to 1 m/s, not as a rigid body.
+#[test]
+fn an_incision_stays_connected_while_the_tissue_waves() {
+    for (amplitude, cells) in [(0.002, 6), (0.005, 6), (0.01, 5), (0.01, 9)] {
+        let mut body = Body::new([0.1; 3], [cells; 3], BoxPattern::Tet6);
+        let rest = body.cut.mesh().nodes.clone();
+        for k in 0..=150 {
+            let time = f64::from(k) * 1e-3;
+            for (x, &node) in body.x.iter_mut().zip(body.cut.copy_node()) {
+                let p = rest[node as usize];
+                let phase = 100.0 * time + 50.0 * p.y + 20.0 * p.x;
+                *x = p + v(0.3 * phase.cos(), 0.5 * phase.cos(), phase.sin()) * amplitude;
+            }
+            let s = -0.02 + 0.14 * f64::from(k) / 150.0;
+            body.sweep(&[[v(s, -0.05, 0.047), v(s, 0.15, 0.052)]], 1);
+        }
+        check::everything(&body.cut);
+        let parts = body.cut.components().volume;
+        assert_eq!(parts.len(), 2, "amplitude {amplitude}: {parts:?}");
+    }
+}
+
 /// A closed curve cuts a plug out of the body.
 #[test]
 fn a_closed_curve_cuts_a_plug_out() {

@@ -23,7 +23,8 @@ fn twenty_random_planes_through_one_ring() {
 /// while the copies move at random; all checks after every `check_every` sweeps.
 fn cut_at_random(seed: u64, sweeps: u32, check_every: u32) {
     let mut random = Random(1000 + seed);
-    let pattern = if seed % 2 == 0 { BoxPattern::Tet6 } else { BoxPattern::Tet5 { parity: seed % 4 == 1 } };
+    let pattern =
+        if seed.is_multiple_of(2) { BoxPattern::Tet6 } else { BoxPattern::Tet5 { parity: seed % 4 == 1 } };
     let cells = 2 + seed as usize % 3;
     let mut body = Body::new([1.0; 3], [cells; 3], pattern);
     let mut refused = 0;
