@@ -9,8 +9,11 @@ use nalgebra::{Matrix3, Vector3};
 use super::blade::BladeSweep;
 use super::sweep_triangle::SweepTriangle;
 
-/// Points the last blade position is remembered by, less one. Between them the front is straight.
-const PARTS: usize = 8;
+/// Stretches a blade position in the air is remembered by.
+const AIR_PARTS: usize = 16;
+
+/// Most points a blade position is remembered by; a finer mesh is sampled.
+const MAX_POINTS: usize = 256;
 
 /// Relative length by which a sweep reaches beyond its border and back over the last one.
 ///
@@ -21,30 +24,31 @@ const OVERREACH: f64 = 1e-6;
 /// One remembered point.
 #[derive(Clone, Copy, Debug)]
 struct FrontPoint {
-    /// Where the blade was [m].
-    world: Vector3<f64>,
-    /// The material around it.
-    anchor: Option<Anchor>,
+    /// Where along the blade, 0 at the tip, 1 at the heel.
+    s: f64,
+    /// The material that carries it.
+    anchor: Anchor,
 }
 
-/// A material point, possibly outside of its tet: Σ weights · x\[copies\].
+/// A material point: Σ weights · x\[copies\].
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
     copies: [u32; 4],
     weights: [f64; 4],
+    /// Where it was when remembered [m].
     at: Vector3<f64>,
 }
 
 impl Anchor {
+    fn new(copies: [u32; 4], weights: [f64; 4], x: &[Vector3<f64>]) -> Option<Self> {
+        let mut anchor = Self { copies, weights, at: Vector3::zeros() };
+        anchor.at = anchor.position(x);
+        anchor.at.iter().all(|c| c.is_finite()).then_some(anchor)
+    }
+
     fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
         self.copies.iter().zip(&self.weights).map(|(&c, &w)| x[c as usize] * w).sum()
     }
-}
-
-/// The remembered front of one incision.
-#[derive(Clone, Debug, Default)]
-pub struct Front {
-    points: Vec<FrontPoint>,
 }
 
 /// The body a blade position is remembered in.
@@ -57,49 +61,92 @@ pub struct Surroundings<'a> {
     pub x: &'a [Vector3<f64>],
 }
 
+/// The remembered front of one incision.
+#[derive(Clone, Debug)]
+pub struct Front {
+    segment: [Vector3<f64>; 2],
+    points: Vec<FrontPoint>,
+}
+
 impl Front {
-    /// Remembers the blade `segment` by the material it passes through. Parts of it in the air go
-    /// with the nearest material, so that tissue which moves onto the blade is cut from its skin on.
+    /// Remembers the blade `segment` by the material it passes through: by the points where it enters
+    /// and leaves a tet, so that between them the front stays straight however the body deforms. Parts
+    /// of it in the air go with the nearest material, so that tissue which moves onto the blade is cut
+    /// from its skin on.
     pub fn remember(segment: &[Vector3<f64>; 2], body: &Surroundings) -> Self {
-        let worlds: Vec<Vector3<f64>> = (0..=PARTS).map(|k| along(segment, k)).collect();
-        let mut anchors: Vec<Option<Anchor>> = worlds.iter().map(|p| anchor(p, body.near, body.x)).collect();
-        if anchors.iter().all(Option::is_none) {
-            anchors = nearest_copies(segment, body.x)
-                .iter()
-                .zip(&worlds)
-                .map(|(copy, p)| nearest_anchor(p, &(body.around)((*copy)?), body.x))
-                .collect();
+        let passages: Vec<[FrontPoint; 2]> =
+            body.near.iter().filter_map(|&copies| passage(segment, copies, body.x)).collect();
+        let in_tissue = |s: f64| passages.iter().any(|[enter, leave]| enter.s <= s && s <= leave.s);
+        let in_air: Vec<usize> = (0..=AIR_PARTS).filter(|&k| !in_tissue(air_place(k))).collect();
+        let mut points = passages.concat();
+        if !in_air.is_empty() {
+            let nearest = nearest_copies(segment, body.x);
+            points.extend(in_air.iter().filter_map(|&k| air_point(segment, k, nearest[k]?, body)));
         }
-        let known: Vec<usize> = (0..=PARTS).filter(|&k| anchors[k].is_some()).collect();
-        let of = |k: usize| anchors[*known.iter().min_by_key(|n| n.abs_diff(k))?];
-        let points = worlds.iter().enumerate().map(|(k, &world)| FrontPoint { world, anchor: of(k) });
-        Self { points: points.collect() }
+        points.sort_by(|p, q| p.s.total_cmp(&q.s));
+        points.dedup_by(|q, p| q.s - p.s < 1e-9);
+        let stride = points.len().div_ceil(MAX_POINTS).max(1);
+        let mut points: Vec<FrontPoint> = points.into_iter().step_by(stride).collect();
+        if let (Some(&first), Some(&last)) = (points.first(), points.last()) {
+            if first.s > 0.0 {
+                points.insert(0, FrontPoint { s: 0.0, ..first });
+            }
+            if last.s < 1.0 {
+                points.push(FrontPoint { s: 1.0, ..last });
+            }
+        }
+        Self { segment: *segment, points }
     }
 
-    /// The front where the material is now, and whether it has moved at all.
-    fn now(&self, x: &[Vector3<f64>]) -> (Vec<Vector3<f64>>, bool) {
-        let mut moved = false;
-        let points = self.points.iter().map(|p| {
-            let shift = p.anchor.map_or(Vector3::zeros(), |a| a.position(x) - a.at);
-            moved |= shift != Vector3::zeros();
-            p.world + shift
-        });
-        (points.collect(), moved)
+    /// The front where the material is now: its two ends if nothing has moved.
+    fn now(&self, x: &[Vector3<f64>]) -> Row {
+        let shifts: Vec<Vector3<f64>> =
+            self.points.iter().map(|p| p.anchor.position(x) - p.anchor.at).collect();
+        if shifts.iter().all(|shift| *shift == Vector3::zeros()) {
+            return Row::straight(&self.segment);
+        }
+        Row {
+            s: self.points.iter().map(|p| p.s).collect(),
+            points: self.points.iter().zip(shifts).map(|(p, d)| at(&self.segment, p.s) + d).collect(),
+        }
+    }
+}
+
+/// A blade position as a polyline: points and where along the blade they are.
+#[derive(Clone, Debug, PartialEq)]
+struct Row {
+    s: Vec<f64>,
+    points: Vec<Vector3<f64>>,
+}
+
+impl Row {
+    fn straight(segment: &[Vector3<f64>; 2]) -> Self {
+        Self { s: vec![0.0, 1.0], points: segment.to_vec() }
+    }
+
+    fn ends(&self) -> [Vector3<f64>; 2] {
+        [self.points[0], self.points[self.points.len() - 1]]
+    }
+
+    /// Points of this row at the places of another one; both are straight or of the same places.
+    fn at_places_of(&self, other: &Row) -> Vec<Vector3<f64>> {
+        if self.s == other.s {
+            return self.points.clone();
+        }
+        other.s.iter().map(|&s| at(&self.ends(), s)).collect()
     }
 }
 
 /// Triangles of a sweep that continues `front`, with the overreach applied.
 pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f64>]) -> Vec<SweepTriangle> {
-    let mut rows: Vec<Vec<Vector3<f64>>> = Vec::with_capacity(blade.segments.len() + 1);
-    if let Some((points, moved)) = front.filter(|f| !f.points.is_empty()).map(|f| f.now(x)) {
-        rows.push(if moved { points } else { vec![points[0], points[PARTS]] });
-    }
-    rows.extend(blade.segments.iter().map(|s| s.to_vec()));
+    let mut rows: Vec<Row> = Vec::with_capacity(blade.segments.len() + 1);
+    rows.extend(front.map(|f| f.now(x)));
+    rows.extend(blade.segments.iter().map(Row::straight));
     rows.dedup();
     overreach(&mut rows);
-    let mut triangles = Vec::with_capacity(2 * rows.len() + 2 * PARTS);
+    let mut triangles = Vec::with_capacity(2 * rows.iter().map(|r| r.s.len()).sum::<usize>());
     for pair in rows.windows(2) {
-        let (from, to) = (&pair[0], resampled(&pair[1], pair[0].len()));
+        let (from, to) = (&pair[0].points, pair[1].at_places_of(&pair[0]));
         for k in 1..from.len() {
             triangles.extend(SweepTriangle::new(from[k - 1], from[k], to[k]));
             triangles.extend(SweepTriangle::new(from[k - 1], to[k], to[k - 1]));
@@ -109,79 +156,83 @@ pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f
 }
 
 /// Widens every row at both ends, moves the first row back and the last one on.
-fn overreach(rows: &mut [Vec<Vector3<f64>>]) {
-    let reach = OVERREACH * rows.iter().map(|r| (r[r.len() - 1] - r[0]).norm()).fold(0.0, f64::max);
+fn overreach(rows: &mut [Row]) {
+    let length = |r: &Row| (r.ends()[1] - r.ends()[0]).norm();
+    let reach = OVERREACH * rows.iter().map(length).fold(0.0, f64::max);
     let n = rows.len();
     if n < 2 {
         return;
     }
-    let push = |row: &[Vector3<f64>], away: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
-        let away = resampled(away, row.len());
-        row.iter().zip(&away).map(|(p, q)| p + unit(p - q) * reach).collect()
+    let push = |row: &Row, away: &Row| -> Vec<Vector3<f64>> {
+        let away = away.at_places_of(row);
+        row.points.iter().zip(&away).map(|(p, q)| p + unit(p - q) * reach).collect()
     };
     let first = push(&rows[0], &rows[1]);
     let last = push(&rows[n - 1], &rows[n - 2]);
-    rows[0] = first;
-    rows[n - 1] = last;
+    rows[0].points = first;
+    rows[n - 1].points = last;
     for row in rows {
-        let end = row.len() - 1;
-        let (tip, heel) = (unit(row[0] - row[1]) * reach, unit(row[end] - row[end - 1]) * reach);
-        row[0] += tip;
-        row[end] += heel;
+        let p = &mut row.points;
+        let end = p.len() - 1;
+        let (tip, heel) = (unit(p[0] - p[1]) * reach, unit(p[end] - p[end - 1]) * reach);
+        p[0] += tip;
+        p[end] += heel;
     }
 }
 
-/// The row with `n` points: itself, or its straight line from end to end.
-fn resampled(row: &[Vector3<f64>], n: usize) -> Vec<Vector3<f64>> {
-    if row.len() == n {
-        return row.to_vec();
-    }
-    let (tip, heel) = (row[0], row[row.len() - 1]);
-    (0..n).map(|k| tip + (heel - tip) * (k as f64 / (n - 1) as f64)).collect()
-}
-
-fn along(segment: &[Vector3<f64>; 2], k: usize) -> Vector3<f64> {
-    let [tip, heel] = segment;
-    if k == PARTS { *heel } else { tip + (heel - tip) * (k as f64 / PARTS as f64) }
+fn at([tip, heel]: &[Vector3<f64>; 2], s: f64) -> Vector3<f64> {
+    if s == 1.0 { *heel } else { tip + (heel - tip) * s }
 }
 
 fn unit(v: Vector3<f64>) -> Vector3<f64> {
     v.try_normalize(0.0).unwrap_or_default()
 }
 
-/// The tet that holds the point, if any; the best one where several touch it.
-fn anchor(point: &Vector3<f64>, tets: &[[u32; 4]], x: &[Vector3<f64>]) -> Option<Anchor> {
-    let mut best: Option<(f64, Anchor)> = None;
-    for copies in tets {
-        let corners = copies.map(|c| x[c as usize]);
-        let inside = (0..3).all(|k| {
-            let (low, high) = corners
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(c[k]), h.max(c[k])));
-            low <= point[k] && point[k] <= high
-        });
-        if !inside {
-            continue;
-        }
-        let Some(a) = bind(point, copies, x) else { continue };
-        let least = a.weights.iter().copied().fold(f64::INFINITY, f64::min);
-        if least >= -1e-9 && best.as_ref().is_none_or(|b| least > b.0) {
-            best = Some((least, a));
+/// Where the segment enters and leaves a tet, if it passes through it.
+fn passage(segment: &[Vector3<f64>; 2], copies: [u32; 4], x: &[Vector3<f64>]) -> Option<[FrontPoint; 2]> {
+    let [from, to] = [barycentric(&segment[0], &copies, x)?, barycentric(&segment[1], &copies, x)?];
+    let (mut enter, mut leave) = (0.0f64, 1.0f64);
+    for (a, b) in from.iter().zip(&to) {
+        let zero = a / (a - b);
+        if *a < 0.0 && *b < 0.0 {
+            return None;
+        } else if *a < 0.0 {
+            enter = enter.max(zero);
+        } else if *b < 0.0 {
+            leave = leave.min(zero);
         }
     }
-    best.map(|b| b.1)
+    if enter.partial_cmp(&leave) != Some(std::cmp::Ordering::Less) {
+        return None;
+    }
+    let point = |s: f64| {
+        let weights = std::array::from_fn(|k| from[k] + (to[k] - from[k]) * s);
+        Some(FrontPoint { s, anchor: Anchor::new(copies, weights, x)? })
+    };
+    Some([point(enter)?, point(leave)?])
 }
 
-/// For each remembered point the copy closest to the blade in that stretch, if there is one.
-fn nearest_copies([tip, heel]: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> [Option<u32>; PARTS + 1] {
+/// Where along the blade the end of a stretch in the air is.
+fn air_place(k: usize) -> f64 {
+    k as f64 / AIR_PARTS as f64
+}
+
+/// A point in the air goes with the material closest to it, around the closest copy.
+fn air_point(segment: &[Vector3<f64>; 2], k: usize, nearest: u32, body: &Surroundings) -> Option<FrontPoint> {
+    let s = air_place(k);
+    Some(FrontPoint { s, anchor: nearest_anchor(&at(segment, s), &(body.around)(nearest), body.x)? })
+}
+
+/// For each end of a stretch the copy closest to the blade there, if there is one.
+fn nearest_copies([tip, heel]: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> [Option<u32>; AIR_PARTS + 1] {
     let axis = heel - tip;
     let length_squared = axis.norm_squared();
-    let mut best = [(f64::INFINITY, None); PARTS + 1];
+    let mut best = [(f64::INFINITY, None); AIR_PARTS + 1];
     for (copy, p) in (0u32..).zip(x) {
         let s =
             if length_squared > 0.0 { ((p - tip).dot(&axis) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
         let distance_squared = (p - (tip + axis * s)).norm_squared();
-        let slot = &mut best[(s * PARTS as f64).round() as usize];
+        let slot = &mut best[(s * AIR_PARTS as f64).round() as usize];
         if distance_squared < slot.0 {
             *slot = (distance_squared, Some(copy));
         }
@@ -192,25 +243,22 @@ fn nearest_copies([tip, heel]: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> [Optio
 /// The material point of these tets closest to a point outside of them.
 fn nearest_anchor(point: &Vector3<f64>, tets: &[[u32; 4]], x: &[Vector3<f64>]) -> Option<Anchor> {
     let mut best: Option<(f64, Anchor)> = None;
-    for copies in tets {
-        let Some(mut a) = bind(point, copies, x) else { continue };
-        a.weights = a.weights.map(|w| w.max(0.0));
-        let sum: f64 = a.weights.iter().sum();
-        a.weights = a.weights.map(|w| w / sum);
-        a.at = a.position(x);
-        let distance = (a.at - point).norm();
+    for &copies in tets {
+        let Some(weights) = barycentric(point, &copies, x) else { continue };
+        let inside = weights.map(|w| w.max(0.0));
+        let sum: f64 = inside.iter().sum();
+        let Some(anchor) = Anchor::new(copies, inside.map(|w| w / sum), x) else { continue };
+        let distance = (anchor.at - point).norm();
         if distance.is_finite() && best.as_ref().is_none_or(|b| distance < b.0) {
-            best = Some((distance, a));
+            best = Some((distance, anchor));
         }
     }
     best.map(|b| b.1)
 }
 
-/// Barycentric weights of the point in the tet, which may lie outside of it.
-fn bind(point: &Vector3<f64>, copies: &[u32; 4], x: &[Vector3<f64>]) -> Option<Anchor> {
+/// Barycentric coordinates of the point in the tet, which may lie outside of it.
+fn barycentric(point: &Vector3<f64>, copies: &[u32; 4], x: &[Vector3<f64>]) -> Option<[f64; 4]> {
     let [o, a, b, c] = copies.map(|c| x[c as usize]);
     let w = Matrix3::from_columns(&[a - o, b - o, c - o]).try_inverse()? * (point - o);
-    let mut anchor = Anchor { copies: *copies, weights: [1.0 - w.sum(), w.x, w.y, w.z], at: *point };
-    anchor.at = anchor.position(x);
-    anchor.at.iter().all(|c| c.is_finite()).then_some(anchor)
+    Some([1.0 - w.sum(), w.x, w.y, w.z])
 }
