@@ -1,1 +1,53 @@
-//! Placeholder.
+//! The scindo server.
+//!
+//! # Layout, along the way of the data
+//! * [`cli`], [`command`], [`progress`]: what the user asked for, and how it goes.
+//! * [`session`]: the two zenoh sessions, haptic and bulk.
+//! * [`convert`]: between the types of the world and the messages of the wire.
+//! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
+//! * [`exchange`]: what the threads share.
+//! * [`engine`], [`sim`]: the simulation thread.
+//! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
+//! * [`publish`], [`stats`]: the publication thread.
+//! * [`rpc`]: questions and orders.
+//! * [`server`]: starts and ends all of these.
+//!
+//! | thread | does | waits for |
+//! |---|---|---|
+//! | `sim` | orders, step, snapshots | the next step's time |
+//! | `contact` | local contact model per held tool | its period; sleeps while nobody holds a tool |
+//! | `publish` | surfaces, tools, answers, events, statistics | its period, or something to send |
+//! | `rpc` | one question after the other | the simulation, at most 1.7 s |
+//! | zenoh's own | decode, check, store in the inbox | nothing |
+
+pub mod cli;
+
+pub mod command;
+
+pub mod progress;
+
+pub mod error;
+
+pub mod session;
+
+pub mod convert;
+
+pub mod inbox;
+
+pub mod receive;
+
+pub mod exchange;
+
+pub mod engine;
+
+pub mod sim;
+
+pub mod contact;
+
+pub mod publish;
+
+pub mod stats;
+
+pub mod rpc;
+
+pub mod server;

@@ -1,1 +1,5 @@
-fn main() {}
+//! The binary `scindo`.
+
+fn main() -> std::process::ExitCode {
+    scindo::cli::main()
+}

@@ -1,0 +1,178 @@
+//! The command line.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+use scindo_proto::endpoint::DEFAULT_ENDPOINT;
+
+use crate::command;
+use crate::error::RuntimeError;
+
+/// Deforms and cuts soft bodies in real time and serves them over the network.
+///
+/// Without a command: the built-in demonstration, at http://127.0.0.1:8080.
+/// Exit codes: 0 done, 1 what was asked for failed, 2 bad input.
+#[derive(Debug, Parser)]
+#[command(name = "scindo", version, args_conflicts_with_subcommands = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    demonstration: ServeArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Simulate a scene and serve it to viewers and haptic clients.
+    Run(RunArgs),
+    /// Check a scene: what is wrong, what is odd, which effects are on, what they will cost.
+    Check(CheckArgs),
+    /// Turn a surface or volume file into tetrahedra.
+    Mesh(MeshArgs),
+}
+
+/// `scindo run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Scene file, TOML or JSON.
+    pub scene: PathBuf,
+    #[command(flatten)]
+    /// How it is served.
+    pub serve: ServeArgs,
+}
+
+/// How a scene is run and served.
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// As fast as possible instead of real time.
+    #[arg(long)]
+    pub fast: bool,
+    /// End after this many steps.
+    #[arg(long, value_name = "N", conflicts_with = "seconds")]
+    pub steps: Option<u64>,
+    /// End after this much simulated time [s].
+    #[arg(long, value_name = "T")]
+    pub seconds: Option<f64>,
+    /// Write summary.json, probes.csv and final.vtu into this directory.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Record everything into a file (not supported yet).
+    #[arg(long, value_name = "FILE.mcap")]
+    pub record: Option<PathBuf>,
+    /// First chunk of every network key; one per laboratory.
+    #[arg(long, default_value = "scindo")]
+    pub realm: String,
+    /// Session within the realm.
+    #[arg(long, default_value = "main")]
+    pub session: String,
+    /// Where clients connect, such as tcp/0.0.0.0:7447; surfaces go out one port above
+    /// [default: tcp/127.0.0.1:7447, or nothing with --connect or --zenoh].
+    #[arg(long, value_name = "ENDPOINT")]
+    pub listen: Vec<String>,
+    /// A zenoh router to connect to.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub connect: Vec<String>,
+    /// A zenoh configuration to start from: TLS, users, access control.
+    #[arg(long, value_name = "FILE.json5")]
+    pub zenoh: Option<PathBuf>,
+    /// Threads that work on a step; the result does not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub threads: u16,
+    /// Serve the browser page at this address.
+    #[arg(long, value_name = "ADDRESS")]
+    pub viewer: Option<SocketAddr>,
+    /// Override a key of the scene, such as body.liver.young_pa=5e3.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Report as JSON, one object per line.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl ServeArgs {
+    /// Endpoints to listen at.
+    pub fn listen_endpoints(&self) -> Vec<String> {
+        if self.listen.is_empty() && self.connect.is_empty() && self.zenoh.is_none() {
+            return vec![DEFAULT_ENDPOINT.to_owned()];
+        }
+        self.listen.clone()
+    }
+}
+
+/// `scindo check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Scene file, TOML or JSON.
+    #[arg(required_unless_present = "schema")]
+    pub scene: Option<PathBuf>,
+    /// Print the JSON Schema of scene files instead.
+    #[arg(long, conflicts_with = "scene")]
+    pub schema: bool,
+    /// Override a key of the scene.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `scindo mesh`.
+#[derive(Debug, Args)]
+pub struct MeshArgs {
+    /// A surface (.obj, .stl, .ply) or a volume (.msh, .vtk, .vtu).
+    pub input: PathBuf,
+    /// The tetrahedra: .vtu, .vtk or .msh.
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Lattice cells along the longest side of a surface.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..=256))]
+    pub cells: u32,
+    /// Factor from the file's length unit to metres: 0.001 for millimetres.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub scale: f64,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Parses, runs, and turns the outcome into an exit code: the one place that does.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    start_log();
+    let json = match &cli.command {
+        None => cli.demonstration.json,
+        Some(Command::Run(args)) => args.serve.json,
+        Some(Command::Check(args)) => args.json,
+        Some(Command::Mesh(args)) => args.json,
+    };
+    let outcome = match cli.command {
+        None => command::run::demonstration(&cli.demonstration),
+        Some(Command::Run(args)) => command::run::scene(&args),
+        Some(Command::Check(args)) => command::check::check(&args),
+        Some(Command::Mesh(args)) => command::mesh::mesh(&args),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => {
+            report(&error, json);
+            error.exit_code()
+        }
+    }
+}
+
+fn report(error: &RuntimeError, json: bool) {
+    if json {
+        let report = serde_json::json!({ "error": { "code": error.code(), "message": error.to_string() } });
+        println!("{report}");
+    } else {
+        eprintln!("error: {error}");
+    }
+}
+
+fn start_log() {
+    let filter = tracing_subscriber::EnvFilter::try_from_env("SCINDO_LOG")
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("error,scindo=info,scindo_world=info,scindo_view=info,scindo_client=warn"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).init();
+}

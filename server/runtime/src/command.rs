@@ -1,0 +1,7 @@
+//! The commands, one file each.
+
+pub mod run;
+
+pub mod check;
+
+pub mod mesh;

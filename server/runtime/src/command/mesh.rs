@@ -1,0 +1,35 @@
+//! `scindo mesh`: a surface or volume file becomes repaired tetrahedra.
+
+use std::process::ExitCode;
+
+use scindo_world::mesh_in::{load_any, write_mesh};
+use serde_json::json;
+
+use crate::cli::MeshArgs;
+use crate::error::RuntimeError;
+
+/// Reads, repairs or fills, writes.
+pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
+    if !(args.scale.is_finite() && args.scale > 0.0) {
+        return Err(RuntimeError::Option {
+            option: "--scale",
+            value: args.scale.to_string(),
+            reason: "a scale must be positive".to_owned(),
+            next: "Use 0.001 for a file in millimetres".to_owned(),
+        });
+    }
+    let (mesh, health) = load_any(&args.input, args.cells as usize, args.scale)?;
+    write_mesh(&args.output, &mesh)?;
+    if args.json {
+        println!(
+            "{:#}",
+            json!({
+                "output": args.output, "elements": mesh.tets.len(), "nodes": mesh.nodes.len(), "mesh": health,
+            })
+        );
+    } else {
+        print!("{health}");
+        println!("{}: {} elements, {} nodes", args.output.display(), mesh.tets.len(), mesh.nodes.len());
+    }
+    Ok(ExitCode::SUCCESS)
+}

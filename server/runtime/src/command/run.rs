@@ -1,0 +1,249 @@
+//! `scindo run`, and `scindo` alone: a scene, simulated and served until done or told to stop.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use scindo_proto::endpoint::bulk_endpoint;
+use scindo_view::{ViewConfig, Viewer};
+use scindo_world::build::BuildOptions;
+use scindo_world::results::Results;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+use serde_json::json;
+use tokio::runtime::Runtime;
+
+use crate::cli::{RunArgs, ServeArgs};
+use crate::engine::Engine;
+use crate::error::RuntimeError;
+use crate::progress::Progress;
+use crate::server::{Server, ServerConfig};
+use crate::session::{NetworkConfig, Sessions};
+use crate::sim::Pace;
+
+/// Where the demonstration's page is served.
+const DEMONSTRATION_VIEWER: &str = "127.0.0.1:8080";
+
+/// How often the foreground looks whether the simulation has ended.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// The built-in demonstration.
+pub fn demonstration(args: &ServeArgs) -> Result<ExitCode, RuntimeError> {
+    let scene = Scene::demonstration(&args.set)?;
+    let viewer = args.viewer.or_else(|| DEMONSTRATION_VIEWER.parse().ok());
+    serve(&scene, args, viewer)
+}
+
+/// A scene file.
+pub fn scene(args: &RunArgs) -> Result<ExitCode, RuntimeError> {
+    let scene = Scene::load_with(&args.scene, &args.serve.set)?;
+    serve(&scene, &args.serve, args.serve.viewer)
+}
+
+/// Builds, starts, waits, writes results.
+fn serve(scene: &Scene, args: &ServeArgs, viewer: Option<SocketAddr>) -> Result<ExitCode, RuntimeError> {
+    let pace = pace(args, scene.checked().step_s)?;
+    let engine = build(scene, args)?;
+    let foreground = foreground()?;
+    let sessions = open_sessions(args, &pace)?;
+    let online = sessions.is_some();
+    if viewer.is_some() && !online {
+        return Err(unserved_viewer(args));
+    }
+    let viewer = viewer.map(|address| start_viewer(&foreground, address, args)).transpose()?;
+    announce(scene, args, online, viewer);
+    let started = Instant::now();
+    let rates = scene.checked().publish;
+    let config = ServerConfig {
+        realm: args.realm.clone(),
+        session: args.session.clone(),
+        pace,
+        surface_hz: rates.surface_hz,
+        contact_hz: rates.contact_hz,
+        stats_hz: rates.stats_hz,
+    };
+    let server = Server::start(engine, sessions, &config)?;
+    let interrupted = foreground.block_on(wait(&server, args, pace))?;
+    let steps = server.steps();
+    let engine = server.join()?;
+    // Browsers may hold connections open; nobody waits for them.
+    foreground.shutdown_timeout(Duration::from_millis(200));
+    let unfinished = interrupted && pace.steps.is_some();
+    let status = if interrupted { "interrupted" } else { "done" };
+    conclude(engine, args, status, (steps, started.elapsed()))?;
+    Ok(if unfinished { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
+    if let Some(path) = &args.record {
+        return Err(RuntimeError::Option {
+            option: "--record",
+            value: path.display().to_string(),
+            reason: "recording is not supported yet".to_owned(),
+            next: "Leave it out; --out DIR writes summary, probes and fields".to_owned(),
+        });
+    }
+    let steps = match args.seconds {
+        None => args.steps,
+        Some(seconds) if seconds.is_finite() && seconds > 0.0 => Some((seconds / step_s).ceil() as u64),
+        Some(seconds) => {
+            return Err(RuntimeError::Option {
+                option: "--seconds",
+                value: seconds.to_string(),
+                reason: "a simulated time must be positive".to_owned(),
+                next: "Leave it out to run until Ctrl-C".to_owned(),
+            });
+        }
+    };
+    Ok(Pace { fast: args.fast, steps })
+}
+
+fn build(scene: &Scene, args: &ServeArgs) -> Result<Engine, RuntimeError> {
+    let options = BuildOptions { threads: usize::from(args.threads), ..BuildOptions::default() };
+    let simulation = Simulation::with_options(scene, scene.base_dir(), options)?;
+    for warning in simulation.warnings() {
+        tracing::warn!("{warning}");
+    }
+    let results = args.out.as_deref().map(|directory| Results::begin(directory, scene, &simulation));
+    Engine::new(simulation, results.transpose()?)
+}
+
+/// A batch run that was not told where to listen goes on without network if the port is taken.
+fn open_sessions(args: &ServeArgs, pace: &Pace) -> Result<Option<Sessions>, RuntimeError> {
+    let network = NetworkConfig {
+        listen: args.listen_endpoints(),
+        connect: args.connect.clone(),
+        zenoh_file: args.zenoh.clone(),
+    };
+    match Sessions::open(&network) {
+        Ok(sessions) => Ok(Some(sessions)),
+        Err(RuntimeError::Listen { endpoints, .. })
+            if args.listen.is_empty() && args.viewer.is_none() && pace.steps.is_some() =>
+        {
+            tracing::warn!(
+                "{endpoints} is taken; nobody can watch this run (--listen chooses another address)"
+            );
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn unserved_viewer(args: &ServeArgs) -> RuntimeError {
+    RuntimeError::Listen { endpoints: args.listen_endpoints().join(", "), reason: "no session".to_owned() }
+}
+
+fn foreground() -> Result<Runtime, RuntimeError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .thread_name("view")
+        .enable_all()
+        .build()
+        .map_err(|e| RuntimeError::System { what: "starting threads".to_owned(), reason: e.to_string() })
+}
+
+/// The viewer connects to us like any other client.
+fn start_viewer(
+    foreground: &Runtime,
+    address: SocketAddr,
+    args: &ServeArgs,
+) -> Result<SocketAddr, RuntimeError> {
+    let mut config = ViewConfig::new(address);
+    config.link.realm.clone_from(&args.realm);
+    config.link.session.clone_from(&args.session);
+    config.link.zenoh_file.clone_from(&args.zenoh);
+    let listen: Vec<String> =
+        args.listen_endpoints().iter().filter_map(|e| crate::session::local(e)).collect();
+    config.link.connect = if listen.is_empty() { args.connect.clone() } else { listen };
+    let failed = |e: scindo_view::ViewError| RuntimeError::Viewer {
+        address: address.to_string(),
+        reason: e.to_string(),
+    };
+    let viewer = foreground.block_on(Viewer::bind(config)).map_err(failed)?;
+    let bound = viewer.address();
+    foreground.spawn(async move {
+        if let Err(error) = viewer.run().await {
+            tracing::error!(%error, "the viewer ended");
+        }
+    });
+    Ok(bound)
+}
+
+fn announce(scene: &Scene, args: &ServeArgs, online: bool, viewer: Option<SocketAddr>) {
+    let listen = if online { args.listen_endpoints() } else { Vec::new() };
+    let surfaces: Vec<String> = listen.iter().filter_map(|e| bulk_endpoint(e)).collect();
+    let page = viewer.map(|address| format!("http://{address}"));
+    if args.json {
+        let report = json!({ "started": {
+            "scene": scene.name(), "listen": listen, "surfaces": surfaces,
+            "realm": args.realm, "session": args.session, "viewer": page,
+        }});
+        println!("{report}");
+        return;
+    }
+    println!("scindo {}: {}", env!("CARGO_PKG_VERSION"), scene.name());
+    if !listen.is_empty() {
+        println!("  clients  {} (surfaces at {})", listen.join(", "), surfaces.join(", "));
+    }
+    if let Some(page) = page {
+        println!("  viewer   {page}");
+    }
+}
+
+/// Until the simulation ends or somebody ends it: true in the second case.
+async fn wait(server: &Server, args: &ServeArgs, pace: Pace) -> Result<bool, RuntimeError> {
+    let progress = Progress::begin("steps", pace.steps, args.json);
+    let failed = |e: std::io::Error| RuntimeError::System {
+        what: "listening for signals".to_owned(),
+        reason: e.to_string(),
+    };
+    let kind = tokio::signal::unix::SignalKind::terminate();
+    let mut terminate = tokio::signal::unix::signal(kind).map_err(failed)?;
+    let mut look = tokio::time::interval(LOOK);
+    let interrupted = loop {
+        tokio::select! {
+            _ = look.tick() => {
+                progress.at(server.steps());
+                if server.finished() {
+                    break false;
+                }
+            }
+            pressed = tokio::signal::ctrl_c() => {
+                pressed.map_err(failed)?;
+                break true;
+            }
+            _ = terminate.recv() => break true,
+        }
+    };
+    progress.end();
+    server.stop();
+    Ok(interrupted)
+}
+
+/// Results on disk and on the terminal.
+fn conclude(
+    mut engine: Engine,
+    args: &ServeArgs,
+    status: &str,
+    (steps, wall): (u64, Duration),
+) -> Result<(), RuntimeError> {
+    engine.finish(status)?;
+    let simulation = engine.simulation();
+    let seconds = wall.as_secs_f64();
+    let simulated = steps as f64 * simulation.step_s();
+    if args.json {
+        let report = json!({ "ended": {
+            "status": status, "steps": steps, "simulated_s": simulated, "wall_s": seconds,
+            "real_time_factor": simulated / seconds, "cuts_applied": simulation.cuts_applied(),
+            "out": args.out,
+        }});
+        println!("{report}");
+    } else {
+        println!("{status}: {steps} steps, {simulated:.3} s simulated in {seconds:.3} s");
+        if let Some(directory) = args.out.as_deref().map(Path::display) {
+            println!("  results  {directory}/summary.json, probes.csv, final.vtu");
+        }
+    }
+    Ok(())
+}

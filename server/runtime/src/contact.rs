@@ -1,0 +1,216 @@
+//! The contact thread: a local contact model per tool at its own rate, on the newest snapshot and
+//! the newest pose, beside the simulation. It computes only for tools whose contact somebody
+//! subscribes to, and asks the simulation for surfaces only then.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+use scindo_proto::limits::MAX_CONTACTS;
+use scindo_proto::messages::{self as wire, HapticContact, haptic_contact};
+use scindo_proto::{Chunk, KeySpace, Topic, encode, encoding};
+use scindo_world::contact_model::{ContactMode, ContactModels, ContactPlane, LocalContact, ToolQuery};
+use scindo_world::inputs::{ToolInput, ToolShape};
+use scindo_world::snapshot::Snapshot;
+use triple_buffer::Output;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority, Reliability};
+use zenoh::{Session, Wait as _};
+
+use crate::convert::{to_pose, unix_ns};
+use crate::exchange::Exchange;
+
+/// How often an idle thread looks for somebody who holds a tool.
+const IDLE: Duration = Duration::from_millis(5);
+
+/// What the thread is given.
+pub struct ContactConfig {
+    /// Keys of the session.
+    pub keys: KeySpace,
+    /// The haptic session.
+    pub haptic: Session,
+    /// Models per second and tool.
+    pub rate_hz: f64,
+    /// Tools of the scene.
+    pub shapes: BTreeMap<String, ToolShape>,
+    /// Bodies of the scene, in its order.
+    pub bodies: Vec<String>,
+}
+
+/// The way out for one held tool.
+struct Line {
+    publisher: Publisher<'static>,
+    wanted: Arc<AtomicBool>,
+    seq: u64,
+}
+
+/// The thread's state.
+pub struct ContactThread {
+    config: ContactConfig,
+    exchange: Arc<Exchange>,
+    snapshots: Output<Snapshot>,
+    models: ContactModels,
+    lines: BTreeMap<Arc<str>, Line>,
+    held: Vec<ToolInput>,
+    epoch: Instant,
+}
+
+impl ContactThread {
+    /// A thread that has nothing to do yet.
+    pub fn new(config: ContactConfig, exchange: Arc<Exchange>, snapshots: Output<Snapshot>) -> Self {
+        Self {
+            config,
+            exchange,
+            snapshots,
+            models: ContactModels::default(),
+            lines: BTreeMap::new(),
+            held: Vec::new(),
+            epoch: Instant::now(),
+        }
+    }
+
+    /// Serves until the server ends.
+    pub fn run(mut self) {
+        let period = Duration::from_secs_f64(1.0 / self.config.rate_hz);
+        let mut next = Instant::now();
+        while !self.exchange.stopping() {
+            let busy = self.look();
+            if busy {
+                self.tick();
+            }
+            next = (next + if busy { period } else { IDLE }).max(Instant::now());
+            std::thread::sleep(next.saturating_duration_since(Instant::now()));
+        }
+    }
+
+    /// Who holds which tool, and whether anybody wants its contact.
+    fn look(&mut self) -> bool {
+        self.held.clear();
+        self.held.extend(self.exchange.inbox().held().cloned());
+        let held = &self.held;
+        self.lines.retain(|tool, _| held.iter().any(|input| input.id == *tool));
+        for input in held {
+            if !self.lines.contains_key(&input.id)
+                && let Some(line) = open_line(&self.config, &input.id)
+            {
+                self.lines.insert(input.id.clone(), line);
+            }
+        }
+        let wanted = self.lines.values().any(|line| line.wanted.load(Ordering::Relaxed));
+        self.exchange.want_contact(wanted);
+        wanted
+    }
+
+    /// One model per tool.
+    fn tick(&mut self) {
+        let now_s = self.epoch.elapsed().as_secs_f64();
+        if self.snapshots.update() {
+            self.models.take(self.snapshots.output_buffer(), now_s);
+        }
+        for input in &self.held {
+            let Some(line) = self.lines.get_mut(&input.id) else { continue };
+            let shape = input.shape.or_else(|| self.config.shapes.get(&*input.id).copied());
+            let Some(shape) = shape.filter(|_| line.wanted.load(Ordering::Relaxed)) else { continue };
+            let query = ToolQuery {
+                id: input.id.clone(),
+                shape,
+                pose: input.pose,
+                velocity_m_s: input.velocity_m_s,
+                mode: input.mode,
+            };
+            let model = self.models.evaluate(&query, now_s);
+            line.seq += 1;
+            let mut message = to_message(model, input, line.seq);
+            message.body_id = model.body.and_then(|i| self.config.bodies.get(i)).cloned().unwrap_or_default();
+            heed_device(&mut message, &self.exchange);
+            if let Err(error) = line.publisher.put(encode(&message)).wait() {
+                tracing::debug!(%error, "contact not published");
+            }
+            self.exchange.meter.contact(&input.id);
+        }
+    }
+}
+
+fn open_line(config: &ContactConfig, tool: &str) -> Option<Line> {
+    let id = Chunk::new("tool id", tool).ok()?;
+    let publisher = config
+        .haptic
+        .declare_publisher(config.keys.key(&Topic::ToolContact(id)))
+        .encoding(encoding::<HapticContact>())
+        .priority(Priority::RealTime)
+        .express(true)
+        .congestion_control(CongestionControl::Drop)
+        .reliability(Reliability::BestEffort)
+        .wait()
+        .inspect_err(|error| tracing::warn!(%error, tool, "no contact for this tool"))
+        .ok()?;
+    let wanted = Arc::new(AtomicBool::new(false));
+    let flag = wanted.clone();
+    publisher
+        .matching_listener()
+        .callback(move |status| flag.store(status.matching(), Ordering::Relaxed))
+        .background()
+        .wait()
+        .ok()?;
+    if publisher.matching_status().wait().is_ok_and(|status| status.matching()) {
+        wanted.store(true, Ordering::Relaxed);
+    }
+    Some(Line { publisher, wanted, seq: 0 })
+}
+
+fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> HapticContact {
+    let mode = match model.mode {
+        ContactMode::Free => haptic_contact::Mode::Free,
+        ContactMode::Contact => haptic_contact::Mode::Contact,
+        ContactMode::Cutting => haptic_contact::Mode::Cutting,
+        ContactMode::Hold => haptic_contact::Mode::Hold,
+    };
+    HapticContact {
+        seq,
+        sim_step: model.step,
+        sim_time_s: model.time_s,
+        publish_unix_ns: unix_ns(),
+        tool_seq_used: input.seq,
+        tool_client_time_ns: input.client_time_ns,
+        epoch: model.epoch,
+        tool_id: input.id.to_string(),
+        body_id: String::new(),
+        tool_pose_used: Some(to_pose(&model.pose_used)),
+        mode: mode.into(),
+        // Planes come with the most pressing first; one datagram holds this many.
+        contacts: model.planes.iter().take(MAX_CONTACTS).map(to_contact).collect(),
+        validity_ms: (1e3 * model.validity_s) as f32,
+        max_force_n: model.max_force_n as f32,
+        max_stiffness_n_m: model.max_stiffness_n_m as f32,
+    }
+}
+
+fn to_contact(plane: &ContactPlane) -> wire::Contact {
+    wire::Contact {
+        point_m: Some(to_vec3f(&plane.point_m)),
+        normal: Some(to_vec3f(&plane.normal)),
+        gap_m: plane.gap_m as f32,
+        force_n: Some(to_vec3f(&plane.force_n)),
+        stiffness_n_m: plane.stiffness_n_m as f32,
+        tangential_stiffness_n_m: plane.tangential_stiffness_n_m as f32,
+        damping_ns_m: plane.damping_ns_m as f32,
+        surface_velocity_m_s: Some(to_vec3f(&plane.surface_velocity_m_s)),
+        patch_radius_m: plane.patch_radius_m as f32,
+        feature_id: plane.feature_id,
+    }
+}
+
+fn to_vec3f(v: &Vector3<f64>) -> wire::Vec3f {
+    wire::Vec3f { x: v.x as f32, y: v.y as f32, z: v.z as f32 }
+}
+
+/// Never advises more than the device said it can do.
+fn heed_device(message: &mut HapticContact, exchange: &Exchange) {
+    let inbox = exchange.inbox();
+    let Some(device) = inbox.capability_of(&message.tool_id) else { return };
+    let least = |advice: f32, device: f64| if device > 0.0 { advice.min(device as f32) } else { advice };
+    message.max_force_n = least(message.max_force_n, device.max_force_n);
+    message.max_stiffness_n_m = least(message.max_stiffness_n_m, device.max_stiffness_n_m);
+}

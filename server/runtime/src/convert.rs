@@ -1,0 +1,155 @@
+//! Between the types of the world and the messages of the wire.
+
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use bytes::Bytes;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use scindo_proto::messages::{self as wire, tool_sample, tool_shape};
+use scindo_world::inputs::{ToolInput, ToolMode, ToolShape};
+use scindo_world::snapshot::{BodySnapshot, Snapshot, SurfaceTopology, ToolSnapshot};
+
+/// Nanoseconds since 1970.
+pub fn unix_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// Vector of the wire.
+pub fn to_vec3(v: &Vector3<f64>) -> wire::Vec3 {
+    wire::Vec3 { x: v.x, y: v.y, z: v.z }
+}
+
+/// Vector of the world; an absent one is zero.
+pub fn from_vec3(v: Option<wire::Vec3>) -> Vector3<f64> {
+    v.map_or_else(Vector3::zeros, |v| Vector3::new(v.x, v.y, v.z))
+}
+
+/// Pose of the wire.
+pub fn to_pose(pose: &Isometry3<f64>) -> wire::Pose {
+    let q = pose.rotation.coords;
+    wire::Pose { position_m: Some(to_vec3(&pose.translation.vector)), qx: q.x, qy: q.y, qz: q.z, qw: q.w }
+}
+
+/// Pose of the world; the wire has checked that the quaternion is near unit length.
+pub fn from_pose(pose: &wire::Pose) -> Isometry3<f64> {
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(pose.qw, pose.qx, pose.qy, pose.qz));
+    Isometry3::from_parts(Translation3::from(from_vec3(pose.position_m)), rotation)
+}
+
+/// Tool geometry of the wire.
+pub fn to_shape(shape: &ToolShape) -> wire::ToolShape {
+    let kind = match *shape {
+        ToolShape::Sphere { radius_m } => tool_shape::Kind::Sphere(tool_shape::Sphere { radius_m }),
+        ToolShape::Capsule { radius_m, length_m } => {
+            tool_shape::Kind::Capsule(tool_shape::Capsule { radius_m, length_m })
+        }
+        ToolShape::Blade { length_m, thickness_m } => {
+            tool_shape::Kind::Blade(tool_shape::Blade { length_m, thickness_m })
+        }
+    };
+    wire::ToolShape { kind: Some(kind) }
+}
+
+/// Tool geometry of the world.
+pub fn from_shape(shape: &wire::ToolShape) -> Option<ToolShape> {
+    Some(match shape.kind? {
+        tool_shape::Kind::Sphere(s) => ToolShape::Sphere { radius_m: s.radius_m },
+        tool_shape::Kind::Capsule(c) => ToolShape::Capsule { radius_m: c.radius_m, length_m: c.length_m },
+        tool_shape::Kind::Blade(b) => ToolShape::Blade { length_m: b.length_m, thickness_m: b.thickness_m },
+    })
+}
+
+/// Mode of the wire.
+pub fn to_mode(mode: ToolMode) -> tool_sample::Mode {
+    match mode {
+        ToolMode::Hover => tool_sample::Mode::Hover,
+        ToolMode::Touch => tool_sample::Mode::Touch,
+        ToolMode::Grab => tool_sample::Mode::Grab,
+        ToolMode::Cut => tool_sample::Mode::Cut,
+    }
+}
+
+/// Mode of the world; an unspecified one hovers.
+pub fn from_mode(mode: tool_sample::Mode) -> ToolMode {
+    match mode {
+        tool_sample::Mode::Touch => ToolMode::Touch,
+        tool_sample::Mode::Grab => ToolMode::Grab,
+        tool_sample::Mode::Cut => ToolMode::Cut,
+        tool_sample::Mode::Hover | tool_sample::Mode::Unspecified => ToolMode::Hover,
+    }
+}
+
+/// What a step reads of a checked sample.
+pub fn to_tool_input(sample: &wire::ToolSample, id: Arc<str>, owner: Arc<str>) -> ToolInput {
+    ToolInput {
+        id,
+        owner,
+        pose: sample.pose.as_ref().map_or_else(Isometry3::identity, from_pose),
+        velocity_m_s: from_vec3(sample.velocity_m_s),
+        mode: from_mode(sample.mode()),
+        shape: sample.shape.as_ref().and_then(from_shape),
+        seq: sample.seq,
+        client_time_ns: sample.client_time_ns,
+    }
+}
+
+/// Positions of a body for the wire. `seq` counts the frames of the body.
+pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceFrame {
+    let mut positions = Vec::with_capacity(12 * body.positions.len());
+    for coordinate in body.positions.iter().flatten() {
+        positions.extend_from_slice(&coordinate.to_le_bytes());
+    }
+    wire::SurfaceFrame {
+        seq,
+        sim_step: snapshot.step,
+        sim_time_s: snapshot.time_s,
+        publish_unix_ns: unix_ns(),
+        body_id: body.id.to_string(),
+        epoch: body.topology.epoch,
+        vertex_count: body.positions.len() as u32,
+        positions: positions.into(),
+    }
+}
+
+/// Triangles of a body for the wire. `seq` counts the topologies of the body.
+pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceTopology {
+    let SurfaceTopology { epoch, vertex_count, triangles, tags } = &*body.topology;
+    wire::SurfaceTopology {
+        seq,
+        sim_step: snapshot.step,
+        sim_time_s: snapshot.time_s,
+        publish_unix_ns: unix_ns(),
+        body_id: body.id.to_string(),
+        epoch: *epoch,
+        vertex_count: *vertex_count,
+        triangle_count: triangles.len() as u32,
+        triangles: little_endian(triangles.iter().flatten(), 3 * triangles.len()),
+        tags: little_endian(tags.iter(), tags.len()),
+    }
+}
+
+fn little_endian<'a>(words: impl Iterator<Item = &'a u32>, count: usize) -> Bytes {
+    let mut bytes = Vec::with_capacity(4 * count);
+    for word in words {
+        bytes.extend_from_slice(&word.to_le_bytes());
+    }
+    bytes.into()
+}
+
+/// What a viewer draws of a tool.
+pub fn to_tool_state(snapshot: &Snapshot, tool: &ToolSnapshot, seq: u64) -> wire::ToolState {
+    wire::ToolState {
+        seq,
+        sim_step: snapshot.step,
+        sim_time_s: snapshot.time_s,
+        publish_unix_ns: unix_ns(),
+        tool_id: tool.id.to_string(),
+        shape: Some(to_shape(&tool.shape)),
+        pose: Some(to_pose(&tool.pose)),
+        proxy_pose: Some(to_pose(&tool.proxy)),
+        mode: to_mode(tool.mode).into(),
+        force_n: Some(to_vec3(&tool.force_n)),
+        owner: tool.owner.to_string(),
+    }
+}

@@ -1,0 +1,397 @@
+//! The publication thread: surfaces and tool states of the newest snapshot at each topic's rate,
+//! keyframes on query, answers, events, the plan, statistics. The simulation never waits for it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::Receiver;
+use scindo_proto::messages::{
+    BodyStats, Counter, CutAck, Event, Plan, StageTime, Stats, SurfaceFrame, SurfaceKeyframe,
+    SurfaceTopology, ToolState, ToolStats,
+};
+use scindo_proto::{Chunk, KeySpace, Topic, WireMessage, encode, encoding};
+use scindo_world::snapshot::Snapshot;
+use triple_buffer::Output;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority, Reliability};
+use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait as _};
+
+use crate::convert::{to_frame, to_tool_state, to_topology, unix_ns};
+use crate::error::RuntimeError;
+use crate::exchange::{Exchange, Outgoing};
+use crate::session::Sessions;
+
+/// Keyframe queries that may wait for a snapshot.
+pub const WAITING_KEYFRAMES: usize = 64;
+
+/// A client waits two seconds for a keyframe; afterwards it asks again.
+const KEYFRAME_PATIENCE: Duration = Duration::from_millis(1900);
+
+/// The plan is repeated this often for those who joined late.
+const PLAN_PERIOD: Duration = Duration::from_secs(2);
+
+/// A query for the keyframe of body `body`.
+pub struct KeyframeQuery {
+    /// Index of the body.
+    pub body: usize,
+    /// Where the answer goes.
+    pub query: Query,
+    /// When it came.
+    pub since: Instant,
+}
+
+/// Publishers of one body.
+struct BodyChannel {
+    frame: Publisher<'static>,
+    topology: Publisher<'static>,
+    frames: u64,
+    topologies: u64,
+    sent_epoch: Option<u32>,
+    _keyframe: Queryable<()>,
+}
+
+/// What the publisher reads.
+pub struct Sources {
+    /// Newest state.
+    pub snapshots: Output<Snapshot>,
+    /// Answers and events.
+    pub outgoing: Receiver<Outgoing>,
+    /// Keyframe queries, and where zenoh puts them.
+    pub keyframes: (crossbeam_channel::Sender<KeyframeQuery>, Receiver<KeyframeQuery>),
+}
+
+/// What is published, and how often.
+pub struct Published {
+    /// Ids of the bodies in the order of the scene.
+    pub bodies: Vec<String>,
+    /// Simulated time per step [s].
+    pub step_s: f64,
+    /// The plan at the start.
+    pub plan: Plan,
+    /// Surfaces and statistics per second.
+    pub rates: (f64, f64),
+}
+
+/// The thread's state.
+pub struct PublishThread {
+    keys: KeySpace,
+    exchange: Arc<Exchange>,
+    sources: Sources,
+    period: Duration,
+    stats_period: Duration,
+    step_s: f64,
+    bulk: Session,
+    haptic: Session,
+    bodies: Vec<BodyChannel>,
+    tools: BTreeMap<Arc<str>, Publisher<'static>>,
+    stats: Publisher<'static>,
+    events: Publisher<'static>,
+    plan: Publisher<'static>,
+    newest_plan: Plan,
+    keyframes: VecDeque<KeyframeQuery>,
+    tool_states: u64,
+    reports: u64,
+    pose_counts: BTreeMap<Arc<str>, u64>,
+    next_stats: Instant,
+    next_plan: Instant,
+}
+
+impl PublishThread {
+    /// Declares every topic.
+    pub fn declare(
+        keys: &KeySpace,
+        sessions: &Sessions,
+        exchange: &Arc<Exchange>,
+        sources: Sources,
+        what: Published,
+    ) -> Result<Self, RuntimeError> {
+        let bulk = &sessions.bulk;
+        let report = |topic: Topic, encoding: String| {
+            declare(bulk, keys.key(&topic), encoding, Priority::Background, CongestionControl::Drop)
+        };
+        let bodies = what.bodies.iter().enumerate();
+        let bodies = bodies.map(|(index, id)| body_channel(keys, bulk, exchange, &sources, (index, id)));
+        Ok(Self {
+            keys: keys.clone(),
+            exchange: exchange.clone(),
+            period: Duration::from_secs_f64(1.0 / what.rates.0),
+            stats_period: Duration::from_secs_f64(1.0 / what.rates.1),
+            step_s: what.step_s,
+            bulk: bulk.clone(),
+            haptic: sessions.haptic.clone(),
+            bodies: bodies.collect::<Result<_, _>>()?,
+            tools: BTreeMap::new(),
+            stats: report(Topic::Stats, encoding::<Stats>())?,
+            events: report(Topic::Event, encoding::<Event>())?,
+            plan: report(Topic::Plan, encoding::<Plan>())?,
+            newest_plan: what.plan,
+            keyframes: VecDeque::new(),
+            tool_states: 0,
+            reports: 0,
+            pose_counts: BTreeMap::new(),
+            next_stats: Instant::now(),
+            next_plan: Instant::now(),
+            sources,
+        })
+    }
+
+    /// Publishes until the server ends.
+    pub fn run(mut self) {
+        let mut next_frame = Instant::now();
+        while !self.exchange.stopping() {
+            while let Ok(outgoing) = self.sources.outgoing.recv_deadline(next_frame) {
+                self.send_out(outgoing);
+            }
+            next_frame = (next_frame + self.period).max(Instant::now());
+            self.tick();
+        }
+        while let Ok(outgoing) = self.sources.outgoing.try_recv() {
+            self.send_out(outgoing);
+        }
+    }
+
+    fn tick(&mut self) {
+        self.collect_keyframe_queries();
+        if self.sources.snapshots.update() {
+            self.publish_surfaces();
+            self.publish_tools();
+        }
+        self.answer_keyframe_queries();
+        self.publish_stats();
+        self.publish_plan();
+    }
+
+    fn send_out(&mut self, outgoing: Outgoing) {
+        match outgoing {
+            Outgoing::Ack(answer) => self.send_ack(&answer),
+            Outgoing::Event(event) => put(&self.events, &event),
+            Outgoing::Plan(plan) => {
+                self.newest_plan = plan;
+                self.next_plan = Instant::now();
+            }
+        }
+    }
+
+    fn send_ack(&self, answer: &CutAck) {
+        let Ok(tool) = Chunk::new("tool id", &answer.tool_id) else { return };
+        let sent = self
+            .haptic
+            .put(self.keys.key(&Topic::ToolCutAck(tool)), encode(answer))
+            .encoding(encoding::<CutAck>())
+            .priority(Priority::InteractiveHigh)
+            .express(true)
+            .congestion_control(CongestionControl::Block)
+            .wait();
+        if let Err(error) = sent {
+            tracing::warn!(%error, "answer to a cut not sent");
+        }
+    }
+
+    fn publish_surfaces(&mut self) {
+        let snapshot = self.sources.snapshots.output_buffer();
+        for (index, (channel, body)) in self.bodies.iter_mut().zip(&snapshot.bodies).enumerate() {
+            if !self.exchange.surface_wanted(index) || body.positions.is_empty() {
+                continue;
+            }
+            if channel.sent_epoch != Some(body.topology.epoch) {
+                channel.sent_epoch = Some(body.topology.epoch);
+                channel.topologies += 1;
+                put(&channel.topology, &to_topology(snapshot, body, channel.topologies));
+            }
+            channel.frames += 1;
+            put(&channel.frame, &to_frame(snapshot, body, channel.frames));
+        }
+    }
+
+    fn publish_tools(&mut self) {
+        self.tool_states += 1;
+        let snapshot = self.sources.snapshots.output_buffer();
+        for tool in &snapshot.tools {
+            let state = to_tool_state(snapshot, tool, self.tool_states);
+            if !self.tools.contains_key(&tool.id) {
+                let Ok(id) = Chunk::new("tool id", &tool.id) else { continue };
+                let key = self.keys.key(&Topic::ToolState(id));
+                let encoding = encoding::<ToolState>();
+                let Ok(publisher) =
+                    declare(&self.bulk, key, encoding, Priority::DataHigh, CongestionControl::Drop)
+                else {
+                    continue;
+                };
+                self.tools.insert(tool.id.clone(), publisher);
+            }
+            if let Some(publisher) = self.tools.get(&tool.id) {
+                put(publisher, &state);
+            }
+        }
+        self.tools.retain(|id, _| snapshot.tools.iter().any(|tool| tool.id == *id));
+    }
+
+    fn collect_keyframe_queries(&mut self) {
+        while let Ok(query) = self.sources.keyframes.1.try_recv() {
+            self.keyframes.push_back(query);
+        }
+        self.keyframes.retain(|waiting| waiting.since.elapsed() < KEYFRAME_PATIENCE);
+    }
+
+    /// Answers those whose body is in the snapshot; the others wait for the next one.
+    fn answer_keyframe_queries(&mut self) {
+        let snapshot = self.sources.snapshots.output_buffer();
+        let bodies = &self.bodies;
+        self.keyframes.retain(|KeyframeQuery { body: index, query, .. }| {
+            let (Some(body), Some(channel)) = (snapshot.bodies.get(*index), bodies.get(*index)) else {
+                return true;
+            };
+            if body.positions.len() != body.topology.vertex_count as usize || body.positions.is_empty() {
+                return true;
+            }
+            let keyframe = SurfaceKeyframe {
+                topology: Some(to_topology(snapshot, body, channel.topologies)),
+                frame: Some(to_frame(snapshot, body, channel.frames)),
+            };
+            let answer = query.reply(query.key_expr().clone(), encode(&keyframe));
+            if let Err(error) = answer.encoding(encoding::<SurfaceKeyframe>()).wait() {
+                tracing::debug!(%error, "keyframe not sent");
+            }
+            false
+        });
+        if self.keyframes.is_empty() && self.sources.keyframes.1.is_empty() {
+            self.exchange.want_keyframe(false);
+        }
+    }
+
+    fn publish_stats(&mut self) {
+        if Instant::now() < self.next_stats {
+            return;
+        }
+        self.next_stats = Instant::now() + self.stats_period;
+        let stats = self.gather_stats();
+        put(&self.stats, &stats);
+    }
+
+    fn gather_stats(&mut self) -> Stats {
+        self.reports += 1;
+        let rates = self.exchange.meter.read();
+        let snapshot = self.sources.snapshots.output_buffer();
+        let inbox = self.exchange.inbox();
+        let mut pose_hz = BTreeMap::new();
+        for (tool, count) in inbox.pose_counts() {
+            let before = self.pose_counts.insert(tool.clone(), count).unwrap_or(0);
+            pose_hz.insert(tool.clone(), count.saturating_sub(before) as f64 / rates.seconds);
+        }
+        self.pose_counts.retain(|tool, _| pose_hz.contains_key(tool));
+        let refused = inbox.refused().iter();
+        let stages = rates.stages_ms.iter();
+        let bodies = snapshot.bodies.iter();
+        let tools = snapshot.tools.iter();
+        let rate = |rates: &BTreeMap<Arc<str>, f64>, id| rates.get(id).copied().unwrap_or(0.0) as f32;
+        Stats {
+            seq: self.reports,
+            sim_step: snapshot.step,
+            sim_time_s: snapshot.time_s,
+            publish_unix_ns: unix_ns(),
+            step_rate_hz: rates.step_hz as f32,
+            real_time_factor: (rates.step_hz * self.step_s) as f32,
+            stages: stages
+                .map(|&(name, ms)| StageTime { name: name.to_owned(), milliseconds: ms as f32 })
+                .collect(),
+            bodies: bodies
+                .map(|body| BodyStats {
+                    body_id: body.id.to_string(),
+                    iterations: body.iterations,
+                    residual: body.residual as f32,
+                    elements: body.elements,
+                    pieces: body.pieces,
+                    copies: body.copies,
+                    epoch: body.epoch,
+                    volume_m3: body.rest_volume_m3,
+                })
+                .collect(),
+            tools: tools
+                .map(|tool| ToolStats {
+                    tool_id: tool.id.to_string(),
+                    owner: tool.owner.to_string(),
+                    contact_rate_hz: rate(&rates.contact_hz, &tool.id),
+                    pose_rate_hz: rate(&pose_hz, &tool.id),
+                    force_n: tool.force_n.norm() as f32,
+                })
+                .collect(),
+            refused: refused.map(|(&name, &count)| Counter { name: name.to_owned(), count }).collect(),
+            cuts_applied: inbox.cuts_applied(),
+            surface_subscribers: (0..self.bodies.len()).filter(|&i| self.exchange.surface_wanted(i)).count()
+                as u32,
+            haptic_clients: inbox.held().count() as u32,
+            paused: self.exchange.paused.load(Ordering::Relaxed),
+        }
+    }
+
+    fn publish_plan(&mut self) {
+        if Instant::now() >= self.next_plan {
+            self.next_plan = Instant::now() + PLAN_PERIOD;
+            put(&self.plan, &self.newest_plan);
+        }
+    }
+}
+
+fn body_channel(
+    keys: &KeySpace,
+    bulk: &Session,
+    exchange: &Arc<Exchange>,
+    sources: &Sources,
+    (index, id): (usize, &str),
+) -> Result<BodyChannel, RuntimeError> {
+    let id = Chunk::new("body id", id)?;
+    let key = |topic: fn(Chunk) -> Topic| keys.key(&topic(id.clone()));
+    let frame = bulk
+        .declare_publisher(key(Topic::SurfaceFrame))
+        .encoding(encoding::<SurfaceFrame>())
+        .priority(Priority::DataLow)
+        .congestion_control(CongestionControl::Drop)
+        .reliability(Reliability::BestEffort)
+        .wait()
+        .map_err(failed)?;
+    let topology_encoding = encoding::<SurfaceTopology>();
+    let topology_key = key(Topic::SurfaceTopology);
+    let topology = declare(bulk, topology_key, topology_encoding, Priority::Data, CongestionControl::Block)?;
+    let watcher = exchange.clone();
+    frame
+        .matching_listener()
+        .callback(move |status| watcher.want_surface(index, status.matching()))
+        .background()
+        .wait()
+        .map_err(failed)?;
+    let (waiting, exchange) = (sources.keyframes.0.clone(), exchange.clone());
+    let keyframe = bulk
+        .declare_queryable(key(Topic::SurfaceKeyframe))
+        .callback(move |query| {
+            // A full queue drops the query: its client asks again.
+            let _ = waiting.try_send(KeyframeQuery { body: index, query, since: Instant::now() });
+            exchange.want_keyframe(true);
+        })
+        .wait()
+        .map_err(failed)?;
+    Ok(BodyChannel { frame, topology, frames: 0, topologies: 0, sent_epoch: None, _keyframe: keyframe })
+}
+
+fn declare(
+    session: &Session,
+    key: String,
+    encoding: String,
+    priority: Priority,
+    congestion: CongestionControl,
+) -> Result<Publisher<'static>, RuntimeError> {
+    let builder = session.declare_publisher(key).encoding(encoding).priority(priority);
+    builder.congestion_control(congestion).wait().map_err(failed)
+}
+
+fn put<M: WireMessage>(publisher: &Publisher<'static>, message: &M) {
+    if let Err(error) = publisher.put(encode(message)).wait() {
+        tracing::debug!(key = %publisher.key_expr(), %error, "not published");
+    }
+}
+
+fn failed(error: zenoh::Error) -> RuntimeError {
+    RuntimeError::Zenoh { what: "declaring topics".to_owned(), reason: error.to_string() }
+}

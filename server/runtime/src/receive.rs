@@ -1,0 +1,151 @@
+//! From zenoh into the inbox. Runs on zenoh's receiving threads: decode, check, store, return.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use scindo_proto::messages::{CutCommand, DeviceCapability, ToolSample};
+use scindo_proto::{DecodeError, KeySpace, Topic, WireMessage, decode_as};
+use scindo_world::simulation::Level;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::{Sample, SampleKind};
+use zenoh::{Session, Wait as _};
+
+use crate::error::RuntimeError;
+use crate::exchange::{Exchange, Outgoing};
+use crate::inbox::{Change, Cut};
+
+/// Subscriptions of the server; dropping them ends the input.
+pub struct Receivers {
+    _subscribers: Vec<Subscriber<()>>,
+    _token: LivelinessToken,
+}
+
+impl Receivers {
+    /// Subscribes to poses, cuts, capabilities and liveliness, then announces the server.
+    pub fn declare(
+        session: &Session,
+        keys: &KeySpace,
+        exchange: &Arc<Exchange>,
+        server: &Topic,
+    ) -> Result<Self, RuntimeError> {
+        let failed =
+            |e: zenoh::Error| RuntimeError::Zenoh { what: "subscribing".into(), reason: e.to_string() };
+        let tokens = session
+            .liveliness()
+            .declare_subscriber(keys.every_live())
+            .history(true)
+            .callback(with(keys, exchange, on_token))
+            .wait()
+            .map_err(failed)?;
+        let subscribe = |key: String, on_sample: OnSample| {
+            let callback = with(keys, exchange, on_sample);
+            session.declare_subscriber(key).callback(callback).wait().map_err(failed)
+        };
+        let subscribers = vec![
+            tokens,
+            subscribe(keys.every_tool_pose(), on_pose)?,
+            subscribe(keys.every_tool_cut(), on_cut)?,
+            subscribe(keys.every_tool_capability(), on_capability)?,
+        ];
+        let token = session.liveliness().declare_token(keys.key(server)).wait().map_err(failed)?;
+        Ok(Self { _subscribers: subscribers, _token: token })
+    }
+}
+
+type OnSample = fn(&KeySpace, &Exchange, &Sample);
+
+fn with(
+    keys: &KeySpace,
+    exchange: &Arc<Exchange>,
+    on_sample: OnSample,
+) -> impl Fn(Sample) + Send + Sync + 'static {
+    let (keys, exchange) = (keys.clone(), exchange.clone());
+    move |sample| on_sample(&keys, &exchange, &sample)
+}
+
+fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
+    let Ok(Topic::Live(_, client)) = keys.parse(sample.key_expr().as_str()) else { return };
+    match sample.kind() {
+        SampleKind::Put => exchange.inbox().client_came(client.as_str()),
+        SampleKind::Delete => {
+            let released = exchange.inbox().client_went(client.as_str());
+            released.into_iter().for_each(|change| announce(exchange, change));
+        }
+    }
+}
+
+fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
+    let Ok(Topic::ToolPose(tool)) = keys.parse(sample.key_expr().as_str()) else {
+        return refuse(exchange, "bad-key", "a pose arrived under a key that names no tool");
+    };
+    match decode::<ToolSample>(sample) {
+        Ok(pose) => {
+            let outcome = exchange.inbox().pose(tool.as_str(), &pose);
+            match outcome {
+                Ok(None) => {}
+                Ok(Some(change)) => announce(exchange, change),
+                Err(refusal) => seldom(exchange, refusal.code, &refusal.message),
+            }
+        }
+        Err(error) => refuse(exchange, error.code(), &error.to_string()),
+    }
+}
+
+fn on_cut(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
+    let Ok(Topic::ToolCut(tool)) = keys.parse(sample.key_expr().as_str()) else {
+        return refuse(exchange, "bad-key", "a cut arrived under a key that names no tool");
+    };
+    match decode::<CutCommand>(sample) {
+        Ok(command) => {
+            let outcome = exchange.inbox().cut(tool.as_str(), &command);
+            if let Cut::Answer(answer) = outcome {
+                exchange.send(Outgoing::Ack(answer));
+            }
+        }
+        Err(error) => refuse(exchange, error.code(), &error.to_string()),
+    }
+}
+
+fn on_capability(_: &KeySpace, exchange: &Exchange, sample: &Sample) {
+    match decode::<DeviceCapability>(sample) {
+        Ok(capability) => exchange.inbox().capability(capability),
+        Err(error) => refuse(exchange, error.code(), &error.to_string()),
+    }
+}
+
+/// The message of a sample; one that is too large is not even copied.
+pub fn decode<M: WireMessage>(sample: &Sample) -> Result<M, DecodeError> {
+    let found = sample.payload().len();
+    if found > M::MAX_BYTES {
+        let field = "payload bytes";
+        return Err(DecodeError::TooLarge { message: M::NAME, field, found, allowed: M::MAX_BYTES });
+    }
+    let payload = Bytes::from(sample.payload().to_bytes().into_owned());
+    decode_as(&sample.encoding().to_string(), payload)
+}
+
+fn announce(exchange: &Exchange, change: Change) {
+    match change {
+        Change::Taken { tool, owner } => {
+            exchange.event(Level::Info, "tool-taken", format!("'{owner}' holds tool '{tool}'"));
+        }
+        Change::Released { tool, owner } => {
+            let message = format!("'{owner}' is gone; tool '{tool}' is free");
+            exchange.event(Level::Info, "tool-released", message);
+        }
+    }
+}
+
+fn refuse(exchange: &Exchange, code: &'static str, message: &str) {
+    exchange.inbox().count(code);
+    seldom(exchange, code, message);
+}
+
+/// An event for the 1st, 10th, 100th … refusal of a kind: a broken client sends thousands.
+fn seldom(exchange: &Exchange, code: &'static str, message: &str) {
+    let count = exchange.inbox().refused().get(code).copied().unwrap_or(0);
+    if count > 0 && 10_u64.pow(count.ilog10()) == count {
+        exchange.event(Level::Warning, "message-refused", format!("{message} ({code}, {count} so far)"));
+    }
+}

@@ -1,0 +1,146 @@
+//! Questions and orders under `rpc/`: one thread answers them in turn.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use bytes::Bytes;
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use prost::Message as _;
+use scindo_proto::messages::{
+    Error, PauseRequest, ResetRequest, RpcReply, SchemaReply, SessionInfo, SetRequest, StepRequest,
+};
+use scindo_proto::{FILE_DESCRIPTOR_SET, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
+use zenoh::Wait as _;
+use zenoh::query::Query;
+
+use crate::exchange::Exchange;
+use crate::sim::{Command, Order};
+
+/// Questions that may wait; beyond it they are refused at once.
+pub const WAITING: usize = 32;
+
+/// A client waits two seconds; an order that takes longer is answered "accepted" before.
+const PATIENCE: Duration = Duration::from_millis(1700);
+
+/// How often the thread looks whether the server ends.
+const IDLE: Duration = Duration::from_millis(100);
+
+/// The thread's state.
+pub struct RpcThread {
+    /// Keys of the session.
+    pub keys: KeySpace,
+    /// Shared state.
+    pub exchange: Arc<Exchange>,
+    /// Questions from zenoh.
+    pub queries: Receiver<Query>,
+    /// Orders to the simulation.
+    pub commands: Sender<Command>,
+    /// What does not change of the answer to `info`.
+    pub info: SessionInfo,
+}
+
+impl RpcThread {
+    /// Answers until the server ends.
+    pub fn run(self) {
+        while !self.exchange.stopping() {
+            match self.queries.recv_timeout(IDLE) {
+                Ok(query) => self.answer(&query),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn answer(&self, query: &Query) {
+        let Ok(Topic::Rpc(verb)) = self.keys.parse(query.key_expr().as_str()) else {
+            return refuse(query, error("bad-key", "rpc/* takes one verb".into(), "ask rpc/<verb>"));
+        };
+        let payload = query.payload().map(|p| Bytes::from(p.to_bytes().into_owned())).unwrap_or_default();
+        match verb {
+            Verb::Info => reply(query, &self.info_now()),
+            Verb::Schema => {
+                let file_descriptor_set = Bytes::from_static(FILE_DESCRIPTOR_SET);
+                reply(query, &SchemaReply { file_descriptor_set });
+            }
+            Verb::Load | Verb::Snapshot | Verb::Restore => {
+                let message = format!("rpc/{} is not supported yet", verb.as_str());
+                refuse(query, error("not-supported", message, "start a server with the scene instead"));
+            }
+            Verb::Pause | Verb::Step | Verb::Reset | Verb::Set => match order(verb, payload) {
+                Ok(order) => reply(query, &self.carry_out(order)),
+                Err(error) => refuse(query, error),
+            },
+        }
+    }
+
+    /// Owners and epochs as they are now.
+    fn info_now(&self) -> SessionInfo {
+        let mut info = self.info.clone();
+        let inbox = self.exchange.inbox();
+        for held in inbox.held() {
+            match info.tools.iter_mut().find(|tool| *tool.id == *held.id) {
+                Some(tool) => tool.owner = held.owner.to_string(),
+                None => info.tools.push(scindo_proto::messages::ToolInfo {
+                    id: held.id.to_string(),
+                    shape: held.shape.as_ref().map(crate::convert::to_shape),
+                    owner: held.owner.to_string(),
+                    cuts: false,
+                }),
+            }
+        }
+        drop(inbox);
+        for (index, body) in info.bodies.iter_mut().enumerate() {
+            body.epoch = self.exchange.epoch(index);
+        }
+        info
+    }
+
+    fn carry_out(&self, order: Order) -> RpcReply {
+        let (answer, answers) = bounded(1);
+        if self.commands.try_send(Command { order, answer }).is_err() {
+            let error = error("busy", "the simulation has too many orders waiting".into(), "ask again later");
+            return RpcReply { error: Some(error), ..RpcReply::default() };
+        }
+        answers.recv_timeout(PATIENCE).unwrap_or_else(|_| RpcReply {
+            ok: true,
+            sim_step: self.exchange.sim_step.load(std::sync::atomic::Ordering::Relaxed),
+            message: "accepted; still running".to_owned(),
+            error: None,
+        })
+    }
+}
+
+fn order(verb: Verb, payload: Bytes) -> Result<Order, Error> {
+    let read = |e: scindo_proto::DecodeError| error(e.code(), e.to_string(), "see rpc/schema");
+    Ok(match verb {
+        Verb::Pause => Order::Pause(decode::<PauseRequest>(payload).map_err(read)?.paused),
+        Verb::Step => Order::Step(decode::<StepRequest>(payload).map_err(read)?.count),
+        Verb::Set => {
+            let SetRequest { key, value } = decode(payload).map_err(read)?;
+            Order::Set { key, value }
+        }
+        _ => {
+            decode::<ResetRequest>(payload).map_err(read)?;
+            Order::Reset
+        }
+    })
+}
+
+fn error(code: &str, message: String, hint: &str) -> Error {
+    Error { code: code.to_owned(), message, hint: hint.to_owned() }
+}
+
+fn reply<M: WireMessage>(query: &Query, message: &M) {
+    let sent = query.reply(query.key_expr().clone(), encode(message)).encoding(encoding::<M>()).wait();
+    if let Err(error) = sent {
+        tracing::debug!(%error, "rpc answer not sent");
+    }
+}
+
+/// Answers with an error message.
+pub fn refuse(query: &Query, error: Error) {
+    let encoding = "application/protobuf;scindo.v1.Error";
+    if let Err(error) = query.reply_err(error.encode_to_vec()).encoding(encoding).wait() {
+        tracing::debug!(%error, "rpc refusal not sent");
+    }
+}

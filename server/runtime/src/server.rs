@@ -1,0 +1,217 @@
+//! A running server: what is started, in which order, and how it ends.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
+
+use crossbeam_channel::bounded;
+use scindo_proto::messages::SessionInfo;
+use scindo_proto::{Chunk, KeySpace, Role, Topic};
+use scindo_world::snapshot::Snapshot;
+use triple_buffer::{Output, triple_buffer};
+use zenoh::Wait as _;
+use zenoh::query::Queryable;
+
+use crate::contact::{ContactConfig, ContactThread};
+use crate::engine::Engine;
+use crate::error::RuntimeError;
+use crate::exchange::{Exchange, OUTGOING};
+use crate::inbox::Inbox;
+use crate::publish::{PublishThread, Published, Sources, WAITING_KEYFRAMES};
+use crate::receive::Receivers;
+use crate::rpc::{self, RpcThread};
+use crate::session::Sessions;
+use crate::sim::{Command, Pace, SimThread};
+
+/// Orders that may wait for the simulation thread.
+const WAITING_ORDERS: usize = 16;
+
+/// How a server runs.
+#[derive(Debug, Clone)]
+pub struct ServerConfig {
+    /// First chunk of every key.
+    pub realm: String,
+    /// Session within the realm.
+    pub session: String,
+    /// How fast and how long.
+    pub pace: Pace,
+    /// Surfaces and tool states per second.
+    pub surface_hz: f64,
+    /// Contact models per second and held tool.
+    pub contact_hz: f64,
+    /// Statistics per second.
+    pub stats_hz: f64,
+}
+
+impl Default for ServerConfig {
+    fn default() -> Self {
+        Self {
+            realm: "scindo".to_owned(),
+            session: "main".to_owned(),
+            pace: Pace::default(),
+            surface_hz: 60.0,
+            contact_hz: 500.0,
+            stats_hz: 5.0,
+        }
+    }
+}
+
+/// See the module.
+pub struct Server {
+    exchange: Arc<Exchange>,
+    sim: JoinHandle<Engine>,
+    others: Vec<JoinHandle<()>>,
+    network: Option<Network>,
+}
+
+struct Network {
+    _receivers: Receivers,
+    _rpc: Queryable<()>,
+    sessions: Sessions,
+}
+
+impl Server {
+    /// Starts every thread: publication, orders, contact, input, simulation; without sessions
+    /// only the simulation.
+    pub fn start(
+        engine: Engine,
+        sessions: Option<Sessions>,
+        config: &ServerConfig,
+    ) -> Result<Self, RuntimeError> {
+        let keys = KeySpace::new(&config.realm, &config.session)?;
+        let (info, plan) = (engine.info(), engine.plan());
+        let (outgoing, outgoing_rx) = bounded(OUTGOING);
+        let exchange = Exchange::new(inbox(&info), info.bodies.len(), outgoing);
+        let (to_publish, published) = triple_buffer(&Snapshot::default());
+        let (to_contact, contact) = triple_buffer(&Snapshot::default());
+        let (commands, commands_rx) = bounded::<Command>(WAITING_ORDERS);
+        let mut others = Vec::new();
+        let mut network = None;
+        if let Some(sessions) = sessions {
+            let contact = contact_thread(&keys, &sessions, &exchange, contact, (&engine, config.contact_hz));
+            let sources = Sources {
+                snapshots: published,
+                outgoing: outgoing_rx,
+                keyframes: bounded(WAITING_KEYFRAMES),
+            };
+            let ids: Vec<String> = info.bodies.iter().map(|body| body.id.clone()).collect();
+            let what = Published {
+                bodies: ids,
+                step_s: info.step_s,
+                plan,
+                rates: (config.surface_hz, config.stats_hz),
+            };
+            let publish = PublishThread::declare(&keys, &sessions, &exchange, sources, what)?;
+            others.push(spawn("publish", move || publish.run())?);
+            let (queries, rpc) = declare_rpc(&keys, &sessions)?;
+            let rpc_thread =
+                RpcThread { keys: keys.clone(), exchange: exchange.clone(), queries, commands, info };
+            others.push(spawn("rpc", move || rpc_thread.run())?);
+            others.push(spawn("contact", move || contact.run())?);
+            let server = Chunk::new("server id", &format!("server-{}", std::process::id()))?;
+            let token = Topic::Live(Role::Server, server);
+            let receivers = Receivers::declare(&sessions.haptic, &keys, &exchange, &token)?;
+            network = Some(Network { _receivers: receivers, _rpc: rpc, sessions });
+        }
+        let sim =
+            SimThread::new(engine, exchange.clone(), commands_rx, (to_publish, to_contact), config.pace);
+        let sim = spawn("sim", move || sim.run())?;
+        Ok(Self { exchange, sim, others, network })
+    }
+
+    /// Shared state, for progress and tests.
+    pub fn exchange(&self) -> &Arc<Exchange> {
+        &self.exchange
+    }
+
+    /// Steps done.
+    pub fn steps(&self) -> u64 {
+        self.exchange.sim_step.load(Ordering::Relaxed)
+    }
+
+    /// True when the simulation thread has ended: all steps done, or told to stop.
+    pub fn finished(&self) -> bool {
+        self.sim.is_finished()
+    }
+
+    /// Asks every thread to end.
+    pub fn stop(&self) {
+        self.exchange.stop();
+    }
+
+    /// Waits for the simulation to end, then ends the rest; gives the engine back for its results.
+    pub fn join(self) -> Result<Engine, RuntimeError> {
+        let engine = self.sim.join();
+        self.exchange.stop();
+        for thread in self.others {
+            let name = thread.thread().name().unwrap_or("?").to_owned();
+            thread.join().map_err(|_| RuntimeError::Died { thread: name })?;
+        }
+        if let Some(Network { _receivers: receivers, _rpc: rpc, sessions }) = self.network {
+            drop((receivers, rpc));
+            for session in [sessions.bulk, sessions.haptic] {
+                if let Err(error) = session.close().wait() {
+                    tracing::debug!(%error, "session not closed cleanly");
+                }
+            }
+        }
+        engine.map_err(|_| RuntimeError::Died { thread: "sim".to_owned() })
+    }
+}
+
+fn inbox(info: &SessionInfo) -> Inbox {
+    let bodies = info.bodies.iter().map(|body| Arc::from(body.id.as_str()));
+    let tools = info.tools.iter().map(|tool| Arc::from(tool.id.as_str()));
+    Inbox::new(bodies, tools)
+}
+
+fn contact_thread(
+    keys: &KeySpace,
+    sessions: &Sessions,
+    exchange: &Arc<Exchange>,
+    snapshots: Output<Snapshot>,
+    (engine, rate_hz): (&Engine, f64),
+) -> ContactThread {
+    let scene = engine.simulation().scene();
+    let config = ContactConfig {
+        keys: keys.clone(),
+        haptic: sessions.haptic.clone(),
+        rate_hz,
+        shapes: scene.tools.iter().map(|tool| (tool.id.clone(), tool.shape)).collect(),
+        bodies: scene.bodies.iter().map(|body| body.id.clone()).collect(),
+    };
+    ContactThread::new(config, exchange.clone(), snapshots)
+}
+
+fn declare_rpc(
+    keys: &KeySpace,
+    sessions: &Sessions,
+) -> Result<(crossbeam_channel::Receiver<zenoh::query::Query>, Queryable<()>), RuntimeError> {
+    let (queries, receiver) = bounded(rpc::WAITING);
+    let queryable = sessions
+        .bulk
+        .declare_queryable(keys.every_rpc())
+        .callback(move |query| {
+            if let Err(full) = queries.try_send(query) {
+                let error = scindo_proto::messages::Error {
+                    code: "busy".to_owned(),
+                    message: "too many questions are waiting".to_owned(),
+                    hint: "ask again later".to_owned(),
+                };
+                rpc::refuse(&full.into_inner(), error);
+            }
+        })
+        .wait()
+        .map_err(|e| RuntimeError::Zenoh { what: "declaring rpc".to_owned(), reason: e.to_string() })?;
+    Ok((receiver, queryable))
+}
+
+fn spawn<T: Send + 'static>(
+    name: &str,
+    body: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, RuntimeError> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(body).map_err(|e| RuntimeError::System {
+        what: format!("starting thread '{name}'"),
+        reason: e.to_string(),
+    })
+}

@@ -1,0 +1,319 @@
+//! The simulation thread: orders, inputs, step, report, snapshots, pace.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
+use scindo_proto::messages::{BodyEpoch, RpcReply};
+use scindo_world::inputs::{Inputs, Wants};
+use scindo_world::simulation::Level;
+use scindo_world::snapshot::Snapshot;
+use triple_buffer::Input;
+
+use crate::engine::Engine;
+use crate::exchange::{Exchange, Outgoing};
+use crate::inbox::Refusal;
+
+/// How often a simulation that holds still looks for new listeners.
+const STILL: Duration = Duration::from_millis(10);
+
+/// A simulation later than this gives up the lost time instead of racing after it.
+const MOST_BEHIND: Duration = Duration::from_millis(250);
+
+/// Steps in a row that may panic before the simulation is paused.
+const MOST_PANICS: u32 = 3;
+
+/// What an rpc asks of the simulation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Order {
+    /// Hold still or go on.
+    Pause(bool),
+    /// Advance a paused simulation.
+    Step(u32),
+    /// Back to the start.
+    Reset,
+    /// Change a parameter.
+    Set {
+        /// Key as in the scene.
+        key: String,
+        /// Value as in the scene.
+        value: String,
+    },
+}
+
+/// An order and where its answer goes.
+pub struct Command {
+    /// What to do.
+    pub order: Order,
+    /// Holds one answer.
+    pub answer: Sender<RpcReply>,
+}
+
+/// How fast and how long.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Pace {
+    /// As fast as possible instead of real time.
+    pub fast: bool,
+    /// End after this many steps.
+    pub steps: Option<u64>,
+}
+
+/// The thread's state.
+pub struct SimThread {
+    engine: Engine,
+    exchange: Arc<Exchange>,
+    commands: Receiver<Command>,
+    to_publish: Input<Snapshot>,
+    to_contact: Input<Snapshot>,
+    pace: Pace,
+    inputs: Inputs,
+    wanted: Wants,
+    step: u64,
+    next_step: Instant,
+    /// Steps a paused simulation still owes, and who waits for them.
+    owed: Option<(u32, Sender<RpcReply>)>,
+    panics: u32,
+    body_ids: Vec<String>,
+}
+
+impl SimThread {
+    /// A simulation at its start.
+    pub fn new(
+        engine: Engine,
+        exchange: Arc<Exchange>,
+        commands: Receiver<Command>,
+        (to_publish, to_contact): (Input<Snapshot>, Input<Snapshot>),
+        pace: Pace,
+    ) -> Self {
+        let body_ids = engine.info().bodies.into_iter().map(|body| body.id).collect();
+        Self {
+            body_ids,
+            engine,
+            exchange,
+            commands,
+            to_publish,
+            to_contact,
+            pace,
+            inputs: Inputs::default(),
+            wanted: Wants::default(),
+            step: 0,
+            next_step: Instant::now(),
+            owed: None,
+            panics: 0,
+        }
+    }
+
+    /// Steps until told to stop or done; gives the engine back for its results.
+    pub fn run(mut self) -> Engine {
+        self.hand_over();
+        while !self.exchange.stopping() && !self.done() {
+            self.obey();
+            if self.holds_still() {
+                self.wait_still();
+                continue;
+            }
+            self.read_inputs();
+            self.advance();
+            self.hand_over();
+            self.report();
+            self.keep_pace();
+        }
+        self.engine
+    }
+
+    fn done(&self) -> bool {
+        self.pace.steps.is_some_and(|steps| self.step >= steps)
+    }
+
+    fn holds_still(&self) -> bool {
+        self.exchange.paused.load(Ordering::Relaxed) && self.owed.is_none()
+    }
+
+    /// Nothing moves, but somebody may begin to watch or give an order.
+    fn wait_still(&mut self) {
+        let mut wants = Wants::default();
+        self.exchange.wants_into(&mut wants);
+        if wants != self.wanted {
+            self.hand_over();
+        }
+        if let Ok(command) = self.commands.recv_timeout(STILL) {
+            self.carry_out(command);
+        }
+        self.next_step = Instant::now();
+    }
+
+    fn obey(&mut self) {
+        while let Ok(command) = self.commands.try_recv() {
+            self.carry_out(command);
+        }
+    }
+
+    fn carry_out(&mut self, Command { order, answer }: Command) {
+        let reply = match order {
+            Order::Pause(paused) => {
+                self.exchange.paused.store(paused, Ordering::Relaxed);
+                Ok(if paused { "paused".to_owned() } else { "running".to_owned() })
+            }
+            Order::Step(count) => {
+                if self.holds_still() {
+                    self.owed = Some((count, answer));
+                    return;
+                }
+                Err(Refusal {
+                    code: "not-paused",
+                    message: "only a paused simulation can be stepped".to_owned(),
+                    hint: "send rpc/pause first",
+                })
+            }
+            Order::Reset => self.reset(),
+            Order::Set { key, value } => self.set(&key, &value),
+        };
+        // Who asked may have given up waiting.
+        let _ = answer.try_send(self.reply(reply));
+    }
+
+    fn reset(&mut self) -> Result<String, Refusal> {
+        self.engine.reset().map_err(|message| Refusal {
+            code: "cannot-reset",
+            message,
+            hint: "start the server again",
+        })?;
+        self.announce_plan();
+        self.exchange.event(Level::Info, "reset", "back at the start of the scene".to_owned());
+        self.hand_over();
+        Ok("at the start".to_owned())
+    }
+
+    fn set(&mut self, key: &str, value: &str) -> Result<String, Refusal> {
+        self.engine.set(key, value).map_err(|message| Refusal {
+            code: "cannot-set",
+            message,
+            hint: "keys and values are those of a scene file",
+        })?;
+        self.announce_plan();
+        self.exchange.event(Level::Info, "set", format!("{key} = {value}"));
+        Ok(format!("{key} = {value}"))
+    }
+
+    fn reply(&self, result: Result<String, Refusal>) -> RpcReply {
+        let (ok, message, error) = match result {
+            Ok(message) => (true, message, None),
+            Err(refusal) => (false, String::new(), Some(refusal.into())),
+        };
+        RpcReply { ok, sim_step: self.step, message, error }
+    }
+
+    fn announce_plan(&self) {
+        self.exchange.send(Outgoing::Plan(self.engine.plan()));
+    }
+
+    fn read_inputs(&mut self) {
+        self.exchange.wants_into(&mut self.inputs.wants);
+        self.exchange.inbox().take(&mut self.inputs);
+    }
+
+    /// One step. A panic costs the state, not the server: the scene starts again.
+    fn advance(&mut self) {
+        let (engine, inputs) = (&mut self.engine, &self.inputs);
+        if catch_unwind(AssertUnwindSafe(|| engine.step(inputs))).is_ok() {
+            self.panics = 0;
+        } else {
+            self.recover();
+        }
+        self.step += 1;
+        self.exchange.sim_step.store(self.step, Ordering::Relaxed);
+        if let Some((count, answer)) = self.owed.take() {
+            if count > 1 {
+                self.owed = Some((count - 1, answer));
+            } else {
+                let _ = answer.try_send(self.reply(Ok("stepped".to_owned())));
+            }
+        }
+    }
+
+    fn recover(&mut self) {
+        self.panics += 1;
+        let reset = matches!(catch_unwind(AssertUnwindSafe(|| self.engine.reset())), Ok(Ok(())));
+        let message = format!("step {} panicked; the scene starts again", self.step);
+        self.exchange.event(Level::Error, "step-panicked", message);
+        if !reset || self.panics >= MOST_PANICS {
+            self.exchange.paused.store(true, Ordering::Relaxed);
+            let message = "paused after repeated panics; rpc/reset and rpc/pause bring it back".to_owned();
+            self.exchange.event(Level::Error, "paused", message);
+        }
+    }
+
+    /// Times to the meter, notes to the events, answers to those who cut.
+    fn report(&mut self) {
+        let report = self.engine.report();
+        self.exchange.meter.step(report.seconds.iter());
+        for event in &report.events {
+            let body = event.body.as_deref().map_or(String::new(), |id| format!("{id}: "));
+            self.exchange.event(event.level, event.name, format!("{body}{}", event.message));
+        }
+        if report.cuts.is_empty() {
+            return;
+        }
+        let bodies = self.body_ids.iter().enumerate();
+        let epochs: Vec<BodyEpoch> =
+            bodies.map(|(i, id)| BodyEpoch { body_id: id.clone(), epoch: self.exchange.epoch(i) }).collect();
+        let answers = self.exchange.inbox().finish(&report.cuts, self.step, &epochs);
+        for answer in answers {
+            let message = match &answer.error {
+                None => format!(
+                    "'{}' cut {} elements with '{}'",
+                    answer.client_id, answer.elements_cut, answer.tool_id
+                ),
+                Some(error) => format!("cut of '{}' failed: {}", answer.client_id, error.message),
+            };
+            let (level, name) = match answer.error {
+                None => (Level::Info, "cut-answered"),
+                Some(_) => (Level::Warning, "cut-failed"),
+            };
+            self.exchange.event(level, name, message);
+            self.exchange.send(Outgoing::Ack(answer));
+        }
+    }
+
+    /// Fresh snapshots for the publisher and, while somebody holds a tool, for the contact
+    /// thread. Without pace, only those that the last one has reached.
+    fn hand_over(&mut self) {
+        self.exchange.wants_into(&mut self.wanted);
+        if !self.pace.fast || self.to_publish.consumed() || !self.inputs.cuts.is_empty() {
+            let snapshot = self.to_publish.input_buffer_mut();
+            self.engine.snapshot_into(&self.wanted, snapshot);
+            for (index, body) in snapshot.bodies.iter().enumerate() {
+                self.exchange.set_epoch(index, body.epoch);
+            }
+            self.to_publish.publish();
+        }
+        if self.wanted.contact {
+            self.engine.snapshot_into(&self.wanted, self.to_contact.input_buffer_mut());
+            self.to_contact.publish();
+        }
+    }
+
+    /// Waits for the next step's time; orders are carried out meanwhile.
+    fn keep_pace(&mut self) {
+        if self.pace.fast || self.owed.is_some() {
+            return;
+        }
+        self.next_step += Duration::from_secs_f64(self.engine.step_s());
+        let now = Instant::now();
+        if now > self.next_step + MOST_BEHIND {
+            self.next_step = now;
+        }
+        loop {
+            match self.commands.recv_deadline(self.next_step) {
+                Ok(command) => self.carry_out(command),
+                Err(RecvTimeoutError::Timeout) => return,
+                Err(RecvTimeoutError::Disconnected) => {
+                    std::thread::sleep(self.next_step.saturating_duration_since(Instant::now()));
+                    return;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,356 @@
+//! A server and clients in one process, over loopback TCP.
+
+#![allow(clippy::unwrap_used)]
+
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicU16, Ordering};
+use std::time::{Duration, Instant};
+
+use scindo::engine::Engine;
+use scindo::server::{Server, ServerConfig};
+use scindo::session::{NetworkConfig, Sessions};
+use scindo_client::messages::{
+    BladeSegment, Pose, ToolSample, Vec3, cut_ack::Outcome, haptic_contact, tool_sample::Mode,
+};
+use scindo_client::{Link, LinkConfig, LinkError, Role};
+use scindo_proto::{Chunk, Topic, encode, encoding};
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+
+const SCENE: &str = r#"
+schema = 1
+name = "wire"
+[world]
+gravity_m_s2 = [0, 0, -9.81]
+step_s = 0.01
+[[body]]
+id = "block"
+mesh = { box = { min_m = [0, 0, 0], max_m = [0.08, 0.04, 0.02], cells = [8, 4, 2], pattern = "tet5" } }
+young_pa = 5e4
+poisson = 0.4
+density_kg_m3 = 1000
+solver = { iterations = 20, tolerance = 1e-4 }
+[[body.fix]]
+where = { box = { min_m = [-1, -1, -1e-6], max_m = [1, 1, 1e-6] } }
+[[tool]]
+id = "scalpel"
+shape = { blade = { length_m = 0.05, thickness_m = 0.001 } }
+[[tool]]
+id = "probe"
+shape = { sphere = { radius_m = 0.005 } }
+"#;
+
+/// A server at a pair of free ports.
+struct Running {
+    server: Option<Server>,
+    endpoint: String,
+}
+
+impl Running {
+    fn start() -> Self {
+        let endpoint = format!("tcp/127.0.0.1:{}", free_pair());
+        Self { server: Some(serve(&endpoint)), endpoint }
+    }
+
+    fn server(&self) -> &Server {
+        self.server.as_ref().unwrap()
+    }
+
+    async fn link(&self, role: Role, id: &str) -> Link {
+        Link::connect(LinkConfig::new(role, id).with_connect([self.endpoint.clone()])).await.unwrap()
+    }
+
+    fn end(&mut self) -> Engine {
+        let server = self.server.take().unwrap();
+        server.stop();
+        server.join().unwrap()
+    }
+}
+
+fn serve(endpoint: &str) -> Server {
+    let scene = Scene::from_toml(SCENE).unwrap();
+    let engine = Engine::new(Simulation::new(&scene, scene.base_dir()).unwrap(), None).unwrap();
+    let network = NetworkConfig { listen: vec![endpoint.to_owned()], ..NetworkConfig::default() };
+    Server::start(engine, Some(Sessions::open(&network).unwrap()), &ServerConfig::default()).unwrap()
+}
+
+/// A port that is free together with the next one.
+fn free_pair() -> u16 {
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    let start = 20_000 + (std::process::id() % 200) as u16 * 100;
+    loop {
+        let port = start + 2 * NEXT.fetch_add(1, Ordering::Relaxed);
+        let both = (TcpListener::bind(("127.0.0.1", port)), TcpListener::bind(("127.0.0.1", port + 1)));
+        if matches!(both, (Ok(_), Ok(_))) {
+            return port;
+        }
+    }
+}
+
+async fn until(what: &str, mut check: impl FnMut() -> bool) {
+    let started = Instant::now();
+    while !check() {
+        assert!(started.elapsed() < Duration::from_secs(20), "{what}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+}
+
+fn refused(running: &Running, code: &str) -> u64 {
+    running.server().exchange().inbox().refused().get(code).copied().unwrap_or(0)
+}
+
+fn at(x: f64, y: f64, z: f64) -> ToolSample {
+    let pose = Pose { position_m: Some(Vec3 { x, y, z }), qw: 1.0, ..Pose::default() };
+    ToolSample { pose: Some(pose), mode: Mode::Touch.into(), ..ToolSample::default() }
+}
+
+/// A vertical sheet through the block at `x`.
+fn sweep(x: f64) -> Vec<BladeSegment> {
+    let segment = |y: f64| BladeSegment {
+        tip_m: Some(Vec3 { x, y, z: -0.01 }),
+        heel_m: Some(Vec3 { x, y, z: 0.03 }),
+    };
+    vec![segment(-0.01), segment(0.02), segment(0.05)]
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_late_joiner_sees_the_same_surface() {
+    let mut running = Running::start();
+    let early = running.link(Role::Viewer, "early").await;
+    let mut first = early.mirror("block").await.unwrap();
+    first.next().await.unwrap();
+    let tool = early.tool("scalpel").await.unwrap();
+    for x in [0.021, 0.043, 0.064] {
+        let ack = tool.cutter.cut("block", sweep(x)).await.unwrap();
+        assert_eq!(ack.outcome(), Outcome::Applied, "{ack:?}");
+        assert!(ack.elements_cut > 0);
+    }
+    early.pause(true).await.unwrap();
+    let late = running.link(Role::Viewer, "late").await;
+    let mut second = late.mirror("block").await.unwrap();
+    let seen = second.next().await.unwrap();
+    assert!(seen.topology.epoch >= 3, "epoch {}", seen.topology.epoch);
+    until("both show one step", || {
+        let (a, b) = (first.latest().unwrap(), second.latest().unwrap());
+        a.frame.sim_step == b.frame.sim_step
+            && a.topology.epoch == b.topology.epoch
+            && a.topology.vertex_count == b.topology.vertex_count
+            && a.topology.triangles == b.topology.triangles
+            && a.topology.tags == b.topology.tags
+            && a.frame.positions == b.frame.positions
+    })
+    .await;
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cut_sent_twice_is_applied_once() {
+    let mut running = Running::start();
+    let link = running.link(Role::Client, "script").await;
+    let tool = link.tool("scalpel").await.unwrap();
+    let command = scindo_client::messages::CutCommand {
+        client_id: "script".into(),
+        tool_id: "scalpel".into(),
+        seq: 1,
+        body_id: "block".into(),
+        sweep: sweep(0.033),
+        ..Default::default()
+    };
+    let first = tool.cutter.send(command.clone()).await.unwrap();
+    let second = tool.cutter.send(command).await.unwrap();
+    assert_eq!(first.outcome(), Outcome::Applied);
+    assert_eq!(second.outcome(), Outcome::Duplicate);
+    assert_eq!((first.elements_cut, first.epochs), (second.elements_cut, second.epochs));
+    assert_eq!(running.end().simulation().cuts_applied(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn broken_messages_are_refused_and_counted_and_the_server_lives() {
+    let mut running = Running::start();
+    let link = running.link(Role::Client, "broken").await;
+    let mut stats = link.stats().await.unwrap();
+    let key = |topic: fn(Chunk) -> Topic| link.keys().key(&topic(Chunk::new("tool", "probe").unwrap()));
+    let mut sample = at(f64::NAN, 0.0, 0.0);
+    (sample.client_id, sample.tool_id, sample.seq) = ("broken".into(), "probe".into(), 1);
+    let put = |key: String, bytes: bytes::Bytes, encoding: String| {
+        let link = link.clone();
+        async move { link.haptic().put(key, bytes).encoding(encoding).await.unwrap() }
+    };
+    let pose = encoding::<ToolSample>();
+    put(key(Topic::ToolPose), encode(&sample), pose.clone()).await;
+    put(key(Topic::ToolPose), encode(&sample), "text/plain".into()).await;
+    put(key(Topic::ToolPose), vec![0xff; 100].into(), pose.clone()).await;
+    put(key(Topic::ToolPose), vec![0; 5000].into(), pose).await;
+    let cut = encoding::<scindo_client::messages::CutCommand>();
+    put(key(Topic::ToolCut), vec![0; 2_000_000].into(), cut).await;
+    until("all are counted", || {
+        ["non-finite", "bad-encoding", "malformed"].iter().all(|code| refused(&running, code) == 1)
+            && refused(&running, "too-large") == 2
+    })
+    .await;
+    loop {
+        let stats = stats.next().await.unwrap();
+        if stats.refused.iter().map(|c| c.count).sum::<u64>() == 5 {
+            break;
+        }
+    }
+    let before = running.server().steps();
+    until("the server steps on", || running.server().steps() > before + 5).await;
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lost_client_loses_its_tool_and_another_may_take_it() {
+    let mut running = Running::start();
+    let watcher = running.link(Role::Viewer, "watcher").await;
+    let mut events = watcher.events().await.unwrap();
+    let owner = || running.server().exchange().inbox().held().next().map(|tool| tool.owner.to_string());
+    {
+        let link = running.link(Role::Haptic, "hand-1").await;
+        let mut tool = link.tool("probe").await.unwrap();
+        tool.poses.send(at(0.04, 0.02, 0.1)).unwrap();
+        until("the first hand holds it", || owner().as_deref() == Some("hand-1")).await;
+        let other = running.link(Role::Haptic, "hand-2").await;
+        let mut same = other.tool("probe").await.unwrap();
+        same.poses.send(at(0.04, 0.02, 0.1)).unwrap();
+        until("the second hand is refused", || refused(&running, "not-owner") == 1).await;
+    }
+    until("the tool is free", || owner().is_none()).await;
+    let third = running.link(Role::Haptic, "hand-3").await;
+    let mut tool = third.tool("probe").await.unwrap();
+    tool.poses.send(at(0.04, 0.02, 0.1)).unwrap();
+    until("the third hand holds it", || owner().as_deref() == Some("hand-3")).await;
+    loop {
+        let event = events.next().await.unwrap();
+        if event.name == "tool-released" {
+            assert!(event.message.contains("hand-1"), "{}", event.message);
+            break;
+        }
+    }
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_haptic_client_feels_the_body_and_costs_nothing_when_it_is_gone() {
+    let mut running = Running::start();
+    {
+        let link = running.link(Role::Haptic, "hand").await;
+        let mut tool = link.tool("probe").await.unwrap();
+        let started = Instant::now();
+        let mut felt = false;
+        let mut first = None;
+        while started.elapsed() < Duration::from_secs(20) {
+            // Lowers the ball from above the block to 4 mm below its top.
+            let depth = (started.elapsed().as_secs_f64() * 0.02).min(0.014);
+            tool.poses.send(at(0.04, 0.02, 0.035 - depth)).unwrap();
+            tokio::time::sleep(Duration::from_millis(2)).await;
+            let received = tool.contacts.received();
+            let newest = tool.contacts.latest();
+            if newest.at.is_some() && first.is_none() {
+                first = Some((Instant::now(), received));
+            }
+            if newest.message.mode() == haptic_contact::Mode::Contact {
+                let pressing = newest.message.contacts.iter().any(|c| c.force_n.is_some_and(|f| f.z > 0.01));
+                felt |= pressing;
+            }
+            if felt && first.is_some_and(|(at, _)| at.elapsed() > Duration::from_secs(1)) {
+                break;
+            }
+        }
+        assert!(felt, "no force after 20 s");
+        let (since, before) = first.unwrap();
+        let rate = (tool.contacts.received() - before) as f64 / since.elapsed().as_secs_f64();
+        assert!(rate > 100.0, "{rate} contacts per second");
+    }
+    until("nobody wants contact any more", || {
+        let mut wants = scindo_world::inputs::Wants::default();
+        running.server().exchange().wants_into(&mut wants);
+        !wants.contact && wants.surface.iter().all(|wanted| !wanted)
+    })
+    .await;
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn surfaces_are_built_only_while_somebody_watches() {
+    let mut running = Running::start();
+    let wanted = || running.server().exchange().surface_wanted(0);
+    assert!(!wanted());
+    let link = running.link(Role::Viewer, "viewer").await;
+    let mut mirror = link.mirror("block").await.unwrap();
+    let surface = mirror.next().await.unwrap();
+    assert_eq!(surface.frame.positions.len(), 12 * surface.topology.vertex_count as usize);
+    until("the subscription is noticed", wanted).await;
+    drop(mirror);
+    until("its end is noticed", || !wanted()).await;
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn orders_are_answered() {
+    let mut running = Running::start();
+    let link = running.link(Role::Client, "operator").await;
+    let info = link.info().await.unwrap();
+    assert_eq!((info.scene_name.as_str(), info.bodies.len(), info.tools.len()), ("wire", 1, 2));
+    assert!(!link.schema().await.unwrap().file_descriptor_set.is_empty());
+    link.pause(true).await.unwrap();
+    let before = running.server().steps();
+    let reply = link.step(7).await.unwrap();
+    assert_eq!(reply.sim_step, before + 7);
+    assert_eq!(running.server().steps(), before + 7);
+    link.set("world.gravity_m_s2", "[0, 0, 0]").await.unwrap();
+    let unknown = link.set("world.gravitas", "1").await.unwrap_err();
+    assert!(matches!(&unknown, LinkError::Refused { code, .. } if code == "cannot-set"), "{unknown}");
+    link.reset().await.unwrap();
+    link.pause(false).await.unwrap();
+    let busy = link.step(1).await.unwrap_err();
+    assert!(matches!(&busy, LinkError::Refused { code, .. } if code == "not-paused"), "{busy}");
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_of_the_haptic_port_alone_gets_everything() {
+    let mut running = Running::start();
+    let mut config = zenoh::Config::default();
+    for (key, value) in [
+        ("mode", r#""client""#.to_owned()),
+        ("connect/endpoints", format!("[{:?}]", running.endpoint)),
+        ("scouting/multicast/enabled", "false".to_owned()),
+    ] {
+        config.insert_json5(key, &value).unwrap();
+    }
+    let session = zenoh::open(config).await.unwrap();
+    let frames = session.declare_subscriber("scindo/@v1/main/body/block/surface/frame").await.unwrap();
+    let frame = tokio::time::timeout(Duration::from_secs(10), frames.recv_async()).await.unwrap().unwrap();
+    assert_eq!(frame.encoding().to_string(), "application/protobuf;scindo.v1.SurfaceFrame");
+    let keyframe = session.get("scindo/@v1/main/body/block/surface/keyframe").await.unwrap();
+    assert!(keyframe.recv_async().await.unwrap().result().is_ok());
+    session.close().await.unwrap();
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_finds_a_server_that_was_restarted() {
+    let mut running = Running::start();
+    let link = running.link(Role::Viewer, "patient").await;
+    let mut mirror = link.mirror("block").await.unwrap();
+    let cutter = link.tool("scalpel").await.unwrap().cutter;
+    cutter.cut("", sweep(0.033)).await.unwrap();
+    until("the cut is shown", || mirror.latest().is_some_and(|s| s.topology.epoch > 0)).await;
+    running.end();
+    let presence = link.presence();
+    until("the server is missed", || presence.borrow().servers == 0).await;
+    running.server = Some(serve(&running.endpoint));
+    until("the server is back", || presence.borrow().servers == 1).await;
+    until("its uncut surface is shown", || mirror.latest().is_some_and(|s| s.topology.epoch == 0)).await;
+    mirror.next().await.unwrap();
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nobody_there_is_said_clearly() {
+    let mut config = LinkConfig::new(Role::Viewer, "lonely").with_connect(["tcp/127.0.0.1:9".to_owned()]);
+    config.timeout = Duration::from_millis(500);
+    let error = Link::connect(config).await.err().unwrap();
+    assert!(error.to_string().contains("no scindo server answers at tcp/127.0.0.1:9"), "{error}");
+}
