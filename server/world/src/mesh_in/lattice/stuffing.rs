@@ -83,8 +83,7 @@ fn classify(lattice: &Bcc, surface: &CleanSurface) -> Vec<Side> {
 }
 
 fn cut_edges(lattice: &Bcc, surface: &CleanSurface, sides: &[Side]) -> Vec<Cut> {
-    let differ = |e: &Edge| sides[e.a as usize] != sides[e.b as usize];
-    let edges: Vec<Edge> = lattice.edges().into_iter().filter(differ).collect();
+    let edges = lattice.edges(|e| sides[e.a as usize] != sides[e.b as usize]);
     edges
         .par_iter()
         .map(|&edge| {
