@@ -1,9 +1,11 @@
 //! A small team of threads that works on one step together.
 //!
 //! The caller's thread is member 0; the others spin briefly between phases and sleep between steps.
-//! Every phase is a fixed list of tasks, cut into one contiguous range per member. Tasks write only
-//! their own blocks and partial results are summed in task order, so the result does not depend on
-//! the number of members. No phase allocates.
+//! Every phase is a fixed list of tasks. Each member starts on a range of its own, which keeps its
+//! part of the data near its core, and then helps with the others': a member that the machine has no
+//! time for delays nobody. Tasks write only their own blocks and partial results are summed in task
+//! order, so the result depends neither on the number of members nor on who did what. No phase
+//! allocates.
 
 #![allow(unsafe_code)] // sharing a borrowed closure and disjoint blocks with persistent threads
 
@@ -16,7 +18,7 @@ use std::thread::JoinHandle;
 
 /// Idle members look this often for the next phase before they sleep (about 30 µs).
 const SPINS_BEFORE_SLEEP: u32 = 4_000;
-/// The caller gives up its time slice after this many looks at unfinished members.
+/// The caller gives up its time slice after this many looks at members that are still busy.
 const SPINS_BEFORE_YIELD: u32 = 2_000;
 
 /// Persistent threads that run phases for their owner.
@@ -30,16 +32,28 @@ type Job = *const (dyn Fn(usize) + Sync);
 
 #[derive(Debug)]
 struct Shared {
-    /// What every member runs in the current phase; written only while all members are idle.
+    /// What every member runs in the current phase; written only while nobody is inside.
     job: UnsafeCell<Option<Job>>,
-    phase: AtomicU64,
-    unfinished: AtomicUsize,
+    /// Number of the phase (upper half), [`CLOSED`], and how many members are inside (lower bits).
+    gate: AtomicU64,
+    /// Next task in the range of every member.
+    next: Vec<Counter>,
     stop: AtomicBool,
     panicked: AtomicBool,
 }
 
-// SAFETY: `job` is written by the owner while `unfinished` is 0, and read by members only between
-// the release store of `phase` and their release decrement of `unfinished`.
+/// Alone on its cache line, so that members do not slow each other down.
+#[derive(Debug, Default)]
+#[repr(align(128))]
+struct Counter(AtomicUsize);
+
+/// Nobody may enter the phase any more.
+const CLOSED: u64 = 1 << 31;
+const INSIDE: u64 = CLOSED - 1;
+const PHASE: u64 = 1 << 32;
+
+// SAFETY: `job` is written by the owner while the gate is closed and nobody is inside, and read only
+// by members that entered through the gate, which synchronises with its opening.
 unsafe impl Sync for Shared {}
 // SAFETY: the pointer inside `job` is only dereferenced while the owner's `run` keeps it alive.
 unsafe impl Send for Shared {}
@@ -49,8 +63,8 @@ impl Team {
     pub fn new(threads: usize) -> std::io::Result<Self> {
         let shared = Arc::new(Shared {
             job: UnsafeCell::new(None),
-            phase: AtomicU64::new(0),
-            unfinished: AtomicUsize::new(0),
+            gate: AtomicU64::new(CLOSED),
+            next: (0..threads.max(1)).map(|_| Counter::default()).collect(),
             stop: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
         });
@@ -71,46 +85,58 @@ impl Team {
     /// Runs `task(t, block t of `state`)` once for every block and returns when all are done.
     pub fn for_blocks<B: Blocks>(&mut self, state: B, task: impl Fn(usize, B::Part) + Sync) {
         let (n, threads) = (state.count(), self.threads());
+        let first = |member: usize| n * member / threads;
+        for (member, next) in self.shared.next.iter().enumerate() {
+            next.0.store(first(member), Ordering::Relaxed);
+        }
+        let shared = Arc::clone(&self.shared);
         self.run(&|member| {
-            for t in n * member / threads..n * (member + 1) / threads {
-                // SAFETY: the ranges of the members partition 0..n, so each block is taken once.
-                task(t, unsafe { state.part(t) });
+            for helped in (member..threads).chain(0..member) {
+                loop {
+                    let t = shared.next[helped].0.fetch_add(1, Ordering::Relaxed);
+                    if t >= first(helped + 1) {
+                        break;
+                    }
+                    // SAFETY: the ranges partition 0..n and a counter never gives a number twice.
+                    task(t, unsafe { state.part(t) });
+                }
             }
         });
     }
 
-    /// Runs `job(member)` on every member.
+    /// Runs `job(0)` here and `job(member)` on every member that comes in time.
     fn run(&mut self, job: &(dyn Fn(usize) + Sync)) {
         if self.members.is_empty() {
             return job(0);
         }
-        // SAFETY: members are idle (`unfinished` is 0), so nobody reads the cell; the lifetime is
-        // only extended until this function has seen every member finish.
+        let shared = &*self.shared;
+        // SAFETY: the gate is closed and nobody is inside, so nobody reads the cell; the lifetime is
+        // only extended until this function has closed the gate and seen everybody leave.
         unsafe {
-            *self.shared.job.get() = Some(std::mem::transmute::<*const (dyn Fn(usize) + Sync + '_), Job>(job))
-        };
-        self.shared.unfinished.store(self.members.len(), Ordering::Relaxed);
-        self.shared.phase.fetch_add(1, Ordering::Release);
+            *shared.job.get() = Some(std::mem::transmute::<*const (dyn Fn(usize) + Sync + '_), Job>(job));
+        }
+        let phase = (shared.gate.load(Ordering::Relaxed) & !(PHASE - 1)).wrapping_add(PHASE);
+        shared.gate.store(phase, Ordering::Release);
         for member in &self.members {
             member.thread().unpark();
         }
         let own = catch_unwind(AssertUnwindSafe(|| job(0)));
+        shared.gate.fetch_or(CLOSED, Ordering::Relaxed);
         let mut spins = 0_u32;
-        while self.shared.unfinished.load(Ordering::Acquire) > 0 {
+        while shared.gate.load(Ordering::Acquire) & INSIDE > 0 {
             spins += 1;
             if spins < SPINS_BEFORE_YIELD { std::hint::spin_loop() } else { std::thread::yield_now() }
         }
         if let Err(panic) = own {
             std::panic::resume_unwind(panic);
         }
-        assert!(!self.shared.panicked.load(Ordering::Relaxed), "a physics thread panicked");
+        assert!(!shared.panicked.swap(false, Ordering::Relaxed), "a physics thread panicked");
     }
 }
 
 impl Drop for Team {
     fn drop(&mut self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
-        self.shared.phase.fetch_add(1, Ordering::Release);
+        self.shared.stop.store(true, Ordering::Release);
         for member in self.members.drain(..) {
             member.thread().unpark();
             // A member that panicked has been reported by `run` already.
@@ -121,35 +147,39 @@ impl Drop for Team {
 
 impl Shared {
     fn serve(&self, member: usize) {
-        let mut seen = 0;
-        loop {
-            seen = self.wait_for_phase_after(seen);
-            if self.stop.load(Ordering::Relaxed) {
-                return;
-            }
-            // SAFETY: the owner wrote the job before the phase it announced, keeps it alive until
-            // `unfinished` reaches 0, and the closure is Sync.
-            let done = catch_unwind(AssertUnwindSafe(|| unsafe {
-                if let Some(job) = *self.job.get() {
-                    (*job)(member);
+        let (mut done, mut spins) = (0, 0);
+        while !self.stop.load(Ordering::Acquire) {
+            if let Some(phase) = self.enter(done) {
+                // SAFETY: this member is inside, so the owner keeps the job alive; it is Sync.
+                let result = catch_unwind(AssertUnwindSafe(|| unsafe {
+                    if let Some(job) = *self.job.get() {
+                        (*job)(member);
+                    }
+                }));
+                if result.is_err() {
+                    self.panicked.store(true, Ordering::Relaxed);
                 }
-            }));
-            if done.is_err() {
-                self.panicked.store(true, Ordering::Relaxed);
+                self.gate.fetch_sub(1, Ordering::Release);
+                (done, spins) = (phase, 0);
+            } else {
+                spins += 1;
+                if spins < SPINS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::park() }
             }
-            self.unfinished.fetch_sub(1, Ordering::Release);
         }
     }
 
-    fn wait_for_phase_after(&self, seen: u64) -> u64 {
-        let mut spins = 0;
+    /// Enters the present phase if it is open and is not `done`; returns its number.
+    fn enter(&self, done: u64) -> Option<u64> {
+        let mut gate = self.gate.load(Ordering::Relaxed);
         loop {
-            let phase = self.phase.load(Ordering::Acquire);
-            if phase != seen {
-                return phase;
+            let phase = gate & !(PHASE - 1);
+            if gate & CLOSED != 0 || phase == done {
+                return None;
             }
-            spins += 1;
-            if spins < SPINS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::park() }
+            match self.gate.compare_exchange_weak(gate, gate + 1, Ordering::Acquire, Ordering::Relaxed) {
+                Ok(_) => return Some(phase),
+                Err(now) => gate = now,
+            }
         }
     }
 }
@@ -247,12 +277,14 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_of_a_member_reaches_the_caller_and_the_team_can_be_dropped() {
+    fn a_panic_in_a_task_reaches_the_caller_and_the_team_goes_on() {
         let mut team = Team::new(2).unwrap();
-        let mut values = [0; 2];
+        let mut values = [0; 64];
         let panicked = catch_unwind(AssertUnwindSafe(|| {
-            team.for_blocks(blocks(&mut values, 1), |i, _| assert!(i == 0, "expected"));
+            team.for_blocks(blocks(&mut values, 1), |i, _| assert!(i != 40, "expected"));
         }));
         assert!(panicked.is_err());
+        team.for_blocks(blocks(&mut values, 1), |i, v| v[0] = i);
+        assert!(values.iter().enumerate().all(|(i, v)| i == *v));
     }
 }
