@@ -131,7 +131,10 @@ impl CutMesh {
     }
 
     /// Cuts along the surface the blade swept, given the current position [m] of every copy.
-    /// Successive sweeps with the same incision id continue one incision.
+    ///
+    /// Successive sweeps with the same incision id continue one incision: the blade position the last
+    /// one ended with goes along with the material and is where this one begins. An incision never
+    /// cuts its own lips, so a stroke that crosses itself takes a new id there.
     pub fn sweep(
         &mut self,
         x: &[Vector3<f64>],
@@ -153,7 +156,7 @@ impl CutMesh {
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
         self.detector.find_candidates(&body, &low, &high);
         if let Some(last) = blade.segments.last() {
-            let near: Vec<[u32; 4]> = self.detector.nearby_tets(&self.pieces).collect();
+            let near = self.detector.tets_near(last, &self.pieces);
             let around = |copy| self.copies.tets_around(copy, &self.pieces);
             let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
             self.fronts.insert(incision, front);

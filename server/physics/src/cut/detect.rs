@@ -81,9 +81,13 @@ impl Record<'_> {
 }
 
 impl Detector {
-    /// Copies of the pieces near the sweep.
-    pub fn nearby_tets<'a>(&'a self, pieces: &'a PieceTable) -> impl Iterator<Item = [u32; 4]> + 'a {
-        self.candidates.iter().map(|c| pieces.pieces[c.0 as usize].copies)
+    /// Copies of the candidate pieces whose box overlaps that of the blade segment.
+    pub fn tets_near(&self, [tip, heel]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
+        let (from, to) = (tip.inf(heel), tip.sup(heel));
+        let overlaps = |(_, low, high): &&(u32, Vector3<f64>, Vector3<f64>)| {
+            (0..3).all(|k| from[k] <= high[k] && low[k] <= to[k])
+        };
+        self.candidates.iter().filter(overlaps).map(|c| pieces.pieces[c.0 as usize].copies).collect()
     }
 
     /// Finds the pieces whose tet overlaps the box [m].

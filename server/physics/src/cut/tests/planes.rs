@@ -58,13 +58,27 @@ fn planes_through_nodes_and_edges() {
     }
 }
 
+/// All edges across the plane are hit in the middle; the numbering of the mesh does not matter.
 #[test]
-fn all_edges_halved() {
-    let mut body = Body::new([1.0; 3], [3; 3], BoxPattern::Tet6);
-    body.cut_plane(v(0.5, 0.5, 0.5), v(0.0, 1.0, 0.0), 2.0, 1);
-    check::everything(&body.cut);
-    let parts = body.cut.components().volume;
-    assert!(parts.len() == 2 && (parts[0] - 0.5).abs() < 1e-13);
+fn all_edges_halved_in_any_numbering() {
+    let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [3; 3], BoxPattern::Tet6);
+    let mut backwards = mesh.clone();
+    backwards.nodes.reverse();
+    backwards.tets.reverse();
+    let last = mesh.nodes.len() as u32 - 1;
+    backwards.tets.iter_mut().flatten().for_each(|n| *n = last - *n);
+    let topology = [mesh, backwards].map(|mesh| {
+        let cut = CutMesh::new(mesh).unwrap();
+        let mut body = Body { x: cut.rest_positions(), cut };
+        body.cut_plane(v(0.5, 0.5, 0.5), v(0.0, 1.0, 0.0), 2.0, 1);
+        check::everything(&body.cut);
+        assert!(body.cut.components().volume.iter().all(|part| (part - 0.5).abs() < 1e-13));
+        body.cut_plane(v(0.5, 0.5, 0.5), v(1.0, 1.0, 0.0), 2.0, 2);
+        body.cut_plane(v(0.5, 0.5, 1.0 / 3.0), v(0.0, 0.0, 1.0), 2.0, 3);
+        check::everything(&body.cut);
+        body.topology()
+    });
+    assert_eq!(topology[0], topology[1]);
 }
 
 #[test]
