@@ -103,6 +103,14 @@ pub struct Wants {
     pub energy: bool,
 }
 
+impl Wants {
+    /// Becomes equal to `other` without a new allocation.
+    pub(crate) fn take(&mut self, other: &Wants) {
+        self.surface.clone_from(&other.surface);
+        (self.contact, self.energy) = (other.contact, other.energy);
+    }
+}
+
 /// Everything a step reads from outside.
 #[derive(Debug, Clone, Default)]
 pub struct Inputs {

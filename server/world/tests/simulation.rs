@@ -204,3 +204,60 @@ fn live_changes_pass_the_same_checks_as_the_file() {
     assert!(sim.set("body.beam.young_pa", "1e4").unwrap_err().contains("only at a start"));
     assert!(sim.set("world.gravty", "1").unwrap_err().contains("did you mean"));
 }
+
+#[test]
+fn mesh_files_that_are_missing_or_broken_are_refused_at_their_line() {
+    let with_mesh = |mesh: &str| {
+        let lines = BEAM.lines().map(|line| if line.starts_with("mesh") { mesh } else { line });
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    let missing = refusal(&with_mesh("mesh = { file = \"nowhere/liver.msh\" }"));
+    for part in ["scene:9: body.beam.mesh: cannot read", "nowhere/liver.msh", "relative to the scene file"] {
+        assert!(missing.contains(part), "{part}: {missing}");
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("broken.msh");
+    std::fs::write(&path, "$NOD\n4\n1 0 0 0\n2 1 0").unwrap();
+    let broken = refusal(&with_mesh(&format!("mesh = {{ file = {path:?} }}")));
+    assert!(broken.contains("scene:9: body.beam.mesh") && broken.contains("broken.msh"), "{broken}");
+}
+
+#[test]
+fn the_plan_says_what_is_on_and_why_and_off_costs_nothing() {
+    let plan = simulation(BEAM).plan();
+    let effect = |name: &str| plan.effects.iter().find(|effect| effect.name == name).unwrap();
+    assert!(effect("gravity").on && effect("large rotation").on && effect("damping").on);
+    assert!(effect("deformation").predicted_ms > 0.0);
+    for off in ["loads", "probes", "energies", "self-collision", "surface publication", "haptic contact"] {
+        assert!(!effect(off).on && effect(off).predicted_ms == 0.0 && !effect(off).why.is_empty(), "{off}");
+    }
+    let text = plan.to_string();
+    assert!(
+        text.lines().count() == plan.effects.len() + 2 && text.contains("world.gravity_m_s2 has 9.810"),
+        "{text}"
+    );
+
+    let quiet = BEAM.replace("[9.81, 0, 0]", "[0, 0, 0]").replace("\"corotational\"", "\"linear\"");
+    let quiet = quiet.replace("[world]", "[effects]\ncutting = false\ncontact = false\n[world]");
+    let mut sim = simulation(&quiet);
+    assert!(!sim.plan().is_on("gravity") && !sim.plan().is_on("cutting"));
+    let edge = |x: f64| [Vector3::new(x, -0.001, 0.1), Vector3::new(x, 0.061, 0.1)];
+    let cut =
+        CutRequest { request: 1, tool: Arc::from("t"), body: None, segments: vec![edge(-0.1), edge(0.1)] };
+    let report = sim.step(&Inputs { cuts: vec![cut], ..Inputs::default() });
+    assert!(report.cuts[0].result.as_ref().unwrap_err().contains("effects.cutting = false"));
+    assert_eq!(sim.bodies()[0].epoch(), 0);
+}
+
+#[test]
+fn an_effect_that_is_off_does_not_change_a_bit() {
+    let run_with = |extra: &str| {
+        let mut sim = simulation(&BEAM.replace("[world]", &format!("{extra}\n[world]")));
+        run(&mut sim, 30);
+        sim.bodies()[0].body.positions().to_vec()
+    };
+    let plain = run_with("");
+    assert_eq!(plain, run_with("[effects]\ncutting = false\ncontact = false"));
+    assert_eq!(plain, run_with("[effects]\nenergy = true"));
+    assert_eq!(plain, run_with("tool = [{ id = \"idle\", shape = { sphere = { radius_m = 0.01 } } }]"));
+}

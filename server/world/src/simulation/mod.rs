@@ -109,7 +109,7 @@ impl Simulation {
 
     fn begin(&mut self, inputs: &Inputs) {
         self.steps += 1;
-        self.wants.clone_from(&inputs.wants);
+        self.wants.take(&inputs.wants);
         self.report.begin(self.steps, self.time_s());
     }
 

@@ -1,0 +1,87 @@
+//! A steady step allocates nothing: not with a tool pressing, not with a snapshot taken.
+
+#![allow(clippy::unwrap_used)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use scindo_world::inputs::{Inputs, Wants};
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+use scindo_world::snapshot::Snapshot;
+
+/// Counts the allocations of the thread that runs the test.
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+thread_local! {
+    static COUNTED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
+}
+
+#[allow(unsafe_code)]
+// SAFETY: forwards to the system allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if COUNTED.try_with(std::cell::Cell::get).unwrap_or(false) {
+            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        }
+        // SAFETY: forwarded contract.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: forwarded contract.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+const PRESSED: &str = r#"
+schema = 1
+world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
+cut = [{ body = "block", sweep_m = [[[0.05, -1, 0.06], [0.05, -1, 1]], [[0.05, 1, 0.06], [0.05, 1, 1]]] }]
+[[body]]
+id = "block"
+mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [6, 6, 6] } }
+young_pa = 2e4
+poisson = 0.4
+density_kg_m3 = 1000
+rayleigh = { stiffness_s = 0.02 }
+fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
+[[tool]]
+id = "finger"
+shape = { sphere = { radius_m = 0.01 } }
+path = [
+  { at_s = 0.0, tip_m = [0.07, 0.05, 0.130] },
+  { at_s = 0.3, tip_m = [0.07, 0.05, 0.103] },
+  { at_s = 2.0, tip_m = [0.07, 0.05, 0.100] },
+]
+[[probe]]
+id = "top"
+body = "block"
+point_m = [0.07, 0.05, 0.1]
+"#;
+
+#[test]
+fn a_steady_step_with_contact_and_snapshot_allocates_nothing() {
+    let mut sim = Simulation::new(&Scene::from_toml(PRESSED).unwrap(), Path::new("")).unwrap();
+    let wants = Wants { surface: vec![true], contact: true, energy: false };
+    let inputs = Inputs { wants: wants.clone(), ..Inputs::default() };
+    let mut snapshot = Snapshot::default();
+    let mut step = |sim: &mut Simulation| {
+        sim.step(&inputs);
+        sim.snapshot_into(&wants, &mut snapshot);
+    };
+    (0..60).for_each(|_| step(&mut sim));
+    let force = sim.tools().iter().next().unwrap().force_n;
+    assert!(force.z > 0.05, "the finger presses with {force}");
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    COUNTED.with(|counted| counted.set(true));
+    (0..50).for_each(|_| step(&mut sim));
+    COUNTED.with(|counted| counted.set(false));
+    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+}
