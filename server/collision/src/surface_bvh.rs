@@ -46,6 +46,8 @@ pub struct SurfaceBvh {
     star_offsets: Vec<u32>,
     star: Vec<u32>,
     tree: Bvh,
+    /// Leaves in the order of the tree's memory: refitting in it is kind to the cache.
+    order: Vec<u32>,
     kept_vertices: u64,
 }
 
@@ -71,13 +73,16 @@ impl SurfaceBvh {
         }
         let boxes: Vec<_> = triangles.iter().map(|t| aabb_of(t.map(|v| positions[v as usize]))).collect();
         let (star_offsets, star) = stars(positions.len(), triangles);
+        let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+        let order = tree.leaves(|_| true).collect();
         Ok(Self {
             triangles: triangles.to_vec(),
             previous: positions.clone(),
             positions,
             star_offsets,
             star,
-            tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
+            tree,
+            order,
             kept_vertices,
         })
     }
@@ -109,10 +114,10 @@ impl SurfaceBvh {
     }
 
     fn refit_boxes(&mut self) {
-        let (positions, previous) = (&self.positions, &self.previous);
-        for (leaf, t) in (0u32..).zip(&self.triangles) {
-            let corners = t.map(|v| positions[v as usize]);
-            let before = t.map(|v| previous[v as usize]);
+        for &leaf in &self.order {
+            let [a, b, c] = self.triangles[leaf as usize].map(|v| v as usize);
+            let corners = [self.positions[a], self.positions[b], self.positions[c]];
+            let before = [self.previous[a], self.previous[b], self.previous[c]];
             let aabb = aabb_of(corners.into_iter().chain(before));
             // No margin: the leaf takes the box as it is; every leaf exists since `new`.
             let _ = self.tree.update_partially_if_present(aabb, leaf, 0.0);

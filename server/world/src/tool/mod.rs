@@ -283,3 +283,7 @@ impl Tools {
         self.time_s = None;
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
