@@ -6,7 +6,8 @@ use super::{LANES, Vector8};
 pub type Mat3<V> = [V; 9];
 
 /// Below det F / (‖F‖/√3)³ = 0.01 a lane is inverted, flat or needle-like, and Newton's inverse
-/// loses digits there: the caller takes the guarded rotation instead.
+/// loses digits there: the caller takes the guarded rotation instead. So it does where ‖F‖² leaves
+/// single precision.
 const WELL_CONDITIONED: f32 = 0.01;
 const ITERATIONS: usize = 5;
 const SCALED_ITERATIONS: usize = 2;
@@ -19,18 +20,16 @@ const SCALED_ITERATIONS: usize = 2;
 /// Higham 1986, "Computing the polar decomposition, with applications".
 #[inline(always)]
 pub fn polar_newton<V: Vector8>(F: &Mat3<V>) -> (Mat3<V>, [bool; LANES]) {
-    let mut X = *F;
+    // Size does not matter to the rotation, but it would to the cubes and squares below.
+    let size = (norm_squared(F) * V::splat(1.0 / 3.0)).sqrt();
+    let mut X = F.map(|x| x * size.recip());
     let mut trusted = [true; LANES];
     for k in 0..ITERATIONS {
         let C = cofactor(&X);
         let det = X[0].mul_add(C[0], X[1].mul_add(C[1], X[2] * C[2]));
         if k == 0 {
-            let size = (norm_squared(&X) * V::splat(1.0 / 3.0)).sqrt();
-            let (det, cube) = (det.store(), (size * size * size).store());
-            for lane in 0..LANES {
-                let (det, cube) = (det.0[lane], cube.0[lane]);
-                trusted[lane] = det > WELL_CONDITIONED * cube && det > 1e-30 && cube < 1e30;
-            }
+            let det = det.store();
+            trusted = std::array::from_fn(|lane| det.0[lane] > WELL_CONDITIONED);
         }
         // X⁻ᵀ = C / det
         let (keep, add) = if k < SCALED_ITERATIONS {
@@ -92,7 +91,7 @@ mod tests {
                 0.3 + (t * 1.7).sin().abs(),
             );
             let F = turn * other.inverse() * Matrix3::from_diagonal(&stretch) * other.matrix();
-            let F = F / if s % 3 == 0 { 1e4 } else { 1e-3 };
+            let F = F / [1e12, 1.0, 1e-12][s as usize % 3];
             let mut lanes = [Lanes::default(); 9];
             for (i, lane) in lanes.iter_mut().enumerate() {
                 *lane = Lanes::splat(F[(i / 3, i % 3)] as f32);

@@ -31,11 +31,13 @@ fn noise(seed: usize) -> f64 {
 fn ruined_starts_stay_finite_and_recover() {
     let material = Material { rayleigh: Rayleigh { mass_1_s: 0.5, stiffness_s: 0.005 }, ..SOFT };
     type Ruin = fn(usize, &Vector3<f64>) -> Vector3<f64>;
-    let ruins: [(&str, Ruin); 6] = [
+    let ruins: [(&str, Ruin); 8] = [
         ("inverted", |_, x| -x),
         ("mirrored", |_, x| Vector3::new(-x.x, x.y, x.z)),
         ("flat", |_, x| Vector3::new(x.x, x.y, 0.0)),
         ("a point", |_, _| Vector3::zeros()),
+        ("nearly a point", |i, _| 1e-10 * Vector3::new(noise(3 * i), noise(3 * i + 1), noise(3 * i + 2))),
+        ("a thousandth", |_, x| 1e-3 * x),
         ("stretched 20 times", |_, x| Vector3::new(20.0 * x.x, x.y, x.z)),
         ("scrambled", |i, _| 0.05 * Vector3::new(noise(3 * i), noise(3 * i + 1), noise(3 * i + 2))),
     ];
