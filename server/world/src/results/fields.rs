@@ -7,9 +7,6 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
-use scindo_physics::body::Body;
-use scindo_physics::cut::Piece;
-use scindo_physics::element::{deformation_gradient, polar_rotation};
 
 use super::vtu::{CellBlock, Field, FieldValues, Grid, VtuError, save_vtu};
 use crate::simulation::{SimBody, Simulation};
@@ -81,12 +78,11 @@ impl Fields {
             self.displacement.push(x - mesh.mesh().nodes[mesh.copy_node()[copy] as usize]);
         }
         self.velocity.extend_from_slice(body.velocities());
-        for piece in mesh.pieces() {
+        for (piece, stress) in mesh.pieces().iter().zip(body.cauchy_stresses()) {
             self.tets.push(piece.copies.map(|copy| first_copy + copy));
             self.cell_body[0].push(number);
             self.cut_tag[0].push(INTERIOR);
             self.fraction.push(piece.fraction);
-            let stress = cauchy_stress(body, piece);
             self.von_mises.push(von_mises(&stress));
             self.normal_stress.push(stress.diagonal());
             self.shear_stress.push(Vector3::new(stress[(1, 2)], stress[(2, 0)], stress[(0, 1)]));
@@ -105,22 +101,6 @@ impl Fields {
             self.cut_tag[1].push(*tag as i32);
         }
     }
-}
-
-/// σ = P Fᵀ / det F [Pa] of a piece; the determinant is kept away from zero.
-fn cauchy_stress(body: &Body, piece: &Piece) -> Matrix3<f64> {
-    let material = body.material();
-    let gradients = body.cut_mesh().mesh().gradients(piece.element as usize);
-    let corners = piece.copies.map(|copy| body.positions()[copy as usize]);
-    let deformation = deformation_gradient(&corners, &gradients);
-    let rotation = if material.law.rotates() {
-        polar_rotation(&deformation, &Matrix3::identity())
-    } else {
-        Matrix3::identity()
-    };
-    let first_piola = material.law.stress(&deformation, &rotation, material.lame());
-    let stress = first_piola * deformation.transpose() / deformation.determinant().abs().max(1e-9);
-    0.5 * (stress + stress.transpose())
 }
 
 /// √(3/2 s:s) of the deviator s [Pa].

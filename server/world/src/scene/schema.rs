@@ -259,6 +259,14 @@ fn words(schema: &Value) -> Vec<&str> {
     options.flat_map(|option| option["const"].as_str().into_iter().chain(words(option))).collect()
 }
 
+/// Whether a word is part of the format but not of this version of the program.
+fn is_planned(schema: &Value, word: &str) -> bool {
+    let mut options = schema["oneOf"].as_array().into_iter().flatten();
+    let described =
+        options.find(|option| option["const"] == word).map(|option| option["description"].as_str());
+    described.flatten().is_some_and(|text| text.to_lowercase().contains("not supported yet"))
+}
+
 /// The keys of "exactly one of these keys".
 fn exclusive_keys(schema: &Value) -> impl Iterator<Item = &str> {
     schema["oneOf"].as_array().into_iter().flatten().filter_map(|option| option["required"][0].as_str())
@@ -302,7 +310,11 @@ fn reference_rows(root: &Value, schema: &Value, path: &str, rows: &mut String, d
             target["items"].is_object() && types(resolve(root, &target["items"])).contains(&"object");
         let at = format!("{}{}", join(path, key), if is_list { "[]" } else { "" });
         let required = schema["required"].as_array().is_some_and(|list| list.iter().any(|name| name == key));
-        let mut value = words(target).join(" \\| ");
+        let mut value = words(target)
+            .into_iter()
+            .map(|word| if is_planned(target, word) { format!("({word})") } else { word.to_owned() })
+            .collect::<Vec<_>>()
+            .join(" \\| ");
         if value.is_empty() {
             value = types(target).join(" ");
         }
