@@ -1,8 +1,9 @@
 //! Momentum, energy and rigid motion.
 
 use nalgebra::{Rotation3, Vector3};
-use scindo_physics::body::Outcome;
+use scindo_physics::body::{Body, Outcome};
 use scindo_physics::material::{Material, Rayleigh};
+use scindo_physics::mesh::{BoxPattern, box_mesh};
 
 use crate::{DOWN, SOFT, cube, left_face, settings};
 
@@ -176,4 +177,39 @@ fn loads_are_shared_and_their_total_is_kept() {
     assert!(body.add_surface_force(&[0, 1], force).is_err());
     assert!(body.add_nodal_force(9999, force).is_err());
     assert!(body.add_nodal_force(0, Vector3::repeat(f64::NAN)).is_err());
+}
+
+#[test]
+fn a_body_a_kilometre_away_moves_the_same() {
+    let end = |origin: Vector3<f64>| {
+        let pattern = BoxPattern::Tet5 { parity: true };
+        let mesh = box_mesh(origin, origin + Vector3::new(0.3, 0.1, 0.1), [6, 2, 2], pattern);
+        let mut body = Body::new(mesh, SOFT, settings(200, 1e-7)).unwrap();
+        body.fix(&(0..63).step_by(7).collect::<Vec<u32>>(), [true; 3], Vector3::zeros()).unwrap();
+        for _ in 0..50 {
+            body.step(0.02, DOWN, &[]);
+        }
+        body.positions().iter().map(|x| x - origin).collect::<Vec<_>>()
+    };
+    let (near, far) = (end(Vector3::zeros()), end(Vector3::new(1000.0, -500.0, 300.0)));
+    assert!(near[62].y < 0.098, "it droops");
+    for (a, b) in near.iter().zip(&far) {
+        assert!((a - b).norm() < 1e-4 * 0.3, "{a} {b}");
+    }
+}
+
+#[test]
+fn no_step_length_makes_energy() {
+    for h in [1e-4, 1e-3, 5e-3, 2e-2, 4e-2, 0.1, 0.2] {
+        let mut body = cube(2, SOFT, settings(300, 1e-6));
+        let x: Vec<_> = body.positions().iter().map(|x| Vector3::new(1.4 * x.x, 0.8 * x.y, x.z)).collect();
+        let v: Vec<_> = x.iter().map(|x| Vector3::new(0.0, 0.0, 5.0).cross(x)).collect();
+        body.set_state(&x, &v).unwrap();
+        let start = body.kinetic_energy() + body.elastic_energy();
+        for _ in 0..60 {
+            body.step(h, Vector3::zeros(), &[]);
+            let energy = body.kinetic_energy() + body.elastic_energy();
+            assert!(energy <= start * (1.0 + 1e-5), "h {h}: {energy} of {start}");
+        }
+    }
 }
