@@ -22,6 +22,7 @@ use crate::operator::{Elastic, FixedCopy};
 pub use crate::solver::{PcgSettings, StopReason};
 use crate::team::Team;
 use boundary::Boundary;
+use cutting::Weightless;
 
 /// A step that fails is tried again in 2 and then in 4 parts.
 const MOST_HALVINGS: u32 = 2;
@@ -88,6 +89,7 @@ pub struct Body {
     mass: Vec<f64>,
     mass_f32: Vec<f32>,
     parts: LooseParts,
+    weightless: Vec<Weightless>,
     elastic: Elastic,
     integrator: ImplicitEuler,
     team: Team,
@@ -111,6 +113,7 @@ impl Body {
             mass: Vec::new(),
             mass_f32: Vec::new(),
             parts: LooseParts::default(),
+            weightless: Vec::new(),
             integrator: ImplicitEuler::default(),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
@@ -141,6 +144,7 @@ impl Body {
         for halvings in 0..=MOST_HALVINGS {
             report.substeps = 1 << halvings;
             if self.try_step(dt_s / f64::from(report.substeps), gravity, springs, &mut report) {
+                self.carry_weightless();
                 return report;
             }
             self.state.copy_from(&self.before);
