@@ -1,0 +1,276 @@
+//! The viewer against a server made of plain zenoh: late joining, going away, coming back, and no
+//! subscription while nobody watches.
+#![allow(clippy::unwrap_used)]
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use bytes::Bytes;
+use futures_util::{SinkExt, StreamExt};
+use prost::Message as _;
+use scindo_proto::messages::viewer_down::Message as Down;
+use scindo_proto::messages::viewer_rpc::Call;
+use scindo_proto::messages::viewer_up::Message as FromPage;
+use scindo_proto::messages::{
+    BodyInfo, PauseRequest, Pose, RpcReply, SessionInfo, SurfaceFrame, SurfaceKeyframe, SurfaceTopology,
+    ToolSample, ToolShape, Vec3, ViewerDown, ViewerRpc, ViewerUp, tool_sample, tool_shape,
+};
+use scindo_proto::{Chunk, KeySpace, Role, Topic, Verb, WireMessage, decode, encode, encoding};
+use scindo_view::{ViewConfig, Viewer};
+use tokio::net::TcpStream;
+use tokio::time::{sleep, timeout};
+use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
+use zenoh::Wait as _;
+use zenoh::query::Query;
+use zenoh::sample::SampleKind;
+
+const PATIENCE: Duration = Duration::from_secs(40);
+
+type Browser = WebSocketStream<MaybeTlsStream<TcpStream>>;
+
+fn keys() -> KeySpace {
+    KeySpace::new("scindo", "main").unwrap()
+}
+
+fn body() -> Chunk {
+    Chunk::new("body id", "liver").unwrap()
+}
+
+fn topology(epoch: u32) -> SurfaceTopology {
+    let words = |n: u32| Bytes::from((0..n).flat_map(u32::to_le_bytes).collect::<Vec<u8>>());
+    SurfaceTopology {
+        body_id: "liver".into(),
+        epoch,
+        vertex_count: 3,
+        triangle_count: 1,
+        triangles: words(3),
+        tags: words(1),
+        ..Default::default()
+    }
+}
+
+fn frame(epoch: u32, step: u64) -> SurfaceFrame {
+    SurfaceFrame {
+        seq: step,
+        sim_step: step,
+        body_id: "liver".into(),
+        epoch,
+        vertex_count: 3,
+        positions: vec![0_u8; 36].into(),
+        ..Default::default()
+    }
+}
+
+/// A server that shows one triangle, at epoch `epoch`.
+struct Server {
+    session: zenoh::Session,
+    epoch: u32,
+}
+
+impl Server {
+    fn start(port: u16, epoch: u32) -> Self {
+        let mut config = zenoh::Config::default();
+        for (key, value) in [
+            ("mode", "\"router\"".to_owned()),
+            ("listen/endpoints", format!("[\"tcp/127.0.0.1:{port}\"]")),
+            ("scouting/multicast/enabled", "false".to_owned()),
+        ] {
+            config.insert_json5(key, &value).unwrap();
+        }
+        let session = zenoh::open(config).wait().unwrap();
+        let info = SessionInfo {
+            scene_name: format!("scene {epoch}"),
+            bodies: vec![BodyInfo { id: "liver".into(), epoch, ..Default::default() }],
+            ..Default::default()
+        };
+        answer(&session, Topic::Rpc(Verb::Info), info);
+        answer(
+            &session,
+            Topic::Rpc(Verb::Pause),
+            RpcReply { ok: true, message: "paused".into(), ..Default::default() },
+        );
+        let keyframe = SurfaceKeyframe { topology: Some(topology(epoch)), frame: Some(frame(epoch, 1)) };
+        answer(&session, Topic::SurfaceKeyframe(body()), keyframe);
+        let token = keys().key(&Topic::Live(Role::Server, Chunk::new("id", "server").unwrap()));
+        std::mem::forget(session.liveliness().declare_token(token).wait().unwrap());
+        Self { session, epoch }
+    }
+
+    fn send_frame(&self, step: u64) {
+        let key = keys().key(&Topic::SurfaceFrame(body()));
+        let payload = encode(&frame(self.epoch, step));
+        self.session.put(key, payload).encoding(encoding::<SurfaceFrame>()).wait().unwrap();
+    }
+
+    /// Whether anybody subscribes to the surface.
+    async fn is_watched(&self) -> bool {
+        let publisher =
+            self.session.declare_publisher(keys().key(&Topic::SurfaceFrame(body()))).await.unwrap();
+        publisher.matching_status().await.unwrap().matching()
+    }
+
+    async fn becomes_watched(&self, wanted: bool) {
+        let wait = async {
+            while self.is_watched().await != wanted {
+                sleep(Duration::from_millis(50)).await;
+            }
+        };
+        timeout(PATIENCE, wait).await.unwrap_or_else(|_| panic!("watched never became {wanted}"));
+    }
+}
+
+fn answer<M: WireMessage>(session: &zenoh::Session, topic: Topic, message: M) {
+    let reply = move |query: Query| {
+        query.reply(query.key_expr(), encode(&message)).encoding(encoding::<M>()).wait().unwrap();
+    };
+    session.declare_queryable(keys().key(&topic)).callback(reply).background().wait().unwrap();
+}
+
+async fn viewer(port: u16) -> SocketAddr {
+    let mut config = ViewConfig::new(SocketAddr::from(([127, 0, 0, 1], 0)));
+    config.link.connect = vec![format!("tcp/127.0.0.1:{port}")];
+    config.link.timeout = Duration::from_secs(1);
+    let viewer = Viewer::bind(config).await.unwrap();
+    let address = viewer.address();
+    tokio::spawn(viewer.run());
+    address
+}
+
+fn free_port() -> u16 {
+    std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+}
+
+async fn join(address: SocketAddr) -> Browser {
+    connect_async(format!("ws://{address}/ws")).await.unwrap().0
+}
+
+/// Reads until a message fits; what comes before it is skipped.
+async fn until<T>(browser: &mut Browser, what: &str, mut fits: impl FnMut(Down) -> Option<T>) -> T {
+    let read = async {
+        loop {
+            let message = browser.next().await.expect("the viewer closed the socket").unwrap();
+            if let Message::Binary(bytes) = message
+                && let Some(found) = fits(ViewerDown::decode(bytes).unwrap().message.unwrap())
+            {
+                return found;
+            }
+        }
+    };
+    timeout(PATIENCE, read).await.unwrap_or_else(|_| panic!("{what} never came"))
+}
+
+async fn send(browser: &mut Browser, message: FromPage) {
+    let bytes = ViewerUp { message: Some(message) }.encode_to_vec();
+    browser.send(Message::Binary(bytes.into())).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_browser_sees_the_server_come_go_and_come_back() {
+    let port = free_port();
+    let address = viewer(port).await;
+    let mut browser = join(address).await;
+    until(&mut browser, "word that nobody is there", |m| {
+        matches!(m, Down::Link(link) if !link.connected).then_some(())
+    })
+    .await;
+
+    let server = Server::start(port, 4);
+    until(&mut browser, "the link", |m| matches!(m, Down::Link(link) if link.connected).then_some(())).await;
+    until(&mut browser, "the scene", |m| {
+        matches!(m, Down::Info(info) if info.scene_name == "scene 4").then_some(())
+    })
+    .await;
+    until(&mut browser, "the keyframe", |m| {
+        matches!(m, Down::Frame(f) if f.epoch == 4 && f.sim_step == 1).then_some(())
+    })
+    .await;
+    server.becomes_watched(true).await;
+    server.send_frame(9);
+    until(&mut browser, "a frame", |m| matches!(m, Down::Frame(f) if f.sim_step == 9).then_some(())).await;
+
+    server.session.close().await.unwrap();
+    until(&mut browser, "word that it left", |m| {
+        matches!(m, Down::Link(link) if !link.connected).then_some(())
+    })
+    .await;
+    let again = Server::start(port, 0);
+    until(&mut browser, "the new scene", |m| {
+        matches!(m, Down::Info(info) if info.scene_name == "scene 0").then_some(())
+    })
+    .await;
+    until(&mut browser, "its keyframe", |m| matches!(m, Down::Frame(f) if f.epoch == 0).then_some(())).await;
+    drop(again);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn nothing_is_subscribed_while_no_browser_watches() {
+    let port = free_port();
+    let server = Server::start(port, 0);
+    let address = viewer(port).await;
+    sleep(Duration::from_secs(2)).await;
+    assert!(!server.is_watched().await);
+    let mut browser = join(address).await;
+    until(&mut browser, "a surface", |m| matches!(m, Down::Frame(_)).then_some(())).await;
+    server.becomes_watched(true).await;
+    drop(browser);
+    server.becomes_watched(false).await;
+    let mut late = join(address).await;
+    until(&mut late, "a surface again", |m| matches!(m, Down::Frame(_)).then_some(())).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn tools_have_an_owner_each_and_calls_are_answered() {
+    let port = free_port();
+    let server = Server::start(port, 0);
+    let address = viewer(port).await;
+    let (owners, mut owner_seen) = tokio::sync::mpsc::channel::<(SampleKind, String)>(16);
+    let live = keys().key(&Topic::Live(Role::Viewer, Chunk::new("id", "x").unwrap())).replace("/x", "/*");
+    let watch = server.session.liveliness().declare_subscriber(live).callback(move |sample| {
+        let _ = owners.try_send((sample.kind(), sample.key_expr().to_string()));
+    });
+    let _watch = watch.await.unwrap();
+    let poses = server.session.declare_subscriber("scindo/@v1/main/tool/*/pose").await.unwrap();
+
+    let mut browser = join(address).await;
+    until(&mut browser, "a surface", |m| matches!(m, Down::Frame(_)).then_some(())).await;
+    send(
+        &mut browser,
+        FromPage::Rpc(ViewerRpc { call_id: 7, call: Some(Call::Pause(PauseRequest { paused: true })) }),
+    )
+    .await;
+    let reply =
+        until(&mut browser, "the answer", |m| if let Down::Rpc(reply) = m { Some(reply) } else { None })
+            .await;
+    assert!(reply.call_id == 7 && reply.reply.unwrap().ok);
+
+    let kind = tool_shape::Kind::Sphere(tool_shape::Sphere { radius_m: 0.01 });
+    let sample = ToolSample {
+        pose: Some(Pose { position_m: Some(Vec3::default()), qw: 1.0, ..Default::default() }),
+        mode: tool_sample::Mode::Touch.into(),
+        shape: Some(ToolShape { kind: Some(kind) }),
+        ..Default::default()
+    };
+    // Best effort: the first samples may come before the subscription does.
+    let arrived = async {
+        loop {
+            send(&mut browser, FromPage::Tool(sample.clone())).await;
+            if let Ok(Ok(sample)) = timeout(Duration::from_millis(200), poses.recv_async()).await {
+                return decode::<ToolSample>(Bytes::from(sample.payload().to_bytes().into_owned())).unwrap();
+            }
+        }
+    };
+    let pose = timeout(PATIENCE, arrived).await.unwrap();
+    assert!(pose.tool_id.starts_with("mouse-") && pose.client_id == pose.tool_id);
+
+    drop(browser);
+    let released = async {
+        while let Some((kind, key)) = owner_seen.recv().await {
+            if kind == SampleKind::Delete && key.ends_with(&pose.client_id) {
+                return;
+            }
+        }
+        panic!("the watch ended");
+    };
+    timeout(PATIENCE, released).await.expect("the owner of the tool goes with its browser");
+}
