@@ -63,6 +63,8 @@ async function openPage() {
     return hooks && hooks.bodies().length > 0 && hooks.counts().pictures > 2 && hooks.bodies().every((b) => b.vertices > 0);
   });
   summary.renderer = await page.evaluate(() => window.scindo.renderer());
+  await page.click("#reset");
+  await until(page, "a reset makes the body whole", MINUTE, () => window.scindo.bodies().every((b) => b.lipTriangles === 0));
   return page;
 }
 

@@ -68,7 +68,7 @@ export class Panel {
     const on = plan.effects.filter((effect) => effect.on).length;
     this.at("effects-count").textContent = `${on} of ${plan.effects.length} on`;
     this.at("effects").replaceChildren(
-      ...plan.effects.map((effect) => {
+      ...[...plan.effects].sort((a, b) => Number(b.on) - Number(a.on)).map((effect) => {
         const row = element("div", effect.on ? "effect on" : "effect");
         const cost = effect.on && effect.measuredMs > 0 ? ` · ${short(effect.measuredMs)} ms` : "";
         row.append(element("i"), element("span", "name", effect.name.replaceAll("_", " ")), element("span", "why", effect.why + cost));
@@ -92,7 +92,7 @@ export class Panel {
 
   log(event: Event): void {
     const level: Level = event.level === Event_Level.ERROR ? "error" : event.level === Event_Level.WARNING ? "warning" : "info";
-    this.line(event.message || event.name, level);
+    this.line(event.message || event.name, level, event.name);
   }
 
   showRpc(answer: ViewerRpcReply): void {
@@ -102,11 +102,19 @@ export class Panel {
     else this.line(`${reply.error?.message ?? "refused"} ${reply.error?.hint ?? ""}`.trim(), "error");
   }
 
-  private line(text: string, level: Level): void {
-    const row = element("div");
-    row.dataset["level"] = level;
-    row.append(element("time", "", new Date().toTimeString().slice(0, 8)), text);
+  /** Adds a line; one of the same kind right after another takes its place and counts it. */
+  private line(text: string, level: Level, kind = ""): void {
     const log = this.at("log");
+    const last = log.lastElementChild as HTMLElement | null;
+    let times = 1;
+    if (last && kind && last.dataset["kind"] === kind) {
+      times += Number(last.dataset["times"]);
+      last.remove();
+    }
+    const row = element("div");
+    Object.assign(row.dataset, { level, kind, times: String(times) });
+    row.append(element("time", "", new Date().toTimeString().slice(0, 8)), text);
+    if (times > 1) row.append(element("span", "times", `×${times}`));
     log.append(row);
     while (log.children.length > LOG_ROWS) log.firstElementChild!.remove();
     setTimeout(() => row.classList.add("old"), LOG_BRIGHT_MS);

@@ -89,7 +89,7 @@ export function parts(shape: ToolShape, material: Material, shaft: boolean): Mes
     case "sphere": {
       const r = kind.value.radiusM;
       const ball = new Mesh(new SphereGeometry(r, 32, 20), material);
-      return shaft ? solid([ball, rod(0.32 * r, r * 0.8, 11 * r, material)]) : [ball];
+      return shaft ? solid([ball, rod(0.24 * r, r * 0.8, 8 * r, material)]) : [ball];
     }
     case "capsule": {
       const { radiusM: r, lengthM: l } = kind.value;
