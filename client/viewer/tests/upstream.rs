@@ -73,7 +73,7 @@ impl Server {
         let mut config = zenoh::Config::default();
         for (key, value) in [
             ("mode", "\"router\"".to_owned()),
-            ("listen/endpoints", format!("[\"tcp/127.0.0.1:{port}\"]")),
+            ("listen/endpoints", format!("[\"tcp/127.0.0.1:{port}\", \"tcp/127.0.0.1:{}\"]", port + 1)),
             ("scouting/multicast/enabled", "false".to_owned()),
         ] {
             config.insert_json5(key, &value).unwrap();
@@ -120,7 +120,7 @@ impl Server {
     }
 }
 
-fn answer<M: WireMessage>(session: &zenoh::Session, topic: Topic, message: M) {
+fn answer<M: WireMessage + 'static>(session: &zenoh::Session, topic: Topic, message: M) {
     let reply = move |query: Query| {
         query.reply(query.key_expr(), encode(&message)).encoding(encoding::<M>()).wait().unwrap();
     };
@@ -130,15 +130,22 @@ fn answer<M: WireMessage>(session: &zenoh::Session, topic: Topic, message: M) {
 async fn viewer(port: u16) -> SocketAddr {
     let mut config = ViewConfig::new(SocketAddr::from(([127, 0, 0, 1], 0)));
     config.link.connect = vec![format!("tcp/127.0.0.1:{port}")];
-    config.link.timeout = Duration::from_secs(1);
+    config.link.timeout = Duration::from_secs(3);
     let viewer = Viewer::bind(config).await.unwrap();
     let address = viewer.address();
     tokio::spawn(viewer.run());
     address
 }
 
+/// A free port with a free one above it, where surfaces go.
 fn free_port() -> u16 {
-    std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+    let bind = |port| std::net::TcpListener::bind(("127.0.0.1", port));
+    loop {
+        let port = bind(0).unwrap().local_addr().unwrap().port();
+        if port < u16::MAX && bind(port + 1).is_ok() {
+            return port;
+        }
+    }
 }
 
 async fn join(address: SocketAddr) -> Browser {

@@ -15,7 +15,8 @@ const UP = new Vector3(0, 0, 1);
 const STEEL = new MeshStandardMaterial({ color: 0xb9c2cc, roughness: 0.34, metalness: 0.35 });
 const HAND = new MeshStandardMaterial({ color: 0x5a9ae6, roughness: 0.4, metalness: 0.1 });
 const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.24, depthWrite: false });
-const ARROW = new MeshBasicMaterial({ color: 0xffd35c, toneMapped: false });
+// A force is read, not seen: tissue before it does not hide it.
+const ARROW = new MeshBasicMaterial({ color: 0xffd35c, toneMapped: false, depthTest: false, transparent: true });
 
 export class ToolVisual {
   readonly object = new Group();
@@ -149,6 +150,7 @@ function arrow(): Group {
   const head = new Mesh(new ConeGeometry(0.028, 0.22, 16), ARROW);
   head.rotation.x = Math.PI / 2;
   head.position.z = 0.89;
+  shaft.renderOrder = head.renderOrder = 5;
   const group = new Group();
   group.add(shaft, head);
   group.visible = false;
