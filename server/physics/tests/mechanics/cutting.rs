@@ -1,7 +1,7 @@
 //! What a cut must not change, and how fragments move.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, StaticSettings};
+use scindo_physics::body::{Body, Outcome, StaticSettings, StopReason};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
@@ -187,7 +187,6 @@ fn half_cut_beam_agrees_with_the_reference() {
         let segment = |x: f64| [Vector3::new(x, -0.01, 0.1), Vector3::new(x, 0.07, 0.1)];
         body.cut(&BladeSweep { segments: vec![segment(-0.01), segment(0.0151)] }, 1).unwrap();
         let report = body.solve_static(Vector3::new(9.81, 0.0, 0.0), &StaticSettings::default()).unwrap();
-        println!("{report:?}");
         let u = body.positions()[3685] - nodes[3685];
         let lips: Vec<Vector3<f64>> = (0..body.cut_mesh().n_copies())
             .filter(|&c| {
@@ -196,10 +195,41 @@ fn half_cut_beam_agrees_with_the_reference() {
             })
             .map(|c| body.positions()[c])
             .collect();
-        println!("{law:?} tip {u:?} lips {lips:?} energy {:e}", body.elastic_energy());
         assert!((u.x - ux).abs() < 1e-6 && (u.z - uz).abs() < 1e-6, "{law:?}: {u}");
         assert_eq!(lips.len(), 2);
         assert!(((lips[1] - lips[0]).z.abs() - opening).abs() < 1e-6);
         assert!((body.elastic_energy() / energy - 1.0).abs() < 1e-6);
     }
+}
+
+#[test]
+fn thirty_cuts_in_all_directions_while_the_body_moves() {
+    let damped = Material { rayleigh: Rayleigh { mass_1_s: 0.5, stiffness_s: 0.002 }, ..SOFT };
+    let mut body = cube(5, damped, settings(500, 1e-4));
+    let clamp = left_face(&body);
+    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    let mass = body.total_mass();
+    for k in 0..30_u32 {
+        let t = f64::from(k);
+        let normal = Vector3::new((1.3 * t).sin(), (2.1 * t).cos(), (0.7 * t + 1.0).sin()).normalize();
+        let along = normal.cross(&Vector3::new(0.3, 0.5, -0.8)).normalize();
+        let across = normal.cross(&along);
+        let centre = body.centre_of_mass() + 0.03 * (0.9 * t).sin() * normal;
+        let segment = |s: f64| [centre + s * along - 0.06 * across, centre + s * along + 0.06 * across];
+        let blade = BladeSweep { segments: vec![segment(-0.06), segment(-0.02), segment(0.03)] };
+        body.cut(&blade, k + 1).unwrap();
+        for _ in 0..4 {
+            let report = body.step(0.01, DOWN, &[]);
+            assert_eq!(
+                (report.outcome, report.substeps),
+                (Outcome::Advanced, 1),
+                "after cut {k}: {report:?}"
+            );
+            assert_eq!(report.stop, StopReason::Converged, "after cut {k}: {report:?}");
+        }
+        assert!((body.total_mass() / mass - 1.0).abs() < 1e-12);
+        let held = body.parts().free.iter().zip(&body.parts().mass).filter(|(free, _)| !**free);
+        assert!(held.map(|(_, m)| m).sum::<f64>() > 0.0);
+    }
+    assert!(body.velocities().iter().all(|v| v.norm() < 50.0));
 }

@@ -14,7 +14,6 @@ fn drooping_bar(law: Law) -> Body {
     let clamp = left_face(&body);
     body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
     let report = body.solve_static(DOWN, &StaticSettings::default()).unwrap();
-    println!("{law:?}: {report:?}");
     assert!(report.converged, "{report:?}");
     body
 }
