@@ -187,6 +187,7 @@ fn half_cut_beam_agrees_with_the_reference() {
         let segment = |x: f64| [Vector3::new(x, -0.01, 0.1), Vector3::new(x, 0.07, 0.1)];
         body.cut(&BladeSweep { segments: vec![segment(-0.01), segment(0.0151)] }, 1).unwrap();
         let report = body.solve_static(Vector3::new(9.81, 0.0, 0.0), &StaticSettings::default()).unwrap();
+        assert!(report.converged, "{report:?}");
         let u = body.positions()[3685] - nodes[3685];
         let lips: Vec<Vector3<f64>> = (0..body.cut_mesh().n_copies())
             .filter(|&c| {
