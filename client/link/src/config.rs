@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use scindo_proto::Role;
-use scindo_proto::endpoint::{DEFAULT_ENDPOINT, bulk_endpoint};
+use scindo_proto::endpoint::DEFAULT_ENDPOINT;
 
 use crate::error::LinkError;
 
@@ -48,22 +48,16 @@ impl LinkConfig {
         self
     }
 
-    /// Zenoh configuration of the session for poses, contacts and cuts.
-    pub(crate) fn haptic_session(&self) -> Result<zenoh::Config, LinkError> {
-        self.session_config(&self.connect)
-    }
-
-    /// Zenoh configuration of the session for surfaces and reports: the bulk port of each
-    /// endpoint, then the endpoint itself, which relays (a router, or a closed bulk port).
-    pub(crate) fn bulk_session(&self) -> Result<zenoh::Config, LinkError> {
-        let direct = self.connect.iter().filter_map(|e| bulk_endpoint(e));
-        let endpoints: Vec<String> = direct.chain(self.connect.iter().cloned()).collect();
-        self.session_config(&endpoints)
-    }
-
-    /// No discovery: only the endpoints that were named. A client-mode session takes the first
-    /// endpoint that answers and comes back by itself after the server was away.
-    fn session_config(&self, connect: &[String]) -> Result<zenoh::Config, LinkError> {
+    /// Zenoh configuration of a session at one endpoint, or at those of the file.
+    ///
+    /// No discovery: only the endpoint that was named. One at a time, because a client-mode session
+    /// with several waits for the first of them and never tries the others. It comes back by
+    /// itself after the server was away.
+    pub(crate) fn session_config(
+        &self,
+        endpoint: Option<&str>,
+        timeout: Duration,
+    ) -> Result<zenoh::Config, LinkError> {
         let mut config = match &self.zenoh_file {
             Some(path) => zenoh::Config::from_file(path).map_err(|e| LinkError::Config {
                 what: format!("zenoh file {}", path.display()),
@@ -71,11 +65,11 @@ impl LinkConfig {
             })?,
             None => zenoh::Config::default(),
         };
-        let endpoints = serde_json_list(connect);
-        let timeout_ms = self.timeout.as_millis().to_string();
+        let endpoints = endpoint.map(|one| format!("[{one:?}]"));
+        let timeout_ms = timeout.as_millis().to_string();
         let mut settings = vec![("mode", r#""client""#), ("connect/timeout_ms", &timeout_ms)];
-        if !connect.is_empty() {
-            settings.push(("connect/endpoints", &endpoints));
+        if let Some(endpoints) = &endpoints {
+            settings.push(("connect/endpoints", endpoints));
         }
         if self.zenoh_file.is_none() {
             settings.extend([
@@ -92,10 +86,4 @@ impl LinkConfig {
         }
         Ok(config)
     }
-}
-
-/// A JSON list of strings.
-fn serde_json_list(items: &[String]) -> String {
-    let quoted: Vec<String> = items.iter().map(|i| format!("{i:?}")).collect();
-    format!("[{}]", quoted.join(","))
 }

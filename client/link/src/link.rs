@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use scindo_proto::endpoint::bulk_endpoint;
 use scindo_proto::{Chunk, KeySpace, Role, Topic, WireMessage, decode_as};
 use tokio::sync::watch;
 use zenoh::Session;
@@ -46,8 +48,7 @@ impl Link {
     pub async fn connect(config: LinkConfig) -> Result<Self, LinkError> {
         let keys = KeySpace::new(&config.realm, &config.session)?;
         let id = Chunk::new("client id", &config.id)?;
-        let haptic = open(config.haptic_session()?, &config).await?;
-        let bulk = open(config.bulk_session()?, &config).await?;
+        let (haptic, bulk) = open_both(&config).await?;
         let (presence, presence_subscriber) = watch_servers(&haptic, &keys).await?;
         let token = haptic
             .liveliness()
@@ -132,9 +133,38 @@ pub(crate) fn decode_sample<M: WireMessage>(sample: &Sample) -> Result<M, LinkEr
     Ok(decode_as(&sample.encoding().to_string(), payload)?)
 }
 
-async fn open(session: zenoh::Config, config: &LinkConfig) -> Result<Session, LinkError> {
-    let started = std::time::Instant::now();
-    zenoh::open(session).await.map_err(|e| LinkError::Unreachable {
+/// How long the bulk port beside an endpoint that answers may take to answer too.
+const BULK_PATIENCE: Duration = Duration::from_secs(1);
+
+/// The session of poses at the first endpoint that answers; the session of surfaces at the bulk
+/// port beside it or, where that is closed (a router), at the same endpoint, which relays.
+async fn open_both(config: &LinkConfig) -> Result<(Session, Session), LinkError> {
+    let Some((last, others)) = config.connect.split_last() else {
+        let haptic = open(config, None, config.timeout).await?;
+        return Ok((haptic, open(config, None, config.timeout).await?));
+    };
+    let share = config.timeout / u32::try_from(config.connect.len()).unwrap_or(1);
+    for endpoint in others {
+        if let Ok(haptic) = open(config, Some(endpoint), share).await {
+            return Ok((haptic, open_bulk(config, endpoint).await?));
+        }
+    }
+    let haptic = open(config, Some(last), share).await?;
+    Ok((haptic, open_bulk(config, last).await?))
+}
+
+async fn open_bulk(config: &LinkConfig, endpoint: &str) -> Result<Session, LinkError> {
+    if let Some(beside) = bulk_endpoint(endpoint)
+        && let Ok(bulk) = open(config, Some(&beside), BULK_PATIENCE.min(config.timeout)).await
+    {
+        return Ok(bulk);
+    }
+    open(config, Some(endpoint), config.timeout).await
+}
+
+async fn open(config: &LinkConfig, endpoint: Option<&str>, timeout: Duration) -> Result<Session, LinkError> {
+    let started = Instant::now();
+    zenoh::open(config.session_config(endpoint, timeout)?).await.map_err(|e| LinkError::Unreachable {
         endpoints: config.connect.join(", "),
         first: config.connect.first().cloned().unwrap_or_default(),
         waited: started.elapsed(),

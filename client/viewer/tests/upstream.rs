@@ -69,11 +69,17 @@ struct Server {
 }
 
 impl Server {
+    /// With a port of its own for surfaces, one above.
     fn start(port: u16, epoch: u32) -> Self {
+        Self::start_at(&[port, port + 1], epoch)
+    }
+
+    fn start_at(ports: &[u16], epoch: u32) -> Self {
+        let listen: Vec<String> = ports.iter().map(|port| format!("\"tcp/127.0.0.1:{port}\"")).collect();
         let mut config = zenoh::Config::default();
         for (key, value) in [
             ("mode", "\"router\"".to_owned()),
-            ("listen/endpoints", format!("[\"tcp/127.0.0.1:{port}\", \"tcp/127.0.0.1:{}\"]", port + 1)),
+            ("listen/endpoints", format!("[{}]", listen.join(","))),
             ("scouting/multicast/enabled", "false".to_owned()),
         ] {
             config.insert_json5(key, &value).unwrap();
@@ -212,8 +218,9 @@ async fn a_browser_sees_the_server_come_go_and_come_back() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nothing_is_subscribed_while_no_browser_watches() {
+    // One port for everything, as behind a router.
     let port = free_port();
-    let server = Server::start(port, 0);
+    let server = Server::start_at(&[port], 0);
     let address = viewer(port).await;
     sleep(Duration::from_secs(2)).await;
     assert!(!server.is_watched().await);
