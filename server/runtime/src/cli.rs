@@ -26,7 +26,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Simulate a scene and serve it to viewers and haptic clients.
-    Run(RunArgs),
+    Run(Box<RunArgs>),
     /// Check a scene: what is wrong, what is odd, which effects are on, what they will cost.
     Check(CheckArgs),
     /// Turn a surface or volume file into tetrahedra.
@@ -172,7 +172,10 @@ fn report(error: &RuntimeError, json: bool) {
 }
 
 fn start_log() {
-    let filter = tracing_subscriber::EnvFilter::try_from_env("SCINDO_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("error,scindo=info,scindo_world=info,scindo_view=info,scindo_client=warn"));
+    let filter = tracing_subscriber::EnvFilter::try_from_env("SCINDO_LOG").unwrap_or_else(|_| {
+        tracing_subscriber::EnvFilter::new(
+            "error,scindo=info,scindo_world=info,scindo_view=info,scindo_client=warn",
+        )
+    });
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).init();
 }

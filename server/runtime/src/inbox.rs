@@ -11,6 +11,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use scindo_proto::limits::{MAX_CLIENT_TOOLS, MAX_TOOLS};
@@ -28,6 +29,9 @@ const MAX_LOGS: usize = 256;
 /// Answers remembered per client and tool. A client repeats a cut for seconds; it would have to
 /// send this many others meanwhile to be told "duplicate" without the details.
 const MAX_ANSWERS: usize = 256;
+
+/// Poses per second and tool that are taken; twice what a 1 kHz device sends.
+const MAX_POSE_RATE: u32 = 2000;
 
 /// Why a message is refused; the reason is counted and, for cuts, answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -75,7 +79,20 @@ pub enum Cut {
 struct Held {
     input: ToolInput,
     poses: u64,
+    /// Poses since the second began.
+    this_second: (Instant, u32),
     capability: Option<DeviceCapability>,
+}
+
+impl Held {
+    /// Counts a pose; false if the client sends too many.
+    fn admit(&mut self, now: Instant) -> bool {
+        if now.duration_since(self.this_second.0) >= Duration::from_secs(1) {
+            self.this_second = (now, 0);
+        }
+        self.this_second.1 += 1;
+        self.this_second.1 <= MAX_POSE_RATE
+    }
 }
 
 /// Cuts of one client with one tool.
@@ -169,6 +186,13 @@ impl Inbox {
                     "number poses upwards",
                 ));
             }
+            if !held.admit(Instant::now()) {
+                return Err(refuse(
+                    "too-fast",
+                    format!("more than {MAX_POSE_RATE} poses per second for tool '{key_tool}'"),
+                    "send at most 1000 per second",
+                ));
+            }
             let (id, owner) = (held.input.id.clone(), held.input.owner.clone());
             held.input = to_tool_input(sample, id, owner);
             held.poses += 1;
@@ -199,7 +223,8 @@ impl Inbox {
         let id = known.unwrap_or_else(|| Arc::from(tool));
         let owner: Arc<str> = Arc::from(sample.client_id.as_str());
         let input = to_tool_input(sample, id.clone(), owner.clone());
-        self.held.insert(id.clone(), Held { input, poses: 1, capability: None });
+        self.held
+            .insert(id.clone(), Held { input, poses: 1, this_second: (Instant::now(), 1), capability: None });
         Ok(Change::Taken { tool: id, owner })
     }
 
@@ -500,6 +525,19 @@ mod tests {
             assert_eq!(inbox.pose(&id, &sample).is_ok(), i < MAX_CLIENT_TOOLS);
         }
         assert_eq!(inbox.refused()["too-many-tools"], 1);
+    }
+
+    #[test]
+    fn a_flood_of_poses_is_cut_short() {
+        let mut inbox = inbox();
+        inbox.client_came("a");
+        for seq in 1..=u64::from(MAX_POSE_RATE) + 50 {
+            let _ = inbox.pose("scalpel", &sample("a", "scalpel", seq));
+        }
+        // A slow machine may need more than the second that is counted.
+        let refused = inbox.refused().get("too-fast").copied().unwrap_or(0);
+        assert!(refused <= 50, "{refused}");
+        assert_eq!(inbox.pose_counts().next().unwrap().1 + refused, u64::from(MAX_POSE_RATE) + 50);
     }
 
     #[test]

@@ -84,7 +84,7 @@ impl RpcThread {
                     id: held.id.to_string(),
                     shape: held.shape.as_ref().map(crate::convert::to_shape),
                     owner: held.owner.to_string(),
-                    cuts: false,
+                    cuts: matches!(held.shape, Some(scindo_world::inputs::ToolShape::Blade { .. })),
                 }),
             }
         }

@@ -22,6 +22,9 @@ const STILL: Duration = Duration::from_millis(10);
 /// A simulation later than this gives up the lost time instead of racing after it.
 const MOST_BEHIND: Duration = Duration::from_millis(250);
 
+/// The plan, with what it costs and who listens, is told this often.
+const PLAN_PERIOD: Duration = Duration::from_secs(1);
+
 /// Steps in a row that may panic before the simulation is paused.
 const MOST_PANICS: u32 = 3;
 
@@ -75,6 +78,7 @@ pub struct SimThread {
     /// Steps a paused simulation still owes, and who waits for them.
     owed: Option<(u32, Sender<RpcReply>)>,
     panics: u32,
+    next_plan: Instant,
     body_ids: Vec<String>,
 }
 
@@ -102,6 +106,7 @@ impl SimThread {
             next_step: Instant::now(),
             owed: None,
             panics: 0,
+            next_plan: Instant::now() + PLAN_PERIOD,
         }
     }
 
@@ -247,6 +252,10 @@ impl SimThread {
 
     /// Times to the meter, notes to the events, answers to those who cut.
     fn report(&mut self) {
+        if Instant::now() >= self.next_plan {
+            self.next_plan = Instant::now() + PLAN_PERIOD;
+            self.announce_plan();
+        }
         let report = self.engine.report();
         self.exchange.meter.step(report.seconds.iter());
         for event in &report.events {

@@ -106,10 +106,8 @@ fn at(x: f64, y: f64, z: f64) -> ToolSample {
 
 /// A vertical sheet through the block at `x`.
 fn sweep(x: f64) -> Vec<BladeSegment> {
-    let segment = |y: f64| BladeSegment {
-        tip_m: Some(Vec3 { x, y, z: -0.01 }),
-        heel_m: Some(Vec3 { x, y, z: 0.03 }),
-    };
+    let segment =
+        |y: f64| BladeSegment { tip_m: Some(Vec3 { x, y, z: -0.01 }), heel_m: Some(Vec3 { x, y, z: 0.03 }) };
     vec![segment(-0.01), segment(0.02), segment(0.05)]
 }
 
