@@ -25,7 +25,10 @@ const CLEAR_OFFSET_M: f64 = 5e-5;
 /// Half angle of the cone within which the direction stays as it is (cosine), like dry friction of
 /// 0.18: a proxy on the facets of a dent wanders by as much while the hand is still.
 const STICK_COSINE: f64 = 0.984;
-/// Weight of the present step in the running direction and shares. Shares that followed at once
+/// Weight of the present step in the running direction: a tenth, since the facets of a dent turn
+/// the line from device to proxy to and fro from step to step.
+const TURN: f64 = 0.1;
+/// Weight of the present step in the running shares. Shares that followed at once
 /// would swing: who bears more sinks the tissue under it and then bears less.
 const FOLLOW: f64 = 0.3;
 /// Share below which a point is left out.
@@ -196,7 +199,7 @@ fn turned(before: Option<Direction>, target: Vector3<f64>) -> Direction {
     let normal = match before {
         Some(before) => {
             let goal = held_direction(before.normal, target);
-            before.normal.lerp(&goal, FOLLOW).try_normalize(1e-3).unwrap_or(goal)
+            before.normal.lerp(&goal, TURN).try_normalize(1e-3).unwrap_or(goal)
         }
         None => target,
     };
@@ -243,8 +246,12 @@ fn cast(
     normal: Vector3<f64>,
     surfaces: &[ContactSurface],
 ) -> Option<Bearing> {
-    let start = proxy.core_point(point.parameter) + point.aside;
-    let lowest = device.core_point(point.parameter) + point.aside - normal * point.below;
+    // On the device's line, at the proxy's height: the proxy itself wanders in its dent, and a
+    // stencil that wandered along would dent the tissue now here, now there.
+    let at_device = device.core_point(point.parameter);
+    let height = normal.dot(&(proxy.core_point(point.parameter) - at_device));
+    let start = at_device + point.aside + normal * (height + proxy.radius);
+    let lowest = at_device + point.aside - normal * point.below;
     let way = normal.dot(&(start - lowest));
     if way <= 0.0 {
         return None;
