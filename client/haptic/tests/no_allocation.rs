@@ -1,0 +1,87 @@
+//! A tick allocates nothing, in free space, in contact, while ramping down, with the log on.
+
+#![allow(clippy::unwrap_used, unsafe_code)]
+
+use nalgebra::Vector3;
+use scindo_haptic::contact_model::{ContactModel, contact_slot};
+use scindo_haptic::device::path::{Path, Touch};
+use scindo_haptic::device::simulated::{Hand, SimulatedDevice};
+use scindo_haptic::recorder::Recorder;
+use scindo_haptic::tick::{HapticTick, Limits, Ports, TickTime};
+use scindo_proto::messages::{Contact, HapticContact, Pose, Vec3, Vec3f, haptic_contact};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Counts the allocations of each thread.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: every call is passed on to the system allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.with(|n| n.set(n.get() + 1));
+        // SAFETY: the caller's promise about `layout` is handed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise about `pointer` and `layout` is handed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Two planes of the same tissue, stiff enough to need the coupling.
+fn message(seq: u64) -> HapticContact {
+    let plane = |x: f32, z: f32| Contact {
+        point_m: Some(Vec3f::default()),
+        normal: Some(Vec3f { x, y: 0.0, z }),
+        force_n: Some(Vec3f::default()),
+        stiffness_n_m: 3000.0,
+        damping_ns_m: 1.0,
+        ..Contact::default()
+    };
+    HapticContact {
+        seq,
+        epoch: (seq / 100) as u32,
+        mode: haptic_contact::Mode::Contact.into(),
+        tool_pose_used: Some(Pose { position_m: Some(Vec3::default()), qw: 1.0, ..Pose::default() }),
+        contacts: vec![plane(0.0, 1.0), plane(0.6, 0.8)],
+        validity_ms: 50.0,
+        ..HapticContact::default()
+    }
+}
+
+#[test]
+fn a_tick_allocates_nothing() {
+    let touch = Touch { point_m: Vector3::zeros(), direction: -Vector3::z(), depth_m: 0.004, clearance_m: 0.02 };
+    let device = SimulatedDevice::new(Path::circle(&touch), Hand::default());
+    let (mut slot, contacts) = contact_slot();
+    let file = std::env::temp_dir().join(format!("scindo-haptic-alloc-{}.csv", std::process::id()));
+    let (log, recorder) = Recorder::create(&file).unwrap();
+    let ports = Ports { contacts, server_alive: Arc::new(AtomicBool::new(true)), poses: None, log: Some(log) };
+    let limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
+    let mut tick = HapticTick::new(Box::new(device), limits, ports);
+    let (mut allocations, mut largest_n) = (0, 0.0f64);
+    for ms in 0..8000u64 {
+        let now_ns = ms * 1_000_000;
+        if ms % 5 == 0 && ms < 5000 {
+            slot.write(ContactModel::parse(&message(1 + ms / 5), now_ns).unwrap());
+        }
+        let before = ALLOCATIONS.with(Cell::get);
+        let output = tick.tick(TickTime { now_ns, elapsed_s: 1e-3 });
+        allocations += ALLOCATIONS.with(Cell::get) - before;
+        largest_n = largest_n.max(output.force_n.norm());
+    }
+    drop(tick);
+    recorder.finish().unwrap();
+    std::fs::remove_file(file).unwrap();
+    assert!(largest_n > 0.3, "the hand must have touched: {largest_n} N");
+    assert_eq!(allocations, 0);
+}
