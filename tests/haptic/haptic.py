@@ -25,6 +25,10 @@ from wire import server_pb2, surface_pb2  # noqa: E402
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "tests/python/scene.toml"
 SLEW = 50.0
+# As deploy/README.md advises, where this user may.
+REAL_TIME = ("chrt", "-f", "20")
+if subprocess.run([*REAL_TIME, "true"], stderr=subprocess.DEVNULL, check=False).returncode != 0:
+    REAL_TIME = ()
 FLAG_LOST = 1 << 2
 
 
@@ -34,18 +38,16 @@ class Programs:
     def __init__(self, bin_dir, out_dir):
         self.bin, self.out, self.running = bin_dir, out_dir, []
 
-    def start(self, name, *arguments, log):
+    def start(self, name, *arguments, log, stdout=None, before=()):
+        """A program whose stderr, and stdout unless it is wanted, go to the log."""
         with open(self.out / log, "wb") as file:
-            process = subprocess.Popen(
-                [self.bin / name, *map(str, arguments)], stdout=subprocess.PIPE, stderr=file, stdin=subprocess.DEVNULL
-            )
+            command = [*before, self.bin / name, *map(str, arguments)]
+            process = subprocess.Popen(command, stdout=stdout or file, stderr=file, stdin=subprocess.DEVNULL)
         self.running.append(process)
         return process
 
     def server(self, endpoint, log="server.log"):
         process = self.start("scindo", "run", SCENE, "--listen", endpoint, log=log)
-        # Its output is of no interest, but must not fill the pipe.
-        process.stdout.close()
         host, port = endpoint.removeprefix("tcp/").split(":")
         end = time.monotonic() + 20
         while time.monotonic() < end:
@@ -58,7 +60,7 @@ class Programs:
 
     def haptic(self, endpoint, *more, log="haptic.log"):
         common = ("--device", "sim", "--tool", "probe", "--connect", endpoint, "--json", "--slew", SLEW)
-        return self.start("scindo-haptic", *common, *more, log=log)
+        return self.start("scindo-haptic", *common, *more, log=log, stdout=subprocess.PIPE, before=REAL_TIME)
 
     def end(self):
         for process in self.running:
