@@ -22,8 +22,8 @@ MODELS = [
 ]
 
 
-def bounds(path, scale):
-    """Lowest and highest corner [m]."""
+def points_of(path, scale):
+    """Vertices of the file [m]."""
     if path.suffix == ".msh":
         # Gmsh 1: after $NOD the count, then lines `number x y z`.
         lines = path.read_text().split("\n")
@@ -32,11 +32,12 @@ def bounds(path, scale):
         points = np.array([row.split()[1:4] for row in rows], float)
     else:
         points = np.asarray(pyvista.read(path).points, float)
-    return points.min(axis=0) * scale, points.max(axis=0) * scale
+    return points * scale
 
 
 def scene(path, kind, scale):
-    low, high = bounds(path, scale)
+    points = points_of(path, scale)
+    low, high = points.min(axis=0), points.max(axis=0)
     size = high - low
     across, along, up = np.argsort(size)[::-1]
     margin = 0.2 * size[across]
@@ -52,6 +53,10 @@ def scene(path, kind, scale):
         heel[up] = high[up] + margin
         sweep.append([tip.tolist(), heel.tolist()])
     axis = "xyz"[across]
+    # Just below the skin beyond the cut: from a vertex a little towards the middle of that part.
+    beyond = points[points[:, across] > middle + 0.1 * size[across]]
+    vertex = beyond[np.argmin(np.linalg.norm(beyond - (low + high) / 2, axis=1))]
+    probe = vertex + 0.1 * (beyond.mean(axis=0) - vertex)
     pull = np.zeros(3)
     pull[across] = 0.6
     cells = "cells = 32, " if kind == "surface" else ""
@@ -84,8 +89,7 @@ sweep_m = {sweep}
 [[probe]]
 id = "end"
 body = "body"
-point_m = {((low + high) / 2).tolist()}
-side = {(pull / 0.6).tolist()}
+point_m = {probe.tolist()}
 """
 
 
