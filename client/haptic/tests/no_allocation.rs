@@ -60,12 +60,14 @@ fn message(seq: u64) -> HapticContact {
 
 #[test]
 fn a_tick_allocates_nothing() {
-    let touch = Touch { point_m: Vector3::zeros(), direction: -Vector3::z(), depth_m: 0.004, clearance_m: 0.02 };
+    let touch =
+        Touch { point_m: Vector3::zeros(), direction: -Vector3::z(), depth_m: 0.004, clearance_m: 0.02 };
     let device = SimulatedDevice::new(Path::circle(&touch), Hand::default());
     let (mut slot, contacts) = contact_slot();
     let file = std::env::temp_dir().join(format!("scindo-haptic-alloc-{}.csv", std::process::id()));
     let (log, recorder) = Recorder::create(&file).unwrap();
-    let ports = Ports { contacts, server_alive: Arc::new(AtomicBool::new(true)), poses: None, log: Some(log) };
+    let ports =
+        Ports { contacts, server_alive: Arc::new(AtomicBool::new(true)), poses: None, log: Some(log) };
     let limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
     let mut tick = HapticTick::new(Box::new(device), limits, ports);
     let (mut allocations, mut largest_n) = (0, 0.0f64);

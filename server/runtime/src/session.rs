@@ -5,7 +5,7 @@
 //! connect nowhere else; the bulk session listens one port above each of them
 //! ([`scindo_proto::endpoint::bulk_endpoint`]), which spares those who know of it the relay.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use scindo_proto::endpoint::bulk_endpoint;
 use zenoh::{Session, Wait as _};
@@ -20,7 +20,7 @@ pub struct NetworkConfig {
     /// Routers to connect to.
     pub connect: Vec<String>,
     /// A zenoh configuration (JSON5) to start from: TLS, users, access control. Its endpoints
-    /// hold for the haptic session where none are given here.
+    /// hold where none are given here.
     pub zenoh_file: Option<PathBuf>,
 }
 
@@ -35,14 +35,29 @@ pub struct Sessions {
 impl Sessions {
     /// Opens both. Fails if an endpoint is taken.
     pub fn open(network: &NetworkConfig) -> Result<Self, RuntimeError> {
-        let bulk_listen: Vec<String> = network.listen.iter().filter_map(|e| bulk_endpoint(e)).collect();
-        let relay: Vec<String> = network.listen.iter().filter_map(|e| local(e)).take(1).collect();
-        let mode = if network.listen.is_empty() { "peer" } else { "router" };
-        let haptic = open(network, mode, &network.listen, &network.connect)?;
+        let listen = match &network.zenoh_file {
+            Some(path) if network.listen.is_empty() => listen_of(path)?,
+            _ => network.listen.clone(),
+        };
+        let bulk_listen: Vec<String> = listen.iter().filter_map(|e| bulk_endpoint(e)).collect();
+        let relay: Vec<String> = listen.iter().filter_map(|e| local(e)).take(1).collect();
+        let mode = if listen.is_empty() { "peer" } else { "router" };
+        let haptic = open(network, mode, &listen, &network.connect)?;
         let bulk_connect = if relay.is_empty() { &network.connect } else { &relay };
         let bulk = open(network, "peer", &bulk_listen, bulk_connect)?;
         Ok(Self { haptic, bulk })
     }
+}
+
+/// The endpoints at which a configuration file says to listen, if it lists them plainly.
+fn listen_of(path: &Path) -> Result<Vec<String>, RuntimeError> {
+    let invalid = |e: zenoh::Error| RuntimeError::Zenoh {
+        what: format!("--zenoh {}", path.display()),
+        reason: e.to_string(),
+    };
+    let config = zenoh::Config::from_file(path).map_err(invalid)?;
+    let endpoints = config.get_json("listen/endpoints").unwrap_or_default();
+    Ok(serde_json::from_str(&endpoints).unwrap_or_default())
 }
 
 fn open(
