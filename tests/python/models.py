@@ -1,5 +1,5 @@
 """Runs the real meshes through `scindo run`: the scene of each is written here: held at
-one end, pulled at the other, cut from above across its longest axis; results.py judges what comes out.
+one end, stretched at the other, cut across its longest axis; results.py judges what comes out.
 
     python tests/python/models.py SCINDO MODELS_DIR OUT_DIR [--steps N]
 """
@@ -47,21 +47,19 @@ def scene(path, kind, scale):
         tip = np.zeros(3)
         tip[across] = middle
         tip[along] = low[along] - margin + part * (size[along] + 2 * margin)
-        # Not through: what is left below is a hinge.
-        tip[up] = low[up] + 0.4 * size[up]
+        tip[up] = low[up] - margin
         heel = tip.copy()
         heel[up] = high[up] + margin
         sweep.append([tip.tolist(), heel.tolist()])
     axis = "xyz"[across]
-    # Just below the skin beyond the cut: from a vertex a little towards the middle of that part.
-    beyond = points[points[:, across] > middle + 0.1 * size[across]]
-    vertex = beyond[np.argmin(np.linalg.norm(beyond - (low + high) / 2, axis=1))]
-    probe = vertex + 0.1 * (beyond.mean(axis=0) - vertex)
+    # Just below the skin at the far end, which bulges outwards whatever the shape.
+    end = points[points[:, across] > high[across] - 0.15 * size[across]]
+    tip = points[np.argmax(points[:, across])]
+    probe = tip + 0.2 * (end.mean(axis=0) - tip)
     pull = np.zeros(3)
-    pull[across] = 0.6
+    pull[across] = 0.1 * size[across]
     cells = "cells = 32, " if kind == "surface" else ""
-    slabs = [(0.0, 0.12, "fix"), (0.88, 1.0, "load")]
-    held, pulled = (f'{{ slab = {{ axis = "{axis}", from = {a}, to = {b} }} }}' for a, b, _ in slabs)
+    ends = [f'{{ slab = {{ axis = "{axis}", from = {a}, to = {b} }} }}' for a, b in [(0.0, 0.12), (0.88, 1.0)]]
     return f"""schema = 1
 name = "{path.stem}"
 [world]
@@ -75,12 +73,13 @@ poisson = 0.4
 density_kg_m3 = 1000.0
 rayleigh = {{ mass_1_s = 2.0, stiffness_s = 0.01 }}
 [[body.fix]]
-where = {held}
+where = {ends[0]}
 axes = "xyz"
-# Pulls the free end away, so that the cut opens.
-[[body.load]]
-where = {pulled}
-force_n = {pull.tolist()}
+# Stretched by a tenth, so that the cut opens.
+[[body.fix]]
+where = {ends[1]}
+axes = "xyz"
+displacement_m = {pull.tolist()}
 [[cut]]
 body = "body"
 at_s = 0.3
