@@ -35,7 +35,8 @@ def points_of(path, scale):
     return points * scale
 
 
-def scene(path, kind, scale):
+def scene(path, kind, scale, depth):
+    """TOML of the scene; its probe lies at a part `depth` of the way from the far tip into the body."""
     points = points_of(path, scale)
     low, high = points.min(axis=0), points.max(axis=0)
     size = high - low
@@ -52,10 +53,9 @@ def scene(path, kind, scale):
         heel[up] = high[up] + margin
         sweep.append([tip.tolist(), heel.tolist()])
     axis = "xyz"[across]
-    # Just below the skin at the far end, which bulges outwards whatever the shape.
     end = points[points[:, across] > high[across] - 0.15 * size[across]]
     tip = points[np.argmax(points[:, across])]
-    probe = tip + 0.2 * (end.mean(axis=0) - tip)
+    probe = tip + depth * (end.mean(axis=0) - tip)
     pull = np.zeros(3)
     pull[across] = 0.1 * size[across]
     cells = "cells = 32, " if kind == "surface" else ""
@@ -107,7 +107,11 @@ def main():
         folder = args.out / name
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / "scene.toml"
-        file.write_text(scene((args.models / name).resolve(), kind, scale))
+        for depth in (0.2, 0.5, 0.1, 0.8, 0.05):
+            file.write_text(scene((args.models / name).resolve(), kind, scale, depth))
+            # A thin or hollow end may leave the probe outside; then the next depth.
+            if subprocess.run([args.scindo, "check", file], capture_output=True, timeout=120).returncode == 0:
+                break
         start = time.monotonic()
         run = [args.scindo, "run", file, "--fast", "--steps", str(args.steps), "--out", folder]
         subprocess.run(run, check=True, timeout=600, stdout=subprocess.DEVNULL)

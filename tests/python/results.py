@@ -150,8 +150,9 @@ class Camera:
 
     def picture(self, view, focus, radius, lit=False):
         up = (0, 1, 0) if abs(view[2]) > 0.9 else (0, 0, 1)
-        self.plotter.camera_position = [tuple(focus + 4 * radius * view), tuple(focus), up]
-        self.plotter.camera.view_angle = 32
+        self.plotter.camera_position = [tuple(focus + 2.2 * radius * view), tuple(focus), up]
+        # Wide, so that both walls of a gap are seen.
+        self.plotter.camera.view_angle = 58
         self.plotter.reset_camera_clipping_range()
         self.actor.prop.lighting = lit
         self.plotter.render()
