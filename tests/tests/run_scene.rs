@@ -1,0 +1,75 @@
+//! `scindo run --fast --out`: a cut beam from scene file to results.
+
+use std::fs;
+
+use scindo_tests::run;
+
+const SCENE: &str = r#"
+schema = 1
+name = "half-cut beam"
+[world]
+gravity_m_s2 = [9.81, 0.0, 0.0]
+step_s = 0.02
+[[body]]
+id = "beam"
+mesh = { box = { min_m = [0,0,0], max_m = [0.03,0.06,0.2], cells = [4,8,24], pattern = "tet5" } }
+element = "tet4"
+law = "corotational"
+young_pa = 3e5
+poisson = 0.35
+density_kg_m3 = 1070
+integrator = "implicit-euler"
+solver = { method = "pcg", iterations = 50, tolerance = 1e-6 }
+[[body.fix]]
+where = { box = { min_m = [-1,-1,-1e-6], max_m = [1,1,1e-6] } }
+axes = "xyz"
+[[cut]]
+body = "beam"
+at_s = 0.1
+method = "xfem"
+sweep_m = [ [[-0.01,-0.01,0.101],[-0.01,0.07,0.101]], [[0.015,-0.01,0.101],[0.015,0.07,0.101]] ]
+[[probe]]
+id = "lip"
+body = "beam"
+point_m = [0.002,0.03,0.101]
+side = [0,0,1]
+"#;
+
+#[test]
+fn results_are_complete_finite_and_the_same_for_any_thread_count() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let scene = directory.path().join("beam.toml");
+    fs::write(&scene, SCENE).expect("written");
+    let mut probes = Vec::new();
+    for threads in ["1", "2"] {
+        let out = directory.path().join(format!("out{threads}"));
+        let (scene, out_text) = (scene.display().to_string(), out.display().to_string());
+        let output = run(
+            "scindo",
+            &["run", &scene, "--fast", "--steps", "60", "--threads", threads, "--out", &out_text],
+        )
+        .expect("scindo starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+
+        let summary: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(out.join("summary.json")).expect("summary.json"))
+                .expect("JSON");
+        assert_eq!(summary["steps"], 60, "{summary:#}");
+        let csv = fs::read_to_string(out.join("probes.csv")).expect("probes.csv");
+        assert_eq!(csv.lines().next(), Some("step,time_s,id,x_m,y_m,z_m,ux_m,uy_m,uz_m"));
+        assert!(csv.lines().count() >= 60, "a row per step:\n{csv}");
+        let last: Vec<f64> = csv
+            .lines()
+            .last()
+            .expect("rows")
+            .split(',')
+            .skip(3)
+            .map(|v| v.parse().expect("a number"))
+            .collect();
+        assert!(last.iter().all(|v| v.is_finite()), "{last:?}");
+        assert!(last[3] > 1e-4, "the beam sags along gravity: {last:?}");
+        assert!(fs::metadata(out.join("final.vtu")).expect("final.vtu").len() > 10_000);
+        probes.push(csv);
+    }
+    assert_eq!(probes[0], probes[1], "the result does not depend on the number of threads");
+}
