@@ -2,7 +2,7 @@
 # Starts the built-in demonstration on free ports and drives its page; see viewer.mjs.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-bin=${SCINDO_TEST_BIN:-target/release}/scindo
+bin=${SCINDO_TEST_BIN:-target/debug}/scindo
 artifacts=${SCINDO_TEST_ARTIFACTS:-$PWD/tests/artifacts}
 mkdir -p "$artifacts"
 free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }

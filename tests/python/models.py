@@ -2,6 +2,9 @@
 one end, stretched at the other, cut across its longest axis; results.py judges what comes out.
 
     python tests/python/models.py SCINDO MODELS_DIR OUT_DIR [--steps N]
+
+Without a folder of real meshes (MODELS_DIR is `made`) the body is a dirty surface made here: an
+ellipsoid with holes, flipped and doubled triangles.
 """
 
 import argparse
@@ -20,6 +23,22 @@ MODELS = [
     ("liver.vtk", "surface", 0.001),
     ("stanford-bunny.obj", "surface", 1.0),
 ]
+
+
+MADE = [("dirty.obj", "surface", 1.0)]
+
+
+def make_dirty(path):
+    """Writes an ellipsoid of 16 x 8 x 8 cm with a twentieth of its triangles lost, flipped or doubled."""
+    sphere = pyvista.Icosphere(radius=0.04, nsub=4)
+    points = np.asarray(sphere.points, float) * [2.0, 1.0, 1.0]
+    triangles = np.asarray(sphere.faces).reshape(-1, 4)[:, 1:]
+    chance = np.random.default_rng(1).random(len(triangles))
+    triangles[chance > 0.98] = triangles[chance > 0.98][:, ::-1]
+    triangles = np.concatenate([triangles[chance > 0.02], triangles[(chance > 0.5) & (chance < 0.51)]])
+    lines = ["v {:.9g} {:.9g} {:.9g}".format(*point) for point in points]
+    lines += ["f {} {} {}".format(*(triangle + 1)) for triangle in triangles]
+    path.write_text("\n".join(lines) + "\n")
 
 
 def points_of(path, scale):
@@ -101,7 +120,12 @@ def main():
     parser.add_argument("--only", help="one of the models")
     args = parser.parse_args()
     results = pathlib.Path(__file__).with_name("results.py")
-    for name, kind, scale in MODELS:
+    made = str(args.models) == "made"
+    if made:
+        args.models = args.out
+        args.out.mkdir(parents=True, exist_ok=True)
+        make_dirty(args.out / "dirty.obj")
+    for name, kind, scale in MADE if made else MODELS:
         if args.only and name != args.only:
             continue
         folder = args.out / name

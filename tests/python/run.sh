@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # The public Python packages against the real programs: a client over the network, and readers of
-# the results. Needs $SCINDO_TEST_BIN (folder of the programs) and $SCINDO_TEST_PYTHON; real meshes
-# are read from $SCINDO_MODELS (../shared/models beside the repository) where they are.
+# the results. Needs $SCINDO_TEST_BIN (folder of the programs) and $SCINDO_TEST_PYTHON; with a folder of
+# real meshes in $SCINDO_MODELS it runs those instead of a dirty surface made here.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 bin=${SCINDO_TEST_BIN:-target/debug}
 python=${SCINDO_TEST_PYTHON:-python3}
 keep=${SCINDO_TEST_ARTIFACTS:-$PWD/tests/artifacts}/python
-models=${SCINDO_MODELS:-../shared/models}
+models=${SCINDO_MODELS:-made}
+steps=${SCINDO_MODEL_STEPS:-100}
 mkdir -p "$keep"
 server=
 finish() { if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true; fi; }
@@ -33,8 +34,4 @@ finish
 server=
 
 echo "-- results on disk"
-if [ -d "$models" ]; then
-  timeout 1500 "$python" tests/python/models.py "$bin/scindo" "$models" "$keep"
-else
-  echo "no real meshes at $models: skipped (set SCINDO_MODELS)"
-fi
+timeout 1500 "$python" tests/python/models.py "$bin/scindo" "$models" "$keep" --steps "$steps"
