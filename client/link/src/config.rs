@@ -6,7 +6,7 @@ use std::time::Duration;
 use scindo_proto::Role;
 use scindo_proto::endpoint::DEFAULT_ENDPOINT;
 
-use crate::error::LinkError;
+use crate::error::{LinkError, words};
 
 /// What [`crate::Link::connect`] needs to know.
 #[derive(Debug, Clone)]
@@ -61,7 +61,7 @@ impl LinkConfig {
         let mut config = match &self.zenoh_file {
             Some(path) => zenoh::Config::from_file(path).map_err(|e| LinkError::Config {
                 what: format!("zenoh file {}", path.display()),
-                reason: e.to_string(),
+                reason: words(&e),
             })?,
             None => zenoh::Config::default(),
         };
@@ -82,7 +82,7 @@ impl LinkConfig {
         for (key, value) in settings {
             config
                 .insert_json5(key, value)
-                .map_err(|e| LinkError::Config { what: format!("{key} = {value}"), reason: e.to_string() })?;
+                .map_err(|e| LinkError::Config { what: format!("{key} = {value}"), reason: words(&e) })?;
         }
         Ok(config)
     }

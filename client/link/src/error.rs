@@ -76,6 +76,12 @@ pub enum LinkError {
 
 impl LinkError {
     pub(crate) fn zenoh(doing: &'static str) -> impl FnOnce(zenoh::Error) -> Self {
-        move |e| Self::Zenoh { doing, reason: e.to_string() }
+        move |e| Self::Zenoh { doing, reason: words(&e) }
     }
+}
+
+/// What zenoh says, without the place in its source.
+pub(crate) fn words(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    text.split(" at /").next().unwrap_or(&text).to_owned()
 }

@@ -14,7 +14,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 
 use crate::config::LinkConfig;
-use crate::error::LinkError;
+use crate::error::{LinkError, words};
 
 /// Whether a server of our session is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -168,7 +168,7 @@ async fn open(config: &LinkConfig, endpoint: Option<&str>, timeout: Duration) ->
         endpoints: config.connect.join(", "),
         first: config.connect.first().cloned().unwrap_or_default(),
         waited: started.elapsed(),
-        reason: e.to_string(),
+        reason: words(&e),
     })
 }
 

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
-use scindo_proto::endpoint::DEFAULT_ENDPOINT;
 
 use crate::command;
 use crate::error::RuntimeError;
@@ -68,7 +67,7 @@ pub struct ServeArgs {
     #[arg(long, default_value = "main")]
     pub session: String,
     /// Where clients connect, such as tcp/0.0.0.0:7447; surfaces go out one port above
-    /// [default: tcp/127.0.0.1:7447, or nothing with --connect or --zenoh].
+    /// [default: that of --zenoh, nothing with --connect, else tcp/127.0.0.1:7447].
     #[arg(long, value_name = "ENDPOINT")]
     pub listen: Vec<String>,
     /// A zenoh router to connect to.
@@ -89,16 +88,6 @@ pub struct ServeArgs {
     /// Report as JSON, one object per line.
     #[arg(long)]
     pub json: bool,
-}
-
-impl ServeArgs {
-    /// Endpoints to listen at.
-    pub fn listen_endpoints(&self) -> Vec<String> {
-        if self.listen.is_empty() && self.connect.is_empty() && self.zenoh.is_none() {
-            return vec![DEFAULT_ENDPOINT.to_owned()];
-        }
-        self.listen.clone()
-    }
 }
 
 /// `scindo check`.

@@ -20,6 +20,9 @@ pub enum RuntimeError {
     /// Results that cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
+    /// A mesh that cannot be written where it was asked for.
+    #[error("{0}; check that the directory exists and is writable")]
+    Unwritten(MeshInError),
     /// An option of the command line that cannot be used.
     #[error("{option} '{value}': {reason}. {next}")]
     Option {
@@ -97,9 +100,16 @@ impl RuntimeError {
             Self::Zenoh { .. } => "zenoh",
             Self::Viewer { .. } => "viewer",
             Self::Mesh(_) => "mesh",
+            Self::Unwritten(_) => "unwritten",
             Self::Results(_) => "results",
             Self::System { .. } => "system",
             Self::Died { .. } => "died",
         }
     }
+}
+
+/// What zenoh says, without the place in its source.
+pub fn words(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    text.split(" at /").next().unwrap_or(&text).to_owned()
 }

@@ -20,7 +20,7 @@ use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait as _};
 
 use crate::convert::{to_frame, to_tool_state, to_topology, unix_ns};
-use crate::error::RuntimeError;
+use crate::error::{RuntimeError, words};
 use crate::exchange::{Exchange, Outgoing};
 use crate::session::Sessions;
 
@@ -393,5 +393,5 @@ fn put<M: WireMessage>(publisher: &Publisher<'static>, message: &M) {
 }
 
 fn failed(error: zenoh::Error) -> RuntimeError {
-    RuntimeError::Zenoh { what: "declaring topics".to_owned(), reason: error.to_string() }
+    RuntimeError::Zenoh { what: "declaring topics".to_owned(), reason: words(&error) }
 }

@@ -11,7 +11,7 @@ use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait as _};
 
-use crate::error::RuntimeError;
+use crate::error::{RuntimeError, words};
 use crate::exchange::{Exchange, Outgoing};
 use crate::inbox::{Change, Cut};
 
@@ -29,8 +29,7 @@ impl Receivers {
         exchange: &Arc<Exchange>,
         server: &Topic,
     ) -> Result<Self, RuntimeError> {
-        let failed =
-            |e: zenoh::Error| RuntimeError::Zenoh { what: "subscribing".into(), reason: e.to_string() };
+        let failed = |e: zenoh::Error| RuntimeError::Zenoh { what: "subscribing".into(), reason: words(&e) };
         let tokens = session
             .liveliness()
             .declare_subscriber(keys.every_live())

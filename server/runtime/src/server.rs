@@ -14,7 +14,7 @@ use zenoh::query::Queryable;
 
 use crate::contact::{ContactConfig, ContactThread};
 use crate::engine::Engine;
-use crate::error::RuntimeError;
+use crate::error::{RuntimeError, words};
 use crate::exchange::{Exchange, OUTGOING};
 use crate::inbox::Inbox;
 use crate::publish::{PublishThread, Published, Sources, WAITING_KEYFRAMES};
@@ -202,7 +202,7 @@ fn declare_rpc(
             }
         })
         .wait()
-        .map_err(|e| RuntimeError::Zenoh { what: "declaring rpc".to_owned(), reason: e.to_string() })?;
+        .map_err(|e| RuntimeError::Zenoh { what: "declaring rpc".to_owned(), reason: words(&e) })?;
     Ok((receiver, queryable))
 }
 

@@ -19,7 +19,7 @@ pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
         });
     }
     let (mesh, health) = load_any(&args.input, args.cells as usize, args.scale)?;
-    write_mesh(&args.output, &mesh)?;
+    write_mesh(&args.output, &mesh).map_err(RuntimeError::Unwritten)?;
     if args.json {
         println!(
             "{:#}",
@@ -28,7 +28,7 @@ pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
             })
         );
     } else {
-        print!("{health}");
+        println!("{health}");
         println!("{}: {} elements, {} nodes", args.output.display(), mesh.tets.len(), mesh.nodes.len());
     }
     Ok(ExitCode::SUCCESS)

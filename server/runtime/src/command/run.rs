@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+use scindo_proto::KeySpace;
 use scindo_proto::endpoint::bulk_endpoint;
 use scindo_view::{ViewConfig, Viewer};
 use scindo_world::build::BuildOptions;
@@ -19,7 +20,7 @@ use crate::engine::Engine;
 use crate::error::RuntimeError;
 use crate::progress::Progress;
 use crate::server::{Server, ServerConfig};
-use crate::session::{NetworkConfig, Sessions};
+use crate::session::{NetworkConfig, Sessions, local};
 use crate::sim::Pace;
 
 /// Where the demonstration's page is served.
@@ -43,16 +44,15 @@ pub fn scene(args: &RunArgs) -> Result<ExitCode, RuntimeError> {
 
 /// Builds, starts, waits, writes results.
 fn serve(scene: &Scene, args: &ServeArgs, viewer: Option<SocketAddr>) -> Result<ExitCode, RuntimeError> {
+    KeySpace::new(&args.realm, &args.session)?;
     let pace = pace(args, scene.checked().step_s)?;
     let engine = build(scene, args)?;
     let foreground = foreground()?;
-    let sessions = open_sessions(args, &pace)?;
-    let online = sessions.is_some();
-    if viewer.is_some() && !online {
-        return Err(unserved_viewer(args));
-    }
-    let viewer = viewer.map(|address| start_viewer(&foreground, address, args)).transpose()?;
-    announce(scene, args, online, viewer);
+    let network = network(args)?;
+    let sessions =
+        open_sessions(&network, args.listen.is_empty() && viewer.is_none() && pace.steps.is_some())?;
+    let viewer = viewer.map(|address| start_viewer(&foreground, address, (args, &network))).transpose()?;
+    announce(scene, args, sessions.as_ref().map_or(&[], |_| &network.listen), viewer);
     let started = Instant::now();
     let rates = scene.checked().publish;
     let config = ServerConfig {
@@ -109,18 +109,20 @@ fn build(scene: &Scene, args: &ServeArgs) -> Result<Engine, RuntimeError> {
     Engine::new(simulation, results.transpose()?)
 }
 
-/// A batch run that was not told where to listen goes on without network if the port is taken.
-fn open_sessions(args: &ServeArgs, pace: &Pace) -> Result<Option<Sessions>, RuntimeError> {
-    let network = NetworkConfig {
-        listen: args.listen_endpoints(),
+fn network(args: &ServeArgs) -> Result<NetworkConfig, RuntimeError> {
+    let asked = NetworkConfig {
+        listen: args.listen.clone(),
         connect: args.connect.clone(),
         zenoh_file: args.zenoh.clone(),
     };
-    match Sessions::open(&network) {
+    asked.settled()
+}
+
+/// A batch run that was not told where to listen goes on without network if the port is taken.
+fn open_sessions(network: &NetworkConfig, may_do_without: bool) -> Result<Option<Sessions>, RuntimeError> {
+    match Sessions::open(network) {
         Ok(sessions) => Ok(Some(sessions)),
-        Err(RuntimeError::Listen { endpoints, .. })
-            if args.listen.is_empty() && args.viewer.is_none() && pace.steps.is_some() =>
-        {
+        Err(RuntimeError::Listen { endpoints, .. }) if may_do_without => {
             tracing::warn!(
                 "{endpoints} is taken; nobody can watch this run (--listen chooses another address)"
             );
@@ -128,10 +130,6 @@ fn open_sessions(args: &ServeArgs, pace: &Pace) -> Result<Option<Sessions>, Runt
         }
         Err(error) => Err(error),
     }
-}
-
-fn unserved_viewer(args: &ServeArgs) -> RuntimeError {
-    RuntimeError::Listen { endpoints: args.listen_endpoints().join(", "), reason: "no session".to_owned() }
 }
 
 fn foreground() -> Result<Runtime, RuntimeError> {
@@ -147,15 +145,14 @@ fn foreground() -> Result<Runtime, RuntimeError> {
 fn start_viewer(
     foreground: &Runtime,
     address: SocketAddr,
-    args: &ServeArgs,
+    (args, network): (&ServeArgs, &NetworkConfig),
 ) -> Result<SocketAddr, RuntimeError> {
     let mut config = ViewConfig::new(address);
     config.link.realm.clone_from(&args.realm);
     config.link.session.clone_from(&args.session);
     config.link.zenoh_file.clone_from(&args.zenoh);
-    let listen: Vec<String> =
-        args.listen_endpoints().iter().filter_map(|e| crate::session::local(e)).collect();
-    config.link.connect = if listen.is_empty() { args.connect.clone() } else { listen };
+    let listen: Vec<String> = network.listen.iter().filter_map(|e| local(e)).collect();
+    config.link.connect = if listen.is_empty() { network.connect.clone() } else { listen };
     let failed = |e: scindo_view::ViewError| RuntimeError::Viewer {
         address: address.to_string(),
         reason: e.to_string(),
@@ -170,8 +167,7 @@ fn start_viewer(
     Ok(bound)
 }
 
-fn announce(scene: &Scene, args: &ServeArgs, online: bool, viewer: Option<SocketAddr>) {
-    let listen = if online { args.listen_endpoints() } else { Vec::new() };
+fn announce(scene: &Scene, args: &ServeArgs, listen: &[String], viewer: Option<SocketAddr>) {
     let surfaces: Vec<String> = listen.iter().filter_map(|e| bulk_endpoint(e)).collect();
     let page = viewer.map(|address| format!("http://{address}"));
     if args.json {
