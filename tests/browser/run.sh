@@ -12,9 +12,8 @@ zenoh=$(free_port)
 server=$!
 trap 'kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true' EXIT
 for _ in $(seq 1 300); do
-  curl -fs "http://127.0.0.1:$web/healthz" >/dev/null 2>&1 && break
+  (exec 3<>"/dev/tcp/127.0.0.1/$web") 2>/dev/null && break
   kill -0 "$server" 2>/dev/null || { echo "the server ended:" >&2; tail -20 "$artifacts/browser-server.log" >&2; exit 1; }
   sleep 0.2
 done
-curl -fs "http://127.0.0.1:$web/healthz"; echo
 node tests/browser/viewer.mjs "http://127.0.0.1:$web"

@@ -43,6 +43,7 @@ try {
   await incisionOpens(page);
   await mouseTouches(page);
   await lateJoinerSeesTheSame(page);
+  await picture(page);
 } catch (error) {
   failures += 1;
   console.error(`FAILED  ${error.stack ?? error}`);
@@ -55,6 +56,8 @@ process.exit(failures === 0 ? 0 : 1);
 
 /** Opens the page and waits for the first surface. */
 async function openPage() {
+  const health = await (await fetch(new URL("/healthz", url))).json();
+  hold(health.ok && health.page === "built", `the viewer is healthy and its page was built (${JSON.stringify(health)})`);
   const page = await context.newPage();
   page.on("pageerror", (error) => { failures += 1; console.error(`FAILED  script error: ${error.message}`); });
   await page.goto(url);
@@ -183,6 +186,18 @@ async function lateJoinerSeesTheSame(page) {
   await page.screenshot({ path: path.join(artifacts, "view-5-late.png") });
   await page.click("#pause");
   await until(page, "the simulation goes on", MINUTE, () => !window.scindo.paused());
+}
+
+/** The open incision in full quality, a little closer: the picture of the README. */
+async function picture(page) {
+  await page.goto(new URL("?quality=full", url).href);
+  await until(page, "a picture in full quality", MINUTE, () => window.scindo?.bodies().some((b) => b.vertices > 0) && window.scindo.counts().pictures > 4);
+  await page.evaluate(() => {
+    const { position: p, target: t } = window.scindo.cameraState();
+    window.scindo.camera([0, 1, 2].map((i) => t[i] + 0.86 * (p[i] - t[i]) + (i === 2 ? 0.02 : 0)), t);
+  });
+  await page.waitForTimeout(6000);
+  await page.screenshot({ path: path.join(artifacts, "view-6-picture.png") });
 }
 
 /** Counts tissue and wound pixels left of the panel in a screenshot, which is kept. */

@@ -229,7 +229,7 @@ export class Panel {
       ["round trip to viewer", `${short(this.relay.roundTripMs)} ms`],
       ["browsers · viewers · haptics", `${this.relay.browsers} · ${stats?.surfaceSubscribers ?? "–"} · ${stats?.hapticClients ?? "–"}`],
       ["frames skipped here", count(this.relay.framesDropped)],
-      ["cuts applied", `${stats?.cutsApplied ?? "–"}`],
+      ["cut commands applied", `${stats?.cutsApplied ?? "–"}`],
     ];
     const refused = stats?.refused.filter((counter) => counter.count > 0n) ?? [];
     if (refused.length === 0) rows.push(["refused", "0"]);

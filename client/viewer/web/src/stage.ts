@@ -19,7 +19,10 @@ export class Stage {
   radius = 0.1;
   readonly center = new Vector3();
   pictures = 0;
+  /** A processor draws: fewer lamps, coarser shadows, no reflections. */
   readonly software: boolean;
+  /** Whether resolution may give way to speed; `?quality=full` forbids it, for pictures. */
+  private readonly spares: boolean;
   private readonly renderer: WebGLRenderer;
   private readonly key = new DirectionalLight(0xfff1e2, 2.3);
   private readonly ground: Ground;
@@ -30,7 +33,9 @@ export class Stage {
   private pixelRatio: number;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.software = isSoftwareRenderer();
+    const query = new URLSearchParams(location.search);
+    this.spares = query.get("quality") !== "full";
+    this.software = this.spares && isSoftwareRenderer();
     document.body.classList.toggle("plain", this.software);
     this.pixelRatio = Math.min(devicePixelRatio, this.software ? 0.85 : 2);
     this.renderer = new WebGLRenderer({ canvas, antialias: !this.software, powerPreference: "high-performance" });
@@ -38,7 +43,7 @@ export class Stage {
     this.renderer.toneMappingExposure = 1.05;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
-    const up = new URLSearchParams(location.search).get("up");
+    const up = query.get("up");
     if (up === "x") this.camera.up.set(1, 0, 0);
     else if (up !== "y") this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -158,6 +163,7 @@ export class Stage {
 
   /** A machine that cannot keep up gets fewer pixels, then no shadows, before it gets fewer pictures. */
   private spare(now: number): void {
+    if (!this.spares) return;
     const took = now - this.lastPicture;
     this.lastPicture = now;
     this.slow = took > SLOW_PICTURE_MS && took < 1500 ? this.slow + 1 : Math.max(0, this.slow - 2);
