@@ -1,5 +1,6 @@
 //! Messages generated from `scindo/v1/*.proto`; meanings, units and layouts stand there.
 
-#![allow(missing_docs, clippy::all)]
+// The comments of the .proto files are prose: `tool/<id>` is no HTML, `[m]` no link.
+#![allow(missing_docs, clippy::all, rustdoc::all)]
 
 include!(concat!(env!("OUT_DIR"), "/scindo.v1.rs"));
