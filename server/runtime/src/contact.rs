@@ -73,7 +73,8 @@ impl ContactThread {
 
     /// Serves until the server ends.
     pub fn run(mut self) {
-        let period = Duration::from_secs_f64(1.0 / self.config.rate_hz);
+        // The scene keeps the rate between 50 and 2000 Hz.
+        let period = Duration::from_secs_f64(1.0 / self.config.rate_hz.max(1.0));
         let mut next = Instant::now();
         while !self.exchange.stopping() {
             let busy = self.look();

@@ -21,7 +21,7 @@ use zenoh::{Session, Wait as _};
 
 use crate::convert::{to_frame, to_tool_state, to_topology, unix_ns};
 use crate::error::{RuntimeError, words};
-use crate::exchange::{Exchange, Outgoing};
+use crate::exchange::{Exchange, OUTGOING, Outgoing};
 use crate::session::Sessions;
 
 /// Keyframe queries that may wait for a snapshot.
@@ -29,6 +29,12 @@ pub const WAITING_KEYFRAMES: usize = 64;
 
 /// A client waits two seconds for a keyframe; afterwards it asks again.
 const KEYFRAME_PATIENCE: Duration = Duration::from_millis(1900);
+
+/// The thread looks for keyframe queries and its end at least this often.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// The longest time between two messages of a topic, however low its rate.
+const LONGEST_PERIOD: Duration = Duration::from_secs(60);
 
 /// The plan is repeated this often for those who joined late.
 const PLAN_PERIOD: Duration = Duration::from_secs(2);
@@ -91,6 +97,8 @@ pub struct PublishThread {
     events: Publisher<'static>,
     plan: Publisher<'static>,
     newest_plan: Plan,
+    /// A snapshot came that was not published yet.
+    fresh: bool,
     keyframes: VecDeque<KeyframeQuery>,
     tool_states: u64,
     reports: u64,
@@ -117,8 +125,8 @@ impl PublishThread {
         Ok(Self {
             keys: keys.clone(),
             exchange: exchange.clone(),
-            period: Duration::from_secs_f64(1.0 / what.rates.0),
-            stats_period: Duration::from_secs_f64(1.0 / what.rates.1),
+            period: period(what.rates.0),
+            stats_period: period(what.rates.1),
             step_s: what.step_s,
             bulk: bulk.clone(),
             haptic: sessions.haptic.clone(),
@@ -128,6 +136,7 @@ impl PublishThread {
             events: report(Topic::Event, encoding::<Event>())?,
             plan: report(Topic::Plan, encoding::<Plan>())?,
             newest_plan: what.plan,
+            fresh: false,
             keyframes: VecDeque::new(),
             tool_states: 0,
             reports: 0,
@@ -142,26 +151,34 @@ impl PublishThread {
     pub fn run(mut self) {
         let mut next_frame = Instant::now();
         while !self.exchange.stopping() {
-            while let Ok(outgoing) = self.sources.outgoing.recv_deadline(next_frame) {
-                self.send_out(outgoing);
+            self.send_until(next_frame.min(Instant::now() + LOOK));
+            self.fresh |= self.sources.snapshots.update();
+            if Instant::now() >= next_frame {
+                next_frame = (next_frame + self.period).max(Instant::now());
+                self.publish_frame();
             }
-            next_frame = (next_frame + self.period).max(Instant::now());
-            self.tick();
+            self.answer_keyframe_queries();
+            self.publish_stats();
+            self.publish_plan();
         }
-        while let Ok(outgoing) = self.sources.outgoing.try_recv() {
-            self.send_out(outgoing);
+        self.send_until(Instant::now());
+    }
+
+    /// Answers and events, as they come, until `deadline`.
+    fn send_until(&mut self, deadline: Instant) {
+        for _ in 0..OUTGOING {
+            match self.sources.outgoing.recv_deadline(deadline) {
+                Ok(outgoing) => self.send_out(outgoing),
+                Err(_) => return,
+            }
         }
     }
 
-    fn tick(&mut self) {
-        self.collect_keyframe_queries();
-        if self.sources.snapshots.update() {
+    fn publish_frame(&mut self) {
+        if std::mem::take(&mut self.fresh) {
             self.publish_surfaces();
             self.publish_tools();
         }
-        self.answer_keyframe_queries();
-        self.publish_stats();
-        self.publish_plan();
     }
 
     fn send_out(&mut self, outgoing: Outgoing) {
@@ -238,6 +255,7 @@ impl PublishThread {
 
     /// Answers those whose body is in the snapshot; the others wait for the next one.
     fn answer_keyframe_queries(&mut self) {
+        self.collect_keyframe_queries();
         let snapshot = self.sources.snapshots.output_buffer();
         let bodies = &self.bodies;
         self.keyframes.retain(|KeyframeQuery { body: index, query, .. }| {
@@ -333,6 +351,10 @@ impl PublishThread {
             put(&self.plan, &self.newest_plan);
         }
     }
+}
+
+fn period(rate_hz: f64) -> Duration {
+    Duration::try_from_secs_f64(1.0 / rate_hz).unwrap_or(LONGEST_PERIOD).min(LONGEST_PERIOD)
 }
 
 fn body_channel(
