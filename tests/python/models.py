@@ -32,7 +32,7 @@ def make_dirty(path):
     """Writes an ellipsoid of 16 x 8 x 8 cm with a twentieth of its triangles lost, flipped or doubled."""
     sphere = pyvista.Icosphere(radius=0.04, nsub=4)
     points = np.asarray(sphere.points, float) * [2.0, 1.0, 1.0]
-    triangles = np.asarray(sphere.faces).reshape(-1, 4)[:, 1:]
+    triangles = np.array(sphere.faces).reshape(-1, 4)[:, 1:]
     chance = np.random.default_rng(1).random(len(triangles))
     triangles[chance > 0.98] = triangles[chance > 0.98][:, ::-1]
     triangles = np.concatenate([triangles[chance > 0.02], triangles[(chance > 0.5) & (chance < 0.51)]])
@@ -122,9 +122,9 @@ def main():
     results = pathlib.Path(__file__).with_name("results.py")
     made = str(args.models) == "made"
     if made:
-        args.models = args.out
-        args.out.mkdir(parents=True, exist_ok=True)
-        make_dirty(args.out / "dirty.obj")
+        args.models = args.out / "made"
+        args.models.mkdir(parents=True, exist_ok=True)
+        make_dirty(args.models / "dirty.obj")
     for name, kind, scale in MADE if made else MODELS:
         if args.only and name != args.only:
             continue
