@@ -20,6 +20,8 @@
 //! | `rpc` | one question after the other | the simulation, at most 1.7 s |
 //! | zenoh's own | decode, check, store in the inbox | nothing |
 
+mod say;
+
 pub mod cli;
 
 pub mod command;

@@ -8,17 +8,18 @@ use serde_json::{Value, json};
 
 use crate::cli::CheckArgs;
 use crate::error::RuntimeError;
+use crate::say::say;
 
 /// Builds the scene without stepping it.
 pub fn check(args: &CheckArgs) -> Result<ExitCode, RuntimeError> {
     let Some(path) = args.scene.as_deref().filter(|_| !args.schema) else {
-        println!("{:#}", Scene::json_schema());
+        say!("{:#}", Scene::json_schema());
         return Ok(ExitCode::SUCCESS);
     };
     let scene = Scene::load_with(path, &args.set)?;
     let simulation = Simulation::new(&scene, scene.base_dir())?;
     if args.json {
-        println!("{:#}", as_json(&scene, &simulation));
+        say!("{:#}", as_json(&scene, &simulation));
     } else {
         print(&scene, &simulation);
     }
@@ -51,26 +52,29 @@ fn body_as_json(body: &SimBody) -> Value {
 }
 
 fn print(scene: &Scene, simulation: &Simulation) {
-    println!("{}: {}", scene.file(), scene.name());
+    say!("{}: {}", scene.file(), scene.name());
     for body in simulation.bodies() {
         let (size, nodes) = (body.size(), body.body.cut_mesh().mesh().nodes.len());
-        println!(
+        say!(
             "  body {}: {} elements, {nodes} nodes, {} surface triangles, {:.4e} m3",
-            body.id, size.elements, size.triangles, body.rest_volume_m3
+            body.id,
+            size.elements,
+            size.triangles,
+            body.rest_volume_m3
         );
         if let Some(health) = &body.health {
-            health.to_string().lines().for_each(|line| println!("    {line}"));
+            health.to_string().lines().for_each(|line| say!("    {line}"));
         }
     }
     let plan = simulation.plan();
-    println!("{:<22} {:<4} {:>9}  why", "effect", "", "ms/step");
+    say!("{:<22} {:<4} {:>9}  why", "effect", "", "ms/step");
     for effect in &plan.effects {
         let (switch, cost) =
             if effect.on { ("on", format!("{:.3}", effect.predicted_ms)) } else { ("off", String::new()) };
-        println!("{:<22} {switch:<4} {cost:>9}  {}", effect.name, effect.why);
+        say!("{:<22} {switch:<4} {cost:>9}  {}", effect.name, effect.why);
     }
-    println!("predicted {:.3} ms per step of {} ms", plan.predicted_ms(), 1e3 * simulation.step_s());
+    say!("predicted {:.3} ms per step of {} ms", plan.predicted_ms(), 1e3 * simulation.step_s());
     for warning in simulation.warnings() {
-        println!("warning: {warning}");
+        say!("warning: {warning}");
     }
 }

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::cli::MeshArgs;
 use crate::error::RuntimeError;
+use crate::say::say;
 
 /// Reads, repairs or fills, writes.
 pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
@@ -21,15 +22,15 @@ pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
     let (mesh, health) = load_any(&args.input, args.cells as usize, args.scale)?;
     write_mesh(&args.output, &mesh).map_err(RuntimeError::Unwritten)?;
     if args.json {
-        println!(
+        say!(
             "{:#}",
             json!({
                 "output": args.output, "elements": mesh.tets.len(), "nodes": mesh.nodes.len(), "mesh": health,
             })
         );
     } else {
-        println!("{health}");
-        println!("{}: {} elements, {} nodes", args.output.display(), mesh.tets.len(), mesh.nodes.len());
+        say!("{health}");
+        say!("{}: {} elements, {} nodes", args.output.display(), mesh.tets.len(), mesh.nodes.len());
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -19,6 +19,7 @@ use crate::cli::{RunArgs, ServeArgs};
 use crate::engine::Engine;
 use crate::error::RuntimeError;
 use crate::progress::Progress;
+use crate::say::say;
 use crate::server::{Server, ServerConfig};
 use crate::session::{NetworkConfig, Sessions, local};
 use crate::sim::Pace;
@@ -175,15 +176,15 @@ fn announce(scene: &Scene, args: &ServeArgs, listen: &[String], viewer: Option<S
             "scene": scene.name(), "listen": listen, "surfaces": surfaces,
             "realm": args.realm, "session": args.session, "viewer": page,
         }});
-        println!("{report}");
+        say!("{report}");
         return;
     }
-    println!("scindo {}: {}", env!("CARGO_PKG_VERSION"), scene.name());
+    say!("scindo {}: {}", env!("CARGO_PKG_VERSION"), scene.name());
     if !listen.is_empty() {
-        println!("  clients  {} (surfaces at {})", listen.join(", "), surfaces.join(", "));
+        say!("  clients  {} (surfaces at {})", listen.join(", "), surfaces.join(", "));
     }
     if let Some(page) = page {
-        println!("  viewer   {page}");
+        say!("  viewer   {page}");
     }
 }
 
@@ -234,11 +235,11 @@ fn conclude(
             "real_time_factor": simulated / seconds, "cuts_applied": simulation.cuts_applied(),
             "out": args.out,
         }});
-        println!("{report}");
+        say!("{report}");
     } else {
-        println!("{status}: {steps} steps, {simulated:.3} s simulated in {seconds:.3} s");
+        say!("{status}: {steps} steps, {simulated:.3} s simulated in {seconds:.3} s");
         if let Some(directory) = args.out.as_deref().map(Path::display) {
-            println!("  results  {directory}/summary.json, probes.csv, final.vtu");
+            say!("  results  {directory}/summary.json, probes.csv, final.vtu");
         }
     }
     Ok(())
