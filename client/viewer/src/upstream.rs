@@ -217,7 +217,11 @@ impl Hands {
         let id = sample.tool_id.clone();
         if !self.held.contains_key(&id) {
             match timeout(RETRY, self.link.guest_tool(&id)).await {
-                Ok(Ok(tool)) => drop(self.held.insert(id.clone(), tool)),
+                Ok(Ok(tool)) => {
+                    // Poses are faster than tokens: the next sample finds the owner announced.
+                    self.held.insert(id, tool);
+                    return;
+                }
                 Ok(Err(error)) => return tracing::warn!(%error, tool = id, "cannot take the tool"),
                 Err(_) => return tracing::warn!(tool = id, "the link is too slow to take the tool"),
             }
