@@ -2,7 +2,7 @@
 //!
 //! Modules stand in the order of the data: a [`mesh`] says where the material is at rest, a
 //! [`material`] what it is made of, an [`element`] how it resists, a [`cut`] which pieces and copies
-//! there are, an [`operator`] how forces follow from displacements, a [`solver`] inverts that, an
+//! there are ([`enrichment`] looks at one cut element in the bases of the literature), an [`operator`] how forces follow from displacements, a [`solver`] inverts that, an
 //! [`integrator`] makes a step of it, and a [`body`] holds all of this together for the world.
 //!
 //! # Invariants
@@ -17,6 +17,7 @@ pub mod mesh;
 pub mod material;
 pub mod element;
 pub mod cut;
+pub mod enrichment;
 pub mod team;
 pub mod operator;
 pub mod solver;

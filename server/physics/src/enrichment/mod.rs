@@ -1,0 +1,46 @@
+//! Enriched elements: an element cut in two, seen through the bases of the extended finite element
+//! method, and the critical time step each basis and mass lumping allows.
+//!
+//! The solver works with pieces and copies ([`crate::cut`]). The enrichments of the literature span
+//! the same displacements; they are linear changes of variables, and differ in conditioning and, with
+//! lumped masses, in the step an explicit integrator may take. This module makes that comparison.
+//!
+//! # Definitions
+//! The cut divides an element into side L (H = −1) and side R (H = +1); H_i is the side of node i.
+//! On the piece of side H the displacement is
+//!
+//!   u = Σ_i N_i u_i + Σ_i ψ_i(H) N_i a_i
+//!
+//! | enrichment | ψ_i(H) | source |
+//! |---|---|---|
+//! | [`Heaviside`](Enrichment::Heaviside) | H | Belytschko & Black 1999, Moës et al. 1999 |
+//! | [`ShiftedHeaviside`](Enrichment::ShiftedHeaviside) | (H − H_i)/2 | Zi & Belytschko 2003 |
+//! | [`OwnSide`](Enrichment::OwnSide) | \|H + H_i\|/2 | what published curves of the shifted one were made with |
+//! | [`Substitution`](Enrichment::Substitution) | every piece a whole element with copies of its own | Molino et al. 2004 |
+//!
+//! With constant gradients K = Σ_pieces w P_Hᵀ K_e P_H, where w is the volume fraction of the piece
+//! and P_H [u; a] = u_i + ψ_i(H) a_i; only the consistent mass needs the moments ∫ N_i N_j over the
+//! pieces.
+//!
+//! | [`Lumping`] | standard dofs | enriched dofs | substitution |
+//! |---|---|---|---|
+//! | `Consistent` | ∫ρ N_i N_j, full matrix over u and a | | per piece |
+//! | `RowSum` | row sums of the standard block | row sums of the enriched block | row sums per piece |
+//! | `Hrz` | s M_ii | s M_ii with the same s = m / Σ M_ii over the standard block | s per piece, so that its mass is kept |
+//! | `HrzBlockMass` | s M_ii | scaled to the row-sum mass of the enriched block | as `Hrz` |
+//! | `Menouillard` | m/n | (m/n) ∫ψ_i² / \|Ω\| (Menouillard et al. 2006) | (m/n) w |
+//!
+//! Hinton, Rock & Zienkiewicz 1976 is HRZ. For undamped central differences (and symplectic Euler)
+//! Δt_c = 2/ω_max of K − ω² M; ratios are taken against the uncut element with masses m/n.
+
+mod basis;
+mod cut_element;
+mod mass;
+mod pieces;
+mod spectrum;
+
+pub use basis::{Enrichment, Side};
+pub use cut_element::{CutElement, EnrichmentError, tet_stiffness};
+pub use mass::Lumping;
+pub use pieces::{Piece, bar_pieces, tet_pieces};
+pub use spectrum::largest_frequency;
