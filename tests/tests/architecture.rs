@@ -16,6 +16,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("scindo-view", BTreeSet::from(["scindo-proto", "scindo-client"])),
         ("scindo-haptic", BTreeSet::from(["scindo-proto", "scindo-client"])),
         ("scindo-tests", BTreeSet::new()),
+        ("scindo-allocations", BTreeSet::new()),
         ("scindo-verification", BTreeSet::new()),
     ])
 }

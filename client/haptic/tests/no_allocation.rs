@@ -1,38 +1,17 @@
 //! A tick allocates nothing, in free space, in contact, while ramping down, with the log on.
 
-#![allow(clippy::unwrap_used, unsafe_code)]
+#![allow(clippy::unwrap_used)]
 
 use nalgebra::Vector3;
+use scindo_allocations::{Counting, allocations};
 use scindo_haptic::contact_model::{ContactModel, contact_slot};
 use scindo_haptic::device::path::{Path, Touch};
 use scindo_haptic::device::simulated::{Hand, SimulatedDevice};
 use scindo_haptic::recorder::Recorder;
 use scindo_haptic::tick::{HapticTick, Limits, Ports, TickTime};
 use scindo_proto::messages::{Contact, HapticContact, Pose, Vec3, Vec3f, haptic_contact};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// Counts the allocations of each thread.
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|n| n.set(n.get() + 1));
-        // SAFETY: the caller's promise about `layout` is handed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise about `pointer` and `layout` is handed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -70,20 +49,20 @@ fn a_tick_allocates_nothing() {
         Ports { contacts, server_alive: Arc::new(AtomicBool::new(true)), poses: None, log: Some(log) };
     let limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
     let mut tick = HapticTick::new(Box::new(device), limits, ports);
-    let (mut allocations, mut largest_n) = (0, 0.0f64);
+    let (mut allocated, mut largest_n) = (0, 0.0f64);
     for ms in 0..8000u64 {
         let now_ns = ms * 1_000_000;
         if ms % 5 == 0 && ms < 5000 {
             slot.write(ContactModel::parse(&message(1 + ms / 5), now_ns).unwrap());
         }
-        let before = ALLOCATIONS.with(Cell::get);
+        let before = allocations();
         let output = tick.tick(TickTime { now_ns, elapsed_s: 1e-3 });
-        allocations += ALLOCATIONS.with(Cell::get) - before;
+        allocated += allocations() - before;
         largest_n = largest_n.max(output.force_n.norm());
     }
     drop(tick);
     recorder.finish().unwrap();
     std::fs::remove_file(file).unwrap();
     assert!(largest_n > 0.3, "the hand must have touched: {largest_n} N");
-    assert_eq!(allocations, 0);
+    assert_eq!(allocated, 0);
 }

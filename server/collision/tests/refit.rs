@@ -1,35 +1,14 @@
 //! A refitted tree answers like a new one, and neither refit nor queries allocate.
 
-#![allow(clippy::unwrap_used, unsafe_code)]
+#![allow(clippy::unwrap_used)]
 
 mod shapes;
 
 use nalgebra::Vector3;
+use scindo_allocations::{Counting, allocations};
 use scindo_collision::{Capsule, CapsuleMotion, SurfaceBvh, SurfaceError};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 
 type V = Vector3<f64>;
-
-/// Counts the allocations of each thread.
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|n| n.set(n.get() + 1));
-        // SAFETY: the caller's promise about `layout` is handed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise about `pointer` and `layout` is handed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -73,7 +52,7 @@ fn refit_and_queries_do_not_allocate() {
     let (positions, triangles) = shapes::ball(0.1, 24);
     let mut surface = SurfaceBvh::new(&positions, &triangles).unwrap();
     let frames: Vec<_> = (0..4).map(|i| waved(&positions, i as f32)).collect();
-    let before = ALLOCATIONS.with(Cell::get);
+    let before = allocations();
     let mut seen = 0usize;
     for frame in &frames {
         surface.refit(frame).unwrap();
@@ -87,7 +66,7 @@ fn refit_and_queries_do_not_allocate() {
         seen += usize::from(surface.sweep(&motion).is_some());
         seen += usize::from(surface.sweep_moving(&motion).is_some());
     }
-    assert_eq!(ALLOCATIONS.with(Cell::get), before);
+    assert_eq!(allocations(), before);
     assert!(seen > 16);
 }
 

@@ -1,13 +1,12 @@
 //! Detection and local contact models do not allocate while topologies and tools stay the same.
 
-#![allow(clippy::unwrap_used, unsafe_code)]
+#![allow(clippy::unwrap_used)]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::Arc;
 use std::time::Instant;
 
 use nalgebra::{Isometry3, Vector3};
+use scindo_allocations::{Counting, allocations};
 use scindo_physics::cut::CutMesh;
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_world::contact::Contacts;
@@ -19,32 +18,8 @@ use scindo_world::tool::Tools;
 
 type V = Vector3<f64>;
 
-/// Counts the allocations of each thread.
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is passed on to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.with(|n| n.set(n.get() + 1));
-        // SAFETY: the caller's promise about `layout` is handed on.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise about `pointer` and `layout` is handed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
-
-fn allocations() -> usize {
-    ALLOCATIONS.with(Cell::get)
-}
 
 const ROD: ToolShape = ToolShape::Capsule { radius_m: 0.003, length_m: 0.03 };
 const BALL: ToolShape = ToolShape::Sphere { radius_m: 0.004 };

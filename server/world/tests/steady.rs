@@ -2,40 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 
+use scindo_allocations::{Counting, allocations};
 use scindo_world::inputs::{Inputs, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
-
-/// Counts the allocations of the thread that runs the test.
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-thread_local! {
-    static COUNTED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
-}
-
-#[allow(unsafe_code)]
-// SAFETY: forwards to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if COUNTED.try_with(std::cell::Cell::get).unwrap_or(false) {
-            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        }
-        // SAFETY: forwarded contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: forwarded contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -79,9 +52,7 @@ fn a_steady_step_with_contact_and_snapshot_allocates_nothing() {
     (0..60).for_each(|_| step(&mut sim));
     let force = sim.tools().iter().next().unwrap().force_n;
     assert!(force.z > 0.05, "the finger presses with {force}");
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
-    COUNTED.with(|counted| counted.set(true));
+    let before = allocations();
     (0..50).for_each(|_| step(&mut sim));
-    COUNTED.with(|counted| counted.set(false));
-    assert_eq!(ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+    assert_eq!(allocations() - before, 0);
 }

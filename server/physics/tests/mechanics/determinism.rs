@@ -1,39 +1,11 @@
 //! The same bits for any number of threads, and no allocation in a steady step.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use nalgebra::Vector3;
+use scindo_allocations::{Counting, allocations};
 use scindo_physics::body::{Body, BodySettings, PointSpring, SpringKind};
 use scindo_physics::material::{Material, Rayleigh};
 
 use crate::{DOWN, SOFT, bar_mesh, left_face, settings};
-
-/// Counts allocations of the thread that asks for the count, and of the physics threads.
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-thread_local! {
-    static COUNTED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
-}
-
-#[allow(unsafe_code)]
-// SAFETY: forwards to the system allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if COUNTED.try_with(std::cell::Cell::get).unwrap_or(false) {
-            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        }
-        // SAFETY: forwarded contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: forwarded contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -103,14 +75,12 @@ fn a_steady_step_does_not_allocate() {
             body.step(0.02, DOWN, &[spring]);
             body.surface_positions(&mut surface);
         }
-        COUNTED.set(true);
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         for _ in 0..20 {
             body.step(0.02, DOWN, &[spring]);
             body.surface_positions(&mut surface);
         }
-        let allocations = ALLOCATIONS.load(Ordering::Relaxed) - before;
-        COUNTED.set(false);
-        assert_eq!(allocations, 0, "with {threads} threads");
+        let allocated = allocations() - before;
+        assert_eq!(allocated, 0, "with {threads} threads");
     }
 }
