@@ -97,6 +97,16 @@ impl CutMesh {
         &self.copies.volume
     }
 
+    /// ∫ N_a dV [m³] over piece `p`, for the nodes of its element.
+    pub fn piece_node_volume(&self, p: usize) -> [f64; 4] {
+        self.pieces.node_volume[p]
+    }
+
+    /// ∫ N_a N_b dV [m³] over piece `p`, for the nodes of its element.
+    pub fn piece_node_products(&self, p: usize) -> [[f64; 4]; 4] {
+        self.pieces.node_products(&self.mesh, p as u32, &self.fragments)
+    }
+
     /// Rises whenever the topology changes.
     pub fn epoch(&self) -> u32 {
         self.epoch

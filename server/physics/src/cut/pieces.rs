@@ -129,6 +129,27 @@ impl PieceTable {
         id
     }
 
+    /// ∫ N_a N_b dV [m³] over piece `p`: over a fragment T with corner values N(v) it is
+    /// |T|/20 Σ_v Σ_w N_a(v) N_b(w) (1 + δ_vw).
+    pub fn node_products(&self, mesh: &TetMesh, p: u32, fragments: &Fragments) -> [[f64; 4]; 4] {
+        let e = self.pieces[p as usize].element as usize;
+        let nodes = mesh.tets[e];
+        let mut M = [[0.0; 4]; 4];
+        for t in self.fragments(p, fragments) {
+            let N = fragments.tets[t as usize]
+                .map(|v| nodes.map(|node| fragments.vertices[v as usize].weight_of(node)));
+            let sum: [f64; 4] = std::array::from_fn(|a| N.iter().map(|n| n[a]).sum());
+            let scale = fragments.fraction[t as usize] * self.element_volume[e] / 20.0;
+            for a in 0..4 {
+                for b in 0..4 {
+                    let same: f64 = N.iter().map(|n| n[a] * n[b]).sum();
+                    M[a][b] += scale * (sum[a] * sum[b] + same);
+                }
+            }
+        }
+        M
+    }
+
     /// Rest volume [m³] of piece `p`.
     pub fn volume(&self, p: usize) -> f64 {
         let piece = &self.pieces[p];

@@ -1,13 +1,19 @@
-//! The linear tetrahedron and the rotation of its deformation gradient.
+//! Elements: the linear tetrahedron with the rotation of its deformation gradient, the quadratic
+//! tetrahedron, the trilinear hexahedron, and the spring between two nodes.
 
 mod polar;
 mod lanes;
 mod polar_lanes;
 mod tet4;
+pub mod quadrature;
+pub mod tet10;
+pub mod hex8;
+mod spring;
 
 #[cfg(target_arch = "x86_64")]
 pub use lanes::avx2;
 pub use lanes::{LANES, Lanes, Simd, Vector8};
 pub use polar::polar_rotation;
 pub use polar_lanes::{Mat3, polar_newton};
+pub use spring::Spring;
 pub use tet4::{deformation_gradient, piece_energy, piece_forces};

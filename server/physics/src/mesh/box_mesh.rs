@@ -14,6 +14,9 @@ pub enum BoxPattern {
     },
     /// Six tets around the cell diagonal 0–7 (Kuhn/Freudenthal), the same in every cell.
     Tet6,
+    /// Two tets at opposite corners 0 and 7 and four around the diagonal 3–4 of the octahedron
+    /// between them, the same in every cell (Nienhuys 2003, *Cutting in deformable objects*, §3.3).
+    Octahedral6,
 }
 
 /// Cell corner c = a + 2 b + 4 d with a, b, d ∈ {0, 1} along x, y, z.
@@ -21,6 +24,9 @@ const TET5_EVEN: [[usize; 4]; 5] = [[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4
 const TET5_ODD: [[usize; 4]; 5] = [[1, 2, 4, 7], [0, 1, 2, 4], [3, 1, 7, 2], [5, 1, 4, 7], [6, 2, 7, 4]];
 const TET6: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
+/// The ring around the diagonal 3–4 is 1, 2, 6, 5 in the order of neighbours 1–2–6–5.
+const OCTAHEDRAL6: [[usize; 4]; 6] =
+    [[0, 1, 2, 4], [7, 6, 5, 3], [4, 3, 1, 2], [4, 3, 2, 6], [4, 3, 6, 5], [4, 3, 5, 1]];
 
 /// Meshes the box from `min` to `max` [m] with `cells` cells along x, y, z.
 ///
@@ -46,17 +52,35 @@ pub fn box_mesh(min: Vector3<f64>, max: Vector3<f64>, cells: [usize; 3], pattern
         for j in 0..ny {
             for i in 0..nx {
                 let corner = |c: usize| node(i + (c & 1), j + ((c >> 1) & 1), k + ((c >> 2) & 1)) as u32;
-                for tet in split(pattern, (i + j + k) % 2 == 1) {
-                    let mut ids = tet.map(corner);
-                    if tet_volume(&ids.map(|n| mesh.nodes[n as usize])) < 0.0 {
-                        ids.swap(2, 3);
-                    }
-                    mesh.tets.push(ids);
-                }
+                split_cell(&mesh.nodes, corner, split(pattern, (i + j + k) % 2 == 1), &mut mesh.tets);
             }
         }
     }
     mesh
+}
+
+/// Splits cells with eight corners each into six tets around their diagonals 0–7.
+pub(super) fn split_cells(nodes: &[Vector3<f64>], cells: &[[u32; 8]]) -> Vec<[u32; 4]> {
+    let mut tets = Vec::new();
+    for cell in cells {
+        split_cell(nodes, |c| cell[c], &TET6, &mut tets);
+    }
+    tets
+}
+
+fn split_cell(
+    nodes: &[Vector3<f64>],
+    corner: impl Fn(usize) -> u32,
+    split: &[[usize; 4]],
+    tets: &mut Vec<[u32; 4]>,
+) {
+    for tet in split {
+        let mut ids = tet.map(&corner);
+        if tet_volume(&ids.map(|n| nodes[n as usize])) < 0.0 {
+            ids.swap(2, 3);
+        }
+        tets.push(ids);
+    }
 }
 
 fn split(pattern: BoxPattern, odd_cell: bool) -> &'static [[usize; 4]] {
@@ -64,6 +88,7 @@ fn split(pattern: BoxPattern, odd_cell: bool) -> &'static [[usize; 4]] {
         BoxPattern::Tet5 { parity } if parity == odd_cell => &TET5_EVEN,
         BoxPattern::Tet5 { .. } => &TET5_ODD,
         BoxPattern::Tet6 => &TET6,
+        BoxPattern::Octahedral6 => &OCTAHEDRAL6,
     }
 }
 
@@ -78,9 +103,12 @@ mod tests {
 
     #[test]
     fn every_pattern_fills_the_box_with_matching_faces() {
-        for pattern in
-            [BoxPattern::Tet5 { parity: false }, BoxPattern::Tet5 { parity: true }, BoxPattern::Tet6]
-        {
+        for pattern in [
+            BoxPattern::Tet5 { parity: false },
+            BoxPattern::Tet5 { parity: true },
+            BoxPattern::Tet6,
+            BoxPattern::Octahedral6,
+        ] {
             let mesh = bar(pattern);
             mesh.check().unwrap();
             assert!((mesh.volumes().iter().sum::<f64>() - 0.04).abs() < 1e-13);

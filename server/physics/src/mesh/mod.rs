@@ -5,13 +5,17 @@
 
 mod box_mesh;
 mod error;
+mod hex_mesh;
 mod quality;
 mod surface;
+mod tet10_mesh;
 
 pub use box_mesh::{BoxPattern, box_mesh};
 pub use error::MeshError;
+pub use hex_mesh::{HexMesh, box_hexes, graded_hexes};
 pub use quality::{MeshQuality, TetQuality};
 pub use surface::BoundaryFace;
+pub use tet10_mesh::Tet10Mesh;
 
 use nalgebra::Vector3;
 

@@ -1,0 +1,170 @@
+//! From a mesh, a material and an element to a model.
+
+use nalgebra::Vector3;
+
+use super::averaging::NodeAverage;
+use super::elastic::Scratch;
+use super::mass::{Products, pack};
+use super::point::PointLaw;
+use super::{BlockCsr, ElementKind, Model, ModelError, Volumetric};
+use crate::cut::CutMesh;
+use crate::element::{hex8, quadrature, tet10};
+use crate::material::Material;
+use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
+
+impl Model {
+    /// Linear tetrahedra of an uncut mesh.
+    pub fn tet4(mesh: &TetMesh, material: &Material, volumetric: Volumetric) -> Result<Self, ModelError> {
+        mesh.check()?;
+        let mut model = Self::begin(ElementKind::Tet4, mesh.nodes.clone(), material, volumetric)?;
+        for (e, tet) in mesh.tets.iter().enumerate() {
+            let volume = mesh.volume(e);
+            model.push_tet4(tet, &mesh.gradients(e), volume, &[volume / 4.0; 4]);
+        }
+        model.products = Products::linear_tet();
+        model.finish()
+    }
+
+    /// Linear tetrahedra of a cut mesh: one element per material piece, on its copies.
+    pub fn tet4_cut(cut: &CutMesh, material: &Material, volumetric: Volumetric) -> Result<Self, ModelError> {
+        let mesh = cut.mesh();
+        let mut model = Self::begin(ElementKind::Tet4, cut.rest_positions(), material, volumetric)?;
+        let mut products = Vec::new();
+        for (p, piece) in cut.pieces().iter().enumerate() {
+            let e = piece.element as usize;
+            let volume = piece.fraction * mesh.volume(e);
+            model.push_tet4(&piece.copies, &mesh.gradients(e), volume, &cut.piece_node_volume(p));
+            products.extend(pack(&cut.piece_node_products(p)));
+        }
+        model.products = Products::PerElement(products);
+        model.finish()
+    }
+
+    /// Straight-sided quadratic tetrahedra on the corners of `mesh`; nodes as in [`Tet10Mesh`].
+    pub fn tet10(mesh: &TetMesh, material: &Material) -> Result<Self, ModelError> {
+        mesh.check()?;
+        let quadratic = Tet10Mesh::new(mesh);
+        let mut model = Self::begin(ElementKind::Tet10, quadratic.nodes, material, Volumetric::Full)?;
+        let rule = quadrature::tet_degree_2();
+        for (e, tet) in quadratic.tets.iter().enumerate() {
+            let (volume, g) = (mesh.volume(e), mesh.gradients(e));
+            model.connectivity.extend_from_slice(tet);
+            model.volumes.push(volume);
+            for (xi, w) in &rule {
+                model.gradients.extend(tet10::gradients(xi, &g));
+                model.weights.push(w * volume);
+            }
+            for (a, &node) in tet.iter().enumerate() {
+                let corner = a < 4;
+                let lumped = if corner { tet10::HRZ_CORNER } else { tet10::HRZ_EDGE };
+                let integral = if corner { tet10::INTEGRAL_CORNER } else { tet10::INTEGRAL_EDGE };
+                model.lumped[node as usize] += lumped * volume;
+                model.integrals[node as usize] += integral * volume;
+            }
+        }
+        model.products = Products::Scaled(pack(&tet10::shape_products()).collect());
+        model.finish()
+    }
+
+    /// Trilinear hexahedra.
+    pub fn hex8(mesh: &HexMesh, material: &Material, volumetric: Volumetric) -> Result<Self, ModelError> {
+        mesh.check()?;
+        let mut model = Self::begin(ElementKind::Hex8, mesh.nodes.clone(), material, volumetric)?;
+        let rule = quadrature::cube_gauss(2);
+        let mut products = Vec::new();
+        for (e, hex) in mesh.hexes.iter().enumerate() {
+            let X = mesh.corners(e);
+            model.connectivity.extend_from_slice(hex);
+            let (mut volume, mut sum) = (0.0, [Vector3::zeros(); 8]);
+            for (xi, w) in &rule {
+                let (g, det) = hex8::gradients(&X, xi).ok_or(MeshError::Degenerate {
+                    tet: e,
+                    volume_m3: 0.0,
+                    least_m3: f64::MIN_POSITIVE,
+                })?;
+                model.gradients.extend_from_slice(&g);
+                model.weights.push(w * det);
+                volume += w * det;
+                for (sum, g) in sum.iter_mut().zip(&g) {
+                    *sum += w * det * g;
+                }
+            }
+            model.volumes.push(volume);
+            if volumetric == Volumetric::Selective {
+                model.mean_gradients.extend(sum.map(|g| g / volume));
+            }
+            let M = hex8::shape_products(&X);
+            for (row, &node) in M.iter().zip(hex) {
+                let integral: f64 = row.iter().sum();
+                model.lumped[node as usize] += integral;
+                model.integrals[node as usize] += integral;
+            }
+            products.extend(pack(&M));
+        }
+        model.products = Products::PerElement(products);
+        model.finish()
+    }
+
+    fn begin(
+        kind: ElementKind,
+        rest: Vec<Vector3<f64>>,
+        material: &Material,
+        volumetric: Volumetric,
+    ) -> Result<Self, ModelError> {
+        material.check()?;
+        let point = PointLaw { law: material.law, lame: material.lame() };
+        match (volumetric, kind) {
+            (Volumetric::Full, _)
+            | (Volumetric::NodeAveraged { .. }, ElementKind::Tet4)
+            | (Volumetric::Selective, ElementKind::Hex8) => {}
+            (remedy, element) => return Err(ModelError::Remedy { element, remedy }),
+        }
+        if volumetric != Volumetric::Full && point.split().is_none() {
+            return Err(ModelError::NoSplit { law: material.law, remedy: volumetric });
+        }
+        if let Volumetric::NodeAveraged { kept } = volumetric
+            && !(0.0..=1.0).contains(&kept)
+        {
+            return Err(ModelError::Kept { kept });
+        }
+        let n = rest.len();
+        Ok(Self {
+            kind,
+            volumetric,
+            point,
+            rest,
+            connectivity: Vec::new(),
+            gradients: Vec::new(),
+            weights: Vec::new(),
+            volumes: Vec::new(),
+            mean_gradients: Vec::new(),
+            averaging: None,
+            springs: Vec::new(),
+            lumped: vec![0.0; n],
+            integrals: vec![0.0; n],
+            products: Products::linear_tet(),
+            pattern: BlockCsr::default(),
+            slots: Vec::new(),
+            scratch: Scratch::default(),
+        })
+    }
+
+    fn push_tet4(&mut self, nodes: &[u32; 4], g: &[Vector3<f64>; 4], volume: f64, node_volume: &[f64; 4]) {
+        self.connectivity.extend_from_slice(nodes);
+        self.gradients.extend_from_slice(g);
+        self.weights.push(volume);
+        self.volumes.push(volume);
+        for (&node, v) in nodes.iter().zip(node_volume) {
+            self.lumped[node as usize] += v;
+            self.integrals[node as usize] += v;
+        }
+    }
+
+    fn finish(mut self) -> Result<Self, ModelError> {
+        if let Volumetric::NodeAveraged { kept } = self.volumetric {
+            self.averaging = Some(NodeAverage::new(&self.connectivity, &self.volumes, self.rest.len(), kept));
+        }
+        self.find_pattern();
+        Ok(self)
+    }
+}

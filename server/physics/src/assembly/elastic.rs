@@ -1,0 +1,356 @@
+//! Energy, internal forces and tangent of a model.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::kernel::{add_forces, add_upper_blocks, deformation_gradient, mirror};
+use super::point::{PointSplit, Tangent, projected};
+use super::{BlockCsr, ElementKind, Model, Volumetric};
+use crate::material::Law;
+
+/// Buffers that calls leave behind for the next one, so that repeated calls do not allocate.
+#[derive(Debug, Default)]
+pub(super) struct Scratch(Mutex<Buffers>);
+
+/// What the two passes of node averaging hand over.
+#[derive(Debug, Default)]
+pub(super) struct Buffers {
+    theta: Vec<f64>,
+    theta_bar: Vec<f64>,
+    theta_gradient: Vec<Matrix3<f64>>,
+    star_gradient: Vec<Vector3<f64>>,
+}
+
+impl Clone for Scratch {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl Scratch {
+    fn take(&self) -> MutexGuard<'_, Buffers> {
+        // Contents are overwritten before they are read, so a panic elsewhere leaves nothing behind.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Model {
+    /// Elastic energy Ψ(x) = Σ w ψ(F) \[J\], springs included.
+    pub fn energy(&self, x: &[Vector3<f64>]) -> f64 {
+        let mut buffers = self.scratch.take();
+        let averaged = self.average_volume(x, &mut buffers, false);
+        let elements: f64 = match self.kind {
+            ElementKind::Tet4 => (0..self.n_elements()).map(|e| self.element_energy::<4>(e, x)).sum(),
+            ElementKind::Tet10 => (0..self.n_elements()).map(|e| self.element_energy::<10>(e, x)).sum(),
+            ElementKind::Hex8 => (0..self.n_elements()).map(|e| self.element_energy::<8>(e, x)).sum(),
+        };
+        let ends = |s: &crate::element::Spring| (x[s.a as usize], x[s.b as usize]);
+        let springs: f64 = self
+            .springs
+            .iter()
+            .map(|s| {
+                let (a, b) = ends(s);
+                s.energy(&a, &b)
+            })
+            .sum();
+        elements + averaged + springs
+    }
+
+    /// Internal forces f = ∂Ψ/∂x [N], to be subtracted from the loads; returns Ψ \[J\].
+    pub fn internal_forces(&self, x: &[Vector3<f64>], f: &mut [Vector3<f64>]) -> f64 {
+        let mut buffers = self.scratch.take();
+        let averaged = self.average_volume(x, &mut buffers, false);
+        f.fill(Vector3::zeros());
+        let mut energy = match self.kind {
+            ElementKind::Tet4 => self.scatter_forces::<4>(x, &buffers, f),
+            ElementKind::Tet10 => self.scatter_forces::<10>(x, &buffers, f),
+            ElementKind::Hex8 => self.scatter_forces::<8>(x, &buffers, f),
+        };
+        for spring in &self.springs {
+            let (a, b) = (spring.a as usize, spring.b as usize);
+            energy += spring.energy(&x[a], &x[b]);
+            let force = spring.force(&x[a], &x[b]);
+            f[a] -= force;
+            f[b] += force;
+        }
+        energy + averaged
+    }
+
+    /// Tangent ∂²Ψ/∂x² [N/m]; overwrites the blocks of `K`, which has the model's pattern.
+    /// [`Tangent::Projected`] and [`Tangent::Held`] are positive semidefinite.
+    pub fn tangent(&self, x: &[Vector3<f64>], kind: Tangent, K: &mut BlockCsr<f64>) {
+        let mut buffers = self.scratch.take();
+        self.average_volume(x, &mut buffers, true);
+        K.clear();
+        match self.kind {
+            ElementKind::Tet4 => self.scatter_tangent::<4>(x, kind, &buffers, K),
+            ElementKind::Tet10 => self.scatter_tangent::<10>(x, kind, &buffers, K),
+            ElementKind::Hex8 => self.scatter_tangent::<8>(x, kind, &buffers, K),
+        }
+        if let (Some(averaging), Some(split)) = (&self.averaging, self.point.split()) {
+            for i in 0..self.n_nodes() {
+                let row = self.pattern.row(i);
+                averaging.add_to_row(
+                    i,
+                    split.lambda(),
+                    &buffers.star_gradient,
+                    &self.pattern,
+                    &mut K.blocks[row],
+                );
+            }
+        }
+        self.add_spring_tangent(x, kind, K);
+    }
+
+    fn add_spring_tangent(&self, x: &[Vector3<f64>], kind: Tangent, K: &mut BlockCsr<f64>) {
+        for spring in &self.springs {
+            let (a, b) = (spring.a as usize, spring.b as usize);
+            let S = spring.stiffness(&x[a], &x[b], kind);
+            for (i, j, sign) in [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)] {
+                if let Some(at) = K.position(i, j as u32) {
+                    for (entry, k) in K.blocks[at].iter_mut().enumerate() {
+                        *k += sign * S[(entry / 3, entry % 3)];
+                    }
+                }
+            }
+        }
+    }
+
+    /// θ̄ of every node, and with `gradients` its derivatives; returns its energy \[J\].
+    fn average_volume(&self, x: &[Vector3<f64>], buffers: &mut Buffers, gradients: bool) -> f64 {
+        let (Some(averaging), Some(split)) = (&self.averaging, self.point.split()) else {
+            return 0.0;
+        };
+        let Buffers { theta, theta_bar, theta_gradient, star_gradient } = buffers;
+        theta.clear();
+        theta_gradient.clear();
+        for e in 0..self.n_elements() {
+            let F = deformation_gradient::<4>(&self.positions(e, x), self.gradients(e, 0));
+            theta.push(split.theta(&F));
+            if gradients {
+                theta_gradient.push(split.theta_gradient(&F));
+            }
+        }
+        theta_bar.clear();
+        theta_bar.extend((0..self.n_nodes()).map(|n| averaging.average(n, theta, &self.volumes)));
+        if gradients {
+            star_gradient.resize(averaging.star_entries(), Vector3::zeros());
+            for n in 0..self.n_nodes() {
+                averaging.gradient(n, theta_gradient, &self.volumes, &self.gradients, star_gradient);
+            }
+        }
+        averaging.energy(split.lambda(), theta_bar)
+    }
+
+    /// λ θ [Pa] of an element whose volumetric energy is (partly) averaged, and the share κ of λ/2 θ²
+    /// that is its own.
+    fn averaged_element(
+        &self,
+        e: usize,
+        split: &PointSplit,
+        theta: f64,
+        buffers: &Buffers,
+    ) -> Option<(f64, f64)> {
+        let averaging = self.averaging.as_ref()?;
+        let pressure =
+            averaging.pressure(split.lambda(), &self.connectivity[4 * e..][..4], &buffers.theta_bar);
+        Some((pressure + averaging.kept * split.lambda() * theta, averaging.kept))
+    }
+
+    fn element_energy<const N: usize>(&self, e: usize, x: &[Vector3<f64>]) -> f64 {
+        let x = self.positions::<N>(e, x);
+        let point = |q: usize, psi: &dyn Fn(&Matrix3<f64>) -> f64| {
+            self.weights(e)[q] * psi(&deformation_gradient::<N>(&x, self.gradients(e, q)))
+        };
+        let Q = self.kind.points();
+        let Some(split) = self.remedy() else {
+            return (0..Q).map(|q| point(q, &|F| self.point.energy(F))).sum();
+        };
+        let shear: f64 = (0..Q).map(|q| point(q, &|F| split.shear_energy(F))).sum();
+        let (F, share) = match &self.averaging {
+            Some(averaging) => (deformation_gradient::<N>(&x, self.gradients(e, 0)), averaging.kept),
+            None => (self.mean_gradient::<N>(e, &x), 1.0),
+        };
+        shear + self.volumes[e] * share * 0.5 * split.lambda() * split.theta(&F).powi(2)
+    }
+
+    /// The split law if the volumetric energy is treated apart.
+    fn remedy(&self) -> Option<PointSplit> {
+        if self.volumetric == Volumetric::Full { None } else { self.point.split() }
+    }
+
+    fn mean_gradient<const N: usize>(&self, e: usize, x: &[Vector3<f64>; N]) -> Matrix3<f64> {
+        deformation_gradient::<N>(x, &self.mean_gradients[e * N..][..N])
+    }
+
+    fn scatter_forces<const N: usize>(
+        &self,
+        x: &[Vector3<f64>],
+        buffers: &Buffers,
+        f: &mut [Vector3<f64>],
+    ) -> f64 {
+        let mut energy = 0.0;
+        for e in 0..self.n_elements() {
+            let mut f_e = [Vector3::zeros(); N];
+            energy += self.element_forces::<N>(e, x, buffers, &mut f_e);
+            for (f_a, &a) in f_e.iter().zip(self.element(e)) {
+                f[a as usize] += f_a;
+            }
+        }
+        energy
+    }
+
+    fn element_forces<const N: usize>(
+        &self,
+        e: usize,
+        x: &[Vector3<f64>],
+        buffers: &Buffers,
+        f: &mut [Vector3<f64>; N],
+    ) -> f64 {
+        let x = self.positions::<N>(e, x);
+        let weights = self.weights(e);
+        let split = self.remedy();
+        let mut energy = 0.0;
+        for q in 0..self.kind.points() {
+            let (g, w) = (self.gradients(e, q), weights[q]);
+            let F = deformation_gradient::<N>(&x, g);
+            let P = match &split {
+                None => {
+                    energy += w * self.point.energy(&F);
+                    self.point.stress(&F)
+                }
+                Some(split) => {
+                    energy += w * split.shear_energy(&F);
+                    let shear = split.shear_stress(&F);
+                    let theta = split.theta(&F);
+                    match self.averaged_element(e, split, theta, buffers) {
+                        Some((pressure, kept)) => {
+                            energy += w * kept * 0.5 * split.lambda() * theta * theta;
+                            shear + pressure * split.theta_gradient(&F)
+                        }
+                        None => shear,
+                    }
+                }
+            };
+            add_forces(&P, g, w, f);
+        }
+        if let (Volumetric::Selective, Some(split)) = (self.volumetric, split) {
+            let F = self.mean_gradient::<N>(e, &x);
+            let (theta, lambda) = (split.theta(&F), split.lambda());
+            energy += self.volumes[e] * 0.5 * lambda * theta * theta;
+            let P = lambda * theta * split.theta_gradient(&F);
+            add_forces(&P, &self.mean_gradients[e * N..][..N], self.volumes[e], f);
+        }
+        energy
+    }
+
+    fn scatter_tangent<const N: usize>(
+        &self,
+        x: &[Vector3<f64>],
+        kind: Tangent,
+        buffers: &Buffers,
+        K: &mut BlockCsr<f64>,
+    ) {
+        let mut blocks = [[0.0; 9]; 100];
+        let blocks = &mut blocks[..N * N];
+        for e in 0..self.n_elements() {
+            self.element_tangent::<N>(e, x, kind, buffers, blocks);
+            for (block, &slot) in blocks.iter().zip(&self.slots[e * N * N..][..N * N]) {
+                for (k, b) in K.blocks[slot as usize].iter_mut().zip(block) {
+                    *k += b;
+                }
+            }
+        }
+    }
+
+    fn element_tangent<const N: usize>(
+        &self,
+        e: usize,
+        x: &[Vector3<f64>],
+        kind: Tangent,
+        buffers: &Buffers,
+        K: &mut [[f64; 9]],
+    ) {
+        K.fill([0.0; 9]);
+        let x = self.positions::<N>(e, x);
+        let weights = self.weights(e);
+        let split = self.remedy();
+        // With selective integration only shear and volume together are (nearly) semidefinite.
+        let selective = self.volumetric == Volumetric::Selective;
+        let held = kind == Tangent::Held && self.point.law == Law::Corotational;
+        let point_kind = if selective && !held { Tangent::Exact } else { kind };
+        for q in 0..self.kind.points() {
+            let g = self.gradients(e, q);
+            let F = deformation_gradient::<N>(&x, g);
+            let A = match &split {
+                None => self.point.tangent(&F, kind),
+                Some(split) if selective => split.shear_tangent(&F, point_kind),
+                Some(split) => self.averaged_tangent(e, split, &F, kind, held, buffers),
+            };
+            add_upper_blocks::<N>(&A, g, weights[q], K);
+        }
+        if let (true, Some(split)) = (selective, split) {
+            let F = self.mean_gradient::<N>(e, &x);
+            let d = vec9(&split.theta_gradient(&F));
+            let mut A = split.lambda() * d * d.transpose();
+            if !held {
+                A += split.lambda() * split.theta(&F) * split.theta_hessian(&F);
+            }
+            add_upper_blocks::<N>(&A, &self.mean_gradients[e * N..][..N], self.volumes[e], K);
+        }
+        mirror::<N>(K);
+        if selective && !held && kind != Tangent::Exact && self.point.law != Law::Linear {
+            project_hexahedron(K);
+        }
+    }
+
+    /// The element's own part of the tangent with averaged volume.
+    fn averaged_tangent(
+        &self,
+        e: usize,
+        split: &PointSplit,
+        F: &Matrix3<f64>,
+        kind: Tangent,
+        held: bool,
+        buffers: &Buffers,
+    ) -> SMatrix<f64, 9, 9> {
+        let d = vec9(&split.theta_gradient(F));
+        let (pressure, kept) = self.averaged_element(e, split, buffers.theta[e], buffers).unwrap_or_default();
+        let own = kept * split.lambda() * d * d.transpose();
+        if held {
+            return split.shear_tangent(F, Tangent::Held) + own;
+        }
+        let exact = split.shear_tangent(F, Tangent::Exact) + own + pressure * split.theta_hessian(F);
+        if kind == Tangent::Exact || self.point.law == Law::Linear { exact } else { projected(&exact) }
+    }
+}
+
+fn vec9(A: &Matrix3<f64>) -> SMatrix<f64, 9, 1> {
+    SMatrix::<f64, 9, 1>::from_column_slice(A.as_slice())
+}
+
+/// Sets the negative eigenvalues of the 24×24 matrix of a hexahedron to zero, if it has any that
+/// matter.
+fn project_hexahedron(K: &mut [[f64; 9]]) {
+    let mut A = SMatrix::<f64, 24, 24>::zeros();
+    for a in 0..8 {
+        for b in 0..8 {
+            for (entry, k) in K[8 * a + b].iter().enumerate() {
+                A[(3 * a + entry / 3, 3 * b + entry % 3)] = *k;
+            }
+        }
+    }
+    let shift = 1e-12 * A.trace().abs();
+    if (A + SMatrix::<f64, 24, 24>::from_diagonal_element(shift)).cholesky().is_some() {
+        return;
+    }
+    let A = projected(&A);
+    for a in 0..8 {
+        for b in 0..8 {
+            for (entry, k) in K[8 * a + b].iter_mut().enumerate() {
+                *k = A[(3 * a + entry / 3, 3 * b + entry % 3)];
+            }
+        }
+    }
+}

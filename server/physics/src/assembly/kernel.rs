@@ -1,0 +1,70 @@
+//! What one quadrature point adds to the forces and to the tangent of its element.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::point::Matrix9;
+
+/// F = Σ_a x_a ⊗ g_a, with differences to the first node so that rigid shifts cancel exactly.
+#[inline]
+pub(super) fn deformation_gradient<const N: usize>(
+    x: &[Vector3<f64>; N],
+    g: &[Vector3<f64>],
+) -> Matrix3<f64> {
+    let mut F = Matrix3::zeros();
+    for a in 1..N {
+        F += (x[a] - x[0]) * g[a].transpose();
+    }
+    F
+}
+
+/// f_a += w P g_a.
+#[inline]
+pub(super) fn add_forces(P: &Matrix3<f64>, g: &[Vector3<f64>], w: f64, f: &mut [Vector3<f64>]) {
+    for (f, g) in f.iter_mut().zip(g) {
+        *f += w * (P * g);
+    }
+}
+
+/// K_ab += w g_a · A · g_b for a ≤ b; `K` is row-major in (a, b), blocks row-major.
+#[inline]
+pub(super) fn add_upper_blocks<const N: usize>(A: &Matrix9, g: &[Vector3<f64>], w: f64, K: &mut [[f64; 9]]) {
+    let A = A.as_slice();
+    for b in 0..N {
+        let g_b = w * g[b];
+        // T = A : (· ⊗ g_b), 9 × 3: T[r][k] = Σ_l A[r][k + 3 l] g_b[l].
+        let mut T = [[0.0; 3]; 9];
+        for k in 0..3 {
+            for l in 0..3 {
+                let column = &A[9 * (k + 3 * l)..][..9];
+                for r in 0..9 {
+                    T[r][k] += column[r] * g_b[l];
+                }
+            }
+        }
+        for a in 0..=b {
+            let block = &mut K[a * N + b];
+            for j in 0..3 {
+                let g_aj = g[a][j];
+                for i in 0..3 {
+                    for k in 0..3 {
+                        block[3 * i + k] += g_aj * T[i + 3 * j][k];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Copies the blocks above the diagonal to below it: K_ba = K_abᵀ.
+pub(super) fn mirror<const N: usize>(K: &mut [[f64; 9]]) {
+    for b in 0..N {
+        for a in 0..b {
+            let block = K[a * N + b];
+            K[b * N + a] = std::array::from_fn(|e| block[3 * (e % 3) + e / 3]);
+        }
+        let block = &mut K[b * N + b];
+        for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+            block[3 * j + i] = block[3 * i + j];
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! The general discretisation in double precision: any element with any law, its energy, internal
+//! forces, assembled tangent and masses.
+//!
+//! A [`Model`] holds quadrature points: shape function gradients in the rest configuration and
+//! weights. With F = Σ_a x_a ⊗ ∇N_a at a point, the energy is Ψ = Σ w ψ(F), the internal force on
+//! node a is f_a = Σ w P(F) ∇N_a, and the tangent block is K_ab = Σ w ∇N_a · ∂P/∂F · ∇N_b.
+//!
+//! On cut tetrahedra each material piece is an element of its own on its copies, with the weight of
+//! its volume: exact, since F is constant in a linear tetrahedron.
+//!
+//! # Source
+//! Zienkiewicz, Taylor, Zhu, *The Finite Element Method*; Bonet, Wood, *Nonlinear Continuum Mechanics
+//! for Finite Element Analysis*.
+
+mod block_csr;
+mod point;
+mod error;
+mod model;
+mod build;
+mod kernel;
+mod averaging;
+mod elastic;
+mod mass;
+
+pub use block_csr::BlockCsr;
+pub use error::ModelError;
+pub use model::{ElementKind, Model, Volumetric};
+pub use point::{Matrix9, Tangent};
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

@@ -1,0 +1,239 @@
+//! The discrete model: elements with their quadrature points, a law, and where the blocks of the
+//! tangent stand.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::averaging::NodeAverage;
+use super::elastic::Scratch;
+use super::mass::Products;
+use super::point::PointLaw;
+use super::{BlockCsr, ModelError, kernel};
+use crate::element::Spring;
+use crate::material::{Lame, Law};
+
+/// The element of a model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ElementKind {
+    /// Linear tetrahedron, one point.
+    #[default]
+    Tet4,
+    /// Quadratic tetrahedron, four points.
+    Tet10,
+    /// Trilinear hexahedron, 2×2×2 points.
+    Hex8,
+}
+
+impl ElementKind {
+    /// Nodes per element.
+    pub fn nodes(self) -> usize {
+        match self {
+            ElementKind::Tet4 => 4,
+            ElementKind::Tet10 => 10,
+            ElementKind::Hex8 => 8,
+        }
+    }
+
+    /// Quadrature points per element.
+    pub fn points(self) -> usize {
+        match self {
+            ElementKind::Tet4 => 1,
+            ElementKind::Tet10 => 4,
+            ElementKind::Hex8 => 8,
+        }
+    }
+}
+
+/// How the volumetric part λ/2 θ² of the energy is integrated: remedies against locking near ν = ½.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Volumetric {
+    /// As the rest of the energy.
+    #[default]
+    Full,
+    /// Tet4: with θ̄_n, the mean of θ over the elements at node n,
+    /// (1 − kept) λ/2 Σ_n V_n θ̄_n² + kept λ/2 Σ_e V_e θ_e². Averages belong to copies, so they
+    /// never cross a cut.
+    NodeAveraged {
+        /// Share that stays with the elements, against checkerboards; 0.05 … 0.1.
+        kept: f64,
+    },
+    /// Hex8: at one point per element, with the mean gradients; shear stays at 2×2×2 points.
+    Selective,
+}
+
+/// A discretised elastic body in double precision.
+#[derive(Clone, Debug)]
+pub struct Model {
+    pub(super) kind: ElementKind,
+    pub(super) volumetric: Volumetric,
+    pub(super) point: PointLaw,
+    pub(super) rest: Vec<Vector3<f64>>,
+    /// Nodes of every element, `kind.nodes()` each.
+    pub(super) connectivity: Vec<u32>,
+    /// ∇N_a [1/m] at rest, per element, point, node.
+    pub(super) gradients: Vec<Vector3<f64>>,
+    /// Weights [m³], per element and point.
+    pub(super) weights: Vec<f64>,
+    /// Σ of the weights of an element [m³].
+    pub(super) volumes: Vec<f64>,
+    /// Mean of ∇N_a over the element [1/m], per element and node; for [`Volumetric::Selective`].
+    pub(super) mean_gradients: Vec<Vector3<f64>>,
+    pub(super) averaging: Option<NodeAverage>,
+    pub(super) springs: Vec<Spring>,
+    /// Volume that each node's lumped mass stands for [m³].
+    pub(super) lumped: Vec<f64>,
+    /// ∫ N_a dV of every node [m³].
+    pub(super) integrals: Vec<f64>,
+    pub(super) products: Products,
+    /// The tangent's pattern, without blocks.
+    pub(super) pattern: BlockCsr<f64>,
+    /// Position in the tangent of every block (a, b) of every element.
+    pub(super) slots: Vec<u32>,
+    pub(super) scratch: Scratch,
+}
+
+impl Model {
+    /// The element.
+    pub fn kind(&self) -> ElementKind {
+        self.kind
+    }
+
+    /// How the volumetric energy is integrated.
+    pub fn volumetric(&self) -> Volumetric {
+        self.volumetric
+    }
+
+    /// The constitutive law.
+    pub fn law(&self) -> Law {
+        self.point.law
+    }
+
+    /// The elastic constants.
+    pub fn lame(&self) -> Lame {
+        self.point.lame
+    }
+
+    /// Number of nodes (copies, where the mesh is cut).
+    pub fn n_nodes(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Rest positions [m], length n_nodes.
+    pub fn rest(&self) -> &[Vector3<f64>] {
+        &self.rest
+    }
+
+    /// Number of elements (pieces, where the mesh is cut).
+    pub fn n_elements(&self) -> usize {
+        self.volumes.len()
+    }
+
+    /// Nodes of element `e`.
+    pub fn element(&self, e: usize) -> &[u32] {
+        let N = self.kind.nodes();
+        &self.connectivity[e * N..][..N]
+    }
+
+    /// Rest volume [m³] of element `e`; of a piece, that of the piece.
+    pub fn volume(&self, e: usize) -> f64 {
+        self.volumes[e]
+    }
+
+    /// Weights [m³] of the quadrature points of element `e`.
+    pub fn weights(&self, e: usize) -> &[f64] {
+        let Q = self.kind.points();
+        &self.weights[e * Q..][..Q]
+    }
+
+    /// Rest gradients ∇N_a [1/m] at point `q` of element `e`, one per node.
+    pub fn gradients(&self, e: usize, q: usize) -> &[Vector3<f64>] {
+        let (N, Q) = (self.kind.nodes(), self.kind.points());
+        &self.gradients[(e * Q + q) * N..][..N]
+    }
+
+    /// F at point `q` of element `e` for the positions `x` [m].
+    pub fn deformation_gradient(&self, e: usize, q: usize, x: &[Vector3<f64>]) -> Matrix3<f64> {
+        match self.kind {
+            ElementKind::Tet4 => self.gradient_at::<4>(e, q, x),
+            ElementKind::Tet10 => self.gradient_at::<10>(e, q, x),
+            ElementKind::Hex8 => self.gradient_at::<8>(e, q, x),
+        }
+    }
+
+    fn gradient_at<const N: usize>(&self, e: usize, q: usize, x: &[Vector3<f64>]) -> Matrix3<f64> {
+        kernel::deformation_gradient::<N>(&self.positions(e, x), self.gradients(e, q))
+    }
+
+    /// Positions of the nodes of element `e`.
+    #[inline]
+    pub(super) fn positions<const N: usize>(&self, e: usize, x: &[Vector3<f64>]) -> [Vector3<f64>; N] {
+        let nodes = &self.connectivity[e * N..][..N];
+        std::array::from_fn(|a| x[nodes[a] as usize])
+    }
+
+    /// One-dimensional springs between nodes.
+    pub fn springs(&self) -> &[Spring] {
+        &self.springs
+    }
+
+    /// The same model with these springs in place of those it had.
+    pub fn with_springs(mut self, springs: Vec<Spring>) -> Result<Self, ModelError> {
+        let n = self.n_nodes();
+        let usable = |s: &Spring| {
+            let number = |v: f64| v.is_finite() && v >= 0.0;
+            s.a != s.b
+                && (s.a as usize) < n
+                && (s.b as usize) < n
+                && number(s.stiffness_n_m)
+                && number(s.rest_length_m)
+        };
+        if let Some(spring) = springs.iter().position(|s| !usable(s)) {
+            return Err(ModelError::Spring { spring });
+        }
+        self.springs = springs;
+        self.find_pattern();
+        Ok(self)
+    }
+
+    /// A zero matrix with the pattern of the tangent and of the consistent mass.
+    pub fn pattern(&self) -> BlockCsr<f64> {
+        let mut matrix = self.pattern.clone();
+        matrix.blocks.resize(matrix.columns.len(), [0.0; 9]);
+        matrix
+    }
+
+    /// Finds which blocks there are and where those of each element stand.
+    pub(super) fn find_pattern(&mut self) {
+        let N = self.kind.nodes();
+        let mut rows: Vec<Vec<u32>> = vec![Vec::new(); self.n_nodes()];
+        for nodes in self.connectivity.chunks_exact(N) {
+            for &a in nodes {
+                rows[a as usize].extend_from_slice(nodes);
+            }
+        }
+        for spring in &self.springs {
+            rows[spring.a as usize].push(spring.b);
+            rows[spring.b as usize].push(spring.a);
+        }
+        if let Some(averaging) = &self.averaging {
+            for node in 0..self.rest.len() {
+                let star = averaging.star(node);
+                for &a in star {
+                    rows[a as usize].extend_from_slice(star);
+                }
+            }
+        }
+        let mut pattern: BlockCsr<f64> = BlockCsr::with_rows(rows);
+        pattern.blocks = Vec::new();
+        self.slots.clear();
+        for nodes in self.connectivity.chunks_exact(N) {
+            for &a in nodes {
+                let row = pattern.row(a as usize);
+                let columns = &pattern.columns[row.clone()];
+                self.slots.extend(
+                    nodes.iter().map(|b| (row.start + columns.partition_point(|column| column < b)) as u32),
+                );
+            }
+        }
+        self.pattern = pattern;
+    }
+}

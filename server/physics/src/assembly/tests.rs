@@ -1,0 +1,188 @@
+//! Forces are the gradient of the energy and tangents that of the forces, for every element, law and
+//! remedy; masses add up; nothing depends on what a call left behind.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::*;
+use crate::cut::{BladeSweep, CutMesh};
+use crate::element::Spring;
+use crate::material::{Law, Material, Rayleigh};
+use crate::mesh::{BoxPattern, box_hexes, box_mesh};
+
+fn material(law: Law) -> Material {
+    Material { young_pa: 3.0, poisson: 0.3, density_kg_m3: 2.0, rayleigh: Rayleigh::default(), law }
+}
+
+const LAWS: [Law; 2] = [Law::Linear, Law::Corotational];
+const AVERAGED: Volumetric = Volumetric::NodeAveraged { kept: 0.05 };
+
+fn size() -> Vector3<f64> {
+    Vector3::new(1.0, 0.8, 1.1)
+}
+
+fn cut_box() -> CutMesh {
+    let mesh = box_mesh(Vector3::zeros(), size(), [2; 3], BoxPattern::Tet6);
+    let mut cut = CutMesh::new(mesh).unwrap();
+    let segment = |x: f64| [Vector3::new(x, -0.3, 0.47), Vector3::new(x, 1.3, 0.53)];
+    let x = cut.rest_positions();
+    cut.sweep(&x, &BladeSweep { segments: vec![segment(-0.3), segment(0.8)] }, 1).unwrap();
+    assert!(cut.n_copies() > 27);
+    cut
+}
+
+/// Every element with every law and remedy, on small meshes; one of them distorted, one cut.
+fn models() -> Vec<Model> {
+    let tets = box_mesh(Vector3::zeros(), size(), [2; 3], BoxPattern::Tet5 { parity: false });
+    let mut hexes = box_hexes(Vector3::zeros(), size(), [2; 3]);
+    for (i, x) in hexes.nodes.iter_mut().enumerate() {
+        let t = i as f64;
+        *x += 0.05 * Vector3::new((3.0 * t).sin(), (5.0 * t).cos(), (7.0 * t).sin());
+    }
+    let cut = cut_box();
+    let spring = Spring { a: 0, b: 13, stiffness_n_m: 2.0, rest_length_m: 0.4 };
+    let mut models = Vec::new();
+    for law in LAWS {
+        let material = material(law);
+        models.push(Model::tet4(&tets, &material, Volumetric::Full).unwrap());
+        models.push(
+            Model::tet4_cut(&cut, &material, Volumetric::Full).unwrap().with_springs(vec![spring]).unwrap(),
+        );
+        models.push(Model::tet10(&tets, &material).unwrap());
+        models.push(Model::hex8(&hexes, &material, Volumetric::Full).unwrap());
+        if law.rotates() || law == Law::Linear {
+            models.push(Model::tet4(&tets, &material, AVERAGED).unwrap());
+            models.push(Model::tet4_cut(&cut, &material, AVERAGED).unwrap());
+            models.push(Model::hex8(&hexes, &material, Volumetric::Selective).unwrap());
+        }
+    }
+    models
+}
+
+fn name(model: &Model) -> String {
+    format!("{:?} {:?} {:?}", model.kind(), model.law(), model.volumetric())
+}
+
+/// A large smooth deformation with some noise.
+fn deformed(model: &Model) -> Vec<Vector3<f64>> {
+    let A = Matrix3::new(0.7, -0.6, 0.1, 0.5, 0.9, 0.2, 0.1, 0.1, 1.2);
+    let noise = |t: f64| 0.03 * Vector3::new((9.0 * t).sin(), (11.0 * t).cos(), (13.0 * t).sin());
+    let bend = |X: &Vector3<f64>| 0.1 * Vector3::new(X.y * X.z, X.x * X.x, -X.x * X.y);
+    model.rest().iter().enumerate().map(|(i, X)| A * X + bend(X) + noise(i as f64)).collect()
+}
+
+#[test]
+fn forces_are_the_gradient_of_the_energy() {
+    for model in models() {
+        let mut x = deformed(&model);
+        let mut f = vec![Vector3::zeros(); x.len()];
+        let energy = model.internal_forces(&x, &mut f);
+        assert!((energy - model.energy(&x)).abs() < 1e-13 * energy, "{}", name(&model));
+        let h = 1e-5;
+        for i in (0..x.len()).step_by(5) {
+            for axis in 0..3 {
+                let there = x[i][axis];
+                x[i][axis] = there + h;
+                let above = model.energy(&x);
+                x[i][axis] = there - h;
+                let below = model.energy(&x);
+                x[i][axis] = there;
+                let slope = (above - below) / (2.0 * h);
+                assert!((slope - f[i][axis]).abs() < 1e-8, "{}: {slope} {}", name(&model), f[i][axis]);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_exact_tangent_is_the_gradient_of_the_forces() {
+    for model in models() {
+        let mut x = deformed(&model);
+        let n = x.len();
+        let mut K = model.pattern();
+        model.tangent(&x, Tangent::Exact, &mut K);
+        let (mut above, mut below) = (vec![Vector3::zeros(); n], vec![Vector3::zeros(); n]);
+        let h = 1e-5;
+        for j in (0..n).step_by(7) {
+            for axis in 0..3 {
+                let there = x[j][axis];
+                x[j][axis] = there + h;
+                model.internal_forces(&x, &mut above);
+                x[j][axis] = there - h;
+                model.internal_forces(&x, &mut below);
+                x[j][axis] = there;
+                for i in 0..n {
+                    let slope = (above[i] - below[i]) / (2.0 * h);
+                    let column = K.block(i, j as u32).column(axis).into_owned();
+                    assert!((slope - column).norm() < 1e-7, "{} {i} {j}", name(&model));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn projected_and_held_tangents_are_symmetric_and_not_negative() {
+    for model in models() {
+        let mut x = deformed(&model);
+        x.iter_mut().for_each(|x| x.z *= 0.4); // compressed: the exact tangent is indefinite
+        let n = x.len();
+        let mut K = model.pattern();
+        for kind in [Tangent::Projected, Tangent::Held] {
+            model.tangent(&x, kind, &mut K);
+            let dense = nalgebra::DMatrix::from_fn(3 * n, 3 * n, |r, c| {
+                K.block(r / 3, (c / 3) as u32)[(r % 3, c % 3)]
+            });
+            let size = dense.amax();
+            assert!((&dense - dense.transpose()).amax() < 1e-14 * size, "{}", name(&model));
+            let least = dense.symmetric_eigenvalues().min();
+            assert!(least > -1e-12 * size, "{} {kind:?}: {least}", name(&model));
+        }
+    }
+}
+
+#[test]
+fn masses_add_up_and_agree_in_their_moments() {
+    for model in models() {
+        let total: f64 = (0..model.n_elements()).map(|e| model.volume(e)).sum::<f64>() * 2.0;
+        let lumped = model.lumped_mass(2.0);
+        assert!((lumped.iter().sum::<f64>() - total).abs() < 1e-12);
+        assert!(lumped.iter().all(|m| *m > 0.0));
+        let mut M = model.pattern();
+        model.consistent_mass(2.0, &mut M);
+        // Linear fields are in the space, so their integrals are exact with either mass.
+        let one = vec![Vector3::repeat(1.0); model.n_nodes()];
+        let x = model.rest().to_vec();
+        let consistent = M.bilinear(&one, &x);
+        let from_lumped: f64 = lumped.iter().zip(&x).map(|(m, x)| m * x.sum()).sum();
+        let from_integrals: f64 =
+            model.shape_integrals().iter().zip(&x).map(|(v, x)| 2.0 * v * x.sum()).sum();
+        assert!(
+            (consistent - from_lumped).abs() < 1e-12 && (consistent - from_integrals).abs() < 1e-12,
+            "{}",
+            name(&model)
+        );
+    }
+    // ∫ x² over the cut box is that of the box: quadratic products of the pieces are exact.
+    let model = Model::tet4_cut(&cut_box(), &material(Law::Linear), Volumetric::Full).unwrap();
+    let mut M = model.pattern();
+    model.consistent_mass(1.0, &mut M);
+    let x: Vec<_> = model.rest().iter().map(|X| Vector3::new(X.x, 0.0, 0.0)).collect();
+    assert!((M.bilinear(&x, &x) - 0.8 * 1.1 / 3.0).abs() < 1e-12);
+}
+
+#[test]
+fn unusable_combinations_are_refused() {
+    let tets = box_mesh(Vector3::zeros(), size(), [1; 3], BoxPattern::Tet6);
+    let hexes = box_hexes(Vector3::zeros(), size(), [1; 3]);
+    let linear = material(Law::Linear);
+    let refused = Model::tet4(&tets, &linear, Volumetric::Selective);
+    assert!(matches!(refused, Err(ModelError::Remedy { element: ElementKind::Tet4, .. })));
+    assert!(matches!(Model::hex8(&hexes, &linear, AVERAGED), Err(ModelError::Remedy { .. })));
+    let kept = Model::tet4(&tets, &linear, Volumetric::NodeAveraged { kept: f64::NAN });
+    assert!(matches!(kept, Err(ModelError::Kept { .. })));
+    let model = Model::tet4(&tets, &linear, Volumetric::Full).unwrap();
+    let loop_spring = Spring { a: 1, b: 1, stiffness_n_m: 1.0, rest_length_m: 0.0 };
+    assert!(matches!(model.with_springs(vec![loop_spring]), Err(ModelError::Spring { spring: 0 })));
+    let broken = Material { poisson: 0.6, ..linear };
+    assert!(matches!(Model::tet10(&tets, &broken), Err(ModelError::Material(_))));
+}
