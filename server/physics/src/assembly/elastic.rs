@@ -175,6 +175,10 @@ impl Model {
         shear + self.volumes[e] * share * 0.5 * split.lambda() * split.theta(&F).powi(2)
     }
 
+    fn holds_rotation(&self, kind: Tangent) -> bool {
+        kind == Tangent::Held && self.point.law == Law::Corotational
+    }
+
     /// The split law if the volumetric energy is treated apart.
     fn remedy(&self) -> Option<PointSplit> {
         if self.volumetric == Volumetric::Full { None } else { self.point.split() }
@@ -278,7 +282,7 @@ impl Model {
         let split = self.remedy();
         // With selective integration only shear and volume together are (nearly) semidefinite.
         let selective = self.volumetric == Volumetric::Selective;
-        let held = kind == Tangent::Held && self.point.law == Law::Corotational;
+        let held = self.holds_rotation(kind);
         let point_kind = if selective && !held { Tangent::Exact } else { kind };
         for q in 0..self.kind.points() {
             let g = self.gradients(e, q);
@@ -286,7 +290,7 @@ impl Model {
             let A = match &split {
                 None => self.point.tangent(&F, kind),
                 Some(split) if selective => split.shear_tangent(&F, point_kind),
-                Some(split) => self.averaged_tangent(e, split, &F, kind, held, buffers),
+                Some(split) => self.averaged_tangent(e, split, &F, kind, buffers),
             };
             add_upper_blocks::<N>(&A, g, weights[q], K);
         }
@@ -312,13 +316,12 @@ impl Model {
         split: &PointSplit,
         F: &Matrix3<f64>,
         kind: Tangent,
-        held: bool,
         buffers: &Buffers,
     ) -> SMatrix<f64, 9, 9> {
         let d = vec9(&split.theta_gradient(F));
         let (pressure, kept) = self.averaged_element(e, split, buffers.theta[e], buffers).unwrap_or_default();
         let own = kept * split.lambda() * d * d.transpose();
-        if held {
+        if self.holds_rotation(kind) {
             return split.shear_tangent(F, Tangent::Held) + own;
         }
         let exact = split.shear_tangent(F, Tangent::Exact) + own + pressure * split.theta_hessian(F);
