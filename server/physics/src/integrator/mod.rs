@@ -3,10 +3,14 @@
 mod implicit_euler;
 mod parts;
 mod springs;
+mod statics;
+mod relaxation;
 
 pub use implicit_euler::{ImplicitEuler, StepInputs, StepOutcome};
 pub use parts::LooseParts;
+pub use relaxation::{Relaxation, RelaxationReport};
 pub use springs::{PointSpring, SpringKind};
+pub use statics::{StaticProblem, find_equilibrium, prescribe};
 
 use nalgebra::Vector3;
 

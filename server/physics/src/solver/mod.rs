@@ -1,5 +1,27 @@
-//! Iterative solution of A x = b.
+//! Solution of A x = b, and of nonlinear equilibrium by Newton's method.
+//!
+//! Every solver stops on the *preconditioned* residual √(rᵀM⁻¹r), M the 3×3 diagonal blocks of A: the
+//! plain norm is blind to slivers. Each says how many iterations it made, how large the residual is
+//! and why it stopped; none iterates through a direction of non-positive curvature.
 
+mod real;
+mod report;
+mod algebraic_error;
+mod constraint;
+mod block_jacobi;
+mod conjugate_gradients;
+mod cholesky;
+mod linear;
+mod newton;
 mod pcg;
 
-pub use pcg::{Pcg, PcgReport, PcgSettings, StopReason};
+pub use algebraic_error::AlgebraicError;
+pub use block_jacobi::DiagonalInverse;
+pub use constraint::Filter;
+pub use linear::{LinearSettings, LinearSolver, Method, Precision};
+pub use newton::{Curvature, Newton, NewtonReport, NewtonSettings, Potential};
+pub use pcg::{Pcg, PcgReport, PcgSettings};
+pub use report::{LinearReport, StopReason};
+
+#[cfg(test)]
+mod tests;

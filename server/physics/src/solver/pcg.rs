@@ -3,6 +3,8 @@
 //! Vectors are single precision, scalar products double. The loop stops on the *preconditioned*
 //! residual √(rᵀM⁻¹r): the plain norm is blind to slivers, whose forces are 1e-9 of the others.
 
+use super::algebraic_error::AlgebraicError;
+use super::report::StopReason;
 use crate::operator::{BLOCK, BlockJacobi, LinearOperator, Padded};
 use crate::team::{Team, blocks};
 
@@ -15,20 +17,6 @@ pub struct PcgSettings {
     pub tolerance: f64,
 }
 
-/// Why the solver stopped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum StopReason {
-    /// The residual fell below the tolerance.
-    #[default]
-    Converged,
-    /// The iterations ran out first; the residual says how good the result is.
-    IterationLimit,
-    /// pᵀAp ≤ 0: the operator is not positive definite; the iterate before it is returned.
-    NonPositiveCurvature,
-    /// A scalar product is NaN or infinite; the result must not be used.
-    NonFinite,
-}
-
 /// How a solve went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PcgReport {
@@ -38,6 +26,8 @@ pub struct PcgReport {
     pub residual: f64,
     /// Why it stopped.
     pub stop: StopReason,
+    /// Estimate of the algebraic error ‖x* − x‖_A, in the unit of √(xᵀA x).
+    pub algebraic_error: f64,
 }
 
 /// Scratch vectors of the solver, one entry per copy; reused from solve to solve.
@@ -76,6 +66,7 @@ impl Pcg {
     ) -> PcgReport {
         let target = settings.tolerance * reference;
         let mut report = PcgReport::default();
+        let mut error = AlgebraicError::default();
         self.p.fill([0.0; 4]);
         let mut rz = self.precondition(team, M);
         let mut beta = 0.0;
@@ -105,6 +96,8 @@ impl Pcg {
                 return report;
             }
             let alpha = rz / curvature;
+            error.add(alpha * rz);
+            report.algebraic_error = error.norm();
             let next = self.advance(team, M, x, alpha); // x += α p, r −= α q, z = M⁻¹ r, rᵀz
             beta = next / rz;
             rz = next;

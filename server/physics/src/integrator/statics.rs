@@ -1,0 +1,81 @@
+//! Static equilibrium of a model: the minimum of Π(x) = Ψ(x) − f·(x − X).
+//!
+//! [`StaticProblem`] is that potential, for Newton's method ([`crate::solver::Newton`]) or for
+//! [`Relaxation`]; [`find_equilibrium`] does the whole with Newton.
+
+use nalgebra::Vector3;
+
+use crate::assembly::{BlockCsr, Model, Tangent};
+use crate::operator::FixedCopy;
+use crate::solver::{Curvature, Newton, NewtonReport, Potential};
+use crate::team::Team;
+
+/// Potential energy Π(x) = Ψ(x) − f·(x − X) of a model under dead loads.
+#[derive(Clone, Copy, Debug)]
+pub struct StaticProblem<'a> {
+    /// The body.
+    pub model: &'a Model,
+    /// Load on every node [N], gravity included.
+    pub load: &'a [Vector3<f64>],
+    /// The tangent that stands for the positive semidefinite Hessian: projected or held.
+    pub definite: Tangent,
+}
+
+impl<'a> StaticProblem<'a> {
+    /// The problem with the projected tangent.
+    pub fn new(model: &'a Model, load: &'a [Vector3<f64>]) -> Self {
+        Self { model, load, definite: Tangent::Projected }
+    }
+
+    /// −f·(x − X): relative to rest, so that it is not large where the work is small.
+    fn work(&self, x: &[Vector3<f64>]) -> f64 {
+        let moved = x.iter().zip(self.model.rest());
+        -self.load.iter().zip(moved).map(|(f, (x, X))| f.dot(&(x - X))).sum::<f64>()
+    }
+}
+
+impl Potential for StaticProblem<'_> {
+    fn value(&mut self, _: &mut Team, x: &[Vector3<f64>]) -> f64 {
+        self.model.energy(x) + self.work(x)
+    }
+
+    fn gradient(&mut self, _: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
+        let energy = self.model.internal_forces(x, g);
+        g.iter_mut().zip(self.load).for_each(|(g, f)| *g -= f);
+        energy + self.work(x)
+    }
+
+    fn pattern(&mut self) -> BlockCsr<f64> {
+        self.model.pattern()
+    }
+
+    fn hessian(&mut self, _: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>) {
+        let kind = if curvature == Curvature::Exact { Tangent::Exact } else { self.definite };
+        self.model.tangent(x, kind, H);
+    }
+
+    fn loads(&mut self, loads: &mut [Vector3<f64>]) {
+        loads.copy_from_slice(self.load);
+    }
+}
+
+/// Moves `x` [m] to equilibrium under `load` [N] and the prescribed positions, by Newton's method.
+pub fn find_equilibrium(
+    newton: &mut Newton,
+    team: &mut Team,
+    problem: &mut StaticProblem<'_>,
+    fixed: &[FixedCopy],
+    x: &mut [Vector3<f64>],
+) -> NewtonReport {
+    prescribe(fixed, x);
+    newton.minimise(team, problem, x, fixed)
+}
+
+/// Sets the prescribed directions of `x` to their positions.
+pub fn prescribe(fixed: &[FixedCopy], x: &mut [Vector3<f64>]) {
+    for f in fixed {
+        for axis in (0..3).filter(|&axis| f.axes[axis]) {
+            x[f.copy as usize][axis] = f.position_m[axis];
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Sparse Cholesky factorisation A = L Lᵀ of the filtered matrix, by faer.
+//!
+//! The fill-reducing order (approximate minimum degree) and the pattern of L depend only on the
+//! pattern of A and are kept until that changes; prescribed directions become rows of the identity,
+//! so that holding or releasing a copy needs no new analysis. Refactorising and solving allocate
+//! nothing. Sequential, so the bits are the same on any number of threads.
+
+use faer::Par;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltError;
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Side};
+use nalgebra::Vector3;
+
+use super::constraint::Filter;
+use super::real::Real;
+use crate::assembly::BlockCsr;
+
+/// Symbolic and numeric factorisation of one matrix, with all memory it needs.
+#[derive(Default)]
+pub struct Cholesky<T> {
+    symbolic: Option<SymbolicCholesky<u32>>,
+    /// The upper triangle of A by columns: start of every column, row of every entry.
+    first: Vec<u32>,
+    rows: Vec<u32>,
+    /// Place of every entry in the blocks of A.
+    source: Vec<Source>,
+    values: Vec<T>,
+    factor: Vec<T>,
+    right: Vec<T>,
+    held: Vec<bool>,
+    scratch: Option<MemBuffer>,
+    factored: bool,
+}
+
+/// Entry `entry` of block `block`.
+#[derive(Clone, Copy, Debug)]
+struct Source {
+    block: u32,
+    entry: u8,
+}
+
+/// Why a factorisation failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// The pivot of this displacement (3 · copy + axis) is not positive.
+    Pivot(u32),
+    /// The machine has not enough memory for the factors, or the matrix is too large for its indices.
+    Memory,
+}
+
+impl<T> std::fmt::Debug for Cholesky<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Cholesky")
+            .field("rows", &self.first.len().saturating_sub(1))
+            .field("factor_entries", &self.factor.len())
+            .field("factored", &self.factored)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
+    /// Analyses the pattern of `A`: order of elimination and pattern of L.
+    pub fn analyse(&mut self, A: &BlockCsr<f64>) -> Result<(), Failure> {
+        (self.symbolic, self.factored) = (None, false);
+        let n = 3 * A.n_rows();
+        self.first.clear();
+        self.first.push(0);
+        self.rows.clear();
+        self.source.clear();
+        for i in 0..A.n_rows() {
+            for column in 0..3 {
+                for block in A.row(i).take_while(|&k| A.columns[k] as usize <= i) {
+                    let j = A.columns[block] as usize;
+                    // A is symmetric: entry (3 j + row, 3 i + column) is (column, row) of block (i, j).
+                    for row in (0..3).filter(|&row| 3 * j + row <= 3 * i + column) {
+                        self.rows.push((3 * j + row) as u32);
+                        self.source.push(Source { block: block as u32, entry: (3 * column + row) as u8 });
+                    }
+                }
+                self.first.push(u32::try_from(self.rows.len()).map_err(|_| Failure::Memory)?);
+            }
+        }
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.first, None, &self.rows);
+        let symbolic =
+            factorize_symbolic_cholesky(pattern, Side::Upper, Default::default(), Default::default())
+                .map_err(|_| Failure::Memory)?;
+        let need = symbolic
+            .factorize_numeric_llt_scratch::<T>(Par::Seq, Default::default())
+            .or(symbolic.solve_in_place_scratch::<T>(1, Par::Seq));
+        self.scratch = Some(MemBuffer::try_new(need).map_err(|_| Failure::Memory)?);
+        self.factor.clear();
+        self.factor.try_reserve_exact(symbolic.len_val()).map_err(|_| Failure::Memory)?;
+        self.factor.resize(symbolic.len_val(), T::default());
+        self.values.resize(self.rows.len(), T::default());
+        self.right.resize(n, T::default());
+        self.held.resize(n, false);
+        self.symbolic = Some(symbolic);
+        Ok(())
+    }
+
+    /// Computes L from the values of `A`, whose pattern was analysed.
+    pub fn factorise(&mut self, A: &BlockCsr<f64>, filter: &Filter) -> Result<(), Failure> {
+        self.factored = false;
+        let (Some(symbolic), Some(scratch)) = (&self.symbolic, &mut self.scratch) else {
+            return Err(Failure::Memory);
+        };
+        let n = self.right.len();
+        self.held.fill(false);
+        for &(copy, axes) in filter.held() {
+            for axis in (0..3).filter(|&axis| axes[axis]) {
+                self.held[3 * copy as usize + axis] = true;
+            }
+        }
+        for column in 0..n {
+            for k in self.first[column] as usize..self.first[column + 1] as usize {
+                let Source { block, entry } = self.source[k];
+                let row = self.rows[k] as usize;
+                let value = A.blocks[block as usize][entry as usize];
+                // A copy without mass and stiffness stays where it is.
+                let idle = self.held[row] || self.held[column] || (row == column && value == 0.0);
+                self.values[k] = T::of(if !idle { value } else { f64::from(u8::from(row == column)) });
+            }
+        }
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.first, None, &self.rows);
+        symbolic
+            .factorize_numeric_llt(
+                &mut self.factor,
+                SparseColMatRef::new(pattern, &self.values),
+                Side::Upper,
+                Default::default(),
+                Par::Seq,
+                MemStack::new(scratch),
+                Default::default(),
+            )
+            .map_err(|LltError::NonPositivePivot { index }| {
+                Failure::Pivot(symbolic.perm().map_or(index as u32, |order| order.arrays().0[index]))
+            })?;
+        self.factored = true;
+        Ok(())
+    }
+
+    /// z = scale · (L Lᵀ)⁻¹ (r / scale), with the solve in the precision of the factor.
+    /// Prescribed directions must be 0 in `r`; without a factor z = 0.
+    pub fn solve(&mut self, r: &[Vector3<f64>], z: &mut [Vector3<f64>], scale: f64) {
+        let (Some(symbolic), Some(scratch), true) = (&self.symbolic, &mut self.scratch, self.factored) else {
+            return z.fill(Vector3::zeros());
+        };
+        for (right, r) in self.right.chunks_exact_mut(3).zip(r) {
+            (0..3).for_each(|k| right[k] = T::of(r[k] / scale));
+        }
+        let n = self.right.len();
+        LltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(&mut self.right, n, 1),
+            Par::Seq,
+            MemStack::new(scratch),
+        );
+        for (z, right) in z.iter_mut().zip(self.right.chunks_exact(3)) {
+            *z = Vector3::from_fn(|k, _| right[k].wide() * scale);
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Conjugate gradients on an assembled matrix: with the constraint filter alone, or preconditioned by
+//! the inverse diagonal blocks; in double precision, or in single precision with reliable updates.
+//!
+//! The thesis' ModifiedCG (Jeřábková 2007, Fig. 4.15) with its misprints corrected: the residual
+//! starts from b − A x and not from b, the search direction from zero, and the loop stops on the
+//! preconditioned residual relative to the loads instead of on |r| in whatever unit.
+
+use nalgebra::Vector3;
+
+use super::algebraic_error::AlgebraicError;
+use super::block_jacobi::{DiagonalInverse, root};
+use super::constraint::Filter;
+use super::real::{Real, dot};
+use super::report::{LinearReport, StopReason};
+use crate::assembly::BlockCsr;
+use crate::operator::BLOCK;
+use crate::team::{Team, blocks};
+
+/// The true residual is computed when the recursion says it fell by this factor (Clark et al. 2010).
+const RELIABLE: f64 = 0.1;
+/// The solver gives up when the true residual has not halved this often in a row.
+const FUTILE: u32 = 2;
+
+/// A filtered matrix with its diagonal, in double precision and in that of the iteration.
+#[derive(Clone, Copy, Debug)]
+pub struct System<'a, T> {
+    /// A, for true residuals.
+    pub exact: &'a BlockCsr<f64>,
+    /// A, rounded to the precision of the iteration.
+    pub working: &'a BlockCsr<T>,
+    /// Prescribed directions.
+    pub filter: &'a Filter,
+    /// M⁻¹ of `exact`.
+    pub exact_inverse: &'a DiagonalInverse<f64>,
+    /// M⁻¹ of `working`.
+    pub inverse: &'a DiagonalInverse<T>,
+    /// Whether M⁻¹ preconditions the iteration; the norm in which it stops is that of M⁻¹ anyway.
+    pub preconditioned: bool,
+}
+
+/// When conjugate gradients stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop {
+    /// At this √(rᵀM⁻¹r), not relative to anything.
+    pub target: f64,
+    /// After so many iterations.
+    pub iterations: u32,
+}
+
+/// Scratch vectors, one entry per copy; reused from solve to solve.
+#[derive(Clone, Debug, Default)]
+pub struct ConjugateGradients<T> {
+    r: Vec<Vector3<T>>,
+    z: Vec<Vector3<T>>,
+    p: Vec<Vector3<T>>,
+    q: Vec<Vector3<T>>,
+    /// Correction since the last true residual.
+    d: Vec<Vector3<T>>,
+    residual: Vec<Vector3<f64>>,
+    sums: Vec<[f64; 2]>,
+}
+
+/// rᵀz, which steers the iteration, and √(rᵀM⁻¹r), on which it stops.
+#[derive(Clone, Copy, Debug)]
+struct Size {
+    rho: f64,
+    norm: f64,
+}
+
+impl<T: Real> ConjugateGradients<T> {
+    fn resize(&mut self, n: usize) {
+        for v in [&mut self.r, &mut self.z, &mut self.p, &mut self.q, &mut self.d] {
+            v.resize(n, Vector3::zeros());
+        }
+        self.residual.resize(n, Vector3::zeros());
+        self.sums.resize(n.div_ceil(BLOCK), [0.0; 2]);
+    }
+
+    /// Improves `x` until the true residual is small enough; prescribed directions of `x` stay.
+    ///
+    /// The residual of the report is not relative: the caller divides by its reference.
+    pub fn solve(
+        &mut self,
+        team: &mut Team,
+        system: &System<'_, T>,
+        b: &[Vector3<f64>],
+        x: &mut [Vector3<f64>],
+        stop: Stop,
+    ) -> LinearReport {
+        self.resize(x.len());
+        self.p.fill(Vector3::zeros());
+        self.d.fill(Vector3::zeros());
+        let mut report = LinearReport::default();
+        let mut error = AlgebraicError::default();
+        // The iteration works on r / scale, so that single precision does not mind the units.
+        let scale = self.true_residual(team, system, b, x, 0.0);
+        let mut checked = scale;
+        report.residual = scale;
+        report.stop = verdict(scale, stop.target);
+        if report.stop != StopReason::IterationLimit || stop.iterations == 0 {
+            return report;
+        }
+        let mut size = self.restart(team, system, scale);
+        let (mut beta, mut futile) = (0.0, 0);
+        loop {
+            let curvature = self.direction(team, system, beta);
+            if !curvature.is_finite() || curvature <= 0.0 {
+                report.residual = self.true_residual(team, system, b, x, scale);
+                report.algebraic_error = error.norm();
+                report.stop = if curvature.is_finite() && report.residual.is_finite() {
+                    StopReason::NonPositiveCurvature
+                } else {
+                    StopReason::NonFinite
+                };
+                return report;
+            }
+            let alpha = size.rho / curvature;
+            let mut next = self.advance(team, system, alpha);
+            error.add(alpha * size.rho * scale * scale);
+            report.iterations += 1;
+            let norm = next.norm * scale;
+            let last = report.iterations == stop.iterations;
+            let doubtful = size_of::<T>() == 4 && norm <= RELIABLE * checked;
+            if norm <= stop.target || doubtful || last || !norm.is_finite() {
+                let known = self.true_residual(team, system, b, x, scale);
+                report.refinements += 1;
+                report.residual = known;
+                report.algebraic_error = error.norm();
+                report.stop = verdict(known, stop.target);
+                futile = if known > 0.5 * checked { futile + 1 } else { 0 };
+                if report.stop == StopReason::IterationLimit && futile == FUTILE && !last {
+                    report.stop = StopReason::Stagnated;
+                }
+                if report.stop != StopReason::IterationLimit || last {
+                    return report;
+                }
+                checked = known;
+                next = self.restart(team, system, scale);
+            }
+            beta = next.rho / size.rho;
+            size = next;
+        }
+    }
+
+    /// x += scale · d, d = 0, residual = S (b − A x); returns √(rᵀM⁻¹r) of it.
+    fn true_residual(
+        &mut self,
+        team: &mut Team,
+        system: &System<'_, T>,
+        b: &[Vector3<f64>],
+        x: &mut [Vector3<f64>],
+        scale: f64,
+    ) -> f64 {
+        for (x, d) in x.iter_mut().zip(&mut self.d) {
+            *x += d.map(|d| d.wide() * scale);
+            *d = Vector3::zeros();
+        }
+        let x = &*x;
+        team.for_blocks(blocks(&mut self.residual, BLOCK), |block, r| {
+            for (i, r) in r.iter_mut().enumerate() {
+                let c = block * BLOCK + i;
+                *r = b[c] - row_times(system.exact, c, x);
+            }
+        });
+        system.filter.apply(&mut self.residual);
+        system.exact_inverse.norm(&self.residual)
+    }
+
+    /// r = residual / scale, z = M⁻¹ r.
+    fn restart(&mut self, team: &mut Team, system: &System<'_, T>, scale: f64) -> Size {
+        let (residual, inverse) = (&self.residual, system.inverse);
+        let state = (blocks(&mut self.r, BLOCK), blocks(&mut self.z, BLOCK), blocks(&mut self.sums, 1));
+        team.for_blocks(state, |block, (r, z, sums)| {
+            sums[0] = [0.0; 2];
+            for (i, (r, z)) in r.iter_mut().zip(z).enumerate() {
+                let c = block * BLOCK + i;
+                *r = residual[c].map(|v| T::of(v / scale));
+                *z = inverse.times(c, r);
+                sums[0][0] += dot(r, z);
+                sums[0][1] += dot(r, r);
+            }
+        });
+        self.size(system)
+    }
+
+    /// p ← z + β p (r in place of z without preconditioner), q = S A p; returns pᵀA p.
+    fn direction(&mut self, team: &mut Team, system: &System<'_, T>, beta: f64) -> f64 {
+        let (towards, beta) = (if system.preconditioned { &self.z } else { &self.r }, T::of(beta));
+        team.for_blocks(blocks(&mut self.p, BLOCK), |block, p| {
+            for (i, p) in p.iter_mut().enumerate() {
+                *p = towards[block * BLOCK + i] + *p * beta;
+            }
+        });
+        let p = &self.p;
+        team.for_blocks((blocks(&mut self.q, BLOCK), blocks(&mut self.sums, 1)), |block, (q, sums)| {
+            sums[0] = [0.0; 2];
+            for (i, q) in q.iter_mut().enumerate() {
+                let c = block * BLOCK + i;
+                *q = row_times(system.working, c, p);
+                sums[0][0] += dot(&p[c], q);
+            }
+        });
+        system.filter.apply(&mut self.q);
+        self.sums.iter().map(|s| s[0]).sum()
+    }
+
+    /// d += α p, r −= α q, z = M⁻¹ r.
+    fn advance(&mut self, team: &mut Team, system: &System<'_, T>, alpha: f64) -> Size {
+        let (p, q, alpha, inverse) = (&self.p, &self.q, T::of(alpha), system.inverse);
+        let state = (
+            blocks(&mut self.d, BLOCK),
+            blocks(&mut self.r, BLOCK),
+            blocks(&mut self.z, BLOCK),
+            blocks(&mut self.sums, 1),
+        );
+        team.for_blocks(state, |block, (d, r, z, sums)| {
+            sums[0] = [0.0; 2];
+            for (i, ((d, r), z)) in d.iter_mut().zip(r).zip(z).enumerate() {
+                let c = block * BLOCK + i;
+                *d += p[c] * alpha;
+                *r -= q[c] * alpha;
+                *z = inverse.times(c, r);
+                sums[0][0] += dot(r, z);
+                sums[0][1] += dot(r, r);
+            }
+        });
+        self.size(system)
+    }
+
+    fn size(&self, system: &System<'_, T>) -> Size {
+        let sum = |k: usize| self.sums.iter().map(|s| s[k]).sum::<f64>();
+        let squared = sum(0);
+        let rho = if system.preconditioned { squared } else { sum(1) };
+        Size { rho, norm: root(squared) }
+    }
+}
+
+/// Whether a residual norm ends the iteration; `IterationLimit` if it does not.
+fn verdict(norm: f64, target: f64) -> StopReason {
+    if !norm.is_finite() {
+        StopReason::NonFinite
+    } else if norm <= target {
+        StopReason::Converged
+    } else {
+        StopReason::IterationLimit
+    }
+}
+
+/// Row `i` of A x.
+#[inline(always)]
+pub fn row_times<T: Real>(A: &BlockCsr<T>, i: usize, x: &[Vector3<T>]) -> Vector3<T> {
+    let row = A.row(i);
+    let mut y = [T::zero(); 3];
+    for (A, &j) in A.blocks[row.clone()].iter().zip(&A.columns[row]) {
+        let x = &x[j as usize];
+        for k in 0..3 {
+            y[k] += A[3 * k] * x.x + A[3 * k + 1] * x.y + A[3 * k + 2] * x.z;
+        }
+    }
+    y.into()
+}

@@ -1,0 +1,321 @@
+//! A x = b for an assembled matrix, by the method and in the precision that the user chose.
+
+use nalgebra::Vector3;
+
+use super::block_jacobi::DiagonalInverse;
+use super::cholesky::{Cholesky, Failure};
+use super::conjugate_gradients::{ConjugateGradients, Stop, System, row_times};
+use super::constraint::Filter;
+use super::real::Real;
+use super::report::{LinearReport, StopReason};
+use crate::assembly::BlockCsr;
+use crate::operator::{BLOCK, FixedCopy};
+use crate::team::{Team, blocks};
+
+/// How A x = b is solved.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Conjugate gradients with nothing but the constraint filter: the thesis' modified CG.
+    Cg,
+    /// Conjugate gradients preconditioned by the inverse 3×3 diagonal blocks.
+    #[default]
+    Pcg,
+    /// Sparse Cholesky factorisation; the analysis is kept while the pattern stays.
+    Cholesky,
+}
+
+/// The precision of the work inside a linear solve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// Residuals and solution in double, everything else in single precision: as accurate as `Double`
+    /// at half the memory traffic.
+    #[default]
+    Mixed,
+    /// Everything in double precision.
+    Double,
+}
+
+/// How and how far a linear system is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearSettings {
+    /// The method.
+    pub method: Method,
+    /// The precision.
+    pub precision: Precision,
+    /// Most iterations; for a factorisation most solves with the factors.
+    pub iterations: u32,
+    /// Stop at √(rᵀM⁻¹r) ≤ tolerance · reference, with M the 3×3 diagonal blocks of A.
+    pub tolerance: f64,
+}
+
+impl Default for LinearSettings {
+    fn default() -> Self {
+        Self { method: Method::Pcg, precision: Precision::Mixed, iterations: 5_000, tolerance: 1e-8 }
+    }
+}
+
+/// Corrections of a direct solve before it counts as stagnated.
+const MOST_CORRECTIONS: u32 = 20;
+
+/// Solves linear systems again and again; nothing is allocated unless the pattern changes.
+#[derive(Debug, Default)]
+pub struct LinearSolver {
+    /// How and how far; may be changed between solves.
+    pub settings: LinearSettings,
+    filter: Filter,
+    inverse: DiagonalInverse<f64>,
+    single: Single,
+    double: ConjugateGradients<f64>,
+    factors: Factors<f64>,
+    single_factors: Factors<f32>,
+    r: Vec<Vector3<f64>>,
+    z: Vec<Vector3<f64>>,
+}
+
+/// What single-precision iterations need.
+#[derive(Debug, Default)]
+struct Single {
+    matrix: BlockCsr<f32>,
+    inverse: DiagonalInverse<f32>,
+    current: bool,
+    gradients: ConjugateGradients<f32>,
+}
+
+/// A factorisation and the pattern and matrix that it is of.
+#[derive(Debug, Default)]
+struct Factors<T> {
+    cholesky: Cholesky<T>,
+    first: Vec<u32>,
+    columns: Vec<u32>,
+    /// Result for the present matrix, once it was factorised.
+    current: Option<Result<(), Failure>>,
+}
+
+impl LinearSolver {
+    /// A solver with these settings.
+    pub fn new(settings: LinearSettings) -> Self {
+        Self { settings, ..Self::default() }
+    }
+
+    /// Takes over the values of a new matrix and which directions are prescribed.
+    ///
+    /// Must be called whenever either has changed, before [`solve`](Self::solve) and
+    /// [`norm`](Self::norm); a matrix that stays is factorised only once.
+    pub fn set_matrix(&mut self, A: &BlockCsr<f64>, fixed: &[FixedCopy]) {
+        self.filter.set(fixed);
+        self.inverse.update(A, &self.filter);
+        self.single.current = false;
+        self.factors.current = None;
+        self.single_factors.current = None;
+    }
+
+    /// √(vᵀM⁻¹v), in which residuals are measured; prescribed directions do not count.
+    pub fn norm(&self, v: &[Vector3<f64>]) -> f64 {
+        self.inverse.norm(v)
+    }
+
+    /// z = M⁻¹ r, the block-Jacobi step.
+    pub fn precondition(&self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
+        self.inverse.apply(r, z);
+    }
+
+    /// Sets the prescribed directions of `v` to 0.
+    pub fn filter(&self, v: &mut [Vector3<f64>]) {
+        self.filter.apply(v);
+    }
+
+    /// Improves `x` until the residual of A x = b is below tolerance · `reference` (√(bᵀM⁻¹b) where
+    /// that is `None`), with the matrix of the last [`set_matrix`](Self::set_matrix).
+    ///
+    /// Prescribed directions of `x` stay as they are. Whatever happens, `x` is the best iterate found
+    /// and the report says how good it is; if it says [`StopReason::NonFinite`], `x` is useless.
+    pub fn solve(
+        &mut self,
+        team: &mut Team,
+        A: &BlockCsr<f64>,
+        b: &[Vector3<f64>],
+        x: &mut [Vector3<f64>],
+        reference: Option<f64>,
+    ) -> LinearReport {
+        let reference = reference.unwrap_or_else(|| self.inverse.norm(b));
+        let stop = Stop { target: self.settings.tolerance * reference, iterations: self.settings.iterations };
+        let mut report = match self.settings.method {
+            Method::Cholesky => self.direct(team, A, b, x, stop),
+            method => self.iterate(team, A, b, x, (stop, method == Method::Pcg)),
+        };
+        if reference > 0.0 {
+            report.residual /= reference;
+        }
+        report
+    }
+
+    fn iterate(
+        &mut self,
+        team: &mut Team,
+        A: &BlockCsr<f64>,
+        b: &[Vector3<f64>],
+        x: &mut [Vector3<f64>],
+        (stop, preconditioned): (Stop, bool),
+    ) -> LinearReport {
+        let Self { filter, inverse, single, double, .. } = self;
+        let (filter, exact_inverse) = (&*filter, &*inverse);
+        if self.settings.precision == Precision::Double {
+            let system = System {
+                exact: A,
+                working: A,
+                filter,
+                exact_inverse,
+                inverse: exact_inverse,
+                preconditioned,
+            };
+            return double.solve(team, &system, b, x, stop);
+        }
+        if !single.current {
+            A.to_f32(&mut single.matrix);
+            single.inverse.update(A, filter);
+            single.current = true;
+        }
+        let system = System {
+            exact: A,
+            working: &single.matrix,
+            filter,
+            exact_inverse,
+            inverse: &single.inverse,
+            preconditioned,
+        };
+        single.gradients.solve(team, &system, b, x, stop)
+    }
+
+    fn direct(
+        &mut self,
+        team: &mut Team,
+        A: &BlockCsr<f64>,
+        b: &[Vector3<f64>],
+        x: &mut [Vector3<f64>],
+        stop: Stop,
+    ) -> LinearReport {
+        self.r.resize(x.len(), Vector3::zeros());
+        self.z.resize(x.len(), Vector3::zeros());
+        let mut report = LinearReport::default();
+        // A single-precision factor that is not good enough is followed by one in double precision.
+        if self.settings.precision == Precision::Mixed && self.single_factors.prepare(A, &self.filter).is_ok()
+        {
+            let Self { single_factors, filter, inverse, r, z, .. } = self;
+            let work = Correction { A, b, filter, inverse, r, z };
+            work.run(team, x, &mut single_factors.cholesky, stop, &mut report);
+            if report.stop != StopReason::Stagnated {
+                return report;
+            }
+        }
+        match self.factors.prepare(A, &self.filter) {
+            Ok(()) => {
+                let Self { factors, filter, inverse, r, z, .. } = self;
+                let work = Correction { A, b, filter, inverse, r, z };
+                work.run(team, x, &mut factors.cholesky, stop, &mut report);
+                report
+            }
+            Err(Failure::Pivot(pivot)) => {
+                let Self { filter, inverse, r, z, .. } = self;
+                let residual = Correction { A, b, filter, inverse, r, z }.residual(team, x);
+                let stop = StopReason::NonPositiveCurvature;
+                LinearReport { residual, stop, pivot: Some(pivot), ..report }
+            }
+            // No room for the factors: conjugate gradients need none.
+            Err(Failure::Memory) => self.iterate(team, A, b, x, (stop, true)),
+        }
+    }
+}
+
+impl<T: Real + faer::traits::ComplexField> Factors<T> {
+    fn prepare(&mut self, A: &BlockCsr<f64>, filter: &Filter) -> Result<(), Failure> {
+        if let Some(known) = self.current {
+            return known;
+        }
+        let mut result = Ok(());
+        if self.first != A.first || self.columns != A.columns {
+            self.first.clear();
+            result = self.cholesky.analyse(A);
+            if result.is_ok() {
+                self.first.clone_from(&A.first);
+                self.columns.clone_from(&A.columns);
+            }
+        }
+        let result = result.and_then(|()| self.cholesky.factorise(A, filter));
+        self.current = Some(result);
+        result
+    }
+}
+
+/// Iterative refinement: x ← x + (L Lᵀ)⁻¹ (b − A x).
+struct Correction<'a> {
+    A: &'a BlockCsr<f64>,
+    b: &'a [Vector3<f64>],
+    filter: &'a Filter,
+    inverse: &'a DiagonalInverse<f64>,
+    r: &'a mut [Vector3<f64>],
+    z: &'a mut [Vector3<f64>],
+}
+
+impl Correction<'_> {
+    fn run<T: Real + faer::traits::ComplexField>(
+        mut self,
+        team: &mut Team,
+        x: &mut [Vector3<f64>],
+        cholesky: &mut Cholesky<T>,
+        stop: Stop,
+        report: &mut LinearReport,
+    ) {
+        report.residual = self.residual(team, x);
+        let mut corrections = 0;
+        loop {
+            report.stop = if !report.residual.is_finite() {
+                StopReason::NonFinite
+            } else if report.residual <= stop.target {
+                StopReason::Converged
+            } else if report.iterations >= stop.iterations {
+                StopReason::IterationLimit
+            } else if corrections == MOST_CORRECTIONS {
+                StopReason::Stagnated
+            } else {
+                let before = report.residual;
+                cholesky.solve(self.r, self.z, before);
+                let energy: f64 = self.r.iter().zip(&*self.z).map(|(r, z)| r.dot(z)).sum();
+                add(x, self.z, 1.0);
+                report.residual = self.residual(team, x);
+                report.iterations += 1;
+                report.refinements += 1;
+                corrections += 1;
+                // The correction was the error; what is left of it shrank as the residual did.
+                report.algebraic_error = energy.max(0.0).sqrt() * (report.residual / before).min(1.0);
+                if report.residual > stop.target && report.residual > 0.5 * before {
+                    if report.residual >= before {
+                        add(x, self.z, -1.0);
+                        report.residual = self.residual(team, x);
+                    }
+                    corrections = MOST_CORRECTIONS;
+                }
+                continue;
+            };
+            return;
+        }
+    }
+
+    /// r = S (b − A x); returns √(rᵀM⁻¹r).
+    fn residual(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
+        let (A, b) = (self.A, self.b);
+        team.for_blocks(blocks(self.r, BLOCK), |block, r| {
+            for (i, r) in r.iter_mut().enumerate() {
+                let c = block * BLOCK + i;
+                *r = b[c] - row_times(A, c, x);
+            }
+        });
+        self.filter.apply(self.r);
+        self.inverse.norm(self.r)
+    }
+}
+
+fn add(x: &mut [Vector3<f64>], z: &[Vector3<f64>], factor: f64) {
+    for (x, z) in x.iter_mut().zip(z) {
+        *x += factor * z;
+    }
+}

@@ -1,0 +1,286 @@
+//! Newton's method with backtracking: minimises a potential, whatever the start.
+//!
+//! H p = −∇Φ, then x ← x + t p with the first t ∈ {1, ½, ¼, …} that lowers Φ enough (Armijo 1966).
+//! A Φ that is not finite counts as +∞. Where p leads nowhere, the block-Jacobi gradient −M⁻¹∇Φ is
+//! tried; where that fails too no step is taken: an unchecked step can overflow.
+
+use nalgebra::Vector3;
+
+use super::linear::{LinearSettings, LinearSolver};
+use super::report::StopReason;
+use crate::assembly::BlockCsr;
+use crate::operator::FixedCopy;
+use crate::team::Team;
+
+/// Something with a minimum: potential energy, or that plus the inertia of a time step.
+pub trait Potential {
+    /// Φ(x) [J]; may be infinite or NaN where x is impossible.
+    fn value(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64;
+
+    /// g = ∇Φ(x) [N], prescribed directions included; returns Φ(x).
+    fn gradient(&mut self, team: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64;
+
+    /// A zero matrix with the pattern of ∇²Φ.
+    fn pattern(&mut self) -> BlockCsr<f64>;
+
+    /// H = ∇²Φ(x) [N/m], or a positive semidefinite approximation of it where `curvature` asks so.
+    fn hessian(&mut self, team: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>);
+
+    /// Writes the forces [N] against which the residual is measured: loads, inertia.
+    fn loads(&mut self, loads: &mut [Vector3<f64>]);
+}
+
+/// Which Hessian Newton's method asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Curvature {
+    /// The second derivative; a step at which it turns out indefinite is made with `Definite`.
+    Exact,
+    /// Projected to positive semidefinite: always a descent direction.
+    #[default]
+    Definite,
+}
+
+/// How and how far a potential is minimised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NewtonSettings {
+    /// Most Newton steps.
+    pub steps: u32,
+    /// Stop at √(gᵀM⁻¹g) ≤ tolerance · reference; reference is the norm of the loads, or of the first
+    /// gradient where that is larger.
+    pub tolerance: f64,
+    /// Most halvings of a step: 8 as a rule, 20 to recover from ruined states.
+    pub halvings: u32,
+    /// Which Hessian.
+    pub curvature: Curvature,
+    /// The linear solver; its tolerance is the largest forcing term η.
+    pub linear: LinearSettings,
+}
+
+impl Default for NewtonSettings {
+    fn default() -> Self {
+        Self {
+            steps: 100,
+            tolerance: 1e-8,
+            halvings: 8,
+            curvature: Curvature::Definite,
+            linear: LinearSettings { tolerance: 0.1, ..LinearSettings::default() },
+        }
+    }
+}
+
+/// How a minimisation went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NewtonReport {
+    /// Newton steps made, gradient steps included.
+    pub steps: u32,
+    /// Iterations of all linear solves.
+    pub linear_iterations: u32,
+    /// √(gᵀM⁻¹g) at the end, over the reference.
+    pub residual: f64,
+    /// The reference itself [√J]: the norm of the loads, or of the first gradient.
+    pub reference: f64,
+    /// Why it stopped.
+    pub stop: StopReason,
+    /// Halvings of all line searches.
+    pub backtracks: u32,
+    /// Steps at which the Hessian was found indefinite.
+    pub indefinite: u32,
+    /// Steps along the block-Jacobi gradient, because Newton's direction led nowhere.
+    pub gradient_steps: u32,
+    /// Φ at the end [J].
+    pub potential: f64,
+    /// Algebraic error of the last linear solve [√J].
+    pub algebraic_error: f64,
+}
+
+/// Newton's method with all its memory; reused from solve to solve without allocation.
+#[derive(Debug, Default)]
+pub struct Newton {
+    /// How and how far; may be changed between solves.
+    pub settings: NewtonSettings,
+    solver: LinearSolver,
+    hessian: BlockCsr<f64>,
+    g: Vec<Vector3<f64>>,
+    minus_g: Vec<Vector3<f64>>,
+    p: Vec<Vector3<f64>>,
+    trial: Vec<Vector3<f64>>,
+    trial_g: Vec<Vector3<f64>>,
+    loads: Vec<Vector3<f64>>,
+}
+
+/// Armijo's factor: the part of the promised decrease that a step must keep.
+const ARMIJO: f64 = 1e-4;
+/// Differences of Φ below this part of the largest |Φ| met are rounding.
+const ROUNDING: f64 = 1e-12;
+/// Halvings of a gradient step, whose length has no natural scale.
+const GRADIENT_HALVINGS: u32 = 40;
+
+impl Newton {
+    /// A minimiser with these settings.
+    pub fn new(settings: NewtonSettings) -> Self {
+        Self { settings, ..Self::default() }
+    }
+
+    /// Prepares for potentials with the pattern of this one; to be called again when it changes.
+    pub fn prepare(&mut self, potential: &mut dyn Potential) {
+        self.hessian = potential.pattern();
+        let n = self.hessian.n_rows();
+        let Self { g, minus_g, p, trial, trial_g, loads, .. } = self;
+        for v in [g, minus_g, p, trial, trial_g, loads] {
+            v.clear();
+            v.resize(n, Vector3::zeros());
+        }
+    }
+
+    /// Moves `x` to a minimum of the potential; prescribed directions stay where they are.
+    ///
+    /// `x` only ever moves to states of lower potential, so it stays finite if it was.
+    pub fn minimise(
+        &mut self,
+        team: &mut Team,
+        potential: &mut dyn Potential,
+        x: &mut [Vector3<f64>],
+        fixed: &[FixedCopy],
+    ) -> NewtonReport {
+        if self.hessian.n_rows() != x.len() {
+            self.prepare(potential);
+        }
+        let mut report = NewtonReport::default();
+        let mut phi = potential.gradient(team, x, &mut self.g);
+        let mut largest = phi.abs();
+        let mut first = None;
+        let mut curvature = self.settings.curvature;
+        loop {
+            report.potential = phi;
+            if !phi.is_finite() || !self.g.iter().all(|g| g.norm_squared().is_finite()) {
+                report.stop = StopReason::NonFinite;
+                return report;
+            }
+            // After the first step the previous preconditioner tells first whether all is done.
+            if first.is_some() && self.measure(potential, &mut report, &mut first) {
+                return report;
+            }
+            potential.hessian(team, x, curvature, &mut self.hessian);
+            self.solver.set_matrix(&self.hessian, fixed);
+            if self.measure(potential, &mut report, &mut first) {
+                return report;
+            }
+            if report.steps == self.settings.steps {
+                report.stop = StopReason::IterationLimit;
+                return report;
+            }
+            let definite = self.direction(team, &mut report);
+            if !definite && curvature == Curvature::Exact {
+                curvature = Curvature::Definite;
+                continue;
+            }
+            let slope = dot(&self.g, &self.p);
+            let halvings = self.settings.halvings;
+            let mut next = self.search(team, potential, (x, phi), (slope, largest, halvings), &mut report);
+            if next.is_none() {
+                self.solver.precondition(&self.minus_g, &mut self.p);
+                let slope = dot(&self.g, &self.p);
+                next =
+                    self.search(team, potential, (x, phi), (slope, largest, GRADIENT_HALVINGS), &mut report);
+                report.gradient_steps += u32::from(next.is_some());
+            }
+            let Some(next) = next else {
+                let rounding = slope.abs() <= 1e3 * ROUNDING * largest;
+                report.stop = if rounding { StopReason::Stagnated } else { StopReason::NoDescent };
+                return report;
+            };
+            phi = next;
+            largest = largest.max(phi.abs());
+            x.copy_from_slice(&self.trial);
+            std::mem::swap(&mut self.g, &mut self.trial_g);
+            report.steps += 1;
+            curvature = self.settings.curvature;
+        }
+    }
+
+    /// Writes the residual into the report; whether the tolerance is reached.
+    fn measure(
+        &mut self,
+        potential: &mut dyn Potential,
+        report: &mut NewtonReport,
+        first: &mut Option<f64>,
+    ) -> bool {
+        self.solver.filter(&mut self.g);
+        potential.loads(&mut self.loads);
+        self.solver.filter(&mut self.loads);
+        let norm = self.solver.norm(&self.g);
+        report.reference = self.solver.norm(&self.loads).max(*first.get_or_insert(norm));
+        report.residual = if report.reference > 0.0 { norm / report.reference } else { norm };
+        report.stop = StopReason::Converged;
+        norm <= self.settings.tolerance * report.reference
+    }
+
+    /// p with H p ≈ −g; whether H showed no direction of non-positive curvature.
+    fn direction(&mut self, team: &mut Team, report: &mut NewtonReport) -> bool {
+        for (minus_g, g) in self.minus_g.iter_mut().zip(&self.g) {
+            *minus_g = -g;
+        }
+        self.p.fill(Vector3::zeros());
+        // Eisenstat, Walker 1996: solve the more accurately, the closer the end; never beyond it.
+        let linear = self.settings.linear;
+        let needed = 0.1 * self.settings.tolerance / report.residual.max(f64::MIN_POSITIVE);
+        let tolerance = linear.tolerance.min(report.residual.sqrt()).max(needed.min(0.1));
+        self.solver.settings = LinearSettings { tolerance, ..linear };
+        let solved = self.solver.solve(team, &self.hessian, &self.minus_g, &mut self.p, None);
+        report.linear_iterations += solved.iterations;
+        report.algebraic_error = solved.algebraic_error;
+        let definite = solved.stop != StopReason::NonPositiveCurvature;
+        report.indefinite += u32::from(!definite);
+        if solved.stop == StopReason::NonFinite {
+            self.p.fill(Vector3::zeros());
+        }
+        definite
+    }
+
+    /// The largest t ∈ {1, ½, …} that lowers Φ enough: Φ there, with x + t p in `trial` and its
+    /// gradient in `trial_g`; `None` if there is none.
+    ///
+    /// Close to the minimum Φ cannot resolve the decrease any more. There the slope decides instead
+    /// (approximate Wolfe condition, Hager, Zhang 2005), or a gradient that is halved.
+    fn search(
+        &mut self,
+        team: &mut Team,
+        potential: &mut dyn Potential,
+        (x, phi): (&[Vector3<f64>], f64),
+        (slope, largest, halvings): (f64, f64, u32),
+        report: &mut NewtonReport,
+    ) -> Option<f64> {
+        if slope >= 0.0 || !slope.is_finite() {
+            return None;
+        }
+        let rounding = ROUNDING * largest;
+        let before = self.solver.norm(&self.g);
+        let mut t = 1.0;
+        for halving in 0..=halvings {
+            for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.p) {
+                *trial = x + t * p;
+            }
+            let mut next = potential.value(team, &self.trial);
+            if next.is_finite() && next <= phi + ARMIJO * t * slope + rounding {
+                next = potential.gradient(team, &self.trial, &mut self.trial_g);
+                self.solver.filter(&mut self.trial_g);
+                let certain = -ARMIJO * t * slope > rounding;
+                let flatter = || {
+                    dot(&self.trial_g, &self.p).abs() <= (1.0 - 2.0 * ARMIJO) * slope.abs()
+                        || self.solver.norm(&self.trial_g) <= 0.5 * before
+                };
+                let lower = next <= phi + ARMIJO * t * slope;
+                if (lower && certain) || (self.trial_g.iter().all(|g| g.norm().is_finite()) && flatter()) {
+                    return Some(next);
+                }
+            }
+            report.backtracks += u32::from(halving < halvings);
+            t *= 0.5;
+        }
+        None
+    }
+}
+
+fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}
