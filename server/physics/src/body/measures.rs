@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Body;
 use crate::cut::Piece;
-use crate::element::{deformation_gradient, piece_energy, piece_forces, polar_rotation};
+use crate::element::{deformation_gradient, piece_energy, piece_forces};
 
 impl Body {
     /// Σ m [kg].
@@ -37,7 +37,7 @@ impl Body {
     /// Σ w V ψ(F) over the pieces [J].
     pub fn elastic_energy(&self) -> f64 {
         let (law, lame) = (self.material.law, self.material.lame());
-        self.deformed_pieces().map(|d| piece_energy(law, lame, &d.F, &d.R, d.volume)).sum()
+        self.deformed_pieces().map(|d| piece_energy(law, lame, &d.F, d.volume)).sum()
     }
 
     /// Σ w V det F, the present volume [m³].
@@ -55,7 +55,7 @@ impl Body {
         let (law, lame) = (self.material.law, self.material.lame());
         let stress = |d: Deformed<'_>| {
             let J = d.F.determinant();
-            if J > 1e-9 { law.stress(&d.F, &d.R, lame) * d.F.transpose() / J } else { Matrix3::zeros() }
+            if J > 1e-9 { law.stress(&d.F, lame) * d.F.transpose() / J } else { Matrix3::zeros() }
         };
         self.deformed_pieces().map(stress).collect()
     }
@@ -74,8 +74,8 @@ impl Body {
         f_int.resize(self.state.x.len(), Vector3::zeros());
         let mut energy = 0.0;
         for d in self.deformed_pieces() {
-            energy += piece_energy(law, lame, &d.F, &d.R, d.volume);
-            let P = law.stress(&d.F, &d.R, lame);
+            energy += piece_energy(law, lame, &d.F, d.volume);
+            let P = law.stress(&d.F, lame);
             for (&copy, force) in d.piece.copies.iter().zip(piece_forces(&P, &d.g, d.volume)) {
                 f_int[copy as usize] += force;
             }
@@ -112,14 +112,12 @@ impl Body {
     }
 
     fn deformed_pieces(&self) -> impl Iterator<Item = Deformed<'_>> {
-        let rotations = self.elastic.rotations();
         let mesh = self.cut_mesh.mesh();
-        self.cut_mesh.pieces().iter().enumerate().map(move |(p, piece)| {
+        self.cut_mesh.pieces().iter().map(move |piece| {
             let e = piece.element as usize;
             let g = mesh.gradients(e);
             let F = deformation_gradient(&piece.copies.map(|c| self.state.x[c as usize]), &g);
-            let R = polar_rotation(&F, &rotations[p].map(f64::from));
-            Deformed { piece, F, R, g, volume: piece.fraction * mesh.volume(e) }
+            Deformed { piece, F, g, volume: piece.fraction * mesh.volume(e) }
         })
     }
 }
@@ -128,7 +126,6 @@ impl Body {
 struct Deformed<'a> {
     piece: &'a Piece,
     F: Matrix3<f64>,
-    R: Matrix3<f64>,
     g: [Vector3<f64>; 4],
     /// w V [m³] at rest.
     volume: f64,

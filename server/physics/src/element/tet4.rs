@@ -11,8 +11,8 @@ pub fn deformation_gradient(x: &[Vector3<f64>; 4], g: &[Vector3<f64>; 4]) -> Mat
 }
 
 /// Elastic energy w V ψ(F) [J] of a piece of volume `volume_m3` = w V.
-pub fn piece_energy(law: Law, lame: Lame, F: &Matrix3<f64>, R: &Matrix3<f64>, volume_m3: f64) -> f64 {
-    volume_m3 * law.energy(F, R, lame)
+pub fn piece_energy(law: Law, lame: Lame, F: &Matrix3<f64>, volume_m3: f64) -> f64 {
+    volume_m3 * law.energy(F, lame)
 }
 
 /// Internal forces f_a = w V P g_a [N] of a piece, to be subtracted from the loads.
@@ -24,7 +24,6 @@ pub fn piece_forces(stress: &Matrix3<f64>, g: &[Vector3<f64>; 4], volume_m3: f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::polar_rotation;
     use crate::mesh::{tet_gradients, tet_volume};
 
     const REST: [Vector3<f64>; 4] = [
@@ -48,11 +47,10 @@ mod tests {
         let mut x = REST.map(|X| Vector3::new(1.3 * X.y, -X.x + 0.2 * X.z, X.z * X.z));
         let energy = |x: &[Vector3<f64>; 4]| {
             let F = deformation_gradient(x, &g);
-            piece_energy(law, lame, &F, &polar_rotation(&F, &Matrix3::identity()), volume)
+            piece_energy(law, lame, &F, volume)
         };
         let F = deformation_gradient(&x, &g);
-        let R = polar_rotation(&F, &Matrix3::identity());
-        let f = piece_forces(&law.stress(&F, &R, lame), &g, volume);
+        let f = piece_forces(&law.stress(&F, lame), &g, volume);
         let h = 1e-6;
         for a in 0..4 {
             for i in 0..3 {

@@ -9,101 +9,127 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Lame;
+use super::principal::{PAIRS, Principal};
+use super::{Lame, Matrix9, SignedSvd, Tangent};
 
-/// The corotational law. `R` is always the rotation that maximises tr(RᵀF).
+/// The corotational law. R is always the rotation that maximises tr(RᵀF).
 #[derive(Clone, Copy, Debug)]
 pub struct Corotational(
     /// Elastic constants.
     pub Lame,
 );
 
+/// Where σ_i + σ_j → 0 the rotation jumps and the energy has a ridge; its curvature is cut off here.
+const LEAST_SUM: f64 = 1e-6;
+
 impl Corotational {
     /// ψ = μ ‖F − R‖² + λ/2 tr²(RᵀF − I) [J/m³].
-    pub fn energy(&self, F: &Matrix3<f64>, R: &Matrix3<f64>) -> f64 {
-        let stretch = R.dot(F) - 3.0;
-        self.0.mu * (F - R).norm_squared() + 0.5 * self.0.lambda * stretch * stretch
+    pub fn energy(&self, F: &Matrix3<f64>) -> f64 {
+        let R = SignedSvd::new(F).rotation();
+        let theta = R.dot(F) - 3.0;
+        self.0.mu * (F - R).norm_squared() + 0.5 * self.0.lambda * theta * theta
     }
 
     /// P = 2μ (F − R) + λ tr(RᵀF − I) R [Pa].
-    pub fn stress(&self, F: &Matrix3<f64>, R: &Matrix3<f64>) -> Matrix3<f64> {
+    pub fn stress(&self, F: &Matrix3<f64>) -> Matrix3<f64> {
+        let R = SignedSvd::new(F).rotation();
         2.0 * self.0.mu * (F - R) + self.0.lambda * (R.dot(F) - 3.0) * R
     }
 
-    /// dP with the rotation held: 2μ R sym(RᵀdF) + λ tr(RᵀdF) R [Pa].
-    ///
-    /// Positive semidefinite for every F: the exact tangent with its three twist eigenvalues set to
-    /// zero. This is the one the solver uses.
-    pub fn tangent_held(&self, R: &Matrix3<f64>, dF: &Matrix3<f64>) -> Matrix3<f64> {
-        let d = R.transpose() * dF;
-        R * (self.0.mu * (d + d.transpose()) + Matrix3::from_diagonal_element(self.0.lambda * d.trace()))
+    /// ∂P/∂F [Pa]. Eigenvalues: 2μ and, once, 2μ + 3λ on the six symmetric modes U sym Vᵀ, and
+    /// t_ij = 2μ + (λ tr(S − I) − 2μ)·2/(σ_i + σ_j) on the three twists, which compression makes
+    /// negative. `Held` sets the twists to 0: R C Rᵀ, which the stiffness-warping solver uses.
+    pub fn tangent(&self, F: &Matrix3<f64>, kind: Tangent) -> Matrix9 {
+        let svd = SignedSvd::new(F);
+        let mut principal = self.principal(&svd.sigma);
+        match kind {
+            Tangent::Exact => {}
+            Tangent::Projected => principal.twist = principal.twist.map(|t| t.max(0.0)),
+            Tangent::Held => principal.twist = Vector3::zeros(),
+        }
+        principal.hessian(&svd)
     }
 
-    /// The exact dP = 2μ (dF − dR) + λ (R:dF) R + λ tr(S − I) dR [Pa], indefinite under
-    /// compression.
-    ///
-    /// # Derivation
-    /// RᵀR = I gives dR = R \[ω\]ₓ; S = RᵀF symmetric gives (tr(S) I − S) ω = axl(RᵀdF − dFᵀR).
-    pub fn tangent(&self, F: &Matrix3<f64>, R: &Matrix3<f64>, dF: &Matrix3<f64>) -> Matrix3<f64> {
-        let S = R.transpose() * F;
-        let d = R.transpose() * dF;
-        let skew = d - d.transpose();
-        let axl = Vector3::new(skew[(2, 1)], skew[(0, 2)], skew[(1, 0)]);
-        let G = Matrix3::from_diagonal_element(S.trace()) - S;
-        let omega = G.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * axl);
-        let dR = R * omega.cross_matrix();
-        2.0 * self.0.mu * (dF - dR) + self.0.lambda * (d.trace() * R + (S.trace() - 3.0) * dR)
+    /// ψ = μ Σ (σ_i − 1)² + λ/2 (Σ σ_i − 3)² by its stretches.
+    pub(super) fn principal(&self, sigma: &Vector3<f64>) -> Principal {
+        let Lame { mu, lambda } = self.0;
+        let theta = sigma.sum() - 3.0;
+        let volume = Self::theta_principal(sigma);
+        Principal {
+            slope: 2.0 * mu * sigma.add_scalar(-1.0) + lambda * theta * volume.slope,
+            scaling: Matrix3::from_diagonal_element(2.0 * mu) + Matrix3::from_element(lambda),
+            twist: Vector3::repeat(2.0 * mu) + (lambda * theta - 2.0 * mu) * volume.twist,
+            flip: Vector3::repeat(2.0 * mu),
+        }
+    }
+
+    /// θ = tr(RᵀF − I) = Σ σ_i − 3 by its stretches: its gradient is R, its Hessian ∂R/∂F.
+    pub(super) fn theta_principal(sigma: &Vector3<f64>) -> Principal {
+        let twist = PAIRS.map(|(i, j)| 2.0 / (sigma[i] + sigma[j]).max(LEAST_SUM));
+        Principal { slope: Vector3::repeat(1.0), twist: twist.into(), ..Principal::default() }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::polar_rotation;
     use crate::material::finite_difference::{assert_triad, samples};
 
     const LAW: Corotational = Corotational(Lame { mu: 1.3, lambda: 2.1 });
 
-    fn rotation(F: &Matrix3<f64>) -> Matrix3<f64> {
-        polar_rotation(F, &Matrix3::identity())
-    }
-
     #[test]
     fn triad_agrees_with_finite_differences() {
         for F in samples() {
-            assert_triad(
-                &F,
-                |F| LAW.energy(F, &rotation(F)),
-                |F| LAW.stress(F, &rotation(F)),
-                |F, dF| LAW.tangent(F, &rotation(F), dF),
-            );
+            assert_triad(&F, |F| LAW.energy(F), |F| LAW.stress(F), |F| LAW.tangent(F, Tangent::Exact));
         }
     }
 
     #[test]
-    fn held_tangent_is_the_exact_one_without_twist_and_never_negative() {
+    fn principal_form_is_the_same_law() {
         for F in samples() {
-            let R = rotation(&F);
-            let S = R.transpose() * F;
-            let symmetric = R * (S + Matrix3::new(0.3, 0.1, 0.2, 0.1, -0.4, 0.5, 0.2, 0.5, 0.1));
-            let exact = LAW.tangent(&F, &R, &symmetric);
-            assert!((LAW.tangent_held(&R, &symmetric) - exact).norm() < 1e-9 * (1.0 + exact.norm()));
-            for dF in samples() {
-                assert!(LAW.tangent_held(&R, &dF).dot(&dF) >= -1e-12);
+            let svd = SignedSvd::new(&F);
+            let P = LAW.principal(&svd.sigma).gradient(&svd);
+            assert!((P - LAW.stress(&F)).norm() < 1e-12 * (1.0 + P.norm()));
+        }
+    }
+
+    #[test]
+    fn eigenvalues_of_the_exact_tangent_are_the_published_ones() {
+        for F in samples() {
+            let SignedSvd { sigma, .. } = SignedSvd::new(&F);
+            let Lame { mu, lambda } = LAW.0;
+            let twist = |i: usize, j: usize| {
+                2.0 * mu + (lambda * (sigma.sum() - 3.0) - 2.0 * mu) * 2.0 / (sigma[i] + sigma[j])
+            };
+            let mut expected = vec![2.0 * mu; 5];
+            expected.extend([2.0 * mu + 3.0 * lambda, twist(0, 1), twist(0, 2), twist(1, 2)]);
+            expected.sort_by(f64::total_cmp);
+            let mut found: Vec<f64> =
+                LAW.tangent(&F, Tangent::Exact).symmetric_eigenvalues().iter().copied().collect();
+            found.sort_by(f64::total_cmp);
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!(
+                    (found - expected).abs() < 1e-9 * (1.0 + expected.abs()),
+                    "{found} {expected} at {F}"
+                );
             }
         }
     }
 
     #[test]
-    fn flat_and_collapsed_elements_stay_finite() {
-        let flat = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0));
-        let needle = Matrix3::from_diagonal(&Vector3::new(1.0, 1e-12, -1e-12));
-        for F in [Matrix3::zeros(), flat, needle, -Matrix3::identity() * 1e-12] {
-            let R = rotation(&F);
-            assert!((R.transpose() * R - Matrix3::identity()).norm() < 1e-12);
-            assert!(LAW.energy(&F, &R).is_finite());
-            assert!(LAW.stress(&F, &R).iter().all(|p| p.is_finite()));
-            assert!(LAW.tangent(&F, &R, &Matrix3::identity()).iter().all(|p| p.is_finite()));
+    fn held_tangent_is_the_exact_one_without_twist() {
+        for F in samples() {
+            let svd = SignedSvd::new(&F);
+            let symmetric =
+                svd.U * Matrix3::new(0.3, 0.1, 0.2, 0.1, -0.4, 0.5, 0.2, 0.5, 0.1) * svd.V.transpose();
+            let d = nalgebra::SVector::<f64, 9>::from_column_slice(symmetric.as_slice());
+            let exact = LAW.tangent(&F, Tangent::Exact) * d;
+            let held = LAW.tangent(&F, Tangent::Held);
+            assert!((held * d - exact).norm() < 1e-9 * (1.0 + exact.norm()));
+            let R = svd.rotation();
+            let turn = R * Vector3::new(0.2, -0.5, 0.3).cross_matrix();
+            let turn = nalgebra::SVector::<f64, 9>::from_column_slice(turn.as_slice());
+            assert!((held * turn).norm() < 1e-12);
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use nalgebra::Matrix3;
 
-use super::Lame;
+use super::{Lame, Matrix9};
 
 /// The small-strain law. Not objective: a rotation alone gives stress.
 #[derive(Clone, Copy, Debug)]
@@ -31,9 +31,19 @@ impl Linear {
         2.0 * self.0.mu * eps + Matrix3::from_diagonal_element(self.0.lambda * eps.trace())
     }
 
-    /// dP = 2μ sym dF + λ tr(dF) I [Pa], the same for every F.
-    pub fn tangent(&self, dF: &Matrix3<f64>) -> Matrix3<f64> {
-        self.0.mu * (dF + dF.transpose()) + Matrix3::from_diagonal_element(self.0.lambda * dF.trace())
+    /// ∂P/∂F = 2μ sym + λ I⊗I [Pa]: the same for every F, positive semidefinite.
+    pub fn tangent(&self) -> Matrix9 {
+        let Lame { mu, lambda } = self.0;
+        Matrix9::from_fn(|m, n| {
+            let (i, j, k, l) = (m % 3, m / 3, n % 3, n / 3);
+            let delta = |a: usize, b: usize| f64::from(u8::from(a == b));
+            mu * (delta(i, k) * delta(j, l) + delta(i, l) * delta(j, k)) + lambda * delta(i, j) * delta(k, l)
+        })
+    }
+
+    /// θ = tr ε [1], the change of volume to first order.
+    pub fn theta(F: &Matrix3<f64>) -> f64 {
+        F.trace() - 3.0
     }
 }
 
@@ -46,7 +56,7 @@ mod tests {
     fn triad_agrees_with_finite_differences() {
         let law = Linear(Lame { mu: 1.3, lambda: 2.1 });
         for F in samples() {
-            assert_triad(&F, |F| law.energy(F), |F| law.stress(F), |_, dF| law.tangent(dF));
+            assert_triad(&F, |F| law.energy(F), |F| law.stress(F), |_| law.tangent());
         }
     }
 }

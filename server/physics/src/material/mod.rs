@@ -1,18 +1,35 @@
 //! What a body is made of: elastic constants, density, damping and the constitutive law.
 //!
 //! A law is the triad energy density ψ(F) [J/m³], first Piola–Kirchhoff stress P(F) = ∂ψ/∂F [Pa]
-//! and tangent dP = ∂P/∂F : dF [Pa], one file each, checked against finite differences there.
+//! and tangent ∂P/∂F [Pa], one file each, checked against finite differences there. A law has no
+//! state besides F.
 
 #[cfg(test)]
 mod finite_difference;
+mod svd;
+mod principal;
 mod linear;
 mod corotational;
+mod st_venant_kirchhoff;
+mod collapse_guard;
+mod neo_hookean;
+mod law;
+mod split;
+#[cfg(test)]
+mod law_tests;
 
 pub use corotational::Corotational;
+pub use law::{Law, Tangent};
 pub use linear::Linear;
+pub use neo_hookean::NeoHookean;
+pub use split::Split;
+pub use st_venant_kirchhoff::StVenantKirchhoff;
+pub use svd::SignedSvd;
 
-use nalgebra::Matrix3;
 use thiserror::Error;
+
+/// ∂²ψ/∂F² on F stacked by columns: entry (row, column) of F has index row + 3·column.
+pub type Matrix9 = nalgebra::SMatrix<f64, 9, 9>;
 
 /// Isotropic elastic material of one body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,16 +54,6 @@ pub struct Rayleigh {
     pub mass_1_s: f64,
     /// β [s], ≥ 0: viscosity of the material.
     pub stiffness_s: f64,
-}
-
-/// The constitutive laws that can be chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Law {
-    /// Small strains and small rotations: cheapest, wrong as soon as the body turns.
-    Linear,
-    /// Small strains in a frame that turns with the material: the robust default.
-    #[default]
-    Corotational,
 }
 
 /// Lamé constants of an isotropic material.
@@ -89,29 +96,6 @@ impl Material {
         within("density_kg_m3", rho, (1e-6..=1e6).contains(&rho), "1e-6 … 1e6 kg/m³")?;
         within("rayleigh.mass_1_s", mass_1_s, (0.0..=1e6).contains(&mass_1_s), "0 … 1e6 1/s")?;
         within("rayleigh.stiffness_s", stiffness_s, (0.0..=1e6).contains(&stiffness_s), "0 … 1e6 s")
-    }
-}
-
-impl Law {
-    /// Energy density ψ(F) [J/m³]. `R` is the rotation of `F`, used by corotational laws.
-    pub fn energy(self, F: &Matrix3<f64>, R: &Matrix3<f64>, lame: Lame) -> f64 {
-        match self {
-            Law::Linear => Linear(lame).energy(F),
-            Law::Corotational => Corotational(lame).energy(F, R),
-        }
-    }
-
-    /// First Piola–Kirchhoff stress P(F) [Pa].
-    pub fn stress(self, F: &Matrix3<f64>, R: &Matrix3<f64>, lame: Lame) -> Matrix3<f64> {
-        match self {
-            Law::Linear => Linear(lame).stress(F),
-            Law::Corotational => Corotational(lame).stress(F, R),
-        }
-    }
-
-    /// Whether elements carry a rotation of their own.
-    pub fn rotates(self) -> bool {
-        matches!(self, Law::Corotational)
     }
 }
 
