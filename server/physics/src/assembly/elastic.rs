@@ -5,9 +5,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::kernel::{add_forces, add_upper_blocks, deformation_gradient, mirror};
-use super::point::{PointSplit, Tangent, projected};
+use super::point::projected;
 use super::{BlockCsr, ElementKind, Model, Volumetric};
-use crate::material::Law;
+use crate::material::{Law, Split, Tangent};
 
 /// Buffers that calls leave behind for the next one, so that repeated calls do not allocate.
 #[derive(Debug, Default)]
@@ -145,13 +145,7 @@ impl Model {
 
     /// λ θ [Pa] of an element whose volumetric energy is (partly) averaged, and the share κ of λ/2 θ²
     /// that is its own.
-    fn averaged_element(
-        &self,
-        e: usize,
-        split: &PointSplit,
-        theta: f64,
-        buffers: &Buffers,
-    ) -> Option<(f64, f64)> {
+    fn averaged_element(&self, e: usize, split: &Split, theta: f64, buffers: &Buffers) -> Option<(f64, f64)> {
         let averaging = self.averaging.as_ref()?;
         let pressure =
             averaging.pressure(split.lambda(), &self.connectivity[4 * e..][..4], &buffers.theta_bar);
@@ -180,7 +174,7 @@ impl Model {
     }
 
     /// The split law if the volumetric energy is treated apart.
-    fn remedy(&self) -> Option<PointSplit> {
+    fn remedy(&self) -> Option<Split> {
         if self.volumetric == Volumetric::Full { None } else { self.point.split() }
     }
 
@@ -221,8 +215,9 @@ impl Model {
             let F = deformation_gradient::<N>(&x, g);
             let P = match &split {
                 None => {
-                    energy += w * self.point.energy(&F);
-                    self.point.stress(&F)
+                    let (psi, P) = self.point.energy_and_stress(&F);
+                    energy += w * psi;
+                    P
                 }
                 Some(split) => {
                     energy += w * split.shear_energy(&F);
@@ -313,7 +308,7 @@ impl Model {
     fn averaged_tangent(
         &self,
         e: usize,
-        split: &PointSplit,
+        split: &Split,
         F: &Matrix3<f64>,
         kind: Tangent,
         buffers: &Buffers,

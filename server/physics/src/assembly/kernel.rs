@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::point::Matrix9;
+use crate::material::Matrix9;
 
 /// F = Σ_a x_a ⊗ g_a, with differences to the first node so that rigid shifts cancel exactly.
 #[inline]

@@ -22,10 +22,10 @@ mod averaging;
 mod elastic;
 mod mass;
 
+pub use crate::material::Tangent;
 pub use block_csr::BlockCsr;
 pub use error::ModelError;
 pub use model::{ElementKind, Model, Volumetric};
-pub use point::{Matrix9, Tangent};
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

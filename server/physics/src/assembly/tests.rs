@@ -13,7 +13,7 @@ fn material(law: Law) -> Material {
     Material { young_pa: 3.0, poisson: 0.3, density_kg_m3: 2.0, rayleigh: Rayleigh::default(), law }
 }
 
-const LAWS: [Law; 2] = [Law::Linear, Law::Corotational];
+const LAWS: [Law; 4] = Law::ALL;
 const AVERAGED: Volumetric = Volumetric::NodeAveraged { kept: 0.05 };
 
 fn size() -> Vector3<f64> {
@@ -49,7 +49,7 @@ fn models() -> Vec<Model> {
         );
         models.push(Model::tet10(&tets, &material).unwrap());
         models.push(Model::hex8(&hexes, &material, Volumetric::Full).unwrap());
-        if law.rotates() || law == Law::Linear {
+        if law != Law::StVenantKirchhoff {
             models.push(Model::tet4(&tets, &material, AVERAGED).unwrap());
             models.push(Model::tet4_cut(&cut, &material, AVERAGED).unwrap());
             models.push(Model::hex8(&hexes, &material, Volumetric::Selective).unwrap());

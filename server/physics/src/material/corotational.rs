@@ -25,15 +25,20 @@ const LEAST_SUM: f64 = 1e-6;
 impl Corotational {
     /// ψ = μ ‖F − R‖² + λ/2 tr²(RᵀF − I) [J/m³].
     pub fn energy(&self, F: &Matrix3<f64>) -> f64 {
-        let R = SignedSvd::new(F).rotation();
-        let theta = R.dot(F) - 3.0;
-        self.0.mu * (F - R).norm_squared() + 0.5 * self.0.lambda * theta * theta
+        self.energy_and_stress(F).0
     }
 
     /// P = 2μ (F − R) + λ tr(RᵀF − I) R [Pa].
     pub fn stress(&self, F: &Matrix3<f64>) -> Matrix3<f64> {
+        self.energy_and_stress(F).1
+    }
+
+    /// Both with one decomposition.
+    pub fn energy_and_stress(&self, F: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
+        let Lame { mu, lambda } = self.0;
         let R = SignedSvd::new(F).rotation();
-        2.0 * self.0.mu * (F - R) + self.0.lambda * (R.dot(F) - 3.0) * R
+        let (d, theta) = (F - R, R.dot(F) - 3.0);
+        (mu * d.norm_squared() + 0.5 * lambda * theta * theta, 2.0 * mu * d + lambda * theta * R)
     }
 
     /// ∂P/∂F [Pa]. Eigenvalues: 2μ and, once, 2μ + 3λ on the six symmetric modes U sym Vᵀ, and

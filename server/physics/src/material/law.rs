@@ -55,6 +55,14 @@ impl Law {
         }
     }
 
+    /// ψ [J/m³] and P [Pa] in one go.
+    pub fn energy_and_stress(self, F: &Matrix3<f64>, lame: Lame) -> (f64, Matrix3<f64>) {
+        match self {
+            Law::Corotational => Corotational(lame).energy_and_stress(F),
+            law => (law.energy(F, lame), law.stress(F, lame)),
+        }
+    }
+
     /// ∂P/∂F [Pa], on F stacked by columns.
     pub fn tangent(self, F: &Matrix3<f64>, lame: Lame, kind: Tangent) -> Matrix9 {
         match self {
