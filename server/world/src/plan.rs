@@ -3,6 +3,8 @@
 //! An effect that is off costs nothing: no memory, no thread, no work in the step. What depends
 //! on who is listening (surfaces, haptic contact, energies) is decided anew at every step.
 
+mod mechanics;
+
 use std::fmt;
 
 use serde::Serialize;
@@ -10,11 +12,7 @@ use serde::Serialize;
 use crate::inputs::Wants;
 use crate::scene::CheckedScene;
 
-/// Seconds per element and solver iteration: one matrix-free product with rotated gradients,
-/// vector work included. Order of magnitude on one core; [`Plan::measured`] replaces it.
-const SECONDS_PER_ELEMENT_ITERATION: f64 = 12e-9;
-
-/// Seconds per element and step: rotations, forces and preconditioner.
+/// Seconds per element and step for energies.
 const SECONDS_PER_ELEMENT: f64 = 80e-9;
 
 /// Seconds per element near a moving blade and step, and per element for the surface afterwards.
@@ -54,6 +52,8 @@ pub struct Plan {
 pub struct BodySize {
     /// Elements.
     pub elements: usize,
+    /// Copies of nodes, with those on mid-edges.
+    pub nodes: usize,
     /// Surface vertices.
     pub vertices: usize,
     /// Surface triangles.
@@ -77,12 +77,15 @@ impl Plan {
         self.effects.iter().any(|effect| effect.name == name && effect.on)
     }
 
-    /// Enters the measured cost of the effect `name`, shared over its pairs where it has some.
+    /// Enters the measured cost of the effect `name`; where it has a line per body or pair, each
+    /// gets a share as large as predicted.
     pub fn measured(&mut self, name: &str, milliseconds: f64) {
         let is_it = |effect: &Effect| effect.on && effect.name.split(' ').next() == Some(name);
-        let pairs = self.effects.iter().filter(|effect| is_it(effect)).count().max(1);
+        let lines = self.effects.iter().filter(|effect| is_it(effect));
+        let (count, predicted) = lines.fold((0.0, 0.0), |(n, sum), e| (n + 1.0, sum + e.predicted_ms));
         for effect in self.effects.iter_mut().filter(|effect| is_it(effect)) {
-            effect.measured_ms = Some(milliseconds / pairs as f64);
+            let share = if predicted > 0.0 { effect.predicted_ms / predicted } else { 1.0 / count };
+            effect.measured_ms = Some(milliseconds * share);
         }
     }
 
@@ -121,31 +124,6 @@ impl Plan {
         self.push("gravity", g > 0.0, why, 0.0);
         let loads: usize = scene.bodies.iter().map(|body| body.loads.len()).sum();
         self.push("loads", loads > 0, count(loads, "load"), 0.0);
-    }
-
-    fn mechanics(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
-        let bodies = scene.bodies.len();
-        let deform: f64 =
-            scene.bodies.iter().zip(sizes).map(|(body, size)| deform_seconds(body.iterations, size)).sum();
-        let elements: usize = sizes.iter().map(|size| size.elements).sum();
-        let why = format!("{}, {elements} elements; implicit Euler", count(bodies, "body"));
-        self.push("deformation", bodies > 0, why, deform);
-        self.push("inertia", bodies > 0, "implicit Euler integrates it; no static bodies", 0.0);
-        let turning = scene.bodies.iter().filter(|body| body.law.rotates()).count();
-        self.push(
-            "large rotation",
-            turning > 0,
-            format!("{} with a corotational law", count(turning, "body")),
-            0.0,
-        );
-        let damped =
-            scene.bodies.iter().filter(|b| b.damping_mass_1_s > 0.0 || b.damping_stiffness_s > 0.0).count();
-        let why = if damped > 0 {
-            format!("{} with rayleigh", count(damped, "body"))
-        } else {
-            "no body has rayleigh".into()
-        };
-        self.push("damping", damped > 0, why, 0.0);
     }
 
     fn cutting(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
@@ -200,10 +178,6 @@ impl Plan {
         let why = format!("on demand: {rate} Hz beside the step, while a haptic client lives");
         self.push("haptic contact", false, why, 0.0);
     }
-}
-
-fn deform_seconds(iterations: u32, size: &BodySize) -> f64 {
-    size.elements as f64 * (SECONDS_PER_ELEMENT + f64::from(iterations) * SECONDS_PER_ELEMENT_ITERATION)
 }
 
 fn count(n: usize, what: &str) -> String {

@@ -91,17 +91,10 @@ fn values_out_of_range_name_range_and_next_step() {
 fn what_is_not_supported_yet_is_refused_never_ignored() {
     let with = |line: &str| message_after("young_pa", &format!("{line}\nyoung_pa"));
     for (line, parts) in [
-        ("element = \"tet10\"", ["`tet10` is not supported yet", "supported now: tet4"]),
-        ("element = \"hex8\"", ["`hex8` is not supported yet", "supported now: tet4"]),
-        ("law = \"stvk\"", ["`stvk` is not supported yet", "supported now: linear, corotational"]),
-        ("law = \"neo-hookean\"", ["`neo-hookean` is not supported yet", "corotational"]),
-        ("integrator = \"static\"", ["`static` is not supported yet", "implicit-euler"]),
-        ("integrator = \"bdf2\"", ["`bdf2` is not supported yet", "implicit-euler"]),
-        ("integrator = \"newmark\"", ["`newmark` is not supported yet", "implicit-euler"]),
-        ("solver = { method = \"cholesky\" }", ["`cholesky` is not supported yet", "pcg"]),
-        ("solver = { method = \"multigrid\" }", ["`multigrid` is not supported yet", "pcg"]),
+        (r#"solver = { method = "multigrid" }"#, ["`multigrid` is not supported yet", "cg, pcg, cholesky"]),
+        (r#"solver = { method = "mg-pcg" }"#, ["`mg-pcg` is not supported yet", "cg, pcg, cholesky"]),
         (
-            "integrator = \"implict-euler\"",
+            r#"integrator = "implict-euler""#,
             ["unknown value `implict-euler`", "did you mean `implicit-euler`?"],
         ),
     ] {
@@ -110,9 +103,101 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
     let cut = |method: &str| message_after("sweep_m =", &format!("method = \"{method}\"\nsweep_m ="));
     assert_says(&cut("snap"), &["`snap` is not supported yet", "xfem"]);
     assert_says(&cut("links"), &["`links` is not supported yet", "xfem"]);
-    assert_says(&message_after("tet5", "hex"), &["`hex` is not supported yet", "tet5, tet6"]);
     let effects = message_after("[world]", "[effects]\nself_collision = true\n[world]");
     assert_says(&effects, &["effects.self_collision", "not supported yet"]);
+}
+
+/// A body with these lines and without the cut.
+fn uncut_with(lines: &str) -> Result<Scene, scindo_world::scene::SceneError> {
+    let start = GOOD.find("[[cut]]").unwrap();
+    let end = GOOD.find("[[probe]]").unwrap();
+    let text = [&GOOD[..start], &GOOD[end..]].concat();
+    Scene::from_toml(&text.replace("young_pa", &format!("{lines}\nyoung_pa")))
+}
+
+#[test]
+fn combinations_that_do_not_go_together_are_refused_with_what_is_allowed() {
+    let cases: &[(&str, &[&str])] = &[
+        (r#"element = "hex8""#, &["body.beam.element", "`hex8` on a mesh of tetrahedra", "pattern `hex`"]),
+        (r#"locking = "selective""#, &["body.beam.locking", "allowed: only hex8", "node-averaged on tet4"]),
+        (
+            r#"element = "tet10"
+locking = "node-averaged""#,
+            &["`node-averaged` with tet10", "allowed: only tet4"],
+        ),
+        (
+            r#"law = "stvk"
+locking = "node-averaged""#,
+            &["with `stvk`", "does not split", "neo-hookean"],
+        ),
+        ("newmark = { beta = 0.3 }", &["body.beam.newmark", "found implicit-euler", "remove it"]),
+        (
+            r#"integrator = "newmark"
+newmark = { gamma = 0.4 }"#,
+            &["newmark.gamma: found 0.4", "at least 0.5", "would gain energy"],
+        ),
+        (
+            r#"integrator = "rk4"
+mass = "consistent""#,
+            &["body.beam.mass", "`consistent` with rk4", "lumped"],
+        ),
+        (
+            r#"integrator = "midpoint"
+solver = { method = "cholesky" }"#,
+            &["solver.method", "midpoint is explicit", "remove"],
+        ),
+        (
+            r#"integrator = "midpoint"
+solver = { newton_steps = 3 }"#,
+            &["solver.newton_steps", "midpoint is explicit"],
+        ),
+        (
+            r#"integrator = "symplectic-euler"
+solver = { precision = "mixed" }"#,
+            &["`mixed` with symplectic-euler", "allowed: double"],
+        ),
+        (
+            r#"integrator = "static"
+rayleigh = { stiffness_s = 0.1 }"#,
+            &["body.beam.rayleigh", "static body", "remove it"],
+        ),
+        (
+            r#"integrator = "static"
+mass = "consistent""#,
+            &["body.beam.mass", "static body"],
+        ),
+        (
+            r#"law = "neo-hookean"
+solver = { precision = "single" }"#,
+            &["`single` with law neo-hookean", "mixed, double"],
+        ),
+        (r#"solver = { precision = "single", newton_steps = 2 }"#, &["more than one Newton step"]),
+        (r#"solver = { precision = "single", method = "cg" }"#, &["another solver than pcg"]),
+    ];
+    for (lines, parts) in cases {
+        assert_says(&uncut_with(lines).unwrap_err().to_string(), parts);
+    }
+    let hex = GOOD.replace("tet5", "hex");
+    assert_says(
+        &Scene::from_toml(&hex).unwrap_err().to_string(),
+        &["`tet4` on the box pattern `hex`", "hex8"],
+    );
+    let loose = GOOD.replace("[[body.fix]]", "integrator = \"static\"\n[[body.load]]\nforce_n = [1, 0, 0]");
+    assert_says(&Scene::from_toml(&loose).unwrap_err().to_string(), &["fixed nowhere", "[[body.fix]]"]);
+    let grid = "mesh = { grid = { x_m = [0, 1], y_m = [0, 1, 1], z_m = [0, 1] } }";
+    let text =
+        GOOD.lines().map(|l| if l.starts_with("mesh") { grid } else { l }).collect::<Vec<_>>().join("\n");
+    assert_says(&Scene::from_toml(&text).unwrap_err().to_string(), &["grid.y_m.2", "1 does not lie above 1"]);
+}
+
+#[test]
+fn only_linear_tetrahedra_are_cut() {
+    let tet10 = message_after("young_pa", "element = \"tet10\"\nyoung_pa");
+    assert_says(&tet10, &["cut.0.body", "body `beam` of tet10", "allowed: only tet4"]);
+    let path = "path = [{ at_s = 0, tip_m = [0, 0, 0], mode = \"cut\" }]\n";
+    let text = GOOD.replace("tet5", "hex").replace("young_pa", "element = \"hex8\"\nyoung_pa") + path;
+    let message = Scene::from_toml(&text).unwrap_err().to_string();
+    assert_says(&message, &["cut.0.body", "of hex8", "tool.scalpel.path.0.mode", "a blade cuts every body"]);
 }
 
 #[test]
@@ -127,7 +212,7 @@ fn names_must_exist_and_be_unique() {
 #[test]
 fn mesh_needs_exactly_one_source() {
     let both = message_after("mesh = { box", "mesh = { file = \"a.msh\", box");
-    assert_says(&both, &["exactly one of box, file, surface, organ", "found box and file"]);
+    assert_says(&both, &["exactly one of box, grid, file, surface, organ", "found box and file"]);
     let surface =
         GOOD.lines().map(|l| if l.starts_with("mesh") { "mesh = { surface = \"a.obj\" }" } else { l });
     let text = surface.collect::<Vec<_>>().join("\n");

@@ -227,7 +227,7 @@ fn the_plan_says_what_is_on_and_why_and_off_costs_nothing() {
     let plan = simulation(BEAM).plan();
     let effect = |name: &str| plan.effects.iter().find(|effect| effect.name == name).unwrap();
     assert!(effect("gravity").on && effect("large rotation").on && effect("damping").on);
-    assert!(effect("deformation").predicted_ms > 0.0);
+    assert!(effect("deformation beam").predicted_ms > 0.0);
     for off in ["loads", "probes", "energies", "self-collision", "surface publication", "haptic contact"] {
         assert!(!effect(off).on && effect(off).predicted_ms == 0.0 && !effect(off).why.is_empty(), "{off}");
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use nalgebra::Vector3;
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 
 use crate::mesh_in::{MeshHealth, MeshInError, check_scale, load_surface, load_volume};
@@ -18,11 +19,16 @@ pub struct Opened {
 pub fn open(source: &MeshSource, base_dir: &Path) -> Result<Opened, Fault> {
     match source {
         MeshSource::Box { min_m, max_m, cells, split } => {
-            let pattern = match split {
-                CellSplit::Five => BoxPattern::Tet5 { parity: false },
-                CellSplit::Six => BoxPattern::Tet6,
-            };
-            Ok(Opened { mesh: box_mesh(*min_m, *max_m, *cells, pattern), health: None })
+            Ok(Opened { mesh: box_mesh(*min_m, *max_m, *cells, pattern(*split)?), health: None })
+        }
+        MeshSource::Grid { lines_m, split } => {
+            let cells = [0, 1, 2].map(|axis| lines_m[axis].len() - 1);
+            let max = Vector3::from_fn(|axis, _| cells[axis] as f64);
+            let mut mesh = box_mesh(Vector3::zeros(), max, cells, pattern(*split)?);
+            for node in &mut mesh.nodes {
+                *node = Vector3::from_fn(|axis, _| lines_m[axis][node[axis].round() as usize]);
+            }
+            Ok(Opened { mesh, health: None })
         }
         MeshSource::File { path, scale } => load_volume(&base_dir.join(path), *scale)
             .map(|(mesh, health)| Opened { mesh, health: Some(MeshHealth::Volume(health)) })
@@ -33,6 +39,18 @@ pub fn open(source: &MeshSource, base_dir: &Path) -> Result<Opened, Fault> {
         MeshSource::Organ { cells } => organ(*cells)
             .map(|(mesh, report)| Opened { mesh, health: Some(MeshHealth::Surface(report)) })
             .map_err(fault),
+    }
+}
+
+/// The pattern of the tetrahedra that a cell is split into.
+fn pattern(split: CellSplit) -> Result<BoxPattern, Fault> {
+    match split {
+        CellSplit::Five => Ok(BoxPattern::Tet5 { parity: false }),
+        CellSplit::Six => Ok(BoxPattern::Tet6),
+        CellSplit::Octahedral | CellSplit::Hex => Err(Fault::Unsupported {
+            found: "this pattern".into(),
+            supported: vec!["tet5".into(), "tet6".into()],
+        }),
     }
 }
 
@@ -52,7 +70,7 @@ fn fault(error: MeshInError) -> Fault {
 pub fn doubts_about_scale(mesh: &TetMesh, spec: &BodySpec) -> Vec<String> {
     let scale = match spec.mesh {
         MeshSource::File { scale, .. } | MeshSource::Surface { scale, .. } => scale,
-        MeshSource::Box { .. } | MeshSource::Organ { .. } => 1.0,
+        MeshSource::Box { .. } | MeshSource::Grid { .. } | MeshSource::Organ { .. } => 1.0,
     };
     let [low, high] = mesh.bounds();
     let warnings = check_scale(&low, &high, scale, spec.density_kg_m3, spec.young_pa);

@@ -2,12 +2,14 @@
 
 pub mod region;
 
+pub mod mechanics;
+
 mod mesh;
 
 use std::path::Path;
 
-use scindo_physics::body::{Body, BodyError, BodySettings, PcgSettings};
-use scindo_physics::material::{Material, Rayleigh};
+use scindo_physics::body::{Body, BodyError, BodySettings};
+use scindo_physics::material::{Law, Material, Rayleigh};
 
 use crate::probe::Probe;
 use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
@@ -74,11 +76,18 @@ impl Builder<'_> {
         let doubts = mesh::doubts_about_scale(&mesh, spec);
         self.warnings.extend(doubts.into_iter().map(|doubt| format!("{at}: {doubt}")));
         let settings = BodySettings {
-            solver: PcgSettings { iterations: spec.iterations, tolerance: spec.tolerance },
+            solver: mechanics::linear(&spec.mechanics),
             threads: self.options.threads,
             portable: self.options.portable,
         };
-        let body = match Body::new(mesh, material(spec), settings) {
+        let law = match mechanics::law(&spec.mechanics) {
+            Ok(law) => law,
+            Err(fault) => {
+                self.findings.push((at, fault));
+                return None;
+            }
+        };
+        let body = match Body::new(mesh, material(spec, law), settings) {
             Ok(body) => body,
             Err(error) => {
                 self.refused(&format!("{at}.mesh"), &error);
@@ -159,12 +168,12 @@ impl Builder<'_> {
     }
 }
 
-fn material(spec: &BodySpec) -> Material {
+fn material(spec: &BodySpec, law: Law) -> Material {
     Material {
         young_pa: spec.young_pa,
         poisson: spec.poisson,
         density_kg_m3: spec.density_kg_m3,
         rayleigh: Rayleigh { mass_1_s: spec.damping_mass_1_s, stiffness_s: spec.damping_stiffness_s },
-        law: spec.law,
+        law,
     }
 }

@@ -1,9 +1,10 @@
 //! From a scene's tree to ready objects: what the schema cannot say is checked here.
 
+mod mechanics;
+
 use std::collections::BTreeSet;
 
 use nalgebra::{Unit, Vector3};
-use scindo_physics::material::Law;
 
 use crate::inputs::{ToolMode, ToolShape};
 
@@ -60,6 +61,7 @@ impl Check<'_> {
             let what = format!("{} tools, allowed: at most {MAX_TOOLS}", raw.tool.len());
             self.conflict("tool".into(), what, "remove some");
         }
+        self.cuttable();
         CheckedScene {
             name: raw.name.clone(),
             seed: raw.seed,
@@ -90,63 +92,20 @@ impl Check<'_> {
 
     fn body(&mut self, body: &RawBody) -> BodySpec {
         let at = format!("body.{}", body.id);
-        match body.element {
-            RawElement::Tet4 => {}
-            RawElement::Tet10 => self.unsupported(format!("{at}.element"), "tet10", &["tet4"]),
-            RawElement::Hex8 => self.unsupported(format!("{at}.element"), "hex8", &["tet4"]),
-        }
-        let law = self.law(&at, body.law);
-        self.integrator(&at, body.integrator);
-        self.solver(&at, &body.solver);
+        let mesh = self.mesh(&format!("{at}.mesh"), &body.mesh);
+        let mechanics = self.mechanics(&at, body, &mesh);
         BodySpec {
             id: body.id.clone(),
-            mesh: self.mesh(&format!("{at}.mesh"), &body.mesh),
-            law,
+            mesh,
+            mechanics,
             young_pa: body.young_pa,
             poisson: body.poisson,
             density_kg_m3: body.density_kg_m3,
             damping_mass_1_s: body.rayleigh.mass_1_s,
             damping_stiffness_s: body.rayleigh.stiffness_s,
-            iterations: body.solver.iterations,
-            tolerance: body.solver.tolerance,
             fixes: self.fixes(&at, &body.fix),
             loads: self.loads(&at, &body.load),
         }
-    }
-
-    fn law(&mut self, at: &str, law: RawLaw) -> Law {
-        let found = match law {
-            RawLaw::Linear => return Law::Linear,
-            RawLaw::Corotational => return Law::Corotational,
-            RawLaw::Stvk => "stvk",
-            RawLaw::NeoHookean => "neo-hookean",
-        };
-        self.unsupported(format!("{at}.law"), found, &["linear", "corotational"]);
-        Law::Corotational
-    }
-
-    fn integrator(&mut self, at: &str, integrator: RawIntegrator) {
-        let found = match integrator {
-            RawIntegrator::ImplicitEuler => return,
-            RawIntegrator::Static => "static",
-            RawIntegrator::SymplecticEuler => "symplectic-euler",
-            RawIntegrator::Midpoint => "midpoint",
-            RawIntegrator::Rk4 => "rk4",
-            RawIntegrator::Bdf2 => "bdf2",
-            RawIntegrator::Newmark => "newmark",
-        };
-        self.unsupported(format!("{at}.integrator"), found, &["implicit-euler"]);
-    }
-
-    fn solver(&mut self, at: &str, solver: &RawSolver) {
-        let found = match solver.method {
-            RawMethod::Pcg => return,
-            RawMethod::Cg => "cg",
-            RawMethod::Cholesky => "cholesky",
-            RawMethod::Multigrid => "multigrid",
-            RawMethod::MgPcg => "mg-pcg",
-        };
-        self.unsupported(format!("{at}.solver.method"), found, &["pcg"]);
     }
 
     fn mesh(&mut self, at: &str, mesh: &RawMesh) -> MeshSource {
@@ -174,32 +133,43 @@ impl Check<'_> {
                 scale,
             };
         }
-        match (&mesh.r#box, &mesh.organ) {
-            (Some(block), _) => self.block(&format!("{at}.box"), block),
-            (None, organ) => MeshSource::Organ { cells: organ.as_ref().map_or(4, |o| o.cells) as usize },
+        if let Some(block) = &mesh.r#box {
+            return self.block(&format!("{at}.box"), block);
         }
+        if let Some(grid) = &mesh.grid {
+            return self.grid(&format!("{at}.grid"), grid);
+        }
+        MeshSource::Organ { cells: mesh.organ.as_ref().map_or(4, |organ| organ.cells) as usize }
     }
 
     fn block(&mut self, at: &str, block: &RawBox) -> MeshSource {
         self.rising_corners(at, block.min_m, block.max_m, true);
-        let cells: u64 = block.cells.iter().map(|n| u64::from(*n)).product();
-        if cells > MAX_BOX_CELLS {
-            let what = format!("found {cells} cells, allowed: at most {MAX_BOX_CELLS}");
-            self.conflict(format!("{at}.cells"), what, "use fewer cells");
-        }
-        let split = match block.pattern {
-            RawPattern::Tet5 => CellSplit::Five,
-            RawPattern::Tet6 => CellSplit::Six,
-            RawPattern::Hex => {
-                self.unsupported(format!("{at}.pattern"), "hex", &["tet5", "tet6"]);
-                CellSplit::Five
-            }
-        };
+        self.cell_count(&format!("{at}.cells"), block.cells.map(u64::from));
         MeshSource::Box {
             min_m: Vector3::from(block.min_m),
             max_m: Vector3::from(block.max_m),
             cells: block.cells.map(|n| n as usize),
-            split,
+            split: split(block.pattern),
+        }
+    }
+
+    fn grid(&mut self, at: &str, grid: &RawGrid) -> MeshSource {
+        let lines_m = [&grid.x_m, &grid.y_m, &grid.z_m];
+        for (name, lines) in ["x_m", "y_m", "z_m"].into_iter().zip(lines_m) {
+            if let Some(i) = (1..lines.len()).find(|&i| lines[i] <= lines[i - 1]) {
+                let what = format!("{} does not lie above {}", lines[i], lines[i - 1]);
+                self.conflict(format!("{at}.{name}.{i}"), what, "let the coordinates rise");
+            }
+        }
+        self.cell_count(at, lines_m.map(|lines| lines.len() as u64 - 1));
+        MeshSource::Grid { lines_m: lines_m.map(Clone::clone), split: split(grid.pattern) }
+    }
+
+    fn cell_count(&mut self, at: &str, cells: [u64; 3]) {
+        let cells: u64 = cells.iter().product();
+        if cells > MAX_BOX_CELLS {
+            let what = format!("found {cells} cells, allowed: at most {MAX_BOX_CELLS}");
+            self.conflict(at.to_owned(), what, "use fewer cells");
         }
     }
 
@@ -361,7 +331,21 @@ impl Check<'_> {
         if raw.self_collision == Some(true) {
             self.unsupported("effects.self_collision".into(), "true", &["false"]);
         }
-        EffectSwitches { cutting: raw.cutting, contact: raw.contact, energy: raw.energy }
+        EffectSwitches {
+            cutting: raw.cutting,
+            contact: raw.contact,
+            energy: raw.energy,
+            error_estimate: raw.error_estimate,
+        }
+    }
+}
+
+fn split(pattern: RawPattern) -> CellSplit {
+    match pattern {
+        RawPattern::Tet5 => CellSplit::Five,
+        RawPattern::Tet6 => CellSplit::Six,
+        RawPattern::Oct6 => CellSplit::Octahedral,
+        RawPattern::Hex => CellSplit::Hex,
     }
 }
 

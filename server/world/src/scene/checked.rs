@@ -1,8 +1,8 @@
 //! A scene as ready objects: names resolved to indices, words to types, lists to vectors.
 
 use nalgebra::{Unit, Vector3};
-use scindo_physics::material::Law;
 
+use super::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawPrecision};
 use crate::inputs::{ToolMode, ToolShape};
 
 /// A scene whose values are all in range and fit each other. Files are not opened yet.
@@ -37,10 +37,10 @@ pub struct CheckedScene {
 pub struct BodySpec {
     /// Name.
     pub id: String,
-    /// Where its tetrahedra come from.
+    /// Where its elements come from.
     pub mesh: MeshSource,
-    /// Constitutive law.
-    pub law: Law,
+    /// How it is computed.
+    pub mechanics: Mechanics,
     /// Young's modulus [Pa].
     pub young_pa: f64,
     /// Poisson's ratio.
@@ -51,17 +51,82 @@ pub struct BodySpec {
     pub damping_mass_1_s: f64,
     /// Rayleigh damping by stiffness [s].
     pub damping_stiffness_s: f64,
-    /// Most solver iterations per step.
-    pub iterations: u32,
-    /// Relative preconditioned residual at which the solver stops.
-    pub tolerance: f64,
     /// Held parts.
     pub fixes: Vec<FixSpec>,
     /// Constant loads.
     pub loads: Vec<LoadSpec>,
 }
 
-/// Where the tetrahedra of a body come from.
+/// How a body is computed: a combination that goes together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mechanics {
+    /// Finite element.
+    pub element: RawElement,
+    /// Constitutive law.
+    pub law: RawLaw,
+    /// Time integration.
+    pub integrator: RawIntegrator,
+    /// Parameters of Newmark's method, used by it alone.
+    pub newmark: Newmark,
+    /// Mass matrix.
+    pub mass: RawMass,
+    /// Remedy against locking.
+    pub locking: RawLocking,
+    /// Linear solver.
+    pub method: RawMethod,
+    /// Arithmetic; none: as the other settings allow.
+    pub precision: Option<RawPrecision>,
+    /// Most Newton steps per step of time; none: as law and integrator call for.
+    pub newton_steps: Option<u32>,
+    /// Most iterations of a linear solve.
+    pub iterations: u32,
+    /// Relative preconditioned residual at which the solver stops.
+    pub tolerance: f64,
+}
+
+/// Parameters of Newmark's method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Newmark {
+    /// β, weight of the new acceleration in the positions.
+    pub beta: f64,
+    /// γ, weight of the new acceleration in the velocities.
+    pub gamma: f64,
+}
+
+/// Tolerances below this are out of reach of single precision.
+const SINGLE_TOLERANCE: f64 = 1e-7;
+
+impl Mechanics {
+    /// What keeps the body from the fast path, which runs in single precision; none if nothing does.
+    pub fn why_general(&self) -> Option<&'static str> {
+        let reasons = [
+            (self.element == RawElement::Tet10, "tet10"),
+            (self.element == RawElement::Hex8, "hex8"),
+            (self.law == RawLaw::Stvk, "law stvk"),
+            (self.law == RawLaw::NeoHookean, "law neo-hookean"),
+            (self.integrator != RawIntegrator::ImplicitEuler, "another integrator than implicit-euler"),
+            (self.method != RawMethod::Pcg, "another solver than pcg"),
+            (self.mass == RawMass::Consistent, "consistent mass"),
+            (self.locking != RawLocking::None, "a locking remedy"),
+            (self.newton_steps.is_some_and(|steps| steps > 1), "more than one Newton step"),
+        ];
+        reasons.iter().find(|(general, _)| *general).map(|(_, why)| *why)
+    }
+
+    /// The arithmetic that is used: single where it can be and the tolerance allows, else mixed;
+    /// double without a solver.
+    pub fn arithmetic(&self) -> RawPrecision {
+        self.precision.unwrap_or(if self.integrator.is_explicit() {
+            RawPrecision::Double
+        } else if self.why_general().is_none() && self.tolerance >= SINGLE_TOLERANCE {
+            RawPrecision::Single
+        } else {
+            RawPrecision::Mixed
+        })
+    }
+}
+
+/// Where the elements of a body come from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum MeshSource {
     /// A block.
@@ -72,6 +137,13 @@ pub enum MeshSource {
         max_m: Vector3<f64>,
         /// Cells along x, y, z.
         cells: [usize; 3],
+        /// How a cell is split.
+        split: CellSplit,
+    },
+    /// A block whose cells end at given coordinates.
+    Grid {
+        /// Rising coordinates along x, y, z [m].
+        lines_m: [Vec<f64>; 3],
         /// How a cell is split.
         split: CellSplit,
     },
@@ -98,13 +170,27 @@ pub enum MeshSource {
     },
 }
 
-/// How a cubic cell is split into tetrahedra.
+impl MeshSource {
+    /// How the cells of a block are split; none for other meshes.
+    pub fn split(&self) -> Option<CellSplit> {
+        match self {
+            MeshSource::Box { split, .. } | MeshSource::Grid { split, .. } => Some(*split),
+            _ => None,
+        }
+    }
+}
+
+/// How a cubic cell is split into elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellSplit {
-    /// Five, mirrored from cell to cell.
+    /// Five tetrahedra, mirrored from cell to cell.
     Five,
-    /// Six around the cell's diagonal.
+    /// Six tetrahedra around the cell's diagonal.
     Six,
+    /// Six tetrahedra as Nienhuys cut his cube.
+    Octahedral,
+    /// Not at all: a hexahedron.
+    Hex,
 }
 
 /// Held nodes.
@@ -243,6 +329,8 @@ pub struct EffectSwitches {
     pub contact: Option<bool>,
     /// Energies in every report.
     pub energy: Option<bool>,
+    /// Estimated discretisation error in every report.
+    pub error_estimate: Option<bool>,
 }
 
 /// How often clients hear of what [Hz].

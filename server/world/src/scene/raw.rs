@@ -5,6 +5,10 @@
 //! cannot drift apart. Ranges stand beside the keys as JSON Schema keywords; `x-next` says what
 //! to do when a value lies outside. Every unit is SI and stands in the key.
 
+mod mechanics;
+
+pub use mechanics::*;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -79,7 +83,7 @@ pub struct RawBody {
     /// Name, unique among bodies; becomes part of network keys.
     #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
     pub id: String,
-    /// Where its tetrahedra come from.
+    /// Where its elements come from.
     pub mesh: RawMesh,
     /// Finite element.
     #[serde(default)]
@@ -105,7 +109,16 @@ pub struct RawBody {
     /// Time integration.
     #[serde(default)]
     pub integrator: RawIntegrator,
-    /// Linear solver.
+    /// Parameters of `integrator = "newmark"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub newmark: Option<RawNewmark>,
+    /// Mass matrix.
+    #[serde(default)]
+    pub mass: RawMass,
+    /// Remedy against locking of nearly incompressible material.
+    #[serde(default)]
+    pub locking: RawLocking,
+    /// Solver of a step.
     #[serde(default)]
     pub solver: RawSolver,
     /// Held or displaced parts.
@@ -116,15 +129,18 @@ pub struct RawBody {
     pub load: Vec<RawLoad>,
 }
 
-/// Where the tetrahedra of a body come from: exactly one of `box`, `file`, `surface`, `organ`.
+/// Where the elements of a body come from: exactly one of `box`, `grid`, `file`, `surface`, `organ`.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{"required": ["box"]}, {"required": ["file"]},
-    {"required": ["surface"]}, {"required": ["organ"]}]))]
+#[schemars(extend("oneOf" = [{"required": ["box"]}, {"required": ["grid"]},
+    {"required": ["file"]}, {"required": ["surface"]}, {"required": ["organ"]}]))]
 pub struct RawMesh {
     /// An axis-aligned block.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub r#box: Option<RawBox>,
+    /// A block whose cells end at given coordinates.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grid: Option<RawGrid>,
     /// A volumetric mesh: Gmsh .msh, .vtk or .vtu; relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
@@ -146,7 +162,7 @@ pub struct RawMesh {
     pub scale: Option<f64>,
 }
 
-/// An axis-aligned block of tetrahedra.
+/// An axis-aligned block of equal cells.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBox {
@@ -162,6 +178,24 @@ pub struct RawBox {
     pub pattern: RawPattern,
 }
 
+/// An axis-aligned block whose cells end at given coordinates, finer where they lie closer.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawGrid {
+    /// Rising coordinates along x [m].
+    #[schemars(length(min = 2, max = 1025))]
+    pub x_m: Vec<f64>,
+    /// Rising coordinates along y [m].
+    #[schemars(length(min = 2, max = 1025))]
+    pub y_m: Vec<f64>,
+    /// Rising coordinates along z [m].
+    #[schemars(length(min = 2, max = 1025))]
+    pub z_m: Vec<f64>,
+    /// How a cell is split.
+    #[serde(default)]
+    pub pattern: RawPattern,
+}
+
 /// How a cubic cell is split into elements.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -171,7 +205,9 @@ pub enum RawPattern {
     Tet5,
     /// Six tetrahedra around the cell's diagonal (Kuhn).
     Tet6,
-    /// Hexahedra; not supported yet.
+    /// Six tetrahedra without a preferred diagonal, as Nienhuys cut his cube.
+    Oct6,
+    /// Not split: one hexahedron, for `element = "hex8"`.
     Hex,
 }
 
@@ -182,104 +218,6 @@ pub struct RawOrgan {
     /// Lattice cells along its longest side.
     #[schemars(range(min = 4, max = 128), extend("x-next" = "20 to 24 cells run in real time"))]
     pub cells: u32,
-}
-
-/// Finite element.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RawElement {
-    /// Linear tetrahedron.
-    #[default]
-    Tet4,
-    /// Quadratic tetrahedron; not supported yet.
-    Tet10,
-    /// Trilinear hexahedron; not supported yet.
-    Hex8,
-}
-
-/// Constitutive law.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RawLaw {
-    /// Small strain, small rotation.
-    Linear,
-    /// Small strain, large rotation.
-    #[default]
-    Corotational,
-    /// St. Venant-Kirchhoff; not supported yet.
-    Stvk,
-    /// Stable Neo-Hookean; not supported yet.
-    NeoHookean,
-}
-
-/// Rayleigh damping, D = mass_1_s M + stiffness_s K.
-#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RawRayleigh {
-    /// Factor of the mass matrix [1/s]: drags against the room.
-    #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "0 switches it off"))]
-    pub mass_1_s: f64,
-    /// Factor of the stiffness matrix [s]: damps deformation, not rigid motion.
-    #[schemars(range(min = 0.0, max = 1e3), extend("x-next" = "0 switches it off"))]
-    pub stiffness_s: f64,
-}
-
-/// Time integration.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RawIntegrator {
-    /// Relaxation without inertia; not supported yet.
-    Static,
-    /// Not supported yet.
-    SymplecticEuler,
-    /// Not supported yet.
-    Midpoint,
-    /// Not supported yet.
-    Rk4,
-    /// Implicit Euler, linearised at the inertial predictor.
-    #[default]
-    ImplicitEuler,
-    /// Not supported yet.
-    Bdf2,
-    /// Not supported yet.
-    Newmark,
-}
-
-/// Linear solver of a step.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RawSolver {
-    /// Method.
-    pub method: RawMethod,
-    /// Most iterations per step.
-    #[schemars(range(min = 1, max = 100000), extend("x-next" = "10 to 100 suits real time"))]
-    pub iterations: u32,
-    /// Stop when the preconditioned residual has fallen by this factor.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0, "x-next" = "1e-3 for speed, 1e-6 for accuracy"))]
-    pub tolerance: f64,
-}
-
-impl Default for RawSolver {
-    fn default() -> Self {
-        Self { method: RawMethod::Pcg, iterations: 50, tolerance: 1e-6 }
-    }
-}
-
-/// Method of the linear solver.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RawMethod {
-    /// Conjugate gradients without preconditioner; not supported yet.
-    Cg,
-    /// Conjugate gradients with block-Jacobi preconditioner.
-    #[default]
-    Pcg,
-    /// Sparse factorisation; not supported yet.
-    Cholesky,
-    /// Not supported yet.
-    Multigrid,
-    /// Not supported yet.
-    MgPcg,
 }
 
 /// A held or displaced part of a body.
@@ -599,6 +537,9 @@ pub struct RawEffects {
     /// `true`: kinetic and elastic energy in every step report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<bool>,
+    /// `true`: estimate of the discretisation error in every step report.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_estimate: Option<bool>,
 }
 
 /// How often clients hear of what.

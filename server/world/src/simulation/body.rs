@@ -53,6 +53,7 @@ impl SimBody {
         let mesh = self.body.cut_mesh();
         BodySize {
             elements: mesh.mesh().tets.len(),
+            nodes: mesh.n_copies(),
             vertices: mesh.surface().vertices.len(),
             triangles: mesh.surface().triangles.len(),
         }

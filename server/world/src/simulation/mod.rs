@@ -13,7 +13,7 @@ mod cuts;
 use std::path::Path;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{BodyError, Outcome, PcgSettings};
+use scindo_physics::body::{BodyError, Outcome};
 
 pub use body::SimBody;
 pub use report::{BodyReport, Energy, Event, Level, StepReport};
@@ -221,7 +221,7 @@ impl Simulation {
             ));
         }
         for (body, spec) in self.bodies.iter_mut().zip(&scene.bodies) {
-            let solver = PcgSettings { iterations: spec.iterations, tolerance: spec.tolerance };
+            let solver = build::mechanics::linear(&spec.mechanics);
             body.body.set_solver(solver).map_err(|error| error.to_string())?;
         }
         self.scene = scene;

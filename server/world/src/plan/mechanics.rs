@@ -1,0 +1,147 @@
+//! What the mechanics of each body are made of, and what they cost.
+
+use super::{BodySize, Plan, count};
+use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawPrecision};
+use crate::scene::{BodySpec, CheckedScene, Mechanics};
+
+/// Fast path, seconds per element and solver iteration: one matrix-free product with rotated
+/// gradients, vector work included. Order of magnitude on one core; [`Plan::measured`] replaces it.
+const FAST_ITERATION: f64 = 12e-9;
+
+/// Fast path, seconds per element and step: rotations, forces and preconditioner.
+const FAST_ELEMENT: f64 = 80e-9;
+
+/// General path, seconds per quadrature point for energy and forces.
+const POINT_FORCES: f64 = 150e-9;
+
+/// General path, seconds per quadrature point and node for the tangent.
+const POINT_TANGENT: f64 = 400e-9;
+
+/// General path, seconds per solver iteration and 3×3 block of a row, times the blocks of a node.
+const BLOCK_ITERATION: f64 = 6e-9;
+
+/// Seconds per row and its blocks squared for a factorisation, a coarse guess.
+const FACTOR_ROW: f64 = 20e-9;
+
+impl Plan {
+    pub(super) fn mechanics(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
+        for (body, size) in scene.bodies.iter().zip(sizes) {
+            let why = describe(&body.mechanics, size);
+            self.push(&format!("deformation {}", body.id), true, why, seconds(&body.mechanics, size));
+        }
+        let moving = |body: &&BodySpec| body.mechanics.integrator != RawIntegrator::Static;
+        let of = |wanted: &dyn Fn(&&BodySpec) -> bool| scene.bodies.iter().filter(wanted).count();
+        let inertia = of(&moving);
+        let why = format!("{} in motion, {} static", count(inertia, "body"), scene.bodies.len() - inertia);
+        self.push("inertia", inertia > 0, why, 0.0);
+        let turning = of(&|body| body.mechanics.law != RawLaw::Linear);
+        let why = format!("{} with a law for large rotations", count(turning, "body"));
+        self.push("large rotation", turning > 0, why, 0.0);
+        let damped = of(&|b| b.damping_mass_1_s > 0.0 || b.damping_stiffness_s > 0.0);
+        let why = if damped > 0 {
+            format!("{} with rayleigh", count(damped, "body"))
+        } else {
+            "no body has rayleigh".into()
+        };
+        self.push("damping", damped > 0, why, 0.0);
+        let remedies = of(&|body| body.mechanics.locking != RawLocking::None);
+        let why = if remedies > 0 {
+            format!("{} with a remedy", count(remedies, "body"))
+        } else {
+            "no body has locking".into()
+        };
+        self.push("locking remedy", remedies > 0, why, 0.0);
+        let estimate = scene.effects.error_estimate == Some(true);
+        let why = if estimate { "effects.error_estimate = true" } else { "nobody asked" };
+        let cost = sizes.iter().map(|size| size.elements as f64 * POINT_FORCES).sum();
+        self.push("error estimate", estimate, why, cost);
+    }
+}
+
+/// Law, element, integrator, solver, arithmetic, path and operator in a line.
+fn describe(m: &Mechanics, size: &BodySize) -> String {
+    let law = match m.law {
+        RawLaw::Linear => "linear",
+        RawLaw::Corotational => "corotational",
+        RawLaw::Stvk => "St. Venant-Kirchhoff",
+        RawLaw::NeoHookean => "Neo-Hookean",
+    };
+    let element = match m.element {
+        RawElement::Tet4 => "tet4",
+        RawElement::Tet10 => "tet10",
+        RawElement::Hex8 => "hex8",
+    };
+    let remedy = match m.locking {
+        RawLocking::None => "",
+        RawLocking::NodeAveraged => " with node-averaged volume",
+        RawLocking::Selective => " with selective integration",
+    };
+    let integrator = match m.integrator {
+        RawIntegrator::Static => "static".into(),
+        RawIntegrator::SymplecticEuler => "symplectic Euler".into(),
+        RawIntegrator::Midpoint => "midpoint".into(),
+        RawIntegrator::Rk4 => "Runge-Kutta 4".into(),
+        RawIntegrator::ImplicitEuler => "implicit Euler".into(),
+        RawIntegrator::Bdf2 => "BDF2".into(),
+        RawIntegrator::Newmark => format!("Newmark {} {}", m.newmark.beta, m.newmark.gamma),
+    };
+    let mass = if m.mass == RawMass::Consistent { ", consistent mass" } else { "" };
+    let precision = match m.arithmetic() {
+        RawPrecision::Single => "single",
+        RawPrecision::Mixed => "mixed",
+        RawPrecision::Double => "double",
+    };
+    let solver = match m.method {
+        _ if m.integrator.is_explicit() => "no solver".into(),
+        RawMethod::Cholesky => format!("cholesky, {precision}"),
+        RawMethod::Cg => format!("cg, {} x {:e}, {precision}", m.iterations, m.tolerance),
+        _ => format!("pcg, {} x {:e}, {precision}", m.iterations, m.tolerance),
+    };
+    let path = if m.arithmetic() == RawPrecision::Single {
+        "fast path, matrix-free".into()
+    } else if m.integrator.is_explicit() {
+        "general path, forces only".into()
+    } else {
+        let why = m.why_general().unwrap_or("the precision asked for");
+        format!("general path for {why}, assembled")
+    };
+    let elements = size.elements;
+    format!("{elements} {element}{remedy}, {law}; {integrator}{mass}; {solver}; {path}")
+}
+
+/// Predicted seconds per step.
+fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
+    let elements = size.elements as f64;
+    if m.arithmetic() == RawPrecision::Single {
+        return elements * (FAST_ELEMENT + f64::from(m.iterations) * FAST_ITERATION);
+    }
+    let (points, nodes_of_element, blocks_of_row) = match (m.element, m.locking) {
+        (RawElement::Tet4, RawLocking::NodeAveraged) => (2.0, 4.0, 60.0),
+        (RawElement::Tet4, _) => (1.0, 4.0, 14.0),
+        (RawElement::Tet10, _) => (4.0, 10.0, 28.0),
+        (RawElement::Hex8, _) => (8.0, 8.0, 27.0),
+    };
+    let forces = elements * points * POINT_FORCES;
+    let evaluations = match m.integrator {
+        RawIntegrator::Rk4 => 4.0,
+        RawIntegrator::Midpoint => 2.0,
+        _ => 1.0,
+    };
+    if m.integrator.is_explicit() {
+        return evaluations * forces;
+    }
+    let rows = size.nodes as f64;
+    let solve = if m.method == RawMethod::Cholesky {
+        rows * rows.powf(2.0 / 3.0) * FACTOR_ROW * 9.0
+    } else {
+        f64::from(m.iterations) * rows * blocks_of_row * BLOCK_ITERATION
+    };
+    let tangent = elements * points * nodes_of_element * POINT_TANGENT;
+    let easy = matches!(m.law, RawLaw::Linear | RawLaw::Corotational);
+    let newton = match m.newton_steps {
+        Some(1) => 1.0,
+        None if easy => 1.0,
+        _ => 3.0, // most steps of time need no more
+    };
+    newton * (tangent + 2.0 * forces + solve)
+}

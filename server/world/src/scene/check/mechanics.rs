@@ -1,0 +1,181 @@
+//! Which elements, laws, integrators and solvers go together; everything else is refused here.
+
+use super::super::checked::{CellSplit, Mechanics, MeshSource, Newmark};
+use super::super::raw::*;
+use super::Check;
+
+impl Check<'_> {
+    /// How `body` is computed, or why it cannot be.
+    pub(super) fn mechanics(&mut self, at: &str, body: &RawBody, mesh: &MeshSource) -> Mechanics {
+        let newmark = body.newmark.clone().unwrap_or_default();
+        let mechanics = Mechanics {
+            element: body.element,
+            law: body.law,
+            integrator: body.integrator,
+            newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
+            mass: body.mass,
+            locking: body.locking,
+            method: body.solver.method,
+            precision: body.solver.precision,
+            newton_steps: body.solver.newton_steps,
+            iterations: body.solver.iterations,
+            tolerance: body.solver.tolerance,
+        };
+        self.element(at, mechanics.element, mesh);
+        self.locking(at, &mechanics);
+        self.integrator(at, body);
+        self.solver(at, &mechanics);
+        self.precision(at, &mechanics);
+        mechanics
+    }
+
+    fn element(&mut self, at: &str, element: RawElement, mesh: &MeshSource) {
+        let hexahedra = mesh.split() == Some(CellSplit::Hex);
+        if element == RawElement::Hex8 && !hexahedra {
+            let what = "found `hex8` on a mesh of tetrahedra, allowed there: tet4, tet10";
+            let next = "give mesh.box or mesh.grid the pattern `hex`, or choose tet4 or tet10";
+            self.conflict(format!("{at}.element"), what, next);
+        }
+        if element != RawElement::Hex8 && hexahedra {
+            let what = format!("found `{}` on the box pattern `hex`, allowed there: hex8", word(&element));
+            let next = "write element = \"hex8\", or choose the pattern tet5, tet6 or oct6";
+            self.conflict(format!("{at}.element"), what, next);
+        }
+    }
+
+    fn locking(&mut self, at: &str, m: &Mechanics) {
+        let key = format!("{at}.locking");
+        let (needs, others) = match m.locking {
+            RawLocking::None => return,
+            RawLocking::NodeAveraged => (RawElement::Tet4, "selective on hex8, or tet10 without a remedy"),
+            RawLocking::Selective => (RawElement::Hex8, "node-averaged on tet4, or tet10 without a remedy"),
+        };
+        let found = word(&m.locking);
+        if m.element != needs {
+            let what = format!("found `{found}` with {}, allowed: only {}", word(&m.element), word(&needs));
+            self.conflict(key.clone(), what, &format!("take {others}"));
+        }
+        if m.law == RawLaw::Stvk {
+            let what = format!(
+                "found `{found}` with `stvk`, whose energy does not split into shape and volume; allowed: \
+                 none"
+            );
+            self.conflict(key, what, "choose linear, corotational or neo-hookean, or no remedy");
+        }
+    }
+
+    fn integrator(&mut self, at: &str, body: &RawBody) {
+        if body.newmark.is_some() && body.integrator != RawIntegrator::Newmark {
+            let what =
+                format!("`newmark` only goes with integrator newmark, found {}", word(&body.integrator));
+            self.conflict(format!("{at}.newmark"), what, "remove it or write integrator = \"newmark\"");
+        }
+        if body.integrator == RawIntegrator::Static {
+            self.statics(at, body);
+        }
+        if body.integrator.is_explicit() && body.mass == RawMass::Consistent {
+            let what = format!(
+                "found `consistent` with {}, allowed with explicit integrators: lumped",
+                word(&body.integrator)
+            );
+            let next =
+                "an explicit step divides by each node's mass; choose lumped or an implicit integrator";
+            self.conflict(format!("{at}.mass"), what, next);
+        }
+    }
+
+    fn statics(&mut self, at: &str, body: &RawBody) {
+        let rayleigh = &body.rayleigh;
+        if rayleigh.mass_1_s > 0.0 || rayleigh.stiffness_s > 0.0 {
+            let what = "found damping in a static body, allowed: none";
+            self.conflict(format!("{at}.rayleigh"), what, "remove it; nothing moves in an equilibrium");
+        }
+        if body.mass == RawMass::Consistent {
+            let what = "found `consistent` in a static body, allowed: lumped";
+            self.conflict(format!("{at}.mass"), what, "remove it; an equilibrium has no inertia");
+        }
+        if body.fix.is_empty() {
+            let what = "a static body is fixed nowhere, so it has no equilibrium";
+            self.conflict(
+                format!("{at}.integrator"),
+                what,
+                "add a [[body.fix]] or choose another integrator",
+            );
+        }
+    }
+
+    fn solver(&mut self, at: &str, m: &Mechanics) {
+        let key = format!("{at}.solver.method");
+        let found = word(&m.method);
+        if matches!(m.method, RawMethod::Multigrid | RawMethod::MgPcg) {
+            return self.unsupported(key, &found, &["cg", "pcg", "cholesky"]);
+        }
+        if !m.integrator.is_explicit() {
+            return;
+        }
+        let explicit = word(&m.integrator);
+        if m.method != RawMethod::Pcg {
+            let what = format!("found `{found}`, but {explicit} is explicit and solves no equations");
+            self.conflict(key, what, "remove solver.method or choose an implicit integrator");
+        }
+        if m.newton_steps.is_some() {
+            let what = format!("`newton_steps` is given, but {explicit} is explicit");
+            self.conflict(format!("{at}.solver.newton_steps"), what, "remove it");
+        }
+    }
+
+    fn precision(&mut self, at: &str, m: &Mechanics) {
+        let key = format!("{at}.solver.precision");
+        match m.precision {
+            Some(RawPrecision::Single) => {
+                if let Some(why) = m.why_general() {
+                    let what = format!("found `single` with {why}, allowed: mixed, double");
+                    let next = "single precision needs tet4, linear or corotational, implicit-euler, pcg, \
+                                lumped mass, no locking remedy and one Newton step";
+                    self.conflict(key, what, next);
+                }
+            }
+            Some(RawPrecision::Mixed) if m.integrator.is_explicit() => {
+                let what = format!("found `mixed` with {}, allowed: double", word(&m.integrator));
+                self.conflict(key, what, "an explicit step has no solver to run in single precision");
+            }
+            _ => {}
+        }
+    }
+
+    /// Bodies whose mesh cannot be cut, against the cuts and blades of the scene.
+    pub(super) fn cuttable(&mut self) {
+        let raw = self.raw;
+        let whole = |body: &&RawBody| body.element != RawElement::Tet4;
+        for (i, cut) in raw.cut.iter().enumerate() {
+            if let Some(body) = raw.body.iter().filter(whole).find(|body| body.id == cut.body) {
+                let what = format!(
+                    "the cut goes through body `{}` of {} elements, allowed: only tet4",
+                    body.id,
+                    word(&body.element)
+                );
+                self.conflict(format!("cut.{i}.body"), what, "make the body of tet4 or remove the cut");
+            }
+        }
+        let Some(body) = raw.body.iter().find(whole) else { return };
+        for tool in &raw.tool {
+            if let Some(i) = tool.path.iter().position(|point| point.mode == RawMode::Cut) {
+                let what = format!(
+                    "a blade cuts every body it meets, but body `{}` is of {} elements; allowed: only tet4",
+                    body.id,
+                    word(&body.element)
+                );
+                self.conflict(
+                    format!("tool.{}.path.{i}.mode", tool.id),
+                    what,
+                    "make the body of tet4 or let the tool touch",
+                );
+            }
+        }
+    }
+}
+
+/// A word of the format as it is written in a scene.
+fn word<T: serde::Serialize>(value: &T) -> String {
+    serde_json::to_value(value).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+}
