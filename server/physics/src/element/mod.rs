@@ -3,6 +3,8 @@
 
 mod polar;
 mod lanes;
+#[cfg(target_arch = "x86_64")]
+pub mod avx2;
 mod polar_lanes;
 mod tet4;
 pub mod quadrature;
@@ -10,9 +12,7 @@ pub mod tet10;
 pub mod hex8;
 mod spring;
 
-#[cfg(target_arch = "x86_64")]
-pub use lanes::avx2;
-pub use lanes::{LANES, Lanes, Simd, Vector8};
+pub use lanes::{Ids, LANES, Lanes, Simd, Vector8};
 pub use polar::polar_rotation;
 pub use polar_lanes::{Mat3, polar_newton};
 pub use spring::Spring;

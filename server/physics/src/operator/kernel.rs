@@ -1,29 +1,27 @@
 //! The two loops over pieces that a step spends its time in: [`Batches::update`] once,
 //! [`Batches::apply`] once per solver iteration.
 //!
-//! Because the law is isotropic, R K Rᵀ applied to a displacement equals: rotate the *gradients*
-//! once per step, g′_a = R g_a; then H = Σ du_a ⊗ g′_a, σ = 2μ sym H + λ tr(H) I, f_a = w V σ g′_a.
-//! That is half the arithmetic and half the memory of multiplying by R K Rᵀ, 52 bytes per piece.
+//! Because the law is isotropic, R K Rᵀ applied to a displacement equals: rotate and scale the
+//! *gradients* once per step, g′_a = √(2μ w V s) R g_a; then H = Σ du_a ⊗ g′_a,
+//! σ = sym H + λ/2μ tr(H) I, f_a = σ g′_a. That is half the arithmetic and a third of the memory of
+//! multiplying by R K Rᵀ: 44 bytes per piece.
 
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
 use nalgebra::Matrix3;
 
 use super::Padded;
-use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
+use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
 
 /// What an application streams per batch of eight pieces.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 struct Batch {
-    /// Rotated gradients g′_1, g′_2, g′_3 [1/m]; g′_0 = −(g′_1 + g′_2 + g′_3).
+    /// Rotated gradients √(2μ w V s) R g_k, k = 1, 2, 3, with s the factor of K̂ in the operator;
+    /// the one of corner 0 is minus their sum.
     g: [[Lanes; 3]; 3],
-    /// 2 μ w V s, with s the factor of K̂ in the operator.
-    two_mu: Lanes,
-    /// λ w V s.
-    lambda: Lanes,
     /// Local numbers of the four copies.
-    nodes: [[u16; LANES]; 4],
+    nodes: [Ids; 4],
 }
 
 /// What only an update needs per batch.
@@ -69,18 +67,20 @@ pub struct Locals<'a> {
 pub struct Batches {
     live: Vec<Batch>,
     rest: Vec<RestBatch>,
+    /// λ/2μ at the last update.
+    ratio: f32,
     /// Length of the local vectors, the waste bin included.
     n_locals: usize,
 }
 
 impl Batches {
     /// Batches with the local numbers `nodes`, all below `n_locals`, and their rest states.
-    pub fn new(nodes: &[[[u16; LANES]; 4]], rest: Vec<RestBatch>, n_locals: usize) -> Self {
+    pub fn new(nodes: &[[Ids; 4]], rest: Vec<RestBatch>, n_locals: usize) -> Self {
         assert_eq!(nodes.len(), rest.len());
         assert!(nodes.iter().flatten().flatten().all(|&id| (id as usize) < n_locals));
         let zero = Lanes::default();
-        let live = nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], two_mu: zero, lambda: zero, nodes });
-        Self { live: live.collect(), rest, n_locals }
+        let live = nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes });
+        Self { live: live.collect(), rest, ratio: 0.0, n_locals }
     }
 
     /// Rest states and rotations.
@@ -94,8 +94,8 @@ impl Batches {
         match simd {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
-            Simd::Avx2 => unsafe { avx2::apply(&self.live, x, y) },
-            _ => apply_with::<Lanes>(&self.live, x, y),
+            Simd::Avx2 => unsafe { avx2::apply(&self.live, self.ratio, x, y) },
+            _ => apply_with::<Lanes>(&self.live, self.ratio, x, y),
         }
     }
 
@@ -103,6 +103,7 @@ impl Batches {
     /// `locals`. Returns the number of pieces with det F ≤ 0.
     pub fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
         let n = self.n_locals;
+        self.ratio = 0.5 * c.lambda / c.mu;
         assert!(locals.x.len() == n && locals.f.len() == n && locals.blocks.len() == n);
         let (rest, live) = (&mut self.rest[..], &mut self.live[..]);
         match simd {
@@ -114,72 +115,81 @@ impl Batches {
     }
 }
 
+// Loops instead of closures below: see `Vector8`.
+
 #[inline(always)]
-fn gather<V: Vector8>(x: &[Padded], ids: &[u16; LANES]) -> [V; 3] {
-    // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
-    V::transpose(std::array::from_fn(|lane| unsafe { x.get_unchecked(ids[lane] as usize) }))
+fn load<V: Vector8>(l: &[Lanes; 3]) -> [V; 3] {
+    [V::load(&l[0]), V::load(&l[1]), V::load(&l[2])]
 }
 
 #[inline(always)]
-fn scatter<V: Vector8>(y: &mut [Padded], ids: &[u16; LANES], f: [V; 3]) {
-    for (row, &id) in V::transpose_back(f).iter().zip(ids) {
-        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
-        let y = unsafe { y.get_unchecked_mut(id as usize) };
-        for i in 0..4 {
-            y[i] += row[i];
+fn product<V: Vector8>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
+    [dot(&A[0], v), dot(&A[1], v), dot(&A[2], v)]
+}
+
+#[inline(always)]
+fn dot<V: Vector8>(a: &[V; 3], b: &[V; 3]) -> V {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
+}
+
+/// The vector of corner 0, where the sum over the corners is 0.
+#[inline(always)]
+fn minus_sum<V: Vector8>(v: &[[V; 3]; 3]) -> [V; 3] {
+    [-(v[0][0] + v[1][0] + v[2][0]), -(v[0][1] + v[1][1] + v[2][1]), -(v[0][2] + v[1][2] + v[2][2])]
+}
+
+/// H_ij = Σ_k d_k,i g_k,j.
+#[inline(always)]
+fn sum_of_outer_products<V: Vector8>(d: &[[V; 3]; 3], g: &[[V; 3]; 3]) -> [[V; 3]; 3] {
+    let mut H = *d;
+    for i in 0..3 {
+        for j in 0..3 {
+            H[i][j] = d[0][i].mul_add(g[0][j], d[1][i].mul_add(g[1][j], d[2][i] * g[2][j]));
         }
     }
+    H
 }
 
 #[inline(always)]
-fn load<V: Vector8, const N: usize>(lanes: &[Lanes; N]) -> [V; N] {
-    std::array::from_fn(|i| V::load(&lanes[i]))
-}
-
-#[inline(always)]
-fn apply_with<V: Vector8>(batches: &[Batch], x: &[Padded], y: &mut [Padded]) {
-    let half = V::splat(0.5);
+fn apply_with<V: Vector8>(batches: &[Batch], ratio: f32, x: &[Padded], y: &mut [Padded]) {
+    let (half, ratio) = (V::splat(0.5), V::splat(ratio));
     for b in batches {
         let g: [[V; 3]; 3] = [load(&b.g[0]), load(&b.g[1]), load(&b.g[2])];
-        let u0 = gather::<V>(x, &b.nodes[0]);
-        let mut H = [[half; 3]; 3];
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        let (u0, mut d) = unsafe {
+            let d = [V::gather(x, &b.nodes[1]), V::gather(x, &b.nodes[2]), V::gather(x, &b.nodes[3])];
+            (V::gather(x, &b.nodes[0]), d)
+        };
         for k in 0..3 {
-            let u = gather::<V>(x, &b.nodes[k + 1]);
             for i in 0..3 {
-                let d = u[i] - u0[i];
-                for j in 0..3 {
-                    H[i][j] = if k == 0 { d * g[0][j] } else { d.mul_add(g[k][j], H[i][j]) };
-                }
+                d[k][i] = d[k][i] - u0[i];
             }
         }
-        let two_mu = V::load(&b.two_mu);
-        let mu = half * two_mu;
-        let pressure = V::load(&b.lambda) * (H[0][0] + H[1][1] + H[2][2]);
-        let sxx = two_mu.mul_add(H[0][0], pressure);
-        let syy = two_mu.mul_add(H[1][1], pressure);
-        let szz = two_mu.mul_add(H[2][2], pressure);
-        let sxy = mu * (H[0][1] + H[1][0]);
-        let sxz = mu * (H[0][2] + H[2][0]);
-        let syz = mu * (H[1][2] + H[2][1]);
+        let H = sum_of_outer_products(&d, &g);
+        let pressure = ratio * (H[0][0] + H[1][1] + H[2][2]);
+        let (sxx, syy, szz) = (H[0][0] + pressure, H[1][1] + pressure, H[2][2] + pressure);
+        let sxy = half * (H[0][1] + H[1][0]);
+        let sxz = half * (H[0][2] + H[2][0]);
+        let syz = half * (H[1][2] + H[2][1]);
         let sigma = [[sxx, sxy, sxz], [sxy, syy, syz], [sxz, syz, szz]];
-        let f = [product(&sigma, &g[0]), product(&sigma, &g[1]), product(&sigma, &g[2])];
-        scatter_forces(y, &b.nodes, f);
+        scatter_forces(
+            y,
+            &b.nodes,
+            &[product(&sigma, &g[0]), product(&sigma, &g[1]), product(&sigma, &g[2])],
+        );
     }
 }
 
 /// Adds f_1, f_2, f_3 and f_0 = −(f_1 + f_2 + f_3).
 #[inline(always)]
-fn scatter_forces<V: Vector8>(y: &mut [Padded], nodes: &[[u16; LANES]; 4], f: [[V; 3]; 3]) {
-    let f0 = std::array::from_fn(|i| -(f[0][i] + f[1][i] + f[2][i]));
-    scatter(y, &nodes[0], f0);
-    for (k, f) in f.into_iter().enumerate() {
-        scatter(y, &nodes[k + 1], f);
+fn scatter_forces<V: Vector8>(y: &mut [Padded], nodes: &[Ids; 4], f: &[[V; 3]; 3]) {
+    // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+    unsafe {
+        V::scatter(y, &nodes[0], minus_sum(f));
+        V::scatter(y, &nodes[1], f[0]);
+        V::scatter(y, &nodes[2], f[1]);
+        V::scatter(y, &nodes[3], f[2]);
     }
-}
-
-#[inline(always)]
-fn product<V: Vector8>(A: &[[V; 3]; 3], v: &[V; 3]) -> [V; 3] {
-    std::array::from_fn(|i| A[i][0].mul_add(v[0], A[i][1].mul_add(v[1], A[i][2] * v[2])))
 }
 
 #[inline(always)]
@@ -190,65 +200,72 @@ fn update_with<V: Vector8>(
     locals: &mut Locals<'_>,
 ) -> usize {
     let mut inverted = 0;
+    let ratio = V::splat(0.5 * c.lambda / c.mu);
     for (rest, live) in rest.iter_mut().zip(live) {
         let g: [[V; 3]; 3] = [load(&rest.g[0]), load(&rest.g[1]), load(&rest.g[2])];
-        let e: [[V; 3]; 3] = std::array::from_fn(|k| edge(locals.x, &live.nodes[0], &live.nodes[k + 1]));
-        let F: Mat3<V> = std::array::from_fn(|ij| {
-            let (i, j) = (ij / 3, ij % 3);
-            e[0][i].mul_add(g[0][j], e[1][i].mul_add(g[1][j], e[2][i] * g[2][j]))
-        });
+        let nodes = &live.nodes;
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        let e: [[V; 3]; 3] = unsafe {
+            [
+                V::gather_edges(locals.x, &nodes[0], &nodes[1]),
+                V::gather_edges(locals.x, &nodes[0], &nodes[2]),
+                V::gather_edges(locals.x, &nodes[0], &nodes[3]),
+            ]
+        };
+        let F = sum_of_outer_products(&e, &g);
         if c.rotates {
             inverted += rotate(&F, rest);
         }
-        let r: Mat3<V> = load(&rest.rotation);
-        let R = [[r[0], r[1], r[2]], [r[3], r[4], r[5]], [r[6], r[7], r[8]]];
-        let volume = V::load(&rest.volume);
-        let sigma = material_stress(c, &R, &F, volume);
-        let f = std::array::from_fn(|k| product(&R, &product(&sigma, &g[k])));
-        scatter_forces(locals.f, &live.nodes, f);
+        let r = &rest.rotation;
+        let R: [[V; 3]; 3] = [
+            [V::load(&r[0]), V::load(&r[1]), V::load(&r[2])],
+            [V::load(&r[3]), V::load(&r[4]), V::load(&r[5])],
+            [V::load(&r[6]), V::load(&r[7]), V::load(&r[8])],
+        ];
+        let two_mu_volume = V::splat(2.0 * c.mu) * V::load(&rest.volume);
+        let P = piola_stress(&F, &R, two_mu_volume, ratio);
+        scatter_forces(locals.f, nodes, &[product(&P, &g[0]), product(&P, &g[1]), product(&P, &g[2])]);
 
-        let stiffness = volume * V::splat(c.scale);
-        let (mu, lambda) = (V::splat(c.mu) * stiffness, V::splat(c.lambda) * stiffness);
-        (live.two_mu, live.lambda) = ((mu + mu).store(), lambda.store());
-        let g: [[V; 3]; 3] = std::array::from_fn(|k| product(&R, &g[k]));
-        let g0 = std::array::from_fn(|i| -(g[0][i] + g[1][i] + g[2][i]));
-        for (a, g) in [g0, g[0], g[1], g[2]].iter().enumerate() {
-            scatter_block(locals.blocks, &live.nodes[a], g, mu, lambda);
+        let root = (two_mu_volume * V::splat(c.scale)).sqrt();
+        let mut turned = [product(&R, &g[0]), product(&R, &g[1]), product(&R, &g[2])];
+        for k in 0..3 {
+            for i in 0..3 {
+                turned[k][i] = turned[k][i] * root;
+                live.g[k][i] = turned[k][i].store();
+            }
         }
-        live.g = g.map(|g| g.map(V::store));
+        scatter_block(locals.blocks, &nodes[0], &minus_sum(&turned), ratio);
+        for k in 0..3 {
+            scatter_block(locals.blocks, &nodes[k + 1], &turned[k], ratio);
+        }
     }
     inverted
 }
 
-/// x_a − x_0 in double precision, rounded: the rounding error is relative to the edge, not to the
-/// distance from the origin.
-#[inline(always)]
-fn edge<V: Vector8>(x: &[[f64; 4]], from: &[u16; LANES], to: &[u16; LANES]) -> [V; 3] {
-    let rows: [Padded; LANES] = std::array::from_fn(|lane| {
-        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
-        let (p, q) = unsafe { (x.get_unchecked(from[lane] as usize), x.get_unchecked(to[lane] as usize)) };
-        std::array::from_fn(|i| (q[i] - p[i]) as f32)
-    });
-    V::transpose(std::array::from_fn(|lane| &rows[lane]))
-}
-
 /// Updates the rotation of every used lane; returns how many have det F ≤ 0.
 #[inline(always)]
-fn rotate<V: Vector8>(F: &Mat3<V>, rest: &mut RestBatch) -> usize {
-    let (R, trusted) = polar_newton(F);
-    if trusted == [true; LANES] {
-        rest.rotation = R.map(V::store);
+fn rotate<V: Vector8>(F: &[[V; 3]; 3], rest: &mut RestBatch) -> usize {
+    let F = [F[0][0], F[0][1], F[0][2], F[1][0], F[1][1], F[1][2], F[2][0], F[2][1], F[2][2]];
+    let (R, trusted) = polar_newton(&F);
+    if trusted == u8::MAX {
+        for i in 0..9 {
+            rest.rotation[i] = R[i].store();
+        }
         return 0;
     }
-    rotate_guarded(&F.map(V::store), &R.map(V::store), trusted, rest)
+    let (mut stored_F, mut stored_R) = ([Lanes::default(); 9], [Lanes::default(); 9]);
+    for i in 0..9 {
+        (stored_F[i], stored_R[i]) = (F[i].store(), R[i].store());
+    }
+    rotate_guarded(&stored_F, &stored_R, trusted, rest)
 }
 
 #[cold]
 #[inline(never)]
-fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: [bool; LANES], rest: &mut RestBatch) -> usize {
+fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: u8, rest: &mut RestBatch) -> usize {
     let mut inverted = 0;
-    for (lane, trusted) in trusted.into_iter().enumerate() {
-        if trusted {
+    for lane in 0..LANES {
+        if trusted >> lane & 1 == 1 {
             for i in 0..9 {
                 rest.rotation[i].0[lane] = R[i].0[lane];
             }
@@ -265,39 +282,53 @@ fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: [bool; LANES], rest
     inverted
 }
 
-/// w V (2μ ε + λ tr(ε) I) with ε = sym(RᵀF) − I, in the frame of the material.
+/// w V P = w V R (2μ ε + λ tr(ε) I), ε = sym(RᵀF) − I.
 #[inline(always)]
-fn material_stress<V: Vector8>(c: &Coefficients, R: &[[V; 3]; 3], F: &Mat3<V>, volume: V) -> [[V; 3]; 3] {
-    let S = |i: usize, j: usize| R[0][i].mul_add(F[j], R[1][i].mul_add(F[3 + j], R[2][i] * F[6 + j]));
-    let one = V::splat(1.0);
-    let (exx, eyy, ezz) = (S(0, 0) - one, S(1, 1) - one, S(2, 2) - one);
-    let (two_exy, two_exz, two_eyz) = (S(0, 1) + S(1, 0), S(0, 2) + S(2, 0), S(1, 2) + S(2, 1));
-    let mu = V::splat(c.mu) * volume;
-    let two_mu = mu + mu;
-    let pressure = V::splat(c.lambda) * volume * (exx + eyy + ezz);
-    let (sxy, sxz, syz) = (mu * two_exy, mu * two_exz, mu * two_eyz);
-    [
-        [two_mu.mul_add(exx, pressure), sxy, sxz],
-        [sxy, two_mu.mul_add(eyy, pressure), syz],
-        [sxz, syz, two_mu.mul_add(ezz, pressure)],
-    ]
-}
-
-/// Adds μ (|g|² I + g gᵀ) + λ g gᵀ, the diagonal block of one copy; μ and λ contain w V s.
-#[inline(always)]
-fn scatter_block<V: Vector8>(blocks: &mut [Block6], ids: &[u16; LANES], g: &[V; 3], mu: V, lambda: V) {
-    let outer = mu + lambda;
-    let isotropic = mu * g[0].mul_add(g[0], g[1].mul_add(g[1], g[2] * g[2]));
-    let t = [outer * g[0], outer * g[1], outer * g[2]];
-    let low = V::transpose_back([t[0].mul_add(g[0], isotropic), t[0] * g[1], t[0] * g[2]]);
-    let high = V::transpose_back([t[1].mul_add(g[1], isotropic), t[1] * g[2], t[2].mul_add(g[2], isotropic)]);
-    for lane in 0..LANES {
-        let block = &mut blocks[ids[lane] as usize];
-        for i in 0..4 {
-            block[i] += low[lane][i];
-            block[4 + i] += high[lane][i];
+fn piola_stress<V: Vector8>(F: &[[V; 3]; 3], R: &[[V; 3]; 3], two_mu_volume: V, ratio: V) -> [[V; 3]; 3] {
+    // RᵀF column by column
+    let mut S = *F;
+    for i in 0..3 {
+        for j in 0..3 {
+            S[i][j] = R[0][i].mul_add(F[0][j], R[1][i].mul_add(F[1][j], R[2][i] * F[2][j]));
         }
     }
+    let (one, half) = (V::splat(1.0), V::splat(0.5));
+    let (exx, eyy, ezz) = (S[0][0] - one, S[1][1] - one, S[2][2] - one);
+    let pressure = ratio * (exx + eyy + ezz);
+    let shear = half * two_mu_volume;
+    let sxy = shear * (S[0][1] + S[1][0]);
+    let sxz = shear * (S[0][2] + S[2][0]);
+    let syz = shear * (S[1][2] + S[2][1]);
+    let sxx = two_mu_volume * (exx + pressure);
+    let syy = two_mu_volume * (eyy + pressure);
+    let szz = two_mu_volume * (ezz + pressure);
+    let sigma = [[sxx, sxy, sxz], [sxy, syy, syz], [sxz, syz, szz]]; // symmetric: rows are columns
+    let mut P = sigma;
+    for i in 0..3 {
+        for j in 0..3 {
+            P[i][j] = dot(&R[i], &sigma[j]);
+        }
+    }
+    P
+}
+
+/// Adds ½ (|g|² I + g gᵀ) + λ/2μ g gᵀ, the diagonal block of one copy; g contains √(2μ w V s).
+#[inline(always)]
+fn scatter_block<V: Vector8>(blocks: &mut [Block6], ids: &Ids, g: &[V; 3], ratio: V) {
+    let half = V::splat(0.5);
+    let outer = half + ratio;
+    let isotropic = half * dot(g, g);
+    let t = [outer * g[0], outer * g[1], outer * g[2]];
+    let block = [
+        t[0].mul_add(g[0], isotropic),
+        t[0] * g[1],
+        t[0] * g[2],
+        t[1].mul_add(g[1], isotropic),
+        t[1] * g[2],
+        t[2].mul_add(g[2], isotropic),
+    ];
+    // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+    unsafe { V::scatter_blocks(blocks, ids, block) }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -308,8 +339,8 @@ mod avx2 {
     use crate::element::avx2::Register;
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn apply(batches: &[Batch], x: &[Padded], y: &mut [Padded]) {
-        super::apply_with::<Register>(batches, x, y);
+    pub fn apply(batches: &[Batch], ratio: f32, x: &[Padded], y: &mut [Padded]) {
+        super::apply_with::<Register>(batches, ratio, x, y);
     }
 
     #[target_feature(enable = "avx2,fma")]
