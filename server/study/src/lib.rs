@@ -1,1 +1,44 @@
-//! Experiments and their reports: accuracy against time.
+//! What accuracy costs in time: the study behind `scindo accuracy`.
+//!
+//! The modules read in the direction of the work: a [`case`] is a scene with a goal and a
+//! reference; its [`axes`] say what is varied (law, element, mesh, step, …) as keys of the scene;
+//! [`design`] picks the configurations; a [`trial`] runs one and times it; [`reference`] says what
+//! the right answer is and how well it is known; [`error`] compares; [`pareto`] keeps the
+//! configurations that nothing beats; [`sources`] tells which source of error dominates there;
+//! [`recommend`] picks one for a time budget; [`store`] keeps what is finished on disk; [`page`]
+//! writes it for people. [`study`] drives them.
+//!
+//! Everything is a scene with changed keys, run by `scindo-world`: the study knows no mechanics,
+//! and what a scene refuses is a result here like any other.
+
+pub mod axes;
+
+pub mod case;
+
+pub mod design;
+
+pub mod trial;
+
+pub mod series;
+
+pub mod reference;
+
+pub mod richardson;
+
+pub mod error;
+
+pub mod pareto;
+
+pub mod sources;
+
+pub mod recommend;
+
+pub mod store;
+
+pub mod table;
+
+pub mod page;
+
+pub mod study;
+
+pub use study::{CaseResult, Outcome, Progress, Settings, StudyError, StudyResult, run};

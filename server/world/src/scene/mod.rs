@@ -95,12 +95,15 @@ impl Scene {
     /// # Errors
     /// A key path that leads nowhere, or a scene that is no longer valid.
     pub fn apply_set(&self, assignment: &str) -> Result<Self, SceneError> {
-        Self::from_tree(
-            self.file.clone(),
-            self.base_dir.clone(),
-            Ok(self.tree.clone()),
-            std::slice::from_ref(&assignment.to_owned()),
-        )
+        self.apply_sets(std::slice::from_ref(&assignment.to_owned()))
+    }
+
+    /// The same scene with several values changed together, checked once.
+    ///
+    /// # Errors
+    /// A key path that leads nowhere, or a scene that is no longer valid.
+    pub fn apply_sets(&self, assignments: &[String]) -> Result<Self, SceneError> {
+        Self::from_tree(self.file.clone(), self.base_dir.clone(), Ok(self.tree.clone()), assignments)
     }
 
     fn from_tree(

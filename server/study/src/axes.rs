@@ -1,0 +1,221 @@
+//! What a study varies: axes, their settings, and the keys of the scene that a setting changes.
+
+use serde::{Deserialize, Serialize};
+
+/// What is varied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Factor {
+    /// Constitutive law.
+    Law,
+    /// Finite element.
+    Element,
+    /// Remedy against volumetric locking.
+    Locking,
+    /// Cells of the mesh.
+    Mesh,
+    /// Time integration.
+    Integrator,
+    /// Time step.
+    Step,
+    /// Linear solver.
+    Solver,
+    /// Where the solver stops.
+    Tolerance,
+    /// Floating-point precision.
+    Precision,
+    /// Threads that work on a step.
+    Threads,
+}
+
+impl Factor {
+    /// All factors, in the order of the columns of a table.
+    pub const ALL: [Factor; 10] = [
+        Factor::Law,
+        Factor::Element,
+        Factor::Locking,
+        Factor::Mesh,
+        Factor::Integrator,
+        Factor::Step,
+        Factor::Solver,
+        Factor::Tolerance,
+        Factor::Precision,
+        Factor::Threads,
+    ];
+
+    /// Name in tables and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Factor::Law => "law",
+            Factor::Element => "element",
+            Factor::Locking => "locking",
+            Factor::Mesh => "mesh",
+            Factor::Integrator => "integrator",
+            Factor::Step => "step",
+            Factor::Solver => "solver",
+            Factor::Tolerance => "tolerance",
+            Factor::Precision => "precision",
+            Factor::Threads => "threads",
+        }
+    }
+}
+
+/// One value of a factor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Setting {
+    /// How it is written for people, unique within its axis.
+    pub label: String,
+    /// Keys of the scene and their values, as `key=value`.
+    pub set: Vec<String>,
+    /// Threads, where this is a setting of [`Factor::Threads`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub threads: Option<usize>,
+    /// Size of it: cells along the longest side, step [s], tolerance. For sorting and refinement.
+    #[serde(default)]
+    pub size: f64,
+}
+
+impl Setting {
+    /// A setting that changes the keys `set`.
+    pub fn new(label: impl Into<String>, size: f64, set: Vec<String>) -> Self {
+        Self { label: label.into(), set, threads: None, size }
+    }
+}
+
+/// The settings of a factor that a case tries.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// What is varied.
+    pub factor: Factor,
+    /// Its values.
+    pub settings: Vec<Setting>,
+    /// Which of them is the base, around which the others are varied one at a time.
+    pub base: usize,
+}
+
+impl Axis {
+    /// An axis whose base is the setting labelled `base`, or the first.
+    pub fn new(factor: Factor, settings: Vec<Setting>, base: &str) -> Self {
+        let base = settings.iter().position(|s| s.label == base).unwrap_or(0);
+        Self { factor, settings, base }
+    }
+
+    /// The setting called `label`.
+    pub fn find(&self, label: &str) -> Option<&Setting> {
+        self.settings.iter().find(|s| s.label == label)
+    }
+
+    /// The base setting; none for an axis that was narrowed to nothing.
+    pub fn base(&self) -> Option<&Setting> {
+        self.settings.get(self.base)
+    }
+}
+
+/// `body.<id>.<key>=<value>` for every body.
+pub fn on_bodies(bodies: &[String], key: &str, value: &str) -> Vec<String> {
+    bodies.iter().map(|id| format!("body.{id}.{key}={value}")).collect()
+}
+
+/// An axis over words of one key, such as `law`.
+pub fn words(factor: Factor, bodies: &[String], key: &str, words: &[&str], base: &str) -> Axis {
+    let setting = |(i, word): (usize, &&str)| {
+        Setting::new(*word, i as f64, on_bodies(bodies, key, &format!("\"{word}\"")))
+    };
+    Axis::new(factor, words.iter().enumerate().map(setting).collect(), base)
+}
+
+/// Precision of the inner kernels; the default needs no key.
+pub fn precisions(bodies: &[String]) -> Axis {
+    let double = Setting::new("double", 1.0, on_bodies(bodies, "solver.precision", "\"double\""));
+    Axis::new(Factor::Precision, vec![Setting::new("mixed", 0.0, Vec::new()), double], "mixed")
+}
+
+/// Where the linear solver stops: relative preconditioned residuals, with iterations to reach them.
+pub fn tolerances(bodies: &[String], tolerances: &[f64], base: f64) -> Axis {
+    let settings = tolerances.iter().map(|t| tolerance(bodies, *t)).collect();
+    Axis::new(Factor::Tolerance, settings, &tolerance_label(base))
+}
+
+/// One tolerance.
+pub fn tolerance(bodies: &[String], tolerance: f64) -> Setting {
+    let mut set = on_bodies(bodies, "solver.tolerance", &format!("{tolerance:e}"));
+    set.extend(on_bodies(bodies, "solver.iterations", "20000"));
+    Setting::new(tolerance_label(tolerance), tolerance, set)
+}
+
+/// A fixed number of iterations, whatever is left then: a speed setting, not a solution.
+pub fn iterations(bodies: &[String], iterations: u32) -> Setting {
+    let mut set = on_bodies(bodies, "solver.tolerance", "1e-12");
+    set.extend(on_bodies(bodies, "solver.iterations", &iterations.to_string()));
+    Setting::new(format!("{iterations} iterations"), 1.0, set)
+}
+
+fn tolerance_label(tolerance: f64) -> String {
+    format!("{tolerance:.0e}")
+}
+
+/// Time steps [s]; `frame_s` is the base.
+pub fn steps(steps_s: &[f64], base_s: f64) -> Axis {
+    Axis::new(Factor::Step, steps_s.iter().map(|h| step(*h)).collect(), &step(base_s).label)
+}
+
+/// One time step [s].
+pub fn step(step_s: f64) -> Setting {
+    Setting::new(format!("{} ms", short(1e3 * step_s)), step_s, vec![format!("world.step_s={step_s:?}")])
+}
+
+/// Threads.
+pub fn threads(threads: &[usize]) -> Axis {
+    let setting =
+        |n: &usize| Setting { threads: Some(*n), ..Setting::new(n.to_string(), *n as f64, Vec::new()) };
+    Axis::new(Factor::Threads, threads.iter().map(setting).collect(), "1")
+}
+
+/// Meshes of a block; the size of a mesh is its number of cells along the longest side.
+pub fn cells(body: &str, cells: &[[usize; 3]], base: [usize; 3]) -> Axis {
+    let settings = cells.iter().map(|c| block(body, *c)).collect();
+    Axis::new(Factor::Mesh, settings, &cells_label(base))
+}
+
+/// One mesh of a block.
+pub fn block(body: &str, cells: [usize; 3]) -> Setting {
+    let [x, y, z] = cells;
+    let set = vec![format!("body.{body}.mesh.box.cells=[{x},{y},{z}]")];
+    Setting::new(cells_label(cells), x.max(y).max(z) as f64, set)
+}
+
+fn cells_label([x, y, z]: [usize; 3]) -> String {
+    format!("{x}×{y}×{z}")
+}
+
+/// A number with four significant digits and no trailing zeros.
+pub fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let digits = 3 - value.abs().log10().floor() as i32;
+    let text = format!("{value:.*}", digits.clamp(0, 12) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_short() {
+        assert_eq!(step(0.04).label, "40 ms");
+        assert_eq!(step(0.0025).label, "2.5 ms");
+        assert_eq!(tolerance(&["b".into()], 1e-6).label, "1e-6");
+        assert_eq!(short(1234.6), "1235");
+        assert_eq!(short(0.012346), "0.01235");
+    }
+
+    #[test]
+    fn a_setting_names_keys_of_every_body() {
+        let bodies = ["a".to_owned(), "b".to_owned()];
+        let axis = words(Factor::Law, &bodies, "law", &["linear", "stvk"], "stvk");
+        assert_eq!(axis.base, 1);
+        assert_eq!(axis.settings[0].set, ["body.a.law=\"linear\"", "body.b.law=\"linear\""]);
+    }
+}

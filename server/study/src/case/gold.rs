@@ -1,0 +1,89 @@
+//! Stored reference solutions: displacements of probes and elastic energy, by law.
+
+use serde::Deserialize;
+
+use super::Truth;
+use crate::series::Series;
+
+/// A file of reference solutions.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Gold {
+    /// Where the displacements are known.
+    pub probes: Vec<Point>,
+    /// The solutions.
+    pub fields: Vec<GoldField>,
+}
+
+/// A material point.
+#[derive(Debug, Clone, Deserialize)]
+pub struct Point {
+    /// Name.
+    pub id: String,
+    /// At rest [m].
+    pub point_m: [f64; 3],
+    /// Side of a cut.
+    pub side: Option<[f64; 3]>,
+}
+
+/// A solution.
+#[derive(Debug, Clone, Deserialize)]
+pub struct GoldField {
+    /// Its law.
+    pub law: String,
+    /// Relative half-width of its error bar.
+    pub error_bar: f64,
+    /// How it was computed.
+    pub source: String,
+    /// Elastic energy [J].
+    pub energy_j: f64,
+    /// Displacement of every probe [m].
+    pub displacement_m: Vec<[f64; 3]>,
+}
+
+impl Gold {
+    /// Reads one of the files beside this crate.
+    pub fn read(text: &str) -> Self {
+        serde_json::from_str(text).expect("the file is part of the program and a test reads it")
+    }
+
+    /// The override that puts the probes into the scene.
+    pub fn probes(&self, body: &str) -> String {
+        probes_override(body, &self.probes)
+    }
+
+    /// Index of a probe.
+    pub fn probe(&self, id: &str) -> usize {
+        self.probes.iter().position(|probe| probe.id == id).unwrap_or(0)
+    }
+
+    /// The solution of a law.
+    pub fn truth(&self, law: &str, goal: Option<f64>, from: &str) -> Truth {
+        let field = self.fields.iter().find(|field| field.law == law);
+        let field = field.expect("the file is part of the program and a test reads it");
+        Truth::Known {
+            series: Series {
+                frames: vec![0],
+                displacement_m: field.displacement_m.iter().flatten().copied().collect(),
+                energy_j: vec![field.energy_j],
+            },
+            goal,
+            error_bar: field.error_bar,
+            law: law.to_owned(),
+            source: format!("{from}: {}", field.source),
+        }
+    }
+}
+
+/// `probe=[…]` for points of a body.
+pub fn probes_override(body: &str, points: &[Point]) -> String {
+    format!("probe=[{}]", probe_tables(body, points))
+}
+
+/// The tables of these probes, separated by commas.
+pub fn probe_tables(body: &str, points: &[Point]) -> String {
+    let table = |Point { id, point_m, side }: &Point| {
+        let side = side.map_or(String::new(), |side| format!(", side = {side:?}"));
+        format!("{{ id = \"{id}\", body = \"{body}\", point_m = {point_m:?}{side} }}")
+    };
+    points.iter().map(table).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,385 @@
+//! A log–log picture of error over time: points, Pareto front, failures, and how well the
+//! reference is known. Colours are CSS classes, so that the page's light or dark ground decides.
+
+use std::fmt::Write as _;
+
+use super::scale::Scale;
+use super::{escape, time};
+use crate::recommend::percent;
+
+/// A point with a result.
+#[derive(Debug, Clone)]
+pub struct Mark {
+    /// Time [ms].
+    pub x: f64,
+    /// Relative error.
+    pub y: f64,
+    /// Index of its colour.
+    pub colour: usize,
+    /// Index of its shape.
+    pub shape: usize,
+    /// Its number on the front, from 1.
+    pub rank: Option<usize>,
+    /// What hovering tells.
+    pub title: String,
+}
+
+/// A run without a result.
+#[derive(Debug, Clone)]
+pub struct Failure {
+    /// Time until it failed [ms]; none if it never ran.
+    pub x: Option<f64>,
+    /// What hovering tells.
+    pub title: String,
+}
+
+/// A picture.
+#[derive(Debug, Clone)]
+pub struct Plot {
+    /// Width and height [px].
+    pub size: [f64; 2],
+    /// What the horizontal axis shows.
+    pub x_label: String,
+    /// What the vertical axis shows.
+    pub y_label: String,
+    /// Points.
+    pub marks: Vec<Mark>,
+    /// Runs without result.
+    pub failures: Vec<Failure>,
+    /// The reference is not known better than this.
+    pub error_bar: f64,
+    /// A time budget [ms].
+    pub budget_ms: Option<f64>,
+    /// Names of the colours in use, by index.
+    pub colours: Vec<(usize, String)>,
+    /// Names of the shapes in use, by index.
+    pub shapes: Vec<(usize, String)>,
+    /// A title within the picture, for a picture that stands alone.
+    pub title: Option<String>,
+}
+
+const LEFT: f64 = 86.0;
+const RIGHT: f64 = 22.0;
+const BOTTOM: f64 = 58.0;
+const LANE: f64 = 34.0;
+const ROW: f64 = 24.0;
+
+impl Plot {
+    /// The picture as SVG, with classes of [`super::style`].
+    pub fn svg(&self) -> String {
+        let [width, height] = self.size;
+        let legend = self.legend();
+        let title = if self.title.is_some() { 34.0 } else { 0.0 };
+        let rows = legend.len() as f64;
+        let top = title + 8.0 + ROW * rows;
+        let lane = if self.failures.is_empty() { 0.0 } else { LANE + 8.0 };
+        let (y0, y1) = (height - BOTTOM, top + lane);
+        let known = self.failures.iter().filter_map(|failure| failure.x);
+        let budget = self.budget_ms.into_iter();
+        let xs = self.marks.iter().map(|mark| mark.x).chain(known).chain(budget);
+        let x = Scale::around(xs, LEFT, width - RIGHT);
+        let bar = Some(self.error_bar).filter(|bar| *bar > 0.0);
+        let y = Scale::around(self.marks.iter().map(|mark| mark.y).chain(bar), y0, y1);
+        let mut out = format!(
+            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">\n<rect class=\"ground\" width=\"{width}\" height=\"{height}\"/>\n",
+            escape(&format!("{} over {}", self.y_label, self.x_label))
+        );
+        if let Some(title) = &self.title {
+            let _ = writeln!(
+                out,
+                "<text x=\"{LEFT}\" y=\"24\" font-size=\"18\" font-weight=\"700\">{}</text>",
+                escape(title)
+            );
+        }
+        for (i, row) in legend.iter().enumerate() {
+            let _ = writeln!(
+                out,
+                "<g transform=\"translate({LEFT},{})\">{row}</g>",
+                title + 6.0 + ROW * (i as f64 + 0.5)
+            );
+        }
+        self.grid(&mut out, &x, &y, (y0, y1));
+        self.bands(&mut out, &x, &y, (y0, y1));
+        self.front(&mut out, &x, &y, y1);
+        self.points(&mut out, &x, &y);
+        if lane > 0.0 {
+            self.lane(&mut out, &x, top);
+        }
+        out += "</svg>\n";
+        out
+    }
+
+    fn grid(&self, out: &mut String, x: &Scale, y: &Scale, (y0, y1): (f64, f64)) {
+        let right = self.size[0] - RIGHT;
+        for (fine, class) in [(true, "fine"), (false, "grid")] {
+            for tick in x.ticks().iter().filter(|tick| tick.labelled != fine) {
+                let at = x.at(tick.value);
+                let _ = writeln!(
+                    out,
+                    "<line class=\"{class}\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{y0:.1}\" y2=\"{y1:.1}\"/>"
+                );
+            }
+            for tick in y.ticks().iter().filter(|tick| tick.labelled != fine) {
+                let at = y.at(tick.value);
+                let _ = writeln!(
+                    out,
+                    "<line class=\"{class}\" x1=\"{LEFT}\" x2=\"{right}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/>"
+                );
+            }
+        }
+        for tick in x.ticks().iter().filter(|tick| tick.labelled) {
+            let (at, label) = (x.at(tick.value), tick_time(tick.value));
+            let _ = writeln!(
+                out,
+                "<text class=\"tick\" x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
+                y0 + 20.0
+            );
+        }
+        for tick in y.ticks().iter().filter(|tick| tick.labelled) {
+            let (at, label) = (y.at(tick.value), tick_percent(tick.value));
+            let _ = writeln!(
+                out,
+                "<text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+                LEFT - 9.0,
+                at + 4.5
+            );
+        }
+        let (middle, below) = (0.5 * (LEFT + right), self.size[1] - 12.0);
+        let _ = writeln!(
+            out,
+            "<text class=\"axis\" x=\"{middle}\" y=\"{below}\" text-anchor=\"middle\">{}</text>",
+            escape(&self.x_label)
+        );
+        let centre = 0.5 * (y0 + y1);
+        let _ = writeln!(
+            out,
+            "<text class=\"axis\" transform=\"translate(18,{centre:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            escape(&self.y_label)
+        );
+        let _ = writeln!(
+            out,
+            "<rect class=\"frame\" x=\"{LEFT}\" y=\"{y1:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
+            right - LEFT,
+            y0 - y1
+        );
+    }
+
+    /// What the reference cannot tell, and the budget.
+    fn bands(&self, out: &mut String, x: &Scale, y: &Scale, (y0, y1): (f64, f64)) {
+        if self.error_bar > 0.0 {
+            let at = y.at(self.error_bar);
+            let _ = writeln!(
+                out,
+                "<g><rect class=\"unknown\" x=\"{LEFT}\" y=\"{at:.1}\" width=\"{:.1}\" height=\"{:.1}\"/><title>error bar of the reference: ± {}</title></g>",
+                self.size[0] - RIGHT - LEFT,
+                (y0 - at).max(0.0),
+                percent(self.error_bar)
+            );
+        }
+        if let Some(budget) = self.budget_ms {
+            let at = x.at(budget);
+            let _ = writeln!(
+                out,
+                "<g><line class=\"budget\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{y0:.1}\" y2=\"{y1:.1}\"/><title>budget {}</title></g>",
+                time(budget)
+            );
+        }
+    }
+
+    fn front(&self, out: &mut String, x: &Scale, y: &Scale, y1: f64) {
+        let mut best: Vec<&Mark> = self.marks.iter().filter(|mark| mark.rank.is_some()).collect();
+        best.sort_by_key(|mark| mark.rank);
+        let Some(first) = best.first() else { return };
+        let mut path = format!("M{:.1} {y1:.1}", x.at(first.x));
+        for mark in &best {
+            let _ = write!(path, " H{:.1} V{:.1}", x.at(mark.x), y.at(mark.y));
+        }
+        let _ = write!(path, " H{:.1}", self.size[0] - RIGHT);
+        let _ = writeln!(out, "<path class=\"front\" d=\"{path}\"/>");
+    }
+
+    fn points(&self, out: &mut String, x: &Scale, y: &Scale) {
+        let (best, others): (Vec<&Mark>, Vec<&Mark>) =
+            self.marks.iter().partition(|mark| mark.rank.is_some());
+        let mut taken: Vec<[f64; 2]> = best.iter().map(|mark| [x.at(mark.x), y.at(mark.y)]).collect();
+        for mark in others.iter().chain(&best) {
+            let (px, py) = (x.at(mark.x), y.at(mark.y));
+            let class = if mark.rank.is_some() { "mark best" } else { "mark" };
+            let radius = if mark.rank.is_some() { 6.5 } else { 5.0 };
+            let _ = writeln!(
+                out,
+                "<g transform=\"translate({px:.1},{py:.1})\"><title>{}</title>{}</g>",
+                escape(&mark.title),
+                shape(mark.shape, radius, &format!("{class} c{}", mark.colour % super::style::MARKS))
+            );
+        }
+        for mark in &best {
+            let (Some(rank), at) = (mark.rank, [x.at(mark.x), y.at(mark.y)]) else { continue };
+            let place = free_place(at, &taken, [self.size[0] - RIGHT, self.size[1] - BOTTOM]);
+            taken.push(place);
+            let _ = writeln!(
+                out,
+                "<text class=\"rank\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{rank}</text>",
+                place[0],
+                place[1] + 4.0
+            );
+        }
+    }
+
+    /// Runs without result, above the frame: at the time they took, or at the left if they never ran.
+    fn lane(&self, out: &mut String, x: &Scale, top: f64) {
+        let middle = top + 0.5 * LANE;
+        let width = self.size[0] - RIGHT - LEFT;
+        let _ = writeln!(
+            out,
+            "<rect class=\"lane\" x=\"{LEFT}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{LANE}\" rx=\"3\"/>"
+        );
+        let _ = writeln!(
+            out,
+            "<text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">no result</text>",
+            LEFT - 9.0,
+            middle + 4.5
+        );
+        let mut never = 0.0_f64;
+        for failure in &self.failures {
+            let at = match failure.x {
+                Some(ms) => x.at(ms),
+                None => {
+                    never += 1.0;
+                    LEFT + (12.0 * never).min(width - 8.0)
+                }
+            };
+            let _ = writeln!(
+                out,
+                "<g transform=\"translate({at:.1},{middle:.1})\"><title>{}</title><rect class=\"hit\" x=\"-7\" y=\"-7\" width=\"14\" height=\"14\"/><path class=\"failed\" d=\"M-4.5 -4.5L4.5 4.5M-4.5 4.5L4.5 -4.5\"/></g>",
+                escape(&failure.title)
+            );
+        }
+    }
+
+    /// Rows of the legend: colours, shapes, and what lines and crosses mean.
+    fn legend(&self) -> Vec<String> {
+        let mut items: Vec<(String, String)> = Vec::new();
+        let single = self.shapes.len() < 2;
+        for (i, name) in &self.colours {
+            let mark = shape(
+                if single { self.shapes.first().map_or(0, |s| s.0) } else { 0 },
+                5.5,
+                &format!("mark c{}", i % super::style::MARKS),
+            );
+            items.push((mark, name.clone()));
+        }
+        if !single {
+            for (i, name) in &self.shapes {
+                items.push((shape(*i, 5.5, "mark key"), name.clone()));
+            }
+        }
+        if self.size[0] > 600.0 {
+            items.push(("<path class=\"front\" d=\"M-9 -5H0V5H9\"/>".to_owned(), "Pareto front".to_owned()));
+            if !self.failures.is_empty() {
+                items.push((
+                    "<path class=\"failed\" d=\"M-4.5 -4.5L4.5 4.5M-4.5 4.5L4.5 -4.5\"/>".to_owned(),
+                    "no result".to_owned(),
+                ));
+            }
+            if self.error_bar > 0.0 {
+                items.push((
+                    "<rect class=\"unknown\" x=\"-9\" y=\"-6\" width=\"18\" height=\"12\"/>".to_owned(),
+                    "within the error bar of the reference".to_owned(),
+                ));
+            }
+            if let Some(budget) = self.budget_ms {
+                items.push((
+                    "<line class=\"budget\" x1=\"0\" x2=\"0\" y1=\"-9\" y2=\"9\"/>".to_owned(),
+                    format!("budget {}", time(budget)),
+                ));
+            }
+        }
+        let mut rows = Vec::new();
+        let (mut row, mut at) = (String::new(), 0.0);
+        for (mark, name) in items {
+            let width = 24.0 + 7.6 * name.chars().count() as f64 + 18.0;
+            if at + width > self.size[0] - LEFT - RIGHT && at > 0.0 {
+                rows.push(std::mem::take(&mut row));
+                at = 0.0;
+            }
+            let _ = write!(
+                row,
+                "<g transform=\"translate({:.1},0)\">{mark}<text x=\"15\" y=\"4.5\">{}</text></g>",
+                at + 9.0,
+                escape(&name)
+            );
+            at += width;
+        }
+        rows.push(row);
+        rows
+    }
+}
+
+/// A shape around the origin.
+fn shape(index: usize, r: f64, class: &str) -> String {
+    match index % 6 {
+        0 => format!("<circle class=\"{class}\" r=\"{r}\"/>"),
+        1 => format!(
+            "<rect class=\"{class}\" x=\"{0}\" y=\"{0}\" width=\"{1}\" height=\"{1}\"/>",
+            -0.88 * r,
+            1.76 * r
+        ),
+        2 => {
+            format!("<path class=\"{class}\" d=\"M0 {}L{} {}H{}Z\"/>", -1.15 * r, 1.1 * r, 0.85 * r, -1.1 * r)
+        }
+        3 => format!("<path class=\"{class}\" d=\"M0 {0}L{1} 0L0 {1}L{0} 0Z\"/>", -1.25 * r, 1.25 * r),
+        4 => {
+            format!("<path class=\"{class}\" d=\"M0 {}L{} {}H{}Z\"/>", 1.15 * r, 1.1 * r, -0.85 * r, -1.1 * r)
+        }
+        _ => format!(
+            "<rect class=\"{class}\" x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
+            -1.2 * r,
+            -0.55 * r,
+            2.4 * r,
+            1.1 * r
+        ),
+    }
+}
+
+/// A place beside `at` that is away from what is taken and within the frame.
+fn free_place(at: [f64; 2], taken: &[[f64; 2]], [right, bottom]: [f64; 2]) -> [f64; 2] {
+    let around = [
+        [-12.0, 12.0],
+        [12.0, -12.0],
+        [-15.0, 0.0],
+        [15.0, 0.0],
+        [0.0, 16.0],
+        [0.0, -16.0],
+        [12.0, 12.0],
+        [-12.0, -12.0],
+    ];
+    let clear = |place: &[f64; 2]| {
+        let others = taken.iter().filter(|other| **other != at);
+        others.map(|o| (o[0] - place[0]).hypot(o[1] - place[1])).fold(30.0, f64::min)
+    };
+    let places = around.map(|[dx, dy]| [at[0] + dx, at[1] + dy]);
+    let inside = |p: &&[f64; 2]| p[0] > LEFT + 6.0 && p[0] < right - 6.0 && p[1] < bottom - 6.0;
+    let best = places.iter().filter(inside).fold(None, |best: Option<([f64; 2], f64)>, place| {
+        let c = clear(place);
+        if best.is_none_or(|(_, b)| c > b) { Some((*place, c)) } else { best }
+    });
+    best.map_or(places[0], |(place, _)| place)
+}
+
+/// A time at an axis: 1, 2, 5 times a power of ten.
+fn tick_time(milliseconds: f64) -> String {
+    let (value, unit) = if milliseconds >= 999.0 {
+        (milliseconds / 1e3, "s")
+    } else if milliseconds >= 0.0999 {
+        (milliseconds, "ms")
+    } else {
+        (milliseconds * 1e3, "µs")
+    };
+    format!("{} {unit}", crate::axes::short(value))
+}
+
+fn tick_percent(error: f64) -> String {
+    let value = 100.0 * error;
+    if value < 0.9e-3 { format!("{value:.0e} %") } else { format!("{} %", crate::axes::short(value)) }
+}

@@ -1,0 +1,243 @@
+//! Which source of error dominates: one source after another is peeled off by a twin run.
+//!
+//! The error of a run telescopes into what each twin changes,
+//!
+//! u − u* = (u − u_d) + (u_d − u_t) + (u_t − u_h) + (u_h − u_m) + (u_m − u*)
+//!
+//! where u_d is the same run in double precision, u_t it solved to 1e-10, u_h that extrapolated to
+//! Δt → 0, u_m that with the law of the reference. The five terms are rounding, algebraic, time,
+//! model and, what is left, discretisation. All relative to ‖u*‖ over the probes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::axes::{Factor, Setting, step, tolerance};
+use crate::case::Case;
+use crate::design::Configuration;
+use crate::reference::Reference;
+use crate::series::Series;
+use crate::trial::Trial;
+
+/// A source of error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// Elements too large or too poor.
+    Discretisation,
+    /// Steps too long.
+    Time,
+    /// Solver stopped too early.
+    Algebraic,
+    /// Another law than that of the reference.
+    Model,
+    /// Too few digits.
+    Rounding,
+}
+
+impl Source {
+    /// All of them, in the order of tables.
+    pub const ALL: [Source; 5] =
+        [Source::Discretisation, Source::Time, Source::Algebraic, Source::Model, Source::Rounding];
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Source::Discretisation => "discretisation",
+            Source::Time => "time",
+            Source::Algebraic => "algebraic",
+            Source::Model => "model",
+            Source::Rounding => "rounding",
+        }
+    }
+
+    /// What makes it smaller.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Source::Discretisation => "a finer mesh or a better element",
+            Source::Time => "a shorter step or an integrator of higher order",
+            Source::Algebraic => "a tighter solver tolerance",
+            Source::Model => "another constitutive law",
+            Source::Rounding => "double precision",
+        }
+    }
+}
+
+/// The share of every source: relative size of its term; none where it could not be told apart.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Sources(pub Vec<(Source, f64)>);
+
+impl Sources {
+    /// The size of a source.
+    pub fn of(&self, source: Source) -> Option<f64> {
+        self.0.iter().find(|(s, _)| *s == source).map(|(_, size)| *size)
+    }
+
+    /// The largest.
+    pub fn dominant(&self) -> Option<Source> {
+        let usable = self.0.iter().filter(|(_, size)| size.is_finite());
+        usable.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(source, _)| *source)
+    }
+}
+
+/// Tolerance of a twin whose algebraic error is nothing.
+const TIGHT: f64 = 1e-10;
+
+/// The same where double precision is not to be had.
+const TIGHT_MIXED: f64 = 1e-8;
+
+/// Peels the error of `configuration`, whose run left `series`; `run` makes the twins.
+pub fn peel(
+    case: &Case,
+    configuration: &Configuration,
+    series: &Series,
+    reference: &Reference,
+    run: &mut dyn FnMut(&Configuration) -> Option<Trial>,
+) -> Sources {
+    let scale = reference.series.at_instants_of(series).norm();
+    let mut peeling = Peeling {
+        run,
+        twin: configuration.clone(),
+        left: series.clone(),
+        ahead: None,
+        scale,
+        found: Sources::default(),
+    };
+    let exact = |t: f64| tolerance(&case.bodies, t);
+    let double = Setting::new("double", 0.0, double_precision(case));
+    if peeling.take(Source::Rounding, Factor::Precision, &double) {
+        peeling.take(Source::Algebraic, Factor::Tolerance, &exact(TIGHT));
+    } else {
+        peeling.take(Source::Algebraic, Factor::Tolerance, &exact(TIGHT_MIXED));
+    }
+    if let Some(h) = configuration.setting(Factor::Step) {
+        peeling.take_time(h.size, order(configuration.label(Factor::Integrator)));
+    }
+    let law =
+        case.axes.iter().find(|axis| axis.factor == Factor::Law).and_then(|axis| axis.find(&reference.law));
+    if let Some(law) = law {
+        peeling.take(Source::Model, Factor::Law, law);
+    }
+    let rest = peeling.rest(&reference.series);
+    peeling.found.0.push((Source::Discretisation, rest));
+    peeling.found
+}
+
+/// Keys for double precision, as the case itself names them.
+fn double_precision(case: &Case) -> Vec<String> {
+    let axis = case.axes.iter().find(|axis| axis.factor == Factor::Precision);
+    axis.and_then(|axis| axis.find("double")).map(|setting| setting.set.clone()).unwrap_or_default()
+}
+
+/// Order of an integrator in Δt.
+fn order(integrator: &str) -> i32 {
+    match integrator {
+        "rk4" => 4,
+        "bdf2" | "newmark" | "midpoint" => 2,
+        _ => 1,
+    }
+}
+
+struct Peeling<'a> {
+    run: &'a mut dyn FnMut(&Configuration) -> Option<Trial>,
+    /// The configuration with all that was peeled off so far.
+    twin: Configuration,
+    /// Its result.
+    left: Series,
+    /// What extrapolation to Δt → 0 adds to it.
+    ahead: Option<Series>,
+    scale: f64,
+    found: Sources,
+}
+
+impl Peeling<'_> {
+    /// Removes one source by changing one factor; false if that could not be run.
+    fn take(&mut self, source: Source, factor: Factor, setting: &Setting) -> bool {
+        if self.twin.label(factor) == setting.label {
+            self.found.0.push((source, 0.0));
+            return true;
+        }
+        let twin = self.twin.with(factor, setting);
+        let Some(trial) = (self.run)(&twin).filter(Trial::is_done) else { return false };
+        self.found.0.push((source, self.left.minus(&trial.series).norm() / self.scale));
+        self.left = trial.series;
+        self.twin = twin;
+        true
+    }
+
+    /// Removes the error of the step h by a run with h/2 and extrapolation from the two.
+    fn take_time(&mut self, step_s: f64, order: i32) {
+        let twin = self.twin.with(Factor::Step, &step(0.5 * step_s));
+        let Some(trial) = (self.run)(&twin).filter(Trial::is_done) else { return };
+        let change = trial.series.minus(&self.left);
+        let ahead = 1.0 / (2.0_f64.powi(order) - 1.0);
+        self.found.0.push((Source::Time, (1.0 + ahead) * change.norm() / self.scale));
+        self.ahead = Some(change.combine(ahead, &change, 0.0));
+        self.left = trial.series;
+        self.twin = twin;
+    }
+
+    /// What is left when all is peeled off, against the reference.
+    fn rest(&self, reference: &Series) -> f64 {
+        let rest = self.left.minus(reference);
+        let rest = self.ahead.as_ref().map_or_else(|| rest.clone(), |ahead| rest.combine(1.0, ahead, 1.0));
+        rest.norm() / self.scale
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::case::builtin;
+    use crate::trial::Status;
+
+    /// u = 1 + mesh error + c Δt + law error + tolerance.
+    fn model(configuration: &Configuration) -> Trial {
+        let law = if configuration.label(Factor::Law) == "linear" { 0.2 } else { 0.0 };
+        let h = configuration.setting(Factor::Step).map_or(0.0, |step| step.size);
+        let t = configuration.setting(Factor::Tolerance).unwrap().size;
+        let u = 1.0 + 0.01 + 5.0 * h + law + t;
+        let series = Series { frames: vec![1], displacement_m: vec![u, 0.0, 0.0], energy_j: vec![1.0] };
+        Trial { status: Status::Done, series, ..Trial::refused(String::new()) }
+    }
+
+    #[test]
+    fn every_source_is_told_apart() {
+        let case = builtin("bar-motion", true).unwrap();
+        let base = Configuration::base(&case.axes);
+        let linear =
+            case.axes.iter().find(|a| a.factor == Factor::Law).unwrap().find("linear").unwrap().clone();
+        let configuration = base.with(Factor::Law, &linear);
+        let reference = Reference {
+            series: Series { frames: vec![1], displacement_m: vec![1.0, 0.0, 0.0], energy_j: vec![1.0] },
+            goal: None,
+            error_bar: 0.0,
+            law: "corotational".into(),
+            source: String::new(),
+        };
+        let series = model(&configuration).series;
+        let found = peel(&case, &configuration, &series, &reference, &mut |c| Some(model(c)));
+        let near = |source, size: f64| (found.of(source).unwrap() - size).abs() < 1e-9;
+        assert!(near(Source::Rounding, 0.0) && near(Source::Algebraic, 1e-4 - 1e-10));
+        assert!(near(Source::Time, 5.0 * 0.04), "{found:?}");
+        assert!(near(Source::Model, 0.2), "{found:?}");
+        assert!(near(Source::Discretisation, 0.01), "{found:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_run_is_left_out() {
+        let case = builtin("r1", true).unwrap();
+        let configuration = Configuration::base(&case.axes);
+        let series = model(&configuration).series;
+        let reference = Reference {
+            series: series.clone(),
+            goal: None,
+            error_bar: 0.0,
+            law: "linear".into(),
+            source: String::new(),
+        };
+        let found = peel(&case, &configuration, &series, &reference, &mut |_| None);
+        assert_eq!(found.of(Source::Algebraic), None);
+        assert_eq!(found.of(Source::Model), Some(0.0));
+        assert_eq!(found.of(Source::Discretisation), Some(0.0));
+    }
+}

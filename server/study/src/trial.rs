@@ -1,0 +1,346 @@
+//! One run of one configuration: set up, solve or step, time it, and say how it ended.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use scindo_world::build::BuildOptions;
+use scindo_world::inputs::Inputs;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::{Level, Simulation, Stage, StepReport};
+use serde::{Deserialize, Serialize};
+
+use crate::series::Series;
+
+/// What a run computes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Protocol {
+    /// One equilibrium from rest; its time is the cost.
+    Static,
+    /// A motion; the cost is the time to compute one frame.
+    Motion {
+        /// Simulated time between the instants that are compared [s].
+        frame_s: f64,
+        /// How many of them.
+        frames: u32,
+    },
+}
+
+/// How much a run may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Longest time of one run [s]; what takes longer is stopped and counts as failed.
+    pub run_s: f64,
+    /// Time for repetitions of a static solution [s].
+    pub repeat_s: f64,
+    /// Most repetitions.
+    pub repeats: usize,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// It gave a result.
+    Done,
+    /// The scene was refused at its check.
+    Refused,
+    /// A step was rolled back, or a displacement left every measure.
+    Exploded,
+    /// It ended without a solution.
+    Failed,
+    /// It took longer than allowed.
+    Late,
+}
+
+impl Status {
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Done => "done",
+            Status::Refused => "refused",
+            Status::Exploded => "exploded",
+            Status::Failed => "failed",
+            Status::Late => "too slow",
+        }
+    }
+}
+
+/// Measured times [ms]. A cost is that of one static solution, or of one frame of a motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Reading, meshing, cutting and preparing.
+    pub setup_ms: f64,
+    /// The first, cold one.
+    pub first_ms: f64,
+    /// Median.
+    pub median_ms: f64,
+    /// 99th percentile; the slowest where there are fewer than 100.
+    pub p99_ms: f64,
+    /// How many were measured.
+    pub count: usize,
+}
+
+/// A run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trial {
+    /// How it ended.
+    pub status: Status,
+    /// Why, where it did not end well; else what is worth knowing, or nothing.
+    pub reason: String,
+    /// What it took.
+    pub cost: Cost,
+    /// Elements of all bodies.
+    pub elements: usize,
+    /// Unknowns of all bodies: three per copy of a node.
+    pub unknowns: usize,
+    /// Solver iterations per step.
+    pub iterations: f64,
+    /// Largest preconditioned residual that a step ended with.
+    pub residual: f64,
+    /// The result; empty where there is none.
+    pub series: Series,
+}
+
+impl Trial {
+    /// A run that never started.
+    pub fn refused(reason: String) -> Self {
+        Self::without(Status::Refused, reason)
+    }
+
+    fn without(status: Status, reason: String) -> Self {
+        Self {
+            status,
+            reason,
+            cost: Cost::default(),
+            elements: 0,
+            unknowns: 0,
+            iterations: 0.0,
+            residual: 0.0,
+            series: Series::default(),
+        }
+    }
+
+    /// Whether it gave a result.
+    pub fn is_done(&self) -> bool {
+        self.status == Status::Done
+    }
+}
+
+/// Runs a scene. `None` if `stop` was raised meanwhile.
+pub fn run(
+    scene: &Scene,
+    base_dir: &Path,
+    threads: usize,
+    protocol: Protocol,
+    limits: Limits,
+    stop: &AtomicBool,
+) -> Option<Trial> {
+    let started = Instant::now();
+    let options = BuildOptions { threads, ..BuildOptions::default() };
+    let simulation = match Simulation::with_options(scene, base_dir, options) {
+        Ok(simulation) => simulation,
+        Err(error) => return Some(Trial::refused(one_line(&error.to_string()))),
+    };
+    let mut running = Running {
+        simulation,
+        trial: Trial::without(Status::Done, String::new()),
+        deadline: started + Duration::from_secs_f64(limits.run_s),
+        steps: 0,
+        build_ms: started.elapsed().as_secs_f64() * 1e3,
+        cut_ms: 0.0,
+    };
+    let mut costs = match protocol {
+        Protocol::Static => running.equilibrium(limits, stop)?,
+        Protocol::Motion { frame_s, frames } => running.motion(frame_s, frames, stop)?,
+    };
+    Some(running.finish(&mut costs))
+}
+
+/// A run under way.
+struct Running {
+    simulation: Simulation,
+    trial: Trial,
+    deadline: Instant,
+    steps: u32,
+    build_ms: f64,
+    cut_ms: f64,
+}
+
+impl Running {
+    /// Solves once for the result, then again from rest for the time.
+    fn equilibrium(&mut self, limits: Limits, stop: &AtomicBool) -> Option<Vec<f64>> {
+        let mut costs = vec![self.solve(stop)?];
+        self.sample(0);
+        let until = Instant::now() + Duration::from_secs_f64(limits.repeat_s);
+        while self.trial.is_done() && costs.len() < limits.repeats && Instant::now() < until {
+            if let Err(error) = self.simulation.reset() {
+                self.end(Status::Failed, error.to_string());
+                break;
+            }
+            costs.push(self.solve(stop)?);
+        }
+        Some(costs)
+    }
+
+    /// Steps until nothing moves any more; milliseconds.
+    fn solve(&mut self, stop: &AtomicBool) -> Option<f64> {
+        let mut milliseconds = 0.0;
+        let mut before = self.displacements();
+        for _ in 0..MOST_SETTLING_STEPS {
+            milliseconds += self.step(stop)?;
+            let after = self.displacements();
+            let moved = distance(&before, &after);
+            if !self.trial.is_done() || moved <= SETTLED * norm(&after) {
+                return Some(milliseconds);
+            }
+            before = after;
+        }
+        self.end(Status::Failed, format!("no equilibrium after {MOST_SETTLING_STEPS} steps"));
+        Some(milliseconds)
+    }
+
+    /// Steps through the frames; milliseconds per frame.
+    fn motion(&mut self, frame_s: f64, frames: u32, stop: &AtomicBool) -> Option<Vec<f64>> {
+        let step_s = self.simulation.step_s();
+        let steps = (f64::from(frames) * frame_s / step_s).round() as u32;
+        let mut costs = Vec::with_capacity(steps as usize);
+        for step in 1..=steps {
+            costs.push(self.step(stop)? * frame_s / step_s);
+            if !self.trial.is_done() {
+                break;
+            }
+            let frame = f64::from(step) * step_s / frame_s;
+            if (frame - frame.round()).abs() < 1e-6 {
+                self.sample(frame.round() as u32);
+            }
+        }
+        Some(costs)
+    }
+
+    /// One step; milliseconds without cuts, which belong to the set-up.
+    fn step(&mut self, stop: &AtomicBool) -> Option<f64> {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let report = self.simulation.step(&Inputs::default());
+        let cut_s = report.seconds.of(Stage::Cuts);
+        let milliseconds = 1e3 * (report.seconds.total() - cut_s);
+        let ended = verdict(report);
+        self.steps += 1;
+        self.cut_ms += 1e3 * cut_s;
+        let solves = report.bodies.iter().map(|body| &body.solve);
+        self.trial.iterations += solves.clone().map(|solve| f64::from(solve.iterations)).sum::<f64>();
+        self.trial.residual = solves.map(|solve| solve.residual).fold(self.trial.residual, f64::max);
+        if let Some((status, reason)) = ended {
+            self.end(status, reason);
+        } else if Instant::now() > self.deadline {
+            self.end(Status::Late, "longer than one run may take".to_owned());
+        } else if self.has_exploded() {
+            self.end(
+                Status::Exploded,
+                "a probe moved further than ten times the size of the body".to_owned(),
+            );
+        }
+        Some(milliseconds)
+    }
+
+    fn end(&mut self, status: Status, reason: String) {
+        self.trial.status = status;
+        self.trial.reason = format!("{reason} (step {})", self.steps);
+    }
+
+    fn displacements(&self) -> Vec<f64> {
+        let simulation = &self.simulation;
+        let of = |probe: &scindo_world::probe::Probe| {
+            let u = simulation.probe_position(probe) - probe.rest_m;
+            [u.x, u.y, u.z]
+        };
+        simulation.probes().iter().flat_map(of).collect()
+    }
+
+    fn has_exploded(&self) -> bool {
+        let size = self.simulation.bodies().iter().map(|body| body.rest_volume_m3.cbrt()).fold(0.0, f64::max);
+        self.displacements().iter().any(|u| !u.is_finite() || u.abs() > 100.0 * size)
+    }
+
+    fn sample(&mut self, frame: u32) {
+        if !self.trial.is_done() {
+            return;
+        }
+        let displacements = self.displacements();
+        let series = &mut self.trial.series;
+        series.frames.push(frame);
+        series.displacement_m.extend(displacements);
+        series.energy_j.push(self.simulation.bodies().iter().map(|body| body.energy().elastic_j).sum());
+        if !series.is_finite() {
+            self.end(Status::Exploded, "not finite".to_owned());
+        }
+    }
+
+    fn finish(mut self, costs: &mut [f64]) -> Trial {
+        let bodies = self.simulation.bodies();
+        self.trial.elements = bodies.iter().map(|body| body.size().elements).sum();
+        self.trial.unknowns = bodies.iter().map(|body| 3 * body.body.positions().len()).sum();
+        self.trial.iterations /= f64::from(self.steps.max(1));
+        let solves = costs.len().max(1) as f64;
+        self.trial.cost = Cost::of(costs, self.build_ms + self.cut_ms / solves);
+        if !self.trial.is_done() {
+            self.trial.series = Series::default();
+        }
+        self.trial
+    }
+}
+
+/// Settling of a dynamic scene: probes that move by less than this share of their displacement rest.
+const SETTLED: f64 = 1e-5;
+
+/// Most steps until it must have settled.
+const MOST_SETTLING_STEPS: u32 = 60;
+
+/// What the step said, if it was bad.
+fn verdict(report: &StepReport) -> Option<(Status, String)> {
+    let bad = report.events.iter().find(|event| event.level == Level::Error)?;
+    let status = if bad.name == "step-rolled-back" { Status::Exploded } else { Status::Failed };
+    Some((status, bad.message.clone()))
+}
+
+impl Cost {
+    fn of(costs: &mut [f64], setup_ms: f64) -> Self {
+        let first_ms = costs.first().copied().unwrap_or(0.0);
+        costs.sort_by(f64::total_cmp);
+        let at = |share: f64| {
+            let index = (share * costs.len() as f64).ceil() as usize;
+            costs.get(index.clamp(1, costs.len().max(1)) - 1).copied().unwrap_or(0.0)
+        };
+        Self { setup_ms, first_ms, median_ms: at(0.5), p99_ms: at(0.99), count: costs.len() }
+    }
+}
+
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// An error message on one line, for tables.
+pub fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_few_and_many() {
+        let mut ten: Vec<f64> = (1..=10).rev().map(f64::from).collect();
+        let cost = Cost::of(&mut ten, 3.0);
+        assert_eq!((cost.first_ms, cost.median_ms, cost.p99_ms, cost.count), (10.0, 5.0, 10.0, 10));
+        let mut many: Vec<f64> = (1..=200).map(f64::from).collect();
+        assert_eq!(Cost::of(&mut many, 0.0).p99_ms, 198.0);
+        assert_eq!(Cost::of(&mut [], 0.0), Cost::default());
+    }
+}

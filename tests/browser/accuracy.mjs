@@ -1,0 +1,127 @@
+// Opens the page of `scindo accuracy` in headless Chromium and holds that a person can read it.
+//
+//   node accuracy.mjs FILE.html [CASE]...
+//
+//   SCINDO_TEST_NODE_MODULES   folder with playwright-core (default: node_modules beside this file)
+//   SCINDO_TEST_ARTIFACTS      where screenshots go (default: ../artifacts)
+//   CHROMIUM                   browser (default: /usr/bin/chromium)
+//
+// Ends with 0 if everything held; prints one line per check.
+import { createRequire } from "node:module";
+import { mkdirSync } from "node:fs";
+import path from "node:path";
+import { fileURLToPath, pathToFileURL } from "node:url";
+
+const here = path.dirname(fileURLToPath(import.meta.url));
+const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
+const { chromium } = createRequire(path.join(modules, "anchor.js"))("playwright-core");
+
+const [file, ...cases] = process.argv.slice(2);
+const artifacts = process.env.SCINDO_TEST_ARTIFACTS ?? path.join(here, "../artifacts");
+mkdirSync(artifacts, { recursive: true });
+
+let failures = 0;
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: ["--no-sandbox", "--disable-gpu"],
+});
+try {
+  for (const colorScheme of ["light", "dark"]) {
+    const context = await browser.newContext({ viewport: { width: 1200, height: 900 }, colorScheme });
+    const page = await context.newPage();
+    page.on("pageerror", (error) => { failures += 1; console.error(`FAILED  script error: ${error.message}`); });
+    const asked = [];
+    page.on("request", (request) => { if (!request.url().startsWith("file:")) asked.push(request.url()); });
+    await page.goto(pathToFileURL(path.resolve(file)).href);
+    if (colorScheme === "light") await isComplete(page);
+    await isLegible(page, colorScheme);
+    hold(asked.length === 0, `${colorScheme}: the page asks nobody for anything (${asked.join(", ") || "self-contained"})`);
+    await page.screenshot({ path: path.join(artifacts, `accuracy-${colorScheme}.png`), fullPage: true });
+    await context.close();
+  }
+  const narrow = await browser.newContext({ viewport: { width: 420, height: 800 } });
+  const page = await narrow.newPage();
+  await page.goto(pathToFileURL(path.resolve(file)).href);
+  const overhang = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  hold(overhang <= 0, `a narrow window does not scroll sideways (${overhang} px over)`);
+  await narrow.close();
+} catch (error) {
+  failures += 1;
+  console.error(`FAILED  ${error.stack ?? error}`);
+} finally {
+  await browser.close();
+}
+process.exit(failures === 0 ? 0 : 1);
+
+/** Every case has its pictures, a front, a table and a reference. */
+async function isComplete(page) {
+  const sections = await page.$$eval("section[id]:not(#method)", (all) => all.map((section) => ({
+    id: section.id,
+    plots: section.querySelectorAll("svg.plot").length,
+    marks: section.querySelectorAll("figure svg.plot .mark").length,
+    titled: [...section.querySelectorAll("svg.plot g:has(> .mark) > title")].filter((t) => t.textContent.includes("median")).length,
+    front: section.querySelectorAll("table.front tbody tr").length,
+    ranks: section.querySelector("svg.plot").querySelectorAll("text.rank").length,
+    line: section.querySelectorAll("svg.plot path.front").length,
+    failed: section.querySelector("svg.plot").querySelectorAll("g > path.failed").length,
+    rows: section.querySelectorAll("table.all tbody tr").length,
+    reasons: section.querySelectorAll("table.all td.reason").length,
+    reference: section.textContent.includes("Error bar"),
+  })));
+  for (const name of cases) hold(sections.some((s) => s.id === name), `case ${name} is on the page`);
+  for (const s of sections) {
+    hold(s.plots === 3 && s.marks > 6 && s.titled > 3, `${s.id}: three pictures with marks that tell what they are (${s.marks} marks)`);
+    hold(s.line >= 1 && s.front >= 1 && s.front === s.ranks, `${s.id}: a Pareto front, drawn and listed (${s.front} points)`);
+    // One cross stands in the legend.
+    hold(s.reasons === 0 || s.failed >= s.reasons, `${s.id}: every run without result is marked (${s.reasons} of ${s.rows}) and its reason is listed`);
+    hold(s.reference, `${s.id}: a reference with its error bar`);
+  }
+  const method = await page.textContent("#method");
+  hold(/Displacement error/.test(method) && /Machine/.test(method) && /commit/i.test(method), "method, machine and commit are named");
+}
+
+/** No text of a picture leaves it or covers another; text has contrast; nothing is tiny. */
+async function isLegible(page, scheme) {
+  const found = await page.evaluate(() => {
+    const faults = [];
+    for (const svg of document.querySelectorAll("svg.plot")) {
+      const frame = svg.getBoundingClientRect();
+      const boxes = [...svg.querySelectorAll("text")].map((text) => ({ text: text.textContent, box: text.getBoundingClientRect() }));
+      for (const { text, box } of boxes) {
+        if (box.left < frame.left - 1 || box.right > frame.right + 1 || box.top < frame.top - 1 || box.bottom > frame.bottom + 1) {
+          faults.push(`"${text}" leaves its picture`);
+        }
+        if (box.height < 8) faults.push(`"${text}" is ${box.height.toFixed(1)} px high`);
+      }
+      boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b) => {
+        const wide = Math.min(a.box.right, b.box.right) - Math.max(a.box.left, b.box.left);
+        const high = Math.min(a.box.bottom, b.box.bottom) - Math.max(a.box.top, b.box.top);
+        if (wide > 2 && high > 4) faults.push(`"${a.text}" and "${b.text}" overlap`);
+      }));
+    }
+    const luminance = (colour) => {
+      const [r, g, b] = colour.match(/[\d.]+/g).map((c) => (c / 255 <= 0.03928 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4));
+      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const ground = luminance(getComputedStyle(document.body).backgroundColor);
+    const contrast = (colour) => {
+      const [a, b] = [luminance(colour), ground].sort((x, y) => y - x);
+      return (a + 0.05) / (b + 0.05);
+    };
+    for (const element of document.querySelectorAll("p, td, th, h1, h2, h3, dd, dt, figcaption")) {
+      const c = contrast(getComputedStyle(element).color);
+      if (c < 4.5) faults.push(`${element.tagName} has contrast ${c.toFixed(1)}`);
+    }
+    for (const text of document.querySelectorAll("svg.plot text")) {
+      const c = contrast(getComputedStyle(text).fill);
+      if (c < 4.5) faults.push(`"${text.textContent}" has contrast ${c.toFixed(1)}`);
+    }
+    return { faults: [...new Set(faults)], sideways: document.documentElement.scrollWidth - innerWidth };
+  });
+  hold(found.faults.length === 0, `${scheme}: all text is legible${found.faults.length ? ": " + found.faults.slice(0, 8).join("; ") : ""}`);
+  hold(found.sideways <= 0, `${scheme}: the page fits its window`);
+}
+
+function hold(condition, words) {
+  if (!condition) failures += 1;
+  console.log(`${condition ? "ok     " : "FAILED "} ${words}`);
+}
