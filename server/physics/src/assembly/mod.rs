@@ -21,6 +21,7 @@ mod kernel;
 mod averaging;
 mod elastic;
 mod mass;
+mod rotated;
 
 pub use crate::material::Tangent;
 pub use block_csr::BlockCsr;

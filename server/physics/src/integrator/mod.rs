@@ -1,11 +1,16 @@
 //! One step in time.
 
+mod dynamics;
 mod implicit_euler;
 mod parts;
 mod springs;
 mod statics;
 mod relaxation;
 
+pub use dynamics::{
+    Dynamics, DynamicsError, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings,
+    LEAST_NEWTON_STEPS, MassKind, Notice, Scheme, stable_step,
+};
 pub use implicit_euler::{ImplicitEuler, StepInputs, StepOutcome};
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};

@@ -24,11 +24,16 @@ pub struct LooseParts {
 impl LooseParts {
     /// Finds the parts that `pieces` hold together.
     pub fn new(pieces: &[Piece], mass: &[f64], fixed: &[FixedCopy]) -> Self {
+        Self::connected(pieces.iter().map(|piece| &piece.copies[..]), mass, fixed)
+    }
+
+    /// Finds the parts that `groups` of copies hold together: pieces, elements, springs.
+    pub fn connected<'a>(groups: impl Iterator<Item = &'a [u32]>, mass: &[f64], fixed: &[FixedCopy]) -> Self {
         let n = mass.len();
         let mut root: Vec<u32> = (0..n as u32).collect();
-        for piece in pieces {
-            let a = find(&mut root, piece.copies[0]);
-            for &copy in &piece.copies[1..] {
+        for group in groups {
+            let a = find(&mut root, group[0]);
+            for &copy in &group[1..] {
                 let b = find(&mut root, copy);
                 let a = find(&mut root, a);
                 root[a.max(b) as usize] = a.min(b);

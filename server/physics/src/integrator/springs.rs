@@ -45,6 +45,17 @@ enum Mode {
     Capped(Vector3<f64>),
 }
 
+/// Energy, force and stiffness of a spring at one position of its point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SpringResponse {
+    /// Energy [J].
+    pub energy: f64,
+    /// Force on the body [N].
+    pub force: Vector3<f64>,
+    /// Minus the derivative of the force [N/m], positive semidefinite.
+    pub stiffness: Matrix3<f64>,
+}
+
 /// A spring in the course of one step.
 #[derive(Clone, Copy, Debug)]
 pub struct ActiveSpring {
@@ -138,6 +149,33 @@ impl ActiveSpring {
             }
             _ => Matrix3::zeros(),
         }
+    }
+
+    /// Energy [J] of the spring with the point at `point`, whatever the mode: ½ k s² of the extension
+    /// s, beyond the cap f_max the line that continues it, f_max s − f_max²/(2k). Convex, and its
+    /// gradient is the force [N] at the point, turned round.
+    pub fn potential(&self, point: Vector3<f64>) -> SpringResponse {
+        let PointSpring { kind, stiffness_n_m: k, max_force_n: cap, .. } = self.spring;
+        let Some(pull) = self.pull(point) else { return SpringResponse::default() };
+        let s = pull.norm();
+        if k * s <= cap {
+            let stiffness = match kind {
+                SpringKind::OneSided { normal, .. } => k * normal * normal.transpose(),
+                SpringKind::Hold { .. } => Matrix3::from_diagonal_element(k),
+            };
+            return SpringResponse { energy: 0.5 * k * s * s, force: k * pull, stiffness };
+        }
+        let direction = pull / s;
+        let stiffness = match kind {
+            SpringKind::OneSided { .. } => Matrix3::zeros(),
+            SpringKind::Hold { .. } => cap / s * (Matrix3::identity() - direction * direction.transpose()),
+        };
+        SpringResponse { energy: cap * (s - 0.5 * cap / k), force: cap * direction, stiffness }
+    }
+
+    /// Stiffness k [N/m], whether or not the spring is in contact.
+    pub fn stiffness_n_m(&self) -> f64 {
+        self.spring.stiffness_n_m
     }
 
     /// The spring as a term h² k J Jᵀ of the operator; `None` unless it is linear.

@@ -2,4 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod bodies;
 mod critical_step;
+mod explicit;
+mod spinning;
+mod time_orders;

@@ -1,0 +1,171 @@
+//! Explicit schemes: symplectic Euler, midpoint, fourth-order Runge–Kutta.
+
+use nalgebra::Vector3;
+
+use super::critical_step::stable_step;
+use super::{Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, Notice, Scheme, finite, hold};
+use crate::assembly::Tangent;
+use crate::integrator::State;
+use crate::material::Law;
+use crate::operator::FixedCopy;
+use crate::team::Team;
+
+/// Part of the longest stable step that is used.
+const MARGIN: f64 = 0.95;
+/// ω_max of a body whose stiffness changes is computed again after so many steps.
+const RECHECK: u32 = 128;
+/// A step that did not stay finite is tried again with sub-steps half, then a quarter as long.
+const RETRIES: u32 = 2;
+
+impl Dynamics {
+    /// Makes the step into `self.next`.
+    pub(super) fn explicit_step(
+        &mut self,
+        team: &mut Team,
+        state: &State,
+        inputs: &DynamicsInputs<'_>,
+        report: &mut DynamicsReport,
+    ) {
+        let stable_s = self.stable_step(team, state, inputs.fixed);
+        report.stable_step_s = Some(stable_s);
+        let parts = (inputs.h / (MARGIN * stable_s) * (1.0 - 1e-9)).ceil().max(1.0);
+        // Saturates; a step of zero length that is stable divides into more parts than anyone allows.
+        let needed = if parts.is_nan() { u32::MAX } else { parts as u32 };
+        if needed > self.settings.most_substeps.max(1) {
+            report.outcome = DynamicsOutcome::Refused;
+            report.notice = Some(Notice::TooLong { h_s: inputs.h, stable_s, needed });
+            return;
+        }
+        for retry in 0..=RETRIES {
+            report.substeps = needed << retry;
+            if report.substeps > 1 {
+                report.notice = Some(Notice::Divided { substeps: report.substeps, stable_s });
+            }
+            let h = inputs.h / f64::from(report.substeps);
+            self.next.copy_from(state);
+            for f in inputs.fixed {
+                let c = f.copy as usize;
+                for k in (0..3).filter(|&k| f.axes[k]) {
+                    self.next.v[c][k] = (f.position_m[k] - state.x[c][k]) / inputs.h;
+                }
+            }
+            for k in 1..=report.substeps {
+                self.substep(team, state, inputs, h, f64::from(k) / f64::from(report.substeps));
+            }
+            if finite(&self.next) {
+                report.kinetic_j = self.mass.kinetic(&self.next.v);
+                return;
+            }
+        }
+        report.outcome = DynamicsOutcome::Held;
+    }
+
+    /// Longest stable step [s] with the springs of this step.
+    fn stable_step(&mut self, team: &mut Team, state: &State, fixed: &[FixedCopy]) -> f64 {
+        let body = match self.omega_squared {
+            Some((omega_squared, left)) if left > 0 || self.model.law() == Law::Linear => {
+                self.omega_squared = Some((omega_squared, left.saturating_sub(1)));
+                omega_squared
+            }
+            _ => {
+                let K = self.tangent.get_or_insert_with(|| self.model.pattern());
+                self.model.tangent(&state.x, Tangent::Projected, K);
+                let omega_squared = self.power.omega_max(team, K, &mut self.mass, fixed).powi(2);
+                self.omega_squared = Some((omega_squared, RECHECK));
+                omega_squared
+            }
+        };
+        let springs = self.power.spring_bound(&self.active, &self.mass.lumped);
+        stable_step(self.settings.scheme, (body + springs).sqrt(), self.material.rayleigh)
+    }
+
+    /// One part of length `h` [s], which ends at the fraction `s` of the step.
+    fn substep(&mut self, team: &mut Team, state: &State, inputs: &DynamicsInputs<'_>, h: f64, s: f64) {
+        let mut next = std::mem::take(&mut self.next);
+        let [mut x, mut v, mut a, mut dx, mut dv] = std::mem::take(&mut self.stages);
+        match self.settings.scheme {
+            Scheme::Midpoint => {
+                self.accelerate(team, &next.x, &next.v, inputs.fixed, &mut a);
+                shifted(&next.x, h / 2.0, &next.v, &mut x);
+                shifted(&next.v, h / 2.0, &a, &mut v);
+                self.accelerate(team, &x, &v, inputs.fixed, &mut a);
+                add(&mut next.x, h, &v);
+                add(&mut next.v, h, &a);
+            }
+            Scheme::Rk4 => {
+                // Stage k at c h: k_x = v_k, k_v = a(x_k, v_k); sums with weights 1, 2, 2, 1.
+                dx.fill(Vector3::zeros());
+                dv.fill(Vector3::zeros());
+                x.copy_from_slice(&next.x);
+                v.copy_from_slice(&next.v);
+                for (weight, forward) in [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)] {
+                    self.accelerate(team, &x, &v, inputs.fixed, &mut a);
+                    add(&mut dx, weight, &v);
+                    add(&mut dv, weight, &a);
+                    shifted(&next.x, h * forward, &v, &mut x);
+                    shifted(&next.v, h * forward, &a, &mut v);
+                }
+                add(&mut next.x, h / 6.0, &dx);
+                add(&mut next.v, h / 6.0, &dv);
+            }
+            _ => {
+                self.accelerate(team, &next.x, &next.v, inputs.fixed, &mut a);
+                add(&mut next.v, h, &a);
+                add(&mut next.x, h, &next.v);
+            }
+        }
+        for f in inputs.fixed {
+            let c = f.copy as usize;
+            for k in (0..3).filter(|&k| f.axes[k]) {
+                let way = f.position_m[k] - state.x[c][k];
+                next.x[c][k] = state.x[c][k] + s * way;
+            }
+        }
+        self.stages = [x, v, a, dx, dv];
+        self.next = next;
+    }
+
+    /// a = M⁻¹ (f_ext + f_springs(x) − f_int(x) − α M v − β K̂(x) v) [m/s²], 0 where prescribed.
+    pub(super) fn accelerate(
+        &mut self,
+        team: &mut Team,
+        x: &[Vector3<f64>],
+        v: &[Vector3<f64>],
+        fixed: &[FixedCopy],
+        a: &mut [Vector3<f64>],
+    ) {
+        let rayleigh = self.material.rayleigh;
+        self.model.internal_forces(x, &mut self.force);
+        if rayleigh.stiffness_s > 0.0 {
+            self.model.add_rotated_stiffness_times(rayleigh.stiffness_s, x, v, &mut self.force);
+        }
+        if rayleigh.mass_1_s > 0.0 {
+            self.mass.add_times(rayleigh.mass_1_s, v, &mut self.force);
+        }
+        for (f, f_ext) in self.force.iter_mut().zip(&self.f_ext) {
+            *f = f_ext - *f;
+        }
+        for spring in &self.active {
+            let force = spring.potential(spring.point(x)).force;
+            spring.carriers().for_each(|(c, w)| self.force[c] += w * force);
+        }
+        hold(fixed, &mut self.force);
+        a.fill(Vector3::zeros());
+        self.mass.solve(team, &self.force, a);
+        hold(fixed, a);
+    }
+}
+
+/// y += s x.
+fn add(y: &mut [Vector3<f64>], s: f64, x: &[Vector3<f64>]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += s * x;
+    }
+}
+
+/// z = y + s x.
+fn shifted(y: &[Vector3<f64>], s: f64, x: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
+    for ((z, y), x) in z.iter_mut().zip(y).zip(x) {
+        *z = y + s * x;
+    }
+}

@@ -1,0 +1,135 @@
+//! What earlier steps left behind, and what tells that a scheme is out of its depth.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::integrator::State;
+use crate::integrator::parts::LooseParts;
+
+/// The last two states.
+#[derive(Clone, Debug, Default)]
+pub(super) struct History {
+    /// State before the last step, and the one that the last step left.
+    pub before: State,
+    last: State,
+    /// Length of the last step [s].
+    pub h: f64,
+    /// Springs in contact at the end of it.
+    pub contacts: usize,
+    /// Whether there was a last step.
+    pub known: bool,
+}
+
+impl History {
+    pub fn forget(&mut self) {
+        self.known = false;
+        self.contacts = 0;
+    }
+
+    /// Whether `state` is what the last step left.
+    pub fn continues(&self, state: &State) -> bool {
+        self.known && self.last == *state
+    }
+
+    /// A step of length `h` from `before` to `after` was made.
+    pub fn push(&mut self, before: &State, after: &State, h: f64) {
+        self.before.copy_from(before);
+        self.last.copy_from(after);
+        self.h = h;
+        self.known = true;
+    }
+}
+
+/// Book-keeping of energy: H = kinetic + elastic + loads and springs, which a step conserves.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Ledger {
+    /// H at the start of the run, plus what changes of loads and springs have put in since [J].
+    reference: Option<f64>,
+    /// H at the end of the last step, with its loads [J].
+    end: f64,
+}
+
+/// Part of the energy that may appear from nowhere before a guard steps in: with schemes that should
+/// keep it, and with implicit Euler, which should lose some.
+pub(super) const GAIN_CONSERVING: f64 = 0.01;
+pub(super) const GAIN_DISSIPATING: f64 = 1e-4;
+
+impl Ledger {
+    pub fn forget(&mut self) {
+        self.reference = None;
+    }
+
+    /// A step begins with energy `H` [J] under its own loads.
+    pub fn begin(&mut self, H: f64) {
+        self.reference = Some(match self.reference {
+            Some(reference) => reference + H - self.end,
+            None => H,
+        });
+    }
+
+    /// Energy [J] above what there should be at most, if a state with energy `H` has more of it
+    /// than the `allowed` gain [J].
+    pub fn excess(&self, H: f64, allowed: f64) -> Option<f64> {
+        let excess = H - self.reference.unwrap_or(H);
+        (excess.is_nan() || excess > allowed).then_some(excess)
+    }
+
+    /// The step ended with energy `H` [J]. Where prescribed nodes moved they put energy in.
+    pub fn end(&mut self, H: f64, driven: bool) {
+        self.end = H;
+        if driven {
+            self.reference = Some(H.max(self.reference.unwrap_or(H)));
+        }
+    }
+}
+
+/// BDF2 serves while a body turns by less than this in one step [rad]. Up to 1.6 no energy is gained,
+/// from 2 on it is.
+pub(super) const LARGEST_TURN: f64 = 0.8;
+
+/// Angular velocities of the connected parts.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SpinGuard {
+    parts: Vec<Spin>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Spin {
+    mass: f64,
+    /// Σ m x, Σ m v.
+    moment: Vector3<f64>,
+    momentum: Vector3<f64>,
+    /// Angular momentum and inertia about the centre of mass.
+    angular: Vector3<f64>,
+    inertia: Matrix3<f64>,
+}
+
+impl SpinGuard {
+    pub fn resize(&mut self, parts: usize) {
+        self.parts.resize(parts, Spin::default());
+    }
+
+    /// Largest angular velocity |J⁻¹ L| of a part [rad/s].
+    pub fn fastest(&mut self, state: &State, mass: &[f64], parts: &LooseParts) -> f64 {
+        self.parts.fill(Spin::default());
+        for (c, &m) in mass.iter().enumerate() {
+            let part = &mut self.parts[parts.of_copy[c] as usize];
+            part.mass += m;
+            part.moment += m * state.x[c];
+            part.momentum += m * state.v[c];
+        }
+        for (c, &m) in mass.iter().enumerate() {
+            let part = &mut self.parts[parts.of_copy[c] as usize];
+            if part.mass > 0.0 {
+                let d = state.x[c] - part.moment / part.mass;
+                part.angular += m * d.cross(&(state.v[c] - part.momentum / part.mass));
+                part.inertia += m * (Matrix3::from_diagonal_element(d.norm_squared()) - d * d.transpose());
+            }
+        }
+        let spin = |part: &Spin| {
+            let floor = 1e-9 * part.inertia.trace();
+            let J = part.inertia + Matrix3::from_diagonal_element(floor);
+            J.try_inverse().map_or(0.0, |inverse| (inverse * part.angular).norm())
+        };
+        self.parts.iter().map(spin).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,317 @@
+//! Implicit schemes: static equilibrium, implicit Euler, BDF2, Newmark.
+
+use nalgebra::Vector3;
+
+use super::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN};
+use super::potential::{Increment, StepPotential};
+use super::{
+    Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, LEAST_NEWTON_STEPS, Notice, Scheme, finite,
+};
+use crate::assembly::Tangent;
+use crate::integrator::State;
+use crate::material::Law;
+use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
+use crate::team::Team;
+
+/// An element whose ‖F‖ is below this has collapsed.
+const COLLAPSED: f64 = 0.05;
+/// Newton steps that a step gets which gained energy with fewer.
+const RETRY_STEPS: u32 = 20;
+/// Halvings of a Newton step that recovers from a ruined state.
+const RECOVERY_HALVINGS: u32 = 20;
+
+impl Dynamics {
+    /// Makes the step into `self.next`.
+    pub(super) fn implicit_step(
+        &mut self,
+        team: &mut Team,
+        state: &State,
+        inputs: &DynamicsInputs<'_>,
+        report: &mut DynamicsReport,
+    ) {
+        let scheme = self.settings.scheme;
+        if scheme == Scheme::Static && self.parts.any_free() {
+            report.outcome = DynamicsOutcome::Refused;
+            report.notice = Some(Notice::LooseBody);
+            return;
+        }
+        let (elastic, kinetic) = (self.model.energy(&state.x), self.mass.kinetic(&state.v));
+        self.ledger.begin(kinetic + elastic + self.load_energy(&state.x));
+        let (scheme, notice) = self.choose(scheme, state, inputs);
+        (report.scheme, report.notice) = (scheme, notice);
+        if let Scheme::Newmark { .. } = scheme
+            && !self.history.known
+        {
+            let mut a = std::mem::take(&mut self.acceleration);
+            self.accelerate(team, &state.x, &state.v, inputs.fixed, &mut a);
+            self.acceleration = a;
+        }
+        let driven = inputs
+            .fixed
+            .iter()
+            .any(|f| (0..3).any(|k| f.axes[k] && f.position_m[k] != state.x[f.copy as usize][k]));
+        let mut advanced = self.attempt(team, state, inputs, (scheme, self.settings.newton.steps), report);
+        let excess = match scheme {
+            Scheme::Static => None,
+            _ if driven => None,
+            _ => self.excess(state, kinetic + elastic, scheme, report),
+        };
+        if let (true, Some(excess_j)) = (advanced, excess) {
+            report.notice = Some(Notice::EnergyGained { excess_j });
+        }
+        // Implicit Euler, solved to the end, is what never fails.
+        let again = scheme != Scheme::ImplicitEuler || self.settings.newton.steps < RETRY_STEPS;
+        if scheme != Scheme::Static && again && (!advanced || excess.is_some()) {
+            report.scheme = Scheme::ImplicitEuler;
+            let steps = RETRY_STEPS.max(self.settings.newton.steps);
+            advanced = self.attempt(team, state, inputs, (Scheme::ImplicitEuler, steps), report);
+        }
+        if !advanced {
+            report.outcome = DynamicsOutcome::Held;
+            return;
+        }
+        self.ledger.end(self.total_energy(report), driven);
+        self.history.contacts = self.contacts();
+    }
+
+    /// Energy [J] in `self.next` that came from nowhere, if it is more than the scheme may gain.
+    fn excess(&self, state: &State, energy: f64, scheme: Scheme, report: &DynamicsReport) -> Option<f64> {
+        let moved = self.next.x.iter().zip(&state.x);
+        let exchanged: f64 = self.f_ext.iter().zip(moved).map(|(f, (next, x))| f.dot(&(next - x))).sum();
+        let gain = if scheme == Scheme::ImplicitEuler { GAIN_DISSIPATING } else { GAIN_CONSERVING };
+        self.ledger.excess(self.total_energy(report), gain * (energy + exchanged.abs()))
+    }
+
+    /// The scheme that this step can be made with, and why it is not the one that was chosen.
+    fn choose(
+        &mut self,
+        scheme: Scheme,
+        state: &State,
+        inputs: &DynamicsInputs<'_>,
+    ) -> (Scheme, Option<Notice>) {
+        if scheme != Scheme::Bdf2 {
+            return (scheme, None);
+        }
+        let euler = |notice| (Scheme::ImplicitEuler, Some(notice));
+        if !self.history.known || (self.history.h - inputs.h).abs() > 1e-9 * inputs.h {
+            return euler(Notice::Started);
+        }
+        let angle_rad = inputs.h * self.spin.fastest(state, &self.mass.lumped, &self.parts);
+        if angle_rad > LARGEST_TURN {
+            return euler(Notice::Spinning { angle_rad });
+        }
+        for ((next, x), v) in self.next.x.iter_mut().zip(&state.x).zip(&state.v) {
+            *next = x + inputs.h * v;
+        }
+        if self.contacts() > self.history.contacts {
+            return euler(Notice::ContactOnset);
+        }
+        (scheme, None)
+    }
+
+    /// Springs that push or pull at the positions in `self.next`.
+    fn contacts(&self) -> usize {
+        self.active.iter().filter(|s| s.potential(s.point(&self.next.x)).energy > 0.0).count()
+    }
+
+    /// Kinetic, elastic, load and spring energy of `self.next` [J].
+    fn total_energy(&self, report: &DynamicsReport) -> f64 {
+        report.kinetic_j + report.elastic_j.unwrap_or(0.0) + self.load_energy(&self.next.x)
+    }
+
+    /// One step with one scheme and at most so many Newton steps; whether the result is finite.
+    fn attempt(
+        &mut self,
+        team: &mut Team,
+        state: &State,
+        inputs: &DynamicsInputs<'_>,
+        (scheme, steps): (Scheme, u32),
+        report: &mut DynamicsReport,
+    ) -> bool {
+        let increment = self.predict(state, inputs, scheme);
+        let beta = if increment.B > 0.0 { self.material.rayleigh.stiffness_s } else { 0.0 };
+        if let (true, Some(K)) = (beta > 0.0, &mut self.damping) {
+            self.model.rotated_stiffness(&self.next.x, K);
+        }
+        let iterations = report.newton.linear_iterations;
+        report.newton = self.minimise(team, state, inputs, (increment, beta, steps), report);
+        report.newton.linear_iterations += iterations;
+        if report.newton.stop == StopReason::NonFinite {
+            return false;
+        }
+        if report.notice.is_none()
+            && !matches!(report.newton.stop, StopReason::Converged | StopReason::Stagnated)
+            && self.newton.settings.steps > 1
+        {
+            report.notice = Some(Notice::Unconverged);
+        }
+        for c in 0..state.x.len() {
+            let (x, B) = (self.next.x[c], increment.B);
+            self.next.v[c] = B * (x - self.x_v[c]);
+            self.acceleration[c] = increment.A * (x - self.x_a[c]);
+        }
+        report.kinetic_j = self.mass.kinetic(&self.next.v);
+        let elastic_j = self.model.energy(&self.next.x);
+        report.elastic_j = Some(elastic_j);
+        finite(&self.next) && (report.kinetic_j + elastic_j).is_finite()
+    }
+
+    /// x_a, x_v and the predictor, which goes to `self.next.x`.
+    fn predict(&mut self, state: &State, inputs: &DynamicsInputs<'_>, scheme: Scheme) -> Increment {
+        let h = inputs.h;
+        let State { x, v } = state;
+        let increment = match scheme {
+            Scheme::Static => {
+                self.x_a.copy_from_slice(x);
+                self.x_v.copy_from_slice(x);
+                self.next.x.copy_from_slice(x);
+                Increment { A: 0.0, B: 0.0 }
+            }
+            Scheme::Bdf2 => {
+                let before = &self.history.before;
+                let h = 2.0 / 3.0 * h;
+                for c in 0..x.len() {
+                    self.x_v[c] = (4.0 * x[c] - before.x[c]) / 3.0;
+                    self.x_a[c] = self.x_v[c] + h * (4.0 * v[c] - before.v[c]) / 3.0;
+                    self.next.x[c] = self.x_a[c];
+                }
+                Increment { A: 1.0 / (h * h), B: 1.0 / h }
+            }
+            Scheme::Newmark { beta, gamma } => {
+                let B = gamma / (beta * h);
+                for c in 0..x.len() {
+                    let a = self.acceleration[c];
+                    self.x_a[c] = x[c] + h * v[c] + h * h * (0.5 - beta) * a;
+                    // v⁺ = ṽ + B (x⁺ − x_a) with ṽ = v + h (1 − γ) a.
+                    self.x_v[c] = self.x_a[c] - (v[c] + h * (1.0 - gamma) * a) / B;
+                    self.next.x[c] = x[c] + h * v[c];
+                }
+                Increment { A: 1.0 / (beta * h * h), B }
+            }
+            _ => {
+                for c in 0..x.len() {
+                    self.x_v[c] = x[c];
+                    self.x_a[c] = x[c] + h * v[c];
+                    self.next.x[c] = self.x_a[c];
+                }
+                Increment { A: 1.0 / (h * h), B: 1.0 / h }
+            }
+        };
+        self.prescribe(inputs);
+        increment
+    }
+
+    fn prescribe(&mut self, inputs: &DynamicsInputs<'_>) {
+        for f in inputs.fixed {
+            for k in (0..3).filter(|&k| f.axes[k]) {
+                self.next.x[f.copy as usize][k] = f.position_m[k];
+            }
+        }
+    }
+
+    /// Newton's method from the predictor, then the balance of momentum of loose parts.
+    fn minimise(
+        &mut self,
+        team: &mut Team,
+        state: &State,
+        inputs: &DynamicsInputs<'_>,
+        (increment, beta, steps): (Increment, f64, u32),
+        report: &mut DynamicsReport,
+    ) -> NewtonReport {
+        let ruined = self.count_ruined(report);
+        let settings = self.settings.newton;
+        let quadratic = matches!(self.model.law(), Law::Linear | Law::Corotational);
+        let steps = match quadratic && !ruined && self.active.is_empty() {
+            true => steps,
+            false => steps.max(LEAST_NEWTON_STEPS),
+        };
+        if ruined && steps > settings.steps && report.notice.is_none() {
+            report.notice = Some(Notice::Recovery);
+        }
+        let halvings = if ruined { RECOVERY_HALVINGS.max(settings.halvings) } else { settings.halvings };
+        // A step that is solved for only once is solved for well, with the rotations of the predictor:
+        // then implicit Euler never gains energy, whatever h.
+        let single = steps == 1;
+        let mut linear = settings.linear;
+        if single {
+            linear.tolerance = linear.tolerance.min(settings.tolerance);
+        }
+        self.newton.settings = NewtonSettings { steps, halvings, linear, ..settings };
+        let mut phi = StepPotential {
+            model: &self.model,
+            mass: &self.mass,
+            increment,
+            x_a: &self.x_a,
+            x_v: &self.x_v,
+            alpha: self.material.rayleigh.mass_1_s,
+            damping: self.damping.as_ref().filter(|_| beta > 0.0).map(|K| (beta, K)),
+            f_ext: &self.f_ext,
+            springs: &self.active,
+            definite: if single { Tangent::Held } else { Tangent::Projected },
+            scratch: &mut self.scratch,
+            force: &mut self.force,
+        };
+        let x = &mut self.next.x;
+        if !phi.value(team, x).is_finite() {
+            // So fast that the predictor overflows: from where the body is.
+            x.copy_from_slice(&state.x);
+            for f in inputs.fixed {
+                for k in (0..3).filter(|&k| f.axes[k]) {
+                    x[f.copy as usize][k] = f.position_m[k];
+                }
+            }
+        }
+        let done = self.newton.minimise(team, &mut phi, x, inputs.fixed);
+        if done.stop != StopReason::NonFinite && increment.A > 0.0 && self.parts.any_free() {
+            self.balance_parts(increment);
+        }
+        done
+    }
+
+    /// Translates every free part to where its momentum is balanced exactly, for an iteration that
+    /// stops early leaves a residual, which is momentum from nowhere.
+    fn balance_parts(&mut self, increment: Increment) {
+        let factor = increment.A + self.material.rayleigh.mass_1_s * increment.B;
+        let mut g = std::mem::take(&mut self.scratch);
+        g.fill(Vector3::zeros());
+        // Internal forces and K̂ add up to nothing in every part; what is left is inertia and loads.
+        let alpha = self.material.rayleigh.mass_1_s;
+        let x = &self.next.x;
+        for (s, from) in [(increment.A, &self.x_a), (alpha * increment.B, &self.x_v)] {
+            for ((d, x), from) in self.force.iter_mut().zip(x).zip(from) {
+                *d = x - from;
+            }
+            self.mass.add_times(s, &self.force, &mut g);
+        }
+        self.translations.restart(&self.parts);
+        self.translations.begin(&self.parts, factor);
+        for (c, g) in g.iter().enumerate() {
+            self.translations.add(&self.parts, c, self.f_ext[c] - g);
+        }
+        for spring in &self.active {
+            let response = spring.potential(spring.point(x));
+            self.translations.add_spring(&self.parts, spring.main_copy(), response.stiffness, response.force);
+        }
+        self.translations.solve(&self.parts);
+        for (c, x) in self.next.x.iter_mut().enumerate() {
+            *x += self.translations.shift[self.parts.of_copy[c] as usize];
+        }
+        self.scratch = g;
+    }
+
+    /// Counts inverted elements at the predictor into the report; whether any element is inverted or
+    /// collapsed.
+    fn count_ruined(&self, report: &mut DynamicsReport) -> bool {
+        let mut ruined = false;
+        report.inverted = 0;
+        for e in 0..self.model.n_elements() {
+            for q in 0..self.model.kind().points() {
+                let F = self.model.deformation_gradient(e, q, &self.next.x);
+                let inverted = F.determinant() <= 0.0;
+                report.inverted += usize::from(inverted);
+                ruined |= inverted || F.norm() < COLLAPSED;
+            }
+        }
+        ruined
+    }
+}

@@ -1,0 +1,315 @@
+//! Motion of a [`Model`]: every scheme, either mass, Rayleigh damping, contacts, guards.
+//!
+//! Explicit schemes check the critical time step and divide a step that is too long, or refuse it.
+//! Implicit schemes minimise the incremental potential of the step by Newton's method with
+//! backtracking, so that contacts, inverted elements and any law are treated alike. Whatever happens
+//! the state stays finite, and what was done differently from what was asked for is reported.
+
+mod critical_step;
+mod explicit;
+mod guard;
+mod implicit;
+mod mass;
+mod potential;
+mod report;
+mod settings;
+
+pub use critical_step::stable_step;
+pub use report::{DynamicsOutcome, DynamicsReport, Notice};
+pub use settings::{DynamicsSettings, LEAST_NEWTON_STEPS, MassKind, Scheme};
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::State;
+use super::parts::{LooseParts, Translations};
+use super::springs::{ActiveSpring, PointSpring};
+use crate::assembly::{BlockCsr, Model, Tangent};
+use crate::material::Material;
+use crate::operator::FixedCopy;
+use crate::solver::Newton;
+use crate::team::Team;
+use critical_step::PowerIteration;
+use guard::{History, Ledger, SpinGuard};
+use mass::Mass;
+
+/// Positions beyond this [m] count as not finite.
+const FARTHEST: f64 = 1e15;
+
+/// What a step is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct DynamicsInputs<'a> {
+    /// Length of the step h [s].
+    pub h: f64,
+    /// Acceleration of gravity [m/s²].
+    pub gravity: Vector3<f64>,
+    /// Load on every node [N], gravity not included.
+    pub load: &'a [Vector3<f64>],
+    /// Prescribed nodes, with their positions at the end of the step.
+    pub fixed: &'a [FixedCopy],
+    /// Springs of this step.
+    pub springs: &'a [PointSpring],
+}
+
+/// Settings that no step can be made with.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum DynamicsError {
+    /// Newmark's parameters are out of range.
+    #[error("Newmark parameters beta = {beta}, gamma = {gamma}: beta must be in (0, 1], gamma in [0.5, 2]")]
+    Newmark {
+        /// β.
+        beta: f64,
+        /// γ.
+        gamma: f64,
+    },
+}
+
+/// Integrates the motion of one body; holds all memory that a step needs.
+#[derive(Debug)]
+pub struct Dynamics {
+    model: Model,
+    material: Material,
+    settings: DynamicsSettings,
+    mass: Mass,
+    newton: Newton,
+    parts: LooseParts,
+    /// Prescribed nodes that the parts were made with.
+    known_fixed: Option<Vec<FixedCopy>>,
+    translations: Translations,
+    active: Vec<ActiveSpring>,
+    accepted: Vec<bool>,
+    f_ext: Vec<Vector3<f64>>,
+    x_a: Vec<Vector3<f64>>,
+    x_v: Vec<Vector3<f64>>,
+    next: State,
+    /// Acceleration at the end of the last step, for Newmark [m/s²].
+    acceleration: Vec<Vector3<f64>>,
+    scratch: Vec<Vector3<f64>>,
+    force: Vec<Vector3<f64>>,
+    /// Room for the stages of explicit schemes.
+    stages: [Vec<Vector3<f64>>; 5],
+    damping: Option<BlockCsr<f64>>,
+    tangent: Option<BlockCsr<f64>>,
+    power: PowerIteration,
+    /// ω_max² [1/s²] without springs, and the explicit steps until it is computed again.
+    omega_squared: Option<(f64, u32)>,
+    history: History,
+    ledger: Ledger,
+    spin: SpinGuard,
+}
+
+impl Dynamics {
+    /// Prepares the motion of `model`, which is made of `material`.
+    pub fn new(model: Model, material: Material, settings: DynamicsSettings) -> Result<Self, DynamicsError> {
+        if let Scheme::Newmark { beta, gamma } = settings.scheme
+            && !(beta > 0.0 && beta <= 1.0 && (0.5..=2.0).contains(&gamma))
+        {
+            return Err(DynamicsError::Newmark { beta, gamma });
+        }
+        let n = model.n_nodes();
+        let zeros = || vec![Vector3::zeros(); n];
+        let mass = Mass::new(&model, material.density_kg_m3, settings.mass);
+        let stages = if settings.scheme.is_explicit() { n } else { 0 };
+        let mut power = PowerIteration::default();
+        if settings.scheme.is_explicit() {
+            power.resize(n);
+        }
+        Ok(Self {
+            mass,
+            newton: Newton::new(settings.newton),
+            parts: LooseParts::default(),
+            known_fixed: None,
+            translations: Translations::default(),
+            active: Vec::new(),
+            accepted: Vec::new(),
+            f_ext: zeros(),
+            x_a: zeros(),
+            x_v: zeros(),
+            next: State { x: zeros(), v: zeros() },
+            acceleration: zeros(),
+            scratch: zeros(),
+            force: zeros(),
+            stages: std::array::from_fn(|_| vec![Vector3::zeros(); stages]),
+            damping: (material.rayleigh.stiffness_s > 0.0).then(|| model.pattern()),
+            tangent: settings.scheme.is_explicit().then(|| model.pattern()),
+            power,
+            omega_squared: None,
+            history: History::default(),
+            ledger: Ledger::default(),
+            spin: SpinGuard::default(),
+            model,
+            material,
+            settings,
+        })
+    }
+
+    /// The model that moves.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// How motion is integrated.
+    pub fn settings(&self) -> &DynamicsSettings {
+        &self.settings
+    }
+
+    /// Lumped masses [kg], also where the mass matrix is consistent.
+    pub fn masses(&self) -> &[f64] {
+        &self.mass.lumped
+    }
+
+    /// Connected parts, as of the last step.
+    pub fn parts(&self) -> &LooseParts {
+        &self.parts
+    }
+
+    /// ½ vᵀ M v [J].
+    pub fn kinetic_energy(&self, v: &[Vector3<f64>]) -> f64 {
+        self.mass.kinetic(v)
+    }
+
+    /// Forgets earlier steps. Called by the integrator itself where a state is not the one it left.
+    pub fn restart(&mut self) {
+        self.history.forget();
+        self.ledger.forget();
+        self.omega_squared = None;
+    }
+
+    /// Advances `state` by h. The force of every spring at the end of the step goes to
+    /// `spring_forces`, in the order of the inputs.
+    pub fn step(
+        &mut self,
+        team: &mut Team,
+        state: &mut State,
+        inputs: &DynamicsInputs<'_>,
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) -> DynamicsReport {
+        let mut report =
+            DynamicsReport { scheme: self.settings.scheme, substeps: 1, ..DynamicsReport::default() };
+        spring_forces.clear();
+        spring_forces.resize(inputs.springs.len(), Vector3::zeros());
+        if !self.usable(state, inputs) {
+            report.outcome = DynamicsOutcome::Refused;
+            report.notice = Some(Notice::BadInput);
+            return report;
+        }
+        self.follow_fixed(inputs.fixed);
+        self.begin(state, inputs);
+        report.refused_springs = inputs.springs.len() - self.active.len();
+        if !self.history.continues(state) {
+            self.restart();
+        }
+        if self.settings.scheme.is_explicit() {
+            self.explicit_step(team, state, inputs, &mut report);
+        } else {
+            self.implicit_step(team, state, inputs, &mut report);
+        }
+        match report.outcome {
+            DynamicsOutcome::Advanced => {
+                self.history.push(state, &self.next, inputs.h);
+                std::mem::swap(state, &mut self.next);
+                self.write_spring_forces(state, spring_forces);
+            }
+            DynamicsOutcome::Held => {
+                state.v.fill(Vector3::zeros());
+                self.restart();
+                report.notice = Some(Notice::NotFinite);
+            }
+            DynamicsOutcome::Refused => {}
+        }
+        report
+    }
+
+    /// ω_max [rad/s] of the tangent at `x` [m] and the mass matrix, in the directions that `fixed`
+    /// leaves free; Δt_c = 2/ω_max.
+    pub fn omega_max(&mut self, team: &mut Team, x: &[Vector3<f64>], fixed: &[FixedCopy]) -> f64 {
+        let n = self.model.n_nodes();
+        self.power.resize(n);
+        self.mass.hold(fixed);
+        let K = self.tangent.get_or_insert_with(|| self.model.pattern());
+        self.model.tangent(x, Tangent::Projected, K);
+        self.power.omega_max(team, K, &mut self.mass, fixed)
+    }
+
+    fn usable(&self, state: &State, inputs: &DynamicsInputs<'_>) -> bool {
+        let n = self.model.n_nodes();
+        let finite = |v: &Vector3<f64>| v.iter().all(|c| c.abs() < FARTHEST);
+        let lengths = [state.x.len(), state.v.len(), inputs.load.len()];
+        lengths == [n; 3]
+            && inputs.h > 0.0
+            && inputs.h.is_finite()
+            && finite(&inputs.gravity)
+            && inputs.load.iter().all(finite)
+            && state.x.iter().all(finite)
+            && state.v.iter().all(finite)
+            && inputs.fixed.iter().all(|f| {
+                (f.copy as usize) < n && (0..3).all(|k| !f.axes[k] || f.position_m[k].abs() < FARTHEST)
+            })
+    }
+
+    /// Finds the connected parts again if other directions are prescribed than before.
+    fn follow_fixed(&mut self, fixed: &[FixedCopy]) {
+        let same = |known: &Vec<FixedCopy>| {
+            known.len() == fixed.len()
+                && known.iter().zip(fixed).all(|(a, b)| (a.copy, a.axes) == (b.copy, b.axes))
+        };
+        if self.known_fixed.as_ref().is_some_and(same) {
+            return;
+        }
+        let model = &self.model;
+        let elements = (0..model.n_elements()).map(|e| model.element(e));
+        let ends: Vec<[u32; 2]> = model.springs().iter().map(|s| [s.a, s.b]).collect();
+        let groups = elements.chain(ends.iter().map(|s| &s[..]));
+        self.parts = LooseParts::connected(groups, &self.mass.lumped, fixed);
+        self.mass.hold(fixed);
+        self.spin.resize(self.parts.len());
+        self.omega_squared = None;
+        self.known_fixed = Some(fixed.to_vec());
+    }
+
+    /// Loads and springs of the step.
+    fn begin(&mut self, state: &State, inputs: &DynamicsInputs<'_>) {
+        for (c, f) in self.f_ext.iter_mut().enumerate() {
+            *f = self.mass.weight(c, inputs.gravity) + inputs.load[c];
+        }
+        self.active.clear();
+        self.accepted.clear();
+        for spring in inputs.springs {
+            let active = ActiveSpring::new(spring, &state.x);
+            self.accepted.push(active.is_some());
+            self.active.extend(active);
+        }
+    }
+
+    fn write_spring_forces(&self, state: &State, spring_forces: &mut [Vector3<f64>]) {
+        let mut active = self.active.iter();
+        for (force, _) in spring_forces.iter_mut().zip(&self.accepted).filter(|(_, accepted)| **accepted) {
+            if let Some(spring) = active.next() {
+                *force = spring.potential(spring.point(&state.x)).force;
+            }
+        }
+    }
+
+    /// Potential energy of springs and loads at `x` [J]; that of gravity is one of the loads.
+    fn load_energy(&self, x: &[Vector3<f64>]) -> f64 {
+        let moved = x.iter().zip(self.model.rest());
+        let loads: f64 = self.f_ext.iter().zip(moved).map(|(f, (x, X))| f.dot(&(x - X))).sum();
+        let springs: f64 = self.active.iter().map(|s| s.potential(s.point(x)).energy).sum();
+        springs - loads
+    }
+}
+
+/// Whether every number is finite and not absurd.
+fn finite(state: &State) -> bool {
+    let fine = |v: &Vector3<f64>| v.iter().all(|c| c.abs() < FARTHEST);
+    state.x.iter().all(fine) && state.v.iter().all(fine)
+}
+
+/// Sets the prescribed directions of `v` to 0.
+fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
+    for f in fixed {
+        for axis in (0..3).filter(|&axis| f.axes[axis]) {
+            v[f.copy as usize][axis] = 0.0;
+        }
+    }
+}

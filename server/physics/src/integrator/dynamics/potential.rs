@@ -1,0 +1,155 @@
+//! The incremental potential of an implicit step, whose minimum is the end of the step.
+//!
+//! Every implicit scheme sets a⁺ = A (x⁺ − x_a) and v⁺ = B (x⁺ − x_v) in
+//! M a⁺ + (α M + β K̂) v⁺ + f_int(x⁺) = f_ext + f_springs(x⁺), which is ∇Φ(x⁺) = 0 of
+//!
+//!   Φ(x) = A/2 ‖x − x_a‖²_M + αB/2 ‖x − x_v‖²_M + βB/2 ‖x − x_v‖²_K̂ + Ψ(x) − f_ext·(x − x_a) + Σ springs
+//!
+//! with K̂ held at the predictor.
+//!
+//! # Source
+//! Radovitzky, Ortiz 1999 (incremental potential of Newmark schemes); Martin et al. 2011.
+
+use nalgebra::Vector3;
+
+use super::mass::Mass;
+use crate::assembly::{BlockCsr, Model, Tangent};
+use crate::integrator::springs::ActiveSpring;
+use crate::solver::{Curvature, Potential};
+use crate::team::Team;
+
+/// a⁺ = A (x⁺ − x_a), v⁺ = B (x⁺ − x_v).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Increment {
+    /// A [1/s²].
+    pub A: f64,
+    /// B [1/s].
+    pub B: f64,
+}
+
+/// Φ of one step; borrows what it is made from.
+pub(super) struct StepPotential<'a> {
+    pub model: &'a Model,
+    pub mass: &'a Mass,
+    pub increment: Increment,
+    pub x_a: &'a [Vector3<f64>],
+    pub x_v: &'a [Vector3<f64>],
+    /// α [1/s].
+    pub alpha: f64,
+    /// β [s] and K̂ at the predictor, if β > 0.
+    pub damping: Option<(f64, &'a BlockCsr<f64>)>,
+    /// Gravity and loads [N].
+    pub f_ext: &'a [Vector3<f64>],
+    pub springs: &'a [ActiveSpring],
+    /// The tangent that stands for a positive semidefinite one.
+    pub definite: Tangent,
+    /// Room for differences of positions and forces.
+    pub scratch: &'a mut [Vector3<f64>],
+    pub force: &'a mut [Vector3<f64>],
+}
+
+impl StepPotential<'_> {
+    /// All but Ψ, and its gradient added to `g`, if wanted.
+    fn rest(&mut self, x: &[Vector3<f64>], mut g: Option<&mut [Vector3<f64>]>) -> f64 {
+        let Increment { A, B } = self.increment;
+        let mut phi = 0.0;
+        for (s, from) in [(A, self.x_a), (self.alpha * B, self.x_v)] {
+            if s == 0.0 {
+                continue;
+            }
+            difference(x, from, self.scratch);
+            for c in 0..x.len() {
+                let f = s * self.mass.row_times(c, self.scratch);
+                phi += 0.5 * f.dot(&self.scratch[c]);
+                if let Some(g) = g.as_deref_mut() {
+                    g[c] += f;
+                }
+            }
+        }
+        if let Some((beta, K)) = self.damping {
+            difference(x, self.x_v, self.scratch);
+            K.multiply(self.scratch, self.force);
+            for (c, (f, d)) in self.force.iter().zip(&*self.scratch).enumerate() {
+                phi += 0.5 * beta * B * f.dot(d);
+                if let Some(g) = g.as_deref_mut() {
+                    g[c] += beta * B * f;
+                }
+            }
+        }
+        // The work of the loads, from x_a so that it is not large where little is done.
+        for (c, (f, x)) in self.f_ext.iter().zip(x).enumerate() {
+            phi -= f.dot(&(x - self.x_a[c]));
+            if let Some(g) = g.as_deref_mut() {
+                g[c] -= f;
+            }
+        }
+        for spring in self.springs {
+            let response = spring.potential(spring.point(x));
+            phi += response.energy;
+            if let Some(g) = g.as_deref_mut() {
+                spring.carriers().for_each(|(c, w)| g[c] -= w * response.force);
+            }
+        }
+        phi
+    }
+}
+
+impl Potential for StepPotential<'_> {
+    fn value(&mut self, _: &mut Team, x: &[Vector3<f64>]) -> f64 {
+        self.model.energy(x) + self.rest(x, None)
+    }
+
+    fn gradient(&mut self, _: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
+        self.model.internal_forces(x, g) + self.rest(x, Some(g))
+    }
+
+    fn pattern(&mut self) -> BlockCsr<f64> {
+        self.model.pattern()
+    }
+
+    fn hessian(&mut self, _: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>) {
+        let kind = match curvature {
+            Curvature::Exact => Tangent::Exact,
+            Curvature::Definite => self.definite,
+        };
+        self.model.tangent(x, kind, H);
+        let Increment { A, B } = self.increment;
+        self.mass.add_to(A + self.alpha * B, H);
+        if let Some((beta, K)) = self.damping {
+            H.add_scaled(beta * B, K);
+        }
+        self.springs.iter().for_each(|spring| add_spring(spring, x, H));
+    }
+
+    fn loads(&mut self, loads: &mut [Vector3<f64>]) {
+        loads.copy_from_slice(self.f_ext);
+    }
+}
+
+/// Adds w_a w_b S of every pair of carriers. A pair that is not in the pattern is moved to the
+/// diagonal, which keeps the matrix positive semidefinite.
+fn add_spring(spring: &ActiveSpring, x: &[Vector3<f64>], H: &mut BlockCsr<f64>) {
+    let S = spring.potential(spring.point(x)).stiffness;
+    if S.amax() == 0.0 {
+        return;
+    }
+    for (a, w_a) in spring.carriers() {
+        for (b, w_b) in spring.carriers() {
+            let block = w_a * w_b * S;
+            match H.position(a, b as u32) {
+                Some(at) => {
+                    for (entry, h) in H.blocks[at].iter_mut().enumerate() {
+                        *h += block[(entry / 3, entry % 3)];
+                    }
+                }
+                None => H.add_to_diagonal(a, &block.abs()),
+            }
+        }
+    }
+}
+
+fn difference(x: &[Vector3<f64>], y: &[Vector3<f64>], d: &mut [Vector3<f64>]) {
+    for ((d, x), y) in d.iter_mut().zip(x).zip(y) {
+        *d = x - y;
+    }
+}

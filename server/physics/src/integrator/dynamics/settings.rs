@@ -1,0 +1,101 @@
+//! What can be chosen: scheme, mass, Newton's method, limits of explicit steps.
+
+use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
+
+/// A time integration scheme. h is the step, a = M⁻¹ (f_ext − f_int − D v).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Scheme {
+    /// No inertia: every step ends in equilibrium with the loads, at rest.
+    Static,
+    /// v⁺ = v + h a(x, v), x⁺ = x + h v⁺. Explicit, first order, symplectic: no drift of energy.
+    SymplecticEuler,
+    /// Explicit midpoint rule (second-order Runge–Kutta). Amplifies undamped oscillations a little,
+    /// by 1 + (ωh)⁴/8 per step.
+    Midpoint,
+    /// The classical fourth-order Runge–Kutta scheme. Explicit.
+    Rk4,
+    /// v⁺ = v + h a(x⁺, v⁺), x⁺ = x + h v⁺. Unconditionally stable, first order, dissipates.
+    #[default]
+    ImplicitEuler,
+    /// v⁺ = (4 v − v₋)/3 + ⅔ h a(x⁺, v⁺), x alike: second order, dissipates far less. Makes a step of
+    /// implicit Euler at the start, at contact onset and where the body turns too fast for it.
+    Bdf2,
+    /// x⁺ = x + h v + h² ((½ − β) a + β a⁺), v⁺ = v + h ((1 − γ) a + γ a⁺) (Newmark 1959).
+    /// β = ¼, γ = ½, the average acceleration, is of second order and dissipates nothing; with large
+    /// rotations it is not stable, so a step that gains energy is replaced by one of implicit Euler.
+    Newmark {
+        /// β > 0.
+        beta: f64,
+        /// γ ≥ ½; the scheme is unconditionally stable for linear bodies if 2β ≥ γ.
+        gamma: f64,
+    },
+}
+
+impl Scheme {
+    /// Average acceleration: β = ¼, γ = ½.
+    pub const AVERAGE_ACCELERATION: Self = Self::Newmark { beta: 0.25, gamma: 0.5 };
+
+    /// Whether the scheme solves no system, so that its step is limited by Δt_c.
+    pub fn is_explicit(self) -> bool {
+        matches!(self, Self::SymplecticEuler | Self::Midpoint | Self::Rk4)
+    }
+
+    /// Name as in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Static => "static",
+            Self::SymplecticEuler => "symplectic-euler",
+            Self::Midpoint => "midpoint",
+            Self::Rk4 => "rk4",
+            Self::ImplicitEuler => "implicit-euler",
+            Self::Bdf2 => "bdf2",
+            Self::Newmark { .. } => "newmark",
+        }
+    }
+}
+
+/// How mass is distributed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MassKind {
+    /// One number per node.
+    #[default]
+    Lumped,
+    /// M_ab = ρ ∫ N_a N_b dV. Explicit schemes solve with it in every evaluation.
+    Consistent,
+}
+
+/// How motion is integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DynamicsSettings {
+    /// The scheme.
+    pub scheme: Scheme,
+    /// Distribution of mass.
+    pub mass: MassKind,
+    /// Newton's method of implicit schemes. `steps` = 1 is the fast path, one linear solve from the
+    /// predictor, which is taken for linear and corotational bodies that are in order; other laws,
+    /// inverted or collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
+    pub newton: NewtonSettings,
+    /// Explicit schemes: a step longer than what is stable is divided into at most so many parts; 1
+    /// refuses it.
+    pub most_substeps: u32,
+}
+
+/// Newton steps that a body gets which one linear solve cannot be trusted with.
+pub const LEAST_NEWTON_STEPS: u32 = 3;
+
+impl Default for DynamicsSettings {
+    fn default() -> Self {
+        let linear = LinearSettings {
+            method: Method::Pcg,
+            precision: Precision::Mixed,
+            iterations: 500,
+            tolerance: 0.1,
+        };
+        Self {
+            scheme: Scheme::ImplicitEuler,
+            mass: MassKind::Lumped,
+            newton: NewtonSettings { steps: 20, tolerance: 1e-6, linear, ..NewtonSettings::default() },
+            most_substeps: 256,
+        }
+    }
+}
