@@ -5,6 +5,7 @@
 
 mod bodies;
 mod critical_step;
+mod cut_through_elements;
 mod explicit;
 mod ruined_starts;
 mod spinning;
