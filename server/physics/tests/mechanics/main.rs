@@ -5,6 +5,7 @@
 mod conservation;
 mod cutting;
 mod determinism;
+mod dynamics;
 mod reference;
 mod robustness;
 mod springs;
