@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{Body, BodyError};
+use super::shape::Shape;
+use super::{Body, BodyError, Path};
 use crate::cut::CutMesh;
 use crate::operator::FixedCopy;
 
@@ -31,22 +32,27 @@ pub struct Boundary {
 impl Boundary {
     /// A fixed node fixes the copy that holds the node's own material, which keeps the node's
     /// number. Copies without that material stay free: fixing them would glue fragments to air.
-    pub fn fixed_copies(&self, mesh: &CutMesh) -> Vec<FixedCopy> {
+    /// `rest` are the rest positions of all copies [m], and of what the element adds.
+    pub fn fixed_copies(&self, rest: &[Vector3<f64>]) -> Vec<FixedCopy> {
         let copy = |f: &FixedNode| {
-            let target = mesh.mesh().nodes[f.node as usize] + f.displacement_m;
+            let target = rest[f.node as usize] + f.displacement_m;
             FixedCopy { copy: f.node, axes: f.axes, position_m: target.into() }
         };
         self.fixed.iter().map(copy).collect()
     }
 
-    /// Force on every copy [N]: point forces go to the copy with the node's material, spread ones to
+    /// Force on every one of `n` copies and further nodes [N]: point forces go to the copy with the node's material, spread ones to
     /// all copies of the node by the volume they carry. Totals are kept.
-    pub fn copy_loads(&self, mesh: &CutMesh) -> Vec<Vector3<f64>> {
-        let mut load = vec![Vector3::zeros(); mesh.n_copies()];
+    pub fn node_loads(&self, mesh: &CutMesh, n: usize) -> Vec<Vector3<f64>> {
+        let mut load = vec![Vector3::zeros(); n];
         for (load, f) in load.iter_mut().zip(&self.point_force) {
             *load += f;
         }
         if !self.spread_force.is_empty() {
+            // Nodes that an element adds have no copies: such elements are not cut.
+            for (load, f) in load.iter_mut().zip(&self.spread_force).skip(mesh.n_copies()) {
+                *load += f;
+            }
             let mut node_volume = vec![0.0; mesh.mesh().nodes.len()];
             for (&node, &volume) in mesh.copy_node().iter().zip(mesh.copy_volume()) {
                 node_volume[node as usize] += volume;
@@ -105,7 +111,7 @@ impl Body {
     pub fn add_nodal_force(&mut self, node: u32, force_n: Vector3<f64>) -> Result<(), BodyError> {
         self.check_nodes(&[node])?;
         check_vector("force_n", &force_n)?;
-        self.boundary.point_force.resize(self.cut_mesh.mesh().nodes.len(), Vector3::zeros());
+        self.boundary.point_force.resize(self.n_fixable(), Vector3::zeros());
         self.boundary.point_force[node as usize] += force_n;
         self.follow_boundary();
         Ok(())
@@ -114,29 +120,44 @@ impl Body {
     /// Adds a total force [N] shared by area over the skin faces all of whose nodes are in `nodes`.
     pub fn add_surface_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
         let selected = self.selection(nodes, &force_n)?;
-        let mut area = vec![0.0; selected.len()];
-        let mesh = self.cut_mesh.mesh();
-        for face in mesh.boundary_faces() {
-            if face.nodes.iter().all(|&n| selected[n as usize]) {
-                for n in face.nodes {
-                    area[n as usize] += mesh.face_area(&face) / 3.0;
-                }
-            }
-        }
+        let area = self.shape.areas(self.cut_mesh.mesh(), &selected);
         self.spread("surface", &area, force_n)
     }
 
     /// Adds a total force [N] shared by volume over the tets around `nodes`.
     pub fn add_volume_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
         let selected = self.selection(nodes, &force_n)?;
+        let volume = self.volumes(&selected);
+        self.spread("volume", &volume, force_n)
+    }
+
+    /// ∫ N_a dV [m³] of the selected nodes, uncut.
+    fn volumes(&self, selected: &[bool]) -> Vec<f64> {
         let mut volume = vec![0.0; selected.len()];
+        if let (Path::General(general), false) = (&self.path, matches!(self.shape, Shape::Tet4)) {
+            let integrals = general.model().shape_integrals();
+            for (volume, integral) in
+                volume.iter_mut().zip(integrals).zip(selected).filter(|(_, s)| **s).map(|(pair, _)| pair)
+            {
+                *volume = *integral;
+            }
+            return volume;
+        }
         let mesh = self.cut_mesh.mesh();
         for (e, tet) in mesh.tets.iter().enumerate() {
             for &n in tet.iter().filter(|&&n| selected[n as usize]) {
                 volume[n as usize] += mesh.volume(e) / 4.0;
             }
         }
-        self.spread("volume", &volume, force_n)
+        volume
+    }
+
+    /// Nodes that can be held or loaded: those of the mesh, and what the element adds.
+    fn n_fixable(&self) -> usize {
+        match &self.shape {
+            Shape::Tet10(mesh) => mesh.nodes.len(),
+            Shape::Tet4 | Shape::Hex8(_) => self.cut_mesh.mesh().nodes.len(),
+        }
     }
 
     /// Removes all loads; gravity is not one of them.
@@ -149,7 +170,7 @@ impl Body {
     fn selection(&self, nodes: &[u32], force_n: &Vector3<f64>) -> Result<Vec<bool>, BodyError> {
         self.check_nodes(nodes)?;
         check_vector("force_n", force_n)?;
-        let mut selected = vec![false; self.cut_mesh.mesh().nodes.len()];
+        let mut selected = vec![false; self.n_fixable()];
         nodes.iter().for_each(|&n| selected[n as usize] = true);
         Ok(selected)
     }
@@ -173,7 +194,7 @@ impl Body {
     }
 
     fn check_nodes(&self, nodes: &[u32]) -> Result<(), BodyError> {
-        let n_nodes = self.cut_mesh.mesh().nodes.len();
+        let n_nodes = self.n_fixable();
         match nodes.iter().find(|&&n| n as usize >= n_nodes) {
             Some(&node) => Err(BodyError::NoSuchNode { node, n_nodes }),
             None => Ok(()),

@@ -2,7 +2,9 @@
 
 use thiserror::Error;
 
+use crate::assembly::ModelError;
 use crate::cut::CutError;
+use crate::integrator::DynamicsError;
 use crate::material::MaterialError;
 use crate::mesh::MeshError;
 
@@ -15,6 +17,22 @@ pub enum BodyError {
     /// A material constant is out of range.
     #[error(transparent)]
     Material(#[from] MaterialError),
+    /// The discrete model cannot be made.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The integrator's parameters are out of range.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+    /// Two settings that do not go together.
+    #[error("{what} does not go with {with}; take {instead}")]
+    Combination {
+        /// What was asked for.
+        what: &'static str,
+        /// What it does not go with.
+        with: &'static str,
+        /// What can be asked for.
+        instead: &'static str,
+    },
     /// A cut was refused.
     #[error(transparent)]
     Cut(#[from] CutError),

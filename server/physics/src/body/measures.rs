@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Body;
+use super::{Body, Path};
 use crate::cut::Piece;
 use crate::element::{deformation_gradient, piece_energy, piece_forces};
 
@@ -29,49 +29,101 @@ impl Body {
         self.mass.iter().zip(&self.state.x).zip(&self.state.v).map(spin).sum()
     }
 
-    /// ½ Σ m v² [J].
+    /// ½ vᵀ M v [J].
     pub fn kinetic_energy(&self) -> f64 {
-        self.mass.iter().zip(&self.state.v).map(|(m, v)| 0.5 * m * v.norm_squared()).sum()
+        match &self.path {
+            Path::Fast(_) => {
+                self.mass.iter().zip(&self.state.v).map(|(m, v)| 0.5 * m * v.norm_squared()).sum()
+            }
+            Path::General(general) => general.dynamics.kinetic_energy(&self.state.v),
+        }
     }
 
     /// Σ w V ψ(F) over the pieces [J].
     pub fn elastic_energy(&self) -> f64 {
-        let (law, lame) = (self.material.law, self.material.lame());
-        self.deformed_pieces().map(|d| piece_energy(law, lame, &d.F, d.volume)).sum()
+        match &self.path {
+            Path::Fast(_) => {
+                let (law, lame) = (self.material.law, self.material.lame());
+                self.deformed_pieces().map(|d| piece_energy(law, lame, &d.F, d.volume)).sum()
+            }
+            Path::General(general) => general.model().energy(&self.state.x),
+        }
     }
 
     /// Σ w V det F, the present volume [m³].
     pub fn volume(&self) -> f64 {
-        self.deformed_pieces().map(|d| d.volume * d.F.determinant()).sum()
+        match &self.path {
+            Path::Fast(_) => self.deformed_pieces().map(|d| d.volume * d.F.determinant()).sum(),
+            Path::General(general) => {
+                let model = general.model();
+                let element = |e: usize| -> f64 {
+                    let points = model.weights(e).iter().enumerate();
+                    points
+                        .map(|(q, w)| w * model.deformation_gradient(e, q, &self.state.x).determinant())
+                        .sum()
+                };
+                (0..model.n_elements()).map(element).sum()
+            }
+        }
     }
 
-    /// Smallest det F of any piece [1]; ≤ 0 means inverted.
+    /// Smallest det F of any piece [1], of any point of integration on the general path; ≤ 0 means
+    /// inverted.
     pub fn least_volume_ratio(&self) -> f64 {
-        self.deformed_pieces().map(|d| d.F.determinant()).fold(f64::INFINITY, f64::min)
+        let least = f64::min;
+        match &self.path {
+            Path::Fast(_) => self.deformed_pieces().map(|d| d.F.determinant()).fold(f64::INFINITY, least),
+            Path::General(general) => {
+                let model = general.model();
+                let points =
+                    (0..model.n_elements()).flat_map(|e| (0..model.kind().points()).map(move |q| (e, q)));
+                points
+                    .map(|(e, q)| model.deformation_gradient(e, q, &self.state.x).determinant())
+                    .fold(f64::INFINITY, least)
+            }
+        }
     }
 
-    /// Cauchy stress P Fᵀ / det F of every piece [Pa]; 0 where a piece is flat or inverted.
+    /// Cauchy stress P Fᵀ / det F of every piece [Pa], the mean over its element's points of
+    /// integration; 0 where it is flat or inverted.
     pub fn cauchy_stresses(&self) -> Vec<Matrix3<f64>> {
         let (law, lame) = (self.material.law, self.material.lame());
-        let stress = |d: Deformed<'_>| {
-            let J = d.F.determinant();
-            if J > 1e-9 { law.stress(&d.F, lame) * d.F.transpose() / J } else { Matrix3::zeros() }
+        let stress = |F: &Matrix3<f64>| {
+            let J = F.determinant();
+            if J > 1e-9 { law.stress(F, lame) * F.transpose() / J } else { Matrix3::zeros() }
         };
-        self.deformed_pieces().map(stress).collect()
+        match &self.path {
+            Path::Fast(_) => self.deformed_pieces().map(|d| stress(&d.F)).collect(),
+            Path::General(general) => {
+                let model = general.model();
+                let mean = |e: usize| -> Matrix3<f64> {
+                    let points = model.weights(e).iter().enumerate();
+                    let sum: Matrix3<f64> = points
+                        .map(|(q, w)| *w * stress(&model.deformation_gradient(e, q, &self.state.x)))
+                        .sum();
+                    sum / model.volume(e)
+                };
+                let pieces = self.cut_mesh.pieces().len();
+                (0..pieces).map(|p| mean(self.shape.element_of(p))).collect()
+            }
+        }
     }
 
-    /// Internal force on every copy [N]; it pulls the body back, so it is subtracted from the loads.
+    /// Internal force on every node [N]; it pulls the body back, so it is subtracted from the loads.
     pub fn internal_forces(&self) -> Vec<Vector3<f64>> {
         let mut f_int = Vec::new();
         self.elastic_response(&mut f_int);
         f_int
     }
 
-    /// Elastic energy [J], and the internal force on every copy [N] into `f_int`.
+    /// Elastic energy [J], and the internal force on every node [N] into `f_int`.
     pub(super) fn elastic_response(&self, f_int: &mut Vec<Vector3<f64>>) -> f64 {
-        let (law, lame) = (self.material.law, self.material.lame());
         f_int.clear();
         f_int.resize(self.state.x.len(), Vector3::zeros());
+        if let Path::General(general) = &self.path {
+            return general.model().internal_forces(&self.state.x, f_int);
+        }
+        let (law, lame) = (self.material.law, self.material.lame());
         let mut energy = 0.0;
         for d in self.deformed_pieces() {
             energy += piece_energy(law, lame, &d.F, d.volume);
@@ -90,7 +142,7 @@ impl Body {
         let mut sum = Vector3::zeros();
         for fixed in self.fixed.iter().filter(|f| nodes.contains(&f.copy)) {
             let c = fixed.copy as usize;
-            let held = f_int[c] - self.mass[c] * gravity - self.load[c];
+            let held = f_int[c] - self.weight(c, gravity) - self.load[c];
             for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
                 sum[axis] += held[axis];
             }
@@ -105,6 +157,14 @@ impl Body {
             let x = vertex.position(&self.state.x);
             [x.x as f32, x.y as f32, x.z as f32]
         }));
+    }
+
+    /// Force of gravity on node `c` [N], as the integrator has it.
+    fn weight(&self, c: usize, gravity: Vector3<f64>) -> Vector3<f64> {
+        match &self.path {
+            Path::Fast(_) => self.mass[c] * gravity,
+            Path::General(general) => general.dynamics.weight(c, gravity),
+        }
     }
 
     fn weighted(&self, values: &[Vector3<f64>]) -> Vector3<f64> {

@@ -3,53 +3,42 @@
 mod boundary;
 mod cutting;
 mod error;
+mod fast;
+mod general;
 mod measures;
+mod settings;
+mod shape;
 mod statics;
 
 pub use boundary::FixedNode;
 pub use error::BodyError;
+pub use settings::{Arithmetic, BodySettings};
 pub use statics::{StaticReport, StaticSettings};
 
 use nalgebra::Vector3;
 
+pub use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::CutMesh;
 use crate::element::Simd;
-use crate::integrator::{ImplicitEuler, LooseParts, State, StepInputs, StepOutcome};
-pub use crate::integrator::{PointSpring, SpringKind};
+use crate::integrator::{DynamicsInputs, LooseParts, State, StepInputs};
+pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
 use crate::material::Material;
-use crate::mesh::TetMesh;
-use crate::operator::{Elastic, FixedCopy};
-pub use crate::solver::{PcgSettings, StopReason};
+use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
+use crate::operator::FixedCopy;
+pub use crate::solver::{Method, PcgSettings, StopReason};
 use crate::team::Team;
 use boundary::Boundary;
-use cutting::Weightless;
-
-/// A step that fails is tried again in 2 and then in 4 parts.
-const MOST_HALVINGS: u32 = 2;
-
-/// How a body is solved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BodySettings {
-    /// When the linear solver stops.
-    pub solver: PcgSettings,
-    /// Number of threads that work on a step, the caller's included; at least 1, at most 64.
-    pub threads: usize,
-    /// Use only instructions that every machine has, for the same bits everywhere.
-    pub portable: bool,
-}
-
-impl Default for BodySettings {
-    fn default() -> Self {
-        Self { solver: PcgSettings { iterations: 50, tolerance: 1e-3 }, threads: 1, portable: false }
-    }
-}
+use fast::Fast;
+use general::General;
+use shape::Shape;
 
 /// How a step of a body went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolveReport {
     /// Solver iterations, all parts of the step together.
     pub iterations: u32,
-    /// √(rᵀM⁻¹r) relative to the right-hand side, worst part of the step.
+    /// √(rᵀM⁻¹r) relative to the right-hand side, worst part of the step; of Newton's method, where the
+    /// step is nonlinear.
     pub residual: f64,
     /// Why the solver stopped last.
     pub stop: StopReason,
@@ -57,10 +46,19 @@ pub struct SolveReport {
     pub outcome: Outcome,
     /// Into how many equal parts the step was divided.
     pub substeps: u32,
-    /// Pieces with det F ≤ 0.
+    /// Pieces (points of integration on the general path) with det F ≤ 0.
     pub inverted_pieces: usize,
     /// Springs that were left out because a number in them is not usable.
     pub refused_springs: usize,
+    /// Newton steps, 1 where the step is one linear solve; 0 for explicit integrators.
+    pub newton_steps: u32,
+    /// Halvings of all line searches.
+    pub backtracks: u32,
+    /// Estimated algebraic error of the last linear solve in the energy norm [√J]; 0 where there is no
+    /// estimate.
+    pub algebraic_error: f64,
+    /// What was done differently from what was asked for.
+    pub notice: Option<Notice>,
 }
 
 /// What became of a step.
@@ -79,121 +77,123 @@ pub enum Outcome {
 #[derive(Debug)]
 pub struct Body {
     cut_mesh: CutMesh,
+    shape: Shape,
+    /// Rest position of every node: copies, then what the element adds [m].
+    rest: Vec<Vector3<f64>>,
     material: Material,
     settings: BodySettings,
-    simd: Simd,
     state: State,
     boundary: Boundary,
     fixed: Vec<FixedCopy>,
     load: Vec<Vector3<f64>>,
     mass: Vec<f64>,
-    mass_f32: Vec<f32>,
     parts: LooseParts,
-    weightless: Vec<Weightless>,
-    elastic: Elastic,
-    integrator: ImplicitEuler,
+    path: Path,
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
-    before: State,
+}
+
+/// How a step is computed.
+#[derive(Debug)]
+enum Path {
+    Fast(Box<Fast>),
+    General(Box<General>),
 }
 
 impl Body {
-    /// A body at rest in the configuration of `mesh`.
+    /// A body at rest in the configuration of `mesh`, of the linear or quadratic tetrahedra that
+    /// `settings` asks for.
     pub fn new(mesh: TetMesh, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
+        let shape = match settings.element {
+            ElementKind::Tet4 => Shape::Tet4,
+            ElementKind::Tet10 => {
+                mesh.check()?;
+                Shape::Tet10(Tet10Mesh::new(&mesh))
+            }
+            ElementKind::Hex8 => {
+                let (what, with) = ("element hex8", "a mesh of tetrahedra");
+                return Err(BodyError::Combination { what, with, instead: "tet4 or tet10" });
+            }
+        };
+        Self::with_shape(CutMesh::new(mesh)?, shape, material, settings)
+    }
+
+    /// A body of trilinear hexahedra at rest in the configuration of `mesh`. Its surface is that of the
+    /// tetrahedra each hexahedron is split into, on the same nodes.
+    pub fn hex8(mesh: HexMesh, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
+        mesh.check()?;
+        let settings = BodySettings { element: ElementKind::Hex8, ..settings };
+        Self::with_shape(CutMesh::new(mesh.to_tets())?, Shape::Hex8(mesh), material, settings)
+    }
+
+    fn with_shape(
+        cut_mesh: CutMesh,
+        shape: Shape,
+        material: Material,
+        settings: BodySettings,
+    ) -> Result<Self, BodyError> {
         material.check()?;
-        settings.check()?;
-        let cut_mesh = CutMesh::new(mesh)?;
-        let simd = if settings.portable { Simd::Baseline } else { Simd::detect() };
-        let elastic = Elastic::new(simd, cut_mesh.mesh(), cut_mesh.pieces(), cut_mesh.n_copies());
+        settings.check(material.law)?;
+        let path = if settings.arithmetic(material.law) == Arithmetic::Single {
+            let simd = if settings.portable { Simd::Baseline } else { Simd::detect() };
+            Path::Fast(Box::new(Fast::new(simd, &cut_mesh)))
+        } else {
+            Path::General(Box::new(General::new(&shape, &cut_mesh, &material, &settings)?))
+        };
         let mut body = Self {
+            rest: Vec::new(),
             state: State::default(),
             boundary: Boundary::default(),
             fixed: Vec::new(),
             load: Vec::new(),
             mass: Vec::new(),
-            mass_f32: Vec::new(),
             parts: LooseParts::default(),
-            weightless: Vec::new(),
-            integrator: ImplicitEuler::default(),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
-            before: State::default(),
             cut_mesh,
+            shape,
             material,
             settings,
-            simd,
-            elastic,
+            path,
         };
         body.return_to_rest();
         body.follow_topology();
         Ok(body)
     }
 
-    /// Advances by `dt_s` with implicit Euler under gravity [m/s²], loads, constraints and springs.
+    /// Advances by `dt_s` under gravity [m/s²], loads, constraints and springs.
     ///
     /// The state stays finite whatever happens: a step that does not is taken back and tried again
     /// in smaller parts, then given up and reported.
     pub fn step(&mut self, dt_s: f64, gravity: Vector3<f64>, springs: &[PointSpring]) -> SolveReport {
         let usable = dt_s > 0.0 && dt_s.is_finite() && gravity.iter().all(|g| g.abs() < 1e12);
         if !usable {
-            self.hold_forces(springs.len());
+            self.spring_forces.clear();
+            self.spring_forces.resize(springs.len(), Vector3::zeros());
             return SolveReport { outcome: Outcome::Refused, ..SolveReport::default() };
         }
-        self.before.copy_from(&self.state);
-        let mut report = SolveReport::default();
-        for halvings in 0..=MOST_HALVINGS {
-            report.substeps = 1 << halvings;
-            if self.try_step(dt_s / f64::from(report.substeps), gravity, springs, &mut report) {
-                self.carry_weightless();
-                return report;
+        let Self { cut_mesh, team, state, spring_forces, load, fixed, mass, parts, .. } = self;
+        match &mut self.path {
+            Path::Fast(fast) => {
+                let inputs = StepInputs {
+                    h: dt_s,
+                    gravity,
+                    mass,
+                    mass_f32: &[],
+                    load,
+                    fixed,
+                    parts,
+                    springs,
+                    material: &self.material,
+                    solver: self.settings.solver,
+                };
+                fast.step(team, cut_mesh, state, (dt_s, &inputs), spring_forces)
             }
-            self.state.copy_from(&self.before);
-        }
-        self.state.v.fill(Vector3::zeros());
-        self.hold_forces(springs.len());
-        SolveReport { outcome: Outcome::Held, ..report }
-    }
-
-    /// Makes all parts of a step; `false` as soon as one does not stay finite.
-    fn try_step(
-        &mut self,
-        h: f64,
-        gravity: Vector3<f64>,
-        springs: &[PointSpring],
-        report: &mut SolveReport,
-    ) -> bool {
-        report.residual = 0.0;
-        for _ in 0..report.substeps {
-            let inputs = StepInputs {
-                h,
-                gravity,
-                mass: &self.mass,
-                mass_f32: &self.mass_f32,
-                load: &self.load,
-                fixed: &self.fixed,
-                parts: &self.parts,
-                springs,
-                material: &self.material,
-                solver: self.settings.solver,
-            };
-            let Self { team, elastic, state, spring_forces, .. } = self;
-            let StepOutcome { solve, inverted_pieces, refused_springs, finite } =
-                self.integrator.step(team, elastic, state, &inputs, spring_forces);
-            report.iterations += solve.iterations;
-            report.residual = report.residual.max(solve.residual);
-            report.stop = solve.stop;
-            report.inverted_pieces = inverted_pieces;
-            report.refused_springs = refused_springs;
-            if !finite {
-                return false;
+            Path::General(general) => {
+                let inputs = DynamicsInputs { h: dt_s, gravity, load, fixed, springs };
+                general.step(team, state, &inputs, spring_forces)
             }
         }
-        true
-    }
-
-    fn hold_forces(&mut self, n_springs: usize) {
-        self.spring_forces.clear();
-        self.spring_forces.resize(n_springs, Vector3::zeros());
     }
 
     /// Force on the body [N] of every spring of the last step, in its order, from the same solve.
@@ -201,17 +201,33 @@ impl Body {
         &self.spring_forces
     }
 
-    /// Position of every copy [m].
+    /// Whether the body takes the fast path: single precision, matrix-free.
+    pub fn is_fast(&self) -> bool {
+        matches!(self.path, Path::Fast(_))
+    }
+
+    /// Rest position of every node [m]: copies, then the nodes that quadratic elements add.
+    pub fn rest_positions(&self) -> &[Vector3<f64>] {
+        &self.rest
+    }
+
+    /// Nodes that carry the point with barycentric coordinates `weights` in tet `tet` of the mesh,
+    /// whose piece is on `copies`, and the element's shape functions there; Σ = 1.
+    pub fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
+        self.shape.carriers(tet, copies, weights)
+    }
+
+    /// Position of every node [m], in the order of [`rest_positions`](Self::rest_positions).
     pub fn positions(&self) -> &[Vector3<f64>] {
         &self.state.x
     }
 
-    /// Velocity of every copy [m/s].
+    /// Velocity of every node [m/s].
     pub fn velocities(&self) -> &[Vector3<f64>] {
         &self.state.v
     }
 
-    /// Mass of every copy [kg].
+    /// Lumped mass of every node [kg].
     pub fn masses(&self) -> &[f64] {
         &self.mass
     }
@@ -233,9 +249,15 @@ impl Body {
 
     /// Changes when the linear solver stops, from the next step on.
     pub fn set_solver(&mut self, solver: PcgSettings) -> Result<(), BodyError> {
+        // What path is taken is decided when the body is made.
+        let arithmetic = Some(self.settings.arithmetic(self.material.law));
         let settings = BodySettings { solver, ..self.settings };
-        settings.check()?;
+        BodySettings { arithmetic, ..settings }.check(self.material.law)?;
         self.settings = settings;
+        if let Path::General(general) = &mut self.path {
+            let newton = BodySettings { arithmetic, ..settings }.newton(self.material.law);
+            general.dynamics.set_newton(newton);
+        }
         Ok(())
     }
 
@@ -244,7 +266,7 @@ impl Body {
         &self.parts
     }
 
-    /// Replaces positions [m] and velocities [m/s] of all copies.
+    /// Replaces positions [m] and velocities [m/s] of all nodes.
     pub fn set_state(&mut self, x: &[Vector3<f64>], v: &[Vector3<f64>]) -> Result<(), BodyError> {
         let expected = self.state.x.len();
         for found in [x.len(), v.len()] {
@@ -264,31 +286,18 @@ impl Body {
     pub fn reset(&mut self) -> Result<(), BodyError> {
         self.cut_mesh.reset()?;
         self.return_to_rest();
-        self.rebuild_elastic();
+        match &mut self.path {
+            Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
+            Path::General(_) => self.rebuild_general()?,
+        }
         self.follow_topology();
         Ok(())
     }
 
     fn return_to_rest(&mut self) {
-        self.state.x = self.cut_mesh.rest_positions();
+        self.rest = self.shape.rest_positions(&self.cut_mesh);
+        self.state.x.clone_from(&self.rest);
         self.state.v = vec![Vector3::zeros(); self.state.x.len()];
         self.spring_forces.clear();
-    }
-}
-
-impl BodySettings {
-    /// Tells whether every setting is in its range.
-    pub fn check(&self) -> Result<(), BodyError> {
-        let setting = |name, found: f64, allowed| Err(BodyError::Setting { name, found, allowed });
-        if !(1..=64).contains(&self.threads) {
-            return setting("threads", self.threads as f64, "1 … 64");
-        }
-        if !(1..=1_000_000).contains(&self.solver.iterations) {
-            return setting("solver.iterations", f64::from(self.solver.iterations), "1 … 1 000 000");
-        }
-        if !(0.0..1.0).contains(&self.solver.tolerance) {
-            return setting("solver.tolerance", self.solver.tolerance, "0 ≤ tolerance < 1");
-        }
-        Ok(())
     }
 }

@@ -7,9 +7,11 @@
 
 use nalgebra::Vector3;
 
-use super::{Body, BodyError};
+use super::fast::Fast;
+use super::{Body, BodyError, Path};
+use crate::integrator::prescribe;
 use crate::operator::{BlockJacobi, ElasticUpdate, FixedCopy, SystemOperator, padded};
-use crate::solver::{Pcg, PcgSettings};
+use crate::solver::{LinearSettings, NewtonSettings, Pcg, PcgSettings};
 
 /// When a static solve stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,13 +56,33 @@ impl Body {
         if let Some(part) = self.parts().free.iter().position(|&free| free) {
             return Err(BodyError::LoosePart { part, mass_kg: self.parts().mass[part] });
         }
-        let n = self.state.x.len();
         self.state.v.fill(Vector3::zeros());
-        for fixed in &self.fixed {
-            for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
-                self.state.x[fixed.copy as usize][axis] = fixed.position_m[axis];
-            }
+        prescribe(&self.fixed, &mut self.state.x);
+        if let Path::General(general) = &self.path {
+            let Self { team, state, load, fixed, .. } = self;
+            let newton = self.settings.newton(self.material.law);
+            let linear = LinearSettings {
+                iterations: settings.linear.iterations,
+                tolerance: settings.linear.tolerance,
+                ..newton.linear
+            };
+            let newton = NewtonSettings {
+                steps: settings.newton_steps,
+                tolerance: settings.tolerance,
+                linear,
+                ..newton
+            };
+            return Ok(general.equilibrium(team, &mut state.x, (load, gravity), fixed, newton));
         }
+        self.fast_equilibrium(gravity, settings)
+    }
+
+    fn fast_equilibrium(
+        &mut self,
+        gravity: Vector3<f64>,
+        settings: &StaticSettings,
+    ) -> Result<StaticReport, BodyError> {
+        let n = self.state.x.len();
         let mut f_ext: Vec<_> = (0..n).map(|c| self.mass[c] * gravity + self.load[c]).collect();
         filter(&self.fixed, &mut f_ext);
         let mut newton = Newton { f_ext, f_int: Vec::new(), residual: vec![Vector3::zeros(); n] };
@@ -95,7 +117,10 @@ impl Body {
         let n = residual.len();
         let with = ElasticUpdate { lame: self.material.lame(), law: self.material.law, scale: 1.0 };
         let (mut f, mut diagonal, mut delta) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n], vec![[0.0; 4]; n]);
-        let Self { elastic, team, state, fixed, mass_f32, .. } = self;
+        let Self { team, state, fixed, path: Path::Fast(fast), .. } = self else {
+            return (vec![Vector3::zeros(); n], 0);
+        };
+        let Fast { elastic, mass_f32, .. } = &mut **fast;
         elastic.update(team, &with, &state.x, &mut f, &mut diagonal);
         let mut M = BlockJacobi::default();
         M.resize(n);

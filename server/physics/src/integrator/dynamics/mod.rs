@@ -27,7 +27,7 @@ use super::springs::{ActiveSpring, PointSpring};
 use crate::assembly::{BlockCsr, Model, Tangent};
 use crate::material::Material;
 use crate::operator::FixedCopy;
-use crate::solver::Newton;
+use crate::solver::{Newton, NewtonSettings};
 use crate::team::Team;
 use critical_step::PowerIteration;
 use guard::{History, Ledger, SpinGuard};
@@ -158,6 +158,20 @@ impl Dynamics {
         &self.mass.lumped
     }
 
+    /// Changes Newton's method, from the next step on.
+    pub fn set_newton(&mut self, newton: NewtonSettings) {
+        self.settings.newton = newton;
+    }
+
+    /// Force of gravity `g` [m/s²] on node `c` [N]: M g in motion. In an equilibrium, where no mass
+    /// matrix has to agree with it, the consistent load ρ ∫ N dV g.
+    pub fn weight(&self, c: usize, g: Vector3<f64>) -> Vector3<f64> {
+        match self.settings.scheme {
+            Scheme::Static => self.material.density_kg_m3 * self.model.shape_integrals()[c] * g,
+            _ => self.mass.weight(c, g),
+        }
+    }
+
     /// Connected parts, as of the last step.
     pub fn parts(&self) -> &LooseParts {
         &self.parts
@@ -269,8 +283,8 @@ impl Dynamics {
 
     /// Loads and springs of the step.
     fn begin(&mut self, state: &State, inputs: &DynamicsInputs<'_>) {
-        for (c, f) in self.f_ext.iter_mut().enumerate() {
-            *f = self.mass.weight(c, inputs.gravity) + inputs.load[c];
+        for c in 0..self.f_ext.len() {
+            self.f_ext[c] = self.weight(c, inputs.gravity) + inputs.load[c];
         }
         self.active.clear();
         self.accepted.clear();

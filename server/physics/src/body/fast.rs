@@ -1,0 +1,154 @@
+//! The fast path: linear tetrahedra, matrix-free in single precision, one linear solve per step.
+
+use nalgebra::Vector3;
+
+use super::{Outcome, SolveReport};
+use crate::cut::{CutMesh, Piece};
+use crate::element::Simd;
+use crate::integrator::{ImplicitEuler, State, StepInputs, StepOutcome};
+use crate::operator::{Elastic, FixedCopy};
+use crate::team::Team;
+
+/// A step that fails is tried again in 2 and then in 4 parts.
+const MOST_HALVINGS: u32 = 2;
+
+/// A copy lighter than this [kg] has no inertia that single precision could hold.
+const WEIGHTLESS: f64 = 1e-30;
+
+/// What the fast path remembers and works with.
+#[derive(Debug)]
+pub(super) struct Fast {
+    pub simd: Simd,
+    pub elastic: Elastic,
+    pub mass_f32: Vec<f32>,
+    integrator: ImplicitEuler,
+    weightless: Vec<Weightless>,
+    before: State,
+}
+
+/// A copy without mass, and the copies of its piece that carry it along.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Weightless {
+    copy: u32,
+    /// Copies of the same piece; those with mass count.
+    piece: [u32; 4],
+}
+
+impl Fast {
+    pub fn new(simd: Simd, mesh: &CutMesh) -> Self {
+        Self {
+            simd,
+            elastic: Elastic::new(simd, mesh.mesh(), mesh.pieces(), mesh.n_copies()),
+            mass_f32: Vec::new(),
+            integrator: ImplicitEuler::default(),
+            weightless: Vec::new(),
+            before: State::default(),
+        }
+    }
+
+    /// Arranges the pieces after a cut; those that were there before keep their rotation.
+    pub fn follow_cut(&mut self, mesh: &CutMesh, before: &[Piece]) {
+        self.elastic.follow(mesh.mesh(), before, mesh.pieces(), mesh.n_copies());
+    }
+
+    /// Arranges the pieces anew, without memory of their rotations.
+    pub fn rebuild(&mut self, mesh: &CutMesh) {
+        self.elastic = Elastic::new(self.simd, mesh.mesh(), mesh.pieces(), mesh.n_copies());
+    }
+
+    /// Everything else that is derived from pieces, copies and their mass [kg].
+    pub fn follow_topology(&mut self, mesh: &CutMesh, mass: &[f64], state: &State) {
+        self.mass_f32 = mass.iter().map(|&m| m as f32).collect();
+        self.weightless = find_weightless(mesh, mass);
+        self.integrator.resize(mesh.n_copies());
+        self.before = state.clone();
+    }
+
+    /// Advances by `dt_s`; a step that does not stay finite is taken back and tried again in smaller
+    /// parts, then given up.
+    pub fn step(
+        &mut self,
+        team: &mut Team,
+        mesh: &CutMesh,
+        state: &mut State,
+        (dt_s, inputs): (f64, &StepInputs<'_>),
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) -> SolveReport {
+        self.before.copy_from(state);
+        let mut report = SolveReport::default();
+        for halvings in 0..=MOST_HALVINGS {
+            report.substeps = 1 << halvings;
+            let inputs = StepInputs { h: dt_s / f64::from(report.substeps), mass_f32: &[], ..*inputs };
+            if self.try_step(team, state, &inputs, &mut report, spring_forces) {
+                self.carry_weightless(mesh, state, inputs.mass, inputs.fixed);
+                return report;
+            }
+            state.copy_from(&self.before);
+        }
+        state.v.fill(Vector3::zeros());
+        spring_forces.clear();
+        spring_forces.resize(inputs.springs.len(), Vector3::zeros());
+        SolveReport { outcome: Outcome::Held, ..report }
+    }
+
+    /// Makes all parts of a step; `false` as soon as one does not stay finite.
+    fn try_step(
+        &mut self,
+        team: &mut Team,
+        state: &mut State,
+        inputs: &StepInputs<'_>,
+        report: &mut SolveReport,
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) -> bool {
+        report.residual = 0.0;
+        for _ in 0..report.substeps {
+            let Self { elastic, integrator, mass_f32, .. } = self;
+            let inputs = StepInputs { mass_f32, ..*inputs };
+            let StepOutcome { solve, inverted_pieces, refused_springs, finite } =
+                integrator.step(team, elastic, state, &inputs, spring_forces);
+            report.newton_steps += 1;
+            report.iterations += solve.iterations;
+            report.residual = report.residual.max(solve.residual);
+            report.stop = solve.stop;
+            report.inverted_pieces = inverted_pieces;
+            report.refused_springs = refused_springs;
+            if !finite {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Moves copies without mass along with the rest of their piece: no force would do it.
+    fn carry_weightless(&self, mesh: &CutMesh, state: &mut State, mass: &[f64], fixed: &[FixedCopy]) {
+        for Weightless { copy, piece } in &self.weightless {
+            let rest = |c: u32| mesh.mesh().nodes[mesh.copy_node()[c as usize] as usize];
+            let (mut moved, mut v, mut hosts) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+            for &host in piece.iter().filter(|&&c| mass[c as usize] > WEIGHTLESS) {
+                moved += state.x[host as usize] - rest(host);
+                v += state.v[host as usize];
+                hosts += 1.0;
+            }
+            let fixed = fixed.binary_search_by_key(copy, |f| f.copy).is_ok();
+            if hosts > 0.0 && !fixed {
+                state.x[*copy as usize] = rest(*copy) + moved / hosts;
+                state.v[*copy as usize] = v / hosts;
+            }
+        }
+    }
+}
+
+fn find_weightless(mesh: &CutMesh, mass: &[f64]) -> Vec<Weightless> {
+    if mass.iter().all(|&m| m > WEIGHTLESS) {
+        return Vec::new();
+    }
+    let mut found: Vec<Weightless> = Vec::new();
+    for piece in mesh.pieces() {
+        for copy in piece.copies {
+            if mass[copy as usize] <= WEIGHTLESS && found.iter().all(|w| w.copy != copy) {
+                found.push(Weightless { copy, piece: piece.copies });
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,101 @@
+//! The general path: any element, law, integrator and solver, in double precision.
+
+use nalgebra::Vector3;
+
+use super::settings::BodySettings;
+use super::shape::Shape;
+use super::{BodyError, Outcome, SolveReport, StaticReport};
+use crate::assembly::Model;
+use crate::cut::CutMesh;
+use crate::integrator::{
+    Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings, State, StaticProblem,
+    find_equilibrium,
+};
+use crate::material::Material;
+use crate::operator::FixedCopy;
+use crate::solver::{Newton, NewtonSettings, StopReason};
+use crate::team::Team;
+
+/// The motion of a body's model.
+#[derive(Debug)]
+pub(super) struct General {
+    pub dynamics: Dynamics,
+    density_kg_m3: f64,
+}
+
+impl General {
+    /// The model of `mesh` as it is cut now, without history.
+    pub fn new(
+        shape: &Shape,
+        mesh: &CutMesh,
+        material: &Material,
+        settings: &BodySettings,
+    ) -> Result<Self, BodyError> {
+        let model = shape.model(mesh, material, settings.volumetric)?;
+        let with = DynamicsSettings {
+            scheme: settings.scheme,
+            mass: settings.mass,
+            newton: settings.newton(material.law),
+            ..DynamicsSettings::default()
+        };
+        let dynamics = Dynamics::new(model, *material, with)?;
+        Ok(Self { dynamics, density_kg_m3: material.density_kg_m3 })
+    }
+
+    /// The discrete model.
+    pub fn model(&self) -> &Model {
+        self.dynamics.model()
+    }
+
+    /// Advances by the step of `inputs`.
+    pub fn step(
+        &mut self,
+        team: &mut Team,
+        state: &mut State,
+        inputs: &DynamicsInputs<'_>,
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) -> SolveReport {
+        report_of(&self.dynamics.step(team, state, inputs, spring_forces))
+    }
+
+    /// Moves `x` to equilibrium under `load` [N] and `gravity` [m/s²].
+    pub fn equilibrium(
+        &self,
+        team: &mut Team,
+        x: &mut [Vector3<f64>],
+        (load, gravity): (&[Vector3<f64>], Vector3<f64>),
+        fixed: &[FixedCopy],
+        settings: NewtonSettings,
+    ) -> StaticReport {
+        let weights = self.model().shape_integrals().iter().map(|v| self.density_kg_m3 * v * gravity);
+        let load: Vec<Vector3<f64>> = load.iter().zip(weights).map(|(f, w)| f + w).collect();
+        let mut problem = StaticProblem::new(self.model(), &load);
+        let done = find_equilibrium(&mut Newton::new(settings), team, &mut problem, fixed, x);
+        StaticReport {
+            converged: done.stop == StopReason::Converged,
+            newton_steps: done.steps,
+            iterations: done.linear_iterations,
+            residual: done.residual,
+        }
+    }
+}
+
+fn report_of(report: &DynamicsReport) -> SolveReport {
+    SolveReport {
+        iterations: report.newton.linear_iterations,
+        residual: report.newton.residual,
+        stop: report.newton.stop,
+        outcome: match report.outcome {
+            DynamicsOutcome::Advanced => Outcome::Advanced,
+            DynamicsOutcome::Held => Outcome::Held,
+            DynamicsOutcome::Refused => Outcome::Refused,
+        },
+        substeps: report.substeps,
+        inverted_pieces: report.inverted,
+        refused_springs: report.refused_springs,
+        newton_steps: report.newton.steps,
+        backtracks: report.newton.backtracks,
+        algebraic_error: report.newton.algebraic_error,
+        notice: report.notice,
+    }
+}

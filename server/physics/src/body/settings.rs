@@ -1,0 +1,157 @@
+//! How a body is discretised and solved, and which combinations the fast path can take.
+
+use super::BodyError;
+use crate::assembly::{ElementKind, Volumetric};
+use crate::integrator::{MassKind, Scheme};
+use crate::material::Law;
+use crate::solver::{LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
+
+/// How a body is solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodySettings {
+    /// When the solver of a step stops: of one linear solve on the fast path, of Newton's method and
+    /// of each of its linear solves on the general one.
+    pub solver: PcgSettings,
+    /// Number of threads that work on a step, the caller's included; at least 1, at most 64.
+    pub threads: usize,
+    /// Use only instructions that every machine has, for the same bits everywhere.
+    pub portable: bool,
+    /// Finite element. Only [`ElementKind::Tet4`] can be cut.
+    pub element: ElementKind,
+    /// Integration of the volumetric energy: a remedy against locking, or none.
+    pub volumetric: Volumetric,
+    /// Time integration.
+    pub scheme: Scheme,
+    /// Distribution of mass.
+    pub mass: MassKind,
+    /// Linear solver.
+    pub method: Method,
+    /// Arithmetic; `None`: the fastest that the other settings allow.
+    pub arithmetic: Option<Arithmetic>,
+    /// Most Newton steps per step of time; `None`: as many as law and scheme call for.
+    pub newton_steps: Option<u32>,
+}
+
+/// The arithmetic of a step. State and sums are in double precision always.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arithmetic {
+    /// Forces and solver in single precision: the fast path. Relative residuals below some 1e-6 are
+    /// those of the solver's recurrence, not true ones.
+    Single,
+    /// Residuals and forces in double precision, the solver's work in single precision.
+    Mixed,
+    /// Everything in double precision.
+    Double,
+}
+
+/// Tolerances below this are out of reach of single precision.
+const SINGLE_TOLERANCE: f64 = 1e-7;
+/// Newton steps where none are asked for: nonlinear laws in motion, and equilibria.
+const NEWTON_STEPS: u32 = 20;
+const STATIC_NEWTON_STEPS: u32 = 100;
+/// Largest forcing term η of inexact Newton methods (Eisenstat, Walker 1996).
+const FORCING: f64 = 0.1;
+
+impl Default for BodySettings {
+    fn default() -> Self {
+        Self {
+            solver: PcgSettings { iterations: 50, tolerance: 1e-3 },
+            threads: 1,
+            portable: false,
+            element: ElementKind::Tet4,
+            volumetric: Volumetric::Full,
+            scheme: Scheme::ImplicitEuler,
+            mass: MassKind::Lumped,
+            method: Method::Pcg,
+            arithmetic: None,
+            newton_steps: None,
+        }
+    }
+}
+
+impl BodySettings {
+    /// What keeps a body of this law from the fast path; `None` if nothing does.
+    ///
+    /// The fast path is single precision, matrix-free, with one linear solve per step.
+    pub fn why_general(&self, law: Law) -> Option<&'static str> {
+        let reasons = [
+            (self.element == ElementKind::Tet10, "element tet10"),
+            (self.element == ElementKind::Hex8, "element hex8"),
+            (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
+            (self.scheme != Scheme::ImplicitEuler, "an integrator other than implicit-euler"),
+            (self.method != Method::Pcg, "a solver other than pcg"),
+            (self.mass != MassKind::Lumped, "consistent mass"),
+            (self.volumetric != Volumetric::Full, "a locking remedy"),
+            (self.newton_steps.is_some_and(|steps| steps > 1), "more than one Newton step"),
+        ];
+        reasons.iter().find(|(general, _)| *general).map(|(_, why)| *why)
+    }
+
+    /// The arithmetic of a body of this law: what was asked for, else single precision where the fast
+    /// path can be taken and the tolerance allows it, else mixed; double without a solver.
+    pub fn arithmetic(&self, law: Law) -> Arithmetic {
+        let fast = self.why_general(law).is_none() && self.reaches_single();
+        self.arithmetic.unwrap_or(match (self.scheme.is_explicit(), fast) {
+            (true, _) => Arithmetic::Double,
+            (false, true) => Arithmetic::Single,
+            (false, false) => Arithmetic::Mixed,
+        })
+    }
+
+    /// A tolerance of 0 asks for a fixed number of iterations, which single precision can do.
+    fn reaches_single(&self) -> bool {
+        self.solver.tolerance >= SINGLE_TOLERANCE || self.solver.tolerance == 0.0
+    }
+
+    /// Most Newton steps per step of time: one linear solve from the predictor for laws that are
+    /// linear in the stretch, two for Newmark's method, which needs them.
+    pub fn newton_steps(&self, law: Law) -> u32 {
+        let easy = matches!(law, Law::Linear | Law::Corotational);
+        self.newton_steps.unwrap_or(match self.scheme {
+            Scheme::Static => STATIC_NEWTON_STEPS,
+            Scheme::Newmark { .. } if easy => 2,
+            _ if easy => 1,
+            _ => NEWTON_STEPS,
+        })
+    }
+
+    /// Newton's method of the general path.
+    pub(super) fn newton(&self, law: Law) -> NewtonSettings {
+        let steps = self.newton_steps(law);
+        let precision =
+            if self.arithmetic(law) == Arithmetic::Double { Precision::Double } else { Precision::Mixed };
+        // A single solve has to reach the tolerance by itself.
+        let tolerance = if steps == 1 { self.solver.tolerance } else { FORCING };
+        let linear =
+            LinearSettings { method: self.method, precision, iterations: self.solver.iterations, tolerance };
+        NewtonSettings { steps, tolerance: self.solver.tolerance, linear, ..NewtonSettings::default() }
+    }
+
+    /// Tells whether every setting is in its range and goes with the others and `law`.
+    pub fn check(&self, law: Law) -> Result<(), BodyError> {
+        let setting = |name, found: f64, allowed| Err(BodyError::Setting { name, found, allowed });
+        if !(1..=64).contains(&self.threads) {
+            return setting("threads", self.threads as f64, "1 … 64");
+        }
+        if !(1..=1_000_000).contains(&self.solver.iterations) {
+            return setting("solver.iterations", f64::from(self.solver.iterations), "1 … 1 000 000");
+        }
+        if !(0.0..1.0).contains(&self.solver.tolerance) {
+            return setting("solver.tolerance", self.solver.tolerance, "0 ≤ tolerance < 1");
+        }
+        if self.newton_steps.is_some_and(|steps| !(1..=10_000).contains(&steps)) {
+            return setting("newton_steps", self.newton_steps.map_or(0.0, f64::from), "1 … 10 000");
+        }
+        match (self.arithmetic, self.why_general(law)) {
+            (Some(Arithmetic::Single), Some(with)) => {
+                Err(BodyError::Combination { what: "single precision", with, instead: "mixed or double" })
+            }
+            (Some(Arithmetic::Mixed), _) if self.scheme.is_explicit() => Err(BodyError::Combination {
+                what: "mixed precision",
+                with: "an explicit integrator, which solves nothing",
+                instead: "double",
+            }),
+            _ => Ok(()),
+        }
+    }
+}
