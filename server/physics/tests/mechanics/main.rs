@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod combinations;
 mod conservation;
 mod cutting;
 mod determinism;
