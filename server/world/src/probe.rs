@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_collision::{barycentric_point, closest_point_on_triangle};
-use scindo_physics::cut::CutMesh;
+use scindo_physics::body::Body;
 use scindo_physics::mesh::TetMesh;
 
 /// How far a point is moved towards its side before it is looked up, relative to the element.
@@ -26,12 +26,13 @@ pub struct Probe {
     pub rest_m: Vector3<f64>,
     /// Element it lies in.
     pub element: u32,
-    /// Shape functions of that element at the point; Σ = 1.
+    /// Barycentric coordinates of the point in that element; Σ = 1.
     pub weights: [f64; 4],
     /// Barycentric coordinates by which its piece is looked up: the point, moved to its side.
     pub lookup: [f64; 4],
-    /// The copies it moves with; follows the topology.
-    pub copies: [u32; 4],
+    /// The copies (and further nodes of the element) it moves with, and their shape functions there;
+    /// follows the topology.
+    pub carriers: Vec<(u32, f64)>,
 }
 
 /// Where a point lies that is in no element.
@@ -51,34 +52,38 @@ impl Probe {
     pub fn bind(
         id: &str,
         body: usize,
-        mesh: &TetMesh,
+        of: &Body,
         rest_m: Vector3<f64>,
         side: Option<Vector3<f64>>,
     ) -> Result<Self, Outside> {
+        let mesh = of.cut_mesh().mesh();
         let aim = side.map_or(rest_m, |side| rest_m + side.normalize() * (SIDE_STEP * cell_size(mesh)));
         let element = element_at(mesh, aim)
             .or_else(|| element_at(mesh, rest_m))
             .ok_or_else(|| nearest(mesh, rest_m))?;
         let corners = mesh.corners(element);
+        let weights = barycentric(&corners, rest_m);
         Ok(Self {
             id: id.to_owned(),
             body,
             rest_m,
             element: element as u32,
-            weights: barycentric(&corners, rest_m),
+            weights,
             lookup: barycentric(&corners, aim),
-            copies: mesh.tets[element],
+            carriers: of.carriers(element as u32, mesh.tets[element], weights),
         })
     }
 
     /// Follows a change of topology: takes the copies of the piece the point belongs to.
-    pub fn follow(&mut self, cut: &CutMesh) {
-        self.copies = cut.pieces()[cut.piece_at(self.element, self.lookup) as usize].copies;
+    pub fn follow(&mut self, of: &Body) {
+        let cut = of.cut_mesh();
+        let copies = cut.pieces()[cut.piece_at(self.element, self.lookup) as usize].copies;
+        self.carriers = of.carriers(self.element, copies, self.weights);
     }
 
-    /// Current position [m], given the position of every copy.
+    /// Current position [m], given the position of every node.
     pub fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        self.copies.iter().zip(&self.weights).map(|(copy, weight)| x[*copy as usize] * *weight).sum()
+        self.carriers.iter().map(|(node, weight)| x[*node as usize] * *weight).sum()
     }
 }
 
@@ -120,24 +125,47 @@ fn nearest(mesh: &TetMesh, point: Vector3<f64>) -> Outside {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use scindo_physics::mesh::{BoxPattern, box_mesh};
+    use scindo_physics::body::{BodySettings, ElementKind};
+    use scindo_physics::material::{Law, Material, Rayleigh};
+    use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
 
-    fn block() -> TetMesh {
-        box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [2, 2, 2], BoxPattern::Tet6)
+    fn block_of(element: ElementKind) -> Body {
+        let law = Law::Corotational;
+        let (young_pa, poisson, density_kg_m3) = (1e5, 0.3, 1e3);
+        let material = Material { young_pa, poisson, density_kg_m3, rayleigh: Rayleigh::default(), law };
+        let settings = BodySettings { element, ..BodySettings::default() };
+        let (low, high, cells) = (Vector3::zeros(), Vector3::repeat(1.0), [2, 2, 2]);
+        match element {
+            ElementKind::Hex8 => Body::hex8(box_hexes(low, high, cells), material, settings).unwrap(),
+            _ => Body::new(box_mesh(low, high, cells, BoxPattern::Tet6), material, settings).unwrap(),
+        }
+    }
+
+    fn block() -> Body {
+        block_of(ElementKind::Tet4)
     }
 
     #[test]
     fn a_probe_reproduces_its_point() {
-        let (mesh, point) = (block(), Vector3::new(0.3, 0.7, 0.2));
-        let probe = Probe::bind("p", 0, &mesh, point, None).unwrap();
-        assert!((probe.position(&mesh.nodes) - point).norm() < 1e-14);
+        let point = Vector3::new(0.3, 0.7, 0.2);
+        // A field that the element holds exactly, whatever its degree below 2.
+        let moved = |x: &Vector3<f64>| Vector3::new(x.x + 0.1 * x.y * x.z, x.y, x.z);
+        for element in [ElementKind::Tet4, ElementKind::Tet10, ElementKind::Hex8] {
+            let body = block_of(element);
+            let probe = Probe::bind("p", 0, &body, point, None).unwrap();
+            assert!((probe.position(body.rest_positions()) - point).norm() < 1e-14, "{element:?}");
+            let x: Vec<Vector3<f64>> = body.rest_positions().iter().map(moved).collect();
+            let exact = element != ElementKind::Tet4;
+            assert_eq!((probe.position(&x) - moved(&point)).norm() < 1e-14, exact, "{element:?}");
+        }
     }
 
     #[test]
     fn side_chooses_the_element_where_the_point_lies_between_two() {
-        let (mesh, point) = (block(), Vector3::new(0.25, 0.25, 0.5));
+        let (body, point) = (block(), Vector3::new(0.25, 0.25, 0.5));
+        let mesh = body.cut_mesh().mesh();
         let centre_z = |side: Vector3<f64>| {
-            let probe = Probe::bind("p", 0, &mesh, point, Some(side)).unwrap();
+            let probe = Probe::bind("p", 0, &body, point, Some(side)).unwrap();
             assert!((probe.position(&mesh.nodes) - point).norm() < 1e-14);
             mesh.corners(probe.element as usize).iter().map(|x| x.z).sum::<f64>() / 4.0
         };

@@ -91,9 +91,7 @@ fn every_element_law_integrator_and_solver_steps() {
 #[test]
 fn remedies_masses_and_precisions_step() {
     let averaged = Volumetric::NodeAveraged { kept: 0.05 };
-    for (element, volumetric) in
-        [(ElementKind::Tet4, averaged), (ElementKind::Hex8, Volumetric::Selective)]
-    {
+    for (element, volumetric) in [(ElementKind::Tet4, averaged), (ElementKind::Hex8, Volumetric::Selective)] {
         for law in [Law::Linear, Law::Corotational, Law::NeoHookean] {
             let settings = BodySettings { element, volumetric, ..settings() };
             run(&mut beam(law, settings).unwrap(), &format!("{element:?} {volumetric:?} {law:?}"));
@@ -102,7 +100,10 @@ fn remedies_masses_and_precisions_step() {
     for element in ELEMENTS {
         for scheme in SCHEMES {
             let settings = BodySettings { element, scheme, mass: MassKind::Consistent, ..settings() };
-            run(&mut beam(Law::Corotational, settings).unwrap(), &format!("{element:?} {scheme:?} consistent"));
+            run(
+                &mut beam(Law::Corotational, settings).unwrap(),
+                &format!("{element:?} {scheme:?} consistent"),
+            );
         }
     }
     for arithmetic in [Arithmetic::Single, Arithmetic::Mixed, Arithmetic::Double] {
@@ -163,7 +164,10 @@ fn every_law_is_cut_on_the_general_path() {
             assert!((body.total_mass() / mass - 1.0).abs() < 1e-12, "{what}");
             assert!((body.momentum() - momentum).norm() <= 1e-12 * (1.0 + momentum.norm()), "{what}");
             let jump = (body.elastic_energy() - energy).abs();
-            assert!(jump <= 1e-9 * energy || volumetric != Volumetric::Full, "{what}: {jump} J of {energy} J");
+            assert!(
+                jump <= 1e-9 * energy || volumetric != Volumetric::Full,
+                "{what}: {jump} J of {energy} J"
+            );
             for _ in 0..10 {
                 let report = body.step(0.005, DOWN, &[]);
                 assert_eq!(report.outcome, Outcome::Advanced, "{what}: {report:?}");

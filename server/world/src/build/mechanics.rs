@@ -1,25 +1,70 @@
 //! From the words of a scene to settings of a body.
 
-use scindo_physics::body::PcgSettings;
+use scindo_physics::body::{
+    Arithmetic, BodySettings, ElementKind, MassKind, Method, PcgSettings, Scheme, Volumetric,
+};
 use scindo_physics::material::Law;
 
-use crate::scene::raw::{RawLaw, RawPrecision};
-use crate::scene::{Fault, Mechanics};
+use crate::scene::Mechanics;
+use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawPrecision};
 
-/// When the linear solver stops.
+/// Share of the volumetric energy that node averaging leaves with the elements, against checkerboards.
+const KEPT: f64 = 0.05;
+
+/// When the solver of a step stops.
 pub fn linear(m: &Mechanics) -> PcgSettings {
     PcgSettings { iterations: m.iterations, tolerance: m.tolerance }
 }
 
-/// The constitutive law, or why there is no body with it.
-pub fn law(m: &Mechanics) -> Result<Law, Fault> {
-    let general = m.why_general().or((m.arithmetic() != RawPrecision::Single).then_some("this precision"));
-    match (general, m.law) {
-        (None, RawLaw::Linear) => Ok(Law::Linear),
-        (None, RawLaw::Corotational) => Ok(Law::Corotational),
-        (why, _) => Err(Fault::Unsupported {
-            found: why.unwrap_or("this law").to_owned(),
-            supported: vec!["what the fast path computes".into()],
+/// The constitutive law.
+pub fn law(m: &Mechanics) -> Law {
+    match m.law {
+        RawLaw::Linear => Law::Linear,
+        RawLaw::Corotational => Law::Corotational,
+        RawLaw::Stvk => Law::StVenantKirchhoff,
+        RawLaw::NeoHookean => Law::NeoHookean,
+    }
+}
+
+/// All settings of a body; threads and instructions as by default.
+pub fn settings(m: &Mechanics) -> BodySettings {
+    BodySettings {
+        solver: linear(m),
+        element: match m.element {
+            RawElement::Tet4 => ElementKind::Tet4,
+            RawElement::Tet10 => ElementKind::Tet10,
+            RawElement::Hex8 => ElementKind::Hex8,
+        },
+        volumetric: match m.locking {
+            RawLocking::None => Volumetric::Full,
+            RawLocking::NodeAveraged => Volumetric::NodeAveraged { kept: KEPT },
+            RawLocking::Selective => Volumetric::Selective,
+        },
+        scheme: match m.integrator {
+            RawIntegrator::Static => Scheme::Static,
+            RawIntegrator::SymplecticEuler => Scheme::SymplecticEuler,
+            RawIntegrator::Midpoint => Scheme::Midpoint,
+            RawIntegrator::Rk4 => Scheme::Rk4,
+            RawIntegrator::ImplicitEuler => Scheme::ImplicitEuler,
+            RawIntegrator::Bdf2 => Scheme::Bdf2,
+            RawIntegrator::Newmark => Scheme::Newmark { beta: m.newmark.beta, gamma: m.newmark.gamma },
+        },
+        mass: match m.mass {
+            RawMass::Lumped => MassKind::Lumped,
+            RawMass::Consistent => MassKind::Consistent,
+        },
+        method: match m.method {
+            RawMethod::Cg => Method::Cg,
+            RawMethod::Cholesky => Method::Cholesky,
+            // The others are refused before a body is made.
+            RawMethod::Pcg | RawMethod::Multigrid | RawMethod::MgPcg => Method::Pcg,
+        },
+        arithmetic: m.precision.map(|precision| match precision {
+            RawPrecision::Single => Arithmetic::Single,
+            RawPrecision::Mixed => Arithmetic::Mixed,
+            RawPrecision::Double => Arithmetic::Double,
         }),
+        newton_steps: m.newton_steps,
+        ..BodySettings::default()
     }
 }

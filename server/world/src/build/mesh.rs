@@ -3,55 +3,91 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
+use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh, graded_hexes};
 
 use crate::mesh_in::{MeshHealth, MeshInError, check_scale, load_surface, load_volume};
 use crate::organ::organ;
 use crate::scene::{BodySpec, CellSplit, Fault, MeshSource};
 
+/// The elements of a body.
+pub enum Mesh {
+    /// Tetrahedra, linear or to be made quadratic.
+    Tets(TetMesh),
+    /// Hexahedra.
+    Hexes(HexMesh),
+}
+
+impl Mesh {
+    /// Corners of the bounding box [m].
+    pub fn bounds(&self) -> [Vector3<f64>; 2] {
+        match self {
+            Mesh::Tets(mesh) => mesh.bounds(),
+            Mesh::Hexes(mesh) => mesh.nodes.iter().fold(
+                [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)],
+                |[low, high], x| [low.inf(x), high.sup(x)],
+            ),
+        }
+    }
+}
+
 /// A mesh and what was found and repaired in its file.
 pub struct Opened {
-    pub mesh: TetMesh,
+    pub mesh: Mesh,
     pub health: Option<MeshHealth>,
+}
+
+impl Opened {
+    fn made(mesh: Mesh) -> Self {
+        Self { mesh, health: None }
+    }
+
+    fn read(mesh: TetMesh, health: MeshHealth) -> Self {
+        Self { mesh: Mesh::Tets(mesh), health: Some(health) }
+    }
 }
 
 /// Opens or makes a mesh; paths are relative to `base_dir`.
 pub fn open(source: &MeshSource, base_dir: &Path) -> Result<Opened, Fault> {
     match source {
-        MeshSource::Box { min_m, max_m, cells, split } => {
-            Ok(Opened { mesh: box_mesh(*min_m, *max_m, *cells, pattern(*split)?), health: None })
-        }
+        MeshSource::Box { min_m, max_m, cells, split } => Ok(Opened::made(match pattern(*split) {
+            Some(pattern) => Mesh::Tets(box_mesh(*min_m, *max_m, *cells, pattern)),
+            None => Mesh::Hexes(box_hexes(*min_m, *max_m, *cells)),
+        })),
         MeshSource::Grid { lines_m, split } => {
-            let cells = [0, 1, 2].map(|axis| lines_m[axis].len() - 1);
-            let max = Vector3::from_fn(|axis, _| cells[axis] as f64);
-            let mut mesh = box_mesh(Vector3::zeros(), max, cells, pattern(*split)?);
-            for node in &mut mesh.nodes {
-                *node = Vector3::from_fn(|axis, _| lines_m[axis][node[axis].round() as usize]);
-            }
-            Ok(Opened { mesh, health: None })
+            let [x, y, z] = lines_m;
+            let hexes = graded_hexes(x, y, z);
+            Ok(Opened::made(match pattern(*split) {
+                Some(pattern) => Mesh::Tets(split_grid(lines_m, hexes.nodes, pattern)),
+                None => Mesh::Hexes(hexes),
+            }))
         }
         MeshSource::File { path, scale } => load_volume(&base_dir.join(path), *scale)
-            .map(|(mesh, health)| Opened { mesh, health: Some(MeshHealth::Volume(health)) })
+            .map(|(mesh, health)| Opened::read(mesh, MeshHealth::Volume(health)))
             .map_err(fault),
         MeshSource::Surface { path, cells, scale } => load_surface(&base_dir.join(path), *cells, *scale)
-            .map(|(mesh, report)| Opened { mesh, health: Some(MeshHealth::Surface(report)) })
+            .map(|(mesh, report)| Opened::read(mesh, MeshHealth::Surface(report)))
             .map_err(fault),
-        MeshSource::Organ { cells } => organ(*cells)
-            .map(|(mesh, report)| Opened { mesh, health: Some(MeshHealth::Surface(report)) })
-            .map_err(fault),
+        MeshSource::Organ { cells } => {
+            organ(*cells).map(|(mesh, report)| Opened::read(mesh, MeshHealth::Surface(report))).map_err(fault)
+        }
     }
 }
 
-/// The pattern of the tetrahedra that a cell is split into.
-fn pattern(split: CellSplit) -> Result<BoxPattern, Fault> {
+/// The tetrahedra that a cell is split into; none: it stays a hexahedron.
+fn pattern(split: CellSplit) -> Option<BoxPattern> {
     match split {
-        CellSplit::Five => Ok(BoxPattern::Tet5 { parity: false }),
-        CellSplit::Six => Ok(BoxPattern::Tet6),
-        CellSplit::Octahedral | CellSplit::Hex => Err(Fault::Unsupported {
-            found: "this pattern".into(),
-            supported: vec!["tet5".into(), "tet6".into()],
-        }),
+        CellSplit::Five => Some(BoxPattern::Tet5 { parity: false }),
+        CellSplit::Six => Some(BoxPattern::Tet6),
+        CellSplit::Octahedral => Some(BoxPattern::Octahedral6),
+        CellSplit::Hex => None,
     }
+}
+
+/// A box of as many cells as the grid has, with the grid's nodes, which are numbered alike.
+fn split_grid(lines_m: &[Vec<f64>; 3], nodes: Vec<Vector3<f64>>, pattern: BoxPattern) -> TetMesh {
+    let cells = [0, 1, 2].map(|axis| lines_m[axis].len() - 1);
+    let unit = Vector3::from_fn(|axis, _| cells[axis] as f64);
+    TetMesh { nodes, ..box_mesh(Vector3::zeros(), unit, cells, pattern) }
 }
 
 fn fault(error: MeshInError) -> Fault {
@@ -67,12 +103,11 @@ fn fault(error: MeshInError) -> Fault {
 
 /// Suspicions about units, each in a sentence: a mesh in millimetres read as metres is a thousand
 /// times too large.
-pub fn doubts_about_scale(mesh: &TetMesh, spec: &BodySpec) -> Vec<String> {
+pub fn doubts_about_scale([low, high]: [Vector3<f64>; 2], spec: &BodySpec) -> Vec<String> {
     let scale = match spec.mesh {
         MeshSource::File { scale, .. } | MeshSource::Surface { scale, .. } => scale,
         MeshSource::Box { .. } | MeshSource::Grid { .. } | MeshSource::Organ { .. } => 1.0,
     };
-    let [low, high] = mesh.bounds();
     let warnings = check_scale(&low, &high, scale, spec.density_kg_m3, spec.young_pa);
     warnings.iter().map(|warning| warning.to_string()).collect()
 }

@@ -9,7 +9,7 @@ mod mesh;
 use std::path::Path;
 
 use scindo_physics::body::{Body, BodyError, BodySettings};
-use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::material::{Material, Rayleigh};
 
 use crate::probe::Probe;
 use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
@@ -73,21 +73,18 @@ impl Builder<'_> {
                 return None;
             }
         };
-        let doubts = mesh::doubts_about_scale(&mesh, spec);
+        let doubts = mesh::doubts_about_scale(mesh.bounds(), spec);
         self.warnings.extend(doubts.into_iter().map(|doubt| format!("{at}: {doubt}")));
         let settings = BodySettings {
-            solver: mechanics::linear(&spec.mechanics),
             threads: self.options.threads,
             portable: self.options.portable,
+            ..mechanics::settings(&spec.mechanics)
         };
-        let law = match mechanics::law(&spec.mechanics) {
-            Ok(law) => law,
-            Err(fault) => {
-                self.findings.push((at, fault));
-                return None;
-            }
+        let made = match mesh {
+            mesh::Mesh::Tets(mesh) => Body::new(mesh, material(spec), settings),
+            mesh::Mesh::Hexes(mesh) => Body::hex8(mesh, material(spec), settings),
         };
-        let body = match Body::new(mesh, material(spec, law), settings) {
+        let body = match made {
             Ok(body) => body,
             Err(error) => {
                 self.refused(&format!("{at}.mesh"), &error);
@@ -137,10 +134,10 @@ impl Builder<'_> {
     }
 
     fn select(&mut self, at: &str, region: &crate::scene::Region, body: &Body) -> Vec<u32> {
-        let mesh = body.cut_mesh().mesh();
-        let nodes = region::select(mesh, region);
+        let bounds = body.cut_mesh().mesh().bounds();
+        let nodes = region::select(body.rest_positions(), bounds, region);
         if nodes.is_empty() {
-            let [low, high] = mesh.bounds();
+            let [low, high] = bounds;
             let fault = Fault::EmptySelection { min_m: low.into(), max_m: high.into() };
             self.findings.push((format!("{at}.where"), fault));
         }
@@ -152,7 +149,7 @@ impl Builder<'_> {
         for spec in &scene.probes {
             let Some(body) = &bodies[spec.body] else { continue };
             let side = spec.side.map(|side| side.into_inner());
-            match Probe::bind(&spec.id, spec.body, body.body.cut_mesh().mesh(), spec.point_m, side) {
+            match Probe::bind(&spec.id, spec.body, &body.body, spec.point_m, side) {
                 Ok(probe) => probes.push(probe),
                 Err(outside) => self.findings.push((
                     format!("probe.{}.point_m", spec.id),
@@ -168,12 +165,12 @@ impl Builder<'_> {
     }
 }
 
-fn material(spec: &BodySpec, law: Law) -> Material {
+fn material(spec: &BodySpec) -> Material {
     Material {
         young_pa: spec.young_pa,
         poisson: spec.poisson,
         density_kg_m3: spec.density_kg_m3,
         rayleigh: Rayleigh { mass_1_s: spec.damping_mass_1_s, stiffness_s: spec.damping_stiffness_s },
-        law,
+        law: mechanics::law(&spec.mechanics),
     }
 }

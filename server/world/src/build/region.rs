@@ -1,13 +1,12 @@
 //! Regions of rest space and the nodes they select.
 
 use nalgebra::Vector3;
-use scindo_physics::mesh::TetMesh;
 
 use crate::scene::checked::Region;
 
-/// Nodes of `mesh` whose rest position lies in `region`, ascending.
-pub fn select(mesh: &TetMesh, region: &Region) -> Vec<u32> {
-    let [low, high] = mesh.bounds();
+/// Nodes whose rest position [m] lies in `region`, ascending; `low` and `high` are the corners of the
+/// body's bounding box [m].
+pub fn select(rest: &[Vector3<f64>], [low, high]: [Vector3<f64>; 2], region: &Region) -> Vec<u32> {
     let inside = |x: &Vector3<f64>| match region {
         Region::Box { min_m, max_m } => (0..3).all(|i| x[i] >= min_m[i] && x[i] <= max_m[i]),
         Region::Ball { centre_m, radius_m } => (x - centre_m).norm_squared() <= radius_m * radius_m,
@@ -19,7 +18,7 @@ pub fn select(mesh: &TetMesh, region: &Region) -> Vec<u32> {
             height >= from * extent - slack && height <= to * extent + slack
         }
     };
-    (0..mesh.nodes.len() as u32).filter(|n| inside(&mesh.nodes[*n as usize])).collect()
+    (0..rest.len() as u32).filter(|n| inside(&rest[*n as usize])).collect()
 }
 
 #[cfg(test)]
@@ -31,7 +30,7 @@ mod tests {
     #[test]
     fn every_kind_of_region_selects_its_nodes() {
         let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [4, 4, 4], BoxPattern::Tet6);
-        let count = |region: Region| select(&mesh, &region).len();
+        let count = |region: Region| select(&mesh.nodes, mesh.bounds(), &region).len();
         let base = Region::Box { min_m: Vector3::repeat(-1.0), max_m: Vector3::new(2.0, 2.0, 0.0) };
         assert_eq!(count(base), 25);
         assert_eq!(count(Region::Slab { axis: 2, from: 0.0, to: 0.25 }), 50);

@@ -1,7 +1,9 @@
 //! What the mechanics of each body are made of, and what they cost.
 
+use scindo_physics::body::Arithmetic;
+
 use super::{BodySize, Plan, count};
-use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawPrecision};
+use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod};
 use crate::scene::{BodySpec, CheckedScene, Mechanics};
 
 /// Fast path, seconds per element and solver iteration: one matrix-free product with rotated
@@ -87,9 +89,9 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
     };
     let mass = if m.mass == RawMass::Consistent { ", consistent mass" } else { "" };
     let precision = match m.arithmetic() {
-        RawPrecision::Single => "single",
-        RawPrecision::Mixed => "mixed",
-        RawPrecision::Double => "double",
+        Arithmetic::Single => "single",
+        Arithmetic::Mixed => "mixed",
+        Arithmetic::Double => "double",
     };
     let solver = match m.method {
         _ if m.integrator.is_explicit() => "no solver".into(),
@@ -97,7 +99,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         RawMethod::Cg => format!("cg, {} x {:e}, {precision}", m.iterations, m.tolerance),
         _ => format!("pcg, {} x {:e}, {precision}", m.iterations, m.tolerance),
     };
-    let path = if m.arithmetic() == RawPrecision::Single {
+    let path = if m.arithmetic() == Arithmetic::Single {
         "fast path, matrix-free".into()
     } else if m.integrator.is_explicit() {
         "general path, forces only".into()
@@ -112,7 +114,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
 /// Predicted seconds per step.
 fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
     let elements = size.elements as f64;
-    if m.arithmetic() == RawPrecision::Single {
+    if m.arithmetic() == Arithmetic::Single {
         return elements * (FAST_ELEMENT + f64::from(m.iterations) * FAST_ITERATION);
     }
     let (points, nodes_of_element, blocks_of_row) = match (m.element, m.locking) {
@@ -138,10 +140,7 @@ fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
     };
     let tangent = elements * points * nodes_of_element * POINT_TANGENT;
     let easy = matches!(m.law, RawLaw::Linear | RawLaw::Corotational);
-    let newton = match m.newton_steps {
-        Some(1) => 1.0,
-        None if easy => 1.0,
-        _ => 3.0, // most steps of time need no more
-    };
+    // Most steps of time need no more than three Newton steps.
+    let newton = if m.newton_steps == Some(1) || (m.newton_steps.is_none() && easy) { 1.0 } else { 3.0 };
     newton * (tangent + 2.0 * forces + solve)
 }

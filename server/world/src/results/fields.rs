@@ -73,9 +73,10 @@ impl Fields {
         let body = &sim.body;
         let mesh = body.cut_mesh();
         let first_copy = self.points.len() as u32;
-        for (copy, x) in body.positions().iter().enumerate() {
+        let rest = body.rest_positions();
+        for (x, start) in body.positions().iter().zip(rest) {
             self.points.push(*x);
-            self.displacement.push(x - mesh.mesh().nodes[mesh.copy_node()[copy] as usize]);
+            self.displacement.push(x - start);
         }
         self.velocity.extend_from_slice(body.velocities());
         for (piece, stress) in mesh.pieces().iter().zip(body.cauchy_stresses()) {
@@ -88,11 +89,10 @@ impl Fields {
             self.shear_stress.push(Vector3::new(stress[(1, 2)], stress[(2, 0)], stress[(0, 1)]));
         }
         let first_vertex = self.points.len() as u32;
-        let rest = mesh.rest_positions();
         for vertex in &mesh.surface().vertices {
             let x = vertex.position(body.positions());
             self.points.push(x);
-            self.displacement.push(x - vertex.position(&rest));
+            self.displacement.push(x - vertex.position(rest));
             self.velocity.push(vertex.position(body.velocities()));
         }
         for (triangle, tag) in mesh.surface().triangles.iter().zip(&mesh.surface().tags) {

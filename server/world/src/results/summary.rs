@@ -139,6 +139,16 @@ pub struct SolverSummary {
     pub max_residual: f64,
     /// Why the last solve stopped.
     pub last_stop: String,
+    /// Newton steps of the last step; 1 where a step is one linear solve, 0 for explicit integrators.
+    pub last_newton_steps: u32,
+    /// Most Newton steps of a step.
+    pub max_newton_steps: u32,
+    /// Halvings of all line searches.
+    pub backtracks: u64,
+    /// Estimated algebraic error of the last linear solve in the energy norm [√J]; 0 without estimate.
+    pub last_algebraic_error: f64,
+    /// Steps at which something was done differently from what was asked for.
+    pub noticed_steps: u64,
     /// Steps that stopped at the iteration limit.
     pub unconverged_steps: u64,
     /// Steps that were divided to stay finite.
@@ -194,6 +204,11 @@ impl Running {
             solver.last_residual = solve.residual;
             solver.max_residual = solver.max_residual.max(solve.residual);
             solver.last_stop = format!("{:?}", solve.stop);
+            solver.last_newton_steps = solve.newton_steps;
+            solver.max_newton_steps = solver.max_newton_steps.max(solve.newton_steps);
+            solver.backtracks += u64::from(solve.backtracks);
+            solver.last_algebraic_error = solve.algebraic_error;
+            solver.noticed_steps += u64::from(solve.notice.is_some());
             solver.unconverged_steps += u64::from(solve.stop == StopReason::IterationLimit);
             solver.divided_steps += u64::from(solve.substeps > 1);
             solver.rolled_back_steps += u64::from(solve.outcome != Outcome::Advanced);
@@ -283,8 +298,7 @@ fn body_summary(sim: &SimBody, simulation: &Simulation, solver: SolverSummary) -
     let lip_triangles = lips.len();
     lips.sort_unstable();
     lips.dedup();
-    let rest = |copy: usize| mesh.mesh().nodes[mesh.copy_node()[copy] as usize];
-    let displaced = body.positions().iter().enumerate().map(|(i, x)| (x - rest(i)).norm());
+    let displaced = body.positions().iter().zip(body.rest_positions()).map(|(x, rest)| (x - rest).norm());
     let finite = body.positions().iter().chain(body.velocities()).all(|x| x.iter().all(|c| c.is_finite()));
     let gravity = simulation.scene().gravity_m_s2;
     BodySummary {

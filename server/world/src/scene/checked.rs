@@ -1,8 +1,10 @@
 //! A scene as ready objects: names resolved to indices, words to types, lists to vectors.
 
 use nalgebra::{Unit, Vector3};
+use scindo_physics::body::Arithmetic;
 
 use super::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawPrecision};
+use crate::build::mechanics;
 use crate::inputs::{ToolMode, ToolShape};
 
 /// A scene whose values are all in range and fit each other. Files are not opened yet.
@@ -93,36 +95,16 @@ pub struct Newmark {
     pub gamma: f64,
 }
 
-/// Tolerances below this are out of reach of single precision.
-const SINGLE_TOLERANCE: f64 = 1e-7;
-
 impl Mechanics {
     /// What keeps the body from the fast path, which runs in single precision; none if nothing does.
     pub fn why_general(&self) -> Option<&'static str> {
-        let reasons = [
-            (self.element == RawElement::Tet10, "tet10"),
-            (self.element == RawElement::Hex8, "hex8"),
-            (self.law == RawLaw::Stvk, "law stvk"),
-            (self.law == RawLaw::NeoHookean, "law neo-hookean"),
-            (self.integrator != RawIntegrator::ImplicitEuler, "another integrator than implicit-euler"),
-            (self.method != RawMethod::Pcg, "another solver than pcg"),
-            (self.mass == RawMass::Consistent, "consistent mass"),
-            (self.locking != RawLocking::None, "a locking remedy"),
-            (self.newton_steps.is_some_and(|steps| steps > 1), "more than one Newton step"),
-        ];
-        reasons.iter().find(|(general, _)| *general).map(|(_, why)| *why)
+        mechanics::settings(self).why_general(mechanics::law(self))
     }
 
     /// The arithmetic that is used: single where it can be and the tolerance allows, else mixed;
     /// double without a solver.
-    pub fn arithmetic(&self) -> RawPrecision {
-        self.precision.unwrap_or(if self.integrator.is_explicit() {
-            RawPrecision::Double
-        } else if self.why_general().is_none() && self.tolerance >= SINGLE_TOLERANCE {
-            RawPrecision::Single
-        } else {
-            RawPrecision::Mixed
-        })
+    pub fn arithmetic(&self) -> Arithmetic {
+        mechanics::settings(self).arithmetic(mechanics::law(self))
     }
 }
 

@@ -1,8 +1,9 @@
 //! A body of the simulation: mechanics plus what the world knows about it.
 
+use std::mem::Discriminant;
 use std::sync::Arc;
 
-use scindo_physics::body::Body;
+use scindo_physics::body::{Body, Notice};
 use scindo_physics::cut::CutMesh;
 
 use super::report::Energy;
@@ -23,6 +24,8 @@ pub struct SimBody {
     pub health: Option<MeshHealth>,
     /// Volume at rest [m³].
     pub rest_volume_m3: f64,
+    /// What was told of the last step.
+    pub(crate) noticed: Option<Discriminant<Notice>>,
     topology: Option<Arc<SurfaceTopology>>,
     surface: Vec<[f32; 3]>,
     surface_is_old: bool,
@@ -37,6 +40,7 @@ impl SimBody {
             fix_groups: Vec::new(),
             health,
             rest_volume_m3,
+            noticed: None,
             topology: None,
             surface: Vec::new(),
             surface_is_old: true,
@@ -53,7 +57,7 @@ impl SimBody {
         let mesh = self.body.cut_mesh();
         BodySize {
             elements: mesh.mesh().tets.len(),
-            nodes: mesh.n_copies(),
+            nodes: self.body.rest_positions().len(),
             vertices: mesh.surface().vertices.len(),
             triangles: mesh.surface().triangles.len(),
         }

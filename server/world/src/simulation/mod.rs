@@ -13,7 +13,7 @@ mod cuts;
 use std::path::Path;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{BodyError, Outcome};
+use scindo_physics::body::BodyError;
 
 pub use body::SimBody;
 pub use report::{BodyReport, Energy, Event, Level, StepReport};
@@ -124,7 +124,7 @@ impl Simulation {
         cuts.apply_requests(requests, at);
         cuts.apply_blades(at);
         if cuts.applied() > before {
-            probes.iter_mut().for_each(|probe| probe.follow(bodies[probe.body].body.cut_mesh()));
+            probes.iter_mut().for_each(|probe| probe.follow(&bodies[probe.body].body));
         }
     }
 
@@ -145,15 +145,7 @@ impl Simulation {
             let solve = body.body.step(self.scene.step_s, self.scene.gravity_m_s2, self.contacts.springs(i));
             body.has_moved();
             self.report.bodies[i].solve = solve;
-            let parts = solve.substeps;
-            if solve.outcome != Outcome::Advanced {
-                let message =
-                    format!("not finite even in {parts} parts; the body is back where it was, at rest");
-                self.report.tell(Level::Error, "step-rolled-back", &body.id, message);
-            } else if parts > 1 {
-                let message = format!("done in {parts} parts to stay finite");
-                self.report.tell(Level::Warning, "step-divided", &body.id, message);
-            }
+            self.report.tell_of_solve(&body.id, &solve, &mut body.noticed);
         }
     }
 
@@ -189,7 +181,7 @@ impl Simulation {
             self.contacts.forget_motion(i);
         }
         for probe in &mut self.probes {
-            probe.follow(self.bodies[probe.body].body.cut_mesh());
+            probe.follow(&self.bodies[probe.body].body);
         }
         self.tools.reset();
         self.cuts.reset();

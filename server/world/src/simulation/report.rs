@@ -1,8 +1,9 @@
 //! What a step says about itself.
 
+use std::mem::{Discriminant, discriminant};
 use std::sync::Arc;
 
-use scindo_physics::body::SolveReport;
+use scindo_physics::body::{Notice, Outcome, SolveReport};
 
 use super::stopwatch::StageSeconds;
 use crate::inputs::CutOutcome;
@@ -72,6 +73,40 @@ impl StepReport {
         self.time_s = time_s;
         self.cuts.clear();
         self.events.clear();
+    }
+
+    /// Tells what a solve did differently from what was asked for: failures always, everything else
+    /// when it begins. `known` is what was told of the last step.
+    pub(crate) fn tell_of_solve(
+        &mut self,
+        body: &Arc<str>,
+        solve: &SolveReport,
+        known: &mut Option<Discriminant<Notice>>,
+    ) {
+        let notice = solve.notice.as_ref().map(discriminant);
+        let begins = notice != *known;
+        *known = notice;
+        match (solve.outcome, solve.notice) {
+            (Outcome::Refused, Some(why)) => self.tell(Level::Error, "step-refused", body, why.to_string()),
+            (Outcome::Refused, None) => {
+                self.tell(Level::Error, "step-refused", body, "step or gravity is not usable".into());
+            }
+            (Outcome::Held, _) => {
+                let parts = solve.substeps;
+                let message =
+                    format!("not finite even in {parts} parts; the body is back where it was, at rest");
+                self.tell(Level::Error, "step-rolled-back", body, message);
+            }
+            (Outcome::Advanced, Some(notice)) if begins => {
+                let level = if matches!(notice, Notice::Started) { Level::Info } else { Level::Warning };
+                self.tell(level, "step-notice", body, notice.to_string());
+            }
+            (Outcome::Advanced, None) if solve.substeps > 1 => {
+                let message = format!("done in {} parts to stay finite", solve.substeps);
+                self.tell(Level::Warning, "step-divided", body, message);
+            }
+            (Outcome::Advanced, _) => {}
+        }
     }
 
     pub(crate) fn tell(&mut self, level: Level, name: &'static str, body: &Arc<str>, message: String) {

@@ -73,15 +73,6 @@ impl Check<'_> {
         if body.integrator == RawIntegrator::Static {
             self.statics(at, body);
         }
-        if body.integrator.is_explicit() && body.mass == RawMass::Consistent {
-            let what = format!(
-                "found `consistent` with {}, allowed with explicit integrators: lumped",
-                word(&body.integrator)
-            );
-            let next =
-                "an explicit step divides by each node's mass; choose lumped or an implicit integrator";
-            self.conflict(format!("{at}.mass"), what, next);
-        }
     }
 
     fn statics(&mut self, at: &str, body: &RawBody) {
