@@ -6,7 +6,14 @@
 mod bodies;
 mod critical_step;
 mod cut_through_elements;
+mod drooping_bar;
 mod explicit;
+mod field;
+mod manufactured;
+mod nienhuys;
+mod patch;
 mod ruined_starts;
+mod same_mesh_beam;
 mod spinning;
+mod support;
 mod time_orders;
