@@ -10,6 +10,7 @@ mod drooping_bar;
 mod explicit;
 mod field;
 mod manufactured;
+mod near_incompressible;
 mod nienhuys;
 mod patch;
 mod ruined_starts;
