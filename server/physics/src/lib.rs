@@ -25,4 +25,5 @@ pub mod assembly;
 pub mod operator;
 pub mod solver;
 pub mod integrator;
+pub mod estimate;
 pub mod body;

@@ -21,13 +21,19 @@ const RELIABLE: f64 = 0.1;
 /// The solver gives up when the true residual has not halved this often in a row.
 const FUTILE: u32 = 2;
 
+/// A matrix that is multiplied row by row.
+pub trait Rows<T>: Sync {
+    /// Row `i` of A x.
+    fn times(&self, i: usize, x: &[Vector3<T>]) -> Vector3<T>;
+}
+
 /// A filtered matrix with its diagonal, in double precision and in that of the iteration.
 #[derive(Clone, Copy, Debug)]
-pub struct System<'a, T> {
+pub struct System<'a, T, A> {
     /// A, for true residuals.
     pub exact: &'a BlockCsr<f64>,
     /// A, rounded to the precision of the iteration.
-    pub working: &'a BlockCsr<T>,
+    pub working: &'a A,
     /// Prescribed directions.
     pub filter: &'a Filter,
     /// M⁻¹ of `exact`.
@@ -54,8 +60,6 @@ pub struct ConjugateGradients<T> {
     z: Vec<Vector3<T>>,
     p: Vec<Vector3<T>>,
     q: Vec<Vector3<T>>,
-    /// Correction since the last true residual.
-    d: Vec<Vector3<T>>,
     residual: Vec<Vector3<f64>>,
     sums: Vec<[f64; 2]>,
 }
@@ -69,7 +73,7 @@ struct Size {
 
 impl<T: Real> ConjugateGradients<T> {
     fn resize(&mut self, n: usize) {
-        for v in [&mut self.r, &mut self.z, &mut self.p, &mut self.q, &mut self.d] {
+        for v in [&mut self.r, &mut self.z, &mut self.p, &mut self.q] {
             v.resize(n, Vector3::zeros());
         }
         self.residual.resize(n, Vector3::zeros());
@@ -82,18 +86,17 @@ impl<T: Real> ConjugateGradients<T> {
     pub fn solve(
         &mut self,
         team: &mut Team,
-        system: &System<'_, T>,
+        system: &System<'_, T, impl Rows<T>>,
         b: &[Vector3<f64>],
         x: &mut [Vector3<f64>],
         stop: Stop,
     ) -> LinearReport {
         self.resize(x.len());
         self.p.fill(Vector3::zeros());
-        self.d.fill(Vector3::zeros());
         let mut report = LinearReport::default();
         let mut error = AlgebraicError::default();
         // The iteration works on r / scale, so that single precision does not mind the units.
-        let scale = self.true_residual(team, system, b, x, 0.0);
+        let scale = self.true_residual(team, system, b, x);
         let mut checked = scale;
         report.residual = scale;
         report.stop = verdict(scale, stop.target);
@@ -105,7 +108,7 @@ impl<T: Real> ConjugateGradients<T> {
         loop {
             let curvature = self.direction(team, system, beta);
             if !curvature.is_finite() || curvature <= 0.0 {
-                report.residual = self.true_residual(team, system, b, x, scale);
+                report.residual = self.true_residual(team, system, b, x);
                 report.algebraic_error = error.norm();
                 report.stop = if curvature.is_finite() && report.residual.is_finite() {
                     StopReason::NonPositiveCurvature
@@ -115,14 +118,14 @@ impl<T: Real> ConjugateGradients<T> {
                 return report;
             }
             let alpha = size.rho / curvature;
-            let mut next = self.advance(team, system, alpha);
+            let mut next = self.advance(team, system, x, (alpha, scale));
             error.add(alpha * size.rho * scale * scale);
             report.iterations += 1;
             let norm = next.norm * scale;
             let last = report.iterations == stop.iterations;
             let doubtful = size_of::<T>() == 4 && norm <= RELIABLE * checked;
             if norm <= stop.target || doubtful || last || !norm.is_finite() {
-                let known = self.true_residual(team, system, b, x, scale);
+                let known = self.true_residual(team, system, b, x);
                 report.refinements += 1;
                 report.residual = known;
                 report.algebraic_error = error.norm();
@@ -142,24 +145,18 @@ impl<T: Real> ConjugateGradients<T> {
         }
     }
 
-    /// x += scale · d, d = 0, residual = S (b − A x); returns √(rᵀM⁻¹r) of it.
+    /// residual = S (b − A x); returns √(rᵀM⁻¹r) of it.
     fn true_residual(
         &mut self,
         team: &mut Team,
-        system: &System<'_, T>,
+        system: &System<'_, T, impl Rows<T>>,
         b: &[Vector3<f64>],
-        x: &mut [Vector3<f64>],
-        scale: f64,
+        x: &[Vector3<f64>],
     ) -> f64 {
-        for (x, d) in x.iter_mut().zip(&mut self.d) {
-            *x += d.map(|d| d.wide() * scale);
-            *d = Vector3::zeros();
-        }
-        let x = &*x;
         team.for_blocks(blocks(&mut self.residual, BLOCK), |block, r| {
             for (i, r) in r.iter_mut().enumerate() {
                 let c = block * BLOCK + i;
-                *r = b[c] - row_times(system.exact, c, x);
+                *r = b[c] - system.exact.times(c, x);
             }
         });
         system.filter.apply(&mut self.residual);
@@ -167,7 +164,7 @@ impl<T: Real> ConjugateGradients<T> {
     }
 
     /// r = residual / scale, z = M⁻¹ r.
-    fn restart(&mut self, team: &mut Team, system: &System<'_, T>, scale: f64) -> Size {
+    fn restart(&mut self, team: &mut Team, system: &System<'_, T, impl Rows<T>>, scale: f64) -> Size {
         let (residual, inverse) = (&self.residual, system.inverse);
         let state = (blocks(&mut self.r, BLOCK), blocks(&mut self.z, BLOCK), blocks(&mut self.sums, 1));
         team.for_blocks(state, |block, (r, z, sums)| {
@@ -184,7 +181,7 @@ impl<T: Real> ConjugateGradients<T> {
     }
 
     /// p ← z + β p (r in place of z without preconditioner), q = S A p; returns pᵀA p.
-    fn direction(&mut self, team: &mut Team, system: &System<'_, T>, beta: f64) -> f64 {
+    fn direction(&mut self, team: &mut Team, system: &System<'_, T, impl Rows<T>>, beta: f64) -> f64 {
         let (towards, beta) = (if system.preconditioned { &self.z } else { &self.r }, T::of(beta));
         team.for_blocks(blocks(&mut self.p, BLOCK), |block, p| {
             for (i, p) in p.iter_mut().enumerate() {
@@ -196,7 +193,7 @@ impl<T: Real> ConjugateGradients<T> {
             sums[0] = [0.0; 2];
             for (i, q) in q.iter_mut().enumerate() {
                 let c = block * BLOCK + i;
-                *q = row_times(system.working, c, p);
+                *q = system.working.times(c, p);
                 sums[0][0] += dot(&p[c], q);
             }
         });
@@ -204,20 +201,30 @@ impl<T: Real> ConjugateGradients<T> {
         self.sums.iter().map(|s| s[0]).sum()
     }
 
-    /// d += α p, r −= α q, z = M⁻¹ r.
-    fn advance(&mut self, team: &mut Team, system: &System<'_, T>, alpha: f64) -> Size {
-        let (p, q, alpha, inverse) = (&self.p, &self.q, T::of(alpha), system.inverse);
+    /// x += scale · α p, r −= α q, z = M⁻¹ r. The solution is summed in double precision: rounding it
+    /// would be a force of A times the rounding.
+    fn advance(
+        &mut self,
+        team: &mut Team,
+        system: &System<'_, T, impl Rows<T>>,
+        x: &mut [Vector3<f64>],
+        (alpha, scale): (f64, f64),
+    ) -> Size {
+        let (p, q, inverse) = (&self.p, &self.q, system.inverse);
+        // What x gets must be what r loses.
+        let alpha = T::of(alpha);
+        let step = alpha.wide() * scale;
         let state = (
-            blocks(&mut self.d, BLOCK),
+            blocks(x, BLOCK),
             blocks(&mut self.r, BLOCK),
             blocks(&mut self.z, BLOCK),
             blocks(&mut self.sums, 1),
         );
-        team.for_blocks(state, |block, (d, r, z, sums)| {
+        team.for_blocks(state, |block, (x, r, z, sums)| {
             sums[0] = [0.0; 2];
-            for (i, ((d, r), z)) in d.iter_mut().zip(r).zip(z).enumerate() {
+            for (i, ((x, r), z)) in x.iter_mut().zip(r).zip(z).enumerate() {
                 let c = block * BLOCK + i;
-                *d += p[c] * alpha;
+                *x += p[c].map(T::wide) * step;
                 *r -= q[c] * alpha;
                 *z = inverse.times(c, r);
                 sums[0][0] += dot(r, z);
@@ -227,7 +234,7 @@ impl<T: Real> ConjugateGradients<T> {
         self.size(system)
     }
 
-    fn size(&self, system: &System<'_, T>) -> Size {
+    fn size(&self, system: &System<'_, T, impl Rows<T>>) -> Size {
         let sum = |k: usize| self.sums.iter().map(|s| s[k]).sum::<f64>();
         let squared = sum(0);
         let rho = if system.preconditioned { squared } else { sum(1) };
@@ -246,16 +253,17 @@ fn verdict(norm: f64, target: f64) -> StopReason {
     }
 }
 
-/// Row `i` of A x.
-#[inline(always)]
-pub fn row_times<T: Real>(A: &BlockCsr<T>, i: usize, x: &[Vector3<T>]) -> Vector3<T> {
-    let row = A.row(i);
-    let mut y = [T::zero(); 3];
-    for (A, &j) in A.blocks[row.clone()].iter().zip(&A.columns[row]) {
-        let x = &x[j as usize];
-        for k in 0..3 {
-            y[k] += A[3 * k] * x.x + A[3 * k + 1] * x.y + A[3 * k + 2] * x.z;
+impl Rows<f64> for BlockCsr<f64> {
+    #[inline(always)]
+    fn times(&self, i: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
+        let row = self.row(i);
+        let mut y = [0.0; 3];
+        for (A, &j) in self.blocks[row.clone()].iter().zip(&self.columns[row]) {
+            let x = &x[j as usize];
+            for k in 0..3 {
+                y[k] += A[3 * k] * x.x + A[3 * k + 1] * x.y + A[3 * k + 2] * x.z;
+            }
         }
+        y.into()
     }
-    y.into()
 }

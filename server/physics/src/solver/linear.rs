@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use super::block_jacobi::DiagonalInverse;
 use super::cholesky::{Cholesky, Failure};
-use super::conjugate_gradients::{ConjugateGradients, Stop, System, row_times};
+use super::conjugate_gradients::{ConjugateGradients, Rows, Stop, System};
 use super::constraint::Filter;
+use super::differences::Differences;
 use super::real::Real;
 use super::report::{LinearReport, StopReason};
 use crate::assembly::BlockCsr;
@@ -75,7 +76,7 @@ pub struct LinearSolver {
 /// What single-precision iterations need.
 #[derive(Debug, Default)]
 struct Single {
-    matrix: BlockCsr<f32>,
+    matrix: Differences,
     inverse: DiagonalInverse<f32>,
     current: bool,
     gradients: ConjugateGradients<f32>,
@@ -171,7 +172,7 @@ impl LinearSolver {
             return double.solve(team, &system, b, x, stop);
         }
         if !single.current {
-            A.to_f32(&mut single.matrix);
+            single.matrix.update(A);
             single.inverse.update(A, filter);
             single.current = true;
         }
@@ -306,7 +307,7 @@ impl Correction<'_> {
         team.for_blocks(blocks(self.r, BLOCK), |block, r| {
             for (i, r) in r.iter_mut().enumerate() {
                 let c = block * BLOCK + i;
-                *r = b[c] - row_times(A, c, x);
+                *r = b[c] - A.times(c, x);
             }
         });
         self.filter.apply(self.r);

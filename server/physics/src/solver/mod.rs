@@ -10,14 +10,17 @@ mod algebraic_error;
 mod constraint;
 mod block_jacobi;
 mod conjugate_gradients;
+mod differences;
 mod cholesky;
 mod linear;
 mod newton;
+mod eigen;
 mod pcg;
 
 pub use algebraic_error::AlgebraicError;
 pub use block_jacobi::DiagonalInverse;
 pub use constraint::Filter;
+pub use eigen::{EigenError, EigenSettings, Modes, natural_frequencies};
 pub use linear::{LinearSettings, LinearSolver, Method, Precision};
 pub use newton::{Curvature, Newton, NewtonReport, NewtonSettings, Potential};
 pub use pcg::{Pcg, PcgReport, PcgSettings};

@@ -1,6 +1,7 @@
 //! Mechanics of a body: invariants that hold to round-off, and energies that must not grow.
 
 #![allow(clippy::unwrap_used)]
+#![allow(non_snake_case)] // the symbols of the field: X, K
 
 mod combinations;
 mod conservation;
@@ -8,6 +9,7 @@ mod cutting;
 mod determinism;
 mod dynamics;
 mod reference;
+mod repeated_solves;
 mod robustness;
 mod springs;
 

@@ -1,0 +1,64 @@
+//! The linear tetrahedra that stress is recovered from: of a model, or of a cut mesh.
+
+use nalgebra::Vector3;
+
+use crate::assembly::{ElementKind, Model};
+use crate::cut::{CutMesh, Piece};
+use crate::mesh::TetMesh;
+
+/// Linear tetrahedra on copies.
+pub trait Tets {
+    /// Number of tetrahedra or pieces.
+    fn count(&self) -> usize;
+    /// Number of copies.
+    fn n_copies(&self) -> usize;
+    /// Copies, rest gradients ∇N_a [1/m] and rest volume [m³] of piece `e`.
+    fn tet(&self, e: usize) -> ([u32; 4], [Vector3<f64>; 4], f64);
+}
+
+/// The pieces of a cut mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct CutTets<'a> {
+    mesh: &'a TetMesh,
+    pieces: &'a [Piece],
+    n_copies: usize,
+}
+
+impl<'a> CutTets<'a> {
+    /// The pieces of this mesh, as it is cut now.
+    pub fn new(cut: &'a CutMesh) -> Self {
+        Self { mesh: cut.mesh(), pieces: cut.pieces(), n_copies: cut.n_copies() }
+    }
+}
+
+impl Tets for CutTets<'_> {
+    fn count(&self) -> usize {
+        self.pieces.len()
+    }
+
+    fn n_copies(&self) -> usize {
+        self.n_copies
+    }
+
+    fn tet(&self, e: usize) -> ([u32; 4], [Vector3<f64>; 4], f64) {
+        let Piece { element, fraction, copies } = self.pieces[e];
+        let element = element as usize;
+        (copies, self.mesh.gradients(element), fraction * self.mesh.volume(element))
+    }
+}
+
+/// The linear tetrahedra of a model; none of a model with other elements.
+impl Tets for Model {
+    fn count(&self) -> usize {
+        if self.kind() == ElementKind::Tet4 { self.n_elements() } else { 0 }
+    }
+
+    fn n_copies(&self) -> usize {
+        self.n_nodes()
+    }
+
+    fn tet(&self, e: usize) -> ([u32; 4], [Vector3<f64>; 4], f64) {
+        let (nodes, gradients) = (self.element(e), self.gradients(e, 0));
+        (std::array::from_fn(|a| nodes[a]), std::array::from_fn(|a| gradients[a]), self.volume(e))
+    }
+}
