@@ -11,7 +11,7 @@ use super::fast::Fast;
 use super::{Body, BodyError, Path};
 use crate::integrator::prescribe;
 use crate::operator::{BlockJacobi, ElasticUpdate, FixedCopy, SystemOperator, padded};
-use crate::solver::{LinearSettings, NewtonSettings, Pcg, PcgSettings};
+use crate::solver::{Curvature, LinearSettings, NewtonSettings, Pcg, PcgSettings};
 
 /// When a static solve stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +69,7 @@ impl Body {
             let newton = NewtonSettings {
                 steps: settings.newton_steps,
                 tolerance: settings.tolerance,
+                curvature: Curvature::Exact,
                 linear,
                 ..newton
             };

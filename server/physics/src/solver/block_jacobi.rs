@@ -19,11 +19,11 @@ impl<T: Real> DiagonalInverse<T> {
     pub fn update(&mut self, A: &BlockCsr<f64>, filter: &Filter) {
         self.inverse.resize(A.n_rows(), Matrix3::zeros());
         for (i, inverse) in self.inverse.iter_mut().enumerate() {
-            *inverse = invert(A.diagonal(i), [false; 3]).map(T::of);
+            *inverse = rounded(invert(A.diagonal(i), [false; 3]));
         }
         for &(copy, axes) in filter.held() {
             let i = copy as usize;
-            self.inverse[i] = invert(A.diagonal(i), axes).map(T::of);
+            self.inverse[i] = rounded(invert(A.diagonal(i), axes));
         }
     }
 
@@ -44,6 +44,12 @@ impl<T: Real> DiagonalInverse<T> {
     pub fn norm(&self, r: &[Vector3<T>]) -> f64 {
         root(r.iter().zip(&self.inverse).map(|(r, M)| dot(r, &(M * r))).sum())
     }
+}
+
+/// The matrix in the precision of the iteration; what is too light for it does not move.
+fn rounded<T: Real>(M: Matrix3<f64>) -> Matrix3<T> {
+    let rounded = M.map(T::of);
+    if rounded.iter().all(|m| m.wide().is_finite()) { rounded } else { Matrix3::zeros() }
 }
 
 /// √s of a sum that only rounding can make negative; NaN stays NaN.

@@ -260,7 +260,7 @@ mod tests {
                 stable_step(Scheme::SymplecticEuler, omega, Rayleigh { mass_1_s: 0.0, stiffness_s: beta });
             for (factor, grows) in [(0.999, false), (1.01, true)] {
                 let (h, mut x, mut v) = (factor * bound, 1.0, 0.0);
-                for _ in 0..3000 {
+                for _ in 0..1000 {
                     v -= h * (omega * omega * x + 2.0 * zeta * omega * v);
                     x += h * v;
                 }
