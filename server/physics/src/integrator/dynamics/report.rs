@@ -81,7 +81,8 @@ pub enum Notice {
     Recovery,
     /// A part of the body hangs on nothing: there is no equilibrium.
     LooseBody,
-    /// Newton's method stopped before its tolerance was reached; the report says how good the state is.
+    /// Newton's method stopped before its tolerance was reached; the report says how good the state
+    /// is. Not said of the few steps of a fast setting, which are meant to stop early.
     Unconverged,
     /// The step was taken back because it did not stay finite.
     NotFinite,

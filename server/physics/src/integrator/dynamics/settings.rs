@@ -71,7 +71,7 @@ pub struct DynamicsSettings {
     pub scheme: Scheme,
     /// Distribution of mass.
     pub mass: MassKind,
-    /// Newton's method of implicit schemes. `steps` = 1 is the fast path, one linear solve from the
+    /// Newton's method of implicit schemes. `steps` = 1 (2 for Newmark) is the fast path, one linear solve from the
     /// predictor, which is taken for linear and corotational bodies that are in order; other laws,
     /// inverted or collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
     pub newton: NewtonSettings,
