@@ -16,8 +16,8 @@ use super::parts::{LooseParts, Translations};
 use super::springs::{ActiveSpring, PointSpring};
 use crate::material::Material;
 use crate::operator::{
-    BLOCK, Block6, BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded, Spring,
-    SystemOperator, filter, padded,
+    BLOCK, Block6, BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded, Spring, Sum,
+    SystemOperator, block_of, filter, invert, padded,
 };
 use crate::solver::{Pcg, PcgReport, PcgSettings, StopReason};
 use crate::team::{Team, blocks};
@@ -72,12 +72,22 @@ pub struct ImplicitEuler {
     predicted: Vec<Vector3<f64>>,
     f_int: Vec<Padded>,
     damping: Vec<Padded>,
-    rhs: Vec<Padded>,
+    scratch: Vec<Padded>,
     delta: Vec<Padded>,
+    /// Blocks of (1 + hα) M + (h² + hβ) K̂, springs not included.
     diagonal: Vec<Block6>,
-    bare_diagonal: Vec<Block6>,
     preconditioner: BlockJacobi,
+    /// What `diagonal` and `preconditioner` were made for: version of K̂ and mass factor.
+    made_for: Option<(u64, f64)>,
+    /// The prescribed directions they were made for.
+    made_for_fixed: Vec<(u32, [bool; 3])>,
+    /// Copies whose entry of the preconditioner contains springs.
+    sprung: Vec<u32>,
+    /// Their blocks without springs, while those with springs are inverted.
+    bare: Vec<Block6>,
     pcg: Pcg,
+    /// One entry per block of the vector loops.
+    partial: Vec<f64>,
     active: Vec<ActiveSpring>,
     accepted: Vec<bool>,
     terms: Vec<Spring>,
@@ -89,11 +99,13 @@ impl ImplicitEuler {
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
         self.predicted.resize(n, Vector3::zeros());
-        for v in [&mut self.f_int, &mut self.damping, &mut self.rhs, &mut self.delta] {
+        for v in [&mut self.f_int, &mut self.damping, &mut self.scratch, &mut self.delta] {
             v.resize(n, [0.0; 4]);
         }
         self.diagonal.resize(n, [0.0; 8]);
-        self.bare_diagonal.resize(n, [0.0; 8]);
+        self.partial.resize(n.div_ceil(BLOCK), 0.0);
+        self.made_for = None;
+        self.sprung.clear();
         self.preconditioner.resize(n);
         self.pcg.resize(n);
     }
@@ -108,14 +120,14 @@ impl ImplicitEuler {
         inputs: &StepInputs<'_>,
         spring_forces: &mut Vec<Vector3<f64>>,
     ) -> StepOutcome {
-        self.predict(state, inputs);
+        self.predict(team, state, inputs);
         let inverted_pieces = self.update_operator(team, elastic, state, inputs);
         self.start_springs(inputs);
         let mut solve = PcgReport::default();
         self.delta.fill([0.0; 4]);
         self.translations.restart(inputs.parts);
         for pass in 0..SPRING_PASSES {
-            self.complete_operator(team, elastic, inputs, pass);
+            self.complete_operator(elastic, inputs);
             self.balance_parts(state, inputs);
             self.residual(team, elastic, state, inputs, pass);
             let report = self.solve(team, elastic, inputs, pass);
@@ -125,15 +137,18 @@ impl ImplicitEuler {
                 break;
             }
         }
-        let finite = solve.stop != StopReason::NonFinite && self.commit(state, inputs, spring_forces);
+        let finite = solve.stop != StopReason::NonFinite && self.commit(team, state, inputs, spring_forces);
         let refused_springs = inputs.springs.len() - self.active.len();
         StepOutcome { solve, inverted_pieces, refused_springs, finite }
     }
 
-    fn predict(&mut self, state: &State, inputs: &StepInputs<'_>) {
-        for ((predicted, x), v) in self.predicted.iter_mut().zip(&state.x).zip(&state.v) {
-            *predicted = x + inputs.h * v;
-        }
+    fn predict(&mut self, team: &mut Team, state: &State, inputs: &StepInputs<'_>) {
+        team.for_blocks(blocks(&mut self.predicted, BLOCK), |block, predicted| {
+            let known = block_of(&state.x, block).iter().zip(block_of(&state.v, block));
+            for (predicted, (x, v)) in predicted.iter_mut().zip(known) {
+                *predicted = x + inputs.h * v;
+            }
+        });
         for fixed in inputs.fixed {
             for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
                 self.predicted[fixed.copy as usize][axis] = fixed.position_m[axis];
@@ -152,18 +167,56 @@ impl ImplicitEuler {
         let (h, beta) = (inputs.h, inputs.material.rayleigh.stiffness_s);
         let scale = h * h + h * beta;
         let with = ElasticUpdate { lame: inputs.material.lame(), law: inputs.material.law, scale };
-        let (f_int, diagonal) = (&mut self.f_int, &mut self.bare_diagonal);
-        let inverted = elastic.update(team, &with, &self.predicted, f_int, diagonal);
+        let inverted = elastic.update_chunks(team, &with, &self.predicted);
+        self.sum_chunks(team, elastic, inputs);
         if beta > 0.0 {
             let moved = self.predicted.iter().zip(&state.x);
-            for (v, (predicted, x)) in self.rhs.iter_mut().zip(moved) {
+            for (v, (predicted, x)) in self.scratch.iter_mut().zip(moved) {
                 *v = padded(&((predicted - x) / h));
             }
-            elastic.apply(team, &self.rhs, &mut self.damping); // s K̂ v
+            elastic.apply(team, &self.scratch, &mut self.damping); // s K̂ v
             let factor = (beta / scale) as f32;
             self.damping.iter_mut().flatten().for_each(|v| *v *= factor); // β K̂ v
         }
         inverted
+    }
+
+    /// Internal forces and, where it changed, the diagonal of A and its inverse, without springs.
+    fn sum_chunks(&mut self, team: &mut Team, elastic: &Elastic, inputs: &StepInputs<'_>) {
+        let factor = mass_factor(inputs);
+        let made_for = Some((elastic.version(), factor));
+        let axes = |f: &FixedCopy| (f.copy, f.axes);
+        let f_int = blocks(&mut self.f_int, BLOCK);
+        if self.made_for == made_for && inputs.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied())
+        {
+            team.for_blocks(f_int, |block, f| {
+                for (i, f) in f.iter_mut().enumerate() {
+                    *f = elastic.force(block * BLOCK + i);
+                }
+            });
+            return;
+        }
+        self.made_for = made_for;
+        self.made_for_fixed.clear();
+        self.made_for_fixed.extend(inputs.fixed.iter().map(axes));
+        self.sprung.clear();
+        let inverses = blocks(self.preconditioner.inverses_mut(), BLOCK);
+        let state = (f_int, blocks(&mut self.diagonal, BLOCK), inverses);
+        let (mass, factor) = (inputs.mass_f32, factor as f32);
+        team.for_blocks(state, |block, (f, diagonal, inverses)| {
+            for (i, ((f, diagonal), inverse)) in f.iter_mut().zip(diagonal).zip(inverses).enumerate() {
+                let c = block * BLOCK + i;
+                (*f, *diagonal) = elastic.force_and_diagonal(c);
+                for k in [0, 4, 6] {
+                    diagonal[k] += factor * mass[c];
+                }
+                *inverse = invert(diagonal, [false; 3]);
+            }
+        });
+        for copy in inputs.fixed {
+            let c = copy.copy as usize;
+            self.preconditioner.set(c, &self.diagonal[c], copy.axes);
+        }
     }
 
     fn start_springs(&mut self, inputs: &StepInputs<'_>) {
@@ -176,20 +229,27 @@ impl ImplicitEuler {
         }
     }
 
-    /// Spring terms of the operator, its diagonal and the preconditioner.
-    fn complete_operator(
-        &mut self,
-        team: &mut Team,
-        elastic: &mut Elastic,
-        inputs: &StepInputs<'_>,
-        pass: usize,
-    ) {
+    /// Spring terms of the operator and of the preconditioner.
+    fn complete_operator(&mut self, elastic: &mut Elastic, inputs: &StepInputs<'_>) {
         self.terms.clear();
         self.terms.extend(self.active.iter().filter_map(|s| s.term(inputs.h * inputs.h)));
-        if pass == 0 || !self.active.is_empty() {
-            self.diagonal.copy_from_slice(&self.bare_diagonal);
-            system(elastic, &self.terms, inputs).complete_diagonal(&mut self.diagonal);
-            self.preconditioner.update(team, &self.diagonal, inputs.fixed);
+        let axes_of = |copy: u32| {
+            let found = inputs.fixed.binary_search_by_key(&copy, |f| f.copy);
+            found.map_or([false; 3], |f| inputs.fixed[f].axes)
+        };
+        for &copy in &self.sprung {
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
+        }
+        self.sprung.clear();
+        self.sprung.extend(self.terms.iter().flat_map(|term| term.copies));
+        self.bare.clear();
+        self.bare.extend(self.sprung.iter().map(|&copy| self.diagonal[copy as usize]));
+        system(elastic, &self.terms, inputs).add_springs(&mut self.diagonal);
+        for &copy in &self.sprung {
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
+        }
+        for (&copy, bare) in self.sprung.iter().zip(&self.bare) {
+            self.diagonal[copy as usize] = *bare;
         }
     }
 
@@ -225,7 +285,7 @@ impl ImplicitEuler {
         self.predicted[c] + self.translations.shift[part] + unpadded(&self.delta[c])
     }
 
-    /// r = b − A δ into the solver's residual.
+    /// r = b − A δ into the solver's residual; on the first pass also the norm of the loads.
     fn residual(
         &mut self,
         team: &mut Team,
@@ -236,28 +296,35 @@ impl ImplicitEuler {
     ) {
         let (h2, factor) = (inputs.h * inputs.h, mass_factor(inputs));
         let damped = inputs.material.rayleigh.stiffness_s > 0.0;
-        let (f_int, damping, shift) = (&self.f_int, &self.damping, &self.translations.shift);
-        team.for_blocks(blocks(&mut self.rhs, BLOCK), |block, rhs| {
-            for (i, rhs) in rhs.iter_mut().enumerate() {
+        if pass > 0 {
+            system(elastic, &[], inputs).apply(team, &self.delta, &mut self.scratch);
+        }
+        let (f_int, damping, solved) = (&self.f_int, &self.damping, &self.scratch);
+        let (M, shift) = (&self.preconditioner, &self.translations.shift);
+        let results = (blocks(&mut self.pcg.r, BLOCK), blocks(&mut self.partial, 1));
+        team.for_blocks(results, |block, (r, partial)| {
+            let mut load = Sum::default();
+            for (i, (r, M)) in r.iter_mut().zip(M.block(block)).enumerate() {
                 let c = block * BLOCK + i;
                 let mut f = external(c, state, inputs) - unpadded(&f_int[c]);
                 if damped {
                     f -= unpadded(&damping[c]);
                 }
                 let moved = shift[inputs.parts.of_copy[c] as usize];
-                *rhs = padded(&(h2 * f - factor * inputs.mass[c] * moved));
-            }
-        });
-        if pass > 0 {
-            let r = &mut self.pcg.r;
-            system(elastic, &[], inputs).apply(team, &self.delta, r);
-            for (r, rhs) in r.iter_mut().zip(&self.rhs) {
-                for k in 0..4 {
-                    r[k] = rhs[k] - r[k];
+                *r = padded(&(h2 * f - factor * inputs.mass[c] * moved));
+                if pass > 0 {
+                    for k in 0..4 {
+                        r[k] -= solved[c][k];
+                    }
+                } else {
+                    let weight = padded(&(h2 * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
+                    load.add(&weight, &M.times(&weight)); // M⁻¹ is 0 where a copy is fixed
                 }
             }
-        } else {
-            self.pcg.r.copy_from_slice(&self.rhs);
+            partial[0] = load.total();
+        });
+        if pass == 0 {
+            self.reference = LOAD_FLOOR * self.partial.iter().sum::<f64>().max(0.0).sqrt();
         }
         for spring in &self.active {
             let f = h2 * spring.force(self.point_of(spring, inputs));
@@ -269,6 +336,7 @@ impl ImplicitEuler {
         filter(inputs.fixed, &mut self.pcg.r);
     }
 
+    /// Improves δ. The residual counts against that of the first pass, or the loads, if larger.
     fn solve(
         &mut self,
         team: &mut Team,
@@ -276,25 +344,13 @@ impl ImplicitEuler {
         inputs: &StepInputs<'_>,
         pass: usize,
     ) -> PcgReport {
-        if pass == 0 {
-            self.reference = self.reference_norm(team, inputs);
-        }
         let Self { pcg, preconditioner, terms, delta, reference, .. } = self;
-        let mut A = system(elastic, terms, inputs);
-        pcg.solve(team, &mut A, preconditioner, delta, (*reference, inputs.solver))
-    }
-
-    /// Norm of the right-hand side, at least [`LOAD_FLOOR`] times that of the loads.
-    fn reference_norm(&mut self, team: &mut Team, inputs: &StepInputs<'_>) -> f64 {
-        let h2 = inputs.h * inputs.h;
-        for (c, rhs) in self.rhs.iter_mut().enumerate() {
-            *rhs = padded(&(h2 * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
+        let rz = pcg.precondition(team, preconditioner);
+        if pass == 0 {
+            *reference = reference.max(rz.max(0.0).sqrt());
         }
-        filter(inputs.fixed, &mut self.rhs);
-        let Self { pcg, preconditioner, rhs, .. } = self;
-        let load = pcg.norm(team, preconditioner, rhs);
-        rhs.copy_from_slice(&pcg.r);
-        pcg.norm(team, preconditioner, rhs).max(LOAD_FLOOR * load)
+        let mut A = system(elastic, terms, inputs);
+        pcg.run(team, &mut A, preconditioner, delta, (rz, *reference, inputs.solver))
     }
 
     fn springs_changed(&mut self, inputs: &StepInputs<'_>, pass: usize) -> bool {
@@ -312,15 +368,24 @@ impl ImplicitEuler {
     /// Writes x⁺, v⁺ and the spring forces, if all of them are finite.
     fn commit(
         &mut self,
+        team: &mut Team,
         state: &mut State,
         inputs: &StepInputs<'_>,
         spring_forces: &mut Vec<Vector3<f64>>,
     ) -> bool {
-        for c in 0..self.predicted.len() {
-            self.predicted[c] = self.position(c, inputs);
-        }
         let bound = 1e15; // m: far outside any scene, far inside the range of single precision
-        if !self.predicted.iter().all(|x| x.iter().all(|c| c.abs() < bound)) {
+        let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.parts.of_copy);
+        let results = (blocks(&mut self.predicted, BLOCK), blocks(&mut self.partial, 1));
+        team.for_blocks(results, |block, (next, partial)| {
+            let known = block_of(delta, block).iter().zip(block_of(of_part, block));
+            let mut finite = true;
+            for (next, (delta, &part)) in next.iter_mut().zip(known) {
+                *next = *next + shift[part as usize] + unpadded(delta);
+                finite &= next.iter().all(|c| c.abs() < bound);
+            }
+            partial[0] = f64::from(u8::from(finite));
+        });
+        if self.partial.contains(&0.0) {
             return false;
         }
         spring_forces.clear();
@@ -330,10 +395,14 @@ impl ImplicitEuler {
             let force = spring.map(|s| s.force(s.point(&self.predicted)));
             spring_forces.push(force.unwrap_or_else(Vector3::zeros));
         }
-        for ((x, v), next) in state.x.iter_mut().zip(&mut state.v).zip(&self.predicted) {
-            *v = (next - *x) / inputs.h;
-            *x = *next;
-        }
+        let predicted = &self.predicted;
+        let results = (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK));
+        team.for_blocks(results, |block, (x, v)| {
+            for ((x, v), next) in x.iter_mut().zip(v).zip(block_of(predicted, block)) {
+                *v = (next - *x) / inputs.h;
+                *x = *next;
+            }
+        });
         true
     }
 }

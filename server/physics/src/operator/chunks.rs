@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use crate::cut::Piece;
-use crate::element::LANES;
+use crate::element::{Ids, LANES};
 
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
 /// body of a few thousand pieces still has work for several threads.
@@ -27,7 +27,7 @@ pub struct ChunkPlan {
     /// Piece in every lane of every batch, or [`NO_PIECE`].
     pub pieces: Vec<[u32; LANES]>,
     /// Local numbers of the four copies of every lane.
-    pub nodes: Vec<[[u16; LANES]; 4]>,
+    pub nodes: Vec<[Ids; 4]>,
 }
 
 /// Region of every element, by recursive bisection of their rest centroids `centres`; also the number
@@ -71,7 +71,11 @@ pub fn plan_chunk(chunk: &[u32], pieces: &[Piece]) -> ChunkPlan {
     let mut copies: Vec<u32> = chunk.iter().flat_map(|&p| pieces[p as usize].copies).collect();
     copies.sort_unstable();
     copies.dedup();
-    let batches = pack(chunk, pieces);
+    let held: Vec<[u32; 4]> = chunk.iter().map(|&p| pieces[p as usize].copies).collect();
+    let mut batches = pack(&held);
+    for lane in batches.iter_mut().flatten().filter(|lane| **lane != NO_PIECE) {
+        *lane = chunk[*lane as usize];
+    }
     let waste = copies.len() as u16;
     let local = |copy: u32| copies.binary_search(&copy).map_or(waste, |l| l as u16);
     let nodes = batches
@@ -91,24 +95,24 @@ pub fn plan_chunk(chunk: &[u32], pieces: &[Piece]) -> ChunkPlan {
     ChunkPlan { nodes, pieces: batches, copies }
 }
 
-/// First-fit packing into batches without a common copy, over a short list of open batches. What is
-/// left at the end is packed without regard to copies: lanes are summed one after the other.
-fn pack(chunk: &[u32], pieces: &[Piece]) -> Vec<[u32; LANES]> {
-    let mut full = Vec::with_capacity(chunk.len() / LANES + OPEN_BATCHES);
+/// First-fit packing of `items` into batches without a common copy, over a short list of open
+/// batches; lanes hold item numbers. What is left at the end is packed without regard to copies:
+/// lanes are summed one after the other.
+pub fn pack<const N: usize>(items: &[[u32; N]]) -> Vec<[u32; LANES]> {
+    let mut full = Vec::with_capacity(items.len() / LANES + OPEN_BATCHES);
     let mut open: Vec<Vec<u32>> = Vec::with_capacity(OPEN_BATCHES);
     fn close(batch: &[u32]) -> [u32; LANES] {
         let mut lanes = [NO_PIECE; LANES];
         lanes[..batch.len()].copy_from_slice(batch);
         lanes
     }
-    for &p in chunk {
-        let copies = &pieces[p as usize].copies;
+    for (p, copies) in items.iter().enumerate() {
         let fits = |batch: &Vec<u32>| {
-            batch.iter().all(|&other| pieces[other as usize].copies.iter().all(|c| !copies.contains(c)))
+            batch.iter().all(|&other| items[other as usize].iter().all(|c| !copies.contains(c)))
         };
         match open.iter().position(fits) {
             Some(b) => {
-                open[b].push(p);
+                open[b].push(p as u32);
                 if open[b].len() == LANES {
                     full.push(close(&open.remove(b)));
                 }
@@ -117,7 +121,7 @@ fn pack(chunk: &[u32], pieces: &[Piece]) -> Vec<[u32; LANES]> {
                 if open.len() == OPEN_BATCHES {
                     full.push(close(&open.remove(0)));
                 }
-                open.push(vec![p]);
+                open.push(vec![p as u32]);
             }
         }
     }

@@ -1,12 +1,13 @@
-//! K̂, the stiffness of all pieces with rotated gradients, never assembled.
+//! K̂, the stiffness of all pieces: by the tets with rotated gradients, or assembled.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::chunks::{Gather, NO_PIECE, plan_chunk, region_of_elements};
+use super::edges::EdgeBlocks;
 use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
-use super::{BLOCK, LinearOperator, Padded};
+use super::{BLOCK, LinearOperator, Padded, padded};
 use crate::cut::Piece;
 use crate::element::{LANES, Lanes, Simd};
 use crate::material::{Lame, Law};
@@ -16,7 +17,20 @@ use crate::team::{Team, blocks};
 /// Most pieces of one chunk: four copies each must leave room in 16-bit local numbers.
 const MOST_PIECES: usize = 8192;
 
-/// s K̂ of a body, matrix-free; also its internal forces and the diagonal blocks of s K̂.
+/// How K̂ is applied.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OperatorChoice {
+    /// Assembled where the stiffness stays the same from step to step (the linear law), by the tets
+    /// where it turns with the material.
+    #[default]
+    Auto,
+    /// By the tets: 44 bytes and 130 operations per tet, nothing to assemble.
+    MatrixFree,
+    /// Assembled: 40 bytes and 36 operations per pair of neighbours (1.2 to 1.6 per tet).
+    Assembled,
+}
+
+/// s K̂ of a body; also its internal forces and the diagonal blocks of s K̂.
 #[derive(Debug)]
 pub struct Elastic {
     simd: Simd,
@@ -27,6 +41,11 @@ pub struct Elastic {
     /// Ordered by region; a region has more than one only after very many cuts.
     chunks: Vec<Chunk>,
     gather: Gather,
+    choice: OperatorChoice,
+    /// What the chunks' stiffness was last made with, and whether it was assembled.
+    made_with: Option<(Coefficients, bool)>,
+    /// Counts the changes of the stiffness.
+    version: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -39,6 +58,10 @@ struct Chunk {
     x: Vec<Padded>,
     y: Vec<Padded>,
     blocks: Vec<Block6>,
+    /// Rest positions [m], for laws without rotation.
+    rest: Vec<Vector3<f64>>,
+    /// The assembled stiffness, where that is in use.
+    edges: Option<EdgeBlocks>,
     inverted: usize,
 }
 
@@ -66,6 +89,9 @@ impl Elastic {
             n_regions,
             chunks: Vec::new(),
             gather: Gather::default(),
+            choice: OperatorChoice::Auto,
+            made_with: None,
+            version: 0,
         };
         elastic.follow(mesh, &[], pieces, n_copies);
         elastic
@@ -92,6 +118,29 @@ impl Elastic {
         self.chunks.sort_by_key(|chunk| chunk.region);
         self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
         self.n_pieces = pieces.len();
+        self.made_with = None;
+    }
+
+    /// Chooses how K̂ is applied from the next update on. The choices differ in the last bits.
+    pub fn set_choice(&mut self, choice: OperatorChoice) {
+        self.choice = choice;
+    }
+
+    /// Rises with every change of the stiffness: the diagonal blocks of an update are the same as
+    /// those of an earlier one with the same version.
+    pub fn version(&self) -> u64 {
+        self.version
+    }
+
+    /// Whether K̂ was assembled at the last update.
+    pub fn assembled(&self) -> bool {
+        self.made_with.is_some_and(|(_, assembled)| assembled)
+    }
+
+    /// Bytes of stiffness that one application streams.
+    pub fn bytes(&self) -> usize {
+        let bytes = |c: &Chunk| c.edges.as_ref().map_or_else(|| c.batches.bytes(), EdgeBlocks::bytes);
+        self.chunks.iter().map(bytes).sum()
     }
 
     /// Recomputes rotations, rotated gradients, forces and diagonal blocks at `positions` [m] (one
@@ -104,34 +153,90 @@ impl Elastic {
         f_int: &mut [Padded],
         diagonal: &mut [Block6],
     ) -> usize {
-        let (simd, c) = (self.simd, coefficients(with));
-        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].update(simd, &c, positions));
-        let (chunks, gather) = (&self.chunks, &self.gather);
+        let inverted = self.update_chunks(team, with, positions);
+        let elastic = &*self;
         team.for_blocks((blocks(f_int, BLOCK), blocks(diagonal, BLOCK)), |block, (f, diagonal)| {
             for (i, (f, diagonal)) in f.iter_mut().zip(diagonal).enumerate() {
-                (*f, *diagonal) = ([0.0; 4], [0.0; 8]);
-                for &(k, l) in gather.of(block * BLOCK + i) {
-                    let chunk = &chunks[k as usize];
-                    add(f, &chunk.y[l as usize]);
-                    for (sum, part) in diagonal.iter_mut().zip(&chunk.blocks[l as usize]) {
-                        *sum += part;
-                    }
-                }
+                (*f, *diagonal) = elastic.force_and_diagonal(block * BLOCK + i);
             }
         });
+        inverted
+    }
+
+    /// First half of an update: every chunk's own sums. Without rotations the stiffness changes only
+    /// if `with` or the pieces do, and what is left to do is one application.
+    pub(crate) fn update_chunks(
+        &mut self,
+        team: &mut Team,
+        with: &ElasticUpdate,
+        positions: &[Vector3<f64>],
+    ) -> usize {
+        let (simd, c) = (self.simd, coefficients(with));
+        let assembled = match self.choice {
+            OperatorChoice::Auto => !c.rotates,
+            OperatorChoice::MatrixFree => false,
+            OperatorChoice::Assembled => true,
+        };
+        if c.rotates || self.made_with != Some((c, assembled)) {
+            self.version += 1;
+            self.made_with = Some((c, assembled));
+            team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
+                chunk[0].update(simd, &c, positions);
+                chunk[0].assemble(assembled);
+            });
+        }
+        if !c.rotates {
+            team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
+                chunk[0].linear_forces(simd, c.scale, positions);
+            });
+        }
         self.chunks.iter().map(|chunk| chunk.inverted).sum()
+    }
+
+    /// Second half: internal force [N] on copy `c`.
+    #[inline(always)]
+    pub(crate) fn force(&self, c: usize) -> Padded {
+        let mut f = [0.0; 4];
+        self.add_sums(c, &mut f);
+        f
+    }
+
+    /// Second half: internal force [N] on copy `c` and its diagonal block of s K̂.
+    #[inline(always)]
+    pub(crate) fn force_and_diagonal(&self, c: usize) -> (Padded, Block6) {
+        let (mut f, mut diagonal) = ([0.0; 4], [0.0; 8]);
+        for &(k, l) in self.gather.of(c) {
+            let chunk = &self.chunks[k as usize];
+            add(&mut f, &chunk.y[l as usize]);
+            let part = &chunk.blocks[l as usize];
+            for i in 0..8 {
+                diagonal[i] += part[i];
+            }
+        }
+        (f, diagonal)
     }
 
     /// First half of an application: every chunk's own sums of s K̂ x.
     pub(super) fn apply_chunks(&mut self, team: &mut Team, x: &[Padded]) {
         let simd = self.simd;
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
-            let Chunk { copies, batches, x: local, y, .. } = &mut chunk[0];
+            let Chunk { copies, x: local, .. } = &mut chunk[0];
             for (local, &copy) in local.iter_mut().zip(copies.iter()) {
                 *local = x[copy as usize];
             }
-            y.fill([0.0; 4]);
-            batches.apply(simd, local, y);
+            chunk[0].apply(simd);
+        });
+    }
+
+    /// The same with x ← z + β x, where x is that of the last application (nothing if β = 0).
+    pub(super) fn apply_chunks_to_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
+        let simd = self.simd;
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
+            let Chunk { copies, x: local, .. } = &mut chunk[0];
+            for (local, &copy) in local.iter_mut().zip(copies.iter()) {
+                direction(local, &z[copy as usize], beta);
+            }
+            chunk[0].apply(simd);
         });
     }
 
@@ -190,12 +295,52 @@ impl Chunk {
             region,
             batches: Batches::new(&plan.nodes, rest, n),
             pieces: plan.pieces,
+            rest: rest_positions(&plan.copies, members, mesh, pieces),
+            edges: None,
             copies: plan.copies,
             positions: vec![[0.0; 4]; n],
             x: vec![[0.0; 4]; n],
             y: vec![[0.0; 4]; n],
             blocks: vec![[0.0; 8]; n],
             inverted: 0,
+        }
+    }
+
+    /// Assembles the stiffness of the last update, or forgets what was assembled before.
+    fn assemble(&mut self, wanted: bool) {
+        let waste = self.copies.len() as u16;
+        if wanted {
+            let Self { edges, batches, .. } = self;
+            edges.get_or_insert_with(|| EdgeBlocks::new(&batches.nodes(), waste)).assemble(batches);
+        } else {
+            self.edges = None;
+        }
+    }
+
+    /// y = s K̂ x.
+    #[inline(always)]
+    fn apply(&mut self, simd: Simd) {
+        self.y.fill([0.0; 4]);
+        match &self.edges {
+            Some(edges) => edges.apply(simd, &self.x, &mut self.y),
+            None => self.batches.apply(simd, &self.x, &mut self.y),
+        }
+    }
+
+    /// y = K̂ u with displacements u relative to the chunk's first copy, subtracted in double
+    /// precision: the error is relative to the chunk, not to how far the body has moved.
+    fn linear_forces(&mut self, simd: Simd, scale: f32, positions: &[Vector3<f64>]) {
+        let displacement = |copy: u32, rest: &Vector3<f64>| positions[copy as usize] - rest;
+        let held = self.copies.iter().zip(&self.rest);
+        let origin =
+            held.clone().next().map_or_else(Vector3::zeros, |(&copy, rest)| displacement(copy, rest));
+        for (local, (&copy, rest)) in self.x.iter_mut().zip(held) {
+            *local = padded(&(displacement(copy, rest) - origin));
+        }
+        self.apply(simd);
+        let factor = 1.0 / scale;
+        for f in self.y.iter_mut().flatten() {
+            *f *= factor;
         }
     }
 
@@ -209,6 +354,12 @@ impl Chunk {
         let mut locals = Locals { x: &self.positions, f: &mut self.y, blocks: &mut self.blocks };
         self.inverted = self.batches.update(simd, c, &mut locals);
     }
+}
+
+/// x ← z + β x, also where x is not finite and β = 0.
+#[inline(always)]
+pub(super) fn direction(x: &mut Padded, z: &Padded, beta: f32) {
+    *x = if beta == 0.0 { *z } else { std::array::from_fn(|i| z[i] + beta * x[i]) };
 }
 
 #[inline(always)]
@@ -230,6 +381,19 @@ fn inherited(known: &[Matrix3<f32>], before: &[Piece], pieces: &[Piece]) -> Vec<
     }
     let new = |piece: &Piece| first.get(&piece.element).copied().unwrap_or_else(Matrix3::identity);
     known.iter().copied().take(before.len()).chain(pieces.iter().skip(before.len()).map(new)).collect()
+}
+
+/// Rest position of each of `copies` (ascending), all of which belong to pieces in `members`.
+fn rest_positions(copies: &[u32], members: &[u32], mesh: &TetMesh, pieces: &[Piece]) -> Vec<Vector3<f64>> {
+    let mut rest = vec![Vector3::zeros(); copies.len()];
+    for piece in members.iter().map(|&p| &pieces[p as usize]) {
+        for (copy, &node) in piece.copies.iter().zip(&mesh.tets[piece.element as usize]) {
+            if let Ok(local) = copies.binary_search(copy) {
+                rest[local] = mesh.nodes[node as usize];
+            }
+        }
+    }
+    rest
 }
 
 fn coefficients(with: &ElasticUpdate) -> Coefficients {

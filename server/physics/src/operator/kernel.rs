@@ -40,7 +40,7 @@ pub struct RestBatch {
 pub type Block6 = [f32; 8];
 
 /// Constants of one update.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coefficients {
     /// μ [Pa].
     pub mu: f32,
@@ -81,6 +81,29 @@ impl Batches {
         let zero = Lanes::default();
         let live = nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes });
         Self { live: live.collect(), rest, ratio: 0.0, n_locals }
+    }
+
+    /// λ/2μ at the last update.
+    pub fn ratio(&self) -> f32 {
+        self.ratio
+    }
+
+    /// Gradients √(2μ w V s) R g_a and local numbers of the four corners of one lane.
+    pub fn gradients(&self, batch: usize, lane: usize) -> ([[f32; 3]; 4], [u16; 4]) {
+        let b = &self.live[batch];
+        let g: [[f32; 3]; 3] = [0, 1, 2].map(|k| [0, 1, 2].map(|i| b.g[k][i].0[lane]));
+        let g0 = [0, 1, 2].map(|i| -(g[0][i] + g[1][i] + g[2][i]));
+        ([g0, g[0], g[1], g[2]], [0, 1, 2, 3].map(|a| b.nodes[a][lane]))
+    }
+
+    /// Local numbers of all batches.
+    pub fn nodes(&self) -> Vec<[Ids; 4]> {
+        self.live.iter().map(|b| b.nodes).collect()
+    }
+
+    /// Bytes that one application streams.
+    pub fn bytes(&self) -> usize {
+        self.live.len() * size_of::<Batch>()
     }
 
     /// Rest states and rotations.

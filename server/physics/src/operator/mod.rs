@@ -3,15 +3,16 @@
 mod chunks;
 mod elastic;
 mod kernel;
+mod edges;
 mod preconditioner;
 mod system;
 
-pub use elastic::{Elastic, ElasticUpdate};
+pub use elastic::{Elastic, ElasticUpdate, OperatorChoice};
 pub use kernel::Block6;
-pub use preconditioner::{BlockJacobi, Inverse3};
+pub use preconditioner::{BlockJacobi, Inverse3, invert};
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 
-use crate::team::Team;
+use crate::team::{Team, blocks};
 
 /// A vector of three components with an unused fourth (always 0), so that one copy is one register.
 pub type Padded = [f32; 4];
@@ -23,6 +24,64 @@ pub const BLOCK: usize = 256;
 pub trait LinearOperator {
     /// y = A x. Both slices have one entry per copy.
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]);
+
+    /// p ← z + β p (z if β = 0), q = A p, and pᵀq: what a conjugate-gradient iteration does with A.
+    ///
+    /// From β = 0 on, `p` must be the p of the call before: an operator may keep it. `partial` is
+    /// scratch with one entry per [`BLOCK`].
+    fn advance(&mut self, team: &mut Team, beta: f32, z: &[Padded], out: Advance<'_>) -> f64 {
+        let Advance { p, q, partial } = out;
+        team.for_blocks(blocks(p, BLOCK), |block, p| {
+            for (p, z) in p.iter_mut().zip(block_of(z, block)) {
+                elastic::direction(p, z, beta);
+            }
+        });
+        self.apply(team, p, q);
+        team.for_blocks(blocks(partial, 1), |block, partial| {
+            let mut sum = Sum::default();
+            for (p, q) in block_of(p, block).iter().zip(block_of(q, block)) {
+                sum.add(p, q);
+            }
+            partial[0] = sum.total();
+        });
+        partial.iter().sum()
+    }
+}
+
+/// What [`LinearOperator::advance`] writes.
+#[derive(Debug)]
+pub struct Advance<'a> {
+    /// The direction p.
+    pub p: &'a mut [Padded],
+    /// q = A p.
+    pub q: &'a mut [Padded],
+    /// Partial sums of pᵀq.
+    pub partial: &'a mut [f64],
+}
+
+/// Block number `block` of a vector.
+#[inline(always)]
+pub fn block_of<T>(v: &[T], block: usize) -> &[T] {
+    &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]
+}
+
+/// A scalar product in the making: single-precision products, double-precision sums.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sum([f64; 4]);
+
+impl Sum {
+    /// Adds x·y.
+    #[inline(always)]
+    pub fn add(&mut self, x: &Padded, y: &Padded) {
+        for k in 0..4 {
+            self.0[k] += f64::from(x[k] * y[k]);
+        }
+    }
+
+    /// The sum.
+    pub fn total(&self) -> f64 {
+        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
+    }
 }
 
 /// x, y, z of a double-precision vector, rounded.

@@ -33,6 +33,16 @@ impl BlockJacobi {
         self.inverse.resize(n, Inverse3::default());
     }
 
+    /// The inverses, to be written block by block with [`invert`] and [`Self::set`].
+    pub fn inverses_mut(&mut self) -> &mut [Inverse3] {
+        &mut self.inverse
+    }
+
+    /// Inverts the block `diagonal` of one copy; in the directions `fixed` the inverse is 0.
+    pub fn set(&mut self, copy: usize, diagonal: &Block6, fixed: [bool; 3]) {
+        self.inverse[copy] = invert(diagonal, fixed);
+    }
+
     /// Inverts `diagonal`; in the fixed directions of `fixed` the inverse is 0.
     pub fn update(&mut self, team: &mut Team, diagonal: &[Block6], fixed: &[FixedCopy]) {
         team.for_blocks(blocks(&mut self.inverse, BLOCK), |block, inverse| {
@@ -58,7 +68,7 @@ const LEAST_TRACE: f64 = 1e-34;
 /// Inverse of a symmetric block by cofactors, scaled by its trace so that pieces of any size stay
 /// within single precision; a copy without mass and stiffness does not move.
 #[inline]
-fn invert(block: &Block6, fixed: [bool; 3]) -> Inverse3 {
+pub fn invert(block: &Block6, fixed: [bool; 3]) -> Inverse3 {
     let [xx, xy, xz, _, yy, yz, zz, _] = block.map(f64::from);
     let trace = xx + yy + zz;
     if !(trace > LEAST_TRACE && trace.is_finite()) {

@@ -1,7 +1,8 @@
 //! The matrix of one implicit step: A = (1 + hα) M + (h² + hβ) K̂ + h² Σ k J Jᵀ, with fixed copies
 //! filtered out.
 
-use super::{BLOCK, Block6, Elastic, LinearOperator, Padded};
+use super::elastic::direction;
+use super::{Advance, BLOCK, Block6, Elastic, LinearOperator, Padded, Sum, block_of};
 use crate::team::{Team, blocks};
 
 /// A copy whose displacement is prescribed in some directions.
@@ -57,16 +58,33 @@ impl LinearOperator for SystemOperator<'_> {
         self.springs.iter().for_each(|spring| spring.add_to(x, y));
         filter(self.fixed, y);
     }
+
+    fn advance(&mut self, team: &mut Team, beta: f32, z: &[Padded], out: Advance<'_>) -> f64 {
+        let Advance { p, q, partial } = out;
+        self.elastic.apply_chunks_to_direction(team, z, beta);
+        let (elastic, mass, factor) = (&*self.elastic, self.mass, self.mass_factor);
+        let state = (blocks(p, BLOCK), blocks(q, BLOCK), blocks(partial, 1));
+        team.for_blocks(state, |block, (p, q, partial)| {
+            let mut sum = Sum::default();
+            let known = block_of(z, block).iter().zip(block_of(mass, block));
+            for (i, ((p, q), (z, &mass))) in p.iter_mut().zip(q).zip(known).enumerate() {
+                direction(p, z, beta);
+                *q = p.map(|v| factor * mass * v);
+                elastic.add_sums(block * BLOCK + i, q);
+                sum.add(p, q);
+            }
+            partial[0] = sum.total();
+        });
+        let springs: f64 = self.springs.iter().map(|spring| spring.curvature(p)).sum();
+        self.springs.iter().for_each(|spring| spring.add_to(p, q));
+        filter(self.fixed, q); // p is 0 there
+        partial.iter().sum::<f64>() + springs
+    }
 }
 
 impl SystemOperator<'_> {
-    /// Adds mass and springs to the diagonal blocks of (h² + hβ) K̂, which gives those of A.
-    pub fn complete_diagonal(&self, diagonal: &mut [Block6]) {
-        for (block, &mass) in diagonal.iter_mut().zip(self.mass) {
-            for i in [0, 4, 6] {
-                block[i] += self.mass_factor * mass;
-            }
-        }
+    /// Adds the springs to the diagonal blocks of (1 + hα) M + (h² + hβ) K̂, which gives those of A.
+    pub fn add_springs(&self, diagonal: &mut [Block6]) {
         for spring in self.springs {
             let n = |i: usize, j: usize| match spring.direction {
                 Some(n) => n[i] * n[j],
@@ -94,6 +112,16 @@ impl Spring {
             }
         }
         p
+    }
+
+    /// k (n·p)² or k |p|² of the point's displacement p.
+    fn curvature(&self, x: &[Padded]) -> f64 {
+        let p = self.point(x).map(f64::from);
+        let squared = match self.direction {
+            Some(n) => (0..3).map(|i| f64::from(n[i]) * p[i]).sum::<f64>().powi(2),
+            None => p.iter().map(|p| p * p).sum(),
+        };
+        f64::from(self.stiffness) * squared
     }
 
     fn add_to(&self, x: &[Padded], y: &mut [Padded]) {

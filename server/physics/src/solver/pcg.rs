@@ -5,7 +5,7 @@
 
 use super::algebraic_error::AlgebraicError;
 use super::report::StopReason;
-use crate::operator::{BLOCK, BlockJacobi, LinearOperator, Padded};
+use crate::operator::{Advance, BLOCK, BlockJacobi, LinearOperator, Padded, Sum, block_of};
 use crate::team::{Team, blocks};
 
 /// When to stop.
@@ -64,11 +64,22 @@ impl Pcg {
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
     ) -> PcgReport {
+        let start = self.precondition(team, M);
+        self.run(team, A, M, x, (start, reference, settings))
+    }
+
+    /// The same where [`Self::precondition`] has just returned `rz`.
+    pub fn run(
+        &mut self,
+        team: &mut Team,
+        A: &mut impl LinearOperator,
+        M: &BlockJacobi,
+        x: &mut [Padded],
+        (mut rz, reference, settings): (f64, f64, PcgSettings),
+    ) -> PcgReport {
         let target = settings.tolerance * reference;
         let mut report = PcgReport::default();
         let mut error = AlgebraicError::default();
-        self.p.fill([0.0; 4]);
-        let mut rz = self.precondition(team, M);
         let mut beta = 0.0;
         loop {
             // rᵀM⁻¹r is not negative: M⁻¹ is positive semidefinite.
@@ -84,9 +95,9 @@ impl Pcg {
             if report.stop != StopReason::IterationLimit || report.iterations == settings.iterations {
                 return report;
             }
-            self.advance_direction(team, beta); //       p ← z + β p
-            A.apply(team, &self.p, &mut self.q); //      q = A p
-            let curvature = self.dot_pq(team); //        pᵀA p
+            // p ← z + β p, q = A p, pᵀA p
+            let out = Advance { p: &mut self.p, q: &mut self.q, partial: &mut self.partial };
+            let curvature = A.advance(team, beta as f32, &self.z, out);
             if !curvature.is_finite() {
                 report.stop = StopReason::NonFinite;
                 return report;
@@ -117,7 +128,8 @@ impl Pcg {
         self.partial.iter().sum::<f64>().max(0.0).sqrt()
     }
 
-    fn precondition(&mut self, team: &mut Team, M: &BlockJacobi) -> f64 {
+    /// z = M⁻¹ r; returns rᵀz.
+    pub fn precondition(&mut self, team: &mut Team, M: &BlockJacobi) -> f64 {
         let r = &self.r;
         let state = (blocks(&mut self.z, BLOCK), blocks(&mut self.partial, 1));
         team.for_blocks(state, |block, (z, partial)| {
@@ -125,27 +137,6 @@ impl Pcg {
             for ((z, r), M) in z.iter_mut().zip(block_of(r, block)).zip(M.block(block)) {
                 *z = M.times(r);
                 sum.add(r, z);
-            }
-            partial[0] = sum.total();
-        });
-        self.partial.iter().sum()
-    }
-
-    fn advance_direction(&mut self, team: &mut Team, beta: f64) {
-        let (z, beta) = (&self.z, beta as f32);
-        team.for_blocks(blocks(&mut self.p, BLOCK), |block, p| {
-            for (p, z) in p.iter_mut().zip(block_of(z, block)) {
-                *p = std::array::from_fn(|i| z[i] + beta * p[i]);
-            }
-        });
-    }
-
-    fn dot_pq(&mut self, team: &mut Team) -> f64 {
-        let (p, q) = (&self.p, &self.q);
-        team.for_blocks(blocks(&mut self.partial, 1), |block, partial| {
-            let mut sum = Sum::default();
-            for (p, q) in block_of(p, block).iter().zip(block_of(q, block)) {
-                sum.add(p, q);
             }
             partial[0] = sum.total();
         });
@@ -173,27 +164,6 @@ impl Pcg {
             partial[0] = sum.total();
         });
         self.partial.iter().sum()
-    }
-}
-
-/// Block number `block` of a vector.
-#[inline(always)]
-fn block_of(v: &[Padded], block: usize) -> &[Padded] {
-    &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]
-}
-
-/// A scalar product in the making: single-precision products, double-precision sums.
-#[derive(Clone, Copy, Default)]
-struct Sum([f64; 4]);
-
-impl Sum {
-    #[inline(always)]
-    fn add(&mut self, x: &Padded, y: &Padded) {
-        self.0 = std::array::from_fn(|k| self.0[k] + f64::from(x[k] * y[k]));
-    }
-
-    fn total(&self) -> f64 {
-        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
     }
 }
 

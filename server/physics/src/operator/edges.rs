@@ -1,0 +1,168 @@
+//! The assembled stiffness of one chunk: one 3×3 block per pair of neighbouring copies.
+//!
+//! K̂ is symmetric and its rows add up to nothing (a translation strains nothing), so the blocks
+//! above the diagonal say everything: (K̂ u)_a = Σ_b K_ab (u_b − u_a). That is half the memory of
+//! block CSR, 40 bytes per pair, and about twice as fast as the tets themselves; but it has to be
+//! assembled, which only pays where the stiffness stays, that is for the linear law.
+
+#![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
+
+use super::Padded;
+use super::chunks::{NO_PIECE, pack};
+use super::kernel::Batches;
+use crate::element::{Ids, LANES, Lanes, Simd, Vector8};
+
+/// Pairs of corners of a tet.
+const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// Eight pairs of copies.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+struct EdgeBatch {
+    /// s K_ab, row by row [kg in a step].
+    block: [[Lanes; 3]; 3],
+    /// Local numbers of a and b, a < b.
+    nodes: [Ids; 2],
+}
+
+/// s K̂ of one chunk, assembled. Local numbers are below those of the [`Batches`] it is made from.
+#[derive(Clone, Debug)]
+pub struct EdgeBlocks {
+    batches: Vec<EdgeBatch>,
+    /// For every batch of tets, pair of corners and lane: 8 · batch + lane of the pair here, or
+    /// [`NO_PIECE`].
+    slots: Vec<[[u32; LANES]; 6]>,
+    n_locals: usize,
+}
+
+impl EdgeBlocks {
+    /// The pairs of the tets `nodes`, whose unused lanes hold `waste` (the last local number) only.
+    pub fn new(nodes: &[[Ids; 4]], waste: u16) -> Self {
+        let pair_of = |ids: &[Ids; 4], [i, j]: [usize; 2], lane: usize| {
+            let (a, b) = (ids[i][lane], ids[j][lane]);
+            [u32::from(a.min(b)), u32::from(a.max(b))]
+        };
+        let lanes = || (0..LANES).flat_map(|lane| PAIRS.map(|pair| (lane, pair)));
+        let mut pairs: Vec<[u32; 2]> = nodes
+            .iter()
+            .flat_map(|ids| lanes().map(move |(lane, pair)| pair_of(ids, pair, lane)))
+            .filter(|[a, b]| a != b)
+            .collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut slot_of_pair = vec![NO_PIECE; pairs.len()];
+        let mut batches = Vec::new();
+        for (k, batch) in pack(&pairs).iter().enumerate() {
+            let mut ids = [[waste; LANES]; 2];
+            for (lane, &pair) in batch.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
+                slot_of_pair[pair as usize] = (LANES * k + lane) as u32;
+                for end in 0..2 {
+                    ids[end][lane] = pairs[pair as usize][end] as u16;
+                }
+            }
+            batches.push(EdgeBatch { block: [[Lanes::default(); 3]; 3], nodes: ids });
+        }
+        let slots = nodes
+            .iter()
+            .map(|ids| {
+                let mut slots = [[NO_PIECE; LANES]; 6];
+                for (slots, pair) in slots.iter_mut().zip(PAIRS) {
+                    for (lane, slot) in slots.iter_mut().enumerate() {
+                        let found = pairs.binary_search(&pair_of(ids, pair, lane));
+                        *slot = found.map_or(NO_PIECE, |p| slot_of_pair[p]);
+                    }
+                }
+                slots
+            })
+            .collect();
+        Self { batches, slots, n_locals: waste as usize + 1 }
+    }
+
+    /// Sums the blocks of the tets as they are in `tets`: with the gradients g′ of the kernel,
+    /// K_ab = ½ (g′_a·g′_b I + g′_b g′_aᵀ) + λ/2μ g′_a g′_bᵀ.
+    pub fn assemble(&mut self, tets: &Batches) {
+        for batch in &mut self.batches {
+            batch.block = [[Lanes::default(); 3]; 3];
+        }
+        for (t, slots) in self.slots.iter().enumerate() {
+            for lane in 0..LANES {
+                let (g, ids) = tets.gradients(t, lane);
+                for (slots, [i, j]) in slots.iter().zip(PAIRS) {
+                    if slots[lane] == NO_PIECE {
+                        continue;
+                    }
+                    let (a, b) = if ids[i] < ids[j] { (&g[i], &g[j]) } else { (&g[j], &g[i]) };
+                    let half_dot = 0.5 * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+                    let slot = slots[lane] as usize;
+                    let block = &mut self.batches[slot / LANES].block;
+                    for r in 0..3 {
+                        for s in 0..3 {
+                            let entry = &mut block[r][s].0[slot % LANES];
+                            *entry += 0.5 * b[r] * a[s] + tets.ratio() * a[r] * b[s];
+                            *entry += if r == s { half_dot } else { 0.0 };
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// y += s K̂ x. `x` and `y` have one entry per local number and the waste bin.
+    pub fn apply(&self, simd: Simd, x: &[Padded], y: &mut [Padded]) {
+        assert!(x.len() == self.n_locals && y.len() == self.n_locals);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
+            Simd::Avx2 => unsafe { avx2::apply(&self.batches, x, y) },
+            _ => apply_with::<Lanes>(&self.batches, x, y),
+        }
+    }
+
+    /// Bytes that one application streams.
+    pub fn bytes(&self) -> usize {
+        self.batches.len() * size_of::<EdgeBatch>()
+    }
+}
+
+// Loops instead of closures: see `Vector8`.
+#[inline(always)]
+fn apply_with<V: Vector8>(batches: &[EdgeBatch], x: &[Padded], y: &mut [Padded]) {
+    for batch in batches {
+        // SAFETY: local numbers are below the length of local vectors: they are those of tets.
+        let (mut d, from) = unsafe { (V::gather(x, &batch.nodes[1]), V::gather(x, &batch.nodes[0])) };
+        for i in 0..3 {
+            d[i] = d[i] - from[i];
+        }
+        let (mut f, mut back) = (d, d);
+        for i in 0..3 {
+            let [k0, k1, k2] = &batch.block[i];
+            let (k0, k1, k2) = (V::load(k0), V::load(k1), V::load(k2));
+            f[i] = k0.mul_add(d[0], k1.mul_add(d[1], k2 * d[2]));
+            if i == 0 {
+                let minus = -d[0];
+                back = [k0 * minus, k1 * minus, k2 * minus];
+            } else {
+                let minus = -d[i];
+                back = [k0.mul_add(minus, back[0]), k1.mul_add(minus, back[1]), k2.mul_add(minus, back[2])];
+            }
+        }
+        // SAFETY: as above.
+        unsafe {
+            V::scatter(y, &batch.nodes[0], f);
+            V::scatter(y, &batch.nodes[1], back);
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    //! The same loop compiled for AVX2 and FMA.
+
+    use super::{EdgeBatch, Padded};
+    use crate::element::avx2::Register;
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn apply(batches: &[EdgeBatch], x: &[Padded], y: &mut [Padded]) {
+        super::apply_with::<Register>(batches, x, y);
+    }
+}
