@@ -1,0 +1,114 @@
+//! What the machine could do at best: memory bandwidth by working set, and multiply-adds.
+
+use std::time::Instant;
+
+use scindo_physics::element::Simd;
+use scindo_physics::team::{Team, blocks};
+
+/// Measured limits of this machine for one number of threads.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine {
+    /// Triad a = b + s c [byte/s] with all three arrays in the second-level cache, in the
+    /// third-level cache, and in memory.
+    pub bandwidth: [f64; 3],
+    /// Multiply-adds in registers [flop/s].
+    pub flops: f64,
+}
+
+/// Bytes of the three arrays together that stand for each level.
+const WORKING_SETS: [usize; 3] = [384 << 10, 8 << 20, 192 << 20];
+/// Working sets up to these sizes [byte] count as within the second and third level.
+const LEVELS: [usize; 2] = [512 << 10, 16 << 20];
+pub const LEVEL_NAMES: [&str; 3] = ["L2", "L3", "DRAM"];
+
+impl Machine {
+    /// Best of several runs with `threads` threads.
+    pub fn measure(threads: usize, quick: bool) -> Self {
+        let mut team = Team::new(threads).unwrap();
+        let bandwidth = WORKING_SETS.map(|bytes| triad(&mut team, bytes, if quick { 3 } else { 25 }));
+        Self { bandwidth, flops: multiply_adds(&mut team, if quick { 3 } else { 25 }) }
+    }
+
+    /// Level that holds `bytes`, as an index.
+    pub fn level(bytes: usize, threads: usize) -> usize {
+        LEVELS
+            .iter()
+            .enumerate()
+            .filter(|(l, size)| bytes > *size * if *l == 0 { threads } else { 1 })
+            .count()
+    }
+
+    /// The least time [s] for `bytes` from a working set of `working_set` bytes and `flops`.
+    pub fn roof(&self, bytes: f64, working_set: usize, flops: f64, threads: usize) -> f64 {
+        (bytes / self.bandwidth[Self::level(working_set, threads)]).max(flops / self.flops)
+    }
+}
+
+/// Bytes per second of a ← b + s c (two reads and one write counted).
+fn triad(team: &mut Team, bytes: usize, runs: usize) -> f64 {
+    let n = bytes / 12;
+    let (mut a, b, c) = (vec![0.0_f32; n], vec![1.0_f32; n], vec![2.0_f32; n]);
+    let (piece, repeats) = (8192, (64 << 20) / bytes + 1);
+    let mut best = f64::INFINITY;
+    for _ in 0..runs {
+        let start = Instant::now();
+        for k in 0..repeats {
+            let s = 0.5 + k as f32;
+            team.for_blocks(blocks(&mut a, piece), |block, a| {
+                let (b, c) = (&b[block * piece..][..a.len()], &c[block * piece..][..a.len()]);
+                for ((a, b), c) in a.iter_mut().zip(b).zip(c) {
+                    *a = b + s * c;
+                }
+            });
+        }
+        best = best.min(start.elapsed().as_secs_f64() / repeats as f64);
+    }
+    assert!(a[n / 2] > 1.0);
+    (12 * n) as f64 / best
+}
+
+/// Flops per second of independent multiply-adds in registers.
+fn multiply_adds(team: &mut Team, runs: usize) -> f64 {
+    const REPEATS: usize = 100_000;
+    let mut results = vec![0.0_f32; team.threads()];
+    let mut best = f64::INFINITY;
+    for _ in 0..runs {
+        let start = Instant::now();
+        team.for_blocks(blocks(&mut results, 1), |_, result| result[0] = chains(REPEATS));
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    assert!(results.iter().all(|r| r.is_finite()));
+    (results.len() * REPEATS * CHAINS * 8 * 2) as f64 / best
+}
+
+const CHAINS: usize = 12;
+
+/// Twelve chains of eight multiply-adds each.
+fn chains(repeats: usize) -> f32 {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn wide(repeats: usize) -> f32 {
+        use scindo_physics::element::{Vector8, avx2::Register};
+        let (factor, term) = (Register::splat(std::hint::black_box(0.999)), Register::splat(1e-3));
+        let mut x = [Register::splat(1.0); CHAINS];
+        for _ in 0..repeats {
+            for x in &mut x {
+                *x = x.mul_add(factor, term);
+            }
+        }
+        x.iter().map(|x| x.store().0[0]).sum()
+    }
+    #[cfg(target_arch = "x86_64")]
+    if Simd::detect() == Simd::Avx2 {
+        // SAFETY: the instructions were detected.
+        return unsafe { wide(repeats) };
+    }
+    let mut x = [[1.0_f32; 8]; CHAINS];
+    let factor = std::hint::black_box(0.999);
+    for _ in 0..repeats {
+        for x in x.iter_mut().flatten() {
+            *x = *x * factor + 1e-3;
+        }
+    }
+    x.iter().flatten().sum()
+}

@@ -1,0 +1,309 @@
+//! What a step costs, against what the machine could do: `cargo bench -p scindo-physics --bench bar`.
+//! `-- --quick` makes short runs that only check that the figures exist and the motion is right.
+//!
+//! All lines are measured in turns, so that a busy moment of the machine hits all of them; best is
+//! what the code can do, median and p99 what it did here. The roof is the least time that the bytes
+//! an iteration streams (at the bandwidth of the cache that holds them) or its operations would take.
+
+#![allow(clippy::disallowed_methods, clippy::unwrap_used)] // a bench reads the clock
+#![allow(unsafe_code)] // multiply-adds in registers
+
+mod machine;
+
+use std::time::Instant;
+
+use machine::{LEVEL_NAMES, Machine};
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, BodySettings, PcgSettings};
+use scindo_physics::element::Simd;
+use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
+use scindo_physics::operator::{
+    BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, OperatorChoice, SystemOperator,
+};
+use scindo_physics::solver::Pcg;
+use scindo_physics::team::Team;
+
+const SOFT: Material = Material {
+    young_pa: 1e5,
+    poisson: 0.33,
+    density_kg_m3: 100.0,
+    rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.0 },
+    law: Law::Corotational,
+};
+const LINEAR: Material = Material { law: Law::Linear, ..SOFT };
+const DOWN: Vector3<f64> = Vector3::new(0.0, -9.81, 0.0);
+/// Vector entries of 16 bytes that one solver iteration reads or writes per copy, and the mass.
+const VECTOR_BYTES: usize = 13 * 16 + 4;
+
+/// One line of the report.
+struct Line {
+    name: String,
+    threads: usize,
+    /// Makes one measurement: number of repetitions inside, and seconds of all of them.
+    run: Box<dyn FnMut() -> (f64, f64)>,
+    /// Seconds per repetition.
+    times: Vec<f64>,
+    /// Pieces whose stiffness is applied once per repetition, if that is what is measured.
+    pieces: usize,
+    /// Bytes that one repetition streams, the working set, and operations.
+    work: (f64, usize, f64),
+    target: &'static str,
+}
+
+fn main() {
+    let quick = std::env::args().any(|a| a == "--quick" || a == "--test");
+    let machines = [1, 2].map(|threads| Machine::measure(threads, quick));
+    println!("{:?}, L2 / L3 / DRAM triad and multiply-adds:", Simd::detect());
+    for (machine, threads) in machines.iter().zip([1, 2]) {
+        let [l2, l3, dram] = machine.bandwidth.map(|b| b * 1e-9);
+        let flops = machine.flops * 1e-9;
+        println!("  {threads} thread(s): {l2:.0} / {l3:.0} / {dram:.1} GB/s, {flops:.0} GFLOP/s");
+    }
+    let mut lines = Vec::new();
+    for threads in [1, 2] {
+        lines.push(steps("bar, 10 iterations", bar(SOFT, 10, 0.0, threads, false), threads, "1.5 / 1.0 ms"));
+    }
+    lines.push(steps("bar, 10 iterations, portable", bar(SOFT, 10, 0.0, 1, true), 1, ""));
+    for threads in [1, 2] {
+        let body = bar(SOFT, 1000, 1e-6, threads, false);
+        lines.push(steps("bar, to 1e-6", body, threads, "25 ms"));
+    }
+    for threads in [1, 2] {
+        lines.push(steps("Hippo-sized linear block", block(threads), threads, "1.2 ms"));
+    }
+    for threads in [1, 2] {
+        lines.push(static_cube(threads));
+    }
+    let bar_mesh = || boxed([1.0, 0.2, 0.2], [40, 8, 8]);
+    for threads in [1, 2] {
+        for choice in [OperatorChoice::MatrixFree, OperatorChoice::Assembled] {
+            lines.push(applications("bar", bar_mesh(), choice, threads, ""));
+        }
+    }
+    let large = || boxed([0.4, 0.6, 0.41], if quick { [10, 10, 10] } else { [40, 60, 41] });
+    for threads in [1, 2] {
+        for choice in [OperatorChoice::MatrixFree, OperatorChoice::Assembled] {
+            lines.push(applications("492 000 tets", large(), choice, threads, "100 M/s"));
+        }
+    }
+    lines.push(updates(bar_mesh()));
+    for _ in 0..if quick { 3 } else { 60 } {
+        for line in &mut lines {
+            let start = Instant::now();
+            while start.elapsed().as_secs_f64() < if quick { 0.0 } else { 0.02 } {
+                let (repetitions, seconds) = (line.run)();
+                line.times.push(seconds / repetitions);
+                if quick {
+                    break;
+                }
+            }
+        }
+    }
+    lines.iter_mut().for_each(|line| line.print(&machines[line.threads - 1]));
+}
+
+impl Line {
+    fn print(&mut self, machine: &Machine) {
+        self.times.sort_by(f64::total_cmp);
+        let n = self.times.len();
+        let [best, median, p99] = [0, n / 2, n * 99 / 100].map(|i| self.times[i]);
+        let (bytes, working_set, flops) = self.work;
+        let roof = machine.roof(bytes, working_set, flops, self.threads);
+        let level = LEVEL_NAMES[Machine::level(working_set, self.threads)];
+        print!(
+            "{:<42} {} thr: best {:>8.1} µs, median {:>8.1}, p99 {:>8.1}; roof {:>7.1} ({level}) = {:.2} of best",
+            self.name,
+            self.threads,
+            best * 1e6,
+            median * 1e6,
+            p99 * 1e6,
+            roof * 1e6,
+            roof / best
+        );
+        if self.pieces > 0 {
+            let rate = |t: f64| self.pieces as f64 / t * 1e-6;
+            print!("; {:.0} (median {:.0}) million tets/s", rate(best), rate(median));
+        } else if self.name.contains("iteration of") {
+            print!("; {:.0} (median {:.0}) iterations/s", 1.0 / best, 1.0 / median);
+        }
+        println!("{}{}", if self.target.is_empty() { "" } else { "; target " }, self.target);
+    }
+}
+
+fn boxed(size: [f64; 3], cells: [usize; 3]) -> TetMesh {
+    box_mesh(Vector3::zeros(), size.into(), cells, BoxPattern::Tet5 { parity: false })
+}
+
+/// `mesh`, clamped at x = 0.
+fn clamped(mesh: TetMesh, material: Material, settings: BodySettings) -> Body {
+    let clamp: Vec<u32> = (0..mesh.nodes.len() as u32).filter(|&n| mesh.nodes[n as usize].x == 0.0).collect();
+    let mut body = Body::new(mesh, material, settings).unwrap();
+    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    body
+}
+
+/// The drooping bar of 12 800 tets, h = 40 ms.
+fn bar(material: Material, iterations: u32, tolerance: f64, threads: usize, portable: bool) -> Body {
+    let solver = PcgSettings { iterations, tolerance };
+    let settings = BodySettings { solver, threads, portable, ..BodySettings::default() };
+    clamped(boxed([1.0, 0.2, 0.2], [40, 8, 8]), material, settings)
+}
+
+/// 21 000 linear tets and 5 610 nodes, as many as the hippopotamus of the thesis.
+fn block(threads: usize) -> Body {
+    let solver = PcgSettings { iterations: 10, tolerance: 0.0 };
+    let settings = BodySettings { solver, threads, ..BodySettings::default() };
+    clamped(boxed([1.0, 0.42, 0.08], [50, 21, 4]), LINEAR, settings)
+}
+
+/// Work of one iteration: bytes, working set, operations.
+fn iteration_work(elastic: &Elastic, n: usize) -> (f64, usize, f64) {
+    let bytes = elastic.bytes() + n * VECTOR_BYTES;
+    let stiffness = if elastic.assembled() {
+        elastic.bytes() as f64 / 40.0 * 44.0
+    } else {
+        elastic.n_pieces() as f64 * 136.0
+    };
+    (bytes as f64, elastic.bytes() + n * (9 * 16), stiffness + (n * 50) as f64)
+}
+
+/// Milliseconds of whole steps.
+fn steps(name: &str, mut body: Body, threads: usize, target: &'static str) -> Line {
+    let (tets, n) = (body.cut_mesh().pieces().len(), body.positions().len());
+    let mut elastic = updated(&body, OperatorChoice::Auto, &mut Team::new(1).unwrap());
+    elastic.set_choice(OperatorChoice::Auto);
+    let (bytes, working_set, flops) = iteration_work(&elastic, n);
+    // What the warm-up needs is what a step of the measurement needs.
+    let mut iterations = 0;
+    for _ in 0..5 {
+        iterations = body.step(0.04, DOWN, &[]).iterations;
+    }
+    let its = f64::from(iterations);
+    let name = format!("step of {name} ({tets} tets, {iterations} its)");
+    let run = move || {
+        let start = Instant::now();
+        body.step(0.04, DOWN, &[]);
+        let seconds = start.elapsed().as_secs_f64();
+        assert!(body.positions().iter().all(|x| x.y.is_finite()));
+        (1.0, seconds)
+    };
+    let rotates = !elastic.assembled();
+    let update = if rotates { (tets * 156) as f64 } else { elastic.bytes() as f64 };
+    let update_flops = tets as f64 * if rotates { 700.0 } else { 66.0 };
+    let work = (its * bytes + update + (n * 300) as f64, working_set, its * flops + update_flops);
+    Line { name, threads, run: Box::new(run), times: Vec::new(), pieces: 0, work, target }
+}
+
+fn updated(body: &Body, choice: OperatorChoice, team: &mut Team) -> Elastic {
+    let (mesh, material) = (body.cut_mesh(), body.material());
+    let n = mesh.n_copies();
+    let mut elastic = Elastic::new(Simd::detect(), mesh.mesh(), mesh.pieces(), n);
+    elastic.set_choice(choice);
+    let with = ElasticUpdate { lame: material.lame(), law: material.law, scale: 1.0 };
+    let (mut f, mut blocks) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+    elastic.update(team, &with, body.positions(), &mut f, &mut blocks);
+    elastic
+}
+
+/// Solver iterations on the static linear cube of 11³ × 6 tets, clamped at one side.
+fn static_cube(threads: usize) -> Line {
+    const ITERATIONS: u32 = 200;
+    let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(0.1), [11; 3], BoxPattern::Tet6);
+    let body = clamped(mesh, LINEAR, BodySettings::default());
+    let n = body.positions().len();
+    let mut team = Team::new(threads).unwrap();
+    let mut elastic = updated(&body, OperatorChoice::Auto, &mut team);
+    let fixed: Vec<FixedCopy> = body
+        .fixed_nodes()
+        .iter()
+        .map(|f| FixedCopy { copy: f.node, axes: f.axes, position_m: [0.0; 3] })
+        .collect();
+    let with = ElasticUpdate { lame: LINEAR.lame(), law: LINEAR.law, scale: 1.0 };
+    let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+    elastic.update(&mut team, &with, body.positions(), &mut f, &mut diagonal);
+    let mut M = BlockJacobi::default();
+    M.resize(n);
+    M.update(&mut team, &diagonal, &fixed);
+    let work = iteration_work(&elastic, n);
+    let mut pcg = Pcg::default();
+    pcg.resize(n);
+    let mass: Vec<f32> = body.masses().iter().map(|&m| m as f32).collect();
+    let settings = PcgSettings { iterations: ITERATIONS, tolerance: 0.0 };
+    let name = format!("iteration of CG, cube ({} tets)", body.cut_mesh().pieces().len());
+    let run = move || {
+        let mut x = vec![[0.0; 4]; n];
+        for (r, m) in pcg.r.iter_mut().zip(&mass) {
+            *r = [0.0, -9.81 * m, 0.0, 0.0];
+        }
+        fixed.iter().for_each(|f| pcg.r[f.copy as usize] = [0.0; 4]);
+        let mut K = SystemOperator {
+            elastic: &mut elastic,
+            mass: &mass,
+            mass_factor: 0.0,
+            springs: &[],
+            fixed: &fixed,
+        };
+        let start = Instant::now();
+        let report = pcg.solve(&mut team, &mut K, &M, &mut x, (1.0, settings));
+        let seconds = start.elapsed().as_secs_f64();
+        assert!(report.iterations == ITERATIONS, "{report:?}");
+        (f64::from(ITERATIONS), seconds)
+    };
+    Line {
+        name,
+        threads,
+        run: Box::new(run),
+        times: Vec::new(),
+        pieces: 0,
+        work,
+        target: "20 000 iterations/s",
+    }
+}
+
+/// y = K̂ x over and over.
+fn applications(
+    name: &str,
+    mesh: TetMesh,
+    choice: OperatorChoice,
+    threads: usize,
+    target: &'static str,
+) -> Line {
+    let body = Body::new(mesh, SOFT, BodySettings::default()).unwrap();
+    let (pieces, n) = (body.cut_mesh().pieces().len(), body.positions().len());
+    let mut team = Team::new(threads).unwrap();
+    let mut elastic = updated(&body, choice, &mut team);
+    let (bytes, _, flops) = iteration_work(&elastic, n);
+    let work = (bytes - (n * (VECTOR_BYTES - 48)) as f64, elastic.bytes() + n * 64, flops - (n * 50) as f64);
+    let x = vec![[0.3, -0.1, 0.2, 0.0]; n];
+    let mut y = x.clone();
+    let run = move || {
+        let start = Instant::now();
+        elastic.apply(&mut team, &x, &mut y);
+        let seconds = start.elapsed().as_secs_f64();
+        assert!(y.iter().flatten().all(|f| f.abs() < 1.0), "a translation gives no force");
+        (1.0, seconds)
+    };
+    let name = format!("application to {name}, {choice:?}");
+    Line { name, threads, run: Box::new(run), times: Vec::new(), pieces, work, target }
+}
+
+/// Rotations, forces, gradients and diagonal blocks.
+fn updates(mesh: TetMesh) -> Line {
+    let body = Body::new(mesh, SOFT, BodySettings::default()).unwrap();
+    let (pieces, n) = (body.cut_mesh().pieces().len(), body.positions().len());
+    let mut team = Team::new(1).unwrap();
+    let mut elastic = updated(&body, OperatorChoice::Auto, &mut team);
+    let with = ElasticUpdate { lame: SOFT.lame(), law: SOFT.law, scale: 1.0 };
+    let (mut f, mut blocks) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+    let x: Vec<Vector3<f64>> =
+        body.positions().iter().map(|x| x + 0.02 * Vector3::new(x.y, x.z, x.x)).collect();
+    let run = move || {
+        let start = Instant::now();
+        elastic.update(&mut team, &with, &x, &mut f, &mut blocks);
+        (1.0, start.elapsed().as_secs_f64())
+    };
+    let work = ((pieces * 156) as f64, pieces * 120, pieces as f64 * 700.0);
+    let name = "update of bar".to_owned();
+    Line { name, threads: 1, run: Box::new(run), times: Vec::new(), pieces, work, target: "" }
+}
