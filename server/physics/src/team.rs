@@ -234,6 +234,38 @@ unsafe impl<'a, T: Send> Blocks for BlocksMut<'a, T> {
     }
 }
 
+/// A slice in consecutive ranges of different lengths.
+#[derive(Debug)]
+pub struct RangesMut<'a, T> {
+    start: *mut T,
+    first: &'a [u32],
+    slice: PhantomData<&'a mut [T]>,
+}
+
+/// Takes the ranges [first\[i\], first\[i + 1\]) out of `slice`; `first` must ascend and end within it.
+pub fn ranges<'a, T: Send>(slice: &'a mut [T], first: &'a [u32]) -> RangesMut<'a, T> {
+    assert!(first.is_sorted() && first.last().is_none_or(|&end| end as usize <= slice.len()));
+    RangesMut { start: slice.as_mut_ptr(), first, slice: PhantomData }
+}
+
+// SAFETY: a shared `RangesMut` only hands out disjoint parts (contract of `part`).
+unsafe impl<T: Send> Sync for RangesMut<'_, T> {}
+
+// SAFETY: the ranges of ascending bounds do not overlap and lie in one exclusively borrowed slice.
+unsafe impl<'a, T: Send> Blocks for RangesMut<'a, T> {
+    type Part = &'a mut [T];
+
+    fn count(&self) -> usize {
+        self.first.len().saturating_sub(1)
+    }
+
+    unsafe fn part(&self, i: usize) -> &'a mut [T] {
+        let (first, end) = (self.first[i] as usize, self.first[i + 1] as usize);
+        // SAFETY: in bounds and ascending by the check of `ranges`, exclusive by the contract.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(first), end - first) }
+    }
+}
+
 macro_rules! blocks_of_tuples {
     ($($name:ident $at:tt),+) => {
         // SAFETY: parts are tuples of parts that do not overlap.

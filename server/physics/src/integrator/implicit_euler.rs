@@ -189,11 +189,7 @@ impl ImplicitEuler {
         let f_int = blocks(&mut self.f_int, BLOCK);
         if self.made_for == made_for && inputs.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied())
         {
-            team.for_blocks(f_int, |block, f| {
-                for (i, f) in f.iter_mut().enumerate() {
-                    *f = elastic.force(block * BLOCK + i);
-                }
-            });
+            team.for_blocks(f_int, |block, f| elastic.forces(block, f));
             return;
         }
         self.made_for = made_for;
@@ -204,11 +200,11 @@ impl ImplicitEuler {
         let state = (f_int, blocks(&mut self.diagonal, BLOCK), inverses);
         let (mass, factor) = (inputs.mass_f32, factor as f32);
         team.for_blocks(state, |block, (f, diagonal, inverses)| {
-            for (i, ((f, diagonal), inverse)) in f.iter_mut().zip(diagonal).zip(inverses).enumerate() {
-                let c = block * BLOCK + i;
-                (*f, *diagonal) = elastic.force_and_diagonal(c);
+            elastic.forces(block, f);
+            elastic.diagonals(block, diagonal);
+            for ((diagonal, inverse), &mass) in diagonal.iter_mut().zip(inverses).zip(block_of(mass, block)) {
                 for k in [0, 4, 6] {
-                    diagonal[k] += factor * mass[c];
+                    diagonal[k] += factor * mass;
                 }
                 *inverse = invert(diagonal, [false; 3]);
             }

@@ -6,6 +6,7 @@
 
 use nalgebra::Vector3;
 
+use super::BLOCK;
 use crate::cut::Piece;
 use crate::element::{Ids, LANES};
 
@@ -129,40 +130,61 @@ pub fn pack<const N: usize>(items: &[[u32; N]]) -> Vec<[u32; LANES]> {
     full
 }
 
-/// Where the chunks' sums of every copy lie, in chunk order.
+/// Where the chunks' sums of every copy lie, in chunk order, within one vector for all chunks. Row 0
+/// of that vector is 0 for ever.
 #[derive(Clone, Debug, Default)]
 pub struct Gather {
-    /// Slots of copy c are `slots[first[c]..first[c + 1]]`.
-    pub first: Vec<u32>,
-    /// (chunk, local number).
-    pub slots: Vec<(u32, u32)>,
+    /// First row of every chunk's own sums, and the end: its copies and the waste bin.
+    pub first_row: Vec<u32>,
+    /// Two rows per copy, row 0 where there are fewer: nearly all copies have no more.
+    pairs: Vec<[u32; 2]>,
+    /// (copy, row) of all further rows, in order.
+    further: Vec<(u32, u32)>,
+    /// `further` of the copies in block b are [first_further[b], first_further[b + 1]).
+    first_further: Vec<u32>,
 }
 
 impl Gather {
-    /// Lists the slots of every copy.
-    pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
-        let mut first = vec![0_u32; n_copies + 1];
-        for copies in chunks.clone() {
-            copies.iter().for_each(|&c| first[c as usize + 1] += 1);
-        }
-        for c in 0..n_copies {
-            first[c + 1] += first[c];
-        }
-        let mut next = first.clone();
-        let mut slots = vec![(0, 0); first[n_copies] as usize];
-        for (k, copies) in chunks.enumerate() {
-            for (l, &c) in copies.iter().enumerate() {
-                slots[next[c as usize] as usize] = (k as u32, l as u32);
-                next[c as usize] += 1;
+    /// Lists the rows of every copy.
+    pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]>, n_copies: usize) -> Self {
+        let mut pairs = vec![[0_u32; 2]; n_copies];
+        let (mut further, mut first_row, mut row) = (Vec::new(), vec![1], 1);
+        for copies in chunks {
+            for (l, &copy) in copies.iter().enumerate() {
+                match &mut pairs[copy as usize] {
+                    [first @ 0, _] | [_, first @ 0] => *first = row + l as u32,
+                    _ => further.push((copy, row + l as u32)),
+                }
             }
+            row += copies.len() as u32 + 1;
+            first_row.push(row);
         }
-        Self { first, slots }
+        further.sort_unstable();
+        let n_blocks = n_copies.div_ceil(BLOCK);
+        let before = |b: usize| further.partition_point(|&(copy, _)| (copy as usize) < b * BLOCK) as u32;
+        Self { first_row, pairs, first_further: (0..=n_blocks).map(before).collect(), further }
     }
 
-    /// Slots of copy `c`.
+    /// Number of rows.
+    pub fn n_rows(&self) -> usize {
+        self.first_row.last().map_or(1, |&end| end as usize)
+    }
+
+    /// Adds the sums of the copies of block number `block` to `out`.
     #[inline(always)]
-    pub fn of(&self, c: usize) -> &[(u32, u32)] {
-        &self.slots[self.first[c] as usize..self.first[c + 1] as usize]
+    pub fn add<const N: usize>(&self, block: usize, rows: &[[f32; N]], out: &mut [[f32; N]]) {
+        for (out, &[a, b]) in out.iter_mut().zip(&self.pairs[block * BLOCK..]) {
+            let (a, b) = (&rows[a as usize], &rows[b as usize]);
+            for i in 0..N {
+                out[i] += a[i] + b[i];
+            }
+        }
+        let further = self.first_further[block] as usize..self.first_further[block + 1] as usize;
+        for &(copy, row) in &self.further[further] {
+            for (out, part) in out[copy as usize - block * BLOCK].iter_mut().zip(&rows[row as usize]) {
+                *out += part;
+            }
+        }
     }
 }
 
@@ -208,12 +230,19 @@ mod tests {
         assert!(batches * LANES < pieces.len() + LANES * plans.len(), "{batches} batches");
         assert!(shared < pieces.len() / 10, "{shared} copies are shared within batches");
         let gather = Gather::new(plans.iter().map(|p| &p.copies[..]), mesh.nodes.len());
-        for c in 0..mesh.nodes.len() {
-            for &(k, l) in gather.of(c) {
-                assert_eq!(plans[k as usize].copies[l as usize], c as u32);
+        let mut rows = vec![[0.0_f32; 2]; gather.n_rows()];
+        let mut expected = vec![[0.0_f32; 2]; mesh.nodes.len()];
+        for (k, plan) in plans.iter().enumerate() {
+            for (l, &copy) in plan.copies.iter().enumerate() {
+                let part = [1.0, (k * copy as usize) as f32];
+                rows[gather.first_row[k] as usize + l] = part;
+                (0..2).for_each(|i| expected[copy as usize][i] += part[i]);
             }
         }
-        let held: usize = plans.iter().map(|p| p.copies.len()).sum();
-        assert_eq!(held, gather.slots.len());
+        let mut sums = vec![[0.0_f32; 2]; mesh.nodes.len()];
+        for (block, sums) in sums.chunks_mut(BLOCK).enumerate() {
+            gather.add(block, &rows, sums);
+        }
+        assert_eq!(sums, expected);
     }
 }

@@ -7,12 +7,13 @@ use nalgebra::{Matrix3, Vector3};
 use super::chunks::{Gather, NO_PIECE, plan_chunk, region_of_elements};
 use super::edges::EdgeBlocks;
 use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
+use super::rows::direction;
 use super::{BLOCK, LinearOperator, Padded, padded};
 use crate::cut::Piece;
 use crate::element::{LANES, Lanes, Simd};
 use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
-use crate::team::{Team, blocks};
+use crate::team::{Team, blocks, ranges};
 
 /// Most pieces of one chunk: four copies each must leave room in 16-bit local numbers.
 const MOST_PIECES: usize = 8192;
@@ -41,6 +42,10 @@ pub struct Elastic {
     /// Ordered by region; a region has more than one only after very many cuts.
     chunks: Vec<Chunk>,
     gather: Gather,
+    /// Sums of all chunks, rows as in `gather`: s K̂ x or internal forces.
+    sums: Vec<Padded>,
+    /// Likewise, diagonal blocks of s K̂.
+    diagonals: Vec<Block6>,
     choice: OperatorChoice,
     /// What the chunks' stiffness was last made with, and whether it was assembled.
     made_with: Option<(Coefficients, bool)>,
@@ -56,8 +61,6 @@ struct Chunk {
     batches: Batches,
     positions: Vec<[f64; 4]>,
     x: Vec<Padded>,
-    y: Vec<Padded>,
-    blocks: Vec<Block6>,
     /// Rest positions [m], for laws without rotation.
     rest: Vec<Vector3<f64>>,
     /// The assembled stiffness, where that is in use.
@@ -89,6 +92,8 @@ impl Elastic {
             n_regions,
             chunks: Vec::new(),
             gather: Gather::default(),
+            sums: Vec::new(),
+            diagonals: Vec::new(),
             choice: OperatorChoice::Auto,
             made_with: None,
             version: 0,
@@ -117,6 +122,8 @@ impl Elastic {
         }
         self.chunks.sort_by_key(|chunk| chunk.region);
         self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
+        self.sums = vec![[0.0; 4]; self.gather.n_rows()];
+        self.diagonals = vec![[0.0; 8]; self.gather.n_rows()];
         self.n_pieces = pieces.len();
         self.made_with = None;
     }
@@ -156,9 +163,8 @@ impl Elastic {
         let inverted = self.update_chunks(team, with, positions);
         let elastic = &*self;
         team.for_blocks((blocks(f_int, BLOCK), blocks(diagonal, BLOCK)), |block, (f, diagonal)| {
-            for (i, (f, diagonal)) in f.iter_mut().zip(diagonal).enumerate() {
-                (*f, *diagonal) = elastic.force_and_diagonal(block * BLOCK + i);
-            }
+            elastic.forces(block, f);
+            elastic.diagonals(block, diagonal);
         });
         inverted
     }
@@ -180,72 +186,66 @@ impl Elastic {
         if c.rotates || self.made_with != Some((c, assembled)) {
             self.version += 1;
             self.made_with = Some((c, assembled));
-            team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
-                chunk[0].update(simd, &c, positions);
+            let first = &self.gather.first_row;
+            let sums = (ranges(&mut self.sums, first), ranges(&mut self.diagonals, first));
+            team.for_blocks((blocks(&mut self.chunks, 1), sums.0, sums.1), |_, (chunk, y, diagonal)| {
+                chunk[0].update(simd, &c, positions, y, diagonal);
                 chunk[0].assemble(assembled);
             });
         }
         if !c.rotates {
-            team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
-                chunk[0].linear_forces(simd, c.scale, positions);
+            let sums = ranges(&mut self.sums, &self.gather.first_row);
+            team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
+                chunk[0].linear_forces(simd, c.scale, positions, y);
             });
         }
         self.chunks.iter().map(|chunk| chunk.inverted).sum()
     }
 
-    /// Second half: internal force [N] on copy `c`.
+    /// Second half: internal forces [N] on the copies of block number `block`.
     #[inline(always)]
-    pub(crate) fn force(&self, c: usize) -> Padded {
-        let mut f = [0.0; 4];
-        self.add_sums(c, &mut f);
-        f
+    pub(crate) fn forces(&self, block: usize, f: &mut [Padded]) {
+        f.fill([0.0; 4]);
+        self.gather.add(block, &self.sums, f);
     }
 
-    /// Second half: internal force [N] on copy `c` and its diagonal block of s K̂.
+    /// Second half: diagonal blocks of s K̂ of the copies of block number `block`.
     #[inline(always)]
-    pub(crate) fn force_and_diagonal(&self, c: usize) -> (Padded, Block6) {
-        let (mut f, mut diagonal) = ([0.0; 4], [0.0; 8]);
-        for &(k, l) in self.gather.of(c) {
-            let chunk = &self.chunks[k as usize];
-            add(&mut f, &chunk.y[l as usize]);
-            let part = &chunk.blocks[l as usize];
-            for i in 0..8 {
-                diagonal[i] += part[i];
-            }
-        }
-        (f, diagonal)
+    pub(crate) fn diagonals(&self, block: usize, diagonal: &mut [Block6]) {
+        diagonal.fill([0.0; 8]);
+        self.gather.add(block, &self.diagonals, diagonal);
     }
 
     /// First half of an application: every chunk's own sums of s K̂ x.
     pub(super) fn apply_chunks(&mut self, team: &mut Team, x: &[Padded]) {
         let simd = self.simd;
-        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
+        let sums = ranges(&mut self.sums, &self.gather.first_row);
+        team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
             let Chunk { copies, x: local, .. } = &mut chunk[0];
             for (local, &copy) in local.iter_mut().zip(copies.iter()) {
                 *local = x[copy as usize];
             }
-            chunk[0].apply(simd);
+            chunk[0].apply(simd, y);
         });
     }
 
     /// The same with x ← z + β x, where x is that of the last application (nothing if β = 0).
     pub(super) fn apply_chunks_to_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
         let simd = self.simd;
-        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
+        let sums = ranges(&mut self.sums, &self.gather.first_row);
+        team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
             let Chunk { copies, x: local, .. } = &mut chunk[0];
             for (local, &copy) in local.iter_mut().zip(copies.iter()) {
                 direction(local, &z[copy as usize], beta);
             }
-            chunk[0].apply(simd);
+            chunk[0].apply(simd, y);
         });
     }
 
-    /// Second half: (s K̂ x) of copy `c`, added to `sum`.
+    /// Second half: s K̂ x of the copies of block number `block`, added to `y`.
     #[inline(always)]
-    pub(super) fn add_sums(&self, c: usize, sum: &mut Padded) {
-        for &(k, l) in self.gather.of(c) {
-            add(sum, &self.chunks[k as usize].y[l as usize]);
-        }
+    pub(super) fn add_sums(&self, block: usize, y: &mut [Padded]) {
+        self.gather.add(block, &self.sums, y);
     }
 
     /// Rotation of every piece at the last update.
@@ -272,10 +272,8 @@ impl LinearOperator for Elastic {
         self.apply_chunks(team, x);
         let elastic = &*self;
         team.for_blocks(blocks(y, BLOCK), |block, y| {
-            for (i, y) in y.iter_mut().enumerate() {
-                *y = [0.0; 4];
-                elastic.add_sums(block * BLOCK + i, y);
-            }
+            y.fill([0.0; 4]);
+            elastic.add_sums(block, y);
         });
     }
 }
@@ -300,8 +298,6 @@ impl Chunk {
             copies: plan.copies,
             positions: vec![[0.0; 4]; n],
             x: vec![[0.0; 4]; n],
-            y: vec![[0.0; 4]; n],
-            blocks: vec![[0.0; 8]; n],
             inverted: 0,
         }
     }
@@ -319,17 +315,17 @@ impl Chunk {
 
     /// y = s K̂ x.
     #[inline(always)]
-    fn apply(&mut self, simd: Simd) {
-        self.y.fill([0.0; 4]);
+    fn apply(&self, simd: Simd, y: &mut [Padded]) {
+        y.fill([0.0; 4]);
         match &self.edges {
-            Some(edges) => edges.apply(simd, &self.x, &mut self.y),
-            None => self.batches.apply(simd, &self.x, &mut self.y),
+            Some(edges) => edges.apply(simd, &self.x, y),
+            None => self.batches.apply(simd, &self.x, y),
         }
     }
 
     /// y = K̂ u with displacements u relative to the chunk's first copy, subtracted in double
     /// precision: the error is relative to the chunk, not to how far the body has moved.
-    fn linear_forces(&mut self, simd: Simd, scale: f32, positions: &[Vector3<f64>]) {
+    fn linear_forces(&mut self, simd: Simd, scale: f32, positions: &[Vector3<f64>], y: &mut [Padded]) {
         let displacement = |copy: u32, rest: &Vector3<f64>| positions[copy as usize] - rest;
         let held = self.copies.iter().zip(&self.rest);
         let origin =
@@ -337,34 +333,31 @@ impl Chunk {
         for (local, (&copy, rest)) in self.x.iter_mut().zip(held) {
             *local = padded(&(displacement(copy, rest) - origin));
         }
-        self.apply(simd);
+        self.apply(simd, y);
         let factor = 1.0 / scale;
-        for f in self.y.iter_mut().flatten() {
+        for f in y.iter_mut().flatten() {
             *f *= factor;
         }
     }
 
-    fn update(&mut self, simd: Simd, c: &Coefficients, positions: &[Vector3<f64>]) {
+    /// Rotations, gradients, internal forces `f` and diagonal blocks.
+    fn update(
+        &mut self,
+        simd: Simd,
+        c: &Coefficients,
+        positions: &[Vector3<f64>],
+        f: &mut [Padded],
+        diagonal: &mut [Block6],
+    ) {
         for (local, &copy) in self.positions.iter_mut().zip(&self.copies) {
             let x = &positions[copy as usize];
             *local = [x.x, x.y, x.z, 0.0];
         }
-        self.y.fill([0.0; 4]);
-        self.blocks.fill([0.0; 8]);
-        let mut locals = Locals { x: &self.positions, f: &mut self.y, blocks: &mut self.blocks };
+        f.fill([0.0; 4]);
+        diagonal.fill([0.0; 8]);
+        let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
         self.inverted = self.batches.update(simd, c, &mut locals);
     }
-}
-
-/// x ← z + β x, also where x is not finite and β = 0.
-#[inline(always)]
-pub(super) fn direction(x: &mut Padded, z: &Padded, beta: f32) {
-    *x = if beta == 0.0 { *z } else { std::array::from_fn(|i| z[i] + beta * x[i]) };
-}
-
-#[inline(always)]
-fn add(sum: &mut Padded, part: &Padded) {
-    *sum = std::array::from_fn(|i| sum[i] + part[i]);
 }
 
 /// Rotation of every present piece: its own if it existed before, else that of the first piece its

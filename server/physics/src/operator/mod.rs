@@ -5,11 +5,13 @@ mod elastic;
 mod kernel;
 mod edges;
 mod preconditioner;
+pub mod rows;
 mod system;
 
 pub use elastic::{Elastic, ElasticUpdate, OperatorChoice};
 pub use kernel::Block6;
 pub use preconditioner::{BlockJacobi, Inverse3, invert};
+pub use rows::Sum;
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 
 use crate::team::{Team, blocks};
@@ -33,16 +35,12 @@ pub trait LinearOperator {
         let Advance { p, q, partial } = out;
         team.for_blocks(blocks(p, BLOCK), |block, p| {
             for (p, z) in p.iter_mut().zip(block_of(z, block)) {
-                elastic::direction(p, z, beta);
+                rows::direction(p, z, beta);
             }
         });
         self.apply(team, p, q);
         team.for_blocks(blocks(partial, 1), |block, partial| {
-            let mut sum = Sum::default();
-            for (p, q) in block_of(p, block).iter().zip(block_of(q, block)) {
-                sum.add(p, q);
-            }
-            partial[0] = sum.total();
+            partial[0] = rows::dot(block_of(p, block), block_of(q, block));
         });
         partial.iter().sum()
     }
@@ -63,25 +61,6 @@ pub struct Advance<'a> {
 #[inline(always)]
 pub fn block_of<T>(v: &[T], block: usize) -> &[T] {
     &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]
-}
-
-/// A scalar product in the making: single-precision products, double-precision sums.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sum([f64; 4]);
-
-impl Sum {
-    /// Adds x·y.
-    #[inline(always)]
-    pub fn add(&mut self, x: &Padded, y: &Padded) {
-        for k in 0..4 {
-            self.0[k] += f64::from(x[k] * y[k]);
-        }
-    }
-
-    /// The sum.
-    pub fn total(&self) -> f64 {
-        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
-    }
 }
 
 /// x, y, z of a double-precision vector, rounded.

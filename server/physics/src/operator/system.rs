@@ -1,8 +1,7 @@
 //! The matrix of one implicit step: A = (1 + hα) M + (h² + hβ) K̂ + h² Σ k J Jᵀ, with fixed copies
 //! filtered out.
 
-use super::elastic::direction;
-use super::{Advance, BLOCK, Block6, Elastic, LinearOperator, Padded, Sum, block_of};
+use super::{Advance, BLOCK, Block6, Elastic, LinearOperator, Padded, block_of, rows};
 use crate::team::{Team, blocks};
 
 /// A copy whose displacement is prescribed in some directions.
@@ -49,11 +48,10 @@ impl LinearOperator for SystemOperator<'_> {
         self.elastic.apply_chunks(team, x);
         let (elastic, mass, factor) = (&*self.elastic, self.mass, self.mass_factor);
         team.for_blocks(blocks(y, BLOCK), |block, y| {
-            for (i, y) in y.iter_mut().enumerate() {
-                let c = block * BLOCK + i;
-                *y = x[c].map(|v| factor * mass[c] * v);
-                elastic.add_sums(c, y);
+            for (y, (x, &mass)) in y.iter_mut().zip(block_of(x, block).iter().zip(block_of(mass, block))) {
+                *y = x.map(|v| factor * mass * v);
             }
+            elastic.add_sums(block, y);
         });
         self.springs.iter().for_each(|spring| spring.add_to(x, y));
         filter(self.fixed, y);
@@ -65,15 +63,10 @@ impl LinearOperator for SystemOperator<'_> {
         let (elastic, mass, factor) = (&*self.elastic, self.mass, self.mass_factor);
         let state = (blocks(p, BLOCK), blocks(q, BLOCK), blocks(partial, 1));
         team.for_blocks(state, |block, (p, q, partial)| {
-            let mut sum = Sum::default();
-            let known = block_of(z, block).iter().zip(block_of(mass, block));
-            for (i, ((p, q), (z, &mass))) in p.iter_mut().zip(q).zip(known).enumerate() {
-                direction(p, z, beta);
-                *q = p.map(|v| factor * mass * v);
-                elastic.add_sums(block * BLOCK + i, q);
-                sum.add(p, q);
-            }
-            partial[0] = sum.total();
+            let (z, mass) = (block_of(z, block), block_of(mass, block));
+            rows::advance_direction(z, beta, mass, factor, p, q);
+            elastic.add_sums(block, q);
+            partial[0] = rows::dot(p, q);
         });
         let springs: f64 = self.springs.iter().map(|spring| spring.curvature(p)).sum();
         self.springs.iter().for_each(|spring| spring.add_to(p, q));

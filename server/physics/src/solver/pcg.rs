@@ -5,7 +5,7 @@
 
 use super::algebraic_error::AlgebraicError;
 use super::report::StopReason;
-use crate::operator::{Advance, BLOCK, BlockJacobi, LinearOperator, Padded, Sum, block_of};
+use crate::operator::{Advance, BLOCK, BlockJacobi, LinearOperator, Padded, Sum, block_of, rows};
 use crate::team::{Team, blocks};
 
 /// When to stop.
@@ -133,12 +133,7 @@ impl Pcg {
         let r = &self.r;
         let state = (blocks(&mut self.z, BLOCK), blocks(&mut self.partial, 1));
         team.for_blocks(state, |block, (z, partial)| {
-            let mut sum = Sum::default();
-            for ((z, r), M) in z.iter_mut().zip(block_of(r, block)).zip(M.block(block)) {
-                *z = M.times(r);
-                sum.add(r, z);
-            }
-            partial[0] = sum.total();
+            partial[0] = rows::precondition(M.block(block), block_of(r, block), z);
         });
         self.partial.iter().sum()
     }
@@ -152,16 +147,8 @@ impl Pcg {
             blocks(&mut self.partial, 1),
         );
         team.for_blocks(state, |block, (x, r, z, partial)| {
-            let mut sum = Sum::default();
-            let known = block_of(p, block).iter().zip(block_of(q, block)).zip(M.block(block));
-            for (((x, r), z), ((p, q), M)) in x.iter_mut().zip(r).zip(z).zip(known) {
-                *x = std::array::from_fn(|k| x[k] + alpha * p[k]);
-                let next: Padded = std::array::from_fn(|k| r[k] - alpha * q[k]);
-                let preconditioned = M.times(&next);
-                sum.add(&next, &preconditioned);
-                (*r, *z) = (next, preconditioned);
-            }
-            partial[0] = sum.total();
+            let pq = [block_of(p, block), block_of(q, block)];
+            partial[0] = rows::advance_solution(alpha, pq, M.block(block), [x, r, z]);
         });
         self.partial.iter().sum()
     }

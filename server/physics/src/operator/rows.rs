@@ -1,0 +1,161 @@
+//! The vector loops of a solver iteration over one block of copies.
+//!
+//! Products are single precision, their sums double. On x86-64 the loops are written for AVX as well
+//! (the compiler's own idea of them is to transpose rows); the operations are the same one by one,
+//! so the bits are the same.
+
+#![allow(unsafe_code)] // vector instructions behind run-time detection
+
+use super::{Inverse3, Padded};
+
+/// p ← z + β p (z if β = 0), q ← factor · mass · p.
+#[inline]
+pub fn advance_direction(
+    z: &[Padded],
+    beta: f32,
+    mass: &[f32],
+    factor: f32,
+    p: &mut [Padded],
+    q: &mut [Padded],
+) {
+    for ((p, q), (z, mass)) in p.iter_mut().zip(q).zip(z.iter().zip(mass)) {
+        direction(p, z, beta);
+        let m = factor * mass;
+        *q = [m * p[0], m * p[1], m * p[2], m * p[3]];
+    }
+}
+
+/// x·y.
+#[inline]
+pub fn dot(x: &[Padded], y: &[Padded]) -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx") {
+        // SAFETY: the instructions were detected.
+        return unsafe { avx::dot(x, y) };
+    }
+    let mut sum = Sum::default();
+    for (x, y) in x.iter().zip(y) {
+        sum.add(x, y);
+    }
+    sum.total()
+}
+
+/// z = M⁻¹ r; returns r·z.
+#[inline]
+pub fn precondition(M: &[Inverse3], r: &[Padded], z: &mut [Padded]) -> f64 {
+    for ((z, r), M) in z.iter_mut().zip(r).zip(M) {
+        *z = M.times(r);
+    }
+    dot(r, z)
+}
+
+/// x += α p, r −= α q, z = M⁻¹ r; returns r·z.
+#[inline]
+pub fn advance_solution(
+    alpha: f32,
+    [p, q]: [&[Padded]; 2],
+    M: &[Inverse3],
+    [x, r, z]: [&mut [Padded]; 3],
+) -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx") {
+        // SAFETY: the instructions were detected.
+        return unsafe { avx::advance_solution(alpha, [p, q], M, [x, r, z]) };
+    }
+    for (((x, r), z), ((p, q), M)) in x.iter_mut().zip(&mut *r).zip(&mut *z).zip(p.iter().zip(q).zip(M)) {
+        for k in 0..4 {
+            x[k] += alpha * p[k];
+            r[k] -= alpha * q[k];
+        }
+        *z = M.times(r);
+    }
+    dot(r, z)
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx {
+    //! The same operations, one register per row.
+
+    use std::arch::x86_64::{
+        __m256d, _mm_add_ps, _mm_loadu_ps, _mm_mul_ps, _mm_permute_ps, _mm_set1_ps, _mm_storeu_ps,
+        _mm_sub_ps, _mm256_add_pd, _mm256_cvtps_pd, _mm256_setzero_pd, _mm256_storeu_pd,
+    };
+
+    use super::{Inverse3, Padded, Sum};
+
+    #[target_feature(enable = "avx")]
+    pub fn dot(x: &[Padded], y: &[Padded]) -> f64 {
+        let mut sum = _mm256_setzero_pd();
+        for (x, y) in x.iter().zip(y) {
+            // SAFETY: a row holds four numbers.
+            let product = unsafe { _mm_mul_ps(_mm_loadu_ps(x.as_ptr()), _mm_loadu_ps(y.as_ptr())) };
+            sum = _mm256_add_pd(sum, _mm256_cvtps_pd(product));
+        }
+        total(sum)
+    }
+
+    #[target_feature(enable = "avx")]
+    pub fn advance_solution(
+        alpha: f32,
+        [p, q]: [&[Padded]; 2],
+        M: &[Inverse3],
+        [x, r, z]: [&mut [Padded]; 3],
+    ) -> f64 {
+        let alpha = _mm_set1_ps(alpha);
+        let mut sum = _mm256_setzero_pd();
+        for (((x, r), z), ((p, q), M)) in x.iter_mut().zip(r).zip(z).zip(p.iter().zip(q).zip(M)) {
+            // SAFETY: a row holds four numbers.
+            unsafe {
+                let (p, q) = (_mm_loadu_ps(p.as_ptr()), _mm_loadu_ps(q.as_ptr()));
+                let next_x = _mm_add_ps(_mm_loadu_ps(x.as_ptr()), _mm_mul_ps(alpha, p));
+                let next_r = _mm_sub_ps(_mm_loadu_ps(r.as_ptr()), _mm_mul_ps(alpha, q));
+                let a = _mm_mul_ps(_mm_loadu_ps(M.0[0].as_ptr()), _mm_permute_ps::<0x00>(next_r));
+                let b = _mm_mul_ps(_mm_loadu_ps(M.0[1].as_ptr()), _mm_permute_ps::<0x55>(next_r));
+                let c = _mm_mul_ps(_mm_loadu_ps(M.0[2].as_ptr()), _mm_permute_ps::<0xAA>(next_r));
+                let next_z = _mm_add_ps(_mm_add_ps(a, b), c);
+                _mm_storeu_ps(x.as_mut_ptr(), next_x);
+                _mm_storeu_ps(r.as_mut_ptr(), next_r);
+                _mm_storeu_ps(z.as_mut_ptr(), next_z);
+                sum = _mm256_add_pd(sum, _mm256_cvtps_pd(_mm_mul_ps(next_r, next_z)));
+            }
+        }
+        total(sum)
+    }
+
+    #[target_feature(enable = "avx")]
+    fn total(sum: __m256d) -> f64 {
+        let mut parts = [0.0; 4];
+        // SAFETY: four numbers.
+        unsafe { _mm256_storeu_pd(parts.as_mut_ptr(), sum) };
+        Sum(parts).total()
+    }
+}
+
+/// p ← z + β p; z if β = 0, also where p is not finite.
+#[inline(always)]
+pub fn direction(p: &mut Padded, z: &Padded, beta: f32) {
+    *p = if beta == 0.0 {
+        *z
+    } else {
+        [z[0] + beta * p[0], z[1] + beta * p[1], z[2] + beta * p[2], z[3] + beta * p[3]]
+    };
+}
+
+/// A scalar product in the making: single-precision products, double-precision sums.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sum([f64; 4]);
+
+impl Sum {
+    /// Adds x·y.
+    #[inline(always)]
+    pub fn add(&mut self, x: &Padded, y: &Padded) {
+        for k in 0..4 {
+            self.0[k] += f64::from(x[k] * y[k]);
+        }
+    }
+
+    /// The sum.
+    pub fn total(&self) -> f64 {
+        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
+    }
+}
