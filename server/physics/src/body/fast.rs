@@ -53,7 +53,9 @@ impl Fast {
 
     /// Arranges the pieces anew, without memory of their rotations.
     pub fn rebuild(&mut self, mesh: &CutMesh) {
+        let choice = self.elastic.choice();
         self.elastic = Elastic::new(self.simd, mesh.mesh(), mesh.pieces(), mesh.n_copies());
+        self.elastic.set_choice(choice);
     }
 
     /// Everything else that is derived from pieces, copies and their mass [kg].

@@ -25,6 +25,7 @@ pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
 use crate::material::Material;
 use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
 use crate::operator::FixedCopy;
+pub use crate::operator::OperatorChoice;
 pub use crate::solver::{Method, PcgSettings, StopReason};
 use crate::team::Team;
 use boundary::Boundary;
@@ -259,6 +260,17 @@ impl Body {
             general.dynamics.set_newton(newton);
         }
         Ok(())
+    }
+
+    /// Chooses how the stiffness is applied from the next step on; results agree to single precision.
+    /// Says `false` where this body's elements, law or integrator take the general path, which always
+    /// assembles.
+    pub fn set_operator(&mut self, choice: OperatorChoice) -> bool {
+        match &mut self.path {
+            Path::Fast(fast) => fast.elastic.set_choice(choice),
+            Path::General(_) => return false,
+        }
+        true
     }
 
     /// Connected parts of the body, by copy.

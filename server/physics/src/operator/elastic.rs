@@ -133,6 +133,11 @@ impl Elastic {
         self.choice = choice;
     }
 
+    /// How K̂ is to be applied.
+    pub fn choice(&self) -> OperatorChoice {
+        self.choice
+    }
+
     /// Rises with every change of the stiffness: the diagonal blocks of an update are the same as
     /// those of an earlier one with the same version.
     pub fn version(&self) -> u64 {

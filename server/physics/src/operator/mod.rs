@@ -67,3 +67,7 @@ pub fn block_of<T>(v: &[T], block: usize) -> &[T] {
 pub fn padded(v: &nalgebra::Vector3<f64>) -> Padded {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

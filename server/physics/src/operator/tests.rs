@@ -1,0 +1,180 @@
+//! The kernels against double precision, and the assembled stiffness against the tets.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Block6, Elastic, ElasticUpdate, LinearOperator, OperatorChoice, Padded};
+use crate::cut::Piece;
+use crate::element::{Simd, deformation_gradient, piece_forces};
+use crate::material::{Lame, Law};
+use crate::mesh::{BoxPattern, TetMesh, box_mesh};
+use crate::team::Team;
+
+const LAME: Lame = Lame { mu: 4e4, lambda: 9e4 };
+
+fn mesh() -> (TetMesh, Vec<Piece>) {
+    let mesh = box_mesh(Vector3::zeros(), Vector3::new(0.3, 0.2, 0.2), [9, 6, 7], BoxPattern::Tet6);
+    let piece = |e: usize| Piece { element: e as u32, fraction: 1.0, copies: mesh.tets[e] };
+    let pieces = (0..mesh.tets.len()).map(piece).collect();
+    (mesh, pieces)
+}
+
+/// A large rotation, a stretch, and noise of `noise` edge lengths; `far` [m] along x.
+fn deformed(mesh: &TetMesh, noise: f64, far: f64) -> Vec<Vector3<f64>> {
+    let turn = nalgebra::Rotation3::new(Vector3::new(1.0, -0.7, 0.4));
+    let stretch = Matrix3::from_diagonal(&Vector3::new(1.2, 0.9, 1.05));
+    let place = |(n, X): (usize, &Vector3<f64>)| {
+        let t = n as f64;
+        let jitter = Vector3::new((12.9 * t).sin(), (78.2 * t).sin(), (37.7 * t).sin());
+        turn * (stretch * X) + (0.033 * noise) * jitter + Vector3::new(far, 0.0, 0.0)
+    };
+    mesh.nodes.iter().enumerate().map(place).collect()
+}
+
+struct Updated {
+    elastic: Elastic,
+    f: Vec<Padded>,
+    diagonal: Vec<Block6>,
+    inverted: usize,
+}
+
+fn updated(simd: Simd, choice: OperatorChoice, law: Law, x: &[Vector3<f64>], scale: f64) -> Updated {
+    let (mesh, pieces) = mesh();
+    let n = mesh.nodes.len();
+    let mut elastic = Elastic::new(simd, &mesh, &pieces, n);
+    elastic.set_choice(choice);
+    let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+    let with = ElasticUpdate { lame: LAME, law, scale };
+    let inverted = elastic.update(&mut Team::new(1).unwrap(), &with, x, &mut f, &mut diagonal);
+    Updated { elastic, f, diagonal, inverted }
+}
+
+fn wide(v: &Padded) -> Vector3<f64> {
+    Vector3::new(v[0], v[1], v[2]).map(f64::from)
+}
+
+fn largest(v: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    v.map(|v| v.norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn forces_agree_with_double_precision_also_where_tets_are_inverted() {
+    let (mesh, pieces) = mesh();
+    for law in [Law::Corotational, Law::Linear] {
+        for noise in [0.0, 0.1, 0.6] {
+            let x = deformed(&mesh, noise, 0.0);
+            let mut exact = vec![Vector3::zeros(); x.len()];
+            let (mut inverted, mut force) = (0, 0.0_f64);
+            for piece in &pieces {
+                let e = piece.element as usize;
+                let g = mesh.gradients(e);
+                let F = deformation_gradient(&piece.copies.map(|c| x[c as usize]), &g);
+                inverted += usize::from(law.rotates() && F.determinant() <= 0.0);
+                let parts = piece_forces(&law.stress(&F, LAME), &g, mesh.volume(e));
+                for (&copy, part) in piece.copies.iter().zip(parts) {
+                    exact[copy as usize] += part;
+                    force = force.max(part.norm());
+                }
+            }
+            assert_eq!(inverted > 0, noise == 0.6 && law.rotates(), "noise {noise}");
+            for simd in [Simd::Baseline, Simd::detect()] {
+                let found = updated(simd, OperatorChoice::Auto, law, &x, 1e-4);
+                let error = largest(found.f.iter().zip(&exact).map(|(f, exact)| wide(f) - exact));
+                assert!(error < 1e-5 * force, "{law:?} {simd:?} noise {noise}: {error:e} of {force:e}");
+                assert_eq!(found.inverted, inverted, "{law:?} {simd:?} noise {noise}");
+            }
+        }
+    }
+}
+
+#[test]
+fn assembled_and_matrix_free_stiffness_are_the_same_map() {
+    let (mesh, _) = mesh();
+    let x = deformed(&mesh, 0.6, 0.0);
+    let direction: Vec<Padded> = (0..x.len())
+        .map(|n| [(0.3 * n as f32).sin(), (1.7 * n as f32).cos(), (0.9 * n as f32).sin(), 0.0])
+        .collect();
+    let mut team = Team::new(2).unwrap();
+    for law in [Law::Corotational, Law::Linear] {
+        for simd in [Simd::Baseline, Simd::detect()] {
+            let apply = |choice, team: &mut Team| {
+                let mut y = vec![[0.0; 4]; x.len()];
+                let mut elastic = updated(simd, choice, law, &x, 1e-4).elastic;
+                assert_eq!(elastic.assembled(), choice == OperatorChoice::Assembled);
+                elastic.apply(team, &direction, &mut y);
+                y
+            };
+            let tets = apply(OperatorChoice::MatrixFree, &mut team);
+            let assembled = apply(OperatorChoice::Assembled, &mut team);
+            let size = largest(tets.iter().map(wide));
+            let error = largest(tets.iter().zip(&assembled).map(|(a, b)| wide(a) - wide(b)));
+            assert!(size > 0.0 && error < 2e-6 * size, "{law:?} {simd:?}: {error:e} of {size:e}");
+        }
+    }
+}
+
+#[test]
+fn diagonal_blocks_are_those_of_the_map() {
+    let (mesh, _) = mesh();
+    let x = deformed(&mesh, 0.3, 0.0);
+    let Updated { mut elastic, diagonal, .. } =
+        updated(Simd::detect(), OperatorChoice::Auto, Law::Corotational, &x, 1e-4);
+    let mut team = Team::new(1).unwrap();
+    for n in [0, 17, 200] {
+        for (axis, entries) in [[0, 1, 2], [1, 4, 5], [2, 5, 6]].into_iter().enumerate() {
+            let (mut unit, mut y) = (vec![[0.0; 4]; x.len()], vec![[0.0; 4]; x.len()]);
+            unit[n][axis] = 1.0;
+            elastic.apply(&mut team, &unit, &mut y);
+            for i in 0..3 {
+                let missing = (y[n][i] - diagonal[n][entries[i]]).abs();
+                assert!(missing < 1e-5 * diagonal[n][0], "copy {n}: {missing:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_linear_stiffness_is_made_once_and_forces_do_not_feel_how_far_the_body_is() {
+    let (mesh, pieces) = mesh();
+    let n = mesh.nodes.len();
+    let (near, far) = (deformed(&mesh, 0.1, 0.0), deformed(&mesh, 0.1, 1e4));
+    let mut team = Team::new(1).unwrap();
+    for choice in [OperatorChoice::MatrixFree, OperatorChoice::Auto] {
+        let first = updated(Simd::detect(), choice, Law::Linear, &near, 1e-4);
+        let mut elastic = first.elastic;
+        let version = elastic.version();
+        let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+        let mut with = ElasticUpdate { lame: LAME, law: Law::Linear, scale: 1e-4 };
+        elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
+        assert_eq!((&f, &diagonal, elastic.version()), (&first.f, &first.diagonal, version));
+        elastic.update(&mut team, &with, &far, &mut f, &mut diagonal);
+        let size = largest(first.f.iter().map(wide));
+        let error = largest(f.iter().zip(&first.f).map(|(a, b)| wide(a) - wide(b)));
+        assert!(error < 1e-5 * size, "{choice:?}: {error:e} of {size:e}");
+        assert_eq!(elastic.version(), version);
+        // Another step length, a cut: the stiffness is made anew.
+        with.scale = 4e-4;
+        elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
+        assert!(elastic.version() > version && diagonal[5][0] > 3.9 * first.diagonal[5][0]);
+        let version = elastic.version();
+        elastic.follow(&mesh, &pieces, &pieces, n);
+        elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
+        assert!(elastic.version() > version);
+    }
+}
+
+#[test]
+fn a_rotation_is_remembered_where_the_gradient_defines_none() {
+    let (mesh, _) = mesh();
+    let x = deformed(&mesh, 0.0, 0.0);
+    let mut found = updated(Simd::detect(), OperatorChoice::Auto, Law::Corotational, &x, 1e-4);
+    let before = found.elastic.rotations();
+    let collapsed = vec![Vector3::zeros(); x.len()];
+    let with = ElasticUpdate { lame: LAME, law: Law::Corotational, scale: 1e-4 };
+    let mut team = Team::new(1).unwrap();
+    let inverted = found.elastic.update(&mut team, &with, &collapsed, &mut found.f, &mut found.diagonal);
+    assert_eq!(inverted, before.len());
+    assert!(found.f.iter().flatten().all(|f| f.is_finite()));
+    let drift =
+        found.elastic.rotations().iter().zip(&before).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
+    assert!(drift < 1e-6, "{drift:e}");
+}
