@@ -1,5 +1,5 @@
 //! The quadratic tetrahedron with ten nodes: corners, then the middles of the edges
-//! [`TET_EDGES`](crate::mesh::TET_EDGES).
+//! [`TET_EDGES`].
 //!
 //! On a straight-sided element the four-point rule integrates the linear stiffness exactly; a single
 //! point would leave rank 6 of 24. Row sums of the mass matrix are negative at corners (−m/20), so the
