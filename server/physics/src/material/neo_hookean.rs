@@ -144,7 +144,9 @@ mod tests {
         for F in samples() {
             let svd = SignedSvd::new(&F);
             assert!((law.energy(&F) - law.guarded(&svd.sigma).energy).abs() < 1e-12);
-            assert!((law.stress(&F) - law.guarded(&svd.sigma).principal.gradient(&svd)).norm() < 1e-12);
+            let P = law.stress(&F);
+            let principal = law.guarded(&svd.sigma).principal.gradient(&svd);
+            assert!((P - principal).norm() < 1e-13 * (1.0 + P.norm() + svd.sigma[0].powi(3)));
         }
         assert!(law.energy(&Matrix3::identity()).abs() < 1e-15);
     }

@@ -10,6 +10,9 @@ use nalgebra::{Matrix3, Vector3};
 /// Sweeps over the three pairs of columns. Convergence is quadratic: five reach round-off.
 const SWEEPS: usize = 12;
 
+/// Cosine of the angle between two columns below which they count as orthogonal: their rounding.
+const ORTHOGONAL: f64 = 4e-16;
+
 /// F = U diag(σ) Vᵀ with det U = det V = +1.
 ///
 /// σ1 ≥ σ2 ≥ |σ3|: only the smallest may be negative, and is exactly when det F < 0. Columns that F
@@ -72,12 +75,12 @@ impl SignedSvd {
 fn orthogonalise(B: &mut Matrix3<f64>, V: &mut Matrix3<f64>, p: usize, q: usize) -> bool {
     let (a, b) = (B.column(p).norm_squared(), B.column(q).norm_squared());
     let c = B.column(p).dot(&B.column(q));
-    if c == 0.0 || c.abs() <= 1e-16 * (a * b).sqrt() {
+    if c * c <= ORTHOGONAL * ORTHOGONAL * a * b {
         return false;
     }
     let zeta = (b - a) / (2.0 * c);
-    let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
-    let cosine = 1.0 / t.hypot(1.0);
+    let t = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+    let cosine = 1.0 / (1.0 + t * t).sqrt();
     for matrix in [B, V] {
         let (x, y) = (matrix.column(p).into_owned(), matrix.column(q).into_owned());
         matrix.set_column(p, &(cosine * (x - t * y)));
