@@ -145,6 +145,9 @@ impl Model {
             products: Products::linear_tet(),
             pattern: BlockCsr::default(),
             slots: Vec::new(),
+            incident_first: Vec::new(),
+            incident: Vec::new(),
+            row_bounds: Vec::new(),
             scratch: Scratch::default(),
         })
     }

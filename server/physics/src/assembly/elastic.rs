@@ -5,6 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::kernel::{add_forces, add_upper_blocks, deformation_gradient, mirror};
+use super::parallel::Work;
 use super::point::projected;
 use super::{BlockCsr, ElementKind, Model, Volumetric};
 use crate::material::{Law, Split, Tangent};
@@ -19,7 +20,8 @@ pub(super) struct Buffers {
     theta: Vec<f64>,
     theta_bar: Vec<f64>,
     theta_gradient: Vec<Matrix3<f64>>,
-    star_gradient: Vec<Vector3<f64>>,
+    pub(super) star_gradient: Vec<Vector3<f64>>,
+    pub(super) work: Work,
 }
 
 impl Clone for Scratch {
@@ -29,7 +31,7 @@ impl Clone for Scratch {
 }
 
 impl Scratch {
-    fn take(&self) -> MutexGuard<'_, Buffers> {
+    pub(super) fn take(&self) -> MutexGuard<'_, Buffers> {
         // Contents are overwritten before they are read, so a panic elsewhere leaves nothing behind.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -45,16 +47,7 @@ impl Model {
             ElementKind::Tet10 => (0..self.n_elements()).map(|e| self.element_energy::<10>(e, x)).sum(),
             ElementKind::Hex8 => (0..self.n_elements()).map(|e| self.element_energy::<8>(e, x)).sum(),
         };
-        let ends = |s: &crate::element::Spring| (x[s.a as usize], x[s.b as usize]);
-        let springs: f64 = self
-            .springs
-            .iter()
-            .map(|s| {
-                let (a, b) = ends(s);
-                s.energy(&a, &b)
-            })
-            .sum();
-        elements + averaged + springs
+        elements + averaged + self.spring_energy(x)
     }
 
     /// Internal forces f = ∂Ψ/∂x [N], to be subtracted from the loads; returns Ψ \[J\].
@@ -62,19 +55,12 @@ impl Model {
         let mut buffers = self.scratch.take();
         let averaged = self.average_volume(x, &mut buffers, false);
         f.fill(Vector3::zeros());
-        let mut energy = match self.kind {
+        let energy = match self.kind {
             ElementKind::Tet4 => self.scatter_forces::<4>(x, &buffers, f),
             ElementKind::Tet10 => self.scatter_forces::<10>(x, &buffers, f),
             ElementKind::Hex8 => self.scatter_forces::<8>(x, &buffers, f),
         };
-        for spring in &self.springs {
-            let (a, b) = (spring.a as usize, spring.b as usize);
-            energy += spring.energy(&x[a], &x[b]);
-            let force = spring.force(&x[a], &x[b]);
-            f[a] -= force;
-            f[b] += force;
-        }
-        energy + averaged
+        energy + averaged + self.add_spring_forces(x, f)
     }
 
     /// Tangent ∂²Ψ/∂x² [N/m]; overwrites the blocks of `K`, which has the model's pattern.
@@ -103,7 +89,21 @@ impl Model {
         self.add_spring_tangent(x, kind, K);
     }
 
-    fn add_spring_tangent(&self, x: &[Vector3<f64>], kind: Tangent, K: &mut BlockCsr<f64>) {
+    pub(super) fn spring_energy(&self, x: &[Vector3<f64>]) -> f64 {
+        self.springs.iter().map(|s| s.energy(&x[s.a as usize], &x[s.b as usize])).sum()
+    }
+
+    pub(super) fn add_spring_forces(&self, x: &[Vector3<f64>], f: &mut [Vector3<f64>]) -> f64 {
+        for spring in &self.springs {
+            let (a, b) = (spring.a as usize, spring.b as usize);
+            let force = spring.force(&x[a], &x[b]);
+            f[a] -= force;
+            f[b] += force;
+        }
+        self.spring_energy(x)
+    }
+
+    pub(super) fn add_spring_tangent(&self, x: &[Vector3<f64>], kind: Tangent, K: &mut BlockCsr<f64>) {
         for spring in &self.springs {
             let (a, b) = (spring.a as usize, spring.b as usize);
             let S = spring.stiffness(&x[a], &x[b], kind);
@@ -118,11 +118,11 @@ impl Model {
     }
 
     /// θ̄ of every node, and with `gradients` its derivatives; returns its energy \[J\].
-    fn average_volume(&self, x: &[Vector3<f64>], buffers: &mut Buffers, gradients: bool) -> f64 {
+    pub(super) fn average_volume(&self, x: &[Vector3<f64>], buffers: &mut Buffers, gradients: bool) -> f64 {
         let (Some(averaging), Some(split)) = (&self.averaging, self.point.split()) else {
             return 0.0;
         };
-        let Buffers { theta, theta_bar, theta_gradient, star_gradient } = buffers;
+        let Buffers { theta, theta_bar, theta_gradient, star_gradient, .. } = buffers;
         theta.clear();
         theta_gradient.clear();
         for e in 0..self.n_elements() {
@@ -152,7 +152,7 @@ impl Model {
         Some((pressure + averaging.kept * split.lambda() * theta, averaging.kept))
     }
 
-    fn element_energy<const N: usize>(&self, e: usize, x: &[Vector3<f64>]) -> f64 {
+    pub(super) fn element_energy<const N: usize>(&self, e: usize, x: &[Vector3<f64>]) -> f64 {
         let x = self.positions::<N>(e, x);
         let point = |q: usize, psi: &dyn Fn(&Matrix3<f64>) -> f64| {
             self.weights(e)[q] * psi(&deformation_gradient::<N>(&x, self.gradients(e, q)))
@@ -199,7 +199,7 @@ impl Model {
         energy
     }
 
-    fn element_forces<const N: usize>(
+    pub(super) fn element_forces<const N: usize>(
         &self,
         e: usize,
         x: &[Vector3<f64>],
@@ -263,7 +263,7 @@ impl Model {
         }
     }
 
-    fn element_tangent<const N: usize>(
+    pub(super) fn element_tangent<const N: usize>(
         &self,
         e: usize,
         x: &[Vector3<f64>],

@@ -20,6 +20,7 @@ mod build;
 mod kernel;
 mod averaging;
 mod elastic;
+mod parallel;
 mod mass;
 mod rotated;
 

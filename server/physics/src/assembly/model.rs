@@ -88,6 +88,11 @@ pub struct Model {
     pub(super) pattern: BlockCsr<f64>,
     /// Position in the tangent of every block (a, b) of every element.
     pub(super) slots: Vec<u32>,
+    /// Where node n stands in elements: entries e · nodes + a, by e, from `incident_first[n]` on.
+    pub(super) incident_first: Vec<u32>,
+    pub(super) incident: Vec<u32>,
+    /// Where every [`ROWS`](super::parallel::ROWS) rows of the tangent begin.
+    pub(super) row_bounds: Vec<u32>,
     pub(super) scratch: Scratch,
 }
 
@@ -235,5 +240,6 @@ impl Model {
             }
         }
         self.pattern = pattern;
+        self.find_incidence();
     }
 }

@@ -186,3 +186,26 @@ fn unusable_combinations_are_refused() {
     let broken = Material { poisson: 0.6, ..linear };
     assert!(matches!(Model::tet10(&tets, &broken), Err(ModelError::Material(_))));
 }
+
+#[test]
+fn a_team_gives_the_bits_of_one_thread() {
+    let big = box_mesh(Vector3::zeros(), size(), [7; 3], BoxPattern::Tet5 { parity: false });
+    let mut all = models();
+    all.push(Model::tet4(&big, &material(Law::Corotational), AVERAGED).unwrap());
+    all.push(Model::tet10(&big, &material(Law::NeoHookean)).unwrap());
+    for model in all {
+        let x = deformed(&model);
+        let mut f = vec![Vector3::zeros(); x.len()];
+        let mut K = model.pattern();
+        let energy = model.internal_forces(&x, &mut f);
+        model.tangent(&x, Tangent::Projected, &mut K);
+        for threads in [1, 2, 3] {
+            let mut team = crate::team::Team::new(threads).unwrap();
+            let (mut f_by, mut K_by) = (vec![Vector3::repeat(7.0); x.len()], model.pattern());
+            assert_eq!(model.internal_forces_by(&mut team, &x, &mut f_by), energy, "{}", name(&model));
+            assert_eq!(model.energy_by(&mut team, &x), model.energy(&x), "{}", name(&model));
+            model.tangent_by(&mut team, &x, Tangent::Projected, &mut K_by);
+            assert!(f_by == f && K_by == K, "{} on {threads} threads", name(&model));
+        }
+    }
+}

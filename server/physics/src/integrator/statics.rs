@@ -35,12 +35,12 @@ impl<'a> StaticProblem<'a> {
 }
 
 impl Potential for StaticProblem<'_> {
-    fn value(&mut self, _: &mut Team, x: &[Vector3<f64>]) -> f64 {
-        self.model.energy(x) + self.work(x)
+    fn value(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
+        self.model.energy_by(team, x) + self.work(x)
     }
 
-    fn gradient(&mut self, _: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
-        let energy = self.model.internal_forces(x, g);
+    fn gradient(&mut self, team: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
+        let energy = self.model.internal_forces_by(team, x, g);
         g.iter_mut().zip(self.load).for_each(|(g, f)| *g -= f);
         energy + self.work(x)
     }
@@ -49,9 +49,9 @@ impl Potential for StaticProblem<'_> {
         self.model.pattern()
     }
 
-    fn hessian(&mut self, _: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>) {
+    fn hessian(&mut self, team: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>) {
         let kind = if curvature == Curvature::Exact { Tangent::Exact } else { self.definite };
-        self.model.tangent(x, kind, H);
+        self.model.tangent_by(team, x, kind, H);
     }
 
     fn loads(&mut self, loads: &mut [Vector3<f64>]) {

@@ -2,8 +2,11 @@
 
 use nalgebra::Vector3;
 use scindo_allocations::{Counting, allocations};
+use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::body::{Body, BodySettings, PointSpring, SpringKind};
-use scindo_physics::material::{Material, Rayleigh};
+use scindo_physics::material::{Law, Material, Rayleigh, Tangent};
+use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
+use scindo_physics::team::Team;
 
 use crate::{DOWN, SOFT, bar_mesh, left_face, settings};
 
@@ -82,5 +85,34 @@ fn a_steady_step_does_not_allocate() {
         }
         let allocated = allocations() - before;
         assert_eq!(allocated, 0, "with {threads} threads");
+    }
+}
+
+#[test]
+fn assembling_a_model_again_does_not_allocate() {
+    let (size, cells) = (Vector3::new(1.0, 0.8, 0.6), [5, 4, 3]);
+    let tets = box_mesh(Vector3::zeros(), size, cells, BoxPattern::Tet6);
+    let hexes = box_hexes(Vector3::zeros(), size, cells);
+    let soft = Material { law: Law::NeoHookean, ..SOFT };
+    let averaged = Volumetric::NodeAveraged { kept: 0.05 };
+    let models = [
+        Model::tet4(&tets, &soft, averaged).unwrap(),
+        Model::tet10(&tets, &SOFT).unwrap(),
+        Model::hex8(&hexes, &soft, Volumetric::Selective).unwrap(),
+    ];
+    for model in models {
+        let x: Vec<_> = model.rest().iter().map(|X| X + 0.1 * Vector3::new(X.y * X.z, 0.0, X.x)).collect();
+        let (mut f, mut K) = (vec![Vector3::zeros(); x.len()], model.pattern());
+        for threads in [1, 2] {
+            let mut team = Team::new(threads).unwrap();
+            let mut assemble = || {
+                model.tangent_by(&mut team, &x, Tangent::Projected, &mut K);
+                model.internal_forces_by(&mut team, &x, &mut f) + model.energy_by(&mut team, &x)
+            };
+            assemble();
+            let before = allocations();
+            assemble();
+            assert_eq!(allocations() - before, 0, "{:?} on {threads} threads", model.kind());
+        }
     }
 }
