@@ -11,6 +11,7 @@ mod eigenfrequencies;
 mod estimates;
 mod explicit;
 mod field;
+mod half_cut_beam;
 mod manufactured;
 mod near_incompressible;
 mod nienhuys;

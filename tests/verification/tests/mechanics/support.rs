@@ -60,11 +60,22 @@ pub fn equilibrium(
     fixed: &[FixedCopy],
     start: &[Vector3<f64>],
 ) -> Vec<Vector3<f64>> {
+    equilibrium_by(Method::Pcg, model, loads, fixed, start)
+}
+
+/// The same with a method of choice for the linear systems.
+pub fn equilibrium_by(
+    method: Method,
+    model: &Model,
+    loads: &[Vector3<f64>],
+    fixed: &[FixedCopy],
+    start: &[Vector3<f64>],
+) -> Vec<Vector3<f64>> {
     let mut x = start.to_vec();
     let none = vec![Vector3::zeros(); x.len()];
     let mut problem = StaticProblem::new(model, if loads.is_empty() { &none } else { loads });
     let linear = LinearSettings {
-        method: Method::Pcg,
+        method,
         precision: Precision::Mixed,
         iterations: 20_000,
         tolerance: if model.law() == Law::Linear { 1e-11 } else { 1e-5 },
@@ -73,6 +84,9 @@ pub fn equilibrium(
         NewtonSettings { steps: 60, tolerance: TOLERANCE, halvings: 12, curvature: Curvature::Exact, linear };
     let mut team = Team::new(1).unwrap();
     let report = find_equilibrium(&mut Newton::new(settings), &mut team, &mut problem, fixed, &mut x);
+    if std::env::var_os("DEBUG_NEWTON").is_some() {
+        println!("{report:?}");
+    }
     assert!(report.stop == StopReason::Converged, "{:?} {:?}: {report:?}", model.kind(), model.law());
     x
 }
