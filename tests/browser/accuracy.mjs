@@ -36,6 +36,10 @@ try {
     await isLegible(page, colorScheme);
     hold(asked.length === 0, `${colorScheme}: the page asks nobody for anything (${asked.join(", ") || "self-contained"})`);
     await page.screenshot({ path: path.join(artifacts, `accuracy-${colorScheme}.png`), fullPage: true });
+    for (const section of await page.$$("section[id]")) {
+      const name = await section.getAttribute("id");
+      await section.screenshot({ path: path.join(artifacts, `accuracy-${colorScheme}-${name}.png`) });
+    }
     await context.close();
   }
   const narrow = await browser.newContext({ viewport: { width: 420, height: 800 } });

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Starts the built-in demonstration on free ports and drives its page; see viewer.mjs.
+# Starts the built-in demonstration on free ports and drives its page; see viewer.mjs. Then makes a quick study
+# of accuracy and looks at its page; see accuracy.mjs.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 bin=${SCINDO_TEST_BIN:-target/debug}/scindo
@@ -17,3 +18,7 @@ for _ in $(seq 1 300); do
   sleep 0.2
 done
 node tests/browser/viewer.mjs "http://127.0.0.1:$web"
+
+rm -rf "$artifacts/accuracy"
+"$bin" accuracy --quick --budget-ms 20 --out "$artifacts/accuracy"
+node tests/browser/accuracy.mjs "$artifacts/accuracy/index.html" r1 r2-tc1 bar-rest bar-motion

@@ -30,6 +30,8 @@ enum Command {
     Check(CheckArgs),
     /// Turn a surface or volume file into tetrahedra.
     Mesh(MeshArgs),
+    /// Measure what accuracy costs in time: laws, elements, meshes, steps, solvers on reference cases or a scene.
+    Accuracy(AccuracyArgs),
 }
 
 /// `scindo run`.
@@ -126,6 +128,47 @@ pub struct MeshArgs {
     pub json: bool,
 }
 
+/// `scindo accuracy`.
+#[derive(Debug, Args)]
+pub struct AccuracyArgs {
+    /// Cases (r1, r2-tc1, bar-rest, bar-motion; bar is the last two) and scene files.
+    #[arg(value_name = "CASE|SCENE", default_values = ["r1", "r2-tc1", "bar"])]
+    pub cases: Vec<String>,
+    /// Recommend a configuration that fits this time: of a static solution, or of a frame of a motion.
+    #[arg(long, value_name = "X")]
+    pub budget_ms: Option<f64>,
+    /// Where index.html, points.csv and study.json go; a study that was interrupted goes on there.
+    #[arg(long, value_name = "DIR", default_value = "accuracy")]
+    pub out: PathBuf,
+    /// Coarse meshes only: less than a minute.
+    #[arg(long)]
+    pub quick: bool,
+    /// Simulated time of scenes in motion [s].
+    #[arg(long, value_name = "T")]
+    pub seconds: Option<f64>,
+    /// Only these laws, such as linear,corotational.
+    #[arg(long, value_name = "LAW", value_delimiter = ',')]
+    pub law: Vec<String>,
+    /// Only these elements, such as tet4,hex8.
+    #[arg(long, value_name = "ELEMENT", value_delimiter = ',')]
+    pub element: Vec<String>,
+    /// Only these integrators.
+    #[arg(long, value_name = "INTEGRATOR", value_delimiter = ',')]
+    pub integrator: Vec<String>,
+    /// Only these solvers.
+    #[arg(long, value_name = "METHOD", value_delimiter = ',')]
+    pub solver: Vec<String>,
+    /// Only these numbers of threads.
+    #[arg(long, value_name = "N", value_delimiter = ',')]
+    pub threads: Vec<String>,
+    /// Other meshes of a block: cells along its longest side.
+    #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub cells: Vec<u32>,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Parses, runs, and turns the outcome into an exit code: the one place that does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -135,12 +178,14 @@ pub fn main() -> ExitCode {
         Some(Command::Run(args)) => args.serve.json,
         Some(Command::Check(args)) => args.json,
         Some(Command::Mesh(args)) => args.json,
+        Some(Command::Accuracy(args)) => args.json,
     };
     let outcome = match cli.command {
         None => command::run::demonstration(&cli.demonstration),
         Some(Command::Run(args)) => command::run::scene(&args),
         Some(Command::Check(args)) => command::check::check(&args),
         Some(Command::Mesh(args)) => command::mesh::mesh(&args),
+        Some(Command::Accuracy(args)) => command::accuracy::accuracy(&args),
     };
     match outcome {
         Ok(code) => code,

@@ -5,3 +5,5 @@ pub mod run;
 pub mod check;
 
 pub mod mesh;
+
+pub mod accuracy;

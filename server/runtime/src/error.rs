@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use scindo_proto::KeyError;
+use scindo_study::StudyError;
 use scindo_world::mesh_in::MeshInError;
 use scindo_world::results::ResultsError;
 use scindo_world::scene::SceneError;
@@ -23,6 +24,9 @@ pub enum RuntimeError {
     /// A mesh that cannot be written where it was asked for.
     #[error("{0}; check that the directory exists and is writable")]
     Unwritten(MeshInError),
+    /// A study of accuracy.
+    #[error(transparent)]
+    Study(#[from] StudyError),
     /// An option of the command line that cannot be used.
     #[error("{option} '{value}': {reason}. {next}")]
     Option {
@@ -85,6 +89,8 @@ impl RuntimeError {
     /// 2: what was asked for is not possible as written. 1: it was, but failed.
     pub fn exit_code(&self) -> ExitCode {
         match self {
+            Self::Study(StudyError::Io { .. }) => ExitCode::from(1),
+            Self::Study(_) => ExitCode::from(2),
             Self::Scene(_) | Self::Mesh(_) | Self::Option { .. } | Self::Key(_) => ExitCode::from(2),
             _ => ExitCode::from(1),
         }
@@ -93,7 +99,8 @@ impl RuntimeError {
     /// Stable name for `--json`.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Scene(_) => "scene",
+            Self::Scene(_) | Self::Study(StudyError::Scene(_)) => "scene",
+            Self::Study(_) => "study",
             Self::Option { .. } => "option",
             Self::Key(_) => "key",
             Self::Listen { .. } => "listen",

@@ -8,10 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum Factor {
     /// Constitutive law.
     Law,
-    /// Finite element.
+    /// Finite element, with its remedy against locking.
     Element,
-    /// Remedy against volumetric locking.
-    Locking,
     /// Cells of the mesh.
     Mesh,
     /// Time integration.
@@ -30,10 +28,9 @@ pub enum Factor {
 
 impl Factor {
     /// All factors, in the order of the columns of a table.
-    pub const ALL: [Factor; 10] = [
+    pub const ALL: [Factor; 9] = [
         Factor::Law,
         Factor::Element,
-        Factor::Locking,
         Factor::Mesh,
         Factor::Integrator,
         Factor::Step,
@@ -48,7 +45,6 @@ impl Factor {
         match self {
             Factor::Law => "law",
             Factor::Element => "element",
-            Factor::Locking => "locking",
             Factor::Mesh => "mesh",
             Factor::Integrator => "integrator",
             Factor::Step => "step",
@@ -124,10 +120,32 @@ pub fn words(factor: Factor, bodies: &[String], key: &str, words: &[&str], base:
     Axis::new(factor, words.iter().enumerate().map(setting).collect(), base)
 }
 
-/// Precision of the inner kernels; the default needs no key.
+/// Arithmetic; left to the program (single where that is allowed, else mixed) it needs no key.
 pub fn precisions(bodies: &[String]) -> Axis {
-    let double = Setting::new("double", 1.0, on_bodies(bodies, "solver.precision", "\"double\""));
-    Axis::new(Factor::Precision, vec![Setting::new("mixed", 0.0, Vec::new()), double], "mixed")
+    let words = ["single", "mixed", "double"].into_iter().enumerate();
+    let word = |(i, word): (usize, &str)| {
+        Setting::new(word, i as f64 + 1.0, on_bodies(bodies, "solver.precision", &format!("\"{word}\"")))
+    };
+    let automatic = Setting::new("auto", 0.0, Vec::new());
+    Axis::new(Factor::Precision, [automatic].into_iter().chain(words.map(word)).collect(), "auto")
+}
+
+/// Elements and their remedies against locking. `pattern` splits the cells of a block into
+/// tetrahedra; without it there is no block, hence no hexahedra.
+pub fn elements(bodies: &[String], pattern: Option<&str>, base: &str) -> Axis {
+    let setting = |(i, label): (usize, &&str)| {
+        let (element, locking) = label.split_once(' ').unwrap_or((label, "none"));
+        let mut set = on_bodies(bodies, "element", &format!("\"{element}\""));
+        set.extend(on_bodies(bodies, "locking", &format!("\"{locking}\"")));
+        if let Some(split) = pattern {
+            let pattern = if element == "hex8" { "hex" } else { split };
+            set.extend(on_bodies(bodies, "mesh.box.pattern", &format!("\"{pattern}\"")));
+        }
+        Setting::new(*label, i as f64, set)
+    };
+    let all = ["tet4", "tet4 node-averaged", "tet10", "hex8", "hex8 selective"];
+    let some = if pattern.is_some() { &all[..] } else { &all[..3] };
+    Axis::new(Factor::Element, some.iter().enumerate().map(setting).collect(), base)
 }
 
 /// Where the linear solver stops: relative preconditioned residuals, with iterations to reach them.

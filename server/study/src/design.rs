@@ -55,12 +55,13 @@ impl Configuration {
         let words: Vec<String> = self
             .choices
             .iter()
-            .filter(|(factor, setting)| !(*factor == Factor::Locking && setting.label == "none"))
+            .filter(|(_, setting)| setting.label != "auto")
             .map(|(factor, setting)| match factor {
                 Factor::Tolerance if !setting.label.contains(' ') => format!("tolerance {}", setting.label),
                 Factor::Threads if setting.label == "1" => "1 thread".to_owned(),
                 Factor::Threads => format!("{} threads", setting.label),
                 Factor::Step => format!("step {}", setting.label),
+                Factor::Precision => format!("{} precision", setting.label),
                 _ => setting.label.clone(),
             })
             .collect();

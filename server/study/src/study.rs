@@ -205,7 +205,9 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     let mut cases = Vec::new();
     for name in &settings.cases {
         if name == "bar" {
-            cases.extend(["bar", "bar-motion"].iter().filter_map(|name| case::builtin(name, settings.quick)));
+            cases.extend(
+                ["bar-rest", "bar-motion"].iter().filter_map(|name| case::builtin(name, settings.quick)),
+            );
         } else if let Some(case) = case::builtin(name, settings.quick) {
             cases.push(case);
         } else if Path::new(name).exists() {

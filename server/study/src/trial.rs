@@ -183,20 +183,15 @@ impl Running {
         Some(costs)
     }
 
-    /// Steps until nothing moves any more; milliseconds.
+    /// Solves from where the body is; milliseconds.
     fn solve(&mut self, stop: &AtomicBool) -> Option<f64> {
-        let mut milliseconds = 0.0;
-        let mut before = self.displacements();
-        for _ in 0..MOST_SETTLING_STEPS {
-            milliseconds += self.step(stop)?;
-            let after = self.displacements();
-            let moved = distance(&before, &after);
-            if !self.trial.is_done() || moved <= SETTLED * norm(&after) {
-                return Some(milliseconds);
-            }
-            before = after;
+        let milliseconds = self.step(stop)?;
+        let stops = self.simulation.report().bodies.iter().map(|body| format!("{:?}", body.solve.stop));
+        if let Some(stop) =
+            stops.into_iter().find(|stop| stop != "Converged").filter(|_| self.trial.is_done())
+        {
+            self.end(Status::Failed, format!("no equilibrium: the solver stopped by {stop}"));
         }
-        self.end(Status::Failed, format!("no equilibrium after {MOST_SETTLING_STEPS} steps"));
         Some(milliseconds)
     }
 
@@ -292,17 +287,14 @@ impl Running {
     }
 }
 
-/// Settling of a dynamic scene: probes that move by less than this share of their displacement rest.
-const SETTLED: f64 = 1e-5;
-
-/// Most steps until it must have settled.
-const MOST_SETTLING_STEPS: u32 = 60;
-
 /// What the step said, if it was bad.
 fn verdict(report: &StepReport) -> Option<(Status, String)> {
-    let bad = report.events.iter().find(|event| event.level == Level::Error)?;
-    let status = if bad.name == "step-rolled-back" { Status::Exploded } else { Status::Failed };
-    Some((status, bad.message.clone()))
+    if let Some(bad) = report.events.iter().find(|event| event.level == Level::Error) {
+        let status = if bad.name == "step-rolled-back" { Status::Exploded } else { Status::Failed };
+        return Some((status, bad.message.clone()));
+    }
+    let lost = report.bodies.iter().find(|body| body.solve.outcome != Default::default())?;
+    Some((Status::Failed, format!("the body did not advance: {:?}", lost.solve.outcome)))
 }
 
 impl Cost {
@@ -315,14 +307,6 @@ impl Cost {
         };
         Self { setup_ms, first_ms, median_ms: at(0.5), p99_ms: at(0.99), count: costs.len() }
     }
-}
-
-fn norm(values: &[f64]) -> f64 {
-    values.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
 /// An error message on one line, for tables.

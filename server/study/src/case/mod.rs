@@ -1,10 +1,16 @@
 //! Cases: a scene, what is varied in it, what it is asked for, and where the right answer comes from.
 
-mod builtin;
+mod cantilever;
+
+mod cut_beam;
+
+mod bar;
+
+mod scene;
 
 mod gold;
 
-mod scene;
+mod shared;
 
 use scindo_world::scene::Scene;
 
@@ -93,15 +99,15 @@ impl Truth {
 }
 
 /// Names of the cases that come with the program.
-pub const NAMES: [&str; 4] = ["r1", "r2-tc1", "bar", "bar-motion"];
+pub const NAMES: [&str; 4] = ["r1", "r2-tc1", "bar-rest", "bar-motion"];
 
 /// A case that comes with the program; `quick` leaves out what takes long.
 pub fn builtin(name: &str, quick: bool) -> Option<Case> {
     match name {
-        "r1" => Some(builtin::r1(quick)),
-        "r2-tc1" => Some(builtin::r2_tc1(quick)),
-        "bar" => Some(builtin::bar(quick)),
-        "bar-motion" => Some(builtin::bar_motion(quick)),
+        "r1" => Some(cantilever::case(quick)),
+        "r2-tc1" => Some(cut_beam::case(quick)),
+        "bar-rest" => Some(bar::at_rest(quick)),
+        "bar-motion" => Some(bar::in_motion(quick)),
         _ => None,
     }
 }

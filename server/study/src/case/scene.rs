@@ -4,10 +4,12 @@ use scindo_world::scene::{Scene, SceneError};
 use scindo_world::simulation::Simulation;
 use serde_json::Value;
 
-use super::builtin::{LAWS, elements};
 use super::gold::{Point, probe_tables};
+use super::shared::LAWS;
 use super::{Case, Plan, Truth};
-use crate::axes::{Axis, Factor, Setting, precisions, step, steps, threads, tolerance, tolerances, words};
+use crate::axes::{
+    Axis, Factor, Setting, elements, precisions, step, steps, threads, tolerance, tolerances, words,
+};
 use crate::design::{Block, Configuration};
 use crate::error::Goal;
 use crate::trial::Protocol;
@@ -70,7 +72,7 @@ fn axes(bodies: &[String], tree: &Value, now: (&str, &str, f64), quick: bool) ->
     let mut tolerance = tolerances(bodies, &[1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8], 0.0);
     tolerance.settings.insert(0, Setting::new("as in the scene", 0.5, Vec::new()));
     tolerance.base = 0;
-    let mut axes = vec![words(Factor::Law, bodies, "law", &LAWS, law), elements(bodies)];
+    let mut axes = vec![words(Factor::Law, bodies, "law", &LAWS, law), own_elements(bodies, tree)];
     axes.extend(meshes(bodies, tree, if quick { &[0.5, 1.0] } else { &[0.5, 0.75, 1.0, 1.5] }, 1.0));
     if !is_static {
         let all = ["implicit-euler", "bdf2", "newmark", "symplectic-euler", "midpoint", "rk4"];
@@ -86,6 +88,23 @@ fn axes(bodies: &[String], tree: &Value, now: (&str, &str, f64), quick: bool) ->
     axes.push(precisions(bodies));
     axes.push(threads(&[1, 2]));
     axes
+}
+
+/// Elements; the base is the scene's own, as it stands.
+fn own_elements(bodies: &[String], tree: &Value) -> Axis {
+    let first = &tree["body"][0];
+    let word = |key: &str, default: &'static str| first[key].as_str().unwrap_or(default).to_owned();
+    let base = match (word("element", "tet4"), word("locking", "none")) {
+        (element, locking) if locking == "none" => element,
+        (element, locking) => format!("{element} {locking}"),
+    };
+    let blocks = tree["body"].as_array().is_some_and(|all| all.iter().all(|b| b["mesh"]["box"].is_object()));
+    let pattern = first["mesh"]["box"]["pattern"].as_str().filter(|pattern| *pattern != "hex");
+    let mut axis = elements(bodies, blocks.then(|| pattern.unwrap_or("tet5")), &base);
+    if let Some(own) = axis.settings.get_mut(axis.base).filter(|setting| setting.label == base) {
+        own.set.clear();
+    }
+    axis
 }
 
 /// Meshes with the cells of every body times a factor; none where no body's mesh can be refined.

@@ -1,0 +1,169 @@
+//! `scindo accuracy`: what accuracy costs in time, on reference cases or a scene.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use scindo_study::axes::Factor;
+use scindo_study::{CaseResult, Settings, StudyResult};
+use serde_json::json;
+
+use crate::cli::AccuracyArgs;
+use crate::error::RuntimeError;
+use crate::say::say;
+
+/// Runs the study; Ctrl-C ends it after the step it is in, and what is finished is kept and shown.
+pub fn accuracy(args: &AccuracyArgs) -> Result<ExitCode, RuntimeError> {
+    check(args)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    listen(&stop)?;
+    let settings = Settings {
+        cases: args.cases.clone(),
+        out: args.out.clone(),
+        quick: args.quick,
+        budget_ms: args.budget_ms,
+        seconds: args.seconds,
+        only: narrowed(args),
+        cells: args.cells.iter().map(|n| *n as usize).collect(),
+        stop,
+    };
+    let bar = bar(args.json);
+    let study = scindo_study::run(&settings, &mut |progress| {
+        bar.set_length(progress.total as u64);
+        bar.set_position(progress.done as u64);
+        let left = progress.left_s.map_or(String::new(), |s| format!("{} left · ", minutes(s)));
+        bar.set_message(format!("{left}{}: {}", progress.case, progress.what));
+    })?;
+    bar.finish_and_clear();
+    if args.json {
+        say!("{}", as_json(args, &study));
+    } else {
+        print(args, &study);
+    }
+    Ok(if study.interrupted { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+fn check(args: &AccuracyArgs) -> Result<(), RuntimeError> {
+    let positive = |option, value: Option<f64>| match value {
+        Some(x) if !(x.is_finite() && x > 0.0) => Err(RuntimeError::Option {
+            option,
+            value: x.to_string(),
+            reason: "must be a positive number".to_owned(),
+            next: "Leave it out for the default".to_owned(),
+        }),
+        _ => Ok(()),
+    };
+    positive("--budget-ms", args.budget_ms)?;
+    positive("--seconds", args.seconds)
+}
+
+fn narrowed(args: &AccuracyArgs) -> Vec<(Factor, Vec<String>)> {
+    let given = [
+        (Factor::Law, &args.law),
+        (Factor::Element, &args.element),
+        (Factor::Integrator, &args.integrator),
+        (Factor::Solver, &args.solver),
+        (Factor::Threads, &args.threads),
+    ];
+    given
+        .into_iter()
+        .filter(|(_, labels)| !labels.is_empty())
+        .map(|(f, labels)| (f, labels.clone()))
+        .collect()
+}
+
+/// Raises `stop` at the first Ctrl-C or request to terminate; a second Ctrl-C ends the program.
+fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
+    let failed = |e: std::io::Error| RuntimeError::System {
+        what: "listening for signals".to_owned(),
+        reason: e.to_string(),
+    };
+    let stop = stop.clone();
+    let signals = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    let wait = move || {
+        signals.block_on(async {
+            let kind = tokio::signal::unix::SignalKind::terminate();
+            let Ok(mut terminate) = tokio::signal::unix::signal(kind) else { return };
+            tokio::select! {
+                _ = tokio::signal::ctrl_c() => {}
+                _ = terminate.recv() => {}
+            }
+            stop.store(true, Ordering::Relaxed);
+            if tokio::signal::ctrl_c().await.is_ok() {
+                std::process::exit(130);
+            }
+        });
+    };
+    std::thread::Builder::new().name("signals".to_owned()).spawn(wait).map_err(failed)?;
+    Ok(())
+}
+
+fn bar(json: bool) -> ProgressBar {
+    let target = if json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {wide_msg}");
+    let bar = ProgressBar::with_draw_target(Some(0), target)
+        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(500));
+    bar
+}
+
+fn minutes(seconds: f64) -> String {
+    let seconds = seconds.ceil() as u64;
+    if seconds < 90 { format!("{seconds} s") } else { format!("{} min", seconds.div_ceil(60)) }
+}
+
+fn print(args: &AccuracyArgs, study: &StudyResult) {
+    for result in &study.cases {
+        print_case(result);
+    }
+    let directory = args.out.display();
+    let how = if study.interrupted { "interrupted; the same command goes on from here" } else { "done" };
+    say!("{how}: {:.0} s, {} runs taken over", study.seconds, study.resumed);
+    say!("  page     {directory}/index.html");
+    say!("  figures  {directory}/points.csv, study.json, pareto-*.svg");
+}
+
+fn print_case(result: &CaseResult) {
+    let counts = result.counts();
+    say!("{}: {} points, {} without a result", result.case.title, counts.points, counts.failures);
+    match &result.reference {
+        Ok(reference) => say!("  reference known to ± {:.3} %", 100.0 * reference.error_bar),
+        Err(why) => say!("  no reference: {why}"),
+    }
+    say!("  {:>10} {:>10}  {:14} Pareto front", "time", "error", "dominated by");
+    for &i in &result.front {
+        let point = &result.points[i];
+        let (milliseconds, error) = point.point();
+        let dominant = point.sources.as_ref().and_then(|s| s.dominant()).map_or("-", |source| source.name());
+        say!(
+            "  {milliseconds:>7.2} ms {:>8.3} %  {dominant:14} {}",
+            100.0 * error,
+            point.configuration.words()
+        );
+    }
+    if let Some(advice) = &result.recommendation {
+        say!("  {}", advice.words);
+    }
+}
+
+fn as_json(args: &AccuracyArgs, study: &StudyResult) -> serde_json::Value {
+    let case = |result: &CaseResult| {
+        json!({
+            "name": result.case.name,
+            "counts": result.counts(),
+            "front": result.front.iter().map(|&i| {
+                let point = &result.points[i];
+                json!({ "median_ms": point.point().0, "error": point.point().1, "set": point.configuration.words() })
+            }).collect::<Vec<_>>(),
+            "recommendation": result.recommendation,
+        })
+    };
+    json!({
+        "out": args.out,
+        "seconds": study.seconds,
+        "interrupted": study.interrupted,
+        "cases": study.cases.iter().map(case).collect::<Vec<_>>(),
+    })
+}

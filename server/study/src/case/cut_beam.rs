@@ -1,0 +1,43 @@
+//! Schoch's beam, half cut, under gravity: against stored solutions.
+
+use super::Case;
+use super::gold::Gold;
+use super::shared::{LAWS, axes, labels, load, names};
+use crate::axes::{Factor, cells, elements};
+use crate::design::Block;
+use crate::error::Goal;
+use crate::trial::Protocol;
+
+/// The case.
+pub fn case(quick: bool) -> Case {
+    let body = ["beam".to_owned()];
+    let gold = Gold::read(include_str!("../../cases/r2-tc1.gold.json"));
+    // 5×10×33 has its faces beside the cut, the others have a layer of faces in it.
+    let all = [[2, 4, 14], [4, 8, 26], [5, 10, 33], [6, 12, 40], [8, 16, 54]];
+    let (meshes, base) = if quick { (&all[..2], all[1]) } else { (&all[..], all[3]) };
+    let mesh = cells("beam", meshes, base);
+    let axes = axes(&body, "corotational", elements(&body, Some("tet5"), "tet4"), mesh, 1e-4);
+    let meshes = labels(&axes, Factor::Mesh);
+    Case {
+        name: "r2-tc1".into(),
+        title: "R2-TC1 · Schoch’s cut beam".into(),
+        about: "A beam of 30 × 60 × 200 mm (E = 300 kPa, ν = 0.35), held at its base and cut through to half \
+                its depth. Gravity bends it sideways and opens the cut; the tip moves by half the length. The \
+                mesh 5×10×33 does not follow the cut, the others do."
+            .into(),
+        scene: load(include_str!("../../cases/r2-tc1.toml"), &[gold.probes("beam")]),
+        bodies: body.to_vec(),
+        protocol: Protocol::Static,
+        goal: Goal::new("sideways deflection of the tip", gold.probe("tip_mid"), [1.0, 0.0, 0.0]),
+        truth: gold.truth("stvk", None, "Stored solution for St. Venant–Kirchhoff"),
+        blocks: vec![
+            Block(vec![(Factor::Law, names(&LAWS)), (Factor::Mesh, meshes.clone())]),
+            Block(vec![(Factor::Tolerance, names(&["1e-2"])), (Factor::Mesh, meshes.clone())]),
+            Block(vec![(Factor::Solver, names(&["cholesky"])), (Factor::Mesh, meshes.clone())]),
+            Block(vec![(Factor::Element, names(&["tet4 node-averaged"])), (Factor::Mesh, meshes)]),
+        ],
+        axes,
+        colour: Factor::Law,
+        shape: Factor::Element,
+    }
+}

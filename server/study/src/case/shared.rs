@@ -1,0 +1,38 @@
+//! What the cases that come with the program have in common.
+
+use scindo_world::scene::Scene;
+
+use crate::axes::{Axis, Factor, precisions, threads, tolerances, words};
+
+/// All laws.
+pub const LAWS: [&str; 4] = ["linear", "corotational", "stvk", "neo-hookean"];
+
+/// Law, element, mesh, solver, tolerance, precision, threads.
+pub fn axes(bodies: &[String], law: &str, element: Axis, mesh: Axis, tolerance: f64) -> Vec<Axis> {
+    vec![
+        words(Factor::Law, bodies, "law", &LAWS, law),
+        element,
+        mesh,
+        words(Factor::Solver, bodies, "solver.method", &["pcg", "cg", "cholesky"], "pcg"),
+        tolerances(bodies, &[1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10], tolerance),
+        precisions(bodies),
+        threads(&[1, 2]),
+    ]
+}
+
+/// The labels of an axis.
+pub fn labels(axes: &[Axis], factor: Factor) -> Vec<String> {
+    let axis = axes.iter().find(|axis| axis.factor == factor);
+    axis.map(|axis| axis.settings.iter().map(|s| s.label.clone()).collect()).unwrap_or_default()
+}
+
+/// Labels from literals.
+pub fn names(labels: &[&str]) -> Vec<String> {
+    labels.iter().map(|label| (*label).to_owned()).collect()
+}
+
+/// A scene that is part of the program.
+pub fn load(text: &str, overrides: &[String]) -> Scene {
+    let scene = Scene::from_toml(text).and_then(|scene| scene.apply_sets(overrides));
+    scene.expect("the file is part of the program and a test reads it")
+}
