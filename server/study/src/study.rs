@@ -396,11 +396,14 @@ fn is_motion(case: &Case) -> bool {
     matches!(case.protocol, Protocol::Motion { .. })
 }
 
-/// How long runs may take: 20 s keep a study of four cases well under a quarter of an hour.
+/// How long runs may take. References and twins may take longer than what is compared.
 fn limits(quick: bool, timed: bool) -> Limits {
-    let run_s = if quick { 3.0 } else { 20.0 };
-    let repeats = if timed { 11 } else { 1 };
-    Limits { run_s, repeat_s: if quick { 0.15 } else { 1.5 }, repeats }
+    let run_s = if quick { 3.0 } else { 12.0 };
+    if timed {
+        Limits { run_s, repeat_s: if quick { 0.15 } else { 1.5 }, repeats: 11 }
+    } else {
+        Limits { run_s: 10.0 * run_s, repeat_s: 0.0, repeats: 1 }
+    }
 }
 
 /// What a run is known by: scene, settings and protocol.

@@ -199,16 +199,23 @@ impl Running {
     fn motion(&mut self, frame_s: f64, frames: u32, stop: &AtomicBool) -> Option<Vec<f64>> {
         let step_s = self.simulation.step_s();
         let steps = (f64::from(frames) * frame_s / step_s).round() as u32;
-        let mut costs = Vec::with_capacity(steps as usize);
+        let mut costs = Vec::with_capacity(frames as usize);
+        let (mut spent, mut since) = (0.0, 0.0);
         for step in 1..=steps {
-            costs.push(self.step(stop)? * frame_s / step_s);
+            spent += self.step(stop)?;
+            since += step_s / frame_s;
             if !self.trial.is_done() {
                 break;
             }
             let frame = f64::from(step) * step_s / frame_s;
             if (frame - frame.round()).abs() < 1e-6 {
                 self.sample(frame.round() as u32);
+                costs.push(spent / since);
+                (spent, since) = (0.0, 0.0);
             }
+        }
+        if costs.is_empty() && since > 0.0 {
+            costs.push(spent / since);
         }
         Some(costs)
     }

@@ -13,11 +13,12 @@ pub fn case(quick: bool) -> Case {
     let body = ["beam".to_owned()];
     let gold = Gold::read(include_str!("../../cases/r2-tc1.gold.json"));
     // 5×10×33 has its faces beside the cut, the others have a layer of faces in it.
-    let all = [[2, 4, 14], [4, 8, 26], [5, 10, 33], [6, 12, 40], [8, 16, 54]];
-    let (meshes, base) = if quick { (&all[..2], all[1]) } else { (&all[..], all[3]) };
+    let all = [[2, 4, 14], [4, 8, 26], [5, 10, 33], [6, 12, 40]];
+    let (meshes, base) = if quick { (&all[..2], all[0]) } else { (&all[..], all[1]) };
     let mesh = cells("beam", meshes, base);
     let axes = axes(&body, "corotational", elements(&body, Some("tet5"), "tet4"), mesh, 1e-4);
     let meshes = labels(&axes, Factor::Mesh);
+    let small: Vec<String> = meshes.iter().take(if quick { 1 } else { 4 }).cloned().collect();
     Case {
         name: "r2-tc1".into(),
         title: "R2-TC1 · Schoch’s cut beam".into(),
@@ -32,9 +33,9 @@ pub fn case(quick: bool) -> Case {
         truth: gold.truth("stvk", None, "Stored solution for St. Venant–Kirchhoff"),
         blocks: vec![
             Block(vec![(Factor::Law, names(&LAWS)), (Factor::Mesh, meshes.clone())]),
-            Block(vec![(Factor::Tolerance, names(&["1e-2"])), (Factor::Mesh, meshes.clone())]),
-            Block(vec![(Factor::Solver, names(&["cholesky"])), (Factor::Mesh, meshes.clone())]),
-            Block(vec![(Factor::Element, names(&["tet4 node-averaged"])), (Factor::Mesh, meshes)]),
+            Block(vec![(Factor::Tolerance, names(&["1e-2"])), (Factor::Mesh, small.clone())]),
+            Block(vec![(Factor::Solver, names(&["cholesky"])), (Factor::Mesh, small.clone())]),
+            Block(vec![(Factor::Element, names(&["tet4 node-averaged"])), (Factor::Mesh, small)]),
         ],
         axes,
         colour: Factor::Law,

@@ -106,7 +106,7 @@ const DEFINITIONS: [(&str, &str); 9] = [
     ),
     (
         "Design",
-        "One factor at a time around a base, and factorial blocks of those that matter together. No setting is tuned to a case. Runs are stopped after 20 s and then count as too slow.",
+        "One factor at a time around a base, and factorial blocks of those that matter together. No setting is tuned to a case. Runs are stopped after 12 s (3 s in a quick study) and then count as too slow.",
     ),
     (
         "No result",
