@@ -95,24 +95,24 @@ impl StepPotential<'_> {
 }
 
 impl Potential for StepPotential<'_> {
-    fn value(&mut self, _: &mut Team, x: &[Vector3<f64>]) -> f64 {
-        self.model.energy(x) + self.rest(x, None)
+    fn value(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
+        self.model.energy_by(team, x) + self.rest(x, None)
     }
 
-    fn gradient(&mut self, _: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
-        self.model.internal_forces(x, g) + self.rest(x, Some(g))
+    fn gradient(&mut self, team: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
+        self.model.internal_forces_by(team, x, g) + self.rest(x, Some(g))
     }
 
     fn pattern(&mut self) -> BlockCsr<f64> {
         self.model.pattern()
     }
 
-    fn hessian(&mut self, _: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>) {
+    fn hessian(&mut self, team: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>) {
         let kind = match curvature {
             Curvature::Exact => Tangent::Exact,
             Curvature::Definite => self.definite,
         };
-        self.model.tangent(x, kind, H);
+        self.model.tangent_by(team, x, kind, H);
         let Increment { A, B } = self.increment;
         self.mass.add_to(A + self.alpha * B, H);
         if let Some((beta, K)) = self.damping {
