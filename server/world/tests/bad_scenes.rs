@@ -91,8 +91,14 @@ fn values_out_of_range_name_range_and_next_step() {
 fn what_is_not_supported_yet_is_refused_never_ignored() {
     let with = |line: &str| message_after("young_pa", &format!("{line}\nyoung_pa"));
     for (line, parts) in [
-        (r#"solver = { method = "multigrid" }"#, ["`multigrid` is not supported yet", "cg, pcg, cholesky"]),
-        (r#"solver = { method = "mg-pcg" }"#, ["`mg-pcg` is not supported yet", "cg, pcg, cholesky"]),
+        (
+            r#"solver = { method = "multigrid" }"#,
+            ["`multigrid` is not supported yet", "cg, pcg, cholesky, relaxation"],
+        ),
+        (
+            r#"solver = { method = "mg-pcg" }"#,
+            ["`mg-pcg` is not supported yet", "cg, pcg, cholesky, relaxation"],
+        ),
         (
             r#"integrator = "implict-euler""#,
             ["unknown value `implict-euler`", "did you mean `implicit-euler`?"],
@@ -142,6 +148,15 @@ solver = { method = "cholesky" }"#,
             &["solver.method", "midpoint is explicit", "remove"],
         ),
         (
+            r#"solver = { method = "relaxation" }"#,
+            &["body.beam.solver.method", "`relaxation` with implicit-euler", "static"],
+        ),
+        (
+            r#"integrator = "static"
+solver = { method = "relaxation", precision = "mixed" }"#,
+            &["solver.precision", "allowed: double"],
+        ),
+        (
             r#"integrator = "midpoint"
 solver = { newton_steps = 3 }"#,
             &["solver.newton_steps", "midpoint is explicit"],
@@ -183,6 +198,14 @@ solver = { precision = "single" }"#,
     let text =
         GOOD.lines().map(|l| if l.starts_with("mesh") { grid } else { l }).collect::<Vec<_>>().join("\n");
     assert_says(&Scene::from_toml(&text).unwrap_err().to_string(), &["grid.y_m.2", "1 does not lie above 1"]);
+}
+
+#[test]
+fn only_linear_tetrahedra_have_an_error_estimate() {
+    let text =
+        GOOD.replace("young_pa", "element = \"tet10\"\nyoung_pa") + "[effects]\nerror_estimate = true\n";
+    let message = Scene::from_toml(&text).unwrap_err().to_string();
+    assert_says(&message, &["effects.error_estimate", "body `beam` is not of tet4"]);
 }
 
 #[test]

@@ -36,6 +36,7 @@ impl General {
             scheme: settings.scheme,
             mass: settings.mass,
             newton: settings.newton(material.law),
+            relaxation: settings.relaxation_iterations(),
             ..DynamicsSettings::default()
         };
         let dynamics = Dynamics::new(model, *material, with)?;

@@ -2,9 +2,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::shape::Shape;
 use super::{Body, Path};
 use crate::cut::Piece;
 use crate::element::{deformation_gradient, piece_energy, piece_forces};
+use crate::estimate::{CutTets, MeshError, StressRecovery};
 
 impl Body {
     /// Σ m [kg].
@@ -107,6 +109,13 @@ impl Body {
                 (0..pieces).map(|p| mean(self.shape.element_of(p))).collect()
             }
         }
+    }
+
+    /// Estimate of the discretisation error; only of linear tetrahedra, cut or not.
+    pub fn mesh_error(&self, recovery: &mut StressRecovery) -> Option<MeshError> {
+        let tets = CutTets::new(&self.cut_mesh);
+        let (law, lame) = (self.material.law, self.material.lame());
+        matches!(self.shape, Shape::Tet4).then(|| recovery.estimate(&tets, &self.state.x, law, lame))
     }
 
     /// Internal force on every node [N]; it pulls the body back, so it is subtracted from the loads.

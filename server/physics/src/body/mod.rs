@@ -207,6 +207,11 @@ impl Body {
         matches!(self.path, Path::Fast(_))
     }
 
+    /// Finite elements of the uncut body.
+    pub fn n_elements(&self) -> usize {
+        self.shape.n_elements(self.cut_mesh.mesh())
+    }
+
     /// Rest position of every node [m]: copies, then the nodes that quadratic elements add.
     pub fn rest_positions(&self) -> &[Vector3<f64>] {
         &self.rest
@@ -257,7 +262,7 @@ impl Body {
         self.settings = settings;
         if let Path::General(general) = &mut self.path {
             let newton = BodySettings { arithmetic, ..settings }.newton(self.material.law);
-            general.dynamics.set_newton(newton);
+            general.dynamics.set_solver(newton, settings.relaxation_iterations());
         }
         Ok(())
     }

@@ -26,6 +26,9 @@ pub struct BodySettings {
     pub mass: MassKind,
     /// Linear solver.
     pub method: Method,
+    /// [`Scheme::Static`] by matrix-free relaxation: `solver.iterations` of it per step, which go on
+    /// where those of the last step ended. `method` is not used then.
+    pub relaxation: bool,
     /// Arithmetic; `None`: the fastest that the other settings allow.
     pub arithmetic: Option<Arithmetic>,
     /// Most Newton steps per step of time; `None`: as many as law and scheme call for.
@@ -63,6 +66,7 @@ impl Default for BodySettings {
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
             method: Method::Pcg,
+            relaxation: false,
             arithmetic: None,
             newton_steps: None,
         }
@@ -91,7 +95,7 @@ impl BodySettings {
     /// path can be taken and the tolerance allows it, else mixed; double without a solver.
     pub fn arithmetic(&self, law: Law) -> Arithmetic {
         let fast = self.why_general(law).is_none() && self.reaches_single();
-        self.arithmetic.unwrap_or(match (self.scheme.is_explicit(), fast) {
+        self.arithmetic.unwrap_or(match (self.scheme.is_explicit() || self.relaxation, fast) {
             (true, _) => Arithmetic::Double,
             (false, true) => Arithmetic::Single,
             (false, false) => Arithmetic::Mixed,
@@ -135,6 +139,11 @@ impl BodySettings {
         }
     }
 
+    /// Iterations of relaxation per step, if that is how the body is solved.
+    pub(super) fn relaxation_iterations(&self) -> Option<u32> {
+        self.relaxation.then_some(self.solver.iterations)
+    }
+
     /// Tells whether every setting is in its range and goes with the others and `law`.
     pub fn check(&self, law: Law) -> Result<(), BodyError> {
         let setting = |name, found: f64, allowed| Err(BodyError::Setting { name, found, allowed });
@@ -153,6 +162,14 @@ impl BodySettings {
         match (self.arithmetic, self.why_general(law)) {
             (Some(Arithmetic::Single), Some(with)) => {
                 Err(BodyError::Combination { what: "single precision", with, instead: "mixed or double" })
+            }
+            _ if self.relaxation && self.scheme != Scheme::Static => Err(BodyError::Combination {
+                what: "relaxation",
+                with: "inertia",
+                instead: "the static integrator",
+            }),
+            (Some(Arithmetic::Mixed), _) if self.relaxation => {
+                Err(BodyError::Combination { what: "mixed precision", with: "relaxation", instead: "double" })
             }
             (Some(Arithmetic::Mixed), _) if self.scheme.is_explicit() => Err(BodyError::Combination {
                 what: "mixed precision",

@@ -103,6 +103,14 @@ impl Shape {
         }
     }
 
+    /// Elements at rest: hexahedra where the tets are only their parts.
+    pub fn n_elements(&self, mesh: &TetMesh) -> usize {
+        match self {
+            Shape::Hex8(mesh) => mesh.hexes.len(),
+            Shape::Tet4 | Shape::Tet10(_) => mesh.tets.len(),
+        }
+    }
+
     /// Elements of the model that tet `tet` of the mesh belongs to.
     pub fn element_of(&self, tet: usize) -> usize {
         match self {

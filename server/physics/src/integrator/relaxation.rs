@@ -71,6 +71,12 @@ impl Relaxation {
         self.x.clear();
     }
 
+    /// Starts the search anew in the next frame, from the iterate: to be called when the potential
+    /// changed other than by its loads.
+    pub fn restart_next(&mut self) {
+        self.known_loads.clear();
+    }
+
     /// Makes at most `iterations` iterations from where the last frame ended.
     pub fn relax(
         &mut self,

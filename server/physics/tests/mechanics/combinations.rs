@@ -114,6 +114,25 @@ fn remedies_masses_and_precisions_step() {
     }
 }
 
+/// Relaxation goes on from step to step: many short steps end where Newton's method does at once.
+#[test]
+fn relaxation_keeps_its_iterate() {
+    for law in LAWS {
+        let statics = BodySettings { scheme: Scheme::Static, ..settings() };
+        let solver = PcgSettings { iterations: 20, tolerance: 1e-8 };
+        let mut relaxed = beam(law, BodySettings { relaxation: true, solver, ..statics }).unwrap();
+        let mut newton = beam(law, statics).unwrap();
+        newton.step(0.02, DOWN, &[]);
+        let steps = (0..300).take_while(|_| relaxed.step(0.02, DOWN, &[]).residual > 1e-8).count();
+        assert!(steps > 2 && steps < 300, "{law:?}: {steps} steps");
+        let apart = relaxed.positions().iter().zip(newton.positions()).map(|(a, b)| (a - b).norm());
+        assert!(apart.fold(0.0, f64::max) < 1e-6, "{law:?}");
+    }
+    let moving = BodySettings { relaxation: true, ..settings() };
+    let message = beam(Law::Linear, moving).unwrap_err().to_string();
+    assert!(message.contains("static integrator"), "{message}");
+}
+
 /// The fast path and the general one make the same step, to single precision.
 #[test]
 fn both_paths_agree() {

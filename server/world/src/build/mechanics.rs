@@ -57,8 +57,9 @@ pub fn settings(m: &Mechanics) -> BodySettings {
             RawMethod::Cg => Method::Cg,
             RawMethod::Cholesky => Method::Cholesky,
             // The others are refused before a body is made.
-            RawMethod::Pcg | RawMethod::Multigrid | RawMethod::MgPcg => Method::Pcg,
+            RawMethod::Pcg | RawMethod::Relaxation | RawMethod::Multigrid | RawMethod::MgPcg => Method::Pcg,
         },
+        relaxation: m.method == RawMethod::Relaxation,
         arithmetic: m.precision.map(|precision| match precision {
             RawPrecision::Single => Arithmetic::Single,
             RawPrecision::Mixed => Arithmetic::Mixed,

@@ -96,12 +96,13 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
     let solver = match m.method {
         _ if m.integrator.is_explicit() => "no solver".into(),
         RawMethod::Cholesky => format!("cholesky, {precision}"),
+        RawMethod::Relaxation => format!("relaxation, {} x {:e}, {precision}", m.iterations, m.tolerance),
         RawMethod::Cg => format!("cg, {} x {:e}, {precision}", m.iterations, m.tolerance),
         _ => format!("pcg, {} x {:e}, {precision}", m.iterations, m.tolerance),
     };
     let path = if m.arithmetic() == Arithmetic::Single {
         "fast path, matrix-free".into()
-    } else if m.integrator.is_explicit() {
+    } else if m.integrator.is_explicit() || m.method == RawMethod::Relaxation {
         "general path, forces only".into()
     } else {
         let why = m.why_general().unwrap_or("the precision asked for");
@@ -131,6 +132,9 @@ fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
     };
     if m.integrator.is_explicit() {
         return evaluations * forces;
+    }
+    if m.method == RawMethod::Relaxation {
+        return 2.0 * f64::from(m.iterations) * forces;
     }
     let rows = size.nodes as f64;
     let solve = if m.method == RawMethod::Cholesky {

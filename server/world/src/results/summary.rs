@@ -1,5 +1,6 @@
 //! `summary.json`: what a run did, in figures.
 
+use scindo_physics::estimate::MeshError;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -86,6 +87,8 @@ pub struct BodySummary {
     pub elements: usize,
     /// Nodes of the mesh.
     pub nodes: usize,
+    /// Unknowns, three per copy and per node that quadratic elements add.
+    pub unknowns: usize,
     /// Pieces that cuts made of the elements.
     pub pieces: usize,
     /// Copies of nodes, three unknowns each.
@@ -120,10 +123,26 @@ pub struct BodySummary {
     pub reactions_n: Vec<[f64; 3]>,
     /// Solver over the run.
     pub solver: SolverSummary,
+    /// Estimate of the discretisation error at the end, with effects.error_estimate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_error: Option<MeshErrorSummary>,
     /// Whether every position and velocity is finite.
     pub finite: bool,
     /// What was found and repaired in the mesh file.
     pub mesh: Value,
+}
+
+/// Estimate of the discretisation error by stress recovery (Zienkiewicz, Zhu 1987).
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct MeshErrorSummary {
+    /// Estimated energy norm of the error [√J].
+    pub eta_sqrt_j: f64,
+    /// Energy norm of the solution [√J].
+    pub energy_norm_sqrt_j: f64,
+    /// Share of the energy norm that the mesh misses.
+    pub relative: f64,
+    /// Pieces left out because they are inverted or flat.
+    pub left_out: usize,
 }
 
 /// The linear solver over the run.
@@ -224,7 +243,8 @@ impl Running {
         let body = |(i, body): (usize, &SimBody)| {
             let (mut solver, iterations) = self.solvers.get(i).cloned().unwrap_or_default();
             solver.mean_iterations = iterations as f64 / steps.max(1) as f64;
-            body_summary(body, simulation, solver)
+            let mesh_error = simulation.report().bodies.get(i).and_then(|report| report.mesh_error);
+            body_summary(body, simulation, solver, mesh_error)
         };
         Summary {
             status: status.to_owned(),
@@ -290,7 +310,12 @@ fn probe_summary(probe: &crate::probe::Probe, simulation: &Simulation) -> ProbeS
     ProbeSummary { id: probe.id.clone(), position_m: x.into(), displacement_m: (x - probe.rest_m).into() }
 }
 
-fn body_summary(sim: &SimBody, simulation: &Simulation, solver: SolverSummary) -> BodySummary {
+fn body_summary(
+    sim: &SimBody,
+    simulation: &Simulation,
+    solver: SolverSummary,
+    mesh_error: Option<MeshError>,
+) -> BodySummary {
     let body = &sim.body;
     let mesh = body.cut_mesh();
     let surface = mesh.surface();
@@ -303,8 +328,9 @@ fn body_summary(sim: &SimBody, simulation: &Simulation, solver: SolverSummary) -
     let gravity = simulation.scene().gravity_m_s2;
     BodySummary {
         id: sim.id.to_string(),
-        elements: mesh.mesh().tets.len(),
+        elements: body.n_elements(),
         nodes: mesh.mesh().nodes.len(),
+        unknowns: 3 * body.rest_positions().len(),
         pieces: mesh.pieces().len(),
         copies: mesh.n_copies(),
         parts: mesh.components().len(),
@@ -322,6 +348,12 @@ fn body_summary(sim: &SimBody, simulation: &Simulation, solver: SolverSummary) -
         elastic_j: body.elastic_energy(),
         reactions_n: sim.fix_groups.iter().map(|nodes| body.reaction(nodes, gravity).into()).collect(),
         solver,
+        mesh_error: mesh_error.map(|error| MeshErrorSummary {
+            eta_sqrt_j: error.eta,
+            energy_norm_sqrt_j: error.energy_norm,
+            relative: error.relative,
+            left_out: error.left_out,
+        }),
         finite,
         mesh: serde_json::to_value(&sim.health).unwrap_or(Value::Null),
     }

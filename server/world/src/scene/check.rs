@@ -331,6 +331,18 @@ impl Check<'_> {
         if raw.self_collision == Some(true) {
             self.unsupported("effects.self_collision".into(), "true", &["false"]);
         }
+        let other = self.raw.body.iter().find(|body| body.element != RawElement::Tet4);
+        if let (Some(true), Some(body)) = (raw.error_estimate, other) {
+            let what = format!(
+                "found true, but body `{}` is not of tet4, the only element with an estimate",
+                body.id
+            );
+            self.conflict(
+                "effects.error_estimate".into(),
+                what,
+                "make the body of tet4 or remove the effect",
+            );
+        }
         EffectSwitches {
             cutting: raw.cutting,
             contact: raw.contact,

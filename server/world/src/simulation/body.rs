@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use scindo_physics::body::{Body, Notice};
 use scindo_physics::cut::CutMesh;
+use scindo_physics::estimate::{MeshError, StressRecovery};
 
 use super::report::Energy;
 use crate::mesh_in::MeshHealth;
@@ -26,6 +27,7 @@ pub struct SimBody {
     pub rest_volume_m3: f64,
     /// What was told of the last step.
     pub(crate) noticed: Option<Discriminant<Notice>>,
+    recovery: StressRecovery,
     topology: Option<Arc<SurfaceTopology>>,
     surface: Vec<[f32; 3]>,
     surface_is_old: bool,
@@ -41,6 +43,7 @@ impl SimBody {
             health,
             rest_volume_m3,
             noticed: None,
+            recovery: StressRecovery::default(),
             topology: None,
             surface: Vec::new(),
             surface_is_old: true,
@@ -56,7 +59,7 @@ impl SimBody {
     pub fn size(&self) -> BodySize {
         let mesh = self.body.cut_mesh();
         BodySize {
-            elements: mesh.mesh().tets.len(),
+            elements: self.body.n_elements(),
             nodes: self.body.rest_positions().len(),
             vertices: mesh.surface().vertices.len(),
             triangles: mesh.surface().triangles.len(),
@@ -91,6 +94,11 @@ impl SimBody {
     /// Kinetic and elastic energy.
     pub fn energy(&self) -> Energy {
         Energy { kinetic_j: self.body.kinetic_energy(), elastic_j: self.body.elastic_energy() }
+    }
+
+    /// Estimate of the discretisation error; only of bodies of tet4.
+    pub fn mesh_error(&mut self) -> Option<MeshError> {
+        self.body.mesh_error(&mut self.recovery)
     }
 
     /// To be told whenever the body moved.

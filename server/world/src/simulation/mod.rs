@@ -158,8 +158,10 @@ impl Simulation {
 
     fn measure(&mut self) {
         let energy = self.wants.energy || self.scene.effects.energy == Some(true);
-        for (body, report) in self.bodies.iter().zip(&mut self.report.bodies) {
+        let estimate = self.scene.effects.error_estimate == Some(true);
+        for (body, report) in self.bodies.iter_mut().zip(&mut self.report.bodies) {
             report.energy = energy.then(|| body.energy());
+            report.mesh_error = if estimate { body.mesh_error() } else { None };
         }
     }
 
@@ -204,12 +206,12 @@ impl Simulation {
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         let changed = self.source.apply_set(&format!("{key}={value}")).map_err(|error| error.to_string())?;
         let scene = changed.checked().clone();
-        let live = key == "world.gravity_m_s2" || key == "effects.energy";
+        let live = key == "world.gravity_m_s2" || key == "effects.energy" || key == "effects.error_estimate";
         let solver = key.starts_with("body.") && key.contains(".solver.");
         if !live && !solver {
             return Err(format!(
                 "`{key}` takes effect only at a start, with --set; while running: world.gravity_m_s2, \
-                 effects.energy, body.<id>.solver.iterations, body.<id>.solver.tolerance"
+                 effects.energy, effects.error_estimate, body.<id>.solver.iterations, body.<id>.solver.tolerance"
             ));
         }
         for (body, spec) in self.bodies.iter_mut().zip(&scene.bodies) {

@@ -4,6 +4,7 @@ use std::mem::{Discriminant, discriminant};
 use std::sync::Arc;
 
 use scindo_physics::body::{Notice, Outcome, SolveReport};
+use scindo_physics::estimate::MeshError;
 
 use super::stopwatch::StageSeconds;
 use crate::inputs::CutOutcome;
@@ -32,6 +33,8 @@ pub struct BodyReport {
     pub solve: SolveReport,
     /// Energies, when asked for.
     pub energy: Option<Energy>,
+    /// Estimated discretisation error, when asked for.
+    pub mesh_error: Option<MeshError>,
 }
 
 /// Energy of a body.

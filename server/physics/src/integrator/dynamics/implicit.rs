@@ -142,6 +142,7 @@ impl Dynamics {
         if report.notice.is_none()
             && !matches!(report.newton.stop, StopReason::Converged | StopReason::Stagnated)
             && self.newton.settings.steps > LEAST_NEWTON_STEPS
+            && self.settings.relaxation.is_none()
         {
             report.notice = Some(Notice::Unconverged);
         }
@@ -262,6 +263,21 @@ impl Dynamics {
                     x[f.copy as usize][k] = f.position_m[k];
                 }
             }
+        }
+        if let (Scheme::Static, Some(iterations)) = (self.settings.scheme, self.settings.relaxation) {
+            self.relaxation.tolerance = settings.tolerance;
+            if !self.active.is_empty() {
+                self.relaxation.restart_next(); // springs move without being loads
+            }
+            let done = self.relaxation.relax(team, &mut phi, inputs.fixed, x, iterations);
+            return NewtonReport {
+                linear_iterations: done.iterations,
+                residual: done.residual,
+                stop: done.stop,
+                indefinite: done.indefinite,
+                potential: done.potential,
+                ..NewtonReport::default()
+            };
         }
         let done = self.newton.minimise(team, &mut phi, x, inputs.fixed);
         if done.stop != StopReason::NonFinite && increment.A > 0.0 && self.parts.any_free() {

@@ -23,6 +23,7 @@ use thiserror::Error;
 
 use super::State;
 use super::parts::{LooseParts, Translations};
+use super::relaxation::Relaxation;
 use super::springs::{ActiveSpring, PointSpring};
 use crate::assembly::{BlockCsr, Model, Tangent};
 use crate::material::Material;
@@ -72,6 +73,7 @@ pub struct Dynamics {
     settings: DynamicsSettings,
     mass: Mass,
     newton: Newton,
+    relaxation: Relaxation,
     parts: LooseParts,
     /// Prescribed nodes that the parts were made with.
     known_fixed: Option<Vec<FixedCopy>>,
@@ -117,6 +119,7 @@ impl Dynamics {
         Ok(Self {
             mass,
             newton: Newton::new(settings.newton),
+            relaxation: Relaxation::default(),
             parts: LooseParts::default(),
             known_fixed: None,
             translations: Translations::default(),
@@ -158,9 +161,9 @@ impl Dynamics {
         &self.mass.lumped
     }
 
-    /// Changes Newton's method, from the next step on.
-    pub fn set_newton(&mut self, newton: NewtonSettings) {
-        self.settings.newton = newton;
+    /// Changes Newton's method and the iterations of relaxation, from the next step on.
+    pub fn set_solver(&mut self, newton: NewtonSettings, relaxation: Option<u32>) {
+        (self.settings.newton, self.settings.relaxation) = (newton, relaxation);
     }
 
     /// Force of gravity `g` [m/s²] on node `c` [N]: M g in motion. In an equilibrium, where no mass

@@ -75,6 +75,9 @@ pub struct DynamicsSettings {
     /// predictor, which is taken for linear and corotational bodies that are in order; other laws,
     /// inverted or collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
     pub newton: NewtonSettings,
+    /// [`Scheme::Static`]: so many iterations of matrix-free relaxation per step, which go on where
+    /// those of the last step ended, in place of Newton's method.
+    pub relaxation: Option<u32>,
     /// Explicit schemes: a step longer than what is stable is divided into at most so many parts; 1
     /// refuses it.
     pub most_substeps: u32,
@@ -95,6 +98,7 @@ impl Default for DynamicsSettings {
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
             newton: NewtonSettings { steps: 20, tolerance: 1e-6, linear, ..NewtonSettings::default() },
+            relaxation: None,
             most_substeps: 256,
         }
     }

@@ -99,7 +99,16 @@ impl Check<'_> {
         let key = format!("{at}.solver.method");
         let found = word(&m.method);
         if matches!(m.method, RawMethod::Multigrid | RawMethod::MgPcg) {
-            return self.unsupported(key, &found, &["cg", "pcg", "cholesky"]);
+            return self.unsupported(key, &found, &["cg", "pcg", "cholesky", "relaxation"]);
+        }
+        if m.method == RawMethod::Relaxation && m.integrator != RawIntegrator::Static {
+            let what = format!("found `relaxation` with {}, allowed: static", word(&m.integrator));
+            let next = "write integrator = \"static\", or choose cg, pcg or cholesky";
+            return self.conflict(key, what, next);
+        }
+        if m.method == RawMethod::Relaxation && m.newton_steps.is_some() {
+            let what = "`newton_steps` is given, but relaxation makes none";
+            self.conflict(format!("{at}.solver.newton_steps"), what, "remove it");
         }
         if !m.integrator.is_explicit() {
             return;
@@ -125,6 +134,10 @@ impl Check<'_> {
                                 lumped mass, no locking remedy and one Newton step";
                     self.conflict(key, what, next);
                 }
+            }
+            Some(RawPrecision::Mixed) if m.method == RawMethod::Relaxation => {
+                let what = "found `mixed` with relaxation, allowed: double";
+                self.conflict(key, what, "relaxation has no inner solver to run in single precision");
             }
             Some(RawPrecision::Mixed) if m.integrator.is_explicit() => {
                 let what = format!("found `mixed` with {}, allowed: double", word(&m.integrator));

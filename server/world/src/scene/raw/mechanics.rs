@@ -153,6 +153,8 @@ pub enum RawMethod {
     Pcg,
     /// Sparse factorisation.
     Cholesky,
+    /// Matrix-free, with integrator static: so many iterations per step, going on where the last ended.
+    Relaxation,
     /// Not supported yet.
     Multigrid,
     /// Not supported yet.
