@@ -110,10 +110,12 @@ fn a_mesh_in_millimetres_is_warned_of() {
 
 #[test]
 fn what_is_not_supported_yet_is_refused() {
-    assert_refused(&SCENE.replace("\"tet4\"", "\"hex8\""), &[], &["hex8", "tet4"]);
-    assert_refused(
-        &SCENE.replace("\"corotational\"", "\"neo-hookean\""),
-        &[],
-        &["neo-hookean", "corotational"],
-    );
+    let solver = "solver = { method = \"multigrid\" }";
+    let multigrid = SCENE.replace("\"corotational\"", &format!("\"corotational\"\n{solver}"));
+    assert_refused(&multigrid, &[], &["multigrid", "pcg"]);
+    let averaged = SCENE.replace("\"corotational\"", "\"stvk\"\nlocking = \"node-averaged\"");
+    let cut = "[[cut]]\nbody = \"block\"\nsweep_m = [[[-1,-1,0.05],[-1,1,0.05]],[[1,-1,0.05],[1,1,0.05]]]";
+    let hexahedra = format!("{}\n{cut}", SCENE.replace("\"tet4\"", "\"hex8\""));
+    assert_refused(&hexahedra, &[], &["hex8", "tet4", "cut.0.body"]);
+    assert_refused(&averaged, &[], &["node-averaged", "stvk", "neo-hookean"]);
 }

@@ -91,6 +91,9 @@ impl Relaxation {
             RelaxationReport { restarted: self.follow(potential, fixed, x), ..Default::default() };
         if report.restarted {
             self.restart(team, potential, x);
+        } else {
+            // Only differences of the potential are kept from frame to frame.
+            self.phi = potential.value(team, x);
         }
         loop {
             let norm = self.rho.sqrt();

@@ -84,9 +84,6 @@ pub fn equilibrium_by(
         NewtonSettings { steps: 60, tolerance: TOLERANCE, halvings: 12, curvature: Curvature::Exact, linear };
     let mut team = Team::new(1).unwrap();
     let report = find_equilibrium(&mut Newton::new(settings), &mut team, &mut problem, fixed, &mut x);
-    if std::env::var_os("DEBUG_NEWTON").is_some() {
-        println!("{report:?}");
-    }
     assert!(report.stop == StopReason::Converged, "{:?} {:?}: {report:?}", model.kind(), model.law());
     x
 }
