@@ -139,9 +139,10 @@ impl HapticTick {
             self.passivity.rest();
             self.limiter.limit(Vector3::zeros(), advice_n)
         } else {
-            let (passive_n, injected) = self.passivity.correct(permit.apply(felt_n, v), v);
+            let (clamped_n, clamped) = self.limiter.clamp(felt_n, advice_n);
+            let (passive_n, injected) = self.passivity.correct(permit.apply(clamped_n, v), v);
             let (force_n, flags) = self.limiter.limit(passive_n, advice_n);
-            (force_n, flags | if injected { flag::PASSIVITY } else { 0 })
+            (force_n, clamped | flags | if injected { flag::PASSIVITY } else { 0 })
         };
         self.passivity.observe(&force_n, v);
         TickOutput { force_n, flags: flags | permit.flags }

@@ -25,7 +25,7 @@ impl Limiter {
     /// The force that may leave [N] and the flags of what held it back. `advice_n`: the server's
     /// limit, approached within the slew limit; the own clamp is hard.
     pub fn limit(&mut self, wanted_n: Vector3<f64>, advice_n: f64) -> (Vector3<f64>, u32) {
-        let (target, mut flags) = clamp(wanted_n, self.max_force_n.min(advice_n));
+        let (target, mut flags) = self.clamp(wanted_n, advice_n);
         let step = target - self.output_n;
         let allowed = self.slew(target.norm()) * PERIOD_S;
         let size = step.norm();
@@ -37,6 +37,13 @@ impl Limiter {
         }
         self.touch_s = if self.output_n.norm() > FREE_FORCE_N { self.touch_s + PERIOD_S } else { 0.0 };
         (self.output_n, flags)
+    }
+
+    /// `wanted_n` within the clamp. The gain of a ramp goes on top of it: were it the other way round, a
+    /// force far above the clamp would fill it until the ramp is nearly over, and the slew limit would
+    /// hold force long after.
+    pub fn clamp(&self, wanted_n: Vector3<f64>, advice_n: f64) -> (Vector3<f64>, u32) {
+        clamp(wanted_n, self.max_force_n.min(advice_n))
     }
 
     /// Zero at once: for faults of the device, where the force itself is the danger.

@@ -154,6 +154,19 @@ fn arrival() -> impl Strategy<Value = Arrival> {
     ]
 }
 
+/// A force far above the clamp, then silence: zero when it was promised, although the slew is slow.
+#[test]
+fn silence_is_followed_however_large_the_force_was() {
+    let mut rig = Rig::engaged(Limits { max_force_n: 3.5, slew_n_s: 55.0 });
+    rig.seq += 1;
+    rig.inbox.accept(&contact(rig.seq, 1e3, 0.0), rig.now_ns, 0);
+    rig.device.place(Vector3::zeros(), Vector3::zeros());
+    let highest = (0..195).map(|_| rig.step().force_n.norm()).fold(0.0, f64::max);
+    assert!(highest > 0.5, "{highest} N");
+    assert!(rig.step().force_n.norm() < 0.06, "one tick of the slew limit");
+    assert_eq!(rig.step().force_n.norm(), 0.0);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 

@@ -77,9 +77,9 @@ fn model(kind: ElementKind, law: Law, case: &str) -> Model {
     let fine_z: &[f64] = if at_strip { &[0.0, CUT_Z, 0.2] } else { &[0.0, CUT_Z] };
     let stops_x = if at_strip { vec![0.0, STRIP_X, FRONT_X, 0.03] } else { vec![0.0, FRONT_X, 0.03] };
     if kind == ElementKind::Hex8 {
-        let x = graded(&stops_x, fine_x, [0.000_08, 0.35, 0.001_2]);
+        let x = graded(&stops_x, fine_x, [0.000_06, 0.3, 0.001_1]);
         let y = [0.0, 0.003, 0.007, 0.013, 0.021, 0.03];
-        let z = graded(&[0.0, CUT_Z, 0.2], fine_z, [0.000_08, 0.35, 0.002]);
+        let z = graded(&[0.0, CUT_Z, 0.2], fine_z, [0.000_06, 0.3, 0.001_8]);
         let mut mesh = graded_hexes(&x, &y, &z);
         if cut {
             open_cut(&mut mesh.nodes, &mut mesh.hexes);
