@@ -28,8 +28,8 @@ use super::sweep_triangle::SweepTriangle;
 #[derive(Clone, Debug)]
 pub struct CutMesh {
     mesh: TetMesh,
-    pub(super) fragments: Fragments,
-    pieces: PieceTable,
+    pub(crate) fragments: Fragments,
+    pub(crate) pieces: PieceTable,
     copies: CopyTable,
     surface: Surface,
     builder: SurfaceBuilder,

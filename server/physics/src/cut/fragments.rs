@@ -179,6 +179,28 @@ impl Fragments {
         }
     }
 
+    /// The boundary face on the far side of the solid wedge around an edge of the boundary face of
+    /// fragment `t` opposite its vertex `face`; `edge` runs from corner `edge` to the next of
+    /// [`TET_FACES`]. Returns fragment, face and edge there, which runs the other way.
+    pub fn around_edge(&self, t: u32, face: usize, edge: usize) -> (u32, usize, usize) {
+        let (mut t, corners) = (t as usize, TET_FACES[face]);
+        let to = self.tets[t][corners[(edge + 1) % 3]];
+        let mut exit = corners[(edge + 2) % 3];
+        let mut pivot = self.tets[t][face];
+        loop {
+            let n = self.neighbour[t][exit];
+            if n == NONE {
+                break;
+            }
+            let back = self.face_towards(n, t as u32).unwrap_or(exit);
+            let entered = self.tets[n as usize][back];
+            let Some(next_exit) = self.slot(n, pivot) else { break };
+            (t, exit, pivot) = (n as usize, next_exit, entered);
+        }
+        let far = TET_FACES[exit].iter().position(|&c| self.tets[t][c] == to);
+        (t as u32, exit, far.unwrap_or(0))
+    }
+
     /// Bisects the edge (a, b) at the new vertex `m` in every fragment of its `wedge`; the faces
     /// between the halves are marked as lying `along` the given set of incisions. `halves` receives
     /// one entry per fragment of the wedge.

@@ -139,29 +139,8 @@ impl SurfaceBuilder {
     /// The half-edge on the far side of the solid wedge around half-edge `h`.
     fn partner(&self, fragments: &Fragments, h: u32) -> u32 {
         let face = self.faces[h as usize / 3];
-        let (mut t, opposite) = ((face / 4) as usize, face as usize % 4);
-        let corners = TET_FACES[opposite];
-        let k = h as usize % 3;
-        let from = fragments.tets[t][corners[k]];
-        let to = fragments.tets[t][corners[(k + 1) % 3]];
-        let mut exit = corners[(k + 2) % 3];
-        let mut pivot = fragments.tets[t][opposite];
-        loop {
-            let n = fragments.neighbour[t][exit];
-            if n == NONE {
-                break;
-            }
-            let back = fragments.face_towards(n, t as u32).unwrap_or(exit);
-            let entered = fragments.tets[n as usize][back];
-            let Some(next_exit) = fragments.slot(n, pivot) else { break };
-            (t, exit, pivot) = (n as usize, next_exit, entered);
-        }
-        let far = self.face_at[4 * t + exit];
-        let far_corners = TET_FACES[exit];
-        let at = (0..3).find(|&k| fragments.tets[t][far_corners[k]] == to);
-        let at = at.unwrap_or(0);
-        debug_assert_eq!(fragments.tets[t][far_corners[(at + 1) % 3]], from);
-        3 * far + at as u32
+        let (t, opposite, edge) = fragments.around_edge(face / 4, face as usize % 4, h as usize % 3);
+        3 * self.face_at[4 * t as usize + opposite] + edge as u32
     }
 
     /// Numbers the cycles of corners: the first cycle at every fragment vertex in the order those
