@@ -183,6 +183,10 @@ solver = { precision = "single" }"#,
         ),
         (r#"solver = { precision = "single", newton_steps = 2 }"#, &["more than one Newton step"]),
         (r#"solver = { precision = "single", method = "cg" }"#, &["a solver other than pcg"]),
+        (
+            r#"solver = { method = "cg", operator = "assembled" }"#,
+            &["solver.operator", "general path", "remove it"],
+        ),
     ];
     for (lines, parts) in cases {
         assert_says(&uncut_with(lines).unwrap_err().to_string(), parts);

@@ -88,7 +88,9 @@ fn main() {
             lines.push(applications("492 000 tets", large(), choice, threads, "100 M/s"));
         }
     }
-    lines.push(updates(bar_mesh()));
+    for choice in [OperatorChoice::MatrixFree, OperatorChoice::Assembled] {
+        lines.push(updates(bar_mesh(), choice));
+    }
     // A word that is not a flag selects lines by name.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     lines.retain(|line| wanted.is_empty() || wanted.iter().any(|word| line.name.contains(word.as_str())));
@@ -293,11 +295,11 @@ fn applications(
 }
 
 /// Rotations, forces, gradients and diagonal blocks.
-fn updates(mesh: TetMesh) -> Line {
+fn updates(mesh: TetMesh, choice: OperatorChoice) -> Line {
     let body = Body::new(mesh, SOFT, BodySettings::default()).unwrap();
     let (pieces, n) = (body.cut_mesh().pieces().len(), body.positions().len());
     let mut team = Team::new(1).unwrap();
-    let mut elastic = updated(&body, OperatorChoice::Auto, &mut team);
+    let mut elastic = updated(&body, choice, &mut team);
     let with = ElasticUpdate { lame: SOFT.lame(), law: SOFT.law, scale: 1.0 };
     let (mut f, mut blocks) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
     let x: Vec<Vector3<f64>> =
@@ -308,6 +310,6 @@ fn updates(mesh: TetMesh) -> Line {
         (1.0, start.elapsed().as_secs_f64())
     };
     let work = ((pieces * 156) as f64, pieces * 120, pieces as f64 * 700.0);
-    let name = "update of bar".to_owned();
+    let name = format!("update of bar, {choice:?}");
     Line { name, threads: 1, run: Box::new(run), times: Vec::new(), pieces, work, target: "" }
 }

@@ -137,7 +137,9 @@ impl Body {
         settings.check(material.law)?;
         let path = if settings.arithmetic(material.law) == Arithmetic::Single {
             let simd = if settings.portable { Simd::Baseline } else { Simd::detect() };
-            Path::Fast(Box::new(Fast::new(simd, &cut_mesh)))
+            let mut fast = Fast::new(simd, &cut_mesh);
+            fast.elastic.set_choice(settings.operator(material.law, cut_mesh.pieces().len()));
+            Path::Fast(Box::new(fast))
         } else {
             Path::General(Box::new(General::new(&shape, &cut_mesh, &material, &settings)?))
         };
@@ -268,14 +270,18 @@ impl Body {
     }
 
     /// Chooses how the stiffness is applied from the next step on; results agree to single precision.
-    /// Says `false` where this body's elements, law or integrator take the general path, which always
+    /// [`OperatorChoice::Auto`] is what costs less. Says `false` where this body's elements, law or integrator take the general path, which always
     /// assembles.
     pub fn set_operator(&mut self, choice: OperatorChoice) -> bool {
         match &mut self.path {
-            Path::Fast(fast) => fast.elastic.set_choice(choice),
-            Path::General(_) => return false,
+            Path::Fast(fast) => {
+                self.settings.operator = choice;
+                let pieces = self.cut_mesh.pieces().len();
+                fast.elastic.set_choice(self.settings.operator(self.material.law, pieces));
+                true
+            }
+            Path::General(_) => false,
         }
-        true
     }
 
     /// Connected parts of the body, by copy.

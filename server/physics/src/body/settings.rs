@@ -4,6 +4,7 @@ use super::BodyError;
 use crate::assembly::{ElementKind, Volumetric};
 use crate::integrator::{MassKind, Scheme};
 use crate::material::Law;
+use crate::operator::{OperatorChoice, cost};
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// How a body is solved.
@@ -29,6 +30,8 @@ pub struct BodySettings {
     /// [`Scheme::Static`] by matrix-free relaxation: `solver.iterations` of it per step, which go on
     /// where those of the last step ended. `method` is not used then.
     pub relaxation: bool,
+    /// How the fast path applies the stiffness; what costs less with [`OperatorChoice::Auto`].
+    pub operator: OperatorChoice,
     /// Arithmetic; `None`: the fastest that the other settings allow.
     pub arithmetic: Option<Arithmetic>,
     /// Most Newton steps per step of time; `None`: as many as law and scheme call for.
@@ -67,6 +70,7 @@ impl Default for BodySettings {
             mass: MassKind::Lumped,
             method: Method::Pcg,
             relaxation: false,
+            operator: OperatorChoice::Auto,
             arithmetic: None,
             newton_steps: None,
         }
@@ -137,6 +141,20 @@ impl BodySettings {
             linear,
             ..NewtonSettings::default()
         }
+    }
+
+    /// How the fast path applies the stiffness of so many pieces.
+    pub fn operator(&self, law: Law, pieces: usize) -> OperatorChoice {
+        match self.operator {
+            OperatorChoice::Auto => cost::cheapest(law, pieces, self.solver),
+            asked => asked,
+        }
+    }
+
+    /// Predicted seconds of a step of the fast path on one thread.
+    pub fn fast_seconds(&self, law: Law, pieces: usize) -> f64 {
+        let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
+        cost::step_seconds(law, pieces, self.solver, assembled)
     }
 
     /// Iterations of relaxation per step, if that is how the body is solved.

@@ -1,12 +1,14 @@
 //! From the words of a scene to settings of a body.
 
 use scindo_physics::body::{
-    Arithmetic, BodySettings, ElementKind, MassKind, Method, PcgSettings, Scheme, Volumetric,
+    Arithmetic, BodySettings, ElementKind, MassKind, Method, OperatorChoice, PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::material::Law;
 
 use crate::scene::Mechanics;
-use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawPrecision};
+use crate::scene::raw::{
+    RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawOperator, RawPrecision,
+};
 
 /// Share of the volumetric energy that node averaging leaves with the elements, against checkerboards.
 const KEPT: f64 = 0.05;
@@ -65,6 +67,11 @@ pub fn settings(m: &Mechanics) -> BodySettings {
             RawPrecision::Mixed => Arithmetic::Mixed,
             RawPrecision::Double => Arithmetic::Double,
         }),
+        operator: match m.operator {
+            None => OperatorChoice::Auto,
+            Some(RawOperator::MatrixFree) => OperatorChoice::MatrixFree,
+            Some(RawOperator::Assembled) => OperatorChoice::Assembled,
+        },
         newton_steps: m.newton_steps,
         ..BodySettings::default()
     }

@@ -1,17 +1,11 @@
 //! What the mechanics of each body are made of, and what they cost.
 
-use scindo_physics::body::Arithmetic;
+use scindo_physics::body::{Arithmetic, OperatorChoice};
 
 use super::{BodySize, Plan, count};
+use crate::build::mechanics;
 use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod};
 use crate::scene::{BodySpec, CheckedScene, Mechanics};
-
-/// Fast path, seconds per element and solver iteration: one matrix-free product with rotated
-/// gradients, vector work included. Order of magnitude on one core; [`Plan::measured`] replaces it.
-const FAST_ITERATION: f64 = 12e-9;
-
-/// Fast path, seconds per element and step: rotations, forces and preconditioner.
-const FAST_ELEMENT: f64 = 80e-9;
 
 /// General path, seconds per quadrature point for energy and forces.
 const POINT_FORCES: f64 = 150e-9;
@@ -101,7 +95,12 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         _ => format!("pcg, {} x {:e}, {precision}", m.iterations, m.tolerance),
     };
     let path = if m.arithmetic() == Arithmetic::Single {
-        "fast path, matrix-free".into()
+        let operator = match mechanics::settings(m).operator(mechanics::law(m), size.elements) {
+            OperatorChoice::Assembled => "assembled",
+            _ => "matrix-free",
+        };
+        let why = if m.operator.is_some() { "the scene asks for it" } else { "it costs less" };
+        format!("fast path, {operator}: {why}")
     } else if m.integrator.is_explicit() || m.method == RawMethod::Relaxation {
         "general path, forces only".into()
     } else {
@@ -116,7 +115,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
 fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
     let elements = size.elements as f64;
     if m.arithmetic() == Arithmetic::Single {
-        return elements * (FAST_ELEMENT + f64::from(m.iterations) * FAST_ITERATION);
+        return mechanics::settings(m).fast_seconds(mechanics::law(m), size.elements);
     }
     let (points, nodes_of_element, blocks_of_row) = match (m.element, m.locking) {
         (RawElement::Tet4, RawLocking::NodeAveraged) => (2.0, 4.0, 60.0),

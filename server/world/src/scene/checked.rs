@@ -3,7 +3,9 @@
 use nalgebra::{Unit, Vector3};
 use scindo_physics::body::Arithmetic;
 
-use super::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawPrecision};
+use super::raw::{
+    RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawOperator, RawPrecision,
+};
 use crate::build::mechanics;
 use crate::inputs::{ToolMode, ToolShape};
 
@@ -80,6 +82,8 @@ pub struct Mechanics {
     pub precision: Option<RawPrecision>,
     /// Most Newton steps per step of time; none: as law and integrator call for.
     pub newton_steps: Option<u32>,
+    /// How single precision applies the stiffness; `None`: what costs less.
+    pub operator: Option<RawOperator>,
     /// Most iterations of a linear solve.
     pub iterations: u32,
     /// Relative preconditioned residual at which the solver stops.

@@ -1,5 +1,7 @@
 //! Which elements, laws, integrators and solvers go together; everything else is refused here.
 
+use scindo_physics::body::Arithmetic;
+
 use super::super::checked::{CellSplit, Mechanics, MeshSource, Newmark};
 use super::super::raw::*;
 use super::Check;
@@ -17,6 +19,7 @@ impl Check<'_> {
             locking: body.locking,
             method: body.solver.method,
             precision: body.solver.precision,
+            operator: body.solver.operator,
             newton_steps: body.solver.newton_steps,
             iterations: body.solver.iterations,
             tolerance: body.solver.tolerance,
@@ -26,6 +29,7 @@ impl Check<'_> {
         self.integrator(at, body);
         self.solver(at, &mechanics);
         self.precision(at, &mechanics);
+        self.operator(at, &mechanics);
         mechanics
     }
 
@@ -145,6 +149,17 @@ impl Check<'_> {
             }
             _ => {}
         }
+    }
+
+    fn operator(&mut self, at: &str, m: &Mechanics) {
+        let Some(found) = m.operator.filter(|_| m.arithmetic() != Arithmetic::Single) else { return };
+        let why = m.why_general().unwrap_or("the precision asked for");
+        let what = format!("found `{}`, but the general path is taken, for {why}", word(&found));
+        self.conflict(
+            format!("{at}.solver.operator"),
+            what,
+            "remove it; only single precision has the choice",
+        );
     }
 
     /// Bodies whose mesh cannot be cut, against the cuts and blades of the scene.

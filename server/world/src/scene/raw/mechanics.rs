@@ -130,6 +130,9 @@ pub struct RawSolver {
     /// Arithmetic; absent: `single` where it can be and the tolerance allows, else `mixed`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<RawPrecision>,
+    /// How single precision applies the stiffness; absent: what costs less, from measured costs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operator: Option<RawOperator>,
     /// Most Newton steps per step of time; absent: 1 for linear and corotational bodies in motion, else 20.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1000), extend("x-next" = "1 for speed, 20 for accuracy"))]
@@ -138,8 +141,25 @@ pub struct RawSolver {
 
 impl Default for RawSolver {
     fn default() -> Self {
-        Self { method: RawMethod::Pcg, iterations: 50, tolerance: 1e-6, precision: None, newton_steps: None }
+        Self {
+            method: RawMethod::Pcg,
+            iterations: 50,
+            tolerance: 1e-6,
+            precision: None,
+            operator: None,
+            newton_steps: None,
+        }
     }
+}
+
+/// How the stiffness is applied to a vector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawOperator {
+    /// Element by element, from rotated gradients.
+    MatrixFree,
+    /// From a matrix of 3×3 blocks.
+    Assembled,
 }
 
 /// Linear solver.

@@ -1,0 +1,77 @@
+//! What the two ways to apply the stiffness cost, and which one costs less.
+//!
+//! The costs are those of the bench `bar` on one core, not of a measurement on the spot: the two ways
+//! differ in the last bits, so a choice by the clock would make the bits of a run depend on the load of
+//! the machine. Only their ratios matter, and these hardly differ between machines.
+
+use super::OperatorChoice;
+use crate::material::Law;
+use crate::solver::PcgSettings;
+
+/// Up to so many pieces the stiffness stays in the caches from one application to the next.
+const CACHED_PIECES: usize = 60_000;
+
+/// Seconds per piece and application from rotated gradients, in the caches and beyond.
+const MATRIX_FREE: [f64; 2] = [5.8e-9, 8.1e-9];
+
+/// Seconds per piece and application from assembled blocks, in the caches and beyond.
+const ASSEMBLED: [f64; 2] = [3.8e-9, 7.4e-9];
+
+/// Seconds per piece and iteration for the vectors of the solver.
+const VECTORS: f64 = 1.6e-9;
+
+/// Seconds per piece to assemble.
+const ASSEMBLY: f64 = 61e-9;
+
+/// Seconds per piece and step for forces and what else is not repeated; with rotations and without.
+const STEP: [f64; 2] = [33e-9, 12e-9];
+
+/// Iterations that take the residual down to a tenth, on meshes of some thousand nodes.
+const ITERATIONS_PER_DECADE: f64 = 12.0;
+
+/// Seconds of a step of a body of so many pieces on one thread.
+pub fn step_seconds(law: Law, pieces: usize, solver: PcgSettings, assembled: bool) -> f64 {
+    let beyond = usize::from(pieces > CACHED_PIECES);
+    let turns = law != Law::Linear;
+    let application = if assembled { ASSEMBLED[beyond] } else { MATRIX_FREE[beyond] };
+    // A stiffness that does not turn is assembled once.
+    let assembly = if assembled && turns { ASSEMBLY } else { 0.0 };
+    let step = STEP[usize::from(!turns)] + assembly;
+    pieces as f64 * (step + expected_iterations(solver) * (application + VECTORS))
+}
+
+/// The way that costs less.
+pub fn cheapest(law: Law, pieces: usize, solver: PcgSettings) -> OperatorChoice {
+    let [free, assembled] = [false, true].map(|way| step_seconds(law, pieces, solver, way));
+    if assembled < free { OperatorChoice::Assembled } else { OperatorChoice::MatrixFree }
+}
+
+/// Iterations that a step will make: those of the tolerance, but no more than allowed.
+fn expected_iterations(solver: PcgSettings) -> f64 {
+    let most = f64::from(solver.iterations);
+    if solver.tolerance > 0.0 { most.min(-ITERATIONS_PER_DECADE * solver.tolerance.log10()) } else { most }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stiffness_is_assembled_where_it_is_used_often_enough() {
+        let of = |law, pieces, iterations| cheapest(law, pieces, PcgSettings { iterations, tolerance: 0.0 });
+        assert_eq!(of(Law::Linear, 5_000, 1), OperatorChoice::Assembled);
+        assert_eq!(of(Law::Corotational, 12_800, 10), OperatorChoice::MatrixFree);
+        assert_eq!(of(Law::Corotational, 12_800, 200), OperatorChoice::Assembled);
+        // Where both wait for memory there is less to win.
+        assert_eq!(of(Law::Corotational, 500_000, 60), OperatorChoice::MatrixFree);
+        assert_eq!(of(Law::Corotational, 500_000, 200), OperatorChoice::Assembled);
+    }
+
+    #[test]
+    fn a_coarse_tolerance_promises_few_iterations() {
+        let solver = PcgSettings { iterations: 1000, tolerance: 1e-1 };
+        assert_eq!(cheapest(Law::Corotational, 12_800, solver), OperatorChoice::MatrixFree);
+        let solver = PcgSettings { tolerance: 1e-8, ..solver };
+        assert_eq!(cheapest(Law::Corotational, 12_800, solver), OperatorChoice::Assembled);
+    }
+}
