@@ -15,14 +15,12 @@ impl Body {
             let with = if self.shape.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" };
             return Err(BodyError::Combination { what: "a cut", with, instead: "tet4" });
         }
-        let epoch = self.cut_mesh.epoch();
-        let pieces = self.cut_mesh.pieces().to_vec();
         let report = self.cut_mesh.sweep(&self.state.x, blade, incision)?;
         // The surface may have changed alone, while a cut is still on its way through an element.
-        if report.epoch != epoch && self.cut_mesh.pieces() != pieces {
+        if !self.cut_mesh.changed_pieces().is_empty() {
             self.inherit(&report);
             match &mut self.path {
-                Path::Fast(fast) => fast.follow_cut(&self.cut_mesh, &pieces),
+                Path::Fast(fast) => fast.follow_cut(&self.cut_mesh),
                 Path::General(_) => self.rebuild_general()?,
             }
             self.follow_topology();

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Outcome, SolveReport};
-use crate::cut::{CutMesh, Piece};
+use crate::cut::CutMesh;
 use crate::element::Simd;
 use crate::integrator::{ImplicitEuler, State, StepInputs, StepOutcome};
 use crate::operator::{Elastic, FixedCopy};
@@ -47,8 +47,8 @@ impl Fast {
     }
 
     /// Arranges the pieces after a cut; those that were there before keep their rotation.
-    pub fn follow_cut(&mut self, mesh: &CutMesh, before: &[Piece]) {
-        self.elastic.follow(mesh.mesh(), before, mesh.pieces(), mesh.n_copies());
+    pub fn follow_cut(&mut self, mesh: &CutMesh) {
+        self.elastic.follow(mesh.mesh(), mesh.pieces(), mesh.changed_pieces(), mesh.n_copies());
     }
 
     /// Arranges the pieces anew, without memory of their rotations.

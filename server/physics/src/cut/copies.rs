@@ -20,6 +20,8 @@ pub struct CopyTable {
     pub volume: Vec<f64>,
     around_start: Vec<u32>,
     around: Vec<u32>,
+    /// Pieces that got another copy since this was last cleared; some more than once.
+    pub changed: Vec<u32>,
     visited: Vec<u32>,
     stamp: u32,
     stack: Vec<u32>,
@@ -98,7 +100,10 @@ impl CopyTable {
             for &p in &component.pieces {
                 let piece = &mut pieces.pieces[p as usize];
                 if let Some(a) = mesh.tets[piece.element as usize].iter().position(|&n| n == i) {
-                    piece.copies[a] = id;
+                    if piece.copies[a] != id {
+                        piece.copies[a] = id;
+                        self.changed.push(p);
+                    }
                     self.volume[id as usize] += pieces.node_volume[p as usize][a];
                 }
             }

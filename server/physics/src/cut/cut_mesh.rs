@@ -17,7 +17,8 @@ use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
 use super::pieces::{Piece, PieceTable};
 use super::separate::{Separator, Sheet};
-use super::surface::{Surface, SurfaceBuilder};
+use super::surface::Surface;
+use super::surface_builder::{Change, Material, SurfaceBuilder};
 use super::sweep_triangle::SweepTriangle;
 
 /// A tet mesh with everything that cuts have made of it.
@@ -32,7 +33,7 @@ pub struct CutMesh {
     pub(crate) pieces: PieceTable,
     copies: CopyTable,
     surface: Surface,
-    builder: SurfaceBuilder,
+    pub(super) builder: SurfaceBuilder,
     pub(super) sets: IncisionSets,
     pub(super) crossings: Crossings,
     fronts: BTreeMap<u32, Front>,
@@ -53,9 +54,9 @@ impl CutMesh {
             let [node, ..] = fragments.vertices[v].nodes;
             copies.update(&mesh, node, &fragments, &mut pieces, &mut new_copies);
         }
-        let mut builder = SurfaceBuilder::default();
-        let mut surface = Surface::default();
-        builder.build(&mesh, &fragments, &pieces, &mut surface);
+        copies.changed.clear();
+        let (builder, surface) =
+            SurfaceBuilder::build(&Material { mesh: &mesh, fragments: &fragments, pieces: &pieces });
         Ok(Self {
             mesh,
             fragments,
@@ -80,6 +81,11 @@ impl CutMesh {
     /// Material pieces, one computational element each. Ids are stable; cuts append.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces.pieces
+    }
+
+    /// Pieces that the last sweep took apart, made, or gave other copies, ascending.
+    pub fn changed_pieces(&self) -> &[u32] {
+        &self.copies.changed
     }
 
     /// Number of node copies.
@@ -188,8 +194,9 @@ impl CutMesh {
             refused_edges: self.separator.refused.len(),
             ..CutReport::default()
         };
+        self.copies.changed.clear();
         for &e in &self.separator.elements {
-            self.pieces.update(&self.mesh, e, &mut self.fragments);
+            self.pieces.update(&self.mesh, e, &mut self.fragments, &mut self.copies.changed);
         }
         let mut nodes: Vec<u32> =
             self.separator.elements.iter().flat_map(|&e| self.mesh.tets[e as usize]).collect();
@@ -198,9 +205,15 @@ impl CutMesh {
         for node in nodes {
             self.copies.update(&self.mesh, node, &self.fragments, &mut self.pieces, &mut report.new_copies);
         }
-        if self.separator.refined || self.separator.faces_opened > 0 {
+        self.copies.changed.sort_unstable();
+        self.copies.changed.dedup();
+        if !self.separator.changed.is_empty() {
+            // Faces that are halved or opened but take no piece apart change the surface alone.
             self.epoch += 1;
-            self.builder.build(&self.mesh, &self.fragments, &self.pieces, &mut self.surface);
+            let material = Material { mesh: &self.mesh, fragments: &self.fragments, pieces: &self.pieces };
+            let Separator { changed, moved, .. } = &self.separator;
+            let change = Change { fragments: changed, moved, pieces: &self.copies.changed };
+            self.builder.update(&material, &change, &mut self.surface);
         }
         report.epoch = self.epoch;
         report

@@ -96,6 +96,8 @@ pub struct Halves {
     pub old: u32,
     /// The appended fragment, at the end `b`.
     pub new: u32,
+    /// Slot of `a` in the fragment that was split: its face there went over to `new`.
+    pub slot: u8,
 }
 
 impl Fragments {
@@ -119,7 +121,25 @@ impl Fragments {
         };
         let every_corner: Vec<(u32, u8)> = (0..n as u32).flat_map(|t| (0..4).map(move |k| (t, k))).collect();
         fragments.split_stars(&every_corner, |_, _, _| {});
+        fragments.leave_room();
         fragments
+    }
+
+    /// Room for a cut, so that the first one does not have to move everything.
+    fn leave_room(&mut self) {
+        leave_room(&mut self.vertices);
+        leave_room(&mut self.on);
+        leave_room(&mut self.tets);
+        leave_room(&mut self.element);
+        leave_room(&mut self.piece);
+        leave_room(&mut self.fraction);
+        leave_room(&mut self.neighbour);
+        leave_room(&mut self.tag);
+        leave_room(&mut self.along);
+        leave_room(&mut self.next_in_element);
+        leave_room(&mut self.next_in_piece);
+        leave_room(&mut self.visited);
+        leave_room(&mut self.claimed);
     }
 
     /// Fragments of element `e`.
@@ -214,13 +234,14 @@ impl Fragments {
     ) {
         halves.clear();
         let first_new = self.tets.len() as u32;
-        halves.extend(wedge.iter().zip(first_new..).map(|(&old, new)| Halves { old, new }));
+        halves.extend(wedge.iter().zip(first_new..).map(|(&old, new)| Halves { old, new, slot: 0 }));
         let [a, b] = ends;
         let (m, t) = m;
         for k in 0..wedge.len() {
-            let Halves { old, new } = halves[k];
+            let Halves { old, new, .. } = halves[k];
             let o = old as usize;
             let (Some(ia), Some(ib)) = (self.slot(old, a), self.slot(old, b)) else { continue };
+            halves[k].slot = ia as u8;
             let mut far = self.tets[o];
             far[ia] = m;
             let mut neighbour = self.neighbour[o];
@@ -332,6 +353,11 @@ impl Fragments {
             }
         }
     }
+}
+
+/// Room for half as many entries again.
+pub fn leave_room<T>(entries: &mut Vec<T>) {
+    entries.reserve(entries.len() / 2);
 }
 
 /// Links tets across faces that exactly two of them use, from opposite sides.

@@ -29,6 +29,8 @@ mod separate;
 pub(crate) mod pieces;
 mod copies;
 mod surface;
+mod surface_builder;
+mod doubled_edges;
 mod components;
 mod locate;
 mod cut_mesh;

@@ -2,7 +2,7 @@
 
 use crate::mesh::TetMesh;
 
-use super::fragments::{Fragments, NONE};
+use super::fragments::{Fragments, NONE, leave_room};
 
 /// One connected piece of material inside one element: what mechanics sees as an element.
 ///
@@ -32,13 +32,14 @@ pub struct PieceTable {
     element_volume: Vec<f64>,
     label: Vec<u32>,
     stack: Vec<u32>,
+    members: Vec<u32>,
 }
 
 impl PieceTable {
     /// One whole piece per element.
     pub fn new(mesh: &TetMesh) -> Self {
         let element_volume = mesh.volumes();
-        Self {
+        let mut table = Self {
             pieces: (0u32..)
                 .zip(&mesh.tets)
                 .map(|(element, &copies)| Piece { element, fraction: 1.0, copies })
@@ -49,7 +50,14 @@ impl PieceTable {
             element_volume,
             label: Vec::new(),
             stack: Vec::new(),
-        }
+            members: Vec::new(),
+        };
+        leave_room(&mut table.pieces);
+        leave_room(&mut table.node_volume);
+        leave_room(&mut table.first_fragment);
+        leave_room(&mut table.next_in_element);
+        table.label.reserve(mesh.tets.len() + mesh.tets.len() / 2);
+        table
     }
 
     /// Pieces of element `e`.
@@ -65,43 +73,62 @@ impl PieceTable {
     }
 
     /// Recomputes the pieces of element `e` from its fragments. Components only ever refine: one
-    /// component of an old piece keeps its id, the others are appended with the same copies.
-    pub fn update(&mut self, mesh: &TetMesh, e: u32, fragments: &mut Fragments) {
-        let members: Vec<u32> = fragments.of_element(e).collect();
+    /// component of an old piece keeps its id, the others are appended with the same copies. Pieces that
+    /// came apart go to `changed`, with what became of them.
+    pub fn update(&mut self, mesh: &TetMesh, e: u32, fragments: &mut Fragments, changed: &mut Vec<u32>) {
+        let first = changed.len();
+        let mut members = std::mem::take(&mut self.members);
+        members.clear();
+        members.extend(fragments.of_element(e));
         self.label.resize(fragments.tets.len(), NONE);
         for &t in &members {
             self.label[t as usize] = NONE;
         }
-        let mut kept: Vec<u32> = Vec::new();
+        // Present pieces and what they were part of before.
+        let mut kept: Vec<[u32; 2]> = Vec::new();
         for &seed in &members {
             if self.label[seed as usize] != NONE {
                 continue;
             }
             let old = fragments.piece[seed as usize];
-            let id = if kept.contains(&old) { self.append_like(old) } else { old };
-            kept.push(id);
+            let id = if kept.iter().any(|k| k[0] == old) { self.append_like(old) } else { old };
+            kept.push([id, old]);
             self.flood(seed, id, fragments);
         }
-        for &p in &kept {
+        for &[p, old] in &kept {
             self.first_fragment[p as usize] = NONE;
-            self.pieces[p as usize].fraction = 0.0;
-            self.node_volume[p as usize] = [0.0; 4];
+            if kept.iter().filter(|k| k[1] == old).count() > 1 {
+                changed.push(p);
+            }
         }
-        let nodes = mesh.tets[e as usize];
         for &t in members.iter().rev() {
             let p = self.label[t as usize];
             fragments.piece[t as usize] = p;
             fragments.next_in_piece[t as usize] = self.first_fragment[p as usize];
             self.first_fragment[p as usize] = t;
-            let fraction = fragments.fraction[t as usize];
-            self.pieces[p as usize].fraction += fraction;
-            let quarter = 0.25 * fraction * self.element_volume[e as usize];
+        }
+        for k in first..changed.len() {
+            self.measure(mesh, changed[k], fragments);
+        }
+        self.members = members;
+    }
+
+    /// Fraction and ∫ N_a dV of piece `p` from its fragments.
+    fn measure(&mut self, mesh: &TetMesh, p: u32, fragments: &Fragments) {
+        let e = self.pieces[p as usize].element as usize;
+        let nodes = mesh.tets[e];
+        let (mut fraction, mut integral) = (0.0, [0.0; 4]);
+        for t in self.fragments(p, fragments) {
+            let part = fragments.fraction[t as usize];
+            fraction += part;
             for v in fragments.tets[t as usize] {
-                for (sum, &node) in self.node_volume[p as usize].iter_mut().zip(&nodes) {
-                    *sum += quarter * fragments.vertices[v as usize].weight_of(node);
+                for (sum, &node) in integral.iter_mut().zip(&nodes) {
+                    *sum += part * fragments.vertices[v as usize].weight_of(node);
                 }
             }
         }
+        self.pieces[p as usize].fraction = fraction;
+        self.node_volume[p as usize] = integral.map(|sum| 0.25 * self.element_volume[e] * sum);
     }
 
     /// Labels everything reachable from `seed` inside its element through closed faces.

@@ -20,10 +20,12 @@ use super::incision_sets::IncisionSets;
 pub struct Separator {
     /// Elements with a face opened by this sweep, ascending.
     pub elements: Vec<u32>,
+    /// Fragments that were bisected or had a face opened by this sweep, ascending.
+    pub changed: Vec<u32>,
+    /// Boundary faces (4·fragment + slot) that went from one fragment to another: from, to, in order.
+    pub moved: Vec<[u32; 2]>,
     /// Number of faces opened.
     pub faces_opened: usize,
-    /// Whether any edge was bisected.
-    pub refined: bool,
     /// Edges that are crossed but not separated.
     pub pending: EdgeSet,
     /// Edges left whole because of the cap.
@@ -62,10 +64,11 @@ impl Separator {
     /// Separates what the sheet cuts completely among `touched` fragments and their neighbours.
     pub fn run(&mut self, touched: &[u32], sheet: &mut Sheet) {
         self.elements.clear();
+        self.changed.clear();
+        self.moved.clear();
         self.pending.clear();
         self.refused.clear();
         self.faces_opened = 0;
-        self.refined = false;
         self.queue.clear();
         self.queue.extend(touched);
         self.active.clear();
@@ -80,6 +83,8 @@ impl Separator {
         self.active.sort_unstable();
         self.active.dedup();
         self.open_faces(sheet);
+        self.changed.sort_unstable();
+        self.changed.dedup();
         self.count_pending(sheet);
     }
 
@@ -126,9 +131,12 @@ impl Separator {
         fragments.bisect(&self.wedge, [a, b], (m, s), along, &mut self.halves);
         for h in &self.halves {
             self.active.extend([h.old, h.new]);
+            self.changed.extend([h.old, h.new]);
+            if sheet.fragments.neighbour[h.new as usize][h.slot as usize] == NONE {
+                self.moved.push([h.old, h.new].map(|t| 4 * t + u32::from(h.slot)));
+            }
             self.queue.extend([h.old, h.new]);
         }
-        self.refined = true;
         self.pass_on_crossings([a, b], m, s, sheet);
         true
     }
@@ -196,6 +204,7 @@ impl Separator {
                 sheet.fragments.open(t, face, sheet.incision);
                 self.faces_opened += 1;
                 for (t, face) in [(t, Some(face)), (n, back)] {
+                    self.changed.push(t);
                     self.elements.push(sheet.fragments.element[t as usize]);
                     self.corners.extend((0..4u8).filter(|&k| Some(k as usize) != face).map(|k| (t, k)));
                 }

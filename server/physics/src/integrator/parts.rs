@@ -32,6 +32,11 @@ impl LooseParts {
         let n = mass.len();
         let mut root: Vec<u32> = (0..n as u32).collect();
         for group in groups {
+            // Mostly the group hangs together already, and the paths to the root are short.
+            let first = root[group[0] as usize];
+            if group.iter().all(|&copy| root[copy as usize] == first) {
+                continue;
+            }
             let a = find(&mut root, group[0]);
             for &copy in &group[1..] {
                 let b = find(&mut root, copy);

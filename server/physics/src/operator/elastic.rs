@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::chunks::{Gather, NO_PIECE, plan_chunk, region_of_elements};
+use super::chunks::{Gather, NO_PIECE, pack, plan_chunk, region_of_elements};
 use super::edges::EdgeBlocks;
 use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
 use super::rows::direction;
 use super::{BLOCK, LinearOperator, Padded, padded};
 use crate::cut::Piece;
-use crate::element::{LANES, Lanes, Simd};
+use crate::element::{LANES, Lanes, Mat3, Simd};
 use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
 use crate::team::{Team, blocks, ranges};
@@ -56,6 +56,9 @@ pub struct Elastic {
 #[derive(Clone, Debug)]
 struct Chunk {
     region: usize,
+    /// Pieces and copies there were when the chunk was planned, and the present number of pieces.
+    planned: [usize; 2],
+    n_pieces: usize,
     copies: Vec<u32>,
     pieces: Vec<[u32; LANES]>,
     batches: Batches,
@@ -98,34 +101,78 @@ impl Elastic {
             made_with: None,
             version: 0,
         };
-        elastic.follow(mesh, &[], pieces, n_copies);
+        elastic.n_pieces = pieces.len();
+        elastic.plan(mesh, pieces, &vec![true; n_regions], &[]);
+        elastic.arrange_sums(n_copies);
         elastic
     }
 
-    /// Rearranges the chunks in which pieces differ from what they were `before` a cut. A new piece
-    /// inherits its rotation from a piece its element had before.
-    pub fn follow(&mut self, mesh: &TetMesh, before: &[Piece], pieces: &[Piece], n_copies: usize) {
-        let region_of = |piece: &Piece| self.region_of_element[piece.element as usize] as usize;
-        let mut changed = vec![false; self.n_regions];
-        for (p, piece) in pieces.iter().enumerate() {
-            changed[region_of(piece)] |= before.get(p) != Some(piece);
+    /// Follows a cut: the `changed` pieces (ascending) are new or have other copies or another fraction
+    /// than before. A new piece inherits its rotation from the first of them that its element had
+    /// before. Chunks without changed pieces stay as they are, the others are amended, and arranged anew
+    /// once they have grown by a quarter.
+    pub fn follow(&mut self, mesh: &TetMesh, pieces: &[Piece], changed: &[u32], n_copies: usize) {
+        let region_of = |p: u32| self.region_of_element[pieces[p as usize].element as usize] as usize;
+        let (old, new): (Vec<u32>, Vec<u32>) = changed.iter().partition(|p| (**p as usize) < self.n_pieces);
+        let mut is_changed = vec![false; self.n_pieces];
+        old.iter().for_each(|&p| is_changed[p as usize] = true);
+        let mut added = vec![Vec::new(); self.n_regions];
+        new.iter().for_each(|&p| added[region_of(p)].push(p));
+        let mut affected = vec![false; self.n_regions];
+        changed.iter().for_each(|&p| affected[region_of(p)] = true);
+        let rotations = self.rotations_by_element(&is_changed, pieces);
+        for chunk in self.chunks.iter_mut().rev().filter(|chunk| affected[chunk.region]) {
+            // New pieces go to the last chunk of their region.
+            let added = std::mem::take(&mut added[chunk.region]);
+            chunk.follow(mesh, pieces, &is_changed, &added, &rotations);
         }
+        self.n_pieces = pieces.len();
+        let mut outgrown = vec![false; self.n_regions];
+        self.chunks.iter().for_each(|chunk| outgrown[chunk.region] |= chunk.has_outgrown_its_plan());
+        if outgrown.contains(&true) {
+            let rotations = self.rotations();
+            self.plan(mesh, pieces, &outgrown, &rotations);
+        }
+        self.arrange_sums(n_copies);
+    }
+
+    /// Divides the pieces of these regions into chunks.
+    fn plan(&mut self, mesh: &TetMesh, pieces: &[Piece], regions: &[bool], rotations: &[Matrix3<f32>]) {
         let mut members = vec![Vec::new(); self.n_regions];
-        for (p, piece) in pieces.iter().enumerate().filter(|(_, piece)| changed[region_of(piece)]) {
-            members[region_of(piece)].push(p as u32);
+        for (p, piece) in (0u32..).zip(pieces) {
+            let region = self.region_of_element[piece.element as usize] as usize;
+            if regions[region] {
+                members[region].push(p);
+            }
         }
-        let rotations = inherited(&self.rotations(), before, pieces);
-        self.chunks.retain(|chunk| !changed[chunk.region]);
+        self.chunks.retain(|chunk| !regions[chunk.region]);
         for (region, members) in members.iter().enumerate() {
-            let build = |part| Chunk::new(region, part, mesh, pieces, &rotations);
+            let build = |part| Chunk::new(region, part, mesh, pieces, rotations);
             self.chunks.extend(members.chunks(MOST_PIECES).map(build));
         }
         self.chunks.sort_by_key(|chunk| chunk.region);
+    }
+
+    fn arrange_sums(&mut self, n_copies: usize) {
         self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
         self.sums = vec![[0.0; 4]; self.gather.n_rows()];
         self.diagonals = vec![[0.0; 8]; self.gather.n_rows()];
-        self.n_pieces = pieces.len();
         self.made_with = None;
+    }
+
+    /// Rotation of the first changed piece of every element that has one.
+    fn rotations_by_element(&self, is_changed: &[bool], pieces: &[Piece]) -> BTreeMap<u32, Matrix3<f32>> {
+        let mut first: BTreeMap<u32, (u32, Matrix3<f32>)> = BTreeMap::new();
+        for chunk in &self.chunks {
+            for (p, batch, lane) in chunk.lanes().filter(|&(p, ..)| is_changed[p as usize]) {
+                let found = (p, chunk.rotation(batch, lane));
+                let first = first.entry(pieces[p as usize].element).or_insert(found);
+                if p < first.0 {
+                    *first = found;
+                }
+            }
+        }
+        first.into_iter().map(|(element, (_, R))| (element, R)).collect()
     }
 
     /// Chooses how K̂ is applied from the next update on. The choices differ in the last bits.
@@ -257,10 +304,8 @@ impl Elastic {
     pub fn rotations(&self) -> Vec<Matrix3<f32>> {
         let mut rotations = vec![Matrix3::identity(); self.n_pieces];
         for chunk in &self.chunks {
-            for (lanes, rest) in chunk.pieces.iter().zip(chunk.batches.rest()) {
-                for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
-                    rotations[p as usize] = Matrix3::from_fn(|i, j| rest.rotation[3 * i + j].0[lane]);
-                }
+            for (p, batch, lane) in chunk.lanes() {
+                rotations[p as usize] = chunk.rotation(batch, lane);
             }
         }
         rotations
@@ -300,11 +345,81 @@ impl Chunk {
             pieces: plan.pieces,
             rest: rest_positions(&plan.copies, members, mesh, pieces),
             edges: None,
+            planned: [members.len(), plan.copies.len()],
+            n_pieces: members.len(),
             copies: plan.copies,
             positions: vec![[0.0; 4]; n],
             x: vec![[0.0; 4]; n],
             inverted: 0,
         }
+    }
+
+    /// Piece, batch and lane of all pieces.
+    fn lanes(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
+        let lanes = self.pieces.iter().enumerate();
+        let lanes = lanes.flat_map(|(b, lanes)| lanes.iter().enumerate().map(move |(l, &p)| (p, b, l)));
+        lanes.filter(|&(p, ..)| p != NO_PIECE)
+    }
+
+    fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
+        let rotation = &self.batches.rest()[batch].rotation;
+        Matrix3::from_fn(|i, j| rotation[3 * i + j].0[lane])
+    }
+
+    /// Whether so much was added that packing and numbering anew pays.
+    fn has_outgrown_its_plan(&self) -> bool {
+        let [pieces, copies] = self.planned;
+        self.n_pieces > pieces + pieces / 4 || self.copies.len() > copies + copies / 2
+    }
+
+    /// Amends the copies and fractions of changed pieces and appends the pieces `added`. Copies that
+    /// are new to the chunk are new altogether, so that `copies` stays in order.
+    fn follow(
+        &mut self,
+        mesh: &TetMesh,
+        pieces: &[Piece],
+        is_changed: &[bool],
+        added: &[u32],
+        rotations: &BTreeMap<u32, Matrix3<f32>>,
+    ) {
+        let changed: Vec<(u32, usize, usize)> =
+            self.lanes().filter(|&(p, ..)| is_changed[p as usize]).collect();
+        let amended = || changed.iter().map(|c| c.0).chain(added.iter().copied());
+        let old_waste = self.copies.len() as u16;
+        let mut new: Vec<(u32, u32)> = amended()
+            .map(|p| &pieces[p as usize])
+            .flat_map(|piece| piece.copies.into_iter().zip(mesh.tets[piece.element as usize]))
+            .filter(|(copy, _)| self.copies.binary_search(copy).is_err())
+            .collect();
+        new.sort_unstable();
+        new.dedup();
+        self.copies.extend(new.iter().map(|n| n.0));
+        self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
+        debug_assert!(self.copies.is_sorted());
+        let waste = self.copies.len() as u16;
+        let local = |copy: &u32| self.copies.binary_search(copy).map_or(waste, |l| l as u16);
+        let (mut nodes, mut rest) = std::mem::take(&mut self.batches).into_parts();
+        for id in nodes.iter_mut().flatten().flatten().filter(|id| **id == old_waste) {
+            *id = waste;
+        }
+        let mut places = changed;
+        places.extend(free_lanes(&mut self.pieces, added, pieces));
+        nodes.resize(self.pieces.len(), [[waste; LANES]; 4]);
+        rest.resize(self.pieces.len(), empty_batch());
+        for (p, batch, lane) in places {
+            let piece = &pieces[p as usize];
+            for (ids, copy) in nodes[batch].iter_mut().zip(&piece.copies) {
+                ids[lane] = local(copy);
+            }
+            let known = rotations.get(&piece.element).filter(|_| p as usize >= is_changed.len());
+            set_lane(&mut rest[batch], lane, mesh, piece, known);
+        }
+        let n = self.copies.len() + 1;
+        self.batches = Batches::new(&nodes, rest, n);
+        self.n_pieces += added.len();
+        self.edges = None;
+        self.positions.resize(n, [0.0; 4]);
+        self.x.resize(n, [0.0; 4]);
     }
 
     /// Assembles the stiffness of the last update, or forgets what was assembled before.
@@ -365,20 +480,27 @@ impl Chunk {
     }
 }
 
-/// Rotation of every present piece: its own if it existed before, else that of the first piece its
-/// element had before, else none.
-fn inherited(known: &[Matrix3<f32>], before: &[Piece], pieces: &[Piece]) -> Vec<Matrix3<f32>> {
-    let mut first = BTreeMap::new();
-    for piece in pieces.iter().skip(before.len()) {
-        first.insert(piece.element, Matrix3::identity());
+/// Gives the pieces `added` lanes: first those that are empty (only the last batch has any), then new
+/// batches. Returns piece, batch and lane of each.
+fn free_lanes(batches: &mut Vec<[u32; LANES]>, added: &[u32], pieces: &[Piece]) -> Vec<(u32, usize, usize)> {
+    let mut places = Vec::with_capacity(added.len());
+    let mut added = added.iter();
+    let last = batches.len().saturating_sub(1);
+    for (l, lane) in batches.last_mut().into_iter().flatten().enumerate().filter(|(_, p)| **p == NO_PIECE) {
+        let Some(&p) = added.next() else { return places };
+        *lane = p;
+        places.push((p, last, l));
     }
-    for (piece, R) in before.iter().zip(known).rev() {
-        if let Some(first) = first.get_mut(&piece.element) {
-            *first = *R;
+    let added = added.as_slice();
+    let held: Vec<[u32; 4]> = added.iter().map(|&p| pieces[p as usize].copies).collect();
+    for mut lanes in pack(&held) {
+        for (l, lane) in lanes.iter_mut().enumerate().filter(|(_, p)| **p != NO_PIECE) {
+            *lane = added[*lane as usize];
+            places.push((*lane, batches.len(), l));
         }
+        batches.push(lanes);
     }
-    let new = |piece: &Piece| first.get(&piece.element).copied().unwrap_or_else(Matrix3::identity);
-    known.iter().copied().take(before.len()).chain(pieces.iter().skip(before.len()).map(new)).collect()
+    places
 }
 
 /// Rest position of each of `copies` (ascending), all of which belong to pieces in `members`.
@@ -409,25 +531,41 @@ fn rest_batch(
     pieces: &[Piece],
     rotations: &[Matrix3<f32>],
 ) -> RestBatch {
-    let mut rest =
-        RestBatch { g: Default::default(), volume: Lanes::default(), rotation: Default::default() };
-    for (lane, &p) in lanes.iter().enumerate() {
-        let R = rotations.get(p as usize).copied().unwrap_or_else(Matrix3::identity);
+    let mut rest = empty_batch();
+    for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
+        set_lane(&mut rest, lane, mesh, &pieces[p as usize], rotations.get(p as usize));
+    }
+    rest
+}
+
+/// A batch without pieces: no volume, no rotation.
+fn empty_batch() -> RestBatch {
+    let mut rotation: Mat3<Lanes> = Default::default();
+    for i in 0..3 {
+        rotation[4 * i] = Lanes([1.0; LANES]);
+    }
+    RestBatch { g: Default::default(), volume: Lanes::default(), rotation }
+}
+
+/// Gradients and volume of a piece, and its rotation if that is known.
+fn set_lane(
+    rest: &mut RestBatch,
+    lane: usize,
+    mesh: &TetMesh,
+    piece: &Piece,
+    rotation: Option<&Matrix3<f32>>,
+) {
+    let e = piece.element as usize;
+    let g = mesh.gradients(e);
+    for k in 0..3 {
+        for i in 0..3 {
+            rest.g[k][i].0[lane] = g[k + 1][i] as f32;
+        }
+    }
+    rest.volume.0[lane] = (piece.fraction * mesh.volume(e)) as f32;
+    if let Some(R) = rotation {
         for i in 0..9 {
             rest.rotation[i].0[lane] = R[(i / 3, i % 3)];
         }
-        if p == NO_PIECE {
-            continue;
-        }
-        let piece = &pieces[p as usize];
-        let e = piece.element as usize;
-        let g = mesh.gradients(e);
-        for k in 0..3 {
-            for i in 0..3 {
-                rest.g[k][i].0[lane] = g[k + 1][i] as f32;
-            }
-        }
-        rest.volume.0[lane] = (piece.fraction * mesh.volume(e)) as f32;
     }
-    rest
 }

@@ -63,7 +63,7 @@ pub struct Locals<'a> {
 }
 
 /// The batches of one chunk. Their local numbers are checked once, here.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Batches {
     live: Vec<Batch>,
     rest: Vec<RestBatch>,
@@ -81,6 +81,11 @@ impl Batches {
         let zero = Lanes::default();
         let live = nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes });
         Self { live: live.collect(), rest, ratio: 0.0, n_locals }
+    }
+
+    /// Local numbers and rest states, to be amended.
+    pub fn into_parts(self) -> (Vec<[Ids; 4]>, Vec<RestBatch>) {
+        (self.nodes(), self.rest)
     }
 
     /// λ/2μ at the last update.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Block6, Elastic, ElasticUpdate, LinearOperator, OperatorChoice, Padded};
-use crate::cut::Piece;
+use crate::cut::{BladeSweep, CutMesh, Piece};
 use crate::element::{Simd, deformation_gradient, piece_forces};
 use crate::material::{Lame, Law};
 use crate::mesh::{BoxPattern, TetMesh, box_mesh};
@@ -156,7 +156,7 @@ fn the_linear_stiffness_is_made_once_and_forces_do_not_feel_how_far_the_body_is(
         elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
         assert!(elastic.version() > version && diagonal[5][0] > 3.9 * first.diagonal[5][0]);
         let version = elastic.version();
-        elastic.follow(&mesh, &pieces, &pieces, n);
+        elastic.follow(&mesh, &pieces, &[], n);
         elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
         assert!(elastic.version() > version);
     }
@@ -177,4 +177,53 @@ fn a_rotation_is_remembered_where_the_gradient_defines_none() {
     let drift =
         found.elastic.rotations().iter().zip(&before).map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
     assert!(drift < 1e-6, "{drift:e}");
+}
+
+/// Cut after cut, chunks that are amended and now and then planned anew give what new ones give.
+#[test]
+fn amended_chunks_act_like_new_ones() {
+    let (mesh, _) = mesh();
+    let mut cut = CutMesh::new(mesh.clone()).unwrap();
+    let mut amended = Elastic::new(Simd::detect(), &mesh, cut.pieces(), cut.n_copies());
+    let mut team = Team::new(1).unwrap();
+    let with = ElasticUpdate { lame: LAME, law: Law::Corotational, scale: 1e-4 };
+    let (low, high) =
+        mesh.nodes.iter().fold((mesh.nodes[0], mesh.nodes[0]), |(low, high), x| (low.inf(x), high.sup(x)));
+    for k in 1..16_u32 {
+        let s = f64::from(k);
+        let middle = low + (high - low) * (0.5 + 0.3 * (1.3 * s).sin());
+        let normal = Vector3::new(s.sin(), (2.0 * s).cos(), (3.1 * s).sin()).normalize();
+        let u = normal.cross(&Vector3::new(0.3, -0.5, 0.8)).normalize() * (high - low).norm();
+        let w = normal.cross(&u) * if k % 2 == 0 { 1.0 } else { 0.1 };
+        let blade =
+            BladeSweep { segments: vec![[middle - u - w, middle - u + w], [middle + u - w, middle + u + w]] };
+        cut.sweep(&cut.rest_positions(), &blade, k).unwrap();
+        let (pieces, n) = (cut.pieces(), cut.n_copies());
+        amended.follow(&mesh, pieces, cut.changed_pieces(), n);
+        let mut fresh = Elastic::new(Simd::detect(), &mesh, pieces, n);
+        let rest = cut.rest_positions();
+        let x: Vec<Vector3<f64>> =
+            (0..n).map(|c| rest[c] + 0.004 * Vector3::new((c as f64).sin(), 0.2, 0.1)).collect();
+        let direction: Vec<Padded> =
+            (0..n).map(|c| [(0.3 * c as f32).sin(), (1.7 * c as f32).cos(), 0.4, 0.0]).collect();
+        let mut found = [&mut fresh, &mut amended].map(|elastic| {
+            let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+            let inverted = elastic.update(&mut team, &with, &x, &mut f, &mut diagonal);
+            let mut y = vec![[0.0; 4]; n];
+            elastic.apply(&mut team, &direction, &mut y);
+            assert_eq!(elastic.n_pieces(), pieces.len());
+            (inverted, f, y, diagonal)
+        });
+        let [(inverted, f, y, diagonal), other] = &mut found;
+        assert_eq!(*inverted, other.0);
+        for (new, old) in [(f, &other.1), (y, &other.2)] {
+            let size = largest(new.iter().map(wide));
+            let error = largest(new.iter().zip(old).map(|(a, b)| wide(a) - wide(b)));
+            assert!(error < 1e-5 * size, "after cut {k}: {error:e} of {size:e}");
+        }
+        let size = diagonal.iter().flatten().fold(0.0_f32, |m, d| m.max(d.abs()));
+        let same = |(a, b): (&Block6, &Block6)| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5 * size);
+        assert!(diagonal.iter().zip(&other.3).all(same), "after cut {k}");
+    }
+    assert!(cut.pieces().len() > 2 * mesh.tets.len(), "chunks have been planned anew");
 }

@@ -7,6 +7,7 @@ use nalgebra::{Matrix4, Vector3};
 
 use super::Random;
 use crate::cut::fragments::NONE;
+use crate::cut::surface_builder::{Material, SurfaceBuilder};
 use crate::cut::{CutMesh, Surface};
 use crate::mesh::TET_FACES;
 
@@ -17,6 +18,7 @@ pub fn everything(cut: &CutMesh) {
     fragments_conform(cut);
     copies_are_components(cut);
     material_hangs_together(cut);
+    surface_is_that_of_a_new_build(cut);
 }
 
 /// Each directed edge once, its opposite once, every vertex link a single cycle, every vertex used.
@@ -198,5 +200,24 @@ pub fn material_hangs_together(cut: &CutMesh) {
             let known = *place[v as usize].get_or_insert(at);
             assert!((known - at).norm() < 1e-12, "vertex {v} is in two places");
         }
+    }
+}
+
+/// The surface that was kept up to date cut by cut is joined like one built from the fragments alone,
+/// and its vertices are where the fragments are.
+pub fn surface_is_that_of_a_new_build(cut: &CutMesh) {
+    let f = &cut.fragments;
+    let (fresh, _) = SurfaceBuilder::build(&Material { mesh: cut.mesh(), fragments: f, pieces: &cut.pieces });
+    assert!(fresh.joints() == cut.builder.joints(), "half-edges are paired differently");
+    assert_eq!(fresh.counts(), cut.builder.counts(), "vertices and edges between the same vertices");
+    let mut random = Random(8);
+    let x: Vec<Vector3<f64>> = (0..cut.n_copies()).map(|_| random.vector(1.0)).collect();
+    for (id, (t, v)) in cut.builder.corners(f) {
+        let piece = &cut.pieces()[f.piece[t as usize] as usize];
+        let nodes = cut.mesh().tets[piece.element as usize];
+        let at: Vector3<f64> =
+            (0..4).map(|a| x[piece.copies[a] as usize] * f.vertices[v as usize].weight_of(nodes[a])).sum();
+        let bound = cut.surface().vertices[id as usize].position(&x);
+        assert!((bound - at).norm() < 1e-12, "surface vertex {id} is not where its fragment is");
     }
 }

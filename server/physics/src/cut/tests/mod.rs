@@ -2,6 +2,7 @@
 
 mod check;
 mod planes;
+mod kinds;
 mod growth;
 mod random;
 mod refusals;

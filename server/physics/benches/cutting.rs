@@ -1,0 +1,222 @@
+//! What cutting costs: `cargo bench -p scindo-physics --bench cutting`; `-- --quick` runs everything
+//! once on a small body. One thread.
+//!
+//! - Insertion: a sweep through 1 000 elements of a body of 20 870 tets, topology alone and the whole
+//!   body with all that its next step needs; the same in advances of a hundredth; building the uncut state.
+//! - Steps: what an enriched element (one that a cut divides) costs beside a plain one, and what a step
+//!   costs after 100 cuts beside the growth of the copies. Every solve makes the same number of
+//!   iterations, and the bodies compared are stepped in turns, so that a busy moment of the machine hits
+//!   all of them.
+
+use std::time::Instant;
+
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, BodySettings, PcgSettings};
+use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
+
+const SIZE_M: f64 = 0.1;
+const DOWN: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+const ITERATIONS: u32 = 25;
+
+fn material(law: Law) -> Material {
+    Material {
+        young_pa: 1e5,
+        poisson: 0.4,
+        density_kg_m3: 1000.0,
+        rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.0 },
+        law,
+    }
+}
+
+fn main() {
+    let quick = std::env::args().any(|a| a == "--quick" || a == "--test");
+    let (cells, tets, elements) = if quick { (5, 700, 60) } else { (16, 20_870, 1_000) };
+    let mesh = block(cells, tets);
+    println!("{} tets, {} nodes", mesh.tets.len(), mesh.nodes.len());
+    // A word that is not a flag selects parts by name.
+    let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let wanted = |part: &str| words.is_empty() || words.iter().any(|word| part.contains(word.as_str()));
+    if wanted("insertion") {
+        insertion(&mesh, elements, if quick { 1 } else { 21 });
+    }
+    if wanted("growth") {
+        growth(&mesh, if quick { 1 } else { 5 });
+    }
+    if wanted("enriched") {
+        enriched_elements(&mesh, if quick { 2 } else { 200 });
+    }
+    if wanted("hundred") {
+        hundred_cuts(&mesh, if quick { 2 } else { 200 });
+    }
+}
+
+/// A block with this many tets: the first ones of a lattice, which ends in an unfinished layer.
+fn block(cells: usize, tets: usize) -> TetMesh {
+    let mut whole = box_mesh(Vector3::zeros(), Vector3::repeat(SIZE_M), [cells; 3], BoxPattern::Tet6);
+    whole.tets.truncate(tets);
+    TetMesh::repaired(whole.nodes, whole.tets).expect("a part of a lattice is a mesh").0
+}
+
+fn body(mesh: &TetMesh, law: Law) -> Body {
+    let solver = PcgSettings { iterations: ITERATIONS, tolerance: 0.0 };
+    let settings = BodySettings { solver, threads: 1, ..BodySettings::default() };
+    let clamp: Vec<u32> = (0..mesh.nodes.len() as u32).filter(|&n| mesh.nodes[n as usize].z == 0.0).collect();
+    let mut body = Body::new(mesh.clone(), material(law), settings).expect("the material is usual");
+    body.fix(&clamp, [true; 3], Vector3::zeros()).expect("the nodes are there");
+    body
+}
+
+/// A blade along y at the place `x`; the plane it moves in is oblique to the lattice.
+fn blade(x: f64) -> [Vector3<f64>; 2] {
+    [Vector3::new(x, -0.01, 0.0521 + 0.1 * x), Vector3::new(x, 0.11, 0.0532 + 0.1 * x)]
+}
+
+/// How far [m] that blade goes to cut about as many elements as are wanted.
+fn reach(mesh: &TetMesh, elements: usize) -> f64 {
+    let uncut = CutMesh::new(mesh.clone()).expect("a block can be cut");
+    let (mut short, mut long) = (0.0, 1.1 * SIZE_M);
+    for _ in 0..12 {
+        let middle = 0.5 * (short + long);
+        let sweep = BladeSweep { segments: vec![blade(-0.01), blade(middle)] };
+        let cut = uncut.clone().sweep(&uncut.rest_positions(), &sweep, 1);
+        let cut = cut.expect("the sweep is well formed").elements_cut;
+        if cut < elements { short = middle } else { long = middle }
+    }
+    long
+}
+
+fn insertion(mesh: &TetMesh, elements: usize, repeats: usize) {
+    let build = best_and_median(repeats.min(9), || {
+        let mesh = mesh.clone();
+        timed(|| CutMesh::new(mesh)).1
+    });
+    say("uncut state", build, "");
+    let sweep = BladeSweep { segments: vec![blade(-0.01), blade(reach(mesh, elements))] };
+    let uncut = CutMesh::new(mesh.clone()).expect("a block can be cut");
+    let x = uncut.rest_positions();
+    let mut cut = 0;
+    let topology = best_and_median(repeats, || {
+        let mut mesh = uncut.clone();
+        let (report, seconds) = timed(|| mesh.sweep(&x, &sweep, 1));
+        cut = report.expect("the sweep is well formed").elements_cut;
+        seconds
+    });
+    say(&format!("sweep through {cut} elements, topology and surface"), topology, "");
+    for law in [Law::Linear, Law::Corotational] {
+        let whole = best_and_median(repeats, || {
+            let mut body = body(mesh, law);
+            body.step(0.01, DOWN, &[]);
+            let (report, seconds) = timed(|| body.cut(&sweep, 1));
+            cut = report.expect("the sweep is well formed").elements_cut;
+            seconds
+        });
+        say(&format!("sweep through {cut} elements, whole body, {law:?}"), whole, "target 5 ms");
+    }
+}
+
+/// The same cut in a hundred advances, each of which continues the one before.
+fn growth(mesh: &TetMesh, repeats: usize) {
+    const ADVANCES: u32 = 100;
+    let mut slowest = 0.0f64;
+    let advance = best_and_median(repeats, || {
+        let mut body = body(mesh, Law::Corotational);
+        let mut sum = 0.0;
+        slowest = 0.0;
+        for k in 0..=ADVANCES {
+            let place = -0.01 + 1.2 * SIZE_M * f64::from(k) / f64::from(ADVANCES);
+            let sweep = BladeSweep { segments: vec![blade(place)] };
+            let (report, seconds) = timed(|| body.cut(&sweep, 1));
+            report.expect("the sweep is well formed");
+            sum += seconds;
+            slowest = slowest.max(seconds);
+        }
+        assert_eq!(body.cut_mesh().components().len(), 2, "the plane takes the body apart");
+        sum / f64::from(ADVANCES + 1)
+    });
+    say("one advance of a hundred, whole body", advance, &format!("slowest {:.3} ms", slowest * 1e3));
+}
+
+/// Times of a step of several bodies [s], taken in turns: best and median of each.
+fn steps(bodies: &mut [&mut Body], repeats: usize) -> Vec<[f64; 2]> {
+    let mut seconds = vec![Vec::new(); bodies.len()];
+    for _ in 0..repeats + 2 {
+        for (body, seconds) in bodies.iter_mut().zip(&mut seconds) {
+            let (report, time) = timed(|| body.step(0.005, DOWN, &[]));
+            assert_eq!(report.iterations, ITERATIONS, "{report:?}");
+            seconds.push(time);
+        }
+    }
+    seconds.into_iter().map(|mut s| sorted(s.split_off(2))).collect()
+}
+
+/// Planes through every second layer of cells: the more elements are enriched the surer the quotient.
+fn enriched_elements(mesh: &TetMesh, repeats: usize) {
+    for law in [Law::Linear, Law::Corotational] {
+        let (mut plain, mut cut) = (body(mesh, law), body(mesh, law));
+        for k in 0..7 {
+            let z = SIZE_M * (0.131 + 0.125 * f64::from(k));
+            let at = |x: f64| [Vector3::new(x, -0.01, z), Vector3::new(x, 0.09, z + 0.0002)];
+            cut.cut(&BladeSweep { segments: vec![at(-0.01), at(0.11)] }, k + 1).expect("well formed");
+        }
+        let mut pieces = vec![0u32; mesh.tets.len()];
+        cut.cut_mesh().pieces().iter().for_each(|piece| pieces[piece.element as usize] += 1);
+        let enriched = pieces.iter().filter(|&&n| n > 1).count();
+        let share = enriched as f64 / mesh.tets.len() as f64;
+        let times = steps(&mut [&mut plain, &mut cut], repeats);
+        let cost = [0, 1].map(|i| (times[1][i] / times[0][i] - 1.0) / share + 1.0);
+        say(&format!("step, {law:?}, uncut"), times[0], "");
+        say(&format!("step, {law:?}, {enriched} elements enriched"), times[1], "");
+        println!(
+            "  an enriched element costs {:.2} × a plain one (median {:.2}); target 2.2",
+            cost[0], cost[1]
+        );
+    }
+}
+
+/// A hundred shallow cuts all over the body.
+fn hundred_cuts(mesh: &TetMesh, repeats: usize) {
+    for law in [Law::Linear, Law::Corotational] {
+        let (mut plain, mut cut) = (body(mesh, law), body(mesh, law));
+        for k in 0..100 {
+            let (row, column) = (k / 10, k % 10);
+            let (x, y) =
+                (SIZE_M * (0.05 + 0.09 * f64::from(row)), SIZE_M * (0.04 + 0.085 * f64::from(column)));
+            let at =
+                |s: f64| [Vector3::new(x + s, y + 0.3 * s, 0.06), Vector3::new(x + s, y + 0.2 * s, 0.12)];
+            cut.cut(&BladeSweep { segments: vec![at(0.0), at(0.009)] }, k + 1).expect("well formed");
+        }
+        let growth = |n: fn(&Body) -> usize| n(&cut) as f64 / n(&plain) as f64;
+        let copies = growth(|b| b.cut_mesh().n_copies());
+        let pieces = growth(|b| b.cut_mesh().pieces().len());
+        let times = steps(&mut [&mut plain, &mut cut], repeats);
+        let slower = [0, 1].map(|i| times[1][i] / times[0][i]);
+        say(&format!("step, {law:?}, after 100 cuts"), times[1], "");
+        println!(
+            "  {:.3} × as slow (median {:.3}) with {copies:.3} × the copies and {pieces:.3} × the pieces",
+            slower[0], slower[1]
+        );
+    }
+}
+
+fn say(what: &str, [best, median]: [f64; 2], more: &str) {
+    println!("{what:<62} best {:8.3} ms, median {:8.3} ms  {more}", best * 1e3, median * 1e3);
+}
+
+/// The result of the work and the seconds it took.
+#[allow(clippy::disallowed_methods, reason = "a benchmark reads the clock; the library does not")]
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = Instant::now();
+    let result = work();
+    (result, start.elapsed().as_secs_f64())
+}
+
+fn best_and_median(repeats: usize, mut run: impl FnMut() -> f64) -> [f64; 2] {
+    sorted((0..repeats).map(|_| run()).collect())
+}
+
+fn sorted(mut seconds: Vec<f64>) -> [f64; 2] {
+    seconds.sort_by(f64::total_cmp);
+    [seconds[0], seconds[seconds.len() / 2]]
+}
