@@ -102,12 +102,9 @@ impl CutElement {
 
     /// ω_max [rad/s] of K − ω² M.
     pub fn omega_max(&self, enrichment: Enrichment, lumping: Lumping) -> Result<f64, EnrichmentError> {
-        // The consistent mass gives the same frequencies in every basis, for they span the same
-        // displacements; that of the pieces does not become singular as one of them gets small.
-        let enrichment = match lumping {
-            Lumping::Consistent => Enrichment::Substitution,
-            _ => enrichment,
-        };
+        // Such a mass gives the same frequencies in every basis, for they span the same displacements;
+        // that of the pieces does not become singular as one of them gets small.
+        let enrichment = if lumping.is_of_the_pieces() { Enrichment::Substitution } else { enrichment };
         let M =
             self.mass(enrichment, lumping).kronecker(&DMatrix::identity(self.dimensions, self.dimensions));
         largest_frequency(&self.stiffness(enrichment), &M)

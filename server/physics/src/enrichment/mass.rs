@@ -1,8 +1,8 @@
 //! Mass matrices of a cut element: consistent and lumped.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
-use super::{CutElement, Enrichment, Side};
+use super::{CutElement, Enrichment, EnrichmentError, Side};
 
 /// How the mass of a cut element is put on its degrees of freedom; formulas in [`super`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,14 +15,32 @@ pub enum Lumping {
     Hrz,
     /// As [`Hrz`](Self::Hrz), with the enriched block scaled to its own row-sum mass.
     HrzBlockMass,
+    /// The weighted diagonal as printed in the thesis, (3.44) and (3.45): m M_ii / Σ_j M_ij. It does not
+    /// keep the mass: it gives 4/3 m for a bar and 1.6 m for a tet.
+    HrzAsPrinted,
     /// m/n, and (m/n) times the mean of ψ_i² for enriched degrees of freedom.
     Menouillard,
+    /// The masses of the copies ρ ∫ N_i dV over the piece, seen in the basis: a 2×2 block for every node,
+    /// M_ua included. The only one of the lumped masses that weighs each piece as what it is.
+    Copies,
 }
 
 impl Lumping {
     /// All of them, in the order of the table.
-    pub const ALL: [Self; 5] =
-        [Self::Consistent, Self::RowSum, Self::Hrz, Self::HrzBlockMass, Self::Menouillard];
+    pub const ALL: [Self; 7] = [
+        Self::Consistent,
+        Self::RowSum,
+        Self::Hrz,
+        Self::HrzBlockMass,
+        Self::HrzAsPrinted,
+        Self::Menouillard,
+        Self::Copies,
+    ];
+
+    /// Whether the matrix is the same linear map in every basis, so that frequencies do not depend on it.
+    pub fn is_of_the_pieces(self) -> bool {
+        matches!(self, Self::Consistent | Self::Copies)
+    }
 }
 
 impl CutElement {
@@ -32,6 +50,9 @@ impl CutElement {
         let consistent = self.consistent_mass(enrichment);
         if lumping == Lumping::Consistent {
             return consistent;
+        }
+        if lumping == Lumping::Copies {
+            return self.copy_mass(enrichment);
         }
         let n = self.n_nodes();
         // The two diagonal blocks and what each of them should weigh.
@@ -46,8 +67,11 @@ impl CutElement {
                 (Enrichment::Substitution, _) => block(b).sum() / block(b).trace(),
                 _ => standard_scale,
             };
+            // What the printed formula calls m: for substitution that of the piece.
+            let m = if enrichment == Enrichment::Substitution { block(b).sum() } else { self.mass_kg() };
             for i in 0..n {
                 lumped[(b * n + i, b * n + i)] = match lumping {
+                    Lumping::HrzAsPrinted => m * block(b)[(i, i)] / block(b).row(i).sum(),
                     Lumping::RowSum => block(b).row(i).sum(),
                     Lumping::Menouillard => self.menouillard(enrichment, i)[b],
                     _ => scale * block(b)[(i, i)],
@@ -73,6 +97,50 @@ impl CutElement {
             }
         }
         M
+    }
+
+    fn copy_mass(&self, enrichment: Enrichment) -> DMatrix<f64> {
+        let n = self.n_nodes();
+        let mut M = DMatrix::zeros(2 * n, 2 * n);
+        for (side, piece) in [Side::Left, Side::Right].into_iter().zip(self.pieces()) {
+            for i in 0..n {
+                let c = enrichment.coefficients(side, self.sides()[i]);
+                let m = self.mass_kg() * piece.moments.row(i).sum();
+                for (b, d) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    M[(b * n + i, d * n + i)] += c[b] * c[d] * m;
+                }
+            }
+        }
+        M
+    }
+
+    /// Inertia [kg] of the two pieces L and R against moving each as a whole, 2 × 2. What it should be is
+    /// the diagonal of their masses.
+    ///
+    /// A rigid translation of the pieces by d_L, d_R is q = T d in the degrees of freedom of the basis,
+    /// and Tᵀ M T what resists it.
+    pub fn piece_inertia(&self, enrichment: Enrichment, lumping: Lumping) -> Matrix2<f64> {
+        let n = self.n_nodes();
+        let mut T = DMatrix::zeros(2 * n, 2);
+        for i in 0..n {
+            let [left, right] =
+                [Side::Left, Side::Right].map(|side| enrichment.coefficients(side, self.sides()[i]));
+            // [u, a] with left·[u, a] = d_L and right·[u, a] = d_R.
+            let det = left[0] * right[1] - left[1] * right[0];
+            (T[(i, 0)], T[(i, 1)]) = (right[1] / det, -left[1] / det);
+            (T[(n + i, 0)], T[(n + i, 1)]) = (-right[0] / det, left[0] / det);
+        }
+        let inertia = T.tr_mul(&self.mass(enrichment, lumping)) * T;
+        Matrix2::new(inertia[(0, 0)], inertia[(0, 1)], inertia[(1, 0)], inertia[(1, 1)])
+    }
+
+    /// Accelerations of the pieces L and R in free fall, over g: under their true weights and with the
+    /// inertia that the mass matrix gives them. Should be 1.
+    pub fn free_fall(&self, enrichment: Enrichment, lumping: Lumping) -> Result<[f64; 2], EnrichmentError> {
+        let weight = Vector2::from_fn(|p, _| self.mass_kg() * self.pieces()[p].fraction);
+        let inertia = self.piece_inertia(enrichment, lumping);
+        let pivot = EnrichmentError::SingularMass { pivot: 0, value: inertia.determinant() };
+        inertia.try_inverse().map(|inverse| (inverse * weight).into()).ok_or(pivot)
     }
 
     /// (m/n) (1/|Ω|) ∫ c² dΩ for the two degrees of freedom of node `i`.

@@ -3,7 +3,11 @@
 //!
 //! The solver works with pieces and copies ([`crate::cut`]). The enrichments of the literature span
 //! the same displacements; they are linear changes of variables, and differ in conditioning and, with
-//! lumped masses, in the step an explicit integrator may take. This module makes that comparison.
+//! lumped masses, in the step an explicit integrator may take. This module makes that comparison:
+//! [`EnrichedView`] writes a whole cut body in any of the bases, whatever its law; [`EnrichedTet`] has
+//! the forces and stiffness blocks of one element as the papers print them, put right; [`CutElement`]
+//! the masses and the critical time step; [`thesis_figures`] and [`thesis_claims`] the published curves
+//! and what is true of them.
 //!
 //! # Definitions
 //! The cut divides an element into side L (H = −1) and side R (H = +1); H_i is the side of node i.
@@ -28,19 +32,29 @@
 //! | `RowSum` | row sums of the standard block | row sums of the enriched block | row sums per piece |
 //! | `Hrz` | s M_ii | s M_ii with the same s = m / Σ M_ii over the standard block | s per piece, so that its mass is kept |
 //! | `HrzBlockMass` | s M_ii | scaled to the row-sum mass of the enriched block | as `Hrz` |
+//! | `HrzAsPrinted` | m M_ii / Σ_j M_ij, more than m in all | likewise | likewise with the mass of the piece |
 //! | `Menouillard` | m/n | (m/n) ∫ψ_i² / \|Ω\| (Menouillard et al. 2006) | (m/n) w |
+//! | `Copies` | ∫ρ N_i over the pieces as 2×2 blocks of u_i and a_i, M_ua included | | row sums per piece |
 //!
 //! Hinton, Rock & Zienkiewicz 1976 is HRZ. For undamped central differences (and symplectic Euler)
 //! Δt_c = 2/ω_max of K − ω² M; ratios are taken against the uncut element with masses m/n.
 
 mod basis;
+mod claims;
 mod cut_element;
+mod enriched_tet;
+mod figures;
 mod mass;
 mod pieces;
 mod spectrum;
+mod view;
 
 pub use basis::{Enrichment, Side};
+pub use claims::{Claim, thesis_claims};
 pub use cut_element::{CutElement, EnrichmentError, tet_stiffness};
+pub use enriched_tet::{EnrichedTangent, EnrichedTet, UA};
+pub use figures::{StepCurve, StepFigure, cut_places, regular_tet, thesis_figures};
 pub use mass::Lumping;
 pub use pieces::{Piece, bar_pieces, tet_pieces};
 pub use spectrum::largest_frequency;
+pub use view::EnrichedView;
