@@ -120,7 +120,7 @@ fn substitution(figures: &[StepFigure]) -> Result<Claim, EnrichmentError> {
         printed: "substituted degrees of freedom: row sums and the weighted diagonal lead to instability for \
                   a cut near a node",
         holds: row_sum < 0.05 && hrz < 0.05,
-        found: format!("down to {row_sum:.4} and {hrz:.4} at c = {SLIVER:e}, as √c"),
+        found: format!("down to {row_sum:.4} and {hrz:.4} at c = {SLIVER:e}, as √c and as c"),
         instead: "implicit integration, or a floor under the mass of copies",
     })
 }
