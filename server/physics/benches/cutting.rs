@@ -98,7 +98,8 @@ fn insertion(mesh: &TetMesh, elements: usize, repeats: usize) {
     let x = uncut.rest_positions();
     let mut cut = 0;
     let topology = best_and_median(repeats, || {
-        let mut mesh = uncut.clone();
+        // Not a clone: that would have no room left for a cut.
+        let mut mesh = CutMesh::new(mesh.clone()).expect("a block can be cut");
         let (report, seconds) = timed(|| mesh.sweep(&x, &sweep, 1));
         cut = report.expect("the sweep is well formed").elements_cut;
         seconds

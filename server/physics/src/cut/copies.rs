@@ -25,11 +25,16 @@ pub struct CopyTable {
     visited: Vec<u32>,
     stamp: u32,
     stack: Vec<u32>,
+    components: Vec<Around>,
+    /// Pieces of all components, one after the other.
+    members: Vec<u32>,
 }
 
 /// A component of the pieces around one node.
+#[derive(Clone, Debug)]
 struct Around {
-    pieces: Vec<u32>,
+    /// Where its pieces are among the members.
+    members: std::ops::Range<usize>,
     parent: u32,
     holds_node: bool,
 }
@@ -80,7 +85,8 @@ impl CopyTable {
         pieces: &mut PieceTable,
         new_copies: &mut Vec<NewCopy>,
     ) {
-        let components = self.components_around(mesh, i, fragments, pieces);
+        self.find_components_around(mesh, i, fragments, pieces);
+        let components = std::mem::take(&mut self.components);
         for (k, component) in components.iter().enumerate() {
             let parent = component.parent;
             let heir = components
@@ -97,7 +103,8 @@ impl CopyTable {
                 new_copies.push(NewCopy { copy, parent });
                 copy
             };
-            for &p in &component.pieces {
+            for k in component.members.clone() {
+                let p = self.members[k];
                 let piece = &mut pieces.pieces[p as usize];
                 if let Some(a) = mesh.tets[piece.element as usize].iter().position(|&n| n == i) {
                     if piece.copies[a] != id {
@@ -108,27 +115,23 @@ impl CopyTable {
                 }
             }
         }
+        self.components = components;
     }
 
-    fn components_around(
-        &mut self,
-        mesh: &TetMesh,
-        i: u32,
-        fragments: &Fragments,
-        pieces: &PieceTable,
-    ) -> Vec<Around> {
+    fn find_components_around(&mut self, mesh: &TetMesh, i: u32, fragments: &Fragments, pieces: &PieceTable) {
         self.stamp += 1;
         self.visited.resize(pieces.pieces.len(), 0);
         let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
-        let mut components = Vec::new();
+        self.components.clear();
+        self.members.clear();
         for k in range {
             for seed in pieces.of_element(self.around[k]) {
                 if self.visited[seed as usize] != self.stamp {
-                    components.push(self.flood(mesh, i, seed, fragments, pieces));
+                    let component = self.flood(mesh, i, seed, fragments, pieces);
+                    self.components.push(component);
                 }
             }
         }
-        components
     }
 
     fn flood(
@@ -141,11 +144,12 @@ impl CopyTable {
     ) -> Around {
         let first = &pieces.pieces[seed as usize];
         let a = mesh.tets[first.element as usize].iter().position(|&n| n == i).unwrap_or(0);
-        let mut component = Around { pieces: Vec::new(), parent: first.copies[a], holds_node: false };
+        let start = self.members.len();
+        let mut component = Around { members: start..start, parent: first.copies[a], holds_node: false };
         self.visited[seed as usize] = self.stamp;
         self.stack.push(seed);
         while let Some(p) = self.stack.pop() {
-            component.pieces.push(p);
+            self.members.push(p);
             for t in pieces.fragments(p, fragments) {
                 component.holds_node |= fragments.tets[t as usize].contains(&i);
                 for n in fragments.neighbour[t as usize] {
@@ -162,7 +166,8 @@ impl CopyTable {
                 }
             }
         }
-        component.pieces.sort_unstable();
+        component.members.end = self.members.len();
+        self.members[start..].sort_unstable();
         component
     }
 }

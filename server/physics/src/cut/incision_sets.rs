@@ -9,12 +9,14 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug)]
 pub struct IncisionSets {
     sets: Vec<Vec<u32>>,
+    /// The member of every set that has one, else 0, which is no incision.
+    only: Vec<u32>,
     ids: BTreeMap<Vec<u32>, u32>,
 }
 
 impl Default for IncisionSets {
     fn default() -> Self {
-        Self { sets: vec![Vec::new()], ids: BTreeMap::from([(Vec::new(), Self::EMPTY)]) }
+        Self { sets: vec![Vec::new()], only: vec![0], ids: BTreeMap::from([(Vec::new(), Self::EMPTY)]) }
     }
 }
 
@@ -24,7 +26,11 @@ impl IncisionSets {
 
     /// Whether the incision is in the set.
     pub fn contains(&self, set: u32, incision: u32) -> bool {
-        set != Self::EMPTY && self.sets[set as usize].contains(&incision)
+        match set {
+            Self::EMPTY => false,
+            _ if self.only[set as usize] != 0 => self.only[set as usize] == incision,
+            _ => self.sets[set as usize].contains(&incision),
+        }
     }
 
     /// The set with the incision added.
@@ -57,6 +63,7 @@ impl IncisionSets {
         }
         let id = self.sets.len() as u32;
         self.sets.push(members.clone());
+        self.only.push(if let [only] = members[..] { only } else { 0 });
         self.ids.insert(members, id);
         id
     }

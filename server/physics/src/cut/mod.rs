@@ -23,6 +23,7 @@ mod sweep_triangle;
 mod front;
 mod incision_sets;
 mod crossings;
+mod marks;
 pub(crate) mod fragments;
 mod detect;
 mod separate;

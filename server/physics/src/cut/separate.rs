@@ -14,13 +14,14 @@ use crate::mesh::{TET_EDGES, TET_FACES};
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
 use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
 use super::incision_sets::IncisionSets;
+use super::marks::Marks;
 
 /// Work list and result of a separation.
 #[derive(Clone, Debug, Default)]
 pub struct Separator {
     /// Elements with a face opened by this sweep, ascending.
     pub elements: Vec<u32>,
-    /// Fragments that were bisected or had a face opened by this sweep, ascending.
+    /// Fragments that were bisected or had a face opened by this sweep.
     pub changed: Vec<u32>,
     /// Boundary faces (4·fragment + slot) that went from one fragment to another: from, to, in order.
     pub moved: Vec<[u32; 2]>,
@@ -31,7 +32,11 @@ pub struct Separator {
     /// Edges left whole because of the cap.
     pub refused: EdgeSet,
     queue: VecDeque<u32>,
+    /// Fragments that were touched or bisected.
     active: Vec<u32>,
+    is_active: Marks,
+    is_changed: Marks,
+    is_cut: Marks,
     wedge: Vec<u32>,
     halves: Vec<Halves>,
     corners: Vec<(u32, u8)>,
@@ -71,8 +76,13 @@ impl Separator {
         self.faces_opened = 0;
         self.queue.clear();
         self.queue.extend(touched);
+        let n = sheet.fragments.tets.len();
+        self.is_changed.restart(n);
+        self.is_cut.restart(sheet.fragments.count.len());
+        self.is_active.restart(n);
         self.active.clear();
         self.active.extend(touched);
+        touched.iter().for_each(|&t| _ = self.is_active.insert(t));
         while let Some(t) = self.queue.pop_front() {
             while let Some((a, b, s)) = self.edge_to_bisect(t, sheet) {
                 if !self.bisect(t, [a, b], s, sheet) {
@@ -80,11 +90,7 @@ impl Separator {
                 }
             }
         }
-        self.active.sort_unstable();
-        self.active.dedup();
         self.open_faces(sheet);
-        self.changed.sort_unstable();
-        self.changed.dedup();
         self.count_pending(sheet);
     }
 
@@ -130,8 +136,14 @@ impl Separator {
         let along = sheet.sets.with(IncisionSets::EMPTY, sheet.incision);
         fragments.bisect(&self.wedge, [a, b], (m, s), along, &mut self.halves);
         for h in &self.halves {
-            self.active.extend([h.old, h.new]);
-            self.changed.extend([h.old, h.new]);
+            for t in [h.old, h.new] {
+                if self.is_active.insert(t) {
+                    self.active.push(t);
+                }
+                if self.is_changed.insert(t) {
+                    self.changed.push(t);
+                }
+            }
             if sheet.fragments.neighbour[h.new as usize][h.slot as usize] == NONE {
                 self.moved.push([h.old, h.new].map(|t| 4 * t + u32::from(h.slot)));
             }
@@ -204,14 +216,18 @@ impl Separator {
                 sheet.fragments.open(t, face, sheet.incision);
                 self.faces_opened += 1;
                 for (t, face) in [(t, Some(face)), (n, back)] {
-                    self.changed.push(t);
-                    self.elements.push(sheet.fragments.element[t as usize]);
+                    if self.is_changed.insert(t) {
+                        self.changed.push(t);
+                    }
+                    let e = sheet.fragments.element[t as usize];
+                    if self.is_cut.insert(e) {
+                        self.elements.push(e);
+                    }
                     self.corners.extend((0..4u8).filter(|&k| Some(k as usize) != face).map(|k| (t, k)));
                 }
             }
         }
         self.elements.sort_unstable();
-        self.elements.dedup();
         let crossings = &mut *sheet.crossings;
         sheet.fragments.split_stars(&self.corners, |fragments, old, [t, new]| {
             for v in fragments.tets[t as usize] {

@@ -29,7 +29,7 @@ pub struct Material<'a> {
 /// What a sweep did to the fragments.
 #[derive(Clone, Copy, Debug)]
 pub struct Change<'a> {
-    /// Fragments that are new, were bisected or had a face opened, ascending.
+    /// Fragments that are new, were bisected or had a face opened, each once.
     pub fragments: &'a [u32],
     /// Boundary faces (4·fragment + slot) that went from one fragment to another: from, to, in order.
     pub moved: &'a [[u32; 2]],

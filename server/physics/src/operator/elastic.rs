@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::chunks::{Gather, NO_PIECE, pack, plan_chunk, region_of_elements};
 use super::edges::EdgeBlocks;
 use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
-use super::rows::direction;
+use super::rows::gather_direction;
 use super::{BLOCK, LinearOperator, Padded, padded};
 use crate::cut::Piece;
 use crate::element::{LANES, Lanes, Mat3, Simd};
@@ -287,9 +287,7 @@ impl Elastic {
         let sums = ranges(&mut self.sums, &self.gather.first_row);
         team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
             let Chunk { copies, x: local, .. } = &mut chunk[0];
-            for (local, &copy) in local.iter_mut().zip(copies.iter()) {
-                direction(local, &z[copy as usize], beta);
-            }
+            gather_direction(local, copies, z, beta);
             chunk[0].apply(simd, y);
         });
     }
@@ -337,7 +335,9 @@ impl Chunk {
         rotations: &[Matrix3<f32>],
     ) -> Self {
         let plan = plan_chunk(members, pieces);
-        let rest = plan.pieces.iter().map(|lanes| rest_batch(lanes, mesh, pieces, rotations)).collect();
+        // Room for what cuts add before the next plan.
+        let mut rest = Vec::with_capacity(plan.pieces.len() + plan.pieces.len() / 4 + 1);
+        rest.extend(plan.pieces.iter().map(|lanes| rest_batch(lanes, mesh, pieces, rotations)));
         let n = plan.copies.len() + 1;
         Self {
             region,

@@ -20,8 +20,7 @@ pub fn advance_direction(
 ) {
     for ((p, q), (z, mass)) in p.iter_mut().zip(q).zip(z.iter().zip(mass)) {
         direction(p, z, beta);
-        let m = factor * mass;
-        *q = [m * p[0], m * p[1], m * p[2], m * p[3]];
+        *q = row::product(factor * mass, p);
     }
 }
 
@@ -134,11 +133,67 @@ mod avx {
 /// p ← z + β p; z if β = 0, also where p is not finite.
 #[inline(always)]
 pub fn direction(p: &mut Padded, z: &Padded, beta: f32) {
-    *p = if beta == 0.0 {
-        *z
+    *p = if beta == 0.0 { *z } else { row::add_product(z, beta, p) };
+}
+
+/// local ← z\[copies\] + β local (z\[copies\] if β = 0).
+#[inline(always)]
+pub fn gather_direction(local: &mut [Padded], copies: &[u32], z: &[Padded], beta: f32) {
+    if beta == 0.0 {
+        for (local, &copy) in local.iter_mut().zip(copies) {
+            *local = z[copy as usize];
+        }
     } else {
-        [z[0] + beta * p[0], z[1] + beta * p[1], z[2] + beta * p[2], z[3] + beta * p[3]]
-    };
+        for (local, &copy) in local.iter_mut().zip(copies) {
+            *local = row::add_product(&z[copy as usize], beta, local);
+        }
+    }
+}
+
+/// One row at a time in one register: left to itself the compiler takes rows apart.
+mod row {
+    use super::Padded;
+
+    /// z + β p.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub fn add_product(z: &Padded, beta: f32, p: &Padded) -> Padded {
+        use std::arch::x86_64::{_mm_add_ps, _mm_loadu_ps, _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps};
+        let mut sum = [0.0; 4];
+        // SAFETY: SSE belongs to x86-64, and a row holds four numbers.
+        unsafe {
+            let product = _mm_mul_ps(_mm_set1_ps(beta), _mm_loadu_ps(p.as_ptr()));
+            _mm_storeu_ps(sum.as_mut_ptr(), _mm_add_ps(_mm_loadu_ps(z.as_ptr()), product));
+        }
+        sum
+    }
+
+    /// z + β p.
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    pub fn add_product(z: &Padded, beta: f32, p: &Padded) -> Padded {
+        std::array::from_fn(|k| z[k] + beta * p[k])
+    }
+
+    /// m p.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub fn product(m: f32, p: &Padded) -> Padded {
+        use std::arch::x86_64::{_mm_loadu_ps, _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps};
+        let mut product = [0.0; 4];
+        // SAFETY: SSE belongs to x86-64, and a row holds four numbers.
+        unsafe {
+            _mm_storeu_ps(product.as_mut_ptr(), _mm_mul_ps(_mm_set1_ps(m), _mm_loadu_ps(p.as_ptr())));
+        }
+        product
+    }
+
+    /// m p.
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    pub fn product(m: f32, p: &Padded) -> Padded {
+        p.map(|p| m * p)
+    }
 }
 
 /// A scalar product in the making: single-precision products, double-precision sums.
