@@ -15,6 +15,7 @@ use super::fragments::Fragments;
 use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
+use super::pending::{Pending, PendingFace, Pieces};
 use super::pieces::{Piece, PieceTable};
 use super::separate::{Separator, Sheet};
 use super::surface::Surface;
@@ -36,6 +37,7 @@ pub struct CutMesh {
     pub(super) builder: SurfaceBuilder,
     pub(super) sets: IncisionSets,
     pub(super) crossings: Crossings,
+    pending: Pending,
     fronts: BTreeMap<u32, Front>,
     detector: Detector,
     separator: Separator,
@@ -66,6 +68,7 @@ impl CutMesh {
             builder,
             sets: IncisionSets::default(),
             crossings: Crossings::default(),
+            pending: Pending::default(),
             fronts: BTreeMap::new(),
             detector: Detector::default(),
             separator: Separator::default(),
@@ -121,6 +124,13 @@ impl CutMesh {
     /// Skin and cut faces, closed and 2-manifold.
     pub fn surface(&self) -> &Surface {
         &self.surface
+    }
+
+    /// Where incisions have entered elements that they do not take apart yet; to be shown with the
+    /// [`surface`](Self::surface), which lags the blade by what is told here.
+    pub fn pending_faces(&self) -> Vec<PendingFace> {
+        let Self { mesh, fragments, pieces, crossings, sets, .. } = self;
+        self.pending.faces(&Pieces { mesh, fragments, pieces, crossings, sets })
     }
 
     /// Loose parts and their rest volumes.
@@ -181,7 +191,8 @@ impl CutMesh {
         let mut record = Record { fragments, sets, crossings, incision };
         self.detector.run(&body, &triangles, &mut record);
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
-        self.separator.run(&self.detector.touched, &mut Sheet { fragments, sets, crossings, incision });
+        let mut sheet = Sheet { fragments, sets, crossings, waiting: &mut self.pending, incision };
+        self.separator.run(&self.detector.touched, &mut sheet);
         Ok(self.follow_separation())
     }
 

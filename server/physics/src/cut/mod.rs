@@ -24,6 +24,7 @@ mod front;
 mod incision_sets;
 mod crossings;
 mod marks;
+mod pending;
 pub(crate) mod fragments;
 mod detect;
 mod separate;
@@ -39,6 +40,7 @@ mod cut_mesh;
 pub use blade::{BladeSweep, CutError, CutReport, NewCopy};
 pub use components::Components;
 pub use cut_mesh::CutMesh;
+pub use pending::PendingFace;
 pub use pieces::Piece;
 pub use surface::{Surface, SurfaceVertex};
 

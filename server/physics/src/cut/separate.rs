@@ -15,6 +15,7 @@ use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
 use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
 use super::incision_sets::IncisionSets;
 use super::marks::Marks;
+use super::pending::Pending;
 
 /// Work list and result of a separation.
 #[derive(Clone, Debug, Default)]
@@ -39,6 +40,8 @@ pub struct Separator {
     is_cut: Marks,
     wedge: Vec<u32>,
     halves: Vec<Halves>,
+    /// Incisions with something pending before this sweep.
+    waiting: Vec<u32>,
     corners: Vec<(u32, u8)>,
 }
 
@@ -50,6 +53,8 @@ pub struct Sheet<'a> {
     pub sets: &'a mut IncisionSets,
     /// Crossings of edges.
     pub crossings: &'a mut Crossings,
+    /// What incisions have entered and not left.
+    pub waiting: &'a mut Pending,
     /// The incision that is worked off.
     pub incision: u32,
 }
@@ -76,6 +81,7 @@ impl Separator {
         self.faces_opened = 0;
         self.queue.clear();
         self.queue.extend(touched);
+        sheet.waiting.incisions(&mut self.waiting);
         let n = sheet.fragments.tets.len();
         self.is_changed.restart(n);
         self.is_cut.restart(sheet.fragments.count.len());
@@ -136,6 +142,7 @@ impl Separator {
         let along = sheet.sets.with(IncisionSets::EMPTY, sheet.incision);
         fragments.bisect(&self.wedge, [a, b], (m, s), along, &mut self.halves);
         for h in &self.halves {
+            sheet.waiting.inherit(&self.waiting, h.old, h.new);
             for t in [h.old, h.new] {
                 if self.is_active.insert(t) {
                     self.active.push(t);
@@ -238,14 +245,17 @@ impl Separator {
         });
     }
 
-    fn count_pending(&mut self, sheet: &Sheet) {
+    fn count_pending(&mut self, sheet: &mut Sheet) {
         for &t in &self.active {
             let tet = sheet.fragments.tets[t as usize];
+            let mut crossed = false;
             for [i, j] in TET_EDGES {
                 if sheet.crossing(tet[i], tet[j]).is_some() {
                     self.pending.insert(edge_key(tet[i], tet[j]));
+                    crossed = true;
                 }
             }
+            sheet.waiting.set(sheet.incision, t, crossed);
         }
     }
 }

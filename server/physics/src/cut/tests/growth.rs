@@ -42,6 +42,34 @@ fn two_hundred_small_advances_equal_the_whole_cut() {
     }
 }
 
+/// A tenth of an element at a time: what the blade has entered and not left is told, lies where the
+/// blade was, reaches no further back than an element, and is gone when the cut is through.
+#[test]
+fn what_is_pending_is_within_one_element_of_the_blade() {
+    let (cells, z) = (6, 0.47);
+    let h = 1.0 / cells as f64;
+    let mut body = Body::unit(cells);
+    let mut most = 0;
+    for k in 0..=75 {
+        let x = -0.1 + 0.1 * h * f64::from(k);
+        let report = body.sweep(&[[v(x, -0.1, z), v(x, 1.1, z)]], 3);
+        let faces = body.cut.pending_faces();
+        assert_eq!(faces.is_empty(), report.pending_edges == 0, "blade at {x}");
+        for face in &faces {
+            assert!(face.incision == 3 && (2..=4).contains(&face.corners.len()));
+            for p in face.corners.iter().map(|c| c.position(&body.x)) {
+                assert!(
+                    (p.z - z).abs() < 1e-12 && p.x < x + 1e-5 && p.x > x - 1.001 * h,
+                    "{p:?}, blade at {x}"
+                );
+            }
+        }
+        most = most.max(faces.len());
+    }
+    assert!(most > 10);
+    assert_eq!((body.cut.components().len(), body.cut.pending_faces().len()), (2, 0));
+}
+
 #[test]
 fn single_segments_continue_the_incision() {
     let mut body = Body::unit(4);
