@@ -59,7 +59,7 @@ fn words(
 ) -> String {
     let told = |i: usize| {
         let c = candidates[i];
-        format!("{} ({} ms, error {})", c.words, crate::axes::short(c.p99_ms), percent(c.error))
+        format!("{} (p99 {} ms, error {})", c.words, crate::axes::short(c.p99_ms), percent(c.error))
     };
     let mut text = match (choice, next) {
         (Some(i), _) => format!("Within {} ms: {}.", crate::axes::short(budget_ms), told(i)),
@@ -122,8 +122,8 @@ mod tests {
         assert_eq!((r.choice, r.next, r.dominant), (Some(1), Some(2), Some(Source::Time)));
         assert_eq!(
             r.words,
-            "Within 10 ms: good (8 ms, error 10 %). Its time error dominates: a shorter step or an integrator \
-             of higher order would help most. With more time: fine (30 ms, error 1.0 %)."
+            "Within 10 ms: good (p99 8 ms, error 10 %). Its time error dominates: a shorter step or an integrator \
+             of higher order would help most. With more time: fine (p99 30 ms, error 1.0 %)."
         );
     }
 

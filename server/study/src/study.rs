@@ -338,7 +338,9 @@ impl<'a> Bench<'a> {
         let coordinates: Vec<(f64, f64)> = points.iter().map(Outcome::point).collect();
         let front = front(&coordinates);
         if let Ok(reference) = &reference {
-            for &i in &front {
+            // What is recommended fits by its slow steps and need not be on the front of medians.
+            let choice = self.settings.budget_ms.and_then(|budget| advise(budget, &points).choice);
+            for i in front.iter().copied().chain(choice.filter(|i| !front.contains(i))) {
                 let Outcome { configuration, trial, .. } = &points[i];
                 let found =
                     peel(&case, configuration, &trial.series, reference, &mut |c| self.once(&case, c));
