@@ -220,6 +220,45 @@ fn enriched_elements_of_the_papers_are_pieces_on_copies() {
     }
 }
 
+/// The masses of the copies seen in u and a: a block [[m_r + m_v, m_v], [m_v, m_v]] for every node with one
+/// added copy in the shifted basis, and the mass of the body in every basis, lumped or consistent.
+#[test]
+fn masses_of_copies_are_two_by_two_blocks() {
+    let cut = much_cut();
+    let material = material(2e4, 0.3, DENSITY, Law::Linear);
+    let model = Model::tet4_cut(&cut, &material, Volumetric::Full).unwrap();
+    let m = model.lumped_mass(DENSITY);
+    let total: f64 = m.iter().sum();
+    let (mut lumped, mut consistent) = (model.pattern(), model.pattern());
+    lumped.add_diagonal(1.0, &m);
+    model.consistent_mass(DENSITY, &mut consistent);
+    for enrichment in Enrichment::ALL {
+        let view = EnrichedView::new(&cut, enrichment);
+        let mut rigid = vec![V::x(); cut.n_copies()];
+        view.from_copies(&mut rigid);
+        for M in [&lumped, &consistent] {
+            assert!((view.matrix(M).bilinear(&rigid, &rigid) / total - 1.0).abs() < 1e-12);
+        }
+    }
+    let view = EnrichedView::new(&cut, Enrichment::ShiftedHeaviside);
+    let M = view.matrix(&lumped);
+    let mut checked = 0;
+    for node in 0..cut.mesh().nodes.len() as u32 {
+        let copies: Vec<u32> =
+            (0..cut.n_copies() as u32).filter(|&c| cut.copy_node()[c as usize] == node).collect();
+        let [real, added] = copies[..] else { continue };
+        let (m_r, m_v) = (m[real as usize], m[added as usize]);
+        for (row, column, expected) in
+            [(real, real, m_r + m_v), (real, added, m_v), (added, real, m_v), (added, added, m_v)]
+        {
+            let off = M.block(row as usize, column) - Matrix3::from_diagonal_element(expected);
+            assert!(off.norm() < 1e-15 * total);
+        }
+        checked += 1;
+    }
+    assert!(checked > 10, "{checked}");
+}
+
 /// Smallest and largest eigenvalue of the free part of A, as it is and with its 3×3 diagonal blocks made
 /// the identity: their quotients.
 fn condition_numbers(A: &BlockCsr<f64>, fixed: &[FixedCopy]) -> [f64; 2] {
