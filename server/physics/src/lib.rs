@@ -19,6 +19,7 @@ pub mod mesh;
 pub mod material;
 pub mod element;
 pub mod cut;
+pub mod skin;
 pub mod enrichment;
 pub mod team;
 pub mod assembly;

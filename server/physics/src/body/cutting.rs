@@ -16,6 +16,9 @@ impl Body {
             return Err(BodyError::Combination { what: "a cut", with, instead: "tet4" });
         }
         let report = self.cut_mesh.sweep(&self.state.x, blade, incision)?;
+        if let Some(skin) = &mut self.skin {
+            skin.follow(&self.cut_mesh);
+        }
         // The surface may have changed alone, while a cut is still on its way through an element.
         if !self.cut_mesh.changed_pieces().is_empty() {
             self.inherit(&report);

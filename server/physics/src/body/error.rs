@@ -7,6 +7,7 @@ use crate::cut::CutError;
 use crate::integrator::DynamicsError;
 use crate::material::MaterialError;
 use crate::mesh::MeshError;
+use crate::skin::SkinError;
 
 /// A refused request; the body is as it was.
 #[derive(Debug, Error)]
@@ -36,6 +37,9 @@ pub enum BodyError {
     /// A cut was refused.
     #[error(transparent)]
     Cut(#[from] CutError),
+    /// The skin cannot be put on.
+    #[error(transparent)]
+    Skin(#[from] SkinError),
     /// A solver setting is out of range.
     #[error("{name} = {found} is outside {allowed}")]
     Setting {

@@ -162,7 +162,7 @@ impl Body {
     /// Position of every surface vertex [m], into `out`.
     pub fn surface_positions(&self, out: &mut Vec<[f32; 3]>) {
         out.clear();
-        out.extend(self.cut_mesh.surface().vertices.iter().map(|vertex| {
+        out.extend(self.surface().vertices.iter().map(|vertex| {
             let x = vertex.position(&self.state.x);
             [x.x as f32, x.y as f32, x.z as f32]
         }));

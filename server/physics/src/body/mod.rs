@@ -18,7 +18,7 @@ pub use statics::{StaticReport, StaticSettings};
 use nalgebra::Vector3;
 
 pub use crate::assembly::{ElementKind, Volumetric};
-use crate::cut::CutMesh;
+use crate::cut::{CutMesh, Surface};
 use crate::element::Simd;
 use crate::integrator::{DynamicsInputs, LooseParts, State, StepInputs};
 pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
@@ -26,6 +26,7 @@ use crate::material::Material;
 use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
+use crate::skin::{Skin, SkinSettings, SkinShape};
 pub use crate::solver::{Method, PcgSettings, StopReason};
 use crate::team::Team;
 use boundary::Boundary;
@@ -78,6 +79,7 @@ pub enum Outcome {
 #[derive(Debug)]
 pub struct Body {
     cut_mesh: CutMesh,
+    skin: Option<Skin>,
     shape: Shape,
     /// Rest position of every node: copies, then what the element adds [m].
     rest: Vec<Vector3<f64>>,
@@ -153,6 +155,7 @@ impl Body {
             parts: LooseParts::default(),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
+            skin: None,
             cut_mesh,
             shape,
             material,
@@ -240,7 +243,32 @@ impl Body {
         &self.mass
     }
 
-    /// Mesh, pieces, copies and surface.
+    /// Puts a skin finer than the elements on the uncut body: [`Skin::new`].
+    pub fn put_on_skin(
+        &mut self,
+        settings: SkinSettings,
+        shape: &mut SkinShape<'_>,
+    ) -> Result<(), BodyError> {
+        if self.shape.kind() == ElementKind::Tet4 {
+            self.skin = Some(Skin::new(&self.cut_mesh, settings, shape)?);
+            return Ok(());
+        }
+        let with = if self.shape.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" };
+        Err(BodyError::Combination { what: "a skin", with, instead: "tet4" })
+    }
+
+    /// The skin, if the body has one.
+    pub fn skin(&self) -> Option<&Skin> {
+        self.skin.as_ref()
+    }
+
+    /// What is shown and touched, closed and 2-manifold: skin and lips, or without a skin the boundary
+    /// of the elements and lips. Changes with the epoch of [`cut_mesh`](Self::cut_mesh) and not else.
+    pub fn surface(&self) -> &Surface {
+        self.skin.as_ref().map_or(self.cut_mesh.surface(), Skin::surface)
+    }
+
+    /// Mesh, pieces, copies and the boundary of the elements.
     pub fn cut_mesh(&self) -> &CutMesh {
         &self.cut_mesh
     }
@@ -308,6 +336,9 @@ impl Body {
     /// Back to the start: uncut, undeformed, at rest. Constraints and loads stay; the epoch rises.
     pub fn reset(&mut self) -> Result<(), BodyError> {
         self.cut_mesh.reset()?;
+        if let Some(skin) = &mut self.skin {
+            skin.follow(&self.cut_mesh);
+        }
         self.return_to_rest();
         match &mut self.path {
             Path::Fast(fast) => fast.rebuild(&self.cut_mesh),

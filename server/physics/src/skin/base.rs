@@ -1,0 +1,91 @@
+//! The boundary of the uncut mesh: faces, and the edges and corners they share through the solid.
+
+use crate::cut::fragments::{Fragments, NONE};
+use crate::mesh::{TET_FACES, TetMesh};
+
+/// One boundary face of the uncut mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct BaseFace {
+    /// Element it belongs to.
+    pub element: u32,
+    /// Its nodes, counter-clockwise seen from outside.
+    pub nodes: [u32; 3],
+    /// Edge from node k to the next, shared with the face beside it.
+    pub edges: [u32; 3],
+    /// Whether the edge is numbered in the direction of this face.
+    pub forward: [bool; 3],
+    /// Corner at node k, shared by the faces of one fan around it.
+    pub corners: [u32; 3],
+}
+
+/// All boundary faces of the uncut mesh.
+#[derive(Clone, Debug, Default)]
+pub struct Base {
+    /// The faces.
+    pub faces: Vec<BaseFace>,
+    /// Number of distinct edges.
+    pub n_edges: usize,
+    /// Number of distinct corners.
+    pub n_corners: usize,
+    /// Face per 4·element + slot of the opposite node, or [`NONE`].
+    face_at: Vec<u32>,
+}
+
+impl Base {
+    /// Boundary of fragments that nothing has cut yet.
+    pub fn new(mesh: &TetMesh, fragments: &Fragments) -> Self {
+        let mut base = Self { face_at: vec![NONE; 4 * mesh.tets.len()], ..Self::default() };
+        let mut place = Vec::new();
+        for (e, tet) in (0u32..).zip(&mesh.tets) {
+            for (k, corners) in TET_FACES.iter().enumerate() {
+                if fragments.neighbour[e as usize][k] == NONE {
+                    base.face_at[4 * e as usize + k] = base.faces.len() as u32;
+                    place.push((e, k));
+                    base.faces.push(BaseFace {
+                        element: e,
+                        nodes: corners.map(|c| tet[c]),
+                        edges: [NONE; 3],
+                        forward: [true; 3],
+                        corners: [NONE; 3],
+                    });
+                }
+            }
+        }
+        let beside = |h: usize| {
+            let (e, k) = place[h / 3];
+            let (far, slot, edge) = fragments.around_edge(e, k, h % 3);
+            3 * base.face_at[4 * far as usize + slot] as usize + edge
+        };
+        let twin: Vec<usize> = (0..3 * base.faces.len()).map(beside).collect();
+        for h in 0..twin.len() {
+            if base.faces[h / 3].edges[h % 3] == NONE {
+                for (half, forward) in [(h, true), (twin[h], false)] {
+                    base.faces[half / 3].edges[half % 3] = base.n_edges as u32;
+                    base.faces[half / 3].forward[half % 3] = forward;
+                }
+                base.n_edges += 1;
+            }
+            let mut corner = h;
+            if base.faces[h / 3].corners[h % 3] == NONE {
+                while base.faces[corner / 3].corners[corner % 3] == NONE {
+                    base.faces[corner / 3].corners[corner % 3] = base.n_corners as u32;
+                    corner = twin[corner / 3 * 3 + (corner + 2) % 3];
+                }
+                base.n_corners += 1;
+            }
+        }
+        base
+    }
+
+    /// The boundary face that the face of fragment `t` opposite its vertex `face` lies in, if it is
+    /// part of the skin.
+    pub fn under(&self, mesh: &TetMesh, fragments: &Fragments, t: u32, face: usize) -> Option<u32> {
+        let e = fragments.element[t as usize] as usize;
+        let nodes = mesh.tets[e];
+        let corners = TET_FACES[face].map(|c| &fragments.vertices[fragments.tets[t as usize][c] as usize]);
+        (0..4).find_map(|slot| {
+            let base = self.face_at[4 * e + slot];
+            (base != NONE && corners.iter().all(|v| v.weight_of(nodes[slot]) == 0.0)).then_some(base)
+        })
+    }
+}

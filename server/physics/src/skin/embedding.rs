@@ -1,0 +1,163 @@
+//! A skin embedded in a body.
+
+use thiserror::Error;
+
+use super::base::Base;
+use super::border::Borders;
+use super::sheet::{Sheet, SkinShape};
+use super::stitch::{Cloth, Seams};
+use crate::cut::{CutMesh, Surface};
+
+/// Most parts of an edge.
+const MAX_DIVISIONS: usize = 32;
+/// Most skin triangles.
+const MAX_TRIANGLES: usize = 4_000_000;
+
+/// Resolution of a skin and how it is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkinSettings {
+    /// Parts of each edge of the boundary: n² skin triangles per boundary face.
+    pub divisions: usize,
+    /// Relative distance in [0, 0.5] from which a corner of a skin triangle is moved onto the cut curve
+    /// instead of the triangle split; 0 splits always.
+    pub snapping: f64,
+}
+
+impl Default for SkinSettings {
+    fn default() -> Self {
+        Self { divisions: 4, snapping: 0.0 }
+    }
+}
+
+/// Why there is no skin.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SkinError {
+    /// The number of divisions is out of range.
+    #[error("a skin divides the edges of the elements in 1 to {MAX_DIVISIONS} parts, not in {found}")]
+    Divisions {
+        /// Parts asked for.
+        found: usize,
+    },
+    /// The skin would have too many triangles.
+    #[error(
+        "the skin would have {found} triangles, at most {MAX_TRIANGLES} are allowed; use fewer divisions"
+    )]
+    TooFine {
+        /// Triangles asked for.
+        found: usize,
+    },
+    /// The snapping distance is out of range.
+    #[error("the snapping distance of a skin is a share from 0 to 0.5, not {found}")]
+    Snapping {
+        /// Distance asked for.
+        found: f64,
+    },
+    /// The body is cut already.
+    #[error("a skin is put on an uncut body; reset the body first")]
+    AlreadyCut,
+    /// A place of the skin is not usable.
+    #[error("skin point {point} has a place that is not finite")]
+    NonFinitePlace {
+        /// Index of the point.
+        point: usize,
+    },
+}
+
+/// A skin and the surface that it and the lips make.
+#[derive(Clone, Debug)]
+pub struct Skin {
+    settings: SkinSettings,
+    base: Base,
+    /// As it was put on.
+    uncut: Sheet,
+    sheet: Sheet,
+    seams: Seams,
+    surface: Surface,
+    epoch: u32,
+    fits: bool,
+}
+
+impl Skin {
+    /// Puts a skin on an uncut body. `shape` says where the skin rests [m] over a point of the boundary
+    /// [m] with its unit normal; the identity follows the boundary.
+    pub fn new(cut: &CutMesh, settings: SkinSettings, shape: &mut SkinShape<'_>) -> Result<Self, SkinError> {
+        let SkinSettings { divisions, snapping } = settings;
+        if !(1..=MAX_DIVISIONS).contains(&divisions) {
+            return Err(SkinError::Divisions { found: divisions });
+        }
+        if !(0.0..=0.5).contains(&snapping) {
+            return Err(SkinError::Snapping { found: snapping });
+        }
+        if cut.pieces().len() != cut.mesh().tets.len() || cut.fragments.tets.len() != cut.mesh().tets.len() {
+            return Err(SkinError::AlreadyCut);
+        }
+        let base = Base::new(cut.mesh(), &cut.fragments);
+        let found = base.faces.len() * divisions * divisions;
+        if found > MAX_TRIANGLES {
+            return Err(SkinError::TooFine { found });
+        }
+        let sheet = Sheet::new(&base, &cut.mesh().nodes, divisions, shape);
+        if let Some(point) = sheet.points.iter().position(|p| !p.place.iter().all(|c| c.is_finite())) {
+            return Err(SkinError::NonFinitePlace { point });
+        }
+        let mut skin = Self {
+            settings,
+            base,
+            uncut: sheet.clone(),
+            sheet,
+            seams: Seams::default(),
+            surface: Surface::default(),
+            epoch: cut.epoch(),
+            fits: true,
+        };
+        skin.sew(cut);
+        Ok(skin)
+    }
+
+    /// Follows the cuts of the body, and its reset.
+    pub fn follow(&mut self, cut: &CutMesh) {
+        if self.epoch == cut.epoch() {
+            return;
+        }
+        self.epoch = cut.epoch();
+        if cut.fragments.tets.len() == cut.mesh().tets.len() && cut.pieces().len() == cut.mesh().tets.len() {
+            self.sheet.clone_from(&self.uncut);
+            self.seams = Seams::default();
+            self.surface = Surface::default();
+            self.fits = true;
+        }
+        self.sew(cut);
+    }
+
+    fn sew(&mut self, cut: &CutMesh) {
+        if self.fits {
+            let mut borders = Borders::of(&self.base, cut);
+            borders.cut(&self.base, cut, &mut self.sheet, self.settings.snapping);
+            let cloth = Cloth { cut, base: &self.base, sheet: &self.sheet, borders: &borders };
+            self.fits = self.sheet.conflicts == 0 && self.seams.sew(&cloth, &mut self.surface);
+        }
+        if !self.fits {
+            self.surface.clone_from(cut.surface());
+        }
+    }
+
+    /// Skin and lips, closed and 2-manifold.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// Whether skin and lips could be sewn together; if not, the surface is the boundary of the elements.
+    pub fn fits(&self) -> bool {
+        self.fits
+    }
+
+    /// Skin triangles that the last cut made anew; the others stayed as they were.
+    pub fn renewed(&self) -> usize {
+        self.seams.renewed()
+    }
+
+    /// Resolution and way of cutting.
+    pub fn settings(&self) -> SkinSettings {
+        self.settings
+    }
+}

@@ -1,0 +1,37 @@
+//! Incisions as deep as a tool goes into the skin.
+//!
+//! A tool that draws over the skin is known by where it touches, the outward normal there and how far it
+//! is pressed in. The blade that makes this incision reaches from that depth to just above the skin; what
+//! it opens are the elements that it cuts through, so the wound is never deeper than the penetration.
+//!
+//! # Source
+//! Jeřábková 2007, 4.1.3 and fig. 4.7: cut path on the surface and depth below it make the wound.
+
+use nalgebra::Vector3;
+
+use crate::cut::BladeSweep;
+
+/// How far the blade stands out of the skin, as a share of the largest depth: the skin between two
+/// places may be curved.
+const STANDS_OUT: f64 = 0.5;
+
+/// One place of a tool on its way over the skin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Penetration {
+    /// Where it touches the skin [m].
+    pub point_m: Vector3<f64>,
+    /// Outward normal there, of any length but zero.
+    pub normal: Vector3<f64>,
+    /// How far its tip is below the skin [m]; 0 only scratches it.
+    pub depth_m: f64,
+}
+
+/// The blade that cuts along `path`, for [`CutMesh::sweep`](crate::cut::CutMesh::sweep).
+pub fn incision(path: &[Penetration]) -> BladeSweep {
+    let above = STANDS_OUT * path.iter().map(|p| p.depth_m).fold(0.0, f64::max);
+    let segment = |p: &Penetration| {
+        let normal = p.normal.try_normalize(0.0).unwrap_or_default();
+        [p.point_m - normal * p.depth_m, p.point_m + normal * above]
+    };
+    BladeSweep { segments: path.iter().map(segment).collect() }
+}

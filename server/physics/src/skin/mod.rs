@@ -1,0 +1,39 @@
+//! A skin finer than the elements: shown and touched in place of the elements' boundary, and cut
+//! with the body.
+//!
+//! 1. [`Base`]: the boundary faces of the *uncut* mesh. Skin triangles lie over one of them each, so
+//!    every skin point has coordinates on the boundary and a rest place of its own, which may lie off
+//!    it: on the surface that the mesh was made from.
+//! 2. [`Sheet`]: the skin triangles, of any resolution. Where fragments opened, the *cut curve* on the
+//!    boundary (edges between a boundary face that is skin and one that is a lip) is inserted: its
+//!    vertices become skin points, its edges chains of skin edges. Triangles are split along it, or,
+//!    with `snapping`, their corners move onto it. Places are interpolated, so splitting changes no
+//!    shape. What does not meet the curve keeps its triangles.
+//! 3. [`stitch`]: skin triangles and lips become one surface. An edge of the cut curve joins its chain
+//!    of skin edges to the fragment face of the lip, whose border corners move to the skin. Surface
+//!    vertices are cycles of corners, so the result is closed and 2-manifold by construction, and both
+//!    lips of a fresh cut are the same triangles: the enclosed volume stays.
+//! 4. Each surface vertex is bound to a piece beside it: barycentric coordinates of its rest place in
+//!    that element (extrapolated where it lies outside), on the piece's copies.
+//!
+//! # Source
+//! Jeřábková 2007, 4.1.1–4.1.3 (embedded geometry; splitting, snapping, wound faces); Sifakis, Der,
+//! Fedkiw 2007 (embedded surfaces cut with their fragments).
+
+mod base;
+mod sheet;
+mod insert;
+mod walk;
+mod border;
+mod lips;
+mod stitch;
+mod embedding;
+mod incision;
+
+pub use embedding::{Skin, SkinError, SkinSettings};
+pub use incision::{Penetration, incision};
+pub use sheet::SkinShape;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
