@@ -210,7 +210,9 @@ impl Dynamics {
         }
     }
 
-    /// Newton's method from the predictor, then the balance of momentum of loose parts.
+    /// Newton's method from the predictor, before and after it the balance of momentum of loose parts:
+    /// what falls freely does so before the first iteration, and conjugate gradients, which find such
+    /// slow modes last, need not look for them.
     fn minimise(
         &mut self,
         team: &mut Team,
@@ -240,6 +242,10 @@ impl Dynamics {
             linear.tolerance = linear.tolerance.min(settings.tolerance);
         }
         self.newton.settings = NewtonSettings { steps, halvings, linear, ..settings };
+        let loose = increment.A > 0.0 && self.parts.any_free();
+        if loose && self.active.is_empty() {
+            self.balance_parts(increment);
+        }
         let mut phi = StepPotential {
             model: &self.model,
             mass: &self.mass,
@@ -280,7 +286,7 @@ impl Dynamics {
             };
         }
         let done = self.newton.minimise(team, &mut phi, x, inputs.fixed);
-        if done.stop != StopReason::NonFinite && increment.A > 0.0 && self.parts.any_free() {
+        if done.stop != StopReason::NonFinite && loose {
             self.balance_parts(increment);
         }
         done
