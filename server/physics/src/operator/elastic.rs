@@ -120,17 +120,21 @@ impl Elastic {
         new.iter().for_each(|&p| added[region_of(p)].push(p));
         let mut affected = vec![false; self.n_regions];
         changed.iter().for_each(|&p| affected[region_of(p)] = true);
-        let rotations = self.rotations_by_element(&is_changed, pieces);
+        let inherited = self.rotations_by_element(&is_changed, pieces);
+        let mut outgrown = vec![false; self.n_regions];
         for chunk in self.chunks.iter_mut().rev().filter(|chunk| affected[chunk.region]) {
             // New pieces go to the last chunk of their region.
             let added = std::mem::take(&mut added[chunk.region]);
-            chunk.follow(mesh, pieces, &is_changed, &added, &rotations);
+            outgrown[chunk.region] |= !chunk.follow(mesh, pieces, &is_changed, &added, &inherited);
         }
         self.n_pieces = pieces.len();
-        let mut outgrown = vec![false; self.n_regions];
-        self.chunks.iter().for_each(|chunk| outgrown[chunk.region] |= chunk.has_outgrown_its_plan());
         if outgrown.contains(&true) {
-            let rotations = self.rotations();
+            let mut rotations = self.rotations();
+            for p in new {
+                if let Some(R) = inherited.get(&pieces[p as usize].element) {
+                    rotations[p as usize] = *R;
+                }
+            }
             self.plan(mesh, pieces, &outgrown, &rotations);
         }
         self.arrange_sums(n_copies);
@@ -366,14 +370,9 @@ impl Chunk {
         Matrix3::from_fn(|i, j| rotation[3 * i + j].0[lane])
     }
 
-    /// Whether so much was added that packing and numbering anew pays.
-    fn has_outgrown_its_plan(&self) -> bool {
-        let [pieces, copies] = self.planned;
-        self.n_pieces > pieces + pieces / 4 || self.copies.len() > copies + copies / 2
-    }
-
     /// Amends the copies and fractions of changed pieces and appends the pieces `added`. Copies that
-    /// are new to the chunk are new altogether, so that `copies` stays in order.
+    /// are new to the chunk are new altogether, so that `copies` stays in order. Says `false` and does
+    /// nothing if the chunk has grown so much that packing and numbering anew pays.
     fn follow(
         &mut self,
         mesh: &TetMesh,
@@ -381,7 +380,7 @@ impl Chunk {
         is_changed: &[bool],
         added: &[u32],
         rotations: &BTreeMap<u32, Matrix3<f32>>,
-    ) {
+    ) -> bool {
         let changed: Vec<(u32, usize, usize)> =
             self.lanes().filter(|&(p, ..)| is_changed[p as usize]).collect();
         let amended = || changed.iter().map(|c| c.0).chain(added.iter().copied());
@@ -393,6 +392,13 @@ impl Chunk {
             .collect();
         new.sort_unstable();
         new.dedup();
+        let [planned_pieces, planned_copies] = self.planned;
+        let n_copies = self.copies.len() + new.len();
+        if self.n_pieces + added.len() > planned_pieces + planned_pieces / 4
+            || n_copies > planned_copies + planned_copies / 2
+        {
+            return false;
+        }
         self.copies.extend(new.iter().map(|n| n.0));
         self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
         debug_assert!(self.copies.is_sorted());
@@ -420,6 +426,7 @@ impl Chunk {
         self.edges = None;
         self.positions.resize(n, [0.0; 4]);
         self.x.resize(n, [0.0; 4]);
+        true
     }
 
     /// Assembles the stiffness of the last update, or forgets what was assembled before.
