@@ -90,7 +90,7 @@ fn split_grid(lines_m: &[Vec<f64>; 3], nodes: Vec<Vector3<f64>>, pattern: BoxPat
     TetMesh { nodes, ..box_mesh(Vector3::zeros(), unit, cells, pattern) }
 }
 
-fn fault(error: MeshInError) -> Fault {
+pub(super) fn fault(error: MeshInError) -> Fault {
     match error {
         MeshInError::Io { path, source } => Fault::File {
             path: path.display().to_string(),

@@ -6,6 +6,8 @@ pub mod mechanics;
 
 mod mesh;
 
+mod skin;
+
 use std::path::Path;
 
 use scindo_physics::body::{Body, BodyError, BodySettings};
@@ -84,13 +86,18 @@ impl Builder<'_> {
             mesh::Mesh::Tets(mesh) => Body::new(mesh, material(spec), settings),
             mesh::Mesh::Hexes(mesh) => Body::hex8(mesh, material(spec), settings),
         };
-        let body = match made {
+        let mut body = match made {
             Ok(body) => body,
             Err(error) => {
                 self.refused(&format!("{at}.mesh"), &error);
                 return None;
             }
         };
+        if let Some(skin) = &spec.skin
+            && let Err(fault) = skin::put_on(&mut body, skin, &spec.mesh, self.base_dir)
+        {
+            self.findings.push((format!("{at}.skin"), fault));
+        }
         let mut body = SimBody::new(&spec.id, body, health);
         for (i, fix) in spec.fixes.iter().enumerate() {
             self.fix(&format!("{at}.fix.{i}"), fix, &mut body);

@@ -89,13 +89,13 @@ impl Fields {
             self.shear_stress.push(Vector3::new(stress[(1, 2)], stress[(2, 0)], stress[(0, 1)]));
         }
         let first_vertex = self.points.len() as u32;
-        for vertex in &mesh.surface().vertices {
+        for vertex in &body.surface().vertices {
             let x = vertex.position(body.positions());
             self.points.push(x);
             self.displacement.push(x - vertex.position(rest));
             self.velocity.push(vertex.position(body.velocities()));
         }
-        for (triangle, tag) in mesh.surface().triangles.iter().zip(&mesh.surface().tags) {
+        for (triangle, tag) in body.surface().triangles.iter().zip(&body.surface().tags) {
             self.triangles.push(triangle.map(|vertex| first_vertex + vertex));
             self.cell_body[1].push(number);
             self.cut_tag[1].push(*tag as i32);

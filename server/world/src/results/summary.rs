@@ -318,7 +318,7 @@ fn body_summary(
 ) -> BodySummary {
     let body = &sim.body;
     let mesh = body.cut_mesh();
-    let surface = mesh.surface();
+    let surface = body.surface();
     let mut lips: Vec<u32> = surface.tags.iter().copied().filter(|tag| *tag > 0).collect();
     let lip_triangles = lips.len();
     lips.sort_unstable();

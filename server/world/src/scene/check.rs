@@ -96,6 +96,7 @@ impl Check<'_> {
         let mechanics = self.mechanics(&at, body, &mesh);
         BodySpec {
             id: body.id.clone(),
+            skin: body.skin.as_ref().map(|skin| self.skin(&at, skin, body.element)),
             mesh,
             mechanics,
             young_pa: body.young_pa,
@@ -105,6 +106,22 @@ impl Check<'_> {
             damping_stiffness_s: body.rayleigh.stiffness_s,
             fixes: self.fixes(&at, &body.fix),
             loads: self.loads(&at, &body.load),
+        }
+    }
+
+    fn skin(&mut self, at: &str, skin: &RawSkin, element: RawElement) -> SkinSpec {
+        if element != RawElement::Tet4 {
+            let next = "write element = \"tet4\", or remove the skin";
+            self.conflict(format!("{at}.skin"), "a skin goes with linear tetrahedra", next);
+        }
+        if skin.scale.is_some() && skin.surface.is_none() {
+            let next = "the mesh has its own `scale`, which holds for its skin too";
+            self.conflict(format!("{at}.skin.scale"), "`scale` only goes with `surface`", next);
+        }
+        SkinSpec {
+            divisions: skin.divisions as usize,
+            snapping: skin.snapping,
+            surface: skin.surface.clone().map(|path| (path, skin.scale.unwrap_or(1.0))),
         }
     }
 
@@ -248,8 +265,22 @@ impl Check<'_> {
             RawCutMethod::Snap => self.unsupported(format!("{at}.method"), "snap", &["xfem"]),
             RawCutMethod::Links => self.unsupported(format!("{at}.method"), "links", &["xfem"]),
         }
-        let segments: Vec<[Vector3<f64>; 2]> =
-            cut.sweep_m.iter().map(|[tip, heel]| [Vector3::from(*tip), Vector3::from(*heel)]).collect();
+        if let (Some(path), Some(depth_m)) = (&cut.path_m, cut.depth_m) {
+            let points: Vec<Vector3<f64>> = path.iter().map(|p| Vector3::from(*p)).collect();
+            if points.windows(2).any(|pair| pair[0] == pair[1]) {
+                let next = "give each point of the path once";
+                self.conflict(format!("{at}.path_m"), "two points in a row are the same", next);
+            }
+            self.cutting_is_on(&at);
+            let body = self.body_named(format!("{at}.body"), &cut.body);
+            return CutSpec { body, at_s: cut.at_s, blade: CutPath::Incision { points, depth_m } };
+        }
+        let segments: Vec<[Vector3<f64>; 2]> = cut
+            .sweep_m
+            .iter()
+            .flatten()
+            .map(|[tip, heel]| [Vector3::from(*tip), Vector3::from(*heel)])
+            .collect();
         if segments.iter().all(|[tip, heel]| tip == heel) {
             let next = "a blade segment reaches from its tip to its heel";
             self.conflict(format!("{at}.sweep_m"), "all blade segments have no length", next);
@@ -257,11 +288,16 @@ impl Check<'_> {
             let next = "give successive positions of the blade";
             self.conflict(format!("{at}.sweep_m"), "the blade does not move", next);
         }
+        self.cutting_is_on(&at);
+        let body = self.body_named(format!("{at}.body"), &cut.body);
+        CutSpec { body, at_s: cut.at_s, blade: CutPath::Sweep(segments) }
+    }
+
+    fn cutting_is_on(&mut self, at: &str) {
         if self.raw.effects.cutting == Some(false) {
             let next = "remove the cut or effects.cutting";
-            self.conflict(at.clone(), "effects.cutting = false, but the scene has a cut", next);
+            self.conflict(at.to_owned(), "effects.cutting = false, but the scene has a cut", next);
         }
-        CutSpec { body: self.body_named(format!("{at}.body"), &cut.body), at_s: cut.at_s, segments }
     }
 
     fn probe(&mut self, probe: &RawProbe) -> ProbeSpec {

@@ -43,6 +43,8 @@ pub struct BodySpec {
     pub id: String,
     /// Where its elements come from.
     pub mesh: MeshSource,
+    /// Its skin; none: the elements' boundary.
+    pub skin: Option<SkinSpec>,
     /// How it is computed.
     pub mechanics: Mechanics,
     /// Young's modulus [Pa].
@@ -59,6 +61,17 @@ pub struct BodySpec {
     pub fixes: Vec<FixSpec>,
     /// Constant loads.
     pub loads: Vec<LoadSpec>,
+}
+
+/// A skin finer than the elements.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SkinSpec {
+    /// Parts of each edge of the elements' boundary.
+    pub divisions: usize,
+    /// Share of an edge from which a corner is moved onto a cut.
+    pub snapping: f64,
+    /// Surface it rests on as path and metres per length unit; none: the one the mesh was made from.
+    pub surface: Option<(String, f64)>,
 }
 
 /// How a body is computed: a combination that goes together.
@@ -245,6 +258,20 @@ pub enum Region {
     },
 }
 
+/// Where a cut goes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum CutPath {
+    /// Successive blade segments [tip, heel] [m].
+    Sweep(Vec<[Vector3<f64>; 2]>),
+    /// Along the skin, to a depth.
+    Incision {
+        /// Points near the skin [m].
+        points: Vec<Vector3<f64>>,
+        /// Depth below the skin [m].
+        depth_m: f64,
+    },
+}
+
 /// A cut by time.
 #[derive(Debug, Clone)]
 pub struct CutSpec {
@@ -252,8 +279,8 @@ pub struct CutSpec {
     pub body: usize,
     /// When [s].
     pub at_s: f64,
-    /// Successive blade segments [tip, heel] [m].
-    pub segments: Vec<[Vector3<f64>; 2]>,
+    /// Where it goes.
+    pub blade: CutPath,
 }
 
 /// A recorded material point.

@@ -20,8 +20,8 @@ mod check;
 use std::path::{Path, PathBuf};
 
 pub use checked::{
-    BodySpec, CellSplit, CheckedScene, CutSpec, EffectSwitches, FixSpec, LoadSpec, Mechanics, MeshSource,
-    Newmark, PathPoint, ProbeSpec, PublishRates, Region, Share, ToolSpec,
+    BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec, Mechanics,
+    MeshSource, Newmark, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
 };
 pub use problem::{Fault, Place, Problem, SceneError};
 pub use schema::{json_schema, key_reference};

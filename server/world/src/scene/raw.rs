@@ -85,6 +85,9 @@ pub struct RawBody {
     pub id: String,
     /// Where its elements come from.
     pub mesh: RawMesh,
+    /// A skin finer than the elements, shown and touched in place of their boundary and cut with them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub skin: Option<RawSkin>,
     /// Finite element.
     #[serde(default)]
     pub element: RawElement,
@@ -218,6 +221,34 @@ pub struct RawOrgan {
     /// Lattice cells along its longest side.
     #[schemars(range(min = 4, max = 128), extend("x-next" = "20 to 24 cells run in real time"))]
     pub cells: u32,
+}
+
+/// A skin finer than the elements.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawSkin {
+    /// Parts of each edge of the elements' boundary: n² skin triangles per face.
+    #[serde(default = "four")]
+    #[schemars(range(min = 1, max = 32), extend("x-next" = "2 to 6 is smooth; triangles rise with the square"))]
+    pub divisions: u32,
+    /// The surface that the skin rests on: .obj, .stl or .ply, relative to the scene file. Absent: the one
+    /// that the mesh was made from, or the elements' own boundary where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub surface: Option<String>,
+    /// Factor from the length unit of `surface` to metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "0.001 for a file in millimetres"))]
+    pub scale: Option<f64>,
+    /// Share of an edge from which a corner is moved onto a cut instead of the triangle split; 0 splits
+    /// always.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 0.5), extend("x-next" = "0.3 leaves few thin triangles along a cut"))]
+    pub snapping: f64,
+}
+
+fn four() -> u32 {
+    4
 }
 
 /// A held or displaced part of a body.
@@ -355,9 +386,10 @@ pub enum RawAxis {
     Z,
 }
 
-/// A cut that happens by itself.
+/// A cut that happens by itself: along a blade's sweep, or along a path on the skin to a depth.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{"required": ["sweep_m"]}, {"required": ["path_m", "depth_m"]}]))]
 pub struct RawCut {
     /// The body that is cut.
     pub body: String,
@@ -369,8 +401,17 @@ pub struct RawCut {
     #[serde(default)]
     pub method: RawCutMethod,
     /// Successive blade segments [tip, heel] in the deformed body [m]; they span the cut surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 2, max = 1024))]
-    pub sweep_m: Vec<[Vec3; 2]>,
+    pub sweep_m: Option<Vec<[Vec3; 2]>>,
+    /// Points near the skin of the deformed body [m]; the incision follows the skin between them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 2, max = 64))]
+    pub path_m: Option<Vec<Vec3>>,
+    /// How deep the tool goes into the skin along `path_m` [m].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "elements are opened that the blade cuts through"))]
+    pub depth_m: Option<f64>,
 }
 
 /// How a mesh is cut.

@@ -4,7 +4,6 @@ use std::mem::Discriminant;
 use std::sync::Arc;
 
 use scindo_physics::body::{Body, Notice};
-use scindo_physics::cut::CutMesh;
 use scindo_physics::estimate::{MeshError, StressRecovery};
 
 use super::report::Energy;
@@ -57,12 +56,12 @@ impl SimBody {
 
     /// The sizes that costs follow from.
     pub fn size(&self) -> BodySize {
-        let mesh = self.body.cut_mesh();
+        let surface = self.body.surface();
         BodySize {
             elements: self.body.n_elements(),
             nodes: self.body.rest_positions().len(),
-            vertices: mesh.surface().vertices.len(),
-            triangles: mesh.surface().triangles.len(),
+            vertices: surface.vertices.len(),
+            triangles: surface.triangles.len(),
         }
     }
 
@@ -75,17 +74,17 @@ impl SimBody {
         &self.surface
     }
 
-    /// Surface positions [m] as last computed, with the mesh they belong to.
-    pub(crate) fn surface_now(&mut self) -> (&CutMesh, &[[f32; 3]]) {
+    /// Surface positions [m] as last computed, with the body they belong to.
+    pub(crate) fn surface_now(&mut self) -> (&Body, &[[f32; 3]]) {
         self.surface_positions();
-        (self.body.cut_mesh(), &self.surface)
+        (&self.body, &self.surface)
     }
 
     /// Surface velocities [m/s] into `out`.
     pub fn surface_velocities(&self, out: &mut Vec<[f32; 3]>) {
         let v = self.body.velocities();
         out.clear();
-        out.extend(self.body.cut_mesh().surface().vertices.iter().map(|vertex| {
+        out.extend(self.body.surface().vertices.iter().map(|vertex| {
             let v = vertex.position(v);
             [v.x as f32, v.y as f32, v.z as f32]
         }));
@@ -114,13 +113,13 @@ impl SimBody {
 
     /// Triangles of the present epoch; made when first asked for.
     pub fn topology(&mut self) -> Arc<SurfaceTopology> {
-        let mesh = self.body.cut_mesh();
+        let (mesh, surface) = (self.body.cut_mesh(), self.body.surface());
         let make = || {
             Arc::new(SurfaceTopology {
                 epoch: mesh.epoch(),
-                vertex_count: mesh.surface().vertices.len() as u32,
-                triangles: mesh.surface().triangles.clone(),
-                tags: mesh.surface().tags.clone(),
+                vertex_count: surface.vertices.len() as u32,
+                triangles: surface.triangles.clone(),
+                tags: surface.tags.clone(),
             })
         };
         self.topology.get_or_insert_with(make).clone()

@@ -9,9 +9,10 @@ use nalgebra::Vector3;
 use scindo_physics::cut::BladeSweep;
 
 use super::body::SimBody;
+use super::incision::incision_along;
 use super::report::{Level, StepReport};
 use crate::inputs::{CutOutcome, CutRequest};
-use crate::scene::CutSpec;
+use crate::scene::{CutPath, CutSpec};
 use crate::tool::Tools;
 
 /// Two requests connect when the gap is below this fraction of the blade's length.
@@ -46,7 +47,7 @@ pub(crate) struct Cuts {
 struct Scheduled {
     at_s: f64,
     body: usize,
-    blade: BladeSweep,
+    blade: CutPath,
 }
 
 #[derive(Debug, Clone)]
@@ -60,11 +61,7 @@ impl Cuts {
     pub fn new(cuts: &[CutSpec], bodies: &[SimBody]) -> Self {
         let mut schedule: Vec<Scheduled> = cuts
             .iter()
-            .map(|cut| Scheduled {
-                at_s: cut.at_s,
-                body: cut.body,
-                blade: BladeSweep { segments: cut.segments.clone() },
-            })
+            .map(|cut| Scheduled { at_s: cut.at_s, body: cut.body, blade: cut.blade.clone() })
             .collect();
         schedule.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
         let element_m = bodies.iter().map(element_size).fold(f64::INFINITY, f64::min);
@@ -87,9 +84,15 @@ impl Cuts {
     pub fn apply_schedule(&mut self, time_s: f64, at: &mut Theatre<'_>) {
         while let Some(due) = self.schedule.get(self.next).filter(|cut| cut.at_s <= time_s) {
             let incision = at.tools.fresh_incision();
-            let (body, blade) = (due.body, due.blade.clone());
+            let body = due.body;
+            let blade = match &due.blade {
+                CutPath::Sweep(segments) => Ok(BladeSweep { segments: segments.clone() }),
+                CutPath::Incision { points, depth_m } => {
+                    incision_along(&mut at.bodies[body], points, *depth_m, self.least_move_m)
+                }
+            };
             self.next += 1;
-            if let Err(reason) = self.sweep(body, &blade, incision, at) {
+            if let Err(reason) = blade.and_then(|blade| self.sweep(body, &blade, incision, at)) {
                 at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason);
             }
         }

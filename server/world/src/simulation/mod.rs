@@ -10,6 +10,8 @@ mod body;
 
 mod cuts;
 
+mod incision;
+
 use std::path::Path;
 
 use nalgebra::Vector3;
@@ -131,8 +133,9 @@ impl Simulation {
     fn touch(&mut self) {
         if self.tools.any_active() {
             for (i, body) in self.bodies.iter_mut().enumerate() {
-                let (mesh, positions) = body.surface_now();
-                if let Err(error) = self.contacts.update_surface(i, mesh.epoch(), mesh.surface(), positions) {
+                let (shown, positions) = body.surface_now();
+                let epoch = shown.cut_mesh().epoch();
+                if let Err(error) = self.contacts.update_surface(i, epoch, shown.surface(), positions) {
                     self.report.tell(Level::Error, "contact-surface", &body.id, error.to_string());
                 }
             }

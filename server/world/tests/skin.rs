@@ -1,0 +1,113 @@
+//! A body with a skin: what is shown and touched is the skin, cut with the body.
+
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use scindo_world::inputs::{Inputs, Wants};
+use scindo_world::organ::organ_surface;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+use scindo_world::snapshot::Snapshot;
+
+const ORGAN: &str = r#"
+schema = 1
+[[body]]
+id = "organ"
+mesh = { organ = { cells = 10 } }
+skin = { divisions = 4 }
+young_pa = 1e4
+poisson = 0.4
+density_kg_m3 = 1050
+[[body.fix]]
+where = { slab = { axis = "x", from = 0.0, to = 0.1 } }
+[[cut]]
+body = "organ"
+at_s = 0.04
+sweep_m = [[[0.02, -0.1, 0.03], [0.02, -0.1, 0.2]], [[0.02, 0.1, 0.03], [0.02, 0.1, 0.2]]]
+"#;
+
+fn start(text: &str) -> Simulation {
+    let scene = Scene::from_toml(text).unwrap();
+    Simulation::new(&scene, Path::new("")).unwrap()
+}
+
+fn snapshot(sim: &mut Simulation) -> Snapshot {
+    let wants = Wants { surface: vec![true], ..Wants::default() };
+    let mut snapshot = Snapshot::default();
+    sim.snapshot_into(&wants, &mut snapshot);
+    snapshot
+}
+
+/// Enclosed volume [m³], after checking that every edge has two triangles.
+fn volume(snapshot: &Snapshot) -> f64 {
+    let body = &snapshot.bodies[0];
+    let mut edges = BTreeSet::new();
+    let mut six = 0.0;
+    for t in &body.topology.triangles {
+        (0..3).for_each(|k| assert!(edges.insert((t[k], t[(k + 1) % 3])), "an edge twice"));
+        let [p, q, r] = t.map(|v| nalgebra::Vector3::from(body.positions[v as usize].map(f64::from)));
+        six += p.dot(&q.cross(&r));
+    }
+    assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "an edge without an opposite");
+    six / 6.0
+}
+
+#[test]
+fn the_skin_lies_on_the_organ_and_is_cut_with_it() {
+    let mut sim = start(ORGAN);
+    let uncut = snapshot(&mut sim);
+    let surface = organ_surface();
+    let exact: f64 = surface
+        .triangles
+        .iter()
+        .map(|t| t.map(|v| surface.vertices[v as usize]))
+        .map(|[p, q, r]| p.dot(&q.cross(&r)) / 6.0)
+        .sum();
+    let skin = volume(&uncut);
+    let elements = sim.bodies()[0].rest_volume_m3;
+    // Twice as close to the organ as the elements are, at least.
+    assert!((skin - exact).abs() < 0.5 * (elements - exact).abs(), "{skin} {elements} {exact}");
+    let faces = sim.bodies()[0].body.cut_mesh().surface().triangles.len();
+    assert_eq!(uncut.bodies[0].topology.triangles.len(), 16 * faces);
+    for _ in 0..4 {
+        sim.step(&Inputs::default());
+    }
+    let cut = snapshot(&mut sim);
+    assert!(sim.bodies()[0].body.skin().unwrap().fits());
+    assert!(cut.bodies[0].topology.tags.contains(&1));
+    assert!((volume(&cut) / skin - 1.0).abs() < 0.02);
+    sim.reset().unwrap();
+    assert_eq!(snapshot(&mut sim).bodies[0].topology.triangles, uncut.bodies[0].topology.triangles);
+}
+
+#[test]
+fn a_skin_on_quadratic_elements_is_refused() {
+    let text = ORGAN.replace("skin =", "element = \"tet10\"\nskin =");
+    let error = Scene::from_toml(&text).unwrap_err().to_string();
+    assert!(error.contains("skin"), "{error}");
+    let error = Scene::from_toml(&ORGAN.replace("divisions = 4", "divisions = 99")).unwrap_err().to_string();
+    assert!(error.contains("divisions"), "{error}");
+}
+
+#[test]
+fn an_incision_follows_a_path_on_the_skin() {
+    let path = "path_m = [[0.02, -0.03, 0.07], [0.03, 0.0, 0.07], [0.02, 0.03, 0.07]]\ndepth_m = 0.03\n";
+    let at = ORGAN.find("sweep_m").unwrap();
+    let mut sim = start(&format!("{}{path}", &ORGAN[..at]));
+    for _ in 0..4 {
+        sim.step(&Inputs::default());
+    }
+    let cut = snapshot(&mut sim);
+    let body = &cut.bodies[0];
+    assert!(sim.bodies()[0].body.skin().unwrap().fits());
+    let lips = body.topology.triangles.iter().zip(&body.topology.tags).filter(|(_, tag)| **tag == 1);
+    let wound: Vec<[f32; 3]> = lips.flat_map(|(t, _)| t.map(|v| body.positions[v as usize])).collect();
+    let lowest = wound.iter().map(|p| p[2]).fold(f32::INFINITY, f32::min);
+    let highest = wound.iter().map(|p| p[2]).fold(f32::NEG_INFINITY, f32::max);
+    // From the skin down, and no deeper than asked for (the body hardly moved).
+    assert!(highest - lowest > 0.005 && highest - lowest < 0.04, "{lowest} {highest}");
+    assert!(wound.iter().all(|p| p[0] > 0.0 && p[0] < 0.05 && p[1].abs() < 0.045), "{wound:?}");
+    volume(&cut);
+}
