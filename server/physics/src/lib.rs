@@ -2,7 +2,7 @@
 //!
 //! Modules stand in the order of the data: a [`mesh`] says where the material is at rest, a
 //! [`material`] what it is made of, an [`element`] how it resists, a [`cut`] which pieces and copies
-//! there are ([`enrichment`] looks at one cut element in the bases of the literature), an [`assembly`]
+//! there are ([`snap`] cuts the mesh itself instead, [`enrichment`] looks at one cut element in the bases of the literature), an [`assembly`]
 //! the forces and matrices of any element with any law, an [`operator`] the fast way from
 //! displacements to forces, a [`solver`] inverts that, an
 //! [`integrator`] makes a step of it, and a [`body`] holds all of this together for the world.
@@ -20,6 +20,7 @@ pub mod material;
 pub mod element;
 pub mod cut;
 pub mod skin;
+pub mod snap;
 pub mod enrichment;
 pub mod team;
 pub mod assembly;

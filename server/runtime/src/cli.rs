@@ -131,7 +131,8 @@ pub struct MeshArgs {
 /// `scindo accuracy`.
 #[derive(Debug, Args)]
 pub struct AccuracyArgs {
-    /// Cases (r1, r2-tc1, bar-rest, bar-motion; bar is the last two) and scene files.
+    /// Cases (r1, r2-tc1, bar-rest, bar-motion; bar is both; cut-tc1, cut-tc2force and cut-tc2strip compare
+    /// methods of cutting; cutting is all three) and scene files.
     #[arg(value_name = "CASE|SCENE", default_values = ["r1", "r2-tc1", "bar"])]
     pub cases: Vec<String>,
     /// Recommend a configuration that fits this time: of a static solution, or of a frame of a motion.

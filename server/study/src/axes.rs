@@ -10,6 +10,8 @@ pub enum Factor {
     Law,
     /// Finite element, with its remedy against locking.
     Element,
+    /// How the mesh is cut.
+    Cutting,
     /// Cells of the mesh.
     Mesh,
     /// Time integration.
@@ -28,9 +30,10 @@ pub enum Factor {
 
 impl Factor {
     /// All factors, in the order of the columns of a table.
-    pub const ALL: [Factor; 9] = [
+    pub const ALL: [Factor; 10] = [
         Factor::Law,
         Factor::Element,
+        Factor::Cutting,
         Factor::Mesh,
         Factor::Integrator,
         Factor::Step,
@@ -45,6 +48,7 @@ impl Factor {
         match self {
             Factor::Law => "law",
             Factor::Element => "element",
+            Factor::Cutting => "cutting",
             Factor::Mesh => "mesh",
             Factor::Integrator => "integrator",
             Factor::Step => "step",

@@ -2,7 +2,8 @@
 //!
 //! The modules read in the direction of the work: a [`case`] is a scene with a goal and a
 //! reference; its [`axes`] say what is varied (law, element, mesh, step, …) as keys of the scene;
-//! [`design`] picks the configurations; a [`trial`] runs one and times it; [`reference`] says what
+//! [`design`] picks the configurations; a [`trial`] runs one and times it, [`wear`] looks
+//! at a mesh after many cuts; [`reference`] says what
 //! the right answer is and how well it is known; [`error`] compares; [`pareto`] keeps the
 //! configurations that nothing beats; [`sources`] tells which source of error dominates there;
 //! [`recommend`] picks one for a time budget; [`store`] keeps what is finished on disk; [`page`]
@@ -18,6 +19,8 @@ pub mod case;
 pub mod design;
 
 pub mod trial;
+
+pub mod wear;
 
 pub mod series;
 

@@ -21,6 +21,7 @@ use crate::sources::{Sources, peel};
 use crate::store::{Origin, Store, fingerprint};
 use crate::table::Table;
 use crate::trial::{self, Limits, Protocol, Trial, one_line};
+use crate::wear::{self, Wear};
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -204,10 +205,13 @@ pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<Study
 fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     let mut cases = Vec::new();
     for name in &settings.cases {
-        if name == "bar" {
-            cases.extend(
-                ["bar-rest", "bar-motion"].iter().filter_map(|name| case::builtin(name, settings.quick)),
-            );
+        let several: &[&str] = match name.as_str() {
+            "bar" => &["bar-rest", "bar-motion"],
+            "cutting" => &["cut-tc1", "cut-tc2force", "cut-tc2strip"],
+            _ => &[],
+        };
+        if !several.is_empty() {
+            cases.extend(several.iter().filter_map(|name| case::builtin(name, settings.quick)));
         } else if let Some(case) = case::builtin(name, settings.quick) {
             cases.push(case);
         } else if Path::new(name).exists() {
@@ -380,7 +384,12 @@ impl<'a> Bench<'a> {
             Ok(scene) => {
                 let limits = limits(self.settings.quick, timed);
                 let (threads, stop) = (configuration.threads(), &*self.settings.stop);
-                trial::run(&scene, case.scene.base_dir(), threads, case.protocol, limits, stop)?
+                let base_dir = case.scene.base_dir();
+                let mut trial = trial::run(&scene, base_dir, threads, case.protocol, limits, stop)?;
+                if timed && compares_methods(case, configuration) {
+                    trial.wear = worn(case, configuration, stop)?;
+                }
+                trial
             }
         };
         self.spent_s += started.elapsed().as_secs_f64();
@@ -391,6 +400,26 @@ impl<'a> Bench<'a> {
             self.broken = Some((self.settings.out.join("runs.jsonl"), error));
         }
         Some(trial)
+    }
+}
+
+/// Whether nothing but the method of cutting differs from the base of the case.
+fn compares_methods(case: &Case, configuration: &Configuration) -> bool {
+    let base = Configuration::base(&case.axes);
+    configuration
+        .setting(Factor::Cutting)
+        .is_some_and(|method| base.with(Factor::Cutting, method).key() == configuration.key())
+}
+
+/// The mesh after many cuts; nothing where the scene is refused, none where the study is to end.
+fn worn(case: &Case, configuration: &Configuration, stop: &AtomicBool) -> Option<Vec<Wear>> {
+    let mut set = configuration.overrides();
+    set.extend(wear::at_rest(&case.bodies));
+    let Ok(scene) = case.scene.apply_sets(&set) else { return Some(Vec::new()) };
+    let once = configuration.label(Factor::Cutting) == "precut";
+    match wear::measure(&scene, case.scene.base_dir(), once, stop) {
+        None if stop.load(Ordering::Relaxed) => None,
+        found => Some(found.unwrap_or_default()),
     }
 }
 

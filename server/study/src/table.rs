@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::axes::Factor;
 use crate::case::Case;
 use crate::study::{Outcome, StudyResult};
+use crate::wear::CUTS;
 
 /// The file.
 #[derive(Debug)]
@@ -16,7 +17,7 @@ pub struct Table {
 }
 
 /// Columns after the factors.
-const FIGURES: [&str; 17] = [
+const FIGURES: [&str; 20] = [
     "status",
     "reason",
     "elements",
@@ -34,6 +35,9 @@ const FIGURES: [&str; 17] = [
     "energy_j",
     "iterations",
     "residual",
+    "quality_1_cut",
+    "quality_10_cuts",
+    "quality_100_cuts",
 ];
 
 type Broken = (PathBuf, io::Error);
@@ -104,6 +108,8 @@ fn line(case: &Case, point: &Outcome, on_front: Option<bool>) -> Vec<String> {
     let results = trial.is_done().then(|| [case.goal.of(&trial.series), last(&trial.series.energy_j)]);
     fields.extend((0..2).map(|i| results.map_or(String::new(), |r| format!("{:.9e}", r[i]))));
     fields.extend([format!("{:.1}", trial.iterations), format!("{:.3e}", trial.residual)]);
+    let after = |cuts: usize| trial.wear.iter().find(|wear| wear.cuts == cuts);
+    fields.extend(CUTS.map(|cuts| after(cuts).map_or(String::new(), |wear| format!("{:.6}", wear.quality))));
     fields.push(on_front.map_or(String::new(), |on| on.to_string()));
     let dominant = point.sources.as_ref().and_then(|sources| sources.dominant());
     fields.push(dominant.map_or(String::new(), |source| source.name().to_owned()));

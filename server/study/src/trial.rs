@@ -11,6 +11,7 @@ use scindo_world::simulation::{Level, Simulation, Stage, StepReport};
 use serde::{Deserialize, Serialize};
 
 use crate::series::Series;
+use crate::wear::Wear;
 
 /// What a run computes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,6 +101,9 @@ pub struct Trial {
     pub residual: f64,
     /// The result; empty where there is none.
     pub series: Series,
+    /// The mesh after many cuts, where methods of cutting are compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wear: Vec<Wear>,
 }
 
 impl Trial {
@@ -118,6 +122,7 @@ impl Trial {
             iterations: 0.0,
             residual: 0.0,
             series: Series::default(),
+            wear: Vec::new(),
         }
     }
 

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::inputs::Wants;
 use crate::scene::CheckedScene;
+use crate::scene::raw::RawCutMethod;
 
 /// Seconds per element and step for energies.
 const SECONDS_PER_ELEMENT: f64 = 80e-9;
@@ -140,6 +141,18 @@ impl Plan {
                 count(cuts, "scheduled cut"),
                 count(blades, "blade")
             ),
+        };
+        let snapped: Vec<&str> = scene
+            .bodies
+            .iter()
+            .filter(|body| body.mechanics.cutting == RawCutMethod::Snap)
+            .map(|body| &*body.id)
+            .collect();
+        let why = match (allowed, snapped.is_empty()) {
+            (true, false) => {
+                format!("{why}; along element faces, the model is built anew per cut: {}", snapped.join(", "))
+            }
+            _ => why,
         };
         let seconds: f64 = sizes.iter().map(|size| size.elements as f64 * SECONDS_PER_ELEMENT_CUT).sum();
         let always = if blades > 0 { seconds } else { 0.0 };

@@ -30,6 +30,8 @@ pub struct Probe {
     pub weights: [f64; 4],
     /// Barycentric coordinates by which its piece is looked up: the point, moved to its side.
     pub lookup: [f64; 4],
+    /// From the point a little to its side [m].
+    towards: Vector3<f64>,
     /// The copies (and further nodes of the element) it moves with, and their shape functions there;
     /// follows the topology.
     pub carriers: Vec<(u32, f64)>,
@@ -57,7 +59,8 @@ impl Probe {
         side: Option<Vector3<f64>>,
     ) -> Result<Self, Outside> {
         let mesh = of.cut_mesh().mesh();
-        let aim = side.map_or(rest_m, |side| rest_m + side.normalize() * (SIDE_STEP * cell_size(mesh)));
+        let towards = side.map_or(Vector3::zeros(), |side| side.normalize() * (SIDE_STEP * cell_size(mesh)));
+        let aim = rest_m + towards;
         let element = element_at(mesh, aim)
             .or_else(|| element_at(mesh, rest_m))
             .ok_or_else(|| nearest(mesh, rest_m))?;
@@ -70,13 +73,23 @@ impl Probe {
             element: element as u32,
             weights,
             lookup: barycentric(&corners, aim),
+            towards,
             carriers: of.carriers(element as u32, mesh.tets[element], weights),
         })
     }
 
-    /// Follows a change of topology: takes the copies of the piece the point belongs to.
+    /// Follows a change of topology: takes the copies of the piece the point belongs to, after looking
+    /// for its element where cuts change the mesh.
     pub fn follow(&mut self, of: &Body) {
         let cut = of.cut_mesh();
+        if of.node_origins().is_some() {
+            let aim = self.rest_m + self.towards;
+            let element = deepest(cut.mesh(), aim);
+            let corners = cut.mesh().corners(element);
+            self.element = element as u32;
+            self.weights = barycentric(&corners, self.rest_m);
+            self.lookup = barycentric(&corners, aim);
+        }
         let copies = cut.pieces()[cut.piece_at(self.element, self.lookup) as usize].copies;
         self.carriers = of.carriers(self.element, copies, self.weights);
     }
@@ -93,12 +106,21 @@ fn cell_size(mesh: &TetMesh) -> f64 {
     (6.0 * volume / mesh.tets.len().max(1) as f64).cbrt()
 }
 
-/// The element in which a point lies deepest.
+/// The element that a point lies in.
 fn element_at(mesh: &TetMesh, point: Vector3<f64>) -> Option<usize> {
-    let depth = |e: usize| barycentric(&mesh.corners(e), point).into_iter().fold(f64::INFINITY, f64::min);
-    let deepest =
-        (0..mesh.tets.len()).map(|e| (depth(e), e)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
-    deepest.filter(|(depth, _)| *depth >= -INSIDE).map(|(_, e)| e)
+    let element = deepest(mesh, point);
+    (depth(mesh, point, element) >= -INSIDE).then_some(element)
+}
+
+/// The element in which a point lies deepest; of equal ones the first.
+fn deepest(mesh: &TetMesh, point: Vector3<f64>) -> usize {
+    let all = (0..mesh.tets.len()).map(|e| (depth(mesh, point, e), e));
+    all.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).map_or(0, |(_, e)| e)
+}
+
+/// Smallest barycentric coordinate of a point in element `e`.
+fn depth(mesh: &TetMesh, point: Vector3<f64>, e: usize) -> f64 {
+    barycentric(&mesh.corners(e), point).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 fn barycentric(x: &[Vector3<f64>; 4], point: Vector3<f64>) -> [f64; 4] {

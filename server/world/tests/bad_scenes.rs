@@ -107,8 +107,14 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
         assert_says(&with(line), &parts);
     }
     let cut = |method: &str| message_after("sweep_m =", &format!("method = \"{method}\"\nsweep_m ="));
-    assert_says(&cut("snap"), &["`snap` is not supported yet", "xfem"]);
-    assert_says(&cut("links"), &["`links` is not supported yet", "xfem"]);
+    assert_says(&cut("links"), &["`links` is not supported yet", "xfem, snap"]);
+    assert_says(&cut("snap"), &["found `snap`, but all cuts of `beam` are made by xfem", "[body.cutting]"]);
+    let snap = "cutting = { method = \"snap\" }";
+    assert_says(&with(&format!("{snap}\nelement = \"tet10\"")), &["found `snap` with tet10, allowed: tet4"]);
+    assert_says(
+        &with("cutting = { loose = \"pinned\" }"),
+        &["found `pinned` with xfem, allowed: snap", "cutting.method"],
+    );
     let effects = message_after("[world]", "[effects]\nself_collision = true\n[world]");
     assert_says(&effects, &["effects.self_collision", "not supported yet"]);
 }

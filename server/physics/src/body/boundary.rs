@@ -6,6 +6,7 @@ use super::shape::Shape;
 use super::{Body, BodyError, Path};
 use crate::cut::CutMesh;
 use crate::operator::FixedCopy;
+use crate::snap::SnapNode;
 
 /// A node whose displacement is prescribed in some directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +31,32 @@ pub struct Boundary {
 }
 
 impl Boundary {
+    /// Constraints and loads that nodes carry along.
+    pub fn of_nodes(nodes: &[SnapNode]) -> Self {
+        let forces = |force: fn(&SnapNode) -> Vector3<f64>| -> Vec<Vector3<f64>> {
+            let any = nodes.iter().any(|node| force(node) != Vector3::zeros());
+            if any { nodes.iter().map(force).collect() } else { Vec::new() }
+        };
+        let held = (0u32..).zip(nodes).filter_map(|(node, n)| {
+            let (axes, displacement_m) = n.fixed?;
+            Some(FixedNode { node, axes, displacement_m })
+        });
+        Self {
+            fixed: held.collect(),
+            point_force: forces(|n| n.point_force),
+            spread_force: forces(|n| n.spread_force),
+        }
+    }
+
+    /// Gives constraints and loads to the nodes they are on.
+    pub fn onto_nodes(&self, nodes: &mut [SnapNode]) {
+        for fixed in &self.fixed {
+            nodes[fixed.node as usize].fixed = Some((fixed.axes, fixed.displacement_m));
+        }
+        nodes.iter_mut().zip(&self.point_force).for_each(|(node, force)| node.point_force = *force);
+        nodes.iter_mut().zip(&self.spread_force).for_each(|(node, force)| node.spread_force = *force);
+    }
+
     /// A fixed node fixes the copy that holds the node's own material, which keeps the node's
     /// number. Copies without that material stay free: fixing them would glue fragments to air.
     /// `rest` are the rest positions of all copies [m], and of what the element adds.

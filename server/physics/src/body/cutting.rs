@@ -15,6 +15,9 @@ impl Body {
             let with = if self.shape.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" };
             return Err(BodyError::Combination { what: "a cut", with, instead: "tet4" });
         }
+        if self.snap.is_some() {
+            return self.snap_cut(blade, incision);
+        }
         let report = self.cut_mesh.sweep(&self.state.x, blade, incision)?;
         if let Some(skin) = &mut self.skin {
             skin.follow(&self.cut_mesh);

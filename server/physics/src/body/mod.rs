@@ -8,11 +8,13 @@ mod general;
 mod measures;
 mod settings;
 mod shape;
+mod snapping;
 mod statics;
 
 pub use boundary::FixedNode;
 pub use error::BodyError;
 pub use settings::{Arithmetic, BodySettings};
+pub use snapping::{CuttingMethod, LooseRule};
 pub use statics::{StaticReport, StaticSettings};
 
 use nalgebra::Vector3;
@@ -27,12 +29,14 @@ use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
 use crate::skin::{Skin, SkinSettings, SkinShape};
+use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};
 use crate::team::Team;
 use boundary::Boundary;
 use fast::Fast;
 use general::General;
 use shape::Shape;
+use snapping::SnapState;
 
 /// How a step of a body went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,6 +98,8 @@ pub struct Body {
     path: Path,
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
+    /// Of a body that is cut along its faces.
+    snap: Option<Box<SnapState>>,
 }
 
 /// How a step is computed.
@@ -116,6 +122,13 @@ impl Body {
             ElementKind::Hex8 => {
                 let (what, with) = ("element hex8", "a mesh of tetrahedra");
                 return Err(BodyError::Combination { what, with, instead: "tet4 or tet10" });
+            }
+        };
+        let mesh = match settings.cutting {
+            CuttingMethod::Xfem => mesh,
+            CuttingMethod::Snap => {
+                mesh.check()?;
+                Snapper::prepared(&mesh)
             }
         };
         Self::with_shape(CutMesh::new(mesh)?, shape, material, settings)
@@ -145,7 +158,9 @@ impl Body {
         } else {
             Path::General(Box::new(General::new(&shape, &cut_mesh, &material, &settings)?))
         };
+        let snap = settings.cutting == CuttingMethod::Snap;
         let mut body = Self {
+            snap: snap.then(|| Box::new(SnapState::new(cut_mesh.mesh()))),
             rest: Vec::new(),
             state: State::default(),
             boundary: Boundary::default(),
@@ -335,6 +350,9 @@ impl Body {
 
     /// Back to the start: uncut, undeformed, at rest. Constraints and loads stay; the epoch rises.
     pub fn reset(&mut self) -> Result<(), BodyError> {
+        if self.snap.is_some() {
+            return self.snap_reset();
+        }
         self.cut_mesh.reset()?;
         if let Some(skin) = &mut self.skin {
             skin.follow(&self.cut_mesh);

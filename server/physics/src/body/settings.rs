@@ -1,6 +1,6 @@
 //! How a body is discretised and solved, and which combinations the fast path can take.
 
-use super::BodyError;
+use super::{BodyError, CuttingMethod, LooseRule};
 use crate::assembly::{ElementKind, Volumetric};
 use crate::integrator::{MassKind, Scheme};
 use crate::material::Law;
@@ -36,6 +36,10 @@ pub struct BodySettings {
     pub arithmetic: Option<Arithmetic>,
     /// Most Newton steps per step of time; `None`: as many as law and scheme call for.
     pub newton_steps: Option<u32>,
+    /// How cuts are made.
+    pub cutting: CuttingMethod,
+    /// What becomes of parts that a cut leaves without a held node.
+    pub loose: LooseRule,
 }
 
 /// The arithmetic of a step. State and sums are in double precision always.
@@ -73,6 +77,8 @@ impl Default for BodySettings {
             operator: OperatorChoice::Auto,
             arithmetic: None,
             newton_steps: None,
+            cutting: CuttingMethod::Xfem,
+            loose: LooseRule::Free,
         }
     }
 }
@@ -176,6 +182,19 @@ impl BodySettings {
         }
         if self.newton_steps.is_some_and(|steps| !(1..=10_000).contains(&steps)) {
             return setting("newton_steps", self.newton_steps.map_or(0.0, f64::from), "1 … 10 000");
+        }
+        let refused = |what, with, instead| Err(BodyError::Combination { what, with, instead });
+        match (self.cutting, self.element, self.loose) {
+            (CuttingMethod::Snap, ElementKind::Tet10, _) => {
+                return refused("cutting along faces", "element tet10", "tet4");
+            }
+            (CuttingMethod::Snap, ElementKind::Hex8, _) => {
+                return refused("cutting along faces", "element hex8", "tet4");
+            }
+            (CuttingMethod::Xfem, _, LooseRule::Pinned) => {
+                return refused("pinning loose parts", "cutting method xfem", "cutting method snap");
+            }
+            _ => {}
         }
         match (self.arithmetic, self.why_general(law)) {
             (Some(Arithmetic::Single), Some(with)) => {

@@ -47,8 +47,15 @@ pub struct CutMesh {
 impl CutMesh {
     /// The uncut state of a mesh.
     pub fn new(mesh: TetMesh) -> Result<Self, MeshError> {
+        Self::with_lips(mesh, &BTreeMap::new(), 0)
+    }
+
+    /// The state of a mesh that was cut along its faces: `lips` names the incision of boundary faces by
+    /// their nodes in ascending order, 0 and absent is skin.
+    pub fn with_lips(mesh: TetMesh, lips: &BTreeMap<[u32; 3], u32>, epoch: u32) -> Result<Self, MeshError> {
         mesh.check()?;
-        let fragments = Fragments::new(&mesh);
+        let mut fragments = Fragments::new(&mesh);
+        fragments.tag_boundary(&mesh, lips);
         let mut pieces = PieceTable::new(&mesh);
         let mut copies = CopyTable::new(&mesh, &pieces);
         let mut new_copies = Vec::new();
@@ -72,7 +79,7 @@ impl CutMesh {
             fronts: BTreeMap::new(),
             detector: Detector::default(),
             separator: Separator::default(),
-            epoch: 0,
+            epoch,
         })
     }
 

@@ -5,6 +5,8 @@
 //! and tags both sides. Vertices are shared by a face-connected star of fragments and by nothing
 //! else, so lips never share a vertex except on the crack front.
 
+use std::collections::BTreeMap;
+
 use crate::mesh::{TET_FACES, TetMesh};
 
 use super::incision_sets::IncisionSets;
@@ -140,6 +142,20 @@ impl Fragments {
         leave_room(&mut self.next_in_piece);
         leave_room(&mut self.visited);
         leave_room(&mut self.claimed);
+    }
+
+    /// Tags boundary faces of the uncut state by their mesh nodes in ascending order.
+    pub fn tag_boundary(&mut self, mesh: &TetMesh, tags: &BTreeMap<[u32; 3], u32>) {
+        if tags.is_empty() {
+            return;
+        }
+        for (t, tet) in mesh.tets.iter().enumerate() {
+            for k in (0..4).filter(|&k| self.neighbour[t][k] == NONE) {
+                let mut nodes = TET_FACES[k].map(|c| tet[c]);
+                nodes.sort_unstable();
+                self.tag[t][k] = tags.get(&nodes).copied().unwrap_or(0);
+            }
+        }
     }
 
     /// Fragments of element `e`.

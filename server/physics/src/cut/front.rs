@@ -98,6 +98,11 @@ impl Front {
         Self { segment: *segment, points }
     }
 
+    /// The two ends of the front where the material is now [m].
+    pub fn ends(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; 2] {
+        self.now(x).ends()
+    }
+
     /// The front where the material is now: its two ends if nothing has moved.
     fn now(&self, x: &[Vector3<f64>]) -> Row {
         let shifts: Vec<Vector3<f64>> =

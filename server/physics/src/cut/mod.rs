@@ -40,9 +40,11 @@ mod cut_mesh;
 pub use blade::{BladeSweep, CutError, CutReport, NewCopy};
 pub use components::Components;
 pub use cut_mesh::CutMesh;
+pub(crate) use front::{Front, Surroundings, sweep_triangles};
 pub use pending::PendingFace;
 pub use pieces::Piece;
 pub use surface::{Surface, SurfaceVertex};
+pub(crate) use sweep_triangle::SweepTriangle;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -1,7 +1,7 @@
 //! The rest mesh: nodes, linear tetrahedra, their volumes and their orientation.
 //!
 //! A mesh is only ever *read* by the rest of the crate: cutting separates material inside the
-//! elements and never edits this structure.
+//! elements and never edits this structure; cutting along faces ([`crate::snap`]) makes another one.
 
 mod box_mesh;
 mod error;

@@ -11,6 +11,7 @@ mod dynamics;
 mod reference;
 mod repeated_solves;
 mod robustness;
+mod snapping;
 mod springs;
 
 use nalgebra::Vector3;

@@ -4,6 +4,8 @@ mod cantilever;
 
 mod cut_beam;
 
+pub mod cutting;
+
 mod bar;
 
 mod scene;
@@ -99,7 +101,8 @@ impl Truth {
 }
 
 /// Names of the cases that come with the program.
-pub const NAMES: [&str; 4] = ["r1", "r2-tc1", "bar-rest", "bar-motion"];
+pub const NAMES: [&str; 7] =
+    ["r1", "r2-tc1", "bar-rest", "bar-motion", "cut-tc1", "cut-tc2force", "cut-tc2strip"];
 
 /// A case that comes with the program; `quick` leaves out what takes long.
 pub fn builtin(name: &str, quick: bool) -> Option<Case> {
@@ -108,6 +111,9 @@ pub fn builtin(name: &str, quick: bool) -> Option<Case> {
         "r2-tc1" => Some(cut_beam::case(quick)),
         "bar-rest" => Some(bar::at_rest(quick)),
         "bar-motion" => Some(bar::in_motion(quick)),
+        "cut-tc1" => Some(cutting::case(cutting::Pull::Gravity, quick)),
+        "cut-tc2force" => Some(cutting::case(cutting::Pull::Force, quick)),
+        "cut-tc2strip" => Some(cutting::case(cutting::Pull::Strip, quick)),
         _ => None,
     }
 }

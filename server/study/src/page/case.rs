@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::plot::{Failure, Mark, Plot};
-use super::{escape, style, time};
+use super::{escape, style, time, wear};
 use crate::axes::{Factor, short};
 use crate::case::Case;
 use crate::error::Errors;
@@ -52,6 +52,7 @@ pub fn section(result: &CaseResult) -> String {
         escape(&goal),
         b.svg()
     );
+    out += &wear::table(result);
     out += &front_table(result);
     out += &reference(result);
     out += &all_points(result);

@@ -58,6 +58,7 @@ fn point(point: &Outcome) -> Value {
         "unknowns": trial.unknowns,
         "iterations": trial.iterations,
         "residual": trial.residual,
+        "wear": trial.wear,
         "errors": point.errors,
         "sources": point.sources.as_ref().map(|sources| &sources.0),
         "dominant": point.sources.as_ref().and_then(|sources| sources.dominant()),

@@ -12,6 +12,8 @@ mod style;
 
 mod text;
 
+mod wear;
+
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};

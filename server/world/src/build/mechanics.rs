@@ -1,13 +1,15 @@
 //! From the words of a scene to settings of a body.
 
 use scindo_physics::body::{
-    Arithmetic, BodySettings, ElementKind, MassKind, Method, OperatorChoice, PcgSettings, Scheme, Volumetric,
+    Arithmetic, BodySettings, CuttingMethod, ElementKind, LooseRule, MassKind, Method, OperatorChoice,
+    PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::material::Law;
 
 use crate::scene::Mechanics;
 use crate::scene::raw::{
-    RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawOperator, RawPrecision,
+    RawCutMethod, RawElement, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawOperator,
+    RawPrecision,
 };
 
 /// Share of the volumetric energy that node averaging leaves with the elements, against checkerboards.
@@ -73,6 +75,15 @@ pub fn settings(m: &Mechanics) -> BodySettings {
             Some(RawOperator::Assembled) => OperatorChoice::Assembled,
         },
         newton_steps: m.newton_steps,
+        cutting: match m.cutting {
+            // Links are refused before a body is made.
+            RawCutMethod::Xfem | RawCutMethod::Links => CuttingMethod::Xfem,
+            RawCutMethod::Snap => CuttingMethod::Snap,
+        },
+        loose: match m.loose {
+            RawLoose::Free => LooseRule::Free,
+            RawLoose::Pinned => LooseRule::Pinned,
+        },
         ..BodySettings::default()
     }
 }

@@ -260,11 +260,8 @@ impl Check<'_> {
 
     fn cut(&mut self, index: usize, cut: &RawCut) -> CutSpec {
         let at = format!("cut.{index}");
-        match cut.method {
-            RawCutMethod::Xfem => {}
-            RawCutMethod::Snap => self.unsupported(format!("{at}.method"), "snap", &["xfem"]),
-            RawCutMethod::Links => self.unsupported(format!("{at}.method"), "links", &["xfem"]),
-        }
+        let body = self.body_named(format!("{at}.body"), &cut.body);
+        self.cut_method(&at, cut, body);
         if let (Some(path), Some(depth_m)) = (&cut.path_m, cut.depth_m) {
             let points: Vec<Vector3<f64>> = path.iter().map(|p| Vector3::from(*p)).collect();
             if points.windows(2).any(|pair| pair[0] == pair[1]) {
@@ -272,7 +269,6 @@ impl Check<'_> {
                 self.conflict(format!("{at}.path_m"), "two points in a row are the same", next);
             }
             self.cutting_is_on(&at);
-            let body = self.body_named(format!("{at}.body"), &cut.body);
             return CutSpec { body, at_s: cut.at_s, blade: CutPath::Incision { points, depth_m } };
         }
         let segments: Vec<[Vector3<f64>; 2]> = cut
@@ -289,7 +285,6 @@ impl Check<'_> {
             self.conflict(format!("{at}.sweep_m"), "the blade does not move", next);
         }
         self.cutting_is_on(&at);
-        let body = self.body_named(format!("{at}.body"), &cut.body);
         CutSpec { body, at_s: cut.at_s, blade: CutPath::Sweep(segments) }
     }
 

@@ -101,6 +101,10 @@ pub struct Mechanics {
     pub iterations: u32,
     /// Relative preconditioned residual at which the solver stops.
     pub tolerance: f64,
+    /// How cuts are made.
+    pub cutting: RawCutMethod,
+    /// What becomes of parts without a held node.
+    pub loose: RawLoose,
 }
 
 /// Parameters of Newmark's method.

@@ -124,6 +124,9 @@ pub struct RawBody {
     /// Solver of a step.
     #[serde(default)]
     pub solver: RawSolver,
+    /// What a cut does to it, whoever makes the cut.
+    #[serde(default)]
+    pub cutting: RawCutting,
     /// Held or displaced parts.
     #[serde(default)]
     pub fix: Vec<RawFix>,
@@ -397,9 +400,9 @@ pub struct RawCut {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-next" = "0 cuts before the first step"))]
     pub at_s: f64,
-    /// How the mesh is cut.
-    #[serde(default)]
-    pub method: RawCutMethod,
+    /// How the mesh is cut; absent: as `cutting.method` of the body says, with which it has to agree.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<RawCutMethod>,
     /// Successive blade segments [tip, heel] in the deformed body [m]; they span the cut surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 2, max = 1024))]
@@ -421,10 +424,31 @@ pub enum RawCutMethod {
     /// Pieces and copies inside the elements; the mesh stays.
     #[default]
     Xfem,
-    /// Along element faces with node snapping; not supported yet.
+    /// Along element faces, nodes moved onto the sweep; the mesh changes. For `tet4`.
     Snap,
     /// Unlinked cells of a hexahedral body; not supported yet.
     Links,
+}
+
+/// What a cut does to a body.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawCutting {
+    /// How the mesh is cut.
+    pub method: RawCutMethod,
+    /// What becomes of a part that a cut leaves without a held node; `pinned` goes with `snap`.
+    pub loose: RawLoose,
+}
+
+/// What becomes of a part that hangs on nothing.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawLoose {
+    /// It is a free body.
+    #[default]
+    Free,
+    /// It is held where it is, at the corners of its largest skin face.
+    Pinned,
 }
 
 /// A material point whose path is recorded.

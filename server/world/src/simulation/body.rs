@@ -20,6 +20,8 @@ pub struct SimBody {
     pub body: Body,
     /// Held nodes, one group per `fix` of the scene, ascending.
     pub fix_groups: Vec<Vec<u32>>,
+    /// The same before the first cut that changed the mesh.
+    fix_groups_uncut: Option<Vec<Vec<u32>>>,
     /// What was found and repaired in its mesh file; none for a body without a file.
     pub health: Option<MeshHealth>,
     /// Volume at rest [m³].
@@ -39,6 +41,7 @@ impl SimBody {
             id: id.into(),
             body,
             fix_groups: Vec::new(),
+            fix_groups_uncut: None,
             health,
             rest_volume_m3,
             noticed: None,
@@ -109,6 +112,17 @@ impl SimBody {
     pub(crate) fn has_changed_topology(&mut self) {
         self.topology = None;
         self.surface_is_old = true;
+        self.follow_nodes();
+    }
+
+    /// Groups of nodes after a cut that changed the mesh: a duplicate is in the groups of its node.
+    fn follow_nodes(&mut self) {
+        let Some(origins) = self.body.node_origins() else { return };
+        let uncut = self.fix_groups_uncut.get_or_insert_with(|| self.fix_groups.clone());
+        for (now, uncut) in self.fix_groups.iter_mut().zip(uncut) {
+            let from_group = |(_, origin): &(u32, &u32)| uncut.binary_search(origin).is_ok();
+            *now = (0u32..).zip(origins).filter(from_group).map(|(node, _)| node).collect();
+        }
     }
 
     /// Triangles of the present epoch; made when first asked for.

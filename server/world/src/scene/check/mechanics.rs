@@ -23,7 +23,10 @@ impl Check<'_> {
             newton_steps: body.solver.newton_steps,
             iterations: body.solver.iterations,
             tolerance: body.solver.tolerance,
+            cutting: body.cutting.method,
+            loose: body.cutting.loose,
         };
+        self.cutting(at, &mechanics);
         self.element(at, mechanics.element, mesh);
         self.locking(at, &mechanics);
         self.integrator(at, body);
@@ -31,6 +34,42 @@ impl Check<'_> {
         self.precision(at, &mechanics);
         self.operator(at, &mechanics);
         mechanics
+    }
+
+    fn cutting(&mut self, at: &str, m: &Mechanics) {
+        let key = format!("{at}.cutting.method");
+        if m.cutting == RawCutMethod::Links {
+            return self.unsupported(key, "links", &["xfem", "snap"]);
+        }
+        if m.cutting == RawCutMethod::Snap && m.element != RawElement::Tet4 {
+            let what = format!("found `snap` with {}, allowed: tet4", word(&m.element));
+            self.conflict(key, what, "choose tet4, whose faces can be cut along, or remove cutting.method");
+        }
+        if m.loose == RawLoose::Pinned && m.cutting != RawCutMethod::Snap {
+            let what = format!("found `pinned` with {}, allowed: snap", word(&m.cutting));
+            let next = "write cutting.method = \"snap\", or let loose parts be free";
+            self.conflict(format!("{at}.cutting.loose"), what, next);
+        }
+    }
+
+    /// The method of a scheduled cut is that of the body, which blades and clients cut too.
+    pub(super) fn cut_method(&mut self, at: &str, cut: &RawCut, body: usize) {
+        let Some(found) = cut.method else { return };
+        let key = format!("{at}.method");
+        if found == RawCutMethod::Links {
+            return self.unsupported(key, "links", &["xfem", "snap"]);
+        }
+        let own = self.raw.body.get(body).map_or(found, |body| body.cutting.method);
+        if found != own {
+            let what = format!(
+                "found `{}`, but all cuts of `{}` are made by {}",
+                word(&found),
+                cut.body,
+                word(&own)
+            );
+            let next = format!("remove it, or write [body.cutting] method = \"{}\"", word(&found));
+            self.conflict(key, what, &next);
+        }
     }
 
     fn element(&mut self, at: &str, element: RawElement, mesh: &MeshSource) {

@@ -1,0 +1,165 @@
+//! Cutting along element faces: the mesh itself changes, and everything on it follows.
+
+use nalgebra::Vector3;
+
+use super::boundary::Boundary;
+use super::{Body, BodyError, Path};
+use crate::cut::{BladeSweep, CutMesh, CutReport, NewCopy};
+use crate::mesh::TetMesh;
+use crate::snap::{SnapNode, SnapReport, Snapper};
+
+/// How cuts are made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CuttingMethod {
+    /// Pieces and copies inside the elements ([`crate::cut`]).
+    #[default]
+    Xfem,
+    /// Along element faces, nodes moved onto the sweep ([`crate::snap`]); only of tet4.
+    Snap,
+}
+
+/// What becomes of a part that a cut leaves without any held node; for [`CuttingMethod::Snap`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LooseRule {
+    /// It is a free body.
+    #[default]
+    Free,
+    /// It is held where it is at the nodes of its largest skin face (Nienhuys 2003, §3.3).
+    Pinned,
+}
+
+/// What a body that is cut along faces remembers.
+#[derive(Clone, Debug)]
+pub(super) struct SnapState {
+    snapper: Snapper,
+    start: Start,
+    report: SnapReport,
+    /// Node of the uncut mesh that every node was, or [`crate::snap::node::NEW`].
+    origins: Vec<u32>,
+}
+
+/// The body before its first cut.
+#[derive(Clone, Debug)]
+struct Start {
+    mesh: TetMesh,
+    /// Set by the first cut.
+    boundary: Option<Boundary>,
+}
+
+impl SnapState {
+    pub fn new(mesh: &TetMesh) -> Self {
+        Self {
+            snapper: Snapper::default(),
+            origins: (0..mesh.nodes.len() as u32).collect(),
+            start: Start { mesh: mesh.clone(), boundary: None },
+            report: SnapReport::default(),
+        }
+    }
+}
+
+impl Body {
+    /// What the last cut along faces did; none for a body that is cut otherwise.
+    pub fn snap_report(&self) -> Option<&SnapReport> {
+        self.snap.as_deref().map(|snap| &snap.report)
+    }
+
+    /// Per node, which node of the uncut mesh it was, [`crate::snap::node::NEW`] if none; none for a
+    /// body whose cuts leave the mesh alone.
+    pub fn node_origins(&self) -> Option<&[u32]> {
+        self.snap.as_deref().map(|snap| &snap.origins[..])
+    }
+
+    /// Cuts along faces. Held nodes stay and all their duplicates are held; loads of a node that is
+    /// duplicated are shared by volume.
+    pub(super) fn snap_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
+        let Some(mut snap) = self.snap.clone() else { return Ok(CutReport::default()) };
+        let nodes = self.snap_nodes();
+        let (report, cut) = snap.snapper.cut(&self.cut_mesh.mesh().tets, nodes, blade, incision)?;
+        let mut told = CutReport {
+            elements_cut: report.elements,
+            faces_opened: report.faces,
+            pending_edges: report.pending,
+            epoch: self.cut_mesh.epoch(),
+            ..CutReport::default()
+        };
+        snap.report = report;
+        let Some(cut) = cut else {
+            self.snap = Some(snap);
+            return Ok(told);
+        };
+        told.epoch += 1;
+        self.cut_mesh = CutMesh::with_lips(cut.mesh, snap.snapper.tags(), told.epoch)?;
+        told.new_copies = cut.duplicates.iter().map(|d| NewCopy { copy: d.node, parent: d.parent }).collect();
+        if snap.start.boundary.is_none() {
+            snap.start.boundary = Some(self.boundary.clone());
+        }
+        let origin = |node: &SnapNode| snap.origins.get(node.origin as usize).copied();
+        snap.origins = cut.nodes.iter().map(|node| origin(node).unwrap_or(node.origin)).collect();
+        self.snap = Some(snap);
+        self.boundary = Boundary::of_nodes(&cut.nodes);
+        self.state.x = cut.nodes.iter().map(|node| node.x).collect();
+        self.state.v = cut.nodes.iter().map(|node| node.v).collect();
+        self.follow_mesh()?;
+        if self.settings.loose == LooseRule::Pinned {
+            self.pin_loose_parts()?;
+        }
+        Ok(told)
+    }
+
+    /// Back to the uncut mesh, with the constraints and loads from before the first cut.
+    pub(super) fn snap_reset(&mut self) -> Result<(), BodyError> {
+        let Some(snap) = &mut self.snap else { return Ok(()) };
+        let epoch = self.cut_mesh.epoch() + 1;
+        let mesh = snap.start.mesh.clone();
+        if let Some(boundary) = snap.start.boundary.take() {
+            self.boundary = boundary;
+        }
+        **snap = SnapState::new(&mesh);
+        self.cut_mesh = CutMesh::with_lips(mesh, snap.snapper.tags(), epoch)?;
+        self.return_to_rest();
+        self.follow_mesh()
+    }
+
+    /// Everything that is derived from a mesh that is another one now.
+    fn follow_mesh(&mut self) -> Result<(), BodyError> {
+        match &mut self.path {
+            Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
+            Path::General(_) => self.rebuild_general()?,
+        }
+        self.follow_topology();
+        Ok(())
+    }
+
+    fn snap_nodes(&self) -> Vec<SnapNode> {
+        let rest = &self.cut_mesh.mesh().nodes;
+        let mut nodes: Vec<SnapNode> =
+            (0u32..).zip(rest).map(|(n, &rest)| SnapNode::at_rest(rest, n)).collect();
+        for ((node, x), v) in nodes.iter_mut().zip(&self.state.x).zip(&self.state.v) {
+            (node.x, node.v) = (*x, *v);
+        }
+        self.boundary.onto_nodes(&mut nodes);
+        nodes
+    }
+
+    /// Holds every part that hangs on nothing at its largest skin face, where it is now.
+    fn pin_loose_parts(&mut self) -> Result<(), BodyError> {
+        let mesh = self.cut_mesh.mesh();
+        let mut largest: Vec<Option<(f64, [u32; 3])>> = vec![None; self.parts.len()];
+        for face in mesh.boundary_faces() {
+            let area = mesh.face_area(&face);
+            let slot = &mut largest[self.parts.of_copy[face.nodes[0] as usize] as usize];
+            if slot.is_none_or(|(most, _)| area > most) {
+                *slot = Some((area, face.nodes));
+            }
+        }
+        let loose = largest.iter().zip(&self.parts.free).filter(|(_, free)| **free);
+        let pins: Vec<(u32, Vector3<f64>)> = loose
+            .flat_map(|(face, _)| face.iter().flat_map(|(_, nodes)| *nodes).collect::<Vec<u32>>())
+            .map(|n| (n, self.state.x[n as usize] - self.rest[n as usize]))
+            .collect();
+        for (node, displacement_m) in pins {
+            self.fix(&[node], [true; 3], displacement_m)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,132 @@
+//! Removal of degenerate elements in passes, as long as there are fewer after each.
+//!
+//! # Source
+//! Nienhuys 2003, §3.2.3. Elements that cannot be collapsed stay: removing them, as there, would lose
+//! mass and open cracks, and they are not inverted.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Vector3;
+
+use super::collapse::{Collapse, collapse, split_edge, split_face};
+use super::complex::{Complex, barycentric};
+use super::shape::{FLAT, Kind, aspect, kind, opposite};
+use crate::mesh::TET_EDGES;
+
+/// How far from the ends of an edge, relative to it, a new node has to be.
+const INSIDE: f64 = 1e-3;
+
+/// What cleaning did.
+#[derive(Clone, Debug, Default)]
+pub struct Cleaned {
+    /// Nodes that are gone, and what they were merged with.
+    pub merged: BTreeMap<u32, u32>,
+    /// Collapsed edges.
+    pub collapses: usize,
+    /// New nodes on edges and faces.
+    pub splits: usize,
+    /// Degenerate elements that could not be removed.
+    pub left: usize,
+}
+
+/// Removes degenerate elements among `region` and what replaces them.
+pub fn clean(complex: &mut Complex, region: BTreeSet<u32>) -> Cleaned {
+    let mut cleaned = Cleaned::default();
+    let mut region: Vec<u32> = region.into_iter().collect();
+    let mut before = usize::MAX;
+    loop {
+        let is_flat = |complex: &Complex, t: u32| complex.is_alive(t) && aspect(&complex.rest(t)) < FLAT;
+        let flat: Vec<u32> = region.iter().copied().filter(|&t| is_flat(complex, t)).collect();
+        cleaned.left = flat.len();
+        if flat.is_empty() || flat.len() >= before {
+            return cleaned;
+        }
+        before = flat.len();
+        let first = complex.n_slots() as u32;
+        for t in flat {
+            if is_flat(complex, t) {
+                remove(complex, t, &mut cleaned);
+            }
+        }
+        region.extend(first..complex.n_slots() as u32);
+    }
+}
+
+fn remove(complex: &mut Complex, t: u32, cleaned: &mut Cleaned) {
+    let start = complex.mark();
+    let (tet, x) = (complex.tet(t), complex.rest(t));
+    let floor = aspect(&x);
+    let mut splits = 0;
+    let mut done = match kind(&x) {
+        Kind::Needle => None,
+        Kind::Spindle(e) => meet_spindle(&x, e).and_then(|(s, k)| {
+            let [a, b] = opposite(e);
+            splits = 1;
+            let m = split_edge(complex, tet[a], tet[b], s);
+            collapse(complex, m, tet[k], floor)
+        }),
+        Kind::Sliver(e, f) => meet_sliver(&x, e, f).and_then(|[s, r]| {
+            splits = 2;
+            let m = split_edge(complex, tet[e[0]], tet[e[1]], s);
+            let n = split_edge(complex, tet[f[0]], tet[f[1]], r);
+            collapse(complex, m, n, floor)
+        }),
+        Kind::Cap(apex) => foot(&x, apex).and_then(|weights| {
+            splits = 1;
+            let m = split_face(complex, t, apex, weights);
+            collapse(complex, m, tet[apex], floor)
+        }),
+    };
+    if done.is_none() {
+        complex.undo(start);
+        splits = 0;
+        // The way of needles for all: the shortest edge first.
+        let mut edges = TET_EDGES;
+        edges.sort_by(|e, f| (x[e[0]] - x[e[1]]).norm().total_cmp(&(x[f[0]] - x[f[1]]).norm()));
+        done = edges.into_iter().find_map(|[i, j]| collapse(complex, tet[i], tet[j], floor));
+    }
+    if let Some(Collapse { kept, gone }) = done {
+        cleaned.merged.insert(gone, kept);
+        cleaned.collapses += 1;
+        cleaned.splits += splits;
+    }
+}
+
+/// The node of edge `e` that lies close to the edge opposite, and where on that.
+fn meet_spindle(x: &[Vector3<f64>; 4], e: [usize; 2]) -> Option<(f64, usize)> {
+    let [a, b] = opposite(e);
+    let axis = x[b] - x[a];
+    let place = |k: usize| {
+        let s = (x[k] - x[a]).dot(&axis) / axis.norm_squared();
+        ((x[k] - x[a] - axis * s).norm(), s, k)
+    };
+    let [p, q] = e.map(place);
+    let (_, s, k) = if p.0 <= q.0 { p } else { q };
+    inside(s).then_some((s, k))
+}
+
+/// Where two edges come closest, along each.
+fn meet_sliver(x: &[Vector3<f64>; 4], e: [usize; 2], f: [usize; 2]) -> Option<[f64; 2]> {
+    let (d, c, between) = (x[e[1]] - x[e[0]], x[f[1]] - x[f[0]], x[f[0]] - x[e[0]]);
+    let (dd, cc, dc) = (d.norm_squared(), c.norm_squared(), d.dot(&c));
+    let area = dd * cc - dc * dc;
+    let s = (between.dot(&d) * cc - between.dot(&c) * dc) / area;
+    let r = (between.dot(&d) * dc - between.dot(&c) * dd) / area;
+    (inside(s) && inside(r)).then_some([s, r])
+}
+
+/// Barycentric coordinates of the foot of the perpendicular from a node to the face opposite, in the
+/// order of that face.
+fn foot(x: &[Vector3<f64>; 4], apex: usize) -> Option<[f64; 3]> {
+    let face = crate::mesh::TET_FACES[apex].map(|k| x[k]);
+    let normal = (face[1] - face[0]).cross(&(face[2] - face[0])).try_normalize(0.0)?;
+    let height = normal.dot(&(x[apex] - face[0]));
+    let corners = [face[0], face[1], face[2], face[0] + normal * (face[1] - face[0]).norm()];
+    let [a, b, c, _] = barycentric(&corners, &(x[apex] - normal * height))?;
+    let weights = [a, b, c];
+    weights.iter().all(|&w| inside(w)).then_some(weights)
+}
+
+fn inside(s: f64) -> bool {
+    s > INSIDE && s < 1.0 - INSIDE
+}

@@ -1,0 +1,85 @@
+//! What an incision has crossed and not yet cut, and the nodes that lie on it.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::complex::Complex;
+
+/// Nodes of an edge in ascending order.
+pub type EdgeKey = [u32; 2];
+
+/// Where a sweep crosses an edge: a point of the material, which goes along with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// Where along the edge, from its lower node.
+    pub t: f64,
+    /// Unit normal of the sweep there, in the present configuration.
+    pub normal: Vector3<f64>,
+}
+
+/// An edge counts as halved within this fraction of its length: rounding only.
+const HALVED: f64 = 1e-9;
+
+/// The record of one incision.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Memory {
+    /// Crossings of edges neither end of which lies on the cut surface.
+    pub crossings: BTreeMap<EdgeKey, Crossing>,
+    /// Nodes of the cut surface, and the unit normal of the sweep there when they were cut.
+    pub on: BTreeMap<u32, Vector3<f64>>,
+}
+
+impl Crossing {
+    /// The end of the edge that the crossing is closest to; the lower node if it is halved.
+    pub fn near(&self, edge: &EdgeKey) -> u32 {
+        if self.t <= 0.5 + HALVED { edge[0] } else { edge[1] }
+    }
+
+    /// Where it is now [m].
+    pub fn point(&self, edge: &EdgeKey, complex: &Complex) -> Vector3<f64> {
+        let [a, b] = edge.map(|n| complex.nodes[n as usize].x);
+        a + (b - a) * self.t
+    }
+}
+
+impl Memory {
+    /// Follows the duplication of node `from` as `to`: elements `tets` stand on `to` now.
+    pub fn duplicate(&mut self, complex: &Complex, from: u32, to: u32, tets: &[u32]) {
+        if let Some(&normal) = self.on.get(&from) {
+            self.on.insert(to, normal);
+        }
+        let mut more = Vec::new();
+        for (edge, crossing) in &self.crossings {
+            let Some(at) = edge.iter().position(|&n| n == from) else { continue };
+            let other = edge[1 - at];
+            if tets.iter().any(|&t| complex.tet(t).contains(&other)) {
+                // The new node has the highest number of all.
+                let t = if at == 0 { 1.0 - crossing.t } else { crossing.t };
+                more.push(([other, to], Crossing { t, ..*crossing }));
+            }
+        }
+        self.crossings.extend(more);
+    }
+
+    /// Forgets what a new cut surface has settled: edges at its nodes.
+    pub fn settle(&mut self, nodes: impl Iterator<Item = (u32, Vector3<f64>)>) {
+        self.on.extend(nodes);
+        let on = &self.on;
+        self.crossings.retain(|edge, _| !edge.iter().any(|n| on.contains_key(n)));
+    }
+
+    /// Forgets edges that the mesh no longer has, and renumbers: `number` of a node that is gone is
+    /// none, or that of the node it was merged with.
+    pub fn renumber(&mut self, complex: &Complex, number: impl Fn(u32) -> Option<u32>) {
+        let crossings = std::mem::take(&mut self.crossings);
+        for ([a, b], crossing) in crossings {
+            let there = complex.around(a).iter().any(|&t| complex.tet(t).contains(&b));
+            if let (true, Some(a), Some(b)) = (there, number(a), number(b)) {
+                let (edge, t) = if a < b { ([a, b], crossing.t) } else { ([b, a], 1.0 - crossing.t) };
+                self.crossings.insert(edge, Crossing { t, ..crossing });
+            }
+        }
+        self.on = self.on.iter().filter_map(|(&n, &normal)| Some((number(n)?, normal))).collect();
+    }
+}

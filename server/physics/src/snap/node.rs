@@ -1,0 +1,47 @@
+//! A node with everything that must stay consistent when the mesh around it changes.
+
+use nalgebra::Vector3;
+
+/// Origin of a node that no node of the mesh before the cut became.
+pub const NEW: u32 = u32::MAX;
+
+/// A node of a body, in both configurations, with what is prescribed on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SnapNode {
+    /// Rest position [m].
+    pub rest: Vector3<f64>,
+    /// Present position [m].
+    pub x: Vector3<f64>,
+    /// Velocity [m/s].
+    pub v: Vector3<f64>,
+    /// Axes along which the displacement is prescribed, and the displacement [m]. Such a node is
+    /// neither moved nor collapsed; all duplicates of it are held alike.
+    pub fixed: Option<([bool; 3], Vector3<f64>)>,
+    /// Force on the node itself [N].
+    pub point_force: Vector3<f64>,
+    /// Force spread over the material around the node [N].
+    pub spread_force: Vector3<f64>,
+    /// The node it was before the cut, or [`NEW`].
+    pub origin: u32,
+}
+
+impl SnapNode {
+    /// A free node at rest.
+    pub fn at_rest(rest: Vector3<f64>, origin: u32) -> Self {
+        let zero = Vector3::zeros();
+        Self { rest, x: rest, v: zero, fixed: None, point_force: zero, spread_force: zero, origin }
+    }
+
+    /// The material point Σ w n, without loads and constraints.
+    pub fn between(nodes: &[&SnapNode], weights: &[f64]) -> Self {
+        let sum = |value: fn(&SnapNode) -> Vector3<f64>| -> Vector3<f64> {
+            nodes.iter().zip(weights).map(|(n, w)| value(n) * *w).sum()
+        };
+        Self { x: sum(|n| n.x), v: sum(|n| n.v), ..Self::at_rest(sum(|n| n.rest), NEW) }
+    }
+
+    /// Takes position and velocity of another node; loads, constraint and origin stay.
+    pub fn placed_at(self, other: &SnapNode) -> Self {
+        Self { rest: other.rest, x: other.x, v: other.v, ..self }
+    }
+}

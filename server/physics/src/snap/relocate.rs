@@ -1,0 +1,182 @@
+//! Moving nodes of the cut surface onto the sweep.
+//!
+//! A node moves through the material: to a material point of an element beside it, which has a place
+//! in the reference and one in the deformed configuration, and a velocity. So the field that the body
+//! had is sampled anew, and a rigid motion stays one.
+//!
+//! A node inside goes to the foot of the perpendicular in the deformed configuration. On the skin it
+//! moves along the plane through it that keeps the volume, which is the skin where that is flat, and
+//! on a crease along the crease; corners stay. This contains the rule of the source (projection on
+//! the intersection of sweep and skin), which is made for flat skins.
+//!
+//! # Source
+//! Nienhuys 2003, §3.2.2.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::complex::{Complex, barycentric, det, face_key};
+use super::node::SnapNode;
+use super::select::NodeMark;
+use super::shape::aspect;
+
+/// A move is refused if it leaves less than this fraction of the volume of any element, in either
+/// configuration.
+pub const LEAST_REMAINDER: f64 = 0.05;
+
+/// A move is refused if it makes an element flatter than this (least height over longest edge).
+pub const LEAST_ASPECT: f64 = 1e-3;
+
+/// Cosine of the angle between two skin faces beyond which the edge between them is a crease: 45°.
+const CREASE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Cosine of the bend up to which a crease goes on through a node.
+const STRAIGHT: f64 = 0.9;
+
+/// Sine of the angle between sweep and skin below which there is no way along the skin.
+const LEAST_ANGLE: f64 = 0.1;
+
+/// How far outside its element the new place may be, in barycentric coordinates: rounding inside the
+/// body, the bend of the skin on it.
+const OUTSIDE: f64 = 1e-9;
+const OUTSIDE_ON_SKIN: f64 = 0.1;
+
+/// Which way a node can go in the reference configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Freedom {
+    Space,
+    /// Perpendicular to this unit vector.
+    Plane(Vector3<f64>),
+    /// Along this vector.
+    Line(Vector3<f64>),
+    None,
+}
+
+/// Moves node `n` onto the sweep near `mark`; `false` if it has to stay where it is.
+pub fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
+    let node = complex.nodes[n as usize];
+    if node.fixed.is_some() {
+        return false;
+    }
+    let freedom = freedom(complex, n);
+    let Some(moved) = target(complex, n, mark, freedom) else { return false };
+    if !moved.rest.iter().chain(moved.x.iter()).all(|c| c.is_finite()) || !stays_sound(complex, n, &moved) {
+        return false;
+    }
+    complex.set_node(n, node.placed_at(&moved));
+    true
+}
+
+/// The material point of the star of `n` that lies on the sweep.
+fn target(complex: &Complex, n: u32, mark: &NodeMark, freedom: Freedom) -> Option<SnapNode> {
+    let node = &complex.nodes[n as usize];
+    // Distance from the sweep [m], positive along its normal.
+    let s = mark.normal.dot(&(node.x - mark.point));
+    let least = if freedom == Freedom::Space { -OUTSIDE } else { -OUTSIDE_ON_SKIN };
+    let mut best: Option<(f64, SnapNode)> = None;
+    for &t in complex.around(n) {
+        let weights = match freedom {
+            Freedom::None => None,
+            Freedom::Space => barycentric(&complex.now(t), &(node.x - mark.normal * s)),
+            Freedom::Plane(up) => along(complex, t, n, mark, |N| {
+                let way = N - up * up.dot(&N);
+                (way.norm() > LEAST_ANGLE * N.norm()).then(|| way * (-s / way.norm_squared()))
+            }),
+            Freedom::Line(d) => along(complex, t, n, mark, |N| {
+                let slope = N.dot(&d);
+                (slope.abs() > LEAST_ANGLE * N.norm() * d.norm()).then(|| d * (-s / slope))
+            }),
+        };
+        let Some(weights) = weights else { continue };
+        let depth = weights.into_iter().fold(f64::INFINITY, f64::min);
+        if depth >= least && best.as_ref().is_none_or(|b| depth > b.0) {
+            let nodes = complex.tet(t).map(|n| &complex.nodes[n as usize]);
+            best = Some((depth, SnapNode::between(&nodes, &weights)));
+        }
+    }
+    best.map(|b| b.1)
+}
+
+/// Barycentric coordinates in `t` of the rest position of `n` moved by what `way` makes of Fᵀ n, the
+/// normal of the sweep pulled back to the reference configuration.
+fn along(
+    complex: &Complex,
+    t: u32,
+    n: u32,
+    mark: &NodeMark,
+    way: impl Fn(Vector3<f64>) -> Option<Vector3<f64>>,
+) -> Option<[f64; 4]> {
+    let edges = |x: [Vector3<f64>; 4]| Matrix3::from_columns(&[x[1] - x[0], x[2] - x[0], x[3] - x[0]]);
+    let rest = complex.rest(t);
+    let F = edges(complex.now(t)) * edges(rest).try_inverse()?;
+    let moved = complex.nodes[n as usize].rest + way(F.transpose() * mark.normal)?;
+    barycentric(&rest, &moved)
+}
+
+/// How the skin around `n` lets it move.
+fn freedom(complex: &Complex, n: u32) -> Freedom {
+    let mut skin: Vec<([u32; 3], Vector3<f64>, Option<u32>)> = Vec::new();
+    for &t in complex.around(n) {
+        for k in (0..4).filter(|&k| complex.tet(t)[k] != n) {
+            if complex.neighbour(t, k).is_none() {
+                let face = complex.face(t, k);
+                let [p, q, r] = face.map(|n| complex.nodes[n as usize].rest);
+                skin.push((face, (q - p).cross(&(r - p)), complex.tag(&face_key(face))));
+            }
+        }
+    }
+    if skin.is_empty() {
+        return Freedom::Space;
+    }
+    let mut beside: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (i, (face, ..)) in skin.iter().enumerate() {
+        face.iter().filter(|&&m| m != n).for_each(|&m| beside.entry(m).or_default().push(i));
+    }
+    let mut creases = Vec::new();
+    for (&m, faces) in &beside {
+        let [i, j] = faces[..] else { return Freedom::None };
+        let cosine = skin[i].1.dot(&skin[j].1) / (skin[i].1.norm() * skin[j].1.norm());
+        // A flat face has no direction; what is beside it counts as a crease.
+        if cosine.is_nan() || cosine < CREASE || skin[i].2 != skin[j].2 {
+            creases.push(m);
+        }
+    }
+    let up: Vector3<f64> = skin.iter().map(|face| face.1).sum();
+    let size: f64 = skin.iter().map(|face| face.1.norm()).sum();
+    // At the tip of an incision the two lips face each other and cancel.
+    let up = if up.norm() > 1e-9 * size { up.normalize() } else { Vector3::zeros() };
+    let rest = |m: u32| complex.nodes[m as usize].rest;
+    match creases[..] {
+        [] => Freedom::Plane(up),
+        [a, b] => {
+            let (to_a, to_b) = (rest(a) - rest(n), rest(b) - rest(n));
+            if -to_a.dot(&to_b) < STRAIGHT * to_a.norm() * to_b.norm() {
+                return Freedom::None;
+            }
+            let d = rest(b) - rest(a);
+            Freedom::Line(d - up * up.dot(&d))
+        }
+        _ => Freedom::None,
+    }
+}
+
+/// Whether all elements around `n` keep enough of their volume and of their shape.
+fn stays_sound(complex: &Complex, n: u32, moved: &SnapNode) -> bool {
+    complex.around(n).iter().all(|&t| {
+        let at = complex.tet(t).map(|m| m == n);
+        let put = |mut x: [Vector3<f64>; 4], to: Vector3<f64>| {
+            for (x, at) in x.iter_mut().zip(at) {
+                if at {
+                    *x = to;
+                }
+            }
+            x
+        };
+        let (rest, now) = (complex.rest(t), complex.now(t));
+        let (new_rest, new_now) = (put(rest, moved.rest), put(now, moved.x));
+        let sound_now = det(&now) <= 0.0 || det(&new_now) > LEAST_REMAINDER * det(&now);
+        let flat = aspect(&new_rest) < LEAST_ASPECT && aspect(&new_rest) < aspect(&rest);
+        sound_now && !flat && det(&new_rest) > LEAST_REMAINDER * det(&rest)
+    })
+}

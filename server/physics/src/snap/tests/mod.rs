@@ -1,0 +1,127 @@
+//! Cuts along faces, each held against [`Sample::check`].
+
+mod cuts;
+mod degenerate;
+mod random;
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::complex::det;
+use super::{SnapNode, SnapReport, Snapper};
+use crate::cut::{BladeSweep, CutMesh, Surface};
+use crate::mesh::{BoxPattern, TetMesh, box_mesh};
+
+/// A body under test.
+struct Sample {
+    snapper: Snapper,
+    mesh: TetMesh,
+    nodes: Vec<SnapNode>,
+    volume: f64,
+}
+
+impl Sample {
+    /// The box from the origin to `size` [m].
+    fn new(size: [f64; 3], cells: [usize; 3], pattern: BoxPattern) -> Self {
+        let mesh = box_mesh(Vector3::zeros(), size.into(), cells, pattern);
+        let nodes = (0u32..).zip(&mesh.nodes).map(|(n, &x)| SnapNode::at_rest(x, n)).collect();
+        Self { snapper: Snapper::default(), volume: size.iter().product(), mesh, nodes }
+    }
+
+    fn unit(cells: usize) -> Self {
+        Self::new([1.0; 3], [cells; 3], BoxPattern::Tet6)
+    }
+
+    fn sweep(&mut self, segments: &[[Vector3<f64>; 2]], incision: u32) -> SnapReport {
+        let blade = BladeSweep { segments: segments.to_vec() };
+        let (report, cut) = self.snapper.cut(&self.mesh.tets, self.nodes.clone(), &blade, incision).unwrap();
+        if let Some(cut) = cut {
+            (self.mesh, self.nodes) = (cut.mesh, cut.nodes);
+        }
+        report
+    }
+
+    /// Sweeps a square of half width `reach` [m] in the plane through `point` with the normal.
+    fn cut_plane(&mut self, point: Vector3<f64>, normal: Vector3<f64>, reach: f64, id: u32) -> SnapReport {
+        let n = normal.normalize();
+        let helper = if n.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+        let u = n.cross(&helper).normalize() * reach;
+        let w = n.cross(&u);
+        self.sweep(&[[point - u - w, point - u + w], [point + u - w, point + u + w]], id)
+    }
+
+    fn cut_mesh(&self) -> CutMesh {
+        CutMesh::with_lips(self.mesh.clone(), self.snapper.tags(), 0).unwrap()
+    }
+
+    fn parts(&self) -> usize {
+        self.cut_mesh().components().len()
+    }
+
+    /// Nodes of lips.
+    fn lip_nodes(&self) -> Vec<u32> {
+        let faces = self.mesh.boundary_faces();
+        let lips = faces.iter().filter(|f| {
+            let mut key = f.nodes;
+            key.sort_unstable();
+            self.snapper.tags().contains_key(&key)
+        });
+        let mut nodes: Vec<u32> = lips.flat_map(|f| f.nodes).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// No element inverted in either configuration, volume as before, one set of degrees of freedom
+    /// per node, surface closed and 2-manifold.
+    fn check(&self) {
+        self.mesh.check().unwrap();
+        for tet in &self.mesh.tets {
+            assert!(det(&tet.map(|n| self.nodes[n as usize].x)) > 0.0);
+        }
+        let volume: f64 = self.mesh.volumes().iter().sum();
+        assert!((volume / self.volume - 1.0).abs() < 1e-9, "volume {volume} of {}", self.volume);
+        let cut = self.cut_mesh();
+        assert_eq!(cut.n_copies(), self.mesh.nodes.len(), "nodes shared by what does not hang together");
+        surface_is_closed_and_manifold(cut.surface());
+        let enclosed = cut.surface().volume(&cut.rest_positions());
+        assert!((enclosed / volume - 1.0).abs() < 1e-10);
+    }
+
+    /// Puts an affine map and an affine velocity on the body.
+    fn deform(&mut self, F: Matrix3<f64>, L: Matrix3<f64>) {
+        for node in &mut self.nodes {
+            node.x = F * node.rest;
+            node.v = L * node.rest;
+        }
+    }
+}
+
+/// From the triangle list alone: each directed edge once, its opposite once, every vertex link one cycle.
+fn surface_is_closed_and_manifold(surface: &Surface) {
+    let mut edges = BTreeMap::new();
+    let mut link: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
+    for t in &surface.triangles {
+        for k in 0..3 {
+            let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
+            assert!(a != b && edges.insert((a, b), ()).is_none(), "edge {a}->{b} twice");
+            link.entry(a).or_default().insert(b, c);
+        }
+    }
+    assert!(edges.keys().all(|&(a, b)| edges.contains_key(&(b, a))), "an edge has no opposite");
+    assert_eq!(link.len(), surface.vertices.len());
+    for (vertex, next) in link {
+        let first = *next.keys().next().unwrap();
+        let (mut at, mut length) = (next[&first], 1);
+        while at != first {
+            at = next[&at];
+            length += 1;
+        }
+        assert_eq!(length, next.len(), "the link of surface vertex {vertex} is not one cycle");
+    }
+}
+
+fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
+    Vector3::new(x, y, z)
+}

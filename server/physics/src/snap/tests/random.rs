@@ -1,0 +1,54 @@
+//! Many random cuts of one body.
+
+use super::*;
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn vector(&mut self, r: f64) -> Vector3<f64> {
+        Vector3::from_fn(|_, _| (2.0 * self.next() - 1.0) * r)
+    }
+}
+
+#[test]
+fn a_hundred_random_cuts_leave_a_sound_body() {
+    for (seed, pattern) in [(1, BoxPattern::Tet6), (2, BoxPattern::Tet5 { parity: false })] {
+        let mut random = Random(seed);
+        let mut sample = Sample::new([1.0; 3], [5; 3], pattern);
+        let mut sum = SnapReport::default();
+        for id in 1..=100 {
+            let middle = v(0.5, 0.5, 0.5) + random.vector(0.5);
+            let a = [middle + random.vector(0.7), middle + random.vector(0.7)];
+            let shift = random.vector(0.7);
+            let b = [a[0] + shift, a[1] + shift + random.vector(0.1)];
+            let report = sample.sweep(&[a, b], 1 + id / 2);
+            sum.faces += report.faces;
+            sum.collapses += report.collapses;
+            sum.degenerate = report.degenerate;
+            sample.check();
+        }
+        assert!(sum.faces > 300, "{sum:?}");
+    }
+}
+
+#[test]
+fn the_same_cuts_give_the_same_mesh() {
+    let cut = || {
+        let mut random = Random(7);
+        let mut sample = Sample::unit(4);
+        for id in 1..=10 {
+            sample.cut_plane(v(0.5, 0.5, 0.5) + random.vector(0.3), random.vector(1.0), 0.8, id);
+        }
+        sample.mesh
+    };
+    assert_eq!(cut(), cut());
+}

@@ -1,0 +1,106 @@
+//! Bodies cut along their faces: state, constraints and loads follow the mesh.
+
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, BodySettings, CuttingMethod, ElementKind, LooseRule, Outcome, Scheme};
+use scindo_physics::cut::BladeSweep;
+use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::mesh::{BoxPattern, box_mesh};
+
+fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
+    Vector3::new(x, y, z)
+}
+
+fn block(law: Law, settings: BodySettings) -> Body {
+    let mesh = box_mesh(Vector3::zeros(), v(0.1, 0.1, 0.2), [4, 4, 8], BoxPattern::Tet6);
+    let rayleigh = Rayleigh::default();
+    let material = Material { young_pa: 2e4, poisson: 0.3, density_kg_m3: 1e3, rayleigh, law };
+    let mut body = Body::new(mesh, material, settings).unwrap();
+    let base: Vec<u32> =
+        (0u32..).zip(body.rest_positions()).filter(|(_, x)| x.z == 0.0).map(|(n, _)| n).collect();
+    body.fix(&base, [true; 3], Vector3::zeros()).unwrap();
+    body
+}
+
+fn snap() -> BodySettings {
+    BodySettings { cutting: CuttingMethod::Snap, ..super::settings(100, 1e-6) }
+}
+
+/// The blade through z ≈ `z`, from outside to `x`.
+fn sweep(z: f64, x: f64) -> BladeSweep {
+    BladeSweep {
+        segments: vec![[v(-0.1, -0.1, z), v(-0.1, 0.2, z + 0.01)], [v(x, -0.1, z), v(x, 0.2, z + 0.01)]],
+    }
+}
+
+const G: Vector3<f64> = Vector3::new(9.81, 0.0, 0.0);
+
+#[test]
+fn a_moving_body_is_cut_and_goes_on() {
+    let general = BodySettings { scheme: Scheme::Bdf2, ..snap() };
+    for (law, settings) in [(Law::Corotational, snap()), (Law::NeoHookean, general)] {
+        let mut body = block(law, settings);
+        for _ in 0..5 {
+            assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
+        }
+        let (mass, centre, epoch) = (body.total_mass(), body.centre_of_mass(), body.cut_mesh().epoch());
+        let (nodes, held) = (body.rest_positions().len(), body.fixed_nodes().len());
+        let report = body.cut(&sweep(0.107, 0.08), 1).unwrap();
+        assert!(report.faces_opened > 4 && !report.new_copies.is_empty(), "{report:?}");
+        assert_eq!(report.epoch, epoch + 1);
+        assert!((body.total_mass() / mass - 1.0).abs() < 1e-9);
+        assert!((body.centre_of_mass() - centre).norm() < 2e-4 && body.least_volume_ratio() > 0.2);
+        assert!(body.rest_positions().len() > nodes && body.fixed_nodes().len() == held);
+        for _ in 0..20 {
+            assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
+        }
+        assert!(body.least_volume_ratio() > 0.0);
+        body.reset().unwrap();
+        assert_eq!((body.rest_positions().len(), body.fixed_nodes().len()), (nodes, held));
+        assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
+    }
+}
+
+#[test]
+fn a_part_cut_off_falls_freely_or_is_pinned() {
+    for loose in [LooseRule::Free, LooseRule::Pinned] {
+        let mut body = block(Law::Corotational, BodySettings { loose, ..snap() });
+        body.cut(&sweep(0.107, 0.2), 1).unwrap();
+        assert_eq!(body.parts().len(), 2);
+        for _ in 0..10 {
+            body.step(0.01, v(0.0, 0.0, 9.81), &[]);
+        }
+        let top = body.positions().iter().map(|x| x.z).fold(0.0, f64::max);
+        // Implicit Euler falls g h² n (n + 1)/2.
+        let fallen = 9.81 * 1e-4 * 55.0;
+        match loose {
+            LooseRule::Free => assert!((top - 0.2 - fallen).abs() < 1e-3, "{top}"),
+            LooseRule::Pinned => assert!(top < 0.25 && body.parts().free == [false, false], "{top}"),
+        }
+    }
+}
+
+#[test]
+fn loads_keep_their_sum_and_what_does_not_go_is_refused() {
+    let mut body = block(Law::Corotational, snap());
+    let top: Vec<u32> =
+        (0u32..).zip(body.rest_positions()).filter(|(_, x)| x.z == 0.2).map(|(n, _)| n).collect();
+    body.add_surface_force(&top, v(0.0, 0.1, 0.0)).unwrap();
+    let blade = BladeSweep {
+        segments: vec![[v(0.047, -1.0, -1.0), v(0.047, -1.0, 1.0)], [v(0.05, 1.0, -1.0), v(0.05, 1.0, 1.0)]],
+    };
+    body.cut(&blade, 1).unwrap();
+    assert_eq!(body.parts().len(), 2);
+    // Both halves are held by the duplicates of the nodes at the base.
+    assert_eq!(body.parts().free, [false, false]);
+    for _ in 0..200 {
+        body.step(0.02, Vector3::zeros(), &[]);
+    }
+    let base: Vec<u32> = body.fixed_nodes().iter().map(|f| f.node).collect();
+    let held = body.reaction(&base, Vector3::zeros());
+    assert!((held + v(0.0, 0.1, 0.0)).norm() < 2e-3, "{held:?}");
+
+    let refused = |settings: BodySettings| settings.check(Law::Corotational).unwrap_err().to_string();
+    assert!(refused(BodySettings { element: ElementKind::Tet10, ..snap() }).contains("tet10"));
+    let xfem = BodySettings { cutting: CuttingMethod::Xfem, loose: LooseRule::Pinned, ..snap() };
+    assert!(refused(xfem).contains("pinning"));
+}

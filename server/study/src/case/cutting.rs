@@ -1,0 +1,126 @@
+//! Schoch's beam, half cut in three ways: inside the elements, along their faces, and by a mesh that
+//! was made with the cut. Each under gravity, under a dead force and under a prescribed strip.
+
+use super::Case;
+use super::gold::Gold;
+use super::shared::{load, names};
+use crate::axes::{Axis, Factor, Setting, on_bodies, tolerances, words};
+use crate::design::Block;
+use crate::error::Goal;
+use crate::trial::Protocol;
+
+/// Names of the ways to cut, the labels of [`Factor::Cutting`].
+pub const METHODS: [&str; 3] = ["xfem", "snap", "precut"];
+
+/// What pulls at the beam.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pull {
+    /// Gravity across the beam.
+    Gravity,
+    /// 5 N along it, on a strip of its free end.
+    Force,
+    /// The same strip moved by 20 mm along it.
+    Strip,
+}
+
+/// Cells of 6×12×40 in the beam, of 3×6×20 for a quick look; the strip ends on a line of cells.
+const FINE: (&[f64], usize, usize) = (&[0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03], 12, 20);
+const COARSE: (&[f64], usize, usize) = (&[0.0, 0.005, 0.015, 0.03], 6, 10);
+
+/// The case.
+pub fn case(pull: Pull, quick: bool) -> Case {
+    let body = ["beam".to_owned()];
+    let gold = Gold::read(match pull {
+        Pull::Gravity => include_str!("../../cases/r2-tc1.gold.json"),
+        Pull::Force => include_str!("../../cases/r2-tc2force.gold.json"),
+        Pull::Strip => include_str!("../../cases/r2-tc2strip.gold.json"),
+    });
+    let (name, title, how, goal) = match pull {
+        Pull::Gravity => ("cut-tc1", "gravity", "Gravity bends it sideways", [1.0, 0.0, 0.0]),
+        Pull::Force => {
+            ("cut-tc2force", "force", "A dead force of 5 N on a strip of its end pulls it", [0.0, 0.0, 1.0])
+        }
+        Pull::Strip => {
+            ("cut-tc2strip", "displacement", "A strip of its end is moved by 20 mm along it", [1.0, 0.0, 0.0])
+        }
+    };
+    let (x_m, y, half_z) = if quick { COARSE } else { FINE };
+    let mut overrides = vec![gold.probes("beam"), format!("name=\"{name}\"")];
+    overrides.extend(pulled(pull));
+    let axes = vec![
+        words(Factor::Law, &body, "law", &["linear", "corotational", "stvk"], "stvk"),
+        methods(&body, x_m, y, half_z),
+        tolerances(&body, &[1e-2, 1e-4, 1e-6, 1e-8], 1e-6),
+    ];
+    let cells = x_m.len() - 1;
+    Case {
+        name: name.into(),
+        title: format!("Cutting methods · Schoch’s beam, {title}"),
+        about: format!(
+            "A beam of 30 × 60 × 200 mm (E = 300 kPa, ν = 0.35), held at its base and cut through to half its \
+             depth. {how} and opens the cut. All meshes have {cells}×{y}×{} cells of five tetrahedra. That \
+             of `precut` has faces where the cut is; for `xfem` and `snap` the plane of the cut lies a third \
+             of a cell inside, and so does its front.",
+            2 * half_z
+        ),
+        scene: load(include_str!("../../cases/r2-tc1.toml"), &overrides),
+        bodies: body.to_vec(),
+        protocol: Protocol::Static,
+        goal: Goal::new("deflection of the tip", gold.probe("tip_mid"), goal),
+        truth: gold.truth("stvk", None, "Stored solution for St. Venant–Kirchhoff"),
+        blocks: vec![
+            Block::of(&[(Factor::Cutting, &METHODS), (Factor::Law, &["linear", "corotational", "stvk"])]),
+            Block(vec![(Factor::Cutting, names(&METHODS)), (Factor::Tolerance, names(&["1e-2", "1e-8"]))]),
+        ],
+        axes,
+        colour: Factor::Cutting,
+        shape: Factor::Law,
+    }
+}
+
+/// Loads and constraints instead of gravity.
+fn pulled(pull: Pull) -> Vec<String> {
+    let base = "{ where = { box = { min_m = [-1, -1, -1], max_m = [1, 1, 1e-6] } } }";
+    let strip = "where = { box = { min_m = [-1, -1, 0.199999], max_m = [0.005001, 1, 1] } }";
+    let weightless = "world.gravity_m_s2=[0.0, 0.0, 0.0]".to_owned();
+    match pull {
+        Pull::Gravity => Vec::new(),
+        Pull::Force => {
+            vec![weightless, format!("body.beam.load=[{{ {strip}, force_n = [0, 0, 5], share = \"area\" }}]")]
+        }
+        Pull::Strip => vec![
+            weightless,
+            format!("body.beam.fix=[{base}, {{ {strip}, axes = \"z\", displacement_m = [0, 0, 0.02] }}]"),
+        ],
+    }
+}
+
+/// The three ways, each with its mesh.
+fn methods(body: &[String], x_m: &[f64], y: usize, half_z: usize) -> Axis {
+    let y_m: Vec<f64> = (0..=y).map(|j| 0.06 * j as f64 / y as f64).collect();
+    let n = half_z as f64;
+    let aligned: Vec<f64> = (0..=2 * half_z).map(|k| 0.1 * k as f64 / n).collect();
+    // The cut at z = 0.1 is a third of a cell above line half_z.
+    let dz = 0.1 / (n + 1.0 / 3.0);
+    let below = (0..=half_z).map(|k| dz * k as f64);
+    let above = (1..=half_z).map(|k| dz * n + (0.2 - dz * n) * k as f64 / n);
+    let beside: Vec<f64> = below.chain(above).collect();
+    // The front at x = 0.015 is a third of a cell before a line.
+    let front = x_m.iter().position(|x| *x == 0.015).unwrap_or(1);
+    let mut x_beside = x_m.to_vec();
+    x_beside[front] += (x_m[front] - x_m[front - 1]) / 3.0;
+    let grid = |x: &[f64], z: &[f64]| {
+        let table = format!("{{ grid = {{ x_m = {x:?}, y_m = {y_m:?}, z_m = {z:?}, pattern = \"tet5\" }} }}");
+        on_bodies(body, "mesh", &table)
+    };
+    let setting = |(i, label): (usize, &&str)| {
+        let mut set = match *label {
+            "precut" => grid(x_m, &aligned),
+            _ => grid(&x_beside, &beside),
+        };
+        let method = if *label == "snap" { "snap" } else { "xfem" };
+        set.extend(on_bodies(body, "cutting.method", &format!("\"{method}\"")));
+        Setting::new(*label, i as f64, set)
+    };
+    Axis::new(Factor::Cutting, METHODS.iter().enumerate().map(setting).collect(), "xfem")
+}

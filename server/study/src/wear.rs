@@ -1,0 +1,122 @@
+//! What many cuts do to a mesh: quality and size after 1, 10 and 100 of them.
+//!
+//! The body lies still, weightless and without loads; the first cut is that of the case, the others are
+//! planes across the beam to seeded random depths, the same for every method.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nalgebra::Vector3;
+use scindo_world::build::BuildOptions;
+use scindo_world::inputs::{CutRequest, Inputs};
+use scindo_world::scene::Scene;
+use scindo_world::simulation::{Simulation, Stage};
+use serde::{Deserialize, Serialize};
+
+/// After how many cuts the mesh is looked at.
+pub const CUTS: [usize; 3] = [1, 10, 100];
+
+/// The mesh after a number of cuts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Wear {
+    /// Cuts so far.
+    pub cuts: usize,
+    /// Mean ratio of the worst element: 1 regular, 0 flat (Liu, Joe 1994).
+    pub quality: f64,
+    /// Elements.
+    pub elements: usize,
+    /// Pieces that material is divided into inside them; as many as elements where none is.
+    pub pieces: usize,
+    /// Nodes, copies included.
+    pub nodes: usize,
+    /// Least volume fraction of a piece of its element.
+    pub least_fraction: f64,
+    /// Parts that hang together.
+    pub parts: usize,
+    /// Time of all cuts so far [ms].
+    pub cut_ms: f64,
+}
+
+/// Keys of the scene that leave the body alone.
+pub fn at_rest(bodies: &[String]) -> Vec<String> {
+    let mut set = vec!["world.gravity_m_s2=[0.0, 0.0, 0.0]".to_owned(), "world.step_s=0.001".to_owned()];
+    for id in bodies {
+        set.push(format!("body.{id}.load=[]"));
+        set.push(format!("body.{id}.fix=[]"));
+        set.push(format!("body.{id}.integrator=\"implicit-euler\""));
+        set.push(format!("body.{id}.law=\"linear\""));
+        set.push(format!("body.{id}.solver.tolerance=1e-2"));
+    }
+    set
+}
+
+/// Cuts the first body of a scene; no more than one cut where `once`. None where the scene is refused
+/// or `stop` was raised.
+pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) -> Option<Vec<Wear>> {
+    let mut simulation = Simulation::with_options(scene, base_dir, BuildOptions::default()).ok()?;
+    let [low, high] = simulation.bodies().first()?.body.cut_mesh().mesh().bounds();
+    let mut random = Random(4);
+    let (mut cut_ms, mut found) = (0.0, Vec::new());
+    for cut in 1..=CUTS[2] {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let cuts = if cut == 1 { Vec::new() } else { vec![plane(&mut random, cut, low, high)] };
+        let report = simulation.step(&Inputs { cuts, ..Inputs::default() });
+        cut_ms += 1e3 * report.seconds.of(Stage::Cuts);
+        if CUTS.contains(&cut) {
+            let mesh = simulation.bodies().first()?.body.cut_mesh();
+            found.push(Wear {
+                cuts: cut,
+                quality: mesh.mesh().quality().min_mean_ratio.0,
+                elements: mesh.mesh().tets.len(),
+                pieces: mesh.pieces().len(),
+                nodes: mesh.n_copies(),
+                least_fraction: mesh.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min),
+                parts: mesh.components().len(),
+                cut_ms,
+            });
+        }
+        if once {
+            break;
+        }
+    }
+    Some(found)
+}
+
+/// A sweep across the box from outside to a random depth, tilted at random.
+fn plane(random: &mut Random, cut: usize, low: Vector3<f64>, high: Vector3<f64>) -> CutRequest {
+    let size = high - low;
+    let across = (0.15 + 0.7 * random.next()) * size.z + low.z;
+    let tilt = [0.2 * size.x * (random.next() - 0.5), 0.2 * size.y * (random.next() - 0.5)];
+    let depth = low.x + size.x * (0.2 + 0.6 * random.next());
+    let at = |x: f64, far: bool, rise: f64| {
+        let y = if far { high.y + 0.1 * size.y } else { low.y - 0.1 * size.y };
+        Vector3::new(x, y, across + rise + if far { tilt[1] } else { 0.0 })
+    };
+    let outside = low.x - 0.1 * size.x;
+    CutRequest {
+        request: cut as u64,
+        // Every cut is an incision of its own.
+        tool: Arc::from(format!("wear-{cut}")),
+        body: None,
+        segments: vec![
+            [at(outside, false, 0.0), at(outside, true, 0.0)],
+            [at(depth, false, tilt[0]), at(depth, true, tilt[0])],
+        ],
+    }
+}
+
+/// SplitMix64: small, seeded, the same everywhere.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
