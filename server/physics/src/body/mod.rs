@@ -264,6 +264,10 @@ impl Body {
         settings: SkinSettings,
         shape: &mut SkinShape<'_>,
     ) -> Result<(), BodyError> {
+        if self.snap.is_some() {
+            let with = "cutting along element faces";
+            return Err(BodyError::Combination { what: "a skin", with, instead: "cutting method xfem" });
+        }
         if self.shape.kind() == ElementKind::Tet4 {
             self.skin = Some(Skin::new(&self.cut_mesh, settings, shape)?);
             return Ok(());

@@ -197,10 +197,9 @@ fn spare_single_elements(complex: &Complex, memory: &Memory, selection: &mut Sel
                 || selection.faces.contains(&keys[k])
                 || complex.tag(&keys[k]).is_some()
         };
-        if complex.tet(t).iter().all(marked) && (0..4).all(parted) {
-            if let Some(key) = keys.iter().find(|key| selection.faces.contains(*key)) {
-                selection.faces.remove(key);
-            }
+        let falls_out = complex.tet(t).iter().all(marked) && (0..4).all(parted);
+        if let (true, Some(key)) = (falls_out, keys.iter().find(|key| selection.faces.contains(*key))) {
+            selection.faces.remove(key);
         }
     }
 }
