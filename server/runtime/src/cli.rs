@@ -32,6 +32,8 @@ enum Command {
     Mesh(MeshArgs),
     /// Measure what accuracy costs in time: laws, elements, meshes, steps, solvers on reference cases or a scene.
     Accuracy(AccuracyArgs),
+    /// Run the hard cases that break codes which deform and cut, and write a page about them.
+    Stress(StressArgs),
 }
 
 /// `scindo run`.
@@ -170,6 +172,29 @@ pub struct AccuracyArgs {
     pub json: bool,
 }
 
+/// `scindo stress`.
+#[derive(Debug, Args)]
+pub struct StressArgs {
+    /// Only this case, by name or number; may be given again.
+    #[arg(long = "case", value_name = "NAME")]
+    pub cases: Vec<String>,
+    /// Print the cases instead of running them.
+    #[arg(long)]
+    pub list: bool,
+    /// Take parts of the method away and see that the cases fail: about five times as long.
+    #[arg(long)]
+    pub mutations: bool,
+    /// Where index.html and stress.json go.
+    #[arg(long, value_name = "DIR", default_value = "stress")]
+    pub out: PathBuf,
+    /// Cases run at the same time; 0: one per hardware thread. Results do not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: u16,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Parses, runs, and turns the outcome into an exit code: the one place that does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -180,6 +205,7 @@ pub fn main() -> ExitCode {
         Some(Command::Check(args)) => args.json,
         Some(Command::Mesh(args)) => args.json,
         Some(Command::Accuracy(args)) => args.json,
+        Some(Command::Stress(args)) => args.json,
     };
     let outcome = match cli.command {
         None => command::run::demonstration(&cli.demonstration),
@@ -187,6 +213,7 @@ pub fn main() -> ExitCode {
         Some(Command::Check(args)) => command::check::check(&args),
         Some(Command::Mesh(args)) => command::mesh::mesh(&args),
         Some(Command::Accuracy(args)) => command::accuracy::accuracy(&args),
+        Some(Command::Stress(args)) => command::stress::stress(&args),
     };
     match outcome {
         Ok(code) => code,

@@ -7,3 +7,5 @@ pub mod check;
 pub mod mesh;
 
 pub mod accuracy;
+
+pub mod stress;

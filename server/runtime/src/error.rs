@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use scindo_proto::KeyError;
 use scindo_study::StudyError;
+use scindo_study::stress::StressError;
 use scindo_world::mesh_in::MeshInError;
 use scindo_world::results::ResultsError;
 use scindo_world::scene::SceneError;
@@ -27,6 +28,9 @@ pub enum RuntimeError {
     /// A study of accuracy.
     #[error(transparent)]
     Study(#[from] StudyError),
+    /// A case that does not exist, or a page that cannot be written.
+    #[error(transparent)]
+    Stress(#[from] StressError),
     /// An option of the command line that cannot be used.
     #[error("{option} '{value}': {reason}. {next}")]
     Option {
@@ -90,7 +94,8 @@ impl RuntimeError {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Study(StudyError::Io { .. }) => ExitCode::from(1),
-            Self::Study(_) => ExitCode::from(2),
+            Self::Stress(StressError::Io { .. }) => ExitCode::from(1),
+            Self::Study(_) | Self::Stress(_) => ExitCode::from(2),
             Self::Scene(_) | Self::Mesh(_) | Self::Option { .. } | Self::Key(_) => ExitCode::from(2),
             _ => ExitCode::from(1),
         }
@@ -101,6 +106,7 @@ impl RuntimeError {
         match self {
             Self::Scene(_) | Self::Study(StudyError::Scene(_)) => "scene",
             Self::Study(_) => "study",
+            Self::Stress(_) => "stress",
             Self::Option { .. } => "option",
             Self::Key(_) => "key",
             Self::Listen { .. } => "listen",

@@ -44,4 +44,8 @@ pub mod page;
 
 pub mod study;
 
+// the other study: what breaks codes that deform and cut
+#[allow(non_snake_case)] // the symbols of the field: X, K, M
+pub mod stress;
+
 pub use study::{CaseResult, Outcome, Progress, Settings, StudyError, StudyResult, run};

@@ -60,10 +60,26 @@ impl Body {
             Path::Fast(_) => self.cut_mesh.copy_volume().iter().map(|v| density * v).collect(),
             Path::General(general) => general.model().lumped_mass(density),
         };
+        if self.settings.ablation.piece_masses && self.is_fast() {
+            self.share_masses_evenly();
+        }
         if let Path::Fast(fast) = &mut self.path {
             fast.follow_topology(&self.cut_mesh, &self.mass, &self.state);
         }
         self.follow_boundary();
+    }
+
+    /// What [`Ablation::piece_masses`](super::Ablation) asks for.
+    fn share_masses_evenly(&mut self) {
+        let mut sum = vec![(0.0, 0.0); self.cut_mesh.mesh().nodes.len()];
+        for (&node, m) in self.cut_mesh.copy_node().iter().zip(&self.mass) {
+            let (mass, copies) = &mut sum[node as usize];
+            (*mass, *copies) = (*mass + m, *copies + 1.0);
+        }
+        for (&node, m) in self.cut_mesh.copy_node().iter().zip(&mut self.mass) {
+            let (mass, copies) = sum[node as usize];
+            *m = mass / copies;
+        }
     }
 
     /// Everything that is derived from constraints and loads.

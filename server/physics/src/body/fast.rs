@@ -35,12 +35,12 @@ struct Weightless {
 }
 
 impl Fast {
-    pub fn new(simd: Simd, mesh: &CutMesh) -> Self {
+    pub fn new(simd: Simd, mesh: &CutMesh, at_start: bool) -> Self {
         Self {
             simd,
             elastic: Elastic::new(simd, mesh.mesh(), mesh.pieces(), mesh.n_copies()),
             mass_f32: Vec::new(),
-            integrator: ImplicitEuler::default(),
+            integrator: ImplicitEuler::new(at_start),
             weightless: Vec::new(),
             before: State::default(),
         }

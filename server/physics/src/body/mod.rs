@@ -1,5 +1,6 @@
 //! One body: what the world holds, steps, cuts, loads and measures.
 
+mod ablation;
 mod boundary;
 mod cutting;
 mod error;
@@ -11,6 +12,8 @@ mod shape;
 mod snapping;
 mod statics;
 
+#[doc(hidden)]
+pub use ablation::Ablation;
 pub use boundary::FixedNode;
 pub use error::BodyError;
 pub use settings::{Arithmetic, BodySettings};
@@ -150,9 +153,11 @@ impl Body {
     ) -> Result<Self, BodyError> {
         material.check()?;
         settings.check(material.law)?;
+        let mut cut_mesh = cut_mesh;
+        cut_mesh.set_exact(!settings.ablation.exact_predicates);
         let path = if settings.arithmetic(material.law) == Arithmetic::Single {
             let simd = if settings.portable { Simd::Baseline } else { Simd::detect() };
-            let mut fast = Fast::new(simd, &cut_mesh);
+            let mut fast = Fast::new(simd, &cut_mesh, settings.ablation.predictor);
             fast.elastic.set_choice(settings.operator(material.law, cut_mesh.pieces().len()));
             Path::Fast(Box::new(fast))
         } else {

@@ -1,6 +1,6 @@
 //! How a body is discretised and solved, and which combinations the fast path can take.
 
-use super::{BodyError, CuttingMethod, LooseRule};
+use super::{Ablation, BodyError, CuttingMethod, LooseRule};
 use crate::assembly::{ElementKind, Volumetric};
 use crate::integrator::{MassKind, Scheme};
 use crate::material::Law;
@@ -40,6 +40,9 @@ pub struct BodySettings {
     pub cutting: CuttingMethod,
     /// What becomes of parts that a cut leaves without a held node.
     pub loose: LooseRule,
+    /// Parts of the method that are taken out; for tests of tests.
+    #[doc(hidden)]
+    pub ablation: Ablation,
 }
 
 /// The arithmetic of a step. State and sums are in double precision always.
@@ -79,6 +82,7 @@ impl Default for BodySettings {
             newton_steps: None,
             cutting: CuttingMethod::Xfem,
             loose: LooseRule::Free,
+            ablation: Ablation::default(),
         }
     }
 }
@@ -140,12 +144,16 @@ impl BodySettings {
             LinearSettings { method: self.method, precision, iterations: self.solver.iterations, tolerance };
         // Without inertia the projected tangent costs three times as many steps as the exact one.
         let curvature = if self.scheme == Scheme::Static { Curvature::Exact } else { Curvature::Definite };
+        let halvings = match self.ablation.line_search {
+            true => NewtonSettings::UNCHECKED,
+            false => NewtonSettings::default().halvings,
+        };
         NewtonSettings {
             steps,
+            halvings,
             tolerance: self.solver.tolerance,
             curvature,
             linear,
-            ..NewtonSettings::default()
         }
     }
 

@@ -42,9 +42,16 @@ pub struct CutMesh {
     detector: Detector,
     separator: Separator,
     epoch: u32,
+    inexact: bool,
 }
 
 impl CutMesh {
+    /// Whether signs are exact, as they are from the start; others are only for a test of tests.
+    #[doc(hidden)]
+    pub fn set_exact(&mut self, exact: bool) {
+        self.inexact = !exact;
+    }
+
     /// The uncut state of a mesh.
     pub fn new(mesh: TetMesh) -> Result<Self, MeshError> {
         Self::with_lips(mesh, &BTreeMap::new(), 0)
@@ -80,6 +87,7 @@ impl CutMesh {
             detector: Detector::default(),
             separator: Separator::default(),
             epoch,
+            inexact: false,
         })
     }
 
@@ -157,9 +165,9 @@ impl CutMesh {
 
     /// Undoes all cuts; the epoch keeps rising.
     pub fn reset(&mut self) -> Result<(), MeshError> {
-        let epoch = self.epoch + 1;
+        let (epoch, inexact) = (self.epoch + 1, self.inexact);
         *self = Self::new(std::mem::take(&mut self.mesh))?;
-        self.epoch = epoch;
+        (self.epoch, self.inexact) = (epoch, inexact);
         Ok(())
     }
 
@@ -184,7 +192,8 @@ impl CutMesh {
         if let Some(copy) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
             return Err(CutError::NonFinitePosition { copy });
         }
-        let triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
+        let mut triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
+        triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
         let (low, high) = bounds(&triangles, blade);
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
         self.detector.find_candidates(&body, &low, &high);

@@ -18,6 +18,8 @@ pub struct SweepTriangle {
     pub high: Vector3<f64>,
     /// Twice the area [m²].
     pub double_area: f64,
+    /// Signs are exact; only a test of tests wants others.
+    pub exact: bool,
 }
 
 impl SweepTriangle {
@@ -29,20 +31,21 @@ impl SweepTriangle {
             low: p.inf(&q).inf(&r),
             high: p.sup(&q).sup(&r),
             double_area,
+            exact: true,
         })
     }
 
     /// Six times the signed volume spanned with `x`; its sign is exact.
     pub fn side(&self, x: &Vector3<f64>) -> f64 {
         let [p, q, r] = &self.corners;
-        orient(p, q, r, x)
+        self.orient(p, q, r, x)
     }
 
     /// Whether the line through `a` and `b`, which lie on different sides of the plane or one of
     /// them on it, meets the triangle, its border included.
     pub fn holds_line(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
         let [p, q, r] = &self.corners;
-        let s = [orient(a, b, p, q), orient(a, b, q, r), orient(a, b, r, p)];
+        let s = [self.orient(a, b, p, q), self.orient(a, b, q, r), self.orient(a, b, r, p)];
         s.iter().all(|&v| v >= 0.0) || s.iter().all(|&v| v <= 0.0)
     }
 
@@ -62,11 +65,14 @@ impl SweepTriangle {
     pub fn overlaps(&self, low: &Vector3<f64>, high: &Vector3<f64>) -> bool {
         (0..3).all(|k| self.low[k] <= high[k] && low[k] <= self.high[k])
     }
-}
 
-fn orient(p: &Vector3<f64>, q: &Vector3<f64>, r: &Vector3<f64>, x: &Vector3<f64>) -> f64 {
-    let c = |v: &Vector3<f64>| Coord3D { x: v.x, y: v.y, z: v.z };
-    robust::orient3d(c(p), c(q), c(r), c(x))
+    fn orient(&self, p: &Vector3<f64>, q: &Vector3<f64>, r: &Vector3<f64>, x: &Vector3<f64>) -> f64 {
+        if !self.exact {
+            return -(q - p).cross(&(r - p)).dot(&(x - p));
+        }
+        let c = |v: &Vector3<f64>| Coord3D { x: v.x, y: v.y, z: v.z };
+        robust::orient3d(c(p), c(q), c(r), c(x))
+    }
 }
 
 #[cfg(test)]

@@ -56,6 +56,12 @@ pub struct NewtonSettings {
     pub linear: LinearSettings,
 }
 
+impl NewtonSettings {
+    /// As `halvings`: full steps, unseen. Only to show what the line search is for.
+    #[doc(hidden)]
+    pub const UNCHECKED: u32 = u32::MAX;
+}
+
 impl Default for NewtonSettings {
     fn default() -> Self {
         Self {
@@ -250,6 +256,12 @@ impl Newton {
         (slope, largest, halvings): (f64, f64, u32),
         report: &mut NewtonReport,
     ) -> Option<f64> {
+        if halvings == NewtonSettings::UNCHECKED {
+            for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.p) {
+                *trial = x + p;
+            }
+            return Some(potential.gradient(team, &self.trial, &mut self.trial_g));
+        }
         if slope >= 0.0 || !slope.is_finite() {
             return None;
         }

@@ -75,7 +75,7 @@ fn narrowed(args: &AccuracyArgs) -> Vec<(Factor, Vec<String>)> {
 }
 
 /// Raises `stop` at the first Ctrl-C or request to terminate; a second Ctrl-C ends the program.
-fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
+pub(super) fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
     let failed = |e: std::io::Error| RuntimeError::System {
         what: "listening for signals".to_owned(),
         reason: e.to_string(),
@@ -100,7 +100,8 @@ fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
     Ok(())
 }
 
-fn bar(json: bool) -> ProgressBar {
+/// A bar on the standard error, nothing with `--json`.
+pub(super) fn bar(json: bool) -> ProgressBar {
     let target = if json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {wide_msg}");
     let bar = ProgressBar::with_draw_target(Some(0), target)

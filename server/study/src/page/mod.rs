@@ -8,7 +8,7 @@ mod plot;
 
 mod scale;
 
-mod style;
+pub(crate) mod style;
 
 mod text;
 
@@ -57,7 +57,7 @@ fn html(study: &StudyResult) -> String {
 }
 
 /// Text for HTML and SVG.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

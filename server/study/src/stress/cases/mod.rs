@@ -1,0 +1,55 @@
+//! The list of hard cases, in their order.
+
+mod flaws;
+mod branches;
+mod critical_step;
+mod falling;
+mod far;
+mod growth;
+mod input;
+mod later;
+mod on_mesh;
+mod ruined;
+mod sliver;
+mod spin;
+mod stiff;
+mod support;
+
+use super::case::Case;
+
+/// All cases: the numbered ones, then what is shown beside them.
+pub const ALL: &[Case] = &[
+    sliver::CASE,
+    on_mesh::NODE,
+    on_mesh::EDGE,
+    on_mesh::FACE,
+    branches::HALVED,
+    branches::RANDOM,
+    falling::FREED_NODE,
+    falling::FRAGMENTS,
+    branches::BRANCHES,
+    growth::GROWTH,
+    growth::AGAIN,
+    branches::MOVING,
+    branches::CLAMPED,
+    ruined::INVERTED,
+    ruined::COLLAPSED,
+    ruined::FLATTENED,
+    ruined::SCRAMBLED,
+    spin::STEPS,
+    spin::SPIN,
+    spin::NEWMARK,
+    stiff::LAYERS,
+    stiff::INCOMPRESSIBLE,
+    stiff::NEEDLES,
+    later::JAB,
+    later::PACKETS,
+    input::CASE,
+    later::WALL,
+    later::LIPS,
+    later::BLADES,
+    later::SOAK,
+    later::OVERLOAD,
+    far::CASE,
+    critical_step::CASE,
+];

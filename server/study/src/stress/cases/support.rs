@@ -1,0 +1,128 @@
+//! Bodies, materials and blades that several cases share.
+
+use nalgebra::Vector3;
+use scindo_physics::body::Body;
+use scindo_physics::cut::{BladeSweep, CutMesh, CutReport};
+use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
+
+use crate::stress::case::Trouble;
+
+/// A vector.
+pub type V = Vector3<f64>;
+
+/// Edge of the cubes [m].
+pub const L: f64 = 0.1;
+
+/// Gravity [m/s²].
+pub const DOWN: V = V::new(0.0, -9.81, 0.0);
+
+/// A light, soft material without damping.
+pub const SOFT: Material = Material {
+    young_pa: 1e5,
+    poisson: 0.33,
+    density_kg_m3: 100.0,
+    rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.0 },
+    law: Law::Corotational,
+};
+
+/// The same material with damping.
+pub fn damped(mass_1_s: f64, stiffness_s: f64) -> Material {
+    Material { rayleigh: Rayleigh { mass_1_s, stiffness_s }, ..SOFT }
+}
+
+/// A cube of 0.1 m, six tetrahedra per cell.
+pub fn cube(cells: usize) -> TetMesh {
+    block([L; 3], [cells; 3])
+}
+
+/// A block with its corner at the origin, six tetrahedra per cell.
+pub fn block(size: [f64; 3], cells: [usize; 3]) -> TetMesh {
+    box_mesh(V::zeros(), size.into(), cells, BoxPattern::Tet6)
+}
+
+/// Nodes for which `chosen` is true.
+pub fn nodes(mesh: &TetMesh, chosen: impl Fn(&V) -> bool) -> Vec<u32> {
+    (0u32..).zip(&mesh.nodes).filter(|(_, X)| chosen(X)).map(|(n, _)| n).collect()
+}
+
+/// Clamps the nodes at x = 0.
+pub fn clamp_left(body: &mut Body) -> Result<Vec<u32>, Trouble> {
+    let clamp = nodes(body.cut_mesh().mesh(), |X| X.x == 0.0);
+    body.fix(&clamp, [true; 3], V::zeros())?;
+    Ok(clamp)
+}
+
+/// A blade that spans z and sweeps the plane x = `at` from y = `from` to `to`, all in edges of the
+/// cube.
+pub fn slice(at: f64, from: f64, to: f64) -> BladeSweep {
+    let segment = |y: f64| [V::new(at, y, -5.0) * L, V::new(at, y, 5.0) * L];
+    BladeSweep { segments: vec![segment(from), segment(to)] }
+}
+
+/// A square of half width `reach` [m] in the plane through `point` with `normal`.
+pub fn plane(point: V, normal: V, reach: f64) -> BladeSweep {
+    let n = normal.normalize();
+    let helper = if n.x.abs() < 0.6 { V::x() } else { V::y() };
+    let u = n.cross(&helper).normalize() * reach;
+    let w = n.cross(&u);
+    BladeSweep { segments: vec![[point - u - w, point - u + w], [point + u - w, point + u + w]] }
+}
+
+/// A cut state with the positions of its copies.
+#[derive(Clone, Debug)]
+pub struct Shaped {
+    /// Pieces and copies.
+    pub mesh: CutMesh,
+    /// Position of every copy [m].
+    pub x: Vec<V>,
+}
+
+impl Shaped {
+    /// The mesh at rest.
+    pub fn new(mesh: CutMesh) -> Self {
+        let x = mesh.rest_positions();
+        Self { mesh, x }
+    }
+
+    /// Sweeps; new copies are where the copies are that they were split from.
+    pub fn sweep(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, Trouble> {
+        let report = self.mesh.sweep(&self.x, blade, incision)?;
+        for new in &report.new_copies {
+            self.x.push(self.x[new.parent as usize]);
+        }
+        Ok(report)
+    }
+
+    /// Numbers of parts, pieces and copies.
+    pub fn topology(&self) -> [usize; 3] {
+        [self.mesh.components().len(), self.mesh.pieces().len(), self.mesh.n_copies()]
+    }
+
+    /// Rest volumes of the parts [m³], the smallest first.
+    pub fn volumes(&self) -> Vec<f64> {
+        let mut volumes = self.mesh.components().volume;
+        volumes.sort_by(f64::total_cmp);
+        volumes
+    }
+}
+
+/// SplitMix64: small, seeded, the same everywhere.
+#[derive(Clone, Debug)]
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in [0, 1).
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Uniform in the cube of half width `r` around the origin.
+    pub fn vector(&mut self, r: f64) -> V {
+        V::from_fn(|_, _| (2.0 * self.next() - 1.0) * r)
+    }
+}

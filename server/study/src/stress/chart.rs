@@ -1,0 +1,224 @@
+//! Lines over time as SVG, with the colours of the page.
+
+use std::fmt::Write as _;
+
+use crate::page::escape;
+
+/// A line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Line {
+    /// Its name.
+    pub name: String,
+    /// Points (x, y).
+    pub points: Vec<[f64; 2]>,
+}
+
+/// Lines over a common axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// What it shows.
+    pub title: String,
+    /// What the horizontal axis shows, with its unit.
+    pub x_label: String,
+    /// What the vertical axis shows, with its unit.
+    pub y_label: String,
+    /// The lines.
+    pub lines: Vec<Line>,
+    /// The vertical axis is logarithmic.
+    pub logarithmic: bool,
+}
+
+const WIDTH: f64 = 520.0;
+const LEFT: f64 = 72.0;
+const RIGHT: f64 = 14.0;
+const HEIGHT: f64 = 230.0;
+const BOTTOM: f64 = 46.0;
+const ROW: f64 = 19.0;
+/// Most points of a drawn line.
+const POINTS: usize = 240;
+/// Colours there are.
+const COLOURS: usize = 6;
+
+impl Chart {
+    /// A chart without lines.
+    pub fn new(title: &str, x_label: &str, y_label: &str) -> Self {
+        Self {
+            title: title.to_owned(),
+            x_label: x_label.to_owned(),
+            y_label: y_label.to_owned(),
+            lines: Vec::new(),
+            logarithmic: false,
+        }
+    }
+
+    /// As SVG; nothing if there is nothing to draw.
+    pub fn svg(&self) -> String {
+        let usable =
+            |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite() && (!self.logarithmic || p[1] > 0.0);
+        let points = || self.lines.iter().flat_map(|line| &line.points).filter(usable);
+        if points().next().is_none() {
+            return String::new();
+        }
+        let height = |y: f64| if self.logarithmic { y.log10() } else { y };
+        let x = Axis::around(points().map(|p| p[0]), false, (LEFT, WIDTH - RIGHT));
+        let legend = self.legend();
+        let top = 10.0 + ROW * legend.len() as f64;
+        let total = HEIGHT + top;
+        let bottom = total - BOTTOM;
+        let y = Axis::around(points().map(|p| height(p[1])), !self.logarithmic, (bottom, top));
+        let mut out = format!(
+            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {total}\" role=\"img\" aria-label=\"{}\">\n<rect class=\"ground\" width=\"{WIDTH}\" height=\"{total}\"/>\n",
+            escape(&self.title)
+        );
+        legend.iter().enumerate().for_each(|(i, row)| {
+            let _ = writeln!(
+                out,
+                "<g transform=\"translate({LEFT},{})\">{row}</g>",
+                4.0 + ROW * (i as f64 + 0.5)
+            );
+        });
+        for tick in x.ticks() {
+            let at = x.at(tick);
+            let _ = writeln!(
+                out,
+                "<line class=\"fine\" x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{top}\" y2=\"{bottom}\"/><text class=\"tick\" x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                bottom + 17.0,
+                label(tick, x.step)
+            );
+        }
+        for tick in y.ticks() {
+            let at = y.at(tick);
+            let words = if self.logarithmic { power(tick) } else { label(tick, y.step) };
+            let _ = writeln!(
+                out,
+                "<line class=\"fine\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/><text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{words}</text>",
+                WIDTH - RIGHT,
+                LEFT - 7.0,
+                at + 4.5
+            );
+        }
+        for (i, line) in self.lines.iter().enumerate() {
+            let usable: Vec<&[f64; 2]> = line.points.iter().filter(usable).collect();
+            let stride = usable.len().div_ceil(POINTS).max(1);
+            let last = usable.len().saturating_sub(1);
+            let mut path = String::new();
+            for (k, p) in usable.iter().enumerate().filter(|(k, _)| k % stride == 0 || *k == last) {
+                let command = if k == 0 { 'M' } else { 'L' };
+                let _ = write!(path, "{command}{:.1} {:.1}", x.at(p[0]), y.at(height(p[1])));
+            }
+            let _ = writeln!(out, "<path class=\"line {}\" d=\"{path}\"/>", class(i));
+        }
+        let _ = writeln!(
+            out,
+            "<rect class=\"frame\" x=\"{LEFT}\" y=\"{top}\" width=\"{}\" height=\"{}\"/>\n<text class=\"axis\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n<text class=\"axis\" transform=\"translate(15,{}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n</svg>",
+            WIDTH - RIGHT - LEFT,
+            bottom - top,
+            0.5 * (LEFT + WIDTH - RIGHT),
+            total - 8.0,
+            escape(&self.x_label),
+            0.5 * (top + bottom),
+            escape(&self.y_label)
+        );
+        out
+    }
+
+    fn legend(&self) -> Vec<String> {
+        let mut rows = Vec::new();
+        let (mut row, mut at) = (String::new(), 0.0);
+        for (i, line) in self.lines.iter().enumerate() {
+            let width = 44.0 + 7.0 * line.name.chars().count() as f64;
+            if at + width > WIDTH - LEFT && at > 0.0 {
+                rows.push(std::mem::take(&mut row));
+                at = 0.0;
+            }
+            let _ = write!(
+                row,
+                "<g transform=\"translate({at:.0},0)\"><path class=\"line {}\" d=\"M0 0H22\"/><text x=\"28\" y=\"4.5\">{}</text></g>",
+                class(i),
+                escape(&line.name)
+            );
+            at += width;
+        }
+        rows.push(row);
+        rows
+    }
+}
+
+/// Colour, and a dash for every further round of colours.
+fn class(i: usize) -> String {
+    format!("l{} d{}", i % COLOURS, (i / COLOURS) % 3)
+}
+
+/// A linear axis.
+struct Axis {
+    low: f64,
+    high: f64,
+    step: f64,
+    pixels: (f64, f64),
+}
+
+impl Axis {
+    fn around(values: impl Iterator<Item = f64>, from_zero: bool, pixels: (f64, f64)) -> Self {
+        let (low, high) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        let low = if from_zero && low > 0.0 { 0.0 } else { low };
+        let span = if high > low { high - low } else { high.abs().max(1.0) };
+        let raw = span / 5.0;
+        let scale = 10f64.powf(raw.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|s| s * scale >= raw).unwrap_or(10.0) * scale;
+        let air = if pixels.0 > pixels.1 { 0.04 * span } else { 0.0 };
+        Self { low: if low == 0.0 { 0.0 } else { low - air }, high: low + span + air, step, pixels }
+    }
+
+    fn at(&self, value: f64) -> f64 {
+        let share = (value - self.low) / (self.high - self.low);
+        self.pixels.0 + (self.pixels.1 - self.pixels.0) * share
+    }
+
+    fn ticks(&self) -> Vec<f64> {
+        let first = (self.low / self.step).ceil() as i64;
+        let last = (self.high / self.step).floor() as i64;
+        (first..=last).take(12).map(|k| k as f64 * self.step).collect()
+    }
+}
+
+fn label(value: f64, step: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-3..1e5).contains(&step) {
+        return format!("{value:.1e}");
+    }
+    let digits = (-step.log10().floor() as i32).clamp(0, 4) as usize;
+    format!("{value:.digits$}")
+}
+
+fn power(exponent: f64) -> String {
+    let digits = if exponent == exponent.round() { 0 } else { 1 };
+    format!("10<tspan baseline-shift=\"super\" font-size=\"10\">{exponent:.digits$}</tspan>")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chart_draws_what_is_finite() {
+        let mut chart = Chart::new("energy", "time [s]", "energy [J]");
+        assert!(chart.svg().is_empty());
+        chart
+            .lines
+            .push(Line { name: "a < b".into(), points: vec![[0.0, 1.0], [1.0, f64::NAN], [2.0, 3.0]] });
+        let svg = chart.svg();
+        assert!(svg.contains("a &lt; b") && !svg.contains("NaN"));
+        chart.logarithmic = true;
+        assert!(!chart.svg().contains("NaN"));
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        let axis = Axis::around([0.0, 0.97].into_iter(), true, (0.0, 1.0));
+        assert_eq!(axis.ticks().len(), 5);
+        assert!((axis.ticks()[1] - 0.2).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,113 @@
+//! Whether the cases can fail: parts of the method are taken out, and some case must notice.
+
+use scindo_physics::body::Ablation;
+
+use super::case::{Setting, Status};
+use super::{Progress, Settings, StressError, run_cases, select};
+
+/// A part of the method that is taken out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mutation {
+    /// The masses of pieces.
+    PieceMasses,
+    /// Exact geometric predicates.
+    ExactPredicates,
+    /// Linearisation at the inertial predictor.
+    Predictor,
+    /// The line search of Newton's method.
+    LineSearch,
+}
+
+impl Mutation {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::PieceMasses, Self::ExactPredicates, Self::Predictor, Self::LineSearch];
+
+    /// Name for programs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PieceMasses => "piece-masses",
+            Self::ExactPredicates => "exact-predicates",
+            Self::Predictor => "predictor",
+            Self::LineSearch => "line-search",
+        }
+    }
+
+    /// What is done instead.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::PieceMasses => "the copies of a node share its mass evenly, whatever their pieces weigh",
+            Self::ExactPredicates => "signs by plain floating-point determinants",
+            Self::Predictor => "the fast path linearises at the positions of the last step",
+            Self::LineSearch => "Newton's method takes every full step",
+        }
+    }
+
+    /// Cases that must notice.
+    pub fn named(self) -> &'static [&'static str] {
+        match self {
+            Self::PieceMasses => &["freed-node", "free-fall"],
+            Self::ExactPredicates => &["edge-on-cut"],
+            Self::Predictor => &["step-sweep", "free-spin"],
+            Self::LineSearch => &["inverted"],
+        }
+    }
+
+    /// What a case is run with.
+    pub fn setting(self) -> Setting {
+        let none = Ablation::default();
+        let ablation = match self {
+            Self::PieceMasses => Ablation { piece_masses: true, ..none },
+            Self::ExactPredicates => Ablation { exact_predicates: true, ..none },
+            Self::Predictor => Ablation { predictor: true, ..none },
+            Self::LineSearch => Ablation { line_search: true, ..none },
+        };
+        Setting { ablation }
+    }
+}
+
+/// A case that failed without a part of the method.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Failed {
+    /// Its name.
+    pub name: &'static str,
+    /// The first figure out of its bound.
+    pub why: String,
+}
+
+/// What the cases made of a mutation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The mutation.
+    pub mutation: Mutation,
+    /// Cases that failed, in their order.
+    pub failed: Vec<Failed>,
+    /// Cases that were run.
+    pub run: usize,
+}
+
+impl Row {
+    /// Whether every named case failed.
+    pub fn caught(&self) -> bool {
+        let failed = |name: &&str| self.failed.iter().any(|failed| failed.name == *name);
+        self.mutation.named().iter().all(failed)
+    }
+}
+
+/// Runs the cases of `settings` once per mutation.
+///
+/// # Errors
+/// A name that no case has.
+pub fn table(settings: &Settings, progress: &mut dyn FnMut(Progress<'_>)) -> Result<Vec<Row>, StressError> {
+    let cases: Vec<_> = select(&settings.cases)?.into_iter().filter(|case| case.run.is_some()).collect();
+    let row = |mutation: Mutation| {
+        let reports = run_cases(&cases, &mutation.setting(), settings, progress);
+        let failed = reports.iter().filter(|(report, _)| report.status == Status::Failed);
+        let first = |report: &super::CaseReport| report.failures().into_iter().next().unwrap_or_default();
+        Row {
+            mutation,
+            failed: failed.map(|(report, _)| Failed { name: report.case.name, why: first(report) }).collect(),
+            run: reports.len(),
+        }
+    };
+    Ok(Mutation::ALL.into_iter().map(row).collect())
+}

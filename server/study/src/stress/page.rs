@@ -1,0 +1,222 @@
+//! The page: a row per case at a glance, then a section per case with figures, charts and pictures.
+
+use std::fmt::Write as _;
+
+use super::case::{CaseReport, Status};
+use super::evidence::{Bound, Figure, short};
+use super::mutation::Row;
+use super::{SuiteReport, view};
+use crate::page::{escape, style};
+
+/// Marks of states, lines of charts, cards of cases.
+const STYLE: &str = "
+.state { display: inline-block; min-width: 66px; padding: 1px 9px; border-radius: 10px; font-size: 13px; font-weight: 600; text-align: center; color: #fff; }
+.state.passed { background: #1f7a4d; } .state.failed { background: #b3261e; } .state.not-yet { background: #7a8491; }
+table.glance td:nth-child(3) { white-space: normal; min-width: 30ch; }
+table.glance td:nth-child(4) { white-space: normal; color: var(--soft); }
+td.out { color: var(--bad); font-weight: 600; }
+table.figures { width: auto; min-width: 60%; }
+table.figures td:first-child { white-space: normal; }
+.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 420px), 1fr)); gap: 18px 24px; }
+.pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(260px, 1fr)); gap: 12px 24px; }
+.pictures figure, .charts figure { margin: 8px 0 0; }
+h2 .state { vertical-align: 4px; margin-left: 10px; }
+svg.plot .line { fill: none; stroke-width: 1.8; stroke-linejoin: round; }
+svg.plot .line.l0 { stroke: var(--c0); } svg.plot .line.l1 { stroke: var(--c1); } svg.plot .line.l2 { stroke: var(--c2); }
+svg.plot .line.l3 { stroke: var(--c3); } svg.plot .line.l4 { stroke: var(--c4); } svg.plot .line.l5 { stroke: var(--c5); }
+svg.plot .line.d1 { stroke-dasharray: 7 4; } svg.plot .line.d2 { stroke-dasharray: 2 3; }
+";
+
+/// The page, which needs nothing beside it.
+pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
+    let mut out = String::with_capacity(1 << 20);
+    out += "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
+    out += "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n";
+    out += "<title>scindo · hard cases</title>\n<style>\n";
+    out += style::PAGE;
+    out += style::COLOURS;
+    out += style::PLOT;
+    out += STYLE;
+    out += &view::style();
+    out += "</style>\n</head>\n<body>\n<main>\n";
+    out += &opening(report);
+    out += &glance(report);
+    if let Some(rows) = table {
+        out += &mutations(rows);
+    }
+    report.cases.iter().for_each(|case| out += &section(case));
+    out += &closing(report);
+    out += "</main>\n</body>\n</html>\n";
+    out
+}
+
+fn opening(report: &SuiteReport) -> String {
+    let machine = &report.origin.machine;
+    let mut out = format!(
+        "<header>\n<h1>Hard cases</h1>\n<p class=\"lead\">{} passed, {} failed, {} not yet · scindo {} · commit {} · {}</p>\n",
+        report.count(Status::Passed),
+        report.count(Status::Failed),
+        report.count(Status::NotYet),
+        escape(&report.origin.version),
+        escape(&report.origin.commit),
+        escape(&machine.processor)
+    );
+    if report.interrupted {
+        out +=
+            "<p class=\"advice\"><strong>Interrupted.</strong> Only the cases that had ended are here.</p>\n";
+    }
+    out += "<p>What breaks codes that deform and cut: slivers, cuts exactly through nodes, fragments in free fall, \
+            inverted and collapsed bodies, steps far too large, input without meaning. Each case has a rule that it \
+            passes or fails. All of them keep rule <strong>C</strong>: everything finite, mass constant to 1e-12, \
+            the momentum of free parts balanced to 1e-6, energy never more than one percent above that of the start \
+            and the work done, no step divided, held or refused. A case of a part that is still to come is listed \
+            as <em>not yet</em>.</p>\n</header>\n";
+    out
+}
+
+fn state(status: Status) -> String {
+    format!("<span class=\"state {}\">{}</span>", status.name().replace(' ', "-"), status.name())
+}
+
+fn number(report: &CaseReport) -> String {
+    report.case.number.map_or(String::new(), |number| number.to_string())
+}
+
+fn glance(report: &SuiteReport) -> String {
+    let mut out = "<div class=\"scroll\"><table class=\"glance\">\n<thead><tr><th class=\"number\">no.</th><th></th><th>case</th><th>closest to its bound, or why it failed</th></tr></thead>\n<tbody>\n".to_owned();
+    for case in &report.cases {
+        let told = match case.status {
+            Status::NotYet => String::new(),
+            Status::Failed => case.failures().into_iter().next().unwrap_or_default(),
+            Status::Passed => closest(&case.evidence.figures).map_or(String::new(), Figure::words),
+        };
+        let _ = writeln!(
+            out,
+            "<tr><td class=\"number\">{}</td><td>{}</td><td><a href=\"#{}\">{}</a></td><td>{}</td></tr>",
+            number(case),
+            state(case.status),
+            case.case.name,
+            escape(case.case.title),
+            escape(&told)
+        );
+    }
+    out += "</tbody></table></div>\n";
+    out
+}
+
+/// The figure that uses most of what its bound allows.
+fn closest(figures: &[Figure]) -> Option<&Figure> {
+    let used = |figure: &&Figure| match figure.bound {
+        Bound::AtMost(bound) if bound > 0.0 => figure.value / bound,
+        Bound::AtLeast(bound) if bound > 0.0 => bound / figure.value,
+        _ => 0.0,
+    };
+    figures.iter().filter(|f| f.bound != Bound::Told).max_by(|a, b| used(a).total_cmp(&used(b)))
+}
+
+fn section(report: &CaseReport) -> String {
+    let case = report.case;
+    let title = case.number.map_or(case.title.to_owned(), |number| format!("{number}. {}", case.title));
+    let mut out = format!(
+        "<section id=\"{}\">\n<h2>{} {}</h2>\n<p>{}</p>\n<p><strong>Passes if:</strong> {}</p>\n<p class=\"soft\">Source: {} · <code>scindo stress --case {}</code></p>\n",
+        case.name,
+        escape(&title),
+        state(report.status),
+        escape(case.set_up),
+        escape(case.rule),
+        escape(case.source),
+        case.name
+    );
+    if let Some(reason) = &report.reason {
+        let _ = writeln!(out, "<p class=\"advice\">It did not come to its end: {}</p>", escape(reason));
+    }
+    let evidence = &report.evidence;
+    evidence.notes.iter().for_each(|note| {
+        let _ = writeln!(out, "<p>{}</p>", escape(note));
+    });
+    if !evidence.pictures.is_empty() {
+        out += "<div class=\"pictures\">\n";
+        for picture in &evidence.pictures {
+            let _ = writeln!(
+                out,
+                "<figure>{}<figcaption>{}</figcaption></figure>",
+                picture.svg,
+                escape(&picture.caption)
+            );
+        }
+        out += "</div>\n";
+    }
+    let drawn: Vec<String> = evidence.charts.iter().map(|chart| chart.svg()).collect();
+    if drawn.iter().any(|svg| !svg.is_empty()) {
+        out += "<div class=\"charts\">\n";
+        for (svg, chart) in drawn.iter().zip(&evidence.charts).filter(|(svg, _)| !svg.is_empty()) {
+            let _ = writeln!(out, "<figure>{svg}<figcaption>{}</figcaption></figure>", escape(&chart.title));
+        }
+        out += "</div>\n";
+    }
+    out += &figures(&evidence.figures);
+    out += "</section>\n";
+    out
+}
+
+fn figures(figures: &[Figure]) -> String {
+    if figures.is_empty() {
+        return String::new();
+    }
+    let mut out = format!(
+        "<details open><summary>{} figures</summary>\n<div class=\"scroll\"><table class=\"figures\">\n<thead><tr><th>figure</th><th class=\"number\">value</th><th class=\"number\">bound</th></tr></thead>\n<tbody>\n",
+        figures.len()
+    );
+    for figure in figures {
+        let bound = match figure.bound {
+            Bound::AtMost(bound) => format!("≤ {}", short(bound)),
+            Bound::AtLeast(bound) => format!("≥ {}", short(bound)),
+            Bound::Exactly(bound) => format!("= {}", short(bound)),
+            Bound::Told => String::new(),
+        };
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td><td class=\"number{}\">{} {}</td><td class=\"number\">{bound}</td></tr>",
+            escape(&figure.name),
+            if figure.holds() { "" } else { " out" },
+            short(figure.value),
+            figure.unit
+        );
+    }
+    out += "</tbody></table></div></details>\n";
+    out
+}
+
+fn mutations(rows: &[Row]) -> String {
+    let mut out = "<section id=\"mutations\">\n<h2>Can the cases fail?</h2>\n<p>A part of the method is taken out and all cases are run again. The named cases must notice.</p>\n<div class=\"scroll\"><table>\n<thead><tr><th>without</th><th>instead</th><th>named cases</th><th></th><th>cases that fail</th></tr></thead>\n<tbody>\n".to_owned();
+    for row in rows {
+        let failed: Vec<String> =
+            row.failed.iter().map(|f| format!("<strong>{}</strong>: {}", f.name, escape(&f.why))).collect();
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td><td style=\"white-space:normal\">{}</td><td>{}</td><td>{}</td><td style=\"white-space:normal\">{}</td></tr>",
+            row.mutation.name(),
+            escape(row.mutation.words()),
+            row.mutation.named().join("<br>"),
+            if row.caught() { "caught" } else { "<strong>missed</strong>" },
+            failed.join("<br>")
+        );
+    }
+    out += "</tbody></table></div>\n</section>\n";
+    out
+}
+
+fn closing(report: &SuiteReport) -> String {
+    let machine = &report.origin.machine;
+    let slow = report.cases.iter().zip(&report.case_seconds).max_by(|a, b| a.1.total_cmp(b.1));
+    let slow = slow
+        .map_or(String::new(), |(case, s)| format!("; the longest case, {}, took {s:.0} s", case.case.name));
+    format!(
+        "<section id=\"run\">\n<h2>This run</h2>\n<p>{:.0} s on {}, {}, {} hardware threads, {}{slow}. Figures, charts and pictures do not depend on it: they are the same on every run. The same for programs: <code>stress.json</code>.</p>\n</section>\n",
+        report.seconds,
+        escape(&machine.processor),
+        escape(&machine.system),
+        machine.threads,
+        if machine.optimised { "release build" } else { "development build" },
+    )
+}
