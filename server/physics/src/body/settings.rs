@@ -148,13 +148,7 @@ impl BodySettings {
             true => NewtonSettings::UNCHECKED,
             false => NewtonSettings::default().halvings,
         };
-        NewtonSettings {
-            steps,
-            halvings,
-            tolerance: self.solver.tolerance,
-            curvature,
-            linear,
-        }
+        NewtonSettings { steps, halvings, tolerance: self.solver.tolerance, curvature, linear }
     }
 
     /// How the fast path applies the stiffness of so many pieces.

@@ -157,7 +157,7 @@ fn run_cases(
     let hardware = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if settings.threads > 0 { settings.threads } else { hardware }.min(cases.len().max(1));
     let next = AtomicUsize::new(0);
-    let (send, receive) = mpsc::channel();
+    let (send, receive) = mpsc::sync_channel(threads);
     let mut reports: Vec<Option<(CaseReport, f64)>> = vec![None; cases.len()];
     std::thread::scope(|scope| {
         for _ in 0..threads {

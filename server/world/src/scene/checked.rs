@@ -4,7 +4,8 @@ use nalgebra::{Unit, Vector3};
 use scindo_physics::body::Arithmetic;
 
 use super::raw::{
-    RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod, RawOperator, RawPrecision,
+    RawCutMethod, RawElement, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawOperator,
+    RawPrecision,
 };
 use crate::build::mechanics;
 use crate::inputs::{ToolMode, ToolShape};

@@ -106,7 +106,8 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
     let mesh = block([0.2; 3], [8; 3]);
     let inclusion = |X: &V| (X - V::repeat(0.1)).amax() < 0.05;
     let layers = |X: &V| (X.y / 0.05) as usize % 2 == 1;
-    let kinds: [(&str, &dyn Fn(&V) -> bool); 2] = [("inclusion", &inclusion), ("layers", &layers)];
+    type Kind<'a> = (&'a str, &'a dyn Fn(&V) -> bool);
+    let kinds: [Kind; 2] = [("inclusion", &inclusion), ("layers", &layers)];
     for (name, stiff) in kinds {
         let K = stiffness(&mesh, stiff)?;
         let mass = Model::tet4(&mesh, &linear(1e3), Volumetric::Full)?.lumped_mass(1e3);
