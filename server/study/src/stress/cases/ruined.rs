@@ -44,7 +44,8 @@ pub const COLLAPSED: Case = Case {
     name: "collapsed",
     title: "All nodes in one point",
     set_up: "The same cube with all nodes at the origin: exactly, with noise of 1e-12 and of 1e-9 edges, and \
-             shrunk to a thousandth.",
+             shrunk to a thousandth. One noise of each size is shown; with others the corotational body may \
+             end folded (no inverted element, shape off by 1.4 edges), so this is no proof for every noise.",
     rule: "C. The same bounds as for the inverted cube.",
     source: "Smith 2018",
     quick: false,
