@@ -173,18 +173,32 @@ impl Gather {
     /// Adds the sums of the copies of block number `block` to `out`.
     #[inline(always)]
     pub fn add<const N: usize>(&self, block: usize, rows: &[[f32; N]], out: &mut [[f32; N]]) {
-        for (out, &[a, b]) in out.iter_mut().zip(&self.pairs[block * BLOCK..]) {
+        for (out, &[a, b]) in out.iter_mut().zip(self.pairs(block)) {
             let (a, b) = (&rows[a as usize], &rows[b as usize]);
             for i in 0..N {
                 out[i] += a[i] + b[i];
             }
         }
+        self.add_further(block, rows, out);
+    }
+
+    /// The first two rows of every copy of block number `block`; row 0 where there are fewer.
+    #[inline(always)]
+    pub fn pairs(&self, block: usize) -> &[[u32; 2]] {
+        &self.pairs[block * BLOCK..((block + 1) * BLOCK).min(self.pairs.len())]
+    }
+
+    /// Adds what [`Self::pairs`] leaves out; says whether there was any.
+    #[inline(always)]
+    pub fn add_further<const N: usize>(&self, block: usize, rows: &[[f32; N]], out: &mut [[f32; N]]) -> bool {
         let further = self.first_further[block] as usize..self.first_further[block + 1] as usize;
+        let any = !further.is_empty();
         for &(copy, row) in &self.further[further] {
             for (out, part) in out[copy as usize - block * BLOCK].iter_mut().zip(&rows[row as usize]) {
                 *out += part;
             }
         }
+        any
     }
 }
 

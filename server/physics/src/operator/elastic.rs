@@ -302,6 +302,19 @@ impl Elastic {
         self.gather.add(block, &self.sums, y);
     }
 
+    /// The chunks' sums and where those of the copies of block number `block` lie in them, two per
+    /// copy; the rest comes with [`Self::add_further`].
+    #[inline(always)]
+    pub(super) fn sums(&self, block: usize) -> (&[[u32; 2]], &[Padded]) {
+        (self.gather.pairs(block), &self.sums)
+    }
+
+    /// Adds what [`Self::sums`] leaves out to `y`; says whether there was any.
+    #[inline(always)]
+    pub(super) fn add_further(&self, block: usize, y: &mut [Padded]) -> bool {
+        self.gather.add_further(block, &self.sums, y)
+    }
+
     /// Rotation of every piece at the last update.
     pub fn rotations(&self) -> Vec<Matrix3<f32>> {
         let mut rotations = vec![Matrix3::identity(); self.n_pieces];

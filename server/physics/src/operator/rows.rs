@@ -8,20 +8,27 @@
 
 use super::{Inverse3, Padded};
 
-/// p ← z + β p (z if β = 0), q ← factor · mass · p.
+/// p ← z + β p (z if β = 0), q ← factor · mass · p + the two rows of `sums` that `pairs` names;
+/// returns p·q.
 #[inline]
 pub fn advance_direction(
     z: &[Padded],
     beta: f32,
-    mass: &[f32],
-    factor: f32,
-    p: &mut [Padded],
-    q: &mut [Padded],
-) {
-    for ((p, q), (z, mass)) in p.iter_mut().zip(q).zip(z.iter().zip(mass)) {
-        direction(p, z, beta);
-        *q = row::product(factor * mass, p);
+    (mass, factor): (&[f32], f32),
+    (pairs, sums): (&[[u32; 2]], &[Padded]),
+    [p, q]: [&mut [Padded]; 2],
+) -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx") {
+        // SAFETY: the instructions were detected.
+        return unsafe { avx::advance_direction(z, beta, (mass, factor), (pairs, sums), [p, q]) };
     }
+    for (((p, q), (z, mass)), &[a, b]) in p.iter_mut().zip(&mut *q).zip(z.iter().zip(mass)).zip(pairs) {
+        direction(p, z, beta);
+        let (a, b) = (&sums[a as usize], &sums[b as usize]);
+        *q = std::array::from_fn(|k| factor * mass * p[k] + (a[k] + b[k]));
+    }
+    dot(p, q)
 }
 
 /// x·y.
@@ -89,6 +96,35 @@ mod avx {
             // SAFETY: a row holds four numbers.
             let product = unsafe { _mm_mul_ps(_mm_loadu_ps(x.as_ptr()), _mm_loadu_ps(y.as_ptr())) };
             sum = _mm256_add_pd(sum, _mm256_cvtps_pd(product));
+        }
+        total(sum)
+    }
+
+    #[target_feature(enable = "avx")]
+    pub fn advance_direction(
+        z: &[Padded],
+        beta: f32,
+        (mass, factor): (&[f32], f32),
+        (pairs, sums): (&[[u32; 2]], &[Padded]),
+        [p, q]: [&mut [Padded]; 2],
+    ) -> f64 {
+        let (turns, beta) = (beta != 0.0, _mm_set1_ps(beta));
+        let mut sum = _mm256_setzero_pd();
+        for (((p, q), (z, mass)), &[a, b]) in p.iter_mut().zip(q).zip(z.iter().zip(mass)).zip(pairs) {
+            let (a, b) = (&sums[a as usize], &sums[b as usize]);
+            // SAFETY: a row holds four numbers.
+            unsafe {
+                let mut next_p = _mm_loadu_ps(z.as_ptr());
+                if turns {
+                    next_p = _mm_add_ps(next_p, _mm_mul_ps(beta, _mm_loadu_ps(p.as_ptr())));
+                }
+                let inertia = _mm_mul_ps(_mm_set1_ps(factor * mass), next_p);
+                let elastic = _mm_add_ps(_mm_loadu_ps(a.as_ptr()), _mm_loadu_ps(b.as_ptr()));
+                let next_q = _mm_add_ps(inertia, elastic);
+                _mm_storeu_ps(p.as_mut_ptr(), next_p);
+                _mm_storeu_ps(q.as_mut_ptr(), next_q);
+                sum = _mm256_add_pd(sum, _mm256_cvtps_pd(_mm_mul_ps(next_p, next_q)));
+            }
         }
         total(sum)
     }
@@ -173,26 +209,6 @@ mod row {
     #[inline(always)]
     pub fn add_product(z: &Padded, beta: f32, p: &Padded) -> Padded {
         std::array::from_fn(|k| z[k] + beta * p[k])
-    }
-
-    /// m p.
-    #[cfg(target_arch = "x86_64")]
-    #[inline(always)]
-    pub fn product(m: f32, p: &Padded) -> Padded {
-        use std::arch::x86_64::{_mm_loadu_ps, _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps};
-        let mut product = [0.0; 4];
-        // SAFETY: SSE belongs to x86-64, and a row holds four numbers.
-        unsafe {
-            _mm_storeu_ps(product.as_mut_ptr(), _mm_mul_ps(_mm_set1_ps(m), _mm_loadu_ps(p.as_ptr())));
-        }
-        product
-    }
-
-    /// m p.
-    #[cfg(not(target_arch = "x86_64"))]
-    #[inline(always)]
-    pub fn product(m: f32, p: &Padded) -> Padded {
-        p.map(|p| m * p)
     }
 }
 

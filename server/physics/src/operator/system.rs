@@ -64,9 +64,8 @@ impl LinearOperator for SystemOperator<'_> {
         let state = (blocks(p, BLOCK), blocks(q, BLOCK), blocks(partial, 1));
         team.for_blocks(state, |block, (p, q, partial)| {
             let (z, mass) = (block_of(z, block), block_of(mass, block));
-            rows::advance_direction(z, beta, mass, factor, p, q);
-            elastic.add_sums(block, q);
-            partial[0] = rows::dot(p, q);
+            let product = rows::advance_direction(z, beta, (mass, factor), elastic.sums(block), [p, q]);
+            partial[0] = if elastic.add_further(block, q) { rows::dot(p, q) } else { product };
         });
         let springs: f64 = self.springs.iter().map(|spring| spring.curvature(p)).sum();
         self.springs.iter().for_each(|spring| spring.add_to(p, q));
