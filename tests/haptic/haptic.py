@@ -160,8 +160,10 @@ def server_killed(programs, endpoint, server):
     # The last message of the first server: the longest time without a new one.
     pressed = [r for r in rows if force(r) > 0]
     check(pressed, "the hand pressed")
-    stale = next(r for r in rows if int(r["flags"]) & FLAG_LOST and r["time_s"] - rows[0]["time_s"] > 2)
-    last = stale["time_s"] - stale["contact_age_ms"] * 1e-3
+    known = [r for r in rows if r["time_s"] - rows[0]["time_s"] > 2 and r["contact_age_ms"] < 1e6]
+    oldest = max(known, key=lambda r: r["contact_age_ms"])
+    last = oldest["time_s"] - oldest["contact_age_ms"] * 1e-3
+    stale = next(r for r in rows if r["time_s"] > last and int(r["flags"]) & FLAG_LOST)
     before = [r for r in rows if last - 0.05 < r["time_s"] <= last]
     check(force(before[-1]) > 0.1, f"the hand pressed when the server died: {force(before[-1]):.3f} N")
     after = [r for r in rows if last + 0.2 <= r["time_s"] < stale["time_s"] + 0.2]

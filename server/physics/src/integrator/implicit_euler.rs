@@ -407,11 +407,11 @@ impl ImplicitEuler {
             let force = spring.map(|s| s.force(s.point(&self.predicted)));
             spring_forces.push(force.unwrap_or_else(Vector3::zeros));
         }
-        let predicted = &self.predicted;
+        let (predicted, rate) = (&self.predicted, 1.0 / inputs.h);
         let results = (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK));
         team.for_blocks(results, |block, (x, v)| {
             for ((x, v), next) in x.iter_mut().zip(v).zip(block_of(predicted, block)) {
-                *v = (next - *x) / inputs.h;
+                *v = (next - *x) * rate;
                 *x = *next;
             }
         });
