@@ -7,7 +7,6 @@
 use nalgebra::Vector3;
 
 use super::BLOCK;
-use crate::cut::Piece;
 use crate::element::{Ids, LANES};
 
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
@@ -68,11 +67,11 @@ fn bisect(order: &mut [u32], parts: usize, centres: &[Vector3<f64>], emit: &mut 
 }
 
 /// Packs the pieces `chunk`, ascending ids, into batches and numbers their copies.
-pub fn plan_chunk(chunk: &[u32], pieces: &[Piece]) -> ChunkPlan {
-    let mut copies: Vec<u32> = chunk.iter().flat_map(|&p| pieces[p as usize].copies).collect();
+pub fn plan_chunk(chunk: &[u32], copies_of: impl Fn(u32) -> [u32; 4]) -> ChunkPlan {
+    let held: Vec<[u32; 4]> = chunk.iter().map(|&p| copies_of(p)).collect();
+    let mut copies = held.as_flattened().to_vec();
     copies.sort_unstable();
     copies.dedup();
-    let held: Vec<[u32; 4]> = chunk.iter().map(|&p| pieces[p as usize].copies).collect();
     let mut batches = pack(&held);
     for lane in batches.iter_mut().flatten().filter(|lane| **lane != NO_PIECE) {
         *lane = chunk[*lane as usize];
@@ -86,7 +85,7 @@ pub fn plan_chunk(chunk: &[u32], pieces: &[Piece]) -> ChunkPlan {
             for (lane, &p) in batch.iter().enumerate() {
                 if p != NO_PIECE {
                     for (a, id) in ids.iter_mut().enumerate() {
-                        id[lane] = local(pieces[p as usize].copies[a]);
+                        id[lane] = local(copies_of(p)[a]);
                     }
                 }
             }
@@ -205,6 +204,7 @@ impl Gather {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cut::Piece;
     use crate::mesh::{BoxPattern, box_mesh};
 
     #[test]
@@ -219,7 +219,7 @@ mod tests {
         let (chunk_of, n_chunks) = region_of_elements(&centres);
         let plans: Vec<ChunkPlan> = (0..n_chunks as u32)
             .map(|k| (0..pieces.len() as u32).filter(|&p| chunk_of[p as usize] == k).collect::<Vec<u32>>())
-            .map(|chunk| plan_chunk(&chunk, &pieces))
+            .map(|chunk| plan_chunk(&chunk, |p| pieces[p as usize].copies))
             .collect();
         let mut seen = vec![0; pieces.len()];
         let (mut batches, mut shared) = (0, 0);

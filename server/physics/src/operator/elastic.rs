@@ -1,22 +1,21 @@
 //! K̂, the stiffness of all pieces: by the tets with rotated gradients, or assembled.
 
-use std::collections::BTreeMap;
-
 use nalgebra::{Matrix3, Vector3};
 
-use super::chunks::{Gather, NO_PIECE, pack, plan_chunk, region_of_elements};
-use super::edges::EdgeBlocks;
-use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
+use super::carriers::Carriers;
+use super::chunk::{Chunk, NewLane};
+use super::chunks::{Gather, NO_PIECE, region_of_elements};
+use super::kernel::{Block6, Coefficients};
 use super::rows::gather_direction;
-use super::{BLOCK, LinearOperator, Padded, padded};
+use super::{BLOCK, LinearOperator, Padded};
 use crate::cut::Piece;
-use crate::element::{LANES, Lanes, Mat3, Simd};
+use crate::element::Simd;
 use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
 use crate::team::{Team, blocks, ranges};
 
-/// Most pieces of one chunk: four copies each must leave room in 16-bit local numbers.
-const MOST_PIECES: usize = 8192;
+/// Most lanes of one chunk: four copies each must leave room in 16-bit local numbers.
+const MOST_LANES: usize = 8192;
 
 /// How K̂ is applied.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,7 +34,8 @@ pub enum OperatorChoice {
 #[derive(Debug)]
 pub struct Elastic {
     simd: Simd,
-    n_pieces: usize,
+    /// Which pieces have a lane, and what it integrates.
+    carriers: Carriers,
     /// Region of every element; cuts do not change it.
     region_of_element: Vec<u32>,
     n_regions: usize,
@@ -51,24 +51,6 @@ pub struct Elastic {
     made_with: Option<(Coefficients, bool)>,
     /// Counts the changes of the stiffness.
     version: u64,
-}
-
-#[derive(Clone, Debug)]
-struct Chunk {
-    region: usize,
-    /// Pieces and copies there were when the chunk was planned, and the present number of pieces.
-    planned: [usize; 2],
-    n_pieces: usize,
-    copies: Vec<u32>,
-    pieces: Vec<[u32; LANES]>,
-    batches: Batches,
-    positions: Vec<[f64; 4]>,
-    x: Vec<Padded>,
-    /// Rest positions [m], for laws without rotation.
-    rest: Vec<Vector3<f64>>,
-    /// The assembled stiffness, where that is in use.
-    edges: Option<EdgeBlocks>,
-    inverted: usize,
 }
 
 /// What an update is made with.
@@ -90,7 +72,7 @@ impl Elastic {
         let (region_of_element, n_regions) = region_of_elements(&centres);
         let mut elastic = Self {
             simd,
-            n_pieces: 0,
+            carriers: Carriers::new(mesh.tets.len(), pieces),
             region_of_element,
             n_regions,
             chunks: Vec::new(),
@@ -101,58 +83,70 @@ impl Elastic {
             made_with: None,
             version: 0,
         };
-        elastic.n_pieces = pieces.len();
-        elastic.plan(mesh, pieces, &vec![true; n_regions], &[]);
+        elastic.plan(mesh, &vec![true; n_regions], &[]);
         elastic.arrange_sums(n_copies);
         elastic
     }
 
     /// Follows a cut: the `changed` pieces (ascending) are new or have other copies or another fraction
-    /// than before. A new piece inherits its rotation from the first of them that its element had
-    /// before. Chunks without changed pieces stay as they are, the others are amended, and arranged anew
-    /// once they have grown by a quarter.
+    /// than before. A piece that gets a lane of its own inherits the rotation of the lane that had its
+    /// material before. Chunks without changes stay as they are, the others are amended, and arranged
+    /// anew once they have grown by a quarter.
     pub fn follow(&mut self, mesh: &TetMesh, pieces: &[Piece], changed: &[u32], n_copies: usize) {
+        let changes = self.carriers.follow(pieces, changed);
         let region_of = |p: u32| self.region_of_element[pieces[p as usize].element as usize] as usize;
-        let (old, new): (Vec<u32>, Vec<u32>) = changed.iter().partition(|p| (**p as usize) < self.n_pieces);
-        let mut is_changed = vec![false; self.n_pieces];
-        old.iter().for_each(|&p| is_changed[p as usize] = true);
-        let mut added = vec![Vec::new(); self.n_regions];
-        new.iter().for_each(|&p| added[region_of(p)].push(p));
+        let mut marks = Marks { amended: vec![false; pieces.len()], source: vec![false; pieces.len()] };
         let mut affected = vec![false; self.n_regions];
-        changed.iter().for_each(|&p| affected[region_of(p)] = true);
-        let inherited = self.rotations_by_element(&is_changed, pieces);
-        let mut outgrown = vec![false; self.n_regions];
-        for chunk in self.chunks.iter_mut().rev().filter(|chunk| affected[chunk.region]) {
-            // New pieces go to the last chunk of their region.
-            let added = std::mem::take(&mut added[chunk.region]);
-            outgrown[chunk.region] |= !chunk.follow(mesh, pieces, &is_changed, &added, &inherited);
+        for &p in &changes.amended {
+            (marks.amended[p as usize], affected[region_of(p)]) = (true, true);
         }
-        self.n_pieces = pieces.len();
-        if outgrown.contains(&true) {
-            let mut rotations = self.rotations();
-            for p in new {
-                if let Some(R) = inherited.get(&pieces[p as usize].element) {
-                    rotations[p as usize] = *R;
-                }
+        for &[p, source] in &changes.added {
+            affected[region_of(p)] = true;
+            if source != NO_PIECE {
+                marks.source[source as usize] = true;
             }
-            self.plan(mesh, pieces, &outgrown, &rotations);
+        }
+        let known = self.rotations_of(&marks.source, &affected);
+        let mut added = vec![Vec::new(); self.n_regions];
+        let rotation = |source: u32| {
+            let found = known.binary_search_by_key(&source, |known| known.0);
+            found.map_or_else(|_| Matrix3::identity(), |at| known[at].1)
+        };
+        for &[piece, source] in &changes.added {
+            added[region_of(piece)].push(NewLane { piece, rotation: rotation(source) });
+        }
+        let (mut outgrown, mut late) = (vec![false; self.n_regions], Vec::new());
+        let merged = self.carriers.merged();
+        for chunk in self.chunks.iter_mut().rev().filter(|chunk| affected[chunk.region]) {
+            // New lanes go to the last chunk of their region.
+            let added = std::mem::take(&mut added[chunk.region]);
+            if !chunk.follow(mesh, merged, &marks.amended, &added) {
+                outgrown[chunk.region] = true;
+                late.extend(added);
+            }
+        }
+        if outgrown.contains(&true) {
+            let mut rotations = self.lane_rotations();
+            late.iter().for_each(|new| rotations[new.piece as usize] = new.rotation);
+            self.plan(mesh, &outgrown, &rotations);
         }
         self.arrange_sums(n_copies);
     }
 
-    /// Divides the pieces of these regions into chunks.
-    fn plan(&mut self, mesh: &TetMesh, pieces: &[Piece], regions: &[bool], rotations: &[Matrix3<f32>]) {
+    /// Divides the carriers of these regions into chunks.
+    fn plan(&mut self, mesh: &TetMesh, regions: &[bool], rotations: &[Matrix3<f32>]) {
         let mut members = vec![Vec::new(); self.n_regions];
-        for (p, piece) in (0u32..).zip(pieces) {
-            let region = self.region_of_element[piece.element as usize] as usize;
+        let merged = self.carriers.merged();
+        for (p, merged) in (0u32..).zip(merged).filter(|(_, merged)| merged.count > 0) {
+            let region = self.region_of_element[merged.piece.element as usize] as usize;
             if regions[region] {
                 members[region].push(p);
             }
         }
         self.chunks.retain(|chunk| !regions[chunk.region]);
         for (region, members) in members.iter().enumerate() {
-            let build = |part| Chunk::new(region, part, mesh, pieces, rotations);
-            self.chunks.extend(members.chunks(MOST_PIECES).map(build));
+            let build = |part| Chunk::new(region, part, mesh, merged, rotations);
+            self.chunks.extend(members.chunks(MOST_LANES).map(build));
         }
         self.chunks.sort_by_key(|chunk| chunk.region);
     }
@@ -164,19 +158,15 @@ impl Elastic {
         self.made_with = None;
     }
 
-    /// Rotation of the first changed piece of every element that has one.
-    fn rotations_by_element(&self, is_changed: &[bool], pieces: &[Piece]) -> BTreeMap<u32, Matrix3<f32>> {
-        let mut first: BTreeMap<u32, (u32, Matrix3<f32>)> = BTreeMap::new();
-        for chunk in &self.chunks {
-            for (p, batch, lane) in chunk.lanes().filter(|&(p, ..)| is_changed[p as usize]) {
-                let found = (p, chunk.rotation(batch, lane));
-                let first = first.entry(pieces[p as usize].element).or_insert(found);
-                if p < first.0 {
-                    *first = found;
-                }
-            }
+    /// Rotation of every marked carrier in these regions, ascending.
+    fn rotations_of(&self, marked: &[bool], regions: &[bool]) -> Vec<(u32, Matrix3<f32>)> {
+        let mut found = Vec::new();
+        for chunk in self.chunks.iter().filter(|chunk| regions[chunk.region]) {
+            let lanes = chunk.lanes().filter(|&(p, ..)| marked[p as usize]);
+            found.extend(lanes.map(|(p, batch, lane)| (p, chunk.rotation(batch, lane))));
         }
-        first.into_iter().map(|(element, (_, R))| (element, R)).collect()
+        found.sort_unstable_by_key(|found| found.0);
+        found
     }
 
     /// Chooses how K̂ is applied from the next update on. The choices differ in the last bits.
@@ -202,8 +192,7 @@ impl Elastic {
 
     /// Bytes of stiffness that one application streams.
     pub fn bytes(&self) -> usize {
-        let bytes = |c: &Chunk| c.edges.as_ref().map_or_else(|| c.batches.bytes(), EdgeBlocks::bytes);
-        self.chunks.iter().map(bytes).sum()
+        self.chunks.iter().map(Chunk::bytes).sum()
     }
 
     /// Recomputes rotations, rotated gradients, forces and diagonal blocks at `positions` [m] (one
@@ -317,7 +306,13 @@ impl Elastic {
 
     /// Rotation of every piece at the last update.
     pub fn rotations(&self) -> Vec<Matrix3<f32>> {
-        let mut rotations = vec![Matrix3::identity(); self.n_pieces];
+        let of_lane = self.lane_rotations();
+        self.carriers.of_piece().iter().map(|&carrier| of_lane[carrier as usize]).collect()
+    }
+
+    /// Rotation of every piece that has a lane.
+    fn lane_rotations(&self) -> Vec<Matrix3<f32>> {
+        let mut rotations = vec![Matrix3::identity(); self.n_pieces()];
         for chunk in &self.chunks {
             for (p, batch, lane) in chunk.lanes() {
                 rotations[p as usize] = chunk.rotation(batch, lane);
@@ -328,8 +323,21 @@ impl Elastic {
 
     /// Number of pieces.
     pub fn n_pieces(&self) -> usize {
-        self.n_pieces
+        self.carriers.of_piece().len()
     }
+
+    /// Number of lanes that are computed with: pieces of one element with the same copies share one.
+    pub fn n_lanes(&self) -> usize {
+        self.chunks.iter().map(Chunk::n_lanes).sum()
+    }
+}
+
+/// Which pieces a cut concerns.
+struct Marks {
+    /// Carriers whose lanes are to be amended.
+    amended: Vec<bool>,
+    /// Carriers whose rotation new lanes inherit.
+    source: Vec<bool>,
 }
 
 impl LinearOperator for Elastic {
@@ -343,249 +351,11 @@ impl LinearOperator for Elastic {
     }
 }
 
-impl Chunk {
-    fn new(
-        region: usize,
-        members: &[u32],
-        mesh: &TetMesh,
-        pieces: &[Piece],
-        rotations: &[Matrix3<f32>],
-    ) -> Self {
-        let plan = plan_chunk(members, pieces);
-        // Room for what cuts add before the next plan.
-        let mut rest = Vec::with_capacity(plan.pieces.len() + plan.pieces.len() / 4 + 1);
-        rest.extend(plan.pieces.iter().map(|lanes| rest_batch(lanes, mesh, pieces, rotations)));
-        let n = plan.copies.len() + 1;
-        Self {
-            region,
-            batches: Batches::new(&plan.nodes, rest, n),
-            pieces: plan.pieces,
-            rest: rest_positions(&plan.copies, members, mesh, pieces),
-            edges: None,
-            planned: [members.len(), plan.copies.len()],
-            n_pieces: members.len(),
-            copies: plan.copies,
-            positions: vec![[0.0; 4]; n],
-            x: vec![[0.0; 4]; n],
-            inverted: 0,
-        }
-    }
-
-    /// Piece, batch and lane of all pieces.
-    fn lanes(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
-        let lanes = self.pieces.iter().enumerate();
-        let lanes = lanes.flat_map(|(b, lanes)| lanes.iter().enumerate().map(move |(l, &p)| (p, b, l)));
-        lanes.filter(|&(p, ..)| p != NO_PIECE)
-    }
-
-    fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
-        let rotation = &self.batches.rest()[batch].rotation;
-        Matrix3::from_fn(|i, j| rotation[3 * i + j].0[lane])
-    }
-
-    /// Amends the copies and fractions of changed pieces and appends the pieces `added`. Copies that
-    /// are new to the chunk are new altogether, so that `copies` stays in order. Says `false` and does
-    /// nothing if the chunk has grown so much that packing and numbering anew pays.
-    fn follow(
-        &mut self,
-        mesh: &TetMesh,
-        pieces: &[Piece],
-        is_changed: &[bool],
-        added: &[u32],
-        rotations: &BTreeMap<u32, Matrix3<f32>>,
-    ) -> bool {
-        let changed: Vec<(u32, usize, usize)> =
-            self.lanes().filter(|&(p, ..)| is_changed[p as usize]).collect();
-        let amended = || changed.iter().map(|c| c.0).chain(added.iter().copied());
-        let old_waste = self.copies.len() as u16;
-        let mut new: Vec<(u32, u32)> = amended()
-            .map(|p| &pieces[p as usize])
-            .flat_map(|piece| piece.copies.into_iter().zip(mesh.tets[piece.element as usize]))
-            .filter(|(copy, _)| self.copies.binary_search(copy).is_err())
-            .collect();
-        new.sort_unstable();
-        new.dedup();
-        let [planned_pieces, planned_copies] = self.planned;
-        let n_copies = self.copies.len() + new.len();
-        if self.n_pieces + added.len() > planned_pieces + planned_pieces / 4
-            || n_copies > planned_copies + planned_copies / 2
-        {
-            return false;
-        }
-        self.copies.extend(new.iter().map(|n| n.0));
-        self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
-        debug_assert!(self.copies.is_sorted());
-        let waste = self.copies.len() as u16;
-        let local = |copy: &u32| self.copies.binary_search(copy).map_or(waste, |l| l as u16);
-        let (mut nodes, mut rest) = std::mem::take(&mut self.batches).into_parts();
-        for id in nodes.iter_mut().flatten().flatten().filter(|id| **id == old_waste) {
-            *id = waste;
-        }
-        let mut places = changed;
-        places.extend(free_lanes(&mut self.pieces, added, pieces));
-        nodes.resize(self.pieces.len(), [[waste; LANES]; 4]);
-        rest.resize(self.pieces.len(), empty_batch());
-        for (p, batch, lane) in places {
-            let piece = &pieces[p as usize];
-            for (ids, copy) in nodes[batch].iter_mut().zip(&piece.copies) {
-                ids[lane] = local(copy);
-            }
-            let known = rotations.get(&piece.element).filter(|_| p as usize >= is_changed.len());
-            set_lane(&mut rest[batch], lane, mesh, piece, known);
-        }
-        let n = self.copies.len() + 1;
-        self.batches = Batches::new(&nodes, rest, n);
-        self.n_pieces += added.len();
-        self.edges = None;
-        self.positions.resize(n, [0.0; 4]);
-        self.x.resize(n, [0.0; 4]);
-        true
-    }
-
-    /// Assembles the stiffness of the last update, or forgets what was assembled before.
-    fn assemble(&mut self, wanted: bool) {
-        let waste = self.copies.len() as u16;
-        if wanted {
-            let Self { edges, batches, .. } = self;
-            edges.get_or_insert_with(|| EdgeBlocks::new(&batches.nodes(), waste)).assemble(batches);
-        } else {
-            self.edges = None;
-        }
-    }
-
-    /// y = s K̂ x.
-    #[inline(always)]
-    fn apply(&self, simd: Simd, y: &mut [Padded]) {
-        y.fill([0.0; 4]);
-        match &self.edges {
-            Some(edges) => edges.apply(simd, &self.x, y),
-            None => self.batches.apply(simd, &self.x, y),
-        }
-    }
-
-    /// y = K̂ u with displacements u relative to the chunk's first copy, subtracted in double
-    /// precision: the error is relative to the chunk, not to how far the body has moved.
-    fn linear_forces(&mut self, simd: Simd, scale: f32, positions: &[Vector3<f64>], y: &mut [Padded]) {
-        let displacement = |copy: u32, rest: &Vector3<f64>| positions[copy as usize] - rest;
-        let held = self.copies.iter().zip(&self.rest);
-        let origin =
-            held.clone().next().map_or_else(Vector3::zeros, |(&copy, rest)| displacement(copy, rest));
-        for (local, (&copy, rest)) in self.x.iter_mut().zip(held) {
-            *local = padded(&(displacement(copy, rest) - origin));
-        }
-        self.apply(simd, y);
-        let factor = 1.0 / scale;
-        for f in y.iter_mut().flatten() {
-            *f *= factor;
-        }
-    }
-
-    /// Rotations, gradients, internal forces `f` and diagonal blocks.
-    fn update(
-        &mut self,
-        simd: Simd,
-        c: &Coefficients,
-        positions: &[Vector3<f64>],
-        f: &mut [Padded],
-        diagonal: &mut [Block6],
-    ) {
-        for (local, &copy) in self.positions.iter_mut().zip(&self.copies) {
-            let x = &positions[copy as usize];
-            *local = [x.x, x.y, x.z, 0.0];
-        }
-        f.fill([0.0; 4]);
-        diagonal.fill([0.0; 8]);
-        let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
-        self.inverted = self.batches.update(simd, c, &mut locals);
-    }
-}
-
-/// Gives the pieces `added` lanes: first those that are empty (only the last batch has any), then new
-/// batches. Returns piece, batch and lane of each.
-fn free_lanes(batches: &mut Vec<[u32; LANES]>, added: &[u32], pieces: &[Piece]) -> Vec<(u32, usize, usize)> {
-    let mut places = Vec::with_capacity(added.len());
-    let mut added = added.iter();
-    let last = batches.len().saturating_sub(1);
-    for (l, lane) in batches.last_mut().into_iter().flatten().enumerate().filter(|(_, p)| **p == NO_PIECE) {
-        let Some(&p) = added.next() else { return places };
-        *lane = p;
-        places.push((p, last, l));
-    }
-    let added = added.as_slice();
-    let held: Vec<[u32; 4]> = added.iter().map(|&p| pieces[p as usize].copies).collect();
-    for mut lanes in pack(&held) {
-        for (l, lane) in lanes.iter_mut().enumerate().filter(|(_, p)| **p != NO_PIECE) {
-            *lane = added[*lane as usize];
-            places.push((*lane, batches.len(), l));
-        }
-        batches.push(lanes);
-    }
-    places
-}
-
-/// Rest position of each of `copies` (ascending), all of which belong to pieces in `members`.
-fn rest_positions(copies: &[u32], members: &[u32], mesh: &TetMesh, pieces: &[Piece]) -> Vec<Vector3<f64>> {
-    let mut rest = vec![Vector3::zeros(); copies.len()];
-    for piece in members.iter().map(|&p| &pieces[p as usize]) {
-        for (copy, &node) in piece.copies.iter().zip(&mesh.tets[piece.element as usize]) {
-            if let Ok(local) = copies.binary_search(copy) {
-                rest[local] = mesh.nodes[node as usize];
-            }
-        }
-    }
-    rest
-}
-
 fn coefficients(with: &ElasticUpdate) -> Coefficients {
     Coefficients {
         mu: with.lame.mu as f32,
         lambda: with.lame.lambda as f32,
         scale: with.scale as f32,
         rotates: with.law.rotates(),
-    }
-}
-
-fn rest_batch(
-    lanes: &[u32; LANES],
-    mesh: &TetMesh,
-    pieces: &[Piece],
-    rotations: &[Matrix3<f32>],
-) -> RestBatch {
-    let mut rest = empty_batch();
-    for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
-        set_lane(&mut rest, lane, mesh, &pieces[p as usize], rotations.get(p as usize));
-    }
-    rest
-}
-
-/// A batch without pieces: no volume, no rotation.
-fn empty_batch() -> RestBatch {
-    let mut rotation: Mat3<Lanes> = Default::default();
-    for i in 0..3 {
-        rotation[4 * i] = Lanes([1.0; LANES]);
-    }
-    RestBatch { g: Default::default(), volume: Lanes::default(), rotation }
-}
-
-/// Gradients and volume of a piece, and its rotation if that is known.
-fn set_lane(
-    rest: &mut RestBatch,
-    lane: usize,
-    mesh: &TetMesh,
-    piece: &Piece,
-    rotation: Option<&Matrix3<f32>>,
-) {
-    let e = piece.element as usize;
-    let g = mesh.gradients(e);
-    for k in 0..3 {
-        for i in 0..3 {
-            rest.g[k][i].0[lane] = g[k + 1][i] as f32;
-        }
-    }
-    rest.volume.0[lane] = (piece.fraction * mesh.volume(e)) as f32;
-    if let Some(R) = rotation {
-        for i in 0..9 {
-            rest.rotation[i].0[lane] = R[(i / 3, i % 3)];
-        }
     }
 }

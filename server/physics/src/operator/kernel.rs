@@ -11,7 +11,9 @@
 use nalgebra::Matrix3;
 
 use super::Padded;
+use super::carriers::Merged;
 use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
+use crate::mesh::TetMesh;
 
 /// What an application streams per batch of eight pieces.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +36,42 @@ pub struct RestBatch {
     pub volume: Lanes,
     /// Rotation R of the last update, also the warm start of the next.
     pub rotation: Mat3<Lanes>,
+    /// How many pieces a lane integrates.
+    pub pieces: [u32; LANES],
+}
+
+impl RestBatch {
+    /// A batch without pieces: no volume, no rotation.
+    pub fn empty() -> Self {
+        let mut rotation: Mat3<Lanes> = Default::default();
+        for i in 0..3 {
+            rotation[4 * i] = Lanes([1.0; LANES]);
+        }
+        Self { g: Default::default(), volume: Lanes::default(), rotation, pieces: [0; LANES] }
+    }
+
+    /// Fills a lane: gradients, volume, and the rotation if that is known.
+    pub fn set(&mut self, lane: usize, mesh: &TetMesh, merged: &Merged, rotation: Option<&Matrix3<f32>>) {
+        let g = mesh.gradients(merged.piece.element as usize);
+        for k in 0..3 {
+            for i in 0..3 {
+                self.g[k][i].0[lane] = g[k + 1][i] as f32;
+            }
+        }
+        self.set_volume(lane, mesh, merged);
+        if let Some(R) = rotation {
+            for i in 0..9 {
+                self.rotation[i].0[lane] = R[(i / 3, i % 3)];
+            }
+        }
+    }
+
+    /// Changes how much material a lane integrates.
+    pub fn set_volume(&mut self, lane: usize, mesh: &TetMesh, merged: &Merged) {
+        let Merged { piece, count } = merged;
+        self.volume.0[lane] = (piece.fraction * mesh.volume(piece.element as usize)) as f32;
+        self.pieces[lane] = *count;
+    }
 }
 
 /// Symmetric 3×3 block (xx, xy, xz, 0, yy, yz, zz, 0): the sum of s K̂ over the pieces around a copy.
@@ -63,7 +101,7 @@ pub struct Locals<'a> {
 }
 
 /// The batches of one chunk. Their local numbers are checked once, here.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Batches {
     live: Vec<Batch>,
     rest: Vec<RestBatch>,
@@ -79,13 +117,36 @@ impl Batches {
         assert_eq!(nodes.len(), rest.len());
         assert!(nodes.iter().flatten().flatten().all(|&id| (id as usize) < n_locals));
         let zero = Lanes::default();
-        let live = nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes });
-        Self { live: live.collect(), rest, ratio: 0.0, n_locals }
+        let mut live = Vec::with_capacity(rest.capacity());
+        live.extend(nodes.iter().map(|&nodes| Batch { g: [[zero; 3]; 3], nodes }));
+        Self { live, rest, ratio: 0.0, n_locals }
     }
 
-    /// Local numbers and rest states, to be amended.
-    pub fn into_parts(self) -> (Vec<[Ids; 4]>, Vec<RestBatch>) {
-        (self.nodes(), self.rest)
+    /// Makes room: `n_batches` in all, the further ones empty, and local numbers below `n_locals`, of
+    /// which the last is the waste bin, as it was before.
+    pub fn grow(&mut self, n_batches: usize, n_locals: usize) {
+        assert!(n_batches >= self.live.len() && n_locals >= self.n_locals);
+        let [before, waste] = [self.n_locals, n_locals].map(|n| (n - 1) as u16);
+        for id in self.live.iter_mut().flat_map(|b| b.nodes.as_flattened_mut()).filter(|id| **id == before) {
+            *id = waste;
+        }
+        let empty = Batch { g: [[Lanes::default(); 3]; 3], nodes: [[waste; LANES]; 4] };
+        self.live.resize(n_batches, empty);
+        self.rest.resize(n_batches, RestBatch::empty());
+        self.n_locals = n_locals;
+    }
+
+    /// Gives one lane other local numbers.
+    pub fn set_nodes(&mut self, batch: usize, lane: usize, ids: [u16; 4]) {
+        assert!(ids.iter().all(|&id| (id as usize) < self.n_locals));
+        for (nodes, id) in self.live[batch].nodes.iter_mut().zip(ids) {
+            nodes[lane] = id;
+        }
+    }
+
+    /// The rest state of one batch.
+    pub fn rest_mut(&mut self, batch: usize) -> &mut RestBatch {
+        &mut self.rest[batch]
     }
 
     /// λ/2μ at the last update.
@@ -304,7 +365,7 @@ fn rotate_guarded(F: &Mat3<Lanes>, R: &Mat3<Lanes>, trusted: u8, rest: &mut Rest
             for i in 0..9 {
                 rest.rotation[i].0[lane] = R[(i / 3, i % 3)] as f32;
             }
-            inverted += usize::from(F.determinant() <= 0.0);
+            inverted += if F.determinant() <= 0.0 { rest.pieces[lane] as usize } else { 0 };
         }
     }
     inverted

@@ -1,5 +1,7 @@
 //! Linear operators on the copies of a body: K̂ matrix-free, and the system matrix of a step.
 
+mod carriers;
+mod chunk;
 mod chunks;
 pub mod cost;
 mod elastic;

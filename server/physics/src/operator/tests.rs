@@ -227,3 +227,70 @@ fn amended_chunks_act_like_new_ones() {
     }
     assert!(cut.pieces().len() > 2 * mesh.tets.len(), "chunks have been planned anew");
 }
+
+/// A mesh with one element for every piece, so that no two pieces go together, and its pieces.
+fn one_element_per_piece(cut: &CutMesh) -> (TetMesh, Vec<Piece>) {
+    let mesh = cut.mesh();
+    let tets = cut.pieces().iter().map(|piece| mesh.tets[piece.element as usize]).collect();
+    let pieces = (0u32..).zip(cut.pieces()).map(|(element, piece)| Piece { element, ..*piece }).collect();
+    (TetMesh { nodes: mesh.nodes.clone(), tets }, pieces)
+}
+
+/// Stabs hardly wider than an element divide elements, but hardly any node; the last incision goes
+/// through the whole body where they are and takes what they divided apart.
+#[test]
+fn pieces_with_the_same_copies_share_a_lane_until_a_cut_separates_them() {
+    let (mesh, _) = mesh();
+    let mut cut = CutMesh::new(mesh.clone()).unwrap();
+    let mut elastic = Elastic::new(Simd::detect(), &mesh, cut.pieces(), cut.n_copies());
+    let mut team = Team::new(1).unwrap();
+    let with = ElasticUpdate { lame: LAME, law: Law::Corotational, scale: 1e-4 };
+    let mut shared = vec![0];
+    for k in 0..13_u32 {
+        let (from, to, depth) = match k {
+            12 => (-0.1, 0.3, 0.3),
+            _ => (0.015 * f64::from(k), 0.015 * f64::from(k) + 0.034, 0.04 + 0.03 * f64::from(k % 4)),
+        };
+        let blade =
+            |y: f64| [Vector3::new(0.11 + 0.2 * y, y, 0.2 - depth), Vector3::new(0.11 + 0.2 * y, y, 0.3)];
+        let sweep = BladeSweep { segments: vec![blade(from), blade(to)] };
+        let before = (elastic.rotations(), elastic.n_pieces());
+        cut.sweep(&cut.rest_positions(), &sweep, k + 1).unwrap();
+        let (pieces, n) = (cut.pieces(), cut.n_copies());
+        elastic.follow(&mesh, pieces, cut.changed_pieces(), n);
+        // Pieces that were there keep the rotation of their lane, whether they have one of their own
+        // now or not.
+        assert_eq!(before.0, elastic.rotations()[..before.1], "cut {k}");
+        shared.push(pieces.len() - elastic.n_lanes());
+
+        let (apart, alone) = one_element_per_piece(&cut);
+        let mut unmerged = Elastic::new(Simd::detect(), &apart, &alone, n);
+        assert_eq!(unmerged.n_lanes(), pieces.len());
+        // Noise inverts a few tets, also among those that share a lane.
+        let rest = cut.rest_positions();
+        let turn = nalgebra::Rotation3::new(Vector3::new(0.1, 0.05 * f64::from(k), 0.2));
+        let noise = |c: usize| 0.02 * Vector3::new((12.9 * c as f64).sin(), (78.2 * c as f64).sin(), 0.3);
+        let x: Vec<Vector3<f64>> = (0..n).map(|c| turn * rest[c] + noise(c)).collect();
+        let direction: Vec<Padded> =
+            (0..n).map(|c| [(0.3 * c as f32).sin(), (1.7 * c as f32).cos(), 0.4, 0.0]).collect();
+        let found = [&mut elastic, &mut unmerged].map(|elastic| {
+            let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
+            let inverted = elastic.update(&mut team, &with, &x, &mut f, &mut diagonal);
+            let mut y = vec![[0.0; 4]; n];
+            elastic.apply(&mut team, &direction, &mut y);
+            (inverted, f, y)
+        });
+        let [(inverted, f, y), other] = &found;
+        assert!(*inverted > 0);
+        assert_eq!(*inverted, other.0, "cut {k}: every inverted piece counts");
+        for (new, old) in [(f, &other.1), (y, &other.2)] {
+            let size = largest(old.iter().map(wide));
+            let error = largest(new.iter().zip(old).map(|(a, b)| wide(a) - wide(b)));
+            assert!(error < 1e-5 * size, "after cut {k}: {error:e} of {size:e}");
+        }
+    }
+    assert!(
+        shared[12] > 20 && shared[13] + 10 < shared[12],
+        "pieces that share a lane after each cut: {shared:?}"
+    );
+}

@@ -1,0 +1,253 @@
+//! One chunk of the stiffness: the lanes of the pieces of one region, their local vectors, and how
+//! they follow a cut.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::carriers::Merged;
+use super::chunks::{NO_PIECE, pack, plan_chunk};
+use super::edges::EdgeBlocks;
+use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
+use super::{Padded, padded};
+use crate::element::{LANES, Simd};
+use crate::mesh::TetMesh;
+
+#[derive(Clone, Debug)]
+pub struct Chunk {
+    /// Region of its elements.
+    pub region: usize,
+    /// Lanes and copies there were when the chunk was planned, and the present number of lanes.
+    planned: [usize; 2],
+    n_lanes: usize,
+    /// Copy of every local number, ascending; the last local number is the waste bin.
+    pub copies: Vec<u32>,
+    pieces: Vec<[u32; LANES]>,
+    batches: Batches,
+    positions: Vec<[f64; 4]>,
+    /// What the stiffness is applied to, by local number.
+    pub x: Vec<Padded>,
+    /// Rest positions [m], for laws without rotation.
+    rest: Vec<Vector3<f64>>,
+    /// The assembled stiffness, where that is in use.
+    edges: Option<EdgeBlocks>,
+    /// Pieces with det F ≤ 0 at the last update.
+    pub inverted: usize,
+}
+
+/// A carrier that gets a lane, and the rotation to start with.
+#[derive(Clone, Copy, Debug)]
+pub struct NewLane {
+    /// The carrier.
+    pub piece: u32,
+    /// Its rotation.
+    pub rotation: Matrix3<f32>,
+}
+
+impl Chunk {
+    /// Arranges the carriers `members` (ascending); `rotations` by piece, or empty.
+    pub fn new(
+        region: usize,
+        members: &[u32],
+        mesh: &TetMesh,
+        merged: &[Merged],
+        rotations: &[Matrix3<f32>],
+    ) -> Self {
+        let plan = plan_chunk(members, |p| merged[p as usize].piece.copies);
+        // Room for what cuts add before the next plan.
+        let mut rest = Vec::with_capacity(plan.pieces.len() + plan.pieces.len() / 4 + 1);
+        for lanes in &plan.pieces {
+            let mut batch = RestBatch::empty();
+            for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
+                batch.set(lane, mesh, &merged[p as usize], rotations.get(p as usize));
+            }
+            rest.push(batch);
+        }
+        let n = plan.copies.len() + 1;
+        Self {
+            region,
+            batches: Batches::new(&plan.nodes, rest, n),
+            pieces: plan.pieces,
+            rest: rest_positions(&plan.copies, members, mesh, merged),
+            edges: None,
+            planned: [members.len(), plan.copies.len()],
+            n_lanes: members.len(),
+            copies: plan.copies,
+            positions: vec![[0.0; 4]; n],
+            x: vec![[0.0; 4]; n],
+            inverted: 0,
+        }
+    }
+
+    /// Carrier, batch and lane of all lanes in use.
+    pub fn lanes(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
+        let lanes = self.pieces.iter().enumerate();
+        let lanes = lanes.flat_map(|(b, lanes)| lanes.iter().enumerate().map(move |(l, &p)| (p, b, l)));
+        lanes.filter(|&(p, ..)| p != NO_PIECE)
+    }
+
+    /// Rotation of a lane at the last update.
+    pub fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
+        let rotation = &self.batches.rest()[batch].rotation;
+        Matrix3::from_fn(|i, j| rotation[3 * i + j].0[lane])
+    }
+
+    /// Amends the copies and fractions of carriers that are marked and gives those `added` lanes. Copies
+    /// that are new to the chunk are new altogether, so that `copies` stays in order. Says `false` and
+    /// does nothing if the chunk has grown so much that packing and numbering anew pays.
+    pub fn follow(
+        &mut self,
+        mesh: &TetMesh,
+        merged: &[Merged],
+        is_amended: &[bool],
+        added: &[NewLane],
+    ) -> bool {
+        let amended: Vec<(u32, usize, usize)> =
+            self.lanes().filter(|&(p, ..)| is_amended[p as usize]).collect();
+        let mut new: Vec<(u32, u32)> = (amended.iter().map(|lane| lane.0))
+            .chain(added.iter().map(|lane| lane.piece))
+            .map(|p| &merged[p as usize].piece)
+            .flat_map(|piece| piece.copies.into_iter().zip(mesh.tets[piece.element as usize]))
+            .filter(|(copy, _)| self.copies.binary_search(copy).is_err())
+            .collect();
+        new.sort_unstable();
+        new.dedup();
+        let [planned_lanes, planned_copies] = self.planned;
+        let n_copies = self.copies.len() + new.len();
+        if self.n_lanes + added.len() > planned_lanes + planned_lanes / 4
+            || n_copies > planned_copies + planned_copies / 2
+        {
+            return false;
+        }
+        self.copies.extend(new.iter().map(|n| n.0));
+        self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
+        debug_assert!(self.copies.is_sorted());
+        let n = n_copies + 1;
+        let places = free_lanes(&mut self.pieces, added, |p| merged[p as usize].piece.copies);
+        self.batches.grow(self.pieces.len(), n);
+        let copies = &self.copies;
+        let locals = |p: u32| {
+            let local = |copy| copies.binary_search(&copy).map_or(n - 1, |local| local) as u16;
+            merged[p as usize].piece.copies.map(local)
+        };
+        for (p, batch, lane) in amended {
+            self.batches.set_nodes(batch, lane, locals(p));
+            self.batches.rest_mut(batch).set_volume(lane, mesh, &merged[p as usize]);
+        }
+        for ([batch, lane], NewLane { piece, rotation }) in places.into_iter().zip(added) {
+            self.batches.set_nodes(batch, lane, locals(*piece));
+            self.batches.rest_mut(batch).set(lane, mesh, &merged[*piece as usize], Some(rotation));
+        }
+        self.n_lanes += added.len();
+        self.edges = None;
+        self.positions.resize(n, [0.0; 4]);
+        self.x.resize(n, [0.0; 4]);
+        true
+    }
+
+    /// Bytes of stiffness that one application streams.
+    pub fn bytes(&self) -> usize {
+        self.edges.as_ref().map_or_else(|| self.batches.bytes(), EdgeBlocks::bytes)
+    }
+
+    /// Number of lanes in use.
+    pub fn n_lanes(&self) -> usize {
+        self.n_lanes
+    }
+
+    /// Assembles the stiffness of the last update, or forgets what was assembled before.
+    pub fn assemble(&mut self, wanted: bool) {
+        let waste = self.copies.len() as u16;
+        if wanted {
+            let Self { edges, batches, .. } = self;
+            edges.get_or_insert_with(|| EdgeBlocks::new(&batches.nodes(), waste)).assemble(batches);
+        } else {
+            self.edges = None;
+        }
+    }
+
+    /// y = s K̂ x.
+    #[inline(always)]
+    pub fn apply(&self, simd: Simd, y: &mut [Padded]) {
+        y.fill([0.0; 4]);
+        match &self.edges {
+            Some(edges) => edges.apply(simd, &self.x, y),
+            None => self.batches.apply(simd, &self.x, y),
+        }
+    }
+
+    /// y = K̂ u with displacements u relative to the chunk's first copy, subtracted in double
+    /// precision: the error is relative to the chunk, not to how far the body has moved.
+    pub fn linear_forces(&mut self, simd: Simd, scale: f32, positions: &[Vector3<f64>], y: &mut [Padded]) {
+        let displacement = |copy: u32, rest: &Vector3<f64>| positions[copy as usize] - rest;
+        let held = self.copies.iter().zip(&self.rest);
+        let origin =
+            held.clone().next().map_or_else(Vector3::zeros, |(&copy, rest)| displacement(copy, rest));
+        for (local, (&copy, rest)) in self.x.iter_mut().zip(held) {
+            *local = padded(&(displacement(copy, rest) - origin));
+        }
+        self.apply(simd, y);
+        let factor = 1.0 / scale;
+        for f in y.iter_mut().flatten() {
+            *f *= factor;
+        }
+    }
+
+    /// Rotations, gradients, internal forces `f` and diagonal blocks.
+    pub fn update(
+        &mut self,
+        simd: Simd,
+        c: &Coefficients,
+        positions: &[Vector3<f64>],
+        f: &mut [Padded],
+        diagonal: &mut [Block6],
+    ) {
+        for (local, &copy) in self.positions.iter_mut().zip(&self.copies) {
+            let x = &positions[copy as usize];
+            *local = [x.x, x.y, x.z, 0.0];
+        }
+        f.fill([0.0; 4]);
+        diagonal.fill([0.0; 8]);
+        let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
+        self.inverted = self.batches.update(simd, c, &mut locals);
+    }
+}
+
+/// Gives the carriers `added` lanes: first those that are empty (only the last batch has any), then new
+/// batches. Returns batch and lane of each.
+fn free_lanes(
+    batches: &mut Vec<[u32; LANES]>,
+    added: &[NewLane],
+    copies: impl Fn(u32) -> [u32; 4],
+) -> Vec<[usize; 2]> {
+    let mut places = Vec::with_capacity(added.len());
+    let last = batches.len().saturating_sub(1);
+    let empty = batches.last_mut().into_iter().flatten().enumerate().filter(|(_, p)| **p == NO_PIECE);
+    for ((l, lane), new) in empty.zip(added) {
+        *lane = new.piece;
+        places.push([last, l]);
+    }
+    let first = places.len();
+    places.resize(added.len(), [0; 2]);
+    let held: Vec<[u32; 4]> = added[first..].iter().map(|new| copies(new.piece)).collect();
+    for mut lanes in pack(&held) {
+        for (l, lane) in lanes.iter_mut().enumerate().filter(|(_, p)| **p != NO_PIECE) {
+            let k = first + *lane as usize;
+            places[k] = [batches.len(), l];
+            *lane = added[k].piece;
+        }
+        batches.push(lanes);
+    }
+    places
+}
+
+/// Rest position of each of `copies` (ascending), all of which belong to pieces in `members`.
+fn rest_positions(copies: &[u32], members: &[u32], mesh: &TetMesh, merged: &[Merged]) -> Vec<Vector3<f64>> {
+    let mut rest = vec![Vector3::zeros(); copies.len()];
+    for piece in members.iter().map(|&p| &merged[p as usize].piece) {
+        for (copy, &node) in piece.copies.iter().zip(&mesh.tets[piece.element as usize]) {
+            if let Ok(local) = copies.binary_search(copy) {
+                rest[local] = mesh.nodes[node as usize];
+            }
+        }
+    }
+    rest
+}
