@@ -41,6 +41,7 @@ try {
   await bodyDeforms(page);
   await messagesFlow(page);
   await incisionOpens(page);
+  await incisionIsCurved(page);
   await mouseTouches(page);
   await lateJoinerSeesTheSame(page);
   await picture(page);
@@ -131,6 +132,44 @@ async function incisionOpens(page) {
   }
   Object.assign(summary, { lips: await lips(), woundPixels: wound });
   hold(wound >= 300, `the incision opens to the eye (${wound} wound pixels)`);
+}
+
+/**
+ * When the blade has left, the wound is an arc that rises over its chord by at least a sixth of it (the arc
+ * through the mean places of the lips in its three thirds; a flat one has 4/9 of its rise between them).
+ * A close look is kept.
+ */
+async function incisionIsCurved(page) {
+  await until(page, "the blade is done", 4 * MINUTE, () => window.scindo.tools().every((tool) => tool.mode !== 4));
+  await page.waitForTimeout(2000);
+  const arc = await page.evaluate(() => {
+    const c = window.scindo.lipCenters(window.scindo.bodies()[0].id), n = c.length / 3;
+    let ends = [0, 0], chord = 0;
+    for (let i = 0; i < n; i++) {
+      for (let j = 0; j < i; j++) {
+        const d = Math.hypot(c[3 * i] - c[3 * j], c[3 * i + 1] - c[3 * j + 1]);
+        if (d > chord) [ends, chord] = [[3 * i, 3 * j], d];
+      }
+    }
+    const [a, b] = ends, u = [(c[b] - c[a]) / chord, (c[b + 1] - c[a + 1]) / chord];
+    const thirds = [[0, 0], [0, 0], [0, 0]];
+    for (let k = 0; k < c.length; k += 3) {
+      const [x, y] = [c[k] - c[a], c[k + 1] - c[a + 1]];
+      const third = thirds[Math.min(2, Math.max(0, Math.floor((3 * (x * u[0] + y * u[1])) / chord)))];
+      third[0] += x * u[1] - y * u[0];
+      third[1] += 1;
+    }
+    const [first, middle, last] = thirds.map(([sum, count]) => sum / Math.max(1, count));
+    return { chordM: chord, risesM: (9 / 4) * Math.abs(middle - (first + last) / 2) };
+  });
+  const { position, target } = await page.evaluate(() => window.scindo.cameraState());
+  await page.evaluate(() => window.scindo.camera([0.085, -0.085, 0.165], [0.022, -0.006, 0.045]));
+  await page.waitForTimeout(3000);
+  const { wound } = await colours(page, "view-3-wound.png");
+  await page.evaluate(([p, t]) => window.scindo.camera(p, t), [position, target]);
+  Object.assign(summary, { arc, woundPixelsClose: wound });
+  hold(arc.risesM > arc.chordM / 6, `the incision is curved (${(1e3 * arc.chordM).toFixed(0)} mm long, rises by ${(1e3 * arc.risesM).toFixed(1)} mm)`);
+  hold(wound >= 5000, `the wound is seen from close by (${wound} wound pixels)`);
 }
 
 /** Pressing with the mouse gives a contact force; letting go ends it. */

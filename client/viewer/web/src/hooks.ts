@@ -35,7 +35,9 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     /** A copy of a body's surface positions [m], x y z interleaved. */
     positions: (id: string) => Array.from(session.bodies.get(id)?.positions ?? []),
     /** Area of all lips of a body [m²]. */
-    lipArea: (id: string) => lipArea(session, id),
+    lipArea: (id: string) => lips(session, id).reduce((sum, lip) => sum + lip.area, 0),
+    /** Centres of all lip triangles of a body [m], x y z interleaved. */
+    lipCenters: (id: string) => lips(session, id).flatMap((lip) => lip.center),
     bounds: () => {
       const box = boundsOf(bodies());
       return { min: box.min.toArray() as Triple, max: box.max.toArray() as Triple };
@@ -78,15 +80,16 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
   Object.assign(window, { scindo: hooks });
 }
 
-function lipArea(session: Session, id: string): number {
+function lips(session: Session, id: string): { area: number; center: Triple }[] {
   const body = session.bodies.get(id);
-  if (!body?.render) return 0;
+  if (!body?.render) return [];
   const { index, source, skinTriangles } = body.render;
   const at = (c: number) => new Vector3().fromArray(body.positions, 3 * source[index[c]]);
-  let area = 0;
+  const lips = [];
   for (let c = 3 * skinTriangles; c < index.length; c += 3) {
-    const a = at(c);
-    area += 0.5 * at(c + 1).sub(a).cross(at(c + 2).sub(a)).length();
+    const [p, q, r] = [at(c), at(c + 1), at(c + 2)];
+    const center = p.clone().add(q).add(r).divideScalar(3).toArray() as Triple;
+    lips.push({ area: 0.5 * q.sub(p).cross(r.sub(p)).length(), center });
   }
-  return area;
+  return lips;
 }
