@@ -14,8 +14,14 @@ pub const MAX_VERTICES: u32 = 4_000_000;
 /// Most surface triangles of one body (a closed surface has about twice as many as vertices).
 pub const MAX_TRIANGLES: u32 = 8_000_000;
 
+/// Most marks of incisions on the surface of one body; a scratch through 100,000 elements has fewer.
+pub const MAX_MARKS: u32 = 1_000_000;
+
 /// Bytes of a position: three little-endian `f32`.
 pub const POSITION_BYTES: usize = 12;
+
+/// Bytes of a mark: two positions.
+pub const MARK_BYTES: usize = 2 * POSITION_BYTES;
 
 /// Bytes of a triangle: three little-endian `u32`.
 pub const TRIANGLE_BYTES: usize = 12;
@@ -27,7 +33,8 @@ pub const TAG_BYTES: usize = 4;
 pub const HEADER_BYTES: usize = 512;
 
 /// Largest surface frame [bytes].
-pub const MAX_FRAME_BYTES: usize = MAX_VERTICES as usize * POSITION_BYTES + HEADER_BYTES;
+pub const MAX_FRAME_BYTES: usize =
+    MAX_VERTICES as usize * POSITION_BYTES + MAX_MARKS as usize * MARK_BYTES + HEADER_BYTES;
 
 /// Largest surface topology [bytes].
 pub const MAX_TOPOLOGY_BYTES: usize = MAX_TRIANGLES as usize * (TRIANGLE_BYTES + TAG_BYTES) + HEADER_BYTES;

@@ -147,6 +147,8 @@ fn keyframe() -> impl Strategy<Value = SurfaceKeyframe> {
                 body_id,
                 epoch,
                 vertex_count: n,
+                mark_count: n / 2,
+                marks: bytes_of_positions[..(n / 2) as usize * 24].to_vec().into(),
                 positions: bytes_of_positions.into(),
             };
             SurfaceKeyframe { topology: Some(topology), frame: Some(frame) }
@@ -411,6 +413,13 @@ fn values_out_of_range_are_refused_with_what_and_where() {
         ..SurfaceFrame::default()
     };
     assert_eq!(refusal(&frame).code(), "out-of-range");
+    let frame = SurfaceFrame {
+        body_id: "b".into(),
+        mark_count: 2,
+        marks: vec![0; 24].into(),
+        ..SurfaceFrame::default()
+    };
+    assert_eq!(refusal(&frame).to_string(), "SurfaceFrame: marks is 24 bytes, allowed 48 bytes (2 x 24)");
     assert_eq!(refusal(&StepRequest { count: 10_001 }).code(), "out-of-range");
 }
 

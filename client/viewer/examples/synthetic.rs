@@ -210,6 +210,7 @@ impl Feed {
             epoch: self.epoch,
             vertex_count: VERTICES,
             positions: x.iter().flatten().flat_map(|f| f.to_le_bytes()).collect::<Vec<u8>>().into(),
+            ..SurfaceFrame::default()
         }
     }
 

@@ -5,8 +5,8 @@ use prost::Name as _;
 use super::field::{Checked, In};
 use crate::codec::{DecodeError, WireMessage};
 use crate::limits::{
-    MAX_FRAME_BYTES, MAX_KEYFRAME_BYTES, MAX_TOPOLOGY_BYTES, MAX_TRIANGLES, MAX_VERTICES, POSITION_BYTES,
-    TAG_BYTES, TRIANGLE_BYTES,
+    MARK_BYTES, MAX_FRAME_BYTES, MAX_KEYFRAME_BYTES, MAX_MARKS, MAX_TOPOLOGY_BYTES, MAX_TRIANGLES,
+    MAX_VERTICES, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES,
 };
 use crate::messages::{SurfaceFrame, SurfaceKeyframe, SurfaceTopology};
 
@@ -19,10 +19,14 @@ impl WireMessage for SurfaceFrame {
         at.finite("sim_time_s", self.sim_time_s)?;
         at.at_most("vertex_count", self.vertex_count as usize, MAX_VERTICES as usize)?;
         array_length(at, "positions", self.positions.len(), self.vertex_count, POSITION_BYTES)?;
-        match first_non_finite(&self.positions) {
-            Some(found) => at.finite("positions", found),
-            None => Ok(()),
+        at.at_most("mark_count", self.mark_count as usize, MAX_MARKS as usize)?;
+        array_length(at, "marks", self.marks.len(), self.mark_count, MARK_BYTES)?;
+        for (field, array) in [("positions", &self.positions), ("marks", &self.marks)] {
+            if let Some(found) = first_non_finite(array) {
+                return at.finite(field, found);
+            }
         }
+        Ok(())
     }
 }
 

@@ -5,6 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use bytes::Bytes;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use scindo_proto::limits::{MARK_BYTES, MAX_MARKS, POSITION_BYTES};
 use scindo_proto::messages::{self as wire, tool_sample, tool_shape};
 use scindo_world::inputs::{ToolInput, ToolMode, ToolShape};
 use scindo_world::snapshot::{BodySnapshot, Snapshot, SurfaceTopology, ToolSnapshot};
@@ -96,9 +97,14 @@ pub fn to_tool_input(sample: &wire::ToolSample, id: Arc<str>, owner: Arc<str>) -
 
 /// Positions of a body for the wire. `seq` counts the frames of the body.
 pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceFrame {
-    let mut positions = Vec::with_capacity(12 * body.positions.len());
+    let mut positions = Vec::with_capacity(POSITION_BYTES * body.positions.len());
     for coordinate in body.positions.iter().flatten() {
         positions.extend_from_slice(&coordinate.to_le_bytes());
+    }
+    let mark_count = body.marks.len().min(MAX_MARKS as usize);
+    let mut marks = Vec::with_capacity(MARK_BYTES * mark_count);
+    for coordinate in body.marks[..mark_count].iter().flatten().flatten() {
+        marks.extend_from_slice(&coordinate.to_le_bytes());
     }
     wire::SurfaceFrame {
         seq,
@@ -109,6 +115,8 @@ pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::Sur
         epoch: body.topology.epoch,
         vertex_count: body.positions.len() as u32,
         positions: positions.into(),
+        mark_count: mark_count as u32,
+        marks: marks.into(),
     }
 }
 

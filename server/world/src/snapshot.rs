@@ -36,6 +36,8 @@ pub struct BodySnapshot {
     pub topology: Arc<SurfaceTopology>,
     /// Surface positions [m]; empty when nobody asked.
     pub positions: Vec<[f32; 3]>,
+    /// Ends [m] of the lines on the surface where incisions have not opened yet; empty when nobody asked.
+    pub marks: Vec<[[f32; 3]; 2]>,
     /// Surface velocities [m/s]; empty when nobody asked for contact.
     pub velocities: Vec<[f32; 3]>,
     /// Solver iterations of the step.
@@ -87,10 +89,12 @@ impl BodySnapshot {
         self.copies = mesh.n_copies() as u32;
         self.rest_volume_m3 = body.rest_volume_m3;
         self.positions.clear();
+        self.marks.clear();
         self.velocities.clear();
         if surface {
             self.topology = body.topology();
             self.positions.extend_from_slice(body.surface_positions());
+            body.incision_marks(&mut self.marks);
         }
         if velocities {
             body.surface_velocities(&mut self.velocities);

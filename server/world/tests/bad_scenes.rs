@@ -112,6 +112,10 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
     let snap = "cutting = { method = \"snap\" }";
     assert_says(&with(&format!("{snap}\nelement = \"tet10\"")), &["found `snap` with tet10, allowed: tet4"]);
     assert_says(
+        &with(&format!("{snap}\nskin = {{ divisions = 2 }}")),
+        &["scene:10: body.beam.skin", "found a skin with cutting.method = `snap`", "remove the skin"],
+    );
+    assert_says(
         &with("cutting = { loose = \"pinned\" }"),
         &["found `pinned` with xfem, allowed: snap", "cutting.method"],
     );

@@ -111,3 +111,32 @@ fn an_incision_follows_a_path_on_the_skin() {
     assert!(wound.iter().all(|p| p[0] > 0.0 && p[0] < 0.05 && p[1].abs() < 0.045), "{wound:?}");
     volume(&cut);
 }
+
+#[test]
+fn a_scratch_is_drawn_for_everybody_and_reported() {
+    let path = "path_m = [[0.02, -0.03, 0.07], [0.03, 0.0, 0.07], [0.02, 0.03, 0.07]]\ndepth_m = 0.002\n";
+    let at = ORGAN.find("sweep_m").unwrap();
+    let mut sim = start(&format!("{}{path}", &ORGAN[..at]));
+    let mut events = Vec::new();
+    for _ in 0..4 {
+        events.extend(sim.step(&Inputs::default()).events.iter().cloned());
+    }
+    let told = events.iter().find(|event| event.name == "cut-opens-nothing").unwrap();
+    assert!(told.message.contains("drawn on the surface") && told.message.contains("mm"), "{told:?}");
+    let shown = snapshot(&mut sim);
+    let body = &shown.bodies[0];
+    assert!(!body.topology.tags.contains(&1));
+    let length = |[p, q]: &[[f32; 3]; 2]| (0..3).map(|k| (q[k] - p[k]).powi(2)).sum::<f32>().sqrt();
+    let drawn: f32 = body.marks.iter().map(length).sum();
+    // The path is 63 mm long; its ends lie inside faces of elements 16 mm wide.
+    assert!(drawn > 0.03 && drawn < 0.08, "{drawn} m in {} lines", body.marks.len());
+    // Each line lies on a triangle that is shown.
+    let vector = |p: [f32; 3]| nalgebra::Vector3::from(p.map(f64::from));
+    let tree = scindo_collision::SurfaceBvh::new(&body.positions, &body.topology.triangles).unwrap();
+    for end in body.marks.iter().flatten() {
+        let off = (tree.closest_point(vector(*end), 1.0).unwrap().point - vector(*end)).norm();
+        assert!(off < 1e-6, "{off} m off the skin");
+    }
+    sim.reset().unwrap();
+    assert!(snapshot(&mut sim).bodies[0].marks.is_empty());
+}

@@ -3,10 +3,13 @@
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, Box3, Vector3 } from "three";
 import { smoothTopology, type RenderTopology } from "./smoothing";
 import { skinMaterial, lipMaterial } from "./tissue";
+import { IncisionMarks } from "./marks";
 import type { SurfaceFrame, SurfaceTopology } from "../gen/scindo/v1/surface_pb";
 
 export class BodySurface {
   readonly object: Mesh;
+  /** Lines along incisions that have not opened yet. */
+  readonly marks = new IncisionMarks();
   readonly bounds = new Box3();
   epoch = -1;
   vertexCount = 0;
@@ -30,6 +33,7 @@ export class BodySurface {
     this.object.frustumCulled = false;
     this.object.castShadow = true;
     this.object.receiveShadow = true;
+    this.object.add(this.marks.object);
   }
 
   /** Keeps the topology until the first frame of its epoch gives it positions. */
@@ -54,6 +58,7 @@ export class BodySurface {
     } else {
       this.positions = floats(frame.positions, this.positions);
     }
+    this.marks.take(frame.marks.length === 24 * frame.markCount ? floats(frame.marks, new Float32Array(6 * frame.markCount)) : null);
     this.frames += 1;
     this.simTimeS = frame.simTimeS;
     this.simStep = frame.simStep;
@@ -65,6 +70,7 @@ export class BodySurface {
   upload(): void {
     if (!this.stale || !this.render) return;
     this.stale = false;
+    this.marks.upload();
     const position = this.geometry.getAttribute("position") as BufferAttribute;
     const normal = this.geometry.getAttribute("normal") as BufferAttribute;
     gather(this.positions, this.render.source, position.array as Float32Array, this.bounds);
@@ -79,6 +85,7 @@ export class BodySurface {
   dispose(): void {
     this.object.removeFromParent();
     this.geometry.dispose();
+    this.marks.dispose();
   }
 
   private adopt(topology: SurfaceTopology): boolean {

@@ -27,6 +27,7 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
       vertices: body.vertexCount,
       triangles: body.triangleCount,
       lipTriangles: body.lipTriangles,
+      marks: body.marks.count,
       simTimeS: body.simTimeS,
       simStep: Number(body.simStep),
       min: body.bounds.min.toArray() as Triple,

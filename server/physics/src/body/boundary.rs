@@ -7,6 +7,7 @@ use super::{Body, BodyError, Path};
 use crate::cut::CutMesh;
 use crate::operator::FixedCopy;
 use crate::snap::SnapNode;
+use crate::snap::node::NEW;
 
 /// A node whose displacement is prescribed in some directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +56,45 @@ impl Boundary {
         }
         nodes.iter_mut().zip(&self.point_force).for_each(|(node, force)| node.point_force = *force);
         nodes.iter_mut().zip(&self.spread_force).for_each(|(node, force)| node.spread_force = *force);
+    }
+
+    /// What was asked for between `then` and `now`, on nodes that came from the `n` nodes of these
+    /// constraints and loads by `origins`; what is on nodes without an origin is left out.
+    pub fn take_changes(&mut self, then: &Self, now: &Self, origins: &[u32], n: usize) {
+        let origin = |node: u32| origins.get(node as usize).copied().filter(|&o| o != NEW);
+        for old in then.fixed.iter().filter(|f| now.fixed_at(f.node).is_none()) {
+            if let Some(node) = origin(old.node) {
+                self.fixed.retain(|f| f.node != node);
+            }
+        }
+        for new in now.fixed.iter().filter(|f| then.fixed_at(f.node) != Some(*f)) {
+            if let Some(node) = origin(new.node) {
+                self.fixed.retain(|f| f.node != node);
+                let at = self.fixed.partition_point(|f| f.node < node);
+                self.fixed.insert(at, FixedNode { node, ..*new });
+            }
+        }
+        for (mine, then, now) in [
+            (&mut self.point_force, &then.point_force, &now.point_force),
+            (&mut self.spread_force, &then.spread_force, &now.spread_force),
+        ] {
+            if now.is_empty() && !then.is_empty() {
+                mine.clear();
+            }
+            if !now.is_empty() {
+                mine.resize(n, Vector3::zeros());
+            }
+            for (node, force) in (0u32..).zip(now) {
+                let change = force - then.get(node as usize).copied().unwrap_or_default();
+                if let (Some(origin), true) = (origin(node), change != Vector3::zeros()) {
+                    mine[origin as usize] += change;
+                }
+            }
+        }
+    }
+
+    fn fixed_at(&self, node: u32) -> Option<&FixedNode> {
+        self.fixed.binary_search_by_key(&node, |f| f.node).ok().map(|at| &self.fixed[at])
     }
 
     /// A fixed node fixes the copy that holds the node's own material, which keeps the node's

@@ -23,7 +23,7 @@ pub use statics::{StaticReport, StaticSettings};
 use nalgebra::Vector3;
 
 pub use crate::assembly::{ElementKind, Volumetric};
-use crate::cut::{CutMesh, Surface};
+use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::element::Simd;
 use crate::integrator::{DynamicsInputs, LooseParts, State, StepInputs};
 pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
@@ -290,6 +290,15 @@ impl Body {
     /// of the elements and lips. Changes with the epoch of [`cut_mesh`](Self::cut_mesh) and not else.
     pub fn surface(&self) -> &Surface {
         self.skin.as_ref().map_or(self.cut_mesh.surface(), Skin::surface)
+    }
+
+    /// What incisions have drawn on the [`surface`](Self::surface) without opening it yet. May change with
+    /// every cut, also where the topology does not.
+    pub fn incision_marks(&self) -> Vec<IncisionMark> {
+        match &self.skin {
+            Some(skin) => skin.incision_marks(&self.cut_mesh),
+            None => self.cut_mesh.incision_marks(),
+        }
     }
 
     /// Mesh, pieces, copies and the boundary of the elements.

@@ -33,6 +33,8 @@ pub enum LooseRule {
 pub(super) struct SnapState {
     snapper: Snapper,
     start: Start,
+    /// Constraints and loads as the last cut left them, pins among them.
+    carried: Boundary,
     report: SnapReport,
     /// Node of the uncut mesh that every node was, or [`crate::snap::node::NEW`].
     origins: Vec<u32>,
@@ -42,7 +44,7 @@ pub(super) struct SnapState {
 #[derive(Clone, Debug)]
 struct Start {
     mesh: TetMesh,
-    /// Set by the first cut.
+    /// Set by the first cut; takes on what is asked for after it.
     boundary: Option<Boundary>,
 }
 
@@ -52,7 +54,16 @@ impl SnapState {
             snapper: Snapper::default(),
             origins: (0..mesh.nodes.len() as u32).collect(),
             start: Start { mesh: mesh.clone(), boundary: None },
+            carried: Boundary::default(),
             report: SnapReport::default(),
+        }
+    }
+
+    /// Remembers what was asked for since the last cut, for a reset.
+    fn take_changes(&mut self, now: &Boundary) {
+        let n = self.start.mesh.nodes.len();
+        if let Some(start) = &mut self.start.boundary {
+            start.take_changes(&self.carried, now, &self.origins, n);
         }
     }
 }
@@ -90,6 +101,7 @@ impl Body {
         told.epoch += 1;
         self.cut_mesh = CutMesh::with_lips(cut.mesh, snap.snapper.tags(), told.epoch)?;
         told.new_copies = cut.duplicates.iter().map(|d| NewCopy { copy: d.node, parent: d.parent }).collect();
+        snap.take_changes(&self.boundary);
         if snap.start.boundary.is_none() {
             snap.start.boundary = Some(self.boundary.clone());
         }
@@ -103,14 +115,19 @@ impl Body {
         if self.settings.loose == LooseRule::Pinned {
             self.pin_loose_parts()?;
         }
+        if let Some(snap) = &mut self.snap {
+            snap.carried = self.boundary.clone();
+        }
         Ok(told)
     }
 
-    /// Back to the uncut mesh, with the constraints and loads from before the first cut.
+    /// Back to the uncut mesh. Constraints and loads stay, on the nodes that theirs were; pins of loose
+    /// parts go, and so does what was asked for on nodes that cuts made.
     pub(super) fn snap_reset(&mut self) -> Result<(), BodyError> {
         let Some(snap) = &mut self.snap else { return Ok(()) };
         let epoch = self.cut_mesh.epoch() + 1;
         let mesh = snap.start.mesh.clone();
+        snap.take_changes(&self.boundary);
         if let Some(boundary) = snap.start.boundary.take() {
             self.boundary = boundary;
         }

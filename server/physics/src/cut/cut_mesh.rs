@@ -15,7 +15,7 @@ use super::fragments::Fragments;
 use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
-use super::pending::{Pending, PendingFace, Pieces};
+use super::pending::{Pending, PendingFace, PendingLine, Pieces};
 use super::pieces::{Piece, PieceTable};
 use super::separate::{Separator, Sheet};
 use super::surface::Surface;
@@ -146,6 +146,12 @@ impl CutMesh {
     pub fn pending_faces(&self) -> Vec<PendingFace> {
         let Self { mesh, fragments, pieces, crossings, sets, .. } = self;
         self.pending.faces(&Pieces { mesh, fragments, pieces, crossings, sets })
+    }
+
+    /// Where those incisions cross the boundary.
+    pub(crate) fn pending_lines(&self) -> Vec<PendingLine> {
+        let Self { mesh, fragments, pieces, crossings, sets, .. } = self;
+        self.pending.lines(&Pieces { mesh, fragments, pieces, crossings, sets })
     }
 
     /// Loose parts and their rest volumes.

@@ -4,9 +4,10 @@ use thiserror::Error;
 
 use super::base::Base;
 use super::border::Borders;
+use super::incision_mark::lift;
 use super::sheet::{Sheet, SkinShape};
 use super::stitch::{Cloth, Seams};
-use crate::cut::{CutMesh, Surface};
+use crate::cut::{CutMesh, IncisionMark, Surface};
 
 /// Most parts of an edge.
 const MAX_DIVISIONS: usize = 32;
@@ -63,6 +64,23 @@ pub enum SkinError {
     },
 }
 
+/// Why skin and lips could not be sewn together. A conforming cut curve excludes it.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum Misfit {
+    /// Two parts of the cut curve run along one edge of the skin.
+    #[error("two parts of the cut curve run along one edge of the skin")]
+    SharedEdge,
+    /// A face of the boundary is cut and no fragment below it is found.
+    #[error("a face of the boundary has no material below it")]
+    NoPiece,
+    /// An edge of the cut curve has no edges of the skin along it, or two have the same.
+    #[error("an edge of the cut curve has no edges of the skin of its own")]
+    NoChain,
+    /// An edge of the skin or of a lip stays open.
+    #[error("an edge of the skin or of a lip has no other side")]
+    OpenSeam,
+}
+
 /// A skin and the surface that it and the lips make.
 #[derive(Clone, Debug)]
 pub struct Skin {
@@ -74,7 +92,7 @@ pub struct Skin {
     seams: Seams,
     surface: Surface,
     epoch: u32,
-    fits: bool,
+    misfit: Option<Misfit>,
 }
 
 impl Skin {
@@ -108,7 +126,7 @@ impl Skin {
             seams: Seams::default(),
             surface: Surface::default(),
             epoch: cut.epoch(),
-            fits: true,
+            misfit: None,
         };
         skin.sew(cut);
         Ok(skin)
@@ -124,19 +142,22 @@ impl Skin {
             self.sheet.clone_from(&self.uncut);
             self.seams = Seams::default();
             self.surface = Surface::default();
-            self.fits = true;
+            self.misfit = None;
         }
         self.sew(cut);
     }
 
     fn sew(&mut self, cut: &CutMesh) {
-        if self.fits {
+        if self.misfit.is_none() {
             let mut borders = Borders::of(&self.base, cut);
             borders.cut(&self.base, cut, &mut self.sheet, self.settings.snapping);
             let cloth = Cloth { cut, base: &self.base, sheet: &self.sheet, borders: &borders };
-            self.fits = self.sheet.conflicts == 0 && self.seams.sew(&cloth, &mut self.surface);
+            self.misfit = match self.sheet.conflicts {
+                0 => self.seams.sew(&cloth, &mut self.surface).err(),
+                _ => Some(Misfit::SharedEdge),
+            };
         }
-        if !self.fits {
+        if self.misfit.is_some() {
             self.surface.clone_from(cut.surface());
         }
     }
@@ -146,9 +167,27 @@ impl Skin {
         &self.surface
     }
 
+    /// What incisions have drawn on skin and lips without opening them, on the triangles of the
+    /// [`surface`](Self::surface).
+    pub fn incision_marks(&self, cut: &CutMesh) -> Vec<IncisionMark> {
+        if self.misfit.is_some() {
+            return cut.incision_marks();
+        }
+        let mut marks = Vec::new();
+        for line in cut.pending_lines() {
+            lift(&self.base, &self.sheet, &self.surface, cut, &line, &mut marks);
+        }
+        marks
+    }
+
     /// Whether skin and lips could be sewn together; if not, the surface is the boundary of the elements.
     pub fn fits(&self) -> bool {
-        self.fits
+        self.misfit.is_none()
+    }
+
+    /// Why they could not.
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.misfit
     }
 
     /// Skin triangles that the last cut made anew; the others stayed as they were.

@@ -26,11 +26,12 @@ mod insert;
 mod walk;
 mod border;
 mod lips;
+mod incision_mark;
 mod stitch;
 mod embedding;
 mod incision;
 
-pub use embedding::{Skin, SkinError, SkinSettings};
+pub use embedding::{Misfit, Skin, SkinError, SkinSettings};
 pub use incision::{Penetration, incision};
 pub use sheet::SkinShape;
 

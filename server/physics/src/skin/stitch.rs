@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 
 use super::base::Base;
 use super::border::Borders;
+use super::embedding::Misfit;
 use super::lips::{Corner, Lips};
 use super::sheet::Sheet;
 use crate::cut::fragments::{FragmentVertex, NONE};
@@ -50,9 +51,8 @@ impl Seams {
         self.renewed
     }
 
-    /// Brings `surface` up to date. `false` where skin and lips do not fit, which a conforming cut curve
-    /// excludes; the surface is then not usable.
-    pub fn sew(&mut self, cloth: &Cloth, surface: &mut Surface) -> bool {
+    /// Brings `surface` up to date; where skin and lips do not fit, it is not usable.
+    pub fn sew(&mut self, cloth: &Cloth, surface: &mut Surface) -> Result<(), Misfit> {
         let sheet = cloth.sheet;
         self.now += 1;
         self.piece.resize(sheet.corners.len(), NONE);
@@ -60,19 +60,19 @@ impl Seams {
         self.round.resize(sheet.twin.len(), 0);
         self.taken.resize(sheet.points.len(), 0);
         self.known.resize(cloth.base.faces.len(), (NONE, [NONE; 4]));
-        let Some(renewed) = self.find_pieces(cloth) else { return false };
+        let renewed = self.find_pieces(cloth).ok_or(Misfit::NoPiece)?;
         self.renewed = renewed.len();
-        let Some(lips) = Lips::new(cloth.cut, sheet, cloth.borders, &mut self.seam) else { return false };
+        let lips = Lips::new(cloth.cut, sheet, cloth.borders, &mut self.seam).ok_or(Misfit::NoChain)?;
         let cut_edges_are_sewn = renewed
             .iter()
             .flat_map(|&t| 3 * t..3 * t + 3)
             .all(|h| sheet.chain[h as usize] == NONE || self.seam[h as usize] != NONE);
         if !cut_edges_are_sewn || lips.twin.contains(&NONE) {
-            return false;
+            return Err(Misfit::OpenSeam);
         }
         self.number(cloth, &lips, &renewed, surface);
         split_doubled_edges(self, cloth, &lips, &renewed, surface);
-        true
+        Ok(())
     }
 
     /// Pieces of the skin triangles that may have changed; returns those triangles.

@@ -104,3 +104,34 @@ fn loads_keep_their_sum_and_what_does_not_go_is_refused() {
     let xfem = BodySettings { cutting: CuttingMethod::Xfem, loose: LooseRule::Pinned, ..snap() };
     assert!(refused(xfem).contains("pinning"));
 }
+
+#[test]
+fn a_reset_keeps_what_was_asked_for_after_the_cut_and_drops_the_pins() {
+    let mut body = block(Law::Corotational, BodySettings { loose: LooseRule::Pinned, ..snap() });
+    let held: Vec<u32> = body.fixed_nodes().iter().map(|f| f.node).collect();
+    body.cut(&sweep(0.107, 0.2), 1).unwrap();
+    assert!(body.fixed_nodes().len() > held.len(), "the part cut off is pinned");
+    let origins = body.node_origins().unwrap().to_vec();
+    let now = |origin: u32| origins.iter().position(|&o| o == origin).unwrap() as u32;
+    // Asked for on the cut body: one node held, one let go, one loaded.
+    let top = (0u32..).zip(body.rest_positions()).find(|(_, x)| **x == v(0.0, 0.0, 0.2)).unwrap().0;
+    let pulled = origins[top as usize];
+    let corner = (0u32..).zip(&origins).filter(|(n, o)| **o == pulled && *n != top).count();
+    assert_eq!(corner, 0, "the corner was not cut");
+    body.fix(&[top], [false, true, false], v(0.0, 0.01, 0.0)).unwrap();
+    body.release(&[now(held[0])]);
+    body.add_nodal_force(now(held[1]), v(0.0, 0.0, 0.5)).unwrap();
+    body.cut(&sweep(0.15, 0.2), 2).unwrap();
+    body.reset().unwrap();
+    let mut expected: Vec<u32> = held[1..].iter().copied().chain([pulled]).collect();
+    expected.sort_unstable();
+    assert_eq!(body.fixed_nodes().iter().map(|f| f.node).collect::<Vec<_>>(), expected);
+    let found = body.fixed_nodes().iter().find(|f| f.node == pulled).unwrap();
+    assert_eq!((found.axes, found.displacement_m), ([false, true, false], v(0.0, 0.01, 0.0)));
+    // The load is on a held node: the support carries it.
+    let force = body.reaction(&expected, Vector3::zeros());
+    assert!(body.step(0.01, Vector3::zeros(), &[]).outcome == Outcome::Advanced && force.norm() < 1.0);
+    let lifted = body.reaction(&[held[1]], Vector3::zeros());
+    body.clear_loads();
+    assert!((body.reaction(&[held[1]], Vector3::zeros()) - lifted - v(0.0, 0.0, 0.5)).norm() < 1e-9);
+}

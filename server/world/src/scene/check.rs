@@ -96,7 +96,7 @@ impl Check<'_> {
         let mechanics = self.mechanics(&at, body, &mesh);
         BodySpec {
             id: body.id.clone(),
-            skin: body.skin.as_ref().map(|skin| self.skin(&at, skin, body.element)),
+            skin: body.skin.as_ref().map(|skin| self.skin(&at, skin, body)),
             mesh,
             mechanics,
             young_pa: body.young_pa,
@@ -109,8 +109,14 @@ impl Check<'_> {
         }
     }
 
-    fn skin(&mut self, at: &str, skin: &RawSkin, element: RawElement) -> SkinSpec {
-        if element != RawElement::Tet4 {
+    fn skin(&mut self, at: &str, skin: &RawSkin, body: &RawBody) -> SkinSpec {
+        if body.cutting.method == RawCutMethod::Snap {
+            let next = "write cutting.method = \"xfem\", or remove the skin";
+            let what =
+                "found a skin with cutting.method = `snap`, which moves the nodes below it; allowed: xfem";
+            self.conflict(format!("{at}.skin"), what, next);
+        }
+        if body.element != RawElement::Tet4 {
             let next = "write element = \"tet4\", or remove the skin";
             self.conflict(format!("{at}.skin"), "a skin goes with linear tetrahedra", next);
         }

@@ -4,6 +4,7 @@ use std::mem::Discriminant;
 use std::sync::Arc;
 
 use scindo_physics::body::{Body, Notice};
+use scindo_physics::cut::IncisionMark;
 use scindo_physics::estimate::{MeshError, StressRecovery};
 
 use super::report::Energy;
@@ -32,6 +33,8 @@ pub struct SimBody {
     topology: Option<Arc<SurfaceTopology>>,
     surface: Vec<[f32; 3]>,
     surface_is_old: bool,
+    marks: Vec<IncisionMark>,
+    marks_are_old: bool,
 }
 
 impl SimBody {
@@ -49,6 +52,8 @@ impl SimBody {
             topology: None,
             surface: Vec::new(),
             surface_is_old: true,
+            marks: Vec::new(),
+            marks_are_old: true,
         }
     }
 
@@ -93,6 +98,19 @@ impl SimBody {
         }));
     }
 
+    /// Ends [m] of the lines that incisions have drawn on the surface without opening it, into `out`.
+    pub fn incision_marks(&mut self, out: &mut Vec<[[f32; 3]; 2]>) {
+        if self.marks_are_old {
+            self.marks = self.body.incision_marks();
+            self.marks_are_old = false;
+        }
+        let x = self.body.positions();
+        out.clear();
+        out.extend(
+            self.marks.iter().map(|mark| mark.ends.map(|end| end.position(x).map(|c| c as f32).into())),
+        );
+    }
+
     /// Kinetic and elastic energy.
     pub fn energy(&self) -> Energy {
         Energy { kinetic_j: self.body.kinetic_energy(), elastic_j: self.body.elastic_energy() }
@@ -108,10 +126,16 @@ impl SimBody {
         self.surface_is_old = true;
     }
 
+    /// To be told whenever a blade went through the body, whether or not it opened something.
+    pub(crate) fn has_been_swept(&mut self) {
+        self.marks_are_old = true;
+    }
+
     /// To be told whenever the body was cut or reset.
     pub(crate) fn has_changed_topology(&mut self) {
         self.topology = None;
         self.surface_is_old = true;
+        self.marks_are_old = true;
         self.follow_nodes();
     }
 

@@ -6,7 +6,8 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::{BladeSweep, CutReport};
+use scindo_physics::skin::Skin;
 
 use super::body::SimBody;
 use super::incision::incision_along;
@@ -92,8 +93,9 @@ impl Cuts {
                 }
             };
             self.next += 1;
-            if let Err(reason) = blade.and_then(|blade| self.sweep(body, &blade, incision, at)) {
-                at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason);
+            match blade.and_then(|blade| self.sweep(body, &blade, incision, at)) {
+                Ok(done) => tell_of_nothing_opened(&done, incision, &at.bodies[body], at.report),
+                Err(reason) => at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason),
             }
         }
     }
@@ -133,7 +135,7 @@ impl Cuts {
         let mut elements = 0;
         for body in 0..at.bodies.len() {
             if wanted(&at.bodies[body]) {
-                elements += self.sweep(body, &blade, incision, at)?;
+                elements += self.sweep(body, &blade, incision, at)?.elements_cut;
             }
         }
         Ok(elements)
@@ -168,13 +170,15 @@ impl Cuts {
         blade: &BladeSweep,
         incision: u32,
         at: &mut Theatre<'_>,
-    ) -> Result<usize, String> {
+    ) -> Result<CutReport, String> {
         if !at.allowed {
             return Err("cutting is switched off by effects.cutting = false".into());
         }
         let body = &mut at.bodies[body];
         let before = body.epoch();
+        let fitted = body.body.skin().is_some_and(Skin::fits);
         let done = body.body.cut(blade, incision).map_err(|error| error.to_string())?;
+        body.has_been_swept();
         if done.epoch != before {
             body.has_changed_topology();
             self.applied += 1;
@@ -189,8 +193,32 @@ impl Cuts {
             );
             at.report.tell(Level::Warning, "cut-incomplete", &body.id, message);
         }
-        Ok(done.elements_cut)
+        if let (true, Some(why)) = (fitted, body.body.skin().and_then(Skin::misfit)) {
+            let message = format!(
+                "incision {incision}: skin and wound do not fit, {why}; the boundary of the elements is shown \
+                 from here to the next reset; other skin.divisions or skin.snapping = 0 may fit"
+            );
+            at.report.tell(Level::Warning, "skin-left", &body.id, message);
+        }
+        Ok(done)
     }
+}
+
+/// Warns of a cut of the scene that opened nothing, with the reason.
+fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, report: &mut StepReport) {
+    if done.elements_cut > 0 || done.refused_edges > 0 {
+        return;
+    }
+    let message = if done.pending_edges > 0 {
+        let size_mm = 1e3 * element_size(body);
+        format!(
+            "incision {incision} is drawn on the surface and opens nothing: it ends inside the elements it \
+             enters, whose cells are {size_mm:.1} mm wide; cut deeper or make the elements smaller"
+        )
+    } else {
+        format!("incision {incision} opens nothing: its sweep crosses no edge of an element of the body")
+    };
+    report.tell(Level::Warning, "cut-opens-nothing", &body.id, message);
 }
 
 /// Edge [m] of a lattice cell that six elements of mean volume would fill.

@@ -1,5 +1,7 @@
 //! Skins of any resolution on bodies cut in every way, checked from the triangle list alone.
 
+mod marks;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;

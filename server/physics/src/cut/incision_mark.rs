@@ -1,0 +1,54 @@
+//! What a blade has drawn on the surface without taking the material apart: where it entered elements
+//! that it has not left yet, or only scratched. Shown as a line, the incision follows the blade at once,
+//! while the cut lags by at most one element.
+
+use nalgebra::Vector3;
+
+use super::cut_mesh::CutMesh;
+use super::pending::PendingLine;
+use super::surface::{SurfaceVertex, bind};
+
+/// A point on the surface: Σ weights · vertices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MarkPoint {
+    /// Vertices around it, or thrice the point itself.
+    pub vertices: [SurfaceVertex; 3],
+    /// Weight of each, Σ = 1.
+    pub weights: [f64; 3],
+}
+
+/// A straight line on the surface, along an incision that has not opened there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IncisionMark {
+    /// The incision.
+    pub incision: u32,
+    /// From where to where.
+    pub ends: [MarkPoint; 2],
+}
+
+impl MarkPoint {
+    /// A point bound to the material.
+    pub fn at(vertex: SurfaceVertex) -> Self {
+        Self { vertices: [vertex; 3], weights: [1.0, 0.0, 0.0] }
+    }
+
+    /// Position [m], given the position of every copy.
+    pub fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+        let held = self.vertices.iter().zip(&self.weights).filter(|(_, w)| **w != 0.0);
+        held.map(|(vertex, &w)| vertex.position(x) * w).sum()
+    }
+}
+
+impl CutMesh {
+    /// Marks on the [`surface`](Self::surface), by incision and place.
+    pub fn incision_marks(&self) -> Vec<IncisionMark> {
+        self.pending_lines().iter().map(|line| self.mark(line)).collect()
+    }
+
+    /// A line on the boundary of a fragment, bound to its piece.
+    pub(crate) fn mark(&self, line: &PendingLine) -> IncisionMark {
+        let piece = self.fragments.piece[line.fragment as usize];
+        let ends = line.ends.map(|end| MarkPoint::at(bind(self.mesh(), &self.pieces, piece, &end)));
+        IncisionMark { incision: line.incision, ends }
+    }
+}

@@ -1,0 +1,71 @@
+//! Marks of incisions on the skin: lines on the boundary, lifted to the skin triangles over it.
+
+use super::base::Base;
+use super::sheet::Sheet;
+use crate::cut::pending::PendingLine;
+use crate::cut::{CutMesh, IncisionMark, MarkPoint, Surface};
+
+/// Parts of a line shorter than this share of it are left out: they lie in a corner of a triangle.
+const SHORT: f64 = 1e-6;
+
+/// Appends the parts of a line, one for every skin triangle over it; a line on a lip stays as it is.
+pub fn lift(
+    base: &Base,
+    sheet: &Sheet,
+    surface: &Surface,
+    cut: &CutMesh,
+    line: &PendingLine,
+    out: &mut Vec<IncisionMark>,
+) {
+    let on_lip = cut.fragments.tag[line.fragment as usize][line.face] != 0;
+    let face = base.under(cut.mesh(), &cut.fragments, line.fragment, line.face).filter(|_| !on_lip);
+    let Some(f) = face else {
+        out.push(cut.mark(line));
+        return;
+    };
+    let ends = line.ends.map(|end| Sheet::coordinates(base, f, &end));
+    for &t in &sheet.over[f as usize] {
+        let corners = sheet.corners[t as usize].map(|p| sheet.point_on(base, f, p));
+        let Some(parts) = clip(&corners, &ends) else { continue };
+        let vertices = surface.triangles[t as usize].map(|v| surface.vertices[v as usize]);
+        let ends = parts.map(|weights| MarkPoint { vertices, weights });
+        out.push(IncisionMark { incision: line.incision, ends });
+    }
+}
+
+/// The part of a line inside a triangle, both in coordinates on one face, as coordinates in the triangle.
+fn clip(triangle: &[[f64; 3]; 3], line: &[[f64; 3]; 2]) -> Option<[[f64; 3]; 2]> {
+    let [a, b, c] = triangle;
+    let whole = Sheet::area(a, b, c);
+    let ends = line.map(|p| [[b, c], [c, a], [a, b]].map(|[q, r]| Sheet::area(&p, q, r) / whole));
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for (p, q) in ends[0].into_iter().zip(ends[1]) {
+        // The coordinate is p + s (q - p), and at least 0 inside.
+        match (p < 0.0, q < 0.0) {
+            (true, true) => return None,
+            (true, false) => from = from.max(p / (p - q)),
+            (false, true) => to = to.min(p / (p - q)),
+            (false, false) => {}
+        }
+    }
+    let at = |s: f64| [0, 1, 2].map(|k| ends[0][k] + s * (ends[1][k] - ends[0][k]));
+    (to - from > SHORT).then(|| [at(from), at(to)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_clipped_to_the_triangle_that_it_crosses() {
+        let triangle = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.5, 0.0, 0.5]];
+        let across = [[0.75, 0.5, -0.25], [0.75, -0.25, 0.5]];
+        let [from, to] = clip(&triangle, &across).unwrap_or_default();
+        for (found, expected) in from.into_iter().chain(to).zip([0.5, 0.5, 0.0, 0.5, 0.0, 0.5]) {
+            assert!((found - expected).abs() < 1e-12, "{from:?} {to:?}");
+        }
+        assert_eq!(clip(&triangle, &[[0.2, 0.8, 0.0], [0.2, 0.0, 0.8]]), None);
+        let inside = [[0.8, 0.1, 0.1], [0.7, 0.1, 0.2]];
+        assert!(clip(&triangle, &inside).is_some());
+    }
+}
