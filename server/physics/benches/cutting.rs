@@ -107,14 +107,19 @@ fn insertion(mesh: &TetMesh, elements: usize, repeats: usize) {
     });
     say(&format!("sweep through {cut} elements, topology and surface"), topology, "");
     for law in [Law::Linear, Law::Corotational] {
+        let (mut first, mut later) = (Vec::new(), Vec::new());
         let whole = best_and_median(repeats, || {
             let mut body = body(mesh, law);
             body.step(0.01, DOWN, &[]);
             let (report, seconds) = timed(|| body.cut(&sweep, 1));
             cut = report.expect("the sweep is well formed").elements_cut;
+            first.push(timed(|| body.step(0.01, DOWN, &[])).1);
+            later.push(timed(|| body.step(0.01, DOWN, &[])).1);
             seconds
         });
         say(&format!("sweep through {cut} elements, whole body, {law:?}"), whole, "target 5 ms");
+        say("  the first step after it", sorted(first), "");
+        say("  the second step after it", sorted(later), "");
     }
 }
 

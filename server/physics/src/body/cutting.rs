@@ -6,6 +6,7 @@ use super::{Body, BodyError, General, Path};
 use crate::assembly::ElementKind;
 use crate::cut::{BladeSweep, CutReport};
 use crate::integrator::LooseParts;
+use crate::operator::resize_with_room;
 
 impl Body {
     /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were
@@ -36,8 +37,8 @@ impl Body {
 
     fn inherit(&mut self, report: &CutReport) {
         let n = self.cut_mesh.n_copies();
-        self.state.x.resize(n, Vector3::zeros());
-        self.state.v.resize(n, Vector3::zeros());
+        resize_with_room(&mut self.state.x, n, Vector3::zeros());
+        resize_with_room(&mut self.state.v, n, Vector3::zeros());
         for new in &report.new_copies {
             let (copy, parent) = (new.copy as usize, new.parent as usize);
             self.state.x[copy] = self.state.x[parent];

@@ -4,6 +4,7 @@
 //! the first crossing wins. The parameter is the same in the rest and in the deformed configuration,
 //! because the map is affine on a piece.
 
+use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -45,33 +46,51 @@ pub fn edge_key(a: u32, b: u32) -> u64 {
 /// Pending crossings by edge.
 #[derive(Clone, Debug, Default)]
 pub struct Crossings {
-    by_edge: HashMap<u64, Vec<(u32, f64)>, BuildHasherDefault<EdgeHasher>>,
+    by_edge: HashMap<u64, OfEdge, BuildHasherDefault<EdgeHasher>>,
+}
+
+/// The crossings of one edge: incision, and parameter counted from the vertex with the smaller id.
+#[derive(Clone, Debug)]
+struct OfEdge {
+    first: (u32, f64),
+    /// Hardly any edge is crossed more than once.
+    further: Vec<(u32, f64)>,
 }
 
 impl Crossings {
     /// Parameter, counted from `a` to `b`, at which the incision crosses the edge.
     pub fn get(&self, a: u32, b: u32, incision: u32) -> Option<f64> {
-        let t = self.of(a, b).iter().find(|c| c.0 == incision)?.1;
+        let t = self.of(a, b).find(|c| c.0 == incision)?.1;
         Some(if a < b { t } else { 1.0 - t })
     }
 
     /// All crossings of the edge, parameters counted from the vertex with the smaller id.
-    pub fn of(&self, a: u32, b: u32) -> &[(u32, f64)] {
-        self.by_edge.get(&edge_key(a, b)).map_or(&[], Vec::as_slice)
+    pub fn of(&self, a: u32, b: u32) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let found = self.by_edge.get(&edge_key(a, b));
+        found.into_iter().flat_map(|of| std::iter::once(of.first).chain(of.further.iter().copied()))
     }
 
     /// Records a crossing at `t` from `a` to `b`, unless the incision has one there already.
     pub fn insert(&mut self, a: u32, b: u32, incision: u32, t: f64) {
-        let list = self.by_edge.entry(edge_key(a, b)).or_default();
-        if list.iter().all(|c| c.0 != incision) {
-            list.push((incision, if a < b { t } else { 1.0 - t }));
+        let t = if a < b { t } else { 1.0 - t };
+        match self.by_edge.entry(edge_key(a, b)) {
+            Entry::Vacant(none) => {
+                none.insert(OfEdge { first: (incision, t), further: Vec::new() });
+            }
+            Entry::Occupied(mut of) => {
+                let OfEdge { first, further } = of.get_mut();
+                if first.0 != incision && further.iter().all(|c| c.0 != incision) {
+                    further.push((incision, t));
+                }
+            }
         }
     }
 
     /// Gives the edge (new, other) the crossings of the edge (old, other).
     pub fn inherit(&mut self, old: u32, new: u32, other: u32) {
-        for k in 0..self.of(old, other).len() {
-            let (incision, t) = self.of(old, other)[k];
+        let Some(of) = self.by_edge.get(&edge_key(old, other)) else { return };
+        let OfEdge { first, further } = of.clone(); // hardly ever with more than nothing in `further`
+        for (incision, t) in std::iter::once(first).chain(further) {
             self.insert(new, other, incision, if old < other { t } else { 1.0 - t });
         }
     }

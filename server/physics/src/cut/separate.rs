@@ -165,7 +165,7 @@ impl Separator {
     fn pass_on_crossings(&self, [a, b]: [u32; 2], m: u32, s: f64, sheet: &mut Sheet) {
         let incision = sheet.incision;
         let others: Vec<u32> =
-            sheet.crossings.of(a, b).iter().map(|c| c.0).filter(|&other| other != incision).collect();
+            sheet.crossings.of(a, b).map(|c| c.0).filter(|&other| other != incision).collect();
         for other in others {
             let Some(t) = sheet.crossings.get(a, b, other) else { continue };
             if (t - s).abs() <= SNAP {
@@ -188,7 +188,7 @@ impl Separator {
         for c in apexes {
             let mut pending: Vec<u32> = Vec::new();
             for (p, q) in [(a, m), (m, b), (a, c), (b, c)] {
-                pending.extend(sheet.crossings.of(p, q).iter().map(|x| x.0).filter(|&o| o != incision));
+                pending.extend(sheet.crossings.of(p, q).map(|x| x.0).filter(|&o| o != incision));
             }
             pending.sort_unstable();
             pending.dedup();

@@ -17,7 +17,7 @@ use super::springs::{ActiveSpring, PointSpring};
 use crate::material::Material;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded, Spring, Sum,
-    SystemOperator, block_of, filter, invert, padded,
+    SystemOperator, block_of, filter, invert, padded, resize_with_room,
 };
 use crate::solver::{Pcg, PcgReport, PcgSettings, StopReason};
 use crate::team::{Team, blocks};
@@ -106,11 +106,11 @@ impl ImplicitEuler {
 
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
-        self.predicted.resize(n, Vector3::zeros());
+        resize_with_room(&mut self.predicted, n, Vector3::zeros());
         for v in [&mut self.f_int, &mut self.damping, &mut self.scratch, &mut self.delta] {
-            v.resize(n, [0.0; 4]);
+            resize_with_room(v, n, [0.0; 4]);
         }
-        self.diagonal.resize(n, [0.0; 8]);
+        resize_with_room(&mut self.diagonal, n, [0.0; 8]);
         self.partial.resize(n.div_ceil(BLOCK), 0.0);
         self.made_for = None;
         self.sprung.clear();

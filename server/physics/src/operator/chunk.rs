@@ -31,6 +31,8 @@ pub struct Chunk {
     edges: Option<EdgeBlocks>,
     /// Pieces with det F ≤ 0 at the last update.
     pub inverted: usize,
+    /// Whether the chunk was planned or amended since the last update.
+    pub stale: bool,
 }
 
 /// A carrier that gets a lane, and the rotation to start with.
@@ -74,6 +76,7 @@ impl Chunk {
             positions: vec![[0.0; 4]; n],
             x: vec![[0.0; 4]; n],
             inverted: 0,
+            stale: true,
         }
     }
 
@@ -121,23 +124,25 @@ impl Chunk {
         self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
         debug_assert!(self.copies.is_sorted());
         let n = n_copies + 1;
-        let places = free_lanes(&mut self.pieces, added, |p| merged[p as usize].piece.copies);
-        self.batches.grow(self.pieces.len(), n);
         let copies = &self.copies;
         let locals = |p: u32| {
             let local = |copy| copies.binary_search(&copy).map_or(n - 1, |local| local) as u16;
             merged[p as usize].piece.copies.map(local)
         };
+        let held: Vec<[u16; 4]> = added.iter().map(|new| locals(new.piece)).collect();
+        let places = free_lanes(&mut self.pieces, added, &held, n);
+        self.batches.grow(self.pieces.len(), n);
         for (p, batch, lane) in amended {
             self.batches.set_nodes(batch, lane, locals(p));
             self.batches.rest_mut(batch).set_volume(lane, mesh, &merged[p as usize]);
         }
-        for ([batch, lane], NewLane { piece, rotation }) in places.into_iter().zip(added) {
-            self.batches.set_nodes(batch, lane, locals(*piece));
+        for (([batch, lane], ids), NewLane { piece, rotation }) in places.into_iter().zip(held).zip(added) {
+            self.batches.set_nodes(batch, lane, ids);
             self.batches.rest_mut(batch).set(lane, mesh, &merged[*piece as usize], Some(rotation));
         }
         self.n_lanes += added.len();
         self.edges = None;
+        self.stale = true;
         self.positions.resize(n, [0.0; 4]);
         self.x.resize(n, [0.0; 4]);
         true
@@ -208,15 +213,17 @@ impl Chunk {
         diagonal.fill([0.0; 8]);
         let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
         self.inverted = self.batches.update(simd, c, &mut locals);
+        self.stale = false;
     }
 }
 
 /// Gives the carriers `added` lanes: first those that are empty (only the last batch has any), then new
-/// batches. Returns batch and lane of each.
+/// batches. `held` are the local numbers of their copies, below `n_locals`. Returns batch and lane of each.
 fn free_lanes(
     batches: &mut Vec<[u32; LANES]>,
     added: &[NewLane],
-    copies: impl Fn(u32) -> [u32; 4],
+    held: &[[u16; 4]],
+    n_locals: usize,
 ) -> Vec<[usize; 2]> {
     let mut places = Vec::with_capacity(added.len());
     let last = batches.len().saturating_sub(1);
@@ -227,8 +234,7 @@ fn free_lanes(
     }
     let first = places.len();
     places.resize(added.len(), [0; 2]);
-    let held: Vec<[u32; 4]> = added[first..].iter().map(|new| copies(new.piece)).collect();
-    for mut lanes in pack(&held) {
+    for mut lanes in pack(&held[first..], n_locals) {
         for (l, lane) in lanes.iter_mut().enumerate().filter(|(_, p)| **p != NO_PIECE) {
             let k = first + *lane as usize;
             places[k] = [batches.len(), l];

@@ -12,7 +12,7 @@ use crate::element::{Ids, LANES};
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
 /// body of a few thousand pieces still has work for several threads.
 const CHUNK_PIECES: usize = 1024;
-/// Batches that are kept open while pieces are packed; more separates neighbours better.
+/// Batches that are kept open while pieces are packed, one bit each; more separates neighbours better.
 const OPEN_BATCHES: usize = 32;
 
 /// No piece in this lane.
@@ -72,61 +72,93 @@ pub fn plan_chunk(chunk: &[u32], copies_of: impl Fn(u32) -> [u32; 4]) -> ChunkPl
     let mut copies = held.as_flattened().to_vec();
     copies.sort_unstable();
     copies.dedup();
-    let mut batches = pack(&held);
-    for lane in batches.iter_mut().flatten().filter(|lane| **lane != NO_PIECE) {
-        *lane = chunk[*lane as usize];
-    }
     let waste = copies.len() as u16;
-    let local = |copy: u32| copies.binary_search(&copy).map_or(waste, |l| l as u16);
-    let nodes = batches
-        .iter()
-        .map(|batch| {
-            let mut ids = [[waste; LANES]; 4];
-            for (lane, &p) in batch.iter().enumerate() {
-                if p != NO_PIECE {
-                    for (a, id) in ids.iter_mut().enumerate() {
-                        id[lane] = local(copies_of(p)[a]);
-                    }
-                }
+    let local = |copy: &u32| copies.binary_search(copy).map_or(waste, |l| l as u16);
+    let held: Vec<[u16; 4]> = held.iter().map(|held| held.each_ref().map(local)).collect();
+    let mut batches = pack(&held, copies.len());
+    let mut nodes = vec![[[waste; LANES]; 4]; batches.len()];
+    for (ids, batch) in nodes.iter_mut().zip(&mut batches) {
+        for (lane, item) in batch.iter_mut().enumerate().filter(|(_, item)| **item != NO_PIECE) {
+            for (id, local) in ids.iter_mut().zip(held[*item as usize]) {
+                id[lane] = local;
             }
-            ids
-        })
-        .collect();
+            *item = chunk[*item as usize];
+        }
+    }
     ChunkPlan { nodes, pieces: batches, copies }
 }
 
-/// First-fit packing of `items` into batches without a common copy, over a short list of open
-/// batches; lanes hold item numbers. What is left at the end is packed without regard to copies:
-/// lanes are summed one after the other.
-pub fn pack<const N: usize>(items: &[[u32; N]]) -> Vec<[u32; LANES]> {
-    let mut full = Vec::with_capacity(items.len() / LANES + OPEN_BATCHES);
-    let mut open: Vec<Vec<u32>> = Vec::with_capacity(OPEN_BATCHES);
-    fn close(batch: &[u32]) -> [u32; LANES] {
-        let mut lanes = [NO_PIECE; LANES];
-        lanes[..batch.len()].copy_from_slice(batch);
-        lanes
+/// First-fit packing of `items`, local numbers below `n_locals`, into batches without a common number,
+/// over a short list of open batches; lanes hold item numbers. What is left at the end is packed
+/// without regard to numbers: lanes are summed one after the other.
+pub fn pack<const N: usize>(items: &[[u16; N]], n_locals: usize) -> Vec<[u32; LANES]> {
+    let mut packing = Packing {
+        full: Vec::with_capacity(items.len() / LANES + OPEN_BATCHES),
+        batches: [[NO_PIECE; LANES]; OPEN_BATCHES],
+        open: Vec::with_capacity(OPEN_BATCHES),
+        free: (0..OPEN_BATCHES as u8).rev().collect(),
+        held_by: vec![0; n_locals],
+    };
+    for (item, numbers) in (0u32..).zip(items) {
+        packing.put(item, numbers, items);
     }
-    for (p, copies) in items.iter().enumerate() {
-        let fits = |batch: &Vec<u32>| {
-            batch.iter().all(|&other| items[other as usize].iter().all(|c| !copies.contains(c)))
-        };
-        match open.iter().position(fits) {
-            Some(b) => {
-                open[b].push(p as u32);
-                if open[b].len() == LANES {
-                    full.push(close(&open.remove(b)));
-                }
-            }
+    let Packing { mut full, batches, open, .. } = packing;
+    let left: Vec<u32> =
+        open.iter().flat_map(|&(slot, n)| &batches[slot as usize][..n as usize]).copied().collect();
+    full.extend(left.chunks(LANES).map(|items| {
+        let mut lanes = [NO_PIECE; LANES];
+        lanes[..items.len()].copy_from_slice(items);
+        lanes
+    }));
+    full
+}
+
+/// Batches in the making.
+struct Packing {
+    full: Vec<[u32; LANES]>,
+    batches: [[u32; LANES]; OPEN_BATCHES],
+    /// Slot and number of items of the open batches, the oldest first.
+    open: Vec<(u8, u8)>,
+    /// Slots that are not in use.
+    free: Vec<u8>,
+    /// For every local number one bit for each slot whose batch holds it.
+    held_by: Vec<u32>,
+}
+
+impl Packing {
+    fn put<const N: usize>(&mut self, item: u32, numbers: &[u16; N], items: &[[u16; N]]) {
+        let taken = numbers.iter().fold(0, |taken, &n| taken | self.held_by[n as usize]);
+        let at = match self.open.iter().position(|(slot, _)| taken >> slot & 1 == 0) {
+            Some(at) => at,
             None => {
-                if open.len() == OPEN_BATCHES {
-                    full.push(close(&open.remove(0)));
+                if self.open.len() == OPEN_BATCHES {
+                    self.close(0, items);
                 }
-                open.push(vec![p as u32]);
+                let slot = self.free.pop().unwrap_or(0);
+                self.open.push((slot, 0));
+                self.open.len() - 1
             }
+        };
+        let (slot, n) = &mut self.open[at];
+        self.batches[*slot as usize][*n as usize] = item;
+        *n += 1;
+        numbers.iter().for_each(|&number| self.held_by[number as usize] |= 1 << *slot);
+        if *n as usize == LANES {
+            self.close(at, items);
         }
     }
-    full.extend(open.concat().chunks(LANES).map(close));
-    full
+
+    fn close<const N: usize>(&mut self, at: usize, items: &[[u16; N]]) {
+        let (slot, n) = self.open.remove(at);
+        let batch = std::mem::replace(&mut self.batches[slot as usize], [NO_PIECE; LANES]);
+        for &item in &batch[..n as usize] {
+            for &number in &items[item as usize] {
+                self.held_by[number as usize] &= !(1 << slot);
+            }
+        }
+        self.full.push(batch);
+        self.free.push(slot);
+    }
 }
 
 /// Where the chunks' sums of every copy lie, in chunk order, within one vector for all chunks. Row 0

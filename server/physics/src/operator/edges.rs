@@ -38,43 +38,39 @@ pub struct EdgeBlocks {
 impl EdgeBlocks {
     /// The pairs of the tets `nodes`, whose unused lanes hold `waste` (the last local number) only.
     pub fn new(nodes: &[[Ids; 4]], waste: u16) -> Self {
-        let pair_of = |ids: &[Ids; 4], [i, j]: [usize; 2], lane: usize| {
-            let (a, b) = (ids[i][lane], ids[j][lane]);
-            [u32::from(a.min(b)), u32::from(a.max(b))]
-        };
-        let lanes = || (0..LANES).flat_map(|lane| PAIRS.map(|pair| (lane, pair)));
-        let mut pairs: Vec<[u32; 2]> = nodes
-            .iter()
-            .flat_map(|ids| lanes().map(move |(lane, pair)| pair_of(ids, pair, lane)))
-            .filter(|[a, b]| a != b)
+        // Pair a·2¹⁶ + b and where it occurs, so that equal pairs come together.
+        let mut found: Vec<(u32, u32)> = Vec::with_capacity(PAIRS.len() * LANES * nodes.len());
+        for (t, ids) in nodes.iter().enumerate() {
+            for (k, [i, j]) in PAIRS.into_iter().enumerate() {
+                for (lane, (&a, &b)) in ids[i].iter().zip(&ids[j]).enumerate().filter(|(_, (a, b))| a != b) {
+                    let pair = u32::from(a.min(b)) << 16 | u32::from(a.max(b));
+                    found.push((pair, ((PAIRS.len() * t + k) * LANES + lane) as u32));
+                }
+            }
+        }
+        found.sort_unstable();
+        let pairs: Vec<[u16; 2]> = found
+            .chunk_by(|p, q| p.0 == q.0)
+            .map(|same| [(same[0].0 >> 16) as u16, same[0].0 as u16])
             .collect();
-        pairs.sort_unstable();
-        pairs.dedup();
         let mut slot_of_pair = vec![NO_PIECE; pairs.len()];
-        let mut batches = Vec::new();
-        for (k, batch) in pack(&pairs).iter().enumerate() {
+        let packed = pack(&pairs, waste as usize + 1);
+        let mut batches = Vec::with_capacity(packed.len());
+        for (k, batch) in packed.iter().enumerate() {
             let mut ids = [[waste; LANES]; 2];
             for (lane, &pair) in batch.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
                 slot_of_pair[pair as usize] = (LANES * k + lane) as u32;
                 for end in 0..2 {
-                    ids[end][lane] = pairs[pair as usize][end] as u16;
+                    ids[end][lane] = pairs[pair as usize][end];
                 }
             }
             batches.push(EdgeBatch { block: [[Lanes::default(); 3]; 3], nodes: ids });
         }
-        let slots = nodes
-            .iter()
-            .map(|ids| {
-                let mut slots = [[NO_PIECE; LANES]; 6];
-                for (slots, pair) in slots.iter_mut().zip(PAIRS) {
-                    for (lane, slot) in slots.iter_mut().enumerate() {
-                        let found = pairs.binary_search(&pair_of(ids, pair, lane));
-                        *slot = found.map_or(NO_PIECE, |p| slot_of_pair[p]);
-                    }
-                }
-                slots
-            })
-            .collect();
+        let mut slots = vec![[[NO_PIECE; LANES]; PAIRS.len()]; nodes.len()];
+        let flat = slots.as_flattened_mut().as_flattened_mut();
+        for (same, &slot) in found.chunk_by(|p, q| p.0 == q.0).zip(&slot_of_pair) {
+            same.iter().for_each(|&(_, place)| flat[place as usize] = slot);
+        }
         Self { batches, slots, n_locals: waste as usize + 1 }
     }
 

@@ -129,6 +129,7 @@ impl Elastic {
             let mut rotations = self.lane_rotations();
             late.iter().for_each(|new| rotations[new.piece as usize] = new.rotation);
             self.plan(mesh, &outgrown, &rotations);
+            self.made_with = None;
         }
         self.arrange_sums(n_copies);
     }
@@ -151,11 +152,23 @@ impl Elastic {
         self.chunks.sort_by_key(|chunk| chunk.region);
     }
 
+    /// Arranges the sums of the present chunks; diagonal blocks of chunks that are not stale stay.
     fn arrange_sums(&mut self, n_copies: usize) {
-        self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
-        self.sums = vec![[0.0; 4]; self.gather.n_rows()];
-        self.diagonals = vec![[0.0; 8]; self.gather.n_rows()];
-        self.made_with = None;
+        let before = std::mem::replace(
+            &mut self.gather,
+            Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies),
+        );
+        self.sums.clear();
+        self.sums.resize(self.gather.n_rows(), [0.0; 4]);
+        let kept = std::mem::replace(&mut self.diagonals, vec![[0.0; 8]; self.gather.n_rows()]);
+        if self.made_with.is_none() {
+            return;
+        }
+        let first = before.first_row.iter().zip(&self.gather.first_row);
+        for (chunk, (&from, &to)) in self.chunks.iter().zip(first).filter(|(chunk, _)| !chunk.stale) {
+            let (from, to, n) = (from as usize, to as usize, chunk.copies.len());
+            self.diagonals[to..to + n].copy_from_slice(&kept[from..from + n]);
+        }
     }
 
     /// Rotation of every marked carrier in these regions, ascending.
@@ -228,14 +241,17 @@ impl Elastic {
             OperatorChoice::MatrixFree => false,
             OperatorChoice::Assembled => true,
         };
-        if c.rotates || self.made_with != Some((c, assembled)) {
+        let all = c.rotates || self.made_with != Some((c, assembled));
+        if all || self.chunks.iter().any(|chunk| chunk.stale) {
             self.version += 1;
             self.made_with = Some((c, assembled));
             let first = &self.gather.first_row;
             let sums = (ranges(&mut self.sums, first), ranges(&mut self.diagonals, first));
             team.for_blocks((blocks(&mut self.chunks, 1), sums.0, sums.1), |_, (chunk, y, diagonal)| {
-                chunk[0].update(simd, &c, positions, y, diagonal);
-                chunk[0].assemble(assembled);
+                if all || chunk[0].stale {
+                    chunk[0].update(simd, &c, positions, y, diagonal);
+                    chunk[0].assemble(assembled);
+                }
             });
         }
         if !c.rotates {

@@ -66,6 +66,14 @@ pub fn block_of<T>(v: &[T], block: usize) -> &[T] {
     &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]
 }
 
+/// Gives a vector `n` entries; where it has to move, to a place with room for what cuts add.
+pub fn resize_with_room<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
+    if n > v.capacity() {
+        v.reserve_exact(n + n / 2 - v.len());
+    }
+    v.resize(n, value);
+}
+
 /// x, y, z of a double-precision vector, rounded.
 pub fn padded(v: &nalgebra::Vector3<f64>) -> Padded {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]

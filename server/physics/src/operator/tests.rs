@@ -156,9 +156,17 @@ fn the_linear_stiffness_is_made_once_and_forces_do_not_feel_how_far_the_body_is(
         elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
         assert!(elastic.version() > version && diagonal[5][0] > 3.9 * first.diagonal[5][0]);
         let version = elastic.version();
-        elastic.follow(&mesh, &pieces, &[], n);
+        let mut cut = pieces.clone();
+        cut[70].fraction = 0.5;
+        elastic.follow(&mesh, &cut, &[70], n);
         elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
         assert!(elastic.version() > version);
+        // Only where the cut was, but no less than that.
+        let mut fresh = Elastic::new(Simd::detect(), &mesh, &cut, n);
+        fresh.set_choice(choice);
+        let (mut fresh_f, mut fresh_diagonal) = (f.clone(), diagonal.clone());
+        fresh.update(&mut team, &with, &near, &mut fresh_f, &mut fresh_diagonal);
+        assert_eq!((&f, &diagonal), (&fresh_f, &fresh_diagonal));
     }
 }
 
