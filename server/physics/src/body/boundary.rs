@@ -97,15 +97,27 @@ impl Boundary {
         self.fixed.binary_search_by_key(&node, |f| f.node).ok().map(|at| &self.fixed[at])
     }
 
-    /// A fixed node fixes the copy that holds the node's own material, which keeps the node's
-    /// number. Copies without that material stay free: fixing them would glue fragments to air.
-    /// `rest` are the rest positions of all copies [m], and of what the element adds.
-    pub fn fixed_copies(&self, rest: &[Vector3<f64>]) -> Vec<FixedCopy> {
-        let copy = |f: &FixedNode| {
+    /// A fixed node fixes the copies that hold the node's own material: one, which keeps the node's
+    /// number, and further ones if a cut passes exactly through the node, so that both lips have it.
+    /// Copies without that material stay free: fixing them would glue fragments to air.
+    /// `rest` are the rest positions of all copies [m], and of what the element adds. Ascending.
+    pub fn fixed_copies(&self, mesh: &CutMesh, rest: &[Vector3<f64>]) -> Vec<FixedCopy> {
+        let n_nodes = mesh.mesh().nodes.len();
+        let mut divided = vec![false; n_nodes];
+        mesh.copy_node().iter().skip(n_nodes).for_each(|&node| divided[node as usize] = true);
+        let mut fixed = Vec::with_capacity(self.fixed.len());
+        for f in &self.fixed {
             let target = rest[f.node as usize] + f.displacement_m;
-            FixedCopy { copy: f.node, axes: f.axes, position_m: target.into() }
-        };
-        self.fixed.iter().map(copy).collect()
+            let held = |copy: u32| FixedCopy { copy, axes: f.axes, position_m: target.into() };
+            fixed.push(held(f.node));
+            // What an element adds to the nodes is not cut.
+            if divided.get(f.node as usize) == Some(&true) {
+                let copies = mesh.copies_with_node(f.node).into_iter();
+                fixed.extend(copies.filter(|&copy| copy != f.node).map(held));
+            }
+        }
+        fixed.sort_unstable_by_key(|f| f.copy);
+        fixed
     }
 
     /// Force on every one of `n` copies and further nodes [N]: point forces go to the copy with the node's material, spread ones to

@@ -85,7 +85,7 @@ impl Body {
 
     /// Everything that is derived from constraints and loads.
     pub(super) fn follow_boundary(&mut self) {
-        self.fixed = self.boundary.fixed_copies(&self.rest);
+        self.fixed = self.boundary.fixed_copies(&self.cut_mesh, &self.rest);
         self.load = self.boundary.node_loads(&self.cut_mesh, self.rest.len());
         self.parts = match &self.path {
             Path::Fast(_) => LooseParts::new(self.cut_mesh.pieces(), &self.mass, &self.fixed),
@@ -95,5 +95,8 @@ impl Body {
                 LooseParts::connected(elements, &self.mass, &self.fixed)
             }
         };
+        if let Path::Fast(fast) = &mut self.path {
+            fast.follow_parts(&self.rest, &self.mass, &self.parts);
+        }
     }
 }

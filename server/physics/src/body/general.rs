@@ -1,5 +1,7 @@
 //! The general path: any element, law, integrator and solver, in double precision.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::settings::BodySettings;
@@ -12,7 +14,7 @@ use crate::integrator::{
     find_equilibrium,
 };
 use crate::material::Material;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, StiffModes, degenerate_elements};
 use crate::solver::{Newton, NewtonSettings, StopReason};
 use crate::team::Team;
 
@@ -21,6 +23,8 @@ use crate::team::Team;
 pub(super) struct General {
     pub dynamics: Dynamics,
     density_kg_m3: f64,
+    /// Of linear tetrahedra.
+    modes: Option<Arc<StiffModes>>,
 }
 
 impl General {
@@ -39,8 +43,15 @@ impl General {
             relaxation: settings.relaxation_iterations(),
             ..DynamicsSettings::default()
         };
-        let dynamics = Dynamics::new(model, *material, with)?;
-        Ok(Self { dynamics, density_kg_m3: material.density_kg_m3 })
+        let mut dynamics = Dynamics::new(model, *material, with)?;
+        let modes = if matches!(shape, Shape::Tet4) {
+            let elements = degenerate_elements(mesh.mesh());
+            StiffModes::new(mesh.mesh(), mesh.pieces(), mesh.n_copies(), &elements).map(Arc::new)
+        } else {
+            None
+        };
+        dynamics.set_stiff_modes(modes.clone());
+        Ok(Self { dynamics, density_kg_m3: material.density_kg_m3, modes })
     }
 
     /// The discrete model.
@@ -71,7 +82,9 @@ impl General {
         let weights = self.model().shape_integrals().iter().map(|v| self.density_kg_m3 * v * gravity);
         let load: Vec<Vector3<f64>> = load.iter().zip(weights).map(|(f, w)| f + w).collect();
         let mut problem = StaticProblem::new(self.model(), &load);
-        let done = find_equilibrium(&mut Newton::new(settings), team, &mut problem, fixed, x);
+        let mut newton = Newton::new(settings);
+        newton.set_stiff_modes(self.modes.clone());
+        let done = find_equilibrium(&mut newton, team, &mut problem, fixed, x);
         StaticReport {
             converged: done.stop == StopReason::Converged,
             newton_steps: done.steps,

@@ -8,6 +8,17 @@ use crate::cut::Piece;
 use crate::element::{deformation_gradient, piece_energy, piece_forces};
 use crate::estimate::{CutTets, MeshError, StressRecovery};
 
+/// Elements that are so flat that a motion of theirs is far stiffer than the others.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StiffMotions {
+    /// Their pieces.
+    pub pieces: usize,
+    /// Copies that the solver moves relative to others, so that these motions cost no iterations.
+    pub substituted: usize,
+    /// Pieces that keep a stiff motion, because too many copies take part in it.
+    pub left: usize,
+}
+
 impl Body {
     /// Σ m [kg].
     pub fn total_mass(&self) -> f64 {
@@ -29,6 +40,17 @@ impl Body {
         let centre = self.centre_of_mass();
         let spin = |((m, x), v): ((&f64, &Vector3<f64>), &Vector3<f64>)| *m * (x - centre).cross(v);
         self.mass.iter().zip(&self.state.x).zip(&self.state.v).map(spin).sum()
+    }
+
+    /// How the solver of the last step dealt with elements of the mesh that are so flat that one of
+    /// their motions is far stiffer than the others. All 0 in a sound mesh; quadratic and hexahedral
+    /// elements are not looked at.
+    pub fn stiff_motions(&self) -> StiffMotions {
+        let [pieces, substituted, left] = match &self.path {
+            Path::Fast(fast) => fast.stiff_motions(),
+            Path::General(general) => general.dynamics.stiff_motions(),
+        };
+        StiffMotions { pieces, substituted, left }
     }
 
     /// ½ vᵀ M v [J].

@@ -16,6 +16,7 @@ mod statics;
 pub use ablation::Ablation;
 pub use boundary::FixedNode;
 pub use error::BodyError;
+pub use measures::StiffMotions;
 pub use settings::{Arithmetic, BodySettings};
 pub use snapping::{CuttingMethod, LooseRule};
 pub use statics::{StaticReport, StaticSettings};

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use super::fast::Fast;
 use super::{Body, BodyError, Path};
 use crate::integrator::prescribe;
-use crate::operator::{BlockJacobi, ElasticUpdate, FixedCopy, SystemOperator, padded};
+use crate::operator::{BlockJacobi, CompositeDiagonal, ElasticUpdate, FixedCopy, SystemOperator, padded};
 use crate::solver::{Curvature, LinearSettings, NewtonSettings, Pcg, PcgSettings};
 
 /// When a static solve stops.
@@ -118,13 +118,19 @@ impl Body {
         let n = residual.len();
         let with = ElasticUpdate { lame: self.material.lame(), law: self.material.law, scale: 1.0 };
         let (mut f, mut diagonal, mut delta) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n], vec![[0.0; 4]; n]);
-        let Self { team, state, fixed, path: Path::Fast(fast), .. } = self else {
+        let Self { cut_mesh, team, state, fixed, path: Path::Fast(fast), .. } = self else {
             return (vec![Vector3::zeros(); n], 0);
         };
-        let Fast { elastic, mass_f32, .. } = &mut **fast;
-        elastic.update(team, &with, &state.x, &mut f, &mut diagonal);
+        fast.elastic.update(team, &with, &state.x, &mut f, &mut diagonal);
         let mut M = BlockJacobi::default();
         M.resize(n);
+        if let Some(modes) = fast.stiff_modes(cut_mesh) {
+            let (T, _) = modes.substitution(|copy| fixed.iter().any(|f| f.copy == copy));
+            let mut composite = CompositeDiagonal::new(&modes, &T, &fast.elastic);
+            composite.update(team, (&fast.elastic, &with), (&fast.mass_f32, 0.0), &mut diagonal);
+            M.set_substitution(T);
+        }
+        let Fast { elastic, mass_f32, .. } = &mut **fast;
         M.update(team, &diagonal, fixed);
         // Scaled to 1, so that single precision does not mind how small the residual has become.
         let size = norm(residual).max(f64::MIN_POSITIVE);

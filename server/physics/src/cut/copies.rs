@@ -67,6 +67,25 @@ impl CopyTable {
         Self { node: (0..n as u32).collect(), volume, around_start, around, ..Self::default() }
     }
 
+    /// The copies of node `i` whose material contains the node itself, ascending: one, or more where a
+    /// cut passes exactly through it, and each lip has the node.
+    pub fn with_node(&self, mesh: &TetMesh, i: u32, fragments: &Fragments, pieces: &PieceTable) -> Vec<u32> {
+        let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
+        let mut found = Vec::new();
+        for &e in &self.around[range] {
+            let Some(a) = mesh.tets[e as usize].iter().position(|&n| n == i) else { continue };
+            for t in fragments.of_element(e) {
+                let at_node = |&v: &u32| fragments.vertices[v as usize].nodes == [i, NONE, NONE, NONE];
+                if fragments.tets[t as usize].iter().any(at_node) {
+                    found.push(pieces.pieces[fragments.piece[t as usize] as usize].copies[a]);
+                }
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
     /// Copies of the pieces that have this copy.
     pub fn tets_around(&self, copy: u32, pieces: &PieceTable) -> Vec<[u32; 4]> {
         let i = self.node[copy as usize] as usize;

@@ -116,6 +116,12 @@ impl CutMesh {
         &self.copies.node
     }
 
+    /// The copies of `node` whose material contains the node itself, ascending: one, or more where a cut
+    /// passes exactly through it.
+    pub fn copies_with_node(&self, node: u32) -> Vec<u32> {
+        self.copies.with_node(&self.mesh, node, &self.fragments, &self.pieces)
+    }
+
     /// Σ over pieces of ∫ N_a dV [m³] per copy; its mass is density times this.
     pub fn copy_volume(&self) -> &[f64] {
         &self.copies.volume

@@ -16,8 +16,9 @@ use super::parts::{LooseParts, Translations};
 use super::springs::{ActiveSpring, PointSpring};
 use crate::material::Material;
 use crate::operator::{
-    BLOCK, Block6, BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded, Spring, Sum,
-    SystemOperator, block_of, filter, invert, padded, resize_with_room,
+    BLOCK, Block6, BlockJacobi, CompositeDiagonal, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded,
+    Spring, StiffModes, Substitution, Sum, SystemOperator, block_of, filter, invert, padded,
+    resize_with_room,
 };
 use crate::solver::{Pcg, PcgReport, PcgSettings, StopReason};
 use crate::team::{Team, blocks};
@@ -83,6 +84,8 @@ pub struct ImplicitEuler {
     made_for: Option<(u64, f64)>,
     /// The prescribed directions they were made for.
     made_for_fixed: Vec<(u32, [bool; 3])>,
+    /// Of a body with degenerate elements.
+    stiff: Option<Box<Stiff>>,
     /// Copies whose entry of the preconditioner contains springs.
     sprung: Vec<u32>,
     /// Their blocks without springs, while those with springs are inverted.
@@ -96,6 +99,23 @@ pub struct ImplicitEuler {
     translations: Translations,
     reference: f64,
 }
+
+/// How degenerate elements are kept from costing iterations.
+#[derive(Debug)]
+struct Stiff {
+    modes: StiffModes,
+    /// Blocks of the preconditioner that the substitution changes.
+    composite: CompositeDiagonal,
+    /// Degenerate pieces that keep a stiff motion.
+    left: usize,
+    /// Whether the substitution has to be found anew.
+    stale: bool,
+    /// A spring's weights in the new variables.
+    row: Vec<(u32, f64)>,
+}
+
+/// Most copies that a spring's weights are expected on in the new variables.
+const SPRING_ROW: usize = 64;
 
 impl ImplicitEuler {
     /// An integrator without memory. `at_start` linearises at the positions of the last step, which
@@ -116,6 +136,24 @@ impl ImplicitEuler {
         self.sprung.clear();
         self.preconditioner.resize(n);
         self.pcg.resize(n);
+        self.set_stiff_modes(None);
+    }
+
+    /// Takes over the stiff motions of the degenerate elements of the present topology.
+    pub fn set_stiff_modes(&mut self, modes: Option<StiffModes>) {
+        self.preconditioner.set_substitution(Substitution::default());
+        self.made_for = None;
+        self.stiff = modes.map(|modes| {
+            let (composite, row) = (CompositeDiagonal::default(), Vec::with_capacity(SPRING_ROW));
+            Box::new(Stiff { modes, composite, left: 0, stale: true, row })
+        });
+    }
+
+    /// Pieces of degenerate elements, copies that are moved relative to others for them, and pieces
+    /// that keep a stiff motion; those of the last step.
+    pub fn stiff_motions(&self) -> [usize; 3] {
+        let (found, left) = self.stiff.as_ref().map_or((0, 0), |s| (s.modes.n_degenerate(), s.left));
+        [found, self.preconditioner.substitution().len(), left]
     }
 
     /// Advances `state` by h, unless something turns out not to be finite. The force of every
@@ -173,8 +211,8 @@ impl ImplicitEuler {
         inputs: &StepInputs<'_>,
     ) -> usize {
         let (h, beta) = (inputs.h, inputs.material.rayleigh.stiffness_s);
-        let scale = h * h + h * beta;
-        let with = ElasticUpdate { lame: inputs.material.lame(), law: inputs.material.law, scale };
+        let with = elastic_update(inputs);
+        let scale = with.scale;
         let at = if self.at_start { &state.x } else { &self.predicted };
         let inverted = elastic.update_chunks(team, &with, at);
         self.sum_chunks(team, elastic, inputs);
@@ -209,8 +247,11 @@ impl ImplicitEuler {
             return;
         }
         self.made_for = made_for;
-        self.made_for_fixed.clear();
-        self.made_for_fixed.extend(inputs.fixed.iter().map(axes));
+        if !inputs.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied()) {
+            self.made_for_fixed.clear();
+            self.made_for_fixed.extend(inputs.fixed.iter().map(axes));
+            self.stiff.iter_mut().for_each(|stiff| stiff.stale = true);
+        }
         self.sprung.clear();
         let inverses = blocks(self.preconditioner.inverses_mut(), BLOCK);
         let state = (f_int, blocks(&mut self.diagonal, BLOCK), inverses);
@@ -225,9 +266,28 @@ impl ImplicitEuler {
                 *inverse = invert(diagonal, [false; 3]);
             }
         });
+        self.substitute(team, elastic, inputs);
         for copy in inputs.fixed {
             let c = copy.copy as usize;
             self.preconditioner.set(c, &self.diagonal[c], copy.axes);
+        }
+    }
+
+    /// The blocks of the preconditioner in the variables in which degenerate elements are not stiff.
+    fn substitute(&mut self, team: &mut Team, elastic: &Elastic, inputs: &StepInputs<'_>) {
+        let Some(stiff) = &mut self.stiff else { return };
+        if stiff.stale {
+            let held = |copy: u32| inputs.fixed.binary_search_by_key(&copy, |f| f.copy).is_ok();
+            let (T, left) = stiff.modes.substitution(held);
+            stiff.composite = CompositeDiagonal::new(&stiff.modes, &T, elastic);
+            (stiff.left, stiff.stale) = (left, false);
+            self.preconditioner.set_substitution(T);
+        }
+        let with = elastic_update(inputs);
+        let mass = (inputs.mass_f32, mass_factor(inputs));
+        stiff.composite.update(team, (elastic, &with), mass, &mut self.diagonal);
+        for copy in stiff.composite.copies() {
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], [false; 3]);
         }
     }
 
@@ -253,10 +313,29 @@ impl ImplicitEuler {
             self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
         }
         self.sprung.clear();
-        self.sprung.extend(self.terms.iter().flat_map(|term| term.copies));
+        match &mut self.stiff {
+            None => self.sprung.extend(self.terms.iter().flat_map(|term| term.copies)),
+            // Springs hold on to the copies that theirs are moved relative to, too.
+            Some(stiff) => {
+                for term in &self.terms {
+                    term.expand(self.preconditioner.substitution(), &mut stiff.row);
+                    self.sprung.extend(stiff.row.iter().map(|r| r.0));
+                }
+            }
+        }
         self.bare.clear();
         self.bare.extend(self.sprung.iter().map(|&copy| self.diagonal[copy as usize]));
-        system(elastic, &self.terms, inputs).add_springs(&mut self.diagonal);
+        if let Some(stiff) = &mut self.stiff {
+            for term in &self.terms {
+                term.expand(self.preconditioner.substitution(), &mut stiff.row);
+                stiff
+                    .row
+                    .iter()
+                    .for_each(|&(copy, w)| term.add_to_block(w as f32, &mut self.diagonal[copy as usize]));
+            }
+        } else {
+            system(elastic, &self.terms, inputs).add_springs(&mut self.diagonal);
+        }
         for &copy in &self.sprung {
             self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
         }
@@ -336,7 +415,16 @@ impl ImplicitEuler {
             partial[0] = load.total();
         });
         if pass == 0 {
-            self.reference = LOAD_FLOOR * self.partial.iter().sum::<f64>().max(0.0).sqrt();
+            let loads = if self.preconditioner.substitution().is_empty() {
+                self.partial.iter().sum::<f64>().max(0.0).sqrt()
+            } else {
+                for (c, load) in self.scratch.iter_mut().enumerate() {
+                    *load = padded(&(h2 * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
+                }
+                filter(inputs.fixed, &mut self.scratch);
+                self.pcg.norm(team, &self.preconditioner, &self.scratch)
+            };
+            self.reference = LOAD_FLOOR * loads;
         }
         for spring in &self.active {
             let f = h2 * spring.force(self.point_of(spring, inputs));
@@ -430,6 +518,16 @@ fn system<'a>(
         mass_factor: mass_factor(inputs) as f32,
         springs,
         fixed: inputs.fixed,
+    }
+}
+
+/// K̂ and its factor h² + hβ.
+fn elastic_update(inputs: &StepInputs<'_>) -> ElasticUpdate {
+    let (h, material) = (inputs.h, inputs.material);
+    ElasticUpdate {
+        lame: material.lame(),
+        law: material.law,
+        scale: h * h + h * material.rayleigh.stiffness_s,
     }
 }
 

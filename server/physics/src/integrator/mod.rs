@@ -3,6 +3,7 @@
 mod dynamics;
 mod implicit_euler;
 mod parts;
+mod spin;
 mod springs;
 mod statics;
 mod relaxation;
@@ -14,6 +15,7 @@ pub use dynamics::{
 pub use implicit_euler::{ImplicitEuler, StepInputs, StepOutcome};
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};
+pub use spin::SpinGuard;
 pub use springs::{PointSpring, SpringKind};
 pub use statics::{StaticProblem, find_equilibrium, prescribe};
 

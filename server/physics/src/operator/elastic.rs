@@ -53,6 +53,14 @@ pub struct Elastic {
     version: u64,
 }
 
+/// Where a piece is kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    chunk: u32,
+    batch: u32,
+    lane: u32,
+}
+
 /// What an update is made with.
 #[derive(Clone, Copy, Debug)]
 pub struct ElasticUpdate {
@@ -335,6 +343,27 @@ impl Elastic {
             }
         }
         rotations
+    }
+
+    /// Where every piece is kept, until the next cut.
+    pub fn places(&self) -> Vec<Place> {
+        let mut places = vec![Place::default(); self.n_pieces()];
+        for (chunk, c) in (0u32..).zip(&self.chunks) {
+            for (p, batch, lane) in c.lanes() {
+                places[p as usize] = Place { chunk, batch: batch as u32, lane: lane as u32 };
+            }
+        }
+        // A carrier comes before what its lane integrates with it.
+        for (p, &carrier) in self.carriers.of_piece().iter().enumerate() {
+            places[p] = places[carrier as usize];
+        }
+        places
+    }
+
+    /// Rotation of one piece at the last update.
+    #[inline]
+    pub fn rotation(&self, place: Place) -> Matrix3<f32> {
+        self.chunks[place.chunk as usize].rotation(place.batch as usize, place.lane as usize)
     }
 
     /// Number of pieces.

@@ -3,18 +3,24 @@
 mod carriers;
 mod chunk;
 mod chunks;
+mod composite_diagonal;
 pub mod cost;
 mod elastic;
 mod kernel;
 mod edges;
 mod preconditioner;
+mod stiff_modes;
+mod substitution;
 pub mod rows;
 mod system;
 
-pub use elastic::{Elastic, ElasticUpdate, OperatorChoice};
+pub use composite_diagonal::CompositeDiagonal;
+pub use elastic::{Elastic, ElasticUpdate, OperatorChoice, Place};
 pub use kernel::Block6;
 pub use preconditioner::{BlockJacobi, Inverse3, invert};
 pub use rows::Sum;
+pub use stiff_modes::{NearPiece, StiffModes, degenerate_elements};
+pub use substitution::{Substitutable, Substitution};
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 
 use crate::team::{Team, blocks};

@@ -1,15 +1,18 @@
-//! The inverse of the 3×3 diagonal blocks, one per copy.
+//! The inverse of the 3×3 diagonal blocks, one per copy; on degenerate elements in variables in which
+//! they are not stiff.
 
-use super::{BLOCK, Block6, FixedCopy, Padded};
+use super::{BLOCK, Block6, FixedCopy, Padded, Substitution};
 use crate::team::{Team, blocks};
 
 /// Block-Jacobi preconditioner M⁻¹: one symmetric positive definite 3×3 matrix per copy.
 ///
 /// It makes the solver blind to the size of pieces: a sliver of 1e-15 of an element has a mass and
-/// a stiffness that are small alike.
+/// a stiffness that are small alike. With a substitution T the blocks are those of TᵀA T, and the
+/// preconditioner is T M⁻¹ Tᵀ; residuals are kept as Tᵀr.
 #[derive(Clone, Debug, Default)]
 pub struct BlockJacobi {
     inverse: Vec<Inverse3>,
+    substitution: Substitution,
 }
 
 /// The inverse of one 3×3 block, by columns.
@@ -31,6 +34,17 @@ impl BlockJacobi {
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
         self.inverse.resize(n, Inverse3::default());
+    }
+
+    /// Changes the variables that the blocks belong to; who writes the inverses writes those of TᵀA T.
+    pub fn set_substitution(&mut self, substitution: Substitution) {
+        self.substitution = substitution;
+    }
+
+    /// T.
+    #[inline]
+    pub fn substitution(&self) -> &Substitution {
+        &self.substitution
     }
 
     /// The inverses, to be written block by block with [`invert`] and [`Self::set`].

@@ -1,7 +1,7 @@
 //! The matrix of one implicit step: A = (1 + hα) M + (h² + hβ) K̂ + h² Σ k J Jᵀ, with fixed copies
 //! filtered out.
 
-use super::{Advance, BLOCK, Block6, Elastic, LinearOperator, Padded, block_of, rows};
+use super::{Advance, BLOCK, Block6, Elastic, LinearOperator, Padded, Substitution, block_of, rows};
 use crate::team::{Team, blocks};
 
 /// A copy whose displacement is prescribed in some directions.
@@ -78,17 +78,8 @@ impl SystemOperator<'_> {
     /// Adds the springs to the diagonal blocks of (1 + hα) M + (h² + hβ) K̂, which gives those of A.
     pub fn add_springs(&self, diagonal: &mut [Block6]) {
         for spring in self.springs {
-            let n = |i: usize, j: usize| match spring.direction {
-                Some(n) => n[i] * n[j],
-                None => f32::from(u8::from(i == j)),
-            };
             for (&copy, &w) in spring.copies.iter().zip(&spring.weights) {
-                let block = &mut diagonal[copy as usize];
-                for (entry, (i, j)) in
-                    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate()
-                {
-                    block[entry] += spring.stiffness * w * w * n(i, j);
-                }
+                spring.add_to_block(w, &mut diagonal[copy as usize]);
             }
         }
     }
@@ -104,6 +95,29 @@ impl Spring {
             }
         }
         p
+    }
+
+    /// Adds k w² n nᵀ, or k w² in all directions, to the diagonal block of a copy with weight `w`.
+    pub fn add_to_block(&self, w: f32, block: &mut Block6) {
+        let n = |i: usize, j: usize| match self.direction {
+            Some(n) => n[i] * n[j],
+            None => f32::from(u8::from(i == j)),
+        };
+        for (k, i, j) in [(0, 0, 0), (1, 0, 1), (2, 0, 2), (4, 1, 1), (5, 1, 2), (6, 2, 2)] {
+            block[k] += self.stiffness * w * w * n(i, j);
+        }
+    }
+
+    /// The copies and their weights in the variables of a substitution, each once.
+    pub fn expand(&self, T: &Substitution, row: &mut Vec<(u32, f64)>) {
+        row.clear();
+        for (&copy, &w) in self.copies.iter().zip(&self.weights) {
+            match row.iter_mut().find(|r| r.0 == copy) {
+                Some(found) => found.1 += f64::from(w),
+                None => row.push((copy, f64::from(w))),
+            }
+        }
+        T.gather(row);
     }
 
     /// k (n·p)² or k |p|² of the point's displacement p.

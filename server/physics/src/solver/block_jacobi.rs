@@ -27,6 +27,11 @@ impl<T: Real> DiagonalInverse<T> {
         }
     }
 
+    /// Inverts `block` in place of that of copy `i`, 0 in the directions `held`.
+    pub fn set(&mut self, i: usize, block: Matrix3<f64>, held: [bool; 3]) {
+        self.inverse[i] = rounded(invert(block, held));
+    }
+
     /// M⁻¹ of copy `i` times `r`.
     #[inline(always)]
     pub fn times(&self, i: usize, r: &Vector3<T>) -> Vector3<T> {

@@ -13,7 +13,7 @@ use super::constraint::Filter;
 use super::real::{Real, dot};
 use super::report::{LinearReport, StopReason};
 use crate::assembly::BlockCsr;
-use crate::operator::BLOCK;
+use crate::operator::{BLOCK, Substitutable, Substitution};
 use crate::team::{Team, blocks};
 
 /// The true residual is computed when the recursion says it fell by this factor (Clark et al. 2010).
@@ -40,6 +40,8 @@ pub struct System<'a, T, A> {
     pub exact_inverse: &'a DiagonalInverse<f64>,
     /// M⁻¹ of `working`.
     pub inverse: &'a DiagonalInverse<T>,
+    /// T: M⁻¹ is of TᵀA T, residuals are kept as Tᵀr; empty for T = 1.
+    pub substitution: &'a Substitution,
     /// Whether M⁻¹ preconditions the iteration; the norm in which it stops is that of M⁻¹ anyway.
     pub preconditioned: bool,
 }
@@ -71,7 +73,10 @@ struct Size {
     norm: f64,
 }
 
-impl<T: Real> ConjugateGradients<T> {
+impl<T: Real> ConjugateGradients<T>
+where
+    Vector3<T>: Substitutable,
+{
     fn resize(&mut self, n: usize) {
         for v in [&mut self.r, &mut self.z, &mut self.p, &mut self.q] {
             v.resize(n, Vector3::zeros());
@@ -145,7 +150,7 @@ impl<T: Real> ConjugateGradients<T> {
         }
     }
 
-    /// residual = S (b − A x); returns √(rᵀM⁻¹r) of it.
+    /// residual = Tᵀ S (b − A x); returns √(rᵀM⁻¹r) of it.
     fn true_residual(
         &mut self,
         team: &mut Team,
@@ -160,6 +165,7 @@ impl<T: Real> ConjugateGradients<T> {
             }
         });
         system.filter.apply(&mut self.residual);
+        system.substitution.fold(&mut self.residual);
         system.exact_inverse.norm(&self.residual)
     }
 
@@ -177,6 +183,7 @@ impl<T: Real> ConjugateGradients<T> {
                 sums[0][1] += dot(r, r);
             }
         });
+        system.substitution.unfold(&mut self.z);
         self.size(system)
     }
 
@@ -198,6 +205,7 @@ impl<T: Real> ConjugateGradients<T> {
             }
         });
         system.filter.apply(&mut self.q);
+        system.substitution.fold(&mut self.q);
         self.sums.iter().map(|s| s[0]).sum()
     }
 
@@ -231,6 +239,7 @@ impl<T: Real> ConjugateGradients<T> {
                 sums[0][1] += dot(r, r);
             }
         });
+        system.substitution.unfold(&mut self.z);
         self.size(system)
     }
 

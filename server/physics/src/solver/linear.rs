@@ -1,5 +1,7 @@
 //! A x = b for an assembled matrix, by the method and in the precision that the user chose.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::block_jacobi::DiagonalInverse;
@@ -9,8 +11,9 @@ use super::constraint::Filter;
 use super::differences::Differences;
 use super::real::Real;
 use super::report::{LinearReport, StopReason};
+use super::substituted::Substituted;
 use crate::assembly::BlockCsr;
-use crate::operator::{BLOCK, FixedCopy};
+use crate::operator::{BLOCK, FixedCopy, StiffModes};
 use crate::team::{Team, blocks};
 
 /// How A x = b is solved.
@@ -65,6 +68,7 @@ pub struct LinearSolver {
     pub settings: LinearSettings,
     filter: Filter,
     inverse: DiagonalInverse<f64>,
+    substituted: Substituted,
     single: Single,
     double: ConjugateGradients<f64>,
     factors: Factors<f64>,
@@ -98,6 +102,19 @@ impl LinearSolver {
         Self { settings, ..Self::default() }
     }
 
+    /// Takes over the stiff motions of degenerate elements, which are then kept from costing
+    /// iterations: the preconditioner works in other variables, in double precision. Not for
+    /// [`Method::Cg`], which has no preconditioner.
+    pub fn set_stiff_modes(&mut self, modes: Option<Arc<StiffModes>>) {
+        self.substituted = Substituted::new(modes);
+    }
+
+    /// Pieces of degenerate elements, copies that are moved relative to others for them, and pieces
+    /// that keep a stiff motion; those of the last matrix.
+    pub fn stiff_motions(&self) -> [usize; 3] {
+        self.substituted.counts()
+    }
+
     /// Takes over the values of a new matrix and which directions are prescribed.
     ///
     /// Must be called whenever either has changed, before [`solve`](Self::solve) and
@@ -105,6 +122,7 @@ impl LinearSolver {
     pub fn set_matrix(&mut self, A: &BlockCsr<f64>, fixed: &[FixedCopy]) {
         self.filter.set(fixed);
         self.inverse.update(A, &self.filter);
+        self.substituted.update(A, &self.filter, self.settings.method != Method::Cg, &mut self.inverse);
         self.single.current = false;
         self.factors.current = None;
         self.single_factors.current = None;
@@ -112,12 +130,12 @@ impl LinearSolver {
 
     /// √(vᵀM⁻¹v), in which residuals are measured; prescribed directions do not count.
     pub fn norm(&self, v: &[Vector3<f64>]) -> f64 {
-        self.inverse.norm(v)
+        self.substituted.norm(&self.inverse, v)
     }
 
     /// z = M⁻¹ r, the block-Jacobi step.
     pub fn precondition(&self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
-        self.inverse.apply(r, z);
+        self.substituted.apply(&self.inverse, r, z);
     }
 
     /// Sets the prescribed directions of `v` to 0.
@@ -138,7 +156,7 @@ impl LinearSolver {
         x: &mut [Vector3<f64>],
         reference: Option<f64>,
     ) -> LinearReport {
-        let reference = reference.unwrap_or_else(|| self.inverse.norm(b));
+        let reference = reference.unwrap_or_else(|| self.norm(b));
         let stop = Stop { target: self.settings.tolerance * reference, iterations: self.settings.iterations };
         let mut report = match self.settings.method {
             Method::Cholesky => self.direct(team, A, b, x, stop),
@@ -158,15 +176,18 @@ impl LinearSolver {
         x: &mut [Vector3<f64>],
         (stop, preconditioned): (Stop, bool),
     ) -> LinearReport {
-        let Self { filter, inverse, single, double, .. } = self;
+        let Self { filter, inverse, substituted, single, double, .. } = self;
         let (filter, exact_inverse) = (&*filter, &*inverse);
-        if self.settings.precision == Precision::Double {
+        let substitution = substituted.substitution();
+        // Rounding a matrix with entries 1/ε times as large as the others would spoil those.
+        if self.settings.precision == Precision::Double || !substitution.is_empty() {
             let system = System {
                 exact: A,
                 working: A,
                 filter,
                 exact_inverse,
                 inverse: exact_inverse,
+                substitution,
                 preconditioned,
             };
             return double.solve(team, &system, b, x, stop);
@@ -182,6 +203,7 @@ impl LinearSolver {
             filter,
             exact_inverse,
             inverse: &single.inverse,
+            substitution,
             preconditioned,
         };
         single.gradients.solve(team, &system, b, x, stop)
@@ -201,8 +223,8 @@ impl LinearSolver {
         // A single-precision factor that is not good enough is followed by one in double precision.
         if self.settings.precision == Precision::Mixed && self.single_factors.prepare(A, &self.filter).is_ok()
         {
-            let Self { single_factors, filter, inverse, r, z, .. } = self;
-            let work = Correction { A, b, filter, inverse, r, z };
+            let Self { single_factors, filter, inverse, substituted, r, z, .. } = self;
+            let work = Correction { A, b, filter, inverse: (inverse, substituted), r, z };
             work.run(team, x, &mut single_factors.cholesky, stop, &mut report);
             if report.stop != StopReason::Stagnated {
                 return report;
@@ -210,13 +232,14 @@ impl LinearSolver {
         }
         match self.factors.prepare(A, &self.filter) {
             Ok(()) => {
-                let Self { factors, filter, inverse, r, z, .. } = self;
-                let work = Correction { A, b, filter, inverse, r, z };
+                let Self { factors, filter, inverse, substituted, r, z, .. } = self;
+                let work = Correction { A, b, filter, inverse: (inverse, substituted), r, z };
                 work.run(team, x, &mut factors.cholesky, stop, &mut report);
                 report
             }
             Err(Failure::Pivot(pivot)) => {
-                let Self { filter, inverse, r, z, .. } = self;
+                let Self { filter, inverse, substituted, r, z, .. } = self;
+                let inverse = (&*inverse, &*substituted);
                 let residual = Correction { A, b, filter, inverse, r, z }.residual(team, x);
                 let stop = StopReason::NonPositiveCurvature;
                 LinearReport { residual, stop, pivot: Some(pivot), ..report }
@@ -252,7 +275,7 @@ struct Correction<'a> {
     A: &'a BlockCsr<f64>,
     b: &'a [Vector3<f64>],
     filter: &'a Filter,
-    inverse: &'a DiagonalInverse<f64>,
+    inverse: (&'a DiagonalInverse<f64>, &'a Substituted),
     r: &'a mut [Vector3<f64>],
     z: &'a mut [Vector3<f64>],
 }
@@ -311,7 +334,8 @@ impl Correction<'_> {
             }
         });
         self.filter.apply(self.r);
-        self.inverse.norm(self.r)
+        let (inverse, substituted) = self.inverse;
+        substituted.norm(inverse, self.r)
     }
 }
 

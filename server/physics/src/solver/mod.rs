@@ -12,6 +12,7 @@ mod block_jacobi;
 mod conjugate_gradients;
 mod differences;
 mod cholesky;
+mod substituted;
 mod linear;
 mod newton;
 mod eigen;

@@ -4,12 +4,14 @@
 //! A Φ that is not finite counts as +∞. Where p leads nowhere, the block-Jacobi gradient −M⁻¹∇Φ is
 //! tried; where that fails too no step is taken: an unchecked step can overflow.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::linear::{LinearSettings, LinearSolver};
 use super::report::StopReason;
 use crate::assembly::BlockCsr;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, StiffModes};
 use crate::team::Team;
 
 /// Something with a minimum: potential energy, or that plus the inertia of a time step.
@@ -125,6 +127,16 @@ impl Newton {
     /// A minimiser with these settings.
     pub fn new(settings: NewtonSettings) -> Self {
         Self { settings, ..Self::default() }
+    }
+
+    /// Takes over the stiff motions of degenerate elements, for the linear solver.
+    pub fn set_stiff_modes(&mut self, modes: Option<Arc<StiffModes>>) {
+        self.solver.set_stiff_modes(modes);
+    }
+
+    /// [`LinearSolver::stiff_motions`].
+    pub fn stiff_motions(&self) -> [usize; 3] {
+        self.solver.stiff_motions()
     }
 
     /// Prepares for potentials with the pattern of this one; to be called again when it changes.

@@ -35,7 +35,8 @@ pub struct PcgReport {
 /// Scratch vectors of the solver, one entry per copy; reused from solve to solve.
 #[derive(Clone, Debug, Default)]
 pub struct Pcg {
-    /// In: the residual b − A x of the start; out: of the result, by recursion.
+    /// In: the residual b − A x of the start; out: of the result, by recursion, in the variables of
+    /// the preconditioner.
     pub r: Vec<Padded>,
     z: Vec<Padded>,
     p: Vec<Padded>,
@@ -100,6 +101,7 @@ impl Pcg {
             // p ← z + β p, q = A p, pᵀA p
             let out = Advance { p: &mut self.p, q: &mut self.q, partial: &mut self.partial };
             let curvature = A.advance(team, beta as f32, &self.z, out);
+            M.substitution().fold(&mut self.q);
             if !curvature.is_finite() {
                 report.stop = StopReason::NonFinite;
                 return report;
@@ -120,6 +122,13 @@ impl Pcg {
 
     /// √(vᵀM⁻¹v), the norm that `reference` is to be given in.
     pub fn norm(&mut self, team: &mut Team, M: &BlockJacobi, v: &[Padded]) -> f64 {
+        let v = if M.substitution().is_empty() {
+            v
+        } else {
+            self.z.copy_from_slice(v);
+            M.substitution().fold(&mut self.z);
+            &self.z
+        };
         team.for_blocks(blocks(&mut self.partial, 1), |block, partial| {
             let mut sum = Sum::default();
             for (v, M) in block_of(v, block).iter().zip(M.block(block)) {
@@ -130,13 +139,15 @@ impl Pcg {
         self.partial.iter().sum::<f64>().max(0.0).sqrt()
     }
 
-    /// z = M⁻¹ r; returns rᵀz.
+    /// z = M⁻¹ r of the residual just put into `self.r`; returns rᵀz.
     pub fn precondition(&mut self, team: &mut Team, M: &BlockJacobi) -> f64 {
+        M.substitution().fold(&mut self.r);
         let r = &self.r;
         let state = (blocks(&mut self.z, BLOCK), blocks(&mut self.partial, 1));
         team.for_blocks(state, |block, (z, partial)| {
             partial[0] = rows::precondition(M.block(block), block_of(r, block), z);
         });
+        M.substitution().unfold(&mut self.z);
         self.partial.iter().sum()
     }
 
@@ -152,6 +163,7 @@ impl Pcg {
             let pq = [block_of(p, block), block_of(q, block)];
             partial[0] = rows::advance_solution(alpha, pq, M.block(block), [x, r, z]);
         });
+        M.substitution().unfold(&mut self.z);
         self.partial.iter().sum()
     }
 }

@@ -1,7 +1,7 @@
 //! What a cut must not change, and how fragments move.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, Outcome, StaticSettings, StopReason};
+use scindo_physics::body::{Arithmetic, Body, BodySettings, Outcome, StaticSettings, StopReason};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
@@ -107,6 +107,42 @@ fn a_cut_through_the_clamp_glues_nothing_to_air() {
     assert!(after[loose].0 > 0.9 * body.total_mass());
     let expected = 1e-4 * 20.0 * 21.0 / 2.0 * DOWN.y;
     assert!(((after[loose].1 - before[loose].1).y / expected - 1.0).abs() < 1e-6);
+}
+
+/// Cut exactly through a layer of nodes that ends in the clamp, both lips have those clamped nodes.
+#[test]
+fn a_cut_exactly_through_clamped_nodes_leaves_both_lips_clamped() {
+    for general in [false, true] {
+        let arithmetic = general.then_some(Arithmetic::Double);
+        let settings = BodySettings { arithmetic, ..settings(200, 1e-5) };
+        let mut body = cube(4, SOFT, settings);
+        let rest = body.cut_mesh().mesh().nodes.clone();
+        let clamp: Vec<u32> = (0..rest.len() as u32).filter(|&n| rest[n as usize].y == 0.0).collect();
+        body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+        body.cut(&slice(0.05, -0.5, 0.5), 1).unwrap();
+        assert_eq!((body.parts().len(), body.parts().free.contains(&true)), (2, false));
+        for _ in 0..20 {
+            body.step(0.01, DOWN, &[]);
+        }
+        let node = body.cut_mesh().copy_node().to_vec();
+        let copies: Vec<usize> = (0..node.len()).filter(|&c| rest[node[c] as usize].y == 0.0).collect();
+        assert_eq!(copies.len(), 25 + 5);
+        let moved = |c: &&usize| body.positions()[**c] != rest[node[**c] as usize];
+        assert_eq!(copies.iter().filter(moved).count(), 0, "general: {general}");
+    }
+}
+
+/// Cut along the first layer of nodes behind the clamp the body falls; a cut along the clamp itself
+/// frees nothing.
+#[test]
+fn what_holds_no_clamped_node_falls() {
+    let mut body = cube(4, SOFT, settings(200, 1e-5));
+    let clamp = left_face(&body);
+    body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
+    body.cut(&slice(0.0, -0.5, 0.5), 1).unwrap();
+    assert_eq!(body.parts().free, [false]);
+    body.cut(&slice(0.025, -0.5, 0.5), 2).unwrap();
+    assert_eq!((body.parts().len(), body.parts().free.iter().filter(|f| **f).count()), (2, 1));
 }
 
 #[test]

@@ -1,9 +1,6 @@
 //! What earlier steps left behind, and what tells that a scheme is out of its depth.
 
-use nalgebra::{Matrix3, Vector3};
-
 use crate::integrator::State;
-use crate::integrator::parts::LooseParts;
 
 /// The last two states.
 #[derive(Clone, Debug, Default)]
@@ -85,51 +82,3 @@ impl Ledger {
 /// BDF2 serves while a body turns by less than this in one step [rad]. Up to 1.6 no energy is gained,
 /// from 2 on it is.
 pub(super) const LARGEST_TURN: f64 = 0.8;
-
-/// Angular velocities of the connected parts.
-#[derive(Clone, Debug, Default)]
-pub(super) struct SpinGuard {
-    parts: Vec<Spin>,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Spin {
-    mass: f64,
-    /// Σ m x, Σ m v.
-    moment: Vector3<f64>,
-    momentum: Vector3<f64>,
-    /// Angular momentum and inertia about the centre of mass.
-    angular: Vector3<f64>,
-    inertia: Matrix3<f64>,
-}
-
-impl SpinGuard {
-    pub fn resize(&mut self, parts: usize) {
-        self.parts.resize(parts, Spin::default());
-    }
-
-    /// Largest angular velocity |J⁻¹ L| of a part [rad/s].
-    pub fn fastest(&mut self, state: &State, mass: &[f64], parts: &LooseParts) -> f64 {
-        self.parts.fill(Spin::default());
-        for (c, &m) in mass.iter().enumerate() {
-            let part = &mut self.parts[parts.of_copy[c] as usize];
-            part.mass += m;
-            part.moment += m * state.x[c];
-            part.momentum += m * state.v[c];
-        }
-        for (c, &m) in mass.iter().enumerate() {
-            let part = &mut self.parts[parts.of_copy[c] as usize];
-            if part.mass > 0.0 {
-                let d = state.x[c] - part.moment / part.mass;
-                part.angular += m * d.cross(&(state.v[c] - part.momentum / part.mass));
-                part.inertia += m * (Matrix3::from_diagonal_element(d.norm_squared()) - d * d.transpose());
-            }
-        }
-        let spin = |part: &Spin| {
-            let floor = 1e-9 * part.inertia.trace();
-            let J = part.inertia + Matrix3::from_diagonal_element(floor);
-            J.try_inverse().map_or(0.0, |inverse| (inverse * part.angular).norm())
-        };
-        self.parts.iter().map(spin).fold(0.0, f64::max)
-    }
-}

@@ -18,20 +18,23 @@ pub use critical_step::stable_step;
 pub use report::{DynamicsOutcome, DynamicsReport, Notice};
 pub use settings::{DynamicsSettings, LEAST_NEWTON_STEPS, MassKind, Scheme};
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::State;
 use super::parts::{LooseParts, Translations};
 use super::relaxation::Relaxation;
+use super::spin::SpinGuard;
 use super::springs::{ActiveSpring, PointSpring};
 use crate::assembly::{BlockCsr, Model, Tangent};
 use crate::material::Material;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, StiffModes};
 use crate::solver::{Newton, NewtonSettings};
 use crate::team::Team;
 use critical_step::PowerIteration;
-use guard::{History, Ledger, SpinGuard};
+use guard::{History, Ledger};
 use mass::Mass;
 
 /// Positions beyond this [m] count as not finite.
@@ -159,6 +162,18 @@ impl Dynamics {
     /// Lumped masses [kg], also where the mass matrix is consistent.
     pub fn masses(&self) -> &[f64] {
         &self.mass.lumped
+    }
+
+    /// Takes over the stiff motions of the model's degenerate elements, which are then kept from
+    /// costing iterations.
+    pub fn set_stiff_modes(&mut self, modes: Option<Arc<StiffModes>>) {
+        self.newton.set_stiff_modes(modes);
+    }
+
+    /// Pieces of degenerate elements, copies that are moved relative to others for them, and pieces
+    /// that keep a stiff motion; those of the last step.
+    pub fn stiff_motions(&self) -> [usize; 3] {
+        self.newton.stiff_motions()
     }
 
     /// Changes Newton's method and the iterations of relaxation, from the next step on.

@@ -72,6 +72,13 @@ pub enum Notice {
         /// Angle per step [rad].
         angle_rad: f64,
     },
+    /// One linear solve per step: a free part turned too far in one step for that, and was slowed.
+    SpinLimited {
+        /// Angle per step before [rad].
+        angle_rad: f64,
+        /// Largest angle per step [rad].
+        largest_rad: f64,
+    },
     /// The step gained energy, it was made again with implicit Euler and as many Newton steps as needed.
     EnergyGained {
         /// Energy above what there was and what was put in [J].
@@ -104,6 +111,12 @@ impl fmt::Display for Notice {
             Self::ContactOnset => write!(f, "new contact: made with implicit Euler"),
             Self::Spinning { angle_rad } => {
                 write!(f, "turns by {angle_rad:.2} rad per step: made with implicit Euler")
+            }
+            Self::SpinLimited { angle_rad, largest_rad } => {
+                write!(
+                    f,
+                    "a loose part turned by {angle_rad:.2} rad per step: slowed to {largest_rad:.2} rad"
+                )
             }
             Self::EnergyGained { excess_j } => {
                 write!(f, "gained {excess_j:.3e} J: made again with implicit Euler")
