@@ -29,6 +29,8 @@ pub struct Chunk {
     rest: Vec<Vector3<f64>>,
     /// The assembled stiffness, where that is in use.
     edges: Option<EdgeBlocks>,
+    /// Lanes (batch, lane) that have changed since it was.
+    unassembled: Vec<[usize; 2]>,
     /// Pieces with det F ≤ 0 at the last update.
     pub inverted: usize,
     /// Whether the chunk was planned or amended since the last update.
@@ -70,6 +72,7 @@ impl Chunk {
             pieces: plan.pieces,
             rest: rest_positions(&plan.copies, members, mesh, merged),
             edges: None,
+            unassembled: Vec::new(),
             planned: [members.len(), plan.copies.len()],
             n_lanes: members.len(),
             copies: plan.copies,
@@ -135,13 +138,14 @@ impl Chunk {
         for (p, batch, lane) in amended {
             self.batches.set_nodes(batch, lane, locals(p));
             self.batches.rest_mut(batch).set_volume(lane, mesh, &merged[p as usize]);
+            self.unassembled.push([batch, lane]);
         }
         for (([batch, lane], ids), NewLane { piece, rotation }) in places.into_iter().zip(held).zip(added) {
             self.batches.set_nodes(batch, lane, ids);
             self.batches.rest_mut(batch).set(lane, mesh, &merged[*piece as usize], Some(rotation));
+            self.unassembled.push([batch, lane]);
         }
         self.n_lanes += added.len();
-        self.edges = None;
         self.stale = true;
         self.positions.resize(n, [0.0; 4]);
         self.x.resize(n, [0.0; 4]);
@@ -160,13 +164,18 @@ impl Chunk {
 
     /// Assembles the stiffness of the last update, or forgets what was assembled before.
     pub fn assemble(&mut self, wanted: bool) {
-        let waste = self.copies.len() as u16;
-        if wanted {
-            let Self { edges, batches, .. } = self;
-            edges.get_or_insert_with(|| EdgeBlocks::new(&batches.nodes(), waste)).assemble(batches);
-        } else {
-            self.edges = None;
+        let Self { edges, batches, unassembled, .. } = self;
+        match edges {
+            _ if !wanted => *edges = None,
+            None => edges.insert(EdgeBlocks::new(batches)).assemble(batches),
+            Some(edges) => {
+                if !unassembled.is_empty() {
+                    edges.follow(batches, unassembled.iter().copied());
+                }
+                edges.assemble(batches);
+            }
         }
+        unassembled.clear();
     }
 
     /// y = s K̂ x.

@@ -32,46 +32,73 @@ pub struct EdgeBlocks {
     /// For every batch of tets, pair of corners and lane: 8 · batch + lane of the pair here, or
     /// [`NO_PIECE`].
     slots: Vec<[[u32; LANES]; 6]>,
+    /// Every pair a · 2¹⁶ + b in ascending order, with 8 · batch + lane.
+    pairs: Vec<(u32, u32)>,
     n_locals: usize,
 }
 
 impl EdgeBlocks {
-    /// The pairs of the tets `nodes`, whose unused lanes hold `waste` (the last local number) only.
-    pub fn new(nodes: &[[Ids; 4]], waste: u16) -> Self {
-        // Pair a·2¹⁶ + b and where it occurs, so that equal pairs come together.
-        let mut found: Vec<(u32, u32)> = Vec::with_capacity(PAIRS.len() * LANES * nodes.len());
-        for (t, ids) in nodes.iter().enumerate() {
+    /// The pairs of `tets`.
+    pub fn new(tets: &Batches) -> Self {
+        let mut blocks = Self { batches: Vec::new(), slots: Vec::new(), pairs: Vec::new(), n_locals: 1 };
+        let lanes = (0..tets.n_batches()).flat_map(|t| (0..LANES).map(move |lane| [t, lane]));
+        blocks.follow(tets, lanes);
+        blocks
+    }
+
+    /// Follows a change: these lanes (batch, lane) of `tets` are new or have other local numbers. Pairs
+    /// that are not there yet are appended; those that nobody needs any more stay, with zeros.
+    pub fn follow(&mut self, tets: &Batches, changed: impl Iterator<Item = [usize; 2]>) {
+        let [before, waste] = [self.n_locals, tets.n_locals()].map(|n| (n - 1) as u16);
+        for id in self.batches.iter_mut().flat_map(|b| b.nodes.as_flattened_mut()).filter(|id| **id == before)
+        {
+            *id = waste;
+        }
+        self.n_locals = tets.n_locals();
+        self.slots.resize(tets.n_batches(), [[NO_PIECE; LANES]; 6]);
+        // New pairs and where they occur, so that equal pairs come together.
+        let mut new: Vec<(u32, u32)> = Vec::with_capacity(PAIRS.len() * changed.size_hint().0);
+        for [t, lane] in changed {
+            let ids = tets.ids(t, lane);
             for (k, [i, j]) in PAIRS.into_iter().enumerate() {
-                for (lane, (&a, &b)) in ids[i].iter().zip(&ids[j]).enumerate().filter(|(_, (a, b))| a != b) {
-                    let pair = u32::from(a.min(b)) << 16 | u32::from(a.max(b));
-                    found.push((pair, ((PAIRS.len() * t + k) * LANES + lane) as u32));
+                let pair = u32::from(ids[i].min(ids[j])) << 16 | u32::from(ids[i].max(ids[j]));
+                let slot = &mut self.slots[t][k][lane];
+                *slot = NO_PIECE;
+                // An unused lane has the waste bin in all corners.
+                if ids[i] != ids[j] {
+                    match self.pairs.binary_search_by_key(&pair, |known| known.0) {
+                        Ok(at) => *slot = self.pairs[at].1,
+                        Err(_) => new.push((pair, ((PAIRS.len() * t + k) * LANES + lane) as u32)),
+                    }
                 }
             }
         }
-        found.sort_unstable();
-        let pairs: Vec<[u16; 2]> = found
-            .chunk_by(|p, q| p.0 == q.0)
-            .map(|same| [(same[0].0 >> 16) as u16, same[0].0 as u16])
-            .collect();
+        new.sort_unstable();
+        self.append(&new, waste);
+    }
+
+    /// Gives the pairs `new` (ascending, each as often as it occurs, with the place in `slots`) lanes.
+    fn append(&mut self, new: &[(u32, u32)], waste: u16) {
+        let same = |p: &(u32, u32), q: &(u32, u32)| p.0 == q.0;
+        let ends = |pair: u32| [(pair >> 16) as u16, pair as u16];
+        let pairs: Vec<[u16; 2]> = new.chunk_by(same).map(|same| ends(same[0].0)).collect();
         let mut slot_of_pair = vec![NO_PIECE; pairs.len()];
-        let packed = pack(&pairs, waste as usize + 1);
-        let mut batches = Vec::with_capacity(packed.len());
-        for (k, batch) in packed.iter().enumerate() {
+        for batch in pack(&pairs, self.n_locals) {
             let mut ids = [[waste; LANES]; 2];
             for (lane, &pair) in batch.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
-                slot_of_pair[pair as usize] = (LANES * k + lane) as u32;
+                slot_of_pair[pair as usize] = (LANES * self.batches.len() + lane) as u32;
                 for end in 0..2 {
                     ids[end][lane] = pairs[pair as usize][end];
                 }
             }
-            batches.push(EdgeBatch { block: [[Lanes::default(); 3]; 3], nodes: ids });
+            self.batches.push(EdgeBatch { block: [[Lanes::default(); 3]; 3], nodes: ids });
         }
-        let mut slots = vec![[[NO_PIECE; LANES]; PAIRS.len()]; nodes.len()];
-        let flat = slots.as_flattened_mut().as_flattened_mut();
-        for (same, &slot) in found.chunk_by(|p, q| p.0 == q.0).zip(&slot_of_pair) {
-            same.iter().for_each(|&(_, place)| flat[place as usize] = slot);
+        let places = self.slots.as_flattened_mut().as_flattened_mut();
+        for (same, &slot) in new.chunk_by(same).zip(&slot_of_pair) {
+            same.iter().for_each(|&(_, place)| places[place as usize] = slot);
+            self.pairs.push((same[0].0, slot));
         }
-        Self { batches, slots, n_locals: waste as usize + 1 }
+        self.pairs.sort(); // two runs that are in order
     }
 
     /// Sums the blocks of the tets as they are in `tets`: with the gradients g′ of the kernel,

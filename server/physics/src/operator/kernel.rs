@@ -162,9 +162,19 @@ impl Batches {
         ([g0, g[0], g[1], g[2]], [0, 1, 2, 3].map(|a| b.nodes[a][lane]))
     }
 
-    /// Local numbers of all batches.
-    pub fn nodes(&self) -> Vec<[Ids; 4]> {
-        self.live.iter().map(|b| b.nodes).collect()
+    /// Local numbers of the four corners of one lane.
+    pub fn ids(&self, batch: usize, lane: usize) -> [u16; 4] {
+        self.live[batch].nodes.each_ref().map(|ids| ids[lane])
+    }
+
+    /// Number of batches.
+    pub fn n_batches(&self) -> usize {
+        self.live.len()
+    }
+
+    /// Local numbers are below this; the last is the waste bin.
+    pub fn n_locals(&self) -> usize {
+        self.n_locals
     }
 
     /// Bytes that one application streams.

@@ -190,11 +190,17 @@ fn a_rotation_is_remembered_where_the_gradient_defines_none() {
 /// Cut after cut, chunks that are amended and now and then planned anew give what new ones give.
 #[test]
 fn amended_chunks_act_like_new_ones() {
+    amended_chunks_act_like_new(Law::Corotational, OperatorChoice::MatrixFree);
+    amended_chunks_act_like_new(Law::Linear, OperatorChoice::Assembled);
+}
+
+fn amended_chunks_act_like_new(law: Law, choice: OperatorChoice) {
     let (mesh, _) = mesh();
     let mut cut = CutMesh::new(mesh.clone()).unwrap();
     let mut amended = Elastic::new(Simd::detect(), &mesh, cut.pieces(), cut.n_copies());
+    amended.set_choice(choice);
     let mut team = Team::new(1).unwrap();
-    let with = ElasticUpdate { lame: LAME, law: Law::Corotational, scale: 1e-4 };
+    let with = ElasticUpdate { lame: LAME, law, scale: 1e-4 };
     let (low, high) =
         mesh.nodes.iter().fold((mesh.nodes[0], mesh.nodes[0]), |(low, high), x| (low.inf(x), high.sup(x)));
     for k in 1..16_u32 {
@@ -209,6 +215,7 @@ fn amended_chunks_act_like_new_ones() {
         let (pieces, n) = (cut.pieces(), cut.n_copies());
         amended.follow(&mesh, pieces, cut.changed_pieces(), n);
         let mut fresh = Elastic::new(Simd::detect(), &mesh, pieces, n);
+        fresh.set_choice(choice);
         let rest = cut.rest_positions();
         let x: Vec<Vector3<f64>> =
             (0..n).map(|c| rest[c] + 0.004 * Vector3::new((c as f64).sin(), 0.2, 0.1)).collect();
