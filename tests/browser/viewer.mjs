@@ -120,6 +120,7 @@ async function incisionOpens(page) {
   });
   await until(page, "an incision begins", 4 * MINUTE, () => window.scindo.bodies()[0].lipTriangles > 0);
   const first = await lips();
+  await until(page, "the line from the wound to the blade is drawn", MINUTE, () => window.scindo.bodies()[0].marks > 0);
   await page.screenshot({ path: path.join(artifacts, "view-2-cut.png") });
   await until(page, "the incision grows", 2 * MINUTE, (first) => {
     const body = window.scindo.bodies()[0];
@@ -210,7 +211,7 @@ async function lateJoinerSeesTheSame(page) {
   await until(page, "the simulation pauses", MINUTE, () => window.scindo.paused());
   await page.waitForTimeout(1500);
   const seen = () => {
-    const bodies = window.scindo.bodies().map(({ id, epoch, vertices, triangles, lipTriangles }) => ({ id, epoch, vertices, triangles, lipTriangles }));
+    const bodies = window.scindo.bodies().map(({ id, epoch, vertices, triangles, lipTriangles, marks }) => ({ id, epoch, vertices, triangles, lipTriangles, marks }));
     return { bodies, x: window.scindo.positions(bodies[0].id) };
   };
   const before = await page.evaluate(seen);

@@ -16,6 +16,7 @@ use scindo_physics::cut::{BladeSweep, CutMesh};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 use scindo_physics::operator::OperatorChoice;
+use scindo_physics::skin::{Skin, SkinSettings};
 
 const SIZE_M: f64 = 0.1;
 const DOWN: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
@@ -50,6 +51,9 @@ fn main() {
     }
     if wanted("hundred") {
         hundred_cuts(&mesh, if quick { 2 } else { 200 });
+    }
+    if wanted("skin") {
+        skin(&mesh, if quick { 1 } else { 5 });
     }
 }
 
@@ -254,6 +258,34 @@ fn body_of_pieces(cut: &Body, law: Law) -> Body {
     pieces.sort_by_key(|piece| piece.element);
     let tets = pieces.iter().map(|piece| piece.copies.map(|c| number[c as usize])).collect();
     body(&TetMesh { nodes, tets }, law)
+}
+
+/// What a skin needs to follow a cut: a hundred equal ones side by side, the first ten beside the last.
+fn skin(mesh: &TetMesh, repeats: usize) {
+    let settings = SkinSettings { divisions: 3, snapping: 0.25 };
+    let top = mesh.nodes.iter().fold(0.0_f64, |top, node| top.max(node.z));
+    let run = || {
+        let mut cut = CutMesh::new(mesh.clone()).expect("a block can be cut");
+        let mut skin = Skin::new(&cut, settings, &mut |p, _| *p).expect("the settings are usual");
+        let mut x = cut.rest_positions();
+        let seconds = (0..100u32).map(|k| {
+            let at = |s: f64| {
+                let x = SIZE_M * (0.02 + 0.097 * f64::from(k % 10) + 0.08 * s);
+                let y = SIZE_M * (0.04 + 0.097 * f64::from(k / 10));
+                [Vector3::new(x, y, top - 0.02), Vector3::new(x, y + 1e-4, top + 0.01)]
+            };
+            let sweep = BladeSweep { segments: vec![at(0.0), at(1.0)] };
+            let report = cut.sweep(&x, &sweep, k + 1).expect("the sweep is well formed");
+            report.new_copies.iter().for_each(|new| x.push(x[new.parent as usize]));
+            timed(|| skin.follow(&cut)).1
+        });
+        seconds.collect::<Vec<f64>>()
+    };
+    let runs: Vec<Vec<f64>> = (0..repeats).map(|_| run()).collect();
+    for (which, cuts) in [("first", 0..10), ("last", 90..100)] {
+        let mean = |run: &Vec<f64>| run[cuts.clone()].iter().sum::<f64>() / 10.0;
+        say(&format!("skin, the {which} ten of 100 cuts"), sorted(runs.iter().map(mean).collect()), "");
+    }
 }
 
 fn say(what: &str, [best, median]: [f64; 2], more: &str) {

@@ -6,7 +6,7 @@ import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 
 /** Width of a line [pixels]. */
-const WIDTH = 3;
+const WIDTH = 2.2;
 /** Lines come this share of their distance nearer to the eye, so that the skin below does not hide them. */
 const LIFT = 1.5e-3;
 
@@ -15,7 +15,7 @@ export class IncisionMarks {
   /** Ends as sent [m]: x y z of both ends, per line. */
   positions: Float32Array = new Float32Array(0);
   private readonly geometry = new LineSegmentsGeometry();
-  private readonly material = new LineMaterial({ color: 0x2c0309, linewidth: WIDTH });
+  private readonly material = new LineMaterial({ color: 0x3d0710, linewidth: WIDTH });
   private buffer: InstancedInterleavedBuffer | null = null;
 
   constructor() {

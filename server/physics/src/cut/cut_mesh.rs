@@ -39,6 +39,8 @@ pub struct CutMesh {
     pub(super) crossings: Crossings,
     pending: Pending,
     fronts: BTreeMap<u32, Front>,
+    /// Incision of the last sweep.
+    latest: Option<u32>,
     detector: Detector,
     separator: Separator,
     epoch: u32,
@@ -84,6 +86,7 @@ impl CutMesh {
             crossings: Crossings::default(),
             pending: Pending::default(),
             fronts: BTreeMap::new(),
+            latest: None,
             detector: Detector::default(),
             separator: Separator::default(),
             epoch,
@@ -104,6 +107,11 @@ impl CutMesh {
     /// Pieces that the last sweep took apart, made, or gave other copies, ascending.
     pub fn changed_pieces(&self) -> &[u32] {
         &self.copies.changed
+    }
+
+    /// Fragments that the last sweep made, bisected or opened.
+    pub(crate) fn changed_fragments(&self) -> &[u32] {
+        &self.separator.changed
     }
 
     /// Number of node copies.
@@ -150,14 +158,22 @@ impl CutMesh {
     /// Where incisions have entered elements that they do not take apart yet; to be shown with the
     /// [`surface`](Self::surface), which lags the blade by what is told here.
     pub fn pending_faces(&self) -> Vec<PendingFace> {
-        let Self { mesh, fragments, pieces, crossings, sets, .. } = self;
-        self.pending.faces(&Pieces { mesh, fragments, pieces, crossings, sets })
+        self.pending.faces(&self.pending_pieces())
     }
 
     /// Where those incisions cross the boundary.
-    pub(crate) fn pending_lines(&self) -> Vec<PendingLine> {
+    pub(super) fn pending_lines(&self) -> Vec<PendingLine> {
+        self.pending.lines(&self.pending_pieces())
+    }
+
+    pub(super) fn pending_pieces(&self) -> Pieces<'_> {
         let Self { mesh, fragments, pieces, crossings, sets, .. } = self;
-        self.pending.lines(&Pieces { mesh, fragments, pieces, crossings, sets })
+        Pieces { mesh, fragments, pieces, crossings, sets }
+    }
+
+    /// The incision of the last sweep, and where the material now has the blade that ended it [m].
+    pub(super) fn blade(&self, x: &[Vector3<f64>]) -> Option<(u32, [Vector3<f64>; 2])> {
+        Some((self.latest?, self.fronts.get(&self.latest?)?.ends(x)))
     }
 
     /// Loose parts and their rest volumes.
@@ -214,6 +230,7 @@ impl CutMesh {
             let around = |copy| self.copies.tets_around(copy, &self.pieces);
             let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
             self.fronts.insert(incision, front);
+            self.latest = Some(incision);
         }
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
         let mut record = Record { fragments, sets, crossings, incision };

@@ -22,7 +22,7 @@ pub struct Deformed<'a> {
 
 impl Deformed<'_> {
     /// Position [m] of fragment vertex `v`, seen from piece `p`.
-    fn vertex(&self, fragments: &Fragments, p: u32, v: u32) -> Vector3<f64> {
+    pub fn vertex(&self, fragments: &Fragments, p: u32, v: u32) -> Vector3<f64> {
         let piece = &self.pieces.pieces[p as usize];
         let nodes = &self.mesh.tets[piece.element as usize];
         let vertex = &fragments.vertices[v as usize];

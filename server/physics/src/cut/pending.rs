@@ -123,30 +123,49 @@ impl Pieces<'_> {
     /// Where the incision crosses the face of fragment `t` opposite vertex `face`, if that lies on the
     /// boundary: from edge to edge, or from a corner it lies on to the edge across.
     fn line(&self, incision: u32, t: u32, face: usize) -> Option<PendingLine> {
+        match self.entries(incision, t, face) {
+            [Some(from), Some(to)] => Some(PendingLine { incision, fragment: t, face, ends: [from, to] }),
+            _ => None,
+        }
+    }
+
+    /// The line over the face of fragment `t` opposite vertex `face` from where the incision entered it
+    /// to the blade, which stands in the face at `blade` [m].
+    pub fn line_to_blade(
+        &self,
+        incision: u32,
+        t: u32,
+        face: usize,
+        blade: FragmentVertex,
+    ) -> Option<PendingLine> {
+        match self.entries(incision, t, face) {
+            [Some(from), None] => Some(PendingLine { incision, fragment: t, face, ends: [from, blade] }),
+            _ => None,
+        }
+    }
+
+    /// Where the incision enters and leaves a face of the boundary as far as it is known.
+    fn entries(&self, incision: u32, t: u32, face: usize) -> [Option<FragmentVertex>; 2] {
         let f = self.fragments;
+        let mut ends = [None; 2];
         if f.neighbour[t as usize][face] != NONE {
-            return None;
+            return ends;
         }
         let corners = TET_FACES[face].map(|k| f.tets[t as usize][k]);
         let on = corners.map(|v| self.sets.contains(f.on[v as usize], incision));
         let vertex = |k: usize| f.vertices[corners[k] as usize];
-        let mut ends = [None; 2];
-        let mut found = 0;
-        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            if let Some(s) = self.crossings.get(corners[i], corners[j], incision)
-                && !on[i]
-                && !on[j]
-                && found < 2
-            {
-                ends[found] = Some(FragmentVertex::between(&vertex(i), &vertex(j), s));
-                found += 1;
-            }
+        let crossings =
+            [(0, 1), (1, 2), (2, 0)].into_iter().filter(|&(i, j)| !on[i] && !on[j]).filter_map(|(i, j)| {
+                let s = self.crossings.get(corners[i], corners[j], incision)?;
+                Some(FragmentVertex::between(&vertex(i), &vertex(j), s))
+            });
+        // An edge between two corners on the incision is one that it has opened or will open.
+        let single = (0..3).filter(|&k| on[k]).count() == 1;
+        let corner = (0..3).filter(|&k| single && on[k]).map(vertex);
+        for (end, found) in ends.iter_mut().zip(crossings.chain(corner)) {
+            *end = Some(found);
         }
-        if let (1, Some(k)) = (found, (0..3).find(|&k| on[k])) {
-            ends[1] = Some(vertex(k));
-        }
-        let [Some(from), Some(to)] = ends else { return None };
-        Some(PendingLine { incision, fragment: t, face, ends: [from, to] })
+        ends
     }
 
     /// Sorts the points by their angle around their middle, in the rest configuration.

@@ -77,6 +77,12 @@ impl Base {
         base
     }
 
+    /// Boundary faces of element `e`.
+    pub fn faces_of(&self, e: u32) -> impl Iterator<Item = u32> {
+        let at = 4 * e as usize;
+        self.face_at[at..at + 4].iter().copied().filter(|&f| f != NONE)
+    }
+
     /// The boundary face that the face of fragment `t` opposite its vertex `face` lies in, if it is
     /// part of the skin.
     pub fn under(&self, mesh: &TetMesh, fragments: &Fragments, t: u32, face: usize) -> Option<u32> {

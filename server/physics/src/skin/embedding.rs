@@ -1,12 +1,12 @@
 //! A skin embedded in a body.
 
+use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::base::Base;
-use super::border::Borders;
 use super::incision_mark::lift;
 use super::sheet::{Sheet, SkinShape};
-use super::stitch::{Cloth, Seams};
+use super::stitch::{Change, Cloth, Seams};
 use crate::cut::{CutMesh, IncisionMark, Surface};
 
 /// Most parts of an edge.
@@ -128,32 +128,45 @@ impl Skin {
             epoch: cut.epoch(),
             misfit: None,
         };
-        skin.sew(cut);
+        skin.sew_anew(cut);
         Ok(skin)
     }
 
-    /// Follows the cuts of the body, and its reset.
+    /// Follows the cuts of the body, and its reset. What it costs is what the last cut changed, as long as it
+    /// is told of every one.
     pub fn follow(&mut self, cut: &CutMesh) {
         if self.epoch == cut.epoch() {
             return;
         }
+        let told = self.epoch + 1 == cut.epoch() && !cut.changed_fragments().is_empty();
         self.epoch = cut.epoch();
         if cut.fragments.tets.len() == cut.mesh().tets.len() && cut.pieces().len() == cut.mesh().tets.len() {
             self.sheet.clone_from(&self.uncut);
-            self.seams = Seams::default();
-            self.surface = Surface::default();
             self.misfit = None;
+            self.sew_anew(cut);
+        } else if told {
+            self.sew(cut, Change { fragments: cut.changed_fragments(), pieces: cut.changed_pieces() });
+        } else {
+            self.sew_anew(cut);
         }
-        self.sew(cut);
     }
 
-    fn sew(&mut self, cut: &CutMesh) {
+    /// Forgets the surface and sews it from nothing.
+    fn sew_anew(&mut self, cut: &CutMesh) {
+        self.seams = Seams::default();
+        self.surface = Surface::default();
+        let fragments: Vec<u32> = (0..cut.fragments.tets.len() as u32).collect();
+        let pieces: Vec<u32> = (0..cut.pieces().len() as u32).collect();
+        self.sew(cut, Change { fragments: &fragments, pieces: &pieces });
+    }
+
+    fn sew(&mut self, cut: &CutMesh, change: Change) {
         if self.misfit.is_none() {
-            let mut borders = Borders::of(&self.base, cut);
-            borders.cut(&self.base, cut, &mut self.sheet, self.settings.snapping);
-            let cloth = Cloth { cut, base: &self.base, sheet: &self.sheet, borders: &borders };
+            let snapping = self.settings.snapping;
+            let mut cloth = Cloth { cut, base: &self.base, sheet: &mut self.sheet, snapping };
+            let sewn = self.seams.sew(&mut cloth, change, &mut self.surface);
             self.misfit = match self.sheet.conflicts {
-                0 => self.seams.sew(&cloth, &mut self.surface).err(),
+                0 => sewn.err(),
                 _ => Some(Misfit::SharedEdge),
             };
         }
@@ -162,20 +175,34 @@ impl Skin {
         }
     }
 
+    /// Numbers of triangles and vertices before doubled edges are divided, and of those edges.
+    #[cfg(test)]
+    pub fn sizes(&self) -> [usize; 3] {
+        self.seams.sizes()
+    }
+
+    /// The same skin, sewn from nothing: what the surface has to be.
+    #[cfg(test)]
+    pub fn sewn_anew(&self, cut: &CutMesh) -> Self {
+        let mut other = self.clone();
+        other.sew_anew(cut);
+        other
+    }
+
     /// Skin and lips, closed and 2-manifold.
     pub fn surface(&self) -> &Surface {
         &self.surface
     }
 
     /// What incisions have drawn on skin and lips without opening them, on the triangles of the
-    /// [`surface`](Self::surface).
-    pub fn incision_marks(&self, cut: &CutMesh) -> Vec<IncisionMark> {
+    /// [`surface`](Self::surface); `x` are the positions of all copies [m]: [`CutMesh::incision_marks`].
+    pub fn incision_marks(&self, cut: &CutMesh, x: &[Vector3<f64>]) -> Vec<IncisionMark> {
         if self.misfit.is_some() {
-            return cut.incision_marks();
+            return cut.incision_marks(x);
         }
         let mut marks = Vec::new();
-        for line in cut.pending_lines() {
-            lift(&self.base, &self.sheet, &self.surface, cut, &line, &mut marks);
+        for line in cut.lines_on_boundary(x) {
+            lift(&self.base, &self.sheet, (&self.seams, &self.surface), cut, &line, &mut marks);
         }
         marks
     }

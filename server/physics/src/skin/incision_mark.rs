@@ -2,6 +2,7 @@
 
 use super::base::Base;
 use super::sheet::Sheet;
+use super::stitch::Seams;
 use crate::cut::pending::PendingLine;
 use crate::cut::{CutMesh, IncisionMark, MarkPoint, Surface};
 
@@ -12,7 +13,7 @@ const SHORT: f64 = 1e-6;
 pub fn lift(
     base: &Base,
     sheet: &Sheet,
-    surface: &Surface,
+    (seams, surface): (&Seams, &Surface),
     cut: &CutMesh,
     line: &PendingLine,
     out: &mut Vec<IncisionMark>,
@@ -27,7 +28,7 @@ pub fn lift(
     for &t in &sheet.over[f as usize] {
         let corners = sheet.corners[t as usize].map(|p| sheet.point_on(base, f, p));
         let Some(parts) = clip(&corners, &ends) else { continue };
-        let vertices = surface.triangles[t as usize].map(|v| surface.vertices[v as usize]);
+        let vertices = surface.triangles[seams.of_skin(t) as usize].map(|v| surface.vertices[v as usize]);
         let ends = parts.map(|weights| MarkPoint { vertices, weights });
         out.push(IncisionMark { incision: line.incision, ends });
     }

@@ -1,14 +1,16 @@
 //! The wound: lip faces of the fragments as triangles whose borders follow the skin.
 
-use std::collections::BTreeMap;
-
-use super::border::{Borders, HalfEdge};
+use super::base::Base;
+use super::embedding::Misfit;
 use super::sheet::Sheet;
 use crate::cut::CutMesh;
 use crate::cut::fragments::NONE;
 use crate::mesh::TET_FACES;
 
-/// What a corner of a lip is.
+/// Fragment and the vertex opposite: a face of the fragments.
+pub type Face = (u32, u8);
+
+/// What a corner of a surface triangle is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Corner {
     /// A skin point.
@@ -19,124 +21,131 @@ pub enum Corner {
     Middle,
 }
 
-/// Triangles of all lips. Their half-edges are numbered behind those of the skin.
-#[derive(Clone, Debug, Default)]
-pub struct Lips {
-    /// Number of the first half-edge.
-    pub first: u32,
-    /// Corners of each triangle.
-    pub corners: Vec<[Corner; 3]>,
-    /// Opposite of each half-edge.
-    pub twin: Vec<u32>,
-    /// Piece of each triangle.
-    pub piece: Vec<u32>,
-    /// Incision of each triangle.
-    pub tag: Vec<u32>,
+/// One edge of the cut curve: where a lip meets the boundary of the uncut mesh.
+#[derive(Clone, Debug)]
+pub struct Border {
+    /// Fragment below the skin beside it.
+    pub below: u32,
+    /// Boundary face below.
+    pub face: u32,
+    /// Skin points at its ends.
+    pub ends: [u32; 2],
+    /// Skin half-edges along it, with the skin that stays on this side to the left.
+    pub chain: Vec<u32>,
 }
 
-impl Lips {
-    /// Triangles of the lips. `seam` receives the opposite of every cut half-edge of the skin. `None`
-    /// where an edge of the cut curve has no chain, or two have the same.
-    pub fn new(cut: &CutMesh, sheet: &Sheet, borders: &Borders, seam: &mut [u32]) -> Option<Self> {
+/// The triangles of one lip face.
+#[derive(Clone, Debug, Default)]
+pub struct Lip {
+    /// Its triangles.
+    pub triangles: Vec<u32>,
+    /// Where its edges meet the skin.
+    pub borders: [Option<Border>; 3],
+    /// Half-edges along each of its edges, in its own direction.
+    pub outline: [Vec<u32>; 3],
+}
+
+/// Whether a face of the fragments is a lip.
+pub fn is_lip(cut: &CutMesh, (t, k): Face) -> bool {
+    let f = &cut.fragments;
+    f.neighbour[t as usize][k as usize] == NONE && f.tag[t as usize][k as usize] != 0
+}
+
+impl Lip {
+    /// Finds where a lip face meets the skin, and inserts the ends of those edges as skin points.
+    pub fn new(base: &Base, cut: &CutMesh, sheet: &mut Sheet, snapping: f64, (t, k): Face) -> Self {
         let f = &cut.fragments;
-        let mut lips = Self { first: 3 * sheet.corners.len() as u32, ..Self::default() };
-        let chains: BTreeMap<HalfEdge, &[u32]> =
-            borders.edges.iter().map(|b| (b.lip, b.chain.as_slice())).collect();
-        for &h in borders.edges.iter().flat_map(|b| &b.chain) {
-            seam[h as usize] = NONE;
-        }
-        let mut inner: BTreeMap<HalfEdge, u32> = BTreeMap::new();
-        for &(t, k) in &borders.lips {
-            let mut ring = Vec::with_capacity(6);
-            let mut parts = [1; 3];
-            for edge in 0..3 {
-                match chains.get(&(t, k, edge)) {
-                    Some([]) => return None,
-                    Some(chain) => {
-                        // The lip runs against the skin.
-                        ring.extend(chain.iter().rev().map(|&h| Corner::Skin(sheet.to(h))));
-                        parts[edge] = chain.len();
-                    }
-                    None => ring.push(Corner::Lip(f.tets[t as usize][TET_FACES[k][edge]])),
-                }
+        let mut lip = Self::default();
+        for (edge, border) in lip.borders.iter_mut().enumerate() {
+            let (below, slot, along) = f.around_edge(t, k as usize, edge);
+            if f.tag[below as usize][slot] != 0 {
+                continue;
             }
-            let outline = lips.fill(&ring, parts, f.piece[t as usize], f.tag[t as usize][k]);
-            let mut rest = outline.as_slice();
-            for (edge, n) in parts.into_iter().enumerate() {
-                let (mine, others) = rest.split_at(n);
-                match chains.get(&(t, k, edge)) {
-                    Some(chain) => {
-                        for (&h, &skin) in mine.iter().zip(chain.iter().rev()) {
-                            if seam[skin as usize] != NONE {
-                                return None;
-                            }
-                            seam[skin as usize] = h;
-                            lips.twin[(h - lips.first) as usize] = skin;
-                        }
-                    }
-                    None => {
-                        inner.insert((t, k, edge), mine[0]);
-                    }
-                }
-                rest = others;
-            }
+            *border = base.under(cut.mesh(), f, below, slot).map(|face| {
+                let corners = [along, (along + 1) % 3].map(|c| f.tets[below as usize][TET_FACES[slot][c]]);
+                let ends = corners.map(|v| sheet.insert_point(base, face, &f.vertices[v as usize], snapping));
+                Border { below, face, ends, chain: Vec::new() }
+            });
         }
-        for (&(t, k, edge), &mine) in &inner {
-            lips.twin[(mine - lips.first) as usize] = *inner.get(&f.around_edge(t, k, edge))?;
-        }
-        Some(lips)
+        lip
     }
 
-    fn push(&mut self, corners: [Corner; 3], piece: u32, tag: u32) -> u32 {
-        let h = self.first + 3 * self.corners.len() as u32;
-        self.corners.push(corners);
-        self.twin.extend([NONE; 3]);
-        self.piece.push(piece);
-        self.tag.push(tag);
-        h
-    }
-
-    fn link(&mut self, g: u32, h: u32) {
-        self.twin[(g - self.first) as usize] = h;
-        self.twin[(h - self.first) as usize] = g;
-    }
-
-    /// Triangles that fill an outline whose three sides have these parts; returns the half-edges along
-    /// it. Both lips of a cut are filled alike.
-    fn fill(&mut self, ring: &[Corner], parts: [usize; 3], piece: u32, tag: u32) -> Vec<u32> {
-        let n = ring.len();
-        if n == 3 {
-            let h = self.push([ring[0], ring[1], ring[2]], piece, tag);
-            return vec![h, h + 1, h + 2];
+    /// Cuts the skin along its borders.
+    pub fn cut(&self, base: &Base, sheet: &mut Sheet, snapping: f64) {
+        for border in self.borders.iter().flatten() {
+            sheet.cut_along(base, border.face, border.ends[0], border.ends[1], snapping);
         }
-        let mut outline = vec![NONE; n];
-        if parts.iter().filter(|&&p| p > 1).count() == 1 {
-            // A fan from the corner opposite the divided side.
-            let side = parts.iter().position(|&p| p > 1).unwrap_or(0);
-            let first: usize = parts[..side].iter().sum();
-            let apex = (first + parts[side] + 1) % n;
-            let mut last = NONE;
-            for i in 0..parts[side] {
-                let corners = [ring[(first + i) % n], ring[(first + i + 1) % n], ring[apex]];
-                let h = self.push(corners, piece, tag);
-                outline[(first + i) % n] = h;
-                if i == 0 {
-                    outline[apex] = h + 2;
-                } else {
-                    self.link(last, h + 2);
-                }
-                last = h + 1;
+    }
+
+    /// Finds the skin half-edges along its borders.
+    pub fn find_chains(&mut self, sheet: &Sheet) -> Result<(), Misfit> {
+        for border in self.borders.iter_mut().flatten() {
+            let [from, to] = border.ends;
+            let path = sheet.cut_between(border.face, from, to).unwrap_or_default();
+            let half_edges = path.windows(2).map(|e| sheet.half_edge(border.face, e[0], e[1]));
+            border.chain = half_edges.collect::<Option<Vec<u32>>>().unwrap_or_default();
+            if border.chain.is_empty() {
+                return Err(Misfit::NoChain);
             }
-            outline[(first + parts[side]) % n] = last;
-            return outline;
         }
-        let first = self.first + 3 * self.corners.len() as u32;
-        for i in 0..n {
-            outline[i] = self.push([ring[i], ring[(i + 1) % n], Corner::Middle], piece, tag);
+        Ok(())
+    }
+
+    /// Corners all around it, and how many parts each of its edges has.
+    pub fn ring(&self, cut: &CutMesh, sheet: &Sheet, (t, k): Face) -> (Vec<Corner>, [usize; 3]) {
+        let mut ring = Vec::with_capacity(6);
+        let mut parts = [1; 3];
+        for (edge, border) in self.borders.iter().enumerate() {
+            match border {
+                Some(border) => {
+                    // The lip runs against the skin.
+                    ring.extend(border.chain.iter().rev().map(|&h| Corner::Skin(sheet.to(h))));
+                    parts[edge] = border.chain.len();
+                }
+                None => {
+                    let corner = TET_FACES[k as usize][edge];
+                    ring.push(Corner::Lip(cut.fragments.tets[t as usize][corner]));
+                }
+            }
         }
-        for i in 0..n as u32 {
-            self.link(first + 3 * i + 1, first + 3 * ((i + 1) % n as u32) + 2);
+        (ring, parts)
+    }
+}
+
+/// Triangles that fill an outline whose three sides have these parts, by their corners in the ring (the
+/// number of corners stands for the middle); both lips of a cut are filled alike.
+pub fn fill(n: usize, parts: [usize; 3]) -> Vec<[usize; 3]> {
+    if n == 3 {
+        return vec![[0, 1, 2]];
+    }
+    if parts.iter().filter(|&&p| p > 1).count() == 1 {
+        // A fan from the corner opposite the divided side.
+        let side = parts.iter().position(|&p| p > 1).unwrap_or(0);
+        let first: usize = parts[..side].iter().sum();
+        let apex = (first + parts[side] + 1) % n;
+        return (0..parts[side]).map(|i| [(first + i) % n, (first + i + 1) % n, apex]).collect();
+    }
+    (0..n).map(|i| [i, (i + 1) % n, n]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_edge_of_an_outline_has_one_triangle_and_every_edge_inside_two() {
+        for parts in [[1, 1, 1], [4, 1, 1], [1, 3, 1], [1, 1, 2], [2, 2, 1], [3, 1, 5], [2, 2, 2]] {
+            let n: usize = parts.iter().sum();
+            let mut edges: Vec<[usize; 2]> =
+                fill(n, parts).iter().flat_map(|t| [0, 1, 2].map(|k| [t[k], t[(k + 1) % 3]])).collect();
+            edges.sort_unstable();
+            let count = edges.len();
+            edges.dedup();
+            assert_eq!(edges.len(), count, "{parts:?}");
+            let outline = |e: &[usize; 2]| e[0] < n && e[1] == (e[0] + 1) % n;
+            assert_eq!(edges.iter().filter(|e| outline(e)).count(), n, "{parts:?}");
+            let inner = edges.iter().filter(|e| !outline(e));
+            assert!(inner.clone().all(|&[a, b]| edges.contains(&[b, a])), "{parts:?}");
         }
-        outline
     }
 }

@@ -40,6 +40,8 @@ pub struct Sheet {
     pub face: Vec<u32>,
     /// Triangles over each boundary face.
     pub over: Vec<Vec<u32>>,
+    /// Boundary faces over which triangles were added since this was emptied.
+    pub split: Vec<u32>,
     /// Points along each inserted edge of the cut curve.
     pub chains: Vec<Vec<u32>>,
     /// Point at each corner of the boundary.
@@ -96,6 +98,7 @@ impl Sheet {
         for (point, normal) in sheet.points.iter_mut().zip(&normals) {
             point.place = shape(&flat(&point.at, nodes), normal);
         }
+        sheet.split.clear();
         sheet
     }
 
@@ -180,6 +183,7 @@ impl Sheet {
         self.twin.extend([NONE; 3]);
         self.chain.extend([NONE; 3]);
         self.over[face as usize].push(t);
+        self.split.push(face);
         t
     }
 

@@ -1,37 +1,21 @@
-//! Skin triangles and lips sewn into one closed surface.
+//! Skin triangles and lips sewn into one closed surface, again wherever a cut changed something.
 //!
-//! Surface triangle i is skin triangle i, surface vertex p is skin point p; lips and the further
-//! vertices of points that a cut divided stand behind them and are made anew with every change, as is
-//! the skin that touches the cut curve or whose elements got new copies. The rest stays.
+//! What a cut changes: the lips on fragments that are new, were bisected or opened or whose piece has
+//! other copies, the lips across their edges, the skin over faces where the curve went or whose element
+//! has such a fragment or piece, and the lips whose border lies over a face where the skin was split.
+//! All else stays as it is.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
 use super::base::Base;
-use super::border::Borders;
 use super::embedding::Misfit;
-use super::lips::{Corner, Lips};
+use super::joined::{Joined, Place};
+use super::lips::{Corner, Face, Lip, fill, is_lip};
 use super::sheet::Sheet;
 use crate::cut::fragments::{FragmentVertex, NONE};
 use crate::cut::{CutMesh, Surface, SurfaceVertex};
-
-/// What sewing remembers of the skin.
-#[derive(Clone, Debug, Default)]
-pub struct Seams {
-    /// Piece of each skin triangle.
-    piece: Vec<u32>,
-    /// Opposite of each half-edge of the skin that is cut: one of a lip.
-    seam: Vec<u32>,
-    /// Piece of each boundary face and its copies; where the face is cut, of one of its parts.
-    known: Vec<(u32, [u32; 4])>,
-    /// Round in which each half-edge of the skin was numbered.
-    round: Vec<u32>,
-    now: u32,
-    taken: Vec<u32>,
-    /// Skin triangles made anew in the last round.
-    renewed: usize,
-}
 
 /// What is sewn.
 pub struct Cloth<'a> {
@@ -40,9 +24,55 @@ pub struct Cloth<'a> {
     /// Boundary of the uncut body.
     pub base: &'a Base,
     /// The skin.
-    pub sheet: &'a Sheet,
-    /// The cut curve.
-    pub borders: &'a Borders,
+    pub sheet: &'a mut Sheet,
+    /// Share of an edge within which skin points are moved onto the curve.
+    pub snapping: f64,
+}
+
+/// Fragments and pieces that are not what they were.
+#[derive(Clone, Copy, Debug)]
+pub struct Change<'a> {
+    /// Fragments that are new, were bisected or had a face opened.
+    pub fragments: &'a [u32],
+    /// Pieces that were taken apart, made, or have other copies.
+    pub pieces: &'a [u32],
+}
+
+/// What a surface triangle is.
+#[derive(Clone, Copy, Debug)]
+enum Owner {
+    Skin(u32),
+    Lip(Face),
+}
+
+/// The surface and what it consists of.
+#[derive(Clone, Debug, Default)]
+pub struct Seams {
+    joined: Joined,
+    parts: Parts,
+    /// Surface triangles that nothing uses.
+    free: Vec<u32>,
+    renewed: usize,
+}
+
+/// What surface triangles are, and where skin triangles and lips are among them.
+#[derive(Clone, Debug, Default)]
+struct Parts {
+    owner: Vec<Owner>,
+    corners: Vec<[Corner; 3]>,
+    piece: Vec<u32>,
+    /// Surface triangle of each skin triangle.
+    of_skin: Vec<u32>,
+    lips: BTreeMap<Face, Lip>,
+    /// Lips with a border over each boundary face.
+    on_face: Vec<BTreeSet<Face>>,
+}
+
+impl Parts {
+    /// A half-edge of the skin as one of the surface.
+    fn half_edge(&self, h: u32) -> u32 {
+        3 * self.of_skin[h as usize / 3] + h % 3
+    }
 }
 
 impl Seams {
@@ -51,270 +81,367 @@ impl Seams {
         self.renewed
     }
 
+    /// Numbers of triangles, vertices and doubled edges.
+    #[cfg(test)]
+    pub fn sizes(&self) -> [usize; 3] {
+        self.joined.sizes()
+    }
+
+    /// Surface triangle of skin triangle `t`.
+    pub fn of_skin(&self, t: u32) -> u32 {
+        self.parts.of_skin[t as usize]
+    }
+
     /// Brings `surface` up to date; where skin and lips do not fit, it is not usable.
-    pub fn sew(&mut self, cloth: &Cloth, surface: &mut Surface) -> Result<(), Misfit> {
-        let sheet = cloth.sheet;
-        self.now += 1;
-        self.piece.resize(sheet.corners.len(), NONE);
-        self.seam.resize(sheet.twin.len(), NONE);
-        self.round.resize(sheet.twin.len(), 0);
-        self.taken.resize(sheet.points.len(), 0);
-        self.known.resize(cloth.base.faces.len(), (NONE, [NONE; 4]));
-        let renewed = self.find_pieces(cloth).ok_or(Misfit::NoPiece)?;
-        self.renewed = renewed.len();
-        let lips = Lips::new(cloth.cut, sheet, cloth.borders, &mut self.seam).ok_or(Misfit::NoChain)?;
-        let cut_edges_are_sewn = renewed
-            .iter()
-            .flat_map(|&t| 3 * t..3 * t + 3)
-            .all(|h| sheet.chain[h as usize] == NONE || self.seam[h as usize] != NONE);
-        if !cut_edges_are_sewn || lips.twin.contains(&NONE) {
+    pub fn sew(&mut self, cloth: &mut Cloth, change: Change, surface: &mut Surface) -> Result<(), Misfit> {
+        self.joined.begin(surface);
+        self.parts.on_face.resize(cloth.base.faces.len(), BTreeSet::new());
+        let mut faces = BTreeSet::new();
+        let lips = self.cut_the_skin(cloth, change, &mut faces)?;
+        self.lay_skin(cloth, change, &mut faces, surface)?;
+        self.fill_lips(cloth, &lips, surface)?;
+        self.give_numbers_back(surface);
+        if self.joined.is_open() {
             return Err(Misfit::OpenSeam);
         }
-        self.number(cloth, &lips, &renewed, surface);
-        split_doubled_edges(self, cloth, &lips, &renewed, surface);
+        let placed = Placed { cut: cloth.cut, sheet: cloth.sheet, parts: &self.parts };
+        self.joined.number(&placed, surface);
+        for lip in lips.iter().filter_map(|lip| self.parts.lips.get(lip)) {
+            placed.place_middle(lip, surface);
+        }
+        self.joined.divide_doubled_edges(&placed, surface);
+        let skin = |t: &&u32| matches!(self.parts.owner[**t as usize], Owner::Skin(_));
+        self.renewed = self.joined.touched().iter().filter(skin).count();
         Ok(())
     }
 
-    /// Pieces of the skin triangles that may have changed; returns those triangles.
-    fn find_pieces(&mut self, cloth: &Cloth) -> Option<Vec<u32>> {
-        let Cloth { cut, base, sheet, borders } = cloth;
-        let mut faces = borders.faces(sheet);
-        for (f, known) in (0u32..).zip(&mut self.known) {
-            let e = base.faces[f as usize].element;
-            let piece = if cut.fragments.count[e as usize] == 1 { e } else { piece_under(cloth, f, e)? };
-            let present = (piece, cut.pieces()[piece as usize].copies);
-            if *known != present {
-                *known = present;
+    /// Takes off the lips that are not what they were, and inserts the borders of those in their place
+    /// into the skin. Returns the new ones; `faces` receives the boundary faces that this concerns.
+    fn cut_the_skin(
+        &mut self,
+        cloth: &mut Cloth,
+        change: Change,
+        faces: &mut BTreeSet<u32>,
+    ) -> Result<Vec<Face>, Misfit> {
+        let Cloth { cut, base, snapping, .. } = *cloth;
+        let mut todo = self.lips_around(cut, change);
+        let mut made: BTreeMap<Face, Lip> = BTreeMap::new();
+        while !todo.is_empty() {
+            for &lip in &todo {
+                self.take_off(lip, faces);
+            }
+            let present: Vec<Face> = todo.iter().copied().filter(|&lip| is_lip(cut, lip)).collect();
+            let new: Vec<Lip> =
+                present.iter().map(|&lip| Lip::new(base, cut, cloth.sheet, snapping, lip)).collect();
+            new.iter().for_each(|lip| lip.cut(base, cloth.sheet, snapping));
+            made.extend(present.into_iter().zip(new));
+            // Where the skin was split, the borders of other lips have more edges now.
+            todo = BTreeSet::new();
+            for f in std::mem::take(&mut cloth.sheet.split) {
                 faces.insert(f);
+                todo.extend(&self.parts.on_face[f as usize]);
             }
         }
-        let mut stack = Vec::new();
-        for &f in &faces {
-            sheet.over[f as usize].iter().for_each(|&t| self.piece[t as usize] = NONE);
+        for (&face, lip) in &mut made {
+            lip.find_chains(cloth.sheet)?;
+            for border in lip.borders.iter().flatten() {
+                faces.insert(border.face);
+                self.parts.on_face[border.face as usize].insert(face);
+            }
         }
-        for border in &borders.edges {
-            for &h in &border.chain {
-                self.piece[h as usize / 3] = cut.fragments.piece[border.skin.0 as usize];
-                stack.push(h / 3);
+        let lips = made.keys().copied().collect();
+        self.parts.lips.append(&mut made);
+        Ok(lips)
+    }
+
+    /// Lips, present and past, on what changed and across its edges.
+    fn lips_around(&self, cut: &CutMesh, change: Change) -> BTreeSet<Face> {
+        let f = &cut.fragments;
+        let mut lips = BTreeSet::new();
+        let of_pieces = change.pieces.iter().flat_map(|&p| cut.pieces.fragments(p, f));
+        for t in change.fragments.iter().copied().chain(of_pieces) {
+            let faces = (0..4u8).map(|k| (t, k));
+            lips.extend(faces.filter(|lip| is_lip(cut, *lip) || self.parts.lips.contains_key(lip)));
+        }
+        for &t in change.fragments {
+            for k in (0..4).filter(|&k| f.neighbour[t as usize][k] == NONE) {
+                let across = (0..3).map(|edge| f.around_edge(t, k, edge)).map(|(s, j, _)| (s, j as u8));
+                lips.extend(across.filter(|lip| is_lip(cut, *lip)));
+            }
+        }
+        lips
+    }
+
+    fn take_off(&mut self, lip: Face, faces: &mut BTreeSet<u32>) {
+        let Some(old) = self.parts.lips.remove(&lip) else { return };
+        for border in old.borders.iter().flatten() {
+            faces.insert(border.face);
+            self.parts.on_face[border.face as usize].remove(&lip);
+        }
+        for &t in &old.triangles {
+            self.joined.clear(t);
+            self.free.push(t);
+        }
+    }
+
+    /// A surface triangle for `owner`.
+    fn new_triangle(&mut self, owner: Owner, surface: &mut Surface) -> u32 {
+        let t = self.free.pop().unwrap_or_else(|| {
+            let t = self.joined.add(surface);
+            self.parts.owner.push(owner);
+            self.parts.corners.push([Corner::Middle; 3]);
+            self.parts.piece.push(NONE);
+            t
+        });
+        self.parts.owner[t as usize] = owner;
+        self.joined.touch(t);
+        t
+    }
+
+    /// Skin triangles over all faces that this change concerns: pieces, neighbours.
+    fn lay_skin(
+        &mut self,
+        cloth: &Cloth,
+        change: Change,
+        faces: &mut BTreeSet<u32>,
+        surface: &mut Surface,
+    ) -> Result<(), Misfit> {
+        let Cloth { cut, base, .. } = *cloth;
+        let sheet = &*cloth.sheet;
+        let of_fragments = change.fragments.iter().map(|&t| cut.fragments.element[t as usize]);
+        let of_pieces = change.pieces.iter().map(|&p| cut.pieces()[p as usize].element);
+        faces.extend(of_fragments.chain(of_pieces).flat_map(|e| base.faces_of(e)));
+        self.parts.of_skin.resize(sheet.corners.len(), NONE);
+        for &t in faces.iter().flat_map(|&f| &sheet.over[f as usize]) {
+            if self.parts.of_skin[t as usize] == NONE {
+                self.parts.of_skin[t as usize] = self.new_triangle(Owner::Skin(t), surface);
+            }
+            let s = self.parts.of_skin[t as usize];
+            self.joined.touch(s);
+            self.parts.corners[s as usize] = sheet.corners[t as usize].map(Corner::Skin);
+            self.parts.piece[s as usize] = NONE;
+            surface.tags[s as usize] = 0;
+        }
+        for &f in faces.iter() {
+            self.find_pieces(cut, base, sheet, f)?;
+        }
+        for h in faces.iter().flat_map(|&f| &sheet.over[f as usize]).flat_map(|&t| 3 * t..3 * t + 3) {
+            let here = self.parts.half_edge(h);
+            if sheet.chain[h as usize] == NONE {
+                self.joined.join(here, self.parts.half_edge(sheet.twin[h as usize]));
+                continue;
+            }
+            let twin = self.joined.twin(here);
+            if twin != NONE && matches!(self.parts.owner[twin as usize / 3], Owner::Skin(_)) {
+                self.joined.open(here);
+            }
+        }
+        Ok(())
+    }
+
+    /// The pieces below the skin over face `f`: from the borders on, as far as no other lies between.
+    fn find_pieces(&mut self, cut: &CutMesh, base: &Base, sheet: &Sheet, f: u32) -> Result<(), Misfit> {
+        let parts = &mut self.parts;
+        let mut stack = Vec::new();
+        for lip in parts.on_face[f as usize].iter().filter_map(|lip| parts.lips.get(lip)) {
+            for border in lip.borders.iter().flatten().filter(|border| border.face == f) {
+                for &h in &border.chain {
+                    let s = parts.of_skin[h as usize / 3];
+                    parts.piece[s as usize] = cut.fragments.piece[border.below as usize];
+                    stack.push(h / 3);
+                }
             }
         }
         while let Some(t) = stack.pop() {
             for h in 3 * t..3 * t + 3 {
                 let next = sheet.twin[h as usize] / 3;
-                let same_face = sheet.face[next as usize] == sheet.face[t as usize];
-                if same_face && sheet.chain[h as usize] == NONE && self.piece[next as usize] == NONE {
-                    self.piece[next as usize] = self.piece[t as usize];
+                if sheet.face[next as usize] != f || sheet.chain[h as usize] != NONE {
+                    continue;
+                }
+                let [s, beside] = [t, next].map(|t| parts.of_skin[t as usize] as usize);
+                if parts.piece[beside] == NONE {
+                    parts.piece[beside] = parts.piece[s];
                     stack.push(next);
                 }
             }
         }
-        let mut renewed = Vec::new();
-        for &f in &faces {
-            for &t in &sheet.over[f as usize] {
-                if self.piece[t as usize] == NONE {
-                    self.piece[t as usize] = self.known[f as usize].0;
-                }
-                renewed.push(t);
+        let mut whole = None;
+        for &t in &sheet.over[f as usize] {
+            let s = parts.of_skin[t as usize] as usize;
+            if parts.piece[s] == NONE {
+                let found = match whole {
+                    Some(piece) => piece,
+                    None => piece_under(cut, base, f).ok_or(Misfit::NoPiece)?,
+                };
+                whole = Some(found);
+                parts.piece[s] = found;
             }
         }
-        renewed.sort_unstable();
-        Some(renewed)
+        Ok(())
     }
 
-    fn twin(&self, cloth: &Cloth, lips: &Lips, h: u32) -> u32 {
-        if h >= lips.first {
-            lips.twin[(h - lips.first) as usize]
-        } else if cloth.sheet.chain[h as usize] == NONE {
-            cloth.sheet.twin[h as usize]
-        } else {
-            self.seam[h as usize]
+    /// Triangles of new lips, joined to each other, to the lips beside them and to the skin.
+    fn fill_lips(&mut self, cloth: &Cloth, lips: &[Face], surface: &mut Surface) -> Result<(), Misfit> {
+        let f = &cloth.cut.fragments;
+        for &face in lips {
+            let Some(mut lip) = self.parts.lips.remove(&face) else { continue };
+            let (t, k) = (face.0 as usize, face.1 as usize);
+            let (ring, parts) = lip.ring(cloth.cut, cloth.sheet, face);
+            let (n, mut edges) = (ring.len(), BTreeMap::new());
+            for corners in fill(n, parts) {
+                let s = self.new_triangle(Owner::Lip(face), surface);
+                self.parts.corners[s as usize] =
+                    corners.map(|c| ring.get(c).copied().unwrap_or(Corner::Middle));
+                self.parts.piece[s as usize] = f.piece[t];
+                surface.tags[s as usize] = f.tag[t][k];
+                lip.triangles.push(s);
+                for i in 0..3 {
+                    edges.insert([corners[i], corners[(i + 1) % 3]], 3 * s + i as u32);
+                }
+            }
+            for ([a, b], &h) in &edges {
+                if let Some(&twin) = edges.get(&[*b, *a]) {
+                    self.joined.join(h, twin);
+                }
+            }
+            let mut first = 0;
+            for (edge, &count) in parts.iter().enumerate() {
+                let along = (first..first + count).map(|i| edges[&[i, (i + 1) % n]]);
+                lip.outline[edge] = along.collect();
+                first += count;
+            }
+            for (border, outline) in lip.borders.iter().zip(&lip.outline) {
+                let Some(border) = border else { continue };
+                for (&h, &skin) in outline.iter().zip(border.chain.iter().rev()) {
+                    let skin = self.parts.half_edge(skin);
+                    if self.joined.twin(skin) != NONE {
+                        return Err(Misfit::NoChain);
+                    }
+                    self.joined.join(h, skin);
+                }
+            }
+            self.parts.lips.insert(face, lip);
         }
-    }
-
-    fn piece_of(&self, lips: &Lips, h: u32) -> u32 {
-        if h >= lips.first { lips.piece[((h - lips.first) / 3) as usize] } else { self.piece[h as usize / 3] }
-    }
-
-    /// Numbers the cycles of corners around the renewed triangles and the lips: the first cycle at every
-    /// skin point has its number.
-    fn number(&mut self, cloth: &Cloth, lips: &Lips, renewed: &[u32], surface: &mut Surface) {
-        let sheet = cloth.sheet;
-        let unbound = SurfaceVertex { copies: [0; 4], weights: [0.0; 4] };
-        surface.vertices.resize(sheet.points.len(), unbound);
-        surface.triangles.resize(sheet.corners.len(), [NONE; 3]);
-        surface.triangles.resize(sheet.corners.len() + lips.corners.len(), [NONE; 3]);
-        surface.tags.resize(sheet.corners.len(), 0);
-        renewed.iter().for_each(|&t| surface.tags[t as usize] = 0);
-        surface.tags.extend(&lips.tag);
-        for triangle in &mut surface.triangles[sheet.corners.len()..] {
-            *triangle = [NONE; 3];
+        for &(t, k) in lips {
+            for edge in (0..3).filter(|&edge| self.parts.lips[&(t, k)].borders[edge].is_none()) {
+                let (s, j, other) = f.around_edge(t, k as usize, edge);
+                let beside = self.parts.lips.get(&(s, j as u8)).map(|lip| &lip.outline[other]);
+                let (mine, Some([twin])) =
+                    (self.parts.lips[&(t, k)].outline[edge][0], beside.map(Vec::as_slice))
+                else {
+                    return Err(Misfit::OpenSeam);
+                };
+                self.joined.join(mine, *twin);
+            }
         }
-        let mut cycle = Vec::new();
-        let on_skin = renewed.iter().flat_map(|&t| 3 * t..3 * t + 3);
-        for first in on_skin.chain(lips.first..lips.first + lips.twin.len() as u32) {
-            let numbered = match first < lips.first {
-                true => self.round[first as usize] == self.now,
-                false => surface.triangles[first as usize / 3][first as usize % 3] != NONE,
-            };
-            if numbered {
+        Ok(())
+    }
+
+    /// Surface triangles that are left over make room for the last ones.
+    fn give_numbers_back(&mut self, surface: &mut Surface) {
+        let mut free = std::mem::take(&mut self.free);
+        free.sort_unstable_by(|s, t| t.cmp(s));
+        for &t in &free {
+            let last = self.joined.remove(t, surface);
+            let parts = &mut self.parts;
+            parts.owner.swap_remove(t as usize);
+            parts.corners.swap_remove(t as usize);
+            parts.piece.swap_remove(t as usize);
+            if t == last {
                 continue;
             }
-            cycle.clear();
-            let mut at = first;
-            loop {
-                cycle.push(at);
-                at = self.twin(cloth, lips, at / 3 * 3 + (at + 2) % 3);
-                if at == first {
-                    break;
-                }
-            }
-            let vertex = self.bind(cloth, lips, &cycle);
-            let point = (first < lips.first).then(|| sheet.from(first));
-            let id = match point {
-                Some(p) if self.taken[p as usize] != self.now => {
-                    self.taken[p as usize] = self.now;
-                    surface.vertices[p as usize] = vertex;
-                    p
-                }
-                _ => {
-                    surface.vertices.push(vertex);
-                    surface.vertices.len() as u32 - 1
-                }
-            };
-            for &c in &cycle {
-                surface.triangles[c as usize / 3][c as usize % 3] = id;
-                if c < lips.first {
-                    self.round[c as usize] = self.now;
+            match parts.owner[t as usize] {
+                Owner::Skin(skin) => parts.of_skin[skin as usize] = t,
+                Owner::Lip(face) => {
+                    let Some(lip) = parts.lips.get_mut(&face) else { continue };
+                    lip.triangles.iter_mut().filter(|s| **s == last).for_each(|s| *s = t);
+                    for h in lip.outline.iter_mut().flatten().filter(|h| **h / 3 == last) {
+                        *h = 3 * t + *h % 3;
+                    }
                 }
             }
         }
-        for (t, corners) in lips.corners.iter().enumerate() {
-            if corners[2] == Corner::Middle {
-                let id = surface.triangles[sheet.corners.len() + t][2];
-                surface.vertices[id as usize] = middle(cloth.cut, lips, surface, t);
-            }
-        }
+        free.clear();
+        self.free = free;
+    }
+}
+
+/// Where the vertices of the surface are.
+struct Placed<'a> {
+    cut: &'a CutMesh,
+    sheet: &'a Sheet,
+    parts: &'a Parts,
+}
+
+impl Placed<'_> {
+    fn corner(&self, c: u32) -> Corner {
+        self.parts.corners[c as usize / 3][c as usize % 3]
     }
 
-    /// The vertex of a cycle of corners: on the skin where one of them is, in the element that has to
-    /// extrapolate least.
-    fn bind(&self, cloth: &Cloth, lips: &Lips, cycle: &[u32]) -> SurfaceVertex {
+    /// Puts the middle of a lip into the centroid of its outline, once that has its vertices.
+    fn place_middle(&self, lip: &Lip, surface: &mut Surface) {
+        let Some(&first) = lip.triangles.first() else { return };
+        if self.corner(3 * first + 2) != Corner::Middle {
+            return;
+        }
+        let place =
+            |s: &u32| rest_place(self.cut, &surface.vertices[surface.triangles[*s as usize][0] as usize]);
+        let sum: Vector3<f64> = lip.triangles.iter().map(place).sum();
+        let middle =
+            in_element(self.cut, self.parts.piece[first as usize], &(sum / lip.triangles.len() as f64));
+        surface.vertices[surface.triangles[first as usize][2] as usize] = middle;
+    }
+}
+
+impl Place for Placed<'_> {
+    /// On the skin where one of the corners is, in the element that has to extrapolate least.
+    fn vertex(&self, cycle: &[u32]) -> SurfaceVertex {
         let mut best: Option<(f64, SurfaceVertex)> = None;
         let mut seen = NONE;
-        for &c in cycle.iter().filter(|c| **c < lips.first) {
-            let piece = self.piece[c as usize / 3];
+        for &c in cycle {
+            let (Owner::Skin(_), Corner::Skin(p)) = (self.parts.owner[c as usize / 3], self.corner(c)) else {
+                continue;
+            };
+            let piece = self.parts.piece[c as usize / 3];
             if piece != seen {
                 seen = piece;
-                let place = &cloth.sheet.points[cloth.sheet.from(c) as usize].place;
-                let vertex = in_element(cloth.cut, piece, place);
+                let vertex = in_element(self.cut, piece, &self.sheet.points[p as usize].place);
                 let reach = vertex.weights.iter().fold(0.0f64, |m, w| m.max(w.abs()));
                 if best.is_none_or(|b| reach < b.0) {
                     best = Some((reach, vertex));
                 }
             }
         }
-        let c = cycle[0];
-        match best {
-            Some((_, vertex)) => vertex,
-            None => match lips.corners[((c - lips.first) / 3) as usize][c as usize % 3] {
-                Corner::Lip(v) => {
-                    let v = &cloth.cut.fragments.vertices[v as usize];
-                    on_fragment(cloth.cut, self.piece_of(lips, c), v)
-                }
-                // A middle is placed when its neighbours are.
-                _ => SurfaceVertex { copies: [0; 4], weights: [0.0; 4] },
-            },
+        match (best, self.corner(cycle[0])) {
+            (Some((_, vertex)), _) => vertex,
+            (None, Corner::Lip(v)) => {
+                let piece = self.parts.piece[cycle[0] as usize / 3];
+                on_fragment(self.cut, piece, &self.cut.fragments.vertices[v as usize])
+            }
+            // A middle is placed when its neighbours are.
+            _ => SurfaceVertex { copies: [0; 4], weights: [0.0; 4] },
         }
+    }
+
+    fn middle(&self, triangle: u32, of: &[SurfaceVertex]) -> SurfaceVertex {
+        let sum: Vector3<f64> = of.iter().map(|vertex| rest_place(self.cut, vertex)).sum();
+        in_element(self.cut, self.parts.piece[triangle as usize], &(sum / of.len() as f64))
     }
 }
 
-/// The piece of element `e` that a part of boundary face `f` belongs to.
-fn piece_under(cloth: &Cloth, f: u32, e: u32) -> Option<u32> {
-    let fragments = &cloth.cut.fragments;
+/// The piece of its element that a part of boundary face `f` belongs to.
+fn piece_under(cut: &CutMesh, base: &Base, f: u32) -> Option<u32> {
+    let fragments = &cut.fragments;
+    let e = base.faces[f as usize].element;
+    if fragments.count[e as usize] == 1 {
+        return Some(e);
+    }
     let is_under = |t: u32, k: usize| {
         fragments.neighbour[t as usize][k] == NONE
             && fragments.tag[t as usize][k] == 0
-            && cloth.base.under(cloth.cut.mesh(), fragments, t, k) == Some(f)
+            && base.under(cut.mesh(), fragments, t, k) == Some(f)
     };
     fragments.of_element(e).find(|&t| (0..4).any(|k| is_under(t, k))).map(|t| fragments.piece[t as usize])
-}
-
-/// The centroid of the outline around the middle corner of lip triangle `t`.
-fn middle(cut: &CutMesh, lips: &Lips, surface: &Surface, t: usize) -> SurfaceVertex {
-    let skin = (lips.first / 3) as usize;
-    let mut sum = Vector3::zeros();
-    let mut count = 0.0;
-    let mut at = t;
-    loop {
-        sum += rest_place(cut, &surface.vertices[surface.triangles[skin + at][0] as usize]);
-        count += 1.0;
-        at = ((lips.twin[3 * at + 1] - lips.first) / 3) as usize;
-        if at == t {
-            break;
-        }
-    }
-    in_element(cut, lips.piece[t], &(sum / count))
-}
-
-/// Two different edges may join the same two vertices, as the lips of a slit of one edge do. All but
-/// the first get a vertex in the middle, and their triangles a fan.
-fn split_doubled_edges(seams: &Seams, cloth: &Cloth, lips: &Lips, renewed: &[u32], surface: &mut Surface) {
-    let cut = cloth.cut;
-    let n = surface.triangles.len() as u32;
-    let mut middle: BTreeMap<u32, u32> = BTreeMap::new();
-    for h in doubled(&surface.triangles, renewed.iter().copied().chain(lips.first / 3..n)) {
-        if middle.contains_key(&h) {
-            continue;
-        }
-        let [t, k] = [h as usize / 3, h as usize % 3];
-        let ends = [surface.triangles[t][k], surface.triangles[t][(k + 1) % 3]];
-        let [a, b] = ends.map(|v| rest_place(cut, &surface.vertices[v as usize]));
-        let id = surface.vertices.len() as u32;
-        surface.vertices.push(in_element(cut, seams.piece_of(lips, h), &((a + b) / 2.0)));
-        middle.insert(h, id);
-        middle.insert(seams.twin(cloth, lips, h), id);
-    }
-    let triangles: Vec<u32> = middle.keys().map(|h| h / 3).collect();
-    for on_triangle in triangles.chunk_by(|s, t| s == t) {
-        let t = on_triangle[0];
-        let triangle = surface.triangles[t as usize];
-        let mut ring = Vec::with_capacity(6);
-        for k in 0..3 {
-            ring.push(triangle[k as usize]);
-            ring.extend(middle.get(&(3 * t + k)));
-        }
-        let places = triangle.map(|v| rest_place(cut, &surface.vertices[v as usize]));
-        let centre = surface.vertices.len() as u32;
-        let place = places.iter().sum::<Vector3<f64>>() / 3.0;
-        surface.vertices.push(in_element(cut, seams.piece_of(lips, 3 * t), &place));
-        let tag = surface.tags[t as usize];
-        for k in 0..ring.len() {
-            let fan = [ring[k], ring[(k + 1) % ring.len()], centre];
-            if k == 0 {
-                surface.triangles[t as usize] = fan;
-            } else {
-                surface.triangles.push(fan);
-                surface.tags.push(tag);
-            }
-        }
-    }
-}
-
-/// Half-edges 3·triangle + k, of the triangles with these numbers, whose directed vertex pair an earlier
-/// one already has.
-fn doubled(triangles: &[[u32; 3]], numbers: impl Iterator<Item = u32>) -> Vec<u32> {
-    let mut edges: Vec<(u32, u32, u32)> = numbers
-        .flat_map(|t| (0..3).map(move |k| (t, k)))
-        .map(|(t, k)| {
-            let triangle = triangles[t as usize];
-            (triangle[k as usize], triangle[(k as usize + 1) % 3], 3 * t + k)
-        })
-        .collect();
-    edges.sort_unstable();
-    let mut doubled: Vec<u32> =
-        edges.windows(2).filter(|e| (e[0].0, e[0].1) == (e[1].0, e[1].1)).map(|e| e[1].2).collect();
-    doubled.sort_unstable();
-    doubled
 }
 
 /// Rest position of a surface vertex [m].
@@ -322,7 +449,6 @@ fn rest_place(cut: &CutMesh, vertex: &SurfaceVertex) -> Vector3<f64> {
     let node = |c: u32| cut.mesh().nodes[cut.copy_node()[c as usize] as usize];
     vertex.copies.iter().zip(&vertex.weights).map(|(&c, &w)| node(c) * w).sum()
 }
-
 /// A rest place in the coordinates of a piece's element.
 fn in_element(cut: &CutMesh, piece: u32, place: &Vector3<f64>) -> SurfaceVertex {
     let piece = &cut.pieces()[piece as usize];

@@ -66,6 +66,11 @@ impl Body {
         let found = self.skin.surface().volume(&rest);
         assert!((found - self.volume).abs() <= tolerance * self.volume, "{found} instead of {}", self.volume);
         bound_to_pieces(&self.cut, self.skin.surface());
+        let anew = self.skin.sewn_anew(&self.cut);
+        assert!(anew.fits());
+        assert_eq!(self.skin.sizes(), anew.sizes(), "triangles, vertices and doubled edges");
+        let again = anew.surface().volume(&rest);
+        assert!((found - again).abs() <= 1e-12 * self.volume, "{found}, sewn anew {again}");
     }
 }
 
@@ -286,6 +291,23 @@ fn a_small_cut_renews_a_small_part_of_a_large_skin() {
     }
     // The same cut, measured in elements, in bodies of 64 and 512 cells.
     assert_eq!(renewed[0], renewed[1]);
+}
+
+#[test]
+fn the_last_of_many_cuts_renews_no_more_than_the_first() {
+    let mut body = Body::new(10, BoxPattern::Tet6, SkinSettings { divisions: 3, snapping: 0.25 }, 0.0);
+    let mut renewed = Vec::new();
+    for k in 0..36u32 {
+        let at = |s: f64| {
+            let (x, y) = (0.1 * f64::from(k % 9) + 0.06 + 0.08 * s, 0.03 + 0.2 * f64::from(k / 9));
+            [v(x, y, 0.8), v(x, y + 0.005, 1.1)]
+        };
+        body.sweep(&[at(0.0), at(1.0)], k + 1);
+        renewed.push(body.skin.renewed());
+    }
+    body.check(0.01);
+    let most = |part: &[usize]| part.iter().copied().max().unwrap();
+    assert!(most(&renewed[27..]) <= most(&renewed[..9]), "{renewed:?}");
 }
 
 #[test]

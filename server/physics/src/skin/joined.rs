@@ -1,0 +1,306 @@
+//! A closed surface made of triangles that are joined edge by edge: who is beside whom, and which
+//! corners are one vertex.
+//!
+//! What changes is told by triangle; everything else is found around it. Corners are one vertex exactly
+//! when the edges around them join them, so the surface is closed and 2-manifold by construction. A
+//! vertex that loses its last corner makes room for the last one, as does a triangle.
+
+use std::collections::BTreeSet;
+
+use crate::cut::fragments::NONE;
+use crate::cut::{Surface, SurfaceVertex};
+
+/// Places vertices: of a cycle of corners, and between other vertices.
+pub trait Place {
+    /// The vertex of a cycle of corners 3·triangle + k.
+    fn vertex(&self, cycle: &[u32]) -> SurfaceVertex;
+    /// The vertex in the middle of others, for a triangle beside them.
+    fn middle(&self, triangle: u32, of: &[SurfaceVertex]) -> SurfaceVertex;
+}
+
+/// Triangles by number, half-edges 3·triangle + k from corner k to the next.
+#[derive(Clone, Debug, Default)]
+pub struct Joined {
+    /// Opposite of each half-edge, or [`NONE`] while it is open.
+    twin: Vec<u32>,
+    /// Surface vertex of each corner.
+    corner: Vec<u32>,
+    /// One corner of every surface vertex.
+    representative: Vec<u32>,
+    /// Half-edges, the smaller of two, whose ends another edge joins too: they get a vertex in the middle.
+    doubled: BTreeSet<u32>,
+    /// Triangles that changed, each once.
+    dirty: Vec<u32>,
+    /// Per triangle the last round in which it changed.
+    changed: Vec<u32>,
+    /// Per corner the last round that walked it.
+    seen: Vec<u32>,
+    /// Per vertex the last round in which a cycle took its number.
+    claimed: Vec<u32>,
+    /// Vertices that may have lost their last corner.
+    doubtful: Vec<u32>,
+    walked: Vec<u32>,
+    round: u32,
+}
+
+impl Joined {
+    /// Begins a change: takes the triangles of doubled edges back together.
+    pub fn begin(&mut self, surface: &mut Surface) {
+        self.round += 1;
+        self.dirty.clear();
+        self.walked.clear();
+        self.doubtful.clear();
+        let n = self.changed.len();
+        surface.triangles.truncate(n);
+        surface.tags.truncate(n);
+        surface.vertices.truncate(self.representative.len());
+        for h in self.doubled.iter().flat_map(|&h| [h, self.twin[h as usize]]) {
+            let t = h / 3;
+            surface.triangles[t as usize] = [0, 1, 2].map(|k| self.corner[(3 * t + k) as usize]);
+        }
+    }
+
+    /// A new triangle, open all around.
+    pub fn add(&mut self, surface: &mut Surface) -> u32 {
+        let t = self.changed.len() as u32;
+        self.twin.extend([NONE; 3]);
+        self.corner.extend([NONE; 3]);
+        self.seen.extend([0; 3]);
+        self.changed.push(0);
+        surface.triangles.push([NONE; 3]);
+        surface.tags.push(0);
+        t
+    }
+
+    /// Tells that a triangle changed: its vertices are found again.
+    pub fn touch(&mut self, t: u32) {
+        if std::mem::replace(&mut self.changed[t as usize], self.round) != self.round {
+            self.dirty.push(t);
+        }
+    }
+
+    /// Opposite of a half-edge, or [`NONE`].
+    pub fn twin(&self, h: u32) -> u32 {
+        self.twin[h as usize]
+    }
+
+    /// Takes a half-edge off the one opposite.
+    pub fn open(&mut self, h: u32) {
+        let twin = std::mem::replace(&mut self.twin[h as usize], NONE);
+        if twin != NONE {
+            self.doubled.remove(&h.min(twin));
+            self.twin[twin as usize] = NONE;
+        }
+    }
+
+    /// Joins two half-edges.
+    pub fn join(&mut self, g: u32, h: u32) {
+        if self.twin[g as usize] != h {
+            self.open(g);
+            self.open(h);
+            (self.twin[g as usize], self.twin[h as usize]) = (h, g);
+        }
+    }
+
+    /// Opens a triangle all around and forgets its vertices.
+    pub fn clear(&mut self, t: u32) {
+        for h in 3 * t..3 * t + 3 {
+            self.open(h);
+            let old = std::mem::replace(&mut self.corner[h as usize], NONE);
+            if old != NONE {
+                self.doubtful.push(old);
+            }
+        }
+    }
+
+    /// Removes a triangle that is open all around; the last one takes its number, which is returned.
+    pub fn remove(&mut self, t: u32, surface: &mut Surface) -> u32 {
+        let last = self.changed.len() as u32 - 1;
+        self.dirty.retain(|d| *d != t);
+        if t != last {
+            for k in 0..3 {
+                let (from, to) = ((3 * last + k) as usize, (3 * t + k) as usize);
+                let twin = self.twin[from];
+                if twin != NONE {
+                    if self.doubled.remove(&(from as u32).min(twin)) {
+                        self.doubled.insert((to as u32).min(twin));
+                    }
+                    self.twin[twin as usize] = to as u32;
+                }
+                (self.twin[to], self.corner[to], self.seen[to]) = (twin, self.corner[from], self.seen[from]);
+                let vertex = self.corner[to];
+                if vertex != NONE && self.representative[vertex as usize] == from as u32 {
+                    self.representative[vertex as usize] = to as u32;
+                }
+            }
+            self.changed[t as usize] = self.changed[last as usize];
+            self.dirty.iter_mut().filter(|d| **d == last).for_each(|d| *d = t);
+        }
+        self.changed.pop();
+        for per_corner in [&mut self.twin, &mut self.corner, &mut self.seen] {
+            per_corner.truncate(3 * last as usize);
+        }
+        surface.triangles.swap_remove(t as usize);
+        surface.tags.swap_remove(t as usize);
+        last
+    }
+
+    /// Whether a triangle that changed is open somewhere.
+    pub fn is_open(&self) -> bool {
+        self.dirty.iter().flat_map(|&t| 3 * t..3 * t + 3).any(|h| self.twin[h as usize] == NONE)
+    }
+
+    /// Numbers of triangles, vertices and doubled edges.
+    #[cfg(test)]
+    pub fn sizes(&self) -> [usize; 3] {
+        [self.changed.len(), self.representative.len(), self.doubled.len()]
+    }
+
+    /// Triangles of this change.
+    pub fn touched(&self) -> &[u32] {
+        &self.dirty
+    }
+
+    /// Ends a change: vertices around what changed.
+    pub fn number(&mut self, place: &impl Place, surface: &mut Surface) {
+        let mut cycle = Vec::new();
+        for i in 0..self.dirty.len() {
+            for first in 3 * self.dirty[i]..3 * self.dirty[i] + 3 {
+                if self.seen[first as usize] != self.round {
+                    self.walk(first, &mut cycle);
+                    self.name(&cycle, place.vertex(&cycle), surface);
+                }
+            }
+        }
+        self.drop_dead_vertices(surface);
+        self.find_doubled_edges();
+    }
+
+    /// The corner behind `c` around their vertex.
+    fn next(&self, c: u32) -> u32 {
+        self.twin[(c / 3 * 3 + (c + 2) % 3) as usize]
+    }
+
+    fn walk(&mut self, first: u32, cycle: &mut Vec<u32>) {
+        cycle.clear();
+        let mut c = first;
+        while self.seen[c as usize] != self.round {
+            self.seen[c as usize] = self.round;
+            cycle.push(c);
+            c = self.next(c);
+        }
+    }
+
+    /// A cycle keeps the number of its vertex; of several that come from one vertex the first keeps it.
+    fn name(&mut self, cycle: &[u32], vertex: SurfaceVertex, surface: &mut Surface) {
+        let mut id = NONE;
+        for &c in cycle {
+            let old = self.corner[c as usize];
+            if old != NONE {
+                self.doubtful.push(old);
+                if id == NONE && self.claimed[old as usize] != self.round {
+                    id = old;
+                }
+            }
+        }
+        if id == NONE {
+            id = self.representative.len() as u32;
+            self.representative.push(NONE);
+            self.claimed.push(0);
+            surface.vertices.push(vertex);
+        }
+        self.claimed[id as usize] = self.round;
+        self.representative[id as usize] = cycle[0];
+        surface.vertices[id as usize] = vertex;
+        self.walked.push(id);
+        cycle.iter().for_each(|&c| self.set_corner(c, id, surface));
+    }
+
+    fn set_corner(&mut self, c: u32, id: u32, surface: &mut Surface) {
+        self.corner[c as usize] = id;
+        surface.triangles[c as usize / 3][c as usize % 3] = id;
+    }
+
+    fn drop_dead_vertices(&mut self, surface: &mut Surface) {
+        let mut doubtful = std::mem::take(&mut self.doubtful);
+        doubtful.retain(|&id| self.claimed[id as usize] != self.round);
+        doubtful.sort_unstable_by(|p, q| q.cmp(p));
+        doubtful.dedup();
+        for &id in &doubtful {
+            let last = self.representative.len() as u32 - 1;
+            self.representative.swap_remove(id as usize);
+            self.claimed.swap_remove(id as usize);
+            surface.vertices.swap_remove(id as usize);
+            if id == last {
+                continue;
+            }
+            self.walked.iter_mut().filter(|w| **w == last).for_each(|w| *w = id);
+            let first = self.representative[id as usize];
+            let mut c = first;
+            loop {
+                self.set_corner(c, id, surface);
+                c = self.next(c);
+                if c == first {
+                    break;
+                }
+            }
+        }
+        self.doubtful = doubtful;
+    }
+
+    /// Looks for different edges between the same two vertices around every vertex that was walked.
+    fn find_doubled_edges(&mut self) {
+        let mut edges: Vec<(u32, u32)> = Vec::new();
+        for i in 0..self.walked.len() {
+            edges.clear();
+            let first = self.representative[self.walked[i] as usize];
+            let mut h = first;
+            loop {
+                let head = self.corner[(h / 3 * 3 + (h + 1) % 3) as usize];
+                edges.push((head, h.min(self.twin[h as usize])));
+                h = self.next(h);
+                if h == first {
+                    break;
+                }
+            }
+            edges.sort_unstable();
+            for same in edges.chunk_by(|p, q| p.0 == q.0) {
+                self.doubled.remove(&same[0].1);
+                self.doubled.extend(same[1..].iter().map(|edge| edge.1));
+            }
+        }
+    }
+
+    /// Divides doubled edges in the middle, and their triangles in a fan around a vertex of its own.
+    pub fn divide_doubled_edges(&self, place: &impl Place, surface: &mut Surface) {
+        let mut middle: Vec<(u32, u32)> = Vec::with_capacity(2 * self.doubled.len());
+        for &h in &self.doubled {
+            let ends = [h, self.twin[h as usize]].map(|h| self.corner[h as usize]);
+            let vertex = place.middle(h / 3, &ends.map(|v| surface.vertices[v as usize]));
+            middle.extend([h, self.twin[h as usize]].map(|h| (h, surface.vertices.len() as u32)));
+            surface.vertices.push(vertex);
+        }
+        middle.sort_unstable();
+        for on_triangle in middle.chunk_by(|p, q| p.0 / 3 == q.0 / 3) {
+            let t = on_triangle[0].0 / 3;
+            let triangle = surface.triangles[t as usize];
+            let mut ring = Vec::with_capacity(6);
+            for k in 0..3 {
+                ring.push(triangle[k as usize]);
+                ring.extend(on_triangle.iter().filter(|m| m.0 == 3 * t + k).map(|m| m.1));
+            }
+            let centre = surface.vertices.len() as u32;
+            surface.vertices.push(place.middle(t, &triangle.map(|v| surface.vertices[v as usize])));
+            let tag = surface.tags[t as usize];
+            for k in 0..ring.len() {
+                let fan = [ring[k], ring[(k + 1) % ring.len()], centre];
+                if k == 0 {
+                    surface.triangles[t as usize] = fan;
+                } else {
+                    surface.triangles.push(fan);
+                    surface.tags.push(tag);
+                }
+            }
+        }
+    }
+}
