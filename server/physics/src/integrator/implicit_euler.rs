@@ -495,7 +495,8 @@ impl ImplicitEuler {
             let force = spring.map(|s| s.force(s.point(&self.predicted)));
             spring_forces.push(force.unwrap_or_else(Vector3::zeros));
         }
-        let (predicted, rate) = (&self.predicted, 1.0 / inputs.h);
+        // The shortest steps have no finite inverse; nothing moves in them.
+        let (predicted, rate) = (&self.predicted, (1.0 / inputs.h).min(f64::MAX));
         let results = (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK));
         team.for_blocks(results, |block, (x, v)| {
             for ((x, v), next) in x.iter_mut().zip(v).zip(block_of(predicted, block)) {

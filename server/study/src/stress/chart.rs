@@ -126,7 +126,7 @@ impl Chart {
         let mut rows = Vec::new();
         let (mut row, mut at) = (String::new(), 0.0);
         for (i, line) in self.lines.iter().enumerate() {
-            let width = 44.0 + 7.0 * line.name.chars().count() as f64;
+            let width = 44.0 + 8.0 * line.name.chars().count() as f64;
             if at + width > WIDTH - LEFT && at > 0.0 {
                 rows.push(std::mem::take(&mut row));
                 at = 0.0;

@@ -70,9 +70,10 @@ pub const CLAMPED: Case = Case {
     title: "A cut beside the clamped face",
     set_up: "A cube clamped at one face is cut 4 % of its edge beside that face: all pieces beyond the cut \
              still have clamped nodes, but hold no clamped material. Then a cut through the clamped nodes \
-             themselves, so that both halves are clamped.",
+             themselves, so that both halves are clamped; once between layers of nodes and once exactly along \
+             one, so that both lips have its clamped nodes.",
     rule: "C. The loose part falls with g to 1e-6: it is not glued to air; clamped material stays where it is, \
-           bit for bit.",
+           bit for bit, on both lips.",
     source: "Schoch 2009, §5.2",
     quick: true,
     run: Some(clamped),
@@ -348,6 +349,20 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.exactly("clamped nodes that moved, cut through the clamp", moved(&body, &clamp), 0);
     let low = body.positions().iter().map(|x| x.y).fold(f64::INFINITY, f64::min);
     evidence.at_least("lowest point", low / L, -0.1, "edges");
+    // Exactly along a layer of nodes that ends in the clamp.
+    let mut body = setting.body(cube(4), damped(0.5, 0.005), 200, 1e-5)?;
+    body.fix(&clamp, [true; 3], V::zeros())?;
+    let mut watch = Watch::new("along nodes", body, 0.01, DOWN);
+    watch.cut(&slice(0.5, -5.0, 5.0), 1)?;
+    flaws.merge(Flaws::of(watch.body.cut_mesh()));
+    watch.steps(50);
+    let body = watch.finish(&mut common, &mut energies, &mut iterations);
+    let copies = body.cut_mesh().copy_node().iter().zip(body.positions().iter().zip(body.rest_positions()));
+    let clamped = copies.filter(|(node, _)| clamp.contains(node));
+    let (all, still) =
+        clamped.fold((0, 0), |(all, still), (_, (x, X))| (all + 1, still + usize::from(x == X)));
+    evidence.exactly("copies of clamped nodes, cut along nodes", all, clamp.len() + 5);
+    evidence.exactly("of these, moved", all - still, 0);
     flaws.tell(&mut evidence);
     evidence.charts.extend([energies, iterations]);
     common.tell(&mut evidence);

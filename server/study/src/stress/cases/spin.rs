@@ -18,8 +18,8 @@ pub const STEPS: Case = Case {
              1e5 and 1e6 Pa; steps of 1e-4, 1e-3, 5e-3, 0.02, 0.04, 0.1 and 0.2 s, up to 100 of them; implicit \
              Euler on the fast path and by Newton's method, and BDF2.",
     rule: "C. Implicit Euler: the energy is never above that of the start (1e-5 in single precision, 1e-9 in \
-           double), up to 4 rad per step on the fast path, which has no guard: beyond, it is told \
-           what it does. BDF2: never more than 1 % above; its guard takes over where the cube turns too far in a \
+           double), up to 4 rad per step on the fast path: beyond, its guard slows the spin to \
+           that and says so, and it is told what energy is gained. BDF2: never more than 1 % above; its guard takes over where the cube turns too far in a \
            step, and says so.",
     source: "METHODS, measured",
     quick: false,
@@ -156,7 +156,7 @@ fn step_sweep(setting: &Setting) -> Result<Evidence, Trouble> {
                     let seconds: f64 = if h < 1e-3 { 0.02 } else { f64::min(2.0, 100.0 * h) };
                     let spin = spin(&mut watch, (seconds / h).round() as usize);
                     let excess = spin.most_energy - 1.0;
-                    // The fast path has no guard: what it does with steps of more than 4 rad is told.
+                    // What the fast path does with steps of more than 4 rad is told.
                     let told = with.is_none() && omega * h > 4.0;
                     let of = if told { &mut beyond } else { &mut worst };
                     *of = if excess.is_nan() || excess > *of { excess } else { *of };
