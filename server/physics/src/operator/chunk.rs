@@ -35,6 +35,8 @@ pub struct Chunk {
     pub inverted: usize,
     /// Whether the chunk was planned or amended since the last update.
     pub stale: bool,
+    /// First row of its sums among those of all chunks.
+    pub first_row: usize,
 }
 
 /// A carrier that gets a lane, and the rotation to start with.
@@ -80,6 +82,7 @@ impl Chunk {
             x: vec![[0.0; 4]; n],
             inverted: 0,
             stale: true,
+            first_row: 0,
         }
     }
 

@@ -137,7 +137,6 @@ impl Elastic {
             let mut rotations = self.lane_rotations();
             late.iter().for_each(|new| rotations[new.piece as usize] = new.rotation);
             self.plan(mesh, &outgrown, &rotations);
-            self.made_with = None;
         }
         self.arrange_sums(n_copies);
     }
@@ -162,20 +161,17 @@ impl Elastic {
 
     /// Arranges the sums of the present chunks; diagonal blocks of chunks that are not stale stay.
     fn arrange_sums(&mut self, n_copies: usize) {
-        let before = std::mem::replace(
-            &mut self.gather,
-            Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies),
-        );
+        self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
         self.sums.clear();
         self.sums.resize(self.gather.n_rows(), [0.0; 4]);
         let kept = std::mem::replace(&mut self.diagonals, vec![[0.0; 8]; self.gather.n_rows()]);
-        if self.made_with.is_none() {
-            return;
-        }
-        let first = before.first_row.iter().zip(&self.gather.first_row);
-        for (chunk, (&from, &to)) in self.chunks.iter().zip(first).filter(|(chunk, _)| !chunk.stale) {
-            let (from, to, n) = (from as usize, to as usize, chunk.copies.len());
-            self.diagonals[to..to + n].copy_from_slice(&kept[from..from + n]);
+        for (chunk, &first) in self.chunks.iter_mut().zip(&self.gather.first_row) {
+            let (from, to) = (chunk.first_row, first as usize);
+            chunk.first_row = to;
+            if !chunk.stale {
+                let n = chunk.copies.len();
+                self.diagonals[to..to + n].copy_from_slice(&kept[from..from + n]);
+            }
         }
     }
 
