@@ -60,7 +60,8 @@ struct OfEdge {
 impl Crossings {
     /// Parameter, counted from `a` to `b`, at which the incision crosses the edge.
     pub fn get(&self, a: u32, b: u32, incision: u32) -> Option<f64> {
-        let t = self.of(a, b).find(|c| c.0 == incision)?.1;
+        let OfEdge { first, further } = self.by_edge.get(&edge_key(a, b))?;
+        let t = if first.0 == incision { first.1 } else { further.iter().find(|c| c.0 == incision)?.1 };
         Some(if a < b { t } else { 1.0 - t })
     }
 

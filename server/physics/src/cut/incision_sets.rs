@@ -12,11 +12,14 @@ pub struct IncisionSets {
     /// The member of every set that has one, else 0, which is no incision.
     only: Vec<u32>,
     ids: BTreeMap<Vec<u32>, u32>,
+    /// The incision that was last added to nothing, and the set of it alone.
+    latest: [u32; 2],
 }
 
 impl Default for IncisionSets {
     fn default() -> Self {
-        Self { sets: vec![Vec::new()], only: vec![0], ids: BTreeMap::from([(Vec::new(), Self::EMPTY)]) }
+        let ids = BTreeMap::from([(Vec::new(), Self::EMPTY)]);
+        Self { sets: vec![Vec::new()], only: vec![0], ids, latest: [0, Self::EMPTY] }
     }
 }
 
@@ -37,6 +40,13 @@ impl IncisionSets {
     pub fn with(&mut self, set: u32, incision: u32) -> u32 {
         if self.contains(set, incision) {
             return set;
+        }
+        if set == Self::EMPTY {
+            // Asked for again and again while one incision is worked off.
+            if self.latest[0] != incision {
+                self.latest = [incision, self.id_of(vec![incision])];
+            }
+            return self.latest[1];
         }
         let mut members = self.sets[set as usize].clone();
         members.push(incision);
