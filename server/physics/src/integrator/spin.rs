@@ -82,6 +82,31 @@ impl SpinGuard {
         self.parts.iter().map(|part| part.velocity().norm()).fold(0.0, f64::max)
     }
 
+    /// Whether a free part may turn by more than `angle` [rad] in a step of `h` [s]: whether anything is
+    /// fast enough for that, and then whether a part with a thousandth of the mass does.
+    pub fn exceeds(
+        &mut self,
+        state: &State,
+        mass: &[f64],
+        parts: &LooseParts,
+        (h, angle): (f64, f64),
+    ) -> bool {
+        if self.too_slow(state, angle / h) {
+            return false;
+        }
+        self.measure(&state.x, &state.v, mass, parts);
+        let least = 1e-3 * mass.iter().sum::<f64>();
+        let counted = self.parts.iter().zip(&parts.free).filter(|(part, free)| **free && part.mass >= least);
+        counted.into_iter().any(|(part, _)| h * part.velocity().norm() > angle)
+    }
+
+    /// Whether nothing is fast enough for a free part to turn at `omega` [rad/s].
+    fn too_slow(&self, state: &State, omega: f64) -> bool {
+        // Half the radius at rest: a part may be crushed.
+        let slow = 0.5 * self.least_radius * omega;
+        state.v.iter().all(|v| v.norm_squared() <= slow * slow)
+    }
+
     /// Slows the spin of free parts that turn by more than `largest` [rad] in a step of `h` [s] to that;
     /// momentum and deformation stay. Returns the largest angle [rad] of a part that was slowed.
     ///
@@ -93,9 +118,7 @@ impl SpinGuard {
         parts: &LooseParts,
         (h, largest): (f64, f64),
     ) -> Option<f64> {
-        // Half the radius at rest: a part may be crushed.
-        let slow = 0.5 * self.least_radius * largest / h;
-        if state.v.iter().all(|v| v.norm_squared() <= slow * slow) {
+        if self.too_slow(state, largest / h) {
             return None;
         }
         self.measure(&state.x, &state.v, mass, parts);

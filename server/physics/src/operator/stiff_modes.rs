@@ -129,9 +129,13 @@ impl StiffModes {
                     break;
                 }
                 let Some((a, g)) = self.pivot(piece, &row, most, &held) else {
-                    // Where all copies are held nothing moves, and a sliver of an element is not stiff.
+                    // What moves against held copies is as stiff as its own block says, and a sliver of an
+                    // element is not stiff.
+                    let moves = |r: &&(u32, Vector3<f64>)| {
+                        !held(r.0) && r.1.norm_squared() >= TAKES_PART * piece.stiff[0]
+                    };
                     let whole = piece.volume * most >= piece.stiff[1];
-                    left += usize::from(whole && !row.iter().all(|r| held(r.0)));
+                    left += usize::from(whole && row.iter().filter(moves).count() > 1);
                     break;
                 };
                 let takes_part =

@@ -69,8 +69,8 @@ fn opening(report: &SuiteReport) -> String {
             inverted and collapsed bodies, steps far too large, input without meaning. Each case has a rule that it \
             passes or fails. All of them keep rule <strong>C</strong>: everything finite, mass constant to 1e-12, \
             the momentum of free parts balanced to 1e-6, energy never more than one percent above that of the start \
-            and the work done, no step divided, held or refused. A case of a part that is still to come is listed \
-            as <em>not yet</em>.</p>\n</header>\n";
+            and the work done, no step held, refused, or divided without saying so. A case of a part that is still \
+            to come is listed as <em>not yet</em>.</p>\n</header>\n";
     out
 }
 

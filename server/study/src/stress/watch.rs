@@ -24,7 +24,7 @@ pub struct Common {
     pub energy: f64,
     /// Positions and velocities that were not finite.
     pub not_finite: usize,
-    /// Steps that were divided, held or refused.
+    /// Steps that were held, refused, or divided without a notice.
     pub not_whole: usize,
     /// Steps.
     pub steps: usize,
@@ -55,7 +55,7 @@ impl Common {
         evidence.at_most("C: largest change of mass", self.mass, 1e-12, "");
         evidence.at_most("C: momentum from nowhere, over that of the part", self.momentum, 1e-6, "");
         evidence.at_most("C: energy beyond that of the start and work", self.energy, 0.01, "");
-        evidence.exactly("C: steps divided, held or refused", self.not_whole, 0);
+        evidence.exactly("C: steps held, refused, or divided without a word", self.not_whole, 0);
         evidence.tell("steps", self.steps as f64, "");
     }
 }
@@ -122,7 +122,8 @@ impl Watch {
         let report = self.body.step(self.h, self.gravity, &[]);
         self.time += self.h;
         self.common.steps += 1;
-        if report.outcome != Outcome::Advanced || report.substeps > 1 {
+        let silent = report.substeps > 1 && report.notice.is_none();
+        if report.outcome != Outcome::Advanced || silent {
             self.common.not_whole += 1;
         }
         self.common.not_finite += self

@@ -6,6 +6,7 @@
 mod bodies;
 mod critical_step;
 mod cut_through_elements;
+mod degenerate_elements;
 mod drooping_bar;
 mod eigenfrequencies;
 mod enriched_bodies;

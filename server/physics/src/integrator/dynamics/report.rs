@@ -79,6 +79,11 @@ pub enum Notice {
         /// Largest angle per step [rad].
         largest_rad: f64,
     },
+    /// One linear solve per step: loose parts turned far and gained energy, the step was divided.
+    SpinDivided {
+        /// Number of parts.
+        substeps: u32,
+    },
     /// The step gained energy, it was made again with implicit Euler and as many Newton steps as needed.
     EnergyGained {
         /// Energy above what there was and what was put in [J].
@@ -117,6 +122,9 @@ impl fmt::Display for Notice {
                     f,
                     "a loose part turned by {angle_rad:.2} rad per step: slowed to {largest_rad:.2} rad"
                 )
+            }
+            Self::SpinDivided { substeps } => {
+                write!(f, "loose parts turned far and gained energy: divided into {substeps} parts")
             }
             Self::EnergyGained { excess_j } => {
                 write!(f, "gained {excess_j:.3e} J: made again with implicit Euler")
