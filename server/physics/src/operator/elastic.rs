@@ -7,7 +7,7 @@ use super::chunk::{Chunk, NewLane};
 use super::chunks::{Gather, NO_PIECE, region_of_elements};
 use super::kernel::{Block6, Coefficients};
 use super::rows::gather_direction;
-use super::{BLOCK, LinearOperator, Padded};
+use super::{BLOCK, LinearOperator, Padded, resize_with_room};
 use crate::cut::Piece;
 use crate::element::Simd;
 use crate::material::{Lame, Law};
@@ -162,8 +162,8 @@ impl Elastic {
     /// Arranges the sums of the present chunks; diagonal blocks of chunks that are not stale stay.
     fn arrange_sums(&mut self, n_copies: usize) {
         self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
-        self.sums.clear();
-        self.sums.resize(self.gather.n_rows(), [0.0; 4]);
+        resize_with_room(&mut self.sums, self.gather.n_rows(), [0.0; 4]);
+        self.sums.fill([0.0; 4]);
         let kept = std::mem::replace(&mut self.diagonals, vec![[0.0; 8]; self.gather.n_rows()]);
         for (chunk, &first) in self.chunks.iter_mut().zip(&self.gather.first_row) {
             let (from, to) = (chunk.first_row, first as usize);

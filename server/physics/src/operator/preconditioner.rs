@@ -1,7 +1,7 @@
 //! The inverse of the 3×3 diagonal blocks, one per copy; on degenerate elements in variables in which
 //! they are not stiff.
 
-use super::{BLOCK, Block6, FixedCopy, Padded, Substitution};
+use super::{BLOCK, Block6, FixedCopy, Padded, Substitution, resize_with_room};
 use crate::team::{Team, blocks};
 
 /// Block-Jacobi preconditioner M⁻¹: one symmetric positive definite 3×3 matrix per copy.
@@ -33,7 +33,7 @@ impl Inverse3 {
 impl BlockJacobi {
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
-        self.inverse.resize(n, Inverse3::default());
+        resize_with_room(&mut self.inverse, n, Inverse3::default());
     }
 
     /// Changes the variables that the blocks belong to; who writes the inverses writes those of TᵀA T.
