@@ -272,7 +272,7 @@ fn skin(mesh: &TetMesh, repeats: usize) {
             let at = |s: f64| {
                 let x = SIZE_M * (0.02 + 0.097 * f64::from(k % 10) + 0.08 * s);
                 let y = SIZE_M * (0.04 + 0.097 * f64::from(k / 10));
-                [Vector3::new(x, y, top - 0.02), Vector3::new(x, y + 1e-4, top + 0.01)]
+                [Vector3::new(x, y, top - 0.03), Vector3::new(x, y + 1e-4, top + 0.01)]
             };
             let sweep = BladeSweep { segments: vec![at(0.0), at(1.0)] };
             let report = cut.sweep(&x, &sweep, k + 1).expect("the sweep is well formed");

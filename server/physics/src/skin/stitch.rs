@@ -150,7 +150,7 @@ impl Seams {
             }
         }
         let lips = made.keys().copied().collect();
-        self.parts.lips.append(&mut made);
+        self.parts.lips.extend(made);
         Ok(lips)
     }
 
