@@ -210,7 +210,11 @@ impl Gather {
                 out[i] += a[i] + b[i];
             }
         }
-        self.add_further(block, rows, out);
+        for (copy, row) in self.further(block) {
+            for (out, part) in out[copy].iter_mut().zip(&rows[row]) {
+                *out += part;
+            }
+        }
     }
 
     /// The first two rows of every copy of block number `block`; row 0 where there are fewer.
@@ -219,17 +223,11 @@ impl Gather {
         &self.pairs[block * BLOCK..((block + 1) * BLOCK).min(self.pairs.len())]
     }
 
-    /// Adds what [`Self::pairs`] leaves out; says whether there was any.
+    /// What [`Self::pairs`] leaves out: copy within the block, and row.
     #[inline(always)]
-    pub fn add_further<const N: usize>(&self, block: usize, rows: &[[f32; N]], out: &mut [[f32; N]]) -> bool {
+    pub fn further(&self, block: usize) -> impl Iterator<Item = (usize, usize)> {
         let further = self.first_further[block] as usize..self.first_further[block + 1] as usize;
-        let any = !further.is_empty();
-        for &(copy, row) in &self.further[further] {
-            for (out, part) in out[copy as usize - block * BLOCK].iter_mut().zip(&rows[row as usize]) {
-                *out += part;
-            }
-        }
-        any
+        self.further[further].iter().map(move |&(copy, row)| (copy as usize - block * BLOCK, row as usize))
     }
 }
 

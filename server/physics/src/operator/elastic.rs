@@ -6,7 +6,7 @@ use super::carriers::Carriers;
 use super::chunk::{Chunk, NewLane};
 use super::chunks::{Gather, NO_PIECE, region_of_elements};
 use super::kernel::{Block6, Coefficients};
-use super::rows::gather_direction;
+use super::rows::{Sum, gather_direction};
 use super::{BLOCK, LinearOperator, Padded, resize_with_room};
 use crate::cut::Piece;
 use crate::element::Simd;
@@ -318,10 +318,17 @@ impl Elastic {
         (self.gather.pairs(block), &self.sums)
     }
 
-    /// Adds what [`Self::sums`] leaves out to `y`; says whether there was any.
+    /// Adds what [`Self::sums`] leaves out to `y`; returns by how much that changes x·y.
     #[inline(always)]
-    pub(super) fn add_further(&self, block: usize, y: &mut [Padded]) -> bool {
-        self.gather.add_further(block, &self.sums, y)
+    pub(super) fn add_further(&self, block: usize, x: &[Padded], y: &mut [Padded]) -> f64 {
+        let mut product = Sum::default();
+        for (copy, row) in self.gather.further(block) {
+            product.add(&x[copy], &self.sums[row]);
+            for (y, part) in y[copy].iter_mut().zip(&self.sums[row]) {
+                *y += part;
+            }
+        }
+        product.total()
     }
 
     /// Rotation of every piece at the last update.

@@ -1,6 +1,6 @@
 //! The vector loops of a solver iteration over one block of copies.
 //!
-//! Products are single precision, their sums double. On x86-64 the loops are written for AVX as well
+//! Vectors are single precision, scalar products double. On x86-64 the loops are written for AVX as well
 //! (the compiler's own idea of them is to transpose rows); the operations are the same one by one,
 //! so the bits are the same.
 
@@ -83,8 +83,8 @@ mod avx {
     //! The same operations, one register per row.
 
     use std::arch::x86_64::{
-        __m256d, _mm_add_ps, _mm_loadu_ps, _mm_mul_ps, _mm_permute_ps, _mm_set1_ps, _mm_storeu_ps,
-        _mm_sub_ps, _mm256_add_pd, _mm256_cvtps_pd, _mm256_setzero_pd, _mm256_storeu_pd,
+        __m128, __m256d, _mm_add_ps, _mm_loadu_ps, _mm_mul_ps, _mm_permute_ps, _mm_set1_ps, _mm_storeu_ps,
+        _mm_sub_ps, _mm256_add_pd, _mm256_cvtps_pd, _mm256_mul_pd, _mm256_setzero_pd, _mm256_storeu_pd,
     };
 
     use super::{Inverse3, Padded, Sum};
@@ -94,8 +94,8 @@ mod avx {
         let mut sum = _mm256_setzero_pd();
         for (x, y) in x.iter().zip(y) {
             // SAFETY: a row holds four numbers.
-            let product = unsafe { _mm_mul_ps(_mm_loadu_ps(x.as_ptr()), _mm_loadu_ps(y.as_ptr())) };
-            sum = _mm256_add_pd(sum, _mm256_cvtps_pd(product));
+            let (x, y) = unsafe { (_mm_loadu_ps(x.as_ptr()), _mm_loadu_ps(y.as_ptr())) };
+            sum = _mm256_add_pd(sum, product(x, y));
         }
         total(sum)
     }
@@ -123,7 +123,7 @@ mod avx {
                 let next_q = _mm_add_ps(inertia, elastic);
                 _mm_storeu_ps(p.as_mut_ptr(), next_p);
                 _mm_storeu_ps(q.as_mut_ptr(), next_q);
-                sum = _mm256_add_pd(sum, _mm256_cvtps_pd(_mm_mul_ps(next_p, next_q)));
+                sum = _mm256_add_pd(sum, product(next_p, next_q));
             }
         }
         total(sum)
@@ -151,10 +151,16 @@ mod avx {
                 _mm_storeu_ps(x.as_mut_ptr(), next_x);
                 _mm_storeu_ps(r.as_mut_ptr(), next_r);
                 _mm_storeu_ps(z.as_mut_ptr(), next_z);
-                sum = _mm256_add_pd(sum, _mm256_cvtps_pd(_mm_mul_ps(next_r, next_z)));
+                sum = _mm256_add_pd(sum, product(next_r, next_z));
             }
         }
         total(sum)
+    }
+
+    /// In double precision: that of two small numbers would be denormal, and slow.
+    #[target_feature(enable = "avx")]
+    fn product(x: __m128, y: __m128) -> __m256d {
+        _mm256_mul_pd(_mm256_cvtps_pd(x), _mm256_cvtps_pd(y))
     }
 
     #[target_feature(enable = "avx")]
@@ -212,7 +218,7 @@ mod row {
     }
 }
 
-/// A scalar product in the making: single-precision products, double-precision sums.
+/// A scalar product in the making, in double precision.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sum([f64; 4]);
 
@@ -221,7 +227,7 @@ impl Sum {
     #[inline(always)]
     pub fn add(&mut self, x: &Padded, y: &Padded) {
         for k in 0..4 {
-            self.0[k] += f64::from(x[k] * y[k]);
+            self.0[k] += f64::from(x[k]) * f64::from(y[k]);
         }
     }
 

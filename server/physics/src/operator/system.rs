@@ -65,7 +65,7 @@ impl LinearOperator for SystemOperator<'_> {
         team.for_blocks(state, |block, (p, q, partial)| {
             let (z, mass) = (block_of(z, block), block_of(mass, block));
             let product = rows::advance_direction(z, beta, (mass, factor), elastic.sums(block), [p, q]);
-            partial[0] = if elastic.add_further(block, q) { rows::dot(p, q) } else { product };
+            partial[0] = product + elastic.add_further(block, p, q);
         });
         let springs: f64 = self.springs.iter().map(|spring| spring.curvature(p)).sum();
         self.springs.iter().for_each(|spring| spring.add_to(p, q));

@@ -183,7 +183,9 @@ impl Cuts {
             body.has_changed_topology();
             self.applied += 1;
             let (elements, copies) = (done.elements_cut, done.new_copies.len());
-            let message = format!("incision {incision}: {elements} elements, {copies} new copies");
+            let elements = if elements == 1 { "1 element".into() } else { format!("{elements} elements") };
+            let copies = if copies == 1 { "1 new copy".into() } else { format!("{copies} new copies") };
+            let message = format!("incision {incision}: {elements}, {copies}");
             at.report.tell(Level::Info, "cut-applied", &body.id, message);
         }
         if done.refused_edges > 0 {
