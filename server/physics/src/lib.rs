@@ -29,3 +29,5 @@ pub mod solver;
 pub mod integrator;
 pub mod estimate;
 pub mod body;
+#[cfg(test)]
+mod testing;

@@ -8,16 +8,11 @@ use nalgebra::Vector3;
 use scindo_physics::assembly::{ElementKind, Model, Volumetric};
 use scindo_physics::material::Law;
 use scindo_physics::mesh::{BoxPattern, box_mesh, graded_hexes};
-use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::Method;
 
-use crate::support::{clamped, equilibrium_by, held, long_tests, material, reference, vector};
+use crate::beam_case::{CUT_Z, DENSITY, FRONT_X, STRIP_X, on_strip, solve};
+use crate::support::{long_tests, material, reference, vector};
 
-const DENSITY: f64 = 1070.0;
-const FRONT_X: f64 = 0.015;
-const CUT_Z: f64 = 0.1;
-/// The strip that is loaded in `tc2force` and `tc2strip`: z = 0.2 m, x up to this [m].
-const STRIP_X: f64 = 0.005;
 /// What is allowed against the converged values.
 const ONE_PERCENT: f64 = 0.01;
 
@@ -96,65 +91,6 @@ fn model(kind: ElementKind, law: Law, case: &str) -> Model {
     Model::tet10(&mesh, &material).unwrap()
 }
 
-fn on_strip(X: &Vector3<f64>) -> bool {
-    X.z > 0.2 - 1e-9 && X.x < STRIP_X + 1e-9
-}
-
-/// ∫ N_a dA over the strip {z = 0.2, x ≤ 0.005} [m²].
-fn strip_areas(model: &Model) -> Vec<f64> {
-    let mut areas = vec![0.0; model.n_nodes()];
-    for e in 0..model.n_elements() {
-        let face: Vec<usize> =
-            model.element(e).iter().map(|&n| n as usize).filter(|&n| on_strip(&model.rest()[n])).collect();
-        let X = |k: usize| model.rest()[face[k]];
-        match (model.kind(), face.len()) {
-            (ElementKind::Hex8, 4) => {
-                let area = (X(1) - X(0)).cross(&(X(2) - X(0))).norm();
-                face.iter().for_each(|&n| areas[n] += area / 4.0);
-            }
-            // Corners come before middles; a quadratic triangle has ∫ N = 0 there and A/3 here.
-            (ElementKind::Tet10, 6) => {
-                let area = 0.5 * (X(1) - X(0)).cross(&(X(2) - X(0))).norm();
-                face[3..].iter().for_each(|&n| areas[n] += area / 3.0);
-            }
-            _ => {}
-        }
-    }
-    areas
-}
-
-/// Equilibrium of the half model.
-fn solve(model: &Model, case: &str) -> Vec<Vector3<f64>> {
-    let rest = model.rest();
-    let mut fixed = clamped(model, |X| X.z < 1e-9);
-    let middle = |n: &usize| rest[*n].y > 0.03 - 1e-9 && rest[*n].z > 1e-9;
-    fixed.extend((0..rest.len()).filter(middle).map(|n| held(n, [false, true, false], rest[n])));
-    let mut loads = vec![Vector3::zeros(); rest.len()];
-    if case.starts_with("tc1") {
-        let integrals = loads.iter_mut().zip(model.shape_integrals());
-        integrals.for_each(|(f, v)| f.x = DENSITY * 9.81 * v);
-    }
-    if case.starts_with("tc2force") {
-        let traction = 5.0 / (STRIP_X * 0.06);
-        loads.iter_mut().zip(strip_areas(model)).for_each(|(f, a)| f.z = traction * a);
-    }
-    if !case.starts_with("tc2strip") {
-        return equilibrium_by(Method::Cholesky, model, &loads, &fixed, rest);
-    }
-    let axes = if case.contains("xyz") { [true; 3] } else { [false, false, true] };
-    let strip: Vec<usize> = (0..rest.len()).filter(|&n| on_strip(&rest[n])).collect();
-    let steps = if model.law() == Law::Linear { 1 } else { 2 };
-    let mut x = rest.to_vec();
-    for step in 1..=steps {
-        let pull = Vector3::new(0.0, 0.0, 0.02 * f64::from(step) / f64::from(steps));
-        let mut now = fixed.clone();
-        now.retain(|f: &FixedCopy| !(axes[1] && strip.contains(&(f.copy as usize))));
-        now.extend(strip.iter().map(|&n| held(n, axes, rest[n] + pull)));
-        x = equilibrium_by(Method::Cholesky, model, &loads, &now, &x);
-    }
-    x
-}
-
 /// Displacement at a rest position, of the element nodes on `side` of the cut.
 fn displacement(model: &Model, x: &[Vector3<f64>], X: &Vector3<f64>, side: i64) -> Vector3<f64> {
     for e in 0..model.n_elements() {
@@ -173,7 +109,7 @@ fn displacement(model: &Model, x: &[Vector3<f64>], X: &Vector3<f64>, side: i64) 
 fn assert_close(case: &str, key: &str, kind: ElementKind, law: Law, allowed: f64) {
     let expected = &reference("R2/beam.json")[case][key];
     let model = model(kind, law, case);
-    let x = solve(&model, case);
+    let x = solve(Method::Cholesky, &model, case);
     let probe = |name: &str| {
         let probe = &expected["probes"][name];
         let found = displacement(&model, &x, &vector(&probe["X"]), probe["side"].as_i64().unwrap());
@@ -263,7 +199,7 @@ fn linear_tetrahedra_at_their_order() {
                     open_cut(&mut mesh.nodes, &mut mesh.tets);
                 }
                 let model = Model::tet4(&mesh, &material, Volumetric::Full).unwrap();
-                let x = solve(&model, case);
+                let x = solve(Method::Cholesky, &model, case);
                 let tip = &expected["probes"]["tip_mid"];
                 let u = displacement(&model, &x, &vector(&tip["X"]), 0);
                 let energy = 2.0 * model.energy(&x) / expected["strain_energy"].as_f64().unwrap();

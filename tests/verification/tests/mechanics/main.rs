@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 #![allow(non_snake_case)] // the symbols of the field: F, P, K, M
 
+mod beam_case;
 mod bodies;
 mod critical_step;
 mod cut_through_elements;

@@ -10,15 +10,12 @@ use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::cut::{BladeSweep, CutMesh};
 use scindo_physics::material::Law;
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
-use scindo_physics::operator::FixedCopy;
+use scindo_physics::solver::Method;
 
-use crate::support::{clamped, equilibrium, held, long_tests, material, reference, vector};
+use crate::beam_case::{CUT_Z, DENSITY, FRONT_X, on_strip, solve};
+use crate::support::{long_tests, material, reference, vector};
 
 type V = Vector3<f64>;
-const DENSITY: f64 = 1070.0;
-const CUT_Z: f64 = 0.1;
-const FRONT_X: f64 = 0.015;
-const STRIP_X: f64 = 0.005;
 /// The singularities at the front and at the edge of the strip allow 1.
 const LEAST_ORDER: f64 = 0.85;
 /// Largest error in the limit of fine meshes.
@@ -40,59 +37,6 @@ fn cut_beam(n: usize) -> CutMesh {
     let x = beam.rest_positions();
     beam.sweep(&x, &BladeSweep { segments: vec![blade(-0.01), blade(FRONT_X + 1e-5)] }, 1).unwrap();
     beam
-}
-
-fn on_strip(X: &V) -> bool {
-    X.z > 0.2 - 1e-9 && X.x < STRIP_X + 1e-9
-}
-
-/// ∫ N_a dA over the strip [m²].
-fn strip_areas(model: &Model) -> Vec<f64> {
-    let mut areas = vec![0.0; model.n_nodes()];
-    for e in 0..model.n_elements() {
-        let face: Vec<usize> =
-            model.element(e).iter().map(|&n| n as usize).filter(|&n| on_strip(&model.rest()[n])).collect();
-        if let [a, b, c] = face[..] {
-            let X = |n: usize| model.rest()[n];
-            let area = 0.5 * (X(b) - X(a)).cross(&(X(c) - X(a))).norm();
-            face.iter().for_each(|&n| areas[n] += area / 3.0);
-        }
-    }
-    areas
-}
-
-fn solve(model: &Model, case: &str) -> Vec<V> {
-    let rest = model.rest();
-    let mut fixed = clamped(model, |X| X.z < 1e-9);
-    let middle = |n: &usize| rest[*n].y > 0.03 - 1e-9 && rest[*n].z > 1e-9;
-    fixed.extend((0..rest.len()).filter(middle).map(|n| held(n, [false, true, false], rest[n])));
-    let mut loads = vec![V::zeros(); rest.len()];
-    if case.starts_with("tc1") {
-        loads.iter_mut().zip(model.shape_integrals()).for_each(|(f, v)| f.x = DENSITY * 9.81 * v);
-    }
-    if case.starts_with("tc2force") {
-        let traction = 5.0 / (STRIP_X * 0.06);
-        loads.iter_mut().zip(strip_areas(model)).for_each(|(f, a)| f.z = traction * a);
-    }
-    if !case.starts_with("tc2strip") {
-        return equilibrium(model, &loads, &fixed, rest);
-    }
-    let axes = if case.contains("xyz") { [true; 3] } else { [false, false, true] };
-    let strip: Vec<usize> = (0..rest.len()).filter(|&n| on_strip(&rest[n])).collect();
-    let steps = if model.law() == Law::Linear { 1 } else { 2 };
-    let mut x = rest.to_vec();
-    for step in 1..=steps {
-        let pull = V::new(0.0, 0.0, 0.02 * f64::from(step) / f64::from(steps));
-        let mut now = fixed.clone();
-        let pulled = |n: usize| {
-            let middle = rest[n].y > 0.03 - 1e-9;
-            held(n, [axes[0], axes[1] || middle, axes[2]], rest[n] + pull)
-        };
-        now.retain(|f: &FixedCopy| !strip.contains(&(f.copy as usize)));
-        now.extend(strip.iter().map(|&n| pulled(n)));
-        x = equilibrium(model, &loads, &now, &x);
-    }
-    x
 }
 
 /// Displacement [m] of the material at `X`, just above or below the cut where `side` says so.
@@ -121,7 +65,7 @@ const QUANTITIES: [&str; 4] = ["energy", "tip", "opening", "reaction"];
 fn errors(beam: &CutMesh, case: &str, key: &str, law: Law) -> [f64; 4] {
     let expected = &reference("R2/beam.json")[case][key];
     let model = Model::tet4_cut(beam, &material(3e5, 0.35, DENSITY, law), Volumetric::Full).unwrap();
-    let x = solve(&model, case);
+    let x = solve(Method::Pcg, &model, case);
     let probe = |name: &str| {
         let probe = &expected["probes"][name];
         let side = probe["side"].as_i64().unwrap();

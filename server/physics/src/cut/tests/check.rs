@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix4, Vector3};
 
-use super::Random;
+use crate::cut::CutMesh;
 use crate::cut::fragments::NONE;
 use crate::cut::surface_builder::{Material, SurfaceBuilder};
-use crate::cut::{CutMesh, Surface};
 use crate::mesh::TET_FACES;
+use crate::testing::{Random, surface_is_closed_and_manifold};
 
 /// All checks.
 pub fn everything(cut: &CutMesh) {
@@ -19,37 +19,6 @@ pub fn everything(cut: &CutMesh) {
     copies_are_components(cut);
     material_hangs_together(cut);
     surface_is_that_of_a_new_build(cut);
-}
-
-/// Each directed edge once, its opposite once, every vertex link a single cycle, every vertex used.
-pub fn surface_is_closed_and_manifold(surface: &Surface) {
-    assert_eq!(surface.triangles.len(), surface.tags.len());
-    let mut edges = BTreeSet::new();
-    let mut link: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
-    for t in &surface.triangles {
-        for k in 0..3 {
-            let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
-            assert!(a != b, "triangle {t:?} names a vertex twice");
-            assert!(edges.insert((a, b)), "edge {a}->{b} twice");
-            link.entry(a).or_default().insert(b, c);
-        }
-    }
-    for &(a, b) in &edges {
-        assert!(edges.contains(&(b, a)), "edge {a}->{b} has no opposite");
-    }
-    assert_eq!(link.len(), surface.vertices.len(), "unused surface vertices");
-    for (vertex, next) in link {
-        let first = *next.keys().next().unwrap();
-        let (mut at, mut length) = (first, 0);
-        loop {
-            at = next[&at];
-            length += 1;
-            if at == first {
-                break;
-            }
-        }
-        assert_eq!(length, next.len(), "the link of surface vertex {vertex} is not one cycle");
-    }
 }
 
 /// Fractions sum to one per element, node volumes to those of the mesh, the surface encloses them.

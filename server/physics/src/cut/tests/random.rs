@@ -10,7 +10,7 @@ fn twenty_random_planes_through_one_ring() {
         let mut body = Body::unit(3);
         for k in 0..20 {
             body.cut_plane(v(0.5, 0.5, 0.5) + random.vector(0.1), random.vector(1.0), 3.0, k + 1);
-            check::surface_is_closed_and_manifold(body.cut.surface());
+            surface_is_closed_and_manifold(body.cut.surface());
             check::volumes(&body.cut);
         }
         check::everything(&body.cut);
@@ -83,7 +83,7 @@ fn collapsed_flat_and_huge_states() {
             body.cut_plane(v(0.5, 0.5, 0.5), v(0.3, 0.2, 1.0), 1.0, incision);
             body.cut_plane(v(0.5, 0.5, 0.5), v(0.0, 0.0, 1.0), 1e199, incision);
         }
-        check::surface_is_closed_and_manifold(body.cut.surface());
+        surface_is_closed_and_manifold(body.cut.surface());
         check::volumes(&body.cut);
         check::copies_are_components(&body.cut);
         assert!(body.cut.epoch() > 0, "state {k}");

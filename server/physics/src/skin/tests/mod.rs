@@ -2,13 +2,14 @@
 
 mod marks;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
 use super::{Penetration, Skin, SkinSettings, incision};
 use crate::cut::{BladeSweep, CutMesh, CutReport, Surface};
 use crate::mesh::{BoxPattern, box_mesh};
+use crate::testing::{Random, square, surface_is_closed_and_manifold, v};
 
 /// A body under test with its skin and the position of every copy.
 struct Body {
@@ -16,10 +17,6 @@ struct Body {
     skin: Skin,
     x: Vec<Vector3<f64>>,
     volume: f64,
-}
-
-fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
-    Vector3::new(x, y, z)
 }
 
 impl Body {
@@ -51,17 +48,13 @@ impl Body {
         reach: f64,
         incision: u32,
     ) -> CutReport {
-        let n = normal.normalize();
-        let helper = if n.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-        let u = n.cross(&helper).normalize() * reach;
-        let w = n.cross(&u);
-        self.sweep(&[[point - u - w, point - u + w], [point + u - w, point + u + w]], incision)
+        self.sweep(&square(point, normal, reach), incision)
     }
 
     /// Closed, 2-manifold, fitting, enclosing what it did uncut to the tolerance.
     fn check(&self, tolerance: f64) {
         assert!(self.skin.fits(), "skin and lips do not fit");
-        closed_and_manifold(self.skin.surface());
+        surface_is_closed_and_manifold(self.skin.surface());
         let rest = self.cut.rest_positions();
         let found = self.skin.surface().volume(&rest);
         assert!((found - self.volume).abs() <= tolerance * self.volume, "{found} instead of {}", self.volume);
@@ -71,35 +64,6 @@ impl Body {
         assert_eq!(self.skin.sizes(), anew.sizes(), "triangles, vertices and doubled edges");
         let again = anew.surface().volume(&rest);
         assert!((found - again).abs() <= 1e-12 * self.volume, "{found}, sewn anew {again}");
-    }
-}
-
-/// Each directed edge once, its opposite once, every vertex link a single cycle, every vertex used.
-fn closed_and_manifold(surface: &Surface) {
-    assert_eq!(surface.triangles.len(), surface.tags.len());
-    let mut edges = BTreeSet::new();
-    let mut link: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
-    for t in &surface.triangles {
-        for k in 0..3 {
-            let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
-            assert!(a != b, "triangle {t:?} names a vertex twice");
-            assert!(edges.insert((a, b)), "edge {a}->{b} twice");
-            link.entry(a).or_default().insert(b, c);
-        }
-    }
-    assert!(edges.iter().all(|&(a, b)| edges.contains(&(b, a))), "an edge has no opposite");
-    assert_eq!(link.len(), surface.vertices.len(), "unused surface vertices");
-    for (vertex, next) in link {
-        let first = *next.keys().next().unwrap();
-        let (mut at, mut length) = (first, 0);
-        loop {
-            at = next[&at];
-            length += 1;
-            if at == first {
-                break;
-            }
-        }
-        assert_eq!(length, next.len(), "the link of surface vertex {vertex} is not one cycle");
     }
 }
 
@@ -129,23 +93,6 @@ fn bound_to_pieces(cut: &CutMesh, surface: &Surface) {
     for triangle in &surface.triangles {
         let [p, q, r] = triangle.map(|v| root(&mut part, surface.vertices[v as usize].copies[0] as usize));
         assert!(p == q && q == r, "a triangle reaches across a cut");
-    }
-}
-
-/// SplitMix64: small, seeded, the same everywhere.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn vector(&mut self, r: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| (2.0 * self.next() - 1.0) * r)
     }
 }
 

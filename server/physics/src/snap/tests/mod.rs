@@ -4,14 +4,13 @@ mod cuts;
 mod degenerate;
 mod random;
 
-use std::collections::BTreeMap;
-
 use nalgebra::{Matrix3, Vector3};
 
 use super::complex::det;
 use super::{SnapNode, SnapReport, Snapper};
-use crate::cut::{BladeSweep, CutMesh, Surface};
+use crate::cut::{BladeSweep, CutMesh};
 use crate::mesh::{BoxPattern, TetMesh, box_mesh};
+use crate::testing::{Random, surface_is_closed_and_manifold, v};
 
 /// A body under test.
 struct Sample {
@@ -96,32 +95,4 @@ impl Sample {
             node.v = L * node.rest;
         }
     }
-}
-
-/// From the triangle list alone: each directed edge once, its opposite once, every vertex link one cycle.
-fn surface_is_closed_and_manifold(surface: &Surface) {
-    let mut edges = BTreeMap::new();
-    let mut link: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
-    for t in &surface.triangles {
-        for k in 0..3 {
-            let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
-            assert!(a != b && edges.insert((a, b), ()).is_none(), "edge {a}->{b} twice");
-            link.entry(a).or_default().insert(b, c);
-        }
-    }
-    assert!(edges.keys().all(|&(a, b)| edges.contains_key(&(b, a))), "an edge has no opposite");
-    assert_eq!(link.len(), surface.vertices.len());
-    for (vertex, next) in link {
-        let first = *next.keys().next().unwrap();
-        let (mut at, mut length) = (next[&first], 1);
-        while at != first {
-            at = next[&at];
-            length += 1;
-        }
-        assert_eq!(length, next.len(), "the link of surface vertex {vertex} is not one cycle");
-    }
-}
-
-fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
-    Vector3::new(x, y, z)
 }

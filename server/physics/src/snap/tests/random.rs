@@ -2,23 +2,6 @@
 
 use super::*;
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn vector(&mut self, r: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| (2.0 * self.next() - 1.0) * r)
-    }
-}
-
 #[test]
 fn a_hundred_random_cuts_leave_a_sound_body() {
     for (seed, pattern) in [(1, BoxPattern::Tet6), (2, BoxPattern::Tet5 { parity: false })] {
