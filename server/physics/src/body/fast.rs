@@ -12,8 +12,8 @@ use crate::team::Team;
 /// A step that fails is tried again in 2 and then in 4 parts.
 const MOST_HALVINGS: u32 = 2;
 
-/// A free part turns by at most this much in a step [rad]: implicit Euler leaves less than a sixteenth
-/// of such a spin, and what more it had.
+/// A free part turns by at most this much [rad] in a step, or in a part of a divided one: implicit
+/// Euler leaves less than a sixteenth of such a spin, and what more it had.
 const LARGEST_TURN: f64 = 4.0;
 
 /// Where a free part turns by more in a step [rad], the energy of the free parts is looked at after it:
@@ -119,13 +119,15 @@ impl Fast {
         let turns = inputs.springs.is_empty()
             && self.spin.exceeds(state, inputs.mass, inputs.parts, (dt_s, NOTABLE_TURN));
         let start = if turns { free_energy(mesh, state, inputs) } else { (0.0, 0.0) };
-        if let Some(angle_rad) = self.spin.limit(state, inputs.mass, inputs.parts, (dt_s, LARGEST_TURN)) {
-            report.notice = Some(Notice::SpinLimited { angle_rad, largest_rad: LARGEST_TURN });
-        }
-        let mut failed = 0;
+        let (mut failed, mut gained) = (0, false);
         for halvings in 0..=MOST_SPIN_HALVINGS {
             report.substeps = 1 << halvings;
             let inputs = StepInputs { h: dt_s / f64::from(report.substeps), mass_f32: &[], ..*inputs };
+            let slowed = self.spin.limit(state, inputs.mass, inputs.parts, (inputs.h, LARGEST_TURN));
+            report.notice = match slowed {
+                Some(angle_rad) => Some(Notice::SpinLimited { angle_rad, largest_rad: LARGEST_TURN }),
+                None => gained.then_some(Notice::SpinDivided { substeps: report.substeps }),
+            };
             if self.try_step(team, state, &inputs, &mut report, spring_forces) {
                 let (now, put_in) = if turns { free_energy(mesh, state, &inputs) } else { (0.0, 0.0) };
                 let (gain, work) = (now - start.0, put_in - start.1);
@@ -133,7 +135,7 @@ impl Fast {
                     self.carry_weightless(mesh, state, inputs.mass, inputs.fixed);
                     return report;
                 }
-                report.notice = Some(Notice::SpinDivided { substeps: 2 * report.substeps });
+                gained = true;
             } else {
                 failed += 1;
             }
