@@ -166,6 +166,21 @@ mod avx {
     }
 
     #[target_feature(enable = "avx")]
+    pub fn gather_direction(local: &mut [Padded], copies: &[u32], z: &[Padded], beta: f32) -> usize {
+        let (turns, beta) = (beta != 0.0, _mm256_set1_ps(beta));
+        let (mut done, copies) = (0, copies.as_chunks::<2>().0);
+        for (local, &[a, b]) in local.as_chunks_mut::<2>().0.iter_mut().zip(copies) {
+            let mut next = load_halves(&z[a as usize], &z[b as usize]);
+            if turns {
+                next = _mm256_add_ps(next, _mm256_mul_ps(beta, load(local)));
+            }
+            store(local, next);
+            done += 2;
+        }
+        done
+    }
+
+    #[target_feature(enable = "avx")]
     fn load(rows: &[Padded; 2]) -> __m256 {
         // SAFETY: two rows hold eight numbers.
         unsafe { _mm256_loadu_ps(rows.as_ptr().cast()) }
@@ -209,46 +224,23 @@ mod avx {
 /// p ← z + β p; z if β = 0, also where p is not finite.
 #[inline(always)]
 pub fn direction(p: &mut Padded, z: &Padded, beta: f32) {
-    *p = if beta == 0.0 { *z } else { row::add_product(z, beta, p) };
+    *p = if beta == 0.0 { *z } else { std::array::from_fn(|k| z[k] + beta * p[k]) };
 }
 
 /// local ← z\[copies\] + β local (z\[copies\] if β = 0).
-#[inline(always)]
+#[inline]
 pub fn gather_direction(local: &mut [Padded], copies: &[u32], z: &[Padded], beta: f32) {
-    if beta == 0.0 {
-        for (local, &copy) in local.iter_mut().zip(copies) {
-            *local = z[copy as usize];
-        }
-    } else {
-        for (local, &copy) in local.iter_mut().zip(copies) {
-            *local = row::add_product(&z[copy as usize], beta, local);
-        }
-    }
-}
-
-/// One row at a time in one register: left to itself the compiler takes rows apart.
-mod row {
-    use super::Padded;
-
-    /// z + β p.
     #[cfg(target_arch = "x86_64")]
-    #[inline(always)]
-    pub fn add_product(z: &Padded, beta: f32, p: &Padded) -> Padded {
-        use std::arch::x86_64::{_mm_add_ps, _mm_loadu_ps, _mm_mul_ps, _mm_set1_ps, _mm_storeu_ps};
-        let mut sum = [0.0; 4];
-        // SAFETY: SSE belongs to x86-64, and a row holds four numbers.
-        unsafe {
-            let product = _mm_mul_ps(_mm_set1_ps(beta), _mm_loadu_ps(p.as_ptr()));
-            _mm_storeu_ps(sum.as_mut_ptr(), _mm_add_ps(_mm_loadu_ps(z.as_ptr()), product));
-        }
-        sum
-    }
-
-    /// z + β p.
+    let done = if std::arch::is_x86_feature_detected!("avx") {
+        // SAFETY: the instructions were detected.
+        unsafe { avx::gather_direction(local, copies, z, beta) }
+    } else {
+        0
+    };
     #[cfg(not(target_arch = "x86_64"))]
-    #[inline(always)]
-    pub fn add_product(z: &Padded, beta: f32, p: &Padded) -> Padded {
-        std::array::from_fn(|k| z[k] + beta * p[k])
+    let done = 0;
+    for (local, &copy) in local.iter_mut().zip(copies).skip(done) {
+        direction(local, &z[copy as usize], beta);
     }
 }
 
@@ -292,11 +284,19 @@ mod tests {
     #[test]
     fn rows_are_worked_on_as_one_after_the_other() {
         for n in [0, 1, 2, 31, 256] {
+            let copies: Vec<u32> = (0..n as u32).map(|i| (5 * i + 3) % n as u32).collect();
             let sums = rows(n + 5, 1);
             let pairs: Vec<[u32; 2]> = (0..n as u32).map(|i| [i + 1, (3 * i + 2) % (n as u32 + 5)]).collect();
             let mass: Vec<f32> = (0..n).map(|i| row(i, 2)[0].abs()).collect();
             for beta in [0.0, 0.37] {
                 let (z, before) = (rows(n, 3), if beta == 0.0 { vec![[f32::NAN; 4]; n] } else { rows(n, 4) });
+                let mut local = before.clone();
+                gather_direction(&mut local, &copies, &z, beta);
+                for (i, &copy) in copies.iter().enumerate() {
+                    let mut expected = before[i];
+                    direction(&mut expected, &z[copy as usize], beta);
+                    assert_eq!(local[i], expected);
+                }
                 let (mut p, mut q) = (before.clone(), vec![[0.0; 4]; n]);
                 let product = advance_direction(&z, beta, (&mass, 1.5), (&pairs, &sums), [&mut p, &mut q]);
                 let (mut expected_p, mut expected_q) = (before, vec![[0.0; 4]; n]);
