@@ -29,5 +29,6 @@ pub mod solver;
 pub mod integrator;
 pub mod estimate;
 pub mod body;
+mod numbering;
 #[cfg(test)]
 mod testing;

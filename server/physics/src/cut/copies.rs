@@ -36,7 +36,6 @@ struct Around {
     /// Where its pieces are among the members.
     members: std::ops::Range<usize>,
     parent: u32,
-    holds_node: bool,
 }
 
 impl CopyTable {
@@ -108,11 +107,12 @@ impl CopyTable {
         let components = std::mem::take(&mut self.components);
         for (k, component) in components.iter().enumerate() {
             let parent = component.parent;
-            let heir = components
-                .iter()
-                .position(|c| c.parent == parent && c.holds_node)
-                .or_else(|| components.iter().position(|c| c.parent == parent));
-            let id = if heir == Some(k) {
+            let mut same = (0..components.len()).filter(|&c| components[c].parent == parent);
+            let first = same.clone().next();
+            // Nothing has to be looked for where the component keeps its copy to itself.
+            let alone = same.clone().nth(1).is_none();
+            let heir = same.find(|&c| alone || self.holds_node(&components[c], i, fragments, pieces));
+            let id = if heir.or(first) == Some(k) {
                 self.volume[parent as usize] = 0.0;
                 parent
             } else {
@@ -135,6 +135,13 @@ impl CopyTable {
             }
         }
         self.components = components;
+    }
+
+    /// Whether the material of a component contains node `i` itself.
+    fn holds_node(&self, component: &Around, i: u32, fragments: &Fragments, pieces: &PieceTable) -> bool {
+        self.members[component.members.clone()]
+            .iter()
+            .any(|&p| pieces.fragments(p, fragments).any(|t| fragments.tets[t as usize].contains(&i)))
     }
 
     fn find_components_around(&mut self, mesh: &TetMesh, i: u32, fragments: &Fragments, pieces: &PieceTable) {
@@ -164,13 +171,12 @@ impl CopyTable {
         let first = &pieces.pieces[seed as usize];
         let a = mesh.tets[first.element as usize].iter().position(|&n| n == i).unwrap_or(0);
         let start = self.members.len();
-        let mut component = Around { members: start..start, parent: first.copies[a], holds_node: false };
+        let mut component = Around { members: start..start, parent: first.copies[a] };
         self.visited[seed as usize] = self.stamp;
         self.stack.push(seed);
         while let Some(p) = self.stack.pop() {
             self.members.push(p);
             for t in pieces.fragments(p, fragments) {
-                component.holds_node |= fragments.tets[t as usize].contains(&i);
                 for n in fragments.neighbour[t as usize] {
                     if n == NONE {
                         continue;

@@ -47,6 +47,9 @@ pub fn edge_key(a: u32, b: u32) -> u64 {
 #[derive(Clone, Debug, Default)]
 pub struct Crossings {
     by_edge: HashMap<u64, OfEdge, BuildHasherDefault<EdgeHasher>>,
+    /// Whether an edge at the vertex was ever crossed; beyond the end none was. Most vertices that are
+    /// asked for lie on a sheet, where no edge is, and need no look into the table.
+    at_vertex: Vec<bool>,
 }
 
 /// The crossings of one edge: incision, and parameter counted from the vertex with the smaller id.
@@ -58,22 +61,32 @@ struct OfEdge {
 }
 
 impl Crossings {
+    fn of_edge(&self, a: u32, b: u32) -> Option<&OfEdge> {
+        let crossed = |v: u32| self.at_vertex.get(v as usize) == Some(&true);
+        if crossed(a) && crossed(b) { self.by_edge.get(&edge_key(a, b)) } else { None }
+    }
+
     /// Parameter, counted from `a` to `b`, at which the incision crosses the edge.
     pub fn get(&self, a: u32, b: u32, incision: u32) -> Option<f64> {
-        let OfEdge { first, further } = self.by_edge.get(&edge_key(a, b))?;
+        let OfEdge { first, further } = self.of_edge(a, b)?;
         let t = if first.0 == incision { first.1 } else { further.iter().find(|c| c.0 == incision)?.1 };
         Some(if a < b { t } else { 1.0 - t })
     }
 
     /// All crossings of the edge, parameters counted from the vertex with the smaller id.
     pub fn of(&self, a: u32, b: u32) -> impl Iterator<Item = (u32, f64)> + '_ {
-        let found = self.by_edge.get(&edge_key(a, b));
+        let found = self.of_edge(a, b);
         found.into_iter().flat_map(|of| std::iter::once(of.first).chain(of.further.iter().copied()))
     }
 
     /// Records a crossing at `t` from `a` to `b`, unless the incision has one there already.
     pub fn insert(&mut self, a: u32, b: u32, incision: u32, t: f64) {
         let t = if a < b { t } else { 1.0 - t };
+        let last = a.max(b) as usize;
+        if last >= self.at_vertex.len() {
+            self.at_vertex.resize(last + 1, false);
+        }
+        [a, b].iter().for_each(|&v| self.at_vertex[v as usize] = true);
         match self.by_edge.entry(edge_key(a, b)) {
             Entry::Vacant(none) => {
                 none.insert(OfEdge { first: (incision, t), further: Vec::new() });
@@ -89,7 +102,7 @@ impl Crossings {
 
     /// Gives the edge (new, other) the crossings of the edge (old, other).
     pub fn inherit(&mut self, old: u32, new: u32, other: u32) {
-        let Some(of) = self.by_edge.get(&edge_key(old, other)) else { return };
+        let Some(of) = self.of_edge(old, other) else { return };
         let OfEdge { first, further } = of.clone(); // hardly ever with more than nothing in `further`
         for (incision, t) in std::iter::once(first).chain(further) {
             self.insert(new, other, incision, if old < other { t } else { 1.0 - t });

@@ -15,6 +15,7 @@ use super::fragments::Fragments;
 use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
+use super::marks::Ascending;
 use super::pending::{Pending, PendingFace, PendingLine, Pieces};
 use super::pieces::{Piece, PieceTable};
 use super::separate::{Separator, Sheet};
@@ -43,6 +44,7 @@ pub struct CutMesh {
     latest: Option<u32>,
     detector: Detector,
     separator: Separator,
+    order: Ascending,
     epoch: u32,
     inexact: bool,
 }
@@ -89,6 +91,7 @@ impl CutMesh {
             latest: None,
             detector: Detector::default(),
             separator: Separator::default(),
+            order: Ascending::default(),
             epoch,
             inexact: false,
         })
@@ -256,13 +259,11 @@ impl CutMesh {
         }
         let mut nodes: Vec<u32> =
             self.separator.elements.iter().flat_map(|&e| self.mesh.tets[e as usize]).collect();
-        nodes.sort_unstable();
-        nodes.dedup();
+        self.order.sort(&mut nodes);
         for node in nodes {
             self.copies.update(&self.mesh, node, &self.fragments, &mut self.pieces, &mut report.new_copies);
         }
-        self.copies.changed.sort_unstable();
-        self.copies.changed.dedup();
+        self.order.sort(&mut self.copies.changed);
         if !self.separator.changed.is_empty() {
             // Faces that are halved or opened but take no piece apart change the surface alone.
             self.epoch += 1;

@@ -7,6 +7,7 @@ use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
 use super::fragments::{Fragments, NONE};
 use super::incision_sets::IncisionSets;
+use super::marks::{Ascending, Marks};
 use super::pieces::PieceTable;
 use super::sweep_triangle::SweepTriangle;
 
@@ -43,7 +44,10 @@ pub struct Detector {
     pub touched: Vec<u32>,
     /// Pieces whose tet may meet the sweep, with the box around it [m].
     candidates: Vec<(u32, Vector3<f64>, Vector3<f64>)>,
-    is_touched: Vec<u32>,
+    /// For every copy one bit for each face of the box around the sweep that it lies beyond.
+    beyond: Vec<u8>,
+    is_touched: Marks,
+    order: Ascending,
     position: Vec<Vector3<f64>>,
     position_stamp: Vec<u32>,
     side: Vec<f64>,
@@ -90,14 +94,20 @@ impl Detector {
         self.candidates.iter().filter(overlaps).map(|c| pieces.pieces[c.0 as usize].copies).collect()
     }
 
-    /// Finds the pieces whose tet overlaps the box [m].
+    /// Finds the pieces whose tet has a bounding box that overlaps this one [m]: those whose corners are
+    /// not all beyond the same face of it.
     pub fn find_candidates(&mut self, body: &Deformed, low: &Vector3<f64>, high: &Vector3<f64>) {
+        let beyond = |x: &Vector3<f64>| {
+            (0..3).fold(0, |faces, k| faces << 2 | u8::from(x[k] < low[k]) << 1 | u8::from(x[k] > high[k]))
+        };
+        self.beyond.clear();
+        self.beyond.extend(body.x.iter().map(beyond));
         self.candidates.clear();
         for (p, piece) in (0u32..).zip(&body.pieces.pieces) {
-            let [a, b, c, d] = piece.copies.map(|c| &body.x[c as usize]);
-            let (piece_low, piece_high) = (a.inf(b).inf(&c.inf(d)), a.sup(b).sup(&c.sup(d)));
-            if (0..3).all(|k| piece_low[k] <= high[k] && low[k] <= piece_high[k]) {
-                self.candidates.push((p, piece_low, piece_high));
+            let [a, b, c, d] = piece.copies.map(|c| self.beyond[c as usize]);
+            if a & b & c & d == 0 {
+                let [a, b, c, d] = piece.copies.map(|c| &body.x[c as usize]);
+                self.candidates.push((p, a.inf(b).inf(&c.inf(d)), a.sup(b).sup(&c.sup(d))));
             }
         }
     }
@@ -106,7 +116,7 @@ impl Detector {
     pub fn run(&mut self, body: &Deformed, triangles: &[SweepTriangle], record: &mut Record) {
         self.touched.clear();
         self.sweep_stamp += 1;
-        self.is_touched.resize(record.fragments.tets.len(), 0);
+        self.is_touched.restart(record.fragments.tets.len());
         let n = record.fragments.vertices.len();
         self.position.resize(n, Vector3::zeros());
         self.position_stamp.resize(n, 0);
@@ -124,7 +134,7 @@ impl Detector {
         }
         self.mark_faces_at_the_sheet(body, triangles, record);
         // The order in which fragments are separated must not depend on that of the triangles.
-        self.touched.sort_unstable();
+        self.order.sort(&mut self.touched);
     }
 
     fn test_piece(&mut self, body: &Deformed, triangle: &SweepTriangle, p: u32, record: &mut Record) {
@@ -146,8 +156,7 @@ impl Detector {
     }
 
     fn touch(&mut self, t: u32) {
-        if self.is_touched[t as usize] != self.sweep_stamp {
-            self.is_touched[t as usize] = self.sweep_stamp;
+        if self.is_touched.insert(t) {
             self.touched.push(t);
         }
     }

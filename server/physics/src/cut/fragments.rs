@@ -193,8 +193,8 @@ impl Fragments {
     pub fn wedge(&self, t: u32, a: u32, b: u32, out: &mut Vec<u32>) {
         out.clear();
         out.push(t);
-        let others: Vec<u32> = self.tets[t as usize].iter().copied().filter(|&v| v != a && v != b).collect();
-        let &[c, d] = others.as_slice() else { return };
+        let mut others = self.tets[t as usize].into_iter().filter(|&v| v != a && v != b);
+        let (Some(c), Some(d), None) = (others.next(), others.next(), others.next()) else { return };
         for (mut opposite, mut pivot) in [(c, d), (d, c)] {
             let mut current = t;
             // Leave through the face opposite `opposite`; it holds a, b and `pivot`.

@@ -28,6 +28,7 @@ impl IncisionSets {
     pub const EMPTY: u32 = 0;
 
     /// Whether the incision is in the set.
+    #[inline]
     pub fn contains(&self, set: u32, incision: u32) -> bool {
         match set {
             Self::EMPTY => false,

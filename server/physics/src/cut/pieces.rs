@@ -33,6 +33,8 @@ pub struct PieceTable {
     label: Vec<u32>,
     stack: Vec<u32>,
     members: Vec<u32>,
+    /// Present pieces of an element and what they were part of before.
+    kept: Vec<[u32; 2]>,
 }
 
 impl PieceTable {
@@ -51,6 +53,7 @@ impl PieceTable {
             label: Vec::new(),
             stack: Vec::new(),
             members: Vec::new(),
+            kept: Vec::new(),
         };
         leave_room(&mut table.pieces);
         leave_room(&mut table.node_volume);
@@ -84,8 +87,8 @@ impl PieceTable {
         for &t in &members {
             self.label[t as usize] = NONE;
         }
-        // Present pieces and what they were part of before.
-        let mut kept: Vec<[u32; 2]> = Vec::new();
+        let mut kept = std::mem::take(&mut self.kept);
+        kept.clear();
         for &seed in &members {
             if self.label[seed as usize] != NONE {
                 continue;
@@ -110,7 +113,7 @@ impl PieceTable {
         for k in first..changed.len() {
             self.measure(mesh, changed[k], fragments);
         }
-        self.members = members;
+        (self.members, self.kept) = (members, kept);
     }
 
     /// Fraction and ∫ N_a dV of piece `p` from its fragments.
@@ -122,8 +125,11 @@ impl PieceTable {
             let part = fragments.fraction[t as usize];
             fraction += part;
             for v in fragments.tets[t as usize] {
-                for (sum, &node) in integral.iter_mut().zip(&nodes) {
-                    *sum += part * fragments.vertices[v as usize].weight_of(node);
+                let vertex = &fragments.vertices[v as usize];
+                for (node, weight) in vertex.nodes.into_iter().zip(vertex.weights) {
+                    if let Some(a) = nodes.iter().position(|&n| n == node) {
+                        integral[a] += part * weight;
+                    }
                 }
             }
         }

@@ -14,7 +14,7 @@ use crate::mesh::{TET_EDGES, TET_FACES};
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
 use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
 use super::incision_sets::IncisionSets;
-use super::marks::Marks;
+use super::marks::{Ascending, Marks};
 use super::pending::Pending;
 
 /// Work list and result of a separation.
@@ -36,13 +36,18 @@ pub struct Separator {
     /// Fragments that were touched or bisected.
     active: Vec<u32>,
     is_active: Marks,
+    /// Fragments in the queue, and the one that was last taken from it.
+    is_queued: Marks,
+    /// Fragments with a crossed edge when they were last looked at.
+    is_crossed: Marks,
     is_changed: Marks,
-    is_cut: Marks,
+    order: Ascending,
     wedge: Vec<u32>,
     halves: Vec<Halves>,
     /// Incisions with something pending before this sweep.
     waiting: Vec<u32>,
     corners: Vec<(u32, u8)>,
+    apexes: Vec<u32>,
 }
 
 /// What a separation changes.
@@ -80,28 +85,39 @@ impl Separator {
         self.refused.clear();
         self.faces_opened = 0;
         self.queue.clear();
-        self.queue.extend(touched);
         sheet.waiting.incisions(&mut self.waiting);
         let n = sheet.fragments.tets.len();
         self.is_changed.restart(n);
-        self.is_cut.restart(sheet.fragments.count.len());
         self.is_active.restart(n);
+        self.is_queued.restart(n);
+        self.is_crossed.restart(n);
         self.active.clear();
-        self.active.extend(touched);
-        touched.iter().for_each(|&t| _ = self.is_active.insert(t));
+        touched.iter().for_each(|&t| self.look_at_later(t));
         while let Some(t) = self.queue.pop_front() {
             while let Some((a, b, s)) = self.edge_to_bisect(t, sheet) {
                 if !self.bisect(t, [a, b], s, sheet) {
                     self.refused.insert(edge_key(a, b));
                 }
             }
+            self.is_queued.remove(t);
         }
         self.open_faces(sheet);
         self.count_pending(sheet);
     }
 
-    /// A crossed edge between two parts of fragment `t`, if the sheet takes it apart.
-    fn edge_to_bisect(&self, t: u32, sheet: &Sheet) -> Option<(u32, u32, f64)> {
+    /// Puts fragment `t` in the queue, unless it waits there already.
+    fn look_at_later(&mut self, t: u32) {
+        if self.is_active.insert(t) {
+            self.active.push(t);
+        }
+        if self.is_queued.insert(t) {
+            self.queue.push_back(t);
+        }
+    }
+
+    /// A crossed edge between two parts of fragment `t`, if the sheet takes it apart. Without one,
+    /// nothing but the bisection of another fragment's edge will change this one.
+    fn edge_to_bisect(&mut self, t: u32, sheet: &Sheet) -> Option<(u32, u32, f64)> {
         let tet = sheet.fragments.tets[t as usize];
         let mut part = [0usize, 1, 2, 3];
         let mut crossed = [None; 6];
@@ -116,6 +132,11 @@ impl Separator {
                 part.iter_mut().filter(|p| **p == drop).for_each(|p| *p = keep);
             }
         }
+        if crossed == [None; 6] {
+            self.is_crossed.remove(t);
+            return None;
+        }
+        self.is_crossed.insert(t);
         TET_EDGES.into_iter().zip(crossed).find_map(|([i, j], s)| {
             let s = s.filter(|_| part[i] != part[j])?;
             (!self.refused.contains(&edge_key(tet[i], tet[j]))).then_some((tet[i], tet[j], s))
@@ -128,8 +149,9 @@ impl Separator {
         let fragments = &mut *sheet.fragments;
         fragments.wedge(t, a, b, &mut self.wedge);
         let full = |e: u32| {
-            let more = self.wedge.iter().filter(|&&w| fragments.element[w as usize] == e).count();
-            usize::from(fragments.count[e as usize]) + more > usize::from(MAX_FRAGMENTS_PER_ELEMENT)
+            let (present, most) = (fragments.count[e as usize], usize::from(MAX_FRAGMENTS_PER_ELEMENT));
+            let more = || self.wedge.iter().filter(|&&w| fragments.element[w as usize] == e).count();
+            usize::from(present) + self.wedge.len() > most && usize::from(present) + more() > most
         };
         if self.wedge.iter().any(|&w| full(fragments.element[w as usize])) {
             return false;
@@ -141,12 +163,11 @@ impl Separator {
         fragments.on.push(sheet.sets.with(both, sheet.incision));
         let along = sheet.sets.with(IncisionSets::EMPTY, sheet.incision);
         fragments.bisect(&self.wedge, [a, b], (m, s), along, &mut self.halves);
-        for h in &self.halves {
+        for k in 0..self.halves.len() {
+            let h = self.halves[k];
             sheet.waiting.inherit(&self.waiting, h.old, h.new);
             for t in [h.old, h.new] {
-                if self.is_active.insert(t) {
-                    self.active.push(t);
-                }
+                self.look_at_later(t);
                 if self.is_changed.insert(t) {
                     self.changed.push(t);
                 }
@@ -154,7 +175,6 @@ impl Separator {
             if sheet.fragments.neighbour[h.new as usize][h.slot as usize] == NONE {
                 self.moved.push([h.old, h.new].map(|t| 4 * t + u32::from(h.slot)));
             }
-            self.queue.extend([h.old, h.new]);
         }
         self.pass_on_crossings([a, b], m, s, sheet);
         true
@@ -162,11 +182,11 @@ impl Separator {
 
     /// Gives the crossings of *other* incisions on (a, b) to its halves, and to the new edges from `m`
     /// into the fragments where their line across a face demands one.
-    fn pass_on_crossings(&self, [a, b]: [u32; 2], m: u32, s: f64, sheet: &mut Sheet) {
+    fn pass_on_crossings(&mut self, [a, b]: [u32; 2], m: u32, s: f64, sheet: &mut Sheet) {
         let incision = sheet.incision;
         let others: Vec<u32> =
             sheet.crossings.of(a, b).map(|c| c.0).filter(|&other| other != incision).collect();
-        for other in others {
+        for &other in &others {
             let Some(t) = sheet.crossings.get(a, b, other) else { continue };
             if (t - s).abs() <= SNAP {
                 let on = &mut sheet.fragments.on[m as usize];
@@ -177,18 +197,18 @@ impl Separator {
                 sheet.crossings.insert(m, b, other, (t - s) / (1.0 - s));
             }
         }
-        let mut apexes: Vec<u32> = Vec::new();
+        self.apexes.clear();
         for h in &self.halves {
             for v in sheet.fragments.tets[h.old as usize] {
-                if v != a && v != m && !apexes.contains(&v) {
-                    apexes.push(v);
+                if v != a && v != m && !self.apexes.contains(&v) {
+                    self.apexes.push(v);
                 }
             }
         }
-        for c in apexes {
-            let mut pending: Vec<u32> = Vec::new();
-            for (p, q) in [(a, m), (m, b), (a, c), (b, c)] {
-                pending.extend(sheet.crossings.of(p, q).map(|x| x.0).filter(|&o| o != incision));
+        for &c in &self.apexes {
+            let mut pending = others.clone(); // hardly ever with anything in it
+            for end in [a, b] {
+                pending.extend(sheet.crossings.of(end, c).map(|x| x.0).filter(|&o| o != incision));
             }
             pending.sort_unstable();
             pending.dedup();
@@ -226,15 +246,12 @@ impl Separator {
                     if self.is_changed.insert(t) {
                         self.changed.push(t);
                     }
-                    let e = sheet.fragments.element[t as usize];
-                    if self.is_cut.insert(e) {
-                        self.elements.push(e);
-                    }
+                    self.elements.push(sheet.fragments.element[t as usize]);
                     self.corners.extend((0..4u8).filter(|&k| Some(k as usize) != face).map(|k| (t, k)));
                 }
             }
         }
-        self.elements.sort_unstable();
+        self.order.sort(&mut self.elements);
         let crossings = &mut *sheet.crossings;
         sheet.fragments.split_stars(&self.corners, |fragments, old, [t, new]| {
             for v in fragments.tets[t as usize] {
@@ -247,15 +264,15 @@ impl Separator {
 
     fn count_pending(&mut self, sheet: &mut Sheet) {
         for &t in &self.active {
-            let tet = sheet.fragments.tets[t as usize];
-            let mut crossed = false;
-            for [i, j] in TET_EDGES {
-                if sheet.crossing(tet[i], tet[j]).is_some() {
-                    self.pending.insert(edge_key(tet[i], tet[j]));
-                    crossed = true;
-                }
-            }
+            let crossed = self.is_crossed.contains(t);
             sheet.waiting.set(sheet.incision, t, crossed);
+            if !crossed {
+                continue;
+            }
+            let tet = sheet.fragments.tets[t as usize];
+            let edges = TET_EDGES.map(|[i, j]| [tet[i], tet[j]]).into_iter();
+            let edges = edges.filter(|&[a, b]| sheet.crossing(a, b).is_some());
+            self.pending.extend(edges.map(|[a, b]| edge_key(a, b)));
         }
     }
 }

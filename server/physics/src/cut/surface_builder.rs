@@ -62,7 +62,7 @@ pub struct SurfaceBuilder {
     cycle: Vec<u32>,
     /// Per corner the last update that walked it.
     seen: Vec<u32>,
-    /// Per surface vertex the last update in which a cycle took its number.
+    /// Per surface vertex the last update that bound it, because a cycle took its number or otherwise.
     claimed: Vec<u32>,
     stamp: u32,
 }
@@ -294,8 +294,9 @@ impl SurfaceBuilder {
         }
     }
 
-    /// Surface vertices of pieces that have other copies now.
-    fn bind_again(&self, material: &Material, pieces: &[u32], surface: &mut Surface) {
+    /// Surface vertices of pieces that have other copies now, as far as they were not walked. All pieces
+    /// around a vertex have the same copies of the nodes it lies between, so any of them will do.
+    fn bind_again(&mut self, material: &Material, pieces: &[u32], surface: &mut Surface) {
         let fragments = material.fragments;
         for &p in pieces {
             for t in material.pieces.fragments(p, fragments) {
@@ -303,9 +304,12 @@ impl SurfaceBuilder {
                 {
                     let f = self.face_at[4 * t as usize + k];
                     for c in 3 * f..3 * f + 3 {
-                        let (_, v) = self.fragment_corner(fragments, c);
-                        surface.vertices[self.corner[c as usize] as usize] =
-                            bind(material.mesh, material.pieces, p, &fragments.vertices[v as usize]);
+                        let id = self.corner[c as usize] as usize;
+                        if std::mem::replace(&mut self.claimed[id], self.stamp) != self.stamp {
+                            let (_, v) = self.fragment_corner(fragments, c);
+                            surface.vertices[id] =
+                                bind(material.mesh, material.pieces, p, &fragments.vertices[v as usize]);
+                        }
                     }
                 }
             }

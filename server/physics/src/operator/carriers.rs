@@ -6,6 +6,7 @@
 
 use super::chunks::NO_PIECE;
 use crate::cut::Piece;
+use crate::numbering::Numbering;
 
 /// Which piece's lane integrates which pieces.
 #[derive(Debug, Default)]
@@ -18,6 +19,9 @@ pub struct Carriers {
     first_in_element: Vec<u32>,
     next_in_element: Vec<u32>,
     members: Vec<u32>,
+    /// Elements with a changed piece.
+    elements: Vec<u32>,
+    numbering: Numbering,
 }
 
 /// The pieces of one carrier, as one.
@@ -32,7 +36,7 @@ pub struct Merged {
 /// What a cut did to the lanes.
 #[derive(Debug, Default)]
 pub struct LaneChanges {
-    /// Carriers that were carriers before and have other copies or other pieces now, by element.
+    /// Carriers that were carriers before and have other copies or other pieces now.
     pub amended: Vec<u32>,
     /// New carriers, ascending, and the carrier that had their material before ([`NO_PIECE`] if none).
     pub added: Vec<[u32; 2]>,
@@ -54,15 +58,15 @@ impl Carriers {
         for p in known as u32..pieces.len() as u32 {
             self.append(p, pieces[p as usize].element);
         }
-        let mut by_element: Vec<[u32; 2]> =
-            changed.iter().map(|&p| [pieces[p as usize].element, p]).collect();
-        by_element.sort_unstable();
         let mut changes = LaneChanges::default();
-        for changed in by_element.chunk_by(|a, b| a[0] == b[0]) {
-            // Pieces that are new come from those that were there and changed.
-            let [element, first] = changed[0];
-            let source = if (first as usize) < known { self.of_piece[first as usize] } else { NO_PIECE };
-            self.regroup(element, source, known, pieces, &mut changes);
+        self.elements.clear();
+        for &p in changed {
+            let element = pieces[p as usize].element;
+            if self.numbering.insert(&mut self.elements, element) {
+                // Pieces that are new come from those that were there and changed.
+                let source = if (p as usize) < known { self.of_piece[p as usize] } else { NO_PIECE };
+                self.regroup(element, source, known, pieces, &mut changes);
+            }
         }
         changes.added.sort_unstable();
         changes

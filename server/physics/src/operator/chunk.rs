@@ -10,6 +10,7 @@ use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
 use super::{Padded, padded};
 use crate::element::{LANES, Simd};
 use crate::mesh::TetMesh;
+use crate::numbering::Numbering;
 
 #[derive(Clone, Debug)]
 pub struct Chunk {
@@ -108,31 +109,36 @@ impl Chunk {
         merged: &[Merged],
         is_amended: &[bool],
         added: &[NewLane],
+        numbering: &mut Numbering,
     ) -> bool {
         let amended: Vec<(u32, usize, usize)> =
             self.lanes().filter(|&(p, ..)| is_amended[p as usize]).collect();
-        let mut new: Vec<(u32, u32)> = (amended.iter().map(|lane| lane.0))
-            .chain(added.iter().map(|lane| lane.piece))
-            .map(|p| &merged[p as usize].piece)
-            .flat_map(|piece| piece.copies.into_iter().zip(mesh.tets[piece.element as usize]))
-            .filter(|(copy, _)| self.copies.binary_search(copy).is_err())
-            .collect();
-        new.sort_unstable();
-        new.dedup();
+        let known = self.copies.len();
+        numbering.note(&self.copies, 0);
+        // Copies that are new to the chunk, and their nodes.
+        let mut new: Vec<(u32, u32)> = Vec::new();
+        for p in amended.iter().map(|lane| lane.0).chain(added.iter().map(|lane| lane.piece)) {
+            let piece = &merged[p as usize].piece;
+            let held = piece.copies.into_iter().zip(mesh.tets[piece.element as usize]);
+            new.extend(held.filter(|&(copy, _)| numbering.insert(&mut self.copies, copy)));
+        }
+        self.copies.truncate(known);
         let [planned_lanes, planned_copies] = self.planned;
-        let n_copies = self.copies.len() + new.len();
+        let n_copies = known + new.len();
         if self.n_lanes + added.len() > planned_lanes + planned_lanes / 4
             || n_copies > planned_copies + planned_copies / 2
         {
             return false;
         }
+        new.sort_unstable();
         self.copies.extend(new.iter().map(|n| n.0));
         self.rest.extend(new.iter().map(|n| mesh.nodes[n.1 as usize]));
         debug_assert!(self.copies.is_sorted());
+        numbering.note(&self.copies, known);
         let n = n_copies + 1;
         let copies = &self.copies;
         let locals = |p: u32| {
-            let local = |copy| copies.binary_search(&copy).map_or(n - 1, |local| local) as u16;
+            let local = |copy| numbering.find(copies, copy).unwrap_or(n - 1) as u16;
             merged[p as usize].piece.copies.map(local)
         };
         let held: Vec<[u16; 4]> = added.iter().map(|new| locals(new.piece)).collect();

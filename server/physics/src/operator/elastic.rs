@@ -12,6 +12,7 @@ use crate::cut::Piece;
 use crate::element::Simd;
 use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
+use crate::numbering::Numbering;
 use crate::team::{Team, blocks, ranges};
 
 /// Most lanes of one chunk: four copies each must leave room in 16-bit local numbers.
@@ -51,6 +52,8 @@ pub struct Elastic {
     made_with: Option<(Coefficients, bool)>,
     /// Counts the changes of the stiffness.
     version: u64,
+    /// Scratch of [`Self::follow`].
+    numbering: Numbering,
 }
 
 /// Where a piece is kept.
@@ -90,6 +93,7 @@ impl Elastic {
             choice: OperatorChoice::Auto,
             made_with: None,
             version: 0,
+            numbering: Numbering::default(),
         };
         elastic.plan(mesh, &vec![true; n_regions], &[]);
         elastic.arrange_sums(n_copies);
@@ -114,11 +118,12 @@ impl Elastic {
                 marks.source[source as usize] = true;
             }
         }
-        let known = self.rotations_of(&marks.source, &affected);
+        let (sources, rotations) = self.rotations_of(&marks.source, &affected);
+        self.numbering.note(&sources, 0);
         let mut added = vec![Vec::new(); self.n_regions];
         let rotation = |source: u32| {
-            let found = known.binary_search_by_key(&source, |known| known.0);
-            found.map_or_else(|_| Matrix3::identity(), |at| known[at].1)
+            let found = self.numbering.find(&sources, source);
+            found.map_or_else(Matrix3::identity, |at| rotations[at])
         };
         for &[piece, source] in &changes.added {
             added[region_of(piece)].push(NewLane { piece, rotation: rotation(source) });
@@ -128,7 +133,7 @@ impl Elastic {
         for chunk in self.chunks.iter_mut().rev().filter(|chunk| affected[chunk.region]) {
             // New lanes go to the last chunk of their region.
             let added = std::mem::take(&mut added[chunk.region]);
-            if !chunk.follow(mesh, merged, &marks.amended, &added) {
+            if !chunk.follow(mesh, merged, &marks.amended, &added, &mut self.numbering) {
                 outgrown[chunk.region] = true;
                 late.extend(added);
             }
@@ -175,15 +180,12 @@ impl Elastic {
         }
     }
 
-    /// Rotation of every marked carrier in these regions, ascending.
-    fn rotations_of(&self, marked: &[bool], regions: &[bool]) -> Vec<(u32, Matrix3<f32>)> {
-        let mut found = Vec::new();
-        for chunk in self.chunks.iter().filter(|chunk| regions[chunk.region]) {
-            let lanes = chunk.lanes().filter(|&(p, ..)| marked[p as usize]);
-            found.extend(lanes.map(|(p, batch, lane)| (p, chunk.rotation(batch, lane))));
-        }
-        found.sort_unstable_by_key(|found| found.0);
-        found
+    /// The marked carriers in these regions, and their rotations.
+    fn rotations_of(&self, marked: &[bool], regions: &[bool]) -> (Vec<u32>, Vec<Matrix3<f32>>) {
+        let chunks = self.chunks.iter().filter(|chunk| regions[chunk.region]);
+        let lanes = chunks.flat_map(|chunk| chunk.lanes().map(move |lane| (chunk, lane)));
+        let lanes = lanes.filter(|(_, (p, ..))| marked[*p as usize]);
+        lanes.map(|(chunk, (p, batch, lane))| (p, chunk.rotation(batch, lane))).unzip()
     }
 
     /// Chooses how K̂ is applied from the next update on. The choices differ in the last bits.
