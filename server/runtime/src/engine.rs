@@ -6,6 +6,7 @@ use scindo_world::inputs::{Inputs, Wants};
 use scindo_world::results::{Results, ResultsError};
 use scindo_world::simulation::{SimBody, Simulation, StepReport};
 use scindo_world::snapshot::Snapshot;
+use scindo_world::tool::SCRIPT;
 
 use crate::convert::{to_shape, to_vec3};
 use crate::error::RuntimeError;
@@ -46,7 +47,7 @@ impl Engine {
         let tools = scene.tools.iter().map(|tool| ToolInfo {
             id: tool.id.clone(),
             shape: Some(to_shape(&tool.shape)),
-            owner: if tool.path.is_empty() { String::new() } else { "script".to_owned() },
+            owner: if tool.path.is_empty() { String::new() } else { SCRIPT.to_owned() },
             cuts: tool.cuts(),
         });
         SessionInfo {

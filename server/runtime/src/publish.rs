@@ -12,7 +12,8 @@ use scindo_proto::messages::{
     SurfaceTopology, ToolState, ToolStats,
 };
 use scindo_proto::{Chunk, KeySpace, Topic, WireMessage, encode, encoding};
-use scindo_world::snapshot::Snapshot;
+use scindo_world::snapshot::{Snapshot, ToolSnapshot};
+use scindo_world::tool::SCRIPT;
 use triple_buffer::Output;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority, Reliability};
@@ -38,6 +39,9 @@ const LONGEST_PERIOD: Duration = Duration::from_secs(60);
 
 /// The plan is repeated this often for those who joined late.
 const PLAN_PERIOD: Duration = Duration::from_secs(2);
+
+/// Tools are told this often when no new snapshot comes: who joins a paused simulation sees them too.
+const TOOLS_PERIOD: Duration = Duration::from_millis(500);
 
 /// A query for the keyframe of body `body`.
 pub struct KeyframeQuery {
@@ -105,6 +109,7 @@ pub struct PublishThread {
     pose_counts: BTreeMap<Arc<str>, u64>,
     next_stats: Instant,
     next_plan: Instant,
+    next_tools: Instant,
 }
 
 impl PublishThread {
@@ -143,6 +148,7 @@ impl PublishThread {
             pose_counts: BTreeMap::new(),
             next_stats: Instant::now(),
             next_plan: Instant::now(),
+            next_tools: Instant::now(),
             sources,
         })
     }
@@ -175,9 +181,13 @@ impl PublishThread {
     }
 
     fn publish_frame(&mut self) {
-        if std::mem::take(&mut self.fresh) {
+        let fresh = std::mem::take(&mut self.fresh);
+        if fresh {
             self.publish_surfaces();
-            self.publish_tools();
+        }
+        if fresh || Instant::now() >= self.next_tools {
+            self.next_tools = Instant::now() + TOOLS_PERIOD;
+            self.publish_tools(fresh);
         }
     }
 
@@ -223,10 +233,18 @@ impl PublishThread {
         }
     }
 
-    fn publish_tools(&mut self) {
+    /// An old snapshot may hold tools that a client has put away since: of those nothing is said.
+    fn publish_tools(&mut self, fresh: bool) {
         self.tool_states += 1;
         let snapshot = self.sources.snapshots.output_buffer();
+        let put_away = |tool: &ToolSnapshot| {
+            let by_client = !tool.owner.is_empty() && *tool.owner != *SCRIPT;
+            !fresh && by_client && !self.exchange.inbox().held().any(|held| held.id == tool.id)
+        };
         for tool in &snapshot.tools {
+            if put_away(tool) {
+                continue;
+            }
             let state = to_tool_state(snapshot, tool, self.tool_states);
             if !self.tools.contains_key(&tool.id) {
                 let Ok(id) = Chunk::new("tool id", &tool.id) else { continue };

@@ -10,7 +10,11 @@ use scindo::engine::Engine;
 use scindo::server::{Server, ServerConfig};
 use scindo::session::{NetworkConfig, Sessions};
 use scindo_client::messages::{
-    BladeSegment, Pose, ToolSample, Vec3, cut_ack::Outcome, haptic_contact, tool_sample::Mode,
+    BladeSegment, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,
+    cut_ack::Outcome,
+    haptic_contact,
+    tool_sample::Mode,
+    tool_shape::{Kind, Sphere},
 };
 use scindo_client::{Link, LinkConfig, LinkError, Role};
 use scindo_proto::{Chunk, Topic, encode, encoding};
@@ -138,6 +142,77 @@ async fn a_late_joiner_sees_the_same_surface() {
             && a.frame.positions == b.frame.positions
     })
     .await;
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_joins_a_paused_simulation_sees_the_tools_that_are_held() {
+    let mut running = Running::start();
+    let early = running.link(Role::Client, "early").await;
+    {
+        let mut gone = early.guest_tool("guest").await.unwrap();
+        let shape = ToolShape { kind: Some(Kind::Sphere(Sphere { radius_m: 0.004 })) };
+        let held = || running.server().exchange().inbox().held().count();
+        until("the guest's tool is known", || {
+            gone.send(ToolSample { shape: Some(shape), ..at(0.04, 0.02, 0.1) }).unwrap();
+            held() == 1
+        })
+        .await;
+        let mut states = early.tool_states().await.unwrap();
+        while !states.next().await.unwrap().contains_key("guest") {}
+        early.pause(true).await.unwrap();
+    }
+    until("the guest's tool is put away", || running.server().exchange().inbox().held().next().is_none())
+        .await;
+    let late = running.link(Role::Viewer, "late").await;
+    let mut states = late.tool_states().await.unwrap();
+    while states.next().await.unwrap().len() < 2 {}
+    tokio::time::sleep(Duration::from_millis(600)).await;
+    let seen = states.get();
+    assert_eq!(seen.keys().map(String::as_str).collect::<Vec<_>>(), ["probe", "scalpel"]);
+    running.end();
+}
+
+/// Ends of the marks of a frame [m].
+fn marks(frame: &SurfaceFrame) -> Vec<[f32; 3]> {
+    assert_eq!(frame.marks.len(), 24 * frame.mark_count as usize);
+    let coordinates: Vec<f32> =
+        frame.marks.chunks_exact(4).map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap())).collect();
+    coordinates.chunks_exact(3).map(|point| point.try_into().unwrap()).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_scratch_is_drawn_for_everybody_until_the_reset() {
+    let mut running = Running::start();
+    let link = running.link(Role::Viewer, "early").await;
+    let mut mirror = link.mirror("block").await.unwrap();
+    let whole = mirror.next().await.unwrap();
+    assert_eq!(marks(&whole.frame), [[0.0; 3]; 0]);
+    let tool = link.tool("scalpel").await.unwrap();
+    // 2 mm deep in cells of 10 mm, from inside one element to inside another one.
+    let segment = |y: f64| BladeSegment {
+        tip_m: Some(Vec3 { x: 0.043, y, z: 0.018 }),
+        heel_m: Some(Vec3 { x: 0.043, y, z: 0.04 }),
+    };
+    let ack = tool.cutter.cut("block", vec![segment(0.006), segment(0.033)]).await.unwrap();
+    assert_eq!((ack.outcome(), ack.elements_cut), (Outcome::Applied, 0));
+    until("the scratch is drawn", || mirror.latest().unwrap().frame.mark_count > 0).await;
+    link.pause(true).await.unwrap();
+    tokio::time::sleep(Duration::from_millis(200)).await;
+    let drawn = mirror.latest().unwrap();
+    let ends = marks(&drawn.frame);
+    // From the first edge of an element that it crosses, 4 mm from where it enters, to the blade.
+    let length: f32 = ends.chunks_exact(2).map(|mark| (mark[1][1] - mark[0][1]).abs()).sum();
+    assert!((0.022..0.028).contains(&length), "{length} m are drawn: {ends:?}");
+    for [x, y, z] in ends {
+        let on_top = (x - 0.043).abs() < 1e-3 && (0.005..0.034).contains(&y) && (z - 0.02).abs() < 1e-3;
+        assert!(on_top, "[{x}, {y}, {z}] is not on the line");
+    }
+    let late = running.link(Role::Viewer, "late").await;
+    let seen = late.mirror("block").await.unwrap().next().await.unwrap();
+    assert_eq!((seen.frame.sim_step, &seen.frame.marks), (drawn.frame.sim_step, &drawn.frame.marks));
+    link.reset().await.unwrap();
+    until("the scratch is gone", || mirror.latest().unwrap().frame.mark_count == 0).await;
     running.end();
 }
 

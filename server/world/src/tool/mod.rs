@@ -26,6 +26,8 @@ use script::Script;
 
 /// Most tools of a simulation, those of the scene and those brought by clients.
 pub const MAX_TOOLS: usize = 16;
+/// Owner of a tool that a script moves.
+pub const SCRIPT: &str = "script";
 /// Spring of a tool that a client brought [N/m] and its largest force [N].
 const GUEST_SPRING: (f64, f64) = (800.0, 8.0);
 
@@ -149,7 +151,7 @@ impl Tools {
         Self {
             tools: declared.collect(),
             numbers: IncisionNumbers::default(),
-            script: Arc::from("script"),
+            script: Arc::from(SCRIPT),
             nobody: Arc::from(""),
             refused: 0,
             time_s: None,
