@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Sender, TrySendError};
 use scindo_proto::messages::{CutAck, Event, Plan, event};
@@ -14,6 +15,9 @@ use crate::stats::Meter;
 
 /// Messages that may wait for the publisher; beyond it events are dropped and counted.
 pub const OUTGOING: usize = 1024;
+
+/// Information of one name is logged this often.
+const LOG_EVERY: Duration = Duration::from_secs(1);
 
 /// What the publisher sends besides surfaces.
 #[derive(Debug)]
@@ -48,6 +52,8 @@ pub struct Exchange {
     /// Events lost because the publisher was behind.
     pub events_dropped: AtomicU64,
     event_seq: AtomicU64,
+    /// Name and time of the last information in the log.
+    logged: Mutex<Option<(String, Instant)>>,
     outgoing: Sender<Outgoing>,
 }
 
@@ -66,6 +72,7 @@ impl Exchange {
             sim_step: AtomicU64::new(0),
             events_dropped: AtomicU64::new(0),
             event_seq: AtomicU64::new(0),
+            logged: Mutex::new(None),
             outgoing,
         })
     }
@@ -140,11 +147,29 @@ impl Exchange {
         }
     }
 
-    /// Publishes and logs an event.
+    /// False for what follows its like within [`LOG_EVERY`].
+    fn is_news(&self, name: &str) -> bool {
+        let mut logged = self.logged.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((last, at)) = &*logged
+            && last == name
+            && at.elapsed() < LOG_EVERY
+        {
+            return false;
+        }
+        *logged = Some((name.to_owned(), Instant::now()));
+        true
+    }
+
+    /// Publishes and logs an event; the log has one line per [`LOG_EVERY`] of what goes on and on, as a cut
+    /// does while the blade moves.
     pub fn event(&self, level: Level, name: &str, message: String) {
         let level = match level {
             Level::Info => {
-                tracing::info!(name, "{message}");
+                if self.is_news(name) {
+                    tracing::info!(name, "{message}");
+                } else {
+                    tracing::debug!(name, "{message}");
+                }
                 event::Level::Info
             }
             Level::Warning => {

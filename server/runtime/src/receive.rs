@@ -126,6 +126,13 @@ pub fn decode<M: WireMessage>(sample: &Sample) -> Result<M, DecodeError> {
 
 fn announce(exchange: &Exchange, change: Change) {
     match change {
+        // Guests, as the mouse of a page, come and go with a tool of their own name.
+        Change::Taken { tool, owner } if tool == owner => {
+            exchange.event(Level::Info, "tool-taken", format!("'{tool}' takes part"));
+        }
+        Change::Released { tool, owner } if tool == owner => {
+            exchange.event(Level::Info, "tool-released", format!("'{tool}' is put away"));
+        }
         Change::Taken { tool, owner } => {
             exchange.event(Level::Info, "tool-taken", format!("'{owner}' holds tool '{tool}'"));
         }

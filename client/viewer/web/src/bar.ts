@@ -7,7 +7,7 @@ import type { Session } from "./main";
 import { length } from "./units";
 
 const HINTS: Record<HandMode, string> = {
-  orbit: "",
+  orbit: "drag turns the view, the wheel zooms · Poke, Grab and Cut touch the tissue",
   poke: "drag on the tissue to press · wheel sets the depth · drag beside it, Shift or right button turns the view",
   grab: "drag the tissue to pull it · wheel pushes and pulls · drag beside it, Shift or right button turns the view",
   cut: "draw the cut on the tissue · wheel sets its depth · drag beside it, Shift or right button turns the view",

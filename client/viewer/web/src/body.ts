@@ -3,13 +3,15 @@
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, Box3, Vector3 } from "three";
 import { smoothTopology, type RenderTopology } from "./smoothing";
 import { skinMaterial, lipMaterial } from "./tissue";
-import { IncisionMarks } from "./marks";
+import { SkinLines } from "./lines";
 import type { SurfaceFrame, SurfaceTopology } from "../gen/scindo/v1/surface_pb";
 
 export class BodySurface {
   readonly object: Mesh;
   /** Lines along incisions that have not opened yet. */
-  readonly marks = new IncisionMarks();
+  readonly marks = new SkinLines(2.2);
+  /** Where skin ends at a wound. */
+  readonly rims = new SkinLines(1.4);
   readonly bounds = new Box3();
   epoch = -1;
   vertexCount = 0;
@@ -33,7 +35,7 @@ export class BodySurface {
     this.object.frustumCulled = false;
     this.object.castShadow = true;
     this.object.receiveShadow = true;
-    this.object.add(this.marks.object);
+    this.object.add(this.marks.object, this.rims.object);
   }
 
   /** Keeps the topology until the first frame of its epoch gives it positions. */
@@ -71,6 +73,8 @@ export class BodySurface {
     if (!this.stale || !this.render) return;
     this.stale = false;
     this.marks.upload();
+    this.rims.follow(this.render.rims, this.positions);
+    this.rims.upload();
     const position = this.geometry.getAttribute("position") as BufferAttribute;
     const normal = this.geometry.getAttribute("normal") as BufferAttribute;
     gather(this.positions, this.render.source, position.array as Float32Array, this.bounds);
@@ -86,6 +90,7 @@ export class BodySurface {
     this.object.removeFromParent();
     this.geometry.dispose();
     this.marks.dispose();
+    this.rims.dispose();
   }
 
   private adopt(topology: SurfaceTopology): boolean {

@@ -91,8 +91,15 @@ export class Panel {
   }
 
   log(event: Event): void {
+    if (this.isOwn(event)) return;
     const level: Level = event.level === Event_Level.ERROR ? "error" : event.level === Event_Level.WARNING ? "warning" : "info";
     this.line(event.message || event.name, level, event.name);
+  }
+
+  /** Whether an event only tells that this page's mouse comes and goes. */
+  private isOwn(event: Event): boolean {
+    const tool = this.hello?.toolId;
+    return !!tool && /^tool-(taken|released)$/.test(event.name) && event.message.includes(`'${tool}'`);
   }
 
   showRpc(answer: ViewerRpcReply): void {

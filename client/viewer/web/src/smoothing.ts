@@ -15,6 +15,8 @@ export interface RenderTopology {
   skinTriangles: number;
   /** Tag of every triangle, in the order of `index`. */
   tags: Uint32Array;
+  /** Edges between skin and lips: two surface vertices each. */
+  rims: Uint32Array;
 }
 
 /**
@@ -31,6 +33,7 @@ export function smoothTopology(
   const { normals, sliver } = faceNormals(triangles, positions);
   const parent = new Uint32Array(corners);
   for (let c = 0; c < corners; c++) parent[c] = c;
+  const rims: number[] = [];
 
   for (let c = 0; c < corners; c++) {
     const t = (c / 3) | 0;
@@ -41,6 +44,7 @@ export function smoothTopology(
       const next2 = c2 % 3 === 2 ? c2 - 2 : c2 + 1;
       if (triangles[next2] !== a) continue;
       const t2 = (c2 / 3) | 0;
+      if (tags[t] === 0 && tags[t2] !== 0) rims.push(a, b);
       if (t < t2 && tags[t] === tags[t2] && isSmooth(normals, sliver, t, t2)) {
         unite(parent, c, next2);
         unite(parent, next, c2);
@@ -62,7 +66,7 @@ export function smoothTopology(
     }
     index[c] = id[root];
   }
-  return { index, source: source.slice(0, count), skinTriangles, tags };
+  return { index, source: source.slice(0, count), skinTriangles, tags, rims: Uint32Array.from(rims) };
 }
 
 /** Stable partition: skin, then lips, so that each kind is one draw range. */

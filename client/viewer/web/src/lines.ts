@@ -1,24 +1,25 @@
-// What a blade has drawn on the surface without opening it: thin dark lines that lie on the skin.
+// Thin dark lines that lie on the skin: what a blade has drawn without opening it, and the rims of wounds,
+// which are seen where lips lie close to each other.
 
 import { DynamicDrawUsage, InstancedInterleavedBuffer, InterleavedBufferAttribute } from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 
-/** Width of a line [pixels]. */
-const WIDTH = 2.2;
 /** Lines come this share of their distance nearer to the eye, so that the skin below does not hide them. */
 const LIFT = 1.5e-3;
 
-export class IncisionMarks {
+export class SkinLines {
   readonly object: LineSegments2;
-  /** Ends as sent [m]: x y z of both ends, per line. */
+  /** Ends [m]: x y z of both ends, per line. */
   positions: Float32Array = new Float32Array(0);
   private readonly geometry = new LineSegmentsGeometry();
-  private readonly material = new LineMaterial({ color: 0x3d0710, linewidth: WIDTH });
+  private readonly material: LineMaterial;
   private buffer: InstancedInterleavedBuffer | null = null;
 
-  constructor() {
+  /** Width [pixels]. */
+  constructor(width: number) {
+    this.material = new LineMaterial({ color: 0x3d0710, linewidth: width });
     this.material.onBeforeCompile = (shader) => {
       shader.vertexShader = shader.vertexShader.replace(
         "vec4 end = modelViewMatrix * vec4( instanceEnd, 1.0 );",
@@ -37,6 +38,12 @@ export class IncisionMarks {
 
   take(positions: Float32Array | null): void {
     this.positions = positions ?? new Float32Array(0);
+  }
+
+  /** Edges of a surface: two of its vertices each. */
+  follow(edges: Uint32Array, surface: Float32Array): void {
+    if (this.positions.length !== 3 * edges.length) this.positions = new Float32Array(3 * edges.length);
+    for (let k = 0; k < edges.length; k++) this.positions.set(surface.subarray(3 * edges[k], 3 * edges[k] + 3), 3 * k);
   }
 
   /** Brings the lines to the GPU; the buffer grows by half. */
