@@ -66,7 +66,7 @@ def read_probes(folder, steps):
     return ids
 
 
-def read_grid(folder):
+def read_grid(folder, summary):
     """final.vtu by two readers that know nothing of each other."""
     file = str(folder / "final.vtu")
     grid, other = pyvista.read(file), meshio.read(file)
@@ -82,6 +82,9 @@ def read_grid(folder):
         check(np.isfinite(values).all(), f"field {name} is finite")
     fraction = grid.cell_data["volume_fraction"][grid.celltypes == pyvista.CellType.TETRA]
     check((fraction > 0).all() and (fraction <= 1 + 1e-9).all(), "fractions lie in (0, 1]")
+    volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
+    expected = sum(body["volume_m3"] for body in summary["bodies"])
+    check(abs(np.abs(volumes).sum() / expected - 1) < 1e-6, f"no tetrahedra overlap: {volumes.sum()} of {expected} m³")
     return grid
 
 
@@ -204,7 +207,7 @@ def main():
     args = parser.parse_args()
     summary = read_summary(args.folder)
     probes = read_probes(args.folder, summary["steps"])
-    grid = read_grid(args.folder)
+    grid = read_grid(args.folder, summary)
     triangles, tags = surface_of(grid)
     lip, lips = lips_of(grid.points, triangles, tags)
     visible, pixels = picture_of(grid.points, triangles, lip, lips, args.picture)

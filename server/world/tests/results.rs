@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use scindo_world::inputs::Inputs;
+use scindo_world::mesh_in::{MeshFile, read_mesh_bytes};
 use scindo_world::results::Results;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
@@ -79,9 +80,24 @@ fn summary_probes_and_fields_are_complete() {
     let pvd = std::fs::read_to_string(directory.path().join("series.pvd")).unwrap();
     assert_eq!(pvd.matches("<DataSet").count(), 4);
     let vtu = std::fs::read_to_string(directory.path().join("final.vtu")).unwrap();
-    for name in ["displacement_m", "von_mises_pa", "cut_tag", "cauchy_xx_yy_zz_pa"] {
-        assert!(vtu.contains(name), "{name}");
+    for name in ["displacement_m", "von_mises_pa", "cut_tag", "cauchy_xx_yy_zz_pa", "piece", "element"] {
+        assert!(vtu.contains(&format!("Name=\"{name}\"")), "{name}");
     }
+    let volume: f64 = sim.bodies().iter().map(|body| body.body.volume()).sum();
+    assert_tets_fill(vtu.as_bytes(), volume);
+}
+
+/// The tetrahedra of a file are positive and fill `volume` [m³]: none overlaps another one.
+fn assert_tets_fill(vtu: &[u8], volume: f64) {
+    let Ok(MeshFile::Volume(mesh)) = read_mesh_bytes("final.vtu", vtu) else { panic!("not a volume") };
+    let volume_of = |tet: &[u32; 4]| {
+        let [a, b, c, d] = tet.map(|node| mesh.nodes[node as usize]);
+        (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
+    };
+    let volumes: Vec<f64> = mesh.tets.iter().map(volume_of).collect();
+    assert!(volumes.iter().all(|&volume| volume > 0.0));
+    let sum: f64 = volumes.iter().sum();
+    assert!((sum / volume - 1.0).abs() < 1e-9, "tetrahedra of {sum} m³, the bodies have {volume} m³");
 }
 
 #[test]

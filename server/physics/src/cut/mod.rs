@@ -32,6 +32,7 @@ mod separate;
 pub(crate) mod pieces;
 mod copies;
 mod surface;
+mod solid;
 mod surface_builder;
 mod doubled_edges;
 mod components;
@@ -45,6 +46,7 @@ pub(crate) use front::{Front, Surroundings, sweep_triangles};
 pub use incision_mark::{IncisionMark, MarkPoint};
 pub use pending::PendingFace;
 pub use pieces::Piece;
+pub use solid::Solid;
 pub use surface::{Surface, SurfaceVertex};
 pub(crate) use sweep_triangle::SweepTriangle;
 

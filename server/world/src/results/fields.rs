@@ -1,28 +1,35 @@
-//! `final.vtu`: every piece as a tetrahedron on its copies, every surface triangle with its cut tag.
+//! `final.vtu`: the material as tetrahedra that fill it once, every surface triangle with its cut tag.
 //!
-//! A piece of a cut element is drawn as its whole tetrahedron, because its displacement is that of
-//! all four copies; `volume_fraction` says how much of it is material. The triangles are the true
-//! surface, lips included.
+//! An element that is cut is written as the tetrahedra its pieces consist of, so that slices, volumes and
+//! integrals are right: their points are moved by the copies of the piece, their stress is that of the piece.
+//! `element` and `piece` say where a tetrahedron belongs, `copy` which copy of a node a point is.
+//! Triangles are the surface that is shown, lips included.
 
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 
+use scindo_physics::body::Body;
+use scindo_physics::cut::SurfaceVertex;
+
 use super::vtu::{CellBlock, Field, FieldValues, Grid, VtuError, save_vtu};
 use crate::simulation::{SimBody, Simulation};
 
-/// Cut tag of a tetrahedron, which is no surface.
-const INTERIOR: i32 = -1;
+/// Cut tag of a tetrahedron, element and piece of a triangle, copy of a point that is not at a node.
+const NONE: i32 = -1;
 
 #[derive(Default)]
 struct Fields {
     points: Vec<Vector3<f64>>,
     displacement: Vec<Vector3<f64>>,
     velocity: Vec<Vector3<f64>>,
+    copy: Vec<i32>,
     tets: Vec<[u32; 4]>,
     triangles: Vec<[u32; 3]>,
     cell_body: [Vec<i32>; 2],
     cut_tag: [Vec<i32>; 2],
+    element: Vec<i32>,
+    piece: Vec<i32>,
     fraction: Vec<f64>,
     von_mises: Vec<f64>,
     normal_stress: Vec<Vector3<f64>>,
@@ -42,6 +49,8 @@ pub fn write_fields(path: &Path, simulation: &Simulation) -> Result<(), VtuError
     // Triangles carry no stress of their own.
     let on_all = |values: &[f64]| [values, &vec![0.0; triangles.len()]].concat();
     let vectors = |values: &[Vector3<f64>]| [values, &vec![Vector3::zeros(); triangles.len()]].concat();
+    let of_tets = |values: &[i32]| [values, &vec![NONE; triangles.len()]].concat();
+    let (element, piece) = (of_tets(&fields.element), of_tets(&fields.piece));
     let (fraction, von_mises) = (on_all(&fields.fraction), on_all(&fields.von_mises));
     let (normal, shear) = (vectors(&fields.normal_stress), vectors(&fields.shear_stress));
     let (body, tag) = (fields.cell_body.concat(), fields.cut_tag.concat());
@@ -54,10 +63,13 @@ pub fn write_fields(path: &Path, simulation: &Simulation) -> Result<(), VtuError
             point_fields: &[
                 field("displacement_m", FieldValues::Vectors(&fields.displacement)),
                 field("velocity_m_s", FieldValues::Vectors(&fields.velocity)),
+                field("copy", FieldValues::Integers(&fields.copy)),
             ],
             cell_fields: &[
                 field("body", FieldValues::Integers(&body)),
                 field("cut_tag", FieldValues::Integers(&tag)),
+                field("element", FieldValues::Integers(&element)),
+                field("piece", FieldValues::Integers(&piece)),
                 field("volume_fraction", FieldValues::Scalars(&fraction)),
                 field("von_mises_pa", FieldValues::Scalars(&von_mises)),
                 field("cauchy_xx_yy_zz_pa", FieldValues::Vectors(&normal)),
@@ -71,35 +83,41 @@ pub fn write_fields(path: &Path, simulation: &Simulation) -> Result<(), VtuError
 impl Fields {
     fn add(&mut self, number: i32, sim: &SimBody) {
         let body = &sim.body;
-        let mesh = body.cut_mesh();
-        let first_copy = self.points.len() as u32;
-        let rest = body.rest_positions();
-        for (x, start) in body.positions().iter().zip(rest) {
-            self.points.push(*x);
-            self.displacement.push(x - start);
-        }
-        self.velocity.extend_from_slice(body.velocities());
-        for (piece, stress) in mesh.pieces().iter().zip(body.cauchy_stresses()) {
-            self.tets.push(piece.copies.map(|copy| first_copy + copy));
+        let solid = body.cut_mesh().solid();
+        let stresses = body.cauchy_stresses();
+        let first = self.add_points(body, &solid.vertices);
+        for (tet, &p) in solid.tets.iter().zip(&solid.piece) {
+            let (piece, stress) = (&body.cut_mesh().pieces()[p as usize], &stresses[p as usize]);
+            self.tets.push(tet.map(|vertex| first + vertex));
             self.cell_body[0].push(number);
-            self.cut_tag[0].push(INTERIOR);
+            self.cut_tag[0].push(NONE);
+            self.element.push(piece.element as i32);
+            self.piece.push(p as i32);
             self.fraction.push(piece.fraction);
-            self.von_mises.push(von_mises(&stress));
+            self.von_mises.push(von_mises(stress));
             self.normal_stress.push(stress.diagonal());
             self.shear_stress.push(Vector3::new(stress[(1, 2)], stress[(2, 0)], stress[(0, 1)]));
         }
-        let first_vertex = self.points.len() as u32;
-        for vertex in &body.surface().vertices {
-            let x = vertex.position(body.positions());
-            self.points.push(x);
-            self.displacement.push(x - vertex.position(rest));
-            self.velocity.push(vertex.position(body.velocities()));
-        }
+        let first = self.add_points(body, &body.surface().vertices);
         for (triangle, tag) in body.surface().triangles.iter().zip(&body.surface().tags) {
-            self.triangles.push(triangle.map(|vertex| first_vertex + vertex));
+            self.triangles.push(triangle.map(|vertex| first + vertex));
             self.cell_body[1].push(number);
             self.cut_tag[1].push(*tag as i32);
         }
+    }
+
+    /// Points bound to copies; the number of the first.
+    fn add_points(&mut self, body: &Body, vertices: &[SurfaceVertex]) -> u32 {
+        let first = self.points.len() as u32;
+        for vertex in vertices {
+            let x = vertex.position(body.positions());
+            self.points.push(x);
+            self.displacement.push(x - vertex.position(body.rest_positions()));
+            self.velocity.push(vertex.position(body.velocities()));
+            let whole = vertex.weights.iter().position(|&weight| weight == 1.0);
+            self.copy.push(whole.map_or(NONE, |slot| vertex.copies[slot] as i32));
+        }
+        first
     }
 }
 

@@ -19,6 +19,37 @@ pub fn everything(cut: &CutMesh) {
     copies_are_components(cut);
     material_hangs_together(cut);
     surface_is_that_of_a_new_build(cut);
+    solid_fills_the_surface(cut);
+}
+
+/// The tetrahedra of the solid are positive at rest, and fill the surface wherever its copies are put.
+pub fn solid_fills_the_surface(cut: &CutMesh) {
+    let solid = cut.solid();
+    let volumes = |x: &[Vector3<f64>]| -> Vec<f64> {
+        let points: Vec<_> = solid.vertices.iter().map(|vertex| vertex.position(x)).collect();
+        let volume = |tet: &[u32; 4]| {
+            let [a, b, c, d] = tet.map(|v| points[v as usize]);
+            (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
+        };
+        solid.tets.iter().map(volume).collect()
+    };
+    let rest = cut.rest_positions();
+    let total: f64 = cut.mesh().volumes().iter().sum();
+    let at_rest = volumes(&rest);
+    assert!(at_rest.iter().all(|&volume| volume > -1e-12 * total));
+    assert!((at_rest.iter().sum::<f64>() - total).abs() < 1e-10 * total);
+    let mut random = Random(7);
+    let shift = 0.3 * total.cbrt();
+    let moved: Vec<_> = rest.iter().map(|x| x + random.vector(shift)).collect();
+    let (filled, enclosed) = (volumes(&moved).iter().sum::<f64>(), cut.surface().volume(&moved));
+    assert!((filled - enclosed).abs() < 1e-9 * total, "solid fills {filled}, surface encloses {enclosed}");
+    let mut of_pieces = vec![0.0; cut.pieces().len()];
+    for (&piece, volume) in solid.piece.iter().zip(at_rest) {
+        of_pieces[piece as usize] += volume;
+    }
+    for (p, volume) in of_pieces.into_iter().enumerate() {
+        assert!((volume - cut.pieces.volume(p)).abs() < 1e-12 * total);
+    }
 }
 
 /// Fractions sum to one per element, node volumes to those of the mesh, the surface encloses them.
