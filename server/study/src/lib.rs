@@ -44,6 +44,8 @@ pub mod page;
 
 pub mod study;
 
+mod random;
+
 // the other study: what breaks codes that deform and cut
 #[allow(non_snake_case)] // the symbols of the field: X, K, M
 pub mod stress;

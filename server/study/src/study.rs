@@ -66,7 +66,7 @@ pub enum StudyError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A name that is neither case nor file.
-    #[error("`{name}` is neither a scene file nor a case; cases: {}", case::NAMES.join(", "))]
+    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting", case::NAMES.join(", "))]
     UnknownCase {
         /// The name.
         name: String,

@@ -14,6 +14,8 @@ use scindo_world::scene::Scene;
 use scindo_world::simulation::{Simulation, Stage};
 use serde::{Deserialize, Serialize};
 
+use crate::random::Random;
+
 /// After how many cuts the mesh is looked at.
 pub const CUTS: [usize; 3] = [1, 10, 100];
 
@@ -105,18 +107,5 @@ fn plane(random: &mut Random, cut: usize, low: Vector3<f64>, high: Vector3<f64>)
             [at(outside, false, 0.0), at(outside, true, 0.0)],
             [at(depth, false, tilt[0]), at(depth, true, tilt[0])],
         ],
-    }
-}
-
-/// SplitMix64: small, seeded, the same everywhere.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 }

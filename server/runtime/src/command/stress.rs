@@ -57,7 +57,7 @@ fn show(bar: &ProgressBar, what: &str, progress: &Progress<'_>) {
 fn print(args: &StressArgs, report: &SuiteReport, table: Option<&[Row]>) {
     for case in &report.cases {
         let number = case.case.number.map_or(String::new(), |number| number.to_string());
-        say!("{number:>3}  {:8} {}", case.status.name(), case.case.title);
+        say!("{number:>3}  {:8} {:16} {}", case.status.name(), case.case.name, case.case.title);
         for failure in failures(case) {
             say!("              {failure}");
         }

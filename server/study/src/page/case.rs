@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::plot::{Failure, Mark, Plot};
-use super::{escape, style, time, wear};
+use super::{escape, prose, style, time, wear};
 use crate::axes::{Factor, short};
 use crate::case::Case;
 use crate::error::Errors;
@@ -27,7 +27,7 @@ pub fn section(result: &CaseResult) -> String {
         "<section id=\"{0}\">\n<h2>{1}</h2>\n<p>{2}</p>\n",
         escape(&case.name),
         escape(&case.title),
-        escape(&case.about)
+        prose(&case.about)
     );
     if let Some(advice) = &result.recommendation {
         let _ =

@@ -61,6 +61,13 @@ pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
+/// Prose for HTML: what stands in backticks is code.
+fn prose(text: &str) -> String {
+    let part =
+        |(i, part): (usize, &str)| if i % 2 == 1 { format!("<code>{part}</code>") } else { part.to_owned() };
+    escape(text).split('`').enumerate().map(part).collect()
+}
+
 /// Milliseconds for people: three digits, seconds from a thousand on.
 fn time(milliseconds: f64) -> String {
     if !milliseconds.is_finite() || milliseconds <= 0.0 {
@@ -74,6 +81,11 @@ fn time(milliseconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_stands_in_backticks_is_code() {
+        assert_eq!(prose("`xfem` & no"), "<code>xfem</code> &amp; no");
+    }
 
     #[test]
     fn times_for_people() {

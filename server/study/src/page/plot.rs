@@ -64,6 +64,9 @@ const BOTTOM: f64 = 58.0;
 const LANE: f64 = 34.0;
 const ROW: f64 = 24.0;
 
+/// An error bar that many times smaller than every error is not drawn.
+const FAR_BELOW: f64 = 20.0;
+
 impl Plot {
     /// The picture as SVG, with classes of [`super::style`].
     pub fn svg(&self) -> String {
@@ -78,7 +81,7 @@ impl Plot {
         let budget = self.budget_ms.into_iter();
         let xs = self.marks.iter().map(|mark| mark.x).chain(known).chain(budget);
         let x = Scale::around(xs, LEFT, width - RIGHT);
-        let bar = Some(self.error_bar).filter(|bar| *bar > 0.0);
+        let bar = Some(self.error_bar).filter(|_| self.shows_error_bar());
         let y = Scale::around(self.marks.iter().map(|mark| mark.y).chain(bar), y0, y1);
         let mut out = format!(
             "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">\n<rect class=\"ground\" width=\"{width}\" height=\"{height}\"/>\n",
@@ -164,9 +167,16 @@ impl Plot {
         );
     }
 
+    /// Whether the error bar of the reference comes near any mark; far below all of them it would only
+    /// press them into a corner.
+    fn shows_error_bar(&self) -> bool {
+        let least = self.marks.iter().map(|mark| mark.y).filter(|y| *y > 0.0).fold(f64::INFINITY, f64::min);
+        self.error_bar > 0.0 && !(self.error_bar * FAR_BELOW < least && least.is_finite())
+    }
+
     /// What the reference cannot tell, and the budget.
     fn bands(&self, out: &mut String, x: &Scale, y: &Scale, (y0, y1): (f64, f64)) {
-        if self.error_bar > 0.0 {
+        if self.shows_error_bar() {
             let at = y.at(self.error_bar);
             let _ = writeln!(
                 out,
@@ -282,7 +292,7 @@ impl Plot {
                     "no result".to_owned(),
                 ));
             }
-            if self.error_bar > 0.0 {
+            if self.shows_error_bar() {
                 items.push((
                     "<rect class=\"unknown\" x=\"-9\" y=\"-6\" width=\"18\" height=\"12\"/>".to_owned(),
                     "within the error bar of the reference".to_owned(),

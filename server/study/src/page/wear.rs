@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{escape, time};
+use super::{escape, prose, time};
 use crate::axes::Factor;
 use crate::recommend::percent;
 use crate::study::{CaseResult, Outcome};
@@ -14,19 +14,25 @@ pub fn table(result: &CaseResult) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let mut out =
-        "<h3>The methods side by side</h3>\n<div class=\"scroll\"><table>\n<thead><tr><th>cutting</th>"
-            .to_owned();
+    let mut out = "<h3>The methods side by side</h3>\n".to_owned();
+    let _ = writeln!(out, "<p>{}</p>", prose(&compared(&rows)));
+    out += "<div class=\"scroll\"><table>\n<thead><tr><th rowspan=\"2\">cutting</th>";
     let heads = ["displacement", "goal", "energy", "median", "iterations", "elements", "unknowns"];
     heads.iter().for_each(|head| {
-        let _ = write!(out, "<th class=\"number\">{head}</th>");
+        let _ = write!(out, "<th class=\"number\" rowspan=\"2\">{head}</th>");
     });
+    let last = CUTS[CUTS.len() - 1];
+    let _ = write!(
+        out,
+        "<th class=\"number\" colspan=\"{}\">worst element after</th><th class=\"number\" colspan=\"3\">after {last} cuts</th></tr>\n<tr>",
+        CUTS.len()
+    );
     for cuts in CUTS {
         let word = if cuts == 1 { "cut" } else { "cuts" };
-        let _ = write!(out, "<th class=\"number\">worst element after {cuts} {word}</th>");
+        let _ = write!(out, "<th class=\"number\">{cuts} {word}</th>");
     }
-    out += "<th class=\"number\">elements, nodes then</th><th class=\"number\">cutting took</th></tr></thead>\n<tbody>\n";
-    for point in rows {
+    out += "<th class=\"number\">elements</th><th class=\"number\">nodes</th><th class=\"number\">time</th></tr></thead>\n<tbody>\n";
+    for point in &rows {
         let trial = &point.trial;
         let _ = write!(out, "<tr><td>{}</td>", escape(point.configuration.label(Factor::Cutting)));
         let errors = point.errors.map(|e| [e.l2, e.goal, e.energy]);
@@ -37,18 +43,61 @@ pub fn table(result: &CaseResult) -> String {
         cells.extend([trial.elements.to_string(), trial.unknowns.to_string()]);
         let after = |cuts: usize| trial.wear.iter().find(|wear| wear.cuts == cuts);
         cells.extend(CUTS.map(|cuts| after(cuts).map_or("–".to_owned(), |w| format!("{:.3}", w.quality))));
-        let last = trial.wear.last();
-        let size = |w: &Wear| format!("{}, {}", w.elements, w.nodes);
-        cells.push(last.map_or(String::new(), size));
-        cells.push(last.map_or(String::new(), |w| time(w.cut_ms)));
+        let last = |of: fn(&Wear) -> String| after(last).map_or("–".to_owned(), of);
+        cells.extend([
+            last(|w| w.elements.to_string()),
+            last(|w| w.nodes.to_string()),
+            last(|w| time(w.cut_ms)),
+        ]);
         cells.iter().for_each(|cell| {
             let _ = write!(out, "<td class=\"number\">{cell}</td>");
         });
         out += "</tr>\n";
     }
-    out += "</tbody></table></div>\n<p class=\"soft\">The worst element is told by its mean ratio: 1 regular, 0 flat. \
-            The cuts after the first are planes across the beam to random depths, the same for all; a mesh that \
-            was made with its cut takes no further one. Inside the elements, `xfem` leaves the mesh as it was and \
-            makes copies of nodes; `snap` moves nodes.</p>\n";
+    out += "</tbody></table></div>\n";
+    let _ = writeln!(
+        out,
+        "<p class=\"soft\">{}</p>",
+        prose(
+            "The worst element is told by its mean ratio: 1 regular, 0 flat. The cuts after the first are planes \
+             across the beam to random depths, the same for all; a mesh that was made with its cut takes no further \
+             one. `xfem` leaves the mesh as it was and makes copies of nodes, which its unknowns count; `snap` moves \
+             nodes and removes elements that become flat."
+        )
+    );
     out
+}
+
+/// What the rows have in common, and what follows from them.
+fn compared(rows: &[&Outcome]) -> String {
+    let label = |factor| rows[0].configuration.label(factor);
+    let mut words = format!("With law {} and tolerance {}", label(Factor::Law), label(Factor::Tolerance));
+    let error = |name: &str| {
+        let row = rows.iter().find(|row| row.configuration.label(Factor::Cutting) == name);
+        row.and_then(|row| row.errors.map(|errors| errors.l2))
+    };
+    if let (Some(precut), Some(xfem), Some(snap)) = (error("precut"), error("xfem"), error("snap")) {
+        let _ = write!(
+            words,
+            ", a mesh that was made with its cut errs by {}; on the mesh that does not know of the cut `xfem` errs \
+             by {} and `snap` by {}",
+            percent(precut),
+            percent(xfem),
+            percent(snap)
+        );
+        if xfem > precut && snap > precut {
+            words += ": neither ends a cut inside an element, so that its front is off by up to one";
+        }
+    }
+    let worn = |name: &str| {
+        let row = rows.iter().find(|row| row.configuration.label(Factor::Cutting) == name)?;
+        row.trial.wear.last().map(|wear| (wear.cuts, wear.quality))
+    };
+    if let (Some((cuts, xfem)), Some((_, snap))) = (worn("xfem"), worn("snap")) {
+        let _ = write!(
+            words,
+            ". After {cuts} cuts the worst element has quality {xfem:.3} with `xfem` and {snap:.3} with `snap`"
+        );
+    }
+    words + "."
 }

@@ -86,7 +86,7 @@ fn glance(report: &SuiteReport) -> String {
     let mut out = "<div class=\"scroll\"><table class=\"glance\">\n<thead><tr><th class=\"number\">no.</th><th></th><th>case</th><th>closest to its bound, or why it failed</th></tr></thead>\n<tbody>\n".to_owned();
     for case in &report.cases {
         let told = match case.status {
-            Status::NotYet => String::new(),
+            Status::NotYet => waits_for(case.case.set_up).to_owned(),
             Status::Failed => case.failures().into_iter().next().unwrap_or_default(),
             Status::Passed => closest(&case.evidence.figures).map_or(String::new(), Figure::words),
         };
@@ -104,14 +104,23 @@ fn glance(report: &SuiteReport) -> String {
     out
 }
 
-/// The figure that uses most of what its bound allows.
+/// The last sentence of a set-up that cannot be run yet.
+fn waits_for(set_up: &str) -> &str {
+    set_up.rfind(". ").map_or(set_up, |end| &set_up[end + 2..])
+}
+
+/// The figure that uses most of what its bound allows; one of the case's own rule where there is one.
 fn closest(figures: &[Figure]) -> Option<&Figure> {
     let used = |figure: &&Figure| match figure.bound {
         Bound::AtMost(bound) if bound > 0.0 => figure.value / bound,
         Bound::AtLeast(bound) if bound > 0.0 => bound / figure.value,
         _ => 0.0,
     };
-    figures.iter().filter(|f| f.bound != Bound::Told).max_by(|a, b| used(a).total_cmp(&used(b)))
+    let most = |own: bool| {
+        let held = |f: &&Figure| f.bound != Bound::Told && f.name.starts_with("C: ") != own;
+        figures.iter().filter(held).max_by(|a, b| used(a).total_cmp(&used(b)))
+    };
+    most(true).or_else(|| most(false))
 }
 
 fn section(report: &CaseReport) -> String {
@@ -154,17 +163,19 @@ fn section(report: &CaseReport) -> String {
         }
         out += "</div>\n";
     }
-    out += &figures(&evidence.figures);
+    out += &figures(&evidence.figures, report.status == Status::Failed);
     out += "</section>\n";
     out
 }
 
-fn figures(figures: &[Figure]) -> String {
+/// All figures, folded away unless one of them is what is looked for.
+fn figures(figures: &[Figure], open: bool) -> String {
     if figures.is_empty() {
         return String::new();
     }
     let mut out = format!(
-        "<details open><summary>{} figures</summary>\n<div class=\"scroll\"><table class=\"figures\">\n<thead><tr><th>figure</th><th class=\"number\">value</th><th class=\"number\">bound</th></tr></thead>\n<tbody>\n",
+        "<details{}><summary>{} figures with their bounds</summary>\n<div class=\"scroll\"><table class=\"figures\">\n<thead><tr><th>figure</th><th class=\"number\">value</th><th class=\"number\">bound</th></tr></thead>\n<tbody>\n",
+        if open { " open" } else { "" },
         figures.len()
     );
     for figure in figures {

@@ -1,7 +1,8 @@
 //! 5, 6, 9, 12 and 13: halved edges, random cuts, branches, moving tissue, clamps.
 
 use super::flaws::{Flaws, mass_of_parts, shells};
-use super::support::{DOWN, L, Random, SOFT, Shaped, V, clamp_left, cube, damped, nodes, plane, slice};
+use super::support::{DOWN, L, SOFT, Shaped, V, clamp_left, cube, damped, nodes, plane, slice};
+use crate::random::Random;
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::Evidence;
 use crate::stress::view;
