@@ -287,6 +287,12 @@ impl Body {
         self.skin.as_ref()
     }
 
+    /// [`Skin::spoil`].
+    #[doc(hidden)]
+    pub fn spoil_skin(&mut self) {
+        self.skin.iter_mut().for_each(Skin::spoil);
+    }
+
     /// What is shown and touched, closed and 2-manifold: skin and lips, or without a skin the boundary
     /// of the elements and lips. Changes with the epoch of [`cut_mesh`](Self::cut_mesh) and not else.
     pub fn surface(&self) -> &Surface {

@@ -175,6 +175,12 @@ impl Skin {
         }
     }
 
+    /// Makes the next cut find that the skin does not fit; only for tests of what happens then.
+    #[doc(hidden)]
+    pub fn spoil(&mut self) {
+        self.sheet.conflicts += 1;
+    }
+
     /// Numbers of triangles and vertices before doubled edges are divided, and of those edges.
     #[cfg(test)]
     pub fn sizes(&self) -> [usize; 3] {

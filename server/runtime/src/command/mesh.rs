@@ -19,6 +19,15 @@ pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
             next: "Use 0.001 for a file in millimetres".to_owned(),
         });
     }
+    let extension = args.output.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    if !extension.as_deref().is_some_and(|extension| ["vtu", "vtk", "msh"].contains(&extension)) {
+        return Err(RuntimeError::Option {
+            option: "--output",
+            value: args.output.display().to_string(),
+            reason: "the format is told by the ending".to_owned(),
+            next: "Use .vtu, .vtk or .msh".to_owned(),
+        });
+    }
     let (mesh, health) = load_any(&args.input, args.cells as usize, args.scale)?;
     write_mesh(&args.output, &mesh).map_err(RuntimeError::Unwritten)?;
     if args.json {

@@ -23,6 +23,7 @@ pub use checked::{
     BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec, Mechanics,
     MeshSource, Newmark, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
 };
+pub(crate) use problem::coordinates;
 pub use problem::{Fault, Place, Problem, SceneError};
 pub use schema::{json_schema, key_reference};
 

@@ -142,7 +142,7 @@ pub enum Fault {
         reason: String,
     },
     /// A region without any node.
-    #[error("selects no node; the body reaches from {min_m:?} to {max_m:?} m")]
+    #[error("selects no node; the body reaches from {} to {} m", coordinates(min_m), coordinates(max_m))]
     EmptySelection {
         /// Lower corner of the body's bounding box [m].
         min_m: [f64; 3],
@@ -151,7 +151,8 @@ pub enum Fault {
     },
     /// A probe beside its body.
     #[error(
-        "the point {point_m:?} lies outside the body, {distance_m:.3e} m away from it; the nearest point inside is {nearest_m:?}"
+        "the point {point_m:?} lies outside the body, {distance_m:.3e} m away from it; the nearest point inside is {}",
+        coordinates(nearest_m)
     )]
     OutsideBody {
         /// The point asked for [m].
@@ -169,6 +170,14 @@ pub enum Fault {
         /// What to do.
         next: String,
     },
+}
+
+/// A point [m] with as many digits as one reads: four of its largest coordinate.
+pub(crate) fn coordinates(point_m: &[f64; 3]) -> String {
+    let largest = point_m.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
+    let digits = if largest > 0.0 { (3 - largest.log10().floor() as i32).clamp(0, 12) as usize } else { 0 };
+    let [x, y, z] = point_m;
+    format!("[{x:.digits$}, {y:.digits$}, {z:.digits$}]")
 }
 
 /// ", did you mean `x`?" or the list of what is known.
@@ -217,4 +226,16 @@ pub(crate) fn nearest_word<'a>(found: &str, known: impl IntoIterator<Item = &'a 
         .filter(|(likeness, _)| *likeness > 0.8)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, word)| word.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::coordinates;
+
+    #[test]
+    fn places_have_the_digits_one_reads() {
+        assert_eq!(coordinates(&[-0.046_536_258, 0.0029, 0.0]), "[-0.04654, 0.00290, 0.00000]");
+        assert_eq!(coordinates(&[0.0, 12.345_67, -3.0]), "[0.00, 12.35, -3.00]");
+        assert_eq!(coordinates(&[0.0; 3]), "[0, 0, 0]");
+    }
 }

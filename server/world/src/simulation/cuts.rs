@@ -13,7 +13,7 @@ use super::body::SimBody;
 use super::incision::incision_along;
 use super::report::{Level, StepReport};
 use crate::inputs::{CutOutcome, CutRequest};
-use crate::scene::{CutPath, CutSpec};
+use crate::scene::{CutPath, CutSpec, coordinates};
 use crate::tool::Tools;
 
 /// Two requests connect when the gap is below this fraction of the blade's length.
@@ -206,6 +206,33 @@ impl Cuts {
     }
 }
 
+/// Doubts about scheduled cuts: those that pass beside their body, as it lies at the start.
+pub(crate) fn doubts(cuts: &[CutSpec], bodies: &[SimBody]) -> Vec<String> {
+    let mut doubts = Vec::new();
+    for (number, cut) in cuts.iter().enumerate() {
+        let (CutPath::Sweep(segments), Some(body)) = (&cut.blade, bodies.get(cut.body)) else { continue };
+        let (low, high) = bounds(body.body.positions().iter());
+        let (from, to) = bounds(segments.iter().flatten());
+        if (0..3).any(|axis| to[axis] < low[axis] || from[axis] > high[axis]) {
+            doubts.push(format!(
+                "cut.{number}.sweep_m: reaches from {} to {} m and passes beside body `{}`, which lies from {} to {} m",
+                coordinates(&from.into()),
+                coordinates(&to.into()),
+                body.id,
+                coordinates(&low.into()),
+                coordinates(&high.into())
+            ));
+        }
+    }
+    doubts
+}
+
+/// Corners of the box around some points.
+fn bounds<'a>(points: impl Iterator<Item = &'a Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
+    let none = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    points.fold(none, |(low, high), point| (low.inf(point), high.sup(point)))
+}
+
 /// Warns of a cut of the scene that opened nothing, with the reason.
 fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, report: &mut StepReport) {
     if done.elements_cut > 0 || done.refused_edges > 0 {
@@ -226,4 +253,64 @@ fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, repor
 /// Edge [m] of a lattice cell that six elements of mean volume would fill.
 fn element_size(body: &SimBody) -> f64 {
     (6.0 * body.rest_volume_m3 / body.size().elements as f64).cbrt()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::path::Path;
+
+    use crate::inputs::Inputs;
+    use crate::scene::Scene;
+    use crate::simulation::{Level, Simulation};
+
+    const SCENE: &str = r#"
+        schema = 1
+        [[body]]
+        id = "block"
+        mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [3, 3, 3] } }
+        skin = { divisions = 2 }
+        young_pa = 1e5
+        poisson = 0.3
+        density_kg_m3 = 1000
+        [[body.fix]]
+        where = { box = { min_m = [-1, -1, -1], max_m = [1, 1, 1e-6] } }
+        [[cut]]
+        body = "block"
+        at_s = 0.0
+        sweep_m = [[[0.045, -0.1, -0.1], [0.045, -0.1, 0.2]], [[0.052, 0.2, -0.1], [0.052, 0.2, 0.2]]]
+    "#;
+
+    fn start(text: &str) -> Simulation {
+        Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap()
+    }
+
+    #[test]
+    fn a_skin_that_is_left_is_told_once_and_comes_back_with_the_reset() {
+        let mut sim = start(SCENE);
+        sim.bodies[0].body.spoil_skin();
+        let told = |sim: &mut Simulation| {
+            let report = sim.step(&Inputs::default());
+            let left = report.events.iter().filter(|event| event.name == "skin-left");
+            left.map(|event| (event.level, event.message.clone())).collect::<Vec<_>>()
+        };
+        let first = told(&mut sim);
+        assert!(
+            matches!(&first[..], [(Level::Warning, message)] if message.contains("do not fit")),
+            "{first:?}"
+        );
+        assert_eq!(told(&mut sim), []);
+        assert!(!sim.bodies[0].body.skin().unwrap().fits());
+        sim.reset().unwrap();
+        assert!(sim.bodies[0].body.skin().unwrap().fits());
+        assert_eq!(told(&mut sim), []);
+    }
+
+    #[test]
+    fn a_cut_beside_its_body_is_doubted() {
+        assert_eq!(start(SCENE).warnings(), [""; 0]);
+        let beside = start(&SCENE.replace("0.045,", "0.45,").replace("0.052,", "0.52,"));
+        let warnings = beside.warnings();
+        assert!(matches!(warnings, [one] if one.contains("passes beside body `block`")), "{warnings:?}");
+    }
 }

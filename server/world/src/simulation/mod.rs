@@ -73,6 +73,8 @@ impl Simulation {
         }
         let report =
             StepReport { bodies: vec![BodyReport::default(); built.bodies.len()], ..StepReport::default() };
+        let mut warnings = built.warnings;
+        warnings.extend(cuts::doubts(&scene.cuts, &built.bodies));
         Ok(Self {
             plan: Plan::new(&scene, &sizes),
             tools: Tools::new(&scene.tools),
@@ -80,7 +82,7 @@ impl Simulation {
             contacts,
             bodies: built.bodies,
             probes: built.probes,
-            warnings: built.warnings,
+            warnings,
             steps: 0,
             wants: Wants::default(),
             total: StageSeconds::default(),

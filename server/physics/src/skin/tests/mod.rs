@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use super::{Penetration, Skin, SkinSettings, incision};
+use super::{Misfit, Penetration, Skin, SkinSettings, incision};
 use crate::cut::{BladeSweep, CutMesh, CutReport, Surface};
 use crate::mesh::{BoxPattern, box_mesh};
 use crate::testing::{Random, square, surface_is_closed_and_manifold, v};
@@ -265,5 +265,27 @@ fn a_reset_skin_is_the_uncut_one() {
     assert_ne!(*body.skin.surface(), uncut);
     body.cut.reset().unwrap();
     body.skin.follow(&body.cut);
+    assert_eq!(*body.skin.surface(), uncut);
+}
+
+#[test]
+fn a_skin_that_does_not_fit_leaves_the_boundary_until_the_reset() {
+    let settings = SkinSettings { divisions: 3, ..SkinSettings::default() };
+    let mut body = Body::new(3, BoxPattern::Tet6, settings, 0.05);
+    let uncut = body.skin.surface().clone();
+    body.cut_plane(v(0.4, 0.5, 0.5), v(1.0, 0.1, 0.2), 2.0, 1);
+    body.check(0.05);
+    body.skin.spoil();
+    body.cut_plane(v(0.5, 0.45, 0.5), v(0.1, 1.0, 0.2), 2.0, 2);
+    assert_eq!(body.skin.misfit(), Some(Misfit::SharedEdge));
+    assert_eq!(body.skin.surface(), body.cut.surface());
+    surface_is_closed_and_manifold(body.skin.surface());
+    // Later cuts and marks go on, on the boundary of the elements.
+    body.cut_plane(v(0.5, 0.5, 1.0), v(0.1, 0.2, 1.0), 0.3, 3);
+    assert_eq!(body.skin.surface(), body.cut.surface());
+    assert_eq!(body.skin.incision_marks(&body.cut, &body.x).len(), body.cut.incision_marks(&body.x).len());
+    body.cut.reset().unwrap();
+    body.skin.follow(&body.cut);
+    assert!(body.skin.fits());
     assert_eq!(*body.skin.surface(), uncut);
 }
