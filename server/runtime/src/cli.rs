@@ -1,13 +1,9 @@
-//! The command line.
+//! The command line: what can be asked for.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
-
-use crate::command;
-use crate::error::RuntimeError;
 
 /// Deforms and cuts soft bodies in real time and serves them over the network.
 ///
@@ -16,14 +12,17 @@ use crate::error::RuntimeError;
 #[derive(Debug, Parser)]
 #[command(name = "scindo", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
+    /// What to do; nothing: the demonstration.
     #[command(subcommand)]
-    command: Option<Command>,
+    pub command: Option<Command>,
+    /// How the demonstration is served.
     #[command(flatten)]
-    demonstration: ServeArgs,
+    pub demonstration: ServeArgs,
 }
 
+/// The commands.
 #[derive(Debug, Subcommand)]
-enum Command {
+pub enum Command {
     /// Simulate a scene and serve it to viewers and haptic clients.
     Run(Box<RunArgs>),
     /// Check a scene: what is wrong, what is odd, which effects are on, what they will cost.
@@ -193,57 +192,4 @@ pub struct StressArgs {
     /// Report as JSON.
     #[arg(long)]
     pub json: bool,
-}
-
-/// Parses, runs, and turns the outcome into an exit code: the one place that does.
-pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    start_log();
-    let json = match &cli.command {
-        None => cli.demonstration.json,
-        Some(Command::Run(args)) => args.serve.json,
-        Some(Command::Check(args)) => args.json,
-        Some(Command::Mesh(args)) => args.json,
-        Some(Command::Accuracy(args)) => args.json,
-        Some(Command::Stress(args)) => args.json,
-    };
-    let outcome = match cli.command {
-        None => command::run::demonstration(&cli.demonstration),
-        Some(Command::Run(args)) => command::run::scene(&args),
-        Some(Command::Check(args)) => command::check::check(&args),
-        Some(Command::Mesh(args)) => command::mesh::mesh(&args),
-        Some(Command::Accuracy(args)) => command::accuracy::accuracy(&args),
-        Some(Command::Stress(args)) => command::stress::stress(&args),
-    };
-    match outcome {
-        Ok(code) => code,
-        Err(error) => {
-            report(&error, json);
-            error.exit_code()
-        }
-    }
-}
-
-fn report(error: &RuntimeError, json: bool) {
-    if json {
-        let report = serde_json::json!({ "error": { "code": error.code(), "message": error.to_string() } });
-        println!("{report}");
-    } else {
-        eprintln!("error: {error}");
-    }
-}
-
-fn start_log() {
-    let filter = tracing_subscriber::EnvFilter::try_from_env("SCINDO_LOG").unwrap_or_else(|_| {
-        tracing_subscriber::EnvFilter::new(
-            "error,scindo=info,scindo_world=info,scindo_view=info,scindo_client=warn",
-        )
-    });
-    let colours = std::io::IsTerminal::is_terminal(&std::io::stderr());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(colours)
-        .with_target(false)
-        .init();
 }

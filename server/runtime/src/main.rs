@@ -1,5 +1,5 @@
 //! The binary `scindo`.
 
 fn main() -> std::process::ExitCode {
-    scindo::cli::main()
+    scindo::command::main()
 }
