@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::averaging::NodeAverage;
-use super::elastic::Scratch;
 use super::mass::{Products, pack};
 use super::point::PointLaw;
+use super::scratch::Scratch;
 use super::{BlockCsr, ElementKind, Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
 use crate::element::{hex8, quadrature, tet10};

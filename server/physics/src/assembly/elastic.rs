@@ -1,41 +1,12 @@
 //! Energy, internal forces and tangent of a model.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::kernel::{add_forces, add_upper_blocks, deformation_gradient, mirror};
-use super::parallel::Work;
 use super::point::projected;
+use super::scratch::Buffers;
 use super::{BlockCsr, ElementKind, Model, Volumetric};
 use crate::material::{Law, Split, Tangent};
-
-/// Buffers that calls leave behind for the next one, so that repeated calls do not allocate.
-#[derive(Debug, Default)]
-pub(super) struct Scratch(Mutex<Buffers>);
-
-/// What the two passes of node averaging hand over.
-#[derive(Debug, Default)]
-pub(super) struct Buffers {
-    theta: Vec<f64>,
-    theta_bar: Vec<f64>,
-    theta_gradient: Vec<Matrix3<f64>>,
-    pub(super) star_gradient: Vec<Vector3<f64>>,
-    pub(super) work: Work,
-}
-
-impl Clone for Scratch {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
-impl Scratch {
-    pub(super) fn take(&self) -> MutexGuard<'_, Buffers> {
-        // Contents are overwritten before they are read, so a panic elsewhere leaves nothing behind.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 impl Model {
     /// Elastic energy Ψ(x) = Σ w ψ(F) \[J\], springs included.

@@ -19,6 +19,7 @@ mod model;
 mod build;
 mod kernel;
 mod averaging;
+mod scratch;
 mod elastic;
 mod parallel;
 mod mass;

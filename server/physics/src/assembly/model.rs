@@ -4,9 +4,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::averaging::NodeAverage;
-use super::elastic::Scratch;
 use super::mass::Products;
 use super::point::PointLaw;
+use super::scratch::Scratch;
 use super::{BlockCsr, ModelError, kernel};
 use crate::element::Spring;
 use crate::material::{Lame, Law};

@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 
-use super::elastic::Buffers;
+use super::scratch::{Buffers, Work};
 use super::{BlockCsr, ElementKind, Model};
 use crate::material::Tangent;
 use crate::team::{Team, blocks, ranges};
@@ -15,16 +15,6 @@ const CHUNK: usize = 32;
 pub(super) const ROWS: usize = 64;
 /// Blocks that elements hand over to nodes at a time: about 1 MB.
 const BATCH_BLOCKS: usize = 16_384;
-
-/// What elements hand over to nodes.
-#[derive(Debug, Default)]
-pub(super) struct Work {
-    energies: Vec<f64>,
-    forces: Vec<Vector3<f64>>,
-    blocks: Vec<[f64; 9]>,
-    /// Next entry of `incident` per node.
-    next: Vec<u32>,
-}
 
 impl Model {
     /// [`energy`](Self::energy) by a team.
