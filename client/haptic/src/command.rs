@@ -1,10 +1,11 @@
 //! The command line, what it builds, and the summary at the end.
 
+use crate::clock::LoopClock;
 use crate::constants::{DEFAULT_MAX_FORCE_N, DEFAULT_SLEW_N_S, RAMP_DOWN_NS};
 use crate::device::HapticDevice;
 use crate::device::path::{Path, PathError, Touch};
 use crate::device::simulated::{CAPABILITY, Hand, SimulatedDevice};
-use crate::haptic_loop::{self, LoopClock};
+use crate::haptic_loop;
 use crate::link::{self, HeldTool, ToolRequest};
 use crate::recorder::Recorder;
 use crate::statistics::{LinkReport, LoopReport};

@@ -3,34 +3,12 @@
 //! A deadline that passed unused is counted and left behind; the next one keeps its place on the
 //! grid, so lateness never accumulates.
 
+use crate::clock::LoopClock;
 use crate::constants::PERIOD_NS;
 use crate::statistics::{Histogram, LoopReport};
 use crate::tick::{HapticTick, TickTime};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
-
-/// Monotonic clock of the process: stamps ticks, poses and arrivals.
-#[derive(Debug, Clone, Copy)]
-pub struct LoopClock {
-    origin: Instant,
-}
-
-impl Default for LoopClock {
-    fn default() -> Self {
-        Self { origin: Instant::now() }
-    }
-}
-
-impl LoopClock {
-    /// Since the clock was made [ns].
-    pub fn now_ns(&self) -> u64 {
-        self.origin.elapsed().as_nanos() as u64
-    }
-
-    fn instant(&self, ns: u64) -> Instant {
-        self.origin + Duration::from_nanos(ns)
-    }
-}
+use std::time::Duration;
 
 /// Ticks until `stop` or until `duration` is over.
 pub fn run(

@@ -22,6 +22,8 @@
 
 pub mod constants;
 
+pub mod clock;
+
 pub mod device;
 
 pub mod contact_model;

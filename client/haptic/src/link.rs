@@ -1,10 +1,10 @@
 //! Contact messages in, poses out. Everything that may wait happens here, on threads of its own:
 //! zenoh's receiving thread fills the contact slot, the thread `haptic-pose` sends.
 
+use crate::clock::LoopClock;
 use crate::constants::{PERIOD_S, POSE_QUEUE};
 use crate::contact_model::{ContactInbox, ContactSlot, contact_slot};
 use crate::device::{Capability, DeviceState, ToolMode};
-use crate::haptic_loop::LoopClock;
 use crate::recorder::LogRow;
 use crate::safety::flag;
 use crate::statistics::LinkReport;

@@ -3,7 +3,7 @@
 import { boundsOf, type Stage } from "./stage";
 import type { Hand, HandMode } from "./hand";
 import type { Relay } from "./relay";
-import type { Session } from "./main";
+import type { Session } from "./session";
 import { length } from "./units";
 
 const HINTS: Record<HandMode, string> = {

@@ -12,7 +12,7 @@ import { parts } from "./tool";
 import { pick, type Hit } from "./pick";
 import type { Relay } from "./relay";
 import type { Stage } from "./stage";
-import type { Session } from "./main";
+import type { Session } from "./session";
 
 export type HandMode = "orbit" | "poke" | "grab" | "cut";
 

@@ -5,7 +5,7 @@ import { boundsOf, type Stage } from "./stage";
 import type { Hand, HandMode } from "./hand";
 import type { Panel } from "./panel";
 import type { Relay } from "./relay";
-import type { Session } from "./main";
+import type { Session } from "./session";
 
 type Triple = [number, number, number];
 

@@ -8,17 +8,8 @@ import { Hand } from "./hand";
 import { Panel } from "./panel";
 import { Bar } from "./bar";
 import { exposeHooks } from "./hooks";
+import type { Session } from "./session";
 import type { ViewerDown } from "../gen/scindo/v1/viewer_pb";
-
-/** All the page knows of the session; what is drawn is drawn from here. */
-export interface Session {
-  bodies: Map<string, BodySurface>;
-  tools: Map<string, ToolVisual>;
-  toolId: string;
-  clientId: string;
-  readOnly: boolean;
-  paused: boolean;
-}
 
 const canvas = document.getElementById("view") as HTMLCanvasElement;
 const session: Session = {
