@@ -14,6 +14,8 @@ pub type EdgeKey = [u32; 2];
 pub struct Crossing {
     /// Where along the edge, from its lower node.
     pub t: f64,
+    /// Whether the lower node of the edge lies below the sweep, against its normal.
+    pub upwards: bool,
     /// Unit normal of the sweep there, in the present configuration.
     pub normal: Vector3<f64>,
 }
@@ -31,9 +33,17 @@ pub struct Memory {
 }
 
 impl Crossing {
-    /// The end of the edge that the crossing is closest to; the lower node if it is halved.
+    /// The end of the edge that the crossing is closest to. If it is halved, the end below the sweep, as
+    /// if that were a little lower: all halved edges of a sweep choose nodes on the same side, and the
+    /// material between them is not pressed flat from both.
     pub fn near(&self, edge: &EdgeKey) -> u32 {
-        if self.t <= 0.5 + HALVED { edge[0] } else { edge[1] }
+        let first = if (self.t - 0.5).abs() <= HALVED { self.upwards } else { self.t < 0.5 };
+        edge[usize::from(!first)]
+    }
+
+    /// The same crossing of the edge the other way round.
+    pub fn turned(self) -> Self {
+        Self { t: 1.0 - self.t, upwards: !self.upwards, ..self }
     }
 
     /// Where it is now [m].
@@ -55,8 +65,7 @@ impl Memory {
             let other = edge[1 - at];
             if tets.iter().any(|&t| complex.tet(t).contains(&other)) {
                 // The new node has the highest number of all.
-                let t = if at == 0 { 1.0 - crossing.t } else { crossing.t };
-                more.push(([other, to], Crossing { t, ..*crossing }));
+                more.push(([other, to], if at == 0 { crossing.turned() } else { *crossing }));
             }
         }
         self.crossings.extend(more);
@@ -76,8 +85,8 @@ impl Memory {
         for ([a, b], crossing) in crossings {
             let there = complex.around(a).iter().any(|&t| complex.tet(t).contains(&b));
             if let (true, Some(a), Some(b)) = (there, number(a), number(b)) {
-                let (edge, t) = if a < b { ([a, b], crossing.t) } else { ([b, a], 1.0 - crossing.t) };
-                self.crossings.insert(edge, Crossing { t, ..crossing });
+                let (edge, crossing) = if a < b { ([a, b], crossing) } else { ([b, a], crossing.turned()) };
+                self.crossings.insert(edge, crossing);
             }
         }
         self.on = self.on.iter().filter_map(|(&n, &normal)| Some((number(n)?, normal))).collect();

@@ -53,8 +53,22 @@ enum Freedom {
     None,
 }
 
+/// Moves as many of the nodes onto the sweep as can go there, the closest first; a move may make room
+/// for another one, so it goes on as long as any is made. Returns how many nodes stay off the sweep.
+pub fn relocate_all(complex: &mut Complex, nodes: Vec<u32>, marks: &BTreeMap<u32, NodeMark>) -> usize {
+    let mut waiting = nodes;
+    waiting.sort_by(|p, q| marks[p].distance.total_cmp(&marks[q].distance).then(p.cmp(q)));
+    loop {
+        let before = waiting.len();
+        waiting.retain(|n| !relocate(complex, *n, &marks[n]));
+        if waiting.is_empty() || waiting.len() == before {
+            return waiting.len();
+        }
+    }
+}
+
 /// Moves node `n` onto the sweep near `mark`; `false` if it has to stay where it is.
-pub fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
+fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
     let node = complex.nodes[n as usize];
     if node.fixed.is_some() {
         return false;

@@ -64,7 +64,8 @@ pub fn cross(complex: &Complex, triangles: &[SweepTriangle], memory: &mut Memory
                 }
                 let (lower, upper) = if tet[i] < tet[j] { (i, j) } else { (j, i) };
                 let edge = [tet[lower], tet[upper]];
-                let crossing = Crossing { t: side[lower] / (side[lower] - side[upper]), normal };
+                let t = side[lower] / (side[lower] - side[upper]);
+                let crossing = Crossing { t, upwards: side[lower] >= 0.0, normal };
                 // A node of the cut surface is there already.
                 if !memory.on.contains_key(&crossing.near(&edge)) {
                     memory.crossings.entry(edge).or_insert(crossing);

@@ -9,13 +9,10 @@ use super::complex::{Complex, FaceKey};
 use super::dissect::{Duplicate, dissect};
 use super::memory::Memory;
 use super::node::{NEW, SnapNode};
-use super::relocate::relocate;
+use super::relocate::relocate_all;
 use super::select::{Selection, cross, select};
-use crate::cut::{BladeSweep, CutError, Front, Surroundings, sweep_triangles};
+use crate::cut::{BladeSweep, CutError, Front, Surroundings, swept};
 use crate::mesh::TetMesh;
-
-/// How often nodes that could not be moved are tried again: others may have made room.
-const ROUNDS: usize = 2;
 
 /// What a cut did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -94,7 +91,7 @@ impl Snapper {
             return Err(CutError::NonFinitePosition { copy });
         }
         let x: Vec<Vector3<f64>> = nodes.iter().map(|n| n.x).collect();
-        let triangles = sweep_triangles(self.fronts.get(&incision), blade, &x);
+        let triangles = swept(self.fronts.get(&incision), blade, &x).triangles().copied().collect::<Vec<_>>();
         let complex = Complex::new(nodes, tets, std::mem::take(&mut self.tags));
         let memory = self.memories.entry(incision).or_default();
         cross(&complex, &triangles, memory);
@@ -122,13 +119,10 @@ impl Snapper {
             self.fronts.iter().filter(|(id, _)| **id != incision).map(|(id, f)| (*id, f.ends(x))).collect();
         let mut report = SnapReport { faces: selection.faces.len(), ..SnapReport::default() };
         let surface: BTreeSet<u32> = selection.faces.iter().flatten().copied().collect();
-        let mut waiting: Vec<u32> =
-            surface.iter().copied().filter(|n| selection.marks.contains_key(n)).collect();
-        let wanted = waiting.len();
-        for _ in 0..ROUNDS {
-            waiting.retain(|n| !relocate(&mut complex, *n, &selection.marks[n]));
-        }
-        (report.moved, report.refused) = (wanted - waiting.len(), waiting.len());
+        let wanted: Vec<u32> = surface.iter().copied().filter(|n| selection.marks.contains_key(n)).collect();
+        report.moved = wanted.len();
+        report.refused = relocate_all(&mut complex, wanted, &selection.marks);
+        report.moved -= report.refused;
         let mut beside = BTreeSet::new();
         for &key in &selection.faces {
             complex.set_tag(key, Some(incision));

@@ -38,6 +38,24 @@ fn a_plane_parts_the_body_in_two_on_the_plane() {
     }
 }
 
+/// A plane that halves every edge it crosses: all choose the node on the same side, so that these have
+/// room to move.
+#[test]
+fn a_plane_that_halves_every_edge_has_nearly_all_lip_nodes_on_it() {
+    for pattern in [BoxPattern::Tet6, BoxPattern::Tet5 { parity: false }, BoxPattern::Octahedral6] {
+        for normal in [v(1.0, 0.0, 0.0), v(0.0, -1.0, 0.0), v(0.0, 0.0, 1.0), v(0.0, 0.0, -1.0)] {
+            let mut sample = Sample::new([1.0; 3], [5; 3], pattern);
+            let report = sample.cut_plane(v(0.5, 0.5, 0.5), normal, 3.0, 1);
+            sample.check();
+            assert_eq!(sample.parts(), 2, "{pattern:?} {normal:?}: {report:?}");
+            let lips = sample.lip_nodes();
+            let off = |m: u32| (sample.nodes[m as usize].rest - v(0.5, 0.5, 0.5)).dot(&normal).abs();
+            let on = lips.iter().filter(|&&m| off(m) < 1e-9).count();
+            assert!(10 * on >= 9 * lips.len(), "{pattern:?} {normal:?}: {on} of {}, {report:?}", lips.len());
+        }
+    }
+}
+
 #[test]
 fn an_incision_that_ends_inside_opens_and_goes_on() {
     let mut sample = Sample::unit(6);
