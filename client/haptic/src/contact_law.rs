@@ -9,7 +9,7 @@
 //! w: one within the trusted radius of the plane, falling to zero beyond.
 //!
 //! # Source
-//! METHODS 1f; the message `scindo.v1.Contact`.
+//! The message `scindo.v1.Contact` (`proto/scindo/v1/tool.proto`).
 
 use crate::constants::{EXTRAPOLATION_STEPS, MAX_EXTRAPOLATION_S, PATCH_FADE};
 use crate::contact_model::{ContactModel, ContactPlane};

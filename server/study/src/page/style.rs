@@ -67,6 +67,8 @@ figcaption { color: var(--soft); font-size: 14.5px; max-width: 90ch; margin-top:
 table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; width: 100%; }
 th { text-align: left; font-weight: 600; color: var(--soft); border-bottom: 1px solid var(--rule); padding: 6px 12px 6px 0; vertical-align: bottom; white-space: nowrap; }
 td { border-bottom: 1px solid var(--faint); padding: 6px 12px 6px 0; vertical-align: top; white-space: nowrap; }
+table.tight { font-size: 13.5px; }
+table.tight th, table.tight td { padding-right: 7px; }
 td.reason { white-space: normal; min-width: 34ch; color: var(--bad); }
 .number { text-align: right; }
 th.number, td.number { padding-left: 4px; }

@@ -21,6 +21,13 @@ pub fn opening(study: &StudyResult) -> String {
     if !machine.optimised {
         out += "<p class=\"advice\"><strong>Not optimised.</strong> This is a development build: its times say nothing about a release.</p>\n";
     }
+    if let Some(load) = study.load[0].filter(|load| *load > machine.threads as f64) {
+        let _ = writeln!(
+            out,
+            "<p class=\"advice\"><strong>Busy machine.</strong> Other programs kept its threads at work (load average \
+             {load:.1}): times are longer than they need be, and runs may have been stopped as too slow.</p>"
+        );
+    }
     if study.interrupted {
         out += "<p class=\"advice\"><strong>Interrupted.</strong> The same command with the same directory goes on from here.</p>\n";
     }

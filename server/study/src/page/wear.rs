@@ -16,7 +16,7 @@ pub fn table(result: &CaseResult) -> String {
     }
     let mut out = "<h3>The methods side by side</h3>\n".to_owned();
     let _ = writeln!(out, "<p>{}</p>", prose(&compared(&rows)));
-    out += "<div class=\"scroll\"><table>\n<thead><tr><th rowspan=\"2\">cutting</th>";
+    out += "<div class=\"scroll\"><table class=\"tight\">\n<thead><tr><th rowspan=\"2\">cutting</th>";
     let heads = ["displacement", "goal", "energy", "median", "iterations", "elements", "unknowns"];
     heads.iter().for_each(|head| {
         let _ = write!(out, "<th class=\"number\" rowspan=\"2\">{head}</th>");

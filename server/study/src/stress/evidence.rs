@@ -58,17 +58,26 @@ impl Figure {
     }
 }
 
-/// A number for people: four digits, whole numbers whole.
+/// A number for people: four digits, without zeros at their end.
 pub fn short(value: f64) -> String {
     let size = value.abs();
     if value == value.round() && size < 1e7 {
-        format!("{value:.0}")
-    } else if (1e-3..1e5).contains(&size) {
-        let digits = (3 - size.log10().floor() as i32).clamp(0, 6) as usize;
-        format!("{value:.digits$}")
-    } else {
-        format!("{value:.2e}")
+        return format!("{value:.0}");
     }
+    if (1e-3..1e5).contains(&size) {
+        let digits = (3 - size.log10().floor() as i32).clamp(0, 6) as usize;
+        return trimmed(&format!("{value:.digits$}")).to_owned();
+    }
+    let text = format!("{value:.2e}");
+    match text.split_once('e') {
+        Some((mantissa, exponent)) => format!("{}e{exponent}", trimmed(mantissa)),
+        None => text,
+    }
+}
+
+/// A decimal number without zeros at the end of its fraction.
+fn trimmed(text: &str) -> &str {
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
 /// What a case leaves behind.
@@ -128,8 +137,9 @@ mod tests {
     #[test]
     fn numbers_for_people() {
         assert_eq!(
-            [short(3.0), short(0.12345), short(1.5e-9), short(1234.6), short(0.0)],
-            ["3", "0.1235", "1.50e-9", "1235", "0"].map(str::to_owned)
+            [3.0, 0.12345, 1.5, 1e-3, 1.5e-9, 1e-15, -2.664e-15, 1234.6, 99_999.7, 0.0].map(short),
+            ["3", "0.1235", "1.5", "0.001", "1.5e-9", "1e-15", "-2.66e-15", "1235", "100000", "0"]
+                .map(str::to_owned)
         );
     }
 }

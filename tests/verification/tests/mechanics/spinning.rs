@@ -1,4 +1,4 @@
-//! METHODS cases 18–20: free spin of a cube with implicit integration, over four decades of Δt.
+//! Hard cases 18 to 20 (`scindo stress --list`): free spin of a cube with implicit integration, over four decades of Δt.
 //!
 //! A cube of 0.1 m, 2×2×2 cells of six tets, corotational, without gravity or damping, spins for 2 s.
 

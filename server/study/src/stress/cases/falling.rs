@@ -19,7 +19,7 @@ pub const FREED_NODE: Case = Case {
              pulls the cone out.",
     rule: "C. One fragment besides the rest; its centre of mass falls with g to 1e-3 although no element has \
            more than a thousandth of its volume in it.",
-    source: "METHODS D2: virtual nodes need the masses of their pieces",
+    source: "Molino, Bao, Fedkiw 2004: virtual nodes with the masses of their pieces",
     quick: true,
     run: Some(freed_node),
 };

@@ -21,7 +21,7 @@ pub const STEPS: Case = Case {
            double), whatever the turn per step; the guard of the fast path divides steps that would gain \
            energy, slows what turns by more than 4 rad in a step, and says so. BDF2: never more than 1 % above; its guard takes over where the cube turns too \
            far in a step, and says so.",
-    source: "METHODS, measured",
+    source: "no paper; bounds as measured",
     quick: false,
     run: Some(step_sweep),
 };
@@ -34,7 +34,7 @@ pub const SPIN: Case = Case {
     set_up: "The same cube at rest shape spins freely at 10 and 40 rad/s, in steps of 5 and 20 ms.",
     rule: "C. Implicit Euler: angular momentum never grows; size grows by less than 1 %. BDF2 at 10 rad/s and \
            20 ms keeps 90 % of the angular momentum.",
-    source: "METHODS, measured",
+    source: "no paper; bounds as measured",
     quick: true,
     run: Some(free_spin),
 };
