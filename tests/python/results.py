@@ -84,7 +84,7 @@ def read_grid(folder, summary):
     check((fraction > 0).all() and (fraction <= 1 + 1e-9).all(), "fractions lie in (0, 1]")
     volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
     expected = sum(body["volume_m3"] for body in summary["bodies"])
-    check(abs(np.abs(volumes).sum() / expected - 1) < 1e-6, f"no tetrahedra overlap: {volumes.sum()} of {expected} m³")
+    check(abs(volumes.sum() / expected - 1) < 1e-6, f"no tetrahedra overlap: {volumes.sum()} of {expected} m³")
     return grid
 
 

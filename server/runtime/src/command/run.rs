@@ -218,6 +218,20 @@ async fn wait(server: &Server, args: &ServeArgs, pace: Pace) -> Result<bool, Run
     Ok(interrupted)
 }
 
+/// Says which bodies end with material that is turned inside out: what they show there is not to be trusted.
+fn warn_of_inverted(simulation: &Simulation) {
+    for body in simulation.bodies() {
+        let least = body.body.least_volume_ratio();
+        if least <= 0.0 {
+            tracing::warn!(
+                "body '{}' ends with inverted elements (least det F {least:.3}): its loads are too much for its \
+                 stiffness or for the region that holds it; law = \"neo-hookean\" resists inversion",
+                body.id
+            );
+        }
+    }
+}
+
 /// Results on disk and on the terminal.
 fn conclude(
     mut engine: Engine,
@@ -227,6 +241,7 @@ fn conclude(
 ) -> Result<(), RuntimeError> {
     engine.finish(status)?;
     let simulation = engine.simulation();
+    warn_of_inverted(simulation);
     let seconds = wall.as_secs_f64();
     let simulated = steps as f64 * simulation.step_s();
     if args.json {
