@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::shape::Shape;
 use super::{Body, BodyError, Path};
 use crate::cut::CutMesh;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, resize_with_room};
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;
 
@@ -120,10 +120,12 @@ impl Boundary {
         fixed
     }
 
-    /// Force on every one of `n` copies and further nodes [N]: point forces go to the copy with the node's material, spread ones to
-    /// all copies of the node by the volume they carry. Totals are kept.
-    pub fn node_loads(&self, mesh: &CutMesh, n: usize) -> Vec<Vector3<f64>> {
-        let mut load = vec![Vector3::zeros(); n];
+    /// Writes the force on every one of `n` copies and further nodes [N] to `load`: point forces go to the
+    /// copy with the node's material, spread ones to all copies of the node by the volume they carry.
+    /// Totals are kept.
+    pub fn node_loads(&self, mesh: &CutMesh, n: usize, load: &mut Vec<Vector3<f64>>) {
+        load.clear();
+        resize_with_room(load, n, Vector3::zeros());
         for (load, f) in load.iter_mut().zip(&self.point_force) {
             *load += f;
         }
@@ -141,7 +143,6 @@ impl Boundary {
                 load[c] += share * self.spread_force[node as usize];
             }
         }
-        load
     }
 }
 

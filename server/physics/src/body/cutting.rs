@@ -6,7 +6,7 @@ use super::{Body, BodyError, General, Path};
 use crate::assembly::ElementKind;
 use crate::cut::{BladeSweep, CutReport};
 use crate::integrator::LooseParts;
-use crate::operator::resize_with_room;
+use crate::operator::{refill, resize_with_room};
 
 impl Body {
     /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were
@@ -57,10 +57,10 @@ impl Body {
     pub(super) fn follow_topology(&mut self) {
         self.rest = self.shape.rest_positions(&self.cut_mesh);
         let density = self.material.density_kg_m3;
-        self.mass = match &mut self.path {
-            Path::Fast(_) => self.cut_mesh.copy_volume().iter().map(|v| density * v).collect(),
-            Path::General(general) => general.model().lumped_mass(density),
-        };
+        match &self.path {
+            Path::Fast(_) => refill(&mut self.mass, self.cut_mesh.copy_volume().iter().map(|v| density * v)),
+            Path::General(general) => self.mass = general.model().lumped_mass(density),
+        }
         if self.settings.ablation.piece_masses && self.is_fast() {
             self.share_masses_evenly();
         }
@@ -86,7 +86,7 @@ impl Body {
     /// Everything that is derived from constraints and loads.
     pub(super) fn follow_boundary(&mut self) {
         self.fixed = self.boundary.fixed_copies(&self.cut_mesh, &self.rest);
-        self.load = self.boundary.node_loads(&self.cut_mesh, self.rest.len());
+        self.boundary.node_loads(&self.cut_mesh, self.rest.len(), &mut self.load);
         self.parts = match &self.path {
             Path::Fast(_) => LooseParts::new(self.cut_mesh.pieces(), &self.mass, &self.fixed),
             Path::General(general) => {

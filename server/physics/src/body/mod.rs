@@ -30,8 +30,8 @@ use crate::integrator::{DynamicsInputs, LooseParts, State, StepInputs};
 pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
 use crate::material::Material;
 use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
-use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
+use crate::operator::{FixedCopy, refill, resize_with_room};
 use crate::skin::{Skin, SkinSettings, SkinShape};
 use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};
@@ -393,8 +393,9 @@ impl Body {
 
     fn return_to_rest(&mut self) {
         self.rest = self.shape.rest_positions(&self.cut_mesh);
-        self.state.x.clone_from(&self.rest);
-        self.state.v = vec![Vector3::zeros(); self.state.x.len()];
+        refill(&mut self.state.x, self.rest.iter().copied());
+        self.state.v.fill(Vector3::zeros());
+        resize_with_room(&mut self.state.v, self.rest.len(), Vector3::zeros());
         self.spring_forces.clear();
     }
 }

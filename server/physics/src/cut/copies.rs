@@ -10,6 +10,7 @@ use crate::mesh::TetMesh;
 use super::blade::NewCopy;
 use super::fragments::{Fragments, NONE};
 use super::pieces::PieceTable;
+use super::slot::slot_of;
 
 /// The copies and the elements around every node.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +73,7 @@ impl CopyTable {
         let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
         let mut found = Vec::new();
         for &e in &self.around[range] {
-            let Some(a) = mesh.tets[e as usize].iter().position(|&n| n == i) else { continue };
+            let Some(a) = slot_of(&mesh.tets[e as usize], i) else { continue };
             for t in fragments.of_element(e) {
                 let at_node = |&v: &u32| fragments.vertices[v as usize].nodes == [i, NONE, NONE, NONE];
                 if fragments.tets[t as usize].iter().any(at_node) {
@@ -125,7 +126,7 @@ impl CopyTable {
             for k in component.members.clone() {
                 let p = self.members[k];
                 let piece = &mut pieces.pieces[p as usize];
-                if let Some(a) = mesh.tets[piece.element as usize].iter().position(|&n| n == i) {
+                if let Some(a) = slot_of(&mesh.tets[piece.element as usize], i) {
                     if piece.copies[a] != id {
                         piece.copies[a] = id;
                         self.changed.push(p);
@@ -169,7 +170,7 @@ impl CopyTable {
         pieces: &PieceTable,
     ) -> Around {
         let first = &pieces.pieces[seed as usize];
-        let a = mesh.tets[first.element as usize].iter().position(|&n| n == i).unwrap_or(0);
+        let a = slot_of(&mesh.tets[first.element as usize], i).unwrap_or(0);
         let start = self.members.len();
         let mut component = Around { members: start..start, parent: first.copies[a] };
         self.visited[seed as usize] = self.stamp;
@@ -183,7 +184,7 @@ impl CopyTable {
                     }
                     let q = fragments.piece[n as usize];
                     if self.visited[q as usize] != self.stamp
-                        && mesh.tets[fragments.element[n as usize] as usize].contains(&i)
+                        && slot_of(&mesh.tets[fragments.element[n as usize] as usize], i).is_some()
                     {
                         self.visited[q as usize] = self.stamp;
                         self.stack.push(q);

@@ -47,8 +47,8 @@ pub fn edge_key(a: u32, b: u32) -> u64 {
 #[derive(Clone, Debug, Default)]
 pub struct Crossings {
     by_edge: HashMap<u64, OfEdge, BuildHasherDefault<EdgeHasher>>,
-    /// Whether an edge at the vertex was ever crossed; beyond the end none was. Most vertices that are
-    /// asked for lie on a sheet, where no edge is, and need no look into the table.
+    /// Per vertex whether an edge there was ever crossed; beyond the end none was. Most vertices that are
+    /// asked for lie on a sheet and have no such edge: they need no look into the table.
     at_vertex: Vec<bool>,
 }
 
@@ -61,9 +61,13 @@ struct OfEdge {
 }
 
 impl Crossings {
+    /// Whether any edge at the vertex was ever crossed.
+    pub fn reach(&self, v: u32) -> bool {
+        self.at_vertex.get(v as usize) == Some(&true)
+    }
+
     fn of_edge(&self, a: u32, b: u32) -> Option<&OfEdge> {
-        let crossed = |v: u32| self.at_vertex.get(v as usize) == Some(&true);
-        if crossed(a) && crossed(b) { self.by_edge.get(&edge_key(a, b)) } else { None }
+        if self.reach(a) && self.reach(b) { self.by_edge.get(&edge_key(a, b)) } else { None }
     }
 
     /// Parameter, counted from `a` to `b`, at which the incision crosses the edge.

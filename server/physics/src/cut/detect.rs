@@ -9,6 +9,7 @@ use super::fragments::{Fragments, NONE};
 use super::incision_sets::IncisionSets;
 use super::marks::{Ascending, Marks};
 use super::pieces::PieceTable;
+use super::slot::slot_of;
 use super::sweep_triangle::SweepTriangle;
 
 /// What detection reads of the body.
@@ -29,7 +30,7 @@ impl Deformed<'_> {
         let vertex = &fragments.vertices[v as usize];
         let mut position = Vector3::zeros();
         for (&node, &weight) in vertex.nodes.iter().zip(&vertex.weights) {
-            if let Some(a) = nodes.iter().position(|&n| n == node) {
+            if let Some(a) = slot_of(nodes, node) {
                 position += self.x[piece.copies[a] as usize] * weight;
             }
         }
@@ -224,7 +225,7 @@ impl Detector {
         record: &mut Record,
     ) {
         let x = record.fragments.tets[t as usize].map(|v| self.position[v as usize]);
-        let longest = TET_EDGES.iter().map(|&[i, j]| (x[i] - x[j]).norm()).fold(0.0, f64::max);
+        let longest = TET_EDGES.iter().map(|&[i, j]| (x[i] - x[j]).norm_squared()).fold(0.0, f64::max).sqrt();
         let flat = side.map(|s| s.abs() <= SNAP * triangle.double_area * longest);
         for (face, corners) in TET_FACES.iter().enumerate() {
             if corners.iter().all(|&k| flat[k]) {

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use crate::mesh::{TET_FACES, TetMesh};
 
 use super::incision_sets::IncisionSets;
+use super::slot::slot_of;
 
 /// No neighbour, no next entry.
 pub const NONE: u32 = u32::MAX;
@@ -52,7 +53,7 @@ impl FragmentVertex {
 
     /// Weight of local node `a` of an element with these nodes.
     pub fn weight_of(&self, node: u32) -> f64 {
-        self.nodes.iter().position(|&n| n == node).map_or(0.0, |slot| self.weights[slot])
+        slot_of(&self.nodes, node).map_or(0.0, |slot| self.weights[slot])
     }
 }
 
@@ -165,12 +166,12 @@ impl Fragments {
 
     /// Slot of vertex `v` in fragment `t`.
     pub fn slot(&self, t: u32, v: u32) -> Option<usize> {
-        self.tets[t as usize].iter().position(|&w| w == v)
+        slot_of(&self.tets[t as usize], v)
     }
 
     /// Face of fragment `n` through which `t` is its neighbour.
     pub fn face_towards(&self, n: u32, t: u32) -> Option<usize> {
-        self.neighbour[n as usize].iter().position(|&m| m == t)
+        slot_of(&self.neighbour[n as usize], t)
     }
 
     /// Collects the fragments around vertex `v` that are face-connected with `t`.

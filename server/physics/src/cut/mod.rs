@@ -27,6 +27,7 @@ mod bends;
 mod incision_sets;
 mod crossings;
 mod marks;
+mod slot;
 pub(crate) mod pending;
 mod incision_mark;
 pub(crate) mod fragments;

@@ -3,6 +3,7 @@
 use crate::mesh::TetMesh;
 
 use super::fragments::{Fragments, NONE, leave_room};
+use super::slot::slot_of;
 
 /// One connected piece of material inside one element: what mechanics sees as an element.
 ///
@@ -126,8 +127,9 @@ impl PieceTable {
             fraction += part;
             for v in fragments.tets[t as usize] {
                 let vertex = &fragments.vertices[v as usize];
-                for (node, weight) in vertex.nodes.into_iter().zip(vertex.weights) {
-                    if let Some(a) = nodes.iter().position(|&n| n == node) {
+                let weights = vertex.nodes.into_iter().zip(vertex.weights);
+                for (node, weight) in weights.take_while(|w| w.0 != NONE) {
+                    if let Some(a) = slot_of(&nodes, node) {
                         integral[a] += part * weight;
                     }
                 }

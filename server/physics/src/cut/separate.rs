@@ -272,10 +272,9 @@ impl Separator {
         self.order.sort(&mut self.elements);
         let crossings = &mut *sheet.crossings;
         sheet.fragments.split_stars(&self.corners, |fragments, old, [t, new]| {
-            for v in fragments.tets[t as usize] {
-                if v != new {
-                    crossings.inherit(old, new, v);
-                }
+            if crossings.reach(old) {
+                let others = fragments.tets[t as usize].into_iter().filter(|&v| v != new);
+                others.for_each(|v| crossings.inherit(old, new, v));
             }
         });
     }

@@ -9,6 +9,7 @@ use crate::mesh::TetMesh;
 
 use super::fragments::{FragmentVertex, NONE};
 use super::pieces::PieceTable;
+use super::slot::slot_of;
 
 /// A surface point bound to the material: x = Σ weights · x\[copies\].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +61,7 @@ pub fn bind(mesh: &TetMesh, pieces: &PieceTable, p: u32, v: &FragmentVertex) -> 
     let nodes = &mesh.tets[piece.element as usize];
     let mut bound = SurfaceVertex { copies: [NONE; 4], weights: v.weights };
     for (copy, &node) in bound.copies.iter_mut().zip(&v.nodes) {
-        if let Some(a) = nodes.iter().position(|&n| n == node) {
+        if let Some(a) = slot_of(nodes, node) {
             *copy = piece.copies[a];
         }
     }

@@ -80,6 +80,15 @@ pub fn resize_with_room<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
     v.resize(n, value);
 }
 
+/// Replaces all entries of a vector; where it has to move, it gets the same room.
+pub fn refill<T>(v: &mut Vec<T>, entries: impl ExactSizeIterator<Item = T>) {
+    v.clear();
+    if entries.len() > v.capacity() {
+        v.reserve_exact(entries.len() + entries.len() / 2);
+    }
+    v.extend(entries);
+}
+
 /// x, y, z of a double-precision vector, rounded.
 pub fn padded(v: &nalgebra::Vector3<f64>) -> Padded {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
