@@ -6,14 +6,13 @@ use nalgebra::Vector3;
 
 use crate::mesh::{MeshError, TetMesh};
 
-use super::bends::BendPoints;
 use super::blade::{BladeSweep, CutError, CutReport};
 use super::components::Components;
 use super::copies::CopyTable;
 use super::crossings::Crossings;
 use super::detect::{Deformed, Detector, Record};
 use super::fragments::Fragments;
-use super::front::{Front, Stretch, Surroundings, swept};
+use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
 use super::marks::Ascending;
@@ -40,7 +39,6 @@ pub struct CutMesh {
     pub(super) sets: IncisionSets,
     pub(super) crossings: Crossings,
     pending: Pending,
-    bend_points: BendPoints,
     fronts: BTreeMap<u32, Front>,
     /// Incision of the last sweep.
     latest: Option<u32>,
@@ -89,7 +87,6 @@ impl CutMesh {
             sets: IncisionSets::default(),
             crossings: Crossings::default(),
             pending: Pending::default(),
-            bend_points: BendPoints::default(),
             fronts: BTreeMap::new(),
             latest: None,
             detector: Detector::default(),
@@ -226,32 +223,24 @@ impl CutMesh {
         if let Some(copy) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
             return Err(CutError::NonFinitePosition { copy });
         }
-        let mut swept = swept(self.fronts.get(&incision), blade, x);
-        for stretch in &mut swept.stretches {
-            stretch.triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
-        }
-        let (low, high) = bounds(swept.triangles(), blade);
+        let mut triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
+        triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
+        let (low, high) = bounds(&triangles, blade);
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
         self.detector.find_candidates(&body, &low, &high);
         if let Some(last) = blade.segments.last() {
             let near = self.detector.tets_near(last, &self.pieces);
             let around = |copy| self.copies.tets_around(copy, &self.pieces);
             let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
-            self.fronts.insert(incision, front.coming(swept.went));
+            self.fronts.insert(incision, front);
             self.latest = Some(incision);
         }
-        self.separator.start(&self.fragments, &self.pending);
-        for Stretch { bend, triangles } in &swept.stretches {
-            let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
-            let mut sheet = Sheet { fragments, sets, crossings, waiting: &mut self.pending, incision };
-            self.separator.divide_at_bend(bend, &self.detector, &body, &mut self.bend_points, &mut sheet);
-            let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
-            let mut record = Record { fragments, sets, crossings, incision };
-            self.detector.run(&body, triangles, &mut record);
-            let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
-            let mut sheet = Sheet { fragments, sets, crossings, waiting: &mut self.pending, incision };
-            self.separator.run(&self.detector.touched, &mut sheet);
-        }
+        let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
+        let mut record = Record { fragments, sets, crossings, incision };
+        self.detector.run(&body, &triangles, &mut record);
+        let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
+        let mut sheet = Sheet { fragments, sets, crossings, waiting: &mut self.pending, incision };
+        self.separator.run(&self.detector.touched, &mut sheet);
         Ok(self.follow_separation())
     }
 
@@ -289,10 +278,7 @@ impl CutMesh {
 }
 
 /// Box around the sweep and the last blade segment [m].
-fn bounds<'a>(
-    triangles: impl Iterator<Item = &'a SweepTriangle>,
-    blade: &BladeSweep,
-) -> (Vector3<f64>, Vector3<f64>) {
+fn bounds(triangles: &[SweepTriangle], blade: &BladeSweep) -> (Vector3<f64>, Vector3<f64>) {
     let mut low = Vector3::repeat(f64::INFINITY);
     let mut high = Vector3::repeat(f64::NEG_INFINITY);
     for triangle in triangles {

@@ -86,18 +86,13 @@ impl Record<'_> {
 }
 
 impl Detector {
-    /// Candidate pieces whose box overlaps that of the blade segment.
-    pub fn pieces_near(&self, [tip, heel]: &[Vector3<f64>; 2]) -> Vec<u32> {
+    /// Copies of the candidate pieces whose box overlaps that of the blade segment.
+    pub fn tets_near(&self, [tip, heel]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
         let (from, to) = (tip.inf(heel), tip.sup(heel));
         let overlaps = |(_, low, high): &&(u32, Vector3<f64>, Vector3<f64>)| {
             (0..3).all(|k| from[k] <= high[k] && low[k] <= to[k])
         };
-        self.candidates.iter().filter(overlaps).map(|c| c.0).collect()
-    }
-
-    /// Copies of those pieces.
-    pub fn tets_near(&self, segment: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
-        self.pieces_near(segment).into_iter().map(|p| pieces.pieces[p as usize].copies).collect()
+        self.candidates.iter().filter(overlaps).map(|c| pieces.pieces[c.0 as usize].copies).collect()
     }
 
     /// Finds the pieces whose tet has a bounding box that overlaps this one [m]: those whose corners are

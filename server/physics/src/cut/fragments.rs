@@ -288,63 +288,6 @@ impl Fragments {
         }
     }
 
-    /// Divides a face into three at the new vertex `m`. `sides` are the one or two fragments beside it
-    /// and their slots opposite to it, `corners` its vertices and the weights of `m`. `halves` receives
-    /// the two fragments that are split off from each.
-    pub fn divide_face(
-        &mut self,
-        sides: &[(u32, usize)],
-        corners: &[(u32, f64)],
-        m: u32,
-        halves: &mut Vec<Halves>,
-    ) {
-        halves.clear();
-        let first_new = self.tets.len() as u32;
-        // The part of a side without corner k of the face.
-        let part = |side: usize, k: usize| match k {
-            0 => sides[side].0,
-            _ => first_new + (2 * side + k - 1) as u32,
-        };
-        for (side, &(old, face)) in sides.iter().enumerate() {
-            let o = old as usize;
-            let (tet, neighbour, fraction) = (self.tets[o], self.neighbour[o], self.fraction[o]);
-            let (tag, along) = (self.tag[o], self.along[o]);
-            let slots: Vec<usize> = corners.iter().filter_map(|c| self.slot(old, c.0)).collect();
-            for (k, (&slot, &(_, weight))) in slots.iter().zip(corners).enumerate() {
-                let (mut part_tet, mut part_neighbour) = (tet, neighbour);
-                let (mut part_tag, mut part_along) = (tag, along);
-                part_tet[slot] = m;
-                for (j, &other) in slots.iter().enumerate().filter(|(j, _)| *j != k) {
-                    part_neighbour[other] = part(side, j);
-                    part_tag[other] = 0;
-                    part_along[other] = IncisionSets::EMPTY;
-                }
-                if neighbour[face] != NONE {
-                    part_neighbour[face] = part(1 - side, k);
-                }
-                if k == 0 {
-                    self.tets[o] = part_tet;
-                    self.neighbour[o] = part_neighbour;
-                    self.fraction[o] = fraction * weight;
-                    self.tag[o] = part_tag;
-                    self.along[o] = part_along;
-                    continue;
-                }
-                let new = part(side, k);
-                self.push(o, part_tet, part_neighbour, fraction * weight);
-                self.tag.push(part_tag);
-                self.along.push(part_along);
-                halves.push(Halves { old, new, slot: slot as u8 });
-                let outer = neighbour[slot];
-                if outer != NONE
-                    && let Some(back) = self.face_towards(outer, old)
-                {
-                    self.neighbour[outer as usize][back] = new;
-                }
-            }
-        }
-    }
-
     /// Appends a fragment of the same element and piece as fragment `o`, right behind it.
     fn push(&mut self, o: usize, tet: [u32; 4], neighbour: [u32; 4], fraction: f64) {
         let id = self.tets.len() as u32;

@@ -21,10 +21,6 @@ const MAX_POINTS: usize = 256;
 /// miss an edge there by a rounding error. The same order as the snapping of crossings.
 const OVERREACH: f64 = 1e-6;
 
-/// Cosine of the angle between the planes of two stretches of a sweep from which on the line between
-/// them is a bend: 30°. A curve that is sampled more finely has none; within an element it is flat.
-const BEND: f64 = 0.866_025_403_784_438_6;
-
 /// One remembered point.
 #[derive(Clone, Copy, Debug)]
 struct FrontPoint {
@@ -70,33 +66,6 @@ pub struct Surroundings<'a> {
 pub struct Front {
     segment: [Vector3<f64>; 2],
     points: Vec<FrontPoint>,
-    /// Which way the blade came [m], if it has moved.
-    came: Option<Vector3<f64>>,
-}
-
-/// What a blade sweeps between two bends.
-#[derive(Clone, Debug)]
-pub struct Stretch {
-    /// Straight parts of the blade position at which it begins, if that is a bend [m].
-    pub bend: Vec<[Vector3<f64>; 2]>,
-    /// The surface, with the overreach applied.
-    pub triangles: Vec<SweepTriangle>,
-}
-
-/// What a blade sweeps.
-#[derive(Clone, Debug)]
-pub struct Swept {
-    /// Stretch after stretch.
-    pub stretches: Vec<Stretch>,
-    /// Which way the blade went last [m], if it has moved.
-    pub went: Option<Vector3<f64>>,
-}
-
-impl Swept {
-    /// The whole surface.
-    pub fn triangles(&self) -> impl Iterator<Item = &SweepTriangle> {
-        self.stretches.iter().flat_map(|s| &s.triangles)
-    }
 }
 
 impl Front {
@@ -126,12 +95,7 @@ impl Front {
                 points.push(FrontPoint { s: 1.0, ..last });
             }
         }
-        Self { segment: *segment, points, came: None }
-    }
-
-    /// The front of a blade that came this way [m].
-    pub fn coming(self, came: Option<Vector3<f64>>) -> Self {
-        Self { came, ..self }
+        Self { segment: *segment, points }
     }
 
     /// The two ends of the front where the material is now [m].
@@ -178,52 +142,13 @@ impl Row {
     }
 }
 
-/// What the blade sweeps that continues `front`.
-pub fn swept(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f64>]) -> Swept {
+/// Triangles of a sweep that continues `front`, with the overreach applied.
+pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f64>]) -> Vec<SweepTriangle> {
     let mut rows: Vec<Row> = Vec::with_capacity(blade.segments.len() + 1);
     rows.extend(front.map(|f| f.now(x)));
     rows.extend(blade.segments.iter().map(Row::straight));
     rows.dedup();
-    let mut swept = Swept { stretches: Vec::new(), went: front.and_then(|f| f.came) };
-    if rows.len() < 2 {
-        return swept;
-    }
-    let length = |r: &Row| (r.ends()[1] - r.ends()[0]).norm();
-    let reach = OVERREACH * rows.iter().map(length).fold(0.0, f64::max);
-    widen(&mut rows, reach);
-    let mut first = 0;
-    let mut bend = Vec::new();
-    for k in 0..rows.len() - 1 {
-        let goes = way(&rows[k], &rows[k + 1]);
-        if swept.went.is_some_and(|came| turns(&rows[k], &came, &goes)) {
-            if k > 0 {
-                swept.stretches.push(stretch(std::mem::take(&mut bend), &rows[first..=k], reach));
-            }
-            bend = rows[k].points.windows(2).map(|p| [p[0], p[1]]).collect();
-            first = k;
-        }
-        swept.went = Some(goes);
-    }
-    swept.stretches.push(stretch(bend, &rows[first..], reach));
-    swept
-}
-
-/// How the middle of the blade moves from one row to another [m].
-fn way(from: &Row, to: &Row) -> Vector3<f64> {
-    let [[p, q], [r, s]] = [from.ends(), to.ends()];
-    0.5 * (r + s - p - q)
-}
-
-/// Whether what is swept turns by more than [`BEND`] at a row.
-fn turns(row: &Row, came: &Vector3<f64>, goes: &Vector3<f64>) -> bool {
-    let [tip, heel] = row.ends();
-    let [p, q] = [came, goes].map(|way| (heel - tip).cross(way));
-    p.dot(&q).abs() < BEND * p.norm() * q.norm()
-}
-
-fn stretch(bend: Vec<[Vector3<f64>; 2]>, rows: &[Row], reach: f64) -> Stretch {
-    let mut rows = rows.to_vec();
-    lengthen(&mut rows, reach);
+    overreach(&mut rows);
     let mut triangles = Vec::with_capacity(2 * rows.iter().map(|r| r.s.len()).sum::<usize>());
     for pair in rows.windows(2) {
         let (from, to) = (&pair[0].points, pair[1].at_places_of(&pair[0]));
@@ -232,23 +157,17 @@ fn stretch(bend: Vec<[Vector3<f64>; 2]>, rows: &[Row], reach: f64) -> Stretch {
             triangles.extend(SweepTriangle::new(from[k - 1], to[k], to[k - 1]));
         }
     }
-    Stretch { bend, triangles }
+    triangles
 }
 
-/// Moves both ends of every row outwards.
-fn widen(rows: &mut [Row], reach: f64) {
-    for row in rows {
-        let p = &mut row.points;
-        let end = p.len() - 1;
-        let (tip, heel) = (unit(p[0] - p[1]) * reach, unit(p[end] - p[end - 1]) * reach);
-        p[0] += tip;
-        p[end] += heel;
-    }
-}
-
-/// Moves the first of several rows back and the last one on.
-fn lengthen(rows: &mut [Row], reach: f64) {
+/// Widens every row at both ends, moves the first row back and the last one on.
+fn overreach(rows: &mut [Row]) {
+    let length = |r: &Row| (r.ends()[1] - r.ends()[0]).norm();
+    let reach = OVERREACH * rows.iter().map(length).fold(0.0, f64::max);
     let n = rows.len();
+    if n < 2 {
+        return;
+    }
     let push = |row: &Row, away: &Row| -> Vec<Vector3<f64>> {
         let away = away.at_places_of(row);
         row.points.iter().zip(&away).map(|(p, q)| p + unit(p - q) * reach).collect()
@@ -257,6 +176,13 @@ fn lengthen(rows: &mut [Row], reach: f64) {
     let last = push(&rows[n - 1], &rows[n - 2]);
     rows[0].points = first;
     rows[n - 1].points = last;
+    for row in rows {
+        let p = &mut row.points;
+        let end = p.len() - 1;
+        let (tip, heel) = (unit(p[0] - p[1]) * reach, unit(p[end] - p[end - 1]) * reach);
+        p[0] += tip;
+        p[end] += heel;
+    }
 }
 
 fn at([tip, heel]: &[Vector3<f64>; 2], s: f64) -> Vector3<f64> {
@@ -340,26 +266,4 @@ fn barycentric(point: &Vector3<f64>, copies: &[u32; 4], x: &[Vector3<f64>]) -> O
     let [o, a, b, c] = copies.map(|c| x[c as usize]);
     let w = Matrix3::from_columns(&[a - o, b - o, c - o]).try_inverse()? * (point - o);
     Some([1.0 - w.sum(), w.x, w.y, w.z])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_sweep_is_divided_where_it_bends_and_nowhere_else() {
-        let blade = |p: [f64; 2]| [Vector3::new(p[0], p[1], 0.0), Vector3::new(p[0], p[1], 1.0)];
-        let lengths = |path: &[[f64; 2]]| -> Vec<(usize, usize)> {
-            let sweep = BladeSweep { segments: path.iter().map(|p| blade(*p)).collect() };
-            let swept = swept(None, &sweep, &[]);
-            swept.stretches.iter().map(|s| (s.bend.len(), s.triangles.len())).collect()
-        };
-        assert_eq!(lengths(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.5], [2.0, 0.0]]), [(0, 4), (1, 2)]);
-        // Straight on, to and fro, along a curve.
-        assert_eq!(lengths(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), [(0, 4)]);
-        assert_eq!(lengths(&[[0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [3.0, 0.0]]), [(0, 6)]);
-        let curve: Vec<[f64; 2]> = (0..9).map(|k| [0.4 * f64::from(k), (0.4 * f64::from(k)).sin()]).collect();
-        assert_eq!(lengths(&curve), [(0, 16)]);
-        assert_eq!(lengths(&[[0.0, 0.0]]), []);
-    }
 }

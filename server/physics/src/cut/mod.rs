@@ -11,8 +11,6 @@
 //!    has a constant deformation gradient per piece, so mechanics needs only its volume fraction.
 //! 3. [`copies`]: the components of the pieces around a node. Each is one set of degrees of freedom.
 //!
-//! Where a blade turns inside an element, the fragments get vertices at the bend first ([`bends`]).
-//!
 //! Crack fronts, branches, crossings and re-cuts need no case analysis: they are what connectivity
 //! says they are.
 //!
@@ -23,7 +21,6 @@
 mod blade;
 mod sweep_triangle;
 mod front;
-mod bends;
 mod incision_sets;
 mod crossings;
 mod marks;
@@ -46,7 +43,7 @@ mod cut_mesh;
 pub use blade::{BladeSweep, CutError, CutReport, NewCopy};
 pub use components::Components;
 pub use cut_mesh::CutMesh;
-pub(crate) use front::{Front, Surroundings, swept};
+pub(crate) use front::{Front, Surroundings, sweep_triangles};
 pub use incision_mark::{IncisionMark, MarkPoint};
 pub use pending::PendingFace;
 pub use pieces::Piece;

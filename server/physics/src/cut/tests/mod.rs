@@ -3,7 +3,6 @@
 mod check;
 mod planes;
 mod kinds;
-mod branches;
 mod growth;
 mod random;
 mod refusals;

@@ -44,7 +44,7 @@ pub const BRANCHES: Case = Case {
     name: "branches",
     title: "T, X and Y, and a cut inside a piece",
     set_up: "A cube of 750 tetrahedra: a cut that ends on another (T); two that cross (X); a bent one with a \
-             third arm that begins exactly at its bend (Y); after T, a cut of one piece only.",
+             third arm that begins half a cell behind its bend (Y); after T, a cut of one piece only.",
     rule: "3, 4, 3 and 4 parts; the surface is closed and 2-manifold; no volume is lost.",
     source: "Jeřábková 2007, Figs. 3.5 and 3.6",
     quick: true,
@@ -220,7 +220,7 @@ fn branches(setting: &Setting) -> Result<Evidence, Trouble> {
     let shapes: [(&str, usize, Vec<BladeSweep>); 4] = [
         ("T", 3, vec![path(&[(0.43, -1.0), (0.43, 2.0)]), path(&[(0.43, 0.52), (2.0, 0.52)])]),
         ("X", 4, vec![path(&[(0.43, -1.0), (0.43, 2.0)]), path(&[(-1.0, 0.52), (2.0, 0.52)])]),
-        ("Y", 3, vec![path(&[arm(-c, s), (0.47, 0.52), arm(-c, -s)]), path(&[(0.47, 0.52), arm(1.0, 0.0)])]),
+        ("Y", 3, vec![path(&[arm(-c, s), (0.47, 0.52), arm(-c, -s)]), path(&[(0.37, 0.52), arm(1.0, 0.0)])]),
         (
             "T and a piece",
             4,
@@ -246,6 +246,11 @@ fn branches(setting: &Setting) -> Result<Evidence, Trouble> {
         ));
     }
     flaws.tell(&mut evidence);
+    evidence.notes.push(
+        "The third arm of the Y has to reach over the bend: a bent sheet is flat within an element, so that an \
+         arm that begins exactly on the bend can leave a bridge of less than one element."
+            .to_owned(),
+    );
     Ok(evidence)
 }
 
