@@ -11,7 +11,7 @@ use super::memory::Memory;
 use super::node::{NEW, SnapNode};
 use super::relocate::relocate_all;
 use super::select::{Selection, cross, select};
-use crate::cut::{BladeSweep, CutError, Front, Surroundings, swept};
+use crate::cut::{BladeSweep, CutError, Front, Surroundings, sweep_triangles};
 use crate::mesh::TetMesh;
 
 /// What a cut did.
@@ -91,7 +91,7 @@ impl Snapper {
             return Err(CutError::NonFinitePosition { copy });
         }
         let x: Vec<Vector3<f64>> = nodes.iter().map(|n| n.x).collect();
-        let triangles = swept(self.fronts.get(&incision), blade, &x).triangles().copied().collect::<Vec<_>>();
+        let triangles = sweep_triangles(self.fronts.get(&incision), blade, &x);
         let complex = Complex::new(nodes, tets, std::mem::take(&mut self.tags));
         let memory = self.memories.entry(incision).or_default();
         cross(&complex, &triangles, memory);

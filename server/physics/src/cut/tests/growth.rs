@@ -144,3 +144,23 @@ fn a_closed_curve_cuts_a_plug_out() {
         }
     }
 }
+
+/// A hand trembles: while the blade goes on by a fiftieth of an element, it is off its path by as much as
+/// a tenth. No chip comes off, and nothing stays joined.
+#[test]
+fn a_blade_that_trembles_cuts_like_a_steady_one() {
+    let h = 1.0 / 6.0;
+    let topologies = [(0.1, 0.0), (0.1, 0.02), (0.1, 0.1), (0.02, 0.02), (0.02, 0.1)].map(|(step, off)| {
+        let mut body = Body::unit(6);
+        let mut random = Random(12);
+        let mut place = |x: f64, y: f64| v(x, y, 0.47) + random.vector(off * h);
+        for k in 0..=(1.2 / (step * h)) as u32 {
+            let x = -0.1 + step * h * f64::from(k);
+            body.sweep(&[[place(x, -0.1), place(x, 1.1)]], 3);
+        }
+        check::everything(&body.cut);
+        assert_eq!(body.cut.components().len(), 2, "{step} {off}");
+        body.topology()
+    });
+    assert!(topologies.iter().all(|t| *t == topologies[0]), "{topologies:?}");
+}

@@ -3,6 +3,7 @@
 mod check;
 mod planes;
 mod kinds;
+mod branches;
 mod growth;
 mod random;
 mod refusals;
