@@ -38,6 +38,9 @@ const ROW: f64 = 19.0;
 const POINTS: usize = 240;
 /// Colours there are.
 const COLOURS: usize = 6;
+/// Ends of the names of the two energies of a run.
+const KINETIC: &str = ", kinetic";
+const ELASTIC: &str = ", elastic";
 
 impl Chart {
     /// A chart without lines.
@@ -97,6 +100,7 @@ impl Chart {
                 at + 4.5
             );
         }
+        let classes = self.classes();
         for (i, line) in self.lines.iter().enumerate() {
             let usable: Vec<&[f64; 2]> = line.points.iter().filter(usable).collect();
             let stride = usable.len().div_ceil(POINTS).max(1);
@@ -106,7 +110,7 @@ impl Chart {
                 let command = if k == 0 { 'M' } else { 'L' };
                 let _ = write!(path, "{command}{:.1} {:.1}", x.at(p[0]), y.at(height(p[1])));
             }
-            let _ = writeln!(out, "<path class=\"line {}\" d=\"{path}\"/>", class(i));
+            let _ = writeln!(out, "<path class=\"line {}\" d=\"{path}\"/>", classes[i]);
         }
         let _ = writeln!(
             out,
@@ -122,20 +126,49 @@ impl Chart {
         out
     }
 
+    /// Whether line `i` is the elastic energy of the run whose kinetic energy is the line before it.
+    fn is_elastic_of_last(&self, i: usize) -> bool {
+        let run = |i: usize, kind| self.lines[i].name.strip_suffix(kind);
+        i > 0 && run(i, ELASTIC).is_some_and(|name| run(i - 1, KINETIC) == Some(name))
+    }
+
+    /// Colour and dash of every line; both energies of a run have one colour.
+    fn classes(&self) -> Vec<String> {
+        let mut runs = 0;
+        let mut of_line = |i: usize| {
+            if self.is_elastic_of_last(i) {
+                return format!("l{} d1", (runs - 1) % COLOURS);
+            }
+            runs += 1;
+            class(runs - 1)
+        };
+        (0..self.lines.len()).map(&mut of_line).collect()
+    }
+
     fn legend(&self) -> Vec<String> {
+        let classes = self.classes();
+        let paired = |i: usize| i < self.lines.len() && self.is_elastic_of_last(i);
+        let mut items = Vec::new();
+        for (i, line) in self.lines.iter().enumerate().filter(|(i, _)| !paired(*i)) {
+            let run = line.name.strip_suffix(KINETIC).filter(|_| paired(i + 1));
+            items.push((classes[i].as_str(), run.unwrap_or(&line.name)));
+        }
+        if items.len() < self.lines.len() {
+            items.push(("key", "kinetic"));
+            items.push(("key d1", "elastic"));
+        }
         let mut rows = Vec::new();
         let (mut row, mut at) = (String::new(), 0.0);
-        for (i, line) in self.lines.iter().enumerate() {
-            let width = 44.0 + 8.0 * line.name.chars().count() as f64;
+        for (class, name) in items {
+            let width = 44.0 + 8.0 * name.chars().count() as f64;
             if at + width > WIDTH - LEFT && at > 0.0 {
                 rows.push(std::mem::take(&mut row));
                 at = 0.0;
             }
             let _ = write!(
                 row,
-                "<g transform=\"translate({at:.0},0)\"><path class=\"line {}\" d=\"M0 0H22\"/><text x=\"28\" y=\"4.5\">{}</text></g>",
-                class(i),
-                escape(&line.name)
+                "<g transform=\"translate({at:.0},0)\"><path class=\"line {class}\" d=\"M0 0H22\"/><text x=\"28\" y=\"4.5\">{}</text></g>",
+                escape(name)
             );
             at += width;
         }
@@ -201,6 +234,19 @@ fn power(exponent: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn both_energies_of_a_run_have_one_colour_and_one_name() {
+        let mut chart = Chart::new("energy", "time [s]", "energy [J]");
+        for name in ["cut, kinetic", "cut, elastic", "uncut, kinetic", "uncut, elastic", "all"] {
+            chart.lines.push(Line { name: name.to_owned(), points: vec![[0.0, 1.0], [1.0, 2.0]] });
+        }
+        assert_eq!(chart.classes(), ["l0 d0", "l0 d1", "l1 d0", "l1 d1", "l2 d0"]);
+        let legend = chart.legend().concat();
+        let names = [">cut<", ">uncut<", ">all<", ">kinetic<", ">elastic<"];
+        assert!(names.iter().all(|name| legend.contains(name)), "{legend}");
+        assert_eq!(legend.matches("<text").count(), names.len());
+    }
 
     #[test]
     fn a_chart_draws_what_is_finite() {
