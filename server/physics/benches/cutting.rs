@@ -2,7 +2,8 @@
 //! once on a small body. One thread.
 //!
 //! - Insertion: a sweep through 1 000 elements of a body of 20 870 tets, topology alone and the whole
-//!   body with all that its next step needs; the same in advances of a hundredth; building the uncut state.
+//!   body with all that its next step needs; the same in a longer body and in advances of a hundredth;
+//!   building the uncut state.
 //! - Steps: what an enriched element (one that a cut divides) costs beside a plain one, and what a step
 //!   costs after 100 cuts beside the growth of the copies. Every solve makes the same number of
 //!   iterations, and the bodies compared are stepped in turns, so that a busy moment of the machine hits
@@ -42,6 +43,7 @@ fn main() {
     let wanted = |part: &str| words.is_empty() || words.iter().any(|word| part.contains(word.as_str()));
     if wanted("insertion") {
         insertion(&mesh, elements, if quick { 1 } else { 21 });
+        longer_body(cells, elements, if quick { 1 } else { 9 });
     }
     if wanted("growth") {
         growth(&mesh, if quick { 1 } else { 5 });
@@ -126,6 +128,26 @@ fn insertion(mesh: &TetMesh, elements: usize, repeats: usize) {
         say(&format!("sweep through {cut} elements, whole body, {law:?}"), whole, "target 5 ms");
         say("  the first step after it", sorted(first), "");
         say("  the second step after it", sorted(later), "");
+    }
+}
+
+/// A cut costs what it cuts: the same sweep in a body and in one four times as long.
+fn longer_body(cells: usize, elements: usize, repeats: usize) {
+    let block = |length: usize| {
+        let size = Vector3::new(length as f64 * SIZE_M, SIZE_M, SIZE_M);
+        box_mesh(Vector3::zeros(), size, [length * cells, cells, cells], BoxPattern::Tet6)
+    };
+    let sweep = BladeSweep { segments: vec![blade(-0.01), blade(reach(&block(1), elements))] };
+    for mesh in [block(1), block(4)] {
+        let mut cut = 0;
+        let whole = best_and_median(repeats, || {
+            let mut body = body(&mesh, Law::Corotational);
+            body.step(0.01, DOWN, &[]);
+            let (report, seconds) = timed(|| body.cut(&sweep, 1));
+            cut = report.expect("the sweep is well formed").elements_cut;
+            seconds
+        });
+        say(&format!("sweep through {cut} elements of {}, whole body", mesh.tets.len()), whole, "");
     }
 }
 

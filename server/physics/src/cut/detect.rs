@@ -12,6 +12,9 @@ use super::pieces::PieceTable;
 use super::slot::slot_of;
 use super::sweep_triangle::SweepTriangle;
 
+/// The mark of fragments that are touched.
+const TOUCHED: u8 = 1;
+
 /// What detection reads of the body.
 pub struct Deformed<'a> {
     /// Rest mesh.
@@ -47,7 +50,7 @@ pub struct Detector {
     candidates: Vec<(u32, Vector3<f64>, Vector3<f64>)>,
     /// For every copy one bit for each face of the box around the sweep that it lies beyond.
     beyond: Vec<u8>,
-    is_touched: Marks,
+    marks: Marks,
     order: Ascending,
     position: Vec<Vector3<f64>>,
     position_stamp: Vec<u32>,
@@ -117,7 +120,7 @@ impl Detector {
     pub fn run(&mut self, body: &Deformed, triangles: &[SweepTriangle], record: &mut Record) {
         self.touched.clear();
         self.sweep_stamp += 1;
-        self.is_touched.restart(record.fragments.tets.len());
+        self.marks.restart(record.fragments.tets.len());
         let n = record.fragments.vertices.len();
         self.position.resize(n, Vector3::zeros());
         self.position_stamp.resize(n, 0);
@@ -157,7 +160,7 @@ impl Detector {
     }
 
     fn touch(&mut self, t: u32) {
-        if self.is_touched.insert(t) {
+        if self.marks.insert(t, TOUCHED) {
             self.touched.push(t);
         }
     }

@@ -1,38 +1,42 @@
 //! Marks on numbered things: a set that is cleared at once, and a set that is read out in order.
 
-/// A set of numbers; clearing it costs nothing.
+/// Up to eight kinds of marks on numbered things, one bit each, so that all marks of a body are near
+/// the core; taking them off costs what setting them did.
 #[derive(Clone, Debug, Default)]
 pub struct Marks {
-    stamp: u32,
-    of: Vec<u32>,
+    of: Vec<u8>,
+    marked: Vec<u32>,
 }
 
 impl Marks {
     /// Takes off all marks; the numbers are below `n` from now on.
     pub fn restart(&mut self, n: usize) {
-        self.stamp += 1;
+        self.marked.drain(..).for_each(|i| self.of[i as usize] = 0);
         self.of.resize(n, 0);
     }
 
-    /// Marks `i`; says whether it had no mark.
-    pub fn insert(&mut self, i: u32) -> bool {
-        let i = i as usize;
-        if i >= self.of.len() {
-            self.of.resize(i + 1 + i / 8, 0);
+    /// Puts `mark` on `i`; says whether it was not there.
+    pub fn insert(&mut self, i: u32, mark: u8) -> bool {
+        let at = i as usize;
+        if at >= self.of.len() {
+            self.of.resize(at + 1 + at / 8, 0);
         }
-        std::mem::replace(&mut self.of[i], self.stamp) != self.stamp
+        let before = self.of[at];
+        if before == 0 {
+            self.marked.push(i);
+        }
+        self.of[at] = before | mark;
+        before & mark == 0
     }
 
-    /// Takes off the mark of `i`.
-    pub fn remove(&mut self, i: u32) {
-        if let Some(mark) = self.of.get_mut(i as usize) {
-            *mark = 0;
-        }
+    /// Takes `mark` off `i`, which had a mark.
+    pub fn remove(&mut self, i: u32, mark: u8) {
+        self.of[i as usize] &= !mark;
     }
 
-    /// Whether `i` has a mark.
-    pub fn contains(&self, i: u32) -> bool {
-        self.of.get(i as usize) == Some(&self.stamp)
+    /// Whether `mark` is on `i`, which had a mark.
+    pub fn contains(&self, i: u32, mark: u8) -> bool {
+        self.of[i as usize] & mark != 0
     }
 }
 
@@ -83,13 +87,16 @@ mod tests {
     }
 
     #[test]
-    fn a_mark_that_was_taken_off_can_be_set_again() {
+    fn marks_of_different_kinds_come_and_go_on_their_own() {
         let mut marks = Marks::default();
         marks.restart(2);
-        assert!(marks.insert(1) && !marks.insert(1) && marks.contains(1) && !marks.contains(0));
-        marks.remove(1);
-        assert!(!marks.contains(1) && marks.insert(1) && marks.insert(9) && marks.contains(9));
-        marks.restart(2);
-        assert!(!marks.contains(1) && !marks.contains(9) && marks.insert(1));
+        assert!(marks.insert(1, 1) && !marks.insert(1, 1) && marks.insert(1, 4));
+        marks.remove(1, 1);
+        assert!(!marks.contains(1, 1) && marks.contains(1, 4) && marks.insert(1, 1));
+        assert!(marks.insert(9, 1));
+        marks.remove(9, 1);
+        assert!(marks.insert(9, 2));
+        marks.restart(12);
+        assert!([1, 9].iter().all(|&i| !marks.contains(i, 7)) && marks.insert(9, 2));
     }
 }

@@ -17,6 +17,15 @@ use super::incision_sets::IncisionSets;
 use super::marks::{Ascending, Marks};
 use super::pending::Pending;
 
+/// The mark of fragments that were touched or bisected.
+const ACTIVE: u8 = 1;
+/// The mark of fragments in the queue, and of the one that was last taken from it.
+const QUEUED: u8 = 2;
+/// The mark of fragments that had a crossed edge when they were last looked at.
+const CROSSED: u8 = 4;
+/// The mark of fragments that were bisected or had a face opened.
+const CHANGED: u8 = 8;
+
 /// Work list and result of a separation.
 #[derive(Clone, Debug, Default)]
 pub struct Separator {
@@ -35,12 +44,8 @@ pub struct Separator {
     queue: VecDeque<u32>,
     /// Fragments that were touched or bisected.
     active: Vec<u32>,
-    is_active: Marks,
-    /// Fragments in the queue, and the one that was last taken from it.
-    is_queued: Marks,
-    /// Fragments with a crossed edge when they were last looked at.
-    is_crossed: Marks,
-    is_changed: Marks,
+    /// What is known of the fragments.
+    marks: Marks,
     order: Ascending,
     wedge: Vec<u32>,
     halves: Vec<Halves>,
@@ -86,11 +91,7 @@ impl Separator {
         self.faces_opened = 0;
         self.queue.clear();
         sheet.waiting.incisions(&mut self.waiting);
-        let n = sheet.fragments.tets.len();
-        self.is_changed.restart(n);
-        self.is_active.restart(n);
-        self.is_queued.restart(n);
-        self.is_crossed.restart(n);
+        self.marks.restart(sheet.fragments.tets.len());
         self.active.clear();
         touched.iter().for_each(|&t| self.look_at_later(t));
         while let Some(t) = self.queue.pop_front() {
@@ -99,7 +100,7 @@ impl Separator {
                     self.refused.insert(edge_key(a, b));
                 }
             }
-            self.is_queued.remove(t);
+            self.marks.remove(t, QUEUED);
         }
         self.open_faces(sheet);
         self.count_pending(sheet);
@@ -107,10 +108,10 @@ impl Separator {
 
     /// Puts fragment `t` in the queue, unless it waits there already.
     fn look_at_later(&mut self, t: u32) {
-        if self.is_active.insert(t) {
+        if self.marks.insert(t, ACTIVE) {
             self.active.push(t);
         }
-        if self.is_queued.insert(t) {
+        if self.marks.insert(t, QUEUED) {
             self.queue.push_back(t);
         }
     }
@@ -133,10 +134,10 @@ impl Separator {
             }
         }
         if crossed == [None; 6] {
-            self.is_crossed.remove(t);
+            self.marks.remove(t, CROSSED);
             return None;
         }
-        self.is_crossed.insert(t);
+        self.marks.insert(t, CROSSED);
         TET_EDGES.into_iter().zip(crossed).find_map(|([i, j], s)| {
             let s = s.filter(|_| part[i] != part[j])?;
             (!self.refused.contains(&edge_key(tet[i], tet[j]))).then_some((tet[i], tet[j], s))
@@ -168,7 +169,7 @@ impl Separator {
             sheet.waiting.inherit(&self.waiting, h.old, h.new);
             for t in [h.old, h.new] {
                 self.look_at_later(t);
-                if self.is_changed.insert(t) {
+                if self.marks.insert(t, CHANGED) {
                     self.changed.push(t);
                 }
             }
@@ -243,7 +244,7 @@ impl Separator {
                 sheet.fragments.open(t, face, sheet.incision);
                 self.faces_opened += 1;
                 for (t, face) in [(t, Some(face)), (n, back)] {
-                    if self.is_changed.insert(t) {
+                    if self.marks.insert(t, CHANGED) {
                         self.changed.push(t);
                     }
                     self.elements.push(sheet.fragments.element[t as usize]);
@@ -263,15 +264,17 @@ impl Separator {
 
     fn count_pending(&mut self, sheet: &mut Sheet) {
         for &t in &self.active {
-            let crossed = self.is_crossed.contains(t);
-            sheet.waiting.set(sheet.incision, t, crossed);
-            if !crossed {
-                continue;
+            let mut crossed = false;
+            if self.marks.contains(t, CROSSED) {
+                let tet = sheet.fragments.tets[t as usize];
+                for [a, b] in TET_EDGES.map(|[i, j]| [tet[i], tet[j]]) {
+                    if sheet.crossing(a, b).is_some() {
+                        self.pending.insert(edge_key(a, b));
+                        crossed = true;
+                    }
+                }
             }
-            let tet = sheet.fragments.tets[t as usize];
-            let edges = TET_EDGES.map(|[i, j]| [tet[i], tet[j]]).into_iter();
-            let edges = edges.filter(|&[a, b]| sheet.crossing(a, b).is_some());
-            self.pending.extend(edges.map(|[a, b]| edge_key(a, b)));
+            sheet.waiting.set(sheet.incision, t, crossed);
         }
     }
 }
