@@ -176,8 +176,9 @@ pub enum Fault {
 pub(crate) fn coordinates(point_m: &[f64; 3]) -> String {
     let largest = point_m.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
     let digits = if largest > 0.0 { (3 - largest.log10().floor() as i32).clamp(0, 12) as usize } else { 0 };
-    let [x, y, z] = point_m;
-    format!("[{x:.digits$}, {y:.digits$}, {z:.digits$}]")
+    // As text and back: without the zeros at the end.
+    let rounded = point_m.map(|c| format!("{c:.digits$}").parse().unwrap_or(c) + 0.0);
+    format!("{rounded:?}")
 }
 
 /// ", did you mean `x`?" or the list of what is known.
@@ -234,8 +235,9 @@ mod tests {
 
     #[test]
     fn places_have_the_digits_one_reads() {
-        assert_eq!(coordinates(&[-0.046_536_258, 0.0029, 0.0]), "[-0.04654, 0.00290, 0.00000]");
-        assert_eq!(coordinates(&[0.0, 12.345_67, -3.0]), "[0.00, 12.35, -3.00]");
-        assert_eq!(coordinates(&[0.0; 3]), "[0, 0, 0]");
+        assert_eq!(coordinates(&[-0.046_536_258, 0.0029, 0.0]), "[-0.04654, 0.0029, 0.0]");
+        assert_eq!(coordinates(&[0.0, 12.345_67, -3.0]), "[0.0, 12.35, -3.0]");
+        assert_eq!(coordinates(&[0.0, -1e-9, 0.2]), "[0.0, 0.0, 0.2]");
+        assert_eq!(coordinates(&[0.0; 3]), "[0.0, 0.0, 0.0]");
     }
 }
