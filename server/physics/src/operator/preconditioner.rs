@@ -97,37 +97,41 @@ pub fn invert(block: &Block6, fixed: [bool; 3]) -> Inverse3 {
         return Inverse3::default();
     }
     let s = 1.0 / trace;
-    let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = [xx, xy, xz, yy, yz, zz].map(|v| v * s);
-    if fixed[0] {
-        (xx, xy, xz) = (1.0, 0.0, 0.0);
-    }
-    if fixed[1] {
-        (yy, xy, yz) = (1.0, 0.0, 0.0);
-    }
-    if fixed[2] {
-        (zz, xz, yz) = (1.0, 0.0, 0.0);
-    }
+    let [xx, xy, xz, yy, yz, zz] = hold([xx, xy, xz, yy, yz, zz].map(|v| v * s), fixed, 1.0);
     // Cofactors; a block that lost its definiteness to rounding falls back to its trace.
     let (cxx, cxy, cxz) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
     let (cyy, cyz, czz) = (xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy);
     let det = xx * cxx + xy * cxy + xz * cxz;
-    let [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz] = if det > 1e-12 {
+    let inverse = if det > 1e-12 {
         let t = s / det;
         [cxx, cxy, cxz, cyy, cyz, czz].map(|c| (c * t) as f32)
     } else {
         let d = (3.0 * s) as f32;
         [d, 0.0, 0.0, d, 0.0, d]
     };
+    let [xx, xy, xz, yy, yz, zz] = hold(inverse, fixed, 0.0);
+    Inverse3([[xx, xy, yy, 0.0], [xz, yz, zz, 0.0]])
+}
+
+/// A symmetric block (xx, xy, xz, yy, yz, zz) without the rows and columns of the fixed directions, which
+/// have this diagonal instead.
+#[inline(always)]
+fn hold<T: Copy + From<u8>>(
+    [mut xx, mut xy, mut xz, mut yy, mut yz, mut zz]: [T; 6],
+    fixed: [bool; 3],
+    diagonal: T,
+) -> [T; 6] {
+    let zero = T::from(0);
     if fixed[0] {
-        (xx, xy, xz) = (0.0, 0.0, 0.0);
+        (xx, xy, xz) = (diagonal, zero, zero);
     }
     if fixed[1] {
-        (yy, xy, yz) = (0.0, 0.0, 0.0);
+        (yy, xy, yz) = (diagonal, zero, zero);
     }
     if fixed[2] {
-        (zz, xz, yz) = (0.0, 0.0, 0.0);
+        (zz, xz, yz) = (diagonal, zero, zero);
     }
-    Inverse3([[xx, xy, yy, 0.0], [xz, yz, zz, 0.0]])
+    [xx, xy, xz, yy, yz, zz]
 }
 
 #[cfg(test)]
