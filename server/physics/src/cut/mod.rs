@@ -14,6 +14,12 @@
 //! Crack fronts, branches, crossings and re-cuts need no case analysis: they are what connectivity
 //! says they are.
 //!
+//! # Limit
+//! Between the edges it crosses a sheet is flat, so a bend inside an element is cut off by a chord. A
+//! branch that is to come off another incision's bend begins a little before it, as a blade does that
+//! reaches into the wound; one that begins exactly there may end before the lip. Vertices at bends would
+//! mend that, but a blade that trembles bends all the time.
+//!
 //! # Source
 //! Molino, Bao, Fedkiw 2004; Sifakis, Der, Fedkiw 2007; Wang, Jiang, Schroeder, Teran 2014 (virtual
 //! nodes). Jeřábková 2007 ch. 3 (the same space seen as an enrichment).
