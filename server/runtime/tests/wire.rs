@@ -20,6 +20,7 @@ use scindo_client::{Link, LinkConfig, LinkError, Role};
 use scindo_proto::{Chunk, Topic, encode, encoding};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
+use zenoh::qos::CongestionControl;
 
 const SCENE: &str = r#"
 schema = 1
@@ -247,7 +248,11 @@ async fn broken_messages_are_refused_and_counted_and_the_server_lives() {
     (sample.client_id, sample.tool_id, sample.seq) = ("broken".into(), "probe".into(), 1);
     let put = |key: String, bytes: bytes::Bytes, encoding: String| {
         let link = link.clone();
-        async move { link.haptic().put(key, bytes).encoding(encoding).await.unwrap() }
+        // Blocking: on a busy machine the two megabytes would be dropped before the server sees them.
+        async move {
+            let put = link.haptic().put(key, bytes).encoding(encoding);
+            put.congestion_control(CongestionControl::Block).await.unwrap();
+        }
     };
     let pose = encoding::<ToolSample>();
     put(key(Topic::ToolPose), encode(&sample), pose.clone()).await;
