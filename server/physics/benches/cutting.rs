@@ -232,10 +232,7 @@ fn enriched_elements(mesh: &TetMesh, repeats: usize) {
             by_the_tets = times[0];
         } else {
             let in_tets = [0, 1].map(|i| cost(&times, i) * times[0][i] / by_the_tets[i]);
-            println!(
-                "  and {:.2} × a plain one by the tets (median {:.2}), the measure of the source",
-                in_tets[0], in_tets[1]
-            );
+            println!("  and {:.2} × a plain one by the tets (median {:.2})", in_tets[0], in_tets[1]);
         }
     }
 }
