@@ -15,15 +15,18 @@ use crate::link::{Link, decode_sample};
 /// How long an answer may take.
 pub const TIMEOUT: Duration = Duration::from_secs(2);
 
+/// After this a question that reached nobody is asked again.
+const PAUSE: Duration = Duration::from_millis(50);
+
 impl Link {
     /// What is running.
     pub async fn info(&self) -> Result<SessionInfo, LinkError> {
-        self.call(Verb::Info, Bytes::new(), None).await
+        self.question(Verb::Info).await
     }
 
     /// Descriptors of the wire messages.
     pub async fn schema(&self) -> Result<SchemaReply, LinkError> {
-        self.call(Verb::Schema, Bytes::new(), None).await
+        self.question(Verb::Schema).await
     }
 
     /// Stops (`true`) or continues the simulation.
@@ -44,6 +47,21 @@ impl Link {
     /// Changes one parameter; key and value as in a scene file.
     pub async fn set(&self, key: &str, value: &str) -> Result<RpcReply, LinkError> {
         self.order(Verb::Set, &SetRequest { key: key.to_owned(), value: value.to_owned() }).await
+    }
+
+    /// Asks again while nobody is there to answer: a server that starts listens before it knows what it
+    /// is asked, and a link that was just made has not heard of it. Orders are not repeated: one whose
+    /// answer was lost may have been carried out.
+    async fn question<R: WireMessage>(&self, verb: Verb) -> Result<R, LinkError> {
+        let started = std::time::Instant::now();
+        loop {
+            match self.call(verb, Bytes::new(), None).await {
+                Err(LinkError::NoServer { .. }) if started.elapsed() < TIMEOUT => {
+                    tokio::time::sleep(PAUSE).await;
+                }
+                answer => return answer,
+            }
+        }
     }
 
     async fn order<M: WireMessage>(&self, verb: Verb, request: &M) -> Result<RpcReply, LinkError> {
