@@ -1,10 +1,15 @@
-//! What the end-to-end tests share: the built programs, free ports, and child processes that end with the test.
+//! What tests over the network share: patience, free ports, the built programs, and child processes that end with
+//! the test.
 
 use std::io;
 use std::net::TcpListener;
 use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicU16, Ordering};
+use std::time::Duration;
+
+/// How long a test waits for what must come, however busy the machine is: longer only when something hangs.
+pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Path of one of the workspace's programs, built into the directory that holds the running test.
 ///
@@ -20,12 +25,20 @@ pub fn program(name: &str) -> PathBuf {
     path
 }
 
-/// A TCP port on loopback that was free a moment ago.
+/// A TCP port on loopback that is free together with the next one, where a server sends its surfaces.
 ///
-/// # Errors
-/// When no port can be bound.
-pub fn free_port() -> io::Result<u16> {
-    Ok(TcpListener::bind(("127.0.0.1", 0))?.local_addr()?.port())
+/// Below the ports that the system gives to outgoing connections: none of those takes it meanwhile.
+///
+/// # Panics
+/// When no such pair is left.
+#[must_use]
+pub fn free_pair() -> u16 {
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    let start = (std::process::id() % 1000) as u16 * 10;
+    let free = |port: &u16| (0..2).all(|next| TcpListener::bind(("127.0.0.1", port + next)).is_ok());
+    let tried =
+        std::iter::repeat_with(|| 10_000 + (start + 2 * NEXT.fetch_add(1, Ordering::Relaxed)) % 10_000);
+    tried.take(5000).find(free).expect("two free ports side by side")
 }
 
 /// Runs a program to its end and returns what it printed and its exit code.
@@ -56,16 +69,4 @@ impl Drop for Running {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
-}
-
-/// Asks `done` every 20 ms until it says yes or the time is over; returns its last answer.
-pub fn eventually(limit: Duration, mut done: impl FnMut() -> bool) -> bool {
-    let end = Instant::now() + limit;
-    while Instant::now() < end {
-        if done() {
-            return true;
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    done()
 }

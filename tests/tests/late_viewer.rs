@@ -1,11 +1,10 @@
 //! A viewer that joins after three cuts sees the surface that one sees who was there from the start.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use scindo_client::messages::{BladeSegment, Vec3, cut_ack};
-use scindo_client::{Link, LinkConfig, LinkError, Role, Surface};
-use scindo_tests::{Running, free_port};
+use scindo_client::{BodyMirror, Link, LinkConfig, LinkError, Role, Surface};
+use scindo_tests::{PATIENCE, Running, free_pair};
 
 const SCENE: &str = r#"
 schema = 1
@@ -33,15 +32,8 @@ fn segment(x: f64, y: f64) -> BladeSegment {
 }
 
 async fn join(endpoint: &str, id: &str) -> Result<Link, LinkError> {
-    let mut last = None;
-    for _ in 0..20 {
-        match Link::connect(LinkConfig::new(Role::Viewer, id).with_connect([endpoint.to_owned()])).await {
-            Ok(link) => return Ok(link),
-            Err(error) => last = Some(error),
-        }
-        tokio::time::sleep(Duration::from_millis(250)).await;
-    }
-    Err(last.expect("tried"))
+    let config = LinkConfig::new(Role::Viewer, id).with_connect([endpoint.to_owned()]);
+    Link::connect(LinkConfig { timeout: PATIENCE, ..config }).await
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -49,9 +41,7 @@ async fn late_viewer_sees_the_same_surface() {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let scene = directory.path().join("block.toml");
     std::fs::write(&scene, SCENE).expect("written");
-    // The bulk session listens one port above the haptic one.
-    let port = free_port().expect("a free port");
-    let endpoint = format!("tcp/127.0.0.1:{port}");
+    let endpoint = format!("tcp/127.0.0.1:{}", free_pair());
     let _server = Running::start("scindo", &["run", &scene.display().to_string(), "--listen", &endpoint])
         .expect("starts");
 
@@ -73,28 +63,27 @@ async fn late_viewer_sees_the_same_surface() {
     early.pause(true).await.expect("paused");
     let late = join(&endpoint, "late").await.expect("the server answers");
     let mut late_mirror = late.mirror("block").await.expect("mirrors");
-    let seen_late = settled(&mut late_mirror).await;
-    let seen_early = settled(&mut early_mirror).await;
+    let seen_late = late_mirror.next().await.expect("a surface");
+    let seen_early = at_step(&mut early_mirror, seen_late.frame.sim_step).await;
 
     assert!(seen_late.topology.epoch > first_epoch);
     assert_eq!(seen_early.topology.epoch, seen_late.topology.epoch);
     assert_eq!(seen_early.topology.vertex_count, seen_late.topology.vertex_count);
     assert_eq!(seen_early.topology.triangles, seen_late.topology.triangles);
     assert_eq!(seen_early.topology.tags, seen_late.topology.tags);
-    assert_eq!(seen_early.frame.sim_step, seen_late.frame.sim_step);
     assert_eq!(seen_early.frame.positions, seen_late.frame.positions);
     assert!(seen_late.topology.triangle_count > first.topology.triangle_count, "the cuts have lips");
 }
 
-/// The newest surface once the paused server has sent what it had.
-async fn settled(mirror: &mut scindo_client::BodyMirror) -> Arc<Surface> {
-    let mut last = mirror.latest();
-    while let Ok(Ok(surface)) = tokio::time::timeout(Duration::from_millis(800), mirror.next()).await {
-        let same = last.as_ref().is_some_and(|l| l.frame.seq == surface.frame.seq);
-        last = Some(surface);
-        if same {
-            break;
+/// The surface of a step that is the last one of a paused server.
+async fn at_step(mirror: &mut BodyMirror, step: u64) -> Arc<Surface> {
+    let seen = async {
+        loop {
+            match mirror.latest().filter(|surface| surface.frame.sim_step == step) {
+                Some(surface) => return surface,
+                None => drop(mirror.next().await.expect("a surface")),
+            }
         }
-    }
-    last.expect("a surface arrived")
+    };
+    tokio::time::timeout(PATIENCE, seen).await.expect("the last surface arrives")
 }

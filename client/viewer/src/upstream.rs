@@ -218,9 +218,7 @@ impl Hands {
         if !self.held.contains_key(&id) {
             match timeout(RETRY, self.link.guest_tool(&id)).await {
                 Ok(Ok(tool)) => {
-                    // Poses are faster than tokens: the next sample finds the owner announced.
-                    self.held.insert(id, tool);
-                    return;
+                    self.held.insert(id.clone(), tool);
                 }
                 Ok(Err(error)) => return tracing::warn!(%error, tool = id, "cannot take the tool"),
                 Err(_) => return tracing::warn!(tool = id, "the link is too slow to take the tool"),

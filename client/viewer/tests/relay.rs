@@ -13,6 +13,7 @@ use scindo_proto::messages::{
     Pose, Stats, SurfaceFrame, SurfaceTopology, ToolSample, Vec3, ViewerDown, ViewerFrameAck, ViewerPing,
     ViewerUp,
 };
+use scindo_tests::PATIENCE;
 use scindo_view::hub::{Hub, Up};
 use scindo_view::{WebConfig, WebServer, page_is_built};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -47,7 +48,7 @@ async fn join(address: SocketAddr) -> Browser {
 
 async fn next(browser: &mut Browser) -> Option<Down> {
     loop {
-        match timeout(Duration::from_secs(20), browser.next()).await.unwrap()? {
+        match timeout(PATIENCE, browser.next()).await.unwrap()? {
             Ok(Message::Binary(bytes)) => return ViewerDown::decode(bytes).unwrap().message,
             Ok(Message::Close(_)) | Err(_) => return None,
             Ok(_) => {}
@@ -141,7 +142,7 @@ async fn a_browser_speaks_only_for_itself_and_its_tool_ends_with_it() {
     assert_eq!((taken.client_id.as_str(), taken.tool_id.as_str()), ("mouse-test-1", "mouse-test-1"));
     assert_eq!(taken.pose.unwrap().position_m.unwrap().x, 0.1, "the one that is not finite was refused");
     drop(browser);
-    let ended = timeout(Duration::from_secs(20), up.recv()).await.unwrap();
+    let ended = timeout(PATIENCE, up.recv()).await.unwrap();
     assert!(matches!(ended, Some(Up::Release { tool_id }) if tool_id == "mouse-test-1"));
 }
 
@@ -170,7 +171,7 @@ async fn browsers_are_counted_and_limited() {
     );
     drop(first);
     let mut watched = hub.watched();
-    timeout(Duration::from_secs(20), watched.wait_for(|watched| !watched)).await.unwrap().unwrap();
+    timeout(PATIENCE, watched.wait_for(|watched| !watched)).await.unwrap().unwrap();
 }
 
 #[tokio::test]

@@ -16,6 +16,7 @@ use scindo_proto::messages::{
     ToolSample, ToolShape, Vec3, ViewerDown, ViewerRpc, ViewerUp, tool_sample, tool_shape,
 };
 use scindo_proto::{Chunk, KeySpace, Role, Topic, Verb, WireMessage, decode, encode, encoding};
+use scindo_tests::{PATIENCE, free_pair};
 use scindo_view::{ViewConfig, Viewer};
 use tokio::net::TcpStream;
 use tokio::time::{sleep, timeout};
@@ -24,8 +25,6 @@ use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
 use zenoh::Wait as _;
 use zenoh::query::Query;
 use zenoh::sample::SampleKind;
-
-const PATIENCE: Duration = Duration::from_secs(40);
 
 type Browser = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
@@ -116,6 +115,17 @@ impl Server {
         publisher.matching_status().await.unwrap().matching()
     }
 
+    /// Waits until the viewer has declared all it wants while nobody watches.
+    async fn becomes_joined(&self) {
+        let publisher = self.session.declare_publisher(keys().key(&Topic::Event)).await.unwrap();
+        let wait = async {
+            while !publisher.matching_status().await.unwrap().matching() {
+                sleep(Duration::from_millis(50)).await;
+            }
+        };
+        timeout(PATIENCE, wait).await.expect("the viewer subscribes to events");
+    }
+
     async fn becomes_watched(&self, wanted: bool) {
         let wait = async {
             while self.is_watched().await != wanted {
@@ -141,17 +151,6 @@ async fn viewer(port: u16) -> SocketAddr {
     let address = viewer.address();
     tokio::spawn(viewer.run());
     address
-}
-
-/// A free port with a free one above it, where surfaces go.
-fn free_port() -> u16 {
-    let bind = |port| std::net::TcpListener::bind(("127.0.0.1", port));
-    loop {
-        let port = bind(0).unwrap().local_addr().unwrap().port();
-        if port < u16::MAX && bind(port + 1).is_ok() {
-            return port;
-        }
-    }
 }
 
 async fn join(address: SocketAddr) -> Browser {
@@ -180,7 +179,7 @@ async fn send(browser: &mut Browser, message: FromPage) {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_browser_sees_the_server_come_go_and_come_back() {
-    let port = free_port();
+    let port = free_pair();
     let address = viewer(port).await;
     let mut browser = join(address).await;
     until(&mut browser, "word that nobody is there", |m| {
@@ -219,10 +218,12 @@ async fn a_browser_sees_the_server_come_go_and_come_back() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn nothing_is_subscribed_while_no_browser_watches() {
     // One port for everything, as behind a router.
-    let port = free_port();
+    let port = free_pair();
     let server = Server::start_at(&[port], 0);
     let address = viewer(port).await;
-    sleep(Duration::from_secs(2)).await;
+    server.becomes_joined().await;
+    // Nothing says that nothing more will come: a moment must do.
+    sleep(Duration::from_secs(1)).await;
     assert!(!server.is_watched().await);
     let mut browser = join(address).await;
     until(&mut browser, "a surface", |m| matches!(m, Down::Frame(_)).then_some(())).await;
@@ -235,7 +236,7 @@ async fn nothing_is_subscribed_while_no_browser_watches() {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn tools_have_an_owner_each_and_calls_are_answered() {
-    let port = free_port();
+    let port = free_pair();
     let server = Server::start(port, 0);
     let address = viewer(port).await;
     let (owners, mut owner_seen) = tokio::sync::mpsc::channel::<(SampleKind, String)>(16);

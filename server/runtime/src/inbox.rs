@@ -2,7 +2,7 @@
 //!
 //! # Rules
 //! * A tool belongs to the first client with a liveliness token that sends a pose for it; it is
-//!   free again when that token goes.
+//!   free again when that token goes. A pose that overtook the token waits for it ([`crate::early`]).
 //! * Of poses only the newest counts; one that is not newer than the last is refused.
 //! * A cut is applied once per (client, tool, sequence number); repetitions get the old answer.
 //! * Whatever is refused is counted by reason and leaves everything as it was.
@@ -19,6 +19,7 @@ use scindo_proto::messages::{self as wire, CutAck, CutCommand, DeviceCapability,
 use scindo_world::inputs::{CutOutcome, CutRequest, Inputs, ToolInput};
 
 use crate::convert::{from_vec3, to_tool_input};
+use crate::early::EarlyPoses;
 
 /// Cuts that may wait for the next step. A step takes all of them.
 const MAX_WAITING_CUTS: usize = 64;
@@ -117,6 +118,7 @@ pub struct Inbox {
     bodies: BTreeSet<Arc<str>>,
     scene_tools: BTreeSet<Arc<str>>,
     alive: BTreeMap<String, usize>,
+    early: EarlyPoses,
     held: BTreeMap<Arc<str>, Held>,
     queue: VecDeque<CutRequest>,
     tickets: BTreeMap<u64, Ticket>,
@@ -139,9 +141,12 @@ impl Inbox {
         }
     }
 
-    /// A liveliness token of `client` appeared.
-    pub fn client_came(&mut self, client: &str) {
+    /// A liveliness token of `client` appeared: what it sent before counts now.
+    pub fn client_came(&mut self, client: &str) -> Vec<Change> {
         *self.alive.entry(client.to_owned()).or_default() += 1;
+        let early = self.early.take(client, Instant::now());
+        let taken = early.iter().filter_map(|sample| self.pose(&sample.tool_id, sample).ok());
+        taken.flatten().collect()
     }
 
     /// A liveliness token of `client` went; with the last one its tools are released.
@@ -158,17 +163,25 @@ impl Inbox {
 
     /// A checked sample that arrived under the key of tool `key_tool`.
     pub fn pose(&mut self, key_tool: &str, sample: &ToolSample) -> Result<Option<Change>, Refusal> {
-        let outcome = self.accept_pose(key_tool, sample);
+        let outcome = self.accept_pose(key_tool, sample, Instant::now());
         if let Err(refusal) = &outcome {
             self.count(refusal.code);
         }
         outcome
     }
 
-    fn accept_pose(&mut self, key_tool: &str, sample: &ToolSample) -> Result<Option<Change>, Refusal> {
+    fn accept_pose(
+        &mut self,
+        key_tool: &str,
+        sample: &ToolSample,
+        now: Instant,
+    ) -> Result<Option<Change>, Refusal> {
         same_key(key_tool, &sample.tool_id)?;
         let client = &*sample.client_id;
         if !self.alive.contains_key(client) {
+            if self.early.keep(sample, now) {
+                return Ok(None);
+            }
             return Err(refuse(
                 "no-token",
                 format!("client '{client}' has no liveliness token"),
@@ -186,7 +199,7 @@ impl Inbox {
                     "number poses upwards",
                 ));
             }
-            if !held.admit(Instant::now()) {
+            if !held.admit(now) {
                 return Err(refuse(
                     "too-fast",
                     format!("more than {MAX_POSE_RATE} poses per second for tool '{key_tool}'"),
@@ -467,6 +480,7 @@ fn repeated(answer: &CutAck) -> CutAck {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::early::PATIENCE;
     use scindo_proto::messages::{BladeSegment, Pose, ToolShape, Vec3};
 
     fn inbox() -> Inbox {
@@ -497,7 +511,6 @@ mod tests {
     #[test]
     fn a_tool_belongs_to_the_first_living_client_until_its_token_goes() {
         let mut inbox = inbox();
-        assert_eq!(inbox.pose("scalpel", &sample("a", "scalpel", 1)).unwrap_err().code, "no-token");
         inbox.client_came("a");
         inbox.client_came("b");
         assert!(matches!(inbox.pose("scalpel", &sample("a", "scalpel", 1)), Ok(Some(Change::Taken { .. }))));
@@ -510,6 +523,24 @@ mod tests {
         inbox.client_came("b");
         assert!(inbox.pose("scalpel", &sample("b", "scalpel", 1)).is_ok());
         assert_eq!(inbox.refused()["not-owner"], 1);
+    }
+
+    #[test]
+    fn a_pose_that_overtook_the_token_counts_when_the_token_comes() {
+        let mut inbox = inbox();
+        for seq in 1..4 {
+            assert_eq!(inbox.pose("scalpel", &sample("a", "scalpel", seq)), Ok(None));
+        }
+        assert!(!inbox.anybody_holds());
+        let taken = Change::Taken { tool: "scalpel".into(), owner: "a".into() };
+        assert_eq!(inbox.client_came("a"), [taken]);
+        assert_eq!(inbox.held().next().unwrap().seq, 3);
+        assert_eq!(inbox.client_came("a"), []);
+        assert_eq!(inbox.refused().len(), 0);
+        let late = Instant::now() + PATIENCE;
+        assert_eq!(inbox.accept_pose("scalpel", &sample("b", "scalpel", 1), late), Ok(None));
+        let refused = inbox.accept_pose("scalpel", &sample("b", "scalpel", 2), late + PATIENCE);
+        assert_eq!(refused.unwrap_err().code, "no-token");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! * [`cli`], [`command`], [`progress`]: what the user asked for, and how it goes.
 //! * [`session`]: the two zenoh sessions, haptic and bulk.
 //! * [`convert`]: between the types of the world and the messages of the wire.
-//! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
+//! * [`receive`] → [`inbox`], [`early`]: poses and cuts of clients; who holds which tool.
 //! * [`exchange`]: what the threads share.
 //! * [`engine`], [`sim`]: the simulation thread.
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
@@ -35,6 +35,8 @@ pub mod session;
 pub mod convert;
 
 pub mod inbox;
+
+pub mod early;
 
 pub mod receive;
 

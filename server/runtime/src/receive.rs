@@ -65,13 +65,11 @@ fn with(
 
 fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     let Ok(Topic::Live(_, client)) = keys.parse(sample.key_expr().as_str()) else { return };
-    match sample.kind() {
+    let changes = match sample.kind() {
         SampleKind::Put => exchange.inbox().client_came(client.as_str()),
-        SampleKind::Delete => {
-            let released = exchange.inbox().client_went(client.as_str());
-            released.into_iter().for_each(|change| announce(exchange, change));
-        }
-    }
+        SampleKind::Delete => exchange.inbox().client_went(client.as_str()),
+    };
+    changes.into_iter().for_each(|change| announce(exchange, change));
 }
 
 fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {

@@ -2,15 +2,14 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::net::TcpListener;
-use std::sync::atomic::{AtomicU16, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use scindo::engine::Engine;
 use scindo::server::{Server, ServerConfig};
 use scindo::session::{NetworkConfig, Sessions};
 use scindo_client::messages::{
-    BladeSegment, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,
+    BladeSegment, HapticContact, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,
     cut_ack::Outcome,
     haptic_contact,
     tool_sample::Mode,
@@ -18,6 +17,7 @@ use scindo_client::messages::{
 };
 use scindo_client::{Link, LinkConfig, LinkError, Role};
 use scindo_proto::{Chunk, Topic, encode, encoding};
+use scindo_tests::{PATIENCE, free_pair};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use zenoh::qos::CongestionControl;
@@ -62,7 +62,8 @@ impl Running {
     }
 
     async fn link(&self, role: Role, id: &str) -> Link {
-        Link::connect(LinkConfig::new(role, id).with_connect([self.endpoint.clone()])).await.unwrap()
+        let config = LinkConfig::new(role, id).with_connect([self.endpoint.clone()]);
+        Link::connect(LinkConfig { timeout: PATIENCE, ..config }).await.unwrap()
     }
 
     fn end(&mut self) -> Engine {
@@ -79,23 +80,10 @@ fn serve(endpoint: &str) -> Server {
     Server::start(engine, Some(Sessions::open(&network).unwrap()), &ServerConfig::default()).unwrap()
 }
 
-/// A port that is free together with the next one.
-fn free_pair() -> u16 {
-    static NEXT: AtomicU16 = AtomicU16::new(0);
-    let start = 20_000 + (std::process::id() % 200) as u16 * 100;
-    loop {
-        let port = start + 2 * NEXT.fetch_add(1, Ordering::Relaxed);
-        let both = (TcpListener::bind(("127.0.0.1", port)), TcpListener::bind(("127.0.0.1", port + 1)));
-        if matches!(both, (Ok(_), Ok(_))) {
-            return port;
-        }
-    }
-}
-
 async fn until(what: &str, mut check: impl FnMut() -> bool) {
     let started = Instant::now();
     while !check() {
-        assert!(started.elapsed() < Duration::from_secs(20), "{what}");
+        assert!(started.elapsed() < PATIENCE, "{what}");
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
 }
@@ -168,7 +156,9 @@ async fn who_joins_a_paused_simulation_sees_the_tools_that_are_held() {
     let late = running.link(Role::Viewer, "late").await;
     let mut states = late.tool_states().await.unwrap();
     while states.next().await.unwrap().len() < 2 {}
-    tokio::time::sleep(Duration::from_millis(600)).await;
+    // Every tool is told anew in each round.
+    let probe = states.get()["probe"].seq;
+    while states.next().await.unwrap()["probe"].seq < probe + 2 {}
     let seen = states.get();
     assert_eq!(seen.keys().map(String::as_str).collect::<Vec<_>>(), ["probe", "scalpel"]);
     running.end();
@@ -199,8 +189,11 @@ async fn a_scratch_is_drawn_for_everybody_until_the_reset() {
     assert_eq!((ack.outcome(), ack.elements_cut), (Outcome::Applied, 0));
     until("the scratch is drawn", || mirror.latest().unwrap().frame.mark_count > 0).await;
     link.pause(true).await.unwrap();
-    tokio::time::sleep(Duration::from_millis(200)).await;
+    let late = running.link(Role::Viewer, "late").await;
+    let seen = late.mirror("block").await.unwrap().next().await.unwrap();
+    until("both show one step", || mirror.latest().unwrap().frame.sim_step == seen.frame.sim_step).await;
     let drawn = mirror.latest().unwrap();
+    assert_eq!(seen.frame.marks, drawn.frame.marks);
     let ends = marks(&drawn.frame);
     // From the first edge of an element that it crosses, 4 mm from where it enters, to the blade.
     let length: f32 = ends.chunks_exact(2).map(|mark| (mark[1][1] - mark[0][1]).abs()).sum();
@@ -209,9 +202,6 @@ async fn a_scratch_is_drawn_for_everybody_until_the_reset() {
         let on_top = (x - 0.043).abs() < 1e-3 && (0.005..0.034).contains(&y) && (z - 0.02).abs() < 1e-3;
         assert!(on_top, "[{x}, {y}, {z}] is not on the line");
     }
-    let late = running.link(Role::Viewer, "late").await;
-    let seen = late.mirror("block").await.unwrap().next().await.unwrap();
-    assert_eq!((seen.frame.sim_step, &seen.frame.marks), (drawn.frame.sim_step, &drawn.frame.marks));
     link.reset().await.unwrap();
     until("the scratch is gone", || mirror.latest().unwrap().frame.mark_count == 0).await;
     running.end();
@@ -286,18 +276,29 @@ async fn a_lost_client_loses_its_tool_and_another_may_take_it() {
     {
         let link = running.link(Role::Haptic, "hand-1").await;
         let mut tool = link.tool("probe").await.unwrap();
-        tool.poses.send(at(0.04, 0.02, 0.1)).unwrap();
-        until("the first hand holds it", || owner().as_deref() == Some("hand-1")).await;
+        // Poses may be lost: a newer one follows.
+        until("the first hand holds it", || {
+            tool.poses.send(at(0.04, 0.02, 0.1)).unwrap();
+            owner().as_deref() == Some("hand-1")
+        })
+        .await;
         let other = running.link(Role::Haptic, "hand-2").await;
         let mut same = other.tool("probe").await.unwrap();
-        same.poses.send(at(0.04, 0.02, 0.1)).unwrap();
-        until("the second hand is refused", || refused(&running, "not-owner") == 1).await;
+        until("the second hand is refused", || {
+            same.poses.send(at(0.04, 0.02, 0.1)).unwrap();
+            refused(&running, "not-owner") >= 1
+        })
+        .await;
+        assert_eq!(owner().as_deref(), Some("hand-1"));
     }
     until("the tool is free", || owner().is_none()).await;
     let third = running.link(Role::Haptic, "hand-3").await;
     let mut tool = third.tool("probe").await.unwrap();
-    tool.poses.send(at(0.04, 0.02, 0.1)).unwrap();
-    until("the third hand holds it", || owner().as_deref() == Some("hand-3")).await;
+    until("the third hand holds it", || {
+        tool.poses.send(at(0.04, 0.02, 0.1)).unwrap();
+        owner().as_deref() == Some("hand-3")
+    })
+    .await;
     loop {
         let event = events.next().await.unwrap();
         if event.name == "tool-released" {
@@ -308,37 +309,57 @@ async fn a_lost_client_loses_its_tool_and_another_may_take_it() {
     running.end();
 }
 
+/// The first poses are on their way before the token of who sends them is.
+#[tokio::test(flavor = "multi_thread")]
+async fn who_moves_a_tool_at_once_is_not_refused() {
+    let mut running = Running::start();
+    let link = running.link(Role::Viewer, "page").await;
+    let shape = ToolShape { kind: Some(Kind::Sphere(Sphere { radius_m: 0.004 })) };
+    for guest in 0..40 {
+        let mut hand = link.guest_tool(&format!("guest-{guest}")).await.unwrap();
+        let holds = || running.server().exchange().inbox().held().count() == 1;
+        until("the guest holds its tool", || {
+            for _ in 0..3 {
+                hand.send(ToolSample { shape: Some(shape), ..at(0.04, 0.02, 0.1) }).unwrap();
+            }
+            holds()
+        })
+        .await;
+        drop(hand);
+        until("the tool is put away", || !holds()).await;
+    }
+    assert_eq!(running.server().exchange().inbox().refused().get("no-token"), None);
+    running.end();
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_haptic_client_feels_the_body_and_costs_nothing_when_it_is_gone() {
     let mut running = Running::start();
     {
         let link = running.link(Role::Haptic, "hand").await;
+        let sent_ns = Arc::new(Mutex::new(Vec::new()));
+        let stamps = sent_ns.clone();
+        let on_contact = move |message: HapticContact| stamps.lock().unwrap().push(message.publish_unix_ns);
+        let _stream = link.each_contact("probe", on_contact).await.unwrap();
         let mut tool = link.tool("probe").await.unwrap();
-        let started = Instant::now();
-        let mut felt = false;
-        let mut first = None;
-        while started.elapsed() < Duration::from_secs(20) {
-            // Lowers the ball from above the block to 4 mm below its top.
-            let depth = (started.elapsed().as_secs_f64() * 0.02).min(0.014);
-            tool.poses.send(at(0.04, 0.02, 0.035 - depth)).unwrap();
-            tokio::time::sleep(Duration::from_millis(2)).await;
-            let received = tool.contacts.received();
-            let newest = tool.contacts.latest();
-            if newest.at.is_some() && first.is_none() {
-                first = Some((Instant::now(), received));
-            }
-            if newest.message.mode() == haptic_contact::Mode::Contact {
-                let pressing = newest.message.contacts.iter().any(|c| c.force_n.is_some_and(|f| f.z > 0.01));
-                felt |= pressing;
-            }
-            if felt && first.is_some_and(|(at, _)| at.elapsed() > Duration::from_secs(1)) {
-                break;
-            }
-        }
-        assert!(felt, "no force after 20 s");
-        let (since, before) = first.unwrap();
-        let rate = (tool.contacts.received() - before) as f64 / since.elapsed().as_secs_f64();
-        assert!(rate > 100.0, "{rate} contacts per second");
+        // Lowers the ball from above the block to 4 mm below its top.
+        let mut height = 0.035_f64;
+        until("the block pushes back", || {
+            height = (height - 2e-4).max(0.021);
+            tool.poses.send(at(0.04, 0.02, height)).unwrap();
+            let newest = &tool.contacts.latest().message;
+            let pushes = newest.contacts.iter().any(|c| c.force_n.is_some_and(|f| f.z > 0.01));
+            newest.mode() == haptic_contact::Mode::Contact && pushes
+        })
+        .await;
+        let already = sent_ns.lock().unwrap().len();
+        until("the contact is told on and on", || sent_ns.lock().unwrap().len() > already + 200).await;
+        // By the server's stamps, wherever it was not held up: most models follow each other sooner than steps.
+        let mut gaps_ms: Vec<f64> =
+            sent_ns.lock().unwrap().windows(2).map(|two| (two[1] as f64 - two[0] as f64) * 1e-6).collect();
+        gaps_ms.sort_by(f64::total_cmp);
+        let median_ms = gaps_ms[gaps_ms.len() / 2];
+        assert!(median_ms < 10.0, "a contact every {median_ms} ms");
     }
     until("nobody wants contact any more", || {
         let mut wants = scindo_world::inputs::Wants::default();
@@ -399,7 +420,7 @@ async fn a_client_of_the_haptic_port_alone_gets_everything() {
     }
     let session = zenoh::open(config).await.unwrap();
     let frames = session.declare_subscriber("scindo/@v1/main/body/block/surface/frame").await.unwrap();
-    let frame = tokio::time::timeout(Duration::from_secs(10), frames.recv_async()).await.unwrap().unwrap();
+    let frame = tokio::time::timeout(PATIENCE, frames.recv_async()).await.unwrap().unwrap();
     assert_eq!(frame.encoding().to_string(), "application/protobuf;scindo.v1.SurfaceFrame");
     let keyframe = session.get("scindo/@v1/main/body/block/surface/keyframe").await.unwrap();
     assert!(keyframe.recv_async().await.unwrap().result().is_ok());
