@@ -126,6 +126,19 @@ impl Boundary {
     pub fn node_loads(&self, mesh: &CutMesh, n: usize, load: &mut Vec<Vector3<f64>>) {
         load.clear();
         resize_with_room(load, n, Vector3::zeros());
+        self.add_loads(mesh, load);
+    }
+
+    /// The same after a cut, where `load` was told before it: point forces are on the copies they were on.
+    pub fn loads_of_new_copies(&self, mesh: &CutMesh, load: &mut Vec<Vector3<f64>>) {
+        if self.spread_force.is_empty() {
+            resize_with_room(load, mesh.n_copies(), Vector3::zeros());
+        } else {
+            self.node_loads(mesh, mesh.n_copies(), load);
+        }
+    }
+
+    fn add_loads(&self, mesh: &CutMesh, load: &mut [Vector3<f64>]) {
         for (load, f) in load.iter_mut().zip(&self.point_force) {
             *load += f;
         }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::{Body, BodyError, General, Path};
 use crate::assembly::ElementKind;
-use crate::cut::{BladeSweep, CutReport};
+use crate::cut::{BladeSweep, CutReport, NewCopy};
 use crate::integrator::LooseParts;
 use crate::operator::{refill, resize_with_room};
 
@@ -27,10 +27,15 @@ impl Body {
         if !self.cut_mesh.changed_pieces().is_empty() {
             self.inherit(&report);
             match &mut self.path {
-                Path::Fast(fast) => fast.follow_cut(&self.cut_mesh),
-                Path::General(_) => self.rebuild_general()?,
+                Path::Fast(fast) => {
+                    fast.follow_cut(&self.cut_mesh);
+                    self.follow_new_copies(&report.new_copies);
+                }
+                Path::General(_) => {
+                    self.rebuild_general()?;
+                    self.follow_topology();
+                }
             }
-            self.follow_topology();
         }
         Ok(report)
     }
@@ -55,7 +60,28 @@ impl Body {
 
     /// Everything that is derived from pieces and copies.
     pub(super) fn follow_topology(&mut self) {
-        self.rest = self.shape.rest_positions(&self.cut_mesh);
+        refill(&mut self.rest, self.shape.rest_positions(&self.cut_mesh).into_iter());
+        self.follow_masses();
+        self.follow_boundary();
+    }
+
+    /// The same on the fast path, after a cut of elements without further nodes that made the copies
+    /// `new`: what belongs to copies that were there stays where it is.
+    fn follow_new_copies(&mut self, new: &[NewCopy]) {
+        let known = self.rest.len();
+        resize_with_room(&mut self.rest, self.cut_mesh.n_copies(), Vector3::zeros());
+        for (rest, new) in self.rest[known..].iter_mut().zip(new) {
+            *rest = self.cut_mesh.mesh().nodes[self.cut_mesh.copy_node()[new.copy as usize] as usize];
+        }
+        self.follow_masses();
+        self.fixed = self.boundary.fixed_copies(&self.cut_mesh, &self.rest);
+        self.boundary.loads_of_new_copies(&self.cut_mesh, &mut self.load);
+        self.reunion.follow(&mut self.parts, &self.cut_mesh, new, &self.mass, &self.fixed);
+        self.follow_parts();
+    }
+
+    /// Masses, and what the fast path derives from them.
+    fn follow_masses(&mut self) {
         let density = self.material.density_kg_m3;
         match &self.path {
             Path::Fast(_) => refill(&mut self.mass, self.cut_mesh.copy_volume().iter().map(|v| density * v)),
@@ -65,9 +91,8 @@ impl Body {
             self.share_masses_evenly();
         }
         if let Path::Fast(fast) = &mut self.path {
-            fast.follow_topology(&self.cut_mesh, &self.mass, &self.state);
+            fast.follow_topology(&self.cut_mesh, &self.mass);
         }
-        self.follow_boundary();
     }
 
     /// What [`Ablation::piece_masses`](super::Ablation) asks for.
@@ -95,6 +120,10 @@ impl Body {
                 LooseParts::connected(elements, &self.mass, &self.fixed)
             }
         };
+        self.follow_parts();
+    }
+
+    fn follow_parts(&mut self) {
         if let Path::Fast(fast) = &mut self.path {
             fast.follow_parts(&self.rest, &self.mass, &self.parts);
         }

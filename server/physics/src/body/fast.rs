@@ -6,7 +6,7 @@ use super::{Outcome, SolveReport};
 use crate::cut::CutMesh;
 use crate::element::{Simd, deformation_gradient, piece_energy};
 use crate::integrator::{ImplicitEuler, LooseParts, Notice, SpinGuard, State, StepInputs, StepOutcome};
-use crate::operator::{Elastic, FixedCopy, StiffModes, degenerate_elements, refill};
+use crate::operator::{Elastic, FixedCopy, StiffModes, degenerate_elements, refill, resize_with_room};
 use crate::team::Team;
 
 /// A step that fails is tried again in 2 and then in 4 parts.
@@ -90,13 +90,14 @@ impl Fast {
     }
 
     /// Everything else that is derived from pieces, copies and their mass [kg].
-    pub fn follow_topology(&mut self, mesh: &CutMesh, mass: &[f64], state: &State) {
+    pub fn follow_topology(&mut self, mesh: &CutMesh, mass: &[f64]) {
         refill(&mut self.mass_f32, mass.iter().map(|&m| m as f32));
         self.weightless = find_weightless(mesh, mass);
         self.integrator.resize(mesh.n_copies());
         self.integrator.set_stiff_modes(self.stiff_modes(mesh));
-        refill(&mut self.before.x, state.x.iter().copied());
-        refill(&mut self.before.v, state.v.iter().copied());
+        // A step fills them; it must not have to make room.
+        resize_with_room(&mut self.before.x, mesh.n_copies(), Vector3::zeros());
+        resize_with_room(&mut self.before.v, mesh.n_copies(), Vector3::zeros());
     }
 
     /// Everything that is derived from the parts of a body with these rest positions [m] and masses [kg].

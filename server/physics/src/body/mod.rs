@@ -26,7 +26,7 @@ use nalgebra::Vector3;
 pub use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::element::Simd;
-use crate::integrator::{DynamicsInputs, LooseParts, State, StepInputs};
+use crate::integrator::{DynamicsInputs, LooseParts, Reunion, State, StepInputs};
 pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
 use crate::material::Material;
 use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
@@ -99,6 +99,7 @@ pub struct Body {
     load: Vec<Vector3<f64>>,
     mass: Vec<f64>,
     parts: LooseParts,
+    reunion: Reunion,
     path: Path,
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
@@ -174,6 +175,7 @@ impl Body {
             load: Vec::new(),
             mass: Vec::new(),
             parts: LooseParts::default(),
+            reunion: Reunion::default(),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
             skin: None,
@@ -392,7 +394,7 @@ impl Body {
     }
 
     fn return_to_rest(&mut self) {
-        self.rest = self.shape.rest_positions(&self.cut_mesh);
+        refill(&mut self.rest, self.shape.rest_positions(&self.cut_mesh).into_iter());
         refill(&mut self.state.x, self.rest.iter().copied());
         self.state.v.fill(Vector3::zeros());
         resize_with_room(&mut self.state.v, self.rest.len(), Vector3::zeros());

@@ -133,6 +133,11 @@ impl CutMesh {
         self.copies.with_node(&self.mesh, node, &self.fragments, &self.pieces)
     }
 
+    /// Copies of the pieces that have this copy.
+    pub(crate) fn tets_around(&self, copy: u32) -> Vec<[u32; 4]> {
+        self.copies.tets_around(copy, &self.pieces)
+    }
+
     /// Σ over pieces of ∫ N_a dV [m³] per copy; its mass is density times this.
     pub fn copy_volume(&self) -> &[f64] {
         &self.copies.volume

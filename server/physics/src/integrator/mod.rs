@@ -3,6 +3,7 @@
 mod dynamics;
 mod implicit_euler;
 mod parts;
+mod reunion;
 mod spin;
 mod springs;
 mod statics;
@@ -15,6 +16,7 @@ pub use dynamics::{
 pub use implicit_euler::{ImplicitEuler, StepInputs, StepOutcome};
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};
+pub use reunion::Reunion;
 pub use spin::SpinGuard;
 pub use springs::{PointSpring, SpringKind};
 pub use statics::{StaticProblem, find_equilibrium, prescribe};

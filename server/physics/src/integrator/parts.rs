@@ -7,6 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::reunion::find;
 use crate::cut::Piece;
 use crate::operator::FixedCopy;
 
@@ -45,22 +46,33 @@ impl LooseParts {
             }
         }
         let mut parts = Self { of_copy: vec![0; n], ..Self::default() };
+        let mut n_parts = 0;
         for copy in 0..n {
             let r = find(&mut root, copy as u32) as usize;
             // Roots are the smallest copy of their part, so they come first.
             if r == copy {
-                parts.of_copy[copy] = parts.mass.len() as u32;
-                parts.mass.push(0.0);
+                parts.of_copy[copy] = n_parts;
+                n_parts += 1;
             } else {
                 parts.of_copy[copy] = parts.of_copy[r];
             }
-            parts.mass[parts.of_copy[copy] as usize] += mass[copy];
         }
-        parts.free = parts.mass.iter().map(|&m| m > 0.0).collect();
-        for copy in fixed.iter().filter(|f| f.axes.contains(&true)) {
-            parts.free[parts.of_copy[copy.copy as usize] as usize] = false;
-        }
+        parts.mass = vec![0.0; n_parts as usize];
+        parts.measure(mass, fixed);
         parts
+    }
+
+    /// Mass of every part and whether it is free, for these masses of its copies [kg].
+    pub(super) fn measure(&mut self, mass: &[f64], fixed: &[FixedCopy]) {
+        self.mass.fill(0.0);
+        for (&part, m) in self.of_copy.iter().zip(mass) {
+            self.mass[part as usize] += m;
+        }
+        self.free.clear();
+        self.free.extend(self.mass.iter().map(|&m| m > 0.0));
+        for copy in fixed.iter().filter(|f| f.axes.contains(&true)) {
+            self.free[self.of_copy[copy.copy as usize] as usize] = false;
+        }
     }
 
     /// Number of parts.
@@ -77,14 +89,6 @@ impl LooseParts {
     pub fn any_free(&self) -> bool {
         self.free.contains(&true)
     }
-}
-
-fn find(root: &mut [u32], mut a: u32) -> u32 {
-    while root[a as usize] != a {
-        root[a as usize] = root[root[a as usize] as usize];
-        a = root[a as usize];
-    }
-    a
 }
 
 /// The three translation equations S t = b of every part.

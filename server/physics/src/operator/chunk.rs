@@ -50,21 +50,17 @@ pub struct NewLane {
 }
 
 impl Chunk {
-    /// Arranges the carriers `members` (ascending); `rotations` by piece, or empty.
-    pub fn new(
-        region: usize,
-        members: &[u32],
-        mesh: &TetMesh,
-        merged: &[Merged],
-        rotations: &[Matrix3<f32>],
-    ) -> Self {
-        let plan = plan_chunk(members, |p| merged[p as usize].piece.copies);
+    /// Arranges the carriers `members` (ascending).
+    pub fn new(region: usize, members: &[NewLane], mesh: &TetMesh, merged: &[Merged]) -> Self {
+        let pieces: Vec<u32> = members.iter().map(|lane| lane.piece).collect();
+        let plan = plan_chunk(&pieces, |p| merged[p as usize].piece.copies);
         // Room for what cuts add before the next plan.
         let mut rest = Vec::with_capacity(plan.pieces.len() + plan.pieces.len() / 4 + 1);
         for lanes in &plan.pieces {
             let mut batch = RestBatch::empty();
             for (lane, &p) in lanes.iter().enumerate().filter(|(_, p)| **p != NO_PIECE) {
-                batch.set(lane, mesh, &merged[p as usize], rotations.get(p as usize));
+                let rotation = pieces.binary_search(&p).ok().map(|at| &members[at].rotation);
+                batch.set(lane, mesh, &merged[p as usize], rotation);
             }
             rest.push(batch);
         }
@@ -73,7 +69,7 @@ impl Chunk {
             region,
             batches: Batches::new(&plan.nodes, rest, n),
             pieces: plan.pieces,
-            rest: rest_positions(&plan.copies, members, mesh, merged),
+            rest: rest_positions(&plan.copies, &pieces, mesh, merged),
             edges: None,
             unassembled: Vec::new(),
             planned: [members.len(), plan.copies.len()],
@@ -92,6 +88,11 @@ impl Chunk {
         let lanes = self.pieces.iter().enumerate();
         let lanes = lanes.flat_map(|(b, lanes)| lanes.iter().enumerate().map(move |(l, &p)| (p, b, l)));
         lanes.filter(|&(p, ..)| p != NO_PIECE)
+    }
+
+    /// All lanes in use, to be arranged anew with their rotations.
+    pub fn new_lanes(&self) -> impl Iterator<Item = NewLane> + '_ {
+        self.lanes().map(|(piece, b, l)| NewLane { piece, rotation: self.rotation(b, l) })
     }
 
     /// Rotation of a lane at the last update.
@@ -187,9 +188,15 @@ impl Chunk {
         unassembled.clear();
     }
 
-    /// y = s K̂ x.
+    /// The part of its rows that the chunk uses.
+    fn used<'a, T>(&self, rows: &'a mut [T]) -> &'a mut [T] {
+        &mut rows[..self.x.len()]
+    }
+
+    /// y = s K̂ x; `y` may have more rows than the chunk uses.
     #[inline(always)]
     pub fn apply(&self, simd: Simd, y: &mut [Padded]) {
+        let y = self.used(y);
         y.fill([0.0; 4]);
         match &self.edges {
             Some(edges) => edges.apply(simd, &self.x, y),
@@ -207,6 +214,7 @@ impl Chunk {
         for (local, (&copy, rest)) in self.x.iter_mut().zip(held) {
             *local = padded(&(displacement(copy, rest) - origin));
         }
+        let y = self.used(y);
         self.apply(simd, y);
         let factor = 1.0 / scale;
         for f in y.iter_mut().flatten() {
@@ -227,6 +235,7 @@ impl Chunk {
             let x = &positions[copy as usize];
             *local = [x.x, x.y, x.z, 0.0];
         }
+        let (f, diagonal) = (self.used(f), self.used(diagonal));
         f.fill([0.0; 4]);
         diagonal.fill([0.0; 8]);
         let mut locals = Locals { x: &self.positions, f, blocks: diagonal };

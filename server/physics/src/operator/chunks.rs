@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::BLOCK;
+use super::{BLOCK, resize_with_room};
 use crate::element::{Ids, LANES};
 
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
@@ -165,7 +165,8 @@ impl Packing {
 /// of that vector is 0 for ever.
 #[derive(Clone, Debug, Default)]
 pub struct Gather {
-    /// First row of every chunk's own sums, and the end: its copies and the waste bin.
+    /// First row of every chunk's own sums, and the end: its copies, the waste bin, and room for what
+    /// cuts add.
     pub first_row: Vec<u32>,
     /// Two rows per copy, row 0 where there are fewer: nearly all copies have no more.
     pairs: Vec<[u32; 2]>,
@@ -176,24 +177,54 @@ pub struct Gather {
 }
 
 impl Gather {
-    /// Lists the rows of every copy.
-    pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]>, n_copies: usize) -> Self {
-        let mut pairs = vec![[0_u32; 2]; n_copies];
-        let (mut further, mut first_row, mut row) = (Vec::new(), vec![1], 1);
-        for copies in chunks {
-            for (l, &copy) in copies.iter().enumerate() {
-                match &mut pairs[copy as usize] {
-                    [first @ 0, _] | [_, first @ 0] => *first = row + l as u32,
-                    _ => further.push((copy, row + l as u32)),
+    /// Lists the rows of every copy; every chunk has room for as many copies again.
+    pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
+        let mut gather = Self { first_row: vec![1], ..Self::default() };
+        let mut row = 1;
+        for copies in chunks.clone() {
+            row += 2 * copies.len() as u32 + 1;
+            gather.first_row.push(row);
+        }
+        gather.arrange(chunks, n_copies);
+        gather
+    }
+
+    /// Lists the rows of every copy anew, where every chunk is.
+    pub fn arrange<'a>(&mut self, chunks: impl Iterator<Item = &'a [u32]>, n_copies: usize) {
+        self.pairs.clear();
+        self.further.clear();
+        self.append(chunks.zip(0..).map(|(copies, chunk)| (chunk, copies, 0)), n_copies);
+    }
+
+    /// Adds copies to chunks: number of the chunk, its copies, and the first that it did not have.
+    pub fn append<'a>(&mut self, chunks: impl Iterator<Item = (usize, &'a [u32], usize)>, n_copies: usize) {
+        resize_with_room(&mut self.pairs, n_copies, [0; 2]);
+        for (chunk, copies, known) in chunks {
+            let first = self.first_row[chunk];
+            for (row, &copy) in (first..).zip(copies).skip(known) {
+                let [a, b] = &mut self.pairs[copy as usize];
+                let mut row = row;
+                // Rows in order: chunks may come in any.
+                for place in [a, b] {
+                    if *place == 0 || row < *place {
+                        std::mem::swap(&mut row, place);
+                    }
+                }
+                if row != 0 {
+                    self.further.push((copy, row));
                 }
             }
-            row += copies.len() as u32 + 1;
-            first_row.push(row);
         }
-        further.sort_unstable();
-        let n_blocks = n_copies.div_ceil(BLOCK);
-        let before = |b: usize| further.partition_point(|&(copy, _)| (copy as usize) < b * BLOCK) as u32;
-        Self { first_row, pairs, first_further: (0..=n_blocks).map(before).collect(), further }
+        self.further.sort_unstable();
+        let before = |b: usize| self.further.partition_point(|&(copy, _)| (copy as usize) < b * BLOCK) as u32;
+        self.first_further.clear();
+        self.first_further.extend((0..=n_copies.div_ceil(BLOCK)).map(before));
+    }
+
+    /// Whether every chunk still has its copies and the waste bin where it is.
+    pub fn holds<'a>(&self, chunks: impl ExactSizeIterator<Item = &'a [u32]>) -> bool {
+        let rooms = self.first_row.windows(2).map(|bounds| (bounds[1] - bounds[0]) as usize);
+        rooms.len() == chunks.len() && rooms.zip(chunks).all(|(room, copies)| copies.len() < room)
     }
 
     /// Number of rows.

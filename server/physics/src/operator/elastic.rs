@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::carriers::Carriers;
+use super::carriers::{Carriers, LaneChanges};
 use super::chunk::{Chunk, NewLane};
 use super::chunks::{Gather, NO_PIECE, region_of_elements};
 use super::kernel::{Block6, Coefficients};
@@ -54,6 +54,7 @@ pub struct Elastic {
     version: u64,
     /// Scratch of [`Self::follow`].
     numbering: Numbering,
+    marks: Marks,
 }
 
 /// Where a piece is kept.
@@ -94,8 +95,17 @@ impl Elastic {
             made_with: None,
             version: 0,
             numbering: Numbering::default(),
+            marks: Marks::default(),
         };
-        elastic.plan(mesh, &vec![true; n_regions], &[]);
+        elastic.marks.put_on(&LaneChanges::default(), pieces.len());
+        let mut members = vec![Some(Vec::new()); n_regions];
+        for (p, merged) in (0u32..).zip(elastic.carriers.merged()).filter(|(_, m)| m.count > 0) {
+            let region = elastic.region_of_element[merged.piece.element as usize] as usize;
+            members[region]
+                .iter_mut()
+                .for_each(|m| m.push(NewLane { piece: p, rotation: Matrix3::identity() }));
+        }
+        elastic.plan(mesh, members);
         elastic.arrange_sums(n_copies);
         elastic
     }
@@ -107,18 +117,11 @@ impl Elastic {
     pub fn follow(&mut self, mesh: &TetMesh, pieces: &[Piece], changed: &[u32], n_copies: usize) {
         let changes = self.carriers.follow(pieces, changed);
         let region_of = |p: u32| self.region_of_element[pieces[p as usize].element as usize] as usize;
-        let mut marks = Marks { amended: vec![false; pieces.len()], source: vec![false; pieces.len()] };
         let mut affected = vec![false; self.n_regions];
-        for &p in &changes.amended {
-            (marks.amended[p as usize], affected[region_of(p)]) = (true, true);
-        }
-        for &[p, source] in &changes.added {
-            affected[region_of(p)] = true;
-            if source != NO_PIECE {
-                marks.source[source as usize] = true;
-            }
-        }
-        let (sources, rotations) = self.rotations_of(&marks.source, &affected);
+        changes.amended.iter().for_each(|&p| affected[region_of(p)] = true);
+        changes.added.iter().for_each(|&[p, _]| affected[region_of(p)] = true);
+        self.marks.put_on(&changes, pieces.len());
+        let (sources, rotations) = self.rotations_of(&affected);
         self.numbering.note(&sources, 0);
         let mut added = vec![Vec::new(); self.n_regions];
         let rotation = |source: u32| {
@@ -128,47 +131,59 @@ impl Elastic {
         for &[piece, source] in &changes.added {
             added[region_of(piece)].push(NewLane { piece, rotation: rotation(source) });
         }
-        let (mut outgrown, mut late) = (vec![false; self.n_regions], Vec::new());
+        // Chunks that got copies and how many they had; what goes to regions that are arranged anew.
+        let (mut grown, mut outgrown) = (Vec::new(), vec![None; self.n_regions]);
         let merged = self.carriers.merged();
-        for chunk in self.chunks.iter_mut().rev().filter(|chunk| affected[chunk.region]) {
+        for (k, chunk) in self.chunks.iter_mut().enumerate().rev().filter(|(_, c)| affected[c.region]) {
             // New lanes go to the last chunk of their region.
             let added = std::mem::take(&mut added[chunk.region]);
-            if !chunk.follow(mesh, merged, &marks.amended, &added, &mut self.numbering) {
-                outgrown[chunk.region] = true;
-                late.extend(added);
+            let known = chunk.copies.len();
+            if chunk.follow(mesh, merged, &self.marks.amended, &added, &mut self.numbering) {
+                grown.push((k, known));
+            } else {
+                outgrown[chunk.region].get_or_insert_with(Vec::new).extend(added);
             }
         }
-        if outgrown.contains(&true) {
-            let mut rotations = self.lane_rotations();
-            late.iter().for_each(|new| rotations[new.piece as usize] = new.rotation);
-            self.plan(mesh, &outgrown, &rotations);
+        self.marks.take_off(&changes);
+        if outgrown.iter().any(Option::is_some) {
+            for chunk in &self.chunks {
+                if let Some(members) = &mut outgrown[chunk.region] {
+                    members.extend(chunk.new_lanes());
+                }
+            }
+            self.plan(mesh, outgrown);
+            self.arrange_sums(n_copies);
+        } else if self.gather.holds(self.chunks.iter().map(|c| &c.copies[..])) {
+            let chunks = &self.chunks;
+            let grown = grown.into_iter().map(|(k, known)| (k, &chunks[k].copies[..], known));
+            self.gather.append(grown, n_copies);
+        } else {
+            self.arrange_sums(n_copies);
         }
-        self.arrange_sums(n_copies);
     }
 
-    /// Divides the carriers of these regions into chunks.
-    fn plan(&mut self, mesh: &TetMesh, regions: &[bool], rotations: &[Matrix3<f32>]) {
-        let mut members = vec![Vec::new(); self.n_regions];
+    /// Divides the carriers `members` of regions into chunks, in place of those there were.
+    fn plan(&mut self, mesh: &TetMesh, members: Vec<Option<Vec<NewLane>>>) {
+        self.chunks.retain(|chunk| members[chunk.region].is_none());
         let merged = self.carriers.merged();
-        for (p, merged) in (0u32..).zip(merged).filter(|(_, merged)| merged.count > 0) {
-            let region = self.region_of_element[merged.piece.element as usize] as usize;
-            if regions[region] {
-                members[region].push(p);
-            }
-        }
-        self.chunks.retain(|chunk| !regions[chunk.region]);
-        for (region, members) in members.iter().enumerate() {
-            let build = |part| Chunk::new(region, part, mesh, merged, rotations);
+        for (region, members) in members.into_iter().enumerate() {
+            let Some(mut members) = members else { continue };
+            members.sort_unstable_by_key(|lane| lane.piece);
+            let build = |part| Chunk::new(region, part, mesh, merged);
             self.chunks.extend(members.chunks(MOST_LANES).map(build));
         }
         self.chunks.sort_by_key(|chunk| chunk.region);
     }
 
-    /// Arranges the sums of the present chunks; diagonal blocks of chunks that are not stale stay.
+    /// Arranges the sums of the present chunks; diagonal blocks of chunks that are not stale stay. The
+    /// chunks stay where they are if they have the room.
     fn arrange_sums(&mut self, n_copies: usize) {
-        self.gather = Gather::new(self.chunks.iter().map(|c| &c.copies[..]), n_copies);
-        resize_with_room(&mut self.sums, self.gather.n_rows(), [0.0; 4]);
-        self.sums.fill([0.0; 4]);
+        let copies = self.chunks.iter().map(|c| &c.copies[..]);
+        if self.gather.holds(copies.clone()) {
+            return self.gather.arrange(copies, n_copies);
+        }
+        self.gather = Gather::new(copies, n_copies);
+        self.sums = vec![[0.0; 4]; self.gather.n_rows()];
         let kept = std::mem::replace(&mut self.diagonals, vec![[0.0; 8]; self.gather.n_rows()]);
         for (chunk, &first) in self.chunks.iter_mut().zip(&self.gather.first_row) {
             let (from, to) = (chunk.first_row, first as usize);
@@ -180,11 +195,11 @@ impl Elastic {
         }
     }
 
-    /// The marked carriers in these regions, and their rotations.
-    fn rotations_of(&self, marked: &[bool], regions: &[bool]) -> (Vec<u32>, Vec<Matrix3<f32>>) {
+    /// The marked sources in these regions, and their rotations.
+    fn rotations_of(&self, regions: &[bool]) -> (Vec<u32>, Vec<Matrix3<f32>>) {
         let chunks = self.chunks.iter().filter(|chunk| regions[chunk.region]);
         let lanes = chunks.flat_map(|chunk| chunk.lanes().map(move |lane| (chunk, lane)));
-        let lanes = lanes.filter(|(_, (p, ..))| marked[*p as usize]);
+        let lanes = lanes.filter(|(_, (p, ..))| self.marks.source[*p as usize]);
         lanes.map(|(chunk, (p, batch, lane))| (p, chunk.rotation(batch, lane))).unzip()
     }
 
@@ -382,12 +397,31 @@ impl Elastic {
     }
 }
 
-/// Which pieces a cut concerns.
+/// Which pieces a cut concerns; none between cuts.
+#[derive(Debug, Default)]
 struct Marks {
     /// Carriers whose lanes are to be amended.
     amended: Vec<bool>,
     /// Carriers whose rotation new lanes inherit.
     source: Vec<bool>,
+}
+
+impl Marks {
+    fn put_on(&mut self, changes: &LaneChanges, n_pieces: usize) {
+        resize_with_room(&mut self.amended, n_pieces, false);
+        resize_with_room(&mut self.source, n_pieces, false);
+        self.set(changes, true);
+    }
+
+    fn take_off(&mut self, changes: &LaneChanges) {
+        self.set(changes, false);
+    }
+
+    fn set(&mut self, changes: &LaneChanges, mark: bool) {
+        changes.amended.iter().for_each(|&p| self.amended[p as usize] = mark);
+        let sources = changes.added.iter().map(|added| added[1]).filter(|&source| source != NO_PIECE);
+        sources.for_each(|source| self.source[source as usize] = mark);
+    }
 }
 
 impl LinearOperator for Elastic {
