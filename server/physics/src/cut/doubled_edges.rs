@@ -4,9 +4,7 @@
 
 use std::collections::BTreeSet;
 
-use super::fragments::FragmentVertex;
-use super::surface::{Surface, bind};
-use super::surface_builder::{Material, SurfaceBuilder};
+use super::surface::{Surface, SurfaceVertex};
 
 /// The edges to divide, each by the smaller of its two half-edges.
 #[derive(Clone, Debug, Default)]
@@ -15,14 +13,19 @@ pub struct DoubledEdges {
 }
 
 impl DoubledEdges {
+    /// The edges.
+    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        self.edges.iter().copied()
+    }
+
+    /// Forgets an edge; whether it was known.
+    pub fn remove(&mut self, edge: u32) -> bool {
+        self.edges.remove(&edge)
+    }
+
     /// Adds an edge.
     pub fn insert(&mut self, edge: u32) {
         self.edges.insert(edge);
-    }
-
-    /// Forgets an edge.
-    pub fn remove(&mut self, edge: u32) {
-        self.edges.remove(&edge);
     }
 
     /// Number of edges.
@@ -31,44 +34,50 @@ impl DoubledEdges {
         self.edges.len()
     }
 
-    /// Triangles with such an edge, some more than once.
-    pub fn triangles(&self, twin: impl Fn(u32) -> u32) -> Vec<u32> {
-        self.edges.iter().flat_map(|&h| [h / 3, twin(h) / 3]).collect()
+    /// Looks at all edges around a vertex, each with the vertex at its other end: of those with the same
+    /// end the first stays whole.
+    pub fn compare(&mut self, around: &mut [(u32, u32)]) {
+        around.sort_unstable();
+        for same in around.chunk_by(|p, q| p.0 == q.0) {
+            self.edges.remove(&same[0].1);
+            self.edges.extend(same[1..].iter().map(|edge| edge.1));
+        }
     }
 
-    /// Appends the vertices in the middle of the edges and divides the triangles there: the first
-    /// part of each takes the place of the triangle, the others come behind all triangles.
-    pub fn put_on_fans(&mut self, builder: &SurfaceBuilder, material: &Material, surface: &mut Surface) {
-        let Material { mesh, fragments, pieces } = material;
-        let place = |t: u32, v: &FragmentVertex| bind(mesh, pieces, fragments.piece[t as usize], v);
-        let at = |corner: u32| {
-            let (t, v) = builder.fragment_corner(fragments, corner);
-            (t, fragments.vertices[v as usize])
-        };
-        let mut middle = Vec::with_capacity(2 * self.edges.len());
-        for &h in &self.edges {
-            let ((t, a), (_, b)) = (at(h), at(super::surface_builder::next(h)));
-            let id = surface.vertices.len() as u32;
-            surface.vertices.push(place(t, &FragmentVertex::between(&a, &b, 0.5)));
-            middle.extend([(h, id), (builder.twin(h), id)]);
+    /// Appends the vertices in the middle of the edges and divides the triangles there: the first part
+    /// of each takes the place of the triangle, the others come behind all triangles. `middle` is the
+    /// vertex in the middle of corners 3·triangle + k of one triangle, which are these vertices.
+    pub fn divide(
+        &self,
+        surface: &mut Surface,
+        twin: impl Fn(u32) -> u32,
+        middle: impl Fn(&[u32], &[SurfaceVertex]) -> SurfaceVertex,
+    ) {
+        let mut halved: Vec<(u32, u32)> = Vec::with_capacity(2 * self.edges.len());
+        let mut on_edges = Vec::with_capacity(self.edges.len());
+        for (&h, id) in self.edges.iter().zip(surface.vertices.len() as u32..) {
+            let (triangle, k) = (surface.triangles[h as usize / 3], h as usize % 3);
+            let ends = [k, (k + 1) % 3].map(|k| surface.vertices[triangle[k] as usize]);
+            on_edges.push(middle(&[h, next(h)], &ends));
+            halved.extend([(h, id), (twin(h), id)]);
         }
-        middle.sort_unstable();
-        for on_triangle in middle.chunk_by(|p, q| p.0 / 3 == q.0 / 3) {
-            let f = on_triangle[0].0 / 3;
+        surface.vertices.extend(on_edges);
+        halved.sort_unstable();
+        for on_triangle in halved.chunk_by(|p, q| p.0 / 3 == q.0 / 3) {
+            let t = on_triangle[0].0 / 3;
+            let (triangle, tag) = (surface.triangles[t as usize], surface.tags[t as usize]);
             let mut ring = Vec::with_capacity(6);
-            for (h, corner) in (3 * f..).zip(surface.triangles[f as usize]) {
+            for (h, corner) in (3 * t..).zip(triangle) {
                 ring.push(corner);
                 ring.extend(on_triangle.iter().filter(|m| m.0 == h).map(|m| m.1));
             }
-            let [(t, a), (_, b), (_, c)] = [0, 1, 2].map(|k| at(3 * f + k));
-            let centroid = FragmentVertex::between(&FragmentVertex::between(&a, &b, 0.5), &c, 1.0 / 3.0);
             let centre = surface.vertices.len() as u32;
-            surface.vertices.push(place(t, &centroid));
-            let tag = surface.tags[f as usize];
+            let corners = triangle.map(|v| surface.vertices[v as usize]);
+            surface.vertices.push(middle(&[3 * t, 3 * t + 1, 3 * t + 2], &corners));
             for k in 0..ring.len() {
                 let fan = [ring[k], ring[(k + 1) % ring.len()], centre];
                 if k == 0 {
-                    surface.triangles[f as usize] = fan;
+                    surface.triangles[t as usize] = fan;
                 } else {
                     surface.triangles.push(fan);
                     surface.tags.push(tag);
@@ -76,4 +85,9 @@ impl DoubledEdges {
             }
         }
     }
+}
+
+/// The half-edge behind `h` in its triangle.
+pub fn next(h: u32) -> u32 {
+    h / 3 * 3 + (h + 1) % 3
 }

@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use super::base::Base;
 use super::incision_mark::lift;
+use super::misfit::Misfit;
 use super::sheet::{Sheet, SkinShape};
 use super::stitch::{Change, Cloth, Seams};
 use crate::cut::{CutMesh, IncisionMark, Surface};
@@ -62,23 +63,6 @@ pub enum SkinError {
         /// Index of the point.
         point: usize,
     },
-}
-
-/// Why skin and lips could not be sewn together. A conforming cut curve excludes it.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-pub enum Misfit {
-    /// Two parts of the cut curve run along one edge of the skin.
-    #[error("two parts of the cut curve run along one edge of the skin")]
-    SharedEdge,
-    /// A face of the boundary is cut and no fragment below it is found.
-    #[error("a face of the boundary has no material below it")]
-    NoPiece,
-    /// An edge of the cut curve has no edges of the skin along it, or two have the same.
-    #[error("an edge of the cut curve has no edges of the skin of its own")]
-    NoChain,
-    /// An edge of the skin or of a lip stays open.
-    #[error("an edge of the skin or of a lip has no other side")]
-    OpenSeam,
 }
 
 /// A skin and the surface that it and the lips make.

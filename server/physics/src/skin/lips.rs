@@ -1,7 +1,7 @@
 //! The wound: lip faces of the fragments as triangles whose borders follow the skin.
 
 use super::base::Base;
-use super::embedding::Misfit;
+use super::misfit::Misfit;
 use super::sheet::Sheet;
 use crate::cut::CutMesh;
 use crate::cut::fragments::NONE;

@@ -24,15 +24,16 @@ mod base;
 mod sheet;
 mod insert;
 mod walk;
+mod misfit;
 mod lips;
-mod joined;
-mod incision_mark;
 mod stitch;
+mod incision_mark;
 mod embedding;
 mod incision;
 
-pub use embedding::{Misfit, Skin, SkinError, SkinSettings};
+pub use embedding::{Skin, SkinError, SkinSettings};
 pub use incision::{Penetration, incision};
+pub use misfit::Misfit;
 pub use sheet::SkinShape;
 
 #[cfg(test)]

@@ -10,11 +10,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::base::Base;
-use super::embedding::Misfit;
-use super::joined::{Joined, Place};
 use super::lips::{Corner, Face, Lip, fill, is_lip};
+use super::misfit::Misfit;
 use super::sheet::Sheet;
 use crate::cut::fragments::{FragmentVertex, NONE};
+use crate::cut::joined::{Joined, Place};
 use crate::cut::{CutMesh, Surface, SurfaceVertex};
 
 /// What is sewn.
@@ -104,8 +104,8 @@ impl Seams {
         if self.joined.is_open() {
             return Err(Misfit::OpenSeam);
         }
-        let placed = Placed { cut: cloth.cut, sheet: cloth.sheet, parts: &self.parts };
-        self.joined.number(&placed, surface);
+        let mut placed = Placed { cut: cloth.cut, sheet: cloth.sheet, parts: &self.parts };
+        self.joined.number(&mut placed, surface);
         for lip in lips.iter().filter_map(|lip| self.parts.lips.get(lip)) {
             placed.place_middle(lip, surface);
         }
@@ -187,7 +187,7 @@ impl Seams {
     /// A surface triangle for `owner`.
     fn new_triangle(&mut self, owner: Owner, surface: &mut Surface) -> u32 {
         let t = self.free.pop().unwrap_or_else(|| {
-            let t = self.joined.add(surface);
+            let t = self.joined.add(0, surface);
             self.parts.owner.push(owner);
             self.parts.corners.push([Corner::Middle; 3]);
             self.parts.piece.push(NONE);
@@ -395,7 +395,7 @@ impl Placed<'_> {
 
 impl Place for Placed<'_> {
     /// On the skin where one of the corners is, in the element that has to extrapolate least.
-    fn vertex(&self, cycle: &[u32]) -> SurfaceVertex {
+    fn vertex(&mut self, cycle: &[u32]) -> SurfaceVertex {
         let mut best: Option<(f64, SurfaceVertex)> = None;
         let mut seen = NONE;
         for &c in cycle {
@@ -423,9 +423,9 @@ impl Place for Placed<'_> {
         }
     }
 
-    fn middle(&self, triangle: u32, of: &[SurfaceVertex]) -> SurfaceVertex {
+    fn middle(&self, corners: &[u32], of: &[SurfaceVertex]) -> SurfaceVertex {
         let sum: Vector3<f64> = of.iter().map(|vertex| rest_place(self.cut, vertex)).sum();
-        in_element(self.cut, self.parts.piece[triangle as usize], &(sum / of.len() as f64))
+        in_element(self.cut, self.parts.piece[corners[0] as usize / 3], &(sum / of.len() as f64))
     }
 }
 
@@ -449,6 +449,7 @@ fn rest_place(cut: &CutMesh, vertex: &SurfaceVertex) -> Vector3<f64> {
     let node = |c: u32| cut.mesh().nodes[cut.copy_node()[c as usize] as usize];
     vertex.copies.iter().zip(&vertex.weights).map(|(&c, &w)| node(c) * w).sum()
 }
+
 /// A rest place in the coordinates of a piece's element.
 fn in_element(cut: &CutMesh, piece: u32, place: &Vector3<f64>) -> SurfaceVertex {
     let piece = &cut.pieces()[piece as usize];

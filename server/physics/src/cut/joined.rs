@@ -5,17 +5,20 @@
 //! when the edges around them join them, so the surface is closed and 2-manifold by construction. A
 //! vertex that loses its last corner makes room for the last one, as does a triangle.
 
-use std::collections::BTreeSet;
+use super::doubled_edges::{DoubledEdges, next};
+use super::fragments::NONE;
+use super::surface::{Surface, SurfaceVertex};
 
-use crate::cut::fragments::NONE;
-use crate::cut::{Surface, SurfaceVertex};
-
-/// Places vertices: of a cycle of corners, and between other vertices.
+/// Says where vertices are; corners are 3·triangle + k.
 pub trait Place {
-    /// The vertex of a cycle of corners 3·triangle + k.
-    fn vertex(&self, cycle: &[u32]) -> SurfaceVertex;
-    /// The vertex in the middle of others, for a triangle beside them.
-    fn middle(&self, triangle: u32, of: &[SurfaceVertex]) -> SurfaceVertex;
+    /// Whether the vertex that a corner had may be that of the cycle it is in now.
+    fn stays(&self, _corner: u32, _cycle: &[u32]) -> bool {
+        true
+    }
+    /// The vertex of a cycle of corners.
+    fn vertex(&mut self, cycle: &[u32]) -> SurfaceVertex;
+    /// The vertex in the middle of two or three corners of a triangle, which are these vertices.
+    fn middle(&self, corners: &[u32], of: &[SurfaceVertex]) -> SurfaceVertex;
 }
 
 /// Triangles by number, half-edges 3·triangle + k from corner k to the next.
@@ -27,19 +30,22 @@ pub struct Joined {
     corner: Vec<u32>,
     /// One corner of every surface vertex.
     representative: Vec<u32>,
-    /// Half-edges, the smaller of two, whose ends another edge joins too: they get a vertex in the middle.
-    doubled: BTreeSet<u32>,
+    /// Edges whose ends another edge joins too.
+    doubled: DoubledEdges,
     /// Triangles that changed, each once.
     dirty: Vec<u32>,
     /// Per triangle the last round in which it changed.
     changed: Vec<u32>,
     /// Per corner the last round that walked it.
     seen: Vec<u32>,
-    /// Per vertex the last round in which a cycle took its number.
+    /// Per vertex the last round in which a cycle took its number, or it was claimed otherwise.
     claimed: Vec<u32>,
     /// Vertices that may have lost their last corner.
     doubtful: Vec<u32>,
+    /// Vertices whose cycle was walked in this round.
     walked: Vec<u32>,
+    cycle: Vec<u32>,
+    around: Vec<(u32, u32)>,
     round: u32,
 }
 
@@ -54,21 +60,21 @@ impl Joined {
         surface.triangles.truncate(n);
         surface.tags.truncate(n);
         surface.vertices.truncate(self.representative.len());
-        for h in self.doubled.iter().flat_map(|&h| [h, self.twin[h as usize]]) {
+        for h in self.doubled.iter().flat_map(|h| [h, self.twin[h as usize]]) {
             let t = h / 3;
             surface.triangles[t as usize] = [0, 1, 2].map(|k| self.corner[(3 * t + k) as usize]);
         }
     }
 
-    /// A new triangle, open all around.
-    pub fn add(&mut self, surface: &mut Surface) -> u32 {
+    /// A new triangle with a tag, open all around.
+    pub fn add(&mut self, tag: u32, surface: &mut Surface) -> u32 {
         let t = self.changed.len() as u32;
         self.twin.extend([NONE; 3]);
         self.corner.extend([NONE; 3]);
         self.seen.extend([0; 3]);
         self.changed.push(0);
         surface.triangles.push([NONE; 3]);
-        surface.tags.push(0);
+        surface.tags.push(tag);
         t
     }
 
@@ -88,7 +94,7 @@ impl Joined {
     pub fn open(&mut self, h: u32) {
         let twin = std::mem::replace(&mut self.twin[h as usize], NONE);
         if twin != NONE {
-            self.doubled.remove(&h.min(twin));
+            self.doubled.remove(h.min(twin));
             self.twin[twin as usize] = NONE;
         }
     }
@@ -122,7 +128,7 @@ impl Joined {
                 let (from, to) = ((3 * last + k) as usize, (3 * t + k) as usize);
                 let twin = self.twin[from];
                 if twin != NONE {
-                    if self.doubled.remove(&(from as u32).min(twin)) {
+                    if self.doubled.remove((from as u32).min(twin)) {
                         self.doubled.insert((to as u32).min(twin));
                     }
                     self.twin[twin as usize] = to as u32;
@@ -161,23 +167,34 @@ impl Joined {
         &self.dirty
     }
 
-    /// Ends a change: vertices around what changed.
-    pub fn number(&mut self, place: &impl Place, surface: &mut Surface) {
-        let mut cycle = Vec::new();
+    /// Surface vertex of a corner.
+    pub fn vertex(&self, corner: u32) -> u32 {
+        self.corner[corner as usize]
+    }
+
+    /// Whether the vertex was neither named nor claimed in this round; now it is.
+    pub fn claim(&mut self, vertex: u32) -> bool {
+        std::mem::replace(&mut self.claimed[vertex as usize], self.round) != self.round
+    }
+
+    /// Finds the vertices around what changed.
+    pub fn number(&mut self, place: &mut impl Place, surface: &mut Surface) {
+        let mut cycle = std::mem::take(&mut self.cycle);
         for i in 0..self.dirty.len() {
             for first in 3 * self.dirty[i]..3 * self.dirty[i] + 3 {
                 if self.seen[first as usize] != self.round {
                     self.walk(first, &mut cycle);
-                    self.name(&cycle, place.vertex(&cycle), surface);
+                    self.name(&cycle, place, surface);
                 }
             }
         }
+        self.cycle = cycle;
         self.drop_dead_vertices(surface);
         self.find_doubled_edges();
     }
 
     /// The corner behind `c` around their vertex.
-    fn next(&self, c: u32) -> u32 {
+    fn next_around(&self, c: u32) -> u32 {
         self.twin[(c / 3 * 3 + (c + 2) % 3) as usize]
     }
 
@@ -187,22 +204,23 @@ impl Joined {
         while self.seen[c as usize] != self.round {
             self.seen[c as usize] = self.round;
             cycle.push(c);
-            c = self.next(c);
+            c = self.next_around(c);
         }
     }
 
     /// A cycle keeps the number of its vertex; of several that come from one vertex the first keeps it.
-    fn name(&mut self, cycle: &[u32], vertex: SurfaceVertex, surface: &mut Surface) {
+    fn name(&mut self, cycle: &[u32], place: &mut impl Place, surface: &mut Surface) {
         let mut id = NONE;
         for &c in cycle {
             let old = self.corner[c as usize];
             if old != NONE {
                 self.doubtful.push(old);
-                if id == NONE && self.claimed[old as usize] != self.round {
+                if id == NONE && self.claimed[old as usize] != self.round && place.stays(c, cycle) {
                     id = old;
                 }
             }
         }
+        let vertex = place.vertex(cycle);
         if id == NONE {
             id = self.representative.len() as u32;
             self.representative.push(NONE);
@@ -239,7 +257,7 @@ impl Joined {
             let mut c = first;
             loop {
                 self.set_corner(c, id, surface);
-                c = self.next(c);
+                c = self.next_around(c);
                 if c == first {
                     break;
                 }
@@ -250,57 +268,25 @@ impl Joined {
 
     /// Looks for different edges between the same two vertices around every vertex that was walked.
     fn find_doubled_edges(&mut self) {
-        let mut edges: Vec<(u32, u32)> = Vec::new();
+        let mut around = std::mem::take(&mut self.around);
         for i in 0..self.walked.len() {
-            edges.clear();
+            around.clear();
             let first = self.representative[self.walked[i] as usize];
             let mut h = first;
             loop {
-                let head = self.corner[(h / 3 * 3 + (h + 1) % 3) as usize];
-                edges.push((head, h.min(self.twin[h as usize])));
-                h = self.next(h);
+                around.push((self.corner[next(h) as usize], h.min(self.twin[h as usize])));
+                h = self.next_around(h);
                 if h == first {
                     break;
                 }
             }
-            edges.sort_unstable();
-            for same in edges.chunk_by(|p, q| p.0 == q.0) {
-                self.doubled.remove(&same[0].1);
-                self.doubled.extend(same[1..].iter().map(|edge| edge.1));
-            }
+            self.doubled.compare(&mut around);
         }
+        self.around = around;
     }
 
-    /// Divides doubled edges in the middle, and their triangles in a fan around a vertex of its own.
+    /// Ends a change: divides doubled edges, and their triangles in a fan.
     pub fn divide_doubled_edges(&self, place: &impl Place, surface: &mut Surface) {
-        let mut middle: Vec<(u32, u32)> = Vec::with_capacity(2 * self.doubled.len());
-        for &h in &self.doubled {
-            let ends = [h, self.twin[h as usize]].map(|h| self.corner[h as usize]);
-            let vertex = place.middle(h / 3, &ends.map(|v| surface.vertices[v as usize]));
-            middle.extend([h, self.twin[h as usize]].map(|h| (h, surface.vertices.len() as u32)));
-            surface.vertices.push(vertex);
-        }
-        middle.sort_unstable();
-        for on_triangle in middle.chunk_by(|p, q| p.0 / 3 == q.0 / 3) {
-            let t = on_triangle[0].0 / 3;
-            let triangle = surface.triangles[t as usize];
-            let mut ring = Vec::with_capacity(6);
-            for k in 0..3 {
-                ring.push(triangle[k as usize]);
-                ring.extend(on_triangle.iter().filter(|m| m.0 == 3 * t + k).map(|m| m.1));
-            }
-            let centre = surface.vertices.len() as u32;
-            surface.vertices.push(place.middle(t, &triangle.map(|v| surface.vertices[v as usize])));
-            let tag = surface.tags[t as usize];
-            for k in 0..ring.len() {
-                let fan = [ring[k], ring[(k + 1) % ring.len()], centre];
-                if k == 0 {
-                    surface.triangles[t as usize] = fan;
-                } else {
-                    surface.triangles.push(fan);
-                    surface.tags.push(tag);
-                }
-            }
-        }
+        self.doubled.divide(surface, |h| self.twin[h as usize], |corners, of| place.middle(corners, of));
     }
 }
