@@ -1,5 +1,7 @@
 //! Where the members of a short list are, out of very many numbered things.
 
+use crate::operator::resize_with_room;
+
 /// The place of things in a list. It is never cleared: a place counts if the list has the thing there.
 #[derive(Clone, Debug, Default)]
 pub struct Numbering {
@@ -7,11 +9,18 @@ pub struct Numbering {
 }
 
 impl Numbering {
+    /// Room for things with numbers below `n`, and half as many again.
+    pub fn with_room(n: usize) -> Self {
+        let mut place = Vec::new();
+        resize_with_room(&mut place, n, 0);
+        Self { place }
+    }
+
     /// Takes down where the things of `list` from `first` on are.
     pub fn note(&mut self, list: &[u32], first: usize) {
         for (place, &thing) in (first as u32..).zip(&list[first..]) {
             if thing as usize >= self.place.len() {
-                self.place.resize(thing as usize + 1 + thing as usize / 4, 0);
+                resize_with_room(&mut self.place, thing as usize + 1, 0);
             }
             self.place[thing as usize] = place;
         }

@@ -101,11 +101,14 @@ impl Boundary {
     /// number, and further ones if a cut passes exactly through the node, so that both lips have it.
     /// Copies without that material stay free: fixing them would glue fragments to air.
     /// `rest` are the rest positions of all copies [m], and of what the element adds. Ascending.
-    pub fn fixed_copies(&self, mesh: &CutMesh, rest: &[Vector3<f64>]) -> Vec<FixedCopy> {
+    pub fn fixed_copies(&self, mesh: &CutMesh, rest: &[Vector3<f64>], fixed: &mut Vec<FixedCopy>) {
         let n_nodes = mesh.mesh().nodes.len();
         let mut divided = vec![false; n_nodes];
         mesh.copy_node().iter().skip(n_nodes).for_each(|&node| divided[node as usize] = true);
-        let mut fixed = Vec::with_capacity(self.fixed.len());
+        fixed.clear();
+        if self.fixed.len() > fixed.capacity() {
+            fixed.reserve_exact(self.fixed.len() + self.fixed.len() / 2);
+        }
         for f in &self.fixed {
             let target = rest[f.node as usize] + f.displacement_m;
             let held = |copy: u32| FixedCopy { copy, axes: f.axes, position_m: target.into() };
@@ -117,7 +120,6 @@ impl Boundary {
             }
         }
         fixed.sort_unstable_by_key(|f| f.copy);
-        fixed
     }
 
     /// Writes the force on every one of `n` copies and further nodes [N] to `load`: point forces go to the

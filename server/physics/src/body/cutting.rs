@@ -74,7 +74,7 @@ impl Body {
             *rest = self.cut_mesh.mesh().nodes[self.cut_mesh.copy_node()[new.copy as usize] as usize];
         }
         self.follow_masses();
-        self.fixed = self.boundary.fixed_copies(&self.cut_mesh, &self.rest);
+        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, &mut self.fixed);
         self.boundary.loads_of_new_copies(&self.cut_mesh, &mut self.load);
         self.reunion.follow(&mut self.parts, &self.cut_mesh, new, &self.mass, &self.fixed);
         self.follow_parts();
@@ -110,7 +110,7 @@ impl Body {
 
     /// Everything that is derived from constraints and loads.
     pub(super) fn follow_boundary(&mut self) {
-        self.fixed = self.boundary.fixed_copies(&self.cut_mesh, &self.rest);
+        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, &mut self.fixed);
         self.boundary.node_loads(&self.cut_mesh, self.rest.len(), &mut self.load);
         self.parts = match &self.path {
             Path::Fast(_) => LooseParts::new(self.cut_mesh.pieces(), &self.mass, &self.fixed),

@@ -8,7 +8,7 @@
 use crate::mesh::TetMesh;
 
 use super::blade::NewCopy;
-use super::fragments::{Fragments, NONE};
+use super::fragments::{Fragments, NONE, leave_room};
 use super::pieces::PieceTable;
 use super::slot::slot_of;
 
@@ -65,6 +65,14 @@ impl CopyTable {
             }
         }
         Self { node: (0..n as u32).collect(), volume, around_start, around, ..Self::default() }
+    }
+
+    /// Room for cuts through a body of so many elements.
+    pub fn leave_room(&mut self, n_elements: usize) {
+        self.visited.resize(n_elements, 0);
+        leave_room(&mut self.node);
+        leave_room(&mut self.volume);
+        leave_room(&mut self.visited);
     }
 
     /// The copies of node `i` whose material contains the node itself, ascending: one, or more where a

@@ -8,6 +8,8 @@ use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
 
+use super::fragments::leave_room;
+
 /// A crossing this close to an end of its edge, relative to the edge, is the end itself.
 ///
 /// Two crossings closer than this would make slivers that carry nothing but rounding errors. It is
@@ -61,6 +63,14 @@ struct OfEdge {
 }
 
 impl Crossings {
+    /// Room for a cut through a body of so many nodes.
+    pub fn with_room(n_nodes: usize) -> Self {
+        let mut crossings = Self { at_vertex: vec![false; n_nodes], ..Self::default() };
+        crossings.by_edge.reserve(n_nodes / 8);
+        leave_room(&mut crossings.at_vertex);
+        crossings
+    }
+
     /// Whether any edge at the vertex was ever crossed.
     pub fn reach(&self, v: u32) -> bool {
         self.at_vertex.get(v as usize) == Some(&true)

@@ -18,6 +18,7 @@ use super::locate::piece_at;
 use super::marks::Ascending;
 use super::pending::{Pending, PendingFace, PendingLine, Pieces};
 use super::pieces::{Piece, PieceTable};
+use super::runs::Runs;
 use super::separate::{Separator, Sheet};
 use super::surface::Surface;
 use super::surface_builder::{Change, Material, SurfaceBuilder};
@@ -31,6 +32,7 @@ use super::sweep_triangle::SweepTriangle;
 #[derive(Clone, Debug)]
 pub struct CutMesh {
     mesh: TetMesh,
+    runs: Runs,
     pub(crate) fragments: Fragments,
     pub(crate) pieces: PieceTable,
     copies: CopyTable,
@@ -75,9 +77,12 @@ impl CutMesh {
             copies.update(&mesh, node, &fragments, &mut pieces, &mut new_copies);
         }
         copies.changed.clear();
+        copies.leave_room(mesh.tets.len());
         let (builder, surface) =
             SurfaceBuilder::build(&Material { mesh: &mesh, fragments: &fragments, pieces: &pieces });
+        let (n_nodes, n_elements) = (mesh.nodes.len(), mesh.tets.len());
         Ok(Self {
+            runs: Runs::new(&mesh),
             mesh,
             fragments,
             pieces,
@@ -85,12 +90,12 @@ impl CutMesh {
             surface,
             builder,
             sets: IncisionSets::default(),
-            crossings: Crossings::default(),
+            crossings: Crossings::with_room(n_nodes),
             pending: Pending::default(),
             fronts: BTreeMap::new(),
             latest: None,
-            detector: Detector::default(),
-            separator: Separator::default(),
+            detector: Detector::with_room(n_nodes, n_elements),
+            separator: Separator::with_room(n_elements),
             order: Ascending::default(),
             epoch,
             inexact: false,
@@ -230,9 +235,9 @@ impl CutMesh {
         }
         let mut triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
         triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
-        let (low, high) = bounds(&triangles, blade);
+        let bounds = bounds(&triangles, blade);
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
-        self.detector.find_candidates(&body, &low, &high);
+        self.detector.find_candidates(&body, (&self.runs, &self.copies.node), &bounds);
         if let Some(last) = blade.segments.last() {
             let near = self.detector.tets_near(last, &self.pieces);
             let around = |copy| self.copies.tets_around(copy, &self.pieces);
@@ -283,7 +288,7 @@ impl CutMesh {
 }
 
 /// Box around the sweep and the last blade segment [m].
-fn bounds(triangles: &[SweepTriangle], blade: &BladeSweep) -> (Vector3<f64>, Vector3<f64>) {
+fn bounds(triangles: &[SweepTriangle], blade: &BladeSweep) -> [Vector3<f64>; 2] {
     let mut low = Vector3::repeat(f64::INFINITY);
     let mut high = Vector3::repeat(f64::NEG_INFINITY);
     for triangle in triangles {
@@ -294,7 +299,7 @@ fn bounds(triangles: &[SweepTriangle], blade: &BladeSweep) -> (Vector3<f64>, Vec
         low = low.inf(point);
         high = high.sup(point);
     }
-    (low, high)
+    [low, high]
 }
 
 #[cfg(test)]

@@ -3,12 +3,14 @@
 use nalgebra::Vector3;
 
 use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
+use crate::operator::resize_with_room;
 
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
-use super::fragments::{Fragments, NONE};
+use super::fragments::{Fragments, NONE, room};
 use super::incision_sets::IncisionSets;
 use super::marks::{Ascending, Marks};
 use super::pieces::PieceTable;
+use super::runs::Runs;
 use super::slot::slot_of;
 use super::sweep_triangle::SweepTriangle;
 
@@ -50,6 +52,10 @@ pub struct Detector {
     candidates: Vec<(u32, Vector3<f64>, Vector3<f64>)>,
     /// For every copy one bit for each face of the box around the sweep that it lies beyond.
     beyond: Vec<u8>,
+    /// Likewise for every node, where all of its copies do.
+    node_beyond: Vec<u8>,
+    /// Pieces of the candidates.
+    near: Vec<u32>,
     marks: Marks,
     order: Ascending,
     position: Vec<Vector3<f64>>,
@@ -89,6 +95,26 @@ impl Record<'_> {
 }
 
 impl Detector {
+    /// Room for an uncut body and for what cuts add.
+    pub fn with_room(n_nodes: usize, n_elements: usize) -> Self {
+        let mut detector = Self::default();
+        detector.marks.restart(n_elements + n_elements / 2);
+        resize_with_room(&mut detector.beyond, n_nodes, 0);
+        resize_with_room(&mut detector.node_beyond, n_nodes, 0);
+        detector.make_room(n_nodes);
+        detector.candidates = room(n_elements / 16, (0, Vector3::zeros(), Vector3::zeros()));
+        detector.near = room(n_elements / 16, 0);
+        detector.touched = room(n_elements / 16, 0);
+        detector
+    }
+
+    fn make_room(&mut self, n_vertices: usize) {
+        resize_with_room(&mut self.position, n_vertices, Vector3::zeros());
+        resize_with_room(&mut self.position_stamp, n_vertices, 0);
+        resize_with_room(&mut self.side, n_vertices, 0.0);
+        resize_with_room(&mut self.side_stamp, n_vertices, 0);
+    }
+
     /// Copies of the candidate pieces whose box overlaps that of the blade segment.
     pub fn tets_near(&self, [tip, heel]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
         let (from, to) = (tip.inf(heel), tip.sup(heel));
@@ -98,22 +124,40 @@ impl Detector {
         self.candidates.iter().filter(overlaps).map(|c| pieces.pieces[c.0 as usize].copies).collect()
     }
 
-    /// Finds the pieces whose tet has a bounding box that overlaps this one [m]: those whose corners are
-    /// not all beyond the same face of it.
-    pub fn find_candidates(&mut self, body: &Deformed, low: &Vector3<f64>, high: &Vector3<f64>) {
+    /// Finds the pieces whose tet has a bounding box that overlaps the one between two corners [m]: those
+    /// whose corners are not all beyond the same face of it. With the runs of the mesh and the node of
+    /// every copy.
+    pub fn find_candidates(
+        &mut self,
+        body: &Deformed,
+        (runs, copy_node): (&Runs, &[u32]),
+        [low, high]: &[Vector3<f64>; 2],
+    ) {
+        let Deformed { mesh, pieces, x } = body;
         let beyond = |x: &Vector3<f64>| {
             (0..3).fold(0, |faces, k| faces << 2 | u8::from(x[k] < low[k]) << 1 | u8::from(x[k] > high[k]))
         };
         self.beyond.clear();
-        self.beyond.extend(body.x.iter().map(beyond));
-        self.candidates.clear();
-        for (p, piece) in (0u32..).zip(&body.pieces.pieces) {
-            let [a, b, c, d] = piece.copies.map(|c| self.beyond[c as usize]);
-            if a & b & c & d == 0 {
-                let [a, b, c, d] = piece.copies.map(|c| &body.x[c as usize]);
-                self.candidates.push((p, a.inf(b).inf(&c.inf(d)), a.sup(b).sup(&c.sup(d))));
-            }
+        self.beyond.extend(x.iter().map(beyond));
+        let n_nodes = mesh.nodes.len();
+        let (of_nodes, further) = self.beyond.split_at(n_nodes);
+        self.node_beyond.clear();
+        self.node_beyond.extend_from_slice(of_nodes);
+        for (&node, beyond) in copy_node[n_nodes..].iter().zip(further) {
+            self.node_beyond[node as usize] &= beyond;
         }
+        self.near.clear();
+        let elements = runs.within_reach(&self.node_beyond);
+        self.near.extend(elements.flat_map(|e| pieces.of_element(e)).filter(|&p| {
+            let [a, b, c, d] = pieces.pieces[p as usize].copies.map(|c| self.beyond[c as usize]);
+            a & b & c & d == 0
+        }));
+        self.order.sort(&mut self.near);
+        self.candidates.clear();
+        self.candidates.extend(self.near.iter().map(|&p| {
+            let [a, b, c, d] = pieces.pieces[p as usize].copies.map(|c| &x[c as usize]);
+            (p, a.inf(b).inf(&c.inf(d)), a.sup(b).sup(&c.sup(d)))
+        }));
     }
 
     /// Records crossings, vertices on the sheet and faces along it; fills `touched`.
@@ -121,11 +165,7 @@ impl Detector {
         self.touched.clear();
         self.sweep_stamp += 1;
         self.marks.restart(record.fragments.tets.len());
-        let n = record.fragments.vertices.len();
-        self.position.resize(n, Vector3::zeros());
-        self.position_stamp.resize(n, 0);
-        self.side.resize(n, 0.0);
-        self.side_stamp.resize(n, 0);
+        self.make_room(record.fragments.vertices.len());
         for triangle in triangles {
             self.triangle_stamp += 1;
             self.tested.clear();

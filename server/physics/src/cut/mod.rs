@@ -35,6 +35,7 @@ pub(crate) mod pending;
 mod incision_mark;
 pub(crate) mod fragments;
 mod detect;
+mod runs;
 mod separate;
 pub(crate) mod pieces;
 mod copies;

@@ -51,7 +51,7 @@ impl PieceTable {
             first_fragment: (0..mesh.tets.len() as u32).collect(),
             next_in_element: vec![NONE; mesh.tets.len()],
             element_volume,
-            label: Vec::new(),
+            label: vec![NONE; mesh.tets.len()],
             stack: Vec::new(),
             members: Vec::new(),
             kept: Vec::new(),
@@ -60,7 +60,7 @@ impl PieceTable {
         leave_room(&mut table.node_volume);
         leave_room(&mut table.first_fragment);
         leave_room(&mut table.next_in_element);
-        table.label.reserve(mesh.tets.len() + mesh.tets.len() / 2);
+        leave_room(&mut table.label);
         table
     }
 

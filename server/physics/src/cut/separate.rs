@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 use crate::mesh::{TET_EDGES, TET_FACES};
 
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
-use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
+use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE, room};
 use super::incision_sets::IncisionSets;
 use super::marks::{Ascending, Marks};
 use super::pending::Pending;
@@ -81,6 +81,21 @@ impl Sheet<'_> {
 }
 
 impl Separator {
+    /// Room for a cut through a body of so many elements.
+    pub fn with_room(n_elements: usize) -> Self {
+        let n = n_elements / 16;
+        let mut separator = Self {
+            elements: room(n, 0),
+            changed: room(n, 0),
+            active: room(n, 0),
+            corners: room(n, (0, 0)),
+            queue: room(n, 0).into(),
+            ..Self::default()
+        };
+        separator.marks.restart(n_elements + n_elements / 2);
+        separator
+    }
+
     /// Separates what the sheet cuts completely among `touched` fragments and their neighbours.
     pub fn run(&mut self, touched: &[u32], sheet: &mut Sheet) {
         self.elements.clear();

@@ -50,10 +50,10 @@ impl Reunion {
         for &p in mesh.changed_pieces() {
             self.join(mesh.pieces()[p as usize].copies);
         }
-        for new in new {
-            if self.numbering.find(&self.copies, new.parent).is_none() {
-                mesh.tets_around(new.parent).into_iter().for_each(|copies| self.join(copies));
-            }
+        let known = |parent: &u32| self.numbering.find(&self.copies, *parent).is_some();
+        let lone: Vec<u32> = new.iter().map(|new| new.parent).filter(|parent| !known(parent)).collect();
+        for copy in lone {
+            mesh.tets_around(copy).into_iter().for_each(|copies| self.join(copies));
         }
         let mut root_of_part = vec![u32::MAX; parts.len()];
         (0..self.copies.len()).all(|i| {
@@ -91,4 +91,40 @@ pub fn find(root: &mut [u32], mut a: u32) -> u32 {
         a = root[a as usize];
     }
     a
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::cut::BladeSweep;
+    use crate::mesh::{BoxPattern, box_mesh};
+
+    #[test]
+    fn parts_that_follow_cuts_are_those_of_the_whole_body() {
+        let mesh = box_mesh(Vector3::zeros(), Vector3::new(6.0, 4.0, 4.0), [6, 4, 4], BoxPattern::Tet6);
+        let mut cut = CutMesh::new(mesh).unwrap();
+        let held: Vec<u32> = (0..cut.n_copies() as u32).filter(|c| c % 35 == 3).collect();
+        let hold = |&copy: &u32| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] };
+        let fixed: Vec<FixedCopy> = held.iter().map(hold).collect();
+        let mut parts = LooseParts::new(cut.pieces(), cut.copy_volume(), &fixed);
+        let mut reunion = Reunion::default();
+        // Incisions and cuts right through, across elements and (the whole numbers) along their faces.
+        let places = [(2.3, 3.1), (1.0, 2.5), (2.3, 4.5), (1.0, 4.5), (3.0, 4.5), (3.0, 1.5), (0.4, 4.5)];
+        let mut sizes = Vec::new();
+        for ((x, depth), incision) in places.into_iter().zip(1..) {
+            let at = |y: f64| [Vector3::new(x, y, -0.5), Vector3::new(x, y, 4.5)];
+            let sweep = BladeSweep { segments: vec![at(-0.5), at(depth)] };
+            let report = cut.sweep(&cut.rest_positions(), &sweep, incision).unwrap();
+            let mass = cut.copy_volume();
+            reunion.follow(&mut parts, &cut, &report.new_copies, mass, &fixed);
+            assert_eq!(parts, LooseParts::new(cut.pieces(), mass, &fixed), "incision {incision}");
+            sizes.push(parts.len());
+            // What hangs together is seen close to the cut.
+            assert!(parts.len() > 1 || reunion.holds(&parts, &cut, &report.new_copies));
+        }
+        assert_eq!(sizes, [1, 1, 2, 3, 4, 4, 5]);
+    }
 }

@@ -7,7 +7,7 @@ use super::carriers::Merged;
 use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
 use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
-use super::{Padded, padded};
+use super::{Padded, padded, resize_with_room};
 use crate::element::{LANES, Simd};
 use crate::mesh::TetMesh;
 use crate::numbering::Numbering;
@@ -65,6 +65,9 @@ impl Chunk {
             rest.push(batch);
         }
         let n = plan.copies.len() + 1;
+        let (mut x, mut positions) = (Vec::new(), Vec::new());
+        resize_with_room(&mut x, n, [0.0; 4]);
+        resize_with_room(&mut positions, n, [0.0; 4]);
         Self {
             region,
             batches: Batches::new(&plan.nodes, rest, n),
@@ -75,8 +78,8 @@ impl Chunk {
             planned: [members.len(), plan.copies.len()],
             n_lanes: members.len(),
             copies: plan.copies,
-            positions: vec![[0.0; 4]; n],
-            x: vec![[0.0; 4]; n],
+            positions,
+            x,
             inverted: 0,
             stale: true,
             first_row: 0,

@@ -320,4 +320,20 @@ mod tests {
         }
         assert_eq!(sums, expected);
     }
+
+    #[test]
+    fn copies_that_are_added_to_chunks_come_where_they_would_have_been_listed() {
+        let before: [&[u32]; 3] = [&[0, 1, 2], &[1, 2, 3], &[1, 2, 3]];
+        let after: [&[u32]; 3] = [&[0, 1, 2, 4, 5, 6], &[1, 2, 3, 5], &[1, 2, 3, 4, 5]];
+        let mut gather = Gather::new(before.into_iter(), 4);
+        assert!(gather.holds(after.into_iter()) && !gather.holds(before.into_iter().take(2)));
+        assert!(!gather.holds([&[0; 7], before[1], before[2]].into_iter()));
+        let mut listed = gather.clone();
+        listed.arrange(after.into_iter(), 7);
+        gather.append([2, 0, 1].into_iter().map(|k| (k, after[k], 3)), 7);
+        assert_eq!((&gather.pairs, &gather.further), (&listed.pairs, &listed.further));
+        assert_eq!(gather.first_further, listed.first_further);
+        assert_eq!(gather.pairs[5], [gather.first_row[0] + 4, gather.first_row[1] + 3]);
+        assert_eq!(gather.further.last(), Some(&(5, gather.first_row[2] + 4)));
+    }
 }

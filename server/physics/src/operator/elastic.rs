@@ -94,7 +94,7 @@ impl Elastic {
             choice: OperatorChoice::Auto,
             made_with: None,
             version: 0,
-            numbering: Numbering::default(),
+            numbering: Numbering::with_room(pieces.len()),
             marks: Marks::default(),
         };
         elastic.marks.put_on(&LaneChanges::default(), pieces.len());
