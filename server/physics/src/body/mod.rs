@@ -305,8 +305,8 @@ impl Body {
     /// every cut, also where the topology does not.
     pub fn incision_marks(&self) -> Vec<IncisionMark> {
         match &self.skin {
-            Some(skin) => skin.incision_marks(&self.cut_mesh, &self.state.x),
-            None => self.cut_mesh.incision_marks(&self.state.x),
+            Some(skin) => skin.incision_marks(&self.cut_mesh),
+            None => self.cut_mesh.incision_marks(),
         }
     }
 

@@ -16,13 +16,14 @@ use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
 use super::marks::Ascending;
-use super::pending::{Pending, PendingFace, PendingLine, Pieces};
+use super::pending::{Pending, PendingFace, Pieces};
 use super::pieces::{Piece, PieceTable};
 use super::runs::Runs;
 use super::separate::{Separator, Sheet};
 use super::surface::Surface;
 use super::surface_builder::{Change, Material, SurfaceBuilder};
 use super::sweep_triangle::SweepTriangle;
+use super::traces::{TraceLine, Traces};
 
 /// A tet mesh with everything that cuts have made of it.
 ///
@@ -42,8 +43,7 @@ pub struct CutMesh {
     pub(super) crossings: Crossings,
     pending: Pending,
     fronts: BTreeMap<u32, Front>,
-    /// Incision of the last sweep.
-    latest: Option<u32>,
+    traces: Traces,
     detector: Detector,
     separator: Separator,
     order: Ascending,
@@ -93,7 +93,7 @@ impl CutMesh {
             crossings: Crossings::with_room(n_nodes),
             pending: Pending::default(),
             fronts: BTreeMap::new(),
-            latest: None,
+            traces: Traces::default(),
             detector: Detector::with_room(n_nodes, n_elements),
             separator: Separator::with_room(n_elements),
             order: Ascending::default(),
@@ -174,19 +174,14 @@ impl CutMesh {
         self.pending.faces(&self.pending_pieces())
     }
 
-    /// Where those incisions cross the boundary.
-    pub(super) fn pending_lines(&self) -> Vec<PendingLine> {
-        self.pending.lines(&self.pending_pieces())
+    /// Where blades went over the boundary without opening it.
+    pub(crate) fn trace_lines(&self) -> Vec<TraceLine> {
+        self.traces.lines(&self.fragments)
     }
 
-    pub(super) fn pending_pieces(&self) -> Pieces<'_> {
+    fn pending_pieces(&self) -> Pieces<'_> {
         let Self { mesh, fragments, pieces, crossings, sets, .. } = self;
         Pieces { mesh, fragments, pieces, crossings, sets }
-    }
-
-    /// The incision of the last sweep, and where the material now has the blade that ended it [m].
-    pub(super) fn blade(&self, x: &[Vector3<f64>]) -> Option<(u32, [Vector3<f64>; 2])> {
-        Some((self.latest?, self.fronts.get(&self.latest?)?.ends(x)))
     }
 
     /// Loose parts and their rest volumes.
@@ -243,15 +238,20 @@ impl CutMesh {
             let around = |copy| self.copies.tets_around(copy, &self.pieces);
             let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
             self.fronts.insert(incision, front);
-            self.latest = Some(incision);
         }
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
-        let mut record = Record { fragments, sets, crossings, incision };
+        let mut record = Record { fragments, sets, crossings, traces: &mut self.traces, incision };
         self.detector.run(&body, &triangles, &mut record);
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
-        let mut sheet = Sheet { fragments, sets, crossings, waiting: &mut self.pending, incision };
+        let (waiting, traces) = (&mut self.pending, &mut self.traces);
+        let mut sheet = Sheet { fragments, sets, crossings, waiting, traces, incision };
         self.separator.run(&self.detector.touched, &mut sheet);
-        Ok(self.follow_separation())
+        let report = self.follow_separation();
+        if !self.traces.is_empty() {
+            let opened = self.builder.faces_beside_lips(&self.surface, incision);
+            opened.for_each(|face| self.traces.open(face, incision, &self.fragments));
+        }
+        Ok(report)
     }
 
     /// Pieces, copies and surface of what the separator changed.

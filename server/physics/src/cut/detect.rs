@@ -13,6 +13,7 @@ use super::pieces::PieceTable;
 use super::runs::Runs;
 use super::slot::slot_of;
 use super::sweep_triangle::SweepTriangle;
+use super::traces::{Traces, line_across};
 
 /// The mark of fragments that are touched.
 const TOUCHED: u8 = 1;
@@ -75,6 +76,8 @@ pub struct Record<'a> {
     pub sets: &'a mut IncisionSets,
     /// Crossings of edges.
     pub crossings: &'a mut Crossings,
+    /// Lines on the boundary.
+    pub traces: &'a mut Traces,
     /// Incision of the sweep.
     pub incision: u32,
 }
@@ -82,6 +85,18 @@ pub struct Record<'a> {
 impl Record<'_> {
     fn is_on(&self, v: u32) -> bool {
         self.sets.contains(self.fragments.on[v as usize], self.incision)
+    }
+
+    /// Whether the incision has opened along an edge of a boundary face.
+    fn is_open_beside(&self, t: u32, face: usize) -> bool {
+        let f = &*self.fragments;
+        let on = TET_FACES[face].map(|k| self.is_on(f.tets[t as usize][k]));
+        (0..3).any(|edge| {
+            on[edge] && on[(edge + 1) % 3] && {
+                let (beside, slot, _) = f.around_edge(t, face, edge);
+                f.tag[beside as usize][slot] == self.incision
+            }
+        })
     }
 
     fn mark_along(&mut self, t: u32, face: usize) {
@@ -194,8 +209,27 @@ impl Detector {
                     }
                 }
                 self.test_flat_faces(body, triangle, t, &side, record);
+                self.draw_lines(triangle, t, &side, record);
             }
             t = record.fragments.next_in_piece[t as usize];
+        }
+    }
+
+    /// Draws where the triangle crosses the boundary faces of fragment `t`.
+    fn draw_lines(&self, triangle: &SweepTriangle, t: u32, side: &[f64; 4], record: &mut Record) {
+        for (face, corners) in TET_FACES.iter().enumerate() {
+            if record.fragments.neighbour[t as usize][face] != NONE {
+                continue;
+            }
+            let Some(line) = line_across(corners.map(|k| side[k])) else { continue };
+            let x = corners.map(|k| self.position[record.fragments.tets[t as usize][k] as usize]);
+            let segment = line.map(|w| x[0] * w[0] + x[1] * w[1] + x[2] * w[2]);
+            if let Some(part) = triangle.part_of(&segment)
+                && !record.is_open_beside(t, face)
+            {
+                let ends = part.map(|s| line[0].lerp(&line[1], s));
+                record.traces.draw(4 * t + face as u32, record.incision, ends);
+            }
         }
     }
 

@@ -148,16 +148,26 @@ pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f
     rows.extend(front.map(|f| f.now(x)));
     rows.extend(blade.segments.iter().map(Row::straight));
     rows.dedup();
+    let drawn = rows.clone();
     overreach(&mut rows);
     let mut triangles = Vec::with_capacity(2 * rows.iter().map(|r| r.s.len()).sum::<usize>());
-    for pair in rows.windows(2) {
-        let (from, to) = (&pair[0].points, pair[1].at_places_of(&pair[0]));
-        for k in 1..from.len() {
-            triangles.extend(SweepTriangle::new(from[k - 1], from[k], to[k]));
-            triangles.extend(SweepTriangle::new(from[k - 1], to[k], to[k - 1]));
+    for (pair, drawn) in rows.windows(2).zip(drawn.windows(2)) {
+        let [quads, drawn] = [pair, drawn].map(quads);
+        for ([a, b, c, d], [p, q, r, s]) in quads.into_iter().zip(drawn) {
+            let triangle = |[a, b, c]: [Vector3<f64>; 3], drawn| {
+                SweepTriangle::new(a, b, c).map(|triangle| SweepTriangle { drawn, ..triangle })
+            };
+            triangles.extend(triangle([a, b, c], [p, q, r]));
+            triangles.extend(triangle([a, c, d], [p, r, s]));
         }
     }
     triangles
+}
+
+/// What the blade swept between two rows, by pairs of neighbouring points.
+fn quads(pair: &[Row]) -> Vec<[Vector3<f64>; 4]> {
+    let (from, to) = (&pair[0].points, pair[1].at_places_of(&pair[0]));
+    (1..from.len()).map(|k| [from[k - 1], from[k], to[k], to[k - 1]]).collect()
 }
 
 /// Widens every row at both ends, moves the first row back and the last one on.

@@ -25,28 +25,29 @@
 //! nodes). Jeřábková 2007 ch. 3 (the same space seen as an enrichment).
 
 mod blade;
-mod sweep_triangle;
-mod front;
 mod incision_sets;
 mod crossings;
 mod marks;
 mod slot;
-pub(crate) mod pending;
-mod incision_mark;
 pub(crate) mod fragments;
-mod detect;
-mod runs;
-mod separate;
+pub(crate) mod traces;
+mod sweep_triangle;
+mod front;
 pub(crate) mod pieces;
 mod copies;
 mod surface;
-mod solid;
+mod pending;
+mod runs;
+mod detect;
+mod separate;
 mod doubled_edges;
 pub(crate) mod joined;
 mod surface_builder;
 mod components;
 mod locate;
 mod cut_mesh;
+mod incision_mark;
+mod solid;
 
 pub use blade::{BladeSweep, CutError, CutReport, NewCopy};
 pub use components::Components;

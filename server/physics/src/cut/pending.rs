@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
+use crate::mesh::{TET_EDGES, TetMesh};
 
 use super::crossings::Crossings;
-use super::fragments::{FragmentVertex, Fragments, NONE};
+use super::fragments::{FragmentVertex, Fragments};
 use super::incision_sets::IncisionSets;
 use super::pieces::PieceTable;
 use super::surface::{SurfaceVertex, bind};
@@ -21,19 +21,6 @@ pub struct PendingFace {
     /// Where it crosses the fragment's edges and corners, in order around the face: two (a line), three
     /// or four points of the material.
     pub corners: Vec<SurfaceVertex>,
-}
-
-/// Where an incision crosses a boundary face of a fragment that it has not left yet.
-#[derive(Clone, Copy, Debug)]
-pub struct PendingLine {
-    /// The incision.
-    pub incision: u32,
-    /// The fragment.
-    pub fragment: u32,
-    /// Its face: the one opposite this vertex.
-    pub face: usize,
-    /// From where to where.
-    pub ends: [FragmentVertex; 2],
 }
 
 /// Fragments that may be pending, by incision.
@@ -71,12 +58,6 @@ impl Pending {
     /// The faces, by incision and fragment.
     pub fn faces(&self, body: &Pieces) -> Vec<PendingFace> {
         self.of.iter().filter_map(|&(incision, t)| body.face(incision, t)).collect()
-    }
-
-    /// The lines on the boundary, by incision, fragment and face.
-    pub fn lines(&self, body: &Pieces) -> Vec<PendingLine> {
-        let lines = |&(incision, t): &(u32, u32)| (0..4).filter_map(move |k| body.line(incision, t, k));
-        self.of.iter().flat_map(lines).collect()
     }
 }
 
@@ -118,54 +99,6 @@ impl Pieces<'_> {
         let piece = self.fragments.piece[t as usize];
         let corners = points.iter().map(|v| bind(self.mesh, self.pieces, piece, v)).collect();
         Some(PendingFace { incision, corners })
-    }
-
-    /// Where the incision crosses the face of fragment `t` opposite vertex `face`, if that lies on the
-    /// boundary: from edge to edge, or from a corner it lies on to the edge across.
-    fn line(&self, incision: u32, t: u32, face: usize) -> Option<PendingLine> {
-        match self.entries(incision, t, face) {
-            [Some(from), Some(to)] => Some(PendingLine { incision, fragment: t, face, ends: [from, to] }),
-            _ => None,
-        }
-    }
-
-    /// The line over the face of fragment `t` opposite vertex `face` from where the incision entered it
-    /// to the blade, which stands in the face at `blade` [m].
-    pub fn line_to_blade(
-        &self,
-        incision: u32,
-        t: u32,
-        face: usize,
-        blade: FragmentVertex,
-    ) -> Option<PendingLine> {
-        match self.entries(incision, t, face) {
-            [Some(from), None] => Some(PendingLine { incision, fragment: t, face, ends: [from, blade] }),
-            _ => None,
-        }
-    }
-
-    /// Where the incision enters and leaves a face of the boundary as far as it is known.
-    fn entries(&self, incision: u32, t: u32, face: usize) -> [Option<FragmentVertex>; 2] {
-        let f = self.fragments;
-        let mut ends = [None; 2];
-        if f.neighbour[t as usize][face] != NONE {
-            return ends;
-        }
-        let corners = TET_FACES[face].map(|k| f.tets[t as usize][k]);
-        let on = corners.map(|v| self.sets.contains(f.on[v as usize], incision));
-        let vertex = |k: usize| f.vertices[corners[k] as usize];
-        let crossings =
-            [(0, 1), (1, 2), (2, 0)].into_iter().filter(|&(i, j)| !on[i] && !on[j]).filter_map(|(i, j)| {
-                let s = self.crossings.get(corners[i], corners[j], incision)?;
-                Some(FragmentVertex::between(&vertex(i), &vertex(j), s))
-            });
-        // An edge between two corners on the incision is one that it has opened or will open.
-        let single = (0..3).filter(|&k| on[k]).count() == 1;
-        let corner = (0..3).filter(|&k| single && on[k]).map(vertex);
-        for (end, found) in ends.iter_mut().zip(crossings.chain(corner)) {
-            *end = Some(found);
-        }
-        ends
     }
 
     /// Sorts the points by their angle around their middle, in the rest configuration.

@@ -16,6 +16,7 @@ use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEM
 use super::incision_sets::IncisionSets;
 use super::marks::{Ascending, Marks};
 use super::pending::Pending;
+use super::traces::{Bisection, Traces};
 
 /// The mark of fragments that were touched or bisected.
 const ACTIVE: u8 = 1;
@@ -65,6 +66,8 @@ pub struct Sheet<'a> {
     pub crossings: &'a mut Crossings,
     /// What incisions have entered and not left.
     pub waiting: &'a mut Pending,
+    /// Lines on the boundary.
+    pub traces: &'a mut Traces,
     /// The incision that is worked off.
     pub incision: u32,
 }
@@ -192,8 +195,32 @@ impl Separator {
                 self.moved.push([h.old, h.new].map(|t| 4 * t + u32::from(h.slot)));
             }
         }
+        self.pass_on_lines(m, s, sheet);
         self.pass_on_crossings([a, b], m, s, sheet);
         true
+    }
+
+    /// Gives lines on boundary faces to the parts that these have now.
+    fn pass_on_lines(&self, m: u32, s: f64, sheet: &mut Sheet) {
+        let f = &*sheet.fragments;
+        for &Halves { old, new, slot } in &self.halves {
+            let a = slot as usize;
+            let Some(b) = f.slot(old, m) else { continue };
+            for (face, corners) in TET_FACES.iter().enumerate() {
+                if face == b || f.neighbour[new as usize][face] != NONE {
+                    continue;
+                }
+                let [old, new] = [old, new].map(|t| 4 * t + face as u32);
+                let edge = [a, b].map(|k| corners.iter().position(|&c| c == k));
+                match edge {
+                    [Some(i), Some(j)] => {
+                        let incision = sheet.incision;
+                        sheet.traces.bisect(&Bisection { old, new, edge: [i, j], s, incision });
+                    }
+                    _ => sheet.traces.move_face(old, new),
+                }
+            }
+        }
     }
 
     /// Gives the crossings of *other* incisions on (a, b) to its halves, and to the new edges from `m`

@@ -71,6 +71,14 @@ impl SurfaceBuilder {
         self.joined.divide_doubled_edges(&placed, surface);
     }
 
+    /// Faces (4·fragment + slot) along an edge of a lip of this incision that the last update touched.
+    pub fn faces_beside_lips(&self, surface: &Surface, incision: u32) -> impl Iterator<Item = u32> {
+        let is_lip = move |f: u32| surface.tags[f as usize] == incision;
+        let lips = self.joined.touched().iter().filter(move |f| is_lip(**f));
+        let beside = lips.flat_map(|f| 3 * f..3 * f + 3).map(|h| self.joined.twin(h) / 3);
+        beside.filter(move |f| !is_lip(*f)).map(|f| self.faces[f as usize])
+    }
+
     /// For every half-edge (4·fragment + slot, k) its partner.
     #[cfg(test)]
     pub fn joints(&self) -> std::collections::BTreeMap<(u32, u32), (u32, u32)> {

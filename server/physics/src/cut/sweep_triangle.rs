@@ -7,11 +7,15 @@
 use nalgebra::Vector3;
 use robust::Coord3D;
 
+use super::traces::part_inside;
+
 /// A triangle in the deformed configuration [m], with its bounds.
 #[derive(Clone, Copy, Debug)]
 pub struct SweepTriangle {
     /// Corners [m].
     pub corners: [Vector3<f64>; 3],
+    /// Corners of the part that the blade itself swept [m], in the same plane.
+    pub drawn: [Vector3<f64>; 3],
     /// Smallest corner of the bounding box [m].
     pub low: Vector3<f64>,
     /// Largest corner of the bounding box [m].
@@ -28,6 +32,7 @@ impl SweepTriangle {
         let double_area = (q - p).cross(&(r - p)).norm();
         (double_area > 0.0).then(|| Self {
             corners: [p, q, r],
+            drawn: [p, q, r],
             low: p.inf(&q).inf(&r),
             high: p.sup(&q).sup(&r),
             double_area,
@@ -59,6 +64,19 @@ impl SweepTriangle {
         let (s, t) = (self.side(a), self.side(b));
         let apart = (s <= 0.0 && t >= 0.0) || (s >= 0.0 && t <= 0.0);
         apart && (s != 0.0 || t != 0.0) && self.holds_line(a, b)
+    }
+
+    /// The part, from 0 to 1, of a segment in the plane that lies in what the blade itself swept.
+    pub fn part_of(&self, segment: &[Vector3<f64>; 2]) -> Option<[f64; 2]> {
+        let [p, q, r] = self.drawn;
+        let normal = (q - p).cross(&(r - p));
+        if normal == Vector3::zeros() {
+            return None;
+        }
+        part_inside([[p, q], [q, r], [r, p]].map(|[a, b]| {
+            let inward = normal.cross(&(b - a));
+            segment.map(|x| inward.dot(&(x - a)))
+        }))
     }
 
     /// Whether the bounding box overlaps another one.

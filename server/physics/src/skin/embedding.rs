@@ -1,6 +1,5 @@
 //! A skin embedded in a body.
 
-use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::base::Base;
@@ -185,13 +184,13 @@ impl Skin {
     }
 
     /// What incisions have drawn on skin and lips without opening them, on the triangles of the
-    /// [`surface`](Self::surface); `x` are the positions of all copies [m]: [`CutMesh::incision_marks`].
-    pub fn incision_marks(&self, cut: &CutMesh, x: &[Vector3<f64>]) -> Vec<IncisionMark> {
+    /// [`surface`](Self::surface).
+    pub fn incision_marks(&self, cut: &CutMesh) -> Vec<IncisionMark> {
         if self.misfit.is_some() {
-            return cut.incision_marks(x);
+            return cut.incision_marks();
         }
         let mut marks = Vec::new();
-        for line in cut.lines_on_boundary(x) {
+        for line in cut.trace_lines() {
             lift(&self.base, &self.sheet, (&self.seams, &self.surface), cut, &line, &mut marks);
         }
         marks

@@ -1,9 +1,17 @@
 //! Marks of incisions on the skin: lines on the boundary, lifted to the skin triangles over it.
+//!
+//! # Limit
+//! A blade leaves a line where it reaches the boundary of the elements. Where the skin stands off that
+//! farther than the blade goes in, as it may over the middle of large faces of a body that bulges, nothing
+//! is drawn, and a very shallow scratch has gaps there. Lines found on the skin triangles themselves would
+//! close them, but not fit the cut: its curve is where the blade crosses edges of the boundary, a blade
+//! that is not along the normal crosses the skin over another place, even another face, than the boundary,
+//! and a line beside the curve would stay there when the lips open.
 
 use super::base::Base;
 use super::sheet::Sheet;
 use super::stitch::Seams;
-use crate::cut::pending::PendingLine;
+use crate::cut::traces::{TraceLine, part_inside};
 use crate::cut::{CutMesh, IncisionMark, MarkPoint, Surface};
 
 /// Parts of a line shorter than this share of it are left out: they lie in a corner of a triangle.
@@ -15,7 +23,7 @@ pub fn lift(
     sheet: &Sheet,
     (seams, surface): (&Seams, &Surface),
     cut: &CutMesh,
-    line: &PendingLine,
+    line: &TraceLine,
     out: &mut Vec<IncisionMark>,
 ) {
     let on_lip = cut.fragments.tag[line.fragment as usize][line.face] != 0;
@@ -39,16 +47,7 @@ fn clip(triangle: &[[f64; 3]; 3], line: &[[f64; 3]; 2]) -> Option<[[f64; 3]; 2]>
     let [a, b, c] = triangle;
     let whole = Sheet::area(a, b, c);
     let ends = line.map(|p| [[b, c], [c, a], [a, b]].map(|[q, r]| Sheet::area(&p, q, r) / whole));
-    let (mut from, mut to) = (0.0f64, 1.0f64);
-    for (p, q) in ends[0].into_iter().zip(ends[1]) {
-        // The coordinate is p + s (q - p), and at least 0 inside.
-        match (p < 0.0, q < 0.0) {
-            (true, true) => return None,
-            (true, false) => from = from.max(p / (p - q)),
-            (false, true) => to = to.min(p / (p - q)),
-            (false, false) => {}
-        }
-    }
+    let [from, to] = part_inside([0, 1, 2].map(|k| ends.map(|end| end[k])))?;
     let at = |s: f64| [0, 1, 2].map(|k| ends[0][k] + s * (ends[1][k] - ends[0][k]));
     (to - from > SHORT).then(|| [at(from), at(to)])
 }

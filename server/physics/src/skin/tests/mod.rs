@@ -283,7 +283,7 @@ fn a_skin_that_does_not_fit_leaves_the_boundary_until_the_reset() {
     // Later cuts and marks go on, on the boundary of the elements.
     body.cut_plane(v(0.5, 0.5, 1.0), v(0.1, 0.2, 1.0), 0.3, 3);
     assert_eq!(body.skin.surface(), body.cut.surface());
-    assert_eq!(body.skin.incision_marks(&body.cut, &body.x).len(), body.cut.incision_marks(&body.x).len());
+    assert_eq!(body.skin.incision_marks(&body.cut).len(), body.cut.incision_marks().len());
     body.cut.reset().unwrap();
     body.skin.follow(&body.cut);
     assert!(body.skin.fits());
