@@ -2,8 +2,8 @@
 //! once on a small body. One thread.
 //!
 //! - Insertion: a sweep through 1 000 elements of a body of 20 870 tets, topology alone and the whole
-//!   body with all that its next step needs; the same in a longer body and in advances of a hundredth;
-//!   building the uncut state.
+//!   body with all that its next step needs; the same in a body and in one four times as long, and in
+//!   advances of a hundredth; building the uncut state.
 //! - Steps: what an enriched element (one that a cut divides) costs beside a plain one, and what a step
 //!   costs after 100 cuts beside the growth of the copies. Every solve makes the same number of
 //!   iterations, and the bodies compared are stepped in turns, so that a busy moment of the machine hits
@@ -131,23 +131,40 @@ fn insertion(mesh: &TetMesh, elements: usize, repeats: usize) {
     }
 }
 
-/// A cut costs what it cuts: the same sweep in a body and in one four times as long.
+/// A cut costs what it cuts: the same sweep in a body and in one four times as long, in turns; and a
+/// second one beside it, which makes the stiffness of some places be arranged anew.
 fn longer_body(cells: usize, elements: usize, repeats: usize) {
     let block = |length: usize| {
         let size = Vector3::new(length as f64 * SIZE_M, SIZE_M, SIZE_M);
         box_mesh(Vector3::zeros(), size, [length * cells, cells, cells], BoxPattern::Tet6)
     };
-    let sweep = BladeSweep { segments: vec![blade(-0.01), blade(reach(&block(1), elements))] };
-    for mesh in [block(1), block(4)] {
-        let mut cut = 0;
-        let whole = best_and_median(repeats, || {
-            let mut body = body(&mesh, Law::Corotational);
-            body.step(0.01, DOWN, &[]);
-            let (report, seconds) = timed(|| body.cut(&sweep, 1));
-            cut = report.expect("the sweep is well formed").elements_cut;
-            seconds
-        });
-        say(&format!("sweep through {cut} elements of {}, whole body", mesh.tets.len()), whole, "");
+    let meshes = [block(1), block(4)];
+    let long = reach(&meshes[0], elements);
+    let sweep = |height: f64| {
+        let at = |x: f64| blade(x).map(|end| end + Vector3::new(0.0, 0.0, height));
+        BladeSweep { segments: vec![at(-0.01), at(long)] }
+    };
+    let mut times = [const { [const { Vec::new() }; 2] }; 2];
+    let mut cut = [0; 2];
+    for _ in 0..repeats {
+        for (mesh, times) in meshes.iter().zip(&mut times) {
+            let mut body = body(mesh, Law::Corotational);
+            for (k, times) in times.iter_mut().enumerate() {
+                body.step(0.01, DOWN, &[]);
+                let sweep = sweep(-0.0187 * k as f64);
+                let (report, seconds) = timed(|| body.cut(&sweep, k as u32 + 1));
+                cut[k] = report.expect("the sweep is well formed").elements_cut;
+                times.push(seconds);
+            }
+        }
+    }
+    let times = times.map(|times| times.map(sorted));
+    for (k, which) in ["first", "second"].into_iter().enumerate() {
+        for (mesh, times) in meshes.iter().zip(&times) {
+            say(&format!("{which} sweep, through {} elements of {}", cut[k], mesh.tets.len()), times[k], "");
+        }
+        let [best, median] = [0, 1].map(|i| times[1][k][i] / times[0][k][i]);
+        println!("  {best:.2} × the time (median {median:.2}) in a body of four times the size");
     }
 }
 

@@ -175,7 +175,7 @@ impl Body {
             load: Vec::new(),
             mass: Vec::new(),
             parts: LooseParts::default(),
-            reunion: Reunion::default(),
+            reunion: Reunion::with_room(cut_mesh.n_copies()),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
             skin: None,

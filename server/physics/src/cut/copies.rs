@@ -8,7 +8,7 @@
 use crate::mesh::TetMesh;
 
 use super::blade::NewCopy;
-use super::fragments::{Fragments, NONE, leave_room};
+use super::fragments::{Fragments, NONE, leave_room, room};
 use super::pieces::PieceTable;
 use super::slot::slot_of;
 
@@ -70,6 +70,7 @@ impl CopyTable {
     /// Room for cuts through a body of so many elements.
     pub fn leave_room(&mut self, n_elements: usize) {
         self.visited.resize(n_elements, 0);
+        self.changed = room(n_elements / 8, 0);
         leave_room(&mut self.node);
         leave_room(&mut self.volume);
         leave_room(&mut self.visited);

@@ -112,14 +112,13 @@ impl Record<'_> {
 impl Detector {
     /// Room for an uncut body and for what cuts add.
     pub fn with_room(n_nodes: usize, n_elements: usize) -> Self {
-        let mut detector = Self::default();
-        detector.marks.restart(n_elements + n_elements / 2);
+        let mut detector = Self { marks: Marks::with_room(n_elements), ..Self::default() };
         resize_with_room(&mut detector.beyond, n_nodes, 0);
         resize_with_room(&mut detector.node_beyond, n_nodes, 0);
         detector.make_room(n_nodes);
         detector.candidates = room(n_elements / 16, (0, Vector3::zeros(), Vector3::zeros()));
         detector.near = room(n_elements / 16, 0);
-        detector.touched = room(n_elements / 16, 0);
+        detector.touched = room(n_elements / 8, 0);
         detector
     }
 

@@ -86,17 +86,16 @@ impl Sheet<'_> {
 impl Separator {
     /// Room for a cut through a body of so many elements.
     pub fn with_room(n_elements: usize) -> Self {
-        let n = n_elements / 16;
-        let mut separator = Self {
+        let n = n_elements / 8;
+        Self {
             elements: room(n, 0),
             changed: room(n, 0),
             active: room(n, 0),
-            corners: room(n, (0, 0)),
+            marks: Marks::with_room(n_elements),
+            corners: room(2 * n, (0, 0)),
             queue: room(n, 0).into(),
             ..Self::default()
-        };
-        separator.marks.restart(n_elements + n_elements / 2);
-        separator
+        }
     }
 
     /// Separates what the sheet cuts completely among `touched` fragments and their neighbours.

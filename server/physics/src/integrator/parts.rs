@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::reunion::find;
 use crate::cut::Piece;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, resize_with_room};
 
 /// Connected parts of a body, by copy.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,7 +45,8 @@ impl LooseParts {
                 root[a.max(b) as usize] = a.min(b);
             }
         }
-        let mut parts = Self { of_copy: vec![0; n], ..Self::default() };
+        let mut parts = Self::default();
+        resize_with_room(&mut parts.of_copy, n, 0);
         let mut n_parts = 0;
         for copy in 0..n {
             let r = find(&mut root, copy as u32) as usize;

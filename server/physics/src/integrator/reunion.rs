@@ -20,6 +20,11 @@ pub struct Reunion {
 }
 
 impl Reunion {
+    /// Room for cuts through a body of so many copies.
+    pub fn with_room(n_copies: usize) -> Self {
+        Self { numbering: Numbering::with_room(n_copies), ..Self::default() }
+    }
+
     /// Brings `parts` up to date after a cut, the last one of `mesh`, that made the copies `new`.
     /// `mass` [kg] and `fixed` are those after it. The result is that of [`LooseParts::new`].
     pub fn follow(
