@@ -194,7 +194,7 @@ impl PublishThread {
             self.told_once = fresh;
             self.publish_surfaces();
         }
-        self.publish_tools(fresh);
+        self.publish_tools();
     }
 
     fn send_out(&mut self, outgoing: Outgoing) {
@@ -239,13 +239,13 @@ impl PublishThread {
         }
     }
 
-    /// An old snapshot may hold tools that a client has put away since: of those nothing is said.
-    fn publish_tools(&mut self, fresh: bool) {
+    /// The snapshot may hold tools that a client has put away since: of those nothing is said.
+    fn publish_tools(&mut self) {
         self.tool_states += 1;
         let snapshot = self.sources.snapshots.output_buffer();
         let put_away = |tool: &ToolSnapshot| {
             let by_client = !tool.owner.is_empty() && *tool.owner != *SCRIPT;
-            !fresh && by_client && !self.exchange.inbox().held().any(|held| held.id == tool.id)
+            by_client && !self.exchange.inbox().held().any(|held| held.id == tool.id)
         };
         for tool in &snapshot.tools {
             if put_away(tool) {
