@@ -416,7 +416,8 @@ fn worn(case: &Case, configuration: &Configuration, stop: &AtomicBool) -> Option
     let mut set = configuration.overrides();
     set.extend(wear::at_rest(&case.bodies));
     let Ok(scene) = case.scene.apply_sets(&set) else { return Some(Vec::new()) };
-    let once = configuration.label(Factor::Cutting) == "precut";
+    // The others have the mesh of one of these, or can take no further cut.
+    let once = !["xfem", "snap"].contains(&configuration.label(Factor::Cutting));
     match wear::measure(&scene, case.scene.base_dir(), once, stop) {
         None if stop.load(Ordering::Relaxed) => None,
         found => Some(found.unwrap_or_default()),

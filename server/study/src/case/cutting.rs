@@ -9,8 +9,12 @@ use crate::design::Block;
 use crate::error::Goal;
 use crate::trial::Protocol;
 
-/// Names of the ways to cut, the labels of [`Factor::Cutting`].
+/// Names of the ways to cut, labels of [`Factor::Cutting`].
 pub const METHODS: [&str; 3] = ["xfem", "snap", "precut"];
+
+/// The same ways where only the plane of the cut lies inside elements and its front does not: they tell how much
+/// of an error the front makes.
+pub const FRONTS: [&str; 2] = ["xfem-front", "snap-front"];
 
 /// What pulls at the beam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +64,7 @@ pub fn case(pull: Pull, quick: bool) -> Case {
             "A beam of 30 × 60 × 200 mm (E = 300 kPa, ν = 0.35), held at its base and cut through to half its \
              depth. {how} and opens the cut. All meshes have {cells}×{y}×{} cells of five tetrahedra. That \
              of `precut` has faces where the cut is; for `xfem` and `snap` the plane of the cut lies a third \
-             of a cell inside, and so does its front.",
+             of a cell inside, and so does its front; for `xfem-front` and `snap-front` only the plane does.",
             2 * half_z
         ),
         scene: load(include_str!("../../cases/r2-tc1.toml"), &overrides),
@@ -95,7 +99,7 @@ fn pulled(pull: Pull) -> Vec<String> {
     }
 }
 
-/// The three ways, each with its mesh.
+/// The ways, each with its mesh.
 fn methods(body: &[String], x_m: &[f64], y: usize, half_z: usize) -> Axis {
     let y_m: Vec<f64> = (0..=y).map(|j| 0.06 * j as f64 / y as f64).collect();
     let n = half_z as f64;
@@ -116,11 +120,12 @@ fn methods(body: &[String], x_m: &[f64], y: usize, half_z: usize) -> Axis {
     let setting = |(i, label): (usize, &&str)| {
         let mut set = match *label {
             "precut" => grid(x_m, &aligned),
-            _ => grid(&x_beside, &beside),
+            "xfem" | "snap" => grid(&x_beside, &beside),
+            _ => grid(x_m, &beside),
         };
-        let method = if *label == "snap" { "snap" } else { "xfem" };
+        let method = if label.starts_with("snap") { "snap" } else { "xfem" };
         set.extend(on_bodies(body, "cutting.method", &format!("\"{method}\"")));
         Setting::new(*label, i as f64, set)
     };
-    Axis::new(Factor::Cutting, METHODS.iter().enumerate().map(setting).collect(), "xfem")
+    Axis::new(Factor::Cutting, METHODS.iter().chain(&FRONTS).enumerate().map(setting).collect(), "xfem")
 }

@@ -47,7 +47,7 @@ pub fn section(result: &CaseResult) -> String {
     );
     let _ = writeln!(
         out,
-        "<div class=\"pair\">\n<figure>{}<figcaption>The same points by the {}.</figcaption></figure>\n<figure>{}<figcaption>The same points by their elastic energy.</figcaption></figure>\n</div>",
+        "<div class=\"pair\">\n<figure>{}<figcaption>The same points by the {}; the line goes through the front above.</figcaption></figure>\n<figure>{}<figcaption>The same points by their elastic energy; the line likewise.</figcaption></figure>\n</div>",
         a.svg(),
         escape(&goal),
         b.svg()

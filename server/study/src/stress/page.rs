@@ -12,6 +12,7 @@ use crate::page::{escape, style};
 const STYLE: &str = "
 .state { display: inline-block; min-width: 66px; padding: 1px 9px; border-radius: 10px; font-size: 13px; font-weight: 600; text-align: center; color: #fff; }
 .state.passed { background: #1f7a4d; } .state.failed { background: #b3261e; } .state.not-yet { background: #7a8491; }
+.whole, p code { white-space: nowrap; }
 table.glance td:nth-child(3) { white-space: normal; min-width: 30ch; }
 table.glance td:nth-child(4) { white-space: normal; color: var(--soft); }
 td.out { color: var(--bad); font-weight: 600; }
@@ -97,12 +98,21 @@ fn glance(report: &SuiteReport) -> String {
             number(case),
             state(case.status),
             case.case.name,
-            escape(case.case.title),
-            escape(&told)
+            whole(case.case.title),
+            whole(&told)
         );
     }
     out += "</tbody></table></div>\n";
     out
+}
+
+/// Text whose powers of ten are not broken at their sign.
+fn whole(text: &str) -> String {
+    let word = |word: &str| {
+        let escaped = escape(word);
+        if word.contains("e-") { format!("<span class=\"whole\">{escaped}</span>") } else { escaped }
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// The last sentence of a set-up that cannot be run yet.
@@ -130,10 +140,10 @@ fn section(report: &CaseReport) -> String {
     let mut out = format!(
         "<section id=\"{}\">\n<h2>{} {}</h2>\n<p>{}</p>\n<p><strong>Passes if:</strong> {}</p>\n<p class=\"soft\">Source: {} · <code>scindo stress --case {}</code></p>\n",
         case.name,
-        escape(&title),
+        whole(&title),
         state(report.status),
-        escape(case.set_up),
-        escape(case.rule),
+        whole(case.set_up),
+        whole(case.rule),
         escape(case.source),
         case.name
     );
