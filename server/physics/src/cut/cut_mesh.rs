@@ -176,7 +176,14 @@ impl CutMesh {
 
     /// Where blades went over the boundary without opening it.
     pub(crate) fn trace_lines(&self) -> Vec<TraceLine> {
-        self.traces.lines(&self.fragments)
+        self.traces.lines(&self.fragments, |vertices, incision| {
+            let on = vertices.map(|v| self.sets.contains(self.fragments.on[v as usize], incision));
+            let is_crossed = |(i, j): (usize, usize)| {
+                let crossing = || self.crossings.get(vertices[i], vertices[j], incision);
+                !on[i] && !on[j] && crossing().is_some()
+            };
+            on.contains(&true) && ![(0, 1), (1, 2), (2, 0)].into_iter().any(is_crossed)
+        })
     }
 
     fn pending_pieces(&self) -> Pieces<'_> {

@@ -143,17 +143,23 @@ impl Traces {
         }
     }
 
-    /// All lines, by incision, fragment and face.
-    pub fn lines(&self, fragments: &Fragments) -> Vec<TraceLine> {
+    /// All lines, by incision, fragment and face; `is_left` says whether an incision has opened at one of
+    /// three vertices of a face and crosses no edge between them any more. Then it left the face where it
+    /// came in, and what it drew there is beside its lips; unless it ends there.
+    pub fn lines(&self, fragments: &Fragments, is_left: impl Fn([u32; 3], u32) -> bool) -> Vec<TraceLine> {
         let mut lines = Vec::new();
         for (&face, drawings) in &self.of_face {
             let (fragment, face) = (face / 4, face as usize % 4);
-            let corners = TET_FACES[face].map(|k| fragments.tets[fragment as usize][k]);
-            let corners = corners.map(|v| &fragments.vertices[v as usize]);
-            for Drawing { incision, lines: of_incision, .. } in drawings {
-                lines.extend(of_incision.iter().map(|line| {
+            let vertices = TET_FACES[face].map(|k| fragments.tets[fragment as usize][k]);
+            let corners = vertices.map(|v| &fragments.vertices[v as usize]);
+            for drawing in drawings {
+                let incision = drawing.incision;
+                if is_left(vertices, incision) && !drawing.ends_inside() {
+                    continue;
+                }
+                lines.extend(drawing.lines.iter().map(|line| {
                     let ends = line.ends.map(|p| vertex_at(&p, corners));
-                    TraceLine { incision: *incision, fragment, face, ends }
+                    TraceLine { incision, fragment, face, ends }
                 }));
             }
         }
@@ -181,6 +187,15 @@ impl Bisection {
 }
 
 impl Drawing {
+    /// Whether the way begins or ends inside the face.
+    fn ends_inside(&self) -> bool {
+        let goes_on = |p: &Place, of: usize| {
+            let others = self.lines.iter().enumerate().filter(|(other, _)| *other != of);
+            p.min() <= SHORT || others.into_iter().any(|(_, line)| distance(p, &line.ends) <= RESOLUTION)
+        };
+        self.lines.iter().enumerate().any(|(l, line)| !line.ends.iter().all(|p| goes_on(p, l)))
+    }
+
     /// Draws a line, or makes one longer that it goes on.
     fn draw(&mut self, mut ends: [Place; 2]) {
         let joints = (0..self.lines.len()).flat_map(|l| [(l, 1, 0), (l, 1, 1), (l, 0, 0), (l, 0, 1)]);
@@ -297,7 +312,7 @@ mod tests {
                     draw((t - 0.01).max(0.0), t);
                 }
             }
-            let lines = traces.lines(&fragments);
+            let lines = traces.lines(&fragments, |_, _| false);
             assert!(lines.len() <= 4, "{} lines of {samples} samples", lines.len());
             let drawn = &traces.of_face[&3][0].lines;
             for k in 0..=90 {
@@ -306,6 +321,19 @@ mod tests {
                 assert!(samples == 3 || off <= 2.0 * RESOLUTION, "{off} at {k} of {samples}");
             }
         }
+    }
+
+    #[test]
+    fn a_blade_that_left_a_face_where_it_came_in_left_no_line_beside_the_lips() {
+        let fragments = fragments();
+        let mut traces = Traces::default();
+        traces.draw(3, 1, [at(0.0, 0.5), at(0.3, 0.3)]);
+        traces.draw(3, 1, [at(0.3, 0.3), at(0.6, 0.0)]);
+        assert_eq!(traces.lines(&fragments, |_, _| false).len(), 2);
+        assert!(traces.lines(&fragments, |_, _| true).is_empty());
+        // It is there: shown with the way to it.
+        traces.draw(3, 1, [at(0.0, 0.8), at(0.1, 0.6)]);
+        assert_eq!(traces.lines(&fragments, |_, _| true).len(), 3);
     }
 
     #[test]
