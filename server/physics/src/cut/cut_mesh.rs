@@ -11,7 +11,7 @@ use super::components::Components;
 use super::copies::CopyTable;
 use super::crossings::Crossings;
 use super::detect::{Deformed, Detector, Record};
-use super::fragments::Fragments;
+use super::fragments::{Fragments, leave_room};
 use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
 use super::locate::piece_at;
@@ -78,8 +78,11 @@ impl CutMesh {
         }
         copies.changed.clear();
         copies.leave_room(mesh.tets.len());
-        let (builder, surface) =
+        let (builder, mut surface) =
             SurfaceBuilder::build(&Material { mesh: &mesh, fragments: &fragments, pieces: &pieces });
+        leave_room(&mut surface.vertices);
+        leave_room(&mut surface.triangles);
+        leave_room(&mut surface.tags);
         let (n_nodes, n_elements) = (mesh.nodes.len(), mesh.tets.len());
         Ok(Self {
             runs: Runs::new(&mesh),
