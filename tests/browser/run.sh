@@ -6,9 +6,8 @@ cd "$(dirname "$0")/../.."
 bin=${SCINDO_TEST_BIN:-target/debug}/scindo
 artifacts=${SCINDO_TEST_ARTIFACTS:-$PWD/tests/artifacts}
 mkdir -p "$artifacts"
-free_port() { python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])'; }
-web=$(free_port)
-zenoh=$(free_port)
+web=$(python3 tests/free_port.py)
+zenoh=$(python3 tests/free_port.py)
 "$bin" --listen "tcp/127.0.0.1:$zenoh" --viewer "127.0.0.1:$web" >"$artifacts/browser-server.log" 2>&1 &
 server=$!
 trap 'kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true' EXIT

@@ -25,7 +25,7 @@ for file in sorted(pathlib.Path("deploy").glob("*.json5")):
 PY
 
 echo "-- client over the network"
-port=$("$python" -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+port=$(python3 tests/free_port.py)
 "$bin/scindo" run tests/python/scene.toml --listen "tcp/127.0.0.1:$port" > "$keep/server.log" 2>&1 &
 server=$!
 "$python" tests/python/client.py --connect "tcp/127.0.0.1:$port"

@@ -61,8 +61,8 @@ pub fn table(result: &CaseResult) -> String {
         prose(
             "The worst element is told by its mean ratio: 1 regular, 0 flat. The cuts after the first are planes \
              across the beam to random depths, the same for all; a mesh that was made with its cut takes no further \
-             one. `xfem` leaves the mesh as it was and makes copies of nodes, which its unknowns count; `snap` moves \
-             nodes and removes elements that become flat."
+             one, and with its front on faces a mesh wears as the other of its method. `xfem` leaves the mesh as it \
+             was and makes copies of nodes, which its unknowns count; `snap` moves nodes and removes elements that become flat."
         )
     );
     out
