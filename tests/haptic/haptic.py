@@ -73,9 +73,8 @@ class Programs:
 
 
 def free_endpoint():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{one.getsockname()[1]}"
+    port = subprocess.run([sys.executable, ROOT / "tests/free_port.py"], stdout=subprocess.PIPE, check=True).stdout
+    return f"tcp/127.0.0.1:{int(port)}"
 
 
 def summary_of(process, seconds):

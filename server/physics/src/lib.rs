@@ -30,5 +30,6 @@ pub mod integrator;
 pub mod estimate;
 pub mod body;
 mod numbering;
+mod room;
 #[cfg(test)]
 mod testing;

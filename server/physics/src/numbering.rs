@@ -1,6 +1,6 @@
 //! Where the members of a short list are, out of very many numbered things.
 
-use crate::operator::resize_with_room;
+use crate::room::resize_with_room;
 
 /// The place of things in a list. It is never cleared: a place counts if the list has the thing there.
 #[derive(Clone, Debug, Default)]

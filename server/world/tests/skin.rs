@@ -128,8 +128,8 @@ fn a_scratch_is_drawn_for_everybody_and_reported() {
     assert!(!body.topology.tags.contains(&1));
     let length = |[p, q]: &[[f32; 3]; 2]| (0..3).map(|k| (q[k] - p[k]).powi(2)).sum::<f32>().sqrt();
     let drawn: f32 = body.marks.iter().map(length).sum();
-    // The path is 63 mm long; its ends lie inside faces of elements 16 mm wide.
-    assert!(drawn > 0.03 && drawn < 0.08, "{drawn} m in {} lines", body.marks.len());
+    // The path is 63 mm long; close to its ends the skin stands off the elements farther than the blade goes in.
+    assert!(drawn > 0.05 && drawn < 0.08, "{drawn} m in {} lines", body.marks.len());
     // Each line lies on a triangle that is shown.
     let vector = |p: [f32; 3]| nalgebra::Vector3::from(p.map(f64::from));
     let tree = scindo_collision::SurfaceBvh::new(&body.positions, &body.topology.triangles).unwrap();

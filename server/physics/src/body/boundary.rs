@@ -5,7 +5,8 @@ use nalgebra::Vector3;
 use super::shape::Shape;
 use super::{Body, BodyError, Path};
 use crate::cut::CutMesh;
-use crate::operator::{FixedCopy, resize_with_room};
+use crate::operator::FixedCopy;
+use crate::room::resize_with_room;
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;
 

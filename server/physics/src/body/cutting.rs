@@ -6,7 +6,7 @@ use super::{Body, BodyError, General, Path};
 use crate::assembly::ElementKind;
 use crate::cut::{BladeSweep, CutReport, NewCopy};
 use crate::integrator::LooseParts;
-use crate::operator::{refill, resize_with_room};
+use crate::room::{refill, resize_with_room};
 
 impl Body {
     /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were

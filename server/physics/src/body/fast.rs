@@ -6,7 +6,8 @@ use super::{Outcome, SolveReport};
 use crate::cut::CutMesh;
 use crate::element::{Simd, deformation_gradient, piece_energy};
 use crate::integrator::{ImplicitEuler, LooseParts, Notice, SpinGuard, State, StepInputs, StepOutcome};
-use crate::operator::{Elastic, FixedCopy, StiffModes, degenerate_elements, refill, resize_with_room};
+use crate::operator::{Elastic, FixedCopy, StiffModes, degenerate_elements};
+use crate::room::{refill, resize_with_room};
 use crate::team::Team;
 
 /// A step that fails is tried again in 2 and then in 4 parts.

@@ -6,9 +6,10 @@
 //! with the node's number: the *real* copy; the others are virtual.
 
 use crate::mesh::TetMesh;
+use crate::room::{empty_with_room, leave_room};
 
 use super::blade::NewCopy;
-use super::fragments::{Fragments, NONE, leave_room, room};
+use super::fragments::{Fragments, NONE};
 use super::pieces::PieceTable;
 use super::slot::slot_of;
 
@@ -70,7 +71,7 @@ impl CopyTable {
     /// Room for cuts through a body of so many elements.
     pub fn leave_room(&mut self, n_elements: usize) {
         self.visited.resize(n_elements, 0);
-        self.changed = room(n_elements / 8, 0);
+        self.changed = empty_with_room(n_elements / 8, 0);
         leave_room(&mut self.node);
         leave_room(&mut self.volume);
         leave_room(&mut self.visited);

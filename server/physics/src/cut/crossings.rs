@@ -4,11 +4,10 @@
 //! the first crossing wins. The parameter is the same in the rest and in the deformed configuration,
 //! because the map is affine on a piece.
 
+use crate::room::leave_room;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
-
-use super::fragments::leave_room;
 
 /// A crossing this close to an end of its edge, relative to the edge, is the end itself.
 ///

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::mesh::{MeshError, TetMesh};
+use crate::room::leave_room;
 
 use super::blade::{BladeSweep, CutError, CutReport};
 use super::components::Components;
 use super::copies::CopyTable;
 use super::crossings::Crossings;
 use super::detect::{Deformed, Detector, Record};
-use super::fragments::{Fragments, leave_room};
+use super::fragments::Fragments;
 use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
 use super::locate::piece_at;

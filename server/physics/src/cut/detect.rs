@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 
 use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
-use crate::operator::resize_with_room;
+use crate::room::{empty_with_room, resize_with_room};
 
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
-use super::fragments::{Fragments, NONE, room};
+use super::fragments::{Fragments, NONE};
 use super::incision_sets::IncisionSets;
 use super::marks::{Ascending, Marks};
 use super::pieces::PieceTable;
@@ -116,9 +116,9 @@ impl Detector {
         resize_with_room(&mut detector.beyond, n_nodes, 0);
         resize_with_room(&mut detector.node_beyond, n_nodes, 0);
         detector.make_room(n_nodes);
-        detector.candidates = room(n_elements / 16, (0, Vector3::zeros(), Vector3::zeros()));
-        detector.near = room(n_elements / 16, 0);
-        detector.touched = room(n_elements / 8, 0);
+        detector.candidates = empty_with_room(n_elements / 16, (0, Vector3::zeros(), Vector3::zeros()));
+        detector.near = empty_with_room(n_elements / 16, 0);
+        detector.touched = empty_with_room(n_elements / 8, 0);
         detector
     }
 

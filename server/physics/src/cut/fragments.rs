@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use crate::mesh::{TET_FACES, TetMesh};
+use crate::room::leave_room;
 
 use super::incision_sets::IncisionSets;
 use super::slot::slot_of;
@@ -370,24 +371,6 @@ impl Fragments {
             }
         }
     }
-}
-
-/// Room for half as many entries again. It is written to, so that a cut does not wait for its pages.
-pub fn leave_room<T: Copy>(entries: &mut Vec<T>) {
-    let n = entries.len();
-    if let Some(&last) = entries.last() {
-        entries.reserve_exact(n / 2);
-        entries.resize(n + n / 2, last);
-        entries.truncate(n);
-    }
-}
-
-/// An empty list with room for `n` entries, written to likewise.
-pub fn room<T: Copy>(n: usize, entry: T) -> Vec<T> {
-    let mut entries = Vec::new();
-    entries.resize(n, entry);
-    entries.clear();
-    entries
 }
 
 /// Links tets across faces that exactly two of them use, from opposite sides.

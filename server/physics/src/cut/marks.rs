@@ -1,6 +1,6 @@
 //! Marks on numbered things: a set that is cleared at once, and a set that is read out in order.
 
-use super::fragments::room;
+use crate::room::empty_with_room;
 
 /// Up to eight kinds of marks on numbered things, one bit each, so that all marks of a body are near
 /// the core; taking them off costs what setting them did.
@@ -13,7 +13,7 @@ pub struct Marks {
 impl Marks {
     /// Room for marks on numbers below `n`, half as many again, and an eighth of them marked at a time.
     pub fn with_room(n: usize) -> Self {
-        Self { of: room(n + n / 2, 0), marked: room(n / 8, 0) }
+        Self { of: empty_with_room(n + n / 2, 0), marked: empty_with_room(n / 8, 0) }
     }
 
     /// Takes off all marks; the numbers are below `n` from now on.

@@ -1,8 +1,9 @@
 //! Material pieces: the face-connected components of the fragments of one element.
 
 use crate::mesh::TetMesh;
+use crate::room::leave_room;
 
-use super::fragments::{Fragments, NONE, leave_room};
+use super::fragments::{Fragments, NONE};
 use super::slot::slot_of;
 
 /// One connected piece of material inside one element: what mechanics sees as an element.

@@ -10,9 +10,10 @@
 use std::collections::VecDeque;
 
 use crate::mesh::{TET_EDGES, TET_FACES};
+use crate::room::empty_with_room;
 
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
-use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE, room};
+use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
 use super::incision_sets::IncisionSets;
 use super::marks::{Ascending, Marks};
 use super::pending::Pending;
@@ -88,12 +89,12 @@ impl Separator {
     pub fn with_room(n_elements: usize) -> Self {
         let n = n_elements / 8;
         Self {
-            elements: room(n, 0),
-            changed: room(n, 0),
-            active: room(n, 0),
+            elements: empty_with_room(n, 0),
+            changed: empty_with_room(n, 0),
+            active: empty_with_room(n, 0),
             marks: Marks::with_room(n_elements),
-            corners: room(2 * n, (0, 0)),
-            queue: room(n, 0).into(),
+            corners: empty_with_room(2 * n, (0, 0)),
+            queue: empty_with_room(n, 0).into(),
             ..Self::default()
         }
     }

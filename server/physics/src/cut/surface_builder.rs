@@ -10,8 +10,9 @@
 //! changed fragments anew, and to walk the cycles that pass one of their corners.
 
 use crate::mesh::{TET_FACES, TetMesh};
+use crate::room::leave_room;
 
-use super::fragments::{FragmentVertex, Fragments, NONE, leave_room};
+use super::fragments::{FragmentVertex, Fragments, NONE};
 use super::joined::{Joined, Place};
 use super::pieces::PieceTable;
 use super::surface::{Surface, SurfaceVertex, bind};

@@ -18,8 +18,8 @@ use crate::material::Material;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded,
     Spring, StiffModes, Substitution, Sum, SystemOperator, block_of, filter, invert, padded,
-    resize_with_room,
 };
+use crate::room::resize_with_room;
 use crate::solver::{Pcg, PcgReport, PcgSettings, StopReason};
 use crate::team::{Team, blocks};
 

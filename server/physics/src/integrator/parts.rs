@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::reunion::find;
 use crate::cut::Piece;
-use crate::operator::{FixedCopy, resize_with_room};
+use crate::operator::FixedCopy;
+use crate::room::resize_with_room;
 
 /// Connected parts of a body, by copy.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -7,7 +7,8 @@
 use super::parts::LooseParts;
 use crate::cut::{CutMesh, NewCopy};
 use crate::numbering::Numbering;
-use crate::operator::{FixedCopy, resize_with_room};
+use crate::operator::FixedCopy;
+use crate::room::resize_with_room;
 
 /// Scratch of a look at what a cut changed.
 #[derive(Clone, Debug, Default)]

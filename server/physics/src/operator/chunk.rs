@@ -7,10 +7,11 @@ use super::carriers::Merged;
 use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
 use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
-use super::{Padded, padded, resize_with_room};
+use super::{Padded, padded};
 use crate::element::{LANES, Simd};
 use crate::mesh::TetMesh;
 use crate::numbering::Numbering;
+use crate::room::resize_with_room;
 
 #[derive(Clone, Debug)]
 pub struct Chunk {

@@ -6,8 +6,9 @@
 
 use nalgebra::Vector3;
 
-use super::{BLOCK, resize_with_room};
+use super::BLOCK;
 use crate::element::{Ids, LANES};
+use crate::room::resize_with_room;
 
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
 /// body of a few thousand pieces still has work for several threads.

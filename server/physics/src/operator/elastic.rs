@@ -7,12 +7,13 @@ use super::chunk::{Chunk, NewLane};
 use super::chunks::{Gather, NO_PIECE, region_of_elements};
 use super::kernel::{Block6, Coefficients};
 use super::rows::{Sum, gather_direction};
-use super::{BLOCK, LinearOperator, Padded, resize_with_room};
+use super::{BLOCK, LinearOperator, Padded};
 use crate::cut::Piece;
 use crate::element::Simd;
 use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
 use crate::numbering::Numbering;
+use crate::room::resize_with_room;
 use crate::team::{Team, blocks, ranges};
 
 /// Most lanes of one chunk: four copies each must leave room in 16-bit local numbers.

@@ -72,29 +72,6 @@ pub fn block_of<T>(v: &[T], block: usize) -> &[T] {
     &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]
 }
 
-/// Gives a vector `n` entries; where it has to move, to a place with room for what cuts add. The room is
-/// written to, so that a cut does not wait for its pages.
-pub fn resize_with_room<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
-    if n > v.capacity() {
-        v.reserve_exact(n + n / 2 - v.len());
-        v.resize(n + n / 2, value.clone());
-    }
-    v.resize(n, value);
-}
-
-/// Replaces all entries of a vector; where it has to move, it gets the same room.
-pub fn refill<T: Clone>(v: &mut Vec<T>, mut entries: impl ExactSizeIterator<Item = T>) {
-    v.clear();
-    if entries.len() > v.capacity()
-        && let Some(first) = entries.next()
-    {
-        let n = entries.len() + 1;
-        resize_with_room(v, n, first);
-        v.truncate(1);
-    }
-    v.extend(entries);
-}
-
 /// x, y, z of a double-precision vector, rounded.
 pub fn padded(v: &nalgebra::Vector3<f64>) -> Padded {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]

@@ -1,7 +1,8 @@
 //! The inverse of the 3×3 diagonal blocks, one per copy; on degenerate elements in variables in which
 //! they are not stiff.
 
-use super::{BLOCK, Block6, FixedCopy, Padded, Substitution, resize_with_room};
+use super::{BLOCK, Block6, FixedCopy, Padded, Substitution};
+use crate::room::resize_with_room;
 use crate::team::{Team, blocks};
 
 /// Block-Jacobi preconditioner M⁻¹: one symmetric positive definite 3×3 matrix per copy.

@@ -5,9 +5,8 @@
 
 use super::algebraic_error::AlgebraicError;
 use super::report::StopReason;
-use crate::operator::{
-    Advance, BLOCK, BlockJacobi, LinearOperator, Padded, Sum, block_of, resize_with_room, rows,
-};
+use crate::operator::{Advance, BLOCK, BlockJacobi, LinearOperator, Padded, Sum, block_of, rows};
+use crate::room::resize_with_room;
 use crate::team::{Team, blocks};
 
 /// When to stop.

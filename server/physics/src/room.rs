@@ -1,0 +1,44 @@
+//! Room in lists for what cuts add.
+//!
+//! Memory that nobody has written to has no pages yet, and a cut that is made within milliseconds would
+//! wait for each of them. So room is written to when it is made.
+
+/// Gives a vector `n` entries; where it has to move, to a place with room for half as many again.
+pub fn resize_with_room<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
+    if n > v.capacity() {
+        v.reserve_exact(n + n / 2 - v.len());
+        v.resize(n + n / 2, value.clone());
+    }
+    v.resize(n, value);
+}
+
+/// Replaces all entries of a vector; where it has to move, it gets the same room.
+pub fn refill<T: Clone>(v: &mut Vec<T>, mut entries: impl ExactSizeIterator<Item = T>) {
+    v.clear();
+    if entries.len() > v.capacity()
+        && let Some(first) = entries.next()
+    {
+        let n = entries.len() + 1;
+        resize_with_room(v, n, first);
+        v.truncate(1);
+    }
+    v.extend(entries);
+}
+
+/// Room for half as many entries again.
+pub fn leave_room<T: Copy>(entries: &mut Vec<T>) {
+    let n = entries.len();
+    if let Some(&last) = entries.last() {
+        entries.reserve_exact(n / 2);
+        entries.resize(n + n / 2, last);
+        entries.truncate(n);
+    }
+}
+
+/// An empty list with room for `n` entries.
+pub fn empty_with_room<T: Copy>(n: usize, entry: T) -> Vec<T> {
+    let mut entries = Vec::new();
+    entries.resize(n, entry);
+    entries.clear();
+    entries
+}
