@@ -96,9 +96,10 @@ async function bodyDeforms(page) {
   summary.movedM = moved;
 }
 
-/** Messages and pictures go on and on; how fast is the machine's affair, and told. */
+/** Messages and pictures go on and on, messages with the simulation; how fast is the machine's affair, and told. */
 async function messagesFlow(page) {
-  const sample = () => page.evaluate(() => ({ at: performance.now(), ...window.scindo.counts() }));
+  const sample = () => page.evaluate(() => ({ at: performance.now(), simulated: window.scindo.stats()?.simTimeS ?? NaN, ...window.scindo.counts() }));
+  await until(page, "statistics arrive", MINUTE, () => Boolean(window.scindo.stats()));
   const a = await sample();
   await until(page, "125 messages arrive and 15 pictures are drawn", MINUTE, (a) => {
     const counts = window.scindo.counts();
@@ -106,6 +107,8 @@ async function messagesFlow(page) {
   }, a);
   const b = await sample();
   const rate = (key) => (1000 * (b[key] - a[key])) / (b.at - a.at);
+  const perSimulated = (b.messages - a.messages) / (b.simulated - a.simulated);
+  hold(perSimulated >= 25, `at least 25 messages arrive per simulated second (${perSimulated.toFixed(1)})`);
   Object.assign(summary, { messagesPerS: rate("messages"), framesPerS: rate("frames"), picturesPerS: rate("pictures") });
 }
 

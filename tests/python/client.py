@@ -111,9 +111,10 @@ def surface(session, body):
 
 
 def watch_frames(session, body, epoch, vertices, count):
-    """So many frames: order, epoch, size, finiteness. Returns the last and the rate."""
+    """So many frames: order, epoch, size, finiteness, five or more per simulated second. Returns the last and the
+    rate."""
     subscription, frames = session.subscribe(f"body/{body}/surface/frame", surface_pb2.SurfaceFrame)
-    start, last = time.monotonic(), None
+    start, first, last = time.monotonic(), None, None
     for seen in range(count):
         try:
             frame = frames.get(timeout=PATIENCE)
@@ -123,8 +124,10 @@ def watch_frames(session, body, epoch, vertices, count):
             check(len(positions(frame)) == vertices, "a frame has the vertices of its epoch")
         if last is not None:
             check(frame.seq > last.seq and frame.sim_time_s >= last.sim_time_s, "frames are in order")
-        last = frame
+        first, last = first or frame, frame
     subscription.undeclare()
+    simulated = last.sim_time_s - first.sim_time_s
+    check(count >= 5 * simulated, f"{count} frames in {simulated:.2f} simulated seconds are at least 5 per second")
     return last, count / (time.monotonic() - start)
 
 
