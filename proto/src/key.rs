@@ -7,6 +7,8 @@
 //! | `body/<id>/surface/frame` | `SurfaceFrame` | server → all |
 //! | `body/<id>/surface/topology` | `SurfaceTopology` | server → all |
 //! | `body/<id>/surface/keyframe` | `SurfaceKeyframe` | query |
+//! | `body/<id>/surface/field/<name>` | `SurfaceField` | server → who asks |
+//! | `measures` | `Measures` | server → who asks |
 //! | `tool/<id>/pose` | `ToolSample` | client → server |
 //! | `tool/<id>/cut` | `CutCommand` | client → server |
 //! | `tool/<id>/cut_ack` | `CutAck` | server → client |
@@ -111,7 +113,8 @@ impl Role {
 }
 
 /// What can be asked under `rpc/`. Requests and replies: `PauseRequest`, `StepRequest`,
-/// `ResetRequest`, `SetRequest` → `RpcReply`; `info` → `SessionInfo`; `schema` → `SchemaReply`.
+/// `ResetRequest`, `SetRequest`, `UndoRequest`, `LoadRequest` → `RpcReply`; `info` → `SessionInfo`;
+/// `params` → `ParamsReply`; `scenes` → `ScenesReply`; `schema` → `SchemaReply`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verb {
     /// What is running.
@@ -126,6 +129,12 @@ pub enum Verb {
     Step,
     /// Change one parameter.
     Set,
+    /// What may change while the scene runs.
+    Params,
+    /// Take the last cut back.
+    Undo,
+    /// Which scenes can be loaded.
+    Scenes,
     /// Keep the present state.
     Snapshot,
     /// Go back to a kept state.
@@ -136,17 +145,25 @@ pub enum Verb {
 
 impl Verb {
     /// Every verb.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 12] = [
         Self::Info,
         Self::Load,
         Self::Reset,
         Self::Pause,
         Self::Step,
         Self::Set,
+        Self::Params,
+        Self::Undo,
+        Self::Scenes,
         Self::Snapshot,
         Self::Restore,
         Self::Schema,
     ];
+
+    /// Whether it changes what everybody sees. Questions, which do not, anybody may ask.
+    pub fn is_order(self) -> bool {
+        !matches!(self, Self::Info | Self::Schema | Self::Params | Self::Scenes)
+    }
 
     /// The chunk in a key.
     pub fn as_str(self) -> &'static str {
@@ -157,6 +174,9 @@ impl Verb {
             Self::Pause => "pause",
             Self::Step => "step",
             Self::Set => "set",
+            Self::Params => "params",
+            Self::Undo => "undo",
+            Self::Scenes => "scenes",
             Self::Snapshot => "snapshot",
             Self::Restore => "restore",
             Self::Schema => "schema",
@@ -173,6 +193,10 @@ pub enum Topic {
     SurfaceTopology(Chunk),
     /// Both together, on query.
     SurfaceKeyframe(Chunk),
+    /// A quantity on a body's surface: body and name of the quantity.
+    SurfaceField(Chunk, Chunk),
+    /// Probes and energies.
+    Measures,
     /// Where a client holds a tool.
     ToolPose(Chunk),
     /// A cut command of a tool.
@@ -204,6 +228,8 @@ impl Topic {
             Self::SurfaceFrame(id) => format!("body/{id}/surface/frame"),
             Self::SurfaceTopology(id) => format!("body/{id}/surface/topology"),
             Self::SurfaceKeyframe(id) => format!("body/{id}/surface/keyframe"),
+            Self::SurfaceField(id, name) => format!("body/{id}/surface/field/{name}"),
+            Self::Measures => "measures".to_owned(),
             Self::ToolPose(id) => format!("tool/{id}/pose"),
             Self::ToolCut(id) => format!("tool/{id}/cut"),
             Self::ToolCutAck(id) => format!("tool/{id}/cut_ack"),
@@ -223,12 +249,16 @@ impl Topic {
         let unknown = || KeyError::Unknown { found: suffix.chars().take(4 * MAX_ID_BYTES).collect() };
         let body = |id| Chunk::new("body id", id);
         let tool = |id| Chunk::new("tool id", id);
-        // No topic has more than four chunks; a fifth makes the key unknown.
-        let chunks: Vec<&str> = suffix.splitn(6, '/').collect();
+        // No topic has more than five chunks; a sixth makes the key unknown.
+        let chunks: Vec<&str> = suffix.splitn(7, '/').collect();
         Ok(match chunks.as_slice() {
             ["body", id, "surface", "frame"] => Self::SurfaceFrame(body(id)?),
             ["body", id, "surface", "topology"] => Self::SurfaceTopology(body(id)?),
             ["body", id, "surface", "keyframe"] => Self::SurfaceKeyframe(body(id)?),
+            ["body", id, "surface", "field", name] => {
+                Self::SurfaceField(body(id)?, Chunk::new("field name", name)?)
+            }
+            ["measures"] => Self::Measures,
             ["tool", id, "pose"] => Self::ToolPose(tool(id)?),
             ["tool", id, "cut"] => Self::ToolCut(tool(id)?),
             ["tool", id, "cut_ack"] => Self::ToolCutAck(tool(id)?),
@@ -280,6 +310,16 @@ impl KeySpace {
                 found: key.chars().take(8 * MAX_ID_BYTES).collect(),
             }),
         }
+    }
+
+    /// Expression for everything of the session.
+    pub fn every_key(&self) -> String {
+        format!("{}**", self.prefix)
+    }
+
+    /// Expression for the keyframes of all bodies.
+    pub fn every_keyframe(&self) -> String {
+        format!("{}body/*/surface/keyframe", self.prefix)
     }
 
     /// Expression for `tool/*/pose`.

@@ -20,6 +20,9 @@ pub const MAX_MARKS: u32 = 1_000_000;
 /// Bytes of a position: three little-endian `f32`.
 pub const POSITION_BYTES: usize = 12;
 
+/// Bytes of a value of a field: one little-endian `f32`.
+pub const VALUE_BYTES: usize = 4;
+
 /// Bytes of a mark: two positions.
 pub const MARK_BYTES: usize = 2 * POSITION_BYTES;
 
@@ -37,7 +40,18 @@ pub const MAX_FRAME_BYTES: usize =
     MAX_VERTICES as usize * POSITION_BYTES + MAX_MARKS as usize * MARK_BYTES + HEADER_BYTES;
 
 /// Largest surface topology [bytes].
-pub const MAX_TOPOLOGY_BYTES: usize = MAX_TRIANGLES as usize * (TRIANGLE_BYTES + TAG_BYTES) + HEADER_BYTES;
+pub const MAX_TOPOLOGY_BYTES: usize = MAX_TRIANGLES as usize * (TRIANGLE_BYTES + TAG_BYTES)
+    + MAX_VERTICES as usize * (POSITION_BYTES + 1)
+    + HEADER_BYTES;
+
+/// Largest field on a surface [bytes].
+pub const MAX_FIELD_BYTES: usize = MAX_VERTICES as usize * VALUE_BYTES + HEADER_BYTES;
+
+/// Most probes whose positions are told; those beyond it are recorded, not shown.
+pub const MAX_PROBES: usize = 256;
+
+/// Most layers of tissue that a body may be drawn with.
+pub const MAX_LAYERS: usize = 8;
 
 /// Largest keyframe [bytes]: a topology and a frame.
 pub const MAX_KEYFRAME_BYTES: usize = MAX_FRAME_BYTES + MAX_TOPOLOGY_BYTES + HEADER_BYTES;
@@ -72,11 +86,14 @@ pub const MAX_BODIES: usize = 256;
 /// Most tools of a session.
 pub const MAX_TOOLS: usize = 64;
 
-/// Most tools that clients may bring beside those of the scene.
-pub const MAX_CLIENT_TOOLS: usize = 16;
-
 /// Most entries of a list in a report (stages, counters, effects).
 pub const MAX_REPORT_ENTRIES: usize = 256;
+
+/// Most parameters that `rpc/params` lists: those of 256 bodies would not fit a report.
+pub const MAX_PARAMS: usize = 512;
+
+/// Most scenes that `rpc/scenes` lists.
+pub const MAX_SCENES: usize = 256;
 
 /// Most steps that one `rpc/step` may ask for.
 pub const MAX_RPC_STEPS: u32 = 10_000;

@@ -138,6 +138,9 @@ fn keyframe() -> impl Strategy<Value = SurfaceKeyframe> {
                 triangle_count: triangles.len() as u32,
                 triangles: bytes_of_triangles.into(),
                 tags: bytes_of_tags.into(),
+                rest_positions: bytes_of_positions.clone().into(),
+                held: vec![1; n.div_ceil(8) as usize].into(),
+                hangs: Bytes::new(),
             };
             let frame = SurfaceFrame {
                 seq,
@@ -172,6 +175,11 @@ fn session_info() -> impl Strategy<Value = SessionInfo> {
         nodes: c,
         min_m: Some(min),
         max_m: None,
+        look: (a % 2 == 0).then(|| BodyLook {
+            colour: Some(b),
+            opacity: 0.5,
+            layers: vec![LookLayer { depth_m: 0.01, colour: c }],
+        }),
     });
     let tool = (id(), shape(), any::<bool>()).prop_map(|(id, shape, cuts)| ToolInfo {
         owner: String::new(),
@@ -186,6 +194,9 @@ fn session_info() -> impl Strategy<Value = SessionInfo> {
         step_s: 0.02,
         bodies,
         tools,
+        scene_seq: 3,
+        scene: "kidney".into(),
+        up: Some(Vec3 { x: 0.0, y: 1.0, z: 0.0 }),
     })
 }
 
@@ -207,6 +218,14 @@ fn stats() -> impl Strategy<Value = Stats> {
             copies: d,
             epoch: a,
             volume_m3: f64::from(x),
+            tolerance: x,
+            unconverged_steps: b.into(),
+            refused_steps: c.into(),
+            divided_steps: d.into(),
+            rolled_back_steps: a.into(),
+            inverted: b,
+            fixed_iterations: c % 2 == 0,
+            unconverged: d % 2 == 0,
         }],
         tools: vec![ToolStats {
             tool_id: id,
@@ -214,6 +233,7 @@ fn stats() -> impl Strategy<Value = Stats> {
             contact_rate_hz: x,
             pose_rate_hz: x,
             force_n: x,
+            contact_age_ms: x,
         }],
         refused: vec![Counter { name: "non-finite".into(), count: d.into() }],
         cuts_applied: a.into(),
@@ -261,7 +281,23 @@ proptest! {
         survives(&ToolState {
             seq: 4, sim_step: 5, sim_time_s: 0.5, publish_unix_ns: 6, tool_id: id.clone(),
             shape: Some(shape), pose: Some(pose), proxy_pose: Some(pose), mode: 2,
-            force_n: Some(force), owner: id,
+            force_n: Some(force), owner: id, max_force_n: 8.0, held_point_m: Some(force),
+        })?;
+    }
+
+    #[test]
+    fn fields_and_measures_round_trip(id in id(), values in vec(0.0..1e6_f32, 0..50), at in metres()) {
+        survives(&SurfaceField {
+            seq: 1, sim_step: 2, sim_time_s: 0.1, publish_unix_ns: 3, body_id: id.clone(), epoch: 4,
+            vertex_count: values.len() as u32, name: "von-mises".into(),
+            values: values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>().into(),
+        })?;
+        survives(&Measures {
+            seq: 1, sim_step: 2, sim_time_s: 0.1, publish_unix_ns: 3,
+            probes: vec![ProbePoint {
+                id: id.clone(), body_id: id.clone(), position_m: Some(at), rest_m: Some(at),
+            }],
+            energies: vec![BodyEnergy { body_id: id, kinetic_j: 1.0, elastic_j: 2.0 }],
         })?;
     }
 
@@ -290,6 +326,16 @@ proptest! {
         survives(&StepRequest { count: number })?;
         survives(&ResetRequest {})?;
         survives(&SetRequest { key: "world.gravity_m_s2".into(), value: text.clone() })?;
+        survives(&UndoRequest {})?;
+        survives(&LoadRequest { name: text.clone() })?;
+        survives(&ScenesReply { scenes: vec![SceneEntry {
+            name: "kidney".into(), description: text.clone(),
+        }] })?;
+        survives(&ParamsReply { params: vec![Param {
+            key: "body.liver.young_pa".into(), meaning: text.clone(), unit: "Pa".into(), kind: level,
+            value: "5000.0".into(), min: 1.0, max: 1e12, usual_min: 10.0, usual_max: f64::from(number),
+            logarithmic: true,
+        }] })?;
         survives(&RpcReply { ok: level > 1, sim_step: 8, message: text, error })?;
         survives(&SchemaReply { file_descriptor_set: Bytes::from_static(b"abc") })?;
     }
@@ -312,11 +358,16 @@ proptest! {
         let _ = decode::<SurfaceFrame>(bytes.clone());
         let _ = decode::<SurfaceTopology>(bytes.clone());
         let _ = decode::<SurfaceKeyframe>(bytes.clone());
+        let _ = decode::<SurfaceField>(bytes.clone());
+        let _ = decode::<Measures>(bytes.clone());
         let _ = decode::<SessionInfo>(bytes.clone());
         let _ = decode::<Stats>(bytes.clone());
         let _ = decode::<Event>(bytes.clone());
         let _ = decode::<Plan>(bytes.clone());
         let _ = decode::<SetRequest>(bytes.clone());
+        let _ = decode::<ParamsReply>(bytes.clone());
+        let _ = decode::<ScenesReply>(bytes.clone());
+        let _ = decode::<LoadRequest>(bytes.clone());
         let _ = decode::<RpcReply>(bytes);
     }
 
@@ -406,6 +457,23 @@ fn values_out_of_range_are_refused_with_what_and_where() {
         refusal(&topology).to_string(),
         "SurfaceTopology: triangles is 3, allowed below vertex_count = 3"
     );
+    let short = vec![0; 11];
+    let topology =
+        SurfaceTopology { triangle_count: 0, triangles: Bytes::new(), tags: Bytes::new(), ..topology };
+    let rest = SurfaceTopology { rest_positions: short.clone().into(), ..topology.clone() };
+    assert_eq!(
+        refusal(&rest).to_string(),
+        "SurfaceTopology: rest_positions is 11 bytes, allowed 36 bytes (3 x 12)"
+    );
+    assert_eq!(refusal(&SurfaceTopology { held: short.into(), ..topology }).code(), "out-of-range");
+    let field = SurfaceField {
+        body_id: "b".into(),
+        name: "von-mises".into(),
+        vertex_count: 1,
+        values: f32::NAN.to_le_bytes().to_vec().into(),
+        ..SurfaceField::default()
+    };
+    assert_eq!(refusal(&field).code(), "non-finite");
     let frame = SurfaceFrame {
         body_id: "b".into(),
         vertex_count: 1000,
@@ -421,6 +489,9 @@ fn values_out_of_range_are_refused_with_what_and_where() {
     };
     assert_eq!(refusal(&frame).to_string(), "SurfaceFrame: marks is 24 bytes, allowed 48 bytes (2 x 24)");
     assert_eq!(refusal(&StepRequest { count: 10_001 }).code(), "out-of-range");
+    let endless = Param { max: f64::INFINITY, ..Param::default() };
+    assert_eq!(refusal(&ParamsReply { params: vec![endless] }).code(), "non-finite");
+    assert_eq!(refusal(&LoadRequest { name: "x".repeat(5000) }).code(), "too-large");
 }
 
 #[test]
@@ -435,6 +506,10 @@ fn oversized_messages_are_refused_before_they_are_decoded() {
     // 1025 empty segments take 2 bytes each on the wire but 112 in memory.
     match refusal(&sweep(1025)) {
         DecodeError::TooLarge { field: "sweep", found: 1025, allowed: 1024, .. } => {}
+        other => panic!("{other}"),
+    }
+    match refusal(&ParamsReply { params: vec![Param::default(); 513] }) {
+        DecodeError::TooLarge { field: "params", found: 513, allowed: 512, .. } => {}
         other => panic!("{other}"),
     }
     match refusal(&sweep(60_000)) {
@@ -454,6 +529,8 @@ fn keys_round_trip_and_foreign_ones_are_refused() {
         Topic::SurfaceFrame(id()),
         Topic::SurfaceTopology(id()),
         Topic::SurfaceKeyframe(id()),
+        Topic::SurfaceField(id(), id()),
+        Topic::Measures,
         Topic::ToolPose(id()),
         Topic::ToolCut(id()),
         Topic::ToolCutAck(id()),

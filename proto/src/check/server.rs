@@ -5,12 +5,12 @@ use prost::Name as _;
 use super::field::{Checked, In};
 use crate::codec::{CountLimit, DecodeError, WireMessage};
 use crate::limits::{
-    MAX_BODIES, MAX_COORDINATE_M, MAX_REPORT_BYTES, MAX_REPORT_ENTRIES, MAX_RPC_STEPS, MAX_SMALL_BYTES,
-    MAX_TOOLS,
+    MAX_BODIES, MAX_COORDINATE_M, MAX_LAYERS, MAX_PARAMS, MAX_PROBES, MAX_REPORT_BYTES, MAX_REPORT_ENTRIES,
+    MAX_RPC_STEPS, MAX_SCENES, MAX_SMALL_BYTES, MAX_TOOLS, QUATERNION_TOLERANCE,
 };
 use crate::messages::{
-    Event, PauseRequest, Plan, ResetRequest, RpcReply, SchemaReply, SessionInfo, SetRequest, Stats,
-    StepRequest, event,
+    BodyLook, Event, LoadRequest, Measures, ParamsReply, PauseRequest, Plan, ResetRequest, RpcReply,
+    ScenesReply, SchemaReply, SessionInfo, SetRequest, Stats, StepRequest, UndoRequest, event, param,
 };
 
 const fn count(tag: u32, field: &'static str, allowed: usize) -> CountLimit {
@@ -25,12 +25,15 @@ impl WireMessage for SessionInfo {
         let at = In(Self::NAME);
         at.text("server_version", &self.server_version)?;
         at.text("scene_name", &self.scene_name)?;
+        at.text("scene", &self.scene)?;
         at.positive("step_s", self.step_s, f64::MAX)?;
         for body in &self.bodies {
             at.id("bodies.id", &body.id)?;
             at.optional_vec3("bodies.min_m", &body.min_m, MAX_COORDINATE_M)?;
             at.optional_vec3("bodies.max_m", &body.max_m, MAX_COORDINATE_M)?;
+            body.look.as_ref().map_or(Ok(()), |look| check_look(at, look))?;
         }
+        at.optional_vec3("up", &self.up, 1.0 + QUATERNION_TOLERANCE)?;
         for tool in &self.tools {
             at.id("tools.id", &tool.id)?;
             at.optional_id("tools.owner", &tool.owner)?;
@@ -38,6 +41,12 @@ impl WireMessage for SessionInfo {
         }
         Ok(())
     }
+}
+
+fn check_look(at: In, look: &BodyLook) -> Checked {
+    at.finite("bodies.look.opacity", f64::from(look.opacity))?;
+    at.at_most("bodies.look.layers", look.layers.len(), MAX_LAYERS)?;
+    look.layers.iter().try_for_each(|layer| at.finite("bodies.look.layers.depth_m", f64::from(layer.depth_m)))
 }
 
 impl WireMessage for Stats {
@@ -61,6 +70,7 @@ impl WireMessage for Stats {
         for body in &self.bodies {
             at.id("bodies.body_id", &body.body_id)?;
             at.finite("bodies.residual", f64::from(body.residual))?;
+            at.finite("bodies.tolerance", f64::from(body.tolerance))?;
             at.finite("bodies.volume_m3", body.volume_m3)?;
         }
         for tool in &self.tools {
@@ -69,8 +79,32 @@ impl WireMessage for Stats {
             at.finite("tools.contact_rate_hz", f64::from(tool.contact_rate_hz))?;
             at.finite("tools.pose_rate_hz", f64::from(tool.pose_rate_hz))?;
             at.finite("tools.force_n", f64::from(tool.force_n))?;
+            at.finite("tools.contact_age_ms", f64::from(tool.contact_age_ms))?;
         }
         self.refused.iter().try_for_each(|counter| at.text("refused.name", &counter.name))
+    }
+}
+
+impl WireMessage for Measures {
+    const MAX_BYTES: usize = MAX_REPORT_BYTES;
+    const MAX_COUNTS: &'static [CountLimit] =
+        &[count(5, "probes", MAX_PROBES), count(6, "energies", MAX_BODIES)];
+
+    fn check(&self) -> Result<(), DecodeError> {
+        let at = In(Self::NAME);
+        at.finite("sim_time_s", self.sim_time_s)?;
+        for probe in &self.probes {
+            at.id("probes.id", &probe.id)?;
+            at.id("probes.body_id", &probe.body_id)?;
+            at.optional_vec3("probes.position_m", &probe.position_m, MAX_COORDINATE_M)?;
+            at.optional_vec3("probes.rest_m", &probe.rest_m, MAX_COORDINATE_M)?;
+        }
+        for energy in &self.energies {
+            at.id("energies.body_id", &energy.body_id)?;
+            at.finite("energies.kinetic_j", energy.kinetic_j)?;
+            at.finite("energies.elastic_j", energy.elastic_j)?;
+        }
+        Ok(())
     }
 }
 
@@ -134,6 +168,54 @@ impl WireMessage for SetRequest {
     fn check(&self) -> Checked {
         In(Self::NAME).text("key", &self.key)?;
         In(Self::NAME).text("value", &self.value)
+    }
+}
+
+impl WireMessage for ParamsReply {
+    const MAX_BYTES: usize = MAX_REPORT_BYTES;
+    const MAX_COUNTS: &'static [CountLimit] = &[count(1, "params", MAX_PARAMS)];
+
+    fn check(&self) -> Checked {
+        let at = In(Self::NAME);
+        for param in &self.params {
+            at.text("params.key", &param.key)?;
+            at.text("params.meaning", &param.meaning)?;
+            at.text("params.unit", &param.unit)?;
+            at.text("params.value", &param.value)?;
+            at.known::<param::Kind>("params.kind", param.kind)?;
+            let ranges = [param.min, param.max, param.usual_min, param.usual_max];
+            ranges.into_iter().try_for_each(|end| at.finite("params.range", end))?;
+        }
+        Ok(())
+    }
+}
+
+impl WireMessage for UndoRequest {
+    const MAX_BYTES: usize = MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        Ok(())
+    }
+}
+
+impl WireMessage for ScenesReply {
+    const MAX_BYTES: usize = MAX_REPORT_BYTES;
+    const MAX_COUNTS: &'static [CountLimit] = &[count(1, "scenes", MAX_SCENES)];
+
+    fn check(&self) -> Checked {
+        let at = In(Self::NAME);
+        self.scenes.iter().try_for_each(|scene| {
+            at.text("scenes.name", &scene.name)?;
+            at.text("scenes.description", &scene.description)
+        })
+    }
+}
+
+impl WireMessage for LoadRequest {
+    const MAX_BYTES: usize = MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        In(Self::NAME).text("name", &self.name)
     }
 }
 

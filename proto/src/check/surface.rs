@@ -5,10 +5,10 @@ use prost::Name as _;
 use super::field::{Checked, In};
 use crate::codec::{DecodeError, WireMessage};
 use crate::limits::{
-    MARK_BYTES, MAX_FRAME_BYTES, MAX_KEYFRAME_BYTES, MAX_MARKS, MAX_TOPOLOGY_BYTES, MAX_TRIANGLES,
-    MAX_VERTICES, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES,
+    MARK_BYTES, MAX_FIELD_BYTES, MAX_FRAME_BYTES, MAX_KEYFRAME_BYTES, MAX_MARKS, MAX_TOPOLOGY_BYTES,
+    MAX_TRIANGLES, MAX_VERTICES, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES, VALUE_BYTES,
 };
-use crate::messages::{SurfaceFrame, SurfaceKeyframe, SurfaceTopology};
+use crate::messages::{SurfaceField, SurfaceFrame, SurfaceKeyframe, SurfaceTopology};
 
 impl WireMessage for SurfaceFrame {
     const MAX_BYTES: usize = MAX_FRAME_BYTES;
@@ -42,6 +42,17 @@ impl WireMessage for SurfaceTopology {
         at.at_most("triangle_count", triangles as usize, MAX_TRIANGLES as usize)?;
         array_length(at, "triangles", self.triangles.len(), triangles, TRIANGLE_BYTES)?;
         array_length(at, "tags", self.tags.len(), triangles, TAG_BYTES)?;
+        if !self.rest_positions.is_empty() {
+            array_length(at, "rest_positions", self.rest_positions.len(), self.vertex_count, POSITION_BYTES)?;
+        }
+        if let Some(found) = first_non_finite(&self.rest_positions) {
+            return at.finite("rest_positions", found);
+        }
+        for (field, bits) in [("held", &self.held), ("hangs", &self.hangs)] {
+            if !bits.is_empty() {
+                array_length(at, field, bits.len(), self.vertex_count.div_ceil(8), 1)?;
+            }
+        }
         match largest_index(&self.triangles) {
             Some(index) if index >= self.vertex_count => {
                 let allowed = format!("below vertex_count = {}", self.vertex_count);
@@ -49,6 +60,20 @@ impl WireMessage for SurfaceTopology {
             }
             _ => Ok(()),
         }
+    }
+}
+
+impl WireMessage for SurfaceField {
+    const MAX_BYTES: usize = MAX_FIELD_BYTES;
+
+    fn check(&self) -> Result<(), DecodeError> {
+        let at = In(Self::NAME);
+        at.id("body_id", &self.body_id)?;
+        at.id("name", &self.name)?;
+        at.finite("sim_time_s", self.sim_time_s)?;
+        at.at_most("vertex_count", self.vertex_count as usize, MAX_VERTICES as usize)?;
+        array_length(at, "values", self.values.len(), self.vertex_count, VALUE_BYTES)?;
+        first_non_finite(&self.values).map_or(Ok(()), |found| at.finite("values", found))
     }
 }
 

@@ -88,6 +88,8 @@ impl WireMessage for ToolState {
         self.proxy_pose.as_ref().map_or(Ok(()), |p| at.pose(p))?;
         at.known::<tool_sample::Mode>("mode", self.mode)?;
         at.optional_vec3("force_n", &self.force_n, MAX_FORCE_N)?;
+        at.positive("max_force_n", f64::from(self.max_force_n), MAX_FORCE_N)?;
+        at.optional_vec3("held_point_m", &self.held_point_m, MAX_COORDINATE_M)?;
         self.shape.as_ref().map_or(Ok(()), |shape| at.shape(shape))
     }
 }
