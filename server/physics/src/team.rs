@@ -26,6 +26,7 @@ const SPINS_BEFORE_YIELD: u32 = 2_000;
 pub struct Team {
     shared: Arc<Shared>,
     members: Vec<JoinHandle<()>>,
+    stop: Option<Arc<AtomicBool>>,
 }
 
 type Job = *const (dyn Fn(usize) + Sync);
@@ -68,13 +69,23 @@ impl Team {
             stop: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
         });
-        let mut team = Self { shared, members: Vec::new() };
+        let mut team = Self { shared, members: Vec::new(), stop: None };
         for member in 1..threads {
             let shared = Arc::clone(&team.shared);
             let thread = std::thread::Builder::new().name(format!("physics-{member}"));
             team.members.push(thread.spawn(move || shared.serve(member))?);
         }
         Ok(team)
+    }
+
+    /// What runs on the team looks at `flag` and ends early when it is raised.
+    pub fn set_stop_flag(&mut self, flag: Arc<AtomicBool>) {
+        self.stop = Some(flag);
+    }
+
+    /// Whether the flag is raised; false without one.
+    pub fn told_to_stop(&self) -> bool {
+        self.stop.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
     /// Number of members, the caller included.

@@ -177,7 +177,9 @@ impl ImplicitEuler {
             self.balance_parts(state, inputs);
             self.residual(team, elastic, state, inputs, pass);
             let report = self.solve(team, elastic, inputs, pass);
-            solve = PcgReport { iterations: solve.iterations + report.iterations, ..report };
+            // A pass that has nothing left to do estimates no error.
+            let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
+            solve = PcgReport { iterations: solve.iterations + report.iterations, algebraic_error, ..report };
             self.balance_parts(state, inputs);
             if report.stop == StopReason::NonFinite || !self.springs_changed(inputs, pass) {
                 break;

@@ -1,6 +1,7 @@
 //! One step in time.
 
 mod dynamics;
+mod free_motion;
 mod implicit_euler;
 mod parts;
 mod reunion;
@@ -13,6 +14,7 @@ pub use dynamics::{
     Dynamics, DynamicsError, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings,
     LEAST_NEWTON_STEPS, MassKind, Notice, Scheme, stable_step,
 };
+pub use free_motion::{FreeMotion, free_motions};
 pub use implicit_euler::{ImplicitEuler, StepInputs, StepOutcome};
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};

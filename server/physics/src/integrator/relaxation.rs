@@ -109,6 +109,10 @@ impl Relaxation {
             if report.stop != StopReason::IterationLimit || report.iterations == iterations {
                 break;
             }
+            if team.told_to_stop() {
+                report.stop = StopReason::Interrupted;
+                break;
+            }
             if !self.iterate(team, potential, x, &mut report) {
                 report.stop = StopReason::Stagnated;
                 break;

@@ -8,7 +8,9 @@
 use faer::Par;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltError;
-use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
+use faer::sparse::linalg::cholesky::{
+    LltRef, SymbolicCholesky, SymbolicCholeskyRaw, factorize_symbolic_cholesky,
+};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Side};
 use nalgebra::Vector3;
@@ -134,9 +136,7 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
                 MemStack::new(scratch),
                 Default::default(),
             )
-            .map_err(|LltError::NonPositivePivot { index }| {
-                Failure::Pivot(symbolic.perm().map_or(index as u32, |order| order.arrays().0[index]))
-            })?;
+            .map_err(|LltError::NonPositivePivot { index }| Failure::Pivot(displacement(symbolic, index)))?;
         self.factored = true;
         Ok(())
     }
@@ -161,4 +161,15 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
             *z = Vector3::from_fn(|k, _| right[k].wide() * scale);
         }
     }
+}
+
+/// The displacement (3 · copy + axis) that faer means by the failed pivot `index`, which it counts from 1
+/// where L is stored by columns, and from 0 where it is stored by supernodes.
+fn displacement(symbolic: &SymbolicCholesky<u32>, index: usize) -> u32 {
+    let from_zero = match symbolic.raw() {
+        SymbolicCholeskyRaw::Simplicial(_) => index.saturating_sub(1),
+        SymbolicCholeskyRaw::Supernodal(_) => index,
+    };
+    let row = from_zero.min(symbolic.nrows().saturating_sub(1));
+    symbolic.perm().map_or(row as u32, |order| order.arrays().0[row])
 }

@@ -111,6 +111,10 @@ where
         let mut size = self.restart(team, system, scale);
         let (mut beta, mut futile) = (0.0, 0);
         loop {
+            if team.told_to_stop() {
+                report.stop = StopReason::Interrupted;
+                return report;
+            }
             let curvature = self.direction(team, system, beta);
             if !curvature.is_finite() || curvature <= 0.0 {
                 report.residual = self.true_residual(team, system, b, x);

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::linear::{LinearSettings, LinearSolver};
+use super::linear::{LinearSettings, LinearSolver, Method};
 use super::report::StopReason;
 use crate::assembly::BlockCsr;
 use crate::operator::{FixedCopy, StiffModes};
@@ -99,6 +99,12 @@ pub struct NewtonReport {
     pub potential: f64,
     /// Algebraic error of the last linear solve [√J].
     pub algebraic_error: f64,
+    /// What the last linear solve and the line search after it left of the linearised equations,
+    /// √(rᵀM⁻¹r) over the reference: for steps that are a fixed number of linear solves by design.
+    pub linear_residual: f64,
+    /// The displacement (3 · copy + axis) whose pivot was not positive, where a factorisation of what must be
+    /// positive definite met one; conjugate gradients took its place.
+    pub pivot: Option<u32>,
 }
 
 /// Newton's method with all its memory; reused from solve to solve without allocation.
@@ -120,6 +126,10 @@ pub struct Newton {
 const ARMIJO: f64 = 1e-4;
 /// Differences of Φ below this part of the largest |Φ| met are rounding.
 const ROUNDING: f64 = 1e-12;
+/// Iterations of conjugate gradients where a factorisation failed, if not more were allowed.
+const INSTEAD_OF_FACTORS: u32 = 500;
+/// Steps without half the residual after which rounding is what is left of it.
+const FUTILE_STEPS: u32 = 3;
 /// Halvings of a gradient step, whose length has no natural scale.
 const GRADIENT_HALVINGS: u32 = 40;
 
@@ -168,10 +178,15 @@ impl Newton {
         let mut largest = phi.abs();
         let mut first = None;
         let mut curvature = self.settings.curvature;
+        let mut floor = Floor::default();
         loop {
             report.potential = phi;
             if !phi.is_finite() || !self.g.iter().all(|g| g.norm_squared().is_finite()) {
                 report.stop = StopReason::NonFinite;
+                return report;
+            }
+            if team.told_to_stop() {
+                report.stop = StopReason::Interrupted;
                 return report;
             }
             // After the first step the previous preconditioner tells first whether all is done.
@@ -183,11 +198,13 @@ impl Newton {
             if self.measure(potential, &mut report, &mut first) {
                 return report;
             }
-            if report.steps == self.settings.steps {
-                report.stop = StopReason::IterationLimit;
+            if floor.is_reached(report.residual) || report.steps == self.settings.steps {
+                let futile = report.steps < self.settings.steps;
+                report.stop = if futile { StopReason::Stagnated } else { StopReason::IterationLimit };
                 return report;
             }
-            let definite = self.direction(team, &mut report);
+            let (before, backtracks) = (report.residual, report.backtracks);
+            let definite = self.direction(team, curvature, &mut report);
             if !definite && curvature == Curvature::Exact {
                 curvature = Curvature::Definite;
                 continue;
@@ -195,6 +212,10 @@ impl Newton {
             let slope = dot(&self.g, &self.p);
             let halvings = self.settings.halvings;
             let mut next = self.search(team, potential, (x, phi), (slope, largest, halvings), &mut report);
+            // A shortened step leaves the rest of the right-hand side.
+            let t =
+                if next.is_some() { 0.5_f64.powf(f64::from(report.backtracks - backtracks)) } else { 0.0 };
+            report.linear_residual = before * (1.0 - t) + t * report.linear_residual;
             if next.is_none() {
                 self.solver.precondition(&self.minus_g, &mut self.p);
                 let slope = dot(&self.g, &self.p);
@@ -204,9 +225,16 @@ impl Newton {
             }
             let Some(next) = next else {
                 let rounding = slope.abs() <= 1e3 * ROUNDING * largest;
-                report.stop = if rounding { StopReason::Stagnated } else { StopReason::NoDescent };
+                report.stop = if team.told_to_stop() {
+                    StopReason::Interrupted
+                } else if rounding {
+                    StopReason::Stagnated
+                } else {
+                    StopReason::NoDescent
+                };
                 return report;
             };
+            floor.below_rounding = slope.abs() <= 1e3 * ROUNDING * next.abs();
             phi = next;
             largest = largest.max(phi.abs());
             x.copy_from_slice(&self.trial);
@@ -234,7 +262,7 @@ impl Newton {
     }
 
     /// p with H p ≈ −g; whether H showed no direction of non-positive curvature.
-    fn direction(&mut self, team: &mut Team, report: &mut NewtonReport) -> bool {
+    fn direction(&mut self, team: &mut Team, curvature: Curvature, report: &mut NewtonReport) -> bool {
         for (minus_g, g) in self.minus_g.iter_mut().zip(&self.g) {
             *minus_g = -g;
         }
@@ -244,9 +272,17 @@ impl Newton {
         let needed = 0.1 * self.settings.tolerance / report.residual.max(f64::MIN_POSITIVE);
         let tolerance = linear.tolerance.min(report.residual.sqrt()).max(needed.min(0.1));
         self.solver.settings = LinearSettings { tolerance, ..linear };
-        let solved = self.solver.solve(team, &self.hessian, &self.minus_g, &mut self.p, None);
+        let mut solved = self.solver.solve(team, &self.hessian, &self.minus_g, &mut self.p, None);
+        if let (Some(pivot), Curvature::Definite) = (solved.pivot, curvature) {
+            report.pivot = Some(pivot);
+            let iterations = linear.iterations.max(INSTEAD_OF_FACTORS);
+            self.solver.settings = LinearSettings { tolerance, method: Method::Pcg, iterations, ..linear };
+            self.p.fill(Vector3::zeros());
+            solved = self.solver.solve(team, &self.hessian, &self.minus_g, &mut self.p, None);
+        }
         report.linear_iterations += solved.iterations;
         report.algebraic_error = solved.algebraic_error;
+        report.linear_residual = solved.residual * report.residual;
         let definite = solved.stop != StopReason::NonPositiveCurvature;
         report.indefinite += u32::from(!definite);
         if solved.stop == StopReason::NonFinite {
@@ -281,6 +317,9 @@ impl Newton {
         let before = self.solver.norm(&self.g);
         let mut t = 1.0;
         for halving in 0..=halvings {
+            if team.told_to_stop() {
+                return None;
+            }
             for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.p) {
                 *trial = x + t * p;
             }
@@ -302,6 +341,33 @@ impl Newton {
             t *= 0.5;
         }
         None
+    }
+}
+
+/// Tells when a minimisation has come down to rounding: the residual no longer falls, and what a step can
+/// gain is less than Φ resolves.
+#[derive(Clone, Copy, Debug)]
+struct Floor {
+    /// Smallest residual so far.
+    least: f64,
+    /// Steps since it halved.
+    futile: u32,
+    /// Whether the last step promised less than the rounding of Φ.
+    below_rounding: bool,
+}
+
+impl Default for Floor {
+    fn default() -> Self {
+        Self { least: f64::INFINITY, futile: 0, below_rounding: false }
+    }
+}
+
+impl Floor {
+    /// Takes in the residual after a step; whether further steps are of no use.
+    fn is_reached(&mut self, residual: f64) -> bool {
+        self.futile = if residual > 0.5 * self.least { self.futile + 1 } else { 0 };
+        self.least = self.least.min(residual);
+        self.below_rounding && self.futile >= FUTILE_STEPS
     }
 }
 

@@ -97,6 +97,10 @@ impl Pcg {
             if report.stop != StopReason::IterationLimit || report.iterations == settings.iterations {
                 return report;
             }
+            if team.told_to_stop() {
+                report.stop = StopReason::Interrupted;
+                return report;
+            }
             // p ← z + β p, q = A p, pᵀA p
             let out = Advance { p: &mut self.p, q: &mut self.q, partial: &mut self.partial };
             let curvature = A.advance(team, beta as f32, &self.z, out);

@@ -15,6 +15,8 @@ pub enum StopReason {
     Stagnated,
     /// No step along any direction tried lowers the potential; the iterate was left where it was.
     NoDescent,
+    /// The stop flag was raised; the residual says how good the result is.
+    Interrupted,
     /// A scalar product is NaN or infinite; the result must not be used.
     NonFinite,
 }

@@ -142,6 +142,43 @@ fn an_indefinite_matrix_is_reported_and_the_iterate_stays_finite() {
     }
 }
 
+/// A grid of springs of which one displacement of one node is pushed away instead of held.
+fn pushed_away(n: u32, node: usize, axis: usize) -> BlockCsr<f64> {
+    let mut A = grid(n, 1.0, 1.0);
+    A.blocks.fill([0.0; 9]);
+    for i in 0..A.n_rows() {
+        A.add_to_diagonal(i, &Matrix3::identity());
+    }
+    let mut push = Matrix3::zeros();
+    push[(axis, axis)] = -2.0;
+    A.add_to_diagonal(node, &push);
+    A
+}
+
+/// Small matrices are factorised by columns, large ones by supernodes; the two count differently.
+#[test]
+fn the_failed_pivot_is_named_whatever_its_place() {
+    for n in [2, 3, 9] {
+        let last = (n * n * n - 1) as usize;
+        for (node, axis) in [(0, 0), (0, 2), (last / 2, 1), (last, 0), (last, 2)] {
+            let (report, _) =
+                solved(&pushed_away(n, node, axis), &[], (Method::Cholesky, Precision::Double), 1);
+            assert_eq!(report.stop, StopReason::NonPositiveCurvature);
+            assert_eq!(report.pivot, Some((3 * node + axis) as u32), "{n}: {node}, {axis}");
+        }
+    }
+}
+
+#[test]
+fn what_nothing_holds_fails_at_the_last_pivot_without_a_panic() {
+    for n in [2, 3, 9] {
+        // Springs alone: three translations are free, and the last pivots are rounding of either sign.
+        let (report, x) = solved(&grid(n, 1e4, 1.0), &[], (Method::Cholesky, Precision::Double), 1);
+        assert!(report.stop != StopReason::Converged || report.residual <= 1e-10, "{report:?}");
+        assert!(x.iter().all(|x| x.amax().is_finite()));
+    }
+}
+
 #[test]
 fn nonsense_is_reported_and_never_called_converged() {
     let (mut A, fixed) = (grid(4, 1e4, 1.0), held(4));
@@ -282,4 +319,78 @@ fn newton_takes_no_step_where_everything_is_infinite() {
     let report = Newton::default().minimise(&mut Team::new(1).unwrap(), &mut Ring { n: 4 }, &mut x, &[]);
     assert_eq!(report.stop, StopReason::NonFinite);
     assert_eq!(x, before);
+}
+
+/// Φ = ½ Σ kᵢ (xᵢ − xᵢ₋₁)² − f·x with springs from 1 to 1e10: at 1e-15 rounding is all that is left.
+struct Chain {
+    n: usize,
+}
+
+impl Chain {
+    fn stiffness(i: usize) -> f64 {
+        [1.0, 1e10, 3e4][i % 3]
+    }
+}
+
+impl Potential for Chain {
+    fn value(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
+        let mut g = vec![Vector3::zeros(); self.n];
+        self.gradient(team, x, &mut g)
+    }
+
+    fn gradient(&mut self, _: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
+        let f = Vector3::new(1.0, 0.3, 0.1);
+        let mut phi = 0.0;
+        g.fill(-f);
+        for i in 0..self.n {
+            phi -= f.dot(&x[i]);
+            let d = if i > 0 { x[i] - x[i - 1] } else { x[i] };
+            phi += 0.5 * Self::stiffness(i) * d.norm_squared();
+            g[i] += Self::stiffness(i) * d;
+            if i > 0 {
+                g[i - 1] -= Self::stiffness(i) * d;
+            }
+        }
+        phi
+    }
+
+    fn pattern(&mut self) -> BlockCsr<f64> {
+        Ring { n: self.n }.pattern()
+    }
+
+    fn hessian(&mut self, _: &mut Team, _: &[Vector3<f64>], _: Curvature, H: &mut BlockCsr<f64>) {
+        H.clear();
+        for i in 0..self.n {
+            let k = Self::stiffness(i) * Matrix3::identity();
+            H.add_to_diagonal(i, &k);
+            if i > 0 {
+                H.add_to_diagonal(i - 1, &k);
+                for (r, c) in [(i, i - 1), (i - 1, i)] {
+                    let at = H.position(r, c as u32).unwrap();
+                    (0..3).for_each(|d| H.blocks[at][4 * d] -= k[(0, 0)]);
+                }
+            }
+        }
+    }
+
+    fn loads(&mut self, loads: &mut [Vector3<f64>]) {
+        loads.fill(Vector3::new(1.0, 0.3, 0.1));
+    }
+}
+
+#[test]
+fn newton_stops_at_its_round_off_floor() {
+    let (n, mut team) = (200, Team::new(1).unwrap());
+    let linear = LinearSettings {
+        method: Method::Cholesky,
+        precision: Precision::Double,
+        iterations: 50,
+        tolerance: 0.1,
+    };
+    let settings = NewtonSettings { tolerance: 1e-16, linear, ..Default::default() };
+    let mut newton = Newton::new(settings);
+    let mut x = vec![Vector3::zeros(); n];
+    let report = newton.minimise(&mut team, &mut Chain { n }, &mut x, &[]);
+    assert_eq!(report.stop, StopReason::Stagnated, "{report:?}");
+    assert!(report.steps < 12 && report.residual < 1e-2, "{report:?}");
 }

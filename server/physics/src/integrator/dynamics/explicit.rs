@@ -38,9 +38,11 @@ impl Dynamics {
         }
         for retry in 0..=RETRIES {
             report.substeps = needed << retry;
-            if report.substeps > 1 {
-                report.notice = Some(Notice::Divided { substeps: report.substeps, stable_s });
-            }
+            report.notice = match (retry, report.substeps) {
+                (0, 1) => None,
+                (0, substeps) => Some(Notice::Divided { substeps, stable_s }),
+                (_, substeps) => Some(Notice::DividedAgain { substeps }),
+            };
             let h = inputs.h / f64::from(report.substeps);
             self.next.copy_from(state);
             for f in inputs.fixed {
@@ -50,6 +52,9 @@ impl Dynamics {
                 }
             }
             for k in 1..=report.substeps {
+                if team.told_to_stop() {
+                    return;
+                }
                 self.substep(team, state, inputs, h, f64::from(k) / f64::from(report.substeps));
             }
             if finite(&self.next) {

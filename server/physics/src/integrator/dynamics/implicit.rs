@@ -8,7 +8,7 @@ use super::{
     Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, LEAST_NEWTON_STEPS, Notice, Scheme, finite,
 };
 use crate::assembly::Tangent;
-use crate::integrator::State;
+use crate::integrator::{FreeMotion, State};
 use crate::material::Law;
 use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
 use crate::team::Team;
@@ -17,6 +17,8 @@ use crate::team::Team;
 const COLLAPSED: f64 = 0.05;
 /// Newton steps that a step gets which gained energy with fewer.
 const RETRY_STEPS: u32 = 20;
+/// Tolerance that such a step is solved to at least: with a coarse one it would gain energy again.
+const RETRY_TOLERANCE: f64 = 1e-3;
 /// Halvings of a Newton step that recovers from a ruined state.
 const RECOVERY_HALVINGS: u32 = 20;
 
@@ -30,15 +32,16 @@ impl Dynamics {
         report: &mut DynamicsReport,
     ) {
         let scheme = self.settings.scheme;
-        if scheme == Scheme::Static && self.parts.any_free() {
+        if let (Scheme::Static, Some(why)) = (scheme, self.why_no_equilibrium()) {
             report.outcome = DynamicsOutcome::Refused;
-            report.notice = Some(Notice::LooseBody);
+            report.notice = Some(why);
             return;
         }
         let (elastic, kinetic) = (self.model.energy(&state.x), self.mass.kinetic(&state.v));
         self.ledger.begin(kinetic + elastic + self.load_energy(&state.x));
         let (scheme, notice) = self.choose(scheme, state, inputs);
-        (report.scheme, report.notice) = (scheme, notice);
+        let underheld = self.free_motions.first().map(|&motion| Notice::Underheld { motion, driven: false });
+        (report.scheme, report.notice) = (scheme, notice.or(underheld));
         if let Scheme::Newmark { .. } = scheme
             && !self.history.known
         {
@@ -60,11 +63,18 @@ impl Dynamics {
             report.notice = Some(Notice::EnergyGained { excess_j });
         }
         // Implicit Euler, solved to the end, is what never fails.
-        let again = scheme != Scheme::ImplicitEuler || self.settings.newton.steps < RETRY_STEPS;
+        let asked = self.settings.newton;
+        let coarse = asked.steps < RETRY_STEPS || asked.tolerance > RETRY_TOLERANCE;
+        let again = scheme != Scheme::ImplicitEuler || coarse;
         if scheme != Scheme::Static && again && (!advanced || excess.is_some()) {
             report.scheme = Scheme::ImplicitEuler;
-            let steps = RETRY_STEPS.max(self.settings.newton.steps);
+            self.settings.newton.tolerance = asked.tolerance.min(RETRY_TOLERANCE);
+            let steps = RETRY_STEPS.max(asked.steps);
             advanced = self.attempt(team, state, inputs, (Scheme::ImplicitEuler, steps), report);
+            self.settings.newton = asked;
+            if report.newton.stop == StopReason::IterationLimit && report.newton.residual <= asked.tolerance {
+                report.newton.stop = StopReason::Converged;
+            }
         }
         if !advanced {
             report.outcome = DynamicsOutcome::Held;
@@ -72,6 +82,20 @@ impl Dynamics {
         }
         self.ledger.end(self.total_energy(report), driven);
         self.history.contacts = self.contacts();
+    }
+
+    /// What keeps the body from an equilibrium: a part that hangs on nothing, or a rigid motion that nothing
+    /// holds and the loads drive. A rotation by a finite angle ends somewhere; the linear law knows none.
+    fn why_no_equilibrium(&self) -> Option<Notice> {
+        if self.parts.any_free() {
+            return Some(Notice::LooseBody);
+        }
+        let endless = |m: &&FreeMotion| m.is_translation() || self.model.law() == Law::Linear;
+        let driven = |m: &&FreeMotion| m.is_driven(&self.parts, self.model.rest(), &self.f_ext);
+        let found = self.free_motions.iter().filter(endless).find(driven);
+        // Springs may hold what the boundary conditions do not.
+        let motion = found.filter(|_| self.active.is_empty())?;
+        Some(Notice::Underheld { motion: *motion, driven: true })
     }
 
     /// Energy [J] in `self.next` that came from nowhere, if it is more than the scheme may gain.
@@ -139,12 +163,11 @@ impl Dynamics {
         if report.newton.stop == StopReason::NonFinite {
             return false;
         }
-        if report.notice.is_none()
-            && !matches!(report.newton.stop, StopReason::Converged | StopReason::Stagnated)
-            && self.newton.settings.steps > LEAST_NEWTON_STEPS
-            && self.settings.relaxation.is_none()
-        {
-            report.notice = Some(Notice::Unconverged);
+        if self.settings.linearised && steps == self.settings.newton.steps {
+            report.newton = judged_by_its_solve(report.newton, self.settings.newton.tolerance);
+        }
+        if let (None, Some(displacement)) = (report.notice, report.newton.pivot) {
+            report.notice = Some(Notice::Pivot { displacement });
         }
         for c in 0..state.x.len() {
             let (x, B) = (self.next.x[c], increment.B);
@@ -338,4 +361,15 @@ impl Dynamics {
         }
         ruined
     }
+}
+
+/// The report of a step that is a fixed number of linear solves by design: how well the last of them was
+/// solved, where Newton's method ended because there were no more.
+fn judged_by_its_solve(newton: NewtonReport, tolerance: f64) -> NewtonReport {
+    if newton.stop != StopReason::IterationLimit {
+        return newton;
+    }
+    let residual = newton.linear_residual;
+    let stop = if residual <= tolerance { StopReason::Converged } else { StopReason::IterationLimit };
+    NewtonReport { residual, stop, ..newton }
 }

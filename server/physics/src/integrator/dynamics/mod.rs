@@ -24,6 +24,7 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::State;
+use super::free_motion::{FreeMotion, free_motions};
 use super::parts::{LooseParts, Translations};
 use super::relaxation::Relaxation;
 use super::spin::SpinGuard;
@@ -78,6 +79,8 @@ pub struct Dynamics {
     newton: Newton,
     relaxation: Relaxation,
     parts: LooseParts,
+    /// Of an equilibrium: rigid motions of held parts that nothing holds.
+    free_motions: Vec<FreeMotion>,
     /// Prescribed nodes that the parts were made with.
     known_fixed: Option<Vec<FixedCopy>>,
     translations: Translations,
@@ -124,6 +127,7 @@ impl Dynamics {
             newton: Newton::new(settings.newton),
             relaxation: Relaxation::default(),
             parts: LooseParts::default(),
+            free_motions: Vec::new(),
             known_fixed: None,
             translations: Translations::default(),
             active: Vec::new(),
@@ -181,6 +185,18 @@ impl Dynamics {
         (self.settings.newton, self.settings.relaxation) = (newton, relaxation);
     }
 
+    /// Changes elastic constants and damping, from the next step on; law and density stay. The energy of
+    /// the next step is booked afresh, because the elastic part of it jumps with the constants.
+    pub fn set_material(&mut self, material: Material) {
+        self.model.set_lame(material.lame());
+        let (damped, model) = (material.rayleigh.stiffness_s > 0.0, &self.model);
+        self.damping = damped.then(|| self.damping.take().unwrap_or_else(|| model.pattern()));
+        self.material =
+            Material { law: self.material.law, density_kg_m3: self.material.density_kg_m3, ..material };
+        self.relaxation.forget();
+        self.restart();
+    }
+
     /// Force of gravity `g` [m/s²] on node `c` [N]: M g in motion. In an equilibrium, where no mass
     /// matrix has to agree with it, the consistent load ρ ∫ N dV g.
     pub fn weight(&self, c: usize, g: Vector3<f64>) -> Vector3<f64> {
@@ -188,6 +204,11 @@ impl Dynamics {
             Scheme::Static => self.material.density_kg_m3 * self.model.shape_integrals()[c] * g,
             _ => self.mass.weight(c, g),
         }
+    }
+
+    /// The state before the last step that advanced.
+    pub fn before(&self) -> &State {
+        &self.history.before
     }
 
     /// Connected parts, as of the last step.
@@ -236,6 +257,9 @@ impl Dynamics {
         } else {
             self.implicit_step(team, state, inputs, &mut report);
         }
+        if team.told_to_stop() {
+            report.outcome = DynamicsOutcome::Interrupted;
+        }
         match report.outcome {
             DynamicsOutcome::Advanced => {
                 self.history.push(state, &self.next, inputs.h);
@@ -247,6 +271,7 @@ impl Dynamics {
                 self.restart();
                 report.notice = Some(Notice::NotFinite);
             }
+            DynamicsOutcome::Interrupted => self.restart(),
             DynamicsOutcome::Refused => {}
         }
         report
@@ -293,6 +318,9 @@ impl Dynamics {
         let ends: Vec<[u32; 2]> = model.springs().iter().map(|s| [s.a, s.b]).collect();
         let groups = elements.chain(ends.iter().map(|s| &s[..]));
         self.parts = LooseParts::connected(groups, &self.mass.lumped, fixed);
+        if self.settings.scheme == Scheme::Static {
+            self.free_motions = free_motions(&self.parts, self.model.rest(), fixed);
+        }
         self.mass.hold(fixed);
         self.spin.resize(self.parts.len());
         self.omega_squared = None;

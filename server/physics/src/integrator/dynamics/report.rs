@@ -2,7 +2,10 @@
 
 use std::fmt;
 
+use nalgebra::Vector3;
+
 use super::Scheme;
+use crate::integrator::FreeMotion;
 use crate::solver::NewtonReport;
 
 /// How a step of [`Dynamics`](super::Dynamics) went.
@@ -14,7 +17,8 @@ pub struct DynamicsReport {
     pub scheme: Scheme,
     /// What the user should know, if anything.
     pub notice: Option<Notice>,
-    /// Newton's method, last solve; linear iterations are those of the whole step.
+    /// Newton's method, last solve; linear iterations are those of the whole step. With
+    /// [`linearised`](super::DynamicsSettings::linearised) `residual` is that of the linear solve.
     pub newton: NewtonReport,
     /// Into how many equal parts an explicit step was divided; 1 for implicit schemes.
     pub substeps: u32,
@@ -40,6 +44,8 @@ pub enum DynamicsOutcome {
     Held,
     /// The step cannot be made as asked; nothing was changed.
     Refused,
+    /// The stop flag was raised; the body is as it was.
+    Interrupted,
 }
 
 /// Something that a step did differently from what was asked for, and why.
@@ -56,12 +62,17 @@ pub enum Notice {
         /// Sub-steps it would take.
         needed: u32,
     },
-    /// The explicit step was divided.
+    /// The explicit step was divided as its stability asks for.
     Divided {
         /// Number of parts.
         substeps: u32,
         /// Longest stable step [s].
         stable_s: f64,
+    },
+    /// The explicit step did not stay finite and was divided further than its stability asks for.
+    DividedAgain {
+        /// Number of parts.
+        substeps: u32,
     },
     /// BDF2: no usable history, the step was made with implicit Euler.
     Started,
@@ -93,11 +104,28 @@ pub enum Notice {
     Recovery,
     /// A part of the body hangs on nothing: there is no equilibrium.
     LooseBody,
-    /// Newton's method stopped before its tolerance was reached; the report says how good the state
-    /// is. Not said of the few steps of a fast setting, which are meant to stop early.
-    Unconverged,
+    /// A part is held, but not against every rigid motion: its equilibrium is one of many or, where the
+    /// loads drive the motion, does not exist.
+    Underheld {
+        /// The motion that is left, the first of them.
+        motion: FreeMotion,
+        /// Whether the loads drive it.
+        driven: bool,
+    },
+    /// A factorisation met a pivot that is not positive; conjugate gradients solved instead.
+    Pivot {
+        /// Its displacement: 3 · copy + axis.
+        displacement: u32,
+    },
     /// The step was taken back because it did not stay finite.
     NotFinite,
+    /// The step was taken back because it drew a part of the body out of any sensible range.
+    OutOfRange {
+        /// How far the part would reach, over its size.
+        stretch: f64,
+        /// Its size: the diagonal of its box at rest, or of its prescribed positions if larger [m].
+        size_m: f64,
+    },
 }
 
 impl fmt::Display for Notice {
@@ -107,10 +135,13 @@ impl fmt::Display for Notice {
             Self::TooLong { h_s, stable_s, needed } => write!(
                 f,
                 "step {h_s:.3e} s is longer than the longest stable one, {stable_s:.3e} s; \
-                 it would take {needed} sub-steps: shorten it, allow them, or choose an implicit scheme"
+                 it would take {needed} sub-steps: shorten it or choose an implicit scheme"
             ),
             Self::Divided { substeps, stable_s } => {
                 write!(f, "divided into {substeps} sub-steps, the longest stable one is {stable_s:.3e} s")
+            }
+            Self::DividedAgain { substeps } => {
+                write!(f, "did not stay finite: divided into {substeps} sub-steps")
             }
             Self::Started => write!(f, "no history yet: made with implicit Euler"),
             Self::ContactOnset => write!(f, "new contact: made with implicit Euler"),
@@ -131,8 +162,41 @@ impl fmt::Display for Notice {
             }
             Self::Recovery => write!(f, "inverted or collapsed elements: more Newton steps allowed"),
             Self::LooseBody => write!(f, "a part hangs on nothing: no static equilibrium"),
-            Self::Unconverged => write!(f, "Newton's method stopped before its tolerance"),
+            Self::Underheld { motion, driven } => {
+                let (mass_kg, FreeMotion { slide, turn, about, .. }) = (motion.mass_kg, motion);
+                write!(f, "nothing keeps a part of {mass_kg:.3e} kg from ")?;
+                match motion.is_translation() {
+                    true => write!(f, "sliding along {}", rounded(slide))?,
+                    false => write!(f, "turning about {} through {} m", rounded(turn), rounded(about))?,
+                }
+                match driven {
+                    true => write!(
+                        f,
+                        ", and the loads do: no static equilibrium; fix more of it, or use dynamics"
+                    ),
+                    false => write!(f, ": its equilibrium is one of many; fix more of it"),
+                }
+            }
+            Self::Pivot { displacement } => write!(
+                f,
+                "Cholesky met a pivot that is not positive at node {} along {}: hardly anything holds it, or the \
+                 stiffness spans more than double precision; conjugate gradients solved instead",
+                displacement / 3,
+                ['x', 'y', 'z'][*displacement as usize % 3]
+            ),
             Self::NotFinite => write!(f, "did not stay finite: taken back"),
+            Self::OutOfRange { stretch, size_m } => write!(
+                f,
+                "a part of {size_m:.3e} m would reach {stretch:.1e} times as far: taken back, the body is at rest; \
+                 it is too soft for its loads, or the step too long or the solver's limits too low for it"
+            ),
         }
     }
+}
+
+/// A vector with the digits one reads.
+fn rounded(v: &Vector3<f64>) -> String {
+    let size = v.amax().max(f64::MIN_POSITIVE);
+    let digits = (3 - size.log10().floor() as i32).clamp(0, 12) as usize;
+    format!("[{:.digits$}, {:.digits$}, {:.digits$}]", v.x + 0.0, v.y + 0.0, v.z + 0.0)
 }

@@ -71,6 +71,9 @@ pub struct DynamicsSettings {
     pub scheme: Scheme,
     /// Distribution of mass.
     pub mass: MassKind,
+    /// A step is a fixed number of linear solves by design and is judged by how well the last of them
+    /// was solved, instead of by the residual of Newton's method.
+    pub linearised: bool,
     /// Newton's method of implicit schemes. `steps` = 1 (2 for Newmark) is the fast path, one linear solve from the
     /// predictor, which is taken for linear and corotational bodies that are in order; other laws,
     /// inverted or collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
@@ -97,6 +100,7 @@ impl Default for DynamicsSettings {
         Self {
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
+            linearised: false,
             newton: NewtonSettings { steps: 20, tolerance: 1e-6, linear, ..NewtonSettings::default() },
             relaxation: None,
             most_substeps: 256,
