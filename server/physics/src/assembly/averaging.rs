@@ -6,11 +6,16 @@
 //!
 //! # Source
 //! Bonet, Burton 1998, "A simple average nodal pressure tetrahedral element"; the share κ that stays
-//! with the elements: Puso, Solberg 2006, "A stabilized nodally integrated tetrahedral".
+//! with the elements, of a λ of at most 25 μ: Puso, Solberg 2006, "A stabilized nodally integrated
+//! tetrahedral". A fixed share of λ itself would lock again as ν approaches ½.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::BlockCsr;
+use crate::material::Lame;
+
+/// Most λ / μ of the energy that partly stays with the elements.
+const STIFFEST: f64 = 25.0;
 
 /// Which pieces are around which copy, and which copies around which.
 #[derive(Clone, Debug)]
@@ -33,6 +38,11 @@ pub(super) struct NodeAverage {
 }
 
 impl NodeAverage {
+    /// κ where `kept` is asked for: that share of λ, or of 25 μ if λ is larger.
+    pub fn share(kept: f64, Lame { mu, lambda }: Lame) -> f64 {
+        if lambda > STIFFEST * mu { kept * STIFFEST * mu / lambda } else { kept }
+    }
+
     pub fn new(connectivity: &[u32], volumes: &[f64], n_nodes: usize, kept: f64) -> Self {
         let mut lists: Vec<Vec<u32>> = vec![Vec::new(); n_nodes];
         for (e, nodes) in (0u32..).zip(connectivity.chunks_exact(4)) {

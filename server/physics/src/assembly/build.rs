@@ -165,6 +165,7 @@ impl Model {
 
     fn finish(mut self) -> Result<Self, ModelError> {
         if let Volumetric::NodeAveraged { kept } = self.volumetric {
+            let kept = NodeAverage::share(kept, self.point.lame);
             self.averaging = Some(NodeAverage::new(&self.connectivity, &self.volumes, self.rest.len(), kept));
         }
         self.find_pattern();

@@ -53,7 +53,8 @@ pub enum Volumetric {
     /// (1 − kept) λ/2 Σ_n V_n θ̄_n² + kept λ/2 Σ_e V_e θ_e². Averages belong to copies, so they
     /// never cross a cut.
     NodeAveraged {
-        /// Share that stays with the elements, against checkerboards; 0.05 … 0.1.
+        /// Share that stays with the elements, against checkerboards; 0.05 … 0.1. Of λ, or of 25 μ where λ is
+        /// larger, so that nothing locks near ν = ½.
         kept: f64,
     },
     /// Hex8: at one point per element, with the mean gradients; shear stays at 2×2×2 points.
@@ -115,6 +116,11 @@ impl Model {
     /// The elastic constants.
     pub fn lame(&self) -> Lame {
         self.point.lame
+    }
+
+    /// Changes the elastic constants; everything else is geometry and stays.
+    pub fn set_lame(&mut self, lame: Lame) {
+        self.point.lame = lame;
     }
 
     /// Number of nodes (copies, where the mesh is cut).

@@ -26,6 +26,8 @@ pub use split::Split;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use svd::SignedSvd;
 
+use std::ops::RangeInclusive;
+
 use thiserror::Error;
 
 /// ∂²ψ/∂F² on F stacked by columns: entry (row, column) of F has index row + 3·column.
@@ -34,11 +36,11 @@ pub type Matrix9 = nalgebra::SMatrix<f64, 9, 9>;
 /// Isotropic elastic material of one body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// Young's modulus E [Pa], > 0.
+    /// Young's modulus E [Pa], within [`Material::YOUNG_PA`].
     pub young_pa: f64,
-    /// Poisson's ratio ν [1], in (-1, 0.5).
+    /// Poisson's ratio ν [1], within [`Material::POISSON`].
     pub poisson: f64,
-    /// Density ρ at rest [kg/m³], > 0.
+    /// Density ρ at rest [kg/m³], within [`Material::DENSITY_KG_M3`].
     pub density_kg_m3: f64,
     /// Damping D = α M + β K̂.
     pub rayleigh: Rayleigh,
@@ -67,17 +69,28 @@ pub struct Lame {
 
 /// A material constant outside its range.
 #[derive(Clone, Debug, Error, PartialEq)]
-#[error("{quantity} = {found} is outside {allowed}")]
+#[error("{quantity} = {found:e} is outside {:e} … {:e}", range.start(), range.end())]
 pub struct MaterialError {
     /// Name of the constant, with its unit.
     pub quantity: &'static str,
     /// Value found.
     pub found: f64,
-    /// Allowed range in words.
-    pub allowed: &'static str,
+    /// Allowed range.
+    pub range: RangeInclusive<f64>,
 }
 
 impl Material {
+    /// Range of Young's modulus [Pa].
+    pub const YOUNG_PA: RangeInclusive<f64> = 1e-6..=1e13;
+    /// Range of Poisson's ratio.
+    pub const POISSON: RangeInclusive<f64> = -0.99..=0.4999;
+    /// Range of the density [kg/m³].
+    pub const DENSITY_KG_M3: RangeInclusive<f64> = 1e-6..=1e6;
+    /// Range of the drag α [1/s].
+    pub const MASS_1_S: RangeInclusive<f64> = 0.0..=1e6;
+    /// Range of the viscosity β [s].
+    pub const STIFFNESS_S: RangeInclusive<f64> = 0.0..=1e6;
+
     /// Lamé constants: μ = E / (2 (1+ν)), λ = E ν / ((1+ν)(1−2ν)).
     pub fn lame(&self) -> Lame {
         let (E, nu) = (self.young_pa, self.poisson);
@@ -86,16 +99,15 @@ impl Material {
 
     /// Tells whether every constant is finite and in its range.
     pub fn check(&self) -> Result<(), MaterialError> {
-        let within = |quantity, found: f64, ok: bool, allowed| {
-            if ok && found.is_finite() { Ok(()) } else { Err(MaterialError { quantity, found, allowed }) }
+        let within = |quantity, found: f64, range: RangeInclusive<f64>| {
+            if range.contains(&found) { Ok(()) } else { Err(MaterialError { quantity, found, range }) }
         };
         let Rayleigh { mass_1_s, stiffness_s } = self.rayleigh;
-        within("young_pa", self.young_pa, (1e-6..=1e13).contains(&self.young_pa), "1e-6 … 1e13 Pa")?;
-        within("poisson", self.poisson, (-0.99..=0.4999).contains(&self.poisson), "-0.99 … 0.4999")?;
-        let rho = self.density_kg_m3;
-        within("density_kg_m3", rho, (1e-6..=1e6).contains(&rho), "1e-6 … 1e6 kg/m³")?;
-        within("rayleigh.mass_1_s", mass_1_s, (0.0..=1e6).contains(&mass_1_s), "0 … 1e6 1/s")?;
-        within("rayleigh.stiffness_s", stiffness_s, (0.0..=1e6).contains(&stiffness_s), "0 … 1e6 s")
+        within("young_pa", self.young_pa, Self::YOUNG_PA)?;
+        within("poisson", self.poisson, Self::POISSON)?;
+        within("density_kg_m3", self.density_kg_m3, Self::DENSITY_KG_M3)?;
+        within("rayleigh.mass_1_s", mass_1_s, Self::MASS_1_S)?;
+        within("rayleigh.stiffness_s", stiffness_s, Self::STIFFNESS_S)
     }
 }
 
