@@ -4,28 +4,116 @@ use nalgebra::Vector3;
 
 use super::{Body, BodyError, General, Path};
 use crate::assembly::ElementKind;
-use crate::cut::{BladeSweep, CutReport, NewCopy};
+use crate::cut::{
+    BladeSweep, CutError, CutLimits, CutReport, NewCopy, Piece, SweepUnderWay, Work, swept_area,
+};
 use crate::integrator::LooseParts;
 use crate::room::{refill, resize_with_room};
 
+/// What comparing one triangle of a sweep with one element costs when a body is cut along its faces, as a
+/// part of a fragment looked at.
+const SNAP_PAIRS_PER_FRAGMENT: usize = 4;
+
+/// Most pairs of blade segment and element of a cut along faces by a client, which is made at once.
+const MAX_SNAP_PAIRS: usize = 4_000_000;
+
+/// A cut that is taken in parts.
+#[derive(Debug)]
+pub(super) enum CutUnderWay {
+    /// Pieces and copies: the sweep, and the positions it began with [m].
+    Pieces(SweepUnderWay, Vec<Vector3<f64>>),
+    /// Along faces.
+    Faces(BladeSweep, u32),
+}
+
 impl Body {
-    /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were
-    /// split from, so the motion of the material does not change by the cut itself.
-    pub fn cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
+    /// Begins a cut that [`go_on_cutting`](Self::go_on_cutting) makes in parts, at the positions of now:
+    /// however the body moves meanwhile, the material that comes apart is what [`cut`](Self::cut) would have
+    /// taken apart now, to the bit.
+    ///
+    /// # Errors
+    /// As [`cut`](Self::cut); also a body that is cut into as much as [`CutLimits::of_mesh`] allows, and one
+    /// that is being cut.
+    pub fn begin_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<(), BodyError> {
+        self.may_be_cut()?;
+        let mesh = self.cut_mesh.mesh();
+        let n_elements = mesh.tets.len();
+        self.under_way = Some(if self.snap.is_some() {
+            blade.check()?;
+            let (found, limit) = (blade.segments.len() * n_elements, MAX_SNAP_PAIRS);
+            if found > limit {
+                let segments = (limit / n_elements.max(1)).max(2);
+                return Err(CutError::TooManySegments { found: blade.segments.len(), limit: segments }.into());
+            }
+            CutUnderWay::Faces(blade.clone(), incision)
+        } else {
+            let limits = CutLimits::of_mesh(n_elements, mesh.nodes.len());
+            let sweep = self.cut_mesh.begin_sweep(&self.state.x, blade, incision, limits)?;
+            CutUnderWay::Pieces(sweep, self.state.x.clone())
+        });
+        Ok(())
+    }
+
+    /// Goes on with the cut that was begun, for as much work as is left; its report when it is made. None
+    /// while it is not, and where none was begun.
+    ///
+    /// # Errors
+    /// As [`cut`](Self::cut).
+    pub fn go_on_cutting(&mut self, work: &mut Work) -> Result<Option<CutReport>, BodyError> {
+        match self.under_way.take() {
+            None => Ok(None),
+            Some(CutUnderWay::Faces(blade, incision)) => {
+                work.book(blade.segments.len() * self.cut_mesh.mesh().tets.len() / SNAP_PAIRS_PER_FRAGMENT);
+                self.snap_cut(&blade, incision).map(Some)
+            }
+            Some(CutUnderWay::Pieces(mut sweep, x)) => {
+                if !self.cut_mesh.detect(&x, &mut sweep, work) {
+                    self.under_way = Some(CutUnderWay::Pieces(sweep, x));
+                    return Ok(None);
+                }
+                let report = self.cut_mesh.complete(sweep, work);
+                self.follow_cut(&report)?;
+                Ok(Some(report))
+            }
+        }
+    }
+
+    /// Whether a cut was begun and is not made.
+    pub fn is_being_cut(&self) -> bool {
+        self.under_way.is_some()
+    }
+
+    fn may_be_cut(&self) -> Result<(), BodyError> {
         if self.shape.kind() != ElementKind::Tet4 {
             let with = if self.shape.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" };
             return Err(BodyError::Combination { what: "a cut", with, instead: "tet4" });
         }
+        if self.under_way.is_some() {
+            return Err(CutError::UnderWay.into());
+        }
+        Ok(())
+    }
+
+    /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were
+    /// split from, so the motion of the material does not change by the cut itself.
+    pub fn cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
+        self.may_be_cut()?;
         if self.snap.is_some() {
             return self.snap_cut(blade, incision);
         }
         let report = self.cut_mesh.sweep(&self.state.x, blade, incision)?;
+        self.follow_cut(&report)?;
+        Ok(report)
+    }
+
+    /// Everything that a cut of pieces and copies changes.
+    fn follow_cut(&mut self, report: &CutReport) -> Result<(), BodyError> {
         if let Some(skin) = &mut self.skin {
             skin.follow(&self.cut_mesh);
         }
         // The surface may have changed alone, while a cut is still on its way through an element.
         if !self.cut_mesh.changed_pieces().is_empty() {
-            self.inherit(&report);
+            self.inherit(report);
             match &mut self.path {
                 Path::Fast(fast) => {
                     fast.follow_cut(&self.cut_mesh);
@@ -37,7 +125,27 @@ impl Body {
                 }
             }
         }
-        Ok(report)
+        Ok(())
+    }
+
+    /// Area [m²] of the sweep inside the body as it lies now; what is cut already counts as well.
+    pub fn swept_area(&self, blade: &BladeSweep) -> f64 {
+        let mut seen = vec![false; self.cut_mesh.mesh().tets.len()];
+        let first_of_element = |p: &&Piece| !std::mem::replace(&mut seen[p.element as usize], true);
+        let pieces = self.cut_mesh.pieces().iter().filter(first_of_element);
+        let tets: Vec<[u32; 4]> = pieces.map(|piece| piece.copies).collect();
+        swept_area(&tets, &self.state.x, blade)
+    }
+
+    /// Area [m²] at rest of the cut that an incision has opened: of one of its two lips.
+    pub fn opened_area(&self, incision: u32) -> f64 {
+        let surface = self.cut_mesh.surface();
+        let lips = surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag == incision);
+        let area = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|v| surface.vertices[v as usize].position(&self.rest));
+            0.5 * (b - a).cross(&(c - a)).norm()
+        };
+        0.5 * lips.map(|(triangle, _)| area(triangle)).sum::<f64>()
     }
 
     fn inherit(&mut self, report: &CutReport) {
@@ -48,6 +156,11 @@ impl Body {
             let (copy, parent) = (new.copy as usize, new.parent as usize);
             self.state.x[copy] = self.state.x[parent];
             self.state.v[copy] = self.state.v[parent];
+        }
+        let known = self.split_from.len();
+        resize_with_room(&mut self.split_from, n, 0);
+        for (from, new) in self.split_from[known..].iter_mut().zip(&report.new_copies) {
+            *from = new.parent;
         }
     }
 
@@ -74,7 +187,7 @@ impl Body {
             *rest = self.cut_mesh.mesh().nodes[self.cut_mesh.copy_node()[new.copy as usize] as usize];
         }
         self.follow_masses();
-        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, &mut self.fixed);
+        self.find_fixed();
         self.boundary.loads_of_new_copies(&self.cut_mesh, &mut self.load);
         self.reunion.follow(&mut self.parts, &self.cut_mesh, new, &self.mass, &self.fixed);
         self.follow_parts();
@@ -110,7 +223,7 @@ impl Body {
 
     /// Everything that is derived from constraints and loads.
     pub(super) fn follow_boundary(&mut self) {
-        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, &mut self.fixed);
+        self.find_fixed();
         self.boundary.node_loads(&self.cut_mesh, self.rest.len(), &mut self.load);
         self.parts = match &self.path {
             Path::Fast(_) => LooseParts::new(self.cut_mesh.pieces(), &self.mass, &self.fixed),
@@ -127,5 +240,6 @@ impl Body {
         if let Path::Fast(fast) = &mut self.path {
             fast.follow_parts(&self.rest, &self.mass, &self.parts);
         }
+        self.range.follow(&self.rest, &self.parts, &self.fixed);
     }
 }

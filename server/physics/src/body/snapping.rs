@@ -109,6 +109,7 @@ impl Body {
         snap.origins = cut.nodes.iter().map(|node| origin(node).unwrap_or(node.origin)).collect();
         self.snap = Some(snap);
         self.boundary = Boundary::of_nodes(&cut.nodes);
+        self.asleep.clear();
         self.state.x = cut.nodes.iter().map(|node| node.x).collect();
         self.state.v = cut.nodes.iter().map(|node| node.v).collect();
         self.follow_mesh()?;

@@ -59,6 +59,74 @@ pub struct CutReport {
     pub epoch: u32,
 }
 
+/// How much a body may hold before cuts that come over the network are refused.
+///
+/// Few cuts need a tenth of it: a plane through every element makes six fragments and two pieces of each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CutLimits {
+    /// Most fragments inside all elements together. A sweep that needs more leaves edges whole.
+    pub fragments: usize,
+    /// Most pieces; a body that has more is not cut again.
+    pub pieces: usize,
+    /// Most node copies; a body that has more is not cut again.
+    pub copies: usize,
+}
+
+impl CutLimits {
+    /// What no body reaches.
+    pub const NONE: Self = Self { fragments: usize::MAX, pieces: usize::MAX, copies: usize::MAX };
+
+    /// Limits for a mesh of so many elements and nodes.
+    pub fn of_mesh(n_elements: usize, n_nodes: usize) -> Self {
+        Self {
+            fragments: 8 * n_elements + 10_000,
+            pieces: 3 * n_elements + 4_000,
+            copies: 6 * n_nodes + 4_000,
+        }
+    }
+
+    /// Refuses a further sweep through a body that holds so much.
+    pub fn check(&self, fragments: usize, pieces: usize, copies: usize) -> Result<(), CutError> {
+        let held = [
+            ("fragments", fragments, self.fragments),
+            ("pieces", pieces, self.pieces),
+            ("copies", copies, self.copies),
+        ];
+        match held.into_iter().find(|(_, found, limit)| found >= limit) {
+            Some((what, found, limit)) => Err(CutError::Full { what, found, limit }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Work that may still be done, in fragments looked at; counted, so that it is the same on every machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work {
+    left: u64,
+}
+
+impl Work {
+    /// So much work.
+    pub fn new(fragments: u64) -> Self {
+        Self { left: fragments }
+    }
+
+    /// As much as there is.
+    pub fn unlimited() -> Self {
+        Self { left: u64::MAX }
+    }
+
+    /// Whether all of it was done.
+    pub fn is_done(&self) -> bool {
+        self.left == 0
+    }
+
+    /// Books what was done; more than was left counts as all.
+    pub fn book(&mut self, fragments: usize) {
+        self.left = self.left.saturating_sub(fragments as u64);
+    }
+}
+
 /// Why a sweep was refused; the mesh is unchanged.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CutError {
@@ -93,6 +161,21 @@ pub enum CutError {
         /// Number of copies.
         expected: usize,
     },
+    /// The body has been cut into as much as it may hold.
+    #[error(
+        "the body holds {found} {what}, at most {limit} are allowed for cuts by clients; reset it to cut again"
+    )]
+    Full {
+        /// `fragments`, `pieces` or `copies`.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// One sweep is taken in parts and has not ended.
+    #[error("another sweep is under way; it has to end before the next one begins")]
+    UnderWay,
     /// Incision id 0 is reserved for the skin.
     #[error("incision id 0 means skin; number incisions from 1")]
     ReservedIncision,

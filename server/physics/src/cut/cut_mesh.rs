@@ -7,11 +7,11 @@ use nalgebra::Vector3;
 use crate::mesh::{MeshError, TetMesh};
 use crate::room::leave_room;
 
-use super::blade::{BladeSweep, CutError, CutReport};
+use super::blade::{BladeSweep, CutError, CutLimits, CutReport, Work};
 use super::components::Components;
 use super::copies::CopyTable;
 use super::crossings::Crossings;
-use super::detect::{Deformed, Detector, Record};
+use super::detect::{Deformed, Detector, Place, Record};
 use super::fragments::Fragments;
 use super::front::{Front, Surroundings, sweep_triangles};
 use super::incision_sets::IncisionSets;
@@ -25,6 +25,25 @@ use super::surface::Surface;
 use super::surface_builder::{Change, Material, SurfaceBuilder};
 use super::sweep_triangle::SweepTriangle;
 use super::traces::{TraceLine, Traces};
+
+/// What a fragment costs to separate and to follow with pieces, copies and surface, in fragments looked at.
+const SEPARATION: usize = 20;
+
+/// A sweep that is taken in parts.
+#[derive(Clone, Debug)]
+pub struct SweepUnderWay {
+    triangles: Vec<SweepTriangle>,
+    incision: u32,
+    place: Place,
+    most_fragments: usize,
+}
+
+impl SweepUnderWay {
+    /// The incision it belongs to.
+    pub fn incision(&self) -> u32 {
+        self.incision
+    }
+}
 
 /// A tet mesh with everything that cuts have made of it.
 ///
@@ -167,6 +186,16 @@ impl CutMesh {
         self.epoch
     }
 
+    /// What is shown of the mesh has changed without a cut.
+    pub(crate) fn raise_epoch(&mut self) {
+        self.epoch += 1;
+    }
+
+    /// Gives an earlier state an epoch of its own, when it becomes the present one again.
+    pub(crate) fn set_epoch(&mut self, epoch: u32) {
+        self.epoch = epoch;
+    }
+
     /// Skin and cut faces, closed and 2-manifold.
     pub fn surface(&self) -> &Surface {
         &self.surface
@@ -229,10 +258,28 @@ impl CutMesh {
         blade: &BladeSweep,
         incision: u32,
     ) -> Result<CutReport, CutError> {
+        let mut sweep = self.begin_sweep(x, blade, incision, CutLimits::NONE)?;
+        let mut work = Work::unlimited();
+        self.detect(x, &mut sweep, &mut work);
+        Ok(self.complete(sweep, &mut work))
+    }
+
+    /// Begins a sweep that is taken in parts, as [`sweep`](Self::sweep) makes it whole: then
+    /// [`detect`](Self::detect) with the same positions until it says true, then
+    /// [`complete`](Self::complete). Until then no other sweep may begin. The result has the same bits,
+    /// however many parts there are.
+    pub fn begin_sweep(
+        &mut self,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+        limits: CutLimits,
+    ) -> Result<SweepUnderWay, CutError> {
         blade.check()?;
         if incision == 0 {
             return Err(CutError::ReservedIncision);
         }
+        limits.check(self.fragments.tets.len(), self.pieces.pieces.len(), self.n_copies())?;
         if x.len() != self.n_copies() {
             return Err(CutError::PositionCount { found: x.len(), expected: self.n_copies() });
         }
@@ -250,19 +297,34 @@ impl CutMesh {
             let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
             self.fronts.insert(incision, front);
         }
+        let place = self.detector.begin(&self.fragments);
+        Ok(SweepUnderWay { triangles, incision, place, most_fragments: limits.fragments })
+    }
+
+    /// Looks for where the sweep crosses the body at the positions `x` [m] it began with; true when all was
+    /// looked at.
+    pub fn detect(&mut self, x: &[Vector3<f64>], sweep: &mut SweepUnderWay, work: &mut Work) -> bool {
+        let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
-        let mut record = Record { fragments, sets, crossings, traces: &mut self.traces, incision };
-        self.detector.run(&body, &triangles, &mut record);
+        let (traces, incision) = (&mut self.traces, sweep.incision);
+        let mut record = Record { fragments, sets, crossings, traces, incision };
+        self.detector.run(&body, &sweep.triangles, &mut record, (&mut sweep.place, work))
+    }
+
+    /// Separates what the sweep was found to cut, at once.
+    pub fn complete(&mut self, sweep: SweepUnderWay, work: &mut Work) -> CutReport {
+        let SweepUnderWay { incision, most_fragments, .. } = sweep;
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
         let (waiting, traces) = (&mut self.pending, &mut self.traces);
-        let mut sheet = Sheet { fragments, sets, crossings, waiting, traces, incision };
+        let mut sheet = Sheet { fragments, sets, crossings, waiting, traces, incision, most_fragments };
         self.separator.run(&self.detector.touched, &mut sheet);
         let report = self.follow_separation();
         if !self.traces.is_empty() {
             let opened = self.builder.faces_beside_lips(&self.surface, incision);
             opened.for_each(|face| self.traces.open(face, incision, &self.fragments));
         }
-        Ok(report)
+        work.book(SEPARATION * (self.detector.touched.len() + self.separator.changed.len()));
+        report
     }
 
     /// Pieces, copies and surface of what the separator changed.

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
 use crate::room::{empty_with_room, resize_with_room};
 
+use super::blade::Work;
 use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
 use super::fragments::{Fragments, NONE};
 use super::incision_sets::IncisionSets;
@@ -17,6 +18,17 @@ use super::traces::{Traces, line_across};
 
 /// The mark of fragments that are touched.
 const TOUCHED: u8 = 1;
+
+/// Boxes that are compared in the time in which one fragment is looked at.
+const CANDIDATES_PER_FRAGMENT: usize = 16;
+
+/// How far the search for a sweep has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    triangle: usize,
+    candidate: usize,
+    touched: usize,
+}
 
 /// What detection reads of the body.
 pub struct Deformed<'a> {
@@ -174,30 +186,62 @@ impl Detector {
         }));
     }
 
-    /// Records crossings, vertices on the sheet and faces along it; fills `touched`.
-    pub fn run(&mut self, body: &Deformed, triangles: &[SweepTriangle], record: &mut Record) {
+    /// Begins to look for a sweep among the candidates.
+    pub fn begin(&mut self, fragments: &Fragments) -> Place {
         self.touched.clear();
         self.sweep_stamp += 1;
-        self.marks.restart(record.fragments.tets.len());
-        self.make_room(record.fragments.vertices.len());
-        for triangle in triangles {
-            self.triangle_stamp += 1;
-            self.tested.clear();
-            for c in 0..self.candidates.len() {
-                let (p, low, high) = self.candidates[c];
-                if triangle.overlaps(&low, &high) {
-                    self.test_piece(body, triangle, p, record);
-                }
-            }
-        }
-        self.mark_faces_at_the_sheet(body, triangles, record);
-        // The order in which fragments are separated must not depend on that of the triangles.
-        self.order.sort(&mut self.touched);
+        self.marks.restart(fragments.tets.len());
+        self.make_room(fragments.vertices.len());
+        Place::default()
     }
 
-    fn test_piece(&mut self, body: &Deformed, triangle: &SweepTriangle, p: u32, record: &mut Record) {
+    /// Records crossings, vertices on the sheet and faces along it, from `place` on; true when `touched` is
+    /// complete, false when the work was done before. In how many parts it is done makes no difference.
+    pub fn run(
+        &mut self,
+        body: &Deformed,
+        triangles: &[SweepTriangle],
+        record: &mut Record,
+        (place, work): (&mut Place, &mut Work),
+    ) -> bool {
+        while let Some(triangle) = triangles.get(place.triangle) {
+            if place.candidate == 0 {
+                self.triangle_stamp += 1;
+                self.tested.clear();
+            }
+            let from = place.candidate;
+            while let Some(&(p, low, high)) = self.candidates.get(place.candidate) {
+                if work.is_done() {
+                    return false;
+                }
+                place.candidate += 1;
+                if triangle.overlaps(&low, &high) && triangle.may_cross(&low, &high) {
+                    work.book(self.test_piece(body, triangle, p, record));
+                }
+            }
+            work.book(1 + (place.candidate - from) / CANDIDATES_PER_FRAGMENT);
+            (place.triangle, place.candidate) = (place.triangle + 1, 0);
+        }
+        if !self.mark_faces_at_the_sheet(body, triangles, record, (place, work)) {
+            return false;
+        }
+        // The order in which fragments are separated must not depend on that of the triangles.
+        self.order.sort(&mut self.touched);
+        true
+    }
+
+    /// Returns the number of fragments that were looked at.
+    fn test_piece(
+        &mut self,
+        body: &Deformed,
+        triangle: &SweepTriangle,
+        p: u32,
+        record: &mut Record,
+    ) -> usize {
         let mut t = body.pieces.first_fragment[p as usize];
+        let mut looked_at = 0;
         while t != NONE {
+            looked_at += 1;
             let tet = record.fragments.tets[t as usize];
             let side = tet.map(|v| self.side_of(body, triangle, p, v, record.fragments));
             if !(side.iter().all(|&s| s > 0.0) || side.iter().all(|&s| s < 0.0)) {
@@ -212,6 +256,7 @@ impl Detector {
             }
             t = record.fragments.next_in_piece[t as usize];
         }
+        looked_at
     }
 
     /// Draws where the triangle crosses the boundary faces of fragment `t`.
@@ -334,9 +379,19 @@ impl Detector {
     }
 
     /// A bent sheet may run through the three vertices of a face that lies in none of its planes.
-    fn mark_faces_at_the_sheet(&mut self, body: &Deformed, triangles: &[SweepTriangle], record: &mut Record) {
-        for k in 0..self.touched.len() {
-            let t = self.touched[k];
+    /// True when all touched fragments were looked at.
+    fn mark_faces_at_the_sheet(
+        &mut self,
+        body: &Deformed,
+        triangles: &[SweepTriangle],
+        record: &mut Record,
+        (place, work): (&mut Place, &mut Work),
+    ) -> bool {
+        while let Some(&t) = self.touched.get(place.touched) {
+            if work.is_done() {
+                return false;
+            }
+            place.touched += 1;
             let on = record.fragments.tets[t as usize].map(|v| record.is_on(v));
             if !on.contains(&true) {
                 continue;
@@ -344,9 +399,11 @@ impl Detector {
             for (face, corners) in TET_FACES.iter().enumerate() {
                 if corners.iter().any(|&k| on[k]) {
                     self.test_face(body, triangles, t, face, record);
+                    work.book(1 + triangles.len() / CANDIDATES_PER_FRAGMENT);
                 }
             }
         }
+        true
     }
 
     fn locate(&mut self, body: &Deformed, fragments: &Fragments, p: u32, v: u32) -> Vector3<f64> {

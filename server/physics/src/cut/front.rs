@@ -155,7 +155,7 @@ pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f
         let [quads, drawn] = [pair, drawn].map(quads);
         for ([a, b, c, d], [p, q, r, s]) in quads.into_iter().zip(drawn) {
             let triangle = |[a, b, c]: [Vector3<f64>; 3], drawn| {
-                SweepTriangle::new(a, b, c).map(|triangle| SweepTriangle { drawn, ..triangle })
+                SweepTriangle::new(a, b, c).map(|triangle| triangle.with_drawn(drawn))
             };
             triangles.extend(triangle([a, b, c], [p, q, r]));
             triangles.extend(triangle([a, c, d], [p, r, s]));

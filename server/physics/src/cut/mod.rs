@@ -33,6 +33,7 @@ pub(crate) mod fragments;
 pub(crate) mod traces;
 mod sweep_triangle;
 mod front;
+mod swept_area;
 pub(crate) mod pieces;
 mod copies;
 mod surface;
@@ -49,9 +50,9 @@ mod cut_mesh;
 mod incision_mark;
 mod solid;
 
-pub use blade::{BladeSweep, CutError, CutReport, NewCopy};
+pub use blade::{BladeSweep, CutError, CutLimits, CutReport, MAX_SEGMENTS, NewCopy, Work};
 pub use components::Components;
-pub use cut_mesh::CutMesh;
+pub use cut_mesh::{CutMesh, SweepUnderWay};
 pub(crate) use front::{Front, Surroundings, sweep_triangles};
 pub use incision_mark::{IncisionMark, MarkPoint};
 pub use pending::PendingFace;
@@ -59,6 +60,7 @@ pub use pieces::Piece;
 pub use solid::Solid;
 pub use surface::{Surface, SurfaceVertex};
 pub(crate) use sweep_triangle::SweepTriangle;
+pub use swept_area::swept_area;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

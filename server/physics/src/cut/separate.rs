@@ -71,6 +71,8 @@ pub struct Sheet<'a> {
     pub traces: &'a mut Traces,
     /// The incision that is worked off.
     pub incision: u32,
+    /// Most fragments that the body may hold; edges that need more stay whole.
+    pub most_fragments: usize,
 }
 
 impl Sheet<'_> {
@@ -172,7 +174,8 @@ impl Separator {
             let more = || self.wedge.iter().filter(|&&w| fragments.element[w as usize] == e).count();
             usize::from(present) + self.wedge.len() > most && usize::from(present) + more() > most
         };
-        if self.wedge.iter().any(|&w| full(fragments.element[w as usize])) {
+        let room = fragments.tets.len() + self.wedge.len() <= sheet.most_fragments;
+        if !room || self.wedge.iter().any(|&w| full(fragments.element[w as usize])) {
             return false;
         }
         let m = fragments.vertices.len() as u32;

@@ -9,6 +9,10 @@ use robust::Coord3D;
 
 use super::traces::part_inside;
 
+/// Relative error that distances from a plane are allowed before a box counts as on one side of it: four
+/// orders above that of double precision.
+const ROUNDING: f64 = 1e-12;
+
 /// A triangle in the deformed configuration [m], with its bounds.
 #[derive(Clone, Copy, Debug)]
 pub struct SweepTriangle {
@@ -22,6 +26,10 @@ pub struct SweepTriangle {
     pub high: Vector3<f64>,
     /// Twice the area [m²].
     pub double_area: f64,
+    /// (q − p) × (r − p) [m²].
+    normal: Vector3<f64>,
+    /// |q − p| |r − p| [m²], the scale of rounding in `normal`.
+    scale: f64,
     /// Signs are exact; only a test of tests wants others.
     pub exact: bool,
 }
@@ -29,8 +37,11 @@ pub struct SweepTriangle {
 impl SweepTriangle {
     /// The triangle, unless it has no area.
     pub fn new(p: Vector3<f64>, q: Vector3<f64>, r: Vector3<f64>) -> Option<Self> {
-        let double_area = (q - p).cross(&(r - p)).norm();
+        let normal = (q - p).cross(&(r - p));
+        let double_area = normal.norm();
         (double_area > 0.0).then(|| Self {
+            normal,
+            scale: (q - p).norm() * (r - p).norm(),
             corners: [p, q, r],
             drawn: [p, q, r],
             low: p.inf(&q).inf(&r),
@@ -38,6 +49,11 @@ impl SweepTriangle {
             double_area,
             exact: true,
         })
+    }
+
+    /// The same triangle where the blade itself swept only a part of it.
+    pub fn with_drawn(self, drawn: [Vector3<f64>; 3]) -> Self {
+        Self { drawn, ..self }
     }
 
     /// Six times the signed volume spanned with `x`; its sign is exact.
@@ -84,6 +100,17 @@ impl SweepTriangle {
         (0..3).all(|k| self.low[k] <= high[k] && low[k] <= self.high[k])
     }
 
+    /// Whether the plane may pass through a box; false only where every point of the box is on one side,
+    /// whatever the rounding.
+    pub fn may_cross(&self, low: &Vector3<f64>, high: &Vector3<f64>) -> bool {
+        let half = (high - low) * 0.5;
+        let from = low + half - self.corners[0];
+        let distance = self.normal.dot(&from).abs();
+        let reach = self.normal.abs().dot(&half);
+        let rounding = ROUNDING * self.scale * (from.lp_norm(1) + half.lp_norm(1));
+        distance.partial_cmp(&(reach + rounding)) != Some(std::cmp::Ordering::Greater)
+    }
+
     fn orient(&self, p: &Vector3<f64>, q: &Vector3<f64>, r: &Vector3<f64>, x: &Vector3<f64>) -> f64 {
         if !self.exact {
             return -(q - p).cross(&(r - p)).dot(&(x - p));
@@ -108,6 +135,33 @@ mod tests {
             assert!(first.meets(&a, &b) && second.meets(&a, &b), "at {s}");
         }
         assert!(!first.meets(&Vector3::new(0.2, 0.8, -1.0), &Vector3::new(0.2, 0.8, 1.0)));
+    }
+
+    #[test]
+    fn a_box_that_may_not_cross_has_no_corner_on_the_other_side() {
+        let mut state = 7u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 40) as f64 / f64::from(1 << 24)
+        };
+        let mut point = |scale: f64| Vector3::new(random(), random(), random()) * scale;
+        let mut apart = 0;
+        for k in 0..20_000 {
+            let flat = if k % 4 == 0 { 1e-9 } else { 1.0 };
+            let p = point(1.0);
+            let Some(t) = SweepTriangle::new(p, p + point(1.0), p + point(flat)) else { continue };
+            let (a, b) = (point(1.0), point(0.2));
+            let (low, high) = (a, a + b);
+            if t.may_cross(&low, &high) {
+                continue;
+            }
+            apart += 1;
+            let corners =
+                (0..8).map(|c| Vector3::from_fn(|i, _| if c >> i & 1 == 0 { low[i] } else { high[i] }));
+            let sides: Vec<f64> = corners.map(|x| t.side(&x)).collect();
+            assert!(sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0), "{t:?} {sides:?}");
+        }
+        assert!(apart > 5_000, "{apart}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ mod planes;
 mod kinds;
 mod branches;
 mod growth;
+mod parts;
 mod random;
 mod refusals;
 
