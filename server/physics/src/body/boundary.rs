@@ -256,6 +256,11 @@ impl Body {
         }
     }
 
+    /// Load on every node [N], gravity not included.
+    pub fn loads(&self) -> &[Vector3<f64>] {
+        &self.load
+    }
+
     /// Removes all loads; gravity is not one of them.
     pub fn clear_loads(&mut self) {
         self.boundary.point_force.clear();

@@ -106,6 +106,11 @@ impl Fast {
         self.spin.follow(rest, mass, parts);
     }
 
+    /// The state before the last step.
+    pub fn before(&self) -> &State {
+        &self.before
+    }
+
     /// Advances by `dt_s`; a step that does not stay finite is taken back and tried again in smaller
     /// parts, then given up.
     pub fn step(
@@ -131,7 +136,14 @@ impl Fast {
                 Some(angle_rad) => Some(Notice::SpinLimited { angle_rad, largest_rad: LARGEST_TURN }),
                 None => gained.then_some(Notice::SpinDivided { substeps: report.substeps }),
             };
-            if self.try_step(team, state, &inputs, &mut report, spring_forces) {
+            let finite = self.try_step(team, state, &inputs, &mut report, spring_forces);
+            if team.told_to_stop() {
+                state.copy_from(&self.before);
+                spring_forces.clear();
+                spring_forces.resize(inputs.springs.len(), Vector3::zeros());
+                return SolveReport { outcome: Outcome::Interrupted, ..report };
+            }
+            if finite {
                 let (now, put_in) = if turns { free_energy(mesh, state, &inputs) } else { (0.0, 0.0) };
                 let (gain, work) = (now - start.0, put_in - start.1);
                 if gain - work <= GAIN * (start.0 + work.abs()) || halvings == MOST_SPIN_HALVINGS {
@@ -162,7 +174,7 @@ impl Fast {
         report: &mut SolveReport,
         spring_forces: &mut Vec<Vector3<f64>>,
     ) -> bool {
-        report.residual = 0.0;
+        (report.residual, report.algebraic_error) = (0.0, 0.0);
         for _ in 0..report.substeps {
             let Self { elastic, integrator, mass_f32, .. } = self;
             let inputs = StepInputs { mass_f32, ..*inputs };
@@ -172,10 +184,15 @@ impl Fast {
             report.iterations += solve.iterations;
             report.residual = report.residual.max(solve.residual);
             report.stop = solve.stop;
+            // δ minimises an energy times h², so that its norm is √J times h.
+            report.algebraic_error = report.algebraic_error.max(solve.algebraic_error / inputs.h);
             report.inverted_pieces = inverted_pieces;
             report.refused_springs = refused_springs;
             if !finite {
                 return false;
+            }
+            if team.told_to_stop() {
+                break;
             }
         }
         true

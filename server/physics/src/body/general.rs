@@ -35,10 +35,14 @@ impl General {
         material: &Material,
         settings: &BodySettings,
     ) -> Result<Self, BodyError> {
-        let model = shape.model(mesh, material, settings.volumetric)?;
+        let mut model = shape.model(mesh, material, settings.volumetric)?;
+        if settings.scheme.is_explicit() {
+            model.share_mass_evenly();
+        }
         let with = DynamicsSettings {
             scheme: settings.scheme,
             mass: settings.mass,
+            linearised: settings.is_linearised(material.law),
             newton: settings.newton(material.law),
             relaxation: settings.relaxation_iterations(),
             ..DynamicsSettings::default()
@@ -68,6 +72,11 @@ impl General {
         spring_forces: &mut Vec<Vector3<f64>>,
     ) -> SolveReport {
         report_of(&self.dynamics.step(team, state, inputs, spring_forces))
+    }
+
+    /// The state before the last step that advanced.
+    pub fn before(&self) -> &State {
+        self.dynamics.before()
     }
 
     /// Moves `x` to equilibrium under `load` [N] and `gravity` [m/s²].
@@ -103,6 +112,7 @@ fn report_of(report: &DynamicsReport) -> SolveReport {
             DynamicsOutcome::Advanced => Outcome::Advanced,
             DynamicsOutcome::Held => Outcome::Held,
             DynamicsOutcome::Refused => Outcome::Refused,
+            DynamicsOutcome::Interrupted => Outcome::Interrupted,
         },
         substeps: report.substeps,
         inverted_pieces: report.inverted,
@@ -110,6 +120,7 @@ fn report_of(report: &DynamicsReport) -> SolveReport {
         newton_steps: report.newton.steps,
         backtracks: report.newton.backtracks,
         algebraic_error: report.newton.algebraic_error,
+        tolerance: 0.0, // a setting of the body
         notice: report.notice,
     }
 }

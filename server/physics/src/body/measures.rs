@@ -167,11 +167,13 @@ impl Body {
     }
 
     /// Sum of the forces [N] that hold the prescribed directions of `nodes` against elasticity,
-    /// gravity [m/s²] and loads (without the inertia of the nodes themselves).
+    /// gravity [m/s²] and loads (without the inertia of the nodes themselves). Where a cut passes exactly
+    /// through a held node every lip has it and is held: all of its copies count.
     pub fn reaction(&self, nodes: &[u32], gravity: Vector3<f64>) -> Vector3<f64> {
         let f_int = self.internal_forces();
         let mut sum = Vector3::zeros();
-        for fixed in self.fixed.iter().filter(|f| nodes.contains(&f.copy)) {
+        let node_of = |copy: u32| self.cut_mesh.copy_node().get(copy as usize).copied().unwrap_or(copy);
+        for fixed in self.fixed.iter().filter(|f| nodes.contains(&node_of(f.copy))) {
             let c = fixed.copy as usize;
             let held = f_int[c] - self.weight(c, gravity) - self.load[c];
             for axis in (0..3).filter(|&axis| fixed.axes[axis]) {

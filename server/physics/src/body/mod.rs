@@ -7,10 +7,14 @@ mod error;
 mod fast;
 mod general;
 mod measures;
+mod precision;
+mod range;
 mod settings;
 mod shape;
+mod sleep;
 mod snapping;
 mod statics;
+mod undo;
 
 #[doc(hidden)]
 pub use ablation::Ablation;
@@ -20,6 +24,10 @@ pub use measures::StiffMotions;
 pub use settings::{Arithmetic, BodySettings};
 pub use snapping::{CuttingMethod, LooseRule};
 pub use statics::{StaticReport, StaticSettings};
+pub use undo::BodyTopology;
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
@@ -28,7 +36,7 @@ use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::element::Simd;
 use crate::integrator::{DynamicsInputs, LooseParts, Reunion, State, StepInputs};
 pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
-use crate::material::Material;
+use crate::material::{Material, Rayleigh};
 use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
@@ -38,8 +46,11 @@ use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};
 use crate::team::Team;
 use boundary::Boundary;
+use cutting::CutUnderWay;
 use fast::Fast;
 use general::General;
+use precision::too_flat_for_single;
+use range::{Beyond, Range};
 use shape::Shape;
 use snapping::SnapState;
 
@@ -51,6 +62,8 @@ pub struct SolveReport {
     /// √(rᵀM⁻¹r) relative to the right-hand side, worst part of the step; of Newton's method, where the
     /// step is nonlinear.
     pub residual: f64,
+    /// What `residual` has to reach; 0 where nothing is solved for, as in explicit integrators.
+    pub tolerance: f64,
     /// Why the solver stopped last.
     pub stop: StopReason,
     /// What became of the step.
@@ -72,16 +85,46 @@ pub struct SolveReport {
     pub notice: Option<Notice>,
 }
 
+impl SolveReport {
+    /// Whether the body advanced by a step whose residual is above its tolerance. It means the same on
+    /// every path: √(rᵀM⁻¹r) over that of the loads, after the linear solve where a step is one by
+    /// design, and after Newton's method otherwise.
+    pub fn is_unconverged(&self) -> bool {
+        self.outcome == Outcome::Advanced && self.tolerance > 0.0 && self.residual > self.tolerance
+    }
+
+    /// Whether the step failed as a whole and was made in parts. An explicit integrator's own
+    /// sub-steps do not count.
+    pub fn is_divided(&self) -> bool {
+        let planned = matches!(self.notice, Some(Notice::Divided { .. }));
+        self.outcome == Outcome::Advanced && self.substeps > 1 && !planned
+    }
+}
+
 /// What became of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Outcome {
     /// The body advanced by the whole step.
     #[default]
     Advanced,
-    /// No subdivision stayed finite: the body is where it was, and at rest.
+    /// No subdivision stayed finite, or a part was drawn out of any sensible range (the notice says which):
+    /// the body is where it was, and at rest.
     Held,
+    /// The stop flag was raised: the body is as it was before the step.
+    Interrupted,
     /// The step length or the gravity is not usable; nothing was changed.
     Refused,
+}
+
+/// Constants of the material that may change while a body moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constants {
+    /// Young's modulus E [Pa].
+    pub young_pa: f64,
+    /// Poisson's ratio ν.
+    pub poisson: f64,
+    /// Damping D = α M + β K̂.
+    pub rayleigh: Rayleigh,
 }
 
 /// A deformable, cuttable body.
@@ -97,15 +140,21 @@ pub struct Body {
     state: State,
     boundary: Boundary,
     fixed: Vec<FixedCopy>,
+    /// Copies of parts that were put to sleep, ascending; they are among `fixed` too.
+    asleep: Vec<FixedCopy>,
     load: Vec<Vector3<f64>>,
     mass: Vec<f64>,
+    /// The copy that every copy was split from, itself where it was there from the start.
+    split_from: Vec<u32>,
     parts: LooseParts,
     reunion: Reunion,
+    range: Range,
     path: Path,
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
     /// Of a body that is cut along its faces.
     snap: Option<Box<SnapState>>,
+    under_way: Option<CutUnderWay>,
 }
 
 /// How a step is computed.
@@ -156,6 +205,13 @@ impl Body {
     ) -> Result<Self, BodyError> {
         material.check()?;
         settings.check(material.law)?;
+        let mut settings = settings;
+        if settings.arithmetic.is_none()
+            && settings.arithmetic(material.law) == Arithmetic::Single
+            && too_flat_for_single(cut_mesh.mesh())
+        {
+            settings.arithmetic = Some(Arithmetic::Mixed);
+        }
         let mut cut_mesh = cut_mesh;
         cut_mesh.set_exact(!settings.ablation.exact_predicates);
         let path = if settings.arithmetic(material.law) == Arithmetic::Single {
@@ -173,12 +229,16 @@ impl Body {
             state: State::default(),
             boundary: Boundary::default(),
             fixed: Vec::new(),
+            asleep: Vec::new(),
             load: Vec::new(),
             mass: Vec::new(),
+            split_from: Vec::new(),
             parts: LooseParts::default(),
             reunion: Reunion::with_room(cut_mesh.n_copies()),
+            range: Range::default(),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
+            under_way: None,
             skin: None,
             cut_mesh,
             shape,
@@ -194,7 +254,8 @@ impl Body {
     /// Advances by `dt_s` under gravity [m/s²], loads, constraints and springs.
     ///
     /// The state stays finite whatever happens: a step that does not is taken back and tried again
-    /// in smaller parts, then given up and reported.
+    /// in smaller parts, then given up and reported. So is a step that draws a part of the body out to many
+    /// times its size.
     pub fn step(&mut self, dt_s: f64, gravity: Vector3<f64>, springs: &[PointSpring]) -> SolveReport {
         let usable = dt_s > 0.0 && dt_s.is_finite() && gravity.iter().all(|g| g.abs() < 1e12);
         if !usable {
@@ -202,8 +263,22 @@ impl Body {
             self.spring_forces.resize(springs.len(), Vector3::zeros());
             return SolveReport { outcome: Outcome::Refused, ..SolveReport::default() };
         }
+        let mut report = self.advance(dt_s, gravity, springs);
+        if let Some(Notice::Pivot { displacement }) = &mut report.notice {
+            let (copy, axis) = (*displacement / 3, *displacement % 3);
+            let node = self.cut_mesh.copy_node().get(copy as usize).copied().unwrap_or(copy);
+            *displacement = 3 * node + axis;
+        }
+        if report.outcome == Outcome::Advanced {
+            self.hold_within_range(&mut report);
+        }
+        report
+    }
+
+    /// Makes the step on the path of this body.
+    fn advance(&mut self, dt_s: f64, gravity: Vector3<f64>, springs: &[PointSpring]) -> SolveReport {
         let Self { cut_mesh, team, state, spring_forces, load, fixed, mass, parts, .. } = self;
-        match &mut self.path {
+        let report = match &mut self.path {
             Path::Fast(fast) => {
                 let inputs = StepInputs {
                     h: dt_s,
@@ -223,7 +298,35 @@ impl Body {
                 let inputs = DynamicsInputs { h: dt_s, gravity, load, fixed, springs };
                 general.step(team, state, &inputs, spring_forces)
             }
+        };
+        let solves = !self.settings.scheme.is_explicit();
+        let tolerance = if solves { self.settings.solver.tolerance } else { 0.0 };
+        SolveReport { tolerance, ..report }
+    }
+
+    /// Takes a step back that drew a part of the body out of any sensible range.
+    fn hold_within_range(&mut self, report: &mut SolveReport) {
+        let before = match &self.path {
+            Path::Fast(fast) => fast.before(),
+            Path::General(general) => general.before(),
+        };
+        let Some(Beyond { stretch, size_m }) = self.range.beyond(&before.x, &self.state.x, &self.parts)
+        else {
+            return;
+        };
+        self.state.x.copy_from_slice(&before.x);
+        self.state.v.fill(Vector3::zeros());
+        self.spring_forces.fill(Vector3::zeros());
+        if let Path::General(general) = &mut self.path {
+            general.dynamics.restart();
         }
+        report.outcome = Outcome::Held;
+        report.notice = Some(Notice::OutOfRange { stretch, size_m });
+    }
+
+    /// Steps and static solves under way end as soon as `flag` is raised; the body then stays as it was.
+    pub fn set_stop_flag(&mut self, flag: Arc<AtomicBool>) {
+        self.team.set_stop_flag(flag);
     }
 
     /// Force on the body [N] of every spring of the last step, in its order, from the same solve.
@@ -239,6 +342,19 @@ impl Body {
     /// Finite elements of the uncut body.
     pub fn n_elements(&self) -> usize {
         self.shape.n_elements(self.cut_mesh.mesh())
+    }
+
+    /// Pieces that cuts made of the elements; as many as elements in a body that cannot be cut.
+    pub fn n_pieces(&self) -> usize {
+        match self.shape.kind() {
+            ElementKind::Tet4 => self.cut_mesh.pieces().len(),
+            _ => self.n_elements(),
+        }
+    }
+
+    /// Nodes of the uncut body, with those that quadratic elements add.
+    pub fn n_nodes(&self) -> usize {
+        self.rest.len() + self.cut_mesh.mesh().nodes.len() - self.cut_mesh.n_copies()
     }
 
     /// Rest position of every node [m]: copies, then the nodes that quadratic elements add.
@@ -340,6 +456,26 @@ impl Body {
         Ok(())
     }
 
+    /// Changes elastic constants and damping, from the next step on. Positions and velocities stay;
+    /// constants that are what they were change nothing.
+    ///
+    /// # Errors
+    /// A constant outside its range ([`Material::check`]); the body is then as it was.
+    pub fn set_constants(&mut self, constants: Constants) -> Result<(), BodyError> {
+        let Constants { young_pa, poisson, rayleigh } = constants;
+        let material = Material { young_pa, poisson, rayleigh, ..self.material };
+        material.check()?;
+        if material == self.material {
+            return Ok(());
+        }
+        self.material = material;
+        // The fast path is given its constants with every step.
+        if let Path::General(general) = &mut self.path {
+            general.dynamics.set_material(material);
+        }
+        Ok(())
+    }
+
     /// Chooses how the stiffness is applied from the next step on; results agree to single precision.
     /// [`OperatorChoice::Auto`] is what costs less. Says `false` where this body's elements, law or integrator take the general path, which always
     /// assembles.
@@ -376,8 +512,11 @@ impl Body {
         Ok(())
     }
 
-    /// Back to the start: uncut, undeformed, at rest. Constraints and loads stay; the epoch rises.
+    /// Back to the start: uncut, undeformed, at rest. Constraints and loads stay; the epoch rises. A cut
+    /// that is being made is forgotten.
     pub fn reset(&mut self) -> Result<(), BodyError> {
+        self.asleep.clear();
+        self.under_way = None;
         if self.snap.is_some() {
             return self.snap_reset();
         }
@@ -396,6 +535,7 @@ impl Body {
 
     fn return_to_rest(&mut self) {
         refill(&mut self.rest, self.shape.rest_positions(&self.cut_mesh).into_iter());
+        refill(&mut self.split_from, 0..self.cut_mesh.n_copies() as u32);
         refill(&mut self.state.x, self.rest.iter().copied());
         self.state.v.fill(Vector3::zeros());
         resize_with_room(&mut self.state.v, self.rest.len(), Vector3::zeros());

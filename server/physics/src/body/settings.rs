@@ -13,7 +13,8 @@ pub struct BodySettings {
     /// When the solver of a step stops: of one linear solve on the fast path, of Newton's method and
     /// of each of its linear solves on the general one.
     pub solver: PcgSettings,
-    /// Number of threads that work on a step, the caller's included; at least 1, at most 64.
+    /// Number of threads that work on a step, the caller's included; at least 1, at most
+    /// [`MOST_THREADS`](Self::MOST_THREADS).
     pub threads: usize,
     /// Use only instructions that every machine has, for the same bits everywhere.
     pub portable: bool,
@@ -32,7 +33,8 @@ pub struct BodySettings {
     pub relaxation: bool,
     /// How the fast path applies the stiffness; what costs less with [`OperatorChoice::Auto`].
     pub operator: OperatorChoice,
-    /// Arithmetic; `None`: the fastest that the other settings allow.
+    /// Arithmetic; `None`: the fastest that the other settings allow, and mixed where most elements are too flat
+    /// for single precision.
     pub arithmetic: Option<Arithmetic>,
     /// Most Newton steps per step of time; `None`: as many as law and scheme call for.
     pub newton_steps: Option<u32>,
@@ -88,6 +90,9 @@ impl Default for BodySettings {
 }
 
 impl BodySettings {
+    /// Most threads that may work on a step.
+    pub const MOST_THREADS: usize = 64;
+
     /// What keeps a body of this law from the fast path; `None` if nothing does.
     ///
     /// The fast path is single precision, matrix-free, with one linear solve per step.
@@ -133,6 +138,15 @@ impl BodySettings {
         })
     }
 
+    /// Whether a step is a fixed number of linear solves by design, so that it has converged when the
+    /// last of them has: motion of laws that are linear in the stretch, unless more Newton steps than
+    /// one are asked for. Everything else has converged when Newton's method has.
+    pub fn is_linearised(&self, law: Law) -> bool {
+        let easy = matches!(law, Law::Linear | Law::Corotational) && self.newton_steps.is_none();
+        let implicit = !self.scheme.is_explicit() && self.scheme != Scheme::Static;
+        implicit && (easy || self.newton_steps == Some(1))
+    }
+
     /// Newton's method of the general path.
     pub(super) fn newton(&self, law: Law) -> NewtonSettings {
         let steps = self.newton_steps(law);
@@ -173,7 +187,7 @@ impl BodySettings {
     /// Tells whether every setting is in its range and goes with the others and `law`.
     pub fn check(&self, law: Law) -> Result<(), BodyError> {
         let setting = |name, found: f64, allowed| Err(BodyError::Setting { name, found, allowed });
-        if !(1..=64).contains(&self.threads) {
+        if !(1..=Self::MOST_THREADS).contains(&self.threads) {
             return setting("threads", self.threads as f64, "1 … 64");
         }
         if !(1..=1_000_000).contains(&self.solver.iterations) {
@@ -183,7 +197,7 @@ impl BodySettings {
             return setting("solver.tolerance", self.solver.tolerance, "0 ≤ tolerance < 1");
         }
         if self.newton_steps.is_some_and(|steps| !(1..=10_000).contains(&steps)) {
-            return setting("newton_steps", self.newton_steps.map_or(0.0, f64::from), "1 … 10 000");
+            return setting("solver.newton_steps", self.newton_steps.map_or(0.0, f64::from), "1 … 10 000");
         }
         let refused = |what, with, instead| Err(BodyError::Combination { what, with, instead });
         match (self.cutting, self.element, self.loose) {

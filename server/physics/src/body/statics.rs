@@ -95,7 +95,7 @@ impl Body {
         loop {
             report.residual = if reference > 0.0 { norm(&newton.residual) / reference } else { 0.0 };
             report.converged = report.residual <= settings.tolerance;
-            if report.converged || report.newton_steps == settings.newton_steps {
+            if report.converged || report.newton_steps == settings.newton_steps || self.team.told_to_stop() {
                 return Ok(report);
             }
             let (direction, iterations) = self.static_direction(&newton.residual, &mut pcg, settings.linear);

@@ -134,6 +134,11 @@ impl Skin {
         }
     }
 
+    /// Follows a body that takes up an earlier state, in which this skin was its own.
+    pub(crate) fn set_epoch(&mut self, epoch: u32) {
+        self.epoch = epoch;
+    }
+
     /// Forgets the surface and sews it from nothing.
     fn sew_anew(&mut self, cut: &CutMesh) {
         self.seams = Seams::default();

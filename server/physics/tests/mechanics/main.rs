@@ -11,8 +11,10 @@ mod dynamics;
 mod reference;
 mod repeated_solves;
 mod robustness;
+mod sensible;
 mod snapping;
 mod springs;
+mod verdicts;
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, PcgSettings};

@@ -1,0 +1,61 @@
+//! Parts that are put to sleep: they stay where they are and cost the solver nothing.
+//!
+//! A part that a cut has freed falls for ever. Far from everything it touches nothing any more, but its
+//! speed still grows, and with it the range of numbers that a step has to hold.
+
+use nalgebra::Vector3;
+
+use super::Body;
+use crate::operator::FixedCopy;
+
+impl Body {
+    /// Puts a part that hangs on nothing to sleep: every copy of it is held where it is, at rest, until
+    /// [`reset`](Self::reset), or until a cut along faces numbers the nodes anew. The epoch rises. Returns
+    /// whether the part was free.
+    pub fn put_to_sleep(&mut self, part: usize) -> bool {
+        if !self.parts.free.get(part).copied().unwrap_or(false) {
+            return false;
+        }
+        for (copy, _) in (0u32..).zip(&self.parts.of_copy).filter(|(_, of)| **of as usize == part) {
+            let position_m = self.state.x[copy as usize].into();
+            self.asleep.push(FixedCopy { copy, axes: [true; 3], position_m });
+            self.state.v[copy as usize] = Vector3::zeros();
+        }
+        self.asleep.sort_unstable_by_key(|held| held.copy);
+        self.cut_mesh.raise_epoch();
+        self.follow_boundary();
+        true
+    }
+
+    /// Whether a copy belongs to a part that sleeps.
+    pub fn is_asleep(&self, copy: u32) -> bool {
+        self.asleep.binary_search_by_key(&copy, |held| held.copy).is_ok()
+    }
+
+    /// Whether any part sleeps.
+    pub fn sleeps(&self) -> bool {
+        !self.asleep.is_empty()
+    }
+
+    /// Mass centre [m] of every part, into `centres`.
+    pub fn part_centres(&self, centres: &mut Vec<Vector3<f64>>) {
+        centres.clear();
+        centres.resize(self.parts.len(), Vector3::zeros());
+        for ((&part, m), x) in self.parts.of_copy.iter().zip(&self.mass).zip(&self.state.x) {
+            centres[part as usize] += *m * x;
+        }
+        for (centre, mass) in centres.iter_mut().zip(&self.parts.mass) {
+            *centre /= mass.max(f64::MIN_POSITIVE);
+        }
+    }
+
+    /// The copies that constraints and sleep hold.
+    pub(super) fn find_fixed(&mut self) {
+        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, &mut self.fixed);
+        if !self.asleep.is_empty() {
+            self.fixed.extend_from_slice(&self.asleep);
+            self.fixed.sort_by_key(|held| held.copy);
+            self.fixed.dedup_by_key(|held| held.copy);
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Taking a cut back: the topology from before it, with the present motion.
+//!
+//! What a cut separated comes together again where its parts are now: a node takes the mean position
+//! and velocity of what it was split into, weighted by mass, so that the centre of mass and the momentum
+//! stay. The tissue is then stretched across the closed wound and pulls itself together.
+//!
+//! A part that the cut had set free may have fallen far away. It goes back to where it was, at rest.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::boundary::Boundary;
+use super::snapping::SnapState;
+use super::{Body, BodyError, Path};
+use crate::cut::CutMesh;
+use crate::mesh::TetMesh;
+use crate::skin::Skin;
+
+/// The topology of a body at some time: mesh, pieces, copies and skin, without positions.
+#[derive(Clone, Debug)]
+pub struct BodyTopology {
+    cut_mesh: CutMesh,
+    skin: Option<Skin>,
+    boundary: Boundary,
+    snap: Option<Box<SnapState>>,
+    x: Vec<Vector3<f64>>,
+    /// Whether all of it was held, so that free parts are the work of cuts since then.
+    held: bool,
+}
+
+/// Bytes per element, surface triangle and skin triangle, measured on the demonstration's organ and
+/// rounded up.
+const ELEMENT_BYTES: usize = 2000;
+const TRIANGLE_BYTES: usize = 400;
+
+impl BodyTopology {
+    /// Memory that it takes, within a factor of about two.
+    pub fn bytes(&self) -> usize {
+        let skin = self.skin.as_ref().map_or(0, |skin| skin.surface().triangles.len());
+        ELEMENT_BYTES * self.cut_mesh.pieces().len()
+            + TRIANGLE_BYTES * (skin + self.cut_mesh.surface().triangles.len())
+    }
+}
+
+impl Body {
+    /// The present topology, for [`restore`](Self::restore).
+    pub fn topology(&self) -> BodyTopology {
+        BodyTopology {
+            cut_mesh: self.cut_mesh.clone(),
+            skin: self.skin.clone(),
+            boundary: self.boundary.clone(),
+            snap: self.snap.clone(),
+            x: self.state.x.clone(),
+            held: !self.parts.any_free(),
+        }
+    }
+
+    /// Takes back every cut since `topology` was taken from this body; the epoch rises. Mass stays, and
+    /// momentum and centre of mass but for parts that were cut off.
+    ///
+    /// # Errors
+    /// Where the model cannot be built again.
+    pub fn restore(&mut self, topology: BodyTopology) -> Result<(), BodyError> {
+        let epoch = self.cut_mesh.epoch() + 1;
+        let before = Moving::of(self, topology.held);
+        let BodyTopology { cut_mesh, skin, boundary, snap, x, .. } = topology;
+        let state = match &snap {
+            Some(_) => before.on_mesh(cut_mesh.mesh(), &x),
+            None => before.joined(&x, &self.split_from),
+        };
+        (self.cut_mesh, self.skin, self.snap) = (cut_mesh, skin, snap);
+        self.cut_mesh.set_epoch(epoch);
+        if let Some(skin) = &mut self.skin {
+            skin.set_epoch(epoch);
+        }
+        self.boundary = boundary;
+        self.asleep.clear();
+        self.split_from.truncate(self.cut_mesh.n_copies());
+        (self.state.x, self.state.v) = state;
+        match &mut self.path {
+            Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
+            Path::General(_) => self.rebuild_general()?,
+        }
+        self.spring_forces.clear();
+        self.follow_topology();
+        if !before.lost.contains(&true) {
+            before.give_momentum_to(self);
+        }
+        Ok(())
+    }
+}
+
+/// Positions [m] and velocities [m/s] of nodes.
+type Motion = (Vec<Vector3<f64>>, Vec<Vector3<f64>>);
+
+/// Σ m [kg], Σ m x and Σ m v.
+type Sum = (f64, Vector3<f64>, Vector3<f64>);
+
+fn mean((mass, mx, mv): &Sum) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    (*mass > 0.0).then(|| (mx / *mass, mv / *mass))
+}
+
+/// How a body moved before it was changed.
+struct Moving {
+    mesh: TetMesh,
+    x: Vec<Vector3<f64>>,
+    v: Vec<Vector3<f64>>,
+    mass: Vec<f64>,
+    /// Copies of parts that were cut off.
+    lost: Vec<bool>,
+    mass_times_x: Vector3<f64>,
+    momentum: Vector3<f64>,
+}
+
+impl Moving {
+    /// `held`: free parts are the work of cuts.
+    fn of(body: &Body, held: bool) -> Self {
+        let free = |&part: &u32| held && body.parts.free[part as usize];
+        // Only a mesh that cuts have changed is looked at again.
+        let mesh = if body.snap.is_some() { body.cut_mesh.mesh().clone() } else { TetMesh::default() };
+        Self {
+            mesh,
+            x: body.state.x.clone(),
+            v: body.state.v.clone(),
+            mass: body.mass.clone(),
+            lost: body
+                .parts
+                .of_copy
+                .iter()
+                .enumerate()
+                .map(|(c, part)| free(part) || body.is_asleep(c as u32))
+                .collect(),
+            mass_times_x: body.centre_of_mass() * body.total_mass(),
+            momentum: body.momentum(),
+        }
+    }
+
+    /// The first copies with all that was split from them, told by the parents of copies; where nothing is
+    /// left of one, `x` [m].
+    fn joined(&self, x: &[Vector3<f64>], split_from: &[u32]) -> Motion {
+        let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); x.len()];
+        for copy in (0..self.x.len()).filter(|&copy| !self.lost[copy]) {
+            let mut root = copy;
+            while root >= x.len() {
+                root = split_from[root] as usize;
+            }
+            self.add(copy, &mut sums[root]);
+        }
+        sums.iter().zip(x).map(|(sum, x)| mean(sum).unwrap_or((*x, Vector3::zeros()))).unzip()
+    }
+
+    /// The motion of the material points that are the nodes of `mesh`, another mesh of the same body: of
+    /// the nodes that lie there, else of the element around. Where a part was cut off, `x` [m].
+    fn on_mesh(&self, mesh: &TetMesh, x: &[Vector3<f64>]) -> Motion {
+        let key = |point: &Vector3<f64>| [point.x, point.y, point.z].map(|c| (c + 0.0).to_bits());
+        let mut there: BTreeMap<[u64; 3], Sum> = BTreeMap::new();
+        for node in (0..self.x.len()).filter(|&node| !self.lost[node]) {
+            self.add(node, there.entry(key(&self.mesh.nodes[node])).or_default());
+        }
+        let whole = !self.lost.contains(&true);
+        let motion = mesh.nodes.iter().zip(x).map(|(point, x)| {
+            let known = there.get(&key(point)).and_then(mean);
+            known.unwrap_or_else(|| if whole { self.within(point) } else { (*x, Vector3::zeros()) })
+        });
+        motion.unzip()
+    }
+
+    fn add(&self, copy: usize, (mass, mx, mv): &mut Sum) {
+        let m = self.mass[copy];
+        (*mass, *mx, *mv) = (*mass + m, *mx + m * self.x[copy], *mv + m * self.v[copy]);
+    }
+
+    /// Position and velocity of the material point that rests at `point` [m].
+    fn within(&self, point: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let mut best = (f64::NEG_INFINITY, [0.25; 4], [0; 4]);
+        for e in 0..self.mesh.tets.len() {
+            let corners = self.mesh.corners(e);
+            let centre = corners.iter().sum::<Vector3<f64>>() / 4.0;
+            let weights = self.mesh.gradients(e).map(|g| 0.25 + g.dot(&(point - centre)));
+            let depth = weights.into_iter().fold(f64::INFINITY, f64::min);
+            if depth > best.0 {
+                best = (depth, weights, self.mesh.tets[e]);
+            }
+        }
+        let (_, weights, nodes) = best;
+        let sample = |values: &[Vector3<f64>]| -> Vector3<f64> {
+            nodes.iter().zip(weights).map(|(&n, w)| w * values[n as usize]).sum()
+        };
+        (sample(&self.x), sample(&self.v))
+    }
+
+    /// Moves free nodes together so that momentum and centre of mass are what they were, but for what the
+    /// held ones put in.
+    fn give_momentum_to(&self, body: &mut Body) {
+        let held: Vec<u32> = body.fixed.iter().map(|fixed| fixed.copy).collect();
+        let free = |c: usize| held.binary_search(&(c as u32)).is_err();
+        let mass: f64 = (0..body.mass.len()).filter(|&c| free(c)).map(|c| body.mass[c]).sum();
+        if mass <= 0.0 {
+            return;
+        }
+        let shift = (self.mass_times_x - body.centre_of_mass() * body.total_mass()) / mass;
+        let push = (self.momentum - body.momentum()) / mass;
+        for c in (0..body.mass.len()).filter(|&c| free(c)) {
+            body.state.x[c] += shift;
+            body.state.v[c] += push;
+        }
+    }
+}
