@@ -152,6 +152,20 @@ pub enum MeshInError {
         /// Most.
         max: usize,
     },
+    /// The mesh would take more memory than there is.
+    #[error(
+        "'{file}': {cells} cells across make about {needs} may be used here. Use cells = {largest} at most"
+    )]
+    Memory {
+        /// File name.
+        file: String,
+        /// Lattice cells across the longest side.
+        cells: usize,
+        /// Tetrahedra, memory needed and memory that there is, in words.
+        needs: String,
+        /// The most cells that fit.
+        largest: usize,
+    },
     /// A scale factor that is not a positive number.
     #[error("'{file}': scale = {scale} is not a positive finite number; use e.g. 0.001 for millimetres")]
     Scale {

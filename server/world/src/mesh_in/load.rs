@@ -6,8 +6,10 @@ use std::path::Path;
 use scindo_physics::mesh::TetMesh;
 use serde::Serialize;
 
+use crate::scene::coordinates;
+
 use super::{
-    LatticeReport, MeshFile, MeshInError, VolumeHealth, lattice_from_surface, read_mesh, repair_volume,
+    LatticeReport, MeshFile, MeshInError, Observer, VolumeHealth, lattice_observed, read_mesh, repair_volume,
 };
 
 /// What was found in a mesh file and what was done about it. Prints as a few lines of text.
@@ -21,9 +23,10 @@ pub enum MeshHealth {
 }
 
 /// Reads a volumetric mesh (`mesh = { file = … }`) and repairs it; `scale` turns its unit into metres.
-pub fn load_volume(path: &Path, scale: f64) -> Result<(TetMesh, VolumeHealth), MeshInError> {
+/// `weld` joins nodes at the same place.
+pub fn load_volume(path: &Path, scale: f64, weld: bool) -> Result<(TetMesh, VolumeHealth), MeshInError> {
     match read_mesh(path)? {
-        MeshFile::Volume(volume) => repair_volume(&volume, scale),
+        MeshFile::Volume(volume) => repair_volume(&volume, scale, weld),
         MeshFile::Surface(surface) => Err(MeshInError::WrongKind {
             file: surface.file,
             found: "a surface without tetrahedra",
@@ -34,9 +37,14 @@ pub fn load_volume(path: &Path, scale: f64) -> Result<(TetMesh, VolumeHealth), M
 }
 
 /// Reads a surface (`mesh = { surface = …, cells = … }`) and fills it with a lattice.
-pub fn load_surface(path: &Path, cells: usize, scale: f64) -> Result<(TetMesh, LatticeReport), MeshInError> {
+pub fn load_surface(
+    path: &Path,
+    cells: usize,
+    scale: f64,
+    observer: &Observer<'_>,
+) -> Result<(TetMesh, LatticeReport), MeshInError> {
     match read_mesh(path)? {
-        MeshFile::Surface(surface) => lattice_from_surface(&surface, cells, scale),
+        MeshFile::Surface(surface) => lattice_observed(&surface, cells, scale, observer),
         MeshFile::Volume(volume) => Err(MeshInError::WrongKind {
             file: volume.file,
             found: "tetrahedra",
@@ -47,12 +55,17 @@ pub fn load_surface(path: &Path, cells: usize, scale: f64) -> Result<(TetMesh, L
 }
 
 /// Reads either: tetrahedra are repaired, a surface is filled with `cells` cubes across.
-pub fn load_any(path: &Path, cells: usize, scale: f64) -> Result<(TetMesh, MeshHealth), MeshInError> {
+pub fn load_any(
+    path: &Path,
+    cells: usize,
+    scale: f64,
+    observer: &Observer<'_>,
+) -> Result<(TetMesh, MeshHealth), MeshInError> {
     match read_mesh(path)? {
         MeshFile::Volume(volume) => {
-            repair_volume(&volume, scale).map(|(mesh, health)| (mesh, MeshHealth::Volume(health)))
+            repair_volume(&volume, scale, true).map(|(mesh, health)| (mesh, MeshHealth::Volume(health)))
         }
-        MeshFile::Surface(surface) => lattice_from_surface(&surface, cells, scale)
+        MeshFile::Surface(surface) => lattice_observed(&surface, cells, scale, observer)
             .map(|(mesh, report)| (mesh, MeshHealth::Surface(report))),
     }
 }
@@ -62,6 +75,27 @@ impl fmt::Display for MeshHealth {
         match self {
             MeshHealth::Volume(health) => health.fmt(f),
             MeshHealth::Surface(report) => report.fmt(f),
+        }
+    }
+}
+
+impl MeshHealth {
+    /// Corners of the box around the file's points, in metres.
+    pub fn corners_m(&self) -> [[f64; 3]; 2] {
+        match self {
+            MeshHealth::Volume(health) => [health.min_m, health.max_m],
+            MeshHealth::Surface(report) => [report.surface.min_m, report.surface.max_m],
+        }
+    }
+
+    /// All parts but one were dropped.
+    pub(crate) fn keeps_one_part(&mut self) {
+        match self {
+            MeshHealth::Volume(health) => health.components = 1,
+            MeshHealth::Surface(report) => {
+                report.dropped_components += report.components - 1;
+                report.components = 1;
+            }
         }
     }
 }
@@ -76,6 +110,11 @@ fn size(min_m: &[f64; 3], max_m: &[f64; 3]) -> String {
         _ => ("mm", 1e3),
     };
     format!("{:.4} × {:.4} × {:.4} {unit}", side[0] * factor, side[1] * factor, side[2] * factor)
+}
+
+/// "from [0.0, 0.0, 0.0] to [0.1, 0.05, 0.05] m": where to place cuts and regions.
+fn corners(min_m: &[f64; 3], max_m: &[f64; 3]) -> String {
+    format!("from {} to {} m", coordinates(min_m), coordinates(max_m))
 }
 
 /// Writes "label: a, b, c" from the counts that are not zero.
@@ -94,6 +133,7 @@ impl fmt::Display for VolumeHealth {
             self.tets,
             size(&self.min_m, &self.max_m)
         )?;
+        writeln!(f, "{}", corners(&self.min_m, &self.max_m))?;
         counts(
             f,
             "repaired",
@@ -136,6 +176,7 @@ impl fmt::Display for LatticeReport {
             s.components,
             size(&s.min_m, &s.max_m)
         )?;
+        writeln!(f, "{}", corners(&s.min_m, &s.max_m))?;
         counts(
             f,
             "repaired",

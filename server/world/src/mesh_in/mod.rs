@@ -9,6 +9,7 @@ mod error;
 mod format;
 mod triangle_tree;
 mod health;
+mod estimate;
 mod lattice;
 pub(crate) mod implicit;
 mod load;
@@ -21,13 +22,36 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 pub use error::MeshInError;
+pub use estimate::{MeshEstimate, estimate, largest};
+pub(crate) use estimate::{body_bytes, memory_for_meshes};
 pub use format::read_mesh_bytes;
+pub(crate) use health::connectivity::components;
 pub use health::scale::{ScaleWarning, check_scale};
 pub use health::surface::SurfaceHealth;
 pub use health::volume::{VolumeHealth, repair_volume};
+pub(crate) use lattice::lattice_observed;
 pub use lattice::{CELLS, LatticeReport, lattice_from_surface};
 pub use load::{MeshHealth, load_any, load_surface, load_volume};
 pub use write::write_mesh;
+
+/// How far the making of a mesh has come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meshing {
+    /// What is done now.
+    pub stage: &'static str,
+    /// Share of the whole that is done, 0 to 1.
+    pub done: f64,
+    /// What it will take altogether.
+    pub estimate: MeshEstimate,
+}
+
+/// Hears how far the making of a mesh has come; from several threads.
+pub type Observer<'a> = dyn Fn(Meshing) + Sync + 'a;
+
+/// Most cells that may be asked for.
+pub(crate) fn most_cells() -> usize {
+    *CELLS.end()
+}
 
 /// Tetrahedra as a file gave them: not checked, not oriented.
 #[derive(Clone, Debug, PartialEq)]

@@ -52,6 +52,11 @@ impl TriangleTree {
         tree
     }
 
+    /// Corners of all triangles [m].
+    pub fn triangles(&self) -> &[[Vector3<f64>; 3]] {
+        &self.corners
+    }
+
     fn split(
         &mut self,
         node: usize,

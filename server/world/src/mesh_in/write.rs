@@ -6,7 +6,7 @@ use std::path::Path;
 use scindo_physics::mesh::TetMesh;
 
 use super::MeshInError;
-use crate::results::vtu::{CellBlock, Grid, save_vtu};
+use crate::results::vtu::{Cells, Grid, save_grid};
 
 /// Writes a mesh in the format of the extension: `.vtu`, `.vtk` (legacy, text) or `.msh` (Gmsh 2.2, text).
 pub fn write_mesh(path: &Path, mesh: &TetMesh) -> Result<(), MeshInError> {
@@ -14,15 +14,14 @@ pub fn write_mesh(path: &Path, mesh: &TetMesh) -> Result<(), MeshInError> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     match extension.as_str() {
         "vtu" => {
-            let cells = [CellBlock::Tets(&mesh.tets)];
             let grid = Grid {
                 points: &mesh.nodes,
-                cells: &cells,
+                cells: Cells::Tets(&mesh.tets),
                 point_fields: &[],
                 cell_fields: &[],
                 time_s: None,
             };
-            save_vtu(path, &grid).map_err(|e| fail(e.to_string()))
+            save_grid(path, &grid).map_err(|e| fail(e.to_string()))
         }
         "vtk" => std::fs::write(path, vtk_text(mesh)).map_err(|e| fail(e.to_string())),
         "msh" => std::fs::write(path, msh_text(mesh)).map_err(|e| fail(e.to_string())),
@@ -76,7 +75,7 @@ mod tests {
         for name in ["a.vtu", "a.vtk", "a.msh"] {
             let path = folder.path().join(name);
             write_mesh(&path, &mesh).unwrap();
-            let (back, health) = load_volume(&path, 1.0).unwrap();
+            let (back, health) = load_volume(&path, 1.0, true).unwrap();
             assert_eq!(back, mesh, "{name}");
             assert_eq!((health.flipped_tets, health.notes.len()), (0, 0));
         }

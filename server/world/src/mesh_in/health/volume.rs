@@ -49,18 +49,25 @@ pub struct VolumeHealth {
     pub notes: Vec<String>,
 }
 
-/// Turns a volume mesh from a file into one that can be simulated; `scale` turns its unit into metres.
-pub fn repair_volume(volume: &VolumeMesh, scale: f64) -> Result<(TetMesh, VolumeHealth), MeshInError> {
+/// Turns a volume mesh from a file into one that can be simulated; `scale` turns its unit into metres,
+/// `weld` joins nodes at the same place, which a mesh that was made with its cut has on purpose.
+pub fn repair_volume(
+    volume: &VolumeMesh,
+    scale: f64,
+    weld: bool,
+) -> Result<(TetMesh, VolumeHealth), MeshInError> {
     if !(scale.is_finite() && scale > 0.0) {
         return Err(MeshInError::Scale { file: volume.file.clone(), scale });
     }
     let mut health = VolumeHealth { notes: volume.notes.clone(), ..VolumeHealth::default() };
     let nodes: Vec<Vector3<f64>> = volume.nodes.iter().map(|x| x * scale).collect();
     let mut mesh = TetMesh { nodes, tets: volume.tets.clone() };
-    let [low, high] = mesh.bounds();
-    let (first_of, welded) = weld::coincident(&mesh.nodes, 1e-9 * (high - low).norm());
-    health.welded_nodes = welded;
-    mesh.tets.iter_mut().flatten().for_each(|n| *n = first_of[*n as usize]);
+    if weld {
+        let [low, high] = mesh.bounds();
+        let (first_of, welded) = weld::coincident(&mesh.nodes, 1e-9 * (high - low).norm());
+        health.welded_nodes = welded;
+        mesh.tets.iter_mut().flatten().for_each(|n| *n = first_of[*n as usize]);
+    }
 
     remove_useless(&mut mesh, &mut health);
     let (bad, total) = (health.degenerate_tets, volume.tets.len());
@@ -80,7 +87,7 @@ pub fn repair_volume(volume: &VolumeMesh, scale: f64) -> Result<(TetMesh, Volume
         }
     }
     // Merged nodes are unused now, too, but they were counted.
-    health.unused_nodes = mesh.drop_unused_nodes().saturating_sub(welded);
+    health.unused_nodes = mesh.drop_unused_nodes().saturating_sub(health.welded_nodes);
     measure(&mesh, &mut health);
     Ok((mesh, health))
 }
@@ -132,7 +139,7 @@ mod tests {
     #[test]
     fn a_good_mesh_is_untouched() {
         let volume = from_box();
-        let (mesh, health) = repair_volume(&volume, 1.0).unwrap();
+        let (mesh, health) = repair_volume(&volume, 1.0, true).unwrap();
         assert_eq!((mesh.nodes, mesh.tets), (volume.nodes, volume.tets));
         let counts = [health.flipped_tets, health.degenerate_tets, health.welded_nodes, health.unused_nodes];
         assert_eq!((counts, health.components, health.non_manifold_edges), ([0; 4], 1, 0));
@@ -152,11 +159,30 @@ mod tests {
         volume.nodes.push(volume.nodes[volume.tets[0][1] as usize]);
         volume.tets[0][1] = own;
         volume.nodes.extend([Vector3::repeat(3.0), Vector3::repeat(4.0)]);
-        let (mesh, health) = repair_volume(&volume, 0.01).unwrap();
+        let (mesh, health) = repair_volume(&volume, 0.01, true).unwrap();
         mesh.check().unwrap();
         assert_eq!((health.flipped_tets, health.duplicate_tets, health.degenerate_tets), (2, 1, 1));
         assert_eq!((health.welded_nodes, health.unused_nodes, health.components), (1, 2, 1));
         assert!((health.volume_m3 - 1e-6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_mesh_that_was_made_with_its_cut_keeps_it() {
+        let mut volume = from_box();
+        let n = volume.nodes.len() as u32;
+        let beyond = |x: &Vector3<f64>| x.x > 0.5 + 1e-9;
+        // What lies beyond x = 0.5 gets nodes of its own there.
+        let nodes = volume.nodes.clone();
+        volume.nodes.extend(nodes.iter());
+        for tet in &mut volume.tets {
+            if tet.iter().any(|&k| beyond(&nodes[k as usize])) {
+                tet.iter_mut().for_each(|k| *k += n);
+            }
+        }
+        let (_, apart) = repair_volume(&volume, 1.0, false).unwrap();
+        assert_eq!((apart.components, apart.welded_nodes), (2, 0));
+        let (_, joined) = repair_volume(&volume, 1.0, true).unwrap();
+        assert_eq!((joined.components, joined.welded_nodes), (1, n as usize));
     }
 
     #[test]
@@ -165,7 +191,7 @@ mod tests {
         for tet in volume.tets.iter_mut().step_by(10) {
             tet[3] = tet[0];
         }
-        let message = repair_volume(&volume, 1.0).unwrap_err().to_string();
+        let message = repair_volume(&volume, 1.0, true).unwrap_err().to_string();
         assert!(message.contains("box.msh") && message.contains("39 of 384 tetrahedra"), "{message}");
     }
 
@@ -182,7 +208,7 @@ mod tests {
         let shift = Vector3::new(1.0, 1.0, 0.0);
         volume.nodes.extend(mesh.nodes.iter().map(|x| x + shift));
         volume.tets.extend(mesh.tets.iter().map(|t| t.map(|n| n + first)));
-        let (_, health) = repair_volume(&volume, 1.0).unwrap();
+        let (_, health) = repair_volume(&volume, 1.0, true).unwrap();
         assert_eq!((health.components, health.welded_nodes, health.non_manifold_edges), (2, 2, 1));
     }
 }

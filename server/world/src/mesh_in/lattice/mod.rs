@@ -11,13 +11,16 @@
 mod bcc;
 mod stuffing;
 mod manifold;
+mod lost;
 
 use nalgebra::Vector3;
 use scindo_physics::mesh::TetMesh;
 use serde::Serialize;
 
+use super::estimate::{MeshEstimate, estimate, largest, memory_for_meshes};
 use super::health::surface::{CleanSurface, SurfaceHealth, clean_surface};
-use super::{MeshInError, SurfaceMesh};
+use super::{MeshInError, Meshing, Observer, SurfaceMesh};
+use crate::quantity::{digits, memory};
 use bcc::Bcc;
 
 /// Fewest and most lattice cubes across the longest side.
@@ -25,6 +28,10 @@ pub const CELLS: std::ops::RangeInclusive<usize> = 2..=256;
 
 /// Components smaller than this share of the volume are dropped (crumbs of thin parts).
 const CRUMB: f64 = 0.005;
+
+/// Shares of the time after which repair and measures begin.
+const REPAIR: f64 = 0.45;
+const MEASURES: f64 = 0.8;
 
 /// What came of a surface.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -63,6 +70,10 @@ pub struct LatticeReport {
     pub volume_m3: f64,
     /// (volume of the tetrahedra − volume of the surface) / volume of the surface.
     pub volume_error: f64,
+    /// Share of the surface that has no tetrahedron within a cell: thin parts that were lost.
+    pub lost_share: f64,
+    /// The point of the surface that is farthest from every tetrahedron, where a part was lost [m].
+    pub lost_near_m: [f64; 3],
 }
 
 /// Fills a surface, given in the file's unit (`scale` turns it into metres), with `cells` cubes across.
@@ -70,6 +81,19 @@ pub fn lattice_from_surface(
     surface: &SurfaceMesh,
     cells: usize,
     scale: f64,
+) -> Result<(TetMesh, LatticeReport), MeshInError> {
+    lattice_observed(surface, cells, scale, &|_| ())
+}
+
+/// The same, telling `observer` how far it has come.
+///
+/// # Errors
+/// What is wrong with the surface or the numbers, or that the mesh would not fit into memory.
+pub fn lattice_observed(
+    surface: &SurfaceMesh,
+    cells: usize,
+    scale: f64,
+    observer: &Observer<'_>,
 ) -> Result<(TetMesh, LatticeReport), MeshInError> {
     if !CELLS.contains(&cells) {
         let (min, max) = (*CELLS.start(), *CELLS.end());
@@ -79,17 +103,45 @@ pub fn lattice_from_surface(
         return Err(MeshInError::Scale { file: surface.file.clone(), scale });
     }
     let (clean, health) = clean_surface(surface, scale)?;
+    let expected = affordable(&clean.file, &health, cells)?;
+    let tell = |stage, done| observer(Meshing { stage, done, estimate: expected });
+    tell("inside and outside", 0.0);
     let lattice = Bcc::around(Vector3::from(health.min_m), Vector3::from(health.max_m), cells);
     let mut report =
         LatticeReport { cells, spacing_m: lattice.spacing, surface: health, ..Default::default() };
-    let mut mesh = stuffing::stuff(&lattice, &clean, &mut report);
+    let mut mesh = stuffing::stuff(&lattice, &clean, &mut report, &tell);
+    tell("repair", REPAIR);
     manifold::make_manifold(&mut mesh, &mut report);
     manifold::drop_crumbs(&mut mesh, CRUMB, &mut report);
     if mesh.tets.is_empty() {
         return Err(nothing_inside(&clean, cells, &report));
     }
+    tell("measures", MEASURES);
     measure(&mesh, &mut report);
+    lost::measure(&clean, &mesh, &mut report);
+    tell("measures", 1.0);
     Ok((mesh, report))
+}
+
+/// What the mesh will take, or that it is too much for this machine.
+fn affordable(file: &str, health: &SurfaceHealth, cells: usize) -> Result<MeshEstimate, MeshInError> {
+    let size_m = [0, 1, 2].map(|axis| health.max_m[axis] - health.min_m[axis]);
+    let expected = estimate(size_m, health.volume_m3, cells);
+    let free = memory_for_meshes();
+    if expected.bytes <= free {
+        return Ok(expected);
+    }
+    Err(MeshInError::Memory {
+        file: file.to_owned(),
+        cells,
+        needs: format!(
+            "{} million tetrahedra, which need about {}; {}",
+            digits(1e-6 * expected.tets),
+            memory(expected.bytes),
+            memory(free)
+        ),
+        largest: largest(size_m, health.volume_m3, free),
+    })
 }
 
 fn nothing_inside(clean: &CleanSurface, cells: usize, report: &LatticeReport) -> MeshInError {

@@ -19,6 +19,12 @@ const ALPHA_SHORT: f64 = 0.411_89;
 /// Steps of bisection where a crossing has no triangle: 2⁻²⁰ of an edge.
 const BISECTIONS: usize = 20;
 
+/// Nodes between two words about how far it has come.
+const PORTION: usize = 1 << 16;
+/// Shares of the time of meshing after which nodes are classified and edges crossed.
+const CLASSIFIED: f64 = 0.25;
+const CROSSED: f64 = 0.35;
+
 /// Which side of the surface a node is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
@@ -41,8 +47,14 @@ struct Cut {
 }
 
 /// Makes the tetrahedra.
-pub fn stuff(lattice: &Bcc, surface: &CleanSurface, report: &mut LatticeReport) -> TetMesh {
-    let mut sides = classify(lattice, surface);
+pub fn stuff(
+    lattice: &Bcc,
+    surface: &CleanSurface,
+    report: &mut LatticeReport,
+    tell: &(dyn Fn(&'static str, f64) + Sync),
+) -> TetMesh {
+    let mut sides = classify(lattice, surface, tell);
+    tell("crossings", CLASSIFIED);
     let cuts = cut_edges(lattice, surface, &sides);
     report.hole_crossings = cuts.iter().filter(|c| c.in_hole).count();
     let mut positions: Vec<Vector3<f64>> =
@@ -61,6 +73,7 @@ pub fn stuff(lattice: &Bcc, surface: &CleanSurface, report: &mut LatticeReport) 
         }
     }
     crossings.sort_unstable_by_key(|c| c.edge);
+    tell("tetrahedra", CROSSED);
     report.cut_edges = crossings.len();
     let splitter = Splitter { sides: &sides, crossings: &crossings };
     let mut tets = Vec::new();
@@ -75,11 +88,16 @@ fn is_inside(surface: &CleanSurface, point: &Vector3<f64>) -> bool {
     surface.tree.winding_number(point) > 0.5
 }
 
-fn classify(lattice: &Bcc, surface: &CleanSurface) -> Vec<Side> {
-    (0..lattice.n_nodes() as u32)
-        .into_par_iter()
-        .map(|n| if is_inside(surface, &lattice.position(n)) { Side::Inside } else { Side::Outside })
-        .collect()
+fn classify(lattice: &Bcc, surface: &CleanSurface, tell: &(dyn Fn(&'static str, f64) + Sync)) -> Vec<Side> {
+    let n_nodes = lattice.n_nodes();
+    let mut sides = Vec::with_capacity(n_nodes);
+    for start in (0..n_nodes).step_by(PORTION) {
+        let portion = start as u32..(start + PORTION).min(n_nodes) as u32;
+        let side = |n| if is_inside(surface, &lattice.position(n)) { Side::Inside } else { Side::Outside };
+        sides.par_extend(portion.into_par_iter().map(side));
+        tell("inside and outside", CLASSIFIED * sides.len() as f64 / n_nodes as f64);
+    }
+    sides
 }
 
 fn cut_edges(lattice: &Bcc, surface: &CleanSurface, sides: &[Side]) -> Vec<Cut> {

@@ -1,0 +1,55 @@
+//! Signed distances [m] to simple solids, negative inside, and ways to put them together.
+
+use nalgebra::Vector3;
+
+/// A point with these coordinates.
+pub fn at(x: f64, y: f64, z: f64) -> Vector3<f64> {
+    Vector3::new(x, y, z)
+}
+
+/// Distance to an ellipsoid to first order (Quilez): exact on its surface.
+pub fn ellipsoid(x: &Vector3<f64>, centre: Vector3<f64>, radii: Vector3<f64>) -> f64 {
+    let p = x - centre;
+    let k0 = p.component_div(&radii).norm();
+    let k1 = p.component_div(&radii.component_mul(&radii)).norm();
+    if k1 > 0.0 { k0 * (k0 - 1.0) / k1 } else { -radii.min() }
+}
+
+/// Distance to a line from `a` to `b` of the given radius.
+pub fn capsule(x: &Vector3<f64>, a: Vector3<f64>, b: Vector3<f64>, radius: f64) -> f64 {
+    cone(x, (a, radius), (b, radius))
+}
+
+/// Distance to a line from `a` to `b` whose radius goes from `a.1` to `b.1`; near enough for slender ones.
+pub fn cone(x: &Vector3<f64>, a: (Vector3<f64>, f64), b: (Vector3<f64>, f64)) -> f64 {
+    let along = b.0 - a.0;
+    let t = ((x - a.0).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+    (x - a.0 - t * along).norm() - (a.1 + t * (b.1 - a.1))
+}
+
+/// Distance to the half of space below the plane through `point` with this normal.
+pub fn half_space(x: &Vector3<f64>, point: Vector3<f64>, normal: Vector3<f64>) -> f64 {
+    (x - point).dot(&normal.normalize())
+}
+
+/// Distance to a ring in the plane z = `centre.z`.
+pub fn ring(x: &Vector3<f64>, centre: Vector3<f64>, radius: f64, thickness: f64) -> f64 {
+    let p = x - centre;
+    (p.xy().norm() - radius).hypot(p.z) - thickness
+}
+
+/// Union with a fillet of about the width `blend` [m] (polynomial smooth minimum).
+pub fn smooth_union(f: f64, g: f64, blend: f64) -> f64 {
+    let h = (1.0 - (f - g).abs() / blend).max(0.0);
+    f.min(g) - 0.25 * blend * h * h
+}
+
+/// `f` without `g`, the new edge rounded.
+pub fn smooth_cut(f: f64, g: f64, blend: f64) -> f64 {
+    -smooth_union(-f, g, blend)
+}
+
+/// What `f` and `g` share, the new edge rounded.
+pub fn smooth_overlap(f: f64, g: f64, blend: f64) -> f64 {
+    -smooth_union(-f, -g, blend)
+}
