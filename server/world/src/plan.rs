@@ -59,6 +59,8 @@ pub struct BodySize {
     pub vertices: usize,
     /// Surface triangles.
     pub triangles: usize,
+    /// Most iterations of a linear solve.
+    pub iterations: u32,
 }
 
 impl Plan {
@@ -95,8 +97,9 @@ impl Plan {
         let surface = wants.contact || wants.surface.contains(&true);
         let now_on = |name: &str| match name {
             "surface publication" => surface,
+            "surface stress" => wants.stress.contains(&true),
             "haptic contact" => wants.contact,
-            "energies" => wants.energy,
+            "energies" => wants.energy || wants.measures,
             _ => false,
         };
         for effect in self.effects.iter_mut().filter(|effect| !effect.on && now_on(&effect.name)) {
@@ -187,6 +190,8 @@ impl Plan {
         let rate = scene.publish.surface_hz;
         let why = format!("on demand: {vertices} vertices, at most {rate} Hz, while somebody subscribes");
         self.push("surface publication", false, why, vertices as f64 * SECONDS_PER_VERTEX);
+        let why = "on demand: von Mises stress on the surface, while somebody subscribes";
+        self.push("surface stress", false, why, elements * SECONDS_PER_ELEMENT);
         let rate = scene.publish.contact_hz;
         let why = format!("on demand: {rate} Hz beside the step, while a haptic client lives");
         self.push("haptic contact", false, why, 0.0);

@@ -5,8 +5,11 @@ use std::path::Path;
 use nalgebra::Vector3;
 use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh, graded_hexes};
 
-use crate::mesh_in::{MeshHealth, MeshInError, check_scale, load_surface, load_volume};
-use crate::organ::organ;
+use crate::mesh_in::{
+    MeshHealth, MeshInError, Observer, VolumeHealth, body_bytes, check_scale, components, load_surface,
+    load_volume, memory_for_meshes,
+};
+use crate::quantity::memory;
 use crate::scene::{BodySpec, CellSplit, Fault, MeshSource};
 
 /// The elements of a body.
@@ -18,6 +21,14 @@ pub enum Mesh {
 }
 
 impl Mesh {
+    /// Number of nodes.
+    pub fn n_nodes(&self) -> usize {
+        match self {
+            Mesh::Tets(mesh) => mesh.nodes.len(),
+            Mesh::Hexes(mesh) => mesh.nodes.len(),
+        }
+    }
+
     /// Corners of the bounding box [m].
     pub fn bounds(&self) -> [Vector3<f64>; 2] {
         match self {
@@ -47,7 +58,8 @@ impl Opened {
 }
 
 /// Opens or makes a mesh; paths are relative to `base_dir`.
-pub fn open(source: &MeshSource, base_dir: &Path) -> Result<Opened, Fault> {
+pub fn open(source: &MeshSource, base_dir: &Path, observer: &Observer<'_>) -> Result<Opened, Fault> {
+    fits(source)?;
     match source {
         MeshSource::Box { min_m, max_m, cells, split } => Ok(Opened::made(match pattern(*split) {
             Some(pattern) => Mesh::Tets(box_mesh(*min_m, *max_m, *cells, pattern)),
@@ -61,16 +73,55 @@ pub fn open(source: &MeshSource, base_dir: &Path) -> Result<Opened, Fault> {
                 None => Mesh::Hexes(hexes),
             }))
         }
-        MeshSource::File { path, scale } => load_volume(&base_dir.join(path), *scale)
+        MeshSource::File { path, scale, weld } => load_volume(&base_dir.join(path), *scale, *weld)
             .map(|(mesh, health)| Opened::read(mesh, MeshHealth::Volume(health)))
             .map_err(fault),
-        MeshSource::Surface { path, cells, scale } => load_surface(&base_dir.join(path), *cells, *scale)
+        MeshSource::Surface { path, cells, scale } => {
+            load_surface(&base_dir.join(path), *cells, *scale, observer)
+                .map(|(mesh, report)| Opened::read(mesh, MeshHealth::Surface(report)))
+                .map_err(fault)
+        }
+        MeshSource::Organ { shape, cells } => shape
+            .observed(*cells, observer)
             .map(|(mesh, report)| Opened::read(mesh, MeshHealth::Surface(report)))
             .map_err(fault),
-        MeshSource::Organ { cells } => {
-            organ(*cells).map(|(mesh, report)| Opened::read(mesh, MeshHealth::Surface(report))).map_err(fault)
-        }
     }
+}
+
+/// Refuses a block that would not fit into the memory of this machine.
+fn fits(source: &MeshSource) -> Result<(), Fault> {
+    let cells = match source {
+        MeshSource::Box { cells, .. } => cells.map(|n| n as f64),
+        MeshSource::Grid { lines_m, .. } => [0, 1, 2].map(|axis| (lines_m[axis].len() - 1) as f64),
+        _ => return Ok(()),
+    };
+    let per_cell = if source.split() == Some(CellSplit::Five) { 5.0 } else { 6.0 };
+    let (needed, free) = (body_bytes(per_cell * cells.iter().product::<f64>()), memory_for_meshes());
+    if needed <= free {
+        return Ok(());
+    }
+    let shrink = (free / needed).cbrt();
+    let most = cells.map(|n| (n * shrink).floor().max(1.0) as u32);
+    Err(Fault::Conflict {
+        what: format!(
+            "found {cells:?} cells, which need about {}; {} may be used here",
+            memory(needed),
+            memory(free)
+        ),
+        next: format!("use {most:?} cells at most"),
+    })
+}
+
+/// Leaves only the part of the largest volume.
+pub fn keep_largest_part(mesh: &mut TetMesh) -> bool {
+    let (part, count) = components(mesh);
+    let mut volumes = vec![0.0; count];
+    (0..mesh.tets.len()).for_each(|e| volumes[part[e] as usize] += mesh.volume(e));
+    let largest = (0..count).max_by(|&a, &b| volumes[a].total_cmp(&volumes[b]));
+    let mut parts = part.iter();
+    mesh.tets.retain(|_| parts.next().map(|&part| part as usize) == largest);
+    mesh.drop_unused_nodes();
+    count > 1
 }
 
 /// The tetrahedra that a cell is split into; none: it stays a hexahedron.
@@ -99,6 +150,17 @@ pub(super) fn fault(error: MeshInError) -> Fault {
         },
         other => Fault::Mesh { reason: other.to_string() },
     }
+}
+
+/// What reading a mesh file has changed that may have been meant otherwise.
+pub fn doubts_about_repair(health: Option<&MeshHealth>) -> Option<String> {
+    let Some(MeshHealth::Volume(VolumeHealth { welded_nodes: joined, .. })) = health else { return None };
+    (*joined > 0).then(|| {
+        format!(
+            "{joined} nodes of the file lie at the same place as another one and were joined with it: a cut or gap \
+             that was meant there is closed; weld = false keeps them apart"
+        )
+    })
 }
 
 /// Suspicions about units, each in a sentence: a mesh in millimetres read as metres is a thousand

@@ -10,9 +10,11 @@ mod skin;
 
 use std::path::Path;
 
-use scindo_physics::body::{Body, BodyError, BodySettings};
-use scindo_physics::material::{Material, Rayleigh};
+use scindo_physics::assembly::ModelError;
+use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants};
+use scindo_physics::material::{Material, MaterialError, Rayleigh};
 
+use crate::mesh_in::{MeshHealth, Observer};
 use crate::probe::Probe;
 use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
 use crate::simulation::SimBody;
@@ -46,14 +48,31 @@ pub struct Built {
 type Finding = (String, Fault);
 
 /// Builds everything, or says everything that stands in the way.
-pub fn build(scene: &Scene, base_dir: &Path, options: BuildOptions) -> Result<Built, SceneError> {
+pub fn build(
+    scene: &Scene,
+    base_dir: &Path,
+    options: BuildOptions,
+    observer: &Observer<'_>,
+) -> Result<Built, SceneError> {
     let checked = scene.checked();
-    let mut builder = Builder { base_dir, options, findings: Vec::new(), warnings: Vec::new() };
+    let mut builder = Builder {
+        base_dir,
+        options,
+        observer,
+        findings: Vec::new(),
+        doubts: Vec::new(),
+        warnings: Vec::new(),
+    };
     let bodies: Vec<Option<SimBody>> = checked.bodies.iter().map(|spec| builder.body(spec)).collect();
     let probes = builder.probes(checked, &bodies);
     if builder.findings.is_empty() {
-        Ok(Built { bodies: bodies.into_iter().flatten().collect(), probes, warnings: builder.warnings })
+        let mut warnings = builder.warnings;
+        warnings.extend(builder.doubts.into_iter().map(|(at, doubt)| format!("{at}: {doubt}")));
+        Ok(Built { bodies: bodies.into_iter().flatten().collect(), probes, warnings })
     } else {
+        // A body of the wrong size is why regions and probes miss it.
+        let doubts = builder.doubts.into_iter();
+        builder.findings.extend(doubts.map(|(at, reason)| (format!("{at}.mesh"), Fault::Mesh { reason })));
         Err(scene.located(builder.findings))
     }
 }
@@ -61,23 +80,36 @@ pub fn build(scene: &Scene, base_dir: &Path, options: BuildOptions) -> Result<Bu
 struct Builder<'a> {
     base_dir: &'a Path,
     options: BuildOptions,
+    observer: &'a Observer<'a>,
     findings: Vec<Finding>,
+    /// Where, and what is odd about the size there.
+    doubts: Vec<(String, String)>,
     warnings: Vec<String>,
 }
 
 impl Builder<'_> {
     fn body(&mut self, spec: &BodySpec) -> Option<SimBody> {
         let at = format!("body.{}", spec.id);
-        let mesh::Opened { mesh, health } = match mesh::open(&spec.mesh, self.base_dir) {
+        let mesh::Opened { mut mesh, mut health } = match mesh::open(&spec.mesh, self.base_dir, self.observer)
+        {
             Ok(opened) => opened,
             Err(fault) => {
                 self.findings.push((format!("{at}.mesh"), fault));
                 return None;
             }
         };
+        let repaired = mesh::doubts_about_repair(health.as_ref());
+        self.warnings.extend(repaired.map(|doubt| format!("{at}.mesh: {doubt}")));
+        if let (true, mesh::Mesh::Tets(tets)) = (spec.largest_part, &mut mesh)
+            && mesh::keep_largest_part(tets)
+        {
+            health.iter_mut().for_each(MeshHealth::keeps_one_part);
+        }
         let doubts = mesh::doubts_about_scale(mesh.bounds(), spec);
-        self.warnings.extend(doubts.into_iter().map(|doubt| format!("{at}: {doubt}")));
+        self.doubts.extend(doubts.into_iter().map(|doubt| (at.clone(), doubt)));
+        let along = mechanics::nodes_along(mesh.bounds(), mesh.n_nodes());
         let settings = BodySettings {
+            solver: mechanics::linear(&spec.mechanics, along, spec.poisson),
             threads: self.options.threads,
             portable: self.options.portable,
             ..mechanics::settings(&spec.mechanics)
@@ -89,16 +121,24 @@ impl Builder<'_> {
         let mut body = match made {
             Ok(body) => body,
             Err(error) => {
-                self.refused(&format!("{at}.mesh"), &error);
+                let (key, fault) = blame(&error);
+                self.findings.push((format!("{at}{key}"), fault));
                 return None;
             }
         };
+        let law = mechanics::law(&spec.mechanics);
+        if settings.arithmetic(law) == Arithmetic::Single && !body.is_fast() {
+            let doubt =
+                "most elements are too flat for single precision: mixed precision is taken, which costs more";
+            self.warnings.push(format!("{at}.mesh: {doubt}; elements of more equal edges would not need it"));
+        }
         if let Some(skin) = &spec.skin
             && let Err(fault) = skin::put_on(&mut body, skin, &spec.mesh, self.base_dir)
         {
             self.findings.push((format!("{at}.skin"), fault));
         }
         let mut body = SimBody::new(&spec.id, body, health);
+        body.fixed_iterations = spec.mechanics.fixed_iterations;
         for (i, fix) in spec.fixes.iter().enumerate() {
             self.fix(&format!("{at}.fix.{i}"), fix, &mut body);
         }
@@ -177,7 +217,61 @@ fn material(spec: &BodySpec) -> Material {
         young_pa: spec.young_pa,
         poisson: spec.poisson,
         density_kg_m3: spec.density_kg_m3,
-        rayleigh: Rayleigh { mass_1_s: spec.damping_mass_1_s, stiffness_s: spec.damping_stiffness_s },
+        rayleigh: rayleigh(spec),
         law: mechanics::law(&spec.mechanics),
+    }
+}
+
+/// Constants that may change while the body moves.
+pub fn constants(spec: &BodySpec) -> Constants {
+    Constants { young_pa: spec.young_pa, poisson: spec.poisson, rayleigh: rayleigh(spec) }
+}
+
+fn rayleigh(spec: &BodySpec) -> Rayleigh {
+    Rayleigh { mass_1_s: spec.damping_mass_1_s, stiffness_s: spec.damping_stiffness_s }
+}
+
+/// The key of a body that is at fault, with the dot before it, and how.
+fn blame(error: &BodyError) -> (String, Fault) {
+    let material = |MaterialError { quantity, found, range }: &MaterialError| {
+        let (found, allowed) = (format!("{found:e}"), format!("{:e} to {:e}", range.start(), range.end()));
+        (format!(".{quantity}"), Fault::OutOfRange { found, allowed, next: "change it".into() })
+    };
+    match error {
+        BodyError::Material(error) | BodyError::Model(ModelError::Material(error)) => material(error),
+        BodyError::Setting { name, found, allowed } => {
+            let (found, allowed) = (found.to_string(), (*allowed).to_owned());
+            (format!(".{name}"), Fault::OutOfRange { found, allowed, next: "change it".into() })
+        }
+        BodyError::Combination { what, with, instead } => {
+            let (what, next) = (format!("{what} does not go with {with}"), format!("take {instead}"));
+            (String::new(), Fault::Conflict { what, next })
+        }
+        BodyError::Dynamics(error) => {
+            (".newmark".into(), Fault::Conflict { what: error.to_string(), next: "change them".into() })
+        }
+        BodyError::Model(error @ (ModelError::Remedy { .. } | ModelError::NoSplit { .. })) => {
+            (".locking".into(), Fault::Conflict { what: error.to_string(), next: "change it".into() })
+        }
+        BodyError::Threads(_) => (String::new(), Fault::Mesh { reason: error.to_string() }),
+        error => (".mesh".into(), Fault::Mesh { reason: error.to_string() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_out_of_range_is_blamed_on_its_own_key() {
+        let range = Material::YOUNG_PA;
+        let too_stiff = MaterialError { quantity: "young_pa", found: 1e14, range };
+        let (key, fault) = blame(&BodyError::Material(too_stiff));
+        assert_eq!(key, ".young_pa");
+        assert_eq!(fault.to_string(), "found 1e14, allowed: 1e-6 to 1e13; change it");
+        let tolerance = BodyError::Setting { name: "solver.tolerance", found: 2.0, allowed: "0 … 1" };
+        assert_eq!(blame(&tolerance).0, ".solver.tolerance");
+        let threads = BodyError::Threads(std::io::Error::other("no more"));
+        assert_eq!(blame(&threads).0, "", "no key is at fault");
     }
 }

@@ -9,7 +9,6 @@ use scindo_physics::skin::SkinSettings;
 
 use super::mesh::fault;
 use crate::mesh_in::{MeshFile, SurfaceMesh, read_mesh};
-use crate::organ::organ_surface;
 use crate::scene::{Fault, MeshSource, SkinSpec};
 
 /// How far the skin may lie off the elements' boundary, in mean edges of elements.
@@ -46,8 +45,8 @@ fn target(spec: &SkinSpec, source: &MeshSource, base_dir: &Path) -> Result<Optio
         (open(path, base_dir)?, *scale)
     } else if let MeshSource::Surface { path, scale, .. } = source {
         (open(path, base_dir)?, *scale)
-    } else if let MeshSource::Organ { .. } = source {
-        (organ_surface(), 1.0)
+    } else if let MeshSource::Organ { shape, .. } = source {
+        (shape.surface(), 1.0)
     } else {
         return Ok(None);
     };

@@ -16,6 +16,9 @@ const POINT_TANGENT: f64 = 400e-9;
 /// General path, seconds per solver iteration and 3×3 block of a row, times the blocks of a node.
 const BLOCK_ITERATION: f64 = 6e-9;
 
+/// Iterations of the general path that take the residual down to a tenth.
+const ITERATIONS_PER_DECADE: f64 = 45.0;
+
 /// Seconds per row and its blocks squared for a factorisation, a coarse guess.
 const FACTOR_ROW: f64 = 20e-9;
 
@@ -90,9 +93,9 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
     let solver = match m.method {
         _ if m.integrator.is_explicit() => "no solver".into(),
         RawMethod::Cholesky => format!("cholesky, {precision}"),
-        RawMethod::Relaxation => format!("relaxation, {} x {:e}, {precision}", m.iterations, m.tolerance),
-        RawMethod::Cg => format!("cg, {} x {:e}, {precision}", m.iterations, m.tolerance),
-        _ => format!("pcg, {} x {:e}, {precision}", m.iterations, m.tolerance),
+        RawMethod::Relaxation => format!("relaxation, {} x {:e}, {precision}", size.iterations, m.tolerance),
+        RawMethod::Cg => format!("cg, {} x {:e}, {precision}", size.iterations, m.tolerance),
+        _ => format!("pcg, {} x {:e}, {precision}", size.iterations, m.tolerance),
     };
     let path = if m.arithmetic() == Arithmetic::Single {
         let operator = match mechanics::settings(m).operator(mechanics::law(m), size.elements) {
@@ -133,13 +136,14 @@ fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
         return evaluations * forces;
     }
     if m.method == RawMethod::Relaxation {
-        return 2.0 * f64::from(m.iterations) * forces;
+        return 2.0 * f64::from(size.iterations) * forces;
     }
     let rows = size.nodes as f64;
     let solve = if m.method == RawMethod::Cholesky {
         rows * rows.powf(2.0 / 3.0) * FACTOR_ROW * 9.0
     } else {
-        f64::from(m.iterations) * rows * blocks_of_row * BLOCK_ITERATION
+        let made = f64::from(size.iterations).min(-ITERATIONS_PER_DECADE * m.tolerance.log10());
+        made * rows * blocks_of_row * BLOCK_ITERATION
     };
     let tangent = elements * points * nodes_of_element * POINT_TANGENT;
     let easy = matches!(m.law, RawLaw::Linear | RawLaw::Corotational);

@@ -1,5 +1,7 @@
 //! From a scene's tree to ready objects: what the schema cannot say is checked here.
 
+mod look;
+
 mod mechanics;
 
 use std::collections::BTreeSet;
@@ -7,6 +9,8 @@ use std::collections::BTreeSet;
 use nalgebra::{Unit, Vector3};
 
 use crate::inputs::{ToolMode, ToolShape};
+use crate::organ::Organ;
+use crate::tool::MAX_TOOLS;
 
 use super::checked::*;
 use super::problem::{Fault, nearest_word};
@@ -16,9 +20,6 @@ use super::source::Node;
 
 /// Most tetrahedra a box may have; more would not fit the memory of an ordinary machine.
 const MAX_BOX_CELLS: u64 = 8_000_000;
-
-/// Most tools of a scene.
-pub const MAX_TOOLS: usize = 16;
 
 /// Checks a tree and turns it into ready objects, or says everything that is wrong with it.
 pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
@@ -31,6 +32,18 @@ pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
     let mut check = Check { raw: &raw, findings: Vec::new() };
     let scene = check.scene();
     if check.findings.is_empty() { Ok(scene) } else { Err(check.findings) }
+}
+
+fn shape(shape: RawOrganShape) -> Organ {
+    match shape {
+        RawOrganShape::Liver => Organ::Liver,
+        RawOrganShape::Kidney => Organ::Kidney,
+        RawOrganShape::Vessel => Organ::Vessel,
+        RawOrganShape::Diaphragm => Organ::Diaphragm,
+        RawOrganShape::Tendon => Organ::Tendon,
+        RawOrganShape::Brain => Organ::Brain,
+        RawOrganShape::Fingertip => Organ::Fingertip,
+    }
 }
 
 struct Check<'a> {
@@ -97,6 +110,7 @@ impl Check<'_> {
         BodySpec {
             id: body.id.clone(),
             skin: body.skin.as_ref().map(|skin| self.skin(&at, skin, body)),
+            largest_part: body.mesh.parts == Some(RawParts::Largest),
             mesh,
             mechanics,
             young_pa: body.young_pa,
@@ -106,6 +120,7 @@ impl Check<'_> {
             damping_stiffness_s: body.rayleigh.stiffness_s,
             fixes: self.fixes(&at, &body.fix),
             loads: self.loads(&at, &body.load),
+            look: self.look(&format!("{at}.look"), body.look.as_ref()),
         }
     }
 
@@ -140,9 +155,17 @@ impl Check<'_> {
             let next = "give box and organ in metres";
             self.conflict(format!("{at}.scale"), "`scale` only goes with `file` or `surface`", next);
         }
+        if mesh.weld.is_some() && mesh.file.is_none() {
+            let next = "a surface is filled with a lattice, which has each node once";
+            self.conflict(format!("{at}.weld"), "`weld` only goes with `file`", next);
+        }
+        if mesh.parts.is_some() && mesh.surface.is_none() && mesh.file.is_none() {
+            let next = "box, grid and organ have one part";
+            self.conflict(format!("{at}.parts"), "`parts` only goes with `file` or `surface`", next);
+        }
         let scale = mesh.scale.unwrap_or(1.0);
         if let Some(path) = &mesh.file {
-            return MeshSource::File { path: path.clone(), scale };
+            return MeshSource::File { path: path.clone(), scale, weld: mesh.weld != Some(false) };
         }
         if let Some(path) = &mesh.surface {
             if mesh.cells.is_none() {
@@ -162,7 +185,9 @@ impl Check<'_> {
         if let Some(grid) = &mesh.grid {
             return self.grid(&format!("{at}.grid"), grid);
         }
-        MeshSource::Organ { cells: mesh.organ.as_ref().map_or(4, |organ| organ.cells) as usize }
+        let organ = mesh.organ.as_ref();
+        let shape = organ.map_or(Organ::default(), |organ| shape(organ.shape));
+        MeshSource::Organ { shape, cells: organ.map_or(4, |organ| organ.cells) as usize }
     }
 
     fn block(&mut self, at: &str, block: &RawBox) -> MeshSource {
@@ -276,6 +301,18 @@ impl Check<'_> {
             }
             self.cutting_is_on(&at);
             return CutSpec { body, at_s: cut.at_s, blade: CutPath::Incision { points, depth_m } };
+        }
+        match (&cut.path_m, cut.depth_m) {
+            (Some(_), None) => {
+                let meaning = "how deep the tool goes into the skin along `path_m` [m], such as 0.01".into();
+                self.report(at.clone(), Fault::MissingKey { key: "depth_m".into(), meaning });
+                return CutSpec { body, at_s: cut.at_s, blade: CutPath::Sweep(Vec::new()) };
+            }
+            (None, Some(_)) => {
+                let next = "remove it: a sweep goes as deep as its blade, or give the path as `path_m`";
+                self.conflict(format!("{at}.depth_m"), "`depth_m` only goes with `path_m`", next);
+            }
+            _ => {}
         }
         let segments: Vec<[Vector3<f64>; 2]> = cut
             .sweep_m

@@ -9,6 +9,7 @@ use super::raw::{
 };
 use crate::build::mechanics;
 use crate::inputs::{ToolMode, ToolShape};
+use crate::organ::Organ;
 
 /// A scene whose values are all in range and fit each other. Files are not opened yet.
 #[derive(Debug, Clone)]
@@ -46,6 +47,8 @@ pub struct BodySpec {
     pub mesh: MeshSource,
     /// Its skin; none: the elements' boundary.
     pub skin: Option<SkinSpec>,
+    /// Whether only the largest part of the mesh is kept.
+    pub largest_part: bool,
     /// How it is computed.
     pub mechanics: Mechanics,
     /// Young's modulus [Pa].
@@ -62,6 +65,19 @@ pub struct BodySpec {
     pub fixes: Vec<FixSpec>,
     /// Constant loads.
     pub loads: Vec<LoadSpec>,
+    /// How it is drawn.
+    pub look: LookSpec,
+}
+
+/// How a body is drawn.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LookSpec {
+    /// Colour of the skin, 0xRRGGBB in sRGB; none: the viewer's choice.
+    pub colour: Option<u32>,
+    /// 1 is opaque.
+    pub opacity: f64,
+    /// Layers inside wounds: where each ends below the skin [m], rising, and its colour.
+    pub layers: Vec<(f64, u32)>,
 }
 
 /// A skin finer than the elements.
@@ -98,8 +114,10 @@ pub struct Mechanics {
     pub newton_steps: Option<u32>,
     /// How single precision applies the stiffness; `None`: what costs less.
     pub operator: Option<RawOperator>,
-    /// Most iterations of a linear solve.
-    pub iterations: u32,
+    /// Most iterations of a linear solve; none: as the mesh calls for.
+    pub iterations: Option<u32>,
+    /// Whether so many iterations are meant, whatever residual they leave.
+    pub fixed_iterations: bool,
     /// Relative preconditioned residual at which the solver stops.
     pub tolerance: f64,
     /// How cuts are made.
@@ -121,6 +139,11 @@ impl Mechanics {
     /// What keeps the body from the fast path, which runs in single precision; none if nothing does.
     pub fn why_general(&self) -> Option<&'static str> {
         mechanics::settings(self).why_general(mechanics::law(self))
+    }
+
+    /// Whether an equilibrium is approached by relaxation, step after step.
+    pub fn relaxes(&self) -> bool {
+        self.method == RawMethod::Relaxation
     }
 
     /// The arithmetic that is used: single where it can be and the tolerance allows, else mixed;
@@ -157,6 +180,8 @@ pub enum MeshSource {
         path: String,
         /// Metres per length unit of the file.
         scale: f64,
+        /// Whether nodes at the same place become one.
+        weld: bool,
     },
     /// A surface file, turned into a lattice with the surface embedded.
     Surface {
@@ -167,8 +192,10 @@ pub enum MeshSource {
         /// Metres per length unit of the file.
         scale: f64,
     },
-    /// The demonstration's organ.
+    /// A shape of our own.
     Organ {
+        /// Which.
+        shape: Organ,
         /// Cells along the longest side.
         cells: usize,
     },

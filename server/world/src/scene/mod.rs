@@ -17,20 +17,23 @@ pub mod checked;
 
 mod check;
 
+pub mod live;
+
+mod shipped;
+
 use std::path::{Path, PathBuf};
 
 pub use checked::{
-    BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec, Mechanics,
-    MeshSource, Newmark, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
+    BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec, LookSpec,
+    Mechanics, MeshSource, Newmark, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
 };
-pub(crate) use problem::coordinates;
+pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};
+pub use problem::coordinates;
 pub use problem::{Fault, Place, Problem, SceneError};
 pub use schema::{json_schema, key_reference};
+pub use shipped::{DEMONSTRATION, SHIPPED, ShippedScene};
 
 use source::{Node, Unreadable};
-
-/// The built-in demonstration.
-const DEMONSTRATION: &str = include_str!("../../scenes/demonstration.toml");
 
 /// A scene that has been read and checked.
 #[derive(Debug, Clone)]
@@ -88,7 +91,7 @@ impl Scene {
     /// # Errors
     /// Overrides that lead nowhere or out of range.
     pub fn demonstration(overrides: &[String]) -> Result<Self, SceneError> {
-        Self::from_tree("demonstration".into(), PathBuf::new(), Node::from_toml(DEMONSTRATION), overrides)
+        shipped::SHIPPED[0].read(overrides)
     }
 
     /// The same scene with one value changed, for example `body.beam.young_pa=3e4`.

@@ -173,7 +173,7 @@ pub enum Fault {
 }
 
 /// A point [m] with as many digits as one reads: four of its largest coordinate.
-pub(crate) fn coordinates(point_m: &[f64; 3]) -> String {
+pub fn coordinates(point_m: &[f64; 3]) -> String {
     let largest = point_m.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
     let digits = if largest > 0.0 { (3 - largest.log10().floor() as i32).clamp(0, 12) as usize } else { 0 };
     // As text and back: without the zeros at the end.

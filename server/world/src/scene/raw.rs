@@ -5,11 +5,15 @@
 //! cannot drift apart. Ranges stand beside the keys as JSON Schema keywords; `x-next` says what
 //! to do when a value lies outside. Every unit is SI and stands in the key.
 
+mod look;
+
 mod mechanics;
 
+pub use look::*;
 pub use mechanics::*;
 
 use schemars::JsonSchema;
+use scindo_physics::material::Material;
 use serde::{Deserialize, Serialize};
 
 /// A vector or point in world axes.
@@ -91,19 +95,20 @@ pub struct RawBody {
     /// Finite element.
     #[serde(default)]
     pub element: RawElement,
-    /// Constitutive law.
+    /// Constitutive law; `neo-hookean` is the stable one of Smith et al. 2018, and `stvk` is continued below a
+    /// stretch of 0.65.
     #[serde(default)]
     pub law: RawLaw,
     /// Young's modulus [Pa].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e15,
+    #[schemars(extend("minimum" = *Material::YOUNG_PA.start(), "maximum" = *Material::YOUNG_PA.end(),
         "x-next" = "soft tissue lies between 1e3 and 1e6 Pa"))]
     pub young_pa: f64,
     /// Poisson's ratio.
-    #[schemars(extend("exclusiveMinimum" = -1.0, "exclusiveMaximum" = 0.5,
+    #[schemars(extend("minimum" = *Material::POISSON.start(), "maximum" = *Material::POISSON.end(),
         "x-next" = "0.45 to 0.49 for nearly incompressible tissue; 0.5 would need a pressure field"))]
     pub poisson: f64,
     /// Density in the rest state [kg/m³].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6,
+    #[schemars(extend("minimum" = *Material::DENSITY_KG_M3.start(), "maximum" = *Material::DENSITY_KG_M3.end(),
         "x-next" = "soft tissue has about 1000 kg/m3"))]
     pub density_kg_m3: f64,
     /// Rayleigh damping.
@@ -118,7 +123,8 @@ pub struct RawBody {
     /// Mass matrix.
     #[serde(default)]
     pub mass: RawMass,
-    /// Remedy against locking of nearly incompressible material.
+    /// Remedy against locking of nearly incompressible material; the last percent takes `tet10`, or `hex8` with
+    /// `selective`.
     #[serde(default)]
     pub locking: RawLocking,
     /// Solver of a step.
@@ -133,6 +139,9 @@ pub struct RawBody {
     /// Constant loads.
     #[serde(default)]
     pub load: Vec<RawLoad>,
+    /// How it is drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look: Option<RawLook>,
 }
 
 /// Where the elements of a body come from: exactly one of `box`, `grid`, `file`, `surface`, `organ`.
@@ -155,7 +164,7 @@ pub struct RawMesh {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub surface: Option<String>,
-    /// The organ-like body of the demonstration.
+    /// A shape that the program makes itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub organ: Option<RawOrgan>,
     /// Lattice cells along the longest side of a `surface`.
@@ -166,6 +175,24 @@ pub struct RawMesh {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "0.001 for a file in millimetres"))]
     pub scale: Option<f64>,
+    /// Whether nodes of a `file` that lie at the same place become one, which is told; absent: true. False
+    /// keeps a mesh as it was made with its cut.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weld: Option<bool>,
+    /// Which parts of a `file` or `surface` are kept, where no element joins them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parts: Option<RawParts>,
+}
+
+/// Which parts of a mesh are kept.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawParts {
+    /// All of them.
+    #[default]
+    All,
+    /// The one of the largest volume.
+    Largest,
 }
 
 /// An axis-aligned block of equal cells.
@@ -217,13 +244,37 @@ pub enum RawPattern {
     Hex,
 }
 
-/// The organ-like body of the demonstration.
+/// A shape that the program makes itself.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawOrgan {
+    /// Which.
+    #[serde(default)]
+    pub shape: RawOrganShape,
     /// Lattice cells along its longest side.
     #[schemars(range(min = 4, max = 128), extend("x-next" = "20 to 24 cells run in real time"))]
     pub cells: u32,
+}
+
+/// Shapes that the program makes itself; long axis along x, top towards +z, centred at x = y = 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawOrganShape {
+    /// Two lobes with a groove, 160 × 104 × 63 mm, from z = 0 up.
+    #[default]
+    Liver,
+    /// A bean with a growth on one end, 112 × 66 × 48 mm, from z = 0 up.
+    Kidney,
+    /// A tube that forks, 120 × 84 × 20 mm, its axis at z = 0.
+    Vessel,
+    /// A thin dome over a ring, 132 × 132 × 38 mm, from z = 0 up.
+    Diaphragm,
+    /// A muscle between a tendon and three strands, 190 × 62 × 34 mm, its axis at z = 0.
+    Tendon,
+    /// A folded half dome, 132 × 92 × 62 mm, flat below at z = 0.
+    Brain,
+    /// The last joint of a finger, pad up, 62 × 36 × 30 mm, from z = 0 up.
+    Fingertip,
 }
 
 /// A skin finer than the elements.

@@ -356,7 +356,7 @@ mod tests {
     #[test]
     fn the_reference_names_nested_keys() {
         let text = key_reference();
-        assert!(text.contains("| `body[].young_pa` | number, above 0"), "{text}");
+        assert!(text.contains("| `body[].young_pa` | number, at least 0.000001"), "{text}");
         assert!(text.contains("| `tool[].path[].mode` | hover \\| touch \\| grab \\| cut"), "{text}");
     }
 }

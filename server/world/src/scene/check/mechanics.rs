@@ -22,6 +22,7 @@ impl Check<'_> {
             operator: body.solver.operator,
             newton_steps: body.solver.newton_steps,
             iterations: body.solver.iterations,
+            fixed_iterations: body.solver.fixed_iterations,
             tolerance: body.solver.tolerance,
             cutting: body.cutting.method,
             loose: body.cutting.loose,

@@ -1,6 +1,7 @@
 //! Keys that say how a body is computed: element, law, integrator, mass, locking, solver.
 
 use schemars::JsonSchema;
+use scindo_physics::material::Material;
 use serde::{Deserialize, Serialize};
 
 /// Finite element.
@@ -25,9 +26,11 @@ pub enum RawLaw {
     /// Small strain, large rotation.
     #[default]
     Corotational,
-    /// St. Venant-Kirchhoff, continued below a stretch of 0.65 so that it resists inversion.
+    /// St. Venant-Kirchhoff as in the textbooks while every principal stretch is above 0.65; below, where that
+    /// law would give way, it is continued so that it resists inversion.
     Stvk,
-    /// Stable Neo-Hookean, with a guard against collapse.
+    /// The stable Neo-Hookean law (Smith, de Goes, Kim 2018), not that of the textbooks: the same for small
+    /// strains, finite when an element inverts; with a guard against collapse.
     NeoHookean,
 }
 
@@ -36,10 +39,12 @@ pub enum RawLaw {
 #[serde(deny_unknown_fields, default)]
 pub struct RawRayleigh {
     /// Factor of the mass matrix [1/s]: drags against the room.
-    #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "0 switches it off"))]
+    #[schemars(extend("minimum" = *Material::MASS_1_S.start(), "maximum" = *Material::MASS_1_S.end(),
+        "x-next" = "0 switches it off"))]
     pub mass_1_s: f64,
     /// Factor of the stiffness matrix [s]: damps deformation, not rigid motion.
-    #[schemars(range(min = 0.0, max = 1e3), extend("x-next" = "0 switches it off"))]
+    #[schemars(extend("minimum" = *Material::STIFFNESS_S.start(), "maximum" = *Material::STIFFNESS_S.end(),
+        "x-next" = "0 switches it off"))]
     pub stiffness_s: f64,
 }
 
@@ -109,7 +114,8 @@ pub enum RawLocking {
     /// Full integration of everything.
     #[default]
     None,
-    /// The volume change averaged around each node, per copy; for `tet4`.
+    /// The volume change averaged around each node, per copy; for `tet4`. Next to `tet10` it is a remedy for
+    /// speed: for the last percent near incompressibility take `tet10`, or `hex8` with `selective`.
     NodeAveraged,
     /// The volume change of each element's centre; for `hex8`.
     Selective,
@@ -119,13 +125,19 @@ pub enum RawLocking {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSolver {
-    /// Linear solver.
+    /// Linear solver. For solutions to round-off take `cholesky` with precision `double` and tolerance 1e-12; in
+    /// equilibrium it also costs least where thin layers would take `pcg` hundreds of iterations.
     pub method: RawMethod,
-    /// Most iterations of a linear solve.
-    #[schemars(range(min = 1, max = 100000), extend("x-next" = "10 to 100 suits real time"))]
-    pub iterations: u32,
-    /// Stop when the preconditioned residual has fallen by this factor.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0, "x-next" = "1e-3 for speed, 1e-6 for accuracy"))]
+    /// Most iterations of a linear solve; absent: several times what the size of the mesh and `poisson` call for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 100000), extend("x-next" = "leave it out; 10 to 100 with fixed_iterations = true suits real time"))]
+    pub iterations: Option<u32>,
+    /// The iterations are a fixed number that is meant, as in real time: steps that end above the tolerance are
+    /// counted, but neither warned of nor a failure of the run.
+    pub fixed_iterations: bool,
+    /// Stop when the preconditioned residual is below this part of that of the loads: after the linear solve where
+    /// a step is one, after Newton's method otherwise. With 1e-4 positions are off by less than 0.1 % of the motion.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0, "x-next" = "1e-3 for speed, 1e-6 for accuracy, 1e-10 with method cholesky and precision double"))]
     pub tolerance: f64,
     /// Arithmetic; absent: `single` where it can be and the tolerance allows, else `mixed`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -133,7 +145,8 @@ pub struct RawSolver {
     /// How single precision applies the stiffness; absent: what costs less, from measured costs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub operator: Option<RawOperator>,
-    /// Most Newton steps per step of time; absent: 1 for linear and corotational bodies in motion, else 20.
+    /// Most Newton steps per step of time; absent: 1 for linear and corotational bodies in motion (2 with
+    /// newmark), 100 for static ones, else 20.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1000), extend("x-next" = "1 for speed, 20 for accuracy"))]
     pub newton_steps: Option<u32>,
@@ -143,8 +156,9 @@ impl Default for RawSolver {
     fn default() -> Self {
         Self {
             method: RawMethod::Pcg,
-            iterations: 50,
-            tolerance: 1e-6,
+            iterations: None,
+            fixed_iterations: false,
+            tolerance: 1e-4,
             precision: None,
             operator: None,
             newton_steps: None,
