@@ -1,0 +1,100 @@
+//! What meshing lost, and elements that a law or a load does not suit.
+
+use crate::mesh_in::{LatticeReport, MeshHealth, VolumeHealth, most_cells};
+use crate::quantity::{length, percent};
+use crate::scene::raw::{RawElement, RawLocking};
+use crate::scene::{BodySpec, coordinates};
+use crate::simulation::SimBody;
+
+/// Share of its volume that a mesh may lose or gain.
+const VOLUME: f64 = 0.03;
+/// The volume of a lattice converges with about this power of the cell, as measured on scans of animals.
+const ORDER: f64 = 1.5;
+/// Share of the surface that may lie outside the mesh.
+const LOST: f64 = 0.01;
+/// Above this ratio linear tetrahedra lock: they are too stiff by a factor.
+const LOCKING: f64 = 0.485;
+/// A load that strains a body by more than this is hardly in newtons.
+const STRAIN: f64 = 1.0;
+
+/// Doubts about the mesh of `body` and whether its material suits it.
+pub fn doubts(spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
+    let at = format!("body.{}", spec.id);
+    match &body.health {
+        Some(MeshHealth::Surface(report)) => lattice(&at, report, doubts),
+        Some(MeshHealth::Volume(health)) => volume(&at, health, doubts),
+        None => {}
+    }
+    if spec.poisson > LOCKING
+        && spec.mechanics.element == RawElement::Tet4
+        && spec.mechanics.locking == RawLocking::None
+    {
+        doubts.push(format!(
+            "{at}.poisson: linear tetrahedra lock at {}, the body will be far too stiff; \
+             take 0.45, element = \"tet10\", or law = \"neo-hookean\" with locking = \"node-averaged\"",
+            spec.poisson
+        ));
+    }
+    forces(&at, spec, body, doubts);
+}
+
+fn lattice(at: &str, report: &LatticeReport, doubts: &mut Vec<String>) {
+    let error = report.volume_error;
+    if error.abs() > VOLUME {
+        let verb = if error < 0.0 { "loses" } else { "adds" };
+        let wanted = report.cells as f64 * (error.abs() / VOLUME).powf(1.0 / ORDER);
+        let cells = ((wanted / 2.0).ceil() as usize * 2).min(most_cells());
+        let holes = report.surface.holes;
+        let open = if holes > 0 { " (the surface has holes, its volume is a guess)" } else { "" };
+        doubts.push(format!(
+            "{at}.mesh: meshing {verb} {} of the volume at {} cells{open}; use cells = {cells}",
+            percent(error.abs()),
+            report.cells
+        ));
+    }
+    if report.lost_share > LOST {
+        doubts.push(format!(
+            "{at}.mesh: {} of the surface has no element below it, such as near {} m: parts there are thinner than \
+             a cell of {}; raise cells, or leave these parts out of the surface",
+            percent(report.lost_share),
+            coordinates(&report.lost_near_m),
+            length(report.spacing_m)
+        ));
+    }
+}
+
+fn volume(at: &str, health: &VolumeHealth, doubts: &mut Vec<String>) {
+    if health.overfull_faces > 0 {
+        doubts.push(format!(
+            "{at}.mesh: {} faces belong to more than two tetrahedra, elements overlap; repair the file, or mesh its \
+             surface anew with mesh = {{ surface = …, cells = … }}",
+            health.overfull_faces
+        ));
+    }
+}
+
+/// Loads and displacements far beyond what the size and stiffness of the body suggest.
+fn forces(at: &str, spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
+    let area_m2 = body.rest_volume_m3.powf(2.0 / 3.0);
+    for (i, load) in spec.loads.iter().enumerate() {
+        let strain = load.force_n.norm() / (spec.young_pa * area_m2);
+        if strain > STRAIN {
+            doubts.push(format!(
+                "{at}.load.{i}.force_n: {:.3e} N would strain a body of this size and stiffness by {} (F / E A); \
+                 is it in newtons, and young_pa in pascals?",
+                load.force_n.norm(),
+                percent(strain)
+            ));
+        }
+    }
+    let size_m = super::longest_side(body);
+    for (i, fix) in spec.fixes.iter().enumerate() {
+        if fix.displacement_m.norm() > size_m {
+            doubts.push(format!(
+                "{at}.fix.{i}.displacement_m: moves a held part by {}, more than the body is long ({}); is it in metres?",
+                length(fix.displacement_m.norm()),
+                length(size_m)
+            ));
+        }
+    }
+}

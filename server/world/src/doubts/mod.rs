@@ -1,0 +1,46 @@
+//! Doubts about a built scene: what is allowed but hardly meant. Each is one sentence that says where, what,
+//! and what to do about it.
+//!
+//! Nothing is solved here; what takes steps to find out is in [`forecast`](crate::forecast).
+
+mod held;
+
+mod cuts;
+
+mod meshes;
+
+mod tools;
+
+mod world;
+
+use nalgebra::Vector3;
+
+use crate::scene::CheckedScene;
+use crate::simulation::SimBody;
+
+pub use cuts::after_the_end;
+
+/// All doubts, in the order of the scene.
+pub(crate) fn of(scene: &CheckedScene, bodies: &mut [SimBody]) -> Vec<String> {
+    let mut doubts = Vec::new();
+    world::doubts(scene, bodies, &mut doubts);
+    for (spec, body) in scene.bodies.iter().zip(&*bodies) {
+        meshes::doubts(spec, body, &mut doubts);
+        held::doubts(scene, spec, body, &mut doubts);
+    }
+    cuts::doubts(&scene.cuts, bodies, &mut doubts);
+    tools::doubts(&scene.tools, bodies, &mut doubts);
+    doubts
+}
+
+/// Corners of the box around some points [m].
+pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
+    let none = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    points.into_iter().fold(none, |(low, high), point| (low.inf(point), high.sup(point)))
+}
+
+/// Longest side of the box around a body [m].
+fn longest_side(body: &SimBody) -> f64 {
+    let (low, high) = bounds(body.body.rest_positions());
+    (high - low).max()
+}
