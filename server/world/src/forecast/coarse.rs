@@ -1,0 +1,188 @@
+//! Coarse copies of a scene: what is too large to be followed until it turns is followed on fewer elements.
+//!
+//! A copy has the skin of the body's elements, filled with a coarser lattice, and its constraints, loads, cuts and
+//! tools. Linear tetrahedra are too stiff by an error of the order h²: two copies tell its factor, and with it
+//! what the mesh of the scene would do.
+
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, ElementKind, Volumetric};
+use scindo_physics::mesh::TetMesh;
+
+use super::{BodyForecast, Effort, Ending, Run, Source};
+use crate::build::{Built, mechanics};
+use crate::mesh_in::{SurfaceMesh, lattice_from_surface};
+use crate::simulation::{SimBody, Simulation};
+
+/// Elements of the two copies.
+const ELEMENTS: [f64; 2] = [1_500.0, 6_000.0];
+/// How the time is shared between them.
+const SHARES: [f64; 2] = [0.3, 0.7];
+/// Lattice tetrahedra per cube of the lattice, a third more of them where the lattice meets the surface.
+const TETS_PER_CELL: f64 = 16.0;
+/// A copy that lost more of its volume is another body.
+const VOLUME: f64 = 0.15;
+/// Largest change that the finer copy may suggest for the scene, as a factor.
+const FACTOR: f64 = 1.5;
+
+/// Puts what coarse copies do in place of what was only seen in part.
+pub fn follow(simulation: &Simulation, bodies: &mut [BodyForecast], growing: &[bool], effort: Effort) {
+    let mut seen: Vec<Vec<(f64, BodyForecast)>> = vec![Vec::new(); bodies.len()];
+    for (elements, share) in ELEMENTS.into_iter().zip(SHARES) {
+        let Some(mut copy) = copy_of(simulation, elements) else { return };
+        let effort = Effort { processor_s: share * effort.processor_s, ..effort };
+        let mut run = Run::new(&mut copy, effort);
+        let ending = run.go(&mut |_| ());
+        for (i, body) in run.concluded(ending).bodies.into_iter().enumerate() {
+            if ending != Ending::Budget || body.displacement != Source::AtLeast {
+                seen[i].push((copy.bodies()[i].cell_m(), body));
+            }
+        }
+    }
+    for (i, body) in bodies.iter_mut().enumerate().filter(|(i, _)| growing[*i]) {
+        let [(coarse_m, coarse), (fine_m, fine)] = &seen[i][..] else { continue };
+        let [u, finer] = [coarse.largest_displacement_m, fine.largest_displacement_m];
+        // u(h) = u₀ + c h²
+        let slope = (finer - u) / (fine_m * fine_m - coarse_m * coarse_m);
+        let own_m = simulation.bodies()[i].cell_m();
+        let continued = finer + slope * (own_m * own_m - fine_m * fine_m);
+        let largest_m = continued.clamp(finer / FACTOR, finer * FACTOR);
+        if largest_m.is_finite() && largest_m > body.largest_displacement_m {
+            body.largest_displacement_m = largest_m;
+            body.largest_at_s = fine.largest_at_s;
+            body.displacement = Source::CoarseCopies;
+        }
+    }
+}
+
+/// The scene with about so many elements per body; none where a body is too thin for that.
+fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
+    let mut scene = simulation.scene().clone();
+    scene.probes.clear();
+    let mut bodies = Vec::new();
+    for (spec, fine) in scene.bodies.iter_mut().zip(simulation.bodies()) {
+        spec.skin = None;
+        let mesh = coarser(&fine.body, elements)?;
+        let wanted = mechanics::settings(&spec.mechanics);
+        let volumetric = match wanted.volumetric {
+            Volumetric::Selective => Volumetric::Full,
+            other => other,
+        };
+        let settings = scindo_physics::body::BodySettings {
+            element: ElementKind::Tet4,
+            volumetric,
+            solver: fine.body.settings().solver,
+            ..wanted
+        };
+        let mut body = Body::new(mesh, *fine.body.material(), settings).ok()?;
+        hold(&mut body, fine)?;
+        load(&mut body, &fine.body)?;
+        bodies.push(SimBody::new(&spec.id, body, None));
+    }
+    let built = Built { bodies, probes: Vec::new(), warnings: Vec::new() };
+    Some(Simulation::assemble(simulation.source().clone(), scene, built))
+}
+
+/// The uncut body with fewer elements, or as it is where it has no more.
+fn coarser(body: &Body, elements: f64) -> Option<TetMesh> {
+    let mesh = body.cut_mesh().mesh();
+    if mesh.tets.len() as f64 <= 1.5 * elements {
+        return Some(mesh.clone());
+    }
+    let volume_m3: f64 = mesh.volumes().iter().sum();
+    let [low, high] = mesh.bounds();
+    let spacing_m = (TETS_PER_CELL * volume_m3 / elements).cbrt();
+    let cells = ((high - low).max() / spacing_m).round().clamp(4.0, 128.0) as usize;
+    let skin = SurfaceMesh {
+        file: "copy".into(),
+        vertices: mesh.nodes.clone(),
+        triangles: mesh.boundary_faces().iter().map(|face| face.nodes).collect(),
+        notes: Vec::new(),
+    };
+    let (copy, report) = lattice_from_surface(&skin, cells, 1.0).ok()?;
+    (report.volume_error.abs() < VOLUME).then_some(copy)
+}
+
+/// Holds the nodes of `copy` that lie where nodes of `fine` are held.
+fn hold(copy: &mut Body, fine: &SimBody) -> Option<()> {
+    let held = fine.body.fixed_nodes();
+    let rest = fine.body.rest_positions();
+    let at = |i: usize| rest[held[i].node as usize];
+    let nodes: Vec<Vector3<f64>> = copy.rest_positions().to_vec();
+    let reach = 0.75 * fine.cell_m();
+    let mut any = false;
+    for (node, x) in (0u32..).zip(&nodes) {
+        let Some(nearest) = nearest(x, (0..held.len()).map(at)) else { return Some(()) };
+        if (at(nearest) - x).norm() <= reach {
+            copy.fix(&[node], held[nearest].axes, held[nearest].displacement_m).ok()?;
+            any = true;
+        }
+    }
+    if !any {
+        for (i, fixed) in held.iter().enumerate() {
+            let node = nearest(&at(i), nodes.iter().copied())?;
+            copy.fix(&[node as u32], fixed.axes, fixed.displacement_m).ok()?;
+        }
+    }
+    Some(())
+}
+
+/// Puts the load of every node of `fine` on the nearest one of `copy`.
+fn load(copy: &mut Body, fine: &Body) -> Option<()> {
+    let nodes: Vec<Vector3<f64>> = copy.rest_positions().to_vec();
+    let mut forces = vec![Vector3::zeros(); nodes.len()];
+    for (x, force) in fine.rest_positions().iter().zip(fine.loads()).filter(|(_, f)| f.norm() > 0.0) {
+        forces[nearest(x, nodes.iter().copied())?] += force;
+    }
+    for (node, force) in (0u32..).zip(forces).filter(|(_, f)| f.norm() > 0.0) {
+        copy.add_nodal_force(node, force).ok()?;
+    }
+    Some(())
+}
+
+fn nearest(x: &Vector3<f64>, points: impl Iterator<Item = Vector3<f64>>) -> Option<usize> {
+    points.map(|p| (p - x).norm_squared()).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::forecast::forecast;
+    use crate::scene::Scene;
+
+    /// A block that sags from a wall and is pushed aside, of 12 000 elements.
+    const BLOCK: &str = r#"
+        schema = 1
+        [world]
+        gravity_m_s2 = [0, 0, -9.81]
+        step_s = 0.02
+        [[body]]
+        id = "block"
+        mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.04, 0.04], cells = [24, 10, 10] } }
+        young_pa = 1e5
+        poisson = 0.3
+        density_kg_m3 = 1000
+        solver = { iterations = 400, tolerance = 1e-3 }
+        [[body.fix]]
+        where = { slab = { axis = "x", from = 0, to = 0 } }
+        [[body.load]]
+        where = { slab = { axis = "x", from = 1, to = 1 } }
+        force_n = [0, 0.2, 0]
+    "#;
+
+    #[test]
+    fn coarse_copies_move_as_far_as_the_scene() {
+        let mut simulation = Simulation::new(&Scene::from_toml(BLOCK).unwrap(), Path::new("")).unwrap();
+        let effort = Effort { processor_s: 60.0, end_s: Some(0.16) };
+        let seen = forecast(&mut simulation, effort, &mut |_| ()).unwrap().bodies.remove(0);
+        assert_eq!(seen.displacement, Source::Steps);
+        let nothing = BodyForecast { id: "block".into(), ..BodyForecast::default() };
+        let mut foretold = [BodyForecast { displacement: Source::AtLeast, ..nothing }];
+        follow(&simulation, &mut foretold, &[true], effort);
+        assert_eq!(foretold[0].displacement, Source::CoarseCopies);
+        let ratio = foretold[0].largest_displacement_m / seen.largest_displacement_m;
+        assert!((0.85..1.15).contains(&ratio), "{ratio}");
+    }
+}
