@@ -20,12 +20,12 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use thiserror::Error;
 
-pub use fields::write_fields;
 pub use machine::Machine;
 pub use summary::{BodySummary, Summary, Timing};
 
 use crate::scene::Scene;
 use crate::simulation::Simulation;
+use fields::{write_blocks, write_fields};
 use summary::Running;
 
 /// How long recorded probes may stay in memory.
@@ -61,7 +61,7 @@ pub struct Results {
     flushed: Instant,
     running: Running,
     series_steps: u64,
-    series: Vec<(f64, String)>,
+    series: Vec<(f64, Vec<String>)>,
 }
 
 impl Results {
@@ -94,7 +94,7 @@ impl Results {
     /// # Errors
     /// What the disk says.
     pub fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
-        self.running.add(simulation.report());
+        self.running.add(simulation);
         self.record_probes(simulation)?;
         if self.series_steps > 0 && simulation.steps().is_multiple_of(self.series_steps) {
             self.record_fields(simulation)?;
@@ -112,8 +112,8 @@ impl Results {
     /// What the disk says.
     pub fn finish(&mut self, simulation: &Simulation, status: &str) -> Result<Summary, ResultsError> {
         self.probes.flush().map_err(at(&self.directory.join("probes.csv")))?;
-        let path = self.directory.join("final.vtu");
-        write_fields(&path, simulation).map_err(|source| ResultsError::Fields { path, source })?;
+        write_blocks(&self.directory, "final", simulation)
+            .map_err(|(path, source)| ResultsError::Fields { path, source })?;
         if self.series_steps > 0 {
             let path = self.directory.join("series.pvd");
             vtu::save_pvd(&path, &self.series).map_err(at(&path))?;
@@ -133,10 +133,10 @@ impl Results {
     }
 
     fn record_fields(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
-        let name = format!("step_{:06}.vtu", simulation.steps());
-        let path = self.directory.join(&name);
-        write_fields(&path, simulation).map_err(|source| ResultsError::Fields { path, source })?;
-        self.series.push((simulation.time_s(), name));
+        let name = format!("step_{:06}", simulation.steps());
+        let files = write_fields(&self.directory, &name, simulation)
+            .map_err(|(path, source)| ResultsError::Fields { path, source })?;
+        self.series.push((simulation.time_s(), files.to_vec()));
         Ok(())
     }
 

@@ -42,8 +42,10 @@ pub struct Summary {
     pub events: Vec<EventSummary>,
     /// How many events there were.
     pub event_count: u64,
-    /// What is odd about the scene.
+    /// What is odd about the scene, and what went wrong in the steps: a line for each body and kind.
     pub warnings: Vec<String>,
+    /// Why the run does not count as one that succeeded.
+    pub failures: Vec<String>,
     /// Effects on and off, with costs.
     pub plan: Plan,
     /// What it ran on.
@@ -63,6 +65,8 @@ pub struct Timing {
     pub p99_ms: f64,
     /// Slowest step.
     pub max_ms: f64,
+    /// Mean processor time of the thread that steps: what a step costs on a machine that is not busy.
+    pub processor_mean_ms: f64,
     /// Simulated over computed time.
     pub real_time_factor: f64,
     /// Mean per stage.
@@ -113,8 +117,10 @@ pub struct BodySummary {
     pub volume_m3: f64,
     /// Smallest det F of any piece.
     pub least_volume_ratio: f64,
-    /// Largest displacement of a node [m].
+    /// Largest displacement of a node at the end [m].
     pub max_displacement_m: f64,
+    /// Largest displacement over the run of a node of a part that something holds [m].
+    pub largest_displacement_m: f64,
     /// Kinetic energy [J].
     pub kinetic_j: f64,
     /// Elastic energy [J].
@@ -168,12 +174,16 @@ pub struct SolverSummary {
     pub last_algebraic_error: f64,
     /// Steps at which something was done differently from what was asked for.
     pub noticed_steps: u64,
-    /// Steps that stopped at the iteration limit.
+    /// Steps that ended above their tolerance.
     pub unconverged_steps: u64,
-    /// Steps that were divided to stay finite.
+    /// Steps that could not be made as asked.
+    pub refused_steps: u64,
+    /// Steps that failed as a whole and were made in parts.
     pub divided_steps: u64,
-    /// Steps that were rolled back.
+    /// Steps that failed in parts as well and were rolled back.
     pub rolled_back_steps: u64,
+    /// Steps that held inverted elements.
+    pub inverted_steps: u64,
 }
 
 /// A probe at the end.
@@ -206,14 +216,27 @@ pub struct EventSummary {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Running {
     step_ms: Vec<f32>,
+    processor_s: f64,
+    /// Per body, over the run [m].
+    largest_displacement_m: Vec<f64>,
     solvers: Vec<(SolverSummary, u64)>,
     events: Vec<EventSummary>,
     event_count: u64,
 }
 
 impl Running {
-    pub fn add(&mut self, report: &StepReport) {
-        use scindo_physics::body::{Outcome, StopReason};
+    /// Takes note of the step that `simulation` has just made.
+    pub fn add(&mut self, simulation: &Simulation) {
+        self.add_report(simulation.report());
+        self.processor_s += simulation.report().processor_s;
+        self.largest_displacement_m.resize(simulation.bodies().len(), 0.0);
+        for (largest, body) in self.largest_displacement_m.iter_mut().zip(simulation.bodies()) {
+            *largest = largest.max(body.displacement_m());
+        }
+    }
+
+    fn add_report(&mut self, report: &StepReport) {
+        use scindo_physics::body::Outcome;
         self.step_ms.push((report.seconds.total() * 1e3) as f32);
         self.solvers.resize(report.bodies.len(), Default::default());
         for ((solver, iterations), body) in self.solvers.iter_mut().zip(&report.bodies) {
@@ -228,9 +251,11 @@ impl Running {
             solver.backtracks += u64::from(solve.backtracks);
             solver.last_algebraic_error = solve.algebraic_error;
             solver.noticed_steps += u64::from(solve.notice.is_some());
-            solver.unconverged_steps += u64::from(solve.stop == StopReason::IterationLimit);
-            solver.divided_steps += u64::from(solve.substeps > 1);
-            solver.rolled_back_steps += u64::from(solve.outcome != Outcome::Advanced);
+            solver.unconverged_steps += u64::from(solve.is_unconverged());
+            solver.refused_steps += u64::from(solve.outcome == Outcome::Refused);
+            solver.divided_steps += u64::from(solve.is_divided());
+            solver.rolled_back_steps += u64::from(solve.outcome == Outcome::Held);
+            solver.inverted_steps += u64::from(solve.inverted_pieces > 0);
         }
         self.event_count += report.events.len() as u64;
         let room = MAX_EVENTS.saturating_sub(self.events.len());
@@ -244,7 +269,9 @@ impl Running {
             let (mut solver, iterations) = self.solvers.get(i).cloned().unwrap_or_default();
             solver.mean_iterations = iterations as f64 / steps.max(1) as f64;
             let mesh_error = simulation.report().bodies.get(i).and_then(|report| report.mesh_error);
-            body_summary(body, simulation, solver, mesh_error)
+            let largest_displacement_m = self.largest_displacement_m.get(i).copied().unwrap_or(0.0);
+            let summary = body_summary(body, simulation, solver, mesh_error);
+            BodySummary { largest_displacement_m, ..summary }
         };
         Summary {
             status: status.to_owned(),
@@ -261,7 +288,8 @@ impl Running {
             refused_tool_samples: simulation.tools().refused_samples(),
             events: self.events.clone(),
             event_count: self.event_count,
-            warnings: simulation.warnings().to_vec(),
+            warnings: [simulation.warnings(), &simulation.troubles()].concat(),
+            failures: simulation.failures(),
             plan: simulation.plan(),
             machine: Machine::here(),
             scene,
@@ -282,6 +310,7 @@ impl Running {
             median_ms: at(0.5),
             p99_ms: at(0.99),
             max_ms: f64::from(max),
+            processor_mean_ms: 1e3 * self.processor_s / n,
             real_time_factor: simulation.step_s() * 1e3 / mean_ms.max(1e-9),
             stages: Stage::ALL
                 .iter()
@@ -329,10 +358,10 @@ fn body_summary(
     BodySummary {
         id: sim.id.to_string(),
         elements: body.n_elements(),
-        nodes: mesh.mesh().nodes.len(),
+        nodes: body.n_nodes(),
         unknowns: 3 * body.rest_positions().len(),
-        pieces: mesh.pieces().len(),
-        copies: mesh.n_copies(),
+        pieces: body.n_pieces(),
+        copies: body.rest_positions().len(),
         parts: mesh.components().len(),
         surface_vertices: surface.vertices.len(),
         surface_triangles: surface.triangles.len(),
@@ -344,6 +373,8 @@ fn body_summary(
         volume_m3: body.volume(),
         least_volume_ratio: body.least_volume_ratio(),
         max_displacement_m: displaced.fold(0.0, f64::max),
+        // Known to whoever followed the run.
+        largest_displacement_m: 0.0,
         kinetic_j: body.kinetic_energy(),
         elastic_j: body.elastic_energy(),
         reactions_n: sim.fix_groups.iter().map(|nodes| body.reaction(nodes, gravity).into()).collect(),

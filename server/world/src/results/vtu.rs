@@ -1,4 +1,4 @@
-//! ParaView files: `.vtu` grids of tetrahedra and triangles with fields, and `.pvd` time series.
+//! ParaView files: `.vtu` grids of tetrahedra and `.vtp` surfaces with fields, `.vtm` that names both, `.pvd` series.
 //!
 //! # Source
 //! "VTK File Formats" (vtk.org): XML, base64 inline, 64-bit headers, little endian. Header and data of
@@ -12,16 +12,18 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::Vector3;
 
-/// VTK's numbers for the cells written here.
-const VTK_TRIANGLE: u8 = 5;
+/// VTK's number for a tetrahedron.
 const VTK_TETRA: u8 = 10;
 
-/// Cells of one type; a grid may hold several blocks, one after the other.
+/// Components of a symmetric tensor in VTK's order; ParaView shows these names.
+const TENSOR_COMPONENTS: [&str; 6] = ["XX", "YY", "ZZ", "XY", "YZ", "XZ"];
+
+/// The cells of a file, and with them its kind.
 #[derive(Clone, Copy, Debug)]
-pub enum CellBlock<'a> {
-    /// Tetrahedra, positively oriented.
+pub enum Cells<'a> {
+    /// Tetrahedra, positively oriented: a `.vtu` file.
     Tets(&'a [[u32; 4]]),
-    /// Triangles, counter-clockwise from outside.
+    /// Triangles, counter-clockwise from outside: a `.vtp` file.
     Triangles(&'a [[u32; 3]]),
 }
 
@@ -32,6 +34,8 @@ pub enum FieldValues<'a> {
     Scalars(&'a [f64]),
     /// Three reals each.
     Vectors(&'a [Vector3<f64>]),
+    /// A symmetric tensor each, in VTK's order: xx, yy, zz, xy, yz, xz.
+    SymmetricTensors(&'a [[f64; 6]]),
     /// One integer each (tags, numbers).
     Integers(&'a [i32]),
 }
@@ -41,22 +45,22 @@ pub enum FieldValues<'a> {
 pub struct Field<'a> {
     /// Name shown by ParaView.
     pub name: &'a str,
-    /// One entry per point or per cell (cells in the order of the blocks).
+    /// One entry per point or per cell.
     pub values: FieldValues<'a>,
 }
 
-/// What a `.vtu` file holds.
+/// What a file holds.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid<'a> {
     /// Positions [m].
     pub points: &'a [Vector3<f64>],
     /// Cells over those points.
-    pub cells: &'a [CellBlock<'a>],
+    pub cells: Cells<'a>,
     /// Fields at points.
     pub point_fields: &'a [Field<'a>],
     /// Fields in cells.
     pub cell_fields: &'a [Field<'a>],
-    /// Simulation time [s], if any.
+    /// Simulation time [s] of a state whose points are current positions; none for a mesh alone.
     pub time_s: Option<f64>,
 }
 
@@ -78,7 +82,7 @@ pub enum VtuError {
     /// A cell names a point that does not exist.
     #[error("cell {cell} uses point {point}, the grid has {n_points}")]
     Index {
-        /// Cell number over all blocks.
+        /// Number of the cell.
         cell: usize,
         /// The index.
         point: u32,
@@ -90,58 +94,93 @@ pub enum VtuError {
     Io(#[from] io::Error),
 }
 
-/// Writes a grid to a file, replacing it.
-pub fn save_vtu(path: &Path, grid: &Grid) -> Result<(), VtuError> {
+/// Writes a grid to a file, replacing it: `.vtu` for tetrahedra, `.vtp` for triangles.
+pub fn save_grid(path: &Path, grid: &Grid) -> Result<(), VtuError> {
     let mut out = BufWriter::new(File::create(path)?);
-    write_vtu(&mut out, grid)?;
+    write_grid(&mut out, grid)?;
     out.flush()?;
     Ok(())
 }
 
-/// Writes a grid as a `.vtu` document.
-pub fn write_vtu(out: &mut impl Write, grid: &Grid) -> Result<(), VtuError> {
+/// Writes a grid as a `.vtu` or `.vtp` document.
+pub fn write_grid(out: &mut impl Write, grid: &Grid) -> Result<(), VtuError> {
     let cells = CellArrays::of(grid)?;
-    let (n_points, n_cells) = (grid.points.len(), cells.types.len());
+    let (n_points, n_cells) = (grid.points.len(), cells.offsets.len());
     check_lengths(grid.point_fields, n_points, "points")?;
     check_lengths(grid.cell_fields, n_cells, "cells")?;
-    writeln!(out, "<?xml version=\"1.0\"?>")?;
-    writeln!(
-        out,
-        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
-    )?;
-    writeln!(out, "<UnstructuredGrid>")?;
+    let (kind, cells_of, counted) = match grid.cells {
+        Cells::Tets(_) => ("UnstructuredGrid", "Cells", "NumberOfCells"),
+        Cells::Triangles(_) => ("PolyData", "Polys", "NumberOfPolys"),
+    };
+    begin(out, kind, "1.0")?;
+    writeln!(out, "<{kind}>")?;
     if let Some(time) = grid.time_s {
-        writeln!(
-            out,
-            "<FieldData><DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">{time}</DataArray></FieldData>"
-        )?;
+        state(out, time)?;
     }
-    writeln!(out, "<Piece NumberOfPoints=\"{n_points}\" NumberOfCells=\"{n_cells}\">")?;
+    writeln!(out, "<Piece NumberOfPoints=\"{n_points}\" {counted}=\"{n_cells}\">")?;
     writeln!(out, "<PointData>")?;
     fields(out, grid.point_fields)?;
     writeln!(out, "</PointData>\n<CellData>")?;
     fields(out, grid.cell_fields)?;
     writeln!(out, "</CellData>\n<Points>")?;
-    array(out, "Float64", "Points", 3, &vector_bytes(grid.points))?;
-    writeln!(out, "</Points>\n<Cells>")?;
-    array(out, "Int64", "connectivity", 1, &bytes(&cells.connectivity, i64::to_le_bytes))?;
-    array(out, "Int64", "offsets", 1, &bytes(&cells.offsets, i64::to_le_bytes))?;
-    array(out, "UInt8", "types", 1, &cells.types)?;
-    writeln!(out, "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")?;
+    array(out, &Array::of("Float64", "Points", 3), &vector_bytes(grid.points))?;
+    writeln!(out, "</Points>\n<{cells_of}>")?;
+    array(out, &Array::of("Int64", "connectivity", 1), &bytes(&cells.connectivity, i64::to_le_bytes))?;
+    array(out, &Array::of("Int64", "offsets", 1), &bytes(&cells.offsets, i64::to_le_bytes))?;
+    if let Cells::Tets(tets) = grid.cells {
+        array(out, &Array::of("UInt8", "types", 1), &vec![VTK_TETRA; tets.len()])?;
+    }
+    writeln!(out, "</{cells_of}>\n</Piece>\n</{kind}>\n</VTKFile>")?;
     Ok(())
 }
 
-/// Writes a `.pvd` series: times [s] and the file of each, relative to the `.pvd`.
-pub fn save_pvd(path: &Path, series: &[(f64, String)]) -> io::Result<()> {
-    let mut out = BufWriter::new(File::create(path)?);
+/// The first lines of a file.
+fn begin(out: &mut impl Write, kind: &str, version: &str) -> io::Result<()> {
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
     writeln!(
         out,
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">"
-    )?;
+        "<VTKFile type=\"{kind}\" version=\"{version}\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
+    )
+}
+
+/// Time and meaning of the points. A number says the latter: common readers refuse text in field data.
+fn state(out: &mut impl Write, time_s: f64) -> io::Result<()> {
+    writeln!(out, "<!-- points: current positions [m]; displacement_m: current minus rest position -->")?;
+    writeln!(out, "<FieldData>")?;
+    for (kind, name, value) in
+        [("Float64", "TimeValue", time_s.to_string()), ("Int32", "points_are_current_positions", "1".into())]
+    {
+        writeln!(
+            out,
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfTuples=\"1\" format=\"ascii\">{value}</DataArray>"
+        )?;
+    }
+    writeln!(out, "</FieldData>")
+}
+
+/// Writes a `.vtm`: named blocks and the file of each, relative to the `.vtm`.
+pub fn save_vtm(path: &Path, blocks: &[(&str, &str)]) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(path)?);
+    begin(&mut out, "vtkMultiBlockDataSet", "1.0")?;
+    writeln!(out, "<vtkMultiBlockDataSet>")?;
+    for (index, (name, file)) in blocks.iter().enumerate() {
+        let (name, file) = (quick_xml::escape::escape(*name), quick_xml::escape::escape(*file));
+        writeln!(out, "<DataSet index=\"{index}\" name=\"{name}\" file=\"{file}\"/>")?;
+    }
+    writeln!(out, "</vtkMultiBlockDataSet>\n</VTKFile>")?;
+    out.flush()
+}
+
+/// Writes a `.pvd` series: times [s] and the files of each, relative to the `.pvd`.
+pub fn save_pvd(path: &Path, series: &[(f64, Vec<String>)]) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(path)?);
+    begin(&mut out, "Collection", "0.1")?;
     writeln!(out, "<Collection>")?;
-    for (time, file) in series {
-        let file = quick_xml::escape::escape(file.as_str());
-        writeln!(out, "<DataSet timestep=\"{time}\" group=\"\" part=\"0\" file=\"{file}\"/>")?;
+    for (time, files) in series {
+        for (part, file) in files.iter().enumerate() {
+            let file = quick_xml::escape::escape(file.as_str());
+            writeln!(out, "<DataSet timestep=\"{time}\" group=\"\" part=\"{part}\" file=\"{file}\"/>")?;
+        }
     }
     writeln!(out, "</Collection>\n</VTKFile>")?;
     out.flush()
@@ -152,32 +191,25 @@ struct CellArrays {
     connectivity: Vec<i64>,
     /// End of each cell in the connectivity.
     offsets: Vec<i64>,
-    types: Vec<u8>,
 }
 
 impl CellArrays {
     fn of(grid: &Grid) -> Result<Self, VtuError> {
-        let mut arrays = CellArrays { connectivity: Vec::new(), offsets: Vec::new(), types: Vec::new() };
-        for block in grid.cells {
-            match block {
-                CellBlock::Tets(tets) => {
-                    tets.iter().try_for_each(|t| arrays.push(t, VTK_TETRA, grid.points.len()))?;
-                }
-                CellBlock::Triangles(triangles) => {
-                    triangles.iter().try_for_each(|t| arrays.push(t, VTK_TRIANGLE, grid.points.len()))?;
-                }
-            }
+        let mut arrays = CellArrays { connectivity: Vec::new(), offsets: Vec::new() };
+        let n_points = grid.points.len();
+        match grid.cells {
+            Cells::Tets(tets) => tets.iter().try_for_each(|t| arrays.push(t, n_points))?,
+            Cells::Triangles(triangles) => triangles.iter().try_for_each(|t| arrays.push(t, n_points))?,
         }
         Ok(arrays)
     }
 
-    fn push(&mut self, nodes: &[u32], vtk_type: u8, n_points: usize) -> Result<(), VtuError> {
+    fn push(&mut self, nodes: &[u32], n_points: usize) -> Result<(), VtuError> {
         if let Some(&point) = nodes.iter().find(|&&n| n as usize >= n_points) {
-            return Err(VtuError::Index { cell: self.types.len(), point, n_points });
+            return Err(VtuError::Index { cell: self.offsets.len(), point, n_points });
         }
         self.connectivity.extend(nodes.iter().map(|&n| i64::from(n)));
         self.offsets.push(self.connectivity.len() as i64);
-        self.types.push(vtk_type);
         Ok(())
     }
 }
@@ -187,6 +219,7 @@ fn check_lengths(fields: &[Field], expected: usize, place: &'static str) -> Resu
         let found = match field.values {
             FieldValues::Scalars(values) => values.len(),
             FieldValues::Vectors(values) => values.len(),
+            FieldValues::SymmetricTensors(values) => values.len(),
             FieldValues::Integers(values) => values.len(),
         };
         if found != expected {
@@ -198,10 +231,15 @@ fn check_lengths(fields: &[Field], expected: usize, place: &'static str) -> Resu
 
 fn fields(out: &mut impl Write, fields: &[Field]) -> io::Result<()> {
     for field in fields {
+        let of = |kind, components| Array::of(kind, field.name, components);
         match field.values {
-            FieldValues::Scalars(v) => array(out, "Float64", field.name, 1, &bytes(v, f64::to_le_bytes))?,
-            FieldValues::Vectors(v) => array(out, "Float64", field.name, 3, &vector_bytes(v))?,
-            FieldValues::Integers(v) => array(out, "Int32", field.name, 1, &bytes(v, i32::to_le_bytes))?,
+            FieldValues::Scalars(v) => array(out, &of("Float64", 1), &bytes(v, f64::to_le_bytes))?,
+            FieldValues::Vectors(v) => array(out, &of("Float64", 3), &vector_bytes(v))?,
+            FieldValues::SymmetricTensors(v) => {
+                let named = Array { component_names: &TENSOR_COMPONENTS, ..of("Float64", 6) };
+                array(out, &named, &bytes(v.as_flattened(), f64::to_le_bytes))?;
+            }
+            FieldValues::Integers(v) => array(out, &of("Int32", 1), &bytes(v, i32::to_le_bytes))?,
         }
     }
     Ok(())
@@ -215,18 +253,29 @@ fn vector_bytes(values: &[Vector3<f64>]) -> Vec<u8> {
     values.iter().flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>()).collect()
 }
 
-fn array(
-    out: &mut impl Write,
-    type_name: &str,
-    name: &str,
+/// What a reader must know about an array.
+struct Array<'a> {
+    kind: &'a str,
+    name: &'a str,
     components: usize,
-    data: &[u8],
-) -> io::Result<()> {
-    let name = quick_xml::escape::escape(name);
-    writeln!(
-        out,
-        "<DataArray type=\"{type_name}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">"
-    )?;
+    /// Empty: they have no names.
+    component_names: &'a [&'a str],
+}
+
+impl<'a> Array<'a> {
+    fn of(kind: &'a str, name: &'a str, components: usize) -> Self {
+        Self { kind, name, components, component_names: &[] }
+    }
+}
+
+fn array(out: &mut impl Write, array: &Array, data: &[u8]) -> io::Result<()> {
+    let Array { kind, components, .. } = array;
+    let name = quick_xml::escape::escape(array.name);
+    write!(out, "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\"")?;
+    for (number, component) in array.component_names.iter().enumerate() {
+        write!(out, " ComponentName{number}=\"{component}\"")?;
+    }
+    writeln!(out, " format=\"binary\">")?;
     let header = (data.len() as u64).to_le_bytes();
     writeln!(out, "{}{}\n</DataArray>", STANDARD.encode(header), STANDARD.encode(data))
 }
@@ -247,31 +296,45 @@ mod tests {
     fn what_is_written_is_read_back() {
         let points = points();
         let fields = [Field { name: "displacement <m>", values: FieldValues::Vectors(&points) }];
-        let tags = [Field { name: "tag", values: FieldValues::Integers(&[-1, 0]) }];
-        let cells = [CellBlock::Tets(&TETS), CellBlock::Triangles(&[[0, 2, 1]])];
+        let tags = [Field { name: "tag", values: FieldValues::Integers(&[-1]) }];
         let grid = Grid {
             points: &points,
-            cells: &cells,
+            cells: Cells::Tets(&TETS),
             point_fields: &fields,
             cell_fields: &tags,
             time_s: Some(0.25),
         };
         let mut out = Vec::new();
-        write_vtu(&mut out, &grid).unwrap();
+        write_grid(&mut out, &grid).unwrap();
         let Ok(MeshFile::Volume(mesh)) = read_mesh_bytes("a.vtu", &out) else { panic!("not a volume") };
         assert_eq!((mesh.nodes, mesh.tets), (points, TETS.to_vec()));
+    }
+
+    #[test]
+    fn a_tensor_names_its_components_in_vtks_order() {
+        let tensor = [Field {
+            name: "cauchy_stress_pa",
+            values: FieldValues::SymmetricTensors(&[[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]),
+        }];
+        let cells = Cells::Triangles(&[[0, 2, 1]]);
+        let grid = Grid { points: &points(), cells, point_fields: &[], cell_fields: &tensor, time_s: None };
+        let mut out = Vec::new();
+        write_grid(&mut out, &grid).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        assert!(text.contains("type=\"PolyData\"") && text.contains("NumberOfPolys=\"1\""), "{text}");
+        assert!(text.contains("NumberOfComponents=\"6\" ComponentName0=\"XX\" ComponentName1=\"YY\""));
+        assert!(text.contains("ComponentName3=\"XY\" ComponentName4=\"YZ\" ComponentName5=\"XZ\""));
     }
 
     #[test]
     fn fields_of_the_wrong_length_and_bad_indices_are_refused() {
         let points = points();
         let short = [Field { name: "speed", values: FieldValues::Scalars(&[1.0]) }];
-        let cells = [CellBlock::Tets(&TETS)];
-        let grid =
-            Grid { points: &points, cells: &cells, point_fields: &short, cell_fields: &[], time_s: None };
-        let message = write_vtu(&mut Vec::new(), &grid).unwrap_err().to_string();
+        let cells = Cells::Tets(&TETS);
+        let grid = Grid { points: &points, cells, point_fields: &short, cell_fields: &[], time_s: None };
+        let message = write_grid(&mut Vec::new(), &grid).unwrap_err().to_string();
         assert!(message.contains("'speed' has 1 entries, the grid has 4 points"), "{message}");
         let grid = Grid { points: &points[..3], point_fields: &[], ..grid };
-        assert!(matches!(write_vtu(&mut Vec::new(), &grid), Err(VtuError::Index { point: 3, .. })));
+        assert!(matches!(write_grid(&mut Vec::new(), &grid), Err(VtuError::Index { point: 3, .. })));
     }
 }
