@@ -101,13 +101,19 @@ pub struct Wants {
     pub contact: bool,
     /// Kinetic and elastic energy in the report.
     pub energy: bool,
+    /// Von Mises stress on the surface in the snapshot, per body.
+    pub stress: Vec<bool>,
+    /// Positions of probes and energies in the snapshot.
+    pub measures: bool,
 }
 
 impl Wants {
     /// Becomes equal to `other` without a new allocation.
     pub(crate) fn take(&mut self, other: &Wants) {
         self.surface.clone_from(&other.surface);
+        self.stress.clone_from(&other.stress);
         (self.contact, self.energy) = (other.contact, other.energy);
+        self.measures = other.measures;
     }
 }
 

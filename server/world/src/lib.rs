@@ -17,7 +17,7 @@ pub mod inputs;
 // mesh files → checked tetrahedra
 pub mod mesh_in;
 
-// the organ of the demonstration
+// bodies of our own making
 pub mod organ;
 
 // rigid tools: where hands and scripts hold them
@@ -38,6 +38,14 @@ pub mod contact_model;
 pub mod plan;
 
 pub mod simulation;
+
+// allowed, but hardly meant
+pub mod doubts;
+
+// what a scene will do, from its first steps
+pub mod forecast;
+
+pub mod quantity;
 
 pub mod snapshot;
 

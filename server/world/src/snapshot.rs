@@ -7,9 +7,11 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
+use scindo_physics::body::Body;
 
 use crate::inputs::{ToolMode, ToolShape, Wants};
-use crate::simulation::{BodyReport, SimBody, StepReport};
+use crate::probe::Probe;
+use crate::simulation::{BodyReport, Energy, SimBody, StepCounts, StepReport};
 use crate::tool::{Tool, Tools};
 
 /// The state after one step.
@@ -23,6 +25,8 @@ pub struct Snapshot {
     pub bodies: Vec<BodySnapshot>,
     /// Tools of the scene, then those brought by clients.
     pub tools: Vec<ToolSnapshot>,
+    /// Positions of the probes [m], in the order of the scene; empty when nobody asked.
+    pub probes: Vec<Vector3<f64>>,
 }
 
 /// One body.
@@ -40,10 +44,24 @@ pub struct BodySnapshot {
     pub marks: Vec<[[f32; 3]; 2]>,
     /// Surface velocities [m/s]; empty when nobody asked for contact.
     pub velocities: Vec<[f32; 3]>,
+    /// Von Mises stress on the surface [Pa]; empty when nobody asked.
+    pub stress: Vec<f32>,
+    /// Kinetic and elastic energy; none when nobody asked.
+    pub energy: Option<Energy>,
     /// Solver iterations of the step.
     pub iterations: u32,
     /// Relative preconditioned residual after the step.
     pub residual: f64,
+    /// What it has to reach; 0 where the integrator solves nothing.
+    pub tolerance: f64,
+    /// Whether the step ended above it.
+    pub unconverged: bool,
+    /// What went wrong since the start or the last reset.
+    pub counts: StepCounts,
+    /// Elements that are turned inside out.
+    pub inverted: u32,
+    /// Whether the scene means a fixed number of iterations.
+    pub fixed_iterations: bool,
     /// Elements of the mesh.
     pub elements: u32,
     /// Pieces that the cuts made of them.
@@ -60,8 +78,21 @@ impl Snapshot {
         self.time_s = time_s;
         self.bodies.resize_with(from.bodies.len(), BodySnapshot::default);
         for (i, (body, out)) in from.bodies.iter_mut().zip(&mut self.bodies).enumerate() {
-            let surface = wants.contact || wants.surface.get(i).copied().unwrap_or(false);
+            let asked = |flags: &[bool]| flags.get(i).copied().unwrap_or(false);
+            let surface = wants.contact || asked(&wants.surface);
             out.fill(body, &from.report.bodies[i], surface, wants.contact);
+            out.stress.clear();
+            if asked(&wants.stress) {
+                out.topology = body.topology();
+                body.surface_stress(&mut out.stress);
+            }
+            out.energy =
+                wants.measures.then(|| from.report.bodies[i].energy.unwrap_or_else(|| body.energy()));
+        }
+        self.probes.clear();
+        if wants.measures {
+            let position = |probe: &Probe| probe.position(from.bodies[probe.body].body.positions());
+            self.probes.extend(from.probes.iter().map(position));
         }
         self.tools.resize_with(from.tools.len(), ToolSnapshot::default);
         from.tools.iter().zip(&mut self.tools).for_each(|(tool, out)| out.fill(tool));
@@ -73,6 +104,7 @@ pub(crate) struct Sources<'a> {
     pub bodies: &'a mut [SimBody],
     pub report: &'a StepReport,
     pub tools: &'a Tools,
+    pub probes: &'a [Probe],
 }
 
 impl BodySnapshot {
@@ -84,9 +116,14 @@ impl BodySnapshot {
         self.epoch = mesh.epoch();
         self.iterations = report.solve.iterations;
         self.residual = if report.solve.residual.is_finite() { report.solve.residual } else { f64::MAX };
-        self.elements = mesh.mesh().tets.len() as u32;
-        self.pieces = mesh.pieces().len() as u32;
-        self.copies = mesh.n_copies() as u32;
+        self.tolerance = report.solve.tolerance;
+        self.unconverged = report.solve.is_unconverged();
+        self.inverted = u32::try_from(report.solve.inverted_pieces).unwrap_or(u32::MAX);
+        self.counts = body.counts();
+        self.fixed_iterations = body.fixed_iterations;
+        self.elements = body.body.n_elements() as u32;
+        self.pieces = body.body.n_pieces() as u32;
+        self.copies = body.body.rest_positions().len() as u32;
         self.rest_volume_m3 = body.rest_volume_m3;
         self.positions.clear();
         self.marks.clear();
@@ -94,10 +131,25 @@ impl BodySnapshot {
         if surface {
             self.topology = body.topology();
             self.positions.extend_from_slice(body.surface_positions());
+            hide_sleepers(&body.body, &mut self.positions);
             body.incision_marks(&mut self.marks);
         }
         if velocities {
             body.surface_velocities(&mut self.velocities);
+        }
+    }
+}
+
+/// Vertices of parts that sleep far away are put where the body was, so that no view looks for them; no
+/// triangle of the topology is on them.
+fn hide_sleepers(body: &Body, positions: &mut [[f32; 3]]) {
+    if !body.sleeps() {
+        return;
+    }
+    let place = body.rest_positions().first().map_or([0.0; 3], |x| [x.x as f32, x.y as f32, x.z as f32]);
+    for (position, vertex) in positions.iter_mut().zip(&body.surface().vertices) {
+        if body.is_asleep(vertex.copies[0]) {
+            *position = place;
         }
     }
 }
@@ -119,6 +171,7 @@ impl ToolSnapshot {
         self.stiffness_n_m = tool.stiffness_n_m;
         self.contact_stiffness_n_m = tool.contact_stiffness_n_m();
         self.max_force_n = tool.max_force_n;
+        self.held_m = tool.held_point();
         self.seq = tool.seq;
         self.client_time_ns = tool.client_time_ns;
     }
@@ -135,6 +188,12 @@ pub struct SurfaceTopology {
     pub triangles: Vec<[u32; 3]>,
     /// Per triangle: 0 = skin, n > 0 = lip of incision n.
     pub tags: Vec<u32>,
+    /// Where the vertices rest [m].
+    pub rest: Vec<[f32; 3]>,
+    /// Per vertex: it moves with held nodes.
+    pub held: Vec<bool>,
+    /// Per vertex: its part of the body hangs on a held node.
+    pub hangs: Vec<bool>,
 }
 
 /// One tool.
@@ -162,6 +221,8 @@ pub struct ToolSnapshot {
     pub contact_stiffness_n_m: f64,
     /// Largest force [N].
     pub max_force_n: f64,
+    /// Middle of the tissue in its grip [m]; none when it holds nothing.
+    pub held_m: Option<Vector3<f64>>,
     /// Sequence number of the newest sample used.
     pub seq: u64,
     /// The client's clock at that sample [ns].

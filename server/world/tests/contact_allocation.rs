@@ -85,6 +85,7 @@ fn steady_contact_does_not_allocate() {
         vertex_count: surface.vertices.len() as u32,
         triangles: surface.triangles.clone(),
         tags: surface.tags.clone(),
+        ..SurfaceTopology::default()
     };
     let velocities = vec![[0.0; 3]; surface.vertices.len()];
     snapshot.bodies.push(BodySnapshot { topology: Arc::new(topology), velocities, ..Default::default() });

@@ -78,11 +78,17 @@ fn summary_probes_and_fields_are_complete() {
     assert!((fallen + 9.81 * 1e-4 * 210.0).abs() < 1e-6, "{fallen}");
 
     let pvd = std::fs::read_to_string(directory.path().join("series.pvd")).unwrap();
-    assert_eq!(pvd.matches("<DataSet").count(), 4);
+    assert_eq!(pvd.matches("<DataSet").count(), 2 * 4);
+    assert!(pvd.contains("part=\"1\" file=\"step_000005-surface.vtp\""), "{pvd}");
     let vtu = std::fs::read_to_string(directory.path().join("final.vtu")).unwrap();
-    for name in ["displacement_m", "von_mises_pa", "cut_tag", "cauchy_xx_yy_zz_pa", "piece", "element"] {
+    for name in ["displacement_m", "rest_position_m", "von_mises_pa", "cauchy_stress_pa", "piece", "element"]
+    {
         assert!(vtu.contains(&format!("Name=\"{name}\"")), "{name}");
     }
+    let surface = std::fs::read_to_string(directory.path().join("final-surface.vtp")).unwrap();
+    assert!(surface.contains("Name=\"cut_tag\"") && !vtu.contains("Name=\"cut_tag\""));
+    let both = std::fs::read_to_string(directory.path().join("final.vtm")).unwrap();
+    assert!(both.contains("file=\"final.vtu\"") && both.contains("file=\"final-surface.vtp\""), "{both}");
     let volume: f64 = sim.bodies().iter().map(|body| body.body.volume()).sum();
     assert_tets_fill(vtu.as_bytes(), volume);
 }

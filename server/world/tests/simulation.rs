@@ -125,7 +125,7 @@ fn surfaces_and_energies_are_only_computed_for_those_who_ask() {
     assert!(snapshot.bodies[0].positions.is_empty() && snapshot.bodies[0].topology.triangles.is_empty());
     assert!(sim.report().bodies[0].energy.is_none());
     assert!(!sim.plan().is_on("surface publication") && sim.plan().is_on("gravity"));
-    let wants = Wants { surface: vec![true], contact: false, energy: true };
+    let wants = Wants { surface: vec![true], contact: false, energy: true, ..Wants::default() };
     sim.step(&Inputs { wants: wants.clone(), ..Inputs::default() });
     sim.snapshot_into(&wants, &mut snapshot);
     let body = &snapshot.bodies[0];
@@ -152,7 +152,10 @@ fn cuts_of_clients_come_back_with_their_number() {
         request(10, "beam", vec![edge(0.01), edge(f64::NAN)]),
     ];
     let report = sim.step(&Inputs { cuts, ..Inputs::default() });
-    let [a, b, c, d] = &report.cuts[..] else { panic!("{:?}", report.cuts) };
+    // What cannot be queued is answered first.
+    let mut outcomes = report.cuts.clone();
+    outcomes.sort_by_key(|outcome| outcome.request);
+    let [a, b, c, d] = &outcomes[..] else { panic!("{outcomes:?}") };
     assert!(a.request == 7 && *a.result.as_ref().unwrap() > 0);
     assert!(b.request == 8 && *b.result.as_ref().unwrap() > 0);
     assert!(c.result.as_ref().unwrap_err().contains("there are: beam"));
@@ -190,19 +193,6 @@ fn millimetres_with_si_stiffness_is_warned_about() {
     let sim = simulation(&text);
     assert!(sim.warnings().iter().any(|w| w.contains("200.000 m long")), "{:?}", sim.warnings());
     assert!(simulation(BEAM).warnings().is_empty());
-}
-
-#[test]
-fn live_changes_pass_the_same_checks_as_the_file() {
-    let mut sim = simulation(BEAM);
-    sim.set("world.gravity_m_s2", "[0, 0, 0]").unwrap();
-    assert_eq!(sim.scene().gravity_m_s2, Vector3::zeros());
-    sim.set("body.beam.solver.iterations", "7").unwrap();
-    sim.step(&Inputs::default());
-    assert!(sim.report().bodies[0].solve.iterations <= 7);
-    assert!(sim.set("world.gravity_m_s2", "[0, nan, 0]").unwrap_err().contains("finite"));
-    assert!(sim.set("body.beam.young_pa", "1e4").unwrap_err().contains("only at a start"));
-    assert!(sim.set("world.gravty", "1").unwrap_err().contains("did you mean"));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use scindo_world::inputs::{Inputs, Wants};
-use scindo_world::organ::organ_surface;
+use scindo_world::organ::Organ;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
@@ -58,7 +58,7 @@ fn volume(snapshot: &Snapshot) -> f64 {
 fn the_skin_lies_on_the_organ_and_is_cut_with_it() {
     let mut sim = start(ORGAN);
     let uncut = snapshot(&mut sim);
-    let surface = organ_surface();
+    let surface = Organ::Liver.surface();
     let exact: f64 = surface
         .triangles
         .iter()

@@ -42,7 +42,7 @@ point_m = [0.07, 0.05, 0.1]
 #[test]
 fn a_steady_step_with_contact_and_snapshot_allocates_nothing() {
     let mut sim = Simulation::new(&Scene::from_toml(PRESSED).unwrap(), Path::new("")).unwrap();
-    let wants = Wants { surface: vec![true], contact: true, energy: false };
+    let wants = Wants { surface: vec![true], contact: true, energy: false, ..Wants::default() };
     let inputs = Inputs { wants: wants.clone(), ..Inputs::default() };
     let mut snapshot = Snapshot::default();
     let mut step = |sim: &mut Simulation| {

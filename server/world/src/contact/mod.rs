@@ -78,6 +78,12 @@ impl Contacts {
         self.sums.reserve(MAX_TOOLS);
     }
 
+    /// The stiffness of `body` [Pa] changed: what the tools have learned of its compliance is out of date.
+    pub fn set_stiffness(&mut self, body: usize, young_pa: f64, tools: &mut Tools) {
+        self.bodies[body].young_pa = young_pa;
+        tools.iter_mut().for_each(|tool| tool.compliance = None);
+    }
+
     /// Takes in where the surface of `body` is now; after a change of epoch also its topology.
     ///
     /// # Errors
@@ -129,10 +135,14 @@ impl Contacts {
     fn press(&mut self, index: u32, tool: &mut Tool) {
         tool.press.update(tool.shape, tool.proxy.pose(), &tool.pose, &self.surfaces);
         let Some(normal) = tool.press.normal() else { return };
+        if let Some(body) = tool.press.bearings().first().map(|bearing| bearing.body)
+            && tool.compliance.is_none_or(|(known, _)| known != body)
+        {
+            let guess = Compliance::new(self.bodies[body].young_pa, core_radius(tool.shape));
+            tool.compliance = Some((body, guess));
+        }
         for bearing in tool.press.bearings() {
             let body = &mut self.bodies[bearing.body];
-            let radius = core_radius(tool.shape);
-            tool.compliance.get_or_insert_with(|| Compliance::new(body.young_pa, radius));
             let Some(tree) = self.surfaces[bearing.body].tree() else { continue };
             let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
             let spring = (tool.stiffness_n_m, tool.max_force_n);
@@ -205,7 +215,7 @@ impl Contacts {
         self.sums.resize(tools.len(), Sums::default());
         for (tool, sums) in tools.iter_mut().zip(&self.sums) {
             tool.force_n = -sums.force;
-            let Some(compliance) = &mut tool.compliance else { continue };
+            let Some((_, compliance)) = &mut tool.compliance else { continue };
             if sums.stiffness > 0.0 && sums.normal_force < 0.95 * tool.max_force_n {
                 let (before, after) = (sums.before / sums.stiffness, sums.after / sums.stiffness);
                 compliance.learn(before, after, sums.normal_force);

@@ -34,6 +34,7 @@ impl Tissue {
             vertex_count: body.surface().vertices.len() as u32,
             triangles: body.surface().triangles.clone(),
             tags: body.surface().tags.clone(),
+            ..SurfaceTopology::default()
         };
         let mut snapshot = Snapshot::default();
         snapshot.bodies.push(BodySnapshot { topology: Arc::new(topology), ..Default::default() });

@@ -3,11 +3,13 @@
 use std::mem::Discriminant;
 use std::sync::Arc;
 
-use scindo_physics::body::{Body, Notice};
+use scindo_physics::body::{Body, ElementKind, Notice, SolveReport};
 use scindo_physics::cut::IncisionMark;
 use scindo_physics::estimate::{MeshError, StressRecovery};
 
-use super::report::Energy;
+use super::counts::{StepCounts, Watch};
+use super::report::{Energy, StepReport};
+use super::shown;
 use crate::mesh_in::MeshHealth;
 use crate::plan::BodySize;
 use crate::snapshot::SurfaceTopology;
@@ -27,6 +29,9 @@ pub struct SimBody {
     pub health: Option<MeshHealth>,
     /// Volume at rest [m³].
     pub rest_volume_m3: f64,
+    /// Whether a fixed number of iterations is meant, whatever residual they leave.
+    pub fixed_iterations: bool,
+    watch: Watch,
     /// What was told of the last step.
     pub(crate) noticed: Option<Discriminant<Notice>>,
     recovery: StressRecovery,
@@ -47,6 +52,8 @@ impl SimBody {
             fix_groups_uncut: None,
             health,
             rest_volume_m3,
+            fixed_iterations: false,
+            watch: Watch::default(),
             noticed: None,
             recovery: StressRecovery::default(),
             topology: None,
@@ -70,6 +77,41 @@ impl SimBody {
             nodes: self.body.rest_positions().len(),
             vertices: surface.vertices.len(),
             triangles: surface.triangles.len(),
+            iterations: self.body.settings().solver.iterations,
+        }
+    }
+
+    /// Edge [m] of a lattice cell that six tetrahedra of mean volume would fill, or one hexahedron.
+    pub fn cell_m(&self) -> f64 {
+        let per_cell = if self.body.settings().element == ElementKind::Hex8 { 1.0 } else { 6.0 };
+        (per_cell * self.rest_volume_m3 / self.size().elements as f64).cbrt()
+    }
+
+    /// Corners of the box around the body as it lies [m].
+    pub fn corners_m(&self) -> [[f64; 3]; 2] {
+        let (low, high) = crate::doubts::bounds(self.body.positions());
+        [low.into(), high.into()]
+    }
+
+    /// Nodes of parts that something holds; the others fall for ever, or sleep.
+    pub fn held_nodes(&self) -> impl Iterator<Item = usize> + '_ {
+        let (parts, sleeps) = (self.body.parts(), self.body.sleeps());
+        let is_held = |part: Option<&u32>| part.is_none_or(|&part| !parts.free[part as usize]);
+        (0..self.body.positions().len()).filter(move |&node| {
+            is_held(parts.of_copy.get(node)) && !(sleeps && self.body.is_asleep(node as u32))
+        })
+    }
+
+    /// Largest displacement of a node of a held part now [m]; of any node, where nothing is held.
+    pub fn displacement_m(&self) -> f64 {
+        let (x, rest) = (self.body.positions(), self.body.rest_positions());
+        let farthest = |nodes: &mut dyn Iterator<Item = usize>| {
+            nodes.map(|node| (x[node] - rest[node]).norm_squared()).fold(0.0, f64::max).sqrt()
+        };
+        if self.body.parts().free.contains(&false) {
+            farthest(&mut self.held_nodes())
+        } else {
+            farthest(&mut (0..x.len()))
         }
     }
 
@@ -98,6 +140,11 @@ impl SimBody {
         }));
     }
 
+    /// Von Mises stress on the surface [Pa] into `out`.
+    pub fn surface_stress(&self, out: &mut Vec<f32>) {
+        shown::surface_stress(&self.body, out);
+    }
+
     /// Ends [m] of the lines that incisions have drawn on the surface without opening it, into `out`.
     pub fn incision_marks(&mut self, out: &mut Vec<[[f32; 3]; 2]>) {
         if self.marks_are_old {
@@ -109,6 +156,44 @@ impl SimBody {
         out.extend(
             self.marks.iter().map(|mark| mark.ends.map(|end| end.position(x).map(|c| c as f32).into())),
         );
+    }
+
+    /// What went wrong in the steps since the start or the last reset.
+    pub fn counts(&self) -> StepCounts {
+        self.watch.counts
+    }
+
+    /// One line for each kind of trouble since the start or the last reset, with what to do about it.
+    pub fn troubles(&self) -> Vec<String> {
+        self.watch.warnings(&self.id, &self.body, self.fixed_iterations)
+    }
+
+    /// Why the run counts as failed: steps that were refused or rolled back, more than half of the steps
+    /// above their tolerance, or an equilibrium that was not reached. A fixed number of iterations that
+    /// is meant excuses the last two.
+    pub fn failure(&self) -> Option<String> {
+        self.watch.failure(&self.id, &self.body, self.fixed_iterations)
+    }
+
+    /// The report without elements that were inverted at the predictor alone, as where a held place is moved far
+    /// at once: what counts is what the step ended with.
+    pub(crate) fn as_it_ended(&self, solve: SolveReport) -> SolveReport {
+        if solve.inverted_pieces == 0 || self.body.least_volume_ratio() <= 0.0 {
+            return solve;
+        }
+        SolveReport { inverted_pieces: 0, ..solve }
+    }
+
+    /// Takes note of how a step went.
+    pub(crate) fn has_stepped(&mut self, solve: &SolveReport, report: &mut StepReport) {
+        self.has_moved();
+        self.watch.follow(&self.id, solve, self.fixed_iterations, report);
+        report.tell_of_solve(&self.id, solve, &mut self.noticed);
+    }
+
+    /// Forgets what went wrong.
+    pub(crate) fn has_been_reset(&mut self) {
+        self.watch = Watch::default();
     }
 
     /// Kinetic and elastic energy.
@@ -151,15 +236,7 @@ impl SimBody {
 
     /// Triangles of the present epoch; made when first asked for.
     pub fn topology(&mut self) -> Arc<SurfaceTopology> {
-        let (mesh, surface) = (self.body.cut_mesh(), self.body.surface());
-        let make = || {
-            Arc::new(SurfaceTopology {
-                epoch: mesh.epoch(),
-                vertex_count: surface.vertices.len() as u32,
-                triangles: surface.triangles.clone(),
-                tags: surface.tags.clone(),
-            })
-        };
-        self.topology.get_or_insert_with(make).clone()
+        let body = &self.body;
+        self.topology.get_or_insert_with(|| Arc::new(shown::topology(body))).clone()
     }
 }

@@ -1,19 +1,25 @@
 //! Cuts of a step: those the scene schedules, those clients ask for, those blades make.
 //!
+//! Cuts of clients and of blades stand in one queue and are made in its order. A step does a counted
+//! amount of [`Work`] on them; a long sweep takes several steps, and its outcome is told when it is made.
+//! What it cuts is what it met where it began.
+//!
 //! Every incision has a number, which tags its lips. A blade keeps its number until it leaves
 //! cut mode; requests of one tool keep theirs while each begins where the last one ended.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use scindo_physics::cut::{BladeSweep, CutReport};
+use scindo_physics::cut::{BladeSweep, CutReport, MAX_SEGMENTS, Work};
 use scindo_physics::skin::Skin;
 
 use super::body::SimBody;
 use super::incision::incision_along;
 use super::report::{Level, StepReport};
+use super::undo::{History, Undone};
 use crate::inputs::{CutOutcome, CutRequest};
-use crate::scene::{CutPath, CutSpec, coordinates};
+use crate::scene::{CutPath, CutSpec};
 use crate::tool::Tools;
 
 /// Two requests connect when the gap is below this fraction of the blade's length.
@@ -22,6 +28,18 @@ const CONNECTED: f64 = 0.02;
 /// A blade cuts when it moved by this fraction of a body's element.
 const LEAST_MOVE: f64 = 0.125;
 
+/// A cut that opens less than this part of what its blade swept ends inside elements.
+const LEAST_OPENED: f64 = 0.98;
+
+/// Work on cuts of clients and blades that a step does, in fragments looked at: some ten milliseconds.
+const WORK_PER_STEP: u64 = 100_000;
+
+/// Nodes and elements that are looked at in the time of one fragment when a cut begins and ends.
+const NODES_PER_FRAGMENT: usize = 4;
+
+/// Most cuts in the queue. The inbox lets fewer in; blades that start anew in every step are stopped here.
+const MAX_WAITING: usize = 256;
+
 /// What a cut works on.
 pub(crate) struct Theatre<'a> {
     pub bodies: &'a mut [SimBody],
@@ -29,6 +47,8 @@ pub(crate) struct Theatre<'a> {
     pub report: &'a mut StepReport,
     /// Whether the scene allows cuts.
     pub allowed: bool,
+    /// Whether the discretisation error is estimated.
+    pub estimates: bool,
 }
 
 /// Pending cuts and what connects them.
@@ -42,6 +62,36 @@ pub(crate) struct Cuts {
     /// A blade cuts when it moved this far [m].
     least_move_m: f64,
     applied: u64,
+    /// Of the scheduled cuts so far, where the error is estimated.
+    swept: Vec<Swept>,
+    history: History,
+    /// Cuts of clients and blades, in the order in which they are made.
+    waiting: VecDeque<Job>,
+}
+
+/// What a scheduled cut was to open.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Swept {
+    /// Index of the body.
+    pub body: usize,
+    /// Number of its incision.
+    pub incision: u32,
+    /// Area that the blade swept inside the body [m²].
+    pub area_m2: f64,
+}
+
+/// A cut in the queue.
+#[derive(Debug, Clone)]
+struct Job {
+    blade: BladeSweep,
+    incision: u32,
+    /// Bodies that it has still to pass through, the next one last.
+    bodies: Vec<usize>,
+    /// The next body is being cut.
+    begun: bool,
+    elements: usize,
+    /// The number of the request; none for a blade.
+    request: Option<u64>,
 }
 
 #[derive(Debug, Clone)]
@@ -65,7 +115,7 @@ impl Cuts {
             .map(|cut| Scheduled { at_s: cut.at_s, body: cut.body, blade: cut.blade.clone() })
             .collect();
         schedule.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-        let element_m = bodies.iter().map(element_size).fold(f64::INFINITY, f64::min);
+        let element_m = bodies.iter().map(SimBody::cell_m).fold(f64::INFINITY, f64::min);
         let least_move_m = if element_m.is_finite() { LEAST_MOVE * element_m } else { 0.0 };
         Self { schedule, least_move_m, ..Self::default() }
     }
@@ -74,6 +124,34 @@ impl Cuts {
     pub fn reset(&mut self) {
         self.next = 0;
         self.ends.clear();
+        self.history.clear();
+        self.swept.clear();
+        self.waiting.clear();
+    }
+
+    /// What the scheduled cuts so far were to open, where the error is estimated.
+    pub fn swept(&self) -> &[Swept] {
+        &self.swept
+    }
+
+    /// Takes the last incision back. What comes next is an incision of its own.
+    ///
+    /// # Errors
+    /// That there is none, that cuts still wait, or that a body cannot be built again.
+    pub fn undo(&mut self, bodies: &mut [SimBody]) -> Result<Undone, String> {
+        if !self.waiting.is_empty() {
+            return Err("cuts are under way; take the last one back once they are made".into());
+        }
+        let undone = self.history.undo(bodies)?;
+        self.ends.retain(|end| end.incision != undone.incision);
+        self.swept.retain(|swept| swept.incision != undone.incision);
+        Ok(undone)
+    }
+
+    /// Forgets the cuts that wait, for a reset or the end; their outcomes say `reason`.
+    pub fn discard(&mut self, reason: &str) -> Vec<CutOutcome> {
+        let discarded = self.waiting.drain(..).filter_map(|job| job.request);
+        discarded.map(|request| CutOutcome { request, result: Err(reason.to_owned()) }).collect()
     }
 
     /// Sweeps that changed a body so far.
@@ -84,6 +162,9 @@ impl Cuts {
     /// Cuts that the schedule has for the time up to `time_s` [s].
     pub fn apply_schedule(&mut self, time_s: f64, at: &mut Theatre<'_>) {
         while let Some(due) = self.schedule.get(self.next).filter(|cut| cut.at_s <= time_s) {
+            if at.bodies[due.body].body.is_being_cut() {
+                return;
+            }
             let incision = at.tools.fresh_incision();
             let body = due.body;
             let blade = match &due.blade {
@@ -93,6 +174,10 @@ impl Cuts {
                 }
             };
             self.next += 1;
+            if let (true, Ok(blade)) = (at.estimates, &blade) {
+                let area_m2 = at.bodies[body].body.swept_area(blade);
+                self.swept.push(Swept { body, incision, area_m2 });
+            }
             match blade.and_then(|blade| self.sweep(body, &blade, incision, at)) {
                 Ok(done) => tell_of_nothing_opened(&done, incision, &at.bodies[body], at.report),
                 Err(reason) => at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason),
@@ -100,27 +185,103 @@ impl Cuts {
         }
     }
 
-    /// Cuts that clients asked for, each with an outcome.
-    pub fn apply_requests(&mut self, requests: &[CutRequest], at: &mut Theatre<'_>) {
+    /// Queues cuts that clients asked for; each gets an outcome, in this step or a later one.
+    pub fn queue_requests(&mut self, requests: &[CutRequest], at: &mut Theatre<'_>) {
         for request in requests {
-            let result = self.request(request, at);
-            at.report.cuts.push(CutOutcome { request: request.request, result });
-        }
-    }
-
-    /// Cuts that blades made by moving, through every body they meet.
-    pub fn apply_blades(&mut self, at: &mut Theatre<'_>) {
-        for tool in 0..at.tools.len() {
-            let Some((blade, incision)) = at.tools.take_sweep(tool, self.least_move_m) else { continue };
-            for body in 0..at.bodies.len() {
-                if let Err(reason) = self.sweep(body, &blade, incision, at) {
-                    at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason);
+            match self.job_of(request, at) {
+                Ok(job) => self.waiting.push_back(job),
+                Err(reason) => {
+                    at.report.cuts.push(CutOutcome { request: request.request, result: Err(reason) });
                 }
             }
         }
     }
 
-    fn request(&mut self, request: &CutRequest, at: &mut Theatre<'_>) -> Result<usize, String> {
+    /// Queues cuts that blades made by moving, through every body they meet.
+    pub fn queue_blades(&mut self, at: &mut Theatre<'_>) {
+        for tool in 0..at.tools.len() {
+            let Some((blade, incision)) = at.tools.take_sweep(tool, self.least_move_m) else { continue };
+            if let Some(job) = self.waiting.iter_mut().rfind(|job| job.incision == incision)
+                && job.goes_on_with(&blade)
+            {
+                job.blade.segments.extend_from_slice(&blade.segments[1..]);
+            } else if self.waiting.len() < MAX_WAITING {
+                let bodies = (0..at.bodies.len()).rev().collect();
+                let job = Job { blade, incision, bodies, begun: false, elements: 0, request: None };
+                self.waiting.push_back(job);
+            } else if let Some(body) = at.bodies.first() {
+                let reason = format!("{MAX_WAITING} cuts wait already; move the blade more slowly");
+                at.report.tell(Level::Error, "cut-refused", &body.id, reason);
+            }
+        }
+    }
+
+    /// Makes queued cuts, in order, as far as the work of one step goes.
+    pub fn work_off(&mut self, at: &mut Theatre<'_>) {
+        let mut work = Work::new(WORK_PER_STEP);
+        while let Some(mut job) = self.waiting.pop_front() {
+            let Some(result) = self.go_on(&mut job, &mut work, at) else {
+                self.waiting.push_front(job);
+                return;
+            };
+            if let Some(request) = job.request {
+                at.report.cuts.push(CutOutcome { request, result });
+            }
+        }
+    }
+
+    /// Goes on with one cut; its result once it has passed through all bodies.
+    fn go_on(
+        &mut self,
+        job: &mut Job,
+        work: &mut Work,
+        at: &mut Theatre<'_>,
+    ) -> Option<Result<usize, String>> {
+        while let Some(&body) = job.bodies.last() {
+            if work.is_done() {
+                return None;
+            }
+            match self.go_on_in(body, job, work, at) {
+                Ok(None) => return None,
+                Ok(Some(report)) => job.elements += report.elements_cut,
+                Err(reason) if job.request.is_some() => return Some(Err(reason)),
+                Err(reason) => at.report.tell(Level::Error, "cut-refused", &at.bodies[body].id, reason),
+            }
+            job.bodies.pop();
+            job.begun = false;
+        }
+        Some(Ok(job.elements))
+    }
+
+    fn go_on_in(
+        &mut self,
+        body: usize,
+        job: &mut Job,
+        work: &mut Work,
+        at: &mut Theatre<'_>,
+    ) -> Result<Option<CutReport>, String> {
+        let cut = &mut at.bodies[body].body;
+        if !job.begun {
+            if !at.allowed {
+                return Err(SWITCHED_OFF.into());
+            }
+            work.book((cut.cut_mesh().n_copies() + cut.n_elements()) / NODES_PER_FRAGMENT);
+            self.history.before(body, &at.bodies[body], &job.blade, job.incision);
+            let cut = &mut at.bodies[body].body;
+            cut.begin_cut(&job.blade, job.incision).map_err(|error| error.to_string())?;
+            job.begun = true;
+        }
+        let before = Before::of(&at.bodies[body]);
+        let done = at.bodies[body].body.go_on_cutting(work).map_err(|error| error.to_string())?;
+        if let Some(done) = &done {
+            self.history.after(body, job.incision, before.epoch, done);
+            self.tell(&mut at.bodies[body], &before, (done, job.incision), at.report);
+        }
+        Ok(done)
+    }
+
+    /// The place in the queue for a request.
+    fn job_of(&mut self, request: &CutRequest, at: &mut Theatre<'_>) -> Result<Job, String> {
         let wanted = |body: &SimBody| request.body.as_ref().is_none_or(|id| *id == body.id);
         if !at.bodies.iter().any(wanted) {
             let known: Vec<&str> = at.bodies.iter().map(|body| &*body.id).collect();
@@ -132,13 +293,8 @@ impl Cuts {
         };
         let incision = self.incision_of(&request.tool, *first, *last, at.tools);
         let blade = BladeSweep { segments: request.segments.clone() };
-        let mut elements = 0;
-        for body in 0..at.bodies.len() {
-            if wanted(&at.bodies[body]) {
-                elements += self.sweep(body, &blade, incision, at)?.elements_cut;
-            }
-        }
-        Ok(elements)
+        let bodies = (0..at.bodies.len()).rev().filter(|&body| wanted(&at.bodies[body])).collect();
+        Ok(Job { blade, incision, bodies, begun: false, elements: 0, request: Some(request.request) })
     }
 
     /// The number of the incision that a request of `tool` from edge `first` to `last` belongs to.
@@ -172,65 +328,76 @@ impl Cuts {
         at: &mut Theatre<'_>,
     ) -> Result<CutReport, String> {
         if !at.allowed {
-            return Err("cutting is switched off by effects.cutting = false".into());
+            return Err(SWITCHED_OFF.into());
         }
-        let body = &mut at.bodies[body];
-        let before = body.epoch();
-        let fitted = body.body.skin().is_some_and(Skin::fits);
+        let index = body;
+        let body = &mut at.bodies[index];
+        let before = Before::of(body);
+        self.history.before(index, body, blade, incision);
         let done = body.body.cut(blade, incision).map_err(|error| error.to_string())?;
+        self.history.after(index, incision, before.epoch, &done);
+        self.tell(body, &before, (&done, incision), at.report);
+        Ok(done)
+    }
+
+    /// Tells what a sweep did to a body that was as in `before`.
+    fn tell(
+        &mut self,
+        body: &mut SimBody,
+        before: &Before,
+        (done, incision): (&CutReport, u32),
+        report: &mut StepReport,
+    ) {
         body.has_been_swept();
-        if done.epoch != before {
+        if done.epoch != before.epoch {
             body.has_changed_topology();
             self.applied += 1;
             let (elements, copies) = (done.elements_cut, done.new_copies.len());
             let elements = if elements == 1 { "1 element".into() } else { format!("{elements} elements") };
             let copies = if copies == 1 { "1 new copy".into() } else { format!("{copies} new copies") };
             let message = format!("incision {incision}: {elements}, {copies}");
-            at.report.tell(Level::Info, "cut-applied", &body.id, message);
+            report.tell(Level::Info, "cut-applied", &body.id, message);
         }
         if done.refused_edges > 0 {
             let edges = done.refused_edges;
             let message = format!(
-                "incision {incision}: {edges} edges stay whole, their elements hold too many fragments"
+                "incision {incision}: {edges} edges stay whole, their elements or the body hold too many fragments"
             );
-            at.report.tell(Level::Warning, "cut-incomplete", &body.id, message);
+            report.tell(Level::Warning, "cut-incomplete", &body.id, message);
         }
-        if let (true, Some(why)) = (fitted, body.body.skin().and_then(Skin::misfit)) {
+        if let (true, Some(why)) = (before.fitted, body.body.skin().and_then(Skin::misfit)) {
             let message = format!(
                 "incision {incision}: skin and wound do not fit, {why}; the boundary of the elements is shown \
                  from here to the next reset; other skin.divisions or skin.snapping = 0 may fit"
             );
-            at.report.tell(Level::Warning, "skin-left", &body.id, message);
+            report.tell(Level::Warning, "skin-left", &body.id, message);
         }
-        Ok(done)
     }
 }
 
-/// Doubts about scheduled cuts: those that pass beside their body, as it lies at the start.
-pub(crate) fn doubts(cuts: &[CutSpec], bodies: &[SimBody]) -> Vec<String> {
-    let mut doubts = Vec::new();
-    for (number, cut) in cuts.iter().enumerate() {
-        let (CutPath::Sweep(segments), Some(body)) = (&cut.blade, bodies.get(cut.body)) else { continue };
-        let (low, high) = bounds(body.body.positions().iter());
-        let (from, to) = bounds(segments.iter().flatten());
-        if (0..3).any(|axis| to[axis] < low[axis] || from[axis] > high[axis]) {
-            doubts.push(format!(
-                "cut.{number}.sweep_m: reaches from {} to {} m and passes beside body `{}`, which lies from {} to {} m",
-                coordinates(&from.into()),
-                coordinates(&to.into()),
-                body.id,
-                coordinates(&low.into()),
-                coordinates(&high.into())
-            ));
-        }
-    }
-    doubts
+/// Why a scene refuses cuts.
+const SWITCHED_OFF: &str = "cutting is switched off by effects.cutting = false";
+
+/// What is to be compared with after a sweep.
+struct Before {
+    epoch: u32,
+    /// The skin fitted its wounds.
+    fitted: bool,
 }
 
-/// Corners of the box around some points.
-fn bounds<'a>(points: impl Iterator<Item = &'a Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
-    let none = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-    points.fold(none, |(low, high), point| (low.inf(point), high.sup(point)))
+impl Before {
+    fn of(body: &SimBody) -> Self {
+        Self { epoch: body.epoch(), fitted: body.body.skin().is_some_and(Skin::fits) }
+    }
+}
+
+impl Job {
+    /// Whether a blade's further sweep can be added to it.
+    fn goes_on_with(&self, blade: &BladeSweep) -> bool {
+        let (last, first) = (self.blade.segments.last(), blade.segments.first());
+        let room = self.blade.segments.len() + blade.segments.len() <= MAX_SEGMENTS;
+        self.request.is_none() && !self.begun && room && last == first
+    }
 }
 
 /// Warns of a cut of the scene that opened nothing, with the reason.
@@ -239,7 +406,7 @@ fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, repor
         return;
     }
     let message = if done.pending_edges > 0 {
-        let size_mm = 1e3 * element_size(body);
+        let size_mm = 1e3 * body.cell_m();
         format!(
             "incision {incision} is drawn on the surface and opens nothing: it ends inside the elements it \
              enters, whose cells are {size_mm:.1} mm wide; cut deeper or make the elements smaller"
@@ -250,9 +417,25 @@ fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, repor
     report.tell(Level::Warning, "cut-opens-nothing", &body.id, message);
 }
 
-/// Edge [m] of a lattice cell that six elements of mean volume would fill.
-fn element_size(body: &SimBody) -> f64 {
-    (6.0 * body.rest_volume_m3 / body.size().elements as f64).cbrt()
+/// What the estimate of the error does not see: cuts that act on less than their blade swept, because
+/// their front is rounded down to whole elements.
+pub(crate) fn rounded_fronts(swept: &[Swept], bodies: &[SimBody]) -> Vec<String> {
+    let mut doubts = Vec::new();
+    for Swept { body, incision, area_m2 } in swept {
+        let body = &bodies[*body];
+        let opened_m2 = body.body.opened_area(*incision);
+        if opened_m2 < LEAST_OPENED * area_m2 {
+            let share = 100.0 * opened_m2 / area_m2;
+            doubts.push(format!(
+                "body.{}: incision {incision} acts on {opened_m2:.3e} of the {area_m2:.3e} m² that its blade swept \
+                 ({share:.0} %): its front is rounded down to whole elements, whose cells are {:.1} mm wide; the \
+                 error estimate does not see that; make the elements smaller, or let faces lie on the front",
+                body.id,
+                1e3 * body.cell_m()
+            ));
+        }
+    }
+    doubts
 }
 
 #[cfg(test)]

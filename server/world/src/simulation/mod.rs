@@ -6,30 +6,47 @@ mod stopwatch;
 
 mod report;
 
+mod counts;
+
 mod body;
+
+mod shown;
 
 mod cuts;
 
 mod incision;
 
+mod sleep;
+
+mod undo;
+
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
-use scindo_physics::body::BodyError;
+use scindo_physics::body::{BodyError, PcgSettings};
 
 pub use body::SimBody;
+pub use counts::StepCounts;
 pub use report::{BodyReport, Energy, Event, Level, StepReport};
+pub(crate) use shown::von_mises;
+pub(crate) use stopwatch::processor_seconds;
 pub use stopwatch::{Stage, StageSeconds};
+pub use undo::{MAX_UNDO, Undone};
 
-use crate::build::{self, BuildOptions};
+use crate::build::{self, BuildOptions, Built};
 use crate::contact::Contacts;
-use crate::inputs::{CutRequest, Inputs, Wants};
+use crate::doubts;
+use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
+use crate::mesh_in::Observer;
 use crate::plan::{BodySize, Plan};
 use crate::probe::Probe;
-use crate::scene::{CheckedScene, Scene, SceneError};
+use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
 use crate::snapshot::{Snapshot, Sources};
 use crate::tool::Tools;
 use cuts::{Cuts, Theatre};
+use sleep::Sleep;
 use stopwatch::Stopwatch;
 
 /// A running scene.
@@ -41,6 +58,7 @@ pub struct Simulation {
     tools: Tools,
     cuts: Cuts,
     contacts: Contacts,
+    sleep: Sleep,
     probes: Vec<Probe>,
     plan: Plan,
     warnings: Vec<String>,
@@ -64,32 +82,53 @@ impl Simulation {
     /// # Errors
     /// As [`Simulation::new`].
     pub fn with_options(scene: &Scene, base_dir: &Path, options: BuildOptions) -> Result<Self, SceneError> {
-        let built = build::build(scene, base_dir, options)?;
+        Self::observed(scene, base_dir, options, &|_| ())
+    }
+
+    /// As [`Simulation::with_options`], telling `observer` how far the meshes have come.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn observed(
+        scene: &Scene,
+        base_dir: &Path,
+        options: BuildOptions,
+        observer: &Observer<'_>,
+    ) -> Result<Self, SceneError> {
+        let mut built = build::build(scene, base_dir, options, observer)?;
         let (source, scene) = (scene.clone(), scene.checked().clone());
+        built.warnings.extend(doubts::of(&scene, &mut built.bodies));
+        Ok(Self::assemble(source, scene, built))
+    }
+
+    /// A scene of these parts.
+    pub(crate) fn assemble(source: Scene, scene: CheckedScene, built: Built) -> Self {
+        let mut scene = scene;
         let sizes: Vec<BodySize> = built.bodies.iter().map(SimBody::size).collect();
+        let plan = Plan::new(&scene, &sizes);
+        settle(&mut scene, &built.bodies);
         let mut contacts = Contacts::default();
         for body in &scene.bodies {
             contacts.add_body(body.young_pa, scene.effects.contact != Some(false));
         }
         let report =
             StepReport { bodies: vec![BodyReport::default(); built.bodies.len()], ..StepReport::default() };
-        let mut warnings = built.warnings;
-        warnings.extend(cuts::doubts(&scene.cuts, &built.bodies));
-        Ok(Self {
-            plan: Plan::new(&scene, &sizes),
+        Self {
+            plan,
             tools: Tools::new(&scene.tools),
             cuts: Cuts::new(&scene.cuts, &built.bodies),
             contacts,
+            sleep: Sleep::new(&built.bodies),
             bodies: built.bodies,
             probes: built.probes,
-            warnings,
+            warnings: built.warnings,
             steps: 0,
             wants: Wants::default(),
             total: StageSeconds::default(),
             report,
             source,
             scene,
-        })
+        }
     }
 
     /// One step of simulated time. The order of the lines is the order of the data.
@@ -122,11 +161,13 @@ impl Simulation {
         let allowed = self.scene.effects.cutting != Some(false);
         let Self { cuts, bodies, tools, report, probes, .. } = self;
         let before = cuts.applied();
-        let at = &mut Theatre { bodies, tools, report, allowed };
+        let estimates = self.scene.effects.error_estimate == Some(true);
+        let at = &mut Theatre { bodies, tools, report, allowed, estimates };
         // A cut at t = 0 is there before the first step, hence at the time this step starts from.
         cuts.apply_schedule(time_s - self.scene.step_s, at);
-        cuts.apply_requests(requests, at);
-        cuts.apply_blades(at);
+        cuts.queue_requests(requests, at);
+        cuts.queue_blades(at);
+        cuts.work_off(at);
         if cuts.applied() > before {
             probes.iter_mut().for_each(|probe| probe.follow(&bodies[probe.body].body));
         }
@@ -148,10 +189,11 @@ impl Simulation {
     fn deform(&mut self) {
         for (i, body) in self.bodies.iter_mut().enumerate() {
             let solve = body.body.step(self.scene.step_s, self.scene.gravity_m_s2, self.contacts.springs(i));
-            body.has_moved();
+            let solve = body.as_it_ended(solve);
             self.report.bodies[i].solve = solve;
-            self.report.tell_of_solve(&body.id, &solve, &mut body.noticed);
+            body.has_stepped(&solve, &mut self.report);
         }
+        self.sleep.look(self.steps, &mut self.bodies, &mut self.report);
     }
 
     fn react(&mut self) {
@@ -172,6 +214,7 @@ impl Simulation {
 
     fn finish(&mut self, watch: Stopwatch) -> &StepReport {
         self.report.seconds = watch.seconds();
+        self.report.processor_s = watch.processor_s();
         self.total.add(&self.report.seconds);
         &self.report
     }
@@ -185,6 +228,7 @@ impl Simulation {
         for (i, body) in self.bodies.iter_mut().enumerate() {
             body.body.reset()?;
             body.has_changed_topology();
+            body.has_been_reset();
             self.contacts.forget_motion(i);
         }
         for probe in &mut self.probes {
@@ -197,35 +241,107 @@ impl Simulation {
         Ok(())
     }
 
+    /// Gives the nodes of body number `index` other positions [m] and velocities [m/s].
+    ///
+    /// # Errors
+    /// As [`scindo_physics::body::Body::set_state`].
+    #[doc(hidden)]
+    pub fn throw(&mut self, index: usize, x: &[Vector3<f64>], v: &[Vector3<f64>]) -> Result<(), BodyError> {
+        self.bodies[index].has_moved();
+        self.bodies[index].body.set_state(x, v)
+    }
+
+    /// Takes the last incision back, whoever made it, with everything that was cut in the same bodies since
+    /// it began. The tissue closes where it is now and moves on; epochs rise.
+    ///
+    /// # Errors
+    /// That there is no cut to take back.
+    pub fn undo(&mut self) -> Result<Undone, String> {
+        let undone = self.cuts.undo(&mut self.bodies)?;
+        for &body in &undone.bodies {
+            self.contacts.forget_motion(body);
+        }
+        for probe in &mut self.probes {
+            probe.follow(&self.bodies[probe.body].body);
+        }
+        Ok(undone)
+    }
+
+    /// Goes on as if `steps` steps had been made in which nothing moved.
+    pub(crate) fn skip_to(&mut self, steps: u64) {
+        self.steps = steps;
+    }
+
+    /// Lets the linear solves of the body `id` make so many iterations from now on.
+    pub(crate) fn allow_iterations(&mut self, id: &str, iterations: u32) {
+        for body in self.bodies.iter_mut().filter(|body| &*body.id == id) {
+            let solver = PcgSettings { iterations, ..body.body.settings().solver };
+            // Only the range of the number could be refused, and the callers keep within it.
+            let _ = body.body.set_solver(solver);
+        }
+    }
+
+    /// Forgets the cuts of clients that wait or are being made; their outcomes say `reason`. To be called
+    /// before a [`reset`](Self::reset), or at the end.
+    pub fn discard_cuts(&mut self, reason: &str) -> Vec<CutOutcome> {
+        self.cuts.discard(reason)
+    }
+
+    /// A step under way ends as soon as `flag` is raised: bodies that have not moved yet stay as they were.
+    /// Without it a step takes as long as its solvers do.
+    pub fn set_stop_flag(&mut self, flag: &Arc<AtomicBool>) {
+        self.bodies.iter_mut().for_each(|body| body.body.set_stop_flag(Arc::clone(flag)));
+    }
+
     /// Fills a snapshot of the present state: surfaces only as `wants` says.
     pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
         let (steps, time_s) = (self.steps, self.time_s());
-        let Self { bodies, report, tools, .. } = self;
-        snapshot.fill(steps, time_s, wants, Sources { bodies, report, tools });
+        let Self { bodies, report, tools, probes, .. } = self;
+        snapshot.fill(steps, time_s, wants, Sources { bodies, report, tools, probes });
     }
 
-    /// Changes one value of the scene while it runs, under the same checks as the file.
+    /// Changes one value of the scene while it runs: a [`LiveKey`], within its range.
     ///
     /// # Errors
-    /// What is wrong with key or value, or that it takes effect only at a start.
+    /// What is wrong with key or value, with the keys or the range that are allowed. Nothing has changed
+    /// then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        let changed = self.source.apply_set(&format!("{key}={value}")).map_err(|error| error.to_string())?;
-        let scene = changed.checked().clone();
-        let live = key == "world.gravity_m_s2" || key == "effects.energy" || key == "effects.error_estimate";
-        let solver = key.starts_with("body.") && key.contains(".solver.");
-        if !live && !solver {
-            return Err(format!(
-                "`{key}` takes effect only at a start, with --set; while running: world.gravity_m_s2, \
-                 effects.energy, effects.error_estimate, body.<id>.solver.iterations, body.<id>.solver.tolerance"
-            ));
+        let live = LiveKey::parse(&self.scene, key)?;
+        let value = live.read(&self.scene, value)?;
+        let assignment = format!("{}={value}", live.path(&self.scene));
+        let changed = self.source.apply_set(&assignment).map_err(|error| error.to_string())?;
+        if let LiveKey::Body(index, _) = live {
+            self.change_body(index, &changed.checked().bodies[index])?;
         }
-        for (body, spec) in self.bodies.iter_mut().zip(&scene.bodies) {
-            let solver = build::mechanics::linear(&spec.mechanics);
-            body.body.set_solver(solver).map_err(|error| error.to_string())?;
-        }
-        self.scene = scene;
+        self.scene = changed.checked().clone();
+        settle(&mut self.scene, &self.bodies);
         self.source = changed;
+        let sizes: Vec<BodySize> = self.bodies.iter().map(SimBody::size).collect();
+        self.plan = Plan::new(&self.scene, &sizes);
         Ok(())
+    }
+
+    fn change_body(&mut self, index: usize, spec: &BodySpec) -> Result<(), String> {
+        let body = &mut self.bodies[index].body;
+        let stiffness = body.material().young_pa;
+        let known = body.settings().solver;
+        let iterations = spec.mechanics.iterations.unwrap_or(known.iterations);
+        let solver = PcgSettings { iterations, tolerance: spec.mechanics.tolerance };
+        if solver != known {
+            body.set_solver(solver).map_err(|error| error.to_string())?;
+        }
+        body.set_constants(build::constants(spec)).map_err(|error| error.to_string())?;
+        if stiffness != spec.young_pa {
+            self.contacts.set_stiffness(index, spec.young_pa, &mut self.tools);
+        }
+        Ok(())
+    }
+}
+
+/// Notes the limits of iterations that bodies have chosen for themselves.
+fn settle(scene: &mut CheckedScene, bodies: &[SimBody]) {
+    for (spec, body) in scene.bodies.iter_mut().zip(bodies) {
+        spec.mechanics.iterations.get_or_insert(body.body.settings().solver.iterations);
     }
 }
 
@@ -236,9 +352,19 @@ impl Simulation {
         &self.scene
     }
 
+    /// The scene as it was read.
+    pub(crate) fn source(&self) -> &Scene {
+        &self.source
+    }
+
     /// Steps done since the start or the last reset.
     pub fn steps(&self) -> u64 {
         self.steps
+    }
+
+    /// What may change while it runs, with its present value and range.
+    pub fn parameters(&self) -> Vec<LiveParameter> {
+        LiveKey::all(&self.scene).into_iter().map(|key| key.parameter(&self.scene)).collect()
     }
 
     /// Simulated time [s].
@@ -274,6 +400,19 @@ impl Simulation {
     /// What is odd about the scene but allowed.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
+    }
+
+    /// What went wrong in the steps since the start or the last reset, a line for each body and kind, and
+    /// what the estimate of the error does not see.
+    pub fn troubles(&self) -> Vec<String> {
+        let blind_spots = cuts::rounded_fronts(self.cuts.swept(), &self.bodies);
+        self.bodies.iter().flat_map(SimBody::troubles).chain(blind_spots).collect()
+    }
+
+    /// Why the steps since the start or the last reset do not count as a run that succeeded; empty if they
+    /// do. See [`SimBody::failure`].
+    pub fn failures(&self) -> Vec<String> {
+        self.bodies.iter().filter_map(SimBody::failure).collect()
     }
 
     /// Report of the last step.

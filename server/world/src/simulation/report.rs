@@ -18,6 +18,8 @@ pub struct StepReport {
     pub time_s: f64,
     /// Measured seconds per stage.
     pub seconds: StageSeconds,
+    /// Processor time of the thread that steps [s]; what other threads of `--threads` do is not in it.
+    pub processor_s: f64,
     /// Per body, in the order of the scene.
     pub bodies: Vec<BodyReport>,
     /// What became of every requested cut of this step.
@@ -78,8 +80,8 @@ impl StepReport {
         self.events.clear();
     }
 
-    /// Tells what a solve did differently from what was asked for: failures always, everything else
-    /// when it begins. `known` is what was told of the last step.
+    /// Tells what a step did differently from what was asked for, when it begins. `known` is what was told
+    /// of the last step.
     pub(crate) fn tell_of_solve(
         &mut self,
         body: &Arc<str>,
@@ -89,26 +91,14 @@ impl StepReport {
         let notice = solve.notice.as_ref().map(discriminant);
         let begins = notice != *known;
         *known = notice;
-        match (solve.outcome, solve.notice) {
-            (Outcome::Refused, Some(why)) => self.tell(Level::Error, "step-refused", body, why.to_string()),
-            (Outcome::Refused, None) => {
-                self.tell(Level::Error, "step-refused", body, "step or gravity is not usable".into());
-            }
-            (Outcome::Held, _) => {
-                let parts = solve.substeps;
-                let message =
-                    format!("not finite even in {parts} parts; the body is back where it was, at rest");
-                self.tell(Level::Error, "step-rolled-back", body, message);
-            }
-            (Outcome::Advanced, Some(notice)) if begins => {
-                let level = if matches!(notice, Notice::Started) { Level::Info } else { Level::Warning };
-                self.tell(level, "step-notice", body, notice.to_string());
-            }
-            (Outcome::Advanced, None) if solve.substeps > 1 => {
-                let message = format!("done in {} parts to stay finite", solve.substeps);
-                self.tell(Level::Warning, "step-divided", body, message);
-            }
-            (Outcome::Advanced, _) => {}
+        if solve.outcome == Outcome::Interrupted {
+            let message = "the step was broken off for an order; the body is as it was before it".into();
+            self.tell(Level::Warning, "step-interrupted", body, message);
+        }
+        if let (Outcome::Advanced, Some(notice), true) = (solve.outcome, solve.notice, begins) {
+            let meant = matches!(notice, Notice::Started | Notice::Divided { .. });
+            let level = if meant { Level::Info } else { Level::Warning };
+            self.tell(level, "step-notice", body, notice.to_string());
         }
     }
 

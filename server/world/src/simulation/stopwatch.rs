@@ -63,16 +63,24 @@ impl StageSeconds {
     }
 }
 
+/// Processor time of the calling thread [s]: what a step costs however busy the machine is.
+pub(crate) fn processor_seconds() -> f64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
+}
+
 /// Runs along a step and books the time since the last look on a stage.
 #[derive(Debug)]
 pub(crate) struct Stopwatch {
     last: Instant,
     seconds: StageSeconds,
+    processor_start_s: f64,
 }
 
 impl Stopwatch {
     pub fn start() -> Self {
-        Self { last: Instant::now(), seconds: StageSeconds::default() }
+        let processor_start_s = processor_seconds();
+        Self { last: Instant::now(), seconds: StageSeconds::default(), processor_start_s }
     }
 
     pub fn book(&mut self, stage: Stage) {
@@ -83,5 +91,10 @@ impl Stopwatch {
 
     pub fn seconds(&self) -> StageSeconds {
         self.seconds
+    }
+
+    /// Processor time of this thread since the start [s].
+    pub fn processor_s(&self) -> f64 {
+        processor_seconds() - self.processor_start_s
     }
 }

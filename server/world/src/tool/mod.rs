@@ -25,7 +25,7 @@ use blade::{BladeEdge, IncisionNumbers};
 use script::Script;
 
 /// Most tools of a simulation, those of the scene and those brought by clients.
-pub const MAX_TOOLS: usize = 16;
+pub const MAX_TOOLS: usize = 64;
 /// Owner of a tool that a script moves.
 pub const SCRIPT: &str = "script";
 /// Spring of a tool that a client brought [N/m] and its largest force [N].
@@ -62,8 +62,8 @@ pub struct Tool {
     pub(crate) press: Press,
     /// What it holds.
     pub(crate) grip: Grip,
-    /// How the tissue under it gives way; none before the first touch.
-    pub(crate) compliance: Option<Compliance>,
+    /// Body that it touched last, and how its tissue gives way under it; none before the first touch.
+    pub(crate) compliance: Option<(usize, Compliance)>,
     edge: BladeEdge,
     script: Option<Script>,
     round: u64,
@@ -100,10 +100,17 @@ impl Tool {
         self.proxy.pose()
     }
 
+    /// Middle of the tissue in its grip [m]; none when it holds nothing.
+    pub fn held_point(&self) -> Option<Vector3<f64>> {
+        let held = if self.mode == ToolMode::Grab { self.grip.held().1 } else { &[] };
+        let sum: Vector3<f64> = held.iter().map(|held| held.point).sum();
+        (!held.is_empty()).then(|| sum / held.len() as f64)
+    }
+
     /// Stiffness of hand spring and tissue in series [N/m]: how force changes with the pose within
     /// a step. The hand's alone before the first touch.
     pub fn contact_stiffness_n_m(&self) -> f64 {
-        let series = |compliance: Compliance| compliance.in_series_with(self.stiffness_n_m);
+        let series = |(_, compliance): (usize, Compliance)| compliance.in_series_with(self.stiffness_n_m);
         self.compliance.map_or(self.stiffness_n_m, series)
     }
 

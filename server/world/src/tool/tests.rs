@@ -81,7 +81,7 @@ fn guests_come_with_a_shape_while_there_is_room_and_leave_when_they_fall_silent(
     tools.advance(0.0, &[sample("finger", 1.0, shape), sample("ghost", 1.0, None)]);
     assert_eq!(tools.len(), 2, "a guest without a shape is refused");
     assert_eq!(tools.refused_samples(), 1);
-    let crowd: Vec<_> = (0..20).map(|i| sample(&format!("guest-{i}"), 0.0, shape)).collect();
+    let crowd: Vec<_> = (0..MAX_TOOLS + 4).map(|i| sample(&format!("guest-{i}"), 0.0, shape)).collect();
     tools.advance(0.1, &crowd);
     assert_eq!(tools.len(), MAX_TOOLS);
     tools.advance(0.2, &[]);

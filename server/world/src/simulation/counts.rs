@@ -1,0 +1,355 @@
+//! What went wrong in the steps of a body: counted apart, told once when it begins and once when it is over.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+use scindo_physics::body::{Body, Method, Notice, Outcome, Scheme, SolveReport, StopReason};
+
+use super::report::{Level, StepReport};
+
+/// A trouble is over after this many steps without it.
+const CALM: u64 = 50;
+
+/// Above this share of unconverged steps the run as a whole counts as failed.
+const MOSTLY: f64 = 0.5;
+
+/// Steps of one body, counted apart by what went wrong in them.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StepCounts {
+    /// Steps asked for.
+    pub steps: u64,
+    /// Ended above their tolerance.
+    pub unconverged: u64,
+    /// Could not be made as asked: the body stood still.
+    pub refused: u64,
+    /// Failed as a whole and were made in parts.
+    pub divided: u64,
+    /// Failed in parts as well: the body was put back, at rest.
+    pub rolled_back: u64,
+    /// Held inverted elements.
+    pub inverted: u64,
+    /// Largest residual of the unconverged steps, over that of the loads.
+    pub worst_residual: f64,
+    /// Most parts of a divided step.
+    pub most_parts: u32,
+    /// Most inverted elements of a step.
+    pub most_inverted: usize,
+}
+
+/// What can go wrong in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Trouble {
+    Unconverged,
+    Refused,
+    Divided,
+    RolledBack,
+    Inverted,
+}
+
+impl Trouble {
+    const ALL: [Self; 5] =
+        [Self::Unconverged, Self::Refused, Self::Divided, Self::RolledBack, Self::Inverted];
+
+    /// Name of its events.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Unconverged => "step-unconverged",
+            Self::Refused => "step-refused",
+            Self::Divided => "step-divided",
+            Self::RolledBack => "step-rolled-back",
+            Self::Inverted => "elements-inverted",
+        }
+    }
+
+    fn level(self) -> Level {
+        match self {
+            Self::Refused | Self::RolledBack => Level::Error,
+            Self::Unconverged | Self::Divided | Self::Inverted => Level::Warning,
+        }
+    }
+
+    /// Whether it happened in the step.
+    fn is_in(self, solve: &SolveReport) -> bool {
+        match self {
+            Self::Unconverged => solve.is_unconverged(),
+            Self::Refused => solve.outcome == Outcome::Refused,
+            Self::Divided => solve.is_divided(),
+            Self::RolledBack => solve.outcome == Outcome::Held,
+            Self::Inverted => solve.inverted_pieces > 0,
+        }
+    }
+
+    /// How its first step is told.
+    fn begins(self, solve: &SolveReport) -> String {
+        match self {
+            Self::Unconverged => {
+                format!(
+                    "the step ended above its tolerance {:e}: residual {:.1e}",
+                    solve.tolerance, solve.residual
+                )
+            }
+            Self::Refused => refusal(solve.notice),
+            Self::Divided => format!("done in {} parts to stay finite", solve.substeps),
+            Self::RolledBack => match solve.notice {
+                Some(why @ Notice::OutOfRange { .. }) => why.to_string(),
+                _ => format!(
+                    "not finite even in {} parts; the body is back where it was, at rest",
+                    solve.substeps
+                ),
+            },
+            Self::Inverted => format!("{} elements are turned inside out", solve.inverted_pieces),
+        }
+    }
+
+    /// What its steps did.
+    fn past(self) -> &'static str {
+        match self {
+            Self::Unconverged => "ended above the tolerance",
+            Self::Refused => "were refused",
+            Self::Divided => "were divided",
+            Self::RolledBack => "were taken back",
+            Self::Inverted => "held elements turned inside out",
+        }
+    }
+}
+
+fn refusal(notice: Option<Notice>) -> String {
+    notice.map_or_else(|| "step or gravity is not usable".into(), |why| why.to_string())
+}
+
+/// A trouble that goes on.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Spell {
+    /// Steps with it since it began; 0: it does not go on.
+    steps: u64,
+    /// Steps since it began.
+    of: u64,
+    /// Steps since it was last seen.
+    calm: u64,
+}
+
+/// Follows the steps of one body.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Watch {
+    /// Since the start or the last reset.
+    pub counts: StepCounts,
+    spells: [Spell; 5],
+    /// Why the first refused step was refused.
+    refused_for: Option<Notice>,
+    /// How far the first step that left any sensible range would have gone.
+    out_of_range: Option<Notice>,
+    /// Why the solver stopped in the worst unconverged step.
+    stop: StopReason,
+    /// Whether the last step ended above its tolerance.
+    last_unconverged: bool,
+}
+
+impl Watch {
+    /// Counts a step and tells what begins and what is over. A fixed number of iterations that is meant
+    /// is counted, not told.
+    pub fn follow(&mut self, body: &Arc<str>, solve: &SolveReport, fixed: bool, report: &mut StepReport) {
+        self.count(solve);
+        for (trouble, spell) in Trouble::ALL.into_iter().zip(&mut self.spells) {
+            if fixed && trouble == Trouble::Unconverged {
+                continue;
+            }
+            let seen = trouble.is_in(solve);
+            if seen && spell.steps == 0 {
+                report.tell(trouble.level(), trouble.name(), body, trouble.begins(solve));
+            }
+            if seen || spell.steps > 0 {
+                spell.of += 1;
+                spell.steps += u64::from(seen);
+                spell.calm = if seen { 0 } else { spell.calm + 1 };
+            }
+            if spell.calm == CALM {
+                let (steps, of) = (spell.steps, spell.of - CALM);
+                let message = format!("over: {steps} of {of} steps {}", trouble.past());
+                report.tell(Level::Info, trouble.name(), body, message);
+                *spell = Spell::default();
+            }
+        }
+    }
+
+    fn count(&mut self, solve: &SolveReport) {
+        let counts = &mut self.counts;
+        counts.steps += 1;
+        for (trouble, count) in Trouble::ALL.into_iter().zip([
+            &mut counts.unconverged,
+            &mut counts.refused,
+            &mut counts.divided,
+            &mut counts.rolled_back,
+            &mut counts.inverted,
+        ]) {
+            *count += u64::from(trouble.is_in(solve));
+        }
+        self.last_unconverged = solve.is_unconverged();
+        if self.last_unconverged && solve.residual >= counts.worst_residual {
+            (counts.worst_residual, self.stop) = (solve.residual, solve.stop);
+        }
+        if solve.is_divided() {
+            counts.most_parts = counts.most_parts.max(solve.substeps);
+        }
+        counts.most_inverted = counts.most_inverted.max(solve.inverted_pieces);
+        if solve.outcome == Outcome::Refused && self.refused_for.is_none() {
+            self.refused_for = solve.notice;
+        }
+        if let (None, Some(Notice::OutOfRange { .. })) = (self.out_of_range, solve.notice) {
+            self.out_of_range = solve.notice;
+        }
+    }
+
+    /// One line per trouble that the body has had, with numbers and what to do about it.
+    pub fn warnings(&self, id: &str, body: &Body, fixed: bool) -> Vec<String> {
+        let StepCounts { steps, refused, divided, rolled_back, inverted, .. } = self.counts;
+        let mut lines = Vec::new();
+        let mut add = |text: String| lines.push(format!("body `{id}`: {text}"));
+        if self.counts.unconverged > 0 && !fixed {
+            add(self.unconverged(body));
+        }
+        if refused > 0 {
+            let why = refusal(self.refused_for);
+            add(format!("{refused} of {steps} steps were refused, and the body stood still: {why}"));
+        }
+        if let Some(why) = self.out_of_range {
+            add(format!("{rolled_back} of {steps} steps were taken back, the first because {why}"));
+        } else if rolled_back > 0 {
+            add(format!(
+                "{rolled_back} of {steps} steps did not stay finite, and the body was put back at rest; take a \
+                 shorter world.step_s or weaker loads"
+            ));
+        }
+        if divided > 0 {
+            add(format!(
+                "{divided} of {steps} steps had to be divided into up to {} parts; take a shorter world.step_s",
+                self.counts.most_parts
+            ));
+        }
+        let least = body.least_volume_ratio();
+        if inverted > 0 || least <= 0.0 {
+            add(format!(
+                "{inverted} of {steps} steps held inverted elements, up to {} of them, and the least det F is now \
+                 {least:.3}: the loads are too much for the stiffness or for the region that holds it; law = \
+                 \"neo-hookean\" resists inversion",
+                self.counts.most_inverted
+            ));
+        }
+        lines
+    }
+
+    fn unconverged(&self, body: &Body) -> String {
+        let StepCounts { steps, unconverged, worst_residual, .. } = self.counts;
+        let tolerance = body.settings().solver.tolerance;
+        let mut text = format!(
+            "{unconverged} of {steps} steps ended above the tolerance {tolerance:e}, worst residual {worst_residual:.1e}; "
+        );
+        let _ = write!(text, "{}", advice(body, self.stop, worst_residual));
+        text
+    }
+
+    /// Why the run counts as failed for this body, if it does.
+    pub fn failure(&self, id: &str, body: &Body, fixed: bool) -> Option<String> {
+        let StepCounts { steps, unconverged, refused, rolled_back, .. } = self.counts;
+        let mut reasons = Vec::new();
+        if refused > 0 {
+            reasons.push(format!("{refused} of {steps} steps were refused"));
+        }
+        if rolled_back > 0 {
+            reasons.push(format!("{rolled_back} of {steps} steps were rolled back"));
+        }
+        if !fixed && unconverged as f64 > MOSTLY * steps as f64 {
+            reasons.push(format!("{unconverged} of {steps} steps did not converge"));
+        } else if !fixed && self.last_unconverged && body.settings().scheme == Scheme::Static {
+            reasons.push("the equilibrium was not reached".into());
+        }
+        (!reasons.is_empty()).then(|| format!("body `{id}`: {}", reasons.join(", ")))
+    }
+}
+
+/// What to do about steps that end above their tolerance.
+fn advice(body: &Body, stop: StopReason, residual: f64) -> String {
+    let (settings, law) = (body.settings(), body.material().law);
+    let solver = settings.solver;
+    if stop != StopReason::IterationLimit {
+        return "the solver could not lower it further: raise solver.tolerance, or take solver.precision = \
+                \"double\" or smaller loads"
+            .into();
+    }
+    let by_newton = !settings.is_linearised(law) && !settings.relaxation && !body.is_fast();
+    if by_newton {
+        let steps = settings.newton_steps(law);
+        return format!("raise solver.newton_steps above {steps}, or take a shorter world.step_s");
+    }
+    if settings.method == Method::Cholesky {
+        return "raise solver.tolerance, or take a shorter world.step_s".into();
+    }
+    let about = needed_iterations(solver.iterations, residual, solver.tolerance);
+    format!("raise solver.iterations to about {about}, or say solver.fixed_iterations = true")
+}
+
+/// Iterations that reach `tolerance` where `made` of them left `residual`: conjugate gradients lower it by
+/// about the same factor in every iteration.
+fn needed_iterations(made: u32, residual: f64, tolerance: f64) -> u32 {
+    let decades = |residual: f64| -residual.clamp(1e-12, 0.5).log10();
+    let needed = 1.2 * f64::from(made) * decades(tolerance) / decades(residual);
+    let unit = 10_f64.powf((needed.log10() - 1.0).floor().max(0.0));
+    ((needed / unit).ceil() * unit).min(100_000.0) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn solve(residual: f64, inverted_pieces: usize) -> SolveReport {
+        SolveReport {
+            residual,
+            tolerance: 1e-3,
+            inverted_pieces,
+            stop: StopReason::IterationLimit,
+            ..SolveReport::default()
+        }
+    }
+
+    #[test]
+    fn a_trouble_is_told_when_it_begins_and_when_it_is_over() {
+        let (mut watch, mut report) = (Watch::default(), StepReport::default());
+        let body: Arc<str> = "b".into();
+        for step in 0..200 {
+            // In every third of the first ninety steps, and never again.
+            let residual = if step < 90 && step % 3 == 0 { 0.5 } else { 1e-4 };
+            watch.follow(&body, &solve(residual, 0), false, &mut report);
+        }
+        let told: Vec<_> = report.events.iter().map(|e| (e.level, e.name, &*e.message)).collect();
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert_eq!((told[0].0, told[0].1), (Level::Warning, "step-unconverged"));
+        assert_eq!(
+            told[1],
+            (Level::Info, "step-unconverged", "over: 30 of 88 steps ended above the tolerance")
+        );
+        assert_eq!((watch.counts.steps, watch.counts.unconverged), (200, 30));
+    }
+
+    #[test]
+    fn kinds_are_counted_apart_and_a_meant_limit_is_not_told() {
+        let (mut watch, mut report) = (Watch::default(), StepReport::default());
+        let body: Arc<str> = "b".into();
+        let refused = SolveReport { outcome: Outcome::Refused, ..SolveReport::default() };
+        let held = SolveReport { outcome: Outcome::Held, ..solve(0.5, 0) };
+        let divided = SolveReport { substeps: 4, ..solve(1e-4, 0) };
+        for solve in [solve(0.5, 3), refused, held, divided, solve(1e-4, 7)] {
+            watch.follow(&body, &solve, true, &mut report);
+        }
+        let StepCounts { unconverged, refused, rolled_back, divided, inverted, .. } = watch.counts;
+        assert_eq!([unconverged, refused, rolled_back, divided, inverted], [1, 1, 1, 1, 2]);
+        assert_eq!((watch.counts.most_parts, watch.counts.most_inverted), (4, 7));
+        let names: Vec<_> = report.events.iter().map(|event| event.name).collect();
+        assert_eq!(names, ["elements-inverted", "step-refused", "step-rolled-back", "step-divided"]);
+    }
+
+    #[test]
+    fn needed_iterations_follow_the_rate() {
+        assert_eq!(needed_iterations(50, 1e-3, 1e-6), 120);
+        assert!(needed_iterations(50, 2.0, 1e-6) >= 1000);
+        assert_eq!(needed_iterations(90_000, 1e-1, 1e-9), 100_000);
+    }
+}

@@ -1,0 +1,101 @@
+//! What a viewer is told of a body beside where its surface is: rest, held parts, stress.
+
+use nalgebra::{Matrix3, Vector3};
+use scindo_physics::body::Body;
+use scindo_physics::cut::SurfaceVertex;
+
+use crate::snapshot::SurfaceTopology;
+
+/// Share of a vertex' weight on held nodes from which it counts as held.
+const MOSTLY: f64 = 0.5;
+
+/// Triangles of the present epoch, where they rest, and what holds them. Triangles of parts that sleep are not in
+/// the view.
+pub fn topology(body: &Body) -> SurfaceTopology {
+    let (mesh, surface) = (body.cut_mesh(), body.surface());
+    let rest = body.rest_positions();
+    let held = held_copies(body);
+    let awake = |triangle: &[u32; 3]| !body.is_asleep(surface.vertices[triangle[0] as usize].copies[0]);
+    let shown = surface.triangles.iter().zip(&surface.tags).filter(|(triangle, _)| awake(triangle));
+    let (triangles, tags) = shown.unzip();
+    let parts = body.parts();
+    let hangs = |vertex: &SurfaceVertex| {
+        let copy = vertex.copies[heaviest(vertex)] as usize;
+        parts.of_copy.get(copy).is_some_and(|&part| !parts.free[part as usize])
+    };
+    let moves_with_held = |vertex: &SurfaceVertex| {
+        let slots = vertex.copies.iter().zip(&vertex.weights);
+        slots.filter(|&(&copy, _)| held[copy as usize]).map(|(_, weight)| weight).sum::<f64>() > MOSTLY
+    };
+    SurfaceTopology {
+        epoch: mesh.epoch(),
+        vertex_count: surface.vertices.len() as u32,
+        triangles,
+        tags,
+        rest: surface.vertices.iter().map(|vertex| single(vertex.position(rest))).collect(),
+        held: surface.vertices.iter().map(moves_with_held).collect(),
+        hangs: surface.vertices.iter().map(hangs).collect(),
+    }
+}
+
+/// Von Mises stress [Pa] of every surface vertex into `out`: the mean over the pieces around each copy,
+/// weighted by volume, interpolated as positions are.
+pub fn surface_stress(body: &Body, out: &mut Vec<f32>) {
+    let mesh = body.cut_mesh();
+    let mut mean = vec![(0.0, 0.0); mesh.n_copies()];
+    for (p, (piece, stress)) in mesh.pieces().iter().zip(&body.cauchy_stresses()).enumerate() {
+        let stress = von_mises(stress);
+        for (&copy, volume) in piece.copies.iter().zip(mesh.piece_node_volume(p)) {
+            let (sum, weight) = &mut mean[copy as usize];
+            (*sum, *weight) = (*sum + stress * volume, *weight + volume);
+        }
+    }
+    out.clear();
+    out.extend(body.surface().vertices.iter().map(|vertex| {
+        let slots = vertex.copies.iter().zip(&vertex.weights).filter(|(_, weight)| **weight > 0.0);
+        let (sum, weights) = slots.fold((0.0, 0.0), |(sum, weights), (&copy, &weight)| {
+            let (stress, volume) = mean[copy as usize];
+            if volume > 0.0 { (sum + weight * stress / volume, weights + weight) } else { (sum, weights) }
+        });
+        let stress = if weights > 0.0 { (sum / weights) as f32 } else { 0.0 };
+        if stress.is_finite() { stress } else { f32::MAX }
+    }));
+}
+
+/// √(3/2 s:s) of the deviator s [Pa].
+pub fn von_mises(stress: &Matrix3<f64>) -> f64 {
+    let deviator = stress - Matrix3::from_diagonal_element(stress.trace() / 3.0);
+    (1.5 * deviator.norm_squared()).sqrt()
+}
+
+/// Per copy: its node is held along some axis.
+fn held_copies(body: &Body) -> Vec<bool> {
+    let mesh = body.cut_mesh();
+    let fixed = body.fixed_nodes();
+    let is_held = |node: &u32| fixed.binary_search_by_key(node, |f| f.node).is_ok();
+    mesh.copy_node().iter().map(is_held).collect()
+}
+
+/// The slot with the largest weight.
+fn heaviest(vertex: &SurfaceVertex) -> usize {
+    (0..4).max_by(|&a, &b| vertex.weights[a].total_cmp(&vertex.weights[b])).unwrap_or(0)
+}
+
+fn single(x: Vector3<f64>) -> [f32; 3] {
+    [x.x as f32, x.y as f32, x.z as f32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn von_mises_of_simple_states() {
+        let pull = Matrix3::from_diagonal(&Vector3::new(5.0, 0.0, 0.0));
+        assert!((von_mises(&pull) - 5.0).abs() < 1e-12);
+        assert!(von_mises(&Matrix3::from_diagonal_element(-7.0)) < 1e-12);
+        let mut shear = Matrix3::zeros();
+        (shear[(0, 1)], shear[(1, 0)]) = (2.0, 2.0);
+        assert!((von_mises(&shear) - 2.0 * 3.0_f64.sqrt()).abs() < 1e-12);
+    }
+}
