@@ -4,10 +4,12 @@
 //! reference; its [`axes`] say what is varied (law, element, mesh, step, …) as keys of the scene;
 //! [`design`] picks the configurations; a [`trial`] runs one and times it, [`wear`] looks
 //! at a mesh after many cuts; [`reference`] says what
-//! the right answer is and how well it is known; [`error`] compares; [`pareto`] keeps the
+//! the right answer is and how well it is known, for a scene by climbing a [`ladder`] of refinements to
+//! its [`limit`] as far as the time goes; [`error`] compares; [`pareto`] keeps the
 //! configurations that nothing beats; [`sources`] tells which source of error dominates there;
 //! [`recommend`] picks one for a time budget; [`store`] keeps what is finished on disk; [`page`]
-//! writes it for people. [`study`] drives them.
+//! writes it for people. [`bench`] makes the runs within the time that [`forecast`] expects; `survey`
+//! studies one case, and [`study`] all of them.
 //!
 //! Everything is a scene with changed keys, run by `scindo-world`: the study knows no mechanics,
 //! and what a scene refuses is a result here like any other.
@@ -28,6 +30,14 @@ pub mod reference;
 
 pub mod richardson;
 
+pub mod limit;
+
+pub mod ladder;
+
+pub mod runner;
+
+pub mod forecast;
+
 pub mod error;
 
 pub mod pareto;
@@ -41,6 +51,10 @@ pub mod store;
 pub mod table;
 
 pub mod page;
+
+pub mod bench;
+
+mod survey;
 
 pub mod study;
 

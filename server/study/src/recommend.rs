@@ -1,4 +1,8 @@
-//! A configuration for a time budget.
+//! A configuration for a time budget, as far as the reference can tell configurations apart.
+//!
+//! Errors are distances from a reference that is itself known only to its error bar b: the true error
+//! of a point lies within e ± b. An error below b is nothing but the reference's own, so points there
+//! cannot be told apart; the cheapest of them is named, as what it is.
 
 use serde::Serialize;
 
@@ -10,9 +14,21 @@ use crate::sources::{Source, Sources};
 pub struct Recommendation {
     /// The budget [ms].
     pub budget_ms: f64,
-    /// The most accurate point within it; none if nothing is fast enough.
+    /// The most accurate point within it, or the cheapest of those that cannot be told from the
+    /// reference; none if nothing is fast enough or nothing is known.
     pub choice: Option<usize>,
-    /// The next point on the front: what more time would buy, or the fastest where nothing fits.
+    /// Whether the choice cannot be told from others: its error is below the error bar.
+    pub indistinguishable: bool,
+    /// Relative error of the choice.
+    pub error: Option<f64>,
+    /// Half-width of the error bar of that error.
+    pub error_bar: f64,
+    /// The 99th percentile of its time [ms].
+    pub p99_ms: Option<f64>,
+    /// What it changes in the scene, as `key=value`.
+    pub set: Vec<String>,
+    /// The next point on the front that is better by more than the bar: what more time would buy, or
+    /// the fastest where nothing fits.
     pub next: Option<usize>,
     /// Which error dominates the choice.
     pub dominant: Option<Source>,
@@ -33,51 +49,71 @@ pub struct Candidate<'a> {
     pub sources: Option<&'a Sources>,
 }
 
-/// Picks the most accurate candidate whose slow steps, too, fit the budget.
-pub fn recommend(budget_ms: f64, candidates: &[Candidate<'_>]) -> Recommendation {
+/// Picks the most accurate candidate whose slow steps, too, fit the budget; where errors fall below
+/// the reference's own error bar, the cheapest of those.
+pub fn recommend(budget_ms: f64, error_bar: f64, candidates: &[Candidate<'_>]) -> Recommendation {
     let points: Vec<(f64, f64)> = candidates.iter().map(|c| (c.p99_ms, c.error)).collect();
     let front = front(&points);
     let fitting = front.iter().take_while(|&&i| points[i].0 <= budget_ms).count();
-    let choice = fitting.checked_sub(1).map(|i| front[i]);
-    let next = front.get(fitting).copied();
+    // Along the front costs rise and errors fall: the first below the bar is the cheapest there.
+    let hidden = front[..fitting].iter().position(|&i| points[i].1 <= error_bar);
+    let choice = hidden.or(fitting.checked_sub(1)).map(|at| front[at]);
+    let next = match choice {
+        None => front.first().copied(),
+        Some(i) => front[fitting..].iter().copied().find(|&j| points[j].1 + error_bar < points[i].1),
+    };
     let dominant = choice.and_then(|i| candidates[i].sources).and_then(Sources::dominant);
-    Recommendation {
+    let mut advice = Recommendation {
         budget_ms,
         choice,
+        indistinguishable: hidden.is_some(),
+        error: choice.map(|i| points[i].1),
+        error_bar,
+        p99_ms: choice.map(|i| points[i].0),
+        set: Vec::new(),
         next,
-        dominant,
-        words: words(budget_ms, candidates, choice, next, dominant),
-    }
+        dominant: dominant.filter(|_| hidden.is_none()),
+        words: String::new(),
+    };
+    let alike = front[..fitting].iter().filter(|&&i| points[i].1 <= error_bar).count();
+    advice.words = words(&advice, candidates, alike);
+    advice
 }
 
-fn words(
-    budget_ms: f64,
-    candidates: &[Candidate<'_>],
-    choice: Option<usize>,
-    next: Option<usize>,
-    dominant: Option<Source>,
-) -> String {
+/// Number of points, by rank of cost, among those that cannot be told apart.
+fn words(advice: &Recommendation, candidates: &[Candidate<'_>], alike: usize) -> String {
+    let short = crate::axes::short;
+    let (budget, bar) = (short(advice.budget_ms), percent(advice.error_bar));
     let told = |i: usize| {
         let c = candidates[i];
-        format!("{} (p99 {} ms, error {})", c.words, crate::axes::short(c.p99_ms), percent(c.error))
+        format!("{} (p99 {} ms, error {} ± {bar})", c.words, short(c.p99_ms), percent(c.error))
     };
-    let mut text = match (choice, next) {
-        (Some(i), _) => format!("Within {} ms: {}.", crate::axes::short(budget_ms), told(i)),
-        (None, Some(i)) => {
-            return format!(
-                "Nothing fits into {} ms; the fastest is {}.",
-                crate::axes::short(budget_ms),
-                told(i)
-            );
+    let mut text = match (advice.choice, advice.next) {
+        (Some(i), _) if advice.indistinguishable => {
+            let c = candidates[i];
+            let others = match alike {
+                0 | 1 => String::new(),
+                n => format!(", the cheapest of {n} that cannot be told apart"),
+            };
+            format!(
+                "Within {budget} ms: {} (p99 {} ms){others}. Its error cannot be told from that of the reference, \
+                 whose bar is {bar}: it is at most {}. Give the study more time to tell: --within 20m.",
+                c.words,
+                short(c.p99_ms),
+                percent(c.error + advice.error_bar)
+            )
         }
-        (None, None) => return "No configuration gave a result.".to_owned(),
+        (Some(i), _) => format!("Within {budget} ms: {}.", told(i)),
+        (None, Some(i)) => return format!("Nothing fits into {budget} ms; the fastest is {}.", told(i)),
+        (None, None) => return "No configuration gave a result whose error is known.".to_owned(),
     };
-    if let Some(source) = dominant {
+    if let Some(source) = advice.dominant {
         text += &format!(" Its {} error dominates: {} would help most.", source.name(), source.remedy());
     }
-    match next {
-        Some(i) => text += &format!(" With more time: {}.", told(i)),
-        None => text += " Nothing that was tried is more accurate.",
+    match advice.next {
+        Some(i) => text += &format!(" With more time per step: {}.", told(i)),
+        None if advice.indistinguishable => {}
+        None => text += " Nothing that was tried is more accurate by more than the bar.",
     }
     text
 }
@@ -118,21 +154,47 @@ mod tests {
             candidate(9.0, 0.15, "beaten"),
         ];
         all[1].sources = Some(&sources);
-        let r = recommend(10.0, &all);
+        let r = recommend(10.0, 0.02, &all);
         assert_eq!((r.choice, r.next, r.dominant), (Some(1), Some(2), Some(Source::Time)));
+        assert!(!r.indistinguishable && r.error == Some(0.1));
         assert_eq!(
             r.words,
-            "Within 10 ms: good (p99 8 ms, error 10 %). Its time error dominates: a shorter step or an integrator \
-             of higher order would help most. With more time: fine (p99 30 ms, error 1.0 %)."
+            "Within 10 ms: good (p99 8 ms, error 10 % ± 2.0 %). Its time error dominates: a shorter step or an \
+             integrator of higher order would help most. With more time per step: fine (p99 30 ms, error 1.0 % ± \
+             2.0 %)."
         );
     }
 
     #[test]
+    fn below_the_bar_the_cheapest_is_named_as_such() {
+        let all = [
+            candidate(1.0, 0.2, "fast"),
+            candidate(3.0, 0.04, "good"),
+            candidate(8.0, 0.01, "better by chance"),
+            candidate(30.0, 0.001, "fine"),
+        ];
+        let r = recommend(10.0, 0.05, &all);
+        assert_eq!((r.choice, r.indistinguishable, r.next), (Some(1), true, None));
+        for part in ["good (p99 3 ms)", "cheapest of 2", "bar is 5.0 %", "at most 9.0 %", "--within 20m"] {
+            assert!(r.words.contains(part), "{part}: {}", r.words);
+        }
+        assert!(!r.words.contains("by chance"), "{}", r.words);
+    }
+
+    #[test]
+    fn more_time_is_offered_only_for_what_can_be_told_apart() {
+        let all = [candidate(1.0, 0.2, "fast"), candidate(20.0, 0.18, "hardly better")];
+        let r = recommend(10.0, 0.05, &all);
+        assert_eq!((r.choice, r.next), (Some(0), None));
+    }
+
+    #[test]
     fn nothing_fits_or_nothing_works() {
-        let r = recommend(0.5, &[candidate(1.0, 0.2, "fast")]);
+        let r = recommend(0.5, 0.01, &[candidate(1.0, 0.2, "fast")]);
         assert_eq!((r.choice, r.next), (None, Some(0)));
         assert!(r.words.starts_with("Nothing fits into 0.5 ms; the fastest is fast"));
-        assert_eq!(recommend(1.0, &[]).words, "No configuration gave a result.");
+        let nothing = recommend(1.0, f64::INFINITY, &[]);
+        assert_eq!(nothing.words, "No configuration gave a result whose error is known.");
     }
 
     #[test]

@@ -25,7 +25,8 @@ pub struct Reference {
     pub source: String,
 }
 
-/// Takes a stored reference, or computes one with `run`.
+/// Takes a stored reference, or computes one with `run`. That of a scene takes as long as it is given:
+/// see [`Climb`](crate::ladder::Climb).
 ///
 /// # Errors
 /// Why none could be computed.
@@ -51,6 +52,7 @@ pub fn settle(
             }
             Err(why)
         }
+        Truth::Refined { .. } => Err("it is climbed level by level".to_owned()),
     }
 }
 

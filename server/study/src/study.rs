@@ -4,24 +4,23 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 use scindo_world::scene::{Scene, SceneError};
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::axes::{Factor, block};
-use crate::case::{self, Case};
-use crate::design::{Configuration, design, narrow};
+use crate::bench::Bench;
+use crate::case::{self, Case, Wishes};
+use crate::design::{Configuration, narrow};
 use crate::error::Errors;
-use crate::pareto::front;
-use crate::recommend::{Candidate, Recommendation, recommend};
-use crate::reference::{self, Reference};
-use crate::sources::{Sources, peel};
-use crate::store::{Origin, Store, fingerprint};
+use crate::recommend::Recommendation;
+use crate::reference::Reference;
+use crate::sources::Sources;
+use crate::store::{Origin, Store};
+use crate::survey;
 use crate::table::Table;
-use crate::trial::{self, Limits, Protocol, Trial, one_line};
-use crate::wear::{self, Wear};
+use crate::trial::Trial;
 
 /// What is asked for.
 #[derive(Debug, Clone)]
@@ -30,8 +29,11 @@ pub struct Settings {
     pub cases: Vec<String>,
     /// Where the results go; finished points there are taken over.
     pub out: PathBuf,
-    /// Only what takes less than a minute.
+    /// Coarse meshes and short runs only.
     pub quick: bool,
+    /// Time that the study may take [s]; none: as long as the cases of the program take, and
+    /// [`SCENE_S`] for a scene.
+    pub within_s: Option<f64>,
     /// Recommend a configuration that fits this time per solution or frame [ms].
     pub budget_ms: Option<f64>,
     /// Simulated time of scenes in motion [s].
@@ -44,19 +46,24 @@ pub struct Settings {
     pub stop: Arc<AtomicBool>,
 }
 
+/// Time that a scene's study may take where nothing is said [s]; in a quick study.
+pub const SCENE_S: [f64; 2] = [300.0, 40.0];
+
 /// How far it is.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Progress {
     /// Case that is worked on.
     pub case: String,
     /// What is run now.
     pub what: String,
-    /// Points done, of all cases.
+    /// Points of this case done; 0 while its reference is computed.
     pub done: usize,
-    /// Points in all, twins and references included where they are known.
+    /// Points of this case in all; 0 before they are known.
     pub total: usize,
-    /// Expected time left [s]; none before it can be told.
-    pub left_s: Option<f64>,
+    /// When this case began and must end [s since the study began]; infinite without a budget.
+    pub case_s: [f64; 2],
+    /// Something to be said once, such as the estimate.
+    pub note: Option<String>,
 }
 
 /// Why there is no study.
@@ -126,6 +133,10 @@ pub struct CaseResult {
     pub front: Vec<usize>,
     /// The recommendation, where one was asked for.
     pub recommendation: Option<Recommendation>,
+    /// Points that were planned and not run, because they did not fit into the time or the budget.
+    pub left_out: usize,
+    /// What the reader should know: what was left out, what regions select.
+    pub notes: Vec<String>,
     /// Whether every point was run.
     pub complete: bool,
 }
@@ -164,46 +175,67 @@ impl CaseResult {
     }
 }
 
+impl StudyResult {
+    /// Whether every case gave at least one result.
+    pub fn has_results(&self) -> bool {
+        let counts = self.cases.iter().map(CaseResult::counts);
+        !self.cases.is_empty() && counts.into_iter().all(|counts| counts.points > counts.failures)
+    }
+}
+
 /// Runs a study and writes `points.csv`, `study.json`, a picture per case and `index.html`.
 ///
 /// # Errors
 /// Bad names or scenes, and a disk that cannot be written. Runs that fail are results.
 pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<StudyResult, StudyError> {
-    let started = Instant::now();
     let cases = open(settings)?;
     let origin = Origin::here();
     let io = |(path, source)| StudyError::Io { path, source };
     let store = Store::open(&settings.out, &origin).map_err(io)?;
-    let table = Table::begin(&settings.out).map_err(io)?;
-    let mut bench = Bench::new(settings, store, table, &cases, tell);
+    Table::begin(&settings.out).map_err(io)?;
+    let mut bench = Bench::new(settings, store, tell);
+    let resumed = bench.store.resumed;
     let mut result = StudyResult {
         cases: Vec::new(),
         origin,
-        resumed: bench.store.resumed,
+        resumed,
         seconds: 0.0,
         load: [load(), None],
         interrupted: false,
     };
+    let mut waiting = cases.len();
     for case in cases {
-        result.cases.push(bench.study(case));
-        result.seconds = started.elapsed().as_secs_f64();
+        let seconds = share(settings, &case, waiting, bench.elapsed_s());
+        result.cases.push(survey::study(&mut bench, case, seconds));
+        waiting -= 1;
+        result.seconds = bench.elapsed_s();
         result.load[1] = load();
         result.interrupted = settings.stop.load(Ordering::Relaxed);
         if let Some((path, source)) = bench.broken.take() {
             return Err(StudyError::Io { path, source });
         }
+        Table::whole(&settings.out, &result).map_err(io)?;
         crate::page::write(&settings.out, &result).map_err(io)?;
         if result.interrupted {
             break;
         }
     }
-    Table::whole(&settings.out, &result).map_err(io)?;
     Ok(result)
+}
+
+/// Seconds for the next of `waiting` cases: an even share of what is left of the budget.
+fn share(settings: &Settings, case: &Case, waiting: usize, elapsed_s: f64) -> f64 {
+    match (settings.within_s, &case.truth) {
+        (Some(within_s), _) => (within_s - elapsed_s).max(0.0) / waiting as f64,
+        (None, case::Truth::Refined { .. }) => SCENE_S[usize::from(settings.quick)],
+        (None, _) => f64::INFINITY,
+    }
 }
 
 /// The cases asked for, narrowed.
 fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     let mut cases = Vec::new();
+    let threads = threads(settings);
     for name in &settings.cases {
         let several: &[&str] = match name.as_str() {
             "bar" => &["bar-rest", "bar-motion"],
@@ -216,7 +248,7 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
             cases.push(case);
         } else if Path::new(name).exists() {
             let scene = Scene::load(Path::new(name))?;
-            cases.push(case::from_scene(&scene, settings.seconds, settings.quick)?);
+            cases.push(case::from_scene(&scene, wishes(settings, &threads))?);
         } else {
             return Err(StudyError::UnknownCase { name: name.clone() });
         }
@@ -231,8 +263,28 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     Ok(cases)
 }
 
-/// Meshes of the wished fineness: the shape of the base mesh, scaled.
+/// What is asked for of scenes.
+fn wishes<'a>(settings: &'a Settings, threads: &'a [usize]) -> Wishes<'a> {
+    Wishes {
+        seconds: settings.seconds,
+        quick: settings.quick,
+        cells: &settings.cells,
+        threads,
+        directory: &settings.out,
+    }
+}
+
+/// Threads that are asked for.
+fn threads(settings: &Settings) -> Vec<usize> {
+    let asked = settings.only.iter().filter(|(factor, _)| *factor == Factor::Threads);
+    asked.flat_map(|(_, labels)| labels.iter().filter_map(|label| label.parse().ok())).collect()
+}
+
+/// Meshes of the wished fineness for a case of the program: the shape of the base mesh, scaled.
 fn replace_meshes(case: &mut Case, cells: &[usize]) {
+    if matches!(case.truth, case::Truth::Refined { .. }) {
+        return;
+    }
     let Some(axis) = case.axes.iter_mut().find(|axis| axis.factor == Factor::Mesh && !cells.is_empty())
     else {
         return;
@@ -274,201 +326,6 @@ fn check(case: &Case, factor: Factor, labels: &[String]) -> Result<(), StudyErro
             known: axis.settings.iter().map(|s| s.label.as_str()).collect::<Vec<_>>().join(", "),
         }),
     }
-}
-
-/// Runs configurations, remembers them, and tells how far it is.
-struct Bench<'a> {
-    settings: &'a Settings,
-    store: Store,
-    table: Table,
-    tell: &'a mut dyn FnMut(&Progress),
-    progress: Progress,
-    /// Expected work in all and done, in units of the base of a case; seconds for what was done.
-    work: [f64; 2],
-    spent_s: f64,
-    broken: Option<(PathBuf, io::Error)>,
-}
-
-/// Twins and reference runs of a case, as a share of its points: a guess for the progress bar.
-const TWINS: f64 = 0.4;
-
-impl<'a> Bench<'a> {
-    fn new(
-        settings: &'a Settings,
-        store: Store,
-        table: Table,
-        cases: &[Case],
-        tell: &'a mut dyn FnMut(&Progress),
-    ) -> Self {
-        let plan: Vec<(usize, f64)> = cases
-            .iter()
-            .map(|case| {
-                let all = design(&case.axes, &case.blocks);
-                (all.len(), all.iter().map(|c| weight(case, c)).sum::<f64>())
-            })
-            .collect();
-        let progress = Progress {
-            case: String::new(),
-            what: String::new(),
-            done: 0,
-            total: plan.iter().map(|(n, _)| n).sum(),
-            left_s: None,
-        };
-        let work = [plan.iter().map(|(_, w)| w).sum::<f64>() * (1.0 + TWINS), 0.0];
-        Self { settings, store, table, tell, progress, work, spent_s: 0.0, broken: None }
-    }
-
-    fn study(&mut self, case: Case) -> CaseResult {
-        self.progress.case.clone_from(&case.name);
-        let reference = reference::settle(&case, &mut |c| self.once(&case, c));
-        let mut points = Vec::new();
-        let all = design(&case.axes, &case.blocks);
-        let planned = all.len();
-        for configuration in all {
-            let Some(trial) = self.measured(&case, &configuration) else { break };
-            let errors = reference.as_ref().ok().filter(|_| trial.is_done());
-            let errors = errors
-                .map(|r| Errors::of(&trial.series, &r.series, &case.goal, r.goal))
-                .filter(Errors::is_finite);
-            let point = Outcome { configuration, trial, errors, sources: None };
-            if let Err(broken) = self.table.append(&case, &point) {
-                self.broken = Some(broken);
-                break;
-            }
-            points.push(point);
-            self.progress.done += 1;
-        }
-        let complete = points.len() == planned;
-        let coordinates: Vec<(f64, f64)> = points.iter().map(Outcome::point).collect();
-        let front = front(&coordinates);
-        if let Ok(reference) = &reference {
-            // What is recommended fits by its slow steps and need not be on the front of medians.
-            let choice = self.settings.budget_ms.and_then(|budget| advise(budget, &points).choice);
-            for i in front.iter().copied().chain(choice.filter(|i| !front.contains(i))) {
-                let Outcome { configuration, trial, .. } = &points[i];
-                let found =
-                    peel(&case, configuration, &trial.series, reference, &mut |c| self.once(&case, c));
-                points[i].sources = Some(found);
-            }
-        }
-        let recommendation = self.settings.budget_ms.map(|budget| advise(budget, &points));
-        CaseResult { case, reference, points, front, recommendation, complete }
-    }
-
-    /// A run with repetitions for its time.
-    fn measured(&mut self, case: &Case, configuration: &Configuration) -> Option<Trial> {
-        self.trial(case, configuration, true)
-    }
-
-    /// A run for its result only.
-    fn once(&mut self, case: &Case, configuration: &Configuration) -> Option<Trial> {
-        self.trial(case, configuration, false)
-    }
-
-    fn trial(&mut self, case: &Case, configuration: &Configuration, timed: bool) -> Option<Trial> {
-        if self.settings.stop.load(Ordering::Relaxed) || self.broken.is_some() {
-            return None;
-        }
-        self.progress.what = configuration.words();
-        (self.tell)(&self.progress);
-        let weight = weight(case, configuration);
-        let key = key(case, configuration);
-        let known = self.store.get(&key).filter(|trial| !timed || trial.cost.count != 1 || is_motion(case));
-        if let Some(trial) = known.cloned() {
-            self.work[0] -= weight;
-            return Some(trial);
-        }
-        let started = Instant::now();
-        let trial = match case.scene.apply_sets(&configuration.overrides()) {
-            Err(error) => Trial::refused(one_line(&error.to_string())),
-            Ok(scene) => {
-                let limits = limits(self.settings.quick, timed);
-                let (threads, stop) = (configuration.threads(), &*self.settings.stop);
-                let base_dir = case.scene.base_dir();
-                let mut trial = trial::run(&scene, base_dir, threads, case.protocol, limits, stop)?;
-                if timed && compares_methods(case, configuration) {
-                    trial.wear = worn(case, configuration, stop)?;
-                }
-                trial
-            }
-        };
-        self.spent_s += started.elapsed().as_secs_f64();
-        self.work[1] += weight;
-        self.work[0] = self.work[0].max(self.work[1]);
-        self.progress.left_s = Some(self.spent_s / self.work[1] * (self.work[0] - self.work[1]));
-        if let Err(error) = self.store.put(&key, &trial) {
-            self.broken = Some((self.settings.out.join("runs.jsonl"), error));
-        }
-        Some(trial)
-    }
-}
-
-/// Whether nothing but the method of cutting differs from the base of the case.
-fn compares_methods(case: &Case, configuration: &Configuration) -> bool {
-    let base = Configuration::base(&case.axes);
-    configuration
-        .setting(Factor::Cutting)
-        .is_some_and(|method| base.with(Factor::Cutting, method).key() == configuration.key())
-}
-
-/// The mesh after many cuts; nothing where the scene is refused, none where the study is to end.
-fn worn(case: &Case, configuration: &Configuration, stop: &AtomicBool) -> Option<Vec<Wear>> {
-    let mut set = configuration.overrides();
-    set.extend(wear::at_rest(&case.bodies));
-    let Ok(scene) = case.scene.apply_sets(&set) else { return Some(Vec::new()) };
-    // The others have the mesh of one of these, or can take no further cut.
-    let once = !["xfem", "snap"].contains(&configuration.label(Factor::Cutting));
-    match wear::measure(&scene, case.scene.base_dir(), once, stop) {
-        None if stop.load(Ordering::Relaxed) => None,
-        found => Some(found.unwrap_or_default()),
-    }
-}
-
-fn is_motion(case: &Case) -> bool {
-    matches!(case.protocol, Protocol::Motion { .. })
-}
-
-/// How long runs may take. References and twins may take longer than what is compared.
-fn limits(quick: bool, timed: bool) -> Limits {
-    let run_s = if quick { 3.0 } else { 12.0 };
-    if timed {
-        Limits { run_s, repeat_s: if quick { 0.15 } else { 1.5 }, repeats: 11 }
-    } else {
-        Limits { run_s: 10.0 * run_s, repeat_s: 0.0, repeats: 1 }
-    }
-}
-
-/// What a run is known by: scene, settings and protocol.
-fn key(case: &Case, configuration: &Configuration) -> String {
-    let scene = fingerprint(&format!("{}{:?}", case.scene.to_json(), case.protocol));
-    format!("{} {scene} {}", case.name, configuration.key())
-}
-
-/// Expected work of a run: cells of the mesh times steps per frame, whatever the unit.
-fn weight(case: &Case, configuration: &Configuration) -> f64 {
-    let cells = configuration.setting(Factor::Mesh).map_or(1.0, |setting| (setting.size / 20.0).powi(3));
-    let element = match configuration.label(Factor::Element) {
-        "tet10" => 8.0,
-        "hex8" => 2.0,
-        _ => 1.0,
-    };
-    let steps = match case.protocol {
-        Protocol::Static => 10.0,
-        Protocol::Motion { frame_s, frames } => {
-            f64::from(frames) * configuration.setting(Factor::Step).map_or(1.0, |h| frame_s / h.size)
-        }
-    };
-    0.5 + cells * element * steps / 100.0
-}
-
-fn advise(budget_ms: f64, points: &[Outcome]) -> Recommendation {
-    let words: Vec<String> = points.iter().map(|point| point.configuration.words()).collect();
-    let mut candidates = Vec::with_capacity(points.len());
-    for (point, words) in points.iter().zip(&words) {
-        let (p99_ms, error) = (point.trial.cost.p99_ms, point.point().1);
-        candidates.push(Candidate { p99_ms, error, words, sources: point.sources.as_ref() });
-    }
-    recommend(budget_ms, &candidates)
 }
 
 /// One-minute load average, where the system tells.

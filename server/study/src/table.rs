@@ -1,4 +1,4 @@
-//! `points.csv`: one line per point, appended as it is finished.
+//! `points.csv`: one line per point, written when a case is finished.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -63,14 +63,6 @@ impl Table {
                 .collect(),
         )?;
         Ok(table)
-    }
-
-    /// Appends a point; it is on disk when this returns.
-    ///
-    /// # Errors
-    /// What the system says.
-    pub fn append(&mut self, case: &Case, point: &Outcome) -> Result<(), Broken> {
-        self.write(line(case, point, None))
     }
 
     /// Writes the whole table, with what is known only at the end: front and dominant error.

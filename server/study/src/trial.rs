@@ -1,22 +1,25 @@
 //! One run of one configuration: set up, solve or step, time it, and say how it ended.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use cpu_time::ThreadTime;
 use scindo_world::build::BuildOptions;
 use scindo_world::inputs::Inputs;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::{Level, Simulation, Stage, StepReport};
 use serde::{Deserialize, Serialize};
 
+use crate::case::sight::{self, Sight};
 use crate::series::Series;
 use crate::wear::Wear;
 
 /// What a run computes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Protocol {
-    /// One equilibrium from rest; its time is the cost.
+    /// One equilibrium from rest; its time is the cost, over all steps that relaxation takes.
     Static,
     /// A motion; the cost is the time to compute one frame.
     Motion {
@@ -26,6 +29,9 @@ pub enum Protocol {
         frames: u32,
     },
 }
+
+/// Frames up to which the first counts like any other.
+const FEW: usize = 11;
 
 /// How much a run may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +73,9 @@ impl Status {
     }
 }
 
-/// Measured times [ms]. A cost is that of one static solution, or of one frame of a motion.
+/// Measured times [ms]. A cost is that of one static solution, or of one frame of a motion. It is the
+/// processor time of the thread that steps, which is the wall time of a machine that does nothing else;
+/// wall time where several threads work on a step.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// Reading, meshing, cutting and preparing.
@@ -76,7 +84,8 @@ pub struct Cost {
     pub first_ms: f64,
     /// Median.
     pub median_ms: f64,
-    /// 99th percentile; the slowest where there are fewer than 100.
+    /// 99th percentile; the slowest where there are fewer than 100. The first frame of a motion stands
+    /// apart, in `first_ms`.
     pub p99_ms: f64,
     /// How many were measured.
     pub count: usize,
@@ -104,6 +113,9 @@ pub struct Trial {
     /// The mesh after many cuts, where methods of cutting are compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wear: Vec<Wear>,
+    /// What the regions of the scene select on its meshes.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seen: Vec<Sight>,
 }
 
 impl Trial {
@@ -123,6 +135,7 @@ impl Trial {
             residual: 0.0,
             series: Series::default(),
             wear: Vec::new(),
+            seen: Vec::new(),
         }
     }
 
@@ -132,8 +145,23 @@ impl Trial {
     }
 }
 
-/// Runs a scene. `None` if `stop` was raised meanwhile.
+/// Runs a scene. `None` if `stop` was raised meanwhile. A run that panics has failed; the others go on.
 pub fn run(
+    scene: &Scene,
+    base_dir: &Path,
+    threads: usize,
+    protocol: Protocol,
+    limits: Limits,
+    stop: &AtomicBool,
+) -> Option<Trial> {
+    let attempt = || attempt(scene, base_dir, threads, protocol, limits, stop);
+    // Nothing that the attempt touches is used again after a panic.
+    catch_unwind(AssertUnwindSafe(attempt)).unwrap_or_else(|_| {
+        Some(Trial::without(Status::Failed, "the program panicked in this run".to_owned()))
+    })
+}
+
+fn attempt(
     scene: &Scene,
     base_dir: &Path,
     threads: usize,
@@ -147,9 +175,13 @@ pub fn run(
         Ok(simulation) => simulation,
         Err(error) => return Some(Trial::refused(one_line(&error.to_string()))),
     };
+    let mut trial = Trial::without(Status::Done, String::new());
+    trial.seen = sight::look(&simulation);
     let mut running = Running {
+        alone: threads == 1,
+        relaxes: scene.checked().bodies.iter().any(|body| body.mechanics.relaxes()),
         simulation,
-        trial: Trial::without(Status::Done, String::new()),
+        trial,
         deadline: started + Duration::from_secs_f64(limits.run_s),
         steps: 0,
         build_ms: started.elapsed().as_secs_f64() * 1e3,
@@ -164,6 +196,10 @@ pub fn run(
 
 /// A run under way.
 struct Running {
+    /// Whether one thread does all the work.
+    alone: bool,
+    /// Whether an equilibrium takes many steps.
+    relaxes: bool,
     simulation: Simulation,
     trial: Trial,
     deadline: Instant,
@@ -190,7 +226,10 @@ impl Running {
 
     /// Solves from where the body is; milliseconds.
     fn solve(&mut self, stop: &AtomicBool) -> Option<f64> {
-        let milliseconds = self.step(stop)?;
+        let mut milliseconds = self.step(stop)?;
+        while self.relaxes && self.trial.is_done() && !self.has_converged() {
+            milliseconds += self.step(stop)?;
+        }
         let stops = self.simulation.report().bodies.iter().map(|body| format!("{:?}", body.solve.stop));
         if let Some(stop) =
             stops.into_iter().find(|stop| stop != "Converged").filter(|_| self.trial.is_done())
@@ -198,6 +237,10 @@ impl Running {
             self.end(Status::Failed, format!("no equilibrium: the solver stopped by {stop}"));
         }
         Some(milliseconds)
+    }
+
+    fn has_converged(&self) -> bool {
+        self.simulation.report().bodies.iter().all(|body| body.solve.stop == Default::default())
     }
 
     /// Steps through the frames; milliseconds per frame.
@@ -230,9 +273,12 @@ impl Running {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
+        let clock = ThreadTime::now();
         let report = self.simulation.step(&Inputs::default());
-        let cut_s = report.seconds.of(Stage::Cuts);
-        let milliseconds = 1e3 * (report.seconds.total() - cut_s);
+        let busy_s = clock.elapsed().as_secs_f64();
+        let (wall_s, cut_s) = (report.seconds.total(), report.seconds.of(Stage::Cuts));
+        let spent_s = if self.alone { busy_s } else { wall_s };
+        let milliseconds = 1e3 * spent_s * (1.0 - cut_s / wall_s.max(1e-12));
         let ended = verdict(report);
         self.steps += 1;
         self.cut_ms += 1e3 * cut_s;
@@ -311,13 +357,15 @@ fn verdict(report: &StepReport) -> Option<(Status, String)> {
 
 impl Cost {
     fn of(costs: &mut [f64], setup_ms: f64) -> Self {
+        let count = costs.len();
         let first_ms = costs.first().copied().unwrap_or(0.0);
+        let costs = &mut costs[usize::from(count > FEW)..];
         costs.sort_by(f64::total_cmp);
         let at = |share: f64| {
             let index = (share * costs.len() as f64).ceil() as usize;
             costs.get(index.clamp(1, costs.len().max(1)) - 1).copied().unwrap_or(0.0)
         };
-        Self { setup_ms, first_ms, median_ms: at(0.5), p99_ms: at(0.99), count: costs.len() }
+        Self { setup_ms, first_ms, median_ms: at(0.5), p99_ms: at(0.99), count }
     }
 }
 
@@ -336,7 +384,14 @@ mod tests {
         let cost = Cost::of(&mut ten, 3.0);
         assert_eq!((cost.first_ms, cost.median_ms, cost.p99_ms, cost.count), (10.0, 5.0, 10.0, 10));
         let mut many: Vec<f64> = (1..=200).map(f64::from).collect();
-        assert_eq!(Cost::of(&mut many, 0.0).p99_ms, 198.0);
+        assert_eq!(Cost::of(&mut many, 0.0).p99_ms, 199.0);
+        let mut cold: Vec<f64> = [90.0].into_iter().chain([1.0; 20]).collect();
+        let cost = Cost::of(&mut cold, 0.0);
+        assert_eq!(
+            (cost.first_ms, cost.p99_ms, cost.count),
+            (90.0, 1.0, 21),
+            "a cold first frame stands apart"
+        );
         assert_eq!(Cost::of(&mut [], 0.0), Cost::default());
     }
 }

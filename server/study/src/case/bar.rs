@@ -33,6 +33,8 @@ pub fn at_rest(quick: bool) -> Case {
         scene: load(SCENE, &[gold.probes("bar")]),
         bodies: body.to_vec(),
         protocol: Protocol::Static,
+        fewest_frames: 0,
+        notes: Vec::new(),
         goal: Goal::new("droop of the tip", gold.probe("tip_center"), [0.0, -1.0, 0.0]),
         truth: gold.truth("stvk", Some(0.3450), "Stored solution for St. Venant–Kirchhoff"),
         blocks: vec![
@@ -95,6 +97,8 @@ pub fn in_motion(quick: bool) -> Case {
         scene: load(SCENE, &moving),
         bodies: body.to_vec(),
         protocol: Protocol::Motion { frame_s, frames: frames(quick) },
+        fewest_frames: 0,
+        notes: Vec::new(),
         goal: Goal::new("lowest point of the tip", gold.probe("tip_center"), [0.0, -1.0, 0.0]),
         truth: Truth::Extrapolated { law: "corotational".into(), plans: plans(&body, &axes, quick) },
         blocks: vec![

@@ -41,6 +41,8 @@ pub fn case(quick: bool) -> Case {
         scene: load(include_str!("../../cases/r1.toml"), &[probes_override("beam", &probes)]),
         bodies: body.to_vec(),
         protocol: Protocol::Static,
+        fewest_frames: 0,
+        notes: Vec::new(),
         goal: Goal::new("deflection of the tip", 6, [0.0, -1.0, 0.0]),
         truth: Truth::Known {
             series: Series { frames: vec![0], displacement_m: truth, energy_j: vec![0.5 * BEAM.force * tip] },

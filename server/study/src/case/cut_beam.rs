@@ -29,6 +29,8 @@ pub fn case(quick: bool) -> Case {
         scene: load(include_str!("../../cases/r2-tc1.toml"), &[gold.probes("beam")]),
         bodies: body.to_vec(),
         protocol: Protocol::Static,
+        fewest_frames: 0,
+        notes: Vec::new(),
         goal: Goal::new("sideways deflection of the tip", gold.probe("tip_mid"), [1.0, 0.0, 0.0]),
         truth: gold.truth("stvk", None, "Stored solution for St. Venant–Kirchhoff"),
         blocks: vec![

@@ -70,6 +70,8 @@ pub fn case(pull: Pull, quick: bool) -> Case {
         scene: load(include_str!("../../cases/r2-tc1.toml"), &overrides),
         bodies: body.to_vec(),
         protocol: Protocol::Static,
+        fewest_frames: 0,
+        notes: Vec::new(),
         goal: Goal::new("deflection of the tip", gold.probe("tip_mid"), goal),
         truth: gold.truth("stvk", None, "Stored solution for St. Venant–Kirchhoff"),
         blocks: vec![

@@ -10,17 +10,26 @@ mod bar;
 
 mod scene;
 
+mod vary;
+
+mod refine;
+
+mod subdivide;
+
+pub mod sight;
+
 mod gold;
 
 mod shared;
 
 use scindo_world::scene::Scene;
 
-pub use scene::from_scene;
+pub use scene::{Wishes, from_scene};
 
 use crate::axes::{Axis, Factor, Setting};
 use crate::design::{Block, Configuration};
 use crate::error::Goal;
+use crate::ladder::Ladder;
 use crate::series::Series;
 use crate::trial::Protocol;
 
@@ -39,6 +48,10 @@ pub struct Case {
     pub bodies: Vec<String>,
     /// What a run computes.
     pub protocol: Protocol,
+    /// How few frames still show what happens in a motion.
+    pub fewest_frames: u32,
+    /// What the user should know about it.
+    pub notes: Vec<String>,
     /// What is varied.
     pub axes: Vec<Axis>,
     /// Combinations that are tried besides one factor at a time.
@@ -76,6 +89,13 @@ pub enum Truth {
         /// Ways to compute it, the best first; the first whose runs all succeed is taken.
         plans: Vec<Plan>,
     },
+    /// Levels of refinement, as many as the time allows.
+    Refined {
+        /// The law it is computed with, as the label of a setting.
+        law: String,
+        /// Ways to compute it, the best first.
+        ladders: Vec<Ladder>,
+    },
 }
 
 /// A way to a reference: which runs it is extrapolated from.
@@ -95,7 +115,7 @@ impl Truth {
     /// The law of the reference: other laws have an error of the model.
     pub fn law(&self) -> &str {
         match self {
-            Truth::Known { law, .. } | Truth::Extrapolated { law, .. } => law,
+            Truth::Known { law, .. } | Truth::Extrapolated { law, .. } | Truth::Refined { law, .. } => law,
         }
     }
 }

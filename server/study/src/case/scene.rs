@@ -1,188 +1,167 @@
 //! Any scene as a case: what can be varied in it, points to compare, a reference by refinement.
 
-use scindo_world::scene::{Scene, SceneError};
+use std::path::Path;
+
+use scindo_world::scene::{CheckedScene, Scene, SceneError};
 use scindo_world::simulation::Simulation;
-use serde_json::Value;
 
 use super::gold::{Point, probe_tables};
-use super::shared::LAWS;
-use super::{Case, Plan, Truth};
-use crate::axes::{
-    Axis, Factor, Setting, elements, precisions, step, steps, threads, tolerance, tolerances, words,
-};
-use crate::design::{Block, Configuration};
+use super::refine::{Split, aligned, levels, uneven};
+use super::subdivide::Subdivisions;
+use super::vary::{self, OWN, Subject};
+use super::{Case, Truth};
+use crate::axes::{Axis, Factor, Setting, on_bodies, tolerance};
+use crate::design::Configuration;
 use crate::error::Goal;
+use crate::ladder::Ladder;
 use crate::trial::Protocol;
 
 /// Points that are compared where the scene has no probe, per body.
-const POINTS: usize = 6;
+const POINTS: usize = 8;
 
-/// A case from a scene. `seconds` is the simulated time of a motion; none: one second, longer
-/// where cuts or tools come later, at most 100 frames.
+/// Longest motion without a word from the user [frames]; in a quick study.
+const MOST_FRAMES: [u32; 2] = [400, 50];
+
+/// Choices about a scene's study.
+#[derive(Debug, Clone, Copy)]
+pub struct Wishes<'a> {
+    /// Simulated time of a motion [s]; none: as long as its events last and the time allows.
+    pub seconds: Option<f64>,
+    /// Coarse meshes and few frames only.
+    pub quick: bool,
+    /// Cells along the longest side, in place of the usual meshes.
+    pub cells: &'a [usize],
+    /// Threads to compare; none: one, as `scindo run` has it.
+    pub threads: &'a [usize],
+    /// Where refined copies of mesh files go.
+    pub directory: &'a Path,
+}
+
+/// A case from a scene.
 ///
 /// # Errors
 /// What is wrong with the scene.
-pub fn from_scene(scene: &Scene, seconds: Option<f64>, quick: bool) -> Result<Case, SceneError> {
+pub fn from_scene(scene: &Scene, wishes: Wishes<'_>) -> Result<Case, SceneError> {
     let scene = with_probes(scene)?;
+    let checked = scene.checked();
     let tree = scene.to_json();
-    let bodies: Vec<String> = scene.checked().bodies.iter().map(|body| body.id.clone()).collect();
-    let word = |key: &str, default: &str| {
-        let value = tree["body"].as_array().and_then(|all| all.first()).map(|body| &body[key]);
-        value.and_then(Value::as_str).unwrap_or(default).to_owned()
-    };
-    let law = word("law", "corotational");
-    let integrator = word("integrator", "implicit-euler");
-    let frame_s = scene.checked().step_s;
-    let protocol = if integrator == "static" {
-        Protocol::Static
-    } else {
-        Protocol::Motion { frame_s, frames: frames(&scene, frame_s, seconds, quick) }
-    };
-    let axes = axes(&bodies, &tree, (&law, &integrator, frame_s), quick);
-    let plans = plans(&bodies, &axes, &tree, frame_s, quick);
-    let name = slug(scene.name());
-    let probes = scene.checked().probes.len();
+    let bodies: Vec<String> = checked.bodies.iter().map(|body| body.id.clone()).collect();
+    let mut notes = Vec::new();
+    let files = Subdivisions::write(checked, scene.base_dir(), wishes.directory).unwrap_or_else(|why| {
+        notes.push(format!("the mesh file is not refined: {why}"));
+        Subdivisions::default()
+    });
+    let of = Subject { scene: checked, tree: &tree, bodies: &bodies, files: &files };
+    let axes = vary::axes(of, wishes.quick, wishes.cells, wishes.threads);
+    let (protocol, fewest) = protocol(checked, of, wishes);
+    if !axes.iter().any(|axis| axis.factor == Factor::Mesh) {
+        notes.push(
+            "no mesh of this scene can be refined: the error of the mesh is not part of the study".into(),
+        );
+    }
+    let law = of.word("law", "corotational").unwrap_or_else(|| OWN.to_owned());
+    let truth = Truth::Refined { law, ladders: ladders(of, &axes) };
     Ok(Case {
         title: scene.name().to_owned(),
-        about: format!(
-            "The scene {}. {} compared at {probes} material points; every other setting is the scene’s own.",
-            scene.file(),
-            match protocol {
-                Protocol::Static => "The equilibrium is".to_owned(),
-                Protocol::Motion { frames, .. } => format!("{frames} frames of {} ms are", 1e3 * frame_s),
-            }
-        ),
-        goal: goal(&scene),
-        truth: Truth::Extrapolated { law, plans },
-        blocks: blocks(&axes),
-        name,
-        scene,
+        about: format!("The scene {}. Every setting that is not named is the scene’s own.", scene.file()),
+        name: slug(scene.name()),
+        goal: goal(checked),
+        blocks: vary::blocks(&axes, of),
+        truth,
         bodies,
         protocol,
+        fewest_frames: fewest,
         axes,
-        colour: Factor::Law,
-        shape: Factor::Integrator,
+        notes,
+        colour: Factor::Mesh,
+        shape: Factor::Element,
+        scene,
     })
 }
 
-/// Axes of a scene; the base of each is what the scene says.
-fn axes(bodies: &[String], tree: &Value, now: (&str, &str, f64), quick: bool) -> Vec<Axis> {
-    let (law, integrator, frame_s) = now;
-    let is_static = integrator == "static";
-    let mut tolerance = tolerances(bodies, &[1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8], 0.0);
-    tolerance.settings.insert(0, Setting::new("as in the scene", 0.5, Vec::new()));
-    tolerance.base = 0;
-    let mut axes = vec![words(Factor::Law, bodies, "law", &LAWS, law), own_elements(bodies, tree)];
-    axes.extend(meshes(bodies, tree, if quick { &[0.5, 1.0] } else { &[0.5, 0.75, 1.0, 1.5] }, 1.0));
-    if !is_static {
-        let all = ["implicit-euler", "bdf2", "newmark", "symplectic-euler", "midpoint", "rk4"];
-        axes.push(words(Factor::Integrator, bodies, "integrator", &all, integrator));
-        let factors: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[2.0, 1.0, 0.5, 0.25] };
-        let sizes: Vec<f64> = factors.iter().map(|f| f * frame_s).collect();
-        axes.push(steps(&sizes, frame_s));
+/// What a run computes, and how few frames still show what happens.
+fn protocol(scene: &CheckedScene, of: Subject<'_>, wishes: Wishes<'_>) -> (Protocol, u32) {
+    let cuts = scene.cuts.iter().map(|cut| cut.at_s).reduce(f64::max);
+    let paths = scene.tools.iter().filter_map(|tool| Some(tool.path.last()?.at_s));
+    let path_s = paths.fold(0.0, f64::max);
+    let lies_still = of.word("integrator", "implicit-euler").as_deref() == Some("static");
+    if lies_still && path_s == 0.0 && cuts.is_none_or(|at| at == 0.0) && wishes.seconds.is_none() {
+        return (Protocol::Static, 0);
     }
-    let method = &tree["body"][0]["solver"]["method"];
-    let method = method.as_str().unwrap_or("pcg");
-    axes.push(words(Factor::Solver, bodies, "solver.method", &["pcg", "cg", "cholesky"], method));
-    axes.push(tolerance);
-    axes.push(precisions(bodies));
-    axes.push(threads(&[1, 2]));
-    axes
-}
-
-/// Elements; the base is the scene's own, as it stands.
-fn own_elements(bodies: &[String], tree: &Value) -> Axis {
-    let first = &tree["body"][0];
-    let word = |key: &str, default: &'static str| first[key].as_str().unwrap_or(default).to_owned();
-    let base = match (word("element", "tet4"), word("locking", "none")) {
-        (element, locking) if locking == "none" => element,
-        (element, locking) => format!("{element} {locking}"),
+    let frame_s = scene.step_s;
+    let frames = |seconds: f64| ((seconds / frame_s).round() as u32).max(4);
+    let most = frames(wishes.seconds.unwrap_or_else(|| cuts.unwrap_or(0.0).max(0.5).max(path_s - 0.5) + 0.5));
+    let most = match wishes.seconds {
+        Some(_) => most,
+        None => most.clamp(20, MOST_FRAMES[usize::from(wishes.quick)]),
     };
-    let blocks = tree["body"].as_array().is_some_and(|all| all.iter().all(|b| b["mesh"]["box"].is_object()));
-    let pattern = first["mesh"]["box"]["pattern"].as_str().filter(|pattern| *pattern != "hex");
-    let mut axis = elements(bodies, blocks.then(|| pattern.unwrap_or("tet5")), &base);
-    if let Some(own) = axis.settings.get_mut(axis.base).filter(|setting| setting.label == base) {
-        own.set.clear();
+    let fewest = match wishes.seconds {
+        Some(_) => most,
+        None => frames(0.3_f64.max(cuts.map_or(0.0, |at| at + 0.2)).max(path_s.min(2.0))).clamp(20, most),
+    };
+    (Protocol::Motion { frame_s, frames: most }, fewest)
+}
+
+/// Ways to the reference, the best first: quadratic tetrahedra, which converge faster, then the
+/// scene's own element; second order in time, then the scene's own integrator. What the scene's check
+/// refuses is left out here.
+fn ladders(of: Subject<'_>, axes: &[Axis]) -> Vec<Ladder> {
+    let own = Configuration::base(axes);
+    let explicit = of.scene.bodies.iter().any(|body| body.mechanics.integrator.is_explicit());
+    let moves = axes.iter().any(|axis| axis.factor == Factor::Integrator);
+    let quadratic = Setting::new("tet10", 0.0, vary::element(of, "tet10"));
+    let bdf2 = Setting::new("bdf2", 0.0, on_bodies(of.bodies, "integrator", "\"bdf2\""));
+    let mut integrators = vec![(None, "the scene’s own integrator")];
+    if moves && !explicit {
+        integrators.insert(0, (Some(&bdf2), "BDF2"));
+    } else if !moves {
+        integrators[0].1 = "equilibrium";
     }
-    axis
-}
-
-/// Meshes with the cells of every body times a factor; none where no body's mesh can be refined.
-fn meshes(bodies: &[String], tree: &Value, factors: &[f64], base: f64) -> Option<Axis> {
-    let settings: Vec<Setting> = factors.iter().filter_map(|factor| scaled(bodies, tree, *factor)).collect();
-    let label = scaled(bodies, tree, base)?.label;
-    Some(Axis::new(Factor::Mesh, settings, &label))
-}
-
-/// All meshes of the scene, refined by a factor.
-fn scaled(bodies: &[String], tree: &Value, factor: f64) -> Option<Setting> {
-    let times = |n: f64| ((n * factor).round() as usize).max(1);
-    let mut set = Vec::new();
-    let mut labels = Vec::new();
-    let mut size = 0.0_f64;
-    for (id, body) in bodies.iter().zip(tree["body"].as_array()?) {
-        let mesh = &body["mesh"];
-        if let Some(cells) = mesh["box"]["cells"].as_array() {
-            let cells: Vec<usize> = cells.iter().filter_map(Value::as_f64).map(times).collect();
-            size = cells.iter().fold(size, |most, n| most.max(*n as f64));
-            set.push(format!("body.{id}.mesh.box.cells={cells:?}"));
-            labels.push(cells.iter().map(ToString::to_string).collect::<Vec<_>>().join("×"));
-        }
-        for (key, cells) in [("mesh.cells", &mesh["cells"]), ("mesh.organ.cells", &mesh["organ"]["cells"])] {
-            if let Some(cells) = cells.as_f64().map(times) {
-                size = size.max(cells as f64);
-                set.push(format!("body.{id}.{key}={cells}"));
-                labels.push(format!("{cells} cells"));
+    let mut ladders = Vec::new();
+    for (integrator, how) in integrators {
+        for element in [Some(&quadratic), None].into_iter().filter(|e| e.is_none() || !explicit) {
+            let mut configuration = if explicit { own.clone() } else { tight(of, &own) };
+            if let Some(bdf2) = integrator {
+                configuration = configuration.with(Factor::Integrator, bdf2);
             }
+            let split = if element.is_some() { Split::Tets } else { Split::Own };
+            if let Some(element) = element {
+                configuration = configuration.with(Factor::Element, element);
+            }
+            let mut meshes = levels(of.scene, &|factor| aligned(of.scene, of.files, factor, split));
+            if meshes.len() < 3 {
+                // No mesh has faces where the regions end; the study says what they select instead.
+                meshes = levels(of.scene, &|factor| uneven(of.scene, of.files, factor, split));
+            }
+            let element = element.map_or_else(|| own.label(Factor::Element).to_owned(), |e| e.label.clone());
+            ladders.push(Ladder {
+                configuration,
+                meshes,
+                step_s: moves.then_some(of.scene.step_s),
+                words: format!("{element}, {how}"),
+            });
         }
     }
-    (!set.is_empty()).then(|| Setting::new(labels.join(" and "), size, set))
+    ladders
 }
 
-/// The reference: the scene's own base, refined in mesh and step.
-fn plans(bodies: &[String], axes: &[Axis], tree: &Value, frame_s: f64, quick: bool) -> Vec<Plan> {
-    let mut configuration = Configuration::base(axes).with(Factor::Tolerance, &tolerance(bodies, 1e-8));
-    let finest = if quick { [0.5, 0.75, 1.0] } else { [1.0, 1.5, 2.0] };
-    let meshes = finest.map(|factor| scaled(bodies, tree, factor));
-    let meshes = match meshes {
-        [Some(a), Some(b), Some(c)] if a.size < b.size && b.size < c.size => Some([a, b, c]),
-        _ => None,
-    };
-    let moves = axes.iter().any(|axis| axis.factor == Factor::Step);
-    let steps = moves.then(|| [0.5, 0.25, 0.125].map(|factor| step(factor * frame_s)));
-    let mut plans = Vec::new();
-    if let Some(bdf2) = axes.iter().find(|a| a.factor == Factor::Integrator).and_then(|a| a.find("bdf2")) {
-        let base = configuration.clone();
-        configuration = configuration.with(Factor::Integrator, bdf2);
-        plans.push(Plan {
-            configuration,
-            meshes: meshes.clone(),
-            steps: steps.clone(),
-            words: "BDF2".into(),
-        });
-        configuration = base;
+/// The scene's own settings, solved to the last digits that count.
+fn tight(of: Subject<'_>, own: &Configuration) -> Configuration {
+    let mut exact = tolerance(of.bodies, 1e-8);
+    exact.set.extend(on_bodies(of.bodies, "solver.precision", "\"double\""));
+    for body in &of.scene.bodies {
+        if body.mechanics.newton_steps.is_some_and(|steps| steps < 20) {
+            exact.set.push(format!("body.{}.solver.newton_steps=20", body.id));
+        }
     }
-    plans.push(Plan { configuration, meshes, steps, words: "the scene’s own integrator".into() });
-    plans
+    let relaxes = of.word("solver.method", "pcg").as_deref() == Some("relaxation");
+    let direct = Setting::new("cholesky", 0.0, on_bodies(of.bodies, "solver.method", "\"cholesky\""));
+    let solver = if relaxes { own.with(Factor::Solver, &direct) } else { own.clone() };
+    solver.with(Factor::Tolerance, &exact)
 }
 
-/// Law × mesh, step × mesh, tolerance × mesh.
-fn blocks(axes: &[Axis]) -> Vec<Block> {
-    let labels = |factor: Factor| {
-        let axis = axes.iter().find(|axis| axis.factor == factor);
-        axis.map(|axis| axis.settings.iter().map(|s| s.label.clone()).collect()).unwrap_or_default()
-    };
-    let cheap = vec!["1e-2".to_owned(), "1e-4".to_owned()];
-    let simple = vec!["linear".to_owned(), "corotational".to_owned()];
-    vec![
-        Block(vec![(Factor::Mesh, labels(Factor::Mesh)), (Factor::Law, simple)]),
-        Block(vec![(Factor::Mesh, labels(Factor::Mesh)), (Factor::Step, labels(Factor::Step))]),
-        Block(vec![(Factor::Mesh, labels(Factor::Mesh)), (Factor::Tolerance, cheap)]),
-    ]
-}
-
-fn goal(scene: &Scene) -> Goal {
-    match scene.checked().probes.as_slice() {
+fn goal(scene: &CheckedScene) -> Goal {
+    match scene.probes.as_slice() {
         [first, ..] if !first.id.starts_with(CHOSEN) => {
             Goal { words: format!("displacement of probe {}", first.id), probe: Some(0), direction: None }
         }
@@ -190,26 +169,11 @@ fn goal(scene: &Scene) -> Goal {
     }
 }
 
-/// Simulated frames of a motion.
-fn frames(scene: &Scene, frame_s: f64, seconds: Option<f64>, quick: bool) -> u32 {
-    let checked = scene.checked();
-    let cuts = checked.cuts.iter().map(|cut| cut.at_s + 0.5);
-    let paths = checked.tools.iter().filter_map(|tool| tool.path.last()).map(|pose| pose.at_s);
-    let until = seconds.unwrap_or_else(|| cuts.chain(paths).fold(1.0, f64::max));
-    let most = if seconds.is_some() {
-        10_000
-    } else if quick {
-        25
-    } else {
-        100
-    };
-    ((until / frame_s).round() as u32).clamp(1, most)
-}
-
 /// How the names of chosen probes begin.
 const CHOSEN: &str = "chosen-";
 
-/// The scene itself if it has probes; else with some material points spread through its bodies.
+/// The scene itself if it has probes; else with material points spread through its bodies, as deep
+/// inside as can be had, so that coarser meshes hold them, too.
 fn with_probes(scene: &Scene) -> Result<Scene, SceneError> {
     if !scene.checked().probes.is_empty() {
         return Ok(scene.clone());
@@ -217,17 +181,37 @@ fn with_probes(scene: &Scene) -> Result<Scene, SceneError> {
     let simulation = Simulation::new(scene, scene.base_dir())?;
     let mut tables = Vec::new();
     for body in simulation.bodies() {
-        let mesh = body.body.cut_mesh().mesh();
-        let n = mesh.tets.len();
-        let mut points = Vec::new();
-        for i in 0..POINTS.min(n) {
-            let corners = mesh.corners((2 * i + 1) * n / (2 * POINTS.min(n)));
-            let centre = [0, 1, 2].map(|axis| corners.iter().map(|x| x[axis]).sum::<f64>() / 4.0);
-            points.push(Point { id: format!("{CHOSEN}{}-{i}", body.id), point_m: centre, side: None });
-        }
+        let points: Vec<Point> = points(body)
+            .into_iter()
+            .enumerate()
+            .map(|(i, point_m)| Point { id: format!("{CHOSEN}{}-{i}", body.id), point_m, side: None })
+            .collect();
         tables.push(probe_tables(&body.id, &points));
     }
     scene.apply_sets(&[format!("probe=[{}]", tables.join(", "))])
+}
+
+/// Centroids of elements, one out of each of [`POINTS`] slices along the longest side of a body: the
+/// one deepest below the surface.
+fn points(body: &scindo_world::simulation::SimBody) -> Vec<[f64; 3]> {
+    let mesh = body.body.cut_mesh().mesh();
+    let [low, high] = mesh.bounds();
+    let axis = (high - low).imax();
+    let x = body.body.rest_positions();
+    let skin: Vec<_> = body.body.cut_mesh().surface().vertices.iter().map(|v| v.position(x)).collect();
+    let skin: Vec<_> = skin.iter().step_by(skin.len().div_ceil(500).max(1)).collect();
+    let every = mesh.tets.len().div_ceil(2_000).max(1);
+    let mut best = [const { None::<(f64, [f64; 3])> }; POINTS];
+    for e in (0..mesh.tets.len()).step_by(every) {
+        let centre = mesh.corners(e).iter().sum::<nalgebra::Vector3<f64>>() / 4.0;
+        let share = (centre[axis] - low[axis]) / (high[axis] - low[axis]);
+        let slice = ((share * POINTS as f64) as usize).min(POINTS - 1);
+        let depth = skin.iter().map(|s| (*s - centre).norm_squared()).fold(f64::INFINITY, f64::min);
+        if best[slice].is_none_or(|(deepest, _)| depth > deepest) {
+            best[slice] = Some((depth, centre.into()));
+        }
+    }
+    best.into_iter().flatten().map(|(_, point)| point).collect()
 }
 
 /// Letters, digits and dashes only.

@@ -29,10 +29,7 @@ pub fn section(result: &CaseResult) -> String {
         escape(&case.title),
         prose(&case.about)
     );
-    if let Some(advice) = &result.recommendation {
-        let _ =
-            writeln!(out, "<p class=\"advice\"><strong>Recommended.</strong> {}</p>", escape(&advice.words));
-    }
+    out += &advice(result);
     let main = plot(result, [1064.0, 580.0], |errors| errors.l2, "displacement error");
     let _ = writeln!(
         out,
@@ -57,6 +54,35 @@ pub fn section(result: &CaseResult) -> String {
     out += &reference(result);
     out += &all_points(result);
     out += "</section>\n";
+    out
+}
+
+/// What is recommended, with the keys to set, and what the reader should know.
+fn advice(result: &CaseResult) -> String {
+    let mut out = String::new();
+    if let Some(advice) = &result.recommendation {
+        let head = if advice.indistinguishable { "Cannot be told apart." } else { "Recommended." };
+        let _ = writeln!(out, "<p class=\"advice\"><strong>{head}</strong> {}</p>", escape(&advice.words));
+        if !advice.set.is_empty() {
+            let set: Vec<String> = advice.set.iter().map(|set| format!("--set '{set}'")).collect();
+            let _ = writeln!(
+                out,
+                "<details><summary>Run it</summary><pre>scindo run {} {}</pre></details>",
+                escape(result.case.scene.file()),
+                escape(&set.join(" "))
+            );
+        }
+    }
+    if result.left_out > 0 {
+        let _ = writeln!(
+            out,
+            "<p class=\"note\">{} configurations were left out: too slow for the budget, or no time was left.</p>",
+            result.left_out
+        );
+    }
+    for note in &result.notes {
+        let _ = writeln!(out, "<p class=\"note\">{}.</p>", prose(note));
+    }
     out
 }
 
@@ -147,9 +173,24 @@ fn title(case: &Case, point: &Outcome, errors: &Errors) -> String {
     text
 }
 
-/// Factors that a case varies.
-fn factors(case: &Case) -> Vec<Factor> {
-    Factor::ALL.into_iter().filter(|factor| case.axes.iter().any(|axis| axis.factor == *factor)).collect()
+/// Factors that these points vary; what all of them share stands once above the table.
+fn factors<'p>(case: &Case, points: impl Iterator<Item = &'p Outcome> + Clone) -> (Vec<Factor>, String) {
+    let known = |factor: &Factor| case.axes.iter().any(|axis| axis.factor == *factor);
+    let varies = |factor: &Factor| {
+        let mut labels = points.clone().map(|point| point.configuration.label(*factor));
+        let first = labels.next();
+        labels.any(|label| Some(label) != first)
+    };
+    let (varied, shared): (Vec<_>, Vec<_>) = Factor::ALL.into_iter().filter(known).partition(varies);
+    let labels = points.clone().next().map(|point| {
+        let told = |factor: &Factor| format!("{} {}", factor.name(), point.configuration.label(*factor));
+        shared.iter().map(told).collect::<Vec<_>>().join(", ")
+    });
+    let shared = labels.filter(|labels| !labels.is_empty());
+    let shared = shared.map_or(String::new(), |labels| {
+        format!("<p class=\"soft\">The same in all: {}.</p>\n", escape(&labels))
+    });
+    (varied, shared)
 }
 
 fn front_table(result: &CaseResult) -> String {
@@ -162,8 +203,10 @@ fn front_table(result: &CaseResult) -> String {
     for (i, source) in Source::ALL.iter().enumerate() {
         let _ = write!(out, "<li><i class=\"s{i}\"></i>{}</li>", source.name());
     }
-    out += "</ul>\n<div class=\"scroll\"><table class=\"front\">\n<thead><tr><th class=\"number\">#</th><th class=\"number\">median</th><th class=\"number\">p99</th><th class=\"number\">displace&shy;ment</th><th class=\"number\">goal</th><th class=\"number\">energy</th><th>dominated by</th><th>sources</th>";
-    let columns = factors(case);
+    let (columns, shared) = factors(case, result.front.iter().map(|&i| &result.points[i]));
+    out += "</ul>\n";
+    out += &shared;
+    out += "<div class=\"scroll\"><table class=\"front\">\n<thead><tr><th class=\"number\">#</th><th class=\"number\">median</th><th class=\"number\">p99</th><th class=\"number\">displace&shy;ment</th><th class=\"number\">goal</th><th class=\"number\">energy</th><th>dominated by</th><th>sources</th>";
     columns.iter().for_each(|factor| {
         let _ = write!(out, "<th>{}</th>", factor.name());
     });
@@ -225,14 +268,14 @@ fn reference(result: &CaseResult) -> String {
 
 fn all_points(result: &CaseResult) -> String {
     let counts = result.counts();
-    let columns = factors(&result.case);
+    let (columns, shared) = factors(&result.case, result.points.iter());
     let mut order: Vec<&Outcome> = result.points.iter().collect();
     order.sort_by(|a, b| {
         let rank = |p: &Outcome| (p.errors.is_none(), p.trial.cost.median_ms);
         rank(a).0.cmp(&rank(b).0).then(rank(a).1.total_cmp(&rank(b).1))
     });
     let mut out = format!(
-        "<details><summary>All {} points, {} of them without a result</summary>\n<div class=\"scroll\"><table class=\"all\">\n<thead><tr>",
+        "<details><summary>All {} points, {} of them without a result</summary>\n{shared}<div class=\"scroll\"><table class=\"all\">\n<thead><tr>",
         counts.points, counts.failures
     );
     for head in ["median", "p99", "displacement", "goal", "energy", "set-up"] {

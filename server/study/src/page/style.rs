@@ -60,10 +60,14 @@ p, ul, dl { max-width: 76ch; margin: 8px 0; }
 .lead { font-size: 18px; color: var(--soft); }
 .soft { color: var(--soft); }
 .advice { border-left: 4px solid var(--c0); background: var(--panel); padding: 12px 18px; margin: 18px 0; max-width: none; }
+.answer { font-size: 18px; }
+.note { color: var(--soft); }
+pre { background: var(--panel); padding: 12px 18px; white-space: pre-wrap; overflow-wrap: anywhere; font-size: 13px; }
 figure { margin: 20px 0 8px; }
 figcaption { color: var(--soft); font-size: 14.5px; max-width: 90ch; margin-top: 6px; }
 .pair { display: grid; grid-template-columns: 1fr 1fr; gap: 24px; }
 .scroll { overflow-x: auto; margin: 8px 0; }
+@media screen and (min-width: 1160px) { .scroll { width: max-content; min-width: 100%; max-width: calc(50vw + 484px); } }
 table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; width: 100%; }
 th { text-align: left; font-weight: 600; color: var(--soft); border-bottom: 1px solid var(--rule); padding: 6px 12px 6px 0; vertical-align: bottom; white-space: nowrap; }
 td { border-bottom: 1px solid var(--faint); padding: 6px 12px 6px 0; vertical-align: top; white-space: nowrap; }

@@ -31,11 +31,49 @@ pub fn opening(study: &StudyResult) -> String {
     if study.interrupted {
         out += "<p class=\"advice\"><strong>Interrupted.</strong> The same command with the same directory goes on from here.</p>\n";
     }
-    out += "<p>Every case below is one scene, solved with many settings. What a setting costs is measured on this \
+    study.cases.iter().for_each(|result| out += &answer(result, study.cases.len() > 1));
+    out += "<p class=\"soft\">Files: <a href=\"points.csv\">points.csv</a> · <a href=\"study.json\">study.json</a>";
+    for result in &study.cases {
+        let name = escape(&result.case.name);
+        let _ = write!(out, " · <a href=\"pareto-{name}.svg\">pareto-{name}.svg</a>");
+    }
+    out += "</p>\n<p>Every case below is one scene, solved with many settings. What a setting costs is measured on this \
             machine; what it is worth is its distance from a reference that is known better than any of them. \
             Runs that failed stay in the picture.</p>\n</header>\n";
     out += &glance(study);
     out
+}
+
+/// The answer of a case in a sentence.
+fn answer(result: &CaseResult, named: bool) -> String {
+    let words = match (&result.recommendation, &result.reference) {
+        (_, Err(why)) => format!("No answer: {why}."),
+        (Some(advice), Ok(_)) => advice.words.clone(),
+        (None, Ok(reference)) => without_budget(result, reference.error_bar),
+    };
+    let title = if named { format!("{}: ", result.case.title) } else { String::new() };
+    format!("<p class=\"advice answer\"><strong>{}</strong>{}</p>\n", escape(&title), escape(&words))
+}
+
+/// The scene as it stands, the first point, and what beats it.
+fn without_budget(result: &CaseResult, bar: f64) -> String {
+    let Some(own) = result.points.first() else { return "Nothing was run.".to_owned() };
+    let (ms, error) = own.point();
+    let mut words =
+        format!("As it stands: {} per solution, error {} ± {}.", time(ms), percent(error), percent(bar));
+    let better = result.front.iter().map(|&i| &result.points[i]);
+    let mut better = better.filter(|point| point.point().0 <= ms && point.point().1 + bar < error);
+    if let Some(point) = better.next_back() {
+        let (ms, error) = point.point();
+        let _ = write!(
+            words,
+            " For no more time: {} ({}, error {}).",
+            point.configuration.words(),
+            time(ms),
+            percent(error)
+        );
+    }
+    words
 }
 
 fn glance(study: &StudyResult) -> String {
@@ -84,7 +122,7 @@ pub fn method(study: &StudyResult) -> String {
     let _ = writeln!(
         out,
         "<dt>This study</dt><dd>{points} points in {:.0} s; {} runs were taken over from an earlier study. Version {}, commit {}. \
-         The same figures for programs: <code>points.csv</code>, <code>study.json</code>.</dd>",
+         The same figures for programs: <a href=\"points.csv\">points.csv</a>, <a href=\"study.json\">study.json</a>.</dd>",
         study.seconds,
         study.resumed,
         escape(&study.origin.version),
@@ -109,11 +147,11 @@ const DEFINITIONS: [(&str, &str); 9] = [
     ),
     (
         "Time",
-        "Wall time without set-up (reading, meshing, cutting), which is listed apart. A static solution is found anew from rest up to 11 times, as far as 1.5 s allow; a motion is timed frame by frame. Median and 99th percentile (the slowest of fewer than 100).",
+        "Processor time of the thread that steps, which a busy machine does not stretch (wall time where several threads work on a step), without set-up (reading, meshing, cutting), which is listed apart. A static solution is found anew from rest up to 11 times, as far as 1.5 s allow; a motion is timed frame by frame, and its first frame stands apart. Median and 99th percentile (the slowest of fewer than 100).",
     ),
     (
         "Design",
-        "One factor at a time around a base, and factorial blocks of those that matter together. No setting is tuned to a case. Runs are stopped after 12 s (3 s in a quick study) and then count as too slow.",
+        "One factor at a time around a base, and factorial blocks of those that matter together. No setting is tuned to a case. Runs of the program’s own cases are stopped after 12 s (3 s in a quick study) and then count as too slow. A scene has a time (--within): half of it goes to the reference; configurations whose forecast does not fit, or is six times over the budget, are left out; then neighbours of the best one that fits are tried, and the one that is recommended is run once more.",
     ),
     (
         "No result",
@@ -129,6 +167,6 @@ const DEFINITIONS: [(&str, &str); 9] = [
     ),
     (
         "Reference",
-        "A formula, a stored solution of higher order on finer meshes, or Richardson extrapolation over three meshes and three steps with the observed order; its error bar is 1.25 times the extrapolated change, 3 times where no order shows.",
+        "A formula, a stored solution of higher order on finer meshes, or Richardson extrapolation over three meshes and three steps with the observed order; its error bar is 1.25 times the extrapolated change, 3 times where no order shows. Of a scene: levels on which mesh and step are refined together, as many as the time allows, fitted by least squares; where no plausible order shows, the finest level with the spread of the levels as its bar (Eça and Hoekstra 2014). Blocks have their elements end where regions and cuts end there.",
     ),
 ];

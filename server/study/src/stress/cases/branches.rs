@@ -75,7 +75,7 @@ pub const CLAMPED: Case = Case {
              one, so that both lips have its clamped nodes.",
     rule: "C. The loose part falls with g to 1e-6: it is not glued to air; clamped material stays where it is, \
            bit for bit, on both lips.",
-    source: "Schoch 2009, §5.2",
+    source: "Schoch et al. 2013, §5.2",
     quick: true,
     run: Some(clamped),
 };

@@ -28,7 +28,7 @@ const ENRICHMENTS: [(Enrichment, &str, &str); 4] = [
         "Fig. 3.10b: shifted Heaviside, as its formula says",
     ),
     (Enrichment::OwnSide, "own side, |H + H_i|/2", "Fig. 3.10b as printed: supported on the node's own side"),
-    (Enrichment::Substitution, "copies of the nodes", "Fig. 3.12: degrees of freedom substituted by copies"),
+    (Enrichment::Substitution, "copies of the nodes", "Fig. 3.11: degrees of freedom substituted by copies"),
 ];
 
 const LUMPINGS: [(Lumping, &str); 4] = [

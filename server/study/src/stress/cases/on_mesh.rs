@@ -21,7 +21,7 @@ pub const NODE: Case = Case {
              A quarter of a second under gravity in double precision.",
     rule: "C. Two parts; volumes add up to 1e-12; surface closed; shifted planes move all material that was \
            not cut to the same places, to 1e-6 of the edge.",
-    source: "Wang 2014; Schoch 2009, the cases \"0\"",
+    source: "Wang 2014; Schoch et al. 2013, the cases \"0\"",
     quick: true,
     run: Some(|setting| {
         on_mesh(setting, &[V::new(0.3, -0.7, 0.9), V::new(1.0, 0.0, 0.0), V::new(0.0, 0.0, 1.0)])
@@ -38,7 +38,7 @@ pub const EDGE: Case = Case {
              away, cut by sweeps of seven blade positions each of which passes through five edges: what \
              crosses a seam of the sweep must not slip through.",
     rule: "As the case before; all of the 60 cubes fall into two parts of the right volume.",
-    source: "Schoch 2009, Fig. 6",
+    source: "Schoch et al. 2013, Fig. 6",
     quick: true,
     run: Some(|setting| {
         let normals = [[1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, -1.0], [2.0, -1.0, -1.0]];

@@ -48,7 +48,7 @@ pub const NEWMARK: Case = Case {
              5, 20 and 40 ms.",
     rule: "C. The energy is never more than 1 % above that of the start; every step that Euler makes instead is \
            reported.",
-    source: "Schoch 2009 (\"jiggling\")",
+    source: "Schoch et al. 2013 (\"jiggling\")",
     quick: true,
     run: Some(newmark),
 };

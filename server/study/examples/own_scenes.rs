@@ -1,0 +1,114 @@
+//! Holds what `scindo accuracy SCENE --budget-ms B --within T` recommends against what it promises.
+//!
+//! For each scene: the study; its recommendation run again, whose 99th percentile must keep the budget
+//! within 10 %; and a run on a mesh four times finer than the scene's with an eighth of its step, from
+//! which the recommendation must be as far as the printed error says, within the printed bar.
+//!
+//! `tests/accuracy/own_scenes.sh` calls it; run by a person, since it takes long.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use scindo_study::axes::Factor;
+use scindo_study::case::Truth;
+use scindo_study::error::Errors;
+use scindo_study::recommend::percent;
+use scindo_study::trial::{self, Limits, Trial};
+use scindo_study::{CaseResult, Settings, run};
+
+/// Mesh and step of the check, relative to the scene's.
+const FINER: f64 = 4.0;
+const STEPS: u32 = 8;
+
+/// Longest time of the check's run [s].
+const CHECK_S: f64 = 900.0;
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1);
+    let mut number = || arguments.next().and_then(|text| text.parse::<f64>().ok());
+    let (Some(budget_ms), Some(within_s)) = (number(), number()) else {
+        eprintln!("usage: own_scenes BUDGET_MS WITHIN_S OUT SCENE...");
+        return ExitCode::from(2);
+    };
+    let Some(out) = arguments.next().map(PathBuf::from) else { return ExitCode::from(2) };
+    let (mut all, mut held) = (0, 0);
+    for scene in arguments {
+        all += 1;
+        match check(&scene, budget_ms, within_s, out.join(all.to_string())) {
+            Ok(words) => {
+                held += 1;
+                println!("held    {scene}: {words}");
+            }
+            Err(words) => println!("FAILED  {scene}: {words}"),
+        }
+    }
+    println!("{held} of {all} held");
+    if 10 * held >= 9 * all { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn check(scene: &str, budget_ms: f64, within_s: f64, out: PathBuf) -> Result<String, String> {
+    let settings = Settings {
+        cases: vec![scene.to_owned()],
+        out,
+        quick: false,
+        within_s: Some(within_s),
+        budget_ms: Some(budget_ms),
+        seconds: None,
+        only: Vec::new(),
+        cells: Vec::new(),
+        stop: Arc::new(AtomicBool::new(false)),
+    };
+    let study = run(&settings, &mut |progress| progress.note.iter().for_each(|note| eprintln!("{note}")))
+        .map_err(|error| error.to_string())?;
+    let case = &study.cases[0];
+    let reference = case.reference.as_ref().map_err(Clone::clone)?;
+    let advice = case.recommendation.as_ref().ok_or("no recommendation")?;
+    println!("{scene} ({:.0} s)\n  ± {}: {}", study.seconds, percent(reference.error_bar), reference.source);
+    case.notes.iter().for_each(|note| println!("  note: {note}"));
+    println!("  {}", advice.words);
+    let Some(choice) = advice.choice else { return Ok("nothing fits, and it says so".to_owned()) };
+    let point = &case.points[choice];
+    let again = repeat(case, &point.configuration.overrides(), point.configuration.threads())?;
+    let truth = finer(case)?;
+    let errors = Errors::of(&again.series, &truth.series, &case.case.goal, None);
+    let printed = advice.error.unwrap_or(f64::NAN);
+    let words = format!(
+        "p99 {:.2} ms again {:.2} ms; error {} ± {}, by the finer run {} ({} elements)",
+        point.trial.cost.p99_ms,
+        again.cost.p99_ms,
+        percent(printed),
+        percent(advice.error_bar),
+        percent(errors.l2),
+        truth.elements
+    );
+    let keeps = again.cost.p99_ms <= 1.1 * budget_ms;
+    let honest = (errors.l2 - printed).abs() <= advice.error_bar;
+    if keeps && honest { Ok(words) } else { Err(words) }
+}
+
+fn repeat(case: &CaseResult, set: &[String], threads: usize) -> Result<Trial, String> {
+    let scene = case.case.scene.apply_sets(set).map_err(|error| error.to_string())?;
+    let limits = Limits { run_s: CHECK_S, repeat_s: 2.0, repeats: 11 };
+    let stop = AtomicBool::new(false);
+    let trial = trial::run(&scene, case.case.scene.base_dir(), threads, case.case.protocol, limits, &stop);
+    let trial = trial.ok_or("stopped")?;
+    if trial.is_done() { Ok(trial) } else { Err(trial.reason) }
+}
+
+/// The scene's own element on the finer mesh, second order in time where it can be.
+fn finer(case: &CaseResult) -> Result<Trial, String> {
+    let Truth::Refined { ladders, .. } = &case.case.truth else { return Err("not a scene".to_owned()) };
+    let own: Vec<_> = ladders.iter().filter(|l| l.configuration.label(Factor::Element) != "tet10").collect();
+    let mut why = "no ladder".to_owned();
+    for ladder in if own.is_empty() { ladders.iter().collect() } else { own } {
+        let most = ladder.meshes.iter().rposition(|mesh| mesh.size <= 1.1 * FINER).unwrap_or(0);
+        let set = ladder.at(most, STEPS).overrides();
+        match repeat(case, &set, 1) {
+            Ok(trial) => return Ok(trial),
+            Err(reason) => why = format!("the finer run: {reason}"),
+        }
+    }
+    Err(why)
+}

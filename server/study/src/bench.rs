@@ -1,0 +1,201 @@
+//! Runs configurations, keeps what ended, watches the time and tells how far it is.
+
+use std::io;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use crate::axes::Factor;
+use crate::case::{Case, Truth};
+use crate::design::Configuration;
+use crate::forecast::Forecast;
+use crate::runner::{Ask, Runner};
+use crate::store::{Store, fingerprint};
+use crate::study::{Progress, Settings};
+use crate::trial::{self, Limits, Protocol, Status, Trial, one_line};
+use crate::wear::{self, Wear};
+
+/// Where runs are made.
+pub struct Bench<'a> {
+    settings: &'a Settings,
+    /// Runs that ended, on disk.
+    pub store: Store,
+    tell: &'a mut dyn FnMut(&Progress),
+    progress: Progress,
+    forecast: Forecast,
+    started: Instant,
+    /// When the present case is to end [s since the start]; infinite without a budget.
+    until_s: f64,
+    /// What could not be written.
+    pub broken: Option<(PathBuf, io::Error)>,
+}
+
+impl<'a> Bench<'a> {
+    /// A bench with the runs of an earlier study.
+    pub fn new(settings: &'a Settings, store: Store, tell: &'a mut dyn FnMut(&Progress)) -> Self {
+        Self {
+            settings,
+            store,
+            tell,
+            progress: Progress::default(),
+            forecast: Forecast::default(),
+            started: Instant::now(),
+            until_s: f64::INFINITY,
+            broken: None,
+        }
+    }
+
+    /// What is asked for.
+    pub fn settings(&self) -> &'a Settings {
+        self.settings
+    }
+
+    /// Begins a case that may take `seconds`.
+    pub fn begin(&mut self, case: &str, seconds: f64) {
+        self.until_s = self.elapsed_s() + seconds;
+        self.progress = Progress { case: case.to_owned(), ..Progress::default() };
+        self.progress.case_s = [self.elapsed_s(), self.until_s];
+    }
+
+    /// Seconds since the study began.
+    pub fn elapsed_s(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Whether the study is to end.
+    pub fn is_over(&self) -> bool {
+        self.settings.stop.load(Ordering::Relaxed) || self.broken.is_some()
+    }
+
+    /// A sentence for the user.
+    pub fn note(&mut self, note: String) {
+        self.progress.note = Some(note);
+        (self.tell)(&self.progress);
+        self.progress.note = None;
+    }
+
+    /// Points done and planned.
+    pub fn count(&mut self, done: usize, total: usize) {
+        (self.progress.done, self.progress.total) = (done, total);
+    }
+
+    /// Runs on `case`.
+    pub fn on<'b>(&'b mut self, case: &'b Case) -> On<'b, 'a> {
+        On { bench: self, case }
+    }
+
+    /// A run whatever is known from before; it is not kept.
+    pub fn again(&mut self, case: &Case, configuration: &Configuration, ask: Ask) -> Option<Trial> {
+        if self.is_over() {
+            return None;
+        }
+        self.progress.what = format!("once more: {}", configuration.words());
+        (self.tell)(&self.progress);
+        self.make(case, configuration, ask)
+    }
+
+    fn make(&mut self, case: &Case, configuration: &Configuration, ask: Ask) -> Option<Trial> {
+        let scene = match case.scene.apply_sets(&configuration.overrides()) {
+            Ok(scene) => scene,
+            Err(error) => return Some(Trial::refused(one_line(&error.to_string()))),
+        };
+        let limits = self.limits(ask);
+        let stop = &*self.settings.stop;
+        let base_dir = case.scene.base_dir();
+        let mut trial = trial::run(&scene, base_dir, configuration.threads(), case.protocol, limits, stop)?;
+        if ask.timed && compares_methods(case, configuration) {
+            trial.wear = worn(case, configuration, stop)?;
+        }
+        Some(trial)
+    }
+
+    fn limits(&self, ask: Ask) -> Limits {
+        let repeat_s = match (ask.timed, self.settings.quick) {
+            (false, _) => 0.0,
+            (true, true) => 0.15,
+            (true, false) => self.settings.within_s.map_or(1.5, |within_s| 1.5_f64.min(within_s / 200.0)),
+        };
+        Limits { run_s: ask.cap_s, repeat_s, repeats: if ask.timed { 11 } else { 1 } }
+    }
+
+    fn known(&self, case: &Case, configuration: &Configuration, timed: bool) -> Option<&Trial> {
+        let is_motion = matches!(case.protocol, Protocol::Motion { .. });
+        let enough = |trial: &&Trial| !timed || trial.cost.count != 1 || is_motion;
+        self.store.get(&key(case, configuration)).filter(enough)
+    }
+}
+
+/// A bench at work on a case.
+pub struct On<'b, 'a> {
+    bench: &'b mut Bench<'a>,
+    case: &'b Case,
+}
+
+impl Runner for On<'_, '_> {
+    fn run(&mut self, configuration: &Configuration, ask: Ask) -> Option<Trial> {
+        let Self { bench, case } = self;
+        if bench.is_over() {
+            return None;
+        }
+        if let Some(trial) = bench.known(case, configuration, ask.timed) {
+            return Some(trial.clone());
+        }
+        bench.progress.what = configuration.words();
+        (bench.tell)(&bench.progress);
+        let before_s = bench.elapsed_s();
+        let trial = bench.make(case, configuration, ask)?;
+        let seconds = bench.elapsed_s() - before_s;
+        if trial.is_done() {
+            bench.forecast.learn(case, configuration, seconds);
+        }
+        // A run that was stopped may end where there is more time.
+        if trial.status != Status::Late
+            && let Err(error) = bench.store.put(&key(case, configuration), &trial)
+        {
+            bench.broken = Some((bench.settings.out.join("runs.jsonl"), error));
+        }
+        Some(trial)
+    }
+
+    fn left_s(&self) -> f64 {
+        self.bench.until_s - self.bench.elapsed_s()
+    }
+
+    fn forecast_s(&self, configuration: &Configuration, timed: bool) -> f64 {
+        if self.bench.known(self.case, configuration, timed).is_some() {
+            return 0.0;
+        }
+        self.bench.forecast.seconds(self.case, configuration).unwrap_or(0.0)
+    }
+}
+
+/// What a run is known by: scene, settings and protocol.
+fn key(case: &Case, configuration: &Configuration) -> String {
+    let mut set = configuration.overrides();
+    set.push(format!("{:?}", case.protocol));
+    let scene = fingerprint(&format!("{}{}", case.scene.to_json(), set.join("\n")));
+    let words =
+        if let Truth::Refined { .. } = case.truth { configuration.words() } else { configuration.key() };
+    format!("{} {scene} {words}", case.name)
+}
+
+/// Whether the point differs only in the method of cutting from the base of the case.
+fn compares_methods(case: &Case, configuration: &Configuration) -> bool {
+    let base = Configuration::base(&case.axes);
+    configuration
+        .setting(Factor::Cutting)
+        .is_some_and(|method| base.with(Factor::Cutting, method).key() == configuration.key())
+}
+
+/// The mesh after many cuts; nothing where the scene is refused, none where the study is to end.
+fn worn(case: &Case, configuration: &Configuration, stop: &AtomicBool) -> Option<Vec<Wear>> {
+    let mut set = configuration.overrides();
+    set.extend(wear::at_rest(&case.bodies));
+    let Ok(scene) = case.scene.apply_sets(&set) else { return Some(Vec::new()) };
+    // The others have the mesh of one of these, or can take no further cut.
+    let once = !["xfem", "snap"].contains(&configuration.label(Factor::Cutting));
+    match wear::measure(&scene, case.scene.base_dir(), once, stop) {
+        None if stop.load(Ordering::Relaxed) => None,
+        found => Some(found.unwrap_or_default()),
+    }
+}

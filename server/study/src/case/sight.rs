@@ -1,0 +1,124 @@
+//! What the regions of a scene hold and load on a mesh: the nodes that lie in them, as area and volume.
+
+use std::collections::BTreeMap;
+
+use scindo_physics::mesh::TetMesh;
+use scindo_world::build::region::select;
+use scindo_world::scene::Region;
+use scindo_world::simulation::Simulation;
+use serde::{Deserialize, Serialize};
+
+/// A region as a mesh sees it: only whole elements and faces count.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Sight {
+    /// Which region, as a key such as `body.liver.fix.0`.
+    pub region: String,
+    /// Nodes in it.
+    pub nodes: usize,
+    /// Area of boundary faces all of whose nodes lie in it [m²].
+    pub area_m2: f64,
+    /// Volume of the elements all of whose nodes lie in it [m³].
+    pub volume_m3: f64,
+}
+
+/// Change of a region from mesh to mesh that is not worth a word.
+pub const SAME: f64 = 0.02;
+
+impl Sight {
+    /// Largest relative change of area or volume between two meshes.
+    fn change(&self, other: &Sight) -> f64 {
+        let relative = |a: f64, b: f64| if a.max(b) > 0.0 { (a - b).abs() / a.max(b) } else { 0.0 };
+        // A volume that is a thin skin of whole elements says little; the area then says it all.
+        if self.area_m2.min(other.area_m2) > 0.0 {
+            relative(self.area_m2, other.area_m2)
+        } else {
+            relative(self.volume_m3, other.volume_m3)
+        }
+    }
+}
+
+/// The region that changes most between two meshes, and by how much; both lists are of one scene.
+pub fn largest_change<'a>(a: &'a [Sight], b: &'a [Sight]) -> Option<(&'a Sight, &'a Sight, f64)> {
+    let changes = a.iter().zip(b).map(|(x, y)| (x, y, x.change(y)));
+    changes.max_by(|x, y| x.2.total_cmp(&y.2))
+}
+
+/// All regions of a scene on its meshes.
+pub fn look(simulation: &Simulation) -> Vec<Sight> {
+    let mut seen = Vec::new();
+    for (spec, body) in simulation.scene().bodies.iter().zip(simulation.bodies()) {
+        let mesh = body.body.cut_mesh().mesh();
+        let fixes = spec.fixes.iter().enumerate().map(|(i, fix)| (format!("fix.{i}"), &fix.region));
+        let loads = spec.loads.iter().enumerate().map(|(i, load)| (format!("load.{i}"), &load.region));
+        let regions: Vec<(String, &Region)> = fixes.chain(loads).collect();
+        if regions.is_empty() {
+            continue;
+        }
+        let boundary = boundary(mesh);
+        for (key, region) in regions {
+            seen.push(measure(mesh, &boundary, format!("body.{}.{key}", spec.id), region));
+        }
+    }
+    seen
+}
+
+/// Faces of one element only.
+fn boundary(mesh: &TetMesh) -> Vec<[u32; 3]> {
+    let mut faces = BTreeMap::new();
+    for [a, b, c, d] in &mesh.tets {
+        for mut face in [[*a, *b, *c], [*a, *b, *d], [*a, *c, *d], [*b, *c, *d]] {
+            face.sort_unstable();
+            *faces.entry(face).or_insert(0_u32) += 1;
+        }
+    }
+    faces.into_iter().filter(|(_, count)| *count == 1).map(|(face, _)| face).collect()
+}
+
+fn measure(mesh: &TetMesh, boundary: &[[u32; 3]], key: String, region: &Region) -> Sight {
+    let nodes = select(&mesh.nodes, mesh.bounds(), region);
+    let mut inside = vec![false; mesh.nodes.len()];
+    nodes.iter().for_each(|n| inside[*n as usize] = true);
+    let at = |n: u32| mesh.nodes[n as usize];
+    let whole = |face: &&[u32; 3]| face.iter().all(|n| inside[*n as usize]);
+    let area = |[a, b, c]: &[u32; 3]| 0.5 * (at(*b) - at(*a)).cross(&(at(*c) - at(*a))).norm();
+    let filled = (0..mesh.tets.len()).filter(|e| mesh.tets[*e].iter().all(|n| inside[*n as usize]));
+    Sight {
+        region: key,
+        nodes: nodes.len(),
+        area_m2: boundary.iter().filter(whole).map(area).sum(),
+        volume_m3: filled.map(|e| mesh.volume(e)).sum(),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use scindo_world::scene::Scene;
+    use std::path::Path;
+
+    fn seen(cells: usize) -> Vec<Sight> {
+        let scene = Scene::from_toml(&format!(
+            "schema = 1\n[[body]]\nid = \"b\"\nyoung_pa = 1e5\npoisson = 0.3\ndensity_kg_m3 = 1000\n\
+             mesh = {{ box = {{ min_m = [0,0,0], max_m = [1,1,1], cells = [{cells},4,4] }} }}\n\
+             [[body.fix]]\nwhere = {{ box = {{ min_m = [-1,-1,-1], max_m = [0.3,2,2] }} }}\n\
+             [[body.load]]\nwhere = {{ slab = {{ axis = \"z\", from = 1, to = 1 }} }}\nforce_n = [0,0,1]"
+        ))
+        .unwrap();
+        look(&Simulation::new(&scene, Path::new("")).unwrap())
+    }
+
+    #[test]
+    fn areas_and_volumes_of_regions() {
+        let (four, ten) = (seen(4), seen(10));
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        near(four[0].volume_m3, 0.25);
+        near(ten[0].volume_m3, 0.3);
+        near(four[1].area_m2, 1.0);
+        assert_eq!((four[1].volume_m3, four[1].nodes), (0.0, 25));
+        let (held, _, change) = largest_change(&four, &ten).unwrap();
+        assert_eq!(held.region, "body.b.fix.0");
+        // Its faces: one side and four strips.
+        near(change, (1.0 + 4.0 * 0.3 - 2.0) / 2.2);
+    }
+}

@@ -1,0 +1,96 @@
+//! How long a run will take: work relative to the scene as it stands, times what such work took so far.
+
+use crate::axes::Factor;
+use crate::case::{Case, Truth};
+use crate::design::Configuration;
+use crate::trial::Protocol;
+
+/// Runs that ended, by kind and work.
+#[derive(Debug, Clone, Default)]
+pub struct Forecast {
+    seen: Vec<Seen>,
+}
+
+#[derive(Debug, Clone)]
+struct Seen {
+    kind: String,
+    work: f64,
+    seconds: f64,
+}
+
+impl Forecast {
+    /// Learns from a run.
+    pub fn learn(&mut self, case: &Case, configuration: &Configuration, seconds: f64) {
+        let kind = kind(case, configuration);
+        self.seen.push(Seen { kind, work: work(case, configuration), seconds });
+    }
+
+    /// Seconds that a run will take; nothing is known before the first.
+    pub fn seconds(&self, case: &Case, configuration: &Configuration) -> Option<f64> {
+        let (kind, work) = (kind(case, configuration), work(case, configuration));
+        let far = |seen: &Seen| (seen.work / work).ln().abs();
+        // A run of the same kind tells more than any other, however far its size is.
+        let rank = |seen: &Seen| far(seen) + if seen.kind == kind { 0.0 } else { 100.0 };
+        let best = self.seen.iter().rev().min_by(|a, b| rank(a).total_cmp(&rank(b)))?;
+        Some(best.seconds * work / best.work)
+    }
+}
+
+/// Runs of one kind differ in size only.
+fn kind(case: &Case, configuration: &Configuration) -> String {
+    let alike = [Factor::Element, Factor::Integrator, Factor::Solver, Factor::Tolerance, Factor::Law];
+    let labels: Vec<&str> = alike.iter().map(|factor| configuration.label(*factor)).collect();
+    format!("{} {}", case.name, labels.join(" "))
+}
+
+/// Expected work of a run, whatever the unit: elements to the power 4/3 (iterations grow with the
+/// number of elements along an edge), times what element and integrator cost, times steps.
+pub fn work(case: &Case, configuration: &Configuration) -> f64 {
+    let scale = if let Truth::Refined { .. } = case.truth { 1.0 } else { 20.0 };
+    let finer = configuration.setting(Factor::Mesh).map_or(1.0, |setting| setting.size / scale);
+    let element = match configuration.label(Factor::Element) {
+        "tet10" => 12.0,
+        "hex8" | "hex8 selective" => 3.0,
+        "tet4 node-averaged" => 4.0,
+        _ => 1.0,
+    };
+    let integrator = match configuration.label(Factor::Integrator) {
+        "bdf2" | "newmark" => 4.0,
+        _ => 1.0,
+    };
+    let law = match configuration.label(Factor::Law) {
+        "stvk" | "neo-hookean" => 4.0,
+        _ => 1.0,
+    };
+    let steps = match case.protocol {
+        Protocol::Static => 10.0,
+        Protocol::Motion { frame_s, frames } => {
+            f64::from(frames) * configuration.setting(Factor::Step).map_or(1.0, |h| frame_s / h.size)
+        }
+    };
+    finer.powi(4).max(1e-3) * element * integrator * law * steps
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::axes::step;
+    use crate::case::builtin;
+
+    #[test]
+    fn a_run_of_the_same_kind_tells_most() {
+        let case = builtin("bar-motion", true).unwrap();
+        let base = Configuration::base(&case.axes);
+        let mut forecast = Forecast::default();
+        assert_eq!(forecast.seconds(&case, &base), None);
+        forecast.learn(&case, &base, 2.0);
+        let frame_s = base.setting(Factor::Step).unwrap().size;
+        let finer = base.with(Factor::Step, &step(0.25 * frame_s));
+        assert!((forecast.seconds(&case, &finer).unwrap() - 8.0).abs() < 1e-9);
+        let element = case.axes.iter().find(|a| a.factor == Factor::Element).unwrap();
+        let other = base.with(Factor::Element, element.settings.iter().find(|s| s.label == "tet10").unwrap());
+        forecast.learn(&case, &other, 100.0);
+        assert!((forecast.seconds(&case, &finer).unwrap() - 8.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,271 @@
+//! A reference that takes the time it is given: mesh and step are refined together, level by level.
+//!
+//! On level i the mesh is f_i times finer than the scene's and the frame is divided into n_i steps with
+//! n_i ∝ f_i, so that all errors vanish along the ladder, the mixed ones too. n_0 is chosen by pilot
+//! runs on the coarsest mesh, so that mesh and step leave errors of like size. Levels that ended are
+//! never thrown away: the reference is the [`limit`](crate::limit) of those there are.
+
+use crate::axes::{Factor, Setting, step};
+use crate::case::sight::{SAME, Sight, largest_change};
+use crate::design::Configuration;
+use crate::limit::{UNKNOWN, limit};
+use crate::recommend::percent;
+use crate::reference::Reference;
+use crate::runner::{Ask, PATIENCE, Runner, fits};
+use crate::series::Series;
+use crate::trial::Trial;
+
+/// A way to a reference.
+#[derive(Debug, Clone)]
+pub struct Ladder {
+    /// Element, integrator, … of its runs; mesh and step are replaced.
+    pub configuration: Configuration,
+    /// Meshes, coarse to fine; their size is the factor f. Empty where the mesh cannot be refined.
+    pub meshes: Vec<Setting>,
+    /// Frame [s] that the steps divide; none for statics.
+    pub step_s: Option<f64>,
+    /// Element and integrator in words.
+    pub words: String,
+}
+
+/// Most steps per frame on the coarsest mesh, and levels of a ladder of steps alone.
+const MOST_STEPS: u32 = 8;
+const MOST_LEVELS: usize = 8;
+
+/// Error bar at which a reference is good enough.
+const ENOUGH: f64 = 2e-3;
+
+impl Ladder {
+    /// Its run on mesh `mesh` with `n` steps per frame.
+    pub fn at(&self, mesh: usize, n: u32) -> Configuration {
+        let mut configuration = self.configuration.clone();
+        if let Some(mesh) = self.meshes.get(mesh) {
+            configuration = configuration.with(Factor::Mesh, mesh);
+        }
+        if let Some(step_s) = self.step_s {
+            configuration = configuration.with(Factor::Step, &step(step_s / f64::from(n)));
+        }
+        configuration
+    }
+
+    /// Levels there are.
+    fn len(&self) -> usize {
+        match (self.meshes.len(), self.step_s) {
+            (0 | 1, None) => 1,
+            (0 | 1, Some(_)) => MOST_LEVELS,
+            (n, _) => n,
+        }
+    }
+
+    /// Mesh and steps per frame of a level.
+    fn level(&self, i: usize, n0: u32) -> (usize, u32) {
+        if self.meshes.len() < 2 {
+            return (0, n0 << i);
+        }
+        let ratio = self.meshes[i].size / self.meshes[0].size;
+        (i, ((f64::from(n0) * ratio).round() as u32).max(1))
+    }
+
+    /// Size h of a level: that of its elements, or of its step where the mesh stays.
+    fn size(&self, i: usize, n0: u32) -> f64 {
+        let (mesh, n) = self.level(i, n0);
+        if self.meshes.len() < 2 { 1.0 / f64::from(n) } else { 1.0 / self.meshes[mesh].size }
+    }
+}
+
+/// A level that ended.
+#[derive(Debug, Clone)]
+struct Rung {
+    size: f64,
+    words: String,
+    series: Series,
+    seen: Vec<Sight>,
+}
+
+/// A ladder under way.
+#[derive(Debug)]
+pub struct Climb<'a> {
+    ladder: &'a Ladder,
+    law: &'a str,
+    /// Steps per frame on the coarsest mesh.
+    n0: u32,
+    rungs: Vec<Rung>,
+    /// Why it does not go on, where that is final.
+    over: Option<String>,
+}
+
+impl<'a> Climb<'a> {
+    /// Makes the pilot runs and the first level, keeping `keep_s` of the study's time for later. None
+    /// if the study is to end before there is a level.
+    ///
+    /// # Errors
+    /// Why the first run gave no result.
+    pub fn start(
+        ladder: &'a Ladder,
+        law: &'a str,
+        runner: &mut dyn Runner,
+        keep_s: f64,
+    ) -> Result<Option<Self>, String> {
+        let cap_s = runner.left_s() - keep_s;
+        let Some(first) = runner.run(&ladder.at(0, 1), Ask { timed: false, cap_s }) else { return Ok(None) };
+        if !usable(&first) {
+            return Err(format!("{}: {}", ladder.words, first.reason));
+        }
+        let mut climb = Self { ladder, law, n0: 1, rungs: Vec::new(), over: None };
+        climb.choose_steps(&first.series, runner, keep_s);
+        climb.push(0, first);
+        if climb.n0 > 1 {
+            // The first level has been run with its n0 steps by the pilots; this finds it again.
+            climb.rungs.clear();
+            climb.up(runner, keep_s);
+        }
+        Ok(Some(climb))
+    }
+
+    /// Doubles the steps per frame until their error is no larger than that of the mesh.
+    fn choose_steps(&mut self, first: &Series, runner: &mut dyn Runner, keep_s: f64) {
+        if self.ladder.step_s.is_none() || self.ladder.meshes.len() < 2 {
+            return;
+        }
+        let Some(finer) = self.pilot(1, 1, runner, keep_s) else { return };
+        let by_mesh = finer.minus(first).norm();
+        let mut last = first.clone();
+        while self.n0 < MOST_STEPS {
+            let Some(next) = self.pilot(0, 2 * self.n0, runner, keep_s) else { return };
+            let by_step = next.minus(&last).norm();
+            if by_step <= 0.5 * by_mesh {
+                return;
+            }
+            self.n0 *= 2;
+            last = next;
+        }
+    }
+
+    /// A pilot run, where it takes no more than a tenth of the time there is.
+    fn pilot(&self, mesh: usize, n: u32, runner: &mut dyn Runner, keep_s: f64) -> Option<Series> {
+        let configuration = self.ladder.at(mesh, n);
+        let allowed_s = 0.1 * (runner.left_s() - keep_s);
+        if runner.forecast_s(&configuration, false) > allowed_s {
+            return None;
+        }
+        let trial = runner.run(&configuration, Ask { timed: false, cap_s: 2.0 * allowed_s })?;
+        usable(&trial).then_some(trial.series)
+    }
+
+    /// Goes on as long as levels fit into the time, less `keep_s`, and the error bar is not small enough.
+    pub fn climb(&mut self, runner: &mut dyn Runner, keep_s: f64) {
+        while self.over.is_none() && self.bar() > ENOUGH {
+            let Some(next) = self.next() else { break };
+            if !fits(runner, &next, false, keep_s) || !self.up(runner, keep_s) {
+                break;
+            }
+        }
+    }
+
+    /// The next level.
+    pub fn next(&self) -> Option<Configuration> {
+        let i = self.rungs.len();
+        (i < self.ladder.len()).then(|| {
+            let (mesh, n) = self.ladder.level(i, self.n0);
+            self.ladder.at(mesh, n)
+        })
+    }
+
+    /// One level more; false if there is none.
+    fn up(&mut self, runner: &mut dyn Runner, keep_s: f64) -> bool {
+        let Some(next) = self.next() else { return false };
+        let room_s = (runner.left_s() - 0.5 * keep_s).max(0.1);
+        let forecast_s = runner.forecast_s(&next, false);
+        let cap_s = if forecast_s > 0.0 { room_s.min((PATIENCE * forecast_s).max(1.0)) } else { room_s };
+        let Some(trial) = runner.run(&next, Ask { timed: false, cap_s }) else {
+            self.over = Some("interrupted".to_owned());
+            return false;
+        };
+        if usable(&trial) {
+            self.push(self.rungs.len(), trial);
+            return true;
+        }
+        self.over = Some(format!("{}: {}", next.words(), trial.reason));
+        false
+    }
+
+    fn push(&mut self, i: usize, trial: Trial) {
+        let (mesh, n) = self.ladder.level(i, self.n0);
+        let mut words = Vec::new();
+        words.extend(self.ladder.meshes.get(mesh).map(|setting| setting.label.clone()));
+        words.extend(self.ladder.step_s.map(|frame_s| step(frame_s / f64::from(n)).label));
+        self.rungs.push(Rung {
+            size: self.ladder.size(i, self.n0),
+            words: words.join(" at "),
+            series: trial.series,
+            seen: trial.seen,
+        });
+    }
+
+    /// Regions of the finest level.
+    pub fn seen(&self) -> &[Sight] {
+        self.rungs.last().map_or(&[], |rung| &rung.seen)
+    }
+
+    /// How much regions change over the last levels, at most.
+    fn wander(&self) -> f64 {
+        let last = &self.rungs[self.rungs.len().saturating_sub(3)..];
+        let pairs = last.windows(2).filter_map(|pair| Some(largest_change(&pair[0].seen, &pair[1].seen)?.2));
+        pairs.fold(0.0, f64::max)
+    }
+
+    fn limit(&self) -> Option<crate::limit::Limit> {
+        let levels: Vec<(f64, &Series)> = self.rungs.iter().map(|rung| (rung.size, &rung.series)).collect();
+        limit(&levels, self.wander() <= SAME)
+    }
+
+    /// Present error bar.
+    pub fn bar(&self) -> f64 {
+        self.limit().map_or(UNKNOWN, |limit| limit.error_bar)
+    }
+
+    /// The reference from the levels that ended.
+    ///
+    /// # Errors
+    /// That nothing moves.
+    pub fn reference(&self) -> Result<Reference, String> {
+        let Some(limit) = self.limit() else {
+            return Err("no probe moves in this scene, so there is no error to measure; give it a load, a \
+                        cut, a tool or gravity, or a probe where it moves"
+                .to_owned());
+        };
+        let levels: Vec<&str> = self.rungs.iter().map(|rung| rung.words.as_str()).collect();
+        let mut words = format!("{}; levels {}", self.ladder.words, levels.join(", "));
+        words += &match (self.rungs.len(), limit.order) {
+            (1, _) => ". Only this run ended: its own error is not known".to_owned(),
+            (_, Some(order)) => format!(". Extrapolated with the observed order {order:.1}"),
+            (_, None) => {
+                ". No plausible order shows: the finest level, with the spread of the levels".to_owned()
+            }
+        };
+        if self.wander() > SAME {
+            words += &format!(
+                ". The regions that are held or loaded change by up to {} from level to level",
+                percent(self.wander())
+            );
+        }
+        if self.ladder.meshes.len() < 2 {
+            words += ". The mesh cannot be refined: its error is not part of this study";
+        }
+        if let Some(why) = self.over.as_ref().filter(|why| *why != "interrupted") {
+            words += &format!(". The next level gave no result ({why})");
+        }
+        Ok(Reference {
+            series: limit.value,
+            goal: None,
+            error_bar: limit.error_bar,
+            law: self.law.to_owned(),
+            source: words,
+        })
+    }
+}
+
+/// Whether a run may be part of a reference: it ended, and the solver with it.
+fn usable(trial: &Trial) -> bool {
+    trial.is_done() && trial.reason.is_empty()
+}
