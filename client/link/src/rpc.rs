@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use scindo_proto::messages::{
-    Error, PauseRequest, ResetRequest, RpcReply, SchemaReply, SessionInfo, SetRequest, StepRequest,
+    Error, LoadRequest, ParamsReply, PauseRequest, ResetRequest, RpcReply, ScenesReply, SchemaReply,
+    SessionInfo, SetRequest, StepRequest, UndoRequest,
 };
 use scindo_proto::{Topic, Verb, WireMessage, encode, encoding};
 use zenoh::query::ConsolidationMode;
@@ -47,6 +48,26 @@ impl Link {
     /// Changes one parameter; key and value as in a scene file.
     pub async fn set(&self, key: &str, value: &str) -> Result<RpcReply, LinkError> {
         self.order(Verb::Set, &SetRequest { key: key.to_owned(), value: value.to_owned() }).await
+    }
+
+    /// What [`Self::set`] may change while the scene runs, with values and ranges.
+    pub async fn params(&self) -> Result<ParamsReply, LinkError> {
+        self.question(Verb::Params).await
+    }
+
+    /// Takes the last cut back.
+    pub async fn undo(&self) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Undo, &UndoRequest {}).await
+    }
+
+    /// The scenes that [`Self::load`] may bring.
+    pub async fn scenes(&self) -> Result<ScenesReply, LinkError> {
+        self.question(Verb::Scenes).await
+    }
+
+    /// Changes to another scene of [`Self::scenes`].
+    pub async fn load(&self, name: &str) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Load, &LoadRequest { name: name.to_owned() }).await
     }
 
     /// Asks again while nobody is there to answer: a server that starts listens before it knows what it

@@ -102,7 +102,10 @@ impl Link {
         let shared = waiting.clone();
         let client_id = self.id().to_owned();
         let on_ack = move |ack: CutAck| {
+            // A cut can overtake the token of its client; it is sent again.
+            let too_early = ack.error.as_ref().is_some_and(|error| error.code == "no-token");
             if ack.client_id == client_id
+                && !too_early
                 && let Some(answer) = shared.take(ack.seq)
             {
                 // The caller may have given up; then nobody wants the answer.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use scindo_proto::messages::{Event, Plan, Stats, ToolState};
-use scindo_proto::{Topic, WireMessage};
+use scindo_proto::messages::{Event, Measures, Plan, Stats, SurfaceField, ToolState};
+use scindo_proto::{Chunk, Topic, WireMessage};
 use tokio::sync::{mpsc, watch};
 use zenoh::pubsub::Subscriber;
 
@@ -85,6 +85,17 @@ impl Link {
     /// Which effects are on, and why.
     pub async fn plan(&self) -> Result<Latest<Plan>, LinkError> {
         self.latest(Topic::Plan).await
+    }
+
+    /// Von Mises stress on the surface of `body`. The server computes it while somebody holds this.
+    pub async fn stress(&self, body: &str) -> Result<Latest<SurfaceField>, LinkError> {
+        let (body, name) = (Chunk::new("body id", body)?, Chunk::new("field name", "von-mises")?);
+        self.latest(Topic::SurfaceField(body, name)).await
+    }
+
+    /// Positions of the probes, and energies. The server computes them while somebody holds this.
+    pub async fn measures(&self) -> Result<Latest<Measures>, LinkError> {
+        self.latest(Topic::Measures).await
     }
 
     /// What happens on the server.

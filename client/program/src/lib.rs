@@ -1,0 +1,123 @@
+//! What `scindo`, `scindo-view` and `scindo-haptic` share: the log, shell completions and man pages.
+
+mod seldom;
+
+use std::io::{self, IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use clap::{Command, CommandFactory, Subcommand};
+use clap_complete::Shell;
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{EnvFilter, Layer as _};
+
+use seldom::Seldom;
+
+/// The environment variable that chooses what is logged, such as `SCINDO_LOG=debug`.
+pub const LOG_VARIABLE: &str = "SCINDO_LOG";
+
+/// Logs to standard error what `SCINDO_LOG` asks for, or what `default` says where it is unset.
+///
+/// A directive that cannot be read is reported, and `default` is used.
+pub fn start_log(default: &str) {
+    let asked = std::env::var(LOG_VARIABLE).ok().filter(|words| !words.trim().is_empty());
+    let filter = match asked.as_deref().map(EnvFilter::try_new) {
+        Some(Ok(filter)) => filter,
+        Some(Err(error)) => {
+            let words = asked.unwrap_or_default();
+            eprintln!(
+                "warning: {LOG_VARIABLE}={words}: {error}; expected directives such as debug or warn,scindo=info"
+            );
+            EnvFilter::new(default)
+        }
+        None => EnvFilter::new(default),
+    };
+    let lines = tracing_subscriber::fmt::layer()
+        .with_writer(io::stderr)
+        .with_ansi(io::stderr().is_terminal())
+        .with_target(false)
+        .with_filter(Seldom::default());
+    tracing_subscriber::registry().with(filter).with(lines).init();
+}
+
+/// The commands that describe a program to a shell and to `man`.
+#[derive(Debug, Subcommand)]
+pub enum Manual {
+    /// Print completions for a shell, to be put where it looks for them.
+    Completions {
+        /// The shell.
+        #[arg(value_enum)]
+        shell: Shell,
+    },
+    /// Write man pages, one per command.
+    Man {
+        /// Where they go; made if missing.
+        directory: PathBuf,
+    },
+}
+
+impl Manual {
+    /// Writes what is asked for about the program `P`.
+    ///
+    /// # Errors
+    /// What the disk or the pipe says.
+    pub fn run<P: CommandFactory>(&self) -> io::Result<()> {
+        match self {
+            Self::Completions { shell } => {
+                // A reader may close its end early; the generator itself would panic at that.
+                let text = completions(*shell, P::command());
+                match io::stdout().write_all(&text) {
+                    Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+                    written => written,
+                }
+            }
+            Self::Man { directory } => man_pages(P::command(), directory),
+        }
+    }
+}
+
+fn completions(shell: Shell, mut program: Command) -> Vec<u8> {
+    let name = program.get_name().to_owned();
+    let mut text = Vec::new();
+    clap_complete::generate(shell, &mut program, name, &mut text);
+    text
+}
+
+fn man_pages(program: Command, directory: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(directory)?;
+    clap_mangen::generate_to(program.disable_help_subcommand(true), directory)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[derive(clap::Parser)]
+    #[command(name = "example", version = "1.2.3")]
+    struct Example {
+        /// How sharp it is.
+        #[arg(long)]
+        sharpness: Option<f64>,
+        #[command(subcommand)]
+        manual: Option<Manual>,
+    }
+
+    #[test]
+    fn every_shell_learns_every_option() {
+        for shell in [Shell::Bash, Shell::Zsh, Shell::Fish, Shell::Elvish, Shell::PowerShell] {
+            let text = String::from_utf8(completions(shell, Example::command())).unwrap();
+            assert!(text.contains("sharpness") && text.contains("completions"), "{shell}");
+        }
+    }
+
+    #[test]
+    fn every_command_has_a_page() {
+        let folder = tempfile::tempdir().unwrap();
+        man_pages(Example::command(), &folder.path().join("man1")).unwrap();
+        for (page, word) in [("example.1", "sharpness"), ("example-man.1", "DIRECTORY")] {
+            let text = std::fs::read_to_string(folder.path().join("man1").join(page)).unwrap();
+            assert!(text.contains(word), "{page}: {text}");
+        }
+    }
+}
