@@ -2,8 +2,12 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
+use scindo_program::Manual;
+
+use crate::orders::Operators;
 
 /// Deforms and cuts soft bodies in real time and serves them over the network.
 ///
@@ -25,7 +29,10 @@ pub struct Cli {
 pub enum Command {
     /// Simulate a scene and serve it to viewers and haptic clients.
     Run(Box<RunArgs>),
-    /// Check a scene: what is wrong, what is odd, which effects are on, what they will cost.
+    /// Run one of the scenes that come with the program, with its page at http://127.0.0.1:8080.
+    Demo(Box<DemoArgs>),
+    /// Check a scene: what is wrong, what is odd, which effects are on; foretell whether it converges, how far it
+    /// moves, what a step costs.
     Check(CheckArgs),
     /// Turn a surface or volume file into tetrahedra.
     Mesh(MeshArgs),
@@ -33,6 +40,9 @@ pub enum Command {
     Accuracy(AccuracyArgs),
     /// Run the hard cases that break codes which deform and cut, and write a page about them.
     Stress(StressArgs),
+    /// Completions and man pages.
+    #[command(flatten)]
+    Manual(Manual),
 }
 
 /// `scindo run`.
@@ -40,6 +50,20 @@ pub enum Command {
 pub struct RunArgs {
     /// Scene file, TOML or JSON.
     pub scene: PathBuf,
+    #[command(flatten)]
+    /// How it is served.
+    pub serve: ServeArgs,
+}
+
+/// `scindo demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Which.
+    #[arg(default_value = scindo_world::scene::DEMONSTRATION)]
+    pub name: String,
+    /// Print the scenes instead of running one.
+    #[arg(long)]
+    pub list: bool,
     #[command(flatten)]
     /// How it is served.
     pub serve: ServeArgs,
@@ -57,7 +81,7 @@ pub struct ServeArgs {
     /// End after this much simulated time [s].
     #[arg(long, value_name = "T")]
     pub seconds: Option<f64>,
-    /// Write summary.json, probes.csv and final.vtu into this directory.
+    /// Write summary.json, probes.csv and final.vtm into this directory.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Record everything into a file (not supported yet).
@@ -80,11 +104,14 @@ pub struct ServeArgs {
     #[arg(long, value_name = "FILE.json5")]
     pub zenoh: Option<PathBuf>,
     /// Threads that work on a step; the result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub threads: u16,
-    /// Serve the browser page at this address.
-    #[arg(long, value_name = "ADDRESS")]
+    /// Serve the browser page at this address: PORT, HOST or HOST:PORT. 8080 is 127.0.0.1:8080.
+    #[arg(long, value_name = "ADDRESS", value_parser = scindo_view::listen_address)]
     pub viewer: Option<SocketAddr>,
+    /// Who may pause, step, reset and set, over the network and in pages; everybody may watch and touch.
+    #[arg(long, value_enum, value_name = "WHO", default_value = "loopback")]
+    pub operators: Operators,
     /// Override a key of the scene, such as body.liver.young_pa=5e3.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -102,6 +129,15 @@ pub struct CheckArgs {
     /// Print the JSON Schema of scene files instead.
     #[arg(long, conflicts_with = "scene")]
     pub schema: bool,
+    /// Look only at the scene: make no steps, foretell nothing.
+    #[arg(long)]
+    pub no_solve: bool,
+    /// Foretell a run of this many steps; without it, until the scene comes to rest.
+    #[arg(long, value_name = "N", conflicts_with = "seconds")]
+    pub steps: Option<u64>,
+    /// Foretell a run of this much simulated time [s].
+    #[arg(long, value_name = "T")]
+    pub seconds: Option<f64>,
     /// Override a key of the scene.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
@@ -142,9 +178,13 @@ pub struct AccuracyArgs {
     /// Where index.html, points.csv and study.json go; a study that was interrupted goes on there.
     #[arg(long, value_name = "DIR", default_value = "accuracy")]
     pub out: PathBuf,
-    /// Coarse meshes only: less than a minute.
+    /// Coarse meshes and short motions only: less than a minute.
     #[arg(long)]
     pub quick: bool,
+    /// Time that the study itself may take, such as 90s, 2m or 1h30m, its reference included
+    /// [default: 5m for a scene, 40s with --quick; as long as it takes for the cases of the program].
+    #[arg(long, value_name = "DURATION", value_parser = duration)]
+    pub within: Option<Duration>,
     /// Simulated time of scenes in motion [s].
     #[arg(long, value_name = "T")]
     pub seconds: Option<f64>,
@@ -169,6 +209,16 @@ pub struct AccuracyArgs {
     /// Report as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// A duration of at least a second.
+fn duration(text: &str) -> Result<Duration, String> {
+    let least = Duration::from_secs(1);
+    match humantime::parse_duration(text) {
+        Ok(duration) if duration >= least => Ok(duration),
+        Ok(_) => Err("must be at least 1s".to_owned()),
+        Err(error) => Err(format!("{error}; write for example 90s, 2m or 1h30m")),
+    }
 }
 
 /// `scindo stress`.

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
+use scindo_program::Manual;
 
 use crate::cli::{Cli, Command};
 use crate::error::RuntimeError;
@@ -15,27 +16,33 @@ pub mod mesh;
 
 pub mod accuracy;
 
+mod study_progress;
+
 pub mod stress;
 
 /// Parses, runs, and turns the outcome into an exit code: the one place that does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    start_log();
+    scindo_program::start_log("error,scindo=info,scindo_world=info,scindo_view=info,scindo_client=warn");
     let json = match &cli.command {
         None => cli.demonstration.json,
         Some(Command::Run(args)) => args.serve.json,
+        Some(Command::Demo(args)) => args.serve.json,
         Some(Command::Check(args)) => args.json,
         Some(Command::Mesh(args)) => args.json,
         Some(Command::Accuracy(args)) => args.json,
         Some(Command::Stress(args)) => args.json,
+        Some(Command::Manual(_)) => false,
     };
     let outcome = match cli.command {
         None => run::demonstration(&cli.demonstration),
         Some(Command::Run(args)) => run::scene(&args),
+        Some(Command::Demo(args)) => run::demo(&args),
         Some(Command::Check(args)) => check::check(&args),
         Some(Command::Mesh(args)) => mesh::mesh(&args),
         Some(Command::Accuracy(args)) => accuracy::accuracy(&args),
         Some(Command::Stress(args)) => stress::stress(&args),
+        Some(Command::Manual(manual)) => describe(&manual),
     };
     match outcome {
         Ok(code) => code,
@@ -55,17 +62,11 @@ fn report(error: &RuntimeError, json: bool) {
     }
 }
 
-fn start_log() {
-    let filter = tracing_subscriber::EnvFilter::try_from_env("SCINDO_LOG").unwrap_or_else(|_| {
-        tracing_subscriber::EnvFilter::new(
-            "error,scindo=info,scindo_world=info,scindo_view=info,scindo_client=warn",
-        )
-    });
-    let colours = std::io::IsTerminal::is_terminal(&std::io::stderr());
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(colours)
-        .with_target(false)
-        .init();
+fn describe(manual: &Manual) -> Result<ExitCode, RuntimeError> {
+    let failed = |e: std::io::Error| RuntimeError::System {
+        what: "writing completions or man pages".to_owned(),
+        reason: e.to_string(),
+    };
+    manual.run::<Cli>().map_err(failed)?;
+    Ok(ExitCode::SUCCESS)
 }

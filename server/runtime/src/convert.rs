@@ -5,10 +5,14 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use bytes::Bytes;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use scindo_proto::limits::{MARK_BYTES, MAX_MARKS, POSITION_BYTES};
-use scindo_proto::messages::{self as wire, tool_sample, tool_shape};
+use scindo_proto::limits::{MARK_BYTES, MAX_MARKS, MAX_PROBES, POSITION_BYTES};
+use scindo_proto::messages::{self as wire, param, tool_sample, tool_shape};
 use scindo_world::inputs::{ToolInput, ToolMode, ToolShape};
+use scindo_world::scene::{LiveParameter, LiveValue};
 use scindo_world::snapshot::{BodySnapshot, Snapshot, SurfaceTopology, ToolSnapshot};
+
+/// Name of the field of von Mises stress.
+pub const STRESS: &str = "von-mises";
 
 /// Nanoseconds since 1970.
 pub fn unix_ns() -> u64 {
@@ -24,6 +28,28 @@ pub fn to_vec3(v: &Vector3<f64>) -> wire::Vec3 {
 /// Vector of the world; an absent one is zero.
 pub fn from_vec3(v: Option<wire::Vec3>) -> Vector3<f64> {
     v.map_or_else(Vector3::zeros, |v| Vector3::new(v.x, v.y, v.z))
+}
+
+/// What may change while a scene runs.
+pub fn to_param(parameter: LiveParameter) -> wire::Param {
+    let kind = match parameter.value {
+        LiveValue::Switch(_) => param::Kind::Switch,
+        LiveValue::Number(_) => param::Kind::Number,
+        LiveValue::Integer(_) => param::Kind::Integer,
+        LiveValue::Vector(_) => param::Kind::Vector,
+    };
+    wire::Param {
+        key: parameter.key,
+        meaning: parameter.meaning.to_owned(),
+        unit: parameter.unit.to_owned(),
+        kind: kind.into(),
+        value: parameter.value.to_string(),
+        min: parameter.range[0],
+        max: parameter.range[1],
+        usual_min: parameter.usual[0],
+        usual_max: parameter.usual[1],
+        logarithmic: parameter.logarithmic,
+    }
 }
 
 /// Pose of the wire.
@@ -122,7 +148,8 @@ pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::Sur
 
 /// Triangles of a body for the wire. `seq` counts the topologies of the body.
 pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceTopology {
-    let SurfaceTopology { epoch, vertex_count, triangles, tags } = &*body.topology;
+    let SurfaceTopology { epoch, vertex_count, triangles, tags, rest, held, hangs } = &*body.topology;
+    let coordinates = rest.iter().flatten().flat_map(|c| c.to_le_bytes());
     wire::SurfaceTopology {
         seq,
         sim_step: snapshot.step,
@@ -134,7 +161,69 @@ pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::
         triangle_count: triangles.len() as u32,
         triangles: little_endian(triangles.iter().flatten(), 3 * triangles.len()),
         tags: little_endian(tags.iter(), tags.len()),
+        rest_positions: coordinates.collect::<Vec<u8>>().into(),
+        held: bits(held),
+        hangs: bits(hangs),
     }
+}
+
+/// Eight flags per byte, the lowest bit first.
+fn bits(flags: &[bool]) -> Bytes {
+    let byte = |flags: &[bool]| flags.iter().rev().fold(0, |byte: u8, &flag| (byte << 1) | u8::from(flag));
+    flags.chunks(8).map(byte).collect::<Vec<u8>>().into()
+}
+
+/// Von Mises stress on the surface of a body for the wire. `seq` counts the fields of the body.
+pub fn to_stress(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceField {
+    wire::SurfaceField {
+        seq,
+        sim_step: snapshot.step,
+        sim_time_s: snapshot.time_s,
+        publish_unix_ns: unix_ns(),
+        body_id: body.id.to_string(),
+        epoch: body.topology.epoch,
+        vertex_count: body.stress.len() as u32,
+        name: STRESS.to_owned(),
+        values: body.stress.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>().into(),
+    }
+}
+
+/// Probes `(id, body, rest)` and energies for the wire. `seq` counts these messages.
+pub fn to_measures(snapshot: &Snapshot, probes: &[ProbeName], seq: u64) -> wire::Measures {
+    let point = |(name, position): (&ProbeName, &Vector3<f64>)| wire::ProbePoint {
+        id: name.id.clone(),
+        body_id: name.body.clone(),
+        position_m: Some(to_vec3(position)),
+        rest_m: Some(to_vec3(&name.rest_m)),
+    };
+    let energy = |body: &BodySnapshot| {
+        let energy = body.energy?;
+        let finite = |joule: f64| if joule.is_finite() { joule } else { f64::MAX };
+        Some(wire::BodyEnergy {
+            body_id: body.id.to_string(),
+            kinetic_j: finite(energy.kinetic_j),
+            elastic_j: finite(energy.elastic_j),
+        })
+    };
+    wire::Measures {
+        seq,
+        sim_step: snapshot.step,
+        sim_time_s: snapshot.time_s,
+        publish_unix_ns: unix_ns(),
+        probes: probes.iter().zip(&snapshot.probes).take(MAX_PROBES).map(point).collect(),
+        energies: snapshot.bodies.iter().filter_map(energy).collect(),
+    }
+}
+
+/// A probe of the scene.
+#[derive(Debug, Clone)]
+pub struct ProbeName {
+    /// Name.
+    pub id: String,
+    /// Name of its body.
+    pub body: String,
+    /// Where it rests [m].
+    pub rest_m: Vector3<f64>,
 }
 
 fn little_endian<'a>(words: impl Iterator<Item = &'a u32>, count: usize) -> Bytes {
@@ -159,5 +248,7 @@ pub fn to_tool_state(snapshot: &Snapshot, tool: &ToolSnapshot, seq: u64) -> wire
         mode: to_mode(tool.mode).into(),
         force_n: Some(to_vec3(&tool.force_n)),
         owner: tool.owner.to_string(),
+        max_force_n: tool.max_force_n as f32,
+        held_point_m: tool.held_m.as_ref().map(to_vec3),
     }
 }

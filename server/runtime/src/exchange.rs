@@ -1,11 +1,12 @@
 //! What the threads share: newest inputs, who waits for what, and the way out.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::{Sender, TrySendError};
-use scindo_proto::messages::{CutAck, Event, Plan, event};
+use crossbeam_channel::Sender;
+use scindo_proto::messages::{CutAck, Event, ParamsReply, Plan, event};
 use scindo_world::inputs::Wants;
 use scindo_world::simulation::Level;
 
@@ -16,14 +17,19 @@ use crate::stats::Meter;
 /// Messages that may wait for the publisher; beyond it events are dropped and counted.
 pub const OUTGOING: usize = 1024;
 
-/// Information of one name is logged this often.
+/// Answers to cuts that may wait for the publisher. One that finds no place is counted; a client repeats its
+/// cut until it is answered, and the inbox knows the answer.
+pub const ANSWERS: usize = 4096;
+
+/// What happens under one name is logged this often.
 const LOG_EVERY: Duration = Duration::from_secs(1);
 
-/// What the publisher sends besides surfaces.
+/// Events of one name that are published per [`LOG_EVERY`].
+const EVENTS_PER_NAME: u64 = 32;
+
+/// What the publisher sends besides surfaces and answers.
 #[derive(Debug)]
 pub enum Outgoing {
-    /// Answer to a cut.
-    Ack(CutAck),
     /// Something happened.
     Event(Event),
     /// The plan changed.
@@ -37,6 +43,10 @@ pub struct Exchange {
     pub meter: Meter,
     /// Per body: somebody subscribes to its surface.
     surface_wanted: Vec<AtomicBool>,
+    /// Per body: somebody subscribes to its stress.
+    stress_wanted: Vec<AtomicBool>,
+    /// Somebody subscribes to probes and energies.
+    measures_wanted: AtomicBool,
     /// Per body: epoch of the newest snapshot.
     epochs: Vec<AtomicU32>,
     /// Somebody asked for a keyframe.
@@ -45,41 +55,89 @@ pub struct Exchange {
     contact_wanted: AtomicBool,
     /// The server ends.
     stop: AtomicBool,
+    /// The simulation thread has ended: nothing more will be sent.
+    simulated: AtomicBool,
+    /// Every thread has ended.
+    closed: AtomicBool,
+    /// Raised to break off a step under way.
+    break_off: Arc<AtomicBool>,
+    /// When the order came that waits longest for the simulation thread.
+    order_since: Mutex<Option<Instant>>,
     /// Simulation holds still.
     pub paused: AtomicBool,
     /// Steps done.
     pub sim_step: AtomicU64,
-    /// Events lost because the publisher was behind.
-    pub events_dropped: AtomicU64,
+    /// Steps that panicked.
+    panicked_steps: AtomicU64,
+    /// Events lost because the publisher was behind, or because there were too many of one name.
+    events_dropped: AtomicU64,
+    /// Answers to cuts lost because the publisher was behind; their clients ask again.
+    answers_lost: AtomicU64,
     event_seq: AtomicU64,
-    /// Name and time of the last information in the log.
-    logged: Mutex<Option<(String, Instant)>>,
+    /// What `rpc/set` may change, as of the last change.
+    params: Mutex<ParamsReply>,
+    /// Since when, and how often since then, something happened under a name.
+    told: Mutex<BTreeMap<String, (Instant, u64)>>,
     outgoing: Sender<Outgoing>,
+    answers: Sender<CutAck>,
+}
+
+/// What becomes of an event.
+struct News {
+    /// It is the first of its name since [`LOG_EVERY`].
+    logged: bool,
+    published: bool,
+    /// Events of its name that were not logged before it.
+    untold: u64,
 }
 
 impl Exchange {
-    /// For `bodies` bodies; `outgoing` leads to the publisher.
-    pub fn new(inbox: Inbox, bodies: usize, outgoing: Sender<Outgoing>) -> Arc<Self> {
+    /// For `bodies` bodies; `outgoing` and `answers` lead to the publisher.
+    pub fn new(
+        inbox: Inbox,
+        bodies: usize,
+        (outgoing, answers): (Sender<Outgoing>, Sender<CutAck>),
+    ) -> Arc<Self> {
         Arc::new(Self {
             inbox: Mutex::new(inbox),
             meter: Meter::default(),
             surface_wanted: (0..bodies).map(|_| AtomicBool::new(false)).collect(),
+            stress_wanted: (0..bodies).map(|_| AtomicBool::new(false)).collect(),
+            measures_wanted: AtomicBool::new(false),
             epochs: (0..bodies).map(|_| AtomicU32::new(0)).collect(),
             keyframe_wanted: AtomicBool::new(false),
             contact_wanted: AtomicBool::new(false),
             stop: AtomicBool::new(false),
+            simulated: AtomicBool::new(false),
+            closed: AtomicBool::new(false),
+            break_off: Arc::default(),
+            order_since: Mutex::new(None),
             paused: AtomicBool::new(false),
             sim_step: AtomicU64::new(0),
+            panicked_steps: AtomicU64::new(0),
             events_dropped: AtomicU64::new(0),
+            answers_lost: AtomicU64::new(0),
             event_seq: AtomicU64::new(0),
-            logged: Mutex::new(None),
+            params: Mutex::default(),
+            told: Mutex::default(),
             outgoing,
+            answers,
         })
     }
 
     /// The inbox; held for microseconds only.
     pub fn inbox(&self) -> MutexGuard<'_, Inbox> {
         self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What `rpc/set` may change.
+    pub fn params(&self) -> ParamsReply {
+        self.params.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Notes what `rpc/set` may change.
+    pub fn set_params(&self, params: ParamsReply) {
+        *self.params.lock().unwrap_or_else(PoisonError::into_inner) = params;
     }
 
     /// Notes whether somebody subscribes to the surface of body `index`.
@@ -92,6 +150,18 @@ impl Exchange {
     /// True if somebody subscribes to the surface of body `index`.
     pub fn surface_wanted(&self, index: usize) -> bool {
         self.surface_wanted.get(index).is_some_and(|flag| flag.load(Ordering::Relaxed))
+    }
+
+    /// Notes whether somebody subscribes to the stress of body `index`.
+    pub fn want_stress(&self, index: usize, wanted: bool) {
+        if let Some(flag) = self.stress_wanted.get(index) {
+            flag.store(wanted, Ordering::Relaxed);
+        }
+    }
+
+    /// Notes whether somebody subscribes to probes and energies.
+    pub fn want_measures(&self, wanted: bool) {
+        self.measures_wanted.store(wanted, Ordering::Relaxed);
     }
 
     /// Notes the epoch of body `index`.
@@ -127,6 +197,9 @@ impl Exchange {
         wants.surface.clear();
         let flags = self.surface_wanted.iter();
         wants.surface.extend(flags.map(|flag| keyframe || flag.load(Ordering::Relaxed)));
+        wants.stress.clear();
+        wants.stress.extend(self.stress_wanted.iter().map(|flag| flag.load(Ordering::Relaxed)));
+        wants.measures = self.measures_wanted.load(Ordering::Relaxed);
         wants.contact = self.contact_wanted.load(Ordering::Relaxed);
     }
 
@@ -140,46 +213,125 @@ impl Exchange {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Hands something to the publisher; never waits.
+    /// The flag that breaks off a step under way, for those who look at it.
+    pub fn break_off_flag(&self) -> &Arc<AtomicBool> {
+        &self.break_off
+    }
+
+    /// An order was given to the simulation thread.
+    pub fn order_given(&self) {
+        self.orders().get_or_insert_with(Instant::now);
+    }
+
+    /// The simulation thread looks at its orders: none has waited longer than since now.
+    pub fn orders_taken(&self) {
+        let mut since = self.orders();
+        *since = None;
+        self.break_off.store(self.stopping() && self.break_off.load(Ordering::Relaxed), Ordering::Relaxed);
+    }
+
+    /// Breaks off the step under way if an order has waited for `patience`.
+    pub fn break_off_after(&self, patience: Duration) {
+        if self.orders().is_some_and(|since| since.elapsed() >= patience) {
+            self.break_off.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Breaks off the step under way.
+    pub fn break_off(&self) {
+        self.break_off.store(true, Ordering::Relaxed);
+    }
+
+    fn orders(&self) -> MutexGuard<'_, Option<Instant>> {
+        self.order_since.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The simulation thread has ended.
+    pub fn has_simulated(&self) {
+        self.simulated.store(true, Ordering::Release);
+    }
+
+    /// True when the simulation thread has ended.
+    pub fn simulated(&self) -> bool {
+        self.simulated.load(Ordering::Acquire)
+    }
+
+    /// Every thread has ended.
+    pub fn close(&self) {
+        self.closed.store(true, Ordering::Release);
+    }
+
+    /// True when every thread has ended.
+    pub fn closed(&self) -> bool {
+        self.closed.load(Ordering::Acquire)
+    }
+
+    /// A step panicked; its state is lost and the scene starts again.
+    pub fn step_panicked(&self) {
+        self.panicked_steps.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Steps that panicked so far. A run with any has not succeeded.
+    pub fn panicked_steps(&self) -> u64 {
+        self.panicked_steps.load(Ordering::Relaxed)
+    }
+
+    /// What was lost or went wrong so far, by name; only what is not zero.
+    pub fn losses(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        let all = [
+            ("events-dropped", &self.events_dropped),
+            ("answers-lost", &self.answers_lost),
+            ("steps-panicked", &self.panicked_steps),
+        ];
+        all.map(|(name, count)| (name, count.load(Ordering::Relaxed))).into_iter().filter(|(_, n)| *n > 0)
+    }
+
+    /// Hands something to the publisher; never waits. Without a publisher it is gone.
     pub fn send(&self, outgoing: Outgoing) {
-        if let Err(TrySendError::Full(_)) = self.outgoing.try_send(outgoing) {
+        if self.outgoing.try_send(outgoing).is_err_and(|error| error.is_full()) {
             self.events_dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// False for what follows its like within [`LOG_EVERY`].
-    fn is_news(&self, name: &str) -> bool {
-        let mut logged = self.logged.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((last, at)) = &*logged
-            && last == name
-            && at.elapsed() < LOG_EVERY
-        {
-            return false;
+    /// Hands the answer to a cut to the publisher; never waits.
+    pub fn answer(&self, answer: CutAck) {
+        if self.answers.try_send(answer).is_err_and(|error| error.is_full()) {
+            self.answers_lost.fetch_add(1, Ordering::Relaxed);
         }
-        *logged = Some((name.to_owned(), Instant::now()));
-        true
     }
 
-    /// Publishes and logs an event; the log has one line per [`LOG_EVERY`] of what goes on and on, as a cut
-    /// does while the blade moves.
+    fn news(&self, name: &str) -> News {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some((since, count)) = told.get_mut(name) else {
+            told.insert(name.to_owned(), (Instant::now(), 1));
+            return News { logged: true, published: true, untold: 0 };
+        };
+        if since.elapsed() >= LOG_EVERY {
+            let untold = *count - 1;
+            (*since, *count) = (Instant::now(), 1);
+            return News { logged: true, published: true, untold };
+        }
+        *count += 1;
+        News { logged: false, published: *count <= EVENTS_PER_NAME, untold: 0 }
+    }
+
+    /// Publishes and logs an event. The log has one line per name and [`LOG_EVERY`] of what goes on and on,
+    /// as a cut does while the blade moves; the next line says how many there were.
     pub fn event(&self, level: Level, name: &str, message: String) {
+        let News { logged, published, untold } = self.news(name);
+        if logged {
+            log(level, name, &message, untold);
+        } else {
+            tracing::debug!(name, "{message}");
+        }
+        if !published {
+            self.events_dropped.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
         let level = match level {
-            Level::Info => {
-                if self.is_news(name) {
-                    tracing::info!(name, "{message}");
-                } else {
-                    tracing::debug!(name, "{message}");
-                }
-                event::Level::Info
-            }
-            Level::Warning => {
-                tracing::warn!(name, "{message}");
-                event::Level::Warning
-            }
-            Level::Error => {
-                tracing::error!(name, "{message}");
-                event::Level::Error
-            }
+            Level::Info => event::Level::Info,
+            Level::Warning => event::Level::Warning,
+            Level::Error => event::Level::Error,
         };
         self.send(Outgoing::Event(Event {
             seq: self.event_seq.fetch_add(1, Ordering::Relaxed) + 1,
@@ -189,5 +341,58 @@ impl Exchange {
             name: name.to_owned(),
             message: message.chars().take(1000).collect(),
         }));
+    }
+}
+
+fn log(level: Level, name: &str, message: &str, untold: u64) {
+    let more = if untold > 0 { format!(" ({untold} more of these before)") } else { String::new() };
+    match level {
+        Level::Info => tracing::info!(name, "{message}{more}"),
+        Level::Warning => tracing::warn!(name, "{message}{more}"),
+        Level::Error => tracing::error!(name, "{message}{more}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crossbeam_channel::bounded;
+
+    #[test]
+    fn a_flood_of_one_event_is_counted_and_leaves_room_for_others() {
+        let (outgoing, events) = bounded(OUTGOING);
+        let exchange = Exchange::new(Inbox::default(), 0, (outgoing, bounded(1).0));
+        for _ in 0..OUTGOING {
+            exchange.event(Level::Error, "step-refused", "again".to_owned());
+        }
+        exchange.event(Level::Info, "reset", "back".to_owned());
+        let names: Vec<String> = events
+            .try_iter()
+            .filter_map(|o| match o {
+                Outgoing::Event(event) => Some(event.name),
+                Outgoing::Plan(_) => None,
+            })
+            .collect();
+        assert_eq!(names.last().map(String::as_str), Some("reset"));
+        let refused = names.iter().filter(|name| *name == "step-refused").count() as u64;
+        // A machine that stalls for a second may let a second handful through.
+        assert!(refused <= 4 * EVENTS_PER_NAME, "{refused}");
+        let dropped: Vec<_> = exchange.losses().collect();
+        assert_eq!(dropped, [("events-dropped", OUTGOING as u64 - refused)]);
+    }
+
+    #[test]
+    fn only_an_order_that_waited_breaks_off_a_step() {
+        let exchange = Exchange::new(Inbox::default(), 0, (bounded(1).0, bounded(1).0));
+        let flag = exchange.break_off_flag().clone();
+        exchange.break_off_after(Duration::ZERO);
+        assert!(!flag.load(Ordering::Relaxed));
+        exchange.order_given();
+        exchange.break_off_after(Duration::from_secs(3600));
+        assert!(!flag.load(Ordering::Relaxed));
+        exchange.break_off_after(Duration::ZERO);
+        assert!(flag.load(Ordering::Relaxed));
+        exchange.orders_taken();
+        assert!(!flag.load(Ordering::Relaxed));
     }
 }

@@ -4,11 +4,12 @@
 //! * [`cli`], [`command`], [`progress`]: what the user asked for, and how it goes.
 //! * [`session`]: the two zenoh sessions, haptic and bulk.
 //! * [`convert`]: between the types of the world and the messages of the wire.
-//! * [`receive`] → [`inbox`], [`early`]: poses and cuts of clients; who holds which tool.
+//! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
+//! * [`orders`]: who may pause, reset and change the simulation.
 //! * [`exchange`]: what the threads share.
 //! * [`engine`], [`sim`]: the simulation thread.
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
-//! * [`publish`], [`stats`]: the publication thread.
+//! * [`publish`], [`keyframes`], [`stats`]: the publication thread, and those that answer late joiners.
 //! * [`rpc`]: questions and orders.
 //! * [`server`]: starts and ends all of these.
 //!
@@ -18,6 +19,7 @@
 //! | `contact` | local contact model per held tool | its period; sleeps while nobody holds a tool |
 //! | `publish` | surfaces, tools, answers, events, statistics | its period, or something to send |
 //! | `rpc` | one question after the other | the simulation, at most 1.7 s |
+//! | `watchdog` | breaks off steps that keep orders waiting; ends a process that does not end | its period |
 //! | zenoh's own | decode, check, store in the inbox | nothing |
 
 mod say;
@@ -32,11 +34,11 @@ pub mod error;
 
 pub mod session;
 
+pub mod orders;
+
 pub mod convert;
 
 pub mod inbox;
-
-pub mod early;
 
 pub mod receive;
 
@@ -48,10 +50,16 @@ pub mod sim;
 
 pub mod contact;
 
+pub mod on_demand;
+
 pub mod publish;
+
+pub mod keyframes;
 
 pub mod stats;
 
 pub mod rpc;
+
+pub mod watchdog;
 
 pub mod server;

@@ -1,9 +1,19 @@
-//! Progress of long work: a bar on a terminal, a few lines elsewhere, nothing with `--json`.
+//! How long work goes on: a bar on a terminal, a few lines elsewhere, nothing with `--json`.
 
 use std::cell::Cell;
 use std::io::IsTerminal as _;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use scindo_world::mesh_in::Meshing;
+use scindo_world::quantity::{digits, duration, memory};
+
+/// Where there is no terminal a line is written this often.
+const EVERY: Duration = Duration::from_secs(3);
+
+/// Meshes that take less than this [s] are not announced.
+const WORTH_A_WORD_S: f64 = 2.0;
 
 /// See the module.
 pub struct Progress {
@@ -38,6 +48,74 @@ impl Progress {
         if !self.quiet && tenths > self.told.get() {
             self.told.set(tenths);
             eprintln!("{done}/{} {}", self.total, self.what);
+        }
+    }
+
+    /// The work ended.
+    pub fn end(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Work that tells the share of it that is done, from any thread: meshing, a forecast.
+pub struct Share {
+    bar: Option<ProgressBar>,
+    quiet: bool,
+    /// When the last line was written, and whether the work was announced.
+    told: Mutex<(Instant, bool)>,
+}
+
+impl Share {
+    /// Nothing is shown before the first word about it.
+    pub fn begin(json: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = (terminal && !json).then(|| {
+            let style = ProgressStyle::with_template("{bar:40} {percent:>3} % {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
+            ProgressBar::new(1000).with_style(style)
+        });
+        Self { bar, quiet: json, told: Mutex::new((Instant::now(), false)) }
+    }
+
+    /// A mesh has come so far.
+    pub fn meshing(&self, at: Meshing) {
+        let expected = &at.estimate;
+        let worth_a_word = expected.seconds > WORTH_A_WORD_S && !self.quiet;
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if worth_a_word && !std::mem::replace(&mut told.1, true) {
+            let text = format!(
+                "meshing at {} cells: about {} tetrahedra, {} and {} on this machine",
+                expected.cells,
+                if expected.tets >= 1e6 {
+                    format!("{} million", digits(1e-6 * expected.tets))
+                } else {
+                    format!("{:.0} thousand", 1e-3 * expected.tets)
+                },
+                memory(expected.bytes),
+                duration(expected.seconds)
+            );
+            match &self.bar {
+                Some(bar) => bar.println(text),
+                None => eprintln!("{text}"),
+            }
+        }
+        drop(told);
+        self.at(at.done, at.stage);
+    }
+
+    /// So much of the work `what` is done, 0 to 1.
+    pub fn at(&self, done: f64, what: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_position((1e3 * done) as u64);
+            bar.set_message(what.to_owned());
+            return;
+        }
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if !self.quiet && told.0.elapsed() > EVERY {
+            told.0 = Instant::now();
+            eprintln!("{:.0} % {what}", 100.0 * done);
         }
     }
 

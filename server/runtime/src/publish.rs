@@ -1,35 +1,32 @@
 //! The publication thread: surfaces and tool states of the newest snapshot at each topic's rate,
 //! keyframes on query, answers, events, the plan, statistics. The simulation never waits for it.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use crossbeam_channel::Receiver;
+use bytes::Bytes;
+use crossbeam_channel::{Receiver, select};
 use scindo_proto::messages::{
-    BodyStats, Counter, CutAck, Event, Plan, StageTime, Stats, SurfaceFrame, SurfaceKeyframe,
-    SurfaceTopology, ToolState, ToolStats,
+    CutAck, Event, Plan, StageTime, Stats, SurfaceFrame, SurfaceKeyframe, SurfaceTopology, ToolState,
 };
 use scindo_proto::{Chunk, KeySpace, Topic, WireMessage, encode, encoding};
-use scindo_world::snapshot::{Snapshot, ToolSnapshot};
+use scindo_world::snapshot::{BodySnapshot, Snapshot, ToolSnapshot};
 use scindo_world::tool::SCRIPT;
 use triple_buffer::Output;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority, Reliability};
-use zenoh::query::{Query, Queryable};
+use zenoh::query::Queryable;
 use zenoh::{Session, Wait as _};
 
-use crate::convert::{to_frame, to_tool_state, to_topology, unix_ns};
+use crate::convert::{ProbeName, to_frame, to_tool_state, to_topology, unix_ns};
 use crate::error::{RuntimeError, words};
 use crate::exchange::{Exchange, OUTGOING, Outgoing};
+use crate::keyframes::Keyframes;
+use crate::on_demand::OnDemand;
 use crate::session::Sessions;
-
-/// Keyframe queries that may wait for a snapshot.
-pub const WAITING_KEYFRAMES: usize = 64;
-
-/// A client waits two seconds for a keyframe; afterwards it asks again.
-const KEYFRAME_PATIENCE: Duration = Duration::from_millis(1900);
+use crate::stats::{Told, body_stats};
 
 /// The thread looks for keyframe queries and its end at least this often.
 const LOOK: Duration = Duration::from_millis(20);
@@ -43,16 +40,6 @@ const PLAN_PERIOD: Duration = Duration::from_secs(2);
 /// Tools are told this often when no new snapshot comes: who joins a paused simulation sees them too. Surfaces
 /// are told once more: the last frame before may have been dropped on its way.
 const STILL_PERIOD: Duration = Duration::from_millis(500);
-
-/// A query for the keyframe of body `body`.
-pub struct KeyframeQuery {
-    /// Index of the body.
-    pub body: usize,
-    /// Where the answer goes.
-    pub query: Query,
-    /// When it came.
-    pub since: Instant,
-}
 
 /// Publishers of one body.
 struct BodyChannel {
@@ -68,16 +55,18 @@ struct BodyChannel {
 pub struct Sources {
     /// Newest state.
     pub snapshots: Output<Snapshot>,
-    /// Answers and events.
+    /// Events and plans.
     pub outgoing: Receiver<Outgoing>,
-    /// Keyframe queries, and where zenoh puts them.
-    pub keyframes: (crossbeam_channel::Sender<KeyframeQuery>, Receiver<KeyframeQuery>),
+    /// Answers to cuts.
+    pub answers: Receiver<CutAck>,
 }
 
 /// What is published, and how often.
 pub struct Published {
     /// Ids of the bodies in the order of the scene.
     pub bodies: Vec<String>,
+    /// Probes in the order of the scene.
+    pub probes: Vec<ProbeName>,
     /// Simulated time per step [s].
     pub step_s: f64,
     /// The plan at the start.
@@ -98,6 +87,7 @@ pub struct PublishThread {
     haptic: Session,
     bodies: Vec<BodyChannel>,
     tools: BTreeMap<Arc<str>, Publisher<'static>>,
+    on_demand: OnDemand,
     stats: Publisher<'static>,
     events: Publisher<'static>,
     plan: Publisher<'static>,
@@ -106,7 +96,7 @@ pub struct PublishThread {
     fresh: bool,
     /// The newest snapshot's surfaces were told only once.
     told_once: bool,
-    keyframes: VecDeque<KeyframeQuery>,
+    keyframes: Keyframes,
     tool_states: u64,
     reports: u64,
     pose_counts: BTreeMap<Arc<str>, u64>,
@@ -129,7 +119,8 @@ impl PublishThread {
             declare(bulk, keys.key(&topic), encoding, Priority::Background, CongestionControl::Drop)
         };
         let bodies = what.bodies.iter().enumerate();
-        let bodies = bodies.map(|(index, id)| body_channel(keys, bulk, exchange, &sources, (index, id)));
+        let keyframes = Keyframes::start()?;
+        let bodies = bodies.map(|(index, id)| body_channel(keys, bulk, exchange, &keyframes, (index, id)));
         Ok(Self {
             keys: keys.clone(),
             exchange: exchange.clone(),
@@ -140,13 +131,14 @@ impl PublishThread {
             haptic: sessions.haptic.clone(),
             bodies: bodies.collect::<Result<_, _>>()?,
             tools: BTreeMap::new(),
+            on_demand: OnDemand::declare(keys, bulk, exchange, &what.bodies, what.probes)?,
             stats: report(Topic::Stats, encoding::<Stats>())?,
             events: report(Topic::Event, encoding::<Event>())?,
             plan: report(Topic::Plan, encoding::<Plan>())?,
             newest_plan: what.plan,
             fresh: false,
             told_once: false,
-            keyframes: VecDeque::new(),
+            keyframes,
             tool_states: 0,
             reports: 0,
             pose_counts: BTreeMap::new(),
@@ -157,10 +149,10 @@ impl PublishThread {
         })
     }
 
-    /// Publishes until the server ends.
+    /// Publishes until the server ends: what the simulation says last is sent, too.
     pub fn run(mut self) {
         let mut next_frame = Instant::now();
-        while !self.exchange.stopping() {
+        while !(self.exchange.stopping() && self.exchange.simulated()) {
             self.send_until(next_frame.min(Instant::now() + LOOK));
             self.fresh |= self.sources.snapshots.update();
             if Instant::now() >= next_frame {
@@ -177,9 +169,17 @@ impl PublishThread {
     /// Answers and events, as they come, until `deadline`.
     fn send_until(&mut self, deadline: Instant) {
         for _ in 0..OUTGOING {
-            match self.sources.outgoing.recv_deadline(deadline) {
-                Ok(outgoing) => self.send_out(outgoing),
-                Err(_) => return,
+            let left = deadline.saturating_duration_since(Instant::now());
+            select! {
+                recv(self.sources.answers) -> answer => {
+                    let Ok(answer) = answer else { return };
+                    self.send_ack(&answer);
+                }
+                recv(self.sources.outgoing) -> outgoing => {
+                    let Ok(outgoing) = outgoing else { return };
+                    self.send_out(outgoing);
+                }
+                default(left) => return,
             }
         }
     }
@@ -199,7 +199,6 @@ impl PublishThread {
 
     fn send_out(&mut self, outgoing: Outgoing) {
         match outgoing {
-            Outgoing::Ack(answer) => self.send_ack(&answer),
             Outgoing::Event(event) => put(&self.events, &event),
             Outgoing::Plan(plan) => {
                 self.newest_plan = plan;
@@ -208,6 +207,8 @@ impl PublishThread {
         }
     }
 
+    /// To a client that does not read it is lost: nobody else waits for that. The client repeats its cut.
+    /// Answers to many cuts of one moment share a batch: as express messages most of them would be dropped.
     fn send_ack(&self, answer: &CutAck) {
         let Ok(tool) = Chunk::new("tool id", &answer.tool_id) else { return };
         let sent = self
@@ -215,8 +216,7 @@ impl PublishThread {
             .put(self.keys.key(&Topic::ToolCutAck(tool)), encode(answer))
             .encoding(encoding::<CutAck>())
             .priority(Priority::InteractiveHigh)
-            .express(true)
-            .congestion_control(CongestionControl::Block)
+            .congestion_control(CongestionControl::Drop)
             .wait();
         if let Err(error) = sent {
             tracing::warn!(%error, "answer to a cut not sent");
@@ -237,6 +237,7 @@ impl PublishThread {
             channel.frames += 1;
             put(&channel.frame, &to_frame(snapshot, body, channel.frames));
         }
+        self.on_demand.publish(snapshot);
     }
 
     /// The snapshot may hold tools that a client has put away since: of those nothing is said.
@@ -270,36 +271,15 @@ impl PublishThread {
         self.tools.retain(|id, _| snapshot.tools.iter().any(|tool| tool.id == *id));
     }
 
-    fn collect_keyframe_queries(&mut self) {
-        while let Ok(query) = self.sources.keyframes.1.try_recv() {
-            self.keyframes.push_back(query);
-        }
-        self.keyframes.retain(|waiting| waiting.since.elapsed() < KEYFRAME_PATIENCE);
-    }
-
     /// Answers those whose body is in the snapshot; the others wait for the next one.
     fn answer_keyframe_queries(&mut self) {
-        self.collect_keyframe_queries();
-        let snapshot = self.sources.snapshots.output_buffer();
-        let bodies = &self.bodies;
-        self.keyframes.retain(|KeyframeQuery { body: index, query, .. }| {
-            let (Some(body), Some(channel)) = (snapshot.bodies.get(*index), bodies.get(*index)) else {
-                return true;
-            };
-            if body.positions.len() != body.topology.vertex_count as usize || body.positions.is_empty() {
-                return true;
-            }
-            let keyframe = SurfaceKeyframe {
-                topology: Some(to_topology(snapshot, body, channel.topologies)),
-                frame: Some(to_frame(snapshot, body, channel.frames)),
-            };
-            let answer = query.reply(query.key_expr().clone(), encode(&keyframe));
-            if let Err(error) = answer.encoding(encoding::<SurfaceKeyframe>()).wait() {
-                tracing::debug!(%error, "keyframe not sent");
-            }
-            false
+        let Self { sources, bodies, keyframes, .. } = self;
+        let snapshot = sources.snapshots.output_buffer();
+        let wanted = keyframes.answer(|index| {
+            let (body, channel) = (snapshot.bodies.get(index)?, bodies.get(index)?);
+            keyframe(snapshot, body, channel)
         });
-        if self.keyframes.is_empty() && self.sources.keyframes.1.is_empty() {
+        if !wanted {
             self.exchange.want_keyframe(false);
         }
     }
@@ -316,19 +296,8 @@ impl PublishThread {
     fn gather_stats(&mut self) -> Stats {
         self.reports += 1;
         let rates = self.exchange.meter.read();
+        let told = Told::by(&self.exchange, &mut self.pose_counts, rates.seconds);
         let snapshot = self.sources.snapshots.output_buffer();
-        let inbox = self.exchange.inbox();
-        let mut pose_hz = BTreeMap::new();
-        for (tool, count) in inbox.pose_counts() {
-            let before = self.pose_counts.insert(tool.clone(), count).unwrap_or(0);
-            pose_hz.insert(tool.clone(), count.saturating_sub(before) as f64 / rates.seconds);
-        }
-        self.pose_counts.retain(|tool, _| pose_hz.contains_key(tool));
-        let refused = inbox.refused().iter();
-        let stages = rates.stages_ms.iter();
-        let bodies = snapshot.bodies.iter();
-        let tools = snapshot.tools.iter();
-        let rate = |rates: &BTreeMap<Arc<str>, f64>, id| rates.get(id).copied().unwrap_or(0.0) as f32;
         Stats {
             seq: self.reports,
             sim_step: snapshot.step,
@@ -336,35 +305,18 @@ impl PublishThread {
             publish_unix_ns: unix_ns(),
             step_rate_hz: rates.step_hz as f32,
             real_time_factor: (rates.step_hz * self.step_s) as f32,
-            stages: stages
+            stages: rates
+                .stages_ms
+                .iter()
                 .map(|&(name, ms)| StageTime { name: name.to_owned(), milliseconds: ms as f32 })
                 .collect(),
-            bodies: bodies
-                .map(|body| BodyStats {
-                    body_id: body.id.to_string(),
-                    iterations: body.iterations,
-                    residual: body.residual as f32,
-                    elements: body.elements,
-                    pieces: body.pieces,
-                    copies: body.copies,
-                    epoch: body.epoch,
-                    volume_m3: body.rest_volume_m3,
-                })
-                .collect(),
-            tools: tools
-                .map(|tool| ToolStats {
-                    tool_id: tool.id.to_string(),
-                    owner: tool.owner.to_string(),
-                    contact_rate_hz: rate(&rates.contact_hz, &tool.id),
-                    pose_rate_hz: rate(&pose_hz, &tool.id),
-                    force_n: tool.force_n.norm() as f32,
-                })
-                .collect(),
-            refused: refused.map(|(&name, &count)| Counter { name: name.to_owned(), count }).collect(),
-            cuts_applied: inbox.cuts_applied(),
+            bodies: snapshot.bodies.iter().map(body_stats).collect(),
+            tools: snapshot.tools.iter().map(|tool| told.tool_stats(tool, &rates)).collect(),
+            refused: told.refused(&self.exchange),
+            cuts_applied: told.cuts_applied,
             surface_subscribers: (0..self.bodies.len()).filter(|&i| self.exchange.surface_wanted(i)).count()
                 as u32,
-            haptic_clients: inbox.held().count() as u32,
+            haptic_clients: told.held,
             paused: self.exchange.paused.load(Ordering::Relaxed),
         }
     }
@@ -377,6 +329,17 @@ impl PublishThread {
     }
 }
 
+/// The whole surface of a body, if the snapshot has it.
+fn keyframe(snapshot: &Snapshot, body: &BodySnapshot, channel: &BodyChannel) -> Option<Bytes> {
+    if body.positions.len() != body.topology.vertex_count as usize || body.positions.is_empty() {
+        return None;
+    }
+    Some(encode(&SurfaceKeyframe {
+        topology: Some(to_topology(snapshot, body, channel.topologies)),
+        frame: Some(to_frame(snapshot, body, channel.frames)),
+    }))
+}
+
 fn period(rate_hz: f64) -> Duration {
     Duration::try_from_secs_f64(1.0 / rate_hz).unwrap_or(LONGEST_PERIOD).min(LONGEST_PERIOD)
 }
@@ -385,7 +348,7 @@ fn body_channel(
     keys: &KeySpace,
     bulk: &Session,
     exchange: &Arc<Exchange>,
-    sources: &Sources,
+    keyframes: &Keyframes,
     (index, id): (usize, &str),
 ) -> Result<BodyChannel, RuntimeError> {
     let id = Chunk::new("body id", id)?;
@@ -400,7 +363,10 @@ fn body_channel(
         .map_err(failed)?;
     let topology_encoding = encoding::<SurfaceTopology>();
     let topology_key = key(Topic::SurfaceTopology);
-    let topology = declare(bulk, topology_key, topology_encoding, Priority::Data, CongestionControl::Block)?;
+    // Never `Block`: this thread serves everybody. A client that misses a topology asks for the keyframe, whose
+    // answer has priority `Data`.
+    let topology =
+        declare(bulk, topology_key, topology_encoding, Priority::DataHigh, CongestionControl::Drop)?;
     let watcher = exchange.clone();
     frame
         .matching_listener()
@@ -408,14 +374,9 @@ fn body_channel(
         .background()
         .wait()
         .map_err(failed)?;
-    let (waiting, exchange) = (sources.keyframes.0.clone(), exchange.clone());
     let keyframe = bulk
         .declare_queryable(key(Topic::SurfaceKeyframe))
-        .callback(move |query| {
-            // A full queue drops the query: its client asks again.
-            let _ = waiting.try_send(KeyframeQuery { body: index, query, since: Instant::now() });
-            exchange.want_keyframe(true);
-        })
+        .callback(keyframes.entrance(exchange, index))
         .wait()
         .map_err(failed)?;
     Ok(BodyChannel { frame, topology, frames: 0, topologies: 0, sent_epoch: None, _keyframe: keyframe })

@@ -1,6 +1,7 @@
 //! From zenoh into the inbox. Runs on zenoh's receiving threads: decode, check, store, return.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use bytes::Bytes;
 use scindo_proto::messages::{CutCommand, DeviceCapability, ToolSample};
@@ -12,7 +13,7 @@ use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait as _};
 
 use crate::error::{RuntimeError, words};
-use crate::exchange::{Exchange, Outgoing};
+use crate::exchange::Exchange;
 use crate::inbox::{Change, Cut};
 
 /// Subscriptions of the server; dropping them ends the input.
@@ -66,8 +67,8 @@ fn with(
 fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     let Ok(Topic::Live(_, client)) = keys.parse(sample.key_expr().as_str()) else { return };
     let changes = match sample.kind() {
-        SampleKind::Put => exchange.inbox().client_came(client.as_str()),
-        SampleKind::Delete => exchange.inbox().client_went(client.as_str()),
+        SampleKind::Put => exchange.inbox().client_came(client.as_str(), Instant::now()),
+        SampleKind::Delete => exchange.inbox().client_went(client.as_str(), Instant::now()),
     };
     changes.into_iter().for_each(|change| announce(exchange, change));
 }
@@ -78,7 +79,7 @@ fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     };
     match decode::<ToolSample>(sample) {
         Ok(pose) => {
-            let outcome = exchange.inbox().pose(tool.as_str(), &pose);
+            let outcome = exchange.inbox().pose(tool.as_str(), &pose, Instant::now());
             match outcome {
                 Ok(None) => {}
                 Ok(Some(change)) => announce(exchange, change),
@@ -97,7 +98,7 @@ fn on_cut(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
         Ok(command) => {
             let outcome = exchange.inbox().cut(tool.as_str(), &command);
             if let Cut::Answer(answer) = outcome {
-                exchange.send(Outgoing::Ack(answer));
+                exchange.answer(answer);
             }
         }
         Err(error) => refuse(exchange, error.code(), &error.to_string()),

@@ -7,7 +7,8 @@ use bytes::Bytes;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use prost::Message as _;
 use scindo_proto::messages::{
-    Error, PauseRequest, ResetRequest, RpcReply, SchemaReply, SessionInfo, SetRequest, StepRequest,
+    Error, PauseRequest, ResetRequest, RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest,
+    StepRequest, UndoRequest,
 };
 use scindo_proto::{FILE_DESCRIPTOR_SET, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
 use zenoh::Wait as _;
@@ -37,6 +38,8 @@ pub struct RpcThread {
     pub commands: Sender<Command>,
     /// What does not change of the answer to `info`.
     pub info: SessionInfo,
+    /// Whether anybody may give orders.
+    pub takes_orders: bool,
 }
 
 impl RpcThread {
@@ -56,8 +59,14 @@ impl RpcThread {
             return refuse(query, error("bad-key", "rpc/* takes one verb".into(), "ask rpc/<verb>"));
         };
         let payload = query.payload().map(|p| Bytes::from(p.to_bytes().into_owned())).unwrap_or_default();
+        if verb.is_order() && !self.takes_orders {
+            let message = format!("rpc/{} is an order, and nobody may give orders here", verb.as_str());
+            return refuse(query, error("not-an-operator", message, "start the server with --operators"));
+        }
         match verb {
             Verb::Info => reply(query, &self.info_now()),
+            Verb::Params => reply(query, &self.exchange.params()),
+            Verb::Scenes => reply(query, &ScenesReply::default()),
             Verb::Schema => {
                 let file_descriptor_set = Bytes::from_static(FILE_DESCRIPTOR_SET);
                 reply(query, &SchemaReply { file_descriptor_set });
@@ -66,7 +75,7 @@ impl RpcThread {
                 let message = format!("rpc/{} is not supported yet", verb.as_str());
                 refuse(query, error("not-supported", message, "start a server with the scene instead"));
             }
-            Verb::Pause | Verb::Step | Verb::Reset | Verb::Set => match order(verb, payload) {
+            Verb::Pause | Verb::Step | Verb::Reset | Verb::Undo | Verb::Set => match order(verb, payload) {
                 Ok(order) => reply(query, &self.carry_out(order)),
                 Err(error) => refuse(query, error),
             },
@@ -97,6 +106,7 @@ impl RpcThread {
 
     fn carry_out(&self, order: Order) -> RpcReply {
         let (answer, answers) = bounded(1);
+        self.exchange.order_given();
         if self.commands.try_send(Command { order, answer }).is_err() {
             let error = error("busy", "the simulation has too many orders waiting".into(), "ask again later");
             return RpcReply { error: Some(error), ..RpcReply::default() };
@@ -115,6 +125,10 @@ fn order(verb: Verb, payload: Bytes) -> Result<Order, Error> {
     Ok(match verb {
         Verb::Pause => Order::Pause(decode::<PauseRequest>(payload).map_err(read)?.paused),
         Verb::Step => Order::Step(decode::<StepRequest>(payload).map_err(read)?.count),
+        Verb::Undo => {
+            decode::<UndoRequest>(payload).map_err(read)?;
+            Order::Undo
+        }
         Verb::Set => {
             let SetRequest { key, value } = decode(payload).map_err(read)?;
             Order::Set { key, value }

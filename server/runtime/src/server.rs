@@ -7,21 +7,24 @@ use std::thread::JoinHandle;
 use crossbeam_channel::bounded;
 use scindo_proto::messages::SessionInfo;
 use scindo_proto::{Chunk, KeySpace, Role, Topic};
+use scindo_world::probe::Probe;
 use scindo_world::snapshot::Snapshot;
 use triple_buffer::{Output, triple_buffer};
 use zenoh::Wait as _;
 use zenoh::query::Queryable;
 
 use crate::contact::{ContactConfig, ContactThread};
+use crate::convert::ProbeName;
 use crate::engine::Engine;
 use crate::error::{RuntimeError, words};
-use crate::exchange::{Exchange, OUTGOING};
+use crate::exchange::{ANSWERS, Exchange, OUTGOING};
 use crate::inbox::Inbox;
-use crate::publish::{PublishThread, Published, Sources, WAITING_KEYFRAMES};
+use crate::publish::{PublishThread, Published, Sources};
 use crate::receive::Receivers;
 use crate::rpc::{self, RpcThread};
 use crate::session::Sessions;
 use crate::sim::{Command, Pace, SimThread};
+use crate::watchdog;
 
 /// Orders that may wait for the simulation thread.
 const WAITING_ORDERS: usize = 16;
@@ -41,6 +44,10 @@ pub struct ServerConfig {
     pub contact_hz: f64,
     /// Statistics per second.
     pub stats_hz: f64,
+    /// Whether orders are taken at all; who may send them is settled where the sessions are opened.
+    pub takes_orders: bool,
+    /// What to do, with the reason, when the threads do not end after they were told to: a program ends itself.
+    pub give_up: fn(&str),
 }
 
 impl Default for ServerConfig {
@@ -52,6 +59,8 @@ impl Default for ServerConfig {
             surface_hz: 60.0,
             contact_hz: 500.0,
             stats_hz: 5.0,
+            takes_orders: true,
+            give_up: |reason| tracing::error!("{reason}"),
         }
     }
 }
@@ -61,6 +70,7 @@ pub struct Server {
     exchange: Arc<Exchange>,
     sim: JoinHandle<Engine>,
     others: Vec<JoinHandle<()>>,
+    watchdog: JoinHandle<()>,
     network: Option<Network>,
 }
 
@@ -81,7 +91,8 @@ impl Server {
         let keys = KeySpace::new(&config.realm, &config.session)?;
         let (info, plan) = (engine.info(), engine.plan());
         let (outgoing, outgoing_rx) = bounded(OUTGOING);
-        let exchange = Exchange::new(inbox(&info), info.bodies.len(), outgoing);
+        let (answers, answers_rx) = bounded(ANSWERS);
+        let exchange = Exchange::new(inbox(&info), info.bodies.len(), (outgoing, answers));
         let (to_publish, published) = triple_buffer(&Snapshot::default());
         let (to_contact, contact) = triple_buffer(&Snapshot::default());
         let (commands, commands_rx) = bounded::<Command>(WAITING_ORDERS);
@@ -89,14 +100,11 @@ impl Server {
         let mut network = None;
         if let Some(sessions) = sessions {
             let contact = contact_thread(&keys, &sessions, &exchange, contact, (&engine, config.contact_hz));
-            let sources = Sources {
-                snapshots: published,
-                outgoing: outgoing_rx,
-                keyframes: bounded(WAITING_KEYFRAMES),
-            };
+            let sources = Sources { snapshots: published, outgoing: outgoing_rx, answers: answers_rx };
             let ids: Vec<String> = info.bodies.iter().map(|body| body.id.clone()).collect();
             let what = Published {
                 bodies: ids,
+                probes: probe_names(&engine),
                 step_s: info.step_s,
                 plan,
                 rates: (config.surface_hz, config.stats_hz),
@@ -104,8 +112,15 @@ impl Server {
             let publish = PublishThread::declare(&keys, &sessions, &exchange, sources, what)?;
             others.push(spawn("publish", move || publish.run())?);
             let (queries, rpc) = declare_rpc(&keys, &sessions)?;
-            let rpc_thread =
-                RpcThread { keys: keys.clone(), exchange: exchange.clone(), queries, commands, info };
+            let takes_orders = config.takes_orders;
+            let rpc_thread = RpcThread {
+                keys: keys.clone(),
+                exchange: exchange.clone(),
+                queries,
+                commands,
+                info,
+                takes_orders,
+            };
             others.push(spawn("rpc", move || rpc_thread.run())?);
             others.push(spawn("contact", move || contact.run())?);
             let server = Chunk::new("server id", &format!("server-{}", std::process::id()))?;
@@ -116,7 +131,9 @@ impl Server {
         let sim =
             SimThread::new(engine, exchange.clone(), commands_rx, (to_publish, to_contact), config.pace);
         let sim = spawn("sim", move || sim.run())?;
-        Ok(Self { exchange, sim, others, network })
+        let (watched, give_up) = (exchange.clone(), config.give_up);
+        let watchdog = spawn("watchdog", move || watchdog::run(&watched, give_up))?;
+        Ok(Self { exchange, sim, others, watchdog, network })
     }
 
     /// Shared state, for progress and tests.
@@ -145,7 +162,10 @@ impl Server {
         self.exchange.stop();
         for thread in self.others {
             let name = thread.thread().name().unwrap_or("?").to_owned();
-            thread.join().map_err(|_| RuntimeError::Died { thread: name })?;
+            thread
+                .join()
+                .map_err(|_| RuntimeError::Died { thread: name })
+                .inspect_err(|_| self.exchange.close())?;
         }
         if let Some(Network { _receivers: receivers, _rpc: rpc, sessions }) = self.network {
             drop((receivers, rpc));
@@ -155,8 +175,21 @@ impl Server {
                 }
             }
         }
+        self.exchange.close();
+        // It has nothing to say any more.
+        let _ = self.watchdog.join();
         engine.map_err(|_| RuntimeError::Died { thread: "sim".to_owned() })
     }
+}
+
+fn probe_names(engine: &Engine) -> Vec<ProbeName> {
+    let bodies = engine.simulation().bodies();
+    let name = |probe: &Probe| ProbeName {
+        id: probe.id.clone(),
+        body: bodies[probe.body].id.to_string(),
+        rest_m: probe.rest_m,
+    };
+    engine.simulation().probes().iter().map(name).collect()
 }
 
 fn inbox(info: &SessionInfo) -> Inbox {

@@ -21,7 +21,31 @@ pub struct NetworkConfig {
     pub connect: Vec<String>,
     /// A zenoh configuration (JSON5) to start from: TLS, users, access control.
     pub zenoh_file: Option<PathBuf>,
+    /// zenoh's access control where the file has none of its own.
+    pub access_control: Option<serde_json::Value>,
+    /// Longest surface message that is relayed to clients of the haptic endpoint [bytes].
+    pub longest_surface: usize,
 }
+
+/// Largest message that a session of the server puts together from fragments [bytes]: orders, poses and cuts
+/// take at most [`scindo_proto::limits::MAX_CUT_BYTES`]. zenoh's own limit is a gigabyte per client, priority and
+/// reliability.
+const LONGEST_MESSAGE: usize = 256 * 1024;
+
+/// Surfaces grow where they are cut; what is longer than this many of the present ones is not relayed.
+const SURFACES_GROW: usize = 8;
+
+/// Limits that hold unless the zenoh file sets others.
+const LIMITS: [(&str, &str); 5] = [
+    // Silent connections hold the door for so long [ms], and so many of them.
+    ("transport/unicast/accept_timeout", "1000"),
+    ("transport/unicast/accept_pending", "256"),
+    ("transport/unicast/max_sessions", "256"),
+    // A message that must not be lost waits for a client that reads nothing for so long before its link is
+    // closed, and a frame for one that is slow for so long before it is dropped [µs].
+    ("transport/link/tx/queue/congestion_control/block/wait_before_close", "1000000"),
+    ("transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments", "20000"),
+];
 
 impl NetworkConfig {
     /// Settles where to listen: where it was said, else where the zenoh file says, else, without
@@ -69,9 +93,10 @@ impl Sessions {
         let bulk_listen: Vec<String> = network.listen.iter().filter_map(|e| bulk_endpoint(e)).collect();
         let relay: Vec<String> = network.listen.iter().filter_map(|e| local(e)).take(1).collect();
         let mode = if network.listen.is_empty() { "peer" } else { "router" };
-        let haptic = open(network, mode, &network.listen, &network.connect)?;
+        let relayed = LONGEST_MESSAGE.max(SURFACES_GROW * network.longest_surface);
+        let haptic = open(network, (mode, relayed), &network.listen, &network.connect)?;
         let bulk_connect = if relay.is_empty() { &network.connect } else { &relay };
-        let bulk = open(network, "peer", &bulk_listen, bulk_connect)?;
+        let bulk = open(network, ("peer", LONGEST_MESSAGE), &bulk_listen, bulk_connect)?;
         Ok(Self { haptic, bulk })
     }
 }
@@ -98,7 +123,7 @@ fn check(option: &'static str, endpoint: &str) -> Result<(), RuntimeError> {
 
 fn open(
     network: &NetworkConfig,
-    mode: &str,
+    (mode, longest_message): (&str, usize),
     listen: &[String],
     connect: &[String],
 ) -> Result<Session, RuntimeError> {
@@ -127,6 +152,10 @@ fn open(
             .map(|(key, value)| (key, value.to_owned())),
         );
     }
+    settings.extend(limits(&config, longest_message));
+    if let Some(rules) = network.access_control.as_ref().filter(|_| !controls_access(&config)) {
+        settings.push(("access_control", rules.to_string()));
+    }
     for (key, value) in settings {
         config.insert_json5(key, &value).map_err(invalid(format!("{key} = {value}")))?;
     }
@@ -138,6 +167,19 @@ fn open(
             RuntimeError::Listen { endpoints: listen.join(", "), reason }
         }
     })
+}
+
+/// Those of our limits that a configuration leaves as zenoh has them.
+fn limits(config: &zenoh::Config, longest_message: usize) -> Vec<(&'static str, String)> {
+    let plain = zenoh::Config::default();
+    let ours = LIMITS.map(|(key, value)| (key, value.to_owned()));
+    let all = ours.into_iter().chain([("transport/link/rx/max_message_size", longest_message.to_string())]);
+    all.filter(|(key, _)| config.get_json(key).ok() == plain.get_json(key).ok()).collect()
+}
+
+fn controls_access(config: &zenoh::Config) -> bool {
+    let enabled = config.get_json("access_control/enabled").unwrap_or_default();
+    enabled == "true"
 }
 
 fn list(endpoints: &[String]) -> String {
@@ -155,4 +197,23 @@ pub fn local(endpoint: &str) -> Option<String> {
         host => host,
     };
     Some(format!("tcp/{host}:{port}"))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_set_unless_the_file_sets_them() {
+        let mut config = zenoh::Config::default();
+        config.insert_json5("transport/unicast/max_sessions", "7").unwrap();
+        let set = limits(&config, 1000);
+        assert!(!set.iter().any(|(key, _)| key.ends_with("max_sessions")), "{set:?}");
+        assert_eq!(set.len(), LIMITS.len());
+        for (key, value) in set {
+            config.insert_json5(key, &value).unwrap();
+            assert_eq!(config.get_json(key).unwrap(), value);
+        }
+    }
 }

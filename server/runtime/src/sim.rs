@@ -14,7 +14,7 @@ use triple_buffer::Input;
 
 use crate::engine::Engine;
 use crate::exchange::{Exchange, Outgoing};
-use crate::inbox::Refusal;
+use crate::inbox::{Answering, Refusal};
 
 /// How often a simulation that holds still looks for new listeners.
 const STILL: Duration = Duration::from_millis(10);
@@ -37,6 +37,8 @@ pub enum Order {
     Step(u32),
     /// Back to the start.
     Reset,
+    /// Take the last cut back.
+    Undo,
     /// Change a parameter.
     Set {
         /// Key as in the scene.
@@ -91,6 +93,7 @@ impl SimThread {
         (to_publish, to_contact): (Input<Snapshot>, Input<Snapshot>),
         pace: Pace,
     ) -> Self {
+        exchange.set_params(engine.params());
         let body_ids = engine.info().bodies.into_iter().map(|body| body.id).collect();
         Self {
             body_ids,
@@ -112,6 +115,8 @@ impl SimThread {
 
     /// Steps until told to stop or done; gives the engine back for its results.
     pub fn run(mut self) -> Engine {
+        let _ended = Ended(self.exchange.clone());
+        self.engine.set_stop_flag(self.exchange.break_off_flag());
         self.hand_over();
         while !self.exchange.stopping() && !self.done() {
             self.obey();
@@ -125,6 +130,7 @@ impl SimThread {
             self.report();
             self.keep_pace();
         }
+        self.discard_cuts("the server ends");
         self.engine
     }
 
@@ -150,12 +156,14 @@ impl SimThread {
     }
 
     fn obey(&mut self) {
+        self.exchange.orders_taken();
         while let Ok(command) = self.commands.try_recv() {
             self.carry_out(command);
         }
     }
 
     fn carry_out(&mut self, Command { order, answer }: Command) {
+        self.exchange.orders_taken();
         let reply = match order {
             Order::Pause(paused) => {
                 self.exchange.paused.store(paused, Ordering::Relaxed);
@@ -173,6 +181,7 @@ impl SimThread {
                 })
             }
             Order::Reset => self.reset(),
+            Order::Undo => self.undo(),
             Order::Set { key, value } => self.set(&key, &value),
         };
         // Who asked may have given up waiting.
@@ -180,6 +189,7 @@ impl SimThread {
     }
 
     fn reset(&mut self) -> Result<String, Refusal> {
+        self.discard_cuts("the scene was reset before the cut was made");
         self.engine.reset().map_err(|message| Refusal {
             code: "cannot-reset",
             message,
@@ -191,12 +201,44 @@ impl SimThread {
         Ok("at the start".to_owned())
     }
 
+    /// Answers the cuts that wait, here and in the simulation: they will not be made.
+    fn discard_cuts(&mut self, reason: &str) {
+        let (step, epochs) = (self.step, self.epochs());
+        let hint = "send it again with a new number";
+        let with = Answering { step, epochs: &epochs, code: "cut-discarded", hint };
+        let begun = self.engine.discard_cuts(reason);
+        let mut inbox = self.exchange.inbox();
+        let mut answers = inbox.finish(&begun, &with);
+        answers.extend(inbox.discard(reason, &with));
+        drop(inbox);
+        answers.into_iter().for_each(|answer| self.exchange.answer(answer));
+    }
+
+    fn epochs(&self) -> Vec<BodyEpoch> {
+        let bodies = self.body_ids.iter().enumerate();
+        bodies.map(|(i, id)| BodyEpoch { body_id: id.clone(), epoch: self.exchange.epoch(i) }).collect()
+    }
+
+    /// The log of cuts stays: one that was taken back is still a duplicate when it is sent again.
+    fn undo(&mut self) -> Result<String, Refusal> {
+        let message = self.engine.undo().map_err(|message| Refusal {
+            code: "cannot-undo",
+            message,
+            hint: "rpc/reset takes back every cut",
+        })?;
+        self.announce_plan();
+        self.exchange.event(Level::Info, "cut-undone", message.clone());
+        self.hand_over();
+        Ok(message)
+    }
+
     fn set(&mut self, key: &str, value: &str) -> Result<String, Refusal> {
         self.engine.set(key, value).map_err(|message| Refusal {
             code: "cannot-set",
             message,
-            hint: "keys and values are those of a scene file",
+            hint: "rpc/params lists the keys, their values and ranges",
         })?;
+        self.exchange.set_params(self.engine.params());
         self.announce_plan();
         self.exchange.event(Level::Info, "set", format!("{key} = {value}"));
         Ok(format!("{key} = {value}"))
@@ -227,6 +269,7 @@ impl SimThread {
         } else {
             self.recover();
         }
+        // Of a panicked step, too: a run that was asked for so many must end.
         self.step += 1;
         self.exchange.sim_step.store(self.step, Ordering::Relaxed);
         if let Some((count, answer)) = self.owed.take() {
@@ -240,6 +283,9 @@ impl SimThread {
 
     fn recover(&mut self) {
         self.panics += 1;
+        self.engine.count_panic();
+        self.exchange.step_panicked();
+        self.discard_cuts("a step panicked and the scene starts again");
         let reset = matches!(catch_unwind(AssertUnwindSafe(|| self.engine.reset())), Ok(Ok(())));
         let message = format!("step {} panicked; the scene starts again", self.step);
         self.exchange.event(Level::Error, "step-panicked", message);
@@ -265,10 +311,10 @@ impl SimThread {
         if report.cuts.is_empty() {
             return;
         }
-        let bodies = self.body_ids.iter().enumerate();
-        let epochs: Vec<BodyEpoch> =
-            bodies.map(|(i, id)| BodyEpoch { body_id: id.clone(), epoch: self.exchange.epoch(i) }).collect();
-        let answers = self.exchange.inbox().finish(&report.cuts, self.step, &epochs);
+        let epochs = self.epochs();
+        let hint = "change the sweep, or reset, and send it with a new number";
+        let with = Answering { step: self.step, epochs: &epochs, code: "cut-failed", hint };
+        let answers = self.exchange.inbox().finish(&report.cuts, &with);
         for answer in answers {
             let message = match &answer.error {
                 None => format!(
@@ -282,7 +328,7 @@ impl SimThread {
                 Some(_) => (Level::Warning, "cut-failed"),
             };
             self.exchange.event(level, name, message);
-            self.exchange.send(Outgoing::Ack(answer));
+            self.exchange.answer(answer);
         }
     }
 
@@ -324,5 +370,14 @@ impl SimThread {
                 }
             }
         }
+    }
+}
+
+/// Says that the simulation has ended, however it did.
+struct Ended(Arc<Exchange>);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        self.0.has_simulated();
     }
 }

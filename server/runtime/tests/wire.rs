@@ -254,7 +254,7 @@ async fn broken_messages_are_refused_and_counted_and_the_server_lives() {
     put(key(Topic::ToolPose), vec![0xff; 100].into(), pose.clone()).await;
     put(key(Topic::ToolPose), vec![0; 5000].into(), pose).await;
     let cut = encoding::<scindo_client::messages::CutCommand>();
-    put(key(Topic::ToolCut), vec![0; 2_000_000].into(), cut).await;
+    put(key(Topic::ToolCut), vec![0; 200_000].into(), cut).await;
     until("all are counted", || {
         ["non-finite", "bad-encoding", "malformed"].iter().all(|code| refused(&running, code) == 1)
             && refused(&running, "too-large") == 2

@@ -7,9 +7,11 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use scindo_study::axes::Factor;
+use scindo_study::recommend::percent;
 use scindo_study::{CaseResult, Settings, StudyResult};
 use serde_json::json;
 
+use super::study_progress::StudyProgress;
 use crate::cli::AccuracyArgs;
 use crate::error::RuntimeError;
 use crate::say::say;
@@ -23,26 +25,23 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<ExitCode, RuntimeError> {
         cases: args.cases.clone(),
         out: args.out.clone(),
         quick: args.quick,
+        within_s: args.within.map(|within| within.as_secs_f64()),
         budget_ms: args.budget_ms,
         seconds: args.seconds,
         only: narrowed(args),
         cells: args.cells.iter().map(|n| *n as usize).collect(),
         stop,
     };
-    let bar = bar(args.json);
-    let study = scindo_study::run(&settings, &mut |progress| {
-        bar.set_length(progress.total as u64);
-        bar.set_position(progress.done as u64);
-        let left = progress.left_s.map_or(String::new(), |s| format!("{} left · ", minutes(s)));
-        bar.set_message(format!("{left}{}: {}", progress.case, progress.what));
-    })?;
-    bar.finish_and_clear();
+    let progress = StudyProgress::begin();
+    let study = scindo_study::run(&settings, &mut |now| progress.show(now))?;
+    progress.end();
+    drop(progress);
     if args.json {
         say!("{}", as_json(args, &study));
     } else {
         print(args, &study);
     }
-    Ok(if study.interrupted { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    Ok(if study.interrupted || !study.has_results() { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
 fn check(args: &AccuracyArgs) -> Result<(), RuntimeError> {
@@ -110,11 +109,6 @@ pub(super) fn bar(json: bool) -> ProgressBar {
     bar
 }
 
-fn minutes(seconds: f64) -> String {
-    let seconds = seconds.ceil() as u64;
-    if seconds < 90 { format!("{seconds} s") } else { format!("{} min", seconds.div_ceil(60)) }
-}
-
 fn print(args: &AccuracyArgs, study: &StudyResult) {
     for result in &study.cases {
         print_case(result);
@@ -128,10 +122,22 @@ fn print(args: &AccuracyArgs, study: &StudyResult) {
 
 fn print_case(result: &CaseResult) {
     let counts = result.counts();
-    say!("{}: {} points, {} without a result", result.case.title, counts.points, counts.failures);
+    let left_out = match result.left_out {
+        0 => String::new(),
+        n => format!(", {n} left out (too slow for the budget, or no time left)"),
+    };
+    say!("{}: {} points, {} without a result{left_out}", result.case.title, counts.points, counts.failures);
     match &result.reference {
-        Ok(reference) => say!("  reference known to ± {:.3} %", 100.0 * reference.error_bar),
+        Ok(reference) => {
+            say!("  reference known to ± {}: {}", percent(reference.error_bar), reference.source)
+        }
         Err(why) => say!("  no reference: {why}"),
+    }
+    for note in &result.notes {
+        say!("  note: {note}");
+    }
+    if result.points.is_empty() {
+        return;
     }
     say!("  {:>10} {:>10}  {:14} Pareto front", "time", "error", "dominated by");
     for &i in &result.front {
@@ -146,6 +152,9 @@ fn print_case(result: &CaseResult) {
     }
     if let Some(advice) = &result.recommendation {
         say!("  {}", advice.words);
+        for set in &advice.set {
+            say!("    --set '{set}'");
+        }
     }
 }
 
@@ -154,6 +163,10 @@ fn as_json(args: &AccuracyArgs, study: &StudyResult) -> serde_json::Value {
         json!({
             "name": result.case.name,
             "counts": result.counts(),
+            "left_out": result.left_out,
+            "notes": result.notes,
+            "reference": result.reference.as_ref().ok(),
+            "no_reference": result.reference.as_ref().err(),
             "front": result.front.iter().map(|&i| {
                 let point = &result.points[i];
                 json!({ "median_ms": point.point().0, "error": point.point().1, "set": point.configuration.words() })

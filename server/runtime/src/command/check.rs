@@ -1,80 +1,214 @@
-//! `scindo check`: what is wrong, what is odd, which effects are on and what they will cost.
+//! `scindo check`: what is wrong, what is odd, which effects are on, and what the scene will do.
 
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
 
+use scindo_world::build::BuildOptions;
+use scindo_world::doubts;
+use scindo_world::forecast::{Effort, Forecast, forecast};
+use scindo_world::plan::Plan;
+use scindo_world::quantity::duration;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::{SimBody, Simulation};
 use serde_json::{Value, json};
 
 use crate::cli::CheckArgs;
 use crate::error::RuntimeError;
+use crate::progress::Share;
 use crate::say::say;
 
-/// Builds the scene without stepping it.
+/// A single step that takes this much longer than the whole forecast may is not waited for.
+const PATIENCE: u32 = 8;
+
+/// Builds the scene and makes its first steps.
 pub fn check(args: &CheckArgs) -> Result<ExitCode, RuntimeError> {
     let Some(path) = args.scene.as_deref().filter(|_| !args.schema) else {
         say!("{:#}", Scene::json_schema());
         return Ok(ExitCode::SUCCESS);
     };
     let scene = Scene::load_with(path, &args.set)?;
-    let simulation = Simulation::new(&scene, scene.base_dir())?;
+    let end_s = end_s(args, scene.checked().step_s)?;
+    let progress = Arc::new(Share::begin(args.json));
+    let simulation =
+        Simulation::observed(&scene, scene.base_dir(), BuildOptions::default(), &|at| progress.meshing(at))?;
+    progress.end();
+    let mut found = Found::of(&scene, &simulation);
+    found.warnings.extend(end_s.into_iter().flat_map(|end_s| doubts::after_the_end(scene.checked(), end_s)));
+    if !args.json {
+        found.print();
+    }
+    if !args.no_solve && !simulation.bodies().is_empty() {
+        found.foretell(simulation, end_s, progress)?;
+    }
     if args.json {
-        say!("{:#}", as_json(&scene, &simulation));
+        say!("{:#}", found.as_json());
     } else {
-        print(&scene, &simulation);
+        found.print_forecast();
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(scene: &Scene, simulation: &Simulation) -> Value {
-    let plan = simulation.plan();
-    json!({
-        "scene": scene.name(),
-        "step_s": simulation.step_s(),
-        "predicted_ms": plan.predicted_ms(),
-        "effects": plan.effects,
-        "bodies": simulation.bodies().iter().map(body_as_json).collect::<Vec<_>>(),
-        "warnings": simulation.warnings(),
-    })
+fn end_s(args: &CheckArgs, step_s: f64) -> Result<Option<f64>, RuntimeError> {
+    match (args.steps, args.seconds) {
+        (Some(steps), _) => Ok(Some(steps as f64 * step_s)),
+        (None, Some(seconds)) if !(seconds.is_finite() && seconds > 0.0) => Err(RuntimeError::Option {
+            option: "--seconds",
+            value: seconds.to_string(),
+            reason: "a simulated time must be positive".to_owned(),
+            next: "Leave it out to look until the scene comes to rest".to_owned(),
+        }),
+        (None, seconds) => Ok(seconds),
+    }
+}
+
+/// What is known of a scene.
+struct Found {
+    file: String,
+    name: String,
+    step_s: f64,
+    bodies: Vec<(String, Value)>,
+    plan: Plan,
+    forecast: Option<Forecast>,
+    /// Why there is no forecast, if one was asked for.
+    no_forecast: Option<String>,
+    warnings: Vec<String>,
+}
+
+impl Found {
+    fn of(scene: &Scene, simulation: &Simulation) -> Self {
+        Self {
+            file: scene.file().to_owned(),
+            name: scene.name().to_owned(),
+            step_s: simulation.step_s(),
+            bodies: simulation.bodies().iter().map(|body| (in_words(body), body_as_json(body))).collect(),
+            plan: simulation.plan(),
+            forecast: None,
+            no_forecast: None,
+            warnings: simulation.warnings().to_vec(),
+        }
+    }
+
+    /// Makes the first steps on a thread of their own: a step that does not end keeps nobody waiting.
+    fn foretell(
+        &mut self,
+        mut simulation: Simulation,
+        end_s: Option<f64>,
+        progress: Arc<Share>,
+    ) -> Result<(), RuntimeError> {
+        let effort = Effort { end_s, ..Effort::default() };
+        let (sender, receiver) = crossbeam_channel::bounded(1);
+        let told = Arc::clone(&progress);
+        let work = move || {
+            let made = forecast(&mut simulation, effort, &mut |share| told.at(share, "first steps"));
+            // Whoever asked may have gone.
+            let _ = sender.send(made);
+        };
+        std::thread::Builder::new().name("forecast".into()).spawn(work).map_err(|e| {
+            RuntimeError::System { what: "starting a thread".to_owned(), reason: e.to_string() }
+        })?;
+        let patience = PATIENCE * Duration::from_secs_f64(effort.processor_s);
+        match receiver.recv_timeout(patience) {
+            Ok(Ok(forecast)) => {
+                self.warnings.extend(forecast.warnings.iter().cloned());
+                self.forecast = Some(forecast);
+            }
+            Ok(Err(error)) => self.no_forecast = Some(error.to_string()),
+            Err(_) => {
+                self.no_forecast = Some(format!(
+                    "the first steps take longer than {}; make the mesh coarser, or look at one step with scindo run --steps 1",
+                    duration(patience.as_secs_f64())
+                ));
+            }
+        }
+        progress.end();
+        Ok(())
+    }
+
+    fn as_json(&self) -> Value {
+        json!({
+            "scene": self.name,
+            "step_s": self.step_s,
+            "predicted_ms": self.predicted_ms(),
+            "effects": self.plan.effects,
+            "bodies": self.bodies.iter().map(|(_, body)| body).collect::<Vec<_>>(),
+            "forecast": self.forecast,
+            "no_forecast": self.no_forecast,
+            "warnings": self.warnings,
+        })
+    }
+
+    /// Measured where steps were made, else from the table of costs.
+    fn predicted_ms(&self) -> f64 {
+        self.forecast.as_ref().map_or(self.plan.predicted_ms(), |forecast| forecast.cost.mean_ms)
+    }
+
+    fn print(&self) {
+        say!("{}: {}", self.file, self.name);
+        for (words, _) in &self.bodies {
+            say!("{words}");
+        }
+        say!("{:<22} {:<4} {:>9}  why", "effect", "", "ms/step");
+        for effect in &self.plan.effects {
+            let (switch, cost) = if effect.on {
+                ("on", format!("{:.3}", effect.predicted_ms))
+            } else {
+                ("off", String::new())
+            };
+            say!("{:<22} {switch:<4} {cost:>9}  {}", effect.name, effect.why);
+        }
+    }
+
+    fn print_forecast(&self) {
+        if let Some(forecast) = &self.forecast {
+            say!("{forecast}");
+        }
+        if let Some(why) = &self.no_forecast {
+            say!("no forecast: {why}");
+        }
+        let how = if self.forecast.is_some() { "measured" } else { "by the table of costs" };
+        let (price, step) = (self.predicted_ms(), 1e3 * self.step_s);
+        let pace = if price <= step {
+            "keeps up with real time".to_owned()
+        } else {
+            format!("{:.1} times slower than real time", price / step)
+        };
+        say!("predicted {price:.3} ms per step of {step} ms ({how}): {pace}");
+        for warning in &self.warnings {
+            say!("warning: {warning}");
+        }
+    }
+}
+
+fn in_words(body: &SimBody) -> String {
+    let (size, nodes) = (body.size(), body.body.cut_mesh().mesh().nodes.len());
+    let [low, high] = body.corners_m().map(|corner| scindo_world::scene::coordinates(&corner));
+    let mut words = format!(
+        "  body {}: {} elements, {nodes} nodes, {} surface triangles, {:.4e} m3\n    from {low} to {high} m",
+        body.id, size.elements, size.triangles, body.rest_volume_m3
+    );
+    for line in body
+        .health
+        .iter()
+        .flat_map(|health| health.to_string().lines().map(str::to_owned).collect::<Vec<_>>())
+    {
+        words += &format!("\n    {line}");
+    }
+    words
 }
 
 fn body_as_json(body: &SimBody) -> Value {
     let size = body.size();
+    let [min_m, max_m] = body.corners_m();
     json!({
         "id": &*body.id,
         "elements": size.elements,
         "nodes": body.body.cut_mesh().mesh().nodes.len(),
         "surface_vertices": size.vertices,
         "surface_triangles": size.triangles,
+        "min_m": min_m,
+        "max_m": max_m,
         "volume_m3": body.rest_volume_m3,
         "mesh": body.health,
     })
-}
-
-fn print(scene: &Scene, simulation: &Simulation) {
-    say!("{}: {}", scene.file(), scene.name());
-    for body in simulation.bodies() {
-        let (size, nodes) = (body.size(), body.body.cut_mesh().mesh().nodes.len());
-        say!(
-            "  body {}: {} elements, {nodes} nodes, {} surface triangles, {:.4e} m3",
-            body.id,
-            size.elements,
-            size.triangles,
-            body.rest_volume_m3
-        );
-        if let Some(health) = &body.health {
-            health.to_string().lines().for_each(|line| say!("    {line}"));
-        }
-    }
-    let plan = simulation.plan();
-    say!("{:<22} {:<4} {:>9}  why", "effect", "", "ms/step");
-    for effect in &plan.effects {
-        let (switch, cost) =
-            if effect.on { ("on", format!("{:.3}", effect.predicted_ms)) } else { ("off", String::new()) };
-        say!("{:<22} {switch:<4} {cost:>9}  {}", effect.name, effect.why);
-    }
-    say!("predicted {:.3} ms per step of {} ms", plan.predicted_ms(), 1e3 * simulation.step_s());
-    for warning in simulation.warnings() {
-        say!("warning: {warning}");
-    }
 }

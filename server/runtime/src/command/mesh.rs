@@ -7,6 +7,7 @@ use serde_json::json;
 
 use crate::cli::MeshArgs;
 use crate::error::RuntimeError;
+use crate::progress::Share;
 use crate::say::say;
 
 /// Reads, repairs or fills, writes.
@@ -28,7 +29,9 @@ pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
             next: "Use .vtu, .vtk or .msh".to_owned(),
         });
     }
-    let (mesh, health) = load_any(&args.input, args.cells as usize, args.scale)?;
+    let progress = Share::begin(args.json);
+    let (mesh, health) = load_any(&args.input, args.cells as usize, args.scale, &|at| progress.meshing(at))?;
+    progress.end();
     write_mesh(&args.output, &mesh).map_err(RuntimeError::Unwritten)?;
     if args.json {
         say!(

@@ -9,16 +9,18 @@ use scindo_proto::KeySpace;
 use scindo_proto::endpoint::bulk_endpoint;
 use scindo_view::{ViewConfig, Viewer};
 use scindo_world::build::BuildOptions;
+use scindo_world::doubts;
 use scindo_world::results::Results;
-use scindo_world::scene::Scene;
+use scindo_world::scene::{SHIPPED, Scene, ShippedScene};
 use scindo_world::simulation::Simulation;
 use serde_json::json;
 use tokio::runtime::Runtime;
 
-use crate::cli::{RunArgs, ServeArgs};
+use crate::cli::{DemoArgs, RunArgs, ServeArgs};
 use crate::engine::Engine;
 use crate::error::RuntimeError;
-use crate::progress::Progress;
+use crate::orders::Operators;
+use crate::progress::{Progress, Share};
 use crate::say::say;
 use crate::server::{Server, ServerConfig};
 use crate::session::{NetworkConfig, Sessions, local};
@@ -32,7 +34,35 @@ const LOOK: Duration = Duration::from_millis(20);
 
 /// The built-in demonstration.
 pub fn demonstration(args: &ServeArgs) -> Result<ExitCode, RuntimeError> {
-    let scene = Scene::demonstration(&args.set)?;
+    shipped(SHIPPED[0], args)
+}
+
+/// A scene that ships with the program, or the list of them.
+pub fn demo(args: &DemoArgs) -> Result<ExitCode, RuntimeError> {
+    if args.list {
+        if args.serve.json {
+            let list = SHIPPED.map(|scene| json!({ "name": scene.name, "description": scene.description }));
+            say!("{:#}", json!({ "scenes": list }));
+        } else {
+            let width = SHIPPED.iter().map(|scene| scene.name.len()).max().unwrap_or(0);
+            SHIPPED.iter().for_each(|scene| say!("{:width$}  {}", scene.name, scene.description));
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let scene = ShippedScene::of_name(&args.name).ok_or_else(|| RuntimeError::Option {
+        option: "NAME",
+        value: args.name.clone(),
+        reason: match ShippedScene::nearest(&args.name) {
+            Some(name) => format!("no such scene; did you mean {name}?"),
+            None => "no such scene".to_owned(),
+        },
+        next: "List them with `scindo demo --list`".to_owned(),
+    })?;
+    shipped(scene, &args.serve)
+}
+
+fn shipped(shipped: ShippedScene, args: &ServeArgs) -> Result<ExitCode, RuntimeError> {
+    let scene = shipped.read(&args.set)?;
     let viewer = args.viewer.or_else(|| DEMONSTRATION_VIEWER.parse().ok());
     serve(&scene, args, viewer)
 }
@@ -45,11 +75,11 @@ pub fn scene(args: &RunArgs) -> Result<ExitCode, RuntimeError> {
 
 /// Builds, starts, waits, writes results.
 fn serve(scene: &Scene, args: &ServeArgs, viewer: Option<SocketAddr>) -> Result<ExitCode, RuntimeError> {
-    KeySpace::new(&args.realm, &args.session)?;
+    let keys = KeySpace::new(&args.realm, &args.session)?;
     let pace = pace(args, scene.checked().step_s)?;
     let engine = build(scene, args)?;
     let foreground = foreground()?;
-    let network = network(args)?;
+    let network = network(args, &keys, &engine)?;
     let sessions =
         open_sessions(&network, args.listen.is_empty() && viewer.is_none() && pace.steps.is_some())?;
     let viewer = viewer.map(|address| start_viewer(&foreground, address, (args, &network))).transpose()?;
@@ -63,6 +93,8 @@ fn serve(scene: &Scene, args: &ServeArgs, viewer: Option<SocketAddr>) -> Result<
         surface_hz: rates.surface_hz,
         contact_hz: rates.contact_hz,
         stats_hz: rates.stats_hz,
+        takes_orders: args.operators != Operators::None,
+        give_up,
     };
     let server = Server::start(engine, sessions, &config)?;
     let interrupted = foreground.block_on(wait(&server, args, pace))?;
@@ -71,9 +103,8 @@ fn serve(scene: &Scene, args: &ServeArgs, viewer: Option<SocketAddr>) -> Result<
     // Browsers may hold connections open; nobody waits for them.
     foreground.shutdown_timeout(Duration::from_millis(200));
     let unfinished = interrupted && pace.steps.is_some();
-    let status = if interrupted { "interrupted" } else { "done" };
-    conclude(engine, args, status, (steps, started.elapsed()))?;
-    Ok(if unfinished { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    let failures = conclude(engine, args, interrupted, (steps, started.elapsed()))?;
+    Ok(if unfinished || !failures.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
 fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
@@ -102,19 +133,25 @@ fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
 
 fn build(scene: &Scene, args: &ServeArgs) -> Result<Engine, RuntimeError> {
     let options = BuildOptions { threads: usize::from(args.threads), ..BuildOptions::default() };
-    let simulation = Simulation::with_options(scene, scene.base_dir(), options)?;
-    for warning in simulation.warnings() {
+    let progress = Share::begin(args.json);
+    let simulation = Simulation::observed(scene, scene.base_dir(), options, &|at| progress.meshing(at))?;
+    progress.end();
+    let late = pace(args, scene.checked().step_s)?.steps.map(|steps| steps as f64 * simulation.step_s());
+    let late = late.map_or(Vec::new(), |end_s| doubts::after_the_end(scene.checked(), end_s));
+    for warning in simulation.warnings().iter().chain(&late) {
         tracing::warn!("{warning}");
     }
     let results = args.out.as_deref().map(|directory| Results::begin(directory, scene, &simulation));
     Engine::new(simulation, results.transpose()?)
 }
 
-fn network(args: &ServeArgs) -> Result<NetworkConfig, RuntimeError> {
+fn network(args: &ServeArgs, keys: &KeySpace, engine: &Engine) -> Result<NetworkConfig, RuntimeError> {
     let asked = NetworkConfig {
         listen: args.listen.clone(),
         connect: args.connect.clone(),
         zenoh_file: args.zenoh.clone(),
+        access_control: args.operators.access_control(keys),
+        longest_surface: engine.longest_surface(),
     };
     asked.settled()
 }
@@ -152,6 +189,7 @@ fn start_viewer(
     config.link.realm.clone_from(&args.realm);
     config.link.session.clone_from(&args.session);
     config.link.zenoh_file.clone_from(&args.zenoh);
+    config.web.operators = args.operators.of_pages();
     let listen: Vec<String> = network.listen.iter().filter_map(|e| local(e)).collect();
     config.link.connect = if listen.is_empty() { network.connect.clone() } else { listen };
     let failed = |e: scindo_view::ViewError| RuntimeError::Viewer {
@@ -218,44 +256,49 @@ async fn wait(server: &Server, args: &ServeArgs, pace: Pace) -> Result<bool, Run
     Ok(interrupted)
 }
 
-/// Says which bodies end with material that is turned inside out: what they show there is not to be trusted.
-fn warn_of_inverted(simulation: &Simulation) {
-    for body in simulation.bodies() {
-        let least = body.body.least_volume_ratio();
-        if least <= 0.0 {
-            tracing::warn!(
-                "body '{}' ends with inverted elements (least det F {least:.3}): its loads are too much for its \
-                 stiffness or for the region that holds it; law = \"neo-hookean\" resists inversion",
-                body.id
-            );
-        }
-    }
+/// The end of a process whose threads do not end: what they hold is lost.
+fn give_up(reason: &str) {
+    eprintln!("error: {reason}; the process ends here and writes no results");
+    std::process::exit(1);
 }
 
-/// Results on disk and on the terminal.
+/// Results on disk and on the terminal; says why the run does not count as one that succeeded, if it does not.
 fn conclude(
     mut engine: Engine,
     args: &ServeArgs,
-    status: &str,
+    interrupted: bool,
     (steps, wall): (u64, Duration),
-) -> Result<(), RuntimeError> {
+) -> Result<Vec<String>, RuntimeError> {
+    let failures = engine.failures();
+    let status = match (interrupted, failures.is_empty()) {
+        (true, _) => "interrupted",
+        (false, true) => "done",
+        (false, false) => "failed",
+    };
     engine.finish(status)?;
     let simulation = engine.simulation();
-    warn_of_inverted(simulation);
+    let troubles = simulation.troubles();
+    for trouble in &troubles {
+        tracing::warn!("{trouble}");
+    }
+    let warnings = [simulation.warnings(), &troubles].concat();
     let seconds = wall.as_secs_f64();
     let simulated = steps as f64 * simulation.step_s();
     if args.json {
         let report = json!({ "ended": {
             "status": status, "steps": steps, "simulated_s": simulated, "wall_s": seconds,
             "real_time_factor": simulated / seconds, "cuts_applied": simulation.cuts_applied(),
-            "out": args.out,
+            "warnings": warnings, "failures": failures, "out": args.out,
         }});
         say!("{report}");
-    } else {
-        say!("{status}: {steps} steps, {simulated:.3} s simulated in {seconds:.3} s");
-        if let Some(directory) = args.out.as_deref().map(Path::display) {
-            say!("  results  {directory}/summary.json, probes.csv, final.vtu");
-        }
+        return Ok(failures);
     }
-    Ok(())
+    say!("{status}: {steps} steps, {simulated:.3} s simulated in {seconds:.3} s");
+    if let Some(directory) = args.out.as_deref().map(Path::display) {
+        say!("  results  {directory}/summary.json, probes.csv, final.vtm");
+    }
+    for failure in &failures {
+        say!("  not to be trusted: {failure}");
+    }
+    Ok(failures)
 }

@@ -40,7 +40,7 @@ impl EarlyPoses {
     pub fn keep(&mut self, sample: &ToolSample, now: Instant) -> bool {
         let whose = (sample.client_id.clone(), sample.tool_id.clone());
         if let Some(early) = self.waiting.get_mut(&whose) {
-            if sample.seq > early.newest.seq {
+            if sample.seq > early.newest.seq || sample.client_time_ns > early.newest.client_time_ns {
                 early.newest.clone_from(sample);
             }
             return early.is_waited_for(now);

@@ -1,0 +1,225 @@
+//! Cuts on their way, and the answers to those that were made: each is applied once.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use scindo_proto::messages::{self as wire, CutAck, CutCommand, cut_ack};
+use scindo_world::inputs::{CutOutcome, CutRequest};
+
+use super::{Refusal, refuse};
+use crate::convert::from_vec3;
+
+/// Cuts that may be without an answer, in the queue here or in the simulation's.
+pub const MAX_WAITING_CUTS: usize = 64;
+
+/// Clients times tools whose cuts are remembered.
+const MAX_LOGS: usize = 256;
+
+/// Answers remembered per client and tool. A client repeats a cut for seconds; it would have to
+/// send this many others meanwhile to be told "duplicate" without the details.
+pub(super) const MAX_ANSWERS: usize = 256;
+
+/// What becomes of a cut command.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cut {
+    /// A step applies it; the answer comes afterwards.
+    Queued,
+    /// It waits already; the answer is on its way.
+    Waiting,
+    /// The answer.
+    Answer(CutAck),
+}
+
+/// What an answer says besides the outcome.
+#[derive(Debug, Clone, Copy)]
+pub struct Answering<'a> {
+    /// The step after the cut.
+    pub step: u64,
+    /// Epochs of all bodies after it.
+    pub epochs: &'a [wire::BodyEpoch],
+    /// Reason of those that were not applied, such as `cut-failed`.
+    pub code: &'static str,
+    /// What their client can do.
+    pub hint: &'static str,
+}
+
+/// Cuts of one client with one tool.
+#[derive(Debug, Default)]
+struct ToolLog {
+    waiting: BTreeSet<u64>,
+    answers: BTreeMap<u64, CutAck>,
+    /// Every number up to here was applied or refused, and its answer forgotten.
+    forgotten_up_to: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Ticket {
+    client: String,
+    tool: String,
+    seq: u64,
+}
+
+/// See the module.
+#[derive(Debug, Default)]
+pub(super) struct CutLog {
+    bodies: BTreeSet<Arc<str>>,
+    queue: VecDeque<CutRequest>,
+    /// Every cut without an answer.
+    tickets: BTreeMap<u64, Ticket>,
+    logs: BTreeMap<(String, String), ToolLog>,
+    next_request: u64,
+    applied: u64,
+}
+
+impl CutLog {
+    pub fn new(bodies: BTreeSet<Arc<str>>) -> Self {
+        Self { bodies, ..Self::default() }
+    }
+
+    /// What is known of a command that came before.
+    pub fn known(&self, command: &CutCommand) -> Option<Cut> {
+        let log = self.logs.get(&(command.client_id.clone(), command.tool_id.clone()))?;
+        if log.waiting.contains(&command.seq) {
+            return Some(Cut::Waiting);
+        }
+        if let Some(answer) = log.answers.get(&command.seq) {
+            return Some(Cut::Answer(repeated(answer)));
+        }
+        let forgotten = command.seq <= log.forgotten_up_to;
+        forgotten.then(|| Cut::Answer(answer(command, cut_ack::Outcome::Duplicate)))
+    }
+
+    /// Queues a new command; the logs of clients that are not here make room if need be.
+    pub fn accept(&mut self, command: &CutCommand, is_here: impl Fn(&str) -> bool) -> Result<(), Refusal> {
+        let body = match &*command.body_id {
+            "" => None,
+            id => Some(self.bodies.get(id).cloned().ok_or_else(|| self.unknown_body(id))?),
+        };
+        if self.tickets.len() >= MAX_WAITING_CUTS {
+            return Err(refuse(
+                "queue-full",
+                format!("{MAX_WAITING_CUTS} cuts wait already"),
+                "send it again after some of them were answered",
+            ));
+        }
+        let whose = (command.client_id.clone(), command.tool_id.clone());
+        if !self.logs.contains_key(&whose) && self.logs.len() >= MAX_LOGS {
+            self.forget_departed(is_here)?;
+        }
+        self.logs.entry(whose).or_default().waiting.insert(command.seq);
+        self.next_request += 1;
+        let segments = command.sweep.iter();
+        self.queue.push_back(CutRequest {
+            request: self.next_request,
+            tool: Arc::from(command.tool_id.as_str()),
+            body,
+            segments: segments
+                .map(|s| -> [Vector3<f64>; 2] { [from_vec3(s.tip_m), from_vec3(s.heel_m)] })
+                .collect(),
+        });
+        let ticket =
+            Ticket { client: command.client_id.clone(), tool: command.tool_id.clone(), seq: command.seq };
+        self.tickets.insert(self.next_request, ticket);
+        Ok(())
+    }
+
+    fn unknown_body(&self, id: &str) -> Refusal {
+        let names: Vec<&str> = self.bodies.iter().map(|b| &**b).collect();
+        refuse(
+            "unknown-body",
+            format!("the scene has no body '{id}', it has {}", names.join(", ")),
+            "name one of these bodies, or none for all",
+        )
+    }
+
+    /// Makes room by forgetting the cuts of clients that are gone.
+    fn forget_departed(&mut self, is_here: impl Fn(&str) -> bool) -> Result<(), Refusal> {
+        self.logs.retain(|(client, _), log| !log.waiting.is_empty() || is_here(client));
+        if self.logs.len() < MAX_LOGS {
+            return Ok(());
+        }
+        Err(refuse(
+            "too-many-clients",
+            format!("cuts of {MAX_LOGS} clients and tools are remembered already"),
+            "use fewer client and tool ids",
+        ))
+    }
+
+    /// Moves the queue into `cuts`.
+    pub fn take(&mut self, cuts: &mut Vec<CutRequest>) {
+        cuts.clear();
+        cuts.extend(self.queue.drain(..));
+    }
+
+    /// Empties the queue; the outcome of what stood in it.
+    pub fn discard(&mut self, reason: &str) -> Vec<CutOutcome> {
+        let failed = |cut: CutRequest| CutOutcome { request: cut.request, result: Err(reason.to_owned()) };
+        self.queue.drain(..).map(failed).collect()
+    }
+
+    /// The answers to cuts that have an outcome now.
+    pub fn finish(&mut self, outcomes: &[CutOutcome], with: &Answering<'_>) -> Vec<CutAck> {
+        let mut answers = Vec::with_capacity(outcomes.len());
+        for outcome in outcomes {
+            let Some(ticket) = self.tickets.remove(&outcome.request) else { continue };
+            let answer = self.answer_of(&ticket, outcome, with);
+            let log = self.logs.entry((ticket.client, ticket.tool)).or_default();
+            log.waiting.remove(&ticket.seq);
+            log.answers.insert(ticket.seq, answer.clone());
+            while log.answers.len() > MAX_ANSWERS {
+                if let Some((seq, _)) = log.answers.pop_first() {
+                    log.forgotten_up_to = log.forgotten_up_to.max(seq);
+                }
+            }
+            answers.push(answer);
+        }
+        answers
+    }
+
+    fn answer_of(&mut self, ticket: &Ticket, outcome: &CutOutcome, with: &Answering<'_>) -> CutAck {
+        let mut ack = CutAck {
+            client_id: ticket.client.clone(),
+            tool_id: ticket.tool.clone(),
+            seq: ticket.seq,
+            sim_step: with.step,
+            epochs: with.epochs.to_vec(),
+            ..CutAck::default()
+        };
+        match &outcome.result {
+            Ok(elements) => {
+                self.applied += 1;
+                ack.elements_cut = u32::try_from(*elements).unwrap_or(u32::MAX);
+                ack.set_outcome(cut_ack::Outcome::Applied);
+            }
+            Err(reason) => {
+                ack.set_outcome(cut_ack::Outcome::Refused);
+                ack.error = Some(refuse(with.code, reason.clone(), with.hint).into());
+            }
+        }
+        ack
+    }
+
+    pub fn applied(&self) -> u64 {
+        self.applied
+    }
+}
+
+pub(super) fn answer(command: &CutCommand, outcome: cut_ack::Outcome) -> CutAck {
+    CutAck {
+        client_id: command.client_id.clone(),
+        tool_id: command.tool_id.clone(),
+        seq: command.seq,
+        outcome: outcome.into(),
+        ..CutAck::default()
+    }
+}
+
+/// The same answer again; one that was applied is now a duplicate.
+fn repeated(answer: &CutAck) -> CutAck {
+    let mut again = answer.clone();
+    if again.outcome() == cut_ack::Outcome::Applied {
+        again.set_outcome(cut_ack::Outcome::Duplicate);
+    }
+    again
+}

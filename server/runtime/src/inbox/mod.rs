@@ -1,0 +1,207 @@
+//! Poses and cuts of clients: who holds which tool, what is newest, what was already applied.
+//!
+//! # Rules
+//! * A tool belongs to the first client with a liveliness token that sends a pose for it; it is
+//!   free again when that token goes ([`owners`]). A pose that overtook the token waits for it ([`early`]).
+//! * Of poses only the newest counts; one that is not newer than the last is refused.
+//! * A cut is applied once per (client, tool, sequence number); repetitions get the old answer
+//!   ([`cut_log`]). A cut of a client without a token is refused.
+//! * Whatever is refused is counted by reason and leaves everything as it was.
+//!
+//! Free of zenoh and of clocks: the threads that receive call in here with the time, the simulation thread
+//! takes out.
+
+pub mod owners;
+
+pub mod early;
+
+pub mod cut_log;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use scindo_proto::messages::{self as wire, CutAck, CutCommand, DeviceCapability, ToolSample, cut_ack};
+use scindo_world::inputs::{CutOutcome, Inputs, ToolInput};
+
+pub use cut_log::{Answering, Cut};
+use cut_log::{CutLog, answer};
+use owners::Owners;
+pub use owners::{Change, MAX_POSE_RATE};
+
+/// Why a message is refused; the reason is counted and, for cuts, answered.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// Stable name, such as `not-owner`.
+    pub code: &'static str,
+    /// What is wrong.
+    pub message: String,
+    /// What to do next.
+    pub hint: &'static str,
+}
+
+/// See the module.
+#[derive(Debug, Default)]
+pub struct Inbox {
+    owners: Owners,
+    cuts: CutLog,
+    refused: BTreeMap<&'static str, u64>,
+}
+
+impl Inbox {
+    /// An inbox for the bodies and tools of a scene.
+    pub fn new(
+        bodies: impl IntoIterator<Item = Arc<str>>,
+        scene_tools: impl IntoIterator<Item = Arc<str>>,
+    ) -> Self {
+        Self {
+            owners: Owners::new(scene_tools.into_iter().collect()),
+            cuts: CutLog::new(bodies.into_iter().collect()),
+            refused: BTreeMap::new(),
+        }
+    }
+
+    /// A liveliness token of `client` appeared: what it sent before counts now.
+    pub fn client_came(&mut self, client: &str, now: Instant) -> Vec<Change> {
+        let early = self.owners.came(client, now);
+        let taken = early.iter().filter_map(|sample| self.pose(&sample.tool_id, sample, now).ok());
+        taken.flatten().collect()
+    }
+
+    /// A liveliness token of `client` went; with the last one its tools are released.
+    pub fn client_went(&mut self, client: &str, now: Instant) -> Vec<Change> {
+        self.owners.went(client, now)
+    }
+
+    /// A checked sample that arrived under the key of tool `key_tool`.
+    ///
+    /// # Errors
+    /// Why it is refused.
+    pub fn pose(
+        &mut self,
+        key_tool: &str,
+        sample: &ToolSample,
+        now: Instant,
+    ) -> Result<Option<Change>, Refusal> {
+        let outcome =
+            same_key(key_tool, &sample.tool_id).and_then(|()| self.owners.pose(key_tool, sample, now));
+        if let Err(refusal) = &outcome {
+            self.count(refusal.code);
+        }
+        outcome
+    }
+
+    /// A checked cut that arrived under the key of tool `key_tool`.
+    pub fn cut(&mut self, key_tool: &str, command: &CutCommand) -> Cut {
+        if let Some(known) = self.cuts.known(command) {
+            return known;
+        }
+        let accepted = same_key(key_tool, &command.tool_id)
+            .and_then(|()| self.owners.may_cut(key_tool, &command.client_id))
+            .and_then(|()| self.cuts.accept(command, |client| self.owners.is_here(client)));
+        match accepted {
+            Ok(()) => Cut::Queued,
+            Err(refusal) => {
+                self.count(refusal.code);
+                let mut answer = answer(command, cut_ack::Outcome::Refused);
+                answer.error = Some(refusal.into());
+                Cut::Answer(answer)
+            }
+        }
+    }
+
+    /// What a device can do, told once per connection.
+    pub fn capability(&mut self, capability: DeviceCapability) {
+        self.owners.capability(capability);
+    }
+
+    /// Counts a refused message; returns how many of its kind there were.
+    pub fn count(&mut self, code: &'static str) -> u64 {
+        let count = self.refused.entry(code).or_default();
+        *count += 1;
+        *count
+    }
+
+    /// Moves what the next step reads into `inputs`: newest poses and all cuts that came since.
+    pub fn take(&mut self, inputs: &mut Inputs) {
+        inputs.tools.clear();
+        inputs.tools.extend(self.owners.held().cloned());
+        self.cuts.take(&mut inputs.cuts);
+    }
+
+    /// Answers the cuts that have an outcome; in no case twice.
+    pub fn finish(&mut self, outcomes: &[CutOutcome], with: &Answering<'_>) -> Vec<CutAck> {
+        let answers = self.cuts.finish(outcomes, with);
+        let failed = answers.iter().filter(|answer| answer.error.is_some()).count() as u64;
+        if failed > 0 {
+            *self.refused.entry(with.code).or_default() += failed;
+        }
+        answers
+    }
+
+    /// Answers every cut that no step has taken yet with `reason`.
+    pub fn discard(&mut self, reason: &str, with: &Answering<'_>) -> Vec<CutAck> {
+        let outcomes = self.cuts.discard(reason);
+        self.finish(&outcomes, with)
+    }
+
+    /// Newest pose of every held tool.
+    pub fn held(&self) -> impl Iterator<Item = &ToolInput> {
+        self.owners.held()
+    }
+
+    /// What the device behind `tool` can do, if it told.
+    pub fn capability_of(&self, tool: &str) -> Option<&DeviceCapability> {
+        self.owners.capability_of(tool)
+    }
+
+    /// True while a client holds a tool.
+    pub fn anybody_holds(&self) -> bool {
+        self.owners.held().next().is_some()
+    }
+
+    /// Age of the contact model that the device behind `tool` last used [ms]; 0: not told.
+    pub fn contact_age_ms(&self, tool: &str) -> f32 {
+        self.owners.contact_age_ms(tool)
+    }
+
+    /// Poses accepted per held tool since it was taken.
+    pub fn pose_counts(&self) -> impl Iterator<Item = (&Arc<str>, u64)> {
+        self.owners.pose_counts()
+    }
+
+    /// Messages refused so far, by reason.
+    pub fn refused(&self) -> &BTreeMap<&'static str, u64> {
+        &self.refused
+    }
+
+    /// Cuts of clients applied so far.
+    pub fn cuts_applied(&self) -> u64 {
+        self.cuts.applied()
+    }
+}
+
+impl From<Refusal> for wire::Error {
+    fn from(refusal: Refusal) -> Self {
+        Self { code: refusal.code.to_owned(), message: refusal.message, hint: refusal.hint.to_owned() }
+    }
+}
+
+fn refuse(code: &'static str, message: String, hint: &'static str) -> Refusal {
+    Refusal { code, message, hint }
+}
+
+fn same_key(key_tool: &str, tool: &str) -> Result<(), Refusal> {
+    if key_tool == tool {
+        return Ok(());
+    }
+    Err(refuse(
+        "wrong-key",
+        format!("a message for tool '{tool}' arrived under the key of '{key_tool}'"),
+        "publish to tool/<tool id>/…",
+    ))
+}

@@ -1,0 +1,262 @@
+//! Who is here, and who holds which tool.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use scindo_proto::messages::{DeviceCapability, ToolSample};
+use scindo_world::inputs::ToolInput;
+use scindo_world::tool::MAX_TOOLS;
+
+use super::early::{EarlyPoses, PATIENCE};
+use super::{Refusal, refuse};
+use crate::convert::to_tool_input;
+
+/// Poses per second and tool that are taken; twice what a 1 kHz device sends.
+pub const MAX_POSE_RATE: u32 = 2000;
+
+/// Most clients with a token at a time; the tokens themselves have no limit on their way here.
+pub const MAX_CLIENTS: usize = 4096;
+
+// What the world takes must fit into the messages that tell of it.
+const _: () = assert!(MAX_TOOLS <= scindo_proto::limits::MAX_TOOLS);
+
+/// What changed hands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Change {
+    /// A client took a tool.
+    Taken {
+        /// The tool.
+        tool: Arc<str>,
+        /// Its new owner.
+        owner: Arc<str>,
+    },
+    /// A client lost a tool because it went away.
+    Released {
+        /// The tool.
+        tool: Arc<str>,
+        /// Its former owner.
+        owner: Arc<str>,
+    },
+}
+
+/// A tool in a client's hand.
+#[derive(Debug, Clone)]
+struct Held {
+    input: ToolInput,
+    poses: u64,
+    /// Age of the contact model that its device last used [ms].
+    contact_age_ms: f32,
+    /// Poses since the second began.
+    this_second: (Instant, u32),
+    capability: Option<DeviceCapability>,
+}
+
+impl Held {
+    /// Counts a pose; false if the client sends too many.
+    fn admit(&mut self, now: Instant) -> bool {
+        if now.duration_since(self.this_second.0) >= Duration::from_secs(1) {
+            self.this_second = (now, 0);
+        }
+        self.this_second.1 += 1;
+        self.this_second.1 <= MAX_POSE_RATE
+    }
+
+    /// Whether `sample` is newer than what is known. A hand that takes its tool anew counts from 1 again;
+    /// its clock goes on. A pose that is neither is old, or was there before.
+    fn is_older_than(&self, sample: &ToolSample) -> bool {
+        sample.seq > self.input.seq || sample.client_time_ns > self.input.client_time_ns
+    }
+}
+
+/// The last pose of a client that let go of a tool.
+#[derive(Debug)]
+struct LetGo {
+    seq: u64,
+    at: Instant,
+}
+
+/// See the module.
+#[derive(Debug, Default)]
+pub(super) struct Owners {
+    scene_tools: BTreeSet<Arc<str>>,
+    /// Tokens per client.
+    here: BTreeMap<String, usize>,
+    early: EarlyPoses,
+    held: BTreeMap<Arc<str>, Held>,
+    /// By client and tool, for as long as a pose may be on its way.
+    let_go: BTreeMap<(String, String), LetGo>,
+}
+
+impl Owners {
+    pub fn new(scene_tools: BTreeSet<Arc<str>>) -> Self {
+        Self { scene_tools, ..Self::default() }
+    }
+
+    /// A token of `client` appeared; returns the poses that waited for it.
+    pub fn came(&mut self, client: &str, now: Instant) -> Vec<ToolSample> {
+        if self.here.len() < MAX_CLIENTS || self.here.contains_key(client) {
+            *self.here.entry(client.to_owned()).or_default() += 1;
+        }
+        self.early.take(client, now)
+    }
+
+    /// A token of `client` went.
+    pub fn went(&mut self, client: &str, now: Instant) -> Vec<Change> {
+        let Some(tokens) = self.here.get_mut(client) else { return Vec::new() };
+        *tokens -= 1;
+        if *tokens > 0 {
+            return Vec::new();
+        }
+        self.here.remove(client);
+        self.let_go.retain(|_, last| now.duration_since(last.at) < PATIENCE);
+        let lost = self.held.extract_if(.., |_, held| &*held.input.owner == client);
+        let mut changes = Vec::new();
+        for (tool, held) in lost {
+            self.let_go.insert((client.to_owned(), tool.to_string()), LetGo { seq: held.input.seq, at: now });
+            changes.push(Change::Released { tool, owner: held.input.owner });
+        }
+        changes
+    }
+
+    pub fn is_here(&self, client: &str) -> bool {
+        self.here.contains_key(client)
+    }
+
+    pub fn pose(
+        &mut self,
+        key_tool: &str,
+        sample: &ToolSample,
+        now: Instant,
+    ) -> Result<Option<Change>, Refusal> {
+        let client = &*sample.client_id;
+        if !self.is_here(client) {
+            return self.wait_for_token(sample, now).map(|()| None);
+        }
+        let Some(held) = self.held.get_mut(key_tool) else {
+            return self.take_tool(key_tool, sample, now).map(Some);
+        };
+        if &*held.input.owner != client {
+            return Err(not_owner(key_tool, &held.input.owner));
+        }
+        if !held.is_older_than(sample) {
+            return Err(refuse(
+                "stale-sequence",
+                format!("pose {} of tool '{key_tool}' is not newer than {}", sample.seq, held.input.seq),
+                "number poses upwards",
+            ));
+        }
+        if !held.admit(now) {
+            return Err(refuse(
+                "too-fast",
+                format!("more than {MAX_POSE_RATE} poses per second for tool '{key_tool}'"),
+                "send at most 1000 per second",
+            ));
+        }
+        let (id, owner) = (held.input.id.clone(), held.input.owner.clone());
+        held.input = to_tool_input(sample, id, owner);
+        held.poses += 1;
+        held.contact_age_ms = sample.contact_age_ms;
+        Ok(None)
+    }
+
+    /// A pose of a client without a token: one that overtook it is kept, one that was sent before the
+    /// client let go is not.
+    fn wait_for_token(&mut self, sample: &ToolSample, now: Instant) -> Result<(), Refusal> {
+        let whose = (sample.client_id.clone(), sample.tool_id.clone());
+        let comes_late = |last: &LetGo| sample.seq > last.seq && now.duration_since(last.at) < PATIENCE;
+        if self.let_go.get(&whose).is_some_and(comes_late) {
+            return Err(refuse(
+                "let-go",
+                format!("a pose of '{}' came after it let go of tool '{}'", whose.0, whose.1),
+                "declare the token again before the next pose",
+            ));
+        }
+        if self.early.keep(sample, now) {
+            return Ok(());
+        }
+        Err(no_token(&whose.0))
+    }
+
+    fn take_tool(&mut self, tool: &str, sample: &ToolSample, now: Instant) -> Result<Change, Refusal> {
+        let known = self.scene_tools.get(tool).cloned();
+        if known.is_none() {
+            if sample.shape.is_none() {
+                return Err(refuse(
+                    "unknown-tool",
+                    format!("the scene has no tool '{tool}' and the sample states no shape"),
+                    "use a tool of rpc/info or state a shape",
+                ));
+            }
+            let brought = self.held.keys().filter(|id| !self.scene_tools.contains(*id)).count();
+            if self.scene_tools.len() + brought >= MAX_TOOLS {
+                let of_scene = self.scene_tools.len();
+                return Err(refuse(
+                    "too-many-tools",
+                    format!(
+                        "the scene has {of_scene} tools and clients brought {brought}, at most {MAX_TOOLS}"
+                    ),
+                    "wait until another client leaves",
+                ));
+            }
+        }
+        let id = known.unwrap_or_else(|| Arc::from(tool));
+        let owner: Arc<str> = Arc::from(sample.client_id.as_str());
+        let input = to_tool_input(sample, id.clone(), owner.clone());
+        let contact_age_ms = sample.contact_age_ms;
+        let held = Held { input, poses: 1, contact_age_ms, this_second: (now, 1), capability: None };
+        self.held.insert(id.clone(), held);
+        Ok(Change::Taken { tool: id, owner })
+    }
+
+    /// Whether `client` may cut with a tool: it is here, and nobody else holds the tool.
+    pub fn may_cut(&self, tool: &str, client: &str) -> Result<(), Refusal> {
+        if !self.is_here(client) {
+            return Err(no_token(client));
+        }
+        match self.held.get(tool) {
+            Some(held) if *held.input.owner != *client => Err(not_owner(tool, &held.input.owner)),
+            _ => Ok(()),
+        }
+    }
+
+    pub fn capability(&mut self, capability: DeviceCapability) {
+        if let Some(held) = self.held.get_mut(&*capability.tool_id)
+            && *held.input.owner == *capability.client_id
+        {
+            held.capability = Some(capability);
+        }
+    }
+
+    pub fn held(&self) -> impl Iterator<Item = &ToolInput> {
+        self.held.values().map(|held| &held.input)
+    }
+
+    pub fn capability_of(&self, tool: &str) -> Option<&DeviceCapability> {
+        self.held.get(tool)?.capability.as_ref()
+    }
+
+    pub fn contact_age_ms(&self, tool: &str) -> f32 {
+        self.held.get(tool).map_or(0.0, |held| held.contact_age_ms)
+    }
+
+    pub fn pose_counts(&self) -> impl Iterator<Item = (&Arc<str>, u64)> {
+        self.held.iter().map(|(tool, held)| (tool, held.poses))
+    }
+}
+
+fn no_token(client: &str) -> Refusal {
+    refuse(
+        "no-token",
+        format!("client '{client}' has no liveliness token"),
+        "declare live/<role>/<client id> before the first message",
+    )
+}
+
+fn not_owner(tool: &str, owner: &str) -> Refusal {
+    refuse(
+        "not-owner",
+        format!("tool '{tool}' is held by '{owner}'"),
+        "take another tool or wait until it is free",
+    )
+}

@@ -1,0 +1,98 @@
+//! What is published only while somebody subscribes to it: stress on surfaces, probes and energies.
+//! A subscriber sets a flag; the simulation provides what is flagged with its next snapshot.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use scindo_proto::messages::{Measures, SurfaceField};
+use scindo_proto::{Chunk, KeySpace, Topic, encode, encoding};
+use scindo_world::snapshot::Snapshot;
+use zenoh::pubsub::Publisher;
+use zenoh::qos::{CongestionControl, Priority, Reliability};
+use zenoh::{Session, Wait as _};
+
+use crate::convert::{ProbeName, STRESS, to_measures, to_stress};
+use crate::error::{RuntimeError, words};
+use crate::exchange::Exchange;
+
+/// Fields and measures come at most this often: colours and curves need less than motion.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// The topics.
+pub struct OnDemand {
+    /// Per body: publisher of its stress, and messages so far.
+    stress: Vec<(Publisher<'static>, u64)>,
+    measures: (Publisher<'static>, u64),
+    probes: Vec<ProbeName>,
+    next: Instant,
+}
+
+impl OnDemand {
+    /// Declares the topics of `bodies`.
+    pub fn declare(
+        keys: &KeySpace,
+        bulk: &Session,
+        exchange: &Arc<Exchange>,
+        bodies: &[String],
+        probes: Vec<ProbeName>,
+    ) -> Result<Self, RuntimeError> {
+        let stress = bodies.iter().enumerate().map(|(index, id)| {
+            let topic = Topic::SurfaceField(Chunk::new("body id", id)?, Chunk::new("field name", STRESS)?);
+            let watcher = exchange.clone();
+            let asked = move |wanted| watcher.want_stress(index, wanted);
+            Ok((declare(bulk, keys.key(&topic), encoding::<SurfaceField>(), asked)?, 0))
+        });
+        let stress = stress.collect::<Result<_, RuntimeError>>()?;
+        let watcher = exchange.clone();
+        let asked = move |wanted| watcher.want_measures(wanted);
+        let measures = declare(bulk, keys.key(&Topic::Measures), encoding::<Measures>(), asked)?;
+        Ok(Self { stress, measures: (measures, 0), probes, next: Instant::now() })
+    }
+
+    /// Publishes what the snapshot holds of it: nothing, while nobody subscribes.
+    pub fn publish(&mut self, snapshot: &Snapshot) {
+        if Instant::now() < self.next {
+            return;
+        }
+        self.next = Instant::now() + PERIOD;
+        for ((publisher, seq), body) in self.stress.iter_mut().zip(&snapshot.bodies) {
+            if !body.stress.is_empty() {
+                *seq += 1;
+                put(publisher, encode(&to_stress(snapshot, body, *seq)));
+            }
+        }
+        if !snapshot.probes.is_empty() || snapshot.bodies.iter().any(|body| body.energy.is_some()) {
+            self.measures.1 += 1;
+            put(&self.measures.0, encode(&to_measures(snapshot, &self.probes, self.measures.1)));
+        }
+    }
+}
+
+fn declare(
+    bulk: &Session,
+    key: String,
+    encoding: String,
+    asked: impl Fn(bool) + Send + Sync + 'static,
+) -> Result<Publisher<'static>, RuntimeError> {
+    let publisher = bulk
+        .declare_publisher(key)
+        .encoding(encoding)
+        .priority(Priority::DataLow)
+        .congestion_control(CongestionControl::Drop)
+        .reliability(Reliability::BestEffort)
+        .wait()
+        .map_err(failed)?;
+    let listener = publisher.matching_listener().callback(move |status| asked(status.matching()));
+    listener.background().wait().map_err(failed)?;
+    Ok(publisher)
+}
+
+fn put(publisher: &Publisher<'static>, payload: bytes::Bytes) {
+    if let Err(error) = publisher.put(payload).wait() {
+        tracing::debug!(key = %publisher.key_expr(), %error, "not published");
+    }
+}
+
+fn failed(error: zenoh::Error) -> RuntimeError {
+    RuntimeError::Zenoh { what: "declaring topics".to_owned(), reason: words(&error) }
+}
