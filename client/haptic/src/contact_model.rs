@@ -271,6 +271,11 @@ impl ContactInbox {
         }
     }
 
+    /// Messages taken so far.
+    pub fn contacts(&self) -> u64 {
+        self.counts.contacts
+    }
+
     /// Counts, rate and round trips so far.
     pub fn report(&self) -> LinkReport {
         let span_s = self.last_received_ns.saturating_sub(self.first_received_ns) as f64 * 1e-9;

@@ -60,7 +60,8 @@ mod tests {
     #[test]
     fn ticks_and_missed_ticks_add_up_to_the_time() {
         let (_input, contacts) = contact_slot();
-        let ports = Ports { contacts, server_alive: Arc::new(AtomicBool::new(true)), poses: None, log: None };
+        let server_alive = Arc::new(AtomicBool::new(true));
+        let ports = Ports { contacts, server_alive, poses: None, log: None, meter: None };
         let tick = HapticTick::new(Box::new(FakeDevice::new()), LIMITS, ports);
         let stop = AtomicBool::new(false);
         let report = run(tick, LoopClock::default(), &stop, Some(Duration::from_millis(200)));

@@ -17,6 +17,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{JoinHandle, Thread};
 use std::time::Duration;
 
+/// Owner of a tool that the scene moves.
+const SCRIPT: &str = "script";
+
 /// Longest sleep of the sender if nobody wakes it.
 const SENDER_PARK: Duration = Duration::from_millis(5);
 
@@ -103,7 +106,7 @@ impl HeldTool {
         let (slot, contacts) = contact_slot();
         let inbox = Arc::new(Mutex::new(ContactInbox::new(slot)));
         let shared = inbox.clone();
-        // Only zenoh's receiving thread and the final report lock it; the loop reads the slot.
+        // Zenoh's receiving thread, the live figures and the final report lock it; the loop reads the slot.
         let stream = link
             .each_contact(&tool.id, move |message| {
                 let mut inbox = shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -123,6 +126,12 @@ impl HeldTool {
         };
         let ports = LoopPorts { contacts, server_alive: follow_presence(link), poses };
         Ok((Self { inbox, sent, sender: thread, _contacts: stream, _cutter: held.cutter }, ports))
+    }
+
+    /// How many contacts were taken so far, for another thread to ask.
+    pub fn contact_count(&self) -> impl Fn() -> u64 + Send + use<> {
+        let inbox = self.inbox.clone();
+        move || inbox.lock().unwrap_or_else(PoisonError::into_inner).contacts()
     }
 
     /// Figures of the link. Ends the sender; the loop's queue must be gone.
@@ -238,7 +247,38 @@ fn position(bytes: &[u8]) -> Vector3<f64> {
     Vector3::from_fn(|i, _| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|b| bytes[4 * i + b]))))
 }
 
+/// Warns where a script of the scene moves the tool that is asked for.
+pub async fn tell_of_script(link: &Link, tool: &str) -> Result<(), LinkError> {
+    if is_scripted(&link.info().await?, tool) {
+        tracing::warn!(
+            "tool '{tool}' is moved by a script of the scene: it follows this device from now on, and its script \
+             again when the device lets go; a tool of the scene without `path`, or a new id, leaves the script alone"
+        );
+    }
+    Ok(())
+}
+
+fn is_scripted(info: &messages::SessionInfo, tool: &str) -> bool {
+    info.tools.iter().any(|known| known.id == tool && known.owner == SCRIPT)
+}
+
 /// A link of role `haptic`.
 pub async fn connect(config: LinkConfig) -> Result<Link, LinkError> {
     Link::connect(config).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scindo_client::messages::{SessionInfo, ToolInfo};
+
+    #[test]
+    fn only_tools_that_a_script_moves_are_told_of() {
+        let tool =
+            |id: &str, owner: &str| ToolInfo { id: id.into(), owner: owner.into(), ..ToolInfo::default() };
+        let tools = vec![tool("finger", "script"), tool("probe", ""), tool("hook", "someone")];
+        let info = SessionInfo { tools, ..SessionInfo::default() };
+        assert!(is_scripted(&info, "finger"));
+        assert!(!is_scripted(&info, "probe") && !is_scripted(&info, "hook") && !is_scripted(&info, "new"));
+    }
 }

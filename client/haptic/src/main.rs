@@ -1,20 +1,27 @@
 //! `scindo-haptic`: parse, run, print, exit code.
 
-use clap::Parser;
-use scindo_haptic::command::{Arguments, run};
+use clap::{CommandFactory, Parser};
+use scindo_haptic::command::{Arguments, Cli, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt()
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| "warn,scindo_haptic=info".into()),
-        )
-        .init();
-    let arguments = Arguments::parse();
-    match run(&arguments) {
+    let cli = Cli::parse();
+    scindo_program::start_log("warn,scindo_haptic=info");
+    match (cli.manual, cli.arguments) {
+        (Some(manual), _) => match manual.run::<Cli>() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => fail(&error, 1),
+        },
+        (None, Some(arguments)) => touch(&arguments),
+        (None, None) => {
+            eprintln!("{}", Cli::command().render_usage());
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn touch(arguments: &Arguments) -> ExitCode {
+    match run(arguments) {
         Ok(summary) if arguments.json => match serde_json::to_string_pretty(&summary) {
             Ok(json) => {
                 println!("{json}");

@@ -1,8 +1,9 @@
-//! Every tick as a line of CSV, written by a thread of its own through a bounded queue.
+//! Every tick as a line of CSV and as a point of the force plot, by a thread of its own through a bounded queue.
 //!
 //! The loop offers rows and never waits: where the queue is full the row is dropped and counted.
 
 use crate::constants::LOG_QUEUE_ROWS;
+use crate::force_plot::Trace;
 use crossbeam_channel::{Receiver, Sender, TryRecvError};
 use nalgebra::Vector3;
 use std::io::{BufWriter, Write};
@@ -54,32 +55,43 @@ impl LogQueue {
 
 /// The writer. It ends when the queue is dropped.
 pub struct Recorder {
-    writer: JoinHandle<std::io::Result<u64>>,
+    writer: JoinHandle<std::io::Result<(u64, Option<Trace>)>>,
 }
 
 impl Recorder {
-    /// Creates the file and starts the writer.
-    pub fn create(file: &Path) -> std::io::Result<(LogQueue, Self)> {
-        let out = BufWriter::with_capacity(1 << 16, std::fs::File::create(file)?);
+    /// Creates the file and starts the writer, which fills `trace` too.
+    pub fn create(file: Option<&Path>, trace: Option<Trace>) -> std::io::Result<(LogQueue, Self)> {
+        let out: Box<dyn Write + Send> = match file {
+            Some(file) => Box::new(BufWriter::with_capacity(1 << 16, std::fs::File::create(file)?)),
+            None => Box::new(std::io::sink()),
+        };
         let (sender, receiver) = crossbeam_channel::bounded(LOG_QUEUE_ROWS);
-        let writer =
-            std::thread::Builder::new().name("haptic-log".into()).spawn(move || write(out, &receiver))?;
+        let writer = std::thread::Builder::new()
+            .name("haptic-log".into())
+            .spawn(move || write(out, trace, &receiver))?;
         Ok((LogQueue(sender), Self { writer }))
     }
 
-    /// Waits for the last row; the number of rows in the file.
-    pub fn finish(self) -> std::io::Result<u64> {
+    /// Waits for the last row; the number of rows, and the trace.
+    pub fn finish(self) -> std::io::Result<(u64, Option<Trace>)> {
         self.writer.join().unwrap_or_else(|_| Err(std::io::Error::other("the log writer panicked")))
     }
 }
 
-fn write(mut out: impl Write, rows: &Receiver<LogRow>) -> std::io::Result<u64> {
+fn write(
+    mut out: impl Write,
+    mut trace: Option<Trace>,
+    rows: &Receiver<LogRow>,
+) -> std::io::Result<(u64, Option<Trace>)> {
     writeln!(out, "{HEADER}")?;
     let mut count = 0;
     loop {
         match rows.try_recv() {
             Ok(row) => {
                 write_row(&mut out, &row)?;
+                if let Some(trace) = &mut trace {
+                    trace.push(&row);
+                }
                 count += 1;
             }
             Err(TryRecvError::Empty) => std::thread::sleep(POLL),
@@ -87,7 +99,7 @@ fn write(mut out: impl Write, rows: &Receiver<LogRow>) -> std::io::Result<u64> {
         }
     }
     out.flush()?;
-    Ok(count)
+    Ok((count, trace))
 }
 
 fn write_row(out: &mut impl Write, row: &LogRow) -> std::io::Result<()> {
@@ -122,10 +134,11 @@ mod tests {
     #[test]
     fn rows_reach_the_file_in_order_with_as_many_fields_as_the_header() {
         let file = std::env::temp_dir().join(format!("scindo-haptic-log-{}.csv", std::process::id()));
-        let (mut queue, recorder) = Recorder::create(&file).unwrap();
+        let (mut queue, recorder) = Recorder::create(Some(&file), Some(Trace::default())).unwrap();
         (1..=1000).for_each(|seq| assert!(queue.offer(&row(seq))));
         drop(queue);
-        assert_eq!(recorder.finish().unwrap(), 1000);
+        let (rows, trace) = recorder.finish().unwrap();
+        assert_eq!((rows, trace.unwrap().rows()), (1000, 1000));
         let mut reader = csv::Reader::from_path(&file).unwrap();
         let columns = reader.headers().unwrap().len();
         let seqs: Vec<u64> = reader

@@ -6,6 +6,7 @@ use crate::contact_law::ContactLaw;
 use crate::contact_model::ContactSlot;
 use crate::device::{DeviceState, HapticDevice};
 use crate::link::PoseQueue;
+use crate::live::Meter;
 use crate::recorder::{LogQueue, LogRow};
 use crate::safety::flag;
 use crate::safety::limiter::Limiter;
@@ -57,6 +58,8 @@ pub struct Ports {
     pub poses: Option<PoseQueue>,
     /// Rows of the log.
     pub log: Option<LogQueue>,
+    /// Figures to show while the loop runs.
+    pub meter: Option<Arc<Meter>>,
 }
 
 /// All state of the loop. One owner: the loop's thread.
@@ -154,6 +157,9 @@ impl HapticTick {
         }
         if let Some(log) = &mut self.ports.log {
             self.report.log_rows_dropped += u64::from(!log.offer(row));
+        }
+        if let Some(meter) = &self.ports.meter {
+            meter.record(row);
         }
     }
 

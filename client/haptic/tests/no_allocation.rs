@@ -44,9 +44,10 @@ fn a_tick_allocates_nothing() {
     let device = SimulatedDevice::new(Path::circle(&touch), Hand::default());
     let (mut slot, contacts) = contact_slot();
     let file = std::env::temp_dir().join(format!("scindo-haptic-alloc-{}.csv", std::process::id()));
-    let (log, recorder) = Recorder::create(&file).unwrap();
-    let ports =
-        Ports { contacts, server_alive: Arc::new(AtomicBool::new(true)), poses: None, log: Some(log) };
+    let (log, recorder) = Recorder::create(Some(&file), None).unwrap();
+    let server_alive = Arc::new(AtomicBool::new(true));
+    let meter = Some(Arc::default());
+    let ports = Ports { contacts, server_alive, poses: None, log: Some(log), meter };
     let limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
     let mut tick = HapticTick::new(Box::new(device), limits, ports);
     let (mut allocated, mut largest_n) = (0, 0.0f64);

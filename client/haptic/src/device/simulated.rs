@@ -53,6 +53,16 @@ pub struct SimulatedDevice {
 }
 
 impl SimulatedDevice {
+    /// At rest in the origin, until it follows a path.
+    pub fn at_rest(hand: Hand) -> Self {
+        Self::new(Path::still(Vector3::zeros()), hand)
+    }
+
+    /// Begins `path` anew, at rest on its first point.
+    pub fn follow(&mut self, path: Path) {
+        *self = Self::new(path, self.hand);
+    }
+
     /// At rest on the first point of `path`.
     pub fn new(path: Path, hand: Hand) -> Self {
         let position_m = path.at(0.0).position_m;

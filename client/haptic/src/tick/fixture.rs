@@ -94,7 +94,7 @@ impl Rig {
     pub fn new(limits: Limits) -> Self {
         let (device, alive) = (FakeDevice::new(), Arc::new(AtomicBool::new(true)));
         let (input, contacts) = contact_slot();
-        let ports = Ports { contacts, server_alive: alive.clone(), poses: None, log: None };
+        let ports = Ports { contacts, server_alive: alive.clone(), poses: None, log: None, meter: None };
         let tick = HapticTick::new(Box::new(device.clone()), limits, ports);
         Self { device, inbox: ContactInbox::new(input), alive, tick, now_ns: MS, seq: 0 }
     }

@@ -85,7 +85,7 @@ fn stiff_tissue_on_a_hand_does_not_chatter() {
     let mut tick = HapticTick::new(
         Box::new(device),
         LIMITS,
-        Ports { contacts, server_alive: alive, poses: None, log: None },
+        Ports { contacts, server_alive: alive, poses: None, log: None, meter: Some(Arc::default()) },
     );
     let mut late = Vec::new();
     for ms in 0..2600u64 {

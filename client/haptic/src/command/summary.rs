@@ -1,0 +1,63 @@
+//! What a run achieved, as the terminal and `--json` show it.
+
+use serde::Serialize;
+
+use crate::statistics::{LinkReport, LoopReport};
+
+/// All figures of a run.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    /// The tool that was held.
+    pub tool: String,
+    /// The device that held it.
+    pub device: &'static str,
+    /// Clamp in force [N].
+    pub force_limit_n: f64,
+    /// Slew limit in force [N/s].
+    pub slew_limit_n_s: f64,
+    /// What the loop saw.
+    #[serde(rename = "loop")]
+    pub loop_: LoopReport,
+    /// What the link saw.
+    pub link: LinkReport,
+    /// Rows in the log file.
+    pub log_rows: Option<u64>,
+}
+
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (l, n) = (&self.loop_, &self.link);
+        writeln!(f, "tool {} on device {}, {:.1} s", self.tool, self.device, l.seconds)?;
+        writeln!(
+            f,
+            "loop      {:7.1} Hz   late p50 {:.3} ms, p99 {:.3} ms, max {:.1} ms   missed {} of {}",
+            l.rate_hz,
+            l.lateness_ms.p50,
+            l.lateness_ms.p99,
+            l.lateness_ms.max,
+            l.missed_ticks,
+            l.ticks + l.missed_ticks
+        )?;
+        writeln!(
+            f,
+            "contact   {:7.1} Hz   lost {}, late {}, refused {}, longest gap {:.0} ms",
+            n.contact_rate_hz, n.contacts_lost, n.contacts_late, n.contacts_refused, n.longest_contact_gap_ms
+        )?;
+        writeln!(
+            f,
+            "pose to contact      p50 {:.2} ms, p99 {:.2} ms, max {:.0} ms   ({} poses sent)",
+            n.round_trip_ms.p50, n.round_trip_ms.p99, n.round_trip_ms.max, n.poses_sent
+        )?;
+        write!(
+            f,
+            "force     max {:.2} N (limit {} N), largest step {:.4} N = {:.1} N/s (limit {} N/s), touched {:.1} s, device faults {}",
+            l.max_force_n,
+            self.force_limit_n,
+            l.max_force_step_n,
+            l.max_slew_n_s,
+            self.slew_limit_n_s,
+            l.touch_ticks as f64 * 1e-3,
+            l.device_faults
+        )
+    }
+}
