@@ -12,7 +12,7 @@ use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::viewer_rpc::Call;
 use scindo_proto::messages::{
     BodyInfo, BodyStats, Counter, Effect, Event, Plan, Pose, RpcReply, SessionInfo, StageTime, Stats,
-    SurfaceFrame, SurfaceTopology, ToolSample, ToolState, ToolStats, Vec3, ViewerToolGone,
+    SurfaceFrame, SurfaceTopology, ToolSample, ToolState, ToolStats, Vec3, ViewerRpcReply, ViewerToolGone,
 };
 use scindo_view::hub::{Hub, Up};
 use scindo_view::{WebConfig, WebServer};
@@ -109,11 +109,10 @@ impl Feed {
                     }
                     _ => "nothing to do",
                 };
-                hub.answer(
-                    browser,
-                    call.call_id,
-                    RpcReply { ok: true, message: message.into(), ..Default::default() },
-                );
+                let reply = RpcReply { ok: true, message: message.into(), ..Default::default() };
+                let answer =
+                    ViewerRpcReply { call_id: call.call_id, reply: Some(reply), ..Default::default() };
+                hub.answer(browser, answer);
             }
         }
     }
@@ -306,6 +305,8 @@ impl Feed {
                 copies: 3_300 + 8 * self.open_rings as u32,
                 epoch: self.epoch,
                 volume_m3: 1.5e-3,
+                tolerance: 1e-6,
+                ..Default::default()
             }],
             tools: self
                 .tool

@@ -4,12 +4,13 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use bytes::Bytes;
 use prost::Message as _;
 use scindo_proto::limits::{MAX_BODIES, MAX_TOOLS};
 use scindo_proto::messages::viewer_down::Message as Down;
-use scindo_proto::messages::{RpcReply, ToolSample, ViewerDown, ViewerLink, ViewerRpc, ViewerRpcReply};
+use scindo_proto::messages::{ToolSample, ViewerDown, ViewerLink, ViewerRpc, ViewerRpcReply, ViewerWatch};
 use tokio::sync::{mpsc, watch};
 
 use crate::outbox::{Outbox, Slot};
@@ -20,8 +21,22 @@ const MAX_WAITING: usize = 256;
 /// Events a late joiner still sees.
 const MAX_EVENTS: usize = 7;
 
-/// State slots beside bodies and tools: link, info, plan, stats.
-const MAX_SLOTS: usize = 4 + 2 * MAX_BODIES + 2 * MAX_TOOLS;
+/// State slots beside bodies and tools: link, info, plan, stats, measures.
+const MAX_SLOTS: usize = 5 + 3 * MAX_BODIES + 2 * MAX_TOOLS;
+
+/// What browsers watch. Nothing else needs to be asked of the server.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Watched {
+    /// Surfaces and tools: some browser is there.
+    pub scene: bool,
+    /// Stress on surfaces.
+    pub stress: bool,
+    /// Probes and energies.
+    pub measures: bool,
+}
+
+/// A browser that has been silent for this long gives its seat to another one, where all are taken.
+const SILENT: Duration = Duration::from_secs(2);
 
 /// What a browser wants of the server, under the identity the viewer gave it.
 #[derive(Debug)]
@@ -49,15 +64,34 @@ pub struct Hub {
     next_browser: AtomicU64,
     up: mpsc::Sender<Up>,
     client_id: String,
-    watched: watch::Sender<bool>,
+    watched: watch::Sender<Watched>,
 }
 
 #[derive(Debug, Default)]
 struct Shared {
     slots: BTreeMap<Slot, Bytes>,
     events: VecDeque<Bytes>,
-    browsers: BTreeMap<u64, Arc<Outbox>>,
+    browsers: BTreeMap<u64, Browser>,
     connected: bool,
+}
+
+/// A browser at the hub: what it has to be sent, and what it asked for beside surfaces.
+#[derive(Debug)]
+struct Browser {
+    outbox: Arc<Outbox>,
+    asks: ViewerWatch,
+}
+
+impl Shared {
+    /// Ends the browser that has been silent for longest; false if none is silent.
+    fn unseat_silent(&mut self) -> bool {
+        let longest = self.browsers.iter().map(|(&number, browser)| (browser.outbox.silence(), number)).max();
+        let Some((_, browser)) = longest.filter(|(silence, _)| *silence >= SILENT) else { return false };
+        if let Some(browser) = self.browsers.remove(&browser) {
+            browser.outbox.close();
+        }
+        true
+    }
 }
 
 /// A browser's place at the hub; leaving it drops the place.
@@ -82,7 +116,7 @@ impl Hub {
             next_browser: AtomicU64::new(1),
             up,
             client_id: client_id.to_owned(),
-            watched: watch::Sender::new(false),
+            watched: watch::Sender::new(Watched::default()),
         };
         (Arc::new(hub), taken)
     }
@@ -92,14 +126,19 @@ impl Hub {
         &self.client_id
     }
 
-    /// Whether any browser watches; without one, nothing needs to be asked of the server.
-    pub fn watched(&self) -> watch::Receiver<bool> {
+    /// What browsers watch.
+    pub fn watched(&self) -> watch::Receiver<Watched> {
         self.watched.subscribe()
     }
 
     /// Forgets surfaces and tools: they will be told anew.
     pub fn forget_scene(&self) {
-        let is_scene = |slot: &Slot| matches!(slot, Slot::Tool(_) | Slot::Topology(_) | Slot::Frame(_));
+        let is_scene = |slot: &Slot| {
+            matches!(
+                slot,
+                Slot::Tool(_) | Slot::Topology(_) | Slot::Frame(_) | Slot::Field(_) | Slot::Measures
+            )
+        };
         self.lock().slots.retain(|slot, _| !is_scene(slot));
     }
 
@@ -117,18 +156,18 @@ impl Hub {
             Down::ToolGone(gone) => {
                 let slot = Slot::Tool(gone.tool_id.clone());
                 shared.slots.remove(&slot);
-                shared.browsers.values().for_each(|outbox| outbox.forget(&slot));
+                shared.browsers.values().for_each(|browser| browser.outbox.forget(&slot));
             }
             Down::Topology(topology) => {
                 // Positions of the epoch before have no triangles any more.
                 let slot = Slot::Frame(topology.body_id.clone());
                 shared.slots.remove(&slot);
-                shared.browsers.values().for_each(|outbox| outbox.forget(&slot));
+                shared.browsers.values().for_each(|browser| browser.outbox.forget(&slot));
             }
             _ => {}
         }
         let Some(slot) = slot_of(&message) else {
-            shared.browsers.values().for_each(|outbox| outbox.push(bytes.clone()));
+            shared.browsers.values().for_each(|browser| browser.outbox.push(bytes.clone()));
             return;
         };
         if shared.slots.len() >= MAX_SLOTS && !shared.slots.contains_key(&slot) {
@@ -136,7 +175,8 @@ impl Hub {
             return;
         }
         shared.slots.insert(slot.clone(), bytes.clone());
-        shared.browsers.values().for_each(|outbox| outbox.put(slot.clone(), bytes.clone()));
+        let asked = shared.browsers.values().filter(|browser| browser.takes(&slot));
+        asked.for_each(|browser| browser.outbox.put(slot.clone(), bytes.clone()));
     }
 
     /// Tells every browser whether a server is heard; a server that left takes its state along.
@@ -153,10 +193,10 @@ impl Hub {
     }
 
     /// Answers the call of one browser.
-    pub fn answer(&self, browser: u64, call_id: u32, reply: RpcReply) {
-        let bytes = encode(&Down::Rpc(ViewerRpcReply { call_id, reply: Some(reply) }));
-        if let Some(outbox) = self.lock().browsers.get(&browser) {
-            outbox.push(bytes);
+    pub fn answer(&self, browser: u64, answer: ViewerRpcReply) {
+        let bytes = encode(&Down::Rpc(answer));
+        if let Some(browser) = self.lock().browsers.get(&browser) {
+            browser.outbox.push(bytes);
         }
     }
 
@@ -170,20 +210,50 @@ impl Hub {
         self.lock().browsers.len()
     }
 
-    /// Seats a browser, unless `most` already sit; it is sent all present state.
+    /// Seats a browser; it is sent all present state. Where `most` already sit, it takes the seat of the one
+    /// that has been silent for longest, and gets none if all of them speak.
     pub fn join(self: &Arc<Self>, most: usize) -> Option<Seat> {
         let mut shared = self.lock();
-        if shared.browsers.len() >= most {
+        if shared.browsers.len() >= most && !shared.unseat_silent() {
             return None;
         }
         let browser = self.next_browser.fetch_add(1, Ordering::Relaxed);
         let outbox = Arc::new(Outbox::default());
-        shared.slots.iter().for_each(|(slot, bytes)| outbox.put(slot.clone(), bytes.clone()));
+        let newcomer = Browser { outbox: Arc::clone(&outbox), asks: ViewerWatch::default() };
+        let slots = shared.slots.iter().filter(|(slot, _)| newcomer.takes(slot));
+        slots.for_each(|(slot, bytes)| outbox.put(slot.clone(), bytes.clone()));
         shared.events.iter().for_each(|bytes| outbox.push(bytes.clone()));
-        shared.browsers.insert(browser, Arc::clone(&outbox));
-        self.watched.send_replace(true);
+        shared.browsers.insert(browser, newcomer);
+        self.tell_watched(&shared);
         let name = self.client_id.strip_prefix("view-").unwrap_or(&self.client_id);
         Some(Seat { hub: Arc::clone(self), browser, outbox, tool_id: format!("mouse-{name}-{browser}") })
+    }
+
+    /// A browser says what it shows beside the surfaces.
+    pub fn ask(&self, browser: u64, asks: ViewerWatch) {
+        let mut shared = self.lock();
+        let Shared { slots, browsers, .. } = &mut *shared;
+        let Some(browser) = browsers.get_mut(&browser) else { return };
+        let asked_before = std::mem::replace(&mut browser.asks, asks);
+        if asked_before == asks {
+            return;
+        }
+        // What others have already asked for is there.
+        let on_demand = |slot: &Slot| matches!(slot, Slot::Field(_) | Slot::Measures);
+        for (slot, bytes) in slots.iter().filter(|(slot, _)| on_demand(slot) && browser.takes(slot)) {
+            browser.outbox.put(slot.clone(), bytes.clone());
+        }
+        self.tell_watched(&shared);
+    }
+
+    fn tell_watched(&self, shared: &Shared) {
+        let asks = |of: fn(&ViewerWatch) -> bool| shared.browsers.values().any(|browser| of(&browser.asks));
+        let watched = Watched {
+            scene: !shared.browsers.is_empty(),
+            stress: asks(|asks| asks.stress),
+            measures: asks(|asks| asks.measures),
+        };
+        self.watched.send_if_modified(|held| std::mem::replace(held, watched) != watched);
     }
 
     /// Passes on what a browser sent. Poses are dropped when the link is behind: a newer one follows.
@@ -200,13 +270,24 @@ impl Hub {
     }
 }
 
+impl Browser {
+    /// Whether it is sent this state: fields and measures only when it asked.
+    fn takes(&self, slot: &Slot) -> bool {
+        match slot {
+            Slot::Field(_) => self.asks.stress,
+            Slot::Measures => self.asks.measures,
+            _ => true,
+        }
+    }
+}
+
 impl Drop for Seat {
     fn drop(&mut self) {
         self.outbox.close();
         {
             let mut shared = self.hub.lock();
             shared.browsers.remove(&self.browser);
-            self.hub.watched.send_replace(!shared.browsers.is_empty());
+            self.hub.tell_watched(&shared);
         }
         // Should the channel be full, the server's watch on poses ends the tool.
         if self.hub.up.try_send(Up::Release { tool_id: self.tool_id.clone() }).is_err() {
@@ -229,6 +310,8 @@ fn slot_of(message: &Down) -> Option<Slot> {
         Down::Tool(state) => Slot::Tool(state.tool_id.clone()),
         Down::Topology(topology) => Slot::Topology(topology.body_id.clone()),
         Down::Frame(frame) => Slot::Frame(frame.body_id.clone()),
+        Down::Field(field) => Slot::Field(field.body_id.clone()),
+        Down::Measures(_) => Slot::Measures,
         Down::Hello(_) | Down::Event(_) | Down::Pong(_) | Down::Rpc(_) | Down::ToolGone(_) => {
             return None;
         }

@@ -17,7 +17,11 @@ mod page;
 
 mod origin;
 
+mod listen;
+
 pub mod socket;
+
+mod door;
 
 pub mod server;
 
@@ -33,7 +37,8 @@ use tokio::sync::mpsc;
 
 use crate::hub::{Hub, Up};
 
-pub use server::{WebConfig, WebServer};
+pub use listen::listen_address;
+pub use server::{Operators, WebConfig, WebServer};
 
 /// Why the viewer cannot work.
 #[derive(Debug, Error)]

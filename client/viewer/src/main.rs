@@ -5,17 +5,20 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use scindo_view::{ViewConfig, Viewer, page_is_built};
+use scindo_program::Manual;
+use scindo_view::{Operators, ViewConfig, Viewer, page_is_built};
 
 /// Shows a running scindo session in a browser.
 #[derive(Debug, Parser)]
-#[command(name = "scindo-view", version)]
+#[command(name = "scindo-view", version, args_conflicts_with_subcommands = true)]
 struct Args {
+    #[command(subcommand)]
+    manual: Option<Manual>,
     /// Zenoh endpoint of the server, for example tcp/192.168.1.10:7447; may be given several times
     #[arg(long, value_name = "ENDPOINT")]
     connect: Vec<String>,
-    /// Address for browsers; port 0 takes a free one
-    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:8080")]
+    /// Address for browsers: PORT, HOST or HOST:PORT; 8080 is 127.0.0.1:8080, and port 0 takes a free one
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8080", value_parser = scindo_view::listen_address)]
     listen: SocketAddr,
     /// First part of every key; one per laboratory
     #[arg(long, default_value = "scindo")]
@@ -35,6 +38,9 @@ struct Args {
     /// Pages may watch, but not touch, cut or pause
     #[arg(long)]
     read_only: bool,
+    /// Which pages may pause, step, reset and set; the server has an option of the same name
+    #[arg(long, value_enum, default_value = "loopback")]
+    operators: Operators,
     /// Serve the page from this folder, for work on the page itself
     #[arg(long, value_name = "DIR", hide = true)]
     page: Option<PathBuf>,
@@ -45,15 +51,17 @@ struct Args {
 
 #[tokio::main]
 async fn main() -> ExitCode {
-    tracing_subscriber::fmt()
-        .with_env_filter(
-            tracing_subscriber::EnvFilter::try_from_default_env()
-                .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("scindo=info,scindo_view=info,warn")),
-        )
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()))
-        .init();
+    scindo_program::start_log("scindo=info,scindo_view=info,warn");
     let args = Args::parse();
+    if let Some(manual) = &args.manual {
+        return match manual.run::<Args>() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("scindo-view: {error}");
+                ExitCode::FAILURE
+            }
+        };
+    }
     match run(args).await {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -93,6 +101,7 @@ fn config(args: Args) -> ViewConfig {
     config.link.zenoh_file = args.zenoh;
     config.web.allow_origins = args.allow_origin;
     config.web.max_browsers = args.max_browsers;
+    config.web.operators = args.operators;
     config.web.read_only = args.read_only;
     config.web.page_folder = args.page;
     config

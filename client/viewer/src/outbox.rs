@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use tokio::sync::Notify;
@@ -24,8 +25,12 @@ pub enum Slot {
     Stats,
     /// State of one tool.
     Tool(String),
+    /// Probes and energies.
+    Measures,
     /// Triangles of one body.
     Topology(String),
+    /// Stress on the surface of one body.
+    Field(String),
     /// Positions of one body.
     Frame(String),
 }
@@ -44,7 +49,7 @@ pub struct Outbox {
     wake: Notify,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Queue {
     slots: BTreeMap<Slot, Bytes>,
     ordered: VecDeque<Bytes>,
@@ -52,6 +57,22 @@ struct Queue {
     frames_acked: u64,
     frames_dropped: u64,
     closed: bool,
+    /// When the browser last said something.
+    heard: Instant,
+}
+
+impl Default for Queue {
+    fn default() -> Self {
+        Self {
+            slots: BTreeMap::new(),
+            ordered: VecDeque::new(),
+            frames_sent: 0,
+            frames_acked: 0,
+            frames_dropped: 0,
+            closed: false,
+            heard: Instant::now(),
+        }
+    }
 }
 
 impl Outbox {
@@ -88,6 +109,16 @@ impl Outbox {
         queue.frames_acked = frames.min(queue.frames_sent).max(queue.frames_acked);
         drop(queue);
         self.wake.notify_one();
+    }
+
+    /// The browser said something.
+    pub fn heard(&self) {
+        self.lock().heard = Instant::now();
+    }
+
+    /// How long the browser has been silent.
+    pub fn silence(&self) -> Duration {
+        self.lock().heard.elapsed()
     }
 
     /// Frames that were replaced before this browser could take them.

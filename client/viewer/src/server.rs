@@ -5,15 +5,21 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use axum::extract::ws::WebSocketUpgrade;
-use axum::extract::{Path, State};
+use axum::extract::{ConnectInfo, Path, State};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{any, get};
 use axum::{Json, Router};
+use scindo_proto::limits::MAX_TOPOLOGY_BYTES;
 use tokio::net::TcpListener;
 
+use crate::door::{Door, From};
 use crate::hub::Hub;
+use crate::socket::Rights;
 use crate::{ViewError, origin, page, socket};
+
+/// What a socket reads at a time [bytes], allocated per browser: a page sends small messages.
+const READ_BUFFER: usize = 8 * 1024;
 
 /// How the web server behaves; part of [`crate::ViewConfig`].
 #[derive(Debug, Clone)]
@@ -26,6 +32,8 @@ pub struct WebConfig {
     pub max_browsers: usize,
     /// Pages may watch, but not touch, cut or call.
     pub read_only: bool,
+    /// Which pages may pause, step, reset and set.
+    pub operators: Operators,
     /// Serve the page from this folder instead of the embedded one, for work on the page.
     pub page_folder: Option<PathBuf>,
 }
@@ -37,7 +45,31 @@ impl Default for WebConfig {
             allow_origins: Vec::new(),
             max_browsers: 32,
             read_only: false,
+            operators: Operators::default(),
             page_folder: None,
+        }
+    }
+}
+
+/// Who among the browsers may give orders: pause, step, reset, set.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Operators {
+    /// Every browser.
+    All,
+    /// Browsers on this machine.
+    #[default]
+    Loopback,
+    /// Nobody.
+    None,
+}
+
+impl Operators {
+    /// Whether a browser at this address is one of them.
+    pub fn admit(self, address: SocketAddr) -> bool {
+        match self {
+            Self::All => true,
+            Self::Loopback => address.ip().to_canonical().is_loopback(),
+            Self::None => false,
         }
     }
 }
@@ -80,7 +112,10 @@ impl WebServer {
             .route("/healthz", get(health))
             .route("/{name}", get(file))
             .with_state(self.app);
-        axum::serve(self.listener, router).await.map_err(|source| ViewError::Listen { address, source })
+        let service = router.into_make_service_with_connect_info::<From>();
+        axum::serve(Door::new(self.listener), service)
+            .await
+            .map_err(|source| ViewError::Listen { address, source })
     }
 }
 
@@ -104,7 +139,12 @@ async fn health(State(app): State<Arc<App>>) -> Response {
     .into_response()
 }
 
-async fn open_socket(State(app): State<Arc<App>>, headers: HeaderMap, upgrade: WebSocketUpgrade) -> Response {
+async fn open_socket(
+    State(app): State<Arc<App>>,
+    ConnectInfo(From(visitor)): ConnectInfo<From>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
     if !origin::is_allowed(&headers, &app.config.allow_origins, app.config.listen.ip().is_loopback()) {
         let words = "this page comes from another origin; start the viewer with --allow-origin to admit it";
         return (StatusCode::FORBIDDEN, words).into_response();
@@ -113,11 +153,18 @@ async fn open_socket(State(app): State<Arc<App>>, headers: HeaderMap, upgrade: W
         return (StatusCode::SERVICE_UNAVAILABLE, "as many browsers as allowed are connected")
             .into_response();
     };
-    upgrade.max_message_size(socket::MAX_UP_BYTES).max_frame_size(socket::MAX_UP_BYTES).on_upgrade(
-        move |stream| {
-            let (hub, upstream, read_only) =
-                (Arc::clone(&app.hub), app.upstream.clone(), app.config.read_only);
-            socket::serve(stream, hub, seat, upstream, read_only)
-        },
-    )
+    visitor.becomes_browser();
+    let rights = Rights {
+        read_only: app.config.read_only,
+        operator: !app.config.read_only && app.config.operators.admit(visitor.address),
+    };
+    upgrade
+        .max_message_size(socket::MAX_UP_BYTES)
+        .max_frame_size(socket::MAX_UP_BYTES)
+        .read_buffer_size(READ_BUFFER)
+        .max_write_buffer_size(2 * MAX_TOPOLOGY_BYTES)
+        .on_upgrade(move |stream| {
+            let (hub, upstream) = (Arc::clone(&app.hub), app.upstream.clone());
+            socket::serve(stream, hub, seat, upstream, rights)
+        })
 }

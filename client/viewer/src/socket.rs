@@ -10,8 +10,12 @@ use prost::Message as _;
 use scindo_proto::codec::WireMessage;
 use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::viewer_up::Message as FromPage;
-use scindo_proto::messages::{ViewerHello, ViewerPing, ViewerPong, ViewerUp};
+use scindo_proto::messages::{
+    Error, RpcReply, ViewerHello, ViewerPing, ViewerPong, ViewerRpcReply, ViewerUp,
+};
+use tokio::time::{Instant, interval_at};
 
+use crate::door::PING;
 use crate::hub::{Hub, Seat, Up, encode};
 
 /// Largest message a page may send [bytes]; a pose takes about 300.
@@ -20,23 +24,42 @@ pub const MAX_UP_BYTES: usize = 64 * 1024;
 /// Messages in a row that may be malformed before the page is sent away.
 const MAX_MALFORMED: u32 = 16;
 
+/// What a page may do.
+#[derive(Debug, Clone, Copy)]
+pub struct Rights {
+    /// It may only watch.
+    pub read_only: bool,
+    /// It may pause, step, reset and set.
+    pub operator: bool,
+}
+
 /// Serves one browser until it leaves.
-pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: String, read_only: bool) {
+pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: String, rights: Rights) {
     let (mut sink, mut stream) = socket.split();
     let hello = encode(&Down::Hello(ViewerHello {
         viewer_version: env!("CARGO_PKG_VERSION").to_owned(),
         client_id: hub.client_id().to_owned(),
         tool_id: seat.tool_id.clone(),
         upstream,
-        read_only,
+        read_only: rights.read_only,
+        operator: rights.operator,
     }));
     let outbox = Arc::clone(&seat.outbox);
     let send = async {
         if sink.send(Message::Binary(hello)).await.is_err() {
             return;
         }
-        while let Some(message) = outbox.next().await {
-            if sink.send(Message::Binary(message)).await.is_err() {
+        let mut ping = interval_at(Instant::now() + PING, PING);
+        loop {
+            let message = tokio::select! {
+                message = outbox.next() => match message {
+                    Some(message) => Message::Binary(message),
+                    None => return,
+                },
+                // The answer keeps the connection open; without one it ends.
+                _ = ping.tick() => Message::Ping(Bytes::new()),
+            };
+            if sink.send(message).await.is_err() {
                 return;
             }
         }
@@ -45,7 +68,7 @@ pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: Strin
         let mut malformed = 0;
         while let Some(Ok(message)) = stream.next().await {
             match message {
-                Message::Binary(bytes) => match take(bytes, &hub, &seat, read_only).await {
+                Message::Binary(bytes) => match take(bytes, &hub, &seat, rights).await {
                     Ok(()) => malformed = 0,
                     Err(reason) => {
                         malformed += 1;
@@ -64,23 +87,38 @@ pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: Strin
 }
 
 /// Applies one message of the page. Identity is the seat's; what the page claims is overwritten.
-async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, read_only: bool) -> Result<(), String> {
+async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, rights: Rights) -> Result<(), String> {
     let up = ViewerUp::decode(bytes).map_err(|error| error.to_string())?;
     let message = up.message.ok_or("empty message")?;
+    seat.outbox.heard();
     match message {
         FromPage::Ping(ping) => seat.outbox.push(encode(&Down::Pong(pong(ping, hub, seat)))),
         FromPage::FrameAck(ack) => seat.outbox.acknowledge(ack.frames),
-        _ if read_only => return Err("this viewer only watches".to_owned()),
+        FromPage::Watch(asks) => hub.ask(seat.browser, asks),
+        _ if rights.read_only => return Err("this viewer only watches".to_owned()),
         FromPage::Tool(mut sample) => {
             sample.client_id.clone_from(&seat.tool_id);
             sample.tool_id.clone_from(&seat.tool_id);
             sample.check().map_err(|error| error.to_string())?;
             hub.send_up(Up::Tool(Box::new(sample))).await;
         }
+        FromPage::Rpc(call) if !rights.operator => {
+            let (call_id, reply) = (call.call_id, Some(not_an_operator()));
+            hub.answer(seat.browser, ViewerRpcReply { call_id, reply, ..ViewerRpcReply::default() });
+        }
         FromPage::Rpc(call) => hub.send_up(Up::Rpc { browser: seat.browser, call }).await,
         FromPage::Release(_) => hub.send_up(Up::Release { tool_id: seat.tool_id.clone() }).await,
     }
     Ok(())
+}
+
+fn not_an_operator() -> RpcReply {
+    let error = Error {
+        code: "not-an-operator".to_owned(),
+        message: "this page may not pause, step, reset or set".to_owned(),
+        hint: "open it on the viewer's own machine, or start the viewer with --operators all".to_owned(),
+    };
+    RpcReply { ok: false, error: Some(error), ..RpcReply::default() }
 }
 
 fn pong(ping: ViewerPing, hub: &Hub, seat: &Seat) -> ViewerPong {

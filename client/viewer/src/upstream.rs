@@ -9,8 +9,10 @@ use std::time::Duration;
 
 use scindo_client::messages::viewer_down::Message as Down;
 use scindo_client::messages::viewer_rpc::Call;
-use scindo_client::messages::{Error, RpcReply, ToolSample, ToolState, ViewerRpc, ViewerToolGone};
-use scindo_client::{BodyMirror, GuestTool, Link, LinkConfig, LinkError, ToolStates};
+use scindo_client::messages::{
+    Error, RpcReply, ToolSample, ToolState, ViewerRpc, ViewerRpcReply, ViewerToolGone,
+};
+use scindo_client::{BodyMirror, GuestTool, Latest, Link, LinkConfig, LinkError, ToolStates};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
@@ -56,7 +58,7 @@ pub async fn run(hub: Arc<Hub>, mut up: mpsc::Receiver<Up>, config: LinkConfig) 
 async fn refuse_calls(hub: &Hub, up: &mut mpsc::Receiver<Up>, words: &str) {
     while let Some(message) = up.recv().await {
         if let Up::Rpc { browser, call } = message {
-            hub.answer(browser, call.call_id, refused("no-server", words));
+            hub.answer(browser, failed(call.call_id, refused("no-server", words)));
         }
     }
 }
@@ -74,18 +76,17 @@ async fn relay(
     let mut plan = link.plan().await?;
     let mut events = link.events().await?;
     let mut hands = Hands::new(link.clone());
-    let mut scene: Option<JoinSet<()>> = None;
-    let mut generation = 0;
-    refresh(hub, &link, place, &mut generation, &mut scene).await?;
+    let mut followed = Followed::default();
+    refresh(hub, &link, place, &mut followed).await?;
     loop {
         tokio::select! {
             changed = presence.changed() => {
                 changed.map_err(|_| LinkError::Closed)?;
-                refresh(hub, &link, place, &mut generation, &mut scene).await?;
+                refresh(hub, &link, place, &mut followed).await?;
             }
             changed = watched.changed() => {
                 if changed.is_err() { return Ok(()); }
-                refresh(hub, &link, place, &mut generation, &mut scene).await?;
+                refresh(hub, &link, place, &mut followed).await?;
             }
             message = stats.next() => hub.publish(Down::Stats((*message?).clone())),
             message = plan.next() => hub.publish(Down::Plan((*message?).clone())),
@@ -97,8 +98,7 @@ async fn relay(
                 Some(Up::Rpc { browser, call }) => {
                     let (hub, link) = (Arc::clone(hub), link.clone());
                     tokio::spawn(async move {
-                        let call_id = call.call_id;
-                        hub.answer(browser, call_id, ask(&link, call).await);
+                        hub.answer(browser, ask(&link, call).await);
                     });
                 }
             },
@@ -106,37 +106,67 @@ async fn relay(
     }
 }
 
-/// Brings what we follow in line with who is there: a server, and a browser that watches.
-async fn refresh(
-    hub: &Arc<Hub>,
-    link: &Link,
-    place: &str,
-    generation: &mut u64,
-    scene: &mut Option<JoinSet<()>>,
-) -> Result<(), LinkError> {
+/// What is followed on the server, by tasks that end when they are dropped.
+#[derive(Default)]
+struct Followed {
+    /// The server that was there.
+    generation: u64,
+    /// Ids of the bodies, while surfaces and tools are followed.
+    bodies: Vec<String>,
+    scene: Option<JoinSet<()>>,
+    stress: Option<JoinSet<()>>,
+    measures: Option<JoinSet<()>>,
+}
+
+/// Brings what we follow in line with who is there: a server, and what browsers watch.
+async fn refresh(hub: &Arc<Hub>, link: &Link, place: &str, followed: &mut Followed) -> Result<(), LinkError> {
     let presence = *link.presence().borrow();
     let watched = *hub.watched().borrow();
     if presence.servers == 0 {
-        *scene = None;
+        *followed = Followed { generation: followed.generation, ..Followed::default() };
         hub.set_link(false, &format!("no server at {place}"));
         return Ok(());
     }
     if !hub.connected() {
         hub.set_link(true, place);
     }
-    if !watched || *generation != presence.generation {
-        *scene = None;
+    if !watched.scene || followed.generation != presence.generation {
+        *followed = Followed::default();
         hub.forget_scene();
     }
-    *generation = presence.generation;
-    if watched && scene.is_none() {
-        *scene = Some(follow_scene(hub, link).await?);
+    followed.generation = presence.generation;
+    if watched.scene && followed.scene.is_none() {
+        let (bodies, tasks) = follow_scene(hub, link).await?;
+        (followed.bodies, followed.scene) = (bodies, Some(tasks));
+    }
+    if !watched.stress {
+        followed.stress = None;
+    } else if followed.stress.is_none() {
+        let mut tasks = JoinSet::new();
+        for body in &followed.bodies {
+            tasks.spawn(pass_on(Arc::clone(hub), link.stress(body).await?, Down::Field));
+        }
+        followed.stress = Some(tasks);
+    }
+    if !watched.measures {
+        followed.measures = None;
+    } else if followed.measures.is_none() {
+        let mut tasks = JoinSet::new();
+        tasks.spawn(pass_on(Arc::clone(hub), link.measures().await?, Down::Measures));
+        followed.measures = Some(tasks);
     }
     Ok(())
 }
 
-/// Starts to follow every body and the tools of the server that is there now.
-async fn follow_scene(hub: &Arc<Hub>, link: &Link) -> Result<JoinSet<()>, LinkError> {
+/// Every new message of a topic to the hub.
+async fn pass_on<M: Clone>(hub: Arc<Hub>, mut latest: Latest<M>, to_down: fn(M) -> Down) {
+    while let Ok(message) = latest.next().await {
+        hub.publish(to_down((*message).clone()));
+    }
+}
+
+/// Starts to follow every body and the tools of the server that is there now; the ids of the bodies.
+async fn follow_scene(hub: &Arc<Hub>, link: &Link) -> Result<(Vec<String>, JoinSet<()>), LinkError> {
     let asked = Instant::now();
     let info = loop {
         match link.info().await {
@@ -155,8 +185,9 @@ async fn follow_scene(hub: &Arc<Hub>, link: &Link) -> Result<JoinSet<()>, LinkEr
         tasks.spawn(follow_body(Arc::clone(hub), link.mirror(&body.id).await?));
     }
     tasks.spawn(follow_tools(Arc::clone(hub), link.tool_states().await?));
+    let bodies = info.bodies.iter().map(|body| body.id.clone()).collect();
     hub.publish(Down::Info(info));
-    Ok(tasks)
+    Ok((bodies, tasks))
 }
 
 /// Surfaces of one body: the topology when it changed, then the frame.
@@ -236,21 +267,38 @@ impl Hands {
     }
 }
 
-/// One call of a page.
-async fn ask(link: &Link, call: ViewerRpc) -> RpcReply {
-    let reply = match call.call {
+/// One call of a page, answered.
+async fn ask(link: &Link, call: ViewerRpc) -> ViewerRpcReply {
+    let call_id = call.call_id;
+    let mut answer = ViewerRpcReply { call_id, ..ViewerRpcReply::default() };
+    let outcome = match call.call {
         Some(Call::Pause(request)) => link.pause(request.paused).await,
         Some(Call::Step(request)) => link.step(request.count).await,
         Some(Call::Reset(_)) => link.reset().await,
         Some(Call::Set(request)) => link.set(&request.key, &request.value).await,
-        None => return refused("empty", "the page asked for nothing"),
+        Some(Call::Undo(_)) => link.undo().await,
+        Some(Call::Load(request)) => link.load(&request.name).await,
+        Some(Call::Params(_)) => link.params().await.map(|params| {
+            answer.params = Some(params);
+            RpcReply { ok: true, ..RpcReply::default() }
+        }),
+        Some(Call::Scenes(_)) => link.scenes().await.map(|scenes| {
+            answer.scenes = Some(scenes);
+            RpcReply { ok: true, ..RpcReply::default() }
+        }),
+        None => return failed(call_id, refused("empty", "the page asked for nothing")),
     };
-    reply.unwrap_or_else(|error| match error {
+    answer.reply = Some(outcome.unwrap_or_else(|error| match error {
         LinkError::Refused { code, message, hint } => {
             RpcReply { ok: false, error: Some(Error { code, message, hint }), ..RpcReply::default() }
         }
         other => refused("not-answered", &other.to_string()),
-    })
+    }));
+    answer
+}
+
+fn failed(call_id: u32, reply: RpcReply) -> ViewerRpcReply {
+    ViewerRpcReply { call_id, reply: Some(reply), ..ViewerRpcReply::default() }
 }
 
 fn refused(code: &str, message: &str) -> RpcReply {

@@ -10,8 +10,8 @@ use prost::Message as _;
 use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::viewer_up::Message as FromPage;
 use scindo_proto::messages::{
-    Pose, Stats, SurfaceFrame, SurfaceTopology, ToolSample, Vec3, ViewerDown, ViewerFrameAck, ViewerPing,
-    ViewerUp,
+    Pose, Stats, SurfaceField, SurfaceFrame, SurfaceTopology, ToolSample, Vec3, ViewerDown, ViewerFrameAck,
+    ViewerPing, ViewerUp, ViewerWatch,
 };
 use scindo_tests::PATIENCE;
 use scindo_view::hub::{Hub, Up};
@@ -163,7 +163,7 @@ async fn browsers_are_counted_and_limited() {
     let (address, hub, _up) = start(WebConfig { max_browsers: 1, ..WebConfig::default() }).await;
     let mut first = join(address).await;
     next(&mut first).await;
-    assert!(*hub.watched().borrow());
+    assert!(hub.watched().borrow().scene);
     assert!(open(address, &format!("http://{address}")).await.is_err());
     send(&mut first, FromPage::Ping(ViewerPing { page_time_ms: 5.0 })).await;
     assert!(
@@ -171,7 +171,34 @@ async fn browsers_are_counted_and_limited() {
     );
     drop(first);
     let mut watched = hub.watched();
-    timeout(PATIENCE, watched.wait_for(|watched| !watched)).await.unwrap().unwrap();
+    timeout(PATIENCE, watched.wait_for(|watched| !watched.scene)).await.unwrap().unwrap();
+}
+
+/// Stress and measures go to the pages that asked, and are asked of the server only while one does.
+#[tokio::test]
+async fn fields_go_only_to_pages_that_ask() {
+    let (address, hub, _up) = start(WebConfig::default()).await;
+    let (mut asks, mut does_not) = (join(address).await, join(address).await);
+    next(&mut asks).await;
+    next(&mut does_not).await;
+    let mut watched = hub.watched();
+    assert!(!watched.borrow().stress && !watched.borrow().measures);
+    send(&mut asks, FromPage::Watch(ViewerWatch { stress: true, measures: true })).await;
+    timeout(PATIENCE, watched.wait_for(|watched| watched.stress && watched.measures)).await.unwrap().unwrap();
+    hub.publish(Down::Field(SurfaceField { body_id: "liver".into(), ..Default::default() }));
+    hub.publish(Down::Stats(Stats { seq: 7, ..Default::default() }));
+    let both = [next(&mut asks).await, next(&mut asks).await];
+    assert!(both.iter().any(|message| matches!(message, Some(Down::Field(_)))), "{both:?}");
+    assert!(matches!(next(&mut does_not).await, Some(Down::Stats(stats)) if stats.seq == 7));
+    // One that asks later is sent what is there.
+    send(&mut does_not, FromPage::Watch(ViewerWatch { stress: true, measures: false })).await;
+    assert!(matches!(next(&mut does_not).await, Some(Down::Field(_))));
+    send(&mut does_not, FromPage::Watch(ViewerWatch::default())).await;
+    drop(asks);
+    timeout(PATIENCE, watched.wait_for(|watched| !watched.stress && !watched.measures))
+        .await
+        .unwrap()
+        .unwrap();
 }
 
 #[tokio::test]

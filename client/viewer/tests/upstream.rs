@@ -12,8 +12,9 @@ use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::viewer_rpc::Call;
 use scindo_proto::messages::viewer_up::Message as FromPage;
 use scindo_proto::messages::{
-    BodyInfo, PauseRequest, Pose, RpcReply, SessionInfo, SurfaceFrame, SurfaceKeyframe, SurfaceTopology,
-    ToolSample, ToolShape, Vec3, ViewerDown, ViewerRpc, ViewerUp, tool_sample, tool_shape,
+    BodyInfo, Param, ParamsReply, PauseRequest, Pose, RpcReply, SessionInfo, SurfaceFrame, SurfaceKeyframe,
+    SurfaceTopology, ToolSample, ToolShape, Vec3, ViewerDown, ViewerParamsCall, ViewerRpc, ViewerUp,
+    tool_sample, tool_shape,
 };
 use scindo_proto::{Chunk, KeySpace, Role, Topic, Verb, WireMessage, decode, encode, encoding};
 use scindo_tests::{PATIENCE, free_pair};
@@ -95,6 +96,8 @@ impl Server {
             Topic::Rpc(Verb::Pause),
             RpcReply { ok: true, message: "paused".into(), ..Default::default() },
         );
+        let param = Param { key: "body.liver.young_pa".into(), ..Default::default() };
+        answer(&session, Topic::Rpc(Verb::Params), ParamsReply { params: vec![param] });
         let keyframe = SurfaceKeyframe { topology: Some(topology(epoch)), frame: Some(frame(epoch, 1)) };
         answer(&session, Topic::SurfaceKeyframe(body()), keyframe);
         let token = keys().key(&Topic::Live(Role::Server, Chunk::new("id", "server").unwrap()));
@@ -258,6 +261,11 @@ async fn tools_have_an_owner_each_and_calls_are_answered() {
         until(&mut browser, "the answer", |m| if let Down::Rpc(reply) = m { Some(reply) } else { None })
             .await;
     assert!(reply.call_id == 7 && reply.reply.unwrap().ok);
+    let question = Call::Params(ViewerParamsCall {});
+    send(&mut browser, FromPage::Rpc(ViewerRpc { call_id: 8, call: Some(question) })).await;
+    let answered = |m| if let Down::Rpc(reply) = m { (reply.call_id == 8).then_some(reply) } else { None };
+    let reply = until(&mut browser, "the parameters", answered).await;
+    assert_eq!(reply.params.unwrap().params[0].key, "body.liver.young_pa");
 
     let kind = tool_shape::Kind::Sphere(tool_shape::Sphere { radius_m: 0.01 });
     let sample = ToolSample {
