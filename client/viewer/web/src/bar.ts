@@ -1,44 +1,61 @@
 // Buttons and keys.
 
-import { boundsOf, type Stage } from "./stage";
+import { boundsOf, PRESETS, type Preset, type Stage } from "./stage";
 import type { Hand, HandMode } from "./hand";
+import type { Help } from "./help";
 import type { Relay } from "./relay";
 import type { Session } from "./session";
+import type { View } from "./view";
 import { length } from "./units";
 
 const HINTS: Record<HandMode, string> = {
-  orbit: "drag turns the view, the wheel zooms · Poke, Grab and Cut touch the tissue",
-  poke: "drag on the tissue to press · wheel sets the depth · drag beside it, Shift or right button turns the view",
-  grab: "drag the tissue to pull it · wheel pushes and pulls · drag beside it, Shift or right button turns the view",
-  cut: "draw the cut on the tissue · wheel sets its depth · drag beside it, Shift or right button turns the view",
+  orbit: "drag turns the view, the wheel zooms · Poke, Grab and Cut touch the tissue · ? shows all keys",
+  poke: "drag on the tissue to press · wheel: depth · beside it, with Shift or right button: turn the view",
+  grab: "drag the tissue to pull it · wheel: push and pull · beside it, with Shift or right button: turn the view",
+  cut: "draw the cut on the tissue · wheel: depth · beside it, with Shift or right button: turn the view",
 };
 const KEYS: Record<string, HandMode> = { "1": "poke", "2": "grab", "3": "cut", c: "cut", o: "orbit", "0": "orbit", escape: "orbit" };
+const CAMERAS: Record<string, Preset> = { "5": "front", "6": "right", "7": "top", "8": "corner" };
+/** The second click on Reset has to come within this time. */
+const SURE_MS = 5000;
+/** Below this width the numbers are hidden at first. */
+const NARROW = 1000;
 
 export class Bar {
   private readonly buttons = [...document.querySelectorAll<HTMLButtonElement>("button[data-hand]")];
   private readonly pause = document.getElementById("pause") as HTMLButtonElement;
   private readonly step = document.getElementById("step") as HTMLButtonElement;
   private readonly reset = document.getElementById("reset") as HTMLButtonElement;
+  private readonly undo = document.getElementById("undo") as HTMLButtonElement;
   private readonly range = document.getElementById("depth-range") as HTMLInputElement;
+  private asked = 0;
 
   constructor(
     private readonly stage: Stage,
     private readonly session: Session,
     private readonly relay: Relay,
     private readonly hand: Hand,
+    private readonly view: View,
+    private readonly help: Help,
   ) {
     for (const button of this.buttons) {
       button.setAttribute("role", "radio");
       button.onclick = () => this.hand.choose(button.dataset["hand"] as HandMode);
     }
+    for (const button of document.querySelectorAll<HTMLButtonElement>("button[data-preset]")) {
+      button.onclick = () => this.fit(button.dataset["preset"] as Preset);
+    }
     this.pause.onclick = () => this.relay.call({ case: "pause", value: { paused: !this.session.paused } });
     this.step.onclick = () => this.relay.call({ case: "step", value: { count: 1 } });
-    this.reset.onclick = () => this.relay.call({ case: "reset", value: {} });
+    this.undo.onclick = () => this.relay.call({ case: "undo", value: {} });
+    this.reset.onclick = () => this.askReset();
     document.getElementById("fit")!.onclick = () => this.fit();
     document.getElementById("toggle")!.onclick = () => this.toggle();
+    document.getElementById("view-toggle")!.onclick = () => this.view.toggle();
+    document.getElementById("help-toggle")!.onclick = () => this.help.toggle();
     this.range.oninput = () => this.hand.setDepth(Number(this.range.value));
     document.addEventListener("keydown", (e) => this.onKey(e));
-    if (innerWidth <= 760) this.toggle();
+    if (innerWidth <= NARROW) this.toggle();
     document.body.dataset["hand"] = "orbit";
     hand.onChange = () => this.refresh();
     this.refresh();
@@ -58,30 +75,69 @@ export class Bar {
     this.pause.querySelector("span")!.textContent = this.session.paused ? "Go on" : "Pause";
     this.pause.querySelector("path")!.setAttribute("d", this.session.paused ? "M7 5l12 7-12 7z" : "M8 5v14M16 5v14");
     this.pause.disabled = this.reset.disabled = this.session.readOnly;
+    this.undo.disabled = this.session.readOnly || !this.hasCuts;
     this.step.disabled = this.session.readOnly || !this.session.paused;
   }
 
+  fit(preset?: Preset): void {
+    const box = boundsOf(this.session.bodies.values());
+    if (!box.isEmpty()) this.stage.fit(box, preset);
+  }
+
+  private get hasCuts(): boolean {
+    return [...this.session.bodies.values()].some((body) => body.lipTriangles > 0 || body.marks.count > 0);
+  }
+
+  /** Cuts cannot be had back: a second click has to confirm. */
+  private askReset(): void {
+    const cuts = this.hasCuts;
+    const words = this.reset.querySelector("span")!;
+    if (cuts && performance.now() - this.asked > SURE_MS) {
+      this.asked = performance.now();
+      this.reset.classList.add("sure");
+      words.textContent = "Lose cuts?";
+      setTimeout(() => this.calm(), SURE_MS);
+      return;
+    }
+    this.calm();
+    this.relay.call({ case: "reset", value: {} });
+  }
+
+  private calm(): void {
+    this.asked = -Infinity;
+    this.reset.classList.remove("sure");
+    this.reset.querySelector("span")!.textContent = "Reset";
+  }
+
   private onKey(e: KeyboardEvent): void {
-    if (e.ctrlKey || e.metaKey || e.altKey || e.target instanceof HTMLInputElement) return;
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
+    if (e.target instanceof HTMLSelectElement || (e.target instanceof HTMLInputElement && e.target.type === "range" && e.key.startsWith("Arrow"))) return;
     const key = e.key.toLowerCase();
-    const mode = KEYS[key];
-    if (mode) this.hand.choose(mode);
+    if (e.key === "?" || (key === "escape" && this.help.isOpen)) {
+      this.help.toggle();
+      return;
+    }
+    const mode = KEYS[key], preset = CAMERAS[key];
+    if (mode) {
+      if (mode === "orbit" || !this.session.readOnly) this.hand.choose(mode);
+    } else if (preset && preset in PRESETS) this.fit(preset);
     else if (key === " ") this.pause.click();
     else if (key === ".") this.step.click();
     else if (key === "r") this.reset.click();
+    else if (key === "u") this.undo.click();
     else if (key === "f") this.fit();
     else if (key === "h") this.toggle();
+    else if (key === "v") this.view.toggle();
+    else if (key === "p") this.view.savePicture();
     else return;
     e.preventDefault();
   }
 
-  private fit(): void {
-    const box = boundsOf(this.session.bodies.values());
-    if (!box.isEmpty()) this.stage.fit(box);
-  }
-
   private toggle(): void {
-    document.body.classList.toggle("bare");
+    const bare = document.body.classList.toggle("bare");
+    // On a phone there is room for one of them.
+    if (!bare && innerWidth <= 640) this.view.toggle(false);
+    document.getElementById("toggle")!.setAttribute("aria-pressed", String(!bare));
     this.stage.relayout();
   }
 }

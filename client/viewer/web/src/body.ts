@@ -1,18 +1,30 @@
 // One body's surface on the GPU. Topology changes when a cut does; positions change every frame.
 
-import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, Box3, Vector3 } from "three";
+import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, MeshLambertMaterial, Box3, type Plane } from "three";
 import { smoothTopology, type RenderTopology } from "./smoothing";
-import { skinMaterial, lipMaterial } from "./tissue";
+import { accumulateNormals, gather } from "./normals";
+import { partsOf, type Parts } from "./parts";
+import { SkinDepth } from "./depth";
+import { Tissue, type Look } from "./tissue";
 import { SkinLines } from "./lines";
-import type { SurfaceFrame, SurfaceTopology } from "../gen/scindo/v1/surface_pb";
+import type { SurfaceField, SurfaceFrame, SurfaceTopology } from "../gen/scindo/v1/surface_pb";
+
+/** Colours of render vertices: fills `colours` (r g b per vertex, linear), given what the body knows. */
+export type Painter = (body: BodySurface, colours: Float32Array) => void;
 
 export class BodySurface {
   readonly object: Mesh;
+  readonly geometry = new BufferGeometry();
+  readonly tissue: Tissue;
   /** Lines along incisions that have not opened yet. */
   readonly marks = new SkinLines(2.2);
   /** Where skin ends at a wound. */
   readonly rims = new SkinLines(1.4);
   readonly bounds = new Box3();
+  /** Bounds of what hangs on something held; of the largest part where nothing is held. */
+  readonly core = new Box3();
+  isHeld = false;
+  coreArea = 0;
   epoch = -1;
   vertexCount = 0;
   triangleCount = 0;
@@ -24,18 +36,55 @@ export class BodySurface {
   simStep = 0n;
   /** Positions of the surface vertices as sent [m]. */
   positions: Float32Array = new Float32Array(0);
+  /** Where they rest [m]; empty when the server does not tell. */
+  rest: Float32Array = new Float32Array(0);
   /** Triangles as drawn; null before the first frame. */
   render: RenderTopology | null = null;
-  private readonly geometry = new BufferGeometry();
+  /** Von Mises stress of the surface vertices [Pa] and its epoch, while it is asked for. */
+  stress: { values: Float32Array; epoch: number } | null = null;
+  /** Called after a picture's positions went to the GPU. */
+  onUpload: (body: BodySurface) => void = () => {};
+  private readonly plain = new MeshLambertMaterial({ vertexColors: true, toneMapped: false });
+  private painter: Painter | null = null;
   private topology: SurfaceTopology | null = null;
+  private triangles = new Uint32Array(0);
+  private held: Uint8Array = new Uint8Array(0);
+  private inCore: Uint8Array | null = null;
+  private skinDepth: SkinDepth | null = null;
+  private parted: Parts | null = null;
+  private look: Look | null = null;
   private stale = false;
 
-  constructor(readonly id: string, order: number) {
-    this.object = new Mesh(this.geometry, [skinMaterial(order), lipMaterial()]);
+  constructor(readonly id: string, readonly order: number) {
+    this.tissue = new Tissue(order);
+    this.object = new Mesh(this.geometry, [this.tissue.skin, this.tissue.lip]);
     this.object.frustumCulled = false;
     this.object.castShadow = true;
     this.object.receiveShadow = true;
     this.object.add(this.marks.object, this.rims.object);
+  }
+
+  setLook(look: Look): void {
+    this.look = look;
+    this.applyLook();
+  }
+
+  /** Colours by a painter instead of tissue; `null` for tissue. */
+  paint(painter: Painter | null): void {
+    this.painter = painter;
+    this.object.material = painter ? [this.plain, this.plain] : [this.tissue.skin, this.tissue.lip];
+    const room = this.geometry.getAttribute("position")?.count ?? 0;
+    if (painter && room > 0) this.reserve(room, 0);
+    else if (!painter) this.geometry.deleteAttribute("color");
+    this.stale = true;
+  }
+
+  clip(planes: Plane[] | null): void {
+    this.tissue.clip(planes);
+    this.plain.clippingPlanes = planes;
+    this.plain.side = planes ? 2 : 0;
+    this.plain.needsUpdate = true;
+    for (const lines of [this.marks, this.rims]) lines.clip(planes);
   }
 
   /** Keeps the topology until the first frame of its epoch gives it positions. */
@@ -68,6 +117,12 @@ export class BodySurface {
     return true;
   }
 
+  setField(field: SurfaceField): void {
+    if (field.name !== "von-mises" || field.values.length !== 4 * field.vertexCount) return;
+    this.stress = { values: floats(field.values, new Float32Array(field.vertexCount)), epoch: field.epoch };
+    this.stale = true;
+  }
+
   /** Brings positions and normals to the GPU if a new frame came since the last picture. */
   upload(): void {
     if (!this.stale || !this.render) return;
@@ -77,20 +132,47 @@ export class BodySurface {
     this.rims.upload();
     const position = this.geometry.getAttribute("position") as BufferAttribute;
     const normal = this.geometry.getAttribute("normal") as BufferAttribute;
-    gather(this.positions, this.render.source, position.array as Float32Array, this.bounds);
+    gather(this.positions, this.render.source, position.array as Float32Array, this.bounds, this.inCore, this.core);
     accumulateNormals(this.render, position.array as Float32Array, normal.array as Float32Array);
-    for (const attribute of [position, normal]) {
-      attribute.clearUpdateRanges();
-      attribute.addUpdateRange(0, 3 * this.render.source.length);
-      attribute.needsUpdate = true;
+    for (const attribute of [position, normal]) this.send(attribute);
+    if (this.painter) {
+      const color = this.geometry.getAttribute("color") as BufferAttribute;
+      this.painter(this, color.array as Float32Array);
+      this.send(color);
     }
+    this.onUpload(this);
+  }
+
+  /** The next picture is made anew, though no frame came. */
+  touch(): void {
+    this.stale = true;
+  }
+
+  /** Loose parts of the present topology. */
+  get parts(): Parts {
+    this.parted ??= partsOf(this.triangles, this.vertexCount, this.positions);
+    return this.parted;
+  }
+
+  /** Surface vertices that move with held nodes. */
+  get heldVertices(): number[] {
+    const vertices: number[] = [];
+    for (let v = 0; v < this.vertexCount && this.held.length > 0; v++) if (bit(this.held, v)) vertices.push(v);
+    return vertices;
   }
 
   dispose(): void {
     this.object.removeFromParent();
     this.geometry.dispose();
+    this.tissue.dispose();
+    this.plain.dispose();
     this.marks.dispose();
     this.rims.dispose();
+  }
+
+  private applyLook(): void {
+    const radius = this.bounds.isEmpty() ? 0.1 : 0.5 * this.bounds.min.distanceTo(this.bounds.max);
+    this.tissue.setLook(this.look ?? { opacity: 1, layers: [] }, this.order, radius);
   }
 
   private adopt(topology: SurfaceTopology): boolean {
@@ -99,6 +181,11 @@ export class BodySurface {
     this.epoch = topology.epoch;
     this.vertexCount = topology.vertexCount;
     this.triangleCount = topology.triangleCount;
+    this.triangles = triangles;
+    this.held = topology.held;
+    this.rest = topology.restPositions.length === 12 * topology.vertexCount
+      ? floats(topology.restPositions, new Float32Array(3 * topology.vertexCount)) : new Float32Array(0);
+    const first = this.render === null;
     this.render = smoothTopology(triangles, tags, this.positions, this.vertexCount);
     this.lipTriangles = this.triangleCount - this.render.skinTriangles;
     this.reserve(this.render.source.length, this.render.index.length);
@@ -112,25 +199,73 @@ export class BodySurface {
     this.geometry.addGroup(0, skin, 0);
     this.geometry.addGroup(skin, this.render.index.length - skin, 1);
     this.geometry.setDrawRange(0, this.render.index.length);
+    this.parted = null;
+    this.findCore(topology.hangs);
+    this.findDepth();
+    if (first) {
+      this.bounds.setFromArray(this.positions as unknown as number[]);
+      this.applyLook();
+    }
     return true;
+  }
+
+  /** What the camera keeps in view. */
+  private findCore(hangs: Uint8Array): void {
+    const hanging = hangs.length > 0 ? Uint8Array.from({ length: this.vertexCount }, (_, v) => bit(hangs, v)) : null;
+    this.isHeld = hanging !== null && hanging.includes(1);
+    if (this.isHeld) {
+      this.inCore = hanging!.includes(0) ? hanging : null;
+      return;
+    }
+    const { of, area } = this.parts;
+    this.coreArea = area[0] ?? 0;
+    this.inCore = area.length > 1 ? Uint8Array.from(of, (part) => (part === 0 ? 1 : 0)) : null;
+  }
+
+  /** Depth below the skin of every vertex on a lip. */
+  private findDepth(): void {
+    const { index, source, skinTriangles } = this.render!;
+    if (this.lipTriangles === 0) {
+      this.skinDepth = null;
+      return;
+    }
+    if (this.rest.length === 0) return;
+    this.skinDepth ??= new SkinDepth(index.slice(0, 3 * skinTriangles).map((r) => source[r]), this.rest);
+    const depth = this.geometry.getAttribute("depth") as BufferAttribute;
+    const values = depth.array as Float32Array;
+    for (let c = 3 * skinTriangles; c < index.length; c++) {
+      const s = 3 * source[index[c]];
+      values[index[c]] = this.skinDepth.at(this.rest[s], this.rest[s + 1], this.rest[s + 2]);
+    }
+    this.send(depth, 1);
+  }
+
+  private send(attribute: BufferAttribute, size = 3): void {
+    attribute.clearUpdateRanges();
+    attribute.addUpdateRange(0, size * this.render!.source.length);
+    attribute.needsUpdate = true;
   }
 
   /** Buffers grow by half, so that a long cut does not make a new buffer at every epoch. */
   private reserve(vertices: number, indices: number): void {
     const position = this.geometry.getAttribute("position") as BufferAttribute | undefined;
-    if (!position || position.count < vertices) {
-      const room = Math.ceil(vertices * 1.5);
-      if (position) this.geometry.dispose();
-      for (const name of ["position", "normal"]) {
-        const attribute = new BufferAttribute(new Float32Array(3 * room), 3);
-        this.geometry.setAttribute(name, attribute.setUsage(DynamicDrawUsage));
-      }
+    const grows = !position || position.count < vertices;
+    const room = grows ? Math.ceil(vertices * 1.5) : position.count;
+    if (grows && position) this.geometry.dispose();
+    const named = { position: 3, normal: 3, depth: 1, ...(this.painter ? { color: 3 } : {}) };
+    for (const [name, size] of Object.entries(named)) {
+      if (!grows && this.geometry.hasAttribute(name)) continue;
+      const attribute = new BufferAttribute(new Float32Array(size * room), size);
+      this.geometry.setAttribute(name, attribute.setUsage(DynamicDrawUsage));
     }
     if (!this.geometry.index || this.geometry.index.count < indices) {
-      const room = Math.ceil(indices * 1.5);
-      this.geometry.setIndex(new BufferAttribute(new Uint32Array(room), 1).setUsage(DynamicDrawUsage));
+      this.geometry.setIndex(new BufferAttribute(new Uint32Array(Math.ceil(indices * 1.5)), 1).setUsage(DynamicDrawUsage));
     }
   }
+}
+
+function bit(bits: Uint8Array, v: number): number {
+  return (bits[v >> 3] >> (v & 7)) & 1;
 }
 
 /** The message's own bytes as floats; copied into `room` only where they do not lie on four bytes. */
@@ -141,45 +276,6 @@ function floats(bytes: Uint8Array, room: Float32Array): Float32Array {
   return out;
 }
 
-function words(bytes: Uint8Array): Uint32Array {
+function words(bytes: Uint8Array): Uint32Array<ArrayBuffer> {
   return new Uint32Array(bytes.slice().buffer);
-}
-
-const low = new Vector3(), high = new Vector3();
-
-function gather(from: Float32Array, source: Uint32Array, to: Float32Array, bounds: Box3): void {
-  low.setScalar(Infinity);
-  high.setScalar(-Infinity);
-  for (let r = 0; r < source.length; r++) {
-    const s = 3 * source[r], d = 3 * r;
-    const x = from[s], y = from[s + 1], z = from[s + 2];
-    to[d] = x; to[d + 1] = y; to[d + 2] = z;
-    if (x < low.x) low.x = x;
-    if (y < low.y) low.y = y;
-    if (z < low.z) low.z = z;
-    if (x > high.x) high.x = x;
-    if (y > high.y) high.y = y;
-    if (z > high.z) high.z = z;
-  }
-  bounds.set(low, high);
-}
-
-/** Area-weighted vertex normals; the shader normalises. */
-function accumulateNormals(render: RenderTopology, x: Float32Array, n: Float32Array): void {
-  n.fill(0, 0, 3 * render.source.length);
-  const index = render.index;
-  for (let c = 0; c < index.length; c += 3) {
-    const i = 3 * index[c], j = 3 * index[c + 1], k = 3 * index[c + 2];
-    const ux = x[j] - x[i], uy = x[j + 1] - x[i + 1], uz = x[j + 2] - x[i + 2];
-    const vx = x[k] - x[i], vy = x[k + 1] - x[i + 1], vz = x[k + 2] - x[i + 2];
-    const nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-    n[i] += nx; n[i + 1] += ny; n[i + 2] += nz;
-    n[j] += nx; n[j + 1] += ny; n[j + 2] += nz;
-    n[k] += nx; n[k + 1] += ny; n[k + 2] += nz;
-  }
-  for (let r = 0; r < 3 * render.source.length; r += 3) {
-    const length = Math.hypot(n[r], n[r + 1], n[r + 2]);
-    if (length > 0) { n[r] /= length; n[r + 1] /= length; n[r + 2] /= length; }
-    else n[r + 2] = 1;
-  }
 }

@@ -2,6 +2,7 @@
 
 import { Vector3 } from "three";
 import { boundsOf, type Stage } from "./stage";
+import type { Curves } from "./curves";
 import type { Hand, HandMode } from "./hand";
 import type { Panel } from "./panel";
 import type { Relay } from "./relay";
@@ -9,7 +10,7 @@ import type { Session } from "./session";
 
 type Triple = [number, number, number];
 
-export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: Hand, panel: Panel): void {
+export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: Hand, panel: Panel, curves: Curves): void {
   const bodies = () => [...session.bodies.values()];
   const hooks = {
     /** Counters since the page opened. */
@@ -32,6 +33,13 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
       simStep: Number(body.simStep),
       min: body.bounds.min.toArray() as Triple,
       max: body.bounds.max.toArray() as Triple,
+      isHeld: body.isHeld,
+      heldVertices: body.heldVertices.length,
+      parts: body.render ? body.parts.area.length : 0,
+      rest: body.rest.length / 3,
+      stressPa: body.stress?.epoch === body.epoch ? Math.max(...body.stress.values) : null,
+      colour: body.tissue.skin.color.getHex(),
+      opacity: body.tissue.skin.opacity,
     })),
     /** A copy of a body's surface positions [m], x y z interleaved. */
     positions: (id: string) => Array.from(session.bodies.get(id)?.positions ?? []),
@@ -49,6 +57,8 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
       mode: tool.state?.mode ?? 0,
       owner: tool.state?.owner ?? "",
       forceN: tool.force.toArray() as Triple,
+      isLimited: tool.isLimited,
+      held: tool.heldPoint?.toArray() ?? null,
       position: [tool.object.children[0].position.x, tool.object.children[0].position.y, tool.object.children[0].position.z] as Triple,
     })),
     /** Force on this page's own tool [N]. */
@@ -60,11 +70,14 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     },
     renderer: () => (stage.software ? "software" : "hardware"),
     stats: () => panel.stats,
+    /** Whether the server's plan has an effect on. */
+    effectIsOn: (name: string) => panel.plan?.effects.some((effect) => effect.name === name && effect.on) ?? false,
     connected: () => relay.isOpen,
     paused: () => session.paused,
     /** A world point in page pixels. */
     project: (point: Triple) => stage.project(new Vector3(...point)),
     camera: (position: Triple, target: Triple) => {
+      stage.release();
       stage.camera.position.set(...position);
       stage.controls.target.set(...target);
       stage.controls.update();
@@ -73,8 +86,13 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     cameraState: () => ({
       position: stage.camera.position.toArray() as Triple,
       target: stage.controls.target.toArray() as Triple,
+      up: stage.camera.up.toArray() as Triple,
       radius: stage.radius,
     }),
+    /** Points of each curve while they are shown. */
+    curves: () => curves.counts,
+    /** Changes a live parameter, with key and value as in a scene. */
+    set: (key: string, value: string) => relay.call({ case: "set", value: { key, value } }),
     hand: (mode: HandMode) => hand.choose(mode),
     depth: (part: number) => hand.setDepth(part),
   };

@@ -1,7 +1,7 @@
 // Thin dark lines that lie on the skin: what a blade has drawn without opening it, and the rims of wounds,
 // which are seen where lips lie close to each other.
 
-import { DynamicDrawUsage, InstancedInterleavedBuffer, InterleavedBufferAttribute } from "three";
+import { DynamicDrawUsage, InstancedInterleavedBuffer, InterleavedBufferAttribute, type Plane } from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
@@ -30,6 +30,10 @@ export class SkinLines {
     this.object = new LineSegments2(this.geometry, this.material);
     this.object.frustumCulled = false;
     this.object.visible = false;
+  }
+
+  clip(planes: Plane[] | null): void {
+    this.material.clippingPlanes = planes;
   }
 
   get count(): number {

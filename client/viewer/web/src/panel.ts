@@ -1,33 +1,26 @@
-// Live numbers, the plan of effects, the log, and what to say when nobody answers.
+// Live numbers and the plan of effects.
 
 import type { Relay } from "./relay";
 import type { ViewerHello, ViewerLink, ViewerRpcReply } from "../gen/scindo/v1/viewer_pb";
-import { Event_Level, type Event, type Plan, type SessionInfo, type Stats } from "../gen/scindo/v1/server_pb";
+import type { BodyStats, Event, Plan, SessionInfo, Stats } from "../gen/scindo/v1/server_pb";
 import type { SurfaceFrame } from "../gen/scindo/v1/surface_pb";
+import { element, setRows, setText, type Row } from "./dom";
+import { Log } from "./log";
 import { Rate, Smooth } from "./rate";
+import { Status } from "./status";
+import { troubles } from "./trouble";
 import { count, exponent, short, volume } from "./units";
 
-/** Rows of the log, and how long the last ones stay bright. */
-const LOG_ROWS = 7;
-const LOG_BRIGHT_MS = 8000;
-/** No frame for this long while not paused: say so. */
-const SILENT_MS = 2500;
-const REFRESH_MS = 250;
-
-type Level = "info" | "warning" | "error";
+const REFRESH_MS = 200;
 
 export class Panel {
   readonly surfaceRate = new Rate();
   readonly pictureRate = new Rate();
   readonly latency = new Smooth();
+  readonly log = new Log();
   stats: Stats | null = null;
   plan: Plan | null = null;
-  private frames = 0;
-  private lastFrame = 0;
-  private socketOpen = false;
-  private everOpen = false;
-  private link: ViewerLink | null = null;
-  private hello: ViewerHello | null = null;
+  private readonly status = new Status();
   private readonly at = (id: string) => document.getElementById(id)!;
 
   constructor(private readonly relay: Relay) {
@@ -36,21 +29,17 @@ export class Panel {
   }
 
   showConnection(open: boolean): void {
-    this.socketOpen = open;
-    this.everOpen ||= open;
-    if (!open) this.link = null;
+    this.status.connection(open);
     this.refresh();
   }
 
   showHello(hello: ViewerHello): void {
-    this.hello = hello;
+    this.status.hello = hello;
   }
 
   showLink(link: ViewerLink): void {
-    if (this.link && link.connected !== this.link.connected) {
-      this.line(link.connected ? "server is back" : "server is gone", link.connected ? "info" : "error");
-    }
-    this.link = link;
+    const change = this.status.setLink(link);
+    if (change) this.log.line(`server is ${change}`, change === "back" ? "info" : "error");
     this.refresh();
   }
 
@@ -79,9 +68,9 @@ export class Panel {
   }
 
   countFrame(frame: SurfaceFrame, _bytes: number): void {
-    this.frames += 1;
-    this.lastFrame = performance.now();
-    this.surfaceRate.count(this.lastFrame);
+    const now = performance.now();
+    this.status.frame(now);
+    this.surfaceRate.count(now);
     const age = this.relay.ageMs(frame.publishUnixNs);
     if (Number.isFinite(age)) this.latency.add(age);
   }
@@ -90,49 +79,28 @@ export class Panel {
     this.pictureRate.count(now);
   }
 
-  log(event: Event): void {
-    if (this.isOwn(event)) return;
-    const level: Level = event.level === Event_Level.ERROR ? "error" : event.level === Event_Level.WARNING ? "warning" : "info";
-    this.line(event.message || event.name, level, event.name);
+  event(event: Event): void {
+    // That this page's own mouse comes and goes is no news.
+    const tool = this.status.hello?.toolId;
+    if (tool && /^tool-(taken|released)$/.test(event.name) && event.message.includes(`'${tool}'`)) return;
+    this.log.event(event);
   }
 
-  /** Whether an event only tells that this page's mouse comes and goes. */
-  private isOwn(event: Event): boolean {
-    const tool = this.hello?.toolId;
-    return !!tool && /^tool-(taken|released)$/.test(event.name) && event.message.includes(`'${tool}'`);
-  }
-
+  /** What the server did is told by an event; here only what it refused. */
   showRpc(answer: ViewerRpcReply): void {
     const { reply } = answer;
-    if (!reply) return;
-    if (reply.ok) this.line(reply.message || "done", "info");
-    else this.line(`${reply.error?.message ?? "refused"} ${reply.error?.hint ?? ""}`.trim(), "error");
-  }
-
-  /** Adds a line; one of the same kind right after another takes its place and counts it. */
-  private line(text: string, level: Level, kind = ""): void {
-    const log = this.at("log");
-    const last = log.lastElementChild as HTMLElement | null;
-    let times = 1;
-    if (last && kind && last.dataset["kind"] === kind) {
-      times += Number(last.dataset["times"]);
-      last.remove();
-    }
-    const row = element("div");
-    Object.assign(row.dataset, { level, kind, times: String(times) });
-    row.append(element("time", "", new Date().toTimeString().slice(0, 8)), text);
-    if (times > 1) row.append(element("span", "times", `×${times}`));
-    log.append(row);
-    while (log.children.length > LOG_ROWS) log.firstElementChild!.remove();
-    setTimeout(() => row.classList.add("old"), LOG_BRIGHT_MS);
+    if (!reply || reply.ok) return;
+    this.log.line(`${reply.error?.message ?? "refused"} ${reply.error?.hint ?? ""}`.trim(), "error", "rpc-refused");
   }
 
   private refresh(): void {
     const now = performance.now();
     this.surfaceRate.advance(now);
     this.pictureRate.advance(now);
-    this.refreshLink(now);
     const stats = this.stats;
+    this.status.refresh(now, stats);
+    this.refreshAlarm(stats);
+    if (document.body.classList.contains("bare")) return;
     this.refreshGauges(stats);
     this.refreshStream(stats);
     if (!stats) return;
@@ -141,29 +109,13 @@ export class Panel {
     this.refreshTools(stats);
   }
 
-  private refreshLink(now: number): void {
-    const silent = this.frames > 0 && now - this.lastFrame > SILENT_MS && !this.stats?.paused;
-    const pill = this.at("link");
-    const connected = this.socketOpen && this.link?.connected === true;
-    const [state, text] = !this.socketOpen
-      ? ["gone", this.everOpen ? "viewer is gone" : "connecting"]
-      : !connected ? ["wait", "waiting for the server"]
-      : this.stats?.paused ? ["paused", "paused"]
-      : silent ? ["wait", "no frames"]
-      : ["live", "live"];
-    pill.dataset["state"] = state;
-    pill.textContent = text;
-    pill.title = this.link?.detail ?? "";
-    const card = this.at("overlay");
-    const up = connected && this.frames > 0;
-    card.classList.toggle("hidden", up);
-    if (up) return;
-    const [title, words] = !this.socketOpen
-      ? [this.everOpen ? "The viewer is gone" : "Connecting", this.everOpen ? "The program that serves this page stopped. The page goes on by itself when it is back." : location.host]
-      : !connected ? [this.frames > 0 ? "The simulation server is gone" : "Looking for a simulation server", `${this.link?.detail || this.hello?.upstream || ""}`]
-      : ["Waiting for the first surface", this.link?.detail ?? ""];
-    card.querySelector("h1")!.textContent = title;
-    card.querySelector("p")!.textContent = words;
+  /** The worst of all bodies stands in the head, also where the numbers are hidden. */
+  private refreshAlarm(stats: Stats | null): void {
+    const found = (stats?.bodies ?? []).flatMap((body) => troubles(body).filter((trouble) => trouble.short).map((trouble) => `${body.bodyId} ${trouble.short}`));
+    const pill = this.at("alarm");
+    pill.hidden = found.length === 0;
+    if (found.length > 0) setText(pill, found.length > 1 ? `${found[0]}, and ${found.length - 1} more` : found[0]);
+    pill.title = found.join("\n");
   }
 
   private refreshGauges(stats: Stats | null): void {
@@ -175,7 +127,7 @@ export class Panel {
       [short(latency >= -2 ? Math.max(0, latency) : NaN), "ms", "latency", latency > 250 ? "bad" : latency > 100 ? "warn" : ""],
       [short(this.surfaceRate.value), "Hz", "surface"],
       [short(this.pictureRate.value), "fps", "drawn"],
-      [(stats?.simTimeS ?? NaN) >= 0 ? stats!.simTimeS.toFixed(2) : "–", "s", "sim time"],
+      [(stats?.simTimeS ?? NaN) >= 0 ? stats!.simTimeS.toFixed(2) : "–", "s", "simulated"],
     ];
     const box = this.at("gauges");
     while (box.children.length < gauges.length) {
@@ -213,64 +165,48 @@ export class Panel {
   }
 
   private refreshBodies(stats: Stats): void {
-    const rows: Row[] = [];
-    for (const body of stats.bodies) {
-      rows.push([body.bodyId, `epoch ${body.epoch}`, "title"]);
-      rows.push(["elements · copies", `${count(body.pieces || body.elements)} · ${count(body.copies)}`]);
-      rows.push(["iterations · residual", `${body.iterations} · ${exponent(body.residual)}`]);
-      if (body.volumeM3 > 0) rows.push(["volume", volume(body.volumeM3)]);
-    }
-    setRows(this.at("bodies"), rows);
+    setRows(this.at("bodies"), stats.bodies.flatMap((body) => bodyRows(body)));
   }
 
   private refreshTools(stats: Stats): void {
-    const rows: Row[] = stats.tools.map((tool) => [
-      tool.owner && tool.owner !== tool.toolId ? `${tool.toolId} · ${tool.owner}` : tool.toolId,
-      `${short(tool.forceN)} N${tool.contactRateHz > 0 ? ` · ${short(tool.contactRateHz)} Hz` : ""}`,
-    ]);
+    const rows: Row[] = stats.tools.map((tool) => {
+      const rate = tool.contactRateHz > 0 ? ` · ${short(tool.contactRateHz)} Hz` : "";
+      const age = tool.contactAgeMs > 0 ? ` · ${short(tool.contactAgeMs)} ms old` : "";
+      const name = tool.owner && tool.owner !== tool.toolId ? `${tool.toolId} · ${tool.owner}` : tool.toolId;
+      return [name, `${short(tool.forceN)} N${rate}${age}`, "", "force, contacts per second and their age in the hand's device"];
+    });
     setRows(this.at("tools"), rows.length > 0 ? rows : [["none", ""]]);
   }
 
   private refreshStream(stats: Stats | null): void {
     const rows: Row[] = [
-      ["round trip to viewer", `${short(this.relay.roundTripMs)} ms`],
-      ["browsers · viewers · haptics", `${this.relay.browsers} · ${stats?.surfaceSubscribers ?? "–"} · ${stats?.hapticClients ?? "–"}`],
+      ["round trip to the viewer", `${short(this.relay.roundTripMs)} ms`],
+      ["pages open here", `${this.relay.browsers}`],
+      ["viewers on the server", `${stats?.surfaceSubscribers ?? "–"}`],
+      ["tools held by people", `${stats?.hapticClients ?? "–"}`],
       ["frames skipped here", count(this.relay.framesDropped)],
       ["cut commands applied", `${stats?.cutsApplied ?? "–"}`],
     ];
+    for (const body of stats?.bodies ?? []) {
+      rows.push([`${body.bodyId}: topology version`, `${body.epoch}`, "", "Rises whenever a cut or a reset changes the surface (epoch)"]);
+      rows.push([`${body.bodyId}: node copies`, count(body.copies), "", "Three unknowns each; a cut adds copies of the nodes beside it"]);
+    }
     const refused = stats?.refused.filter((counter) => counter.count > 0n) ?? [];
-    if (refused.length === 0) rows.push(["refused", "0"]);
-    for (const counter of refused) rows.push([`refused: ${counter.name}`, count(Number(counter.count)), "bad"]);
+    for (const counter of refused) rows.push([`messages refused: ${counter.name}`, count(Number(counter.count)), "bad"]);
     setRows(this.at("stream"), rows);
   }
 }
 
-type Row = [key: string, value: string, kind?: string];
-
-/** Fills a list of key and value, touching the page only where a text changed. */
-function setRows(box: Element, rows: Row[]): void {
-  while (box.children.length > rows.length) box.lastElementChild!.remove();
-  while (box.children.length < rows.length) {
-    const row = element("div", "row");
-    row.append(element("span", "key"), element("span", "value"));
-    box.append(row);
-  }
-  rows.forEach(([key, value, kind], i) => {
-    const row = box.children[i] as HTMLElement;
-    row.className = kind === "title" ? "row title" : "row";
-    row.dataset["level"] = kind === "bad" ? "bad" : "";
-    setText(row.children[0], key);
-    setText(row.children[1], value);
-  });
-}
-
-function setText(node: Element, text: string): void {
-  if (node.textContent !== text) node.textContent = text;
-}
-
-function element(tag: string, className = "", text = ""): HTMLElement {
-  const node = document.createElement(tag);
-  if (className) node.className = className;
-  if (text) node.textContent = text;
-  return node;
+function bodyRows(body: BodyStats): Row[] {
+  const found = troubles(body);
+  const missed = found.some((trouble) => trouble.kind === "error");
+  const goal = body.tolerance > 0 ? ` of ${exponent(body.tolerance)}` : "";
+  const rows: Row[] = [
+    [body.bodyId, body.volumeM3 > 0 ? volume(body.volumeM3) : "", "title", "name and volume at rest"],
+    ["elements", count(body.pieces || body.elements), "", "pieces of elements, where cuts took elements apart"],
+    ["solver", `${body.iterations} iterations${body.fixedIterations ? " (fixed)" : ""}`],
+    ["error left", `${exponent(body.residual)}${goal}`, missed ? "bad" : "", "relative residual after the step, and the goal of the scene"],
+  ];
+  for (const trouble of found) rows.push(["", trouble.words, "bad words"]);
+  return rows;
 }

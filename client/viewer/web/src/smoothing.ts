@@ -1,5 +1,7 @@
 // Which triangle corners share a normal: smooth over skin, sharp at the rim of a cut.
 
+import { find, unite } from "./parts";
+
 /** Neighbouring triangles of one kind share normals below this angle between them. */
 const CREASE_COS = Math.cos((52 * Math.PI) / 180);
 /** Triangles below this part of the mean area have no reliable normal; they never make a crease. */
@@ -127,18 +129,4 @@ function isSmooth(n: Float32Array, sliver: Uint8Array, s: number, t: number): bo
   if (sliver[s] || sliver[t]) return true;
   const cos = n[3 * s] * n[3 * t] + n[3 * s + 1] * n[3 * t + 1] + n[3 * s + 2] * n[3 * t + 2];
   return cos > CREASE_COS;
-}
-
-function find(parent: Uint32Array, c: number): number {
-  while (parent[c] !== c) {
-    parent[c] = parent[parent[c]];
-    c = parent[c];
-  }
-  return c;
-}
-
-function unite(parent: Uint32Array, a: number, b: number): void {
-  const ra = find(parent, a), rb = find(parent, b);
-  if (ra < rb) parent[rb] = ra;
-  else parent[ra] = rb;
 }

@@ -1,8 +1,8 @@
 // A rigid tool as the server sees it: solid where the tissue lets it be, a ghost where the hand holds it.
 
 import {
-  BufferGeometry, CapsuleGeometry, ConeGeometry, CylinderGeometry, Float32BufferAttribute, Group, Mesh, MeshBasicMaterial,
-  MeshStandardMaterial, Quaternion, SphereGeometry, Vector3, type Material,
+  BufferAttribute, BufferGeometry, CapsuleGeometry, ConeGeometry, CylinderGeometry, Float32BufferAttribute, Group, Line,
+  LineBasicMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, Quaternion, SphereGeometry, Vector3, type Material,
 } from "three";
 import type { Stage } from "./stage";
 import { ToolSample_Mode, type ToolShape, type ToolState } from "../gen/scindo/v1/tool_pb";
@@ -18,6 +18,11 @@ const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacit
 // A force is read, not seen: tissue before it does not hide it.
 const ARROW = new MeshBasicMaterial({ color: 0xffd35c, toneMapped: false, depthTest: false, transparent: true });
 
+/** From the hand to the tissue in its grip. */
+const LEASH = new LineBasicMaterial({ color: 0x9fd0ff, toneMapped: false, depthTest: false, transparent: true, opacity: 0.95 });
+/** A force this near to its limit is at it. */
+const AT_LIMIT = 0.985;
+
 export class ToolVisual {
   readonly object = new Group();
   state: ToolState | null = null;
@@ -25,11 +30,14 @@ export class ToolVisual {
   private readonly solid = new Group();
   private readonly ghost = new Group();
   private readonly arrow = arrow();
+  private readonly leash = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)), LEASH);
   private readonly label = document.createElement("div");
   private shapeKey = "";
 
   constructor(readonly id: string, private readonly own: boolean) {
-    this.object.add(this.solid, this.ghost, this.arrow);
+    this.object.add(this.solid, this.ghost, this.arrow, this.leash);
+    this.leash.frustumCulled = this.leash.visible = false;
+    this.leash.renderOrder = 5;
     document.getElementById("labels")!.append(this.label);
   }
 
@@ -56,6 +64,7 @@ export class ToolVisual {
     setPose(this.ghost, state.pose);
     const apart = this.solid.position.distanceTo(this.ghost.position);
     this.ghost.visible = apart > 0.004 * stage.radius;
+    this.placeLeash(state);
     const newtons = this.force.length();
     this.arrow.visible = newtons > QUIET_N;
     this.label.hidden = newtons <= QUIET_N;
@@ -69,12 +78,37 @@ export class ToolVisual {
     const at = stage.project(head);
     this.label.hidden = !at.visible;
     this.label.style.transform = `translate(${(at.x + 10).toFixed(0)}px, ${(at.y - 12).toFixed(0)}px)`;
-    const text = `${newtons.toFixed(newtons < 1 ? 2 : 1)} N`;
+    const limited = this.isLimited;
+    const text = `${newtons.toFixed(newtons < 1 ? 2 : 1)} N${limited ? " · at its limit" : ""}`;
+    this.label.classList.toggle("limit", limited);
     if (this.label.textContent !== text) this.label.textContent = text;
+  }
+
+  /** Whether the force would be larger, were it not limited. */
+  get isLimited(): boolean {
+    const limit = this.state?.maxForceN ?? 0;
+    return limit > 0 && this.force.length() >= AT_LIMIT * limit;
+  }
+
+  /** Where the tissue is that the tool holds, or null. */
+  get heldPoint(): Vector3 | null {
+    const at = this.state?.heldPointM;
+    return at ? new Vector3(at.x, at.y, at.z) : null;
+  }
+
+  private placeLeash(state: ToolState): void {
+    const to = this.heldPoint, from = state.pose?.positionM;
+    this.leash.visible = to !== null && from !== undefined;
+    if (!to || !from) return;
+    const position = this.leash.geometry.getAttribute("position") as BufferAttribute;
+    position.setXYZ(0, from.x, from.y, from.z);
+    position.setXYZ(1, to.x, to.y, to.z);
+    position.needsUpdate = true;
   }
 
   dispose(): void {
     this.object.removeFromParent();
+    this.leash.geometry.dispose();
     this.label.remove();
   }
 }

@@ -27,3 +27,11 @@ export function short(x: number): string {
 export function exponent(x: number): string {
   return x === 0 ? "0" : x.toExponential(1).replace("e-", "e−").replace("e+", "e");
 }
+
+/** With the prefix that gives one to three digits before the point. */
+export function engineering(x: number, unit: string): string {
+  const size = Math.abs(x);
+  const [factor, prefix] = size >= 1e9 ? [1e-9, "G"] : size >= 1e6 ? [1e-6, "M"] : size >= 1e3 ? [1e-3, "k"]
+    : size >= 1 || size === 0 ? [1, ""] : size >= 1e-3 ? [1e3, "m"] : size >= 1e-6 ? [1e6, "µ"] : [1e9, "n"];
+  return `${short(x * factor)} ${prefix}${unit}`;
+}

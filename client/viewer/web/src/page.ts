@@ -1,0 +1,185 @@
+// What the page is made of, and the way of a message.
+
+import { Relay } from "./relay";
+import { Stage } from "./stage";
+import { BodySurface } from "./body";
+import { ToolVisual } from "./tool";
+import { Hand } from "./hand";
+import { Panel } from "./panel";
+import { Bar } from "./bar";
+import { Colours } from "./colours";
+import { Curves } from "./curves";
+import { Gizmo } from "./gizmo";
+import { Help } from "./help";
+import { Overlays } from "./overlays";
+import { Params } from "./params";
+import { Probes } from "./probes";
+import { View } from "./view";
+import { exposeHooks } from "./hooks";
+import type { Session } from "./session";
+import type { BodyInfo, SessionInfo } from "../gen/scindo/v1/server_pb";
+import type { ViewerDown } from "../gen/scindo/v1/viewer_pb";
+
+export function start(canvas: HTMLCanvasElement): void {
+  const page = new Page(canvas);
+  page.run();
+}
+
+class Page {
+  private readonly session: Session = {
+    bodies: new Map(), tools: new Map(), toolId: "", clientId: "", readOnly: false, paused: false,
+  };
+  private readonly relay = new Relay((message, bytes) => this.receive(message, bytes), (open) => this.panel.showConnection(open));
+  private readonly stage: Stage;
+  private readonly panel = new Panel(this.relay);
+  private readonly hand: Hand;
+  private readonly bar: Bar;
+  private readonly view: View;
+  private readonly params = new Params(this.relay, this.session);
+  private readonly colours: Colours;
+  private readonly curves = new Curves();
+  private readonly overlays: Overlays;
+  private readonly probes: Probes;
+  private readonly gizmo: Gizmo;
+
+  constructor(canvas: HTMLCanvasElement) {
+    this.stage = new Stage(canvas);
+    this.hand = new Hand(canvas, this.stage, this.session, this.relay);
+    this.colours = new Colours(this.session, () => this.view.ask());
+    this.overlays = new Overlays(this.stage, this.session);
+    this.probes = new Probes(this.stage);
+    this.gizmo = new Gizmo(this.stage);
+    const { colours, overlays, probes, curves, gizmo } = this;
+    this.view = new View(this.stage, this.relay, { colours, overlays, probes, curves, gizmo });
+    this.bar = new Bar(this.stage, this.session, this.relay, this.hand, this.view, new Help());
+    this.view.onOpen = () => this.params.ask();
+    this.stage.onPicture = () => this.gizmo.place();
+  }
+
+  run(): void {
+    exposeHooks(this.session, this.stage, this.relay, this.hand, this.panel, this.curves);
+    requestAnimationFrame((now) => this.frame(now));
+    this.relay.open();
+  }
+
+  /** Applies one message. Nothing is drawn here: a burst of messages costs one picture. */
+  private receive(message: ViewerDown["message"], bytes: number): void {
+    switch (message.case) {
+      case "hello":
+        this.session.clientId = message.value.clientId;
+        this.session.toolId = message.value.toolId;
+        this.session.readOnly = message.value.readOnly;
+        this.panel.showHello(message.value);
+        this.bar.refresh();
+        this.view.ask(true);
+        break;
+      case "link":
+        if (!message.value.connected) this.hand.drop();
+        this.panel.showLink(message.value);
+        break;
+      case "info": this.takeInfo(message.value); break;
+      case "plan": this.panel.showPlan(message.value); break;
+      case "topology": this.bodyOf(message.value.bodyId).setTopology(message.value); break;
+      case "frame":
+        if (this.bodyOf(message.value.bodyId).setFrame(message.value)) this.stage.invalidate();
+        this.panel.countFrame(message.value, bytes);
+        break;
+      case "field":
+        this.session.bodies.get(message.value.bodyId)?.setField(message.value);
+        this.stage.invalidate();
+        break;
+      case "measures":
+        this.probes.take(message.value);
+        this.curves.measures(message.value);
+        break;
+      case "tool":
+        this.toolOf(message.value.toolId).update(message.value);
+        this.curves.tool(message.value);
+        this.stage.invalidate();
+        break;
+      case "toolGone": this.forgetTool(message.value.toolId); break;
+      case "stats":
+        this.session.paused = message.value.paused;
+        this.panel.showStats(message.value);
+        this.colours.setStats(message.value);
+        this.curves.stats(message.value);
+        this.bar.refresh();
+        break;
+      case "event": this.panel.event(message.value); break;
+      case "rpc":
+        this.panel.showRpc(message.value);
+        if (message.value.params) this.params.showParams(message.value.params);
+        if (message.value.scenes) this.params.showScenes(message.value.scenes);
+        break;
+    }
+  }
+
+  /** One picture: surfaces to the GPU, tools in place, camera, render. */
+  private frame(now: number): void {
+    requestAnimationFrame((next) => this.frame(next));
+    this.hand.advance(now);
+    this.stage.advance();
+    if (!this.stage.takeDirty()) return;
+    for (const body of this.session.bodies.values()) body.upload();
+    this.colours.advance();
+    this.stage.frameBodies(this.session.bodies.values());
+    for (const tool of this.session.tools.values()) tool.place(this.stage);
+    this.overlays.place();
+    this.probes.place();
+    this.hand.place();
+    this.stage.render();
+    this.panel.countPicture(now);
+  }
+
+  /** Another scene, or the same from a server that came back: bodies it does not know leave the picture. */
+  private takeInfo(info: SessionInfo): void {
+    this.panel.showInfo(info);
+    this.params.setScene(info.scene);
+    if (this.view.isOpen) this.params.ask();
+    this.stage.setUp(info.up);
+    const ids = info.bodies.map((body) => body.id);
+    for (const [id, body] of this.session.bodies) {
+      if (ids.includes(id)) continue;
+      this.overlays.undress(body);
+      body.dispose();
+      this.session.bodies.delete(id);
+    }
+    if (![...this.session.bodies.keys()].some((id) => ids.includes(id))) this.stage.forget();
+    info.bodies.forEach((body) => this.takeLook(body));
+    this.stage.invalidate();
+  }
+
+  private takeLook({ id, look }: BodyInfo): void {
+    const layers = look?.layers.map(({ depthM, colour }) => ({ depthM, colour })) ?? [];
+    this.bodyOf(id).setLook({ colour: look?.colour, opacity: look?.opacity ?? 1, layers });
+  }
+
+  private bodyOf(id: string): BodySurface {
+    let body = this.session.bodies.get(id);
+    if (!body) {
+      body = new BodySurface(id, this.session.bodies.size);
+      this.session.bodies.set(id, body);
+      this.colours.dress(body);
+      this.overlays.dress(body);
+      this.stage.scene.add(body.object);
+    }
+    return body;
+  }
+
+  private toolOf(id: string): ToolVisual {
+    let tool = this.session.tools.get(id);
+    if (!tool) {
+      tool = new ToolVisual(id, id === this.session.toolId);
+      this.session.tools.set(id, tool);
+      this.stage.scene.add(tool.object);
+    }
+    return tool;
+  }
+
+  private forgetTool(id: string): void {
+    this.session.tools.get(id)?.dispose();
+    this.session.tools.delete(id);
+    this.curves.toolGone(id);
+    this.stage.invalidate();
+  }
+}

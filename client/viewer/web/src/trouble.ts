@@ -1,0 +1,34 @@
+// What went wrong in a body's steps, in words. Each kind is told apart, and only while there is something to tell.
+
+import type { BodyStats } from "../gen/scindo/v1/server_pb";
+import { count, exponent } from "./units";
+
+export interface Trouble {
+  kind: "error" | "refused" | "divided" | "rolled-back" | "inverted" | "missed";
+  /** For the head of the page, after the body's name; empty for what stands in the panel only. */
+  short: string;
+  /** For the panel. */
+  words: string;
+}
+
+export function troubles(body: BodyStats): Trouble[] {
+  const found: Trouble[] = [];
+  const say = (kind: Trouble["kind"], short: string, words: string) => found.push({ kind, short, words });
+  if (body.refusedSteps > 0n) {
+    say("refused", "refuses steps", `${many(body.refusedSteps, "step")} refused: the body stands still in them`);
+  }
+  if (body.inverted > 0) say("inverted", "is inverted", `${many(body.inverted, "element")} turned inside out: the result is wrong there`);
+  if (body.unconverged && !body.fixedIterations) {
+    say("error", "does not converge", `the solver stopped above its goal: ${exponent(body.residual)}, goal ${exponent(body.tolerance)}`);
+  }
+  if (body.unconvergedSteps > 0n && !body.fixedIterations && !body.unconverged) {
+    say("missed", "", `${many(body.unconvergedSteps, "step")} ended above the goal so far`);
+  }
+  if (body.rolledBackSteps > 0n) say("rolled-back", "was rolled back", `${many(body.rolledBackSteps, "step")} rolled back and tried again`);
+  if (body.dividedSteps > 0n) say("divided", "", `${many(body.dividedSteps, "step")} divided into shorter ones`);
+  return found;
+}
+
+function many(n: bigint | number, what: string): string {
+  return `${count(Number(n))} ${what}${Number(n) === 1 ? "" : "s"}`;
+}

@@ -1,0 +1,116 @@
+// The tray of what is shown and how: colours, overlays, curves, camera, picture.
+
+import type { Colours, ColourMode } from "./colours";
+import type { Curves } from "./curves";
+import type { Gizmo } from "./gizmo";
+import type { Overlays } from "./overlays";
+import type { Probes } from "./probes";
+import type { Relay } from "./relay";
+import type { Insets, Stage } from "./stage";
+
+export class View {
+  private readonly tray = document.getElementById("tray")!;
+  private readonly at = <E extends HTMLElement>(id: string) => document.getElementById(id) as E;
+  private asked = "";
+  onOpen: () => void = () => {};
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly relay: Relay,
+    private readonly parts: { colours: Colours; overlays: Overlays; probes: Probes; curves: Curves; gizmo: Gizmo },
+  ) {
+    const { colours, overlays, probes, curves, gizmo } = parts;
+    const select = this.at<HTMLSelectElement>("colour");
+    select.onchange = () => {
+      colours.choose(select.value as ColourMode);
+      // Keys go to the scene again.
+      select.blur();
+      stage.invalidate();
+    };
+    this.box("show-mesh", (on) => overlays.showMesh(on));
+    this.box("show-held", (on) => overlays.showHeld(on));
+    this.box("show-probes", (on) => probes.show(on));
+    this.box("show-curves", (on) => curves.show(on));
+    this.box("show-axes", (on) => gizmo.show(on));
+    this.box("show-clip", (on) => {
+      this.at("clip-row").hidden = !on;
+      overlays.showClip(on);
+    });
+    const axis = this.at<HTMLSelectElement>("clip-axis"), range = this.at<HTMLInputElement>("clip-at");
+    axis.onchange = () => {
+      overlays.setAxis(axis.value as "eye" | "x" | "y" | "z");
+      axis.blur();
+    };
+    range.oninput = () => overlays.setPart(Number(range.value));
+    this.at("clip-flip").onclick = () => overlays.flipPlane();
+    this.at("shot").onclick = () => this.savePicture();
+    stage.insets = () => this.insets();
+  }
+
+  get isOpen(): boolean {
+    return !this.tray.hidden;
+  }
+
+  toggle(open = this.tray.hidden): void {
+    this.tray.hidden = !open;
+    this.at("view-toggle").setAttribute("aria-pressed", String(open));
+    if (open) this.onOpen();
+    if (open && innerWidth <= 640) document.body.classList.add("bare");
+    this.stage.relayout();
+  }
+
+  /** Tells the server's relay what this page shows beside surfaces; only when that changed, or anew. */
+  ask(anew = false): void {
+    const { colours, probes, curves } = this.parts;
+    const watch = { stress: colours.mode === "stress", measures: probes.on || curves.on };
+    const words = JSON.stringify(watch);
+    if (!anew && words === this.asked) return;
+    if (anew && !watch.stress && !watch.measures) return;
+    this.asked = words;
+    this.relay.send({ case: "watch", value: watch });
+  }
+
+  /** The canvas as a PNG; drawn at once, as its buffer is gone after a picture. */
+  savePicture(): void {
+    this.stage.render();
+    this.at<HTMLCanvasElement>("view").toBlob((blob) => {
+      if (!blob) return;
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(blob);
+      const name = (this.at("scene").textContent || "scene").replace(/[^a-z0-9]+/gi, "-");
+      link.download = `scindo-${name}-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.png`;
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    }, "image/png");
+  }
+
+  private box(id: string, set: (on: boolean) => void): void {
+    const box = this.at<HTMLInputElement>(id);
+    box.onchange = () => {
+      set(box.checked);
+      this.ask();
+      box.blur();
+      this.stage.relayout();
+    };
+  }
+
+  /** What covers the picture at its sides now. */
+  private insets(): Insets {
+    const width = innerWidth, height = innerHeight;
+    const over = (id: string) => {
+      const box = this.at(id).getBoundingClientRect();
+      return box.width > 0 && box.height > 0 ? box : null;
+    };
+    const panel = over("panel"), foot = over("bar");
+    const side = [over("tray"), over("curves")].filter((box) => box !== null);
+    if (width <= 640) {
+      const top = Math.max(44, ...side.map((box) => box.bottom));
+      return { left: 0, right: 0, top, bottom: height - Math.min(panel?.top ?? height, foot?.top ?? height) };
+    }
+    const left = Math.max(0, ...side.map((box) => box.right));
+    const right = panel ? width - panel.left : 0;
+    // A window too narrow for both sides keeps the middle.
+    const covers = left + right < 0.7 * width;
+    return { left: covers ? left : 0, right: covers ? right : 0, top: 0, bottom: foot ? 0.6 * (height - foot.top) : 0 };
+  }
+}
