@@ -67,9 +67,15 @@ async function openPage() {
     return hooks && hooks.bodies().length > 0 && hooks.counts().pictures > 2 && hooks.bodies().every((b) => b.vertices > 0);
   });
   summary.renderer = await page.evaluate(() => window.scindo.renderer());
-  await page.click("#reset");
+  await reset(page);
   await until(page, "a reset makes the body whole", MINUTE, () => window.scindo.bodies().every((b) => b.lipTriangles === 0));
   return page;
+}
+
+/** Back to the start; where there are cuts the button asks once more. */
+async function reset(page) {
+  await page.click("#reset");
+  if (await page.evaluate(() => document.getElementById("reset").classList.contains("sure"))) await page.click("#reset");
 }
 
 /** Pixels of tissue: reddish, away from the grey of ground and panel. */
@@ -121,7 +127,7 @@ async function incisionOpens(page) {
   // A busy machine may show the blade's way in so few pictures that the incision is done at the first look.
   let first = null, marks = 0;
   for (let attempt = 0; attempt < 4 && marks === 0; attempt++) {
-    if (attempt > 0) await page.click("#reset");
+    if (attempt > 0) await reset(page);
     await until(page, "an incision begins", 4 * MINUTE, (epoch) => {
       const body = window.scindo.bodies()[0];
       return body.lipTriangles > 0 && body.epoch !== epoch;

@@ -1,7 +1,8 @@
 """Reads the results of `scindo run … --out DIR` with independent readers, and draws them.
 
-Checks that summary.json, probes.csv and final.vtu are complete and finite, that meshio and pyvista
-read the same grid, that the surface is closed, and that a picture shows both lips of a cut.
+Checks that summary.json, probes.csv, final.vtu and final-surface.vtp are complete and finite, that meshio
+and pyvista read the same grid, that displacements lead from rest to current positions, that the stress is
+one symmetric tensor, that the surface is closed, and that a picture shows both lips of a cut.
 
     python tests/python/results.py DIR [--picture FILE.png] [--no-lips]
 """
@@ -66,6 +67,33 @@ def read_probes(folder, steps):
     return ids
 
 
+POINT_FIELDS = {"displacement_m", "rest_position_m", "velocity_m_s", "copy"}
+
+
+def check_fields(data, cell_fields):
+    """All fields are there and finite; the points are where the displacement leads."""
+    check(np.isfinite(data.points).all(), "positions are finite")
+    check(POINT_FIELDS <= set(data.point_data), f"point fields: {list(data.point_data)}")
+    check(cell_fields <= set(data.cell_data), f"cell fields: {list(data.cell_data)}")
+    for fields in (data.point_data, data.cell_data):
+        for name in fields:
+            check(np.isfinite(fields[name]).all(), f"field {name} is finite")
+    check(int(data.field_data["points_are_current_positions"][0]) == 1, "the file says what its points are")
+    moved = data.point_data["rest_position_m"] + data.point_data["displacement_m"]
+    check(np.allclose(moved, data.points, rtol=0, atol=1e-12), "rest position + displacement = point")
+
+
+def check_stress(grid):
+    """One tensor in VTK's order, whose von Mises stress is the one in the file."""
+    tensor = grid.cell_data["cauchy_stress_pa"]
+    check(tensor.shape == (grid.n_cells, 6), f"six components: {tensor.shape}")
+    names = [grid.GetCellData().GetArray("cauchy_stress_pa").GetComponentName(i) for i in range(6)]
+    check(names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"], f"VTK's order: {names}")
+    xx, yy, zz, xy, yz, xz = tensor.T
+    squares = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * (xy**2 + yz**2 + xz**2)
+    check(np.allclose(np.sqrt(squares), grid.cell_data["von_mises_pa"], rtol=1e-9, atol=1e-9), "von Mises stress")
+
+
 def read_grid(folder, summary):
     """final.vtu by two readers that know nothing of each other."""
     file = str(folder / "final.vtu")
@@ -73,14 +101,10 @@ def read_grid(folder, summary):
     check(grid.n_points == len(other.points), "pyvista and meshio see the same points")
     check(np.array_equal(grid.points, other.points), "pyvista and meshio see the same positions")
     check(grid.n_cells == sum(len(block.data) for block in other.cells), "and the same number of cells")
-    check({"tetra", "triangle"} <= {block.type for block in other.cells}, "tetrahedra and surface triangles")
-    check(np.isfinite(grid.points).all(), "positions are finite")
-    check({"displacement_m", "velocity_m_s"} <= set(grid.point_data), f"point fields: {list(grid.point_data)}")
-    check({"cut_tag", "volume_fraction", "von_mises_pa"} <= set(grid.cell_data), f"cell fields: {list(grid.cell_data)}")
-    for name in [*grid.point_data, *grid.cell_data]:
-        values = grid.point_data[name] if name in grid.point_data else grid.cell_data[name]
-        check(np.isfinite(values).all(), f"field {name} is finite")
-    fraction = grid.cell_data["volume_fraction"][grid.celltypes == pyvista.CellType.TETRA]
+    check({block.type for block in other.cells} == {"tetra"}, "tetrahedra only")
+    check_fields(grid, {"body", "element", "piece", "volume_fraction", "von_mises_pa", "cauchy_stress_pa"})
+    check_stress(grid)
+    fraction = grid.cell_data["volume_fraction"]
     check((fraction > 0).all() and (fraction <= 1 + 1e-9).all(), "fractions lie in (0, 1]")
     volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
     expected = sum(body["volume_m3"] for body in summary["bodies"])
@@ -88,14 +112,19 @@ def read_grid(folder, summary):
     return grid
 
 
-def surface_of(grid):
-    """Triangles n × 3 and their cut tags; closed."""
-    is_triangle = grid.celltypes == pyvista.CellType.TRIANGLE
-    triangles = grid.cells_dict[np.uint8(pyvista.CellType.TRIANGLE)]
+def read_surface(folder):
+    """final-surface.vtp: points n × 3, triangles m × 3 and their cut tags; closed."""
+    surface = pyvista.read(str(folder / "final-surface.vtp"))
+    check_fields(surface, {"body", "cut_tag"})
+    check(surface.is_all_triangles, "triangles only")
+    triangles = surface.regular_faces
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, uses = np.unique(edges, axis=0, return_counts=True)
     check((uses == 2).all(), "two triangles at every edge: the surface is closed and 2-manifold")
-    return triangles, np.asarray(grid.cell_data["cut_tag"])[is_triangle]
+    blocks = pyvista.read(str(folder / "final.vtm"))
+    check(blocks.keys() == ["solid", "surface"], f"both files in one: {blocks.keys()}")
+    check(blocks["surface"].n_cells == surface.n_cells, "the block is the surface")
+    return np.asarray(surface.points), triangles, np.asarray(surface.cell_data["cut_tag"])
 
 
 def lips_of(points, triangles, tags):
@@ -208,11 +237,11 @@ def main():
     summary = read_summary(args.folder)
     probes = read_probes(args.folder, summary["steps"])
     grid = read_grid(args.folder, summary)
-    triangles, tags = surface_of(grid)
-    lip, lips = lips_of(grid.points, triangles, tags)
-    visible, pixels = picture_of(grid.points, triangles, lip, lips, args.picture)
+    points, triangles, tags = read_surface(args.folder)
+    lip, lips = lips_of(points, triangles, tags)
+    visible, pixels = picture_of(points, triangles, lip, lips, args.picture)
     print(
-        f"{args.folder}: {summary['steps']} steps, {grid.n_points} points, {grid.n_cells} cells, "
+        f"{args.folder}: {summary['steps']} steps, {grid.n_points} points, {grid.n_cells} tetrahedra, "
         f"{len(triangles)} triangles, probes {sorted(probes)}, {lips} lips, {visible} visible {pixels[:4]}"
     )
     if not args.no_lips:

@@ -28,6 +28,7 @@ echo "-- client over the network"
 port=$(python3 tests/free_port.py)
 "$bin/scindo" run tests/python/scene.toml --listen "tcp/127.0.0.1:$port" > "$keep/server.log" 2>&1 &
 server=$!
+"$python" tests/python/readme.py "tcp/127.0.0.1:$port"
 "$python" tests/python/client.py --connect "tcp/127.0.0.1:$port"
 kill -0 "$server" || { echo "the server did not survive; see $keep/server.log" >&2; exit 1; }
 finish

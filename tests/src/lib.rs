@@ -1,6 +1,8 @@
 //! What tests over the network share: patience, free ports, the built programs, and child processes that end with
 //! the test.
 
+pub mod random_scene;
+
 use std::io;
 use std::net::TcpListener;
 use std::path::PathBuf;

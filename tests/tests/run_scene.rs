@@ -19,7 +19,7 @@ young_pa = 3e5
 poisson = 0.35
 density_kg_m3 = 1070
 integrator = "implicit-euler"
-solver = { method = "pcg", iterations = 50, tolerance = 1e-6 }
+solver = { method = "pcg", tolerance = 1e-6 }
 [[body.fix]]
 where = { box = { min_m = [-1,-1,-1e-6], max_m = [1,1,1e-6] } }
 axes = "xyz"
@@ -72,4 +72,49 @@ fn results_are_complete_finite_and_the_same_for_any_thread_count() {
         probes.push(csv);
     }
     assert_eq!(probes[0], probes[1], "the result does not depend on the number of threads");
+}
+
+/// Runs the scene with these overrides: exit code, standard output and the summary.
+fn ended(overrides: &[&str]) -> (i32, String, serde_json::Value) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let scene = directory.path().join("beam.toml");
+    fs::write(&scene, SCENE).expect("written");
+    let (scene, out) = (scene.display().to_string(), directory.path().join("out").display().to_string());
+    let mut arguments = vec!["run", &scene, "--fast", "--steps", "10", "--out", &out];
+    overrides.iter().for_each(|text| arguments.extend(["--set", text]));
+    let output = run("scindo", &arguments).expect("scindo starts");
+    let summary = fs::read_to_string(format!("{out}/summary.json")).expect("summary.json");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    (output.status.code().expect("an exit code"), text, serde_json::from_str(&summary).expect("JSON"))
+}
+
+#[test]
+fn a_run_that_did_not_converge_fails_unless_its_iterations_are_meant() {
+    let (code, text, summary) = ended(&[]);
+    assert_eq!((code, &summary["status"]), (0, &"done".into()), "{text}");
+    assert_eq!(summary["warnings"], serde_json::json!([]), "{summary:#}");
+
+    let few = "body.beam.solver.iterations=5";
+    let (code, text, summary) = ended(&[few]);
+    assert_eq!((code, &summary["status"]), (1, &"failed".into()), "{text}");
+    assert_eq!(summary["bodies"][0]["solver"]["unconverged_steps"], 10);
+    let warning = summary["warnings"][0].as_str().expect("a warning");
+    for word in ["10 of 10 steps ended above the tolerance 1e-6", "raise solver.iterations to about"] {
+        assert!(warning.contains(word), "{word:?} in {warning}");
+    }
+    assert!(text.contains("not to be trusted: body `beam`: 10 of 10 steps did not converge"), "{text}");
+
+    let (code, text, summary) = ended(&[few, "body.beam.solver.fixed_iterations=true"]);
+    assert_eq!((code, &summary["warnings"]), (0, &serde_json::json!([])), "{text}");
+    assert_eq!(summary["bodies"][0]["solver"]["unconverged_steps"], 10);
+}
+
+#[test]
+fn a_run_whose_steps_are_refused_fails() {
+    let (code, text, summary) = ended(&["body.beam.integrator=\"rk4\"", "world.step_s=0.5"]);
+    assert_eq!((code, &summary["status"]), (1, &"failed".into()), "{text}");
+    assert!(text.contains("10 of 10 steps were refused"), "{text}");
+    let events = summary["events"].as_array().expect("events");
+    let refused = events.iter().filter(|event| event["name"] == "step-refused").count();
+    assert_eq!(refused, 1, "one event for all of them: {events:?}");
 }

@@ -1,0 +1,232 @@
+// Holds the views of the page: upright, in view, colours, overlays, curves, layout at three sizes, words when nothing
+// comes. Looks at a running views.toml.
+//
+//   node views.mjs URL PID      PID: the server, to be stopped and continued
+//
+//   SCINDO_TEST_NODE_MODULES, SCINDO_TEST_ARTIFACTS, CHROMIUM: as for viewer.mjs
+import { createRequire } from "node:module";
+import { mkdirSync } from "node:fs";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = path.dirname(fileURLToPath(import.meta.url));
+const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
+const { chromium } = createRequire(path.join(modules, "anchor.js"))("playwright-core");
+
+const [, , url, server] = process.argv;
+const artifacts = process.env.SCINDO_TEST_ARTIFACTS ?? path.join(here, "../artifacts");
+mkdirSync(artifacts, { recursive: true });
+const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
+const FLAGS = [
+  "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+  "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
+];
+const SIZES = [[1440, 900], [800, 600], [390, 780]];
+const MINUTE = 60_000;
+
+let failures = 0;
+const browser = await chromium.launch({ executablePath, headless: true, args: FLAGS });
+try {
+  const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
+  page.on("pageerror", (error) => { failures += 1; console.error(`FAILED  script error: ${error.message}`); });
+  await page.goto(url);
+  await until(page, "both bodies are drawn", () => window.scindo?.bodies().length === 2 && window.scindo.bodies().every((b) => b.vertices > 0) && window.scindo.counts().pictures > 2);
+  await standsUpright(page);
+  await looksAsTheSceneSays(page);
+  await staysWithWhatIsHeld(page);
+  await coloursByQuantity(page);
+  await overlaysAndCurves(page);
+  await saysWhatDoesNotConverge(page);
+  await keysAndButtons(page);
+  await nothingOverlaps(page);
+  await saysThatItIsStalled(page);
+  await page.close();
+  await saysThatThereIsNoWebGl();
+} catch (error) {
+  failures += 1;
+  console.error(`FAILED  ${error.stack ?? error}`);
+} finally {
+  await browser.close();
+}
+process.exit(failures === 0 ? 0 : 1);
+
+/** Gravity along −y: y points upwards in the picture. */
+async function standsUpright(page) {
+  const { up, rise } = await page.evaluate(() => {
+    const [low, high] = [[0.1, 0, 0.03], [0.1, 0.04, 0.03]].map((at) => window.scindo.project(at));
+    return { up: window.scindo.cameraState().up, rise: low.y - high.y };
+  });
+  hold(up.join() === "0,1,0" && rise > 10, `up is against gravity (${up}, the top lies ${rise.toFixed(0)} pixels higher)`);
+}
+
+async function looksAsTheSceneSays(page) {
+  const [shelf, cube] = await page.evaluate(() => window.scindo.bodies());
+  hold(shelf.colour === 0x3f8f6b && cube.opacity === 0.5, "colour and opacity are those of the scene");
+  hold(cube.colour !== shelf.colour, "a second body has a colour of its own");
+  hold(shelf.isHeld && shelf.heldVertices > 0 && shelf.rest === shelf.vertices, "held places and rest are told");
+}
+
+/** The end that was cut off falls until the server lets it sleep; the camera does not go after it, nor does Fit. */
+async function staysWithWhatIsHeld(page) {
+  await until(page, "the end has come off", () => window.scindo.bodies()[0].simTimeS > 2.4 && window.scindo.bodies()[0].lipTriangles > 0);
+  for (const words of ["", " after Fit"]) {
+    if (words) await page.keyboard.press("f");
+    const { radius, target } = await page.evaluate(() => window.scindo.cameraState());
+    hold(radius < 0.2 && target[1] > -0.1, `the camera stays with what is held${words} (radius ${radius.toFixed(3)} m)`);
+  }
+  await picture(page, "views-1-held.png");
+}
+
+async function coloursByQuantity(page) {
+  await page.keyboard.press("v");
+  for (const mode of ["displacement", "stress", "iterations", "part"]) {
+    await page.selectOption("#colour", mode);
+    if (mode === "stress") await until(page, "stress comes when it is asked for", () => window.scindo.bodies().every((b) => b.stressPa > 0));
+    if (mode !== "part") {
+      await until(page, `the legend of ${mode} has a range`, () => /^[\d.]+ ?\D*$/.test(document.getElementById("legend-high").textContent) && parseFloat(document.getElementById("legend-high").textContent) > 0);
+    }
+    await picture(page, `views-2-${mode}.png`);
+  }
+  await page.selectOption("#colour", "stress");
+  await until(page, "the server says that stress is on", () => window.scindo.effectIsOn("surface stress"));
+  await page.click("#legend-hold");
+  hold((await page.getAttribute("#legend-hold", "aria-pressed")) === "true", "the range can be held");
+  await page.selectOption("#colour", "tissue");
+  await until(page, "stress is off again when nobody looks", () => !window.scindo.effectIsOn("surface stress"));
+  hold(await page.isHidden("#legend"), "tissue has no legend");
+}
+
+async function overlaysAndCurves(page) {
+  for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip"]) await page.check(`#${id}`);
+  await until(page, "the probe has a name and a way", () => [...document.querySelectorAll("#labels div")].some((label) => /^tip · moved /.test(label.textContent)));
+  await until(page, "forces, energies and times are drawn", () => window.scindo.curves().slice(0, 3).every((count) => count > 10));
+  await picture(page, "views-3-overlays.png");
+  await page.click("#clip-flip");
+  for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip"]) await page.uncheck(`#${id}`);
+  await until(page, "what is hidden is not measured", () => !window.scindo.effectIsOn("energies"));
+  await page.keyboard.press("v");
+}
+
+/** One iteration is not enough: the number is red, the words stand in the panel and in the head. */
+async function saysWhatDoesNotConverge(page) {
+  hold(await page.isHidden("#alarm"), "nothing is red while all steps converge");
+  await page.evaluate(() => window.scindo.set("body.shelf.solver.iterations", "1"));
+  await until(page, "a solver that stops too early is told in words", () => /shelf does not converge/.test(document.getElementById("alarm").textContent));
+  hold((await page.locator("#bodies .row[data-level=bad]").count()) >= 2, "its number and its words are red");
+  await picture(page, "views-4-red.png");
+  await page.evaluate(() => window.scindo.set("body.shelf.solver.iterations", "300"));
+  await until(page, "and no more when it converges", () => document.getElementById("alarm").hidden);
+}
+
+async function keysAndButtons(page) {
+  await page.keyboard.press("?");
+  hold(await page.isVisible("#help"), "? shows all keys");
+  await picture(page, "views-4-help.png");
+  await page.keyboard.press("Escape");
+  hold(await page.isHidden("#help"), "Escape closes them");
+  const seen = [];
+  for (const key of ["5", "6", "7", "8"]) {
+    await page.keyboard.press(key);
+    seen.push(await page.evaluate(() => window.scindo.cameraState().position.map((x) => x.toFixed(3)).join()));
+  }
+  hold(new Set(seen).size === 4, "four keys, four views");
+  const download = page.waitForEvent("download", { timeout: MINUTE });
+  await page.keyboard.press("p");
+  hold(/^scindo-views-.*\.png$/.test((await download).suggestedFilename()), "the picture is saved");
+  await page.click("#reset");
+  hold(await page.evaluate(() => document.getElementById("reset").classList.contains("sure")), "Reset asks before cuts are lost");
+  const before = await page.evaluate(() => window.scindo.stats().simTimeS);
+  await page.click("#reset");
+  await until(page, "the second click resets", (before) => window.scindo.stats().simTimeS < before, before);
+}
+
+/** Nothing lies over anything else, at three sizes, with and without numbers and tray, in light and dark. */
+async function nothingOverlaps(page) {
+  for (const [width, height] of SIZES) {
+    for (const scheme of ["dark", "light"]) {
+      await page.setViewportSize({ width, height });
+      await page.emulateMedia({ colorScheme: scheme });
+      for (const shown of ["none", "numbers", "tray"]) {
+        await page.evaluate((shown) => {
+          const set = (id, on) => { if ((document.getElementById(id).getAttribute("aria-pressed") === "true") !== on) document.getElementById(id).click(); };
+          set("toggle", shown === "numbers");
+          set("view-toggle", shown === "tray");
+          document.querySelector("button[data-hand=poke]").click();
+        }, shown);
+        const found = await page.evaluate(overlaps);
+        hold(found.length === 0, `nothing overlaps at ${width} × ${height}, ${scheme}, ${shown} shown ${found.join(", ")}`);
+        await picture(page, `views-5-${width}-${scheme}-${shown}.png`);
+      }
+    }
+  }
+  await page.emulateMedia({ colorScheme: "dark" });
+  await page.setViewportSize({ width: 1440, height: 900 });
+  await page.keyboard.press("o");
+}
+
+/** Runs in the page: pairs of visible things that share more than two pixels, and things beyond the window. */
+function overlaps() {
+  const things = ["head", "tray", "curves", "panel", "legend", "axes", "hint"].map((id) => document.getElementById(id));
+  things.push(...document.querySelectorAll("#bar > *"), ...document.querySelectorAll("#log > *"));
+  const boxes = things.map((thing) => {
+    let box = thing.getBoundingClientRect();
+    if (thing.id === "head") box = DOMRect.fromRect({ x: box.x, y: box.y, height: box.height, width: Math.max(...[...thing.children].map((c) => c.getBoundingClientRect().right)) - box.x });
+    // The log hides what is older than it has place for.
+    if (thing.parentElement?.id === "log") {
+      const top = Math.max(box.top, thing.parentElement.getBoundingClientRect().top);
+      box = DOMRect.fromRect({ x: box.x, y: top, width: box.width, height: box.bottom - top });
+    }
+    return { name: thing.id || thing.className || thing.textContent, box };
+  }).filter(({ box }) => box.width > 1 && box.height > 1);
+  const found = [];
+  boxes.forEach(({ name, box: a }, i) => {
+    if (a.left < -1 || a.top < -1 || a.right > innerWidth + 1 || a.bottom > innerHeight + 1) found.push(`${name} beyond the window`);
+    for (const { name: other, box: b } of boxes.slice(i + 1)) {
+      if (Math.min(a.right, b.right) - Math.max(a.left, b.left) > 2 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2) found.push(`${name} on ${other}`);
+    }
+  });
+  return found;
+}
+
+async function saysThatItIsStalled(page) {
+  await until(page, "the page is live", () => document.getElementById("link").dataset.state === "live");
+  process.kill(Number(server), "SIGSTOP");
+  try {
+    await until(page, "the page says that it is stalled", () => document.getElementById("link").dataset.state === "stalled");
+    await picture(page, "views-6-stalled.png");
+  } finally {
+    process.kill(Number(server), "SIGCONT");
+  }
+  await until(page, "and that it goes on", () => document.getElementById("link").dataset.state === "live");
+}
+
+async function saysThatThereIsNoWebGl() {
+  const blind = await chromium.launch({ executablePath, headless: true, args: [...FLAGS.filter((flag) => !flag.includes("swiftshader")), "--disable-3d-apis"] });
+  try {
+    const page = await blind.newPage({ viewport: { width: 800, height: 600 } });
+    await page.goto(url);
+    await until(page, "a browser without WebGL is told so", () => /needs WebGL 2/.test(document.getElementById("overlay").textContent));
+    await picture(page, "views-7-no-webgl.png");
+  } finally {
+    await blind.close();
+  }
+}
+
+async function picture(page, name) {
+  await page.screenshot({ path: path.join(artifacts, name) });
+}
+
+function hold(condition, words) {
+  if (!condition) failures += 1;
+  console.log(`${condition ? "ok     " : "FAILED "} ${words}`);
+}
+
+async function until(page, words, check, argument) {
+  try {
+    await page.waitForFunction(check, argument, { timeout: MINUTE, polling: 200 });
+    console.log(`ok      ${words}`);
+  } catch (error) {
+    await picture(page, "views-failed.png").catch(() => {});
+    throw new Error(`${words}: not within ${MINUTE / 1000} s (${error.message.split("\n")[0]})`);
+  }
+}

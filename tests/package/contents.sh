@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# Packs the programs that are built already and looks at what is inside: files, page, man pages, unit, and that
+# the programs run from where they were unpacked. Needs $SCINDO_TEST_BIN (folder of the programs).
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+bin=${SCINDO_TEST_BIN:-target/debug}
+scratch=$(mktemp -d)
+server=
+finish() {
+  if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true; fi
+  rm -rf "$scratch"
+}
+trap finish EXIT
+fail() { echo "package: $*" >&2; exit 1; }
+
+deploy/package --quick --programs "$bin" --out "$scratch/out"
+tarball=$(echo "$scratch"/out/*.tar.gz) deb=$(echo "$scratch"/out/*.deb)
+mkdir "$scratch/tree" "$scratch/deb"
+tar -xzf "$tarball" -C "$scratch/tree" --strip-components 1
+dpkg-deb -x "$deb" "$scratch/deb"
+
+for root in "$scratch/tree" "$scratch/deb/usr"; do
+  for file in bin/scindo bin/scindo-view bin/scindo-haptic share/man/man1/scindo.1.gz share/man/man1/scindo-run.1.gz \
+    share/man/man1/scindo-view.1.gz share/man/man1/scindo-haptic.1.gz share/bash-completion/completions/scindo-haptic \
+    share/zsh/site-functions/_scindo share/fish/vendor_completions.d/scindo-view.fish share/scindo/scenes/KEYS.md \
+    share/scindo/scenes/first-cut.toml share/scindo/proto/scindo/v1/server.proto share/doc/scindo/LICENSE-MIT \
+    lib/systemd/system/scindo.service; do
+    [ -s "$root/$file" ] || fail "$file is missing below $root"
+  done
+  zcat "$root/share/man/man1/scindo-run.1.gz" | grep -q viewer || fail "the man page of run does not tell of --viewer"
+  [ -z "$(find "$root" -name '*.rs' -o -name node_modules)" ] || fail "sources are inside"
+done
+for file in etc/scindo/scene.toml etc/scindo/open-lab.json5; do
+  [ -s "$scratch/deb/$file" ] || fail "$file is missing in the .deb"
+done
+# The unit of the package starts what the package brings.
+unit=$scratch/deb/usr/lib/systemd/system/scindo.service
+for path in $(sed -n 's/^ExecStart=//p' "$unit" | tr ' ' '\n' | grep ^/); do
+  [ -e "$scratch/deb$path" ] || fail "the unit names $path, which the package does not bring"
+done
+[ "$(dpkg-deb -f "$deb" Version)" = "$("$bin/scindo" --version | cut -d' ' -f2)" ] || fail "version of the .deb"
+"$scratch/deb/usr/bin/scindo" check "$scratch/deb/etc/scindo/scene.toml" >/dev/null || fail "the scene of the unit"
+bash -n "$scratch/tree/share/bash-completion/completions/scindo" || fail "completions for bash"
+
+# The demonstration from the unpacked tarball, its page fetched.
+web=$(python3 tests/free_port.py)
+"$scratch/tree/bin/scindo" --listen "tcp/127.0.0.1:$(python3 tests/free_port.py)" --viewer "$web" \
+  >"$scratch/server.log" 2>&1 &
+server=$!
+python3 tests/package/fetch.py "http://127.0.0.1:$web" || { cat "$scratch/server.log" >&2; fail "no page"; }
+kill -TERM "$server"; wait "$server" || fail "the demonstration ended with $?"
+server=
+echo "package: $(tar -tzf "$tarball" | wc -l) files, $(du -h "$tarball" | cut -f1) and $(du -h "$deb" | cut -f1) without optimisation"
