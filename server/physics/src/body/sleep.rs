@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use super::Body;
+use super::{Body, Path};
 use crate::operator::FixedCopy;
 
 impl Body {
@@ -16,10 +16,16 @@ impl Body {
         if !self.parts.free.get(part).copied().unwrap_or(false) {
             return false;
         }
-        for (copy, _) in (0u32..).zip(&self.parts.of_copy).filter(|(_, of)| **of as usize == part) {
+        let of_copy = (0u32..).zip(&self.parts.of_copy);
+        let copies: Vec<u32> =
+            of_copy.filter(|(_, of)| **of as usize == part).map(|(copy, _)| copy).collect();
+        for &copy in &copies {
             let position_m = self.state.x[copy as usize].into();
             self.asleep.push(FixedCopy { copy, axes: [true; 3], position_m });
             self.state.v[copy as usize] = Vector3::zeros();
+        }
+        if let Path::General(general) = &mut self.path {
+            general.dynamics.still(&copies, &self.state);
         }
         self.asleep.sort_unstable_by_key(|held| held.copy);
         self.cut_mesh.raise_epoch();
@@ -51,7 +57,7 @@ impl Body {
 
     /// The copies that constraints and sleep hold.
     pub(super) fn find_fixed(&mut self) {
-        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, &mut self.fixed);
+        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, self.prescribed_share, &mut self.fixed);
         if !self.asleep.is_empty() {
             self.fixed.extend_from_slice(&self.asleep);
             self.fixed.sort_by_key(|held| held.copy);

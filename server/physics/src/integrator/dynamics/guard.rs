@@ -1,5 +1,7 @@
 //! What earlier steps left behind, and what tells that a scheme is out of its depth.
 
+use nalgebra::Vector3;
+
 use crate::integrator::State;
 
 /// The last two states.
@@ -25,6 +27,19 @@ impl History {
     /// Whether `state` is what the last step left.
     pub fn continues(&self, state: &State) -> bool {
         self.known && self.last == *state
+    }
+
+    /// Copies that are held from now on, at the positions of `state`, have never moved.
+    pub fn still(&mut self, copies: &[u32], state: &State) {
+        if !self.known {
+            return;
+        }
+        for &c in copies {
+            for kept in [&mut self.before, &mut self.last] {
+                kept.x[c as usize] = state.x[c as usize];
+                kept.v[c as usize] = Vector3::zeros();
+            }
+        }
     }
 
     /// A step of length `h` from `before` to `after` was made.

@@ -228,6 +228,14 @@ impl Dynamics {
         self.omega_squared = None;
     }
 
+    /// `copies` were stopped in `state` and are held from now on: the others go on as they did. What the
+    /// copies took with them leaves the book of energy.
+    pub fn still(&mut self, copies: &[u32], state: &State) {
+        self.history.still(copies, state);
+        copies.iter().for_each(|&c| self.acceleration[c as usize] = Vector3::zeros());
+        self.ledger.forget();
+    }
+
     /// Advances `state` by h. The force of every spring at the end of the step goes to
     /// `spring_forces`, in the order of the inputs.
     pub fn step(
