@@ -2,33 +2,20 @@
 //
 //   node accuracy.mjs FILE.html [CASE]...
 //
-//   SCINDO_TEST_NODE_MODULES   folder with playwright-core (default: node_modules beside this file)
-//   SCINDO_TEST_ARTIFACTS      where screenshots go (default: ../artifacts)
-//   CHROMIUM                   browser (default: /usr/bin/chromium)
-//
-// Ends with 0 if everything held; prints one line per check.
-import { createRequire } from "node:module";
-import { mkdirSync } from "node:fs";
+// Prints one line per check. The environment: check.mjs.
 import path from "node:path";
-import { fileURLToPath, pathToFileURL } from "node:url";
+import { pathToFileURL } from "node:url";
 
-const here = path.dirname(fileURLToPath(import.meta.url));
-const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
-const { chromium } = createRequire(path.join(modules, "anchor.js"))("playwright-core");
+import { LAUNCH, artifacts, chromium, hold, run, watch } from "./check.mjs";
 
 const [file, ...cases] = process.argv.slice(2);
-const artifacts = process.env.SCINDO_TEST_ARTIFACTS ?? path.join(here, "../artifacts");
-mkdirSync(artifacts, { recursive: true });
 
-let failures = 0;
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: ["--no-sandbox", "--disable-gpu"],
-});
-try {
+const browser = await chromium.launch(LAUNCH);
+await run(async () => {
   for (const colorScheme of ["light", "dark"]) {
     const context = await browser.newContext({ viewport: { width: 1200, height: 900 }, colorScheme });
     const page = await context.newPage();
-    page.on("pageerror", (error) => { failures += 1; console.error(`FAILED  script error: ${error.message}`); });
+    watch(page);
     const asked = [];
     page.on("request", (request) => { if (!request.url().startsWith("file:")) asked.push(request.url()); });
     await page.goto(pathToFileURL(path.resolve(file)).href);
@@ -48,13 +35,7 @@ try {
   const overhang = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
   hold(overhang <= 0, `a narrow window does not scroll sideways (${overhang} px over)`);
   await narrow.close();
-} catch (error) {
-  failures += 1;
-  console.error(`FAILED  ${error.stack ?? error}`);
-} finally {
-  await browser.close();
-}
-process.exit(failures === 0 ? 0 : 1);
+}, () => browser.close());
 
 /** Every case has its pictures, a front, a table and a reference. */
 async function isComplete(page) {
@@ -123,9 +104,4 @@ async function isLegible(page, scheme) {
   });
   hold(found.faults.length === 0, `${scheme}: all text is legible${found.faults.length ? ": " + found.faults.slice(0, 8).join("; ") : ""}`);
   hold(found.sideways <= 0, `${scheme}: the page fits its window`);
-}
-
-function hold(condition, words) {
-  if (!condition) failures += 1;
-  console.log(`${condition ? "ok     " : "FAILED "} ${words}`);
 }

@@ -2,40 +2,20 @@
 //
 //   node viewer.mjs URL
 //
-//   SCINDO_TEST_NODE_MODULES   folder with playwright-core (default: node_modules beside this file)
-//   SCINDO_TEST_ARTIFACTS      where screenshots go (default: ../artifacts)
-//   CHROMIUM                   browser (default: /usr/bin/chromium)
-//
-// Ends with 0 if everything held; prints one line per check and a JSON summary.
-import { createRequire } from "node:module";
-import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
+// Prints one line per check and a JSON summary. The environment: check.mjs.
+import { mkdtempSync, rmSync } from "node:fs";
 import os from "node:os";
 import path from "node:path";
-import { fileURLToPath } from "node:url";
 
-const here = path.dirname(fileURLToPath(import.meta.url));
-const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
-const { chromium } = createRequire(path.join(modules, "anchor.js"))("playwright-core");
+import { LAUNCH, MINUTE, artifacts, chromium, hold, picture, run, until, watch } from "./check.mjs";
 
 const url = process.argv[2] ?? "http://127.0.0.1:8080";
-const artifacts = process.env.SCINDO_TEST_ARTIFACTS ?? path.join(here, "../artifacts");
-mkdirSync(artifacts, { recursive: true });
 const profile = mkdtempSync(path.join(os.tmpdir(), "scindo-browser-"));
 
 // SwiftShader on a busy two-core machine draws 6 to 20 pictures per second and takes seconds to start.
-const FLAGS = [
-  "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
-];
-const MINUTE = 60_000;
-
 const summary = { url };
-let failures = 0;
-const context = await chromium.launchPersistentContext(profile, {
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: FLAGS,
-  viewport: { width: 1280, height: 720 },
-});
-try {
+const context = await chromium.launchPersistentContext(profile, { ...LAUNCH, viewport: { width: 1280, height: 720 } });
+await run(async () => {
   const page = await openPage();
   await bodyIsVisible(page);
   await bodyDeforms(page);
@@ -44,23 +24,19 @@ try {
   await incisionIsCurved(page);
   await mouseTouches(page);
   await lateJoinerSeesTheSame(page);
-  await picture(page);
-} catch (error) {
-  failures += 1;
-  console.error(`FAILED  ${error.stack ?? error}`);
-} finally {
+  await fromCloserBy(page);
+}, async () => {
   await context.close();
   rmSync(profile, { recursive: true, force: true });
-}
-console.log(JSON.stringify(summary));
-process.exit(failures === 0 ? 0 : 1);
+  console.log(JSON.stringify(summary));
+});
 
 /** Opens the page and waits for the first surface. */
 async function openPage() {
   const health = await (await fetch(new URL("/healthz", url))).json();
   hold(health.ok && health.page === "built", `the viewer is healthy and its page was built (${JSON.stringify(health)})`);
   const page = await context.newPage();
-  page.on("pageerror", (error) => { failures += 1; console.error(`FAILED  script error: ${error.message}`); });
+  watch(page);
   await page.goto(url);
   await until(page, "a surface arrives and is drawn", MINUTE, () => {
     const hooks = window.scindo;
@@ -136,7 +112,7 @@ async function incisionOpens(page) {
     await holdsStill(page, "the simulation pauses within the cut");
     first = await lips();
     marks = await page.evaluate(() => window.scindo.bodies()[0].marks);
-    await page.screenshot({ path: path.join(artifacts, "view-2-cut.png") });
+    await picture(page, "view-2-cut.png");
     await page.click("#pause");
   }
   hold(marks > 0, `the line from the wound to the blade is drawn (${marks} parts)`);
@@ -195,7 +171,7 @@ async function mouseTouches(page) {
   const force = await pressSomewhere(page);
   summary.mouseForceN = force;
   hold(force > 0.005, `the mouse tool feels the tissue (${force.toFixed(3)} N)`);
-  await page.screenshot({ path: path.join(artifacts, "view-4-mouse.png") });
+  await picture(page, "view-4-mouse.png");
   await page.mouse.up();
   await until(page, "the force ends when the mouse lets go", MINUTE, () => window.scindo.contactForceN() < 0.005);
   await page.keyboard.press("o");
@@ -246,13 +222,13 @@ async function lateJoinerSeesTheSame(page) {
   await until(page, "the page that opened late gets the tools", MINUTE, (count) => window.scindo.tools().filter((tool) => tool.owner === "script").length >= count, tools.split(" ").length);
   const late = scripted(await page.evaluate(() => window.scindo.tools()));
   hold(tools !== "" && late === tools, `a late page shows the tools (${late || "none"}; there were ${tools})`);
-  await page.screenshot({ path: path.join(artifacts, "view-5-late.png") });
+  await picture(page, "view-5-late.png");
   await page.click("#pause");
   await until(page, "the simulation goes on", MINUTE, () => !window.scindo.paused());
 }
 
 /** The open incision in full quality, a little closer: the picture of the README. */
-async function picture(page) {
+async function fromCloserBy(page) {
   await page.goto(new URL("?quality=full", url).href);
   await until(page, "a picture in full quality", MINUTE, () => window.scindo?.bodies().some((b) => b.vertices > 0) && window.scindo.counts().pictures > 4);
   await page.evaluate(() => {
@@ -261,7 +237,7 @@ async function picture(page) {
   });
   const pictures = await page.evaluate(() => window.scindo.counts().pictures);
   await until(page, "pictures from closer by", MINUTE, (pictures) => window.scindo.counts().pictures > pictures + 8, pictures);
-  await page.screenshot({ path: path.join(artifacts, "view-6-picture.png") });
+  await picture(page, "view-6-picture.png");
 }
 
 /**
@@ -316,21 +292,4 @@ async function colours(page, name) {
   }, png.toString("base64"));
   await blank.close();
   return counts;
-}
-
-function hold(condition, words) {
-  if (!condition) failures += 1;
-  console.log(`${condition ? "ok     " : "FAILED "} ${words}`);
-}
-
-/** Polls until `check` gives something; its value. Fails the test when the time is over. */
-async function until(page, words, timeout, check, argument) {
-  try {
-    const handle = await page.waitForFunction(check, argument, { timeout, polling: 200 });
-    console.log(`ok      ${words}`);
-    return await handle.jsonValue();
-  } catch (error) {
-    await page.screenshot({ path: path.join(artifacts, "view-failed.png") }).catch(() => {});
-    throw new Error(`${words}: not within ${timeout / 1000} s (${error.message.split("\n")[0]})`);
-  }
 }

@@ -3,34 +3,18 @@
 //
 //   node views.mjs URL PID      PID: the server, to be stopped and continued
 //
-//   SCINDO_TEST_NODE_MODULES, SCINDO_TEST_ARTIFACTS, CHROMIUM: as for viewer.mjs
-import { createRequire } from "node:module";
-import { mkdirSync } from "node:fs";
-import path from "node:path";
-import { fileURLToPath } from "node:url";
-
-const here = path.dirname(fileURLToPath(import.meta.url));
-const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
-const { chromium } = createRequire(path.join(modules, "anchor.js"))("playwright-core");
+// The environment: check.mjs.
+import { LAUNCH, MINUTE, chromium, hold, picture, run, until, watch } from "./check.mjs";
 
 const [, , url, server] = process.argv;
-const artifacts = process.env.SCINDO_TEST_ARTIFACTS ?? path.join(here, "../artifacts");
-mkdirSync(artifacts, { recursive: true });
-const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
-const FLAGS = [
-  "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-  "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
-];
 const SIZES = [[1440, 900], [800, 600], [390, 780]];
-const MINUTE = 60_000;
 
-let failures = 0;
-const browser = await chromium.launch({ executablePath, headless: true, args: FLAGS });
-try {
+const browser = await chromium.launch(LAUNCH);
+await run(async () => {
   const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
-  page.on("pageerror", (error) => { failures += 1; console.error(`FAILED  script error: ${error.message}`); });
+  watch(page);
   await page.goto(url);
-  await until(page, "both bodies are drawn", () => window.scindo?.bodies().length === 2 && window.scindo.bodies().every((b) => b.vertices > 0) && window.scindo.counts().pictures > 2);
+  await until(page, "both bodies are drawn", MINUTE, () => window.scindo?.bodies().length === 2 && window.scindo.bodies().every((b) => b.vertices > 0) && window.scindo.counts().pictures > 2);
   await standsUpright(page);
   await looksAsTheSceneSays(page);
   await staysWithWhatIsHeld(page);
@@ -42,13 +26,7 @@ try {
   await saysThatItIsStalled(page);
   await page.close();
   await saysThatThereIsNoWebGl();
-} catch (error) {
-  failures += 1;
-  console.error(`FAILED  ${error.stack ?? error}`);
-} finally {
-  await browser.close();
-}
-process.exit(failures === 0 ? 0 : 1);
+}, () => browser.close());
 
 /** Gravity along −y: y points upwards in the picture. */
 async function standsUpright(page) {
@@ -68,7 +46,7 @@ async function looksAsTheSceneSays(page) {
 
 /** The end that was cut off falls until the server lets it sleep; the camera does not go after it, nor does Fit. */
 async function staysWithWhatIsHeld(page) {
-  await until(page, "the end has come off", () => window.scindo.bodies()[0].simTimeS > 2.4 && window.scindo.bodies()[0].lipTriangles > 0);
+  await until(page, "the end has come off", MINUTE, () => window.scindo.bodies()[0].simTimeS > 2.4 && window.scindo.bodies()[0].lipTriangles > 0);
   for (const words of ["", " after Fit"]) {
     if (words) await page.keyboard.press("f");
     const { radius, target } = await page.evaluate(() => window.scindo.cameraState());
@@ -81,29 +59,29 @@ async function coloursByQuantity(page) {
   await page.keyboard.press("v");
   for (const mode of ["displacement", "stress", "iterations", "part"]) {
     await page.selectOption("#colour", mode);
-    if (mode === "stress") await until(page, "stress comes when it is asked for", () => window.scindo.bodies().every((b) => b.stressPa > 0));
+    if (mode === "stress") await until(page, "stress comes when it is asked for", MINUTE, () => window.scindo.bodies().every((b) => b.stressPa > 0));
     if (mode !== "part") {
-      await until(page, `the legend of ${mode} has a range`, () => /^[\d.]+ ?\D*$/.test(document.getElementById("legend-high").textContent) && parseFloat(document.getElementById("legend-high").textContent) > 0);
+      await until(page, `the legend of ${mode} has a range`, MINUTE, () => /^[\d.]+ ?\D*$/.test(document.getElementById("legend-high").textContent) && parseFloat(document.getElementById("legend-high").textContent) > 0);
     }
     await picture(page, `views-2-${mode}.png`);
   }
   await page.selectOption("#colour", "stress");
-  await until(page, "the server says that stress is on", () => window.scindo.effectIsOn("surface stress"));
+  await until(page, "the server says that stress is on", MINUTE, () => window.scindo.effectIsOn("surface stress"));
   await page.click("#legend-hold");
   hold((await page.getAttribute("#legend-hold", "aria-pressed")) === "true", "the range can be held");
   await page.selectOption("#colour", "tissue");
-  await until(page, "stress is off again when nobody looks", () => !window.scindo.effectIsOn("surface stress"));
+  await until(page, "stress is off again when nobody looks", MINUTE, () => !window.scindo.effectIsOn("surface stress"));
   hold(await page.isHidden("#legend"), "tissue has no legend");
 }
 
 async function overlaysAndCurves(page) {
   for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip"]) await page.check(`#${id}`);
-  await until(page, "the probe has a name and a way", () => [...document.querySelectorAll("#labels div")].some((label) => /^tip · moved /.test(label.textContent)));
-  await until(page, "forces, energies and times are drawn", () => window.scindo.curves().slice(0, 3).every((count) => count > 10));
+  await until(page, "the probe has a name and a way", MINUTE, () => [...document.querySelectorAll("#labels div")].some((label) => /^tip · moved /.test(label.textContent)));
+  await until(page, "forces, energies and times are drawn", MINUTE, () => window.scindo.curves().slice(0, 3).every((count) => count > 10));
   await picture(page, "views-3-overlays.png");
   await page.click("#clip-flip");
   for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip"]) await page.uncheck(`#${id}`);
-  await until(page, "what is hidden is not measured", () => !window.scindo.effectIsOn("energies"));
+  await until(page, "what is hidden is not measured", MINUTE, () => !window.scindo.effectIsOn("energies"));
   await page.keyboard.press("v");
 }
 
@@ -111,11 +89,11 @@ async function overlaysAndCurves(page) {
 async function saysWhatDoesNotConverge(page) {
   hold(await page.isHidden("#alarm"), "nothing is red while all steps converge");
   await page.evaluate(() => window.scindo.set("body.shelf.solver.iterations", "1"));
-  await until(page, "a solver that stops too early is told in words", () => /shelf does not converge/.test(document.getElementById("alarm").textContent));
+  await until(page, "a solver that stops too early is told in words", MINUTE, () => /shelf does not converge/.test(document.getElementById("alarm").textContent));
   hold((await page.locator("#bodies .row[data-level=bad]").count()) >= 2, "its number and its words are red");
   await picture(page, "views-4-red.png");
   await page.evaluate(() => window.scindo.set("body.shelf.solver.iterations", "300"));
-  await until(page, "and no more when it converges", () => document.getElementById("alarm").hidden);
+  await until(page, "and no more when it converges", MINUTE, () => document.getElementById("alarm").hidden);
 }
 
 async function keysAndButtons(page) {
@@ -137,7 +115,7 @@ async function keysAndButtons(page) {
   hold(await page.evaluate(() => document.getElementById("reset").classList.contains("sure")), "Reset asks before cuts are lost");
   const before = await page.evaluate(() => window.scindo.stats().simTimeS);
   await page.click("#reset");
-  await until(page, "the second click resets", (before) => window.scindo.stats().simTimeS < before, before);
+  await until(page, "the second click resets", MINUTE, (before) => window.scindo.stats().simTimeS < before, before);
 }
 
 /** Nothing lies over anything else, at three sizes, with and without numbers and tray, in light and dark. */
@@ -189,44 +167,25 @@ function overlaps() {
 }
 
 async function saysThatItIsStalled(page) {
-  await until(page, "the page is live", () => document.getElementById("link").dataset.state === "live");
+  await until(page, "the page is live", MINUTE, () => document.getElementById("link").dataset.state === "live");
   process.kill(Number(server), "SIGSTOP");
   try {
-    await until(page, "the page says that it is stalled", () => document.getElementById("link").dataset.state === "stalled");
+    await until(page, "the page says that it is stalled", MINUTE, () => document.getElementById("link").dataset.state === "stalled");
     await picture(page, "views-6-stalled.png");
   } finally {
     process.kill(Number(server), "SIGCONT");
   }
-  await until(page, "and that it goes on", () => document.getElementById("link").dataset.state === "live");
+  await until(page, "and that it goes on", MINUTE, () => document.getElementById("link").dataset.state === "live");
 }
 
 async function saysThatThereIsNoWebGl() {
-  const blind = await chromium.launch({ executablePath, headless: true, args: [...FLAGS.filter((flag) => !flag.includes("swiftshader")), "--disable-3d-apis"] });
+  const blind = await chromium.launch({ ...LAUNCH, args: [...LAUNCH.args.filter((flag) => !flag.includes("swiftshader")), "--disable-3d-apis"] });
   try {
     const page = await blind.newPage({ viewport: { width: 800, height: 600 } });
     await page.goto(url);
-    await until(page, "a browser without WebGL is told so", () => /needs WebGL 2/.test(document.getElementById("overlay").textContent));
+    await until(page, "a browser without WebGL is told so", MINUTE, () => /needs WebGL 2/.test(document.getElementById("overlay").textContent));
     await picture(page, "views-7-no-webgl.png");
   } finally {
     await blind.close();
-  }
-}
-
-async function picture(page, name) {
-  await page.screenshot({ path: path.join(artifacts, name) });
-}
-
-function hold(condition, words) {
-  if (!condition) failures += 1;
-  console.log(`${condition ? "ok     " : "FAILED "} ${words}`);
-}
-
-async function until(page, words, check, argument) {
-  try {
-    await page.waitForFunction(check, argument, { timeout: MINUTE, polling: 200 });
-    console.log(`ok      ${words}`);
-  } catch (error) {
-    await picture(page, "views-failed.png").catch(() => {});
-    throw new Error(`${words}: not within ${MINUTE / 1000} s (${error.message.split("\n")[0]})`);
   }
 }

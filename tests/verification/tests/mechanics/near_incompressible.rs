@@ -191,12 +191,16 @@ fn node_averaging_does_not_lock_in_bending() {
         law: Law::Linear,
     };
     let reference = bend(&Model::tet10(&cook(12, BoxPattern::Tet5 { parity: false }), &material).unwrap());
-    for pattern in [BoxPattern::Tet5 { parity: false }, BoxPattern::Tet6] {
+    // What is left of locking on this mesh, and what there is without a remedy (measured: 5.3 and 11.2 %,
+    // 11.9 and 64.1 %): six tetrahedra per cell lock far more than five.
+    for (pattern, remains, locks) in
+        [(BoxPattern::Tet5 { parity: false }, 0.06, 0.10), (BoxPattern::Tet6, 0.125, 0.50)]
+    {
         let up = |volumetric| bend(&Model::tet4(&cook(16, pattern), &material, volumetric).unwrap());
         let [full, averaged] = [Volumetric::Full, Volumetric::NodeAveraged { kept: 0.05 }].map(up);
         let [full, averaged] = [full, averaged].map(|up| up / reference - 1.0);
         println!("{pattern:?}: node-averaged {:+.3}, without remedy {:+.3}", averaged, full);
-        assert!(averaged.abs() < 0.13, "{pattern:?}: {averaged}");
-        assert!(full < -0.1, "{pattern:?}: the case must be one that locks, {full}");
+        assert!(averaged.abs() < remains, "{pattern:?}: {averaged}");
+        assert!(full < -locks, "{pattern:?}: the case must be one that locks, {full}");
     }
 }
