@@ -47,6 +47,11 @@ fn cut(sim: &mut Simulation, number: u64, x: f64) {
     assert!(*report.cuts[0].result.as_ref().unwrap() > 0, "{report:?}");
 }
 
+/// Largest distance between points of the same number [m].
+fn furthest(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y).norm()).fold(0.0, f64::max)
+}
+
 fn surface(sim: &Simulation) -> (Vec<[u32; 3]>, Vec<u32>) {
     let surface = sim.bodies()[0].body.surface();
     (surface.triangles.clone(), surface.tags.clone())
@@ -130,10 +135,10 @@ fn a_cut_in_the_air_is_none_and_a_scratch_is_one() {
 fn a_part_that_was_cut_off_and_fell_comes_back() {
     for how in ["", SNAP] {
         let held = "[world]\ngravity_m_s2 = [0, 0, -9.81]\n";
-        let mut sim =
-            block_with(how, held, "[[body.fix]]\nwhere = { slab = { axis = \"x\", from = 0, to = 0 } }\n");
+        let fix = "[[body.fix]]\nwhere = { slab = { axis = \"x\", from = 0, to = 0 } }\n";
+        let mut sim = block_with(how, held, fix);
         steps(&mut sim, 20);
-        let (before, whole) = (sim.bodies()[0].body.positions().to_vec(), surface(&sim));
+        let whole = surface(&sim);
         let at = |y: f64| [Vector3::new(0.0552, y, -0.05), Vector3::new(0.0552, y, 0.09)];
         let segments = vec![at(-0.02), at(0.06)];
         let cut = CutRequest { request: 1, tool: Arc::from("t"), body: None, segments };
@@ -145,8 +150,24 @@ fn a_part_that_was_cut_off_and_fell_comes_back() {
         sim.undo().unwrap();
         steps(&mut sim, 1);
         assert_eq!(surface(&sim), whole);
-        let now = sim.bodies()[0].body.positions();
-        let off = now.iter().zip(&before).map(|(x, y)| (x - y).norm()).fold(0.0, f64::max);
-        assert!(off < 0.05, "{how}: {off} m from where it was");
+        let rest = sim.bodies()[0].body.rest_positions().to_vec();
+        let sag = |sim: &Simulation| furthest(sim.bodies()[0].body.positions(), &rest);
+        let back = sag(&sim);
+        // A body that was never cut, for as long: it swings and comes to rest, and so does the one that was
+        // joined again.
+        let mut uncut = block_with(how, held, fix);
+        let mut swings: f64 = 0.0;
+        for _ in 0..182 {
+            steps(&mut uncut, 1);
+            swings = swings.max(sag(&uncut));
+        }
+        assert!(back <= swings, "{how}: {back} m from its rest shape, and never more than {swings} m uncut");
+        steps(&mut sim, 100);
+        let hangs = sag(&uncut);
+        let off = furthest(sim.bodies()[0].body.positions(), uncut.bodies()[0].body.positions());
+        assert!(
+            off < 0.01 * hangs,
+            "{how}: {off} m from where it hangs uncut, {hangs} m below its rest shape"
+        );
     }
 }
