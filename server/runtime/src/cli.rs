@@ -70,7 +70,7 @@ pub struct DemoArgs {
 }
 
 /// How a scene is run and served.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct ServeArgs {
     /// As fast as possible instead of real time.
     #[arg(long)]

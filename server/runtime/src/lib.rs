@@ -58,6 +58,8 @@ pub mod keyframes;
 
 pub mod stats;
 
+pub mod catalogue;
+
 pub mod rpc;
 
 pub mod watchdog;

@@ -1,19 +1,21 @@
 //! Questions and orders under `rpc/`: one thread answers them in turn.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use bytes::Bytes;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use prost::Message as _;
 use scindo_proto::messages::{
-    Error, PauseRequest, ResetRequest, RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest,
+    Error, LoadRequest, PauseRequest, ResetRequest, RpcReply, SchemaReply, SessionInfo, SetRequest,
     StepRequest, UndoRequest,
 };
 use scindo_proto::{FILE_DESCRIPTOR_SET, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
 use zenoh::Wait as _;
 use zenoh::query::Query;
 
+use crate::catalogue::Catalogue;
 use crate::exchange::Exchange;
 use crate::sim::{Command, Order};
 
@@ -38,6 +40,8 @@ pub struct RpcThread {
     pub commands: Sender<Command>,
     /// What does not change of the answer to `info`.
     pub info: SessionInfo,
+    /// Scenes that may be loaded.
+    pub catalogue: Arc<Catalogue>,
     /// Whether anybody may give orders.
     pub takes_orders: bool,
 }
@@ -66,12 +70,16 @@ impl RpcThread {
         match verb {
             Verb::Info => reply(query, &self.info_now()),
             Verb::Params => reply(query, &self.exchange.params()),
-            Verb::Scenes => reply(query, &ScenesReply::default()),
+            Verb::Scenes => reply(query, &self.catalogue.entries()),
             Verb::Schema => {
                 let file_descriptor_set = Bytes::from_static(FILE_DESCRIPTOR_SET);
                 reply(query, &SchemaReply { file_descriptor_set });
             }
-            Verb::Load | Verb::Snapshot | Verb::Restore => {
+            Verb::Load => match decode::<LoadRequest>(payload) {
+                Ok(request) => reply(query, &self.load(&request.name)),
+                Err(e) => refuse(query, error(e.code(), e.to_string(), "see rpc/schema")),
+            },
+            Verb::Snapshot | Verb::Restore => {
                 let message = format!("rpc/{} is not supported yet", verb.as_str());
                 refuse(query, error("not-supported", message, "start a server with the scene instead"));
             }
@@ -80,6 +88,15 @@ impl RpcThread {
                 Err(error) => refuse(query, error),
             },
         }
+    }
+
+    /// The scene is built while this one goes on; an event says why, should that fail.
+    fn load(&self, name: &str) -> RpcReply {
+        let reply = match self.catalogue.ask(name) {
+            Ok(()) => RpcReply { ok: true, message: format!("building {name}"), ..RpcReply::default() },
+            Err(refusal) => RpcReply { error: Some(refusal.into()), ..RpcReply::default() },
+        };
+        RpcReply { sim_step: self.exchange.sim_step.load(Ordering::Relaxed), ..reply }
     }
 
     /// Owners and epochs as they are now.
@@ -113,7 +130,7 @@ impl RpcThread {
         }
         answers.recv_timeout(PATIENCE).unwrap_or_else(|_| RpcReply {
             ok: true,
-            sim_step: self.exchange.sim_step.load(std::sync::atomic::Ordering::Relaxed),
+            sim_step: self.exchange.sim_step.load(Ordering::Relaxed),
             message: "accepted; still running".to_owned(),
             error: None,
         })

@@ -13,6 +13,7 @@ use triple_buffer::{Output, triple_buffer};
 use zenoh::Wait as _;
 use zenoh::query::Queryable;
 
+use crate::catalogue::Catalogue;
 use crate::contact::{ContactConfig, ContactThread};
 use crate::convert::ProbeName;
 use crate::engine::Engine;
@@ -44,6 +45,12 @@ pub struct ServerConfig {
     pub contact_hz: f64,
     /// Statistics per second.
     pub stats_hz: f64,
+    /// Scenes that clients may change to.
+    pub catalogue: Arc<Catalogue>,
+    /// The name under which the scene that runs is listed there; empty for one that is not.
+    pub scene: String,
+    /// How many scenes ran before it.
+    pub scene_seq: u32,
     /// Whether orders are taken at all; who may send them is settled where the sessions are opened.
     pub takes_orders: bool,
     /// What to do, with the reason, when the threads do not end after they were told to: a program ends itself.
@@ -59,6 +66,9 @@ impl Default for ServerConfig {
             surface_hz: 60.0,
             contact_hz: 500.0,
             stats_hz: 5.0,
+            catalogue: Arc::default(),
+            scene: String::new(),
+            scene_seq: 0,
             takes_orders: true,
             give_up: |reason| tracing::error!("{reason}"),
         }
@@ -89,7 +99,8 @@ impl Server {
         config: &ServerConfig,
     ) -> Result<Self, RuntimeError> {
         let keys = KeySpace::new(&config.realm, &config.session)?;
-        let (info, plan) = (engine.info(), engine.plan());
+        let info = SessionInfo { scene: config.scene.clone(), scene_seq: config.scene_seq, ..engine.info() };
+        let plan = engine.plan();
         let (outgoing, outgoing_rx) = bounded(OUTGOING);
         let (answers, answers_rx) = bounded(ANSWERS);
         let exchange = Exchange::new(inbox(&info), info.bodies.len(), (outgoing, answers));
@@ -119,6 +130,7 @@ impl Server {
                 queries,
                 commands,
                 info,
+                catalogue: config.catalogue.clone(),
                 takes_orders,
             };
             others.push(spawn("rpc", move || rpc_thread.run())?);
@@ -158,6 +170,17 @@ impl Server {
 
     /// Waits for the simulation to end, then ends the rest; gives the engine back for its results.
     pub fn join(self) -> Result<Engine, RuntimeError> {
+        let (engine, sessions) = self.release()?;
+        for session in sessions.into_iter().flat_map(|sessions| [sessions.bulk, sessions.haptic]) {
+            if let Err(error) = session.close().wait() {
+                tracing::debug!(%error, "session not closed cleanly");
+            }
+        }
+        Ok(engine)
+    }
+
+    /// The same, and gives back the sessions, for the next server: their clients stay connected.
+    pub fn release(self) -> Result<(Engine, Option<Sessions>), RuntimeError> {
         let engine = self.sim.join();
         self.exchange.stop();
         for thread in self.others {
@@ -167,18 +190,15 @@ impl Server {
                 .map_err(|_| RuntimeError::Died { thread: name })
                 .inspect_err(|_| self.exchange.close())?;
         }
-        if let Some(Network { _receivers: receivers, _rpc: rpc, sessions }) = self.network {
+        let sessions = self.network.map(|Network { _receivers: receivers, _rpc: rpc, sessions }| {
             drop((receivers, rpc));
-            for session in [sessions.bulk, sessions.haptic] {
-                if let Err(error) = session.close().wait() {
-                    tracing::debug!(%error, "session not closed cleanly");
-                }
-            }
-        }
+            sessions
+        });
         self.exchange.close();
         // It has nothing to say any more.
         let _ = self.watchdog.join();
-        engine.map_err(|_| RuntimeError::Died { thread: "sim".to_owned() })
+        let engine = engine.map_err(|_| RuntimeError::Died { thread: "sim".to_owned() })?;
+        Ok((engine, sessions))
     }
 }
 

@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use scindo_proto::KeySpace;
@@ -12,10 +13,12 @@ use scindo_world::build::BuildOptions;
 use scindo_world::doubts;
 use scindo_world::results::Results;
 use scindo_world::scene::{SHIPPED, Scene, ShippedScene};
-use scindo_world::simulation::Simulation;
+use scindo_world::simulation::{Level, Simulation};
 use serde_json::json;
 use tokio::runtime::Runtime;
+use tokio::task::JoinHandle;
 
+use crate::catalogue::Catalogue;
 use crate::cli::{DemoArgs, RunArgs, ServeArgs};
 use crate::engine::Engine;
 use crate::error::RuntimeError;
@@ -64,47 +67,73 @@ pub fn demo(args: &DemoArgs) -> Result<ExitCode, RuntimeError> {
 fn shipped(shipped: ShippedScene, args: &ServeArgs) -> Result<ExitCode, RuntimeError> {
     let scene = shipped.read(&args.set)?;
     let viewer = args.viewer.or_else(|| DEMONSTRATION_VIEWER.parse().ok());
-    serve(&scene, args, viewer)
+    serve((shipped.name, &scene), args, viewer)
 }
 
 /// A scene file.
 pub fn scene(args: &RunArgs) -> Result<ExitCode, RuntimeError> {
     let scene = Scene::load_with(&args.scene, &args.serve.set)?;
-    serve(&scene, &args.serve, args.serve.viewer)
+    serve((scene.name(), &scene), &args.serve, args.serve.viewer)
 }
 
-/// Builds, starts, waits, writes results.
-fn serve(scene: &Scene, args: &ServeArgs, viewer: Option<SocketAddr>) -> Result<ExitCode, RuntimeError> {
+/// Builds, starts, waits, writes results; again for every scene that a client asks for.
+fn serve(
+    (name, scene): (&str, &Scene),
+    args: &ServeArgs,
+    viewer: Option<SocketAddr>,
+) -> Result<ExitCode, RuntimeError> {
     let keys = KeySpace::new(&args.realm, &args.session)?;
     let pace = pace(args, scene.checked().step_s)?;
-    let engine = build(scene, args)?;
+    let mut engine = build(scene, args)?;
     let foreground = foreground()?;
     let network = network(args, &keys, &engine)?;
-    let sessions =
+    let mut sessions =
         open_sessions(&network, args.listen.is_empty() && viewer.is_none() && pace.steps.is_some())?;
     let viewer = viewer.map(|address| start_viewer(&foreground, address, (args, &network))).transpose()?;
     announce(scene, args, sessions.as_ref().map_or(&[], |_| &network.listen), viewer);
-    let started = Instant::now();
     let rates = scene.checked().publish;
-    let config = ServerConfig {
+    let mut config = ServerConfig {
         realm: args.realm.clone(),
         session: args.session.clone(),
         pace,
         surface_hz: rates.surface_hz,
         contact_hz: rates.contact_hz,
         stats_hz: rates.stats_hz,
+        catalogue: Arc::new(catalogue((name, scene), args)),
+        scene: name.to_owned(),
+        scene_seq: 0,
         takes_orders: args.operators != Operators::None,
         give_up,
     };
-    let server = Server::start(engine, sessions, &config)?;
-    let interrupted = foreground.block_on(wait(&server, args, pace))?;
-    let steps = server.steps();
-    let engine = server.join()?;
-    // Browsers may hold connections open; nobody waits for them.
-    foreground.shutdown_timeout(Duration::from_millis(200));
-    let unfinished = interrupted && pace.steps.is_some();
-    let failures = conclude(engine, args, interrupted, (steps, started.elapsed()))?;
-    Ok(if unfinished || !failures.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    loop {
+        let started = Instant::now();
+        let server = Server::start(engine, sessions, &config)?;
+        let ended = foreground.block_on(wait(&server, args, &config))?;
+        let steps = server.steps();
+        if let Ended::Next(next) = ended {
+            sessions = server.release()?.1;
+            let Next { name, engine: built } = *next;
+            engine = built;
+            let rates = engine.simulation().scene().publish;
+            let scene_seq = config.scene_seq + 1;
+            let (surface_hz, contact_hz, stats_hz) = (rates.surface_hz, rates.contact_hz, rates.stats_hz);
+            config = ServerConfig { scene: name, scene_seq, surface_hz, contact_hz, stats_hz, ..config };
+            continue;
+        }
+        let interrupted = matches!(ended, Ended::Interrupted);
+        let engine = server.join()?;
+        // Browsers may hold connections open; nobody waits for them.
+        foreground.shutdown_timeout(Duration::from_millis(200));
+        let unfinished = interrupted && pace.steps.is_some();
+        let failures = conclude(engine, args, interrupted, (steps, started.elapsed()))?;
+        return Ok(if unfinished || !failures.is_empty() { ExitCode::from(1) } else { ExitCode::SUCCESS });
+    }
+}
+
+/// What clients may change to: nothing where the run is one that is asked for as a whole.
+fn catalogue((name, scene): (&str, &Scene), args: &ServeArgs) -> Catalogue {
+    let whole = args.out.is_some() || args.steps.is_some() || args.seconds.is_some() || args.fast;
+    if whole { Catalogue::default() } else { Catalogue::beside(name, scene) }
 }
 
 fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
@@ -226,9 +255,25 @@ fn announce(scene: &Scene, args: &ServeArgs, listen: &[String], viewer: Option<S
     }
 }
 
-/// Until the simulation ends or somebody ends it: true in the second case.
-async fn wait(server: &Server, args: &ServeArgs, pace: Pace) -> Result<bool, RuntimeError> {
-    let progress = Progress::begin("steps", pace.steps, args.json);
+/// How a server comes to its end.
+enum Ended {
+    /// All steps are done.
+    Done,
+    /// Somebody ended it.
+    Interrupted,
+    /// Another scene takes its place.
+    Next(Box<Next>),
+}
+
+/// A scene that a client asked for, built.
+struct Next {
+    name: String,
+    engine: Engine,
+}
+
+/// Until the simulation ends, somebody ends it or another scene is ready.
+async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig) -> Result<Ended, RuntimeError> {
+    let progress = Progress::begin("steps", config.pace.steps, args.json);
     let failed = |e: std::io::Error| RuntimeError::System {
         what: "listening for signals".to_owned(),
         reason: e.to_string(),
@@ -236,24 +281,38 @@ async fn wait(server: &Server, args: &ServeArgs, pace: Pace) -> Result<bool, Run
     let kind = tokio::signal::unix::SignalKind::terminate();
     let mut terminate = tokio::signal::unix::signal(kind).map_err(failed)?;
     let mut look = tokio::time::interval(LOOK);
-    let interrupted = loop {
+    let mut building: Option<JoinHandle<Result<Next, RuntimeError>>> = None;
+    let ended = loop {
         tokio::select! {
             _ = look.tick() => {
                 progress.at(server.steps());
                 if server.finished() {
-                    break false;
+                    break Ended::Done;
+                }
+                if building.as_ref().is_some_and(JoinHandle::is_finished) && let Some(built) = building.take() {
+                    config.catalogue.settled();
+                    match built.await.map_err(|_| RuntimeError::Died { thread: "build".to_owned() }).flatten() {
+                        Ok(next) => break Ended::Next(Box::new(next)),
+                        Err(error) => server.exchange().event(Level::Warning, "scene-not-loaded", error.to_string()),
+                    }
+                }
+                if building.is_none() && let Some((name, scene)) = config.catalogue.asked_for() {
+                    let args = args.clone();
+                    building = Some(tokio::task::spawn_blocking(move || {
+                        Ok(Next { name, engine: build(&scene?, &args)? })
+                    }));
                 }
             }
             pressed = tokio::signal::ctrl_c() => {
                 pressed.map_err(failed)?;
-                break true;
+                break Ended::Interrupted;
             }
-            _ = terminate.recv() => break true,
+            _ = terminate.recv() => break Ended::Interrupted,
         }
     };
     progress.end();
     server.stop();
-    Ok(interrupted)
+    Ok(ended)
 }
 
 /// The end of a process whose threads do not end: what they hold is lost.
