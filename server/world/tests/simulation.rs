@@ -251,3 +251,35 @@ fn an_effect_that_is_off_does_not_change_a_bit() {
     assert_eq!(plain, run_with("[effects]\nenergy = true"));
     assert_eq!(plain, run_with("tool = [{ id = \"idle\", shape = { sphere = { radius_m = 0.01 } } }]"));
 }
+
+/// Displacements that arrive in proportion, whatever computes the body.
+#[test]
+fn what_is_held_arrives_over_the_time_it_is_given() {
+    let stretched = |body: &str| {
+        let fix = "[[body.fix]]\nwhere = { slab = { axis = \"z\", from = 1, to = 1 } }\ndisplacement_m = [0, 0, 0.08]\n";
+        let text = BEAM.replacen("rayleigh", &format!("{body}\nrayleigh"), 1);
+        simulation(&format!("{text}{fix}"))
+    };
+    let top = |sim: &Simulation| -> f64 {
+        let (body, group) = (&sim.bodies()[0].body, &sim.bodies()[0].fix_groups[1]);
+        let up = |&n: &u32| body.positions()[n as usize].z - body.rest_positions()[n as usize].z;
+        let [least, most] = [f64::min, f64::max].map(|pick| group.iter().map(up).reduce(pick).unwrap());
+        assert!(most - least < 1e-15, "{least} {most}");
+        most
+    };
+    for more in ["", "cutting = { method = \"snap\" }", "law = \"neo-hookean\"", "element = \"tet10\""] {
+        let mut sim = stretched(&format!("displacement_over_s = 0.4\n{more}"));
+        for step in 1..=60 {
+            run(&mut sim, 1);
+            let share = (f64::from(step) / 40.0).min(1.0);
+            assert!((top(&sim) - 0.08 * share).abs() < 1e-12, "{more}, step {step}: {}", top(&sim));
+            assert!(sim.bodies()[0].body.least_volume_ratio() > 0.4, "{more}, step {step}");
+        }
+        sim.reset().unwrap();
+        run(&mut sim, 4);
+        assert!((top(&sim) - 0.008).abs() < 1e-12, "{more}: {}", top(&sim));
+    }
+    let mut sim = stretched("");
+    run(&mut sim, 1);
+    assert!((top(&sim) - 0.08).abs() < 1e-12, "at once, unless a time is given: {}", top(&sim));
+}

@@ -101,8 +101,15 @@ impl Boundary {
     /// A fixed node fixes the copies that hold the node's own material: one, which keeps the node's
     /// number, and further ones if a cut passes exactly through the node, so that both lips have it.
     /// Copies without that material stay free: fixing them would glue fragments to air.
-    /// `rest` are the rest positions of all copies [m], and of what the element adds. Ascending.
-    pub fn fixed_copies(&self, mesh: &CutMesh, rest: &[Vector3<f64>], fixed: &mut Vec<FixedCopy>) {
+    /// `rest` are the rest positions of all copies [m], and of what the element adds; `share` of the prescribed
+    /// displacements is reached. Ascending.
+    pub fn fixed_copies(
+        &self,
+        mesh: &CutMesh,
+        rest: &[Vector3<f64>],
+        share: f64,
+        fixed: &mut Vec<FixedCopy>,
+    ) {
         let n_nodes = mesh.mesh().nodes.len();
         let mut divided = vec![false; n_nodes];
         mesh.copy_node().iter().skip(n_nodes).for_each(|&node| divided[node as usize] = true);
@@ -111,7 +118,7 @@ impl Boundary {
             fixed.reserve_exact(self.fixed.len() + self.fixed.len() / 2);
         }
         for f in &self.fixed {
-            let target = rest[f.node as usize] + f.displacement_m;
+            let target = rest[f.node as usize] + share * f.displacement_m;
             let held = |copy: u32| FixedCopy { copy, axes: f.axes, position_m: target.into() };
             fixed.push(held(f.node));
             // What an element adds to the nodes is not cut.
@@ -190,6 +197,23 @@ impl Body {
         }
         self.follow_boundary();
         Ok(())
+    }
+
+    /// Lets what is held reach `share` of its prescribed displacements with the next step; all of them at
+    /// first. A displacement that arrives at once turns soft elements inside out.
+    pub fn set_prescribed_share(&mut self, share: f64) {
+        if share == self.prescribed_share {
+            return;
+        }
+        self.prescribed_share = share;
+        for held in &mut self.fixed {
+            let node = self.cut_mesh.copy_node().get(held.copy as usize).copied().unwrap_or(held.copy);
+            let asleep = self.asleep.binary_search_by_key(&held.copy, |held| held.copy).is_ok();
+            if let (Some(asked), false) = (self.boundary.fixed_at(node), asleep) {
+                held.position_m = (self.rest[node as usize] + share * asked.displacement_m).into();
+            }
+        }
+        self.range.follow(&self.rest, &self.parts, &self.fixed);
     }
 
     /// Frees `nodes` again.

@@ -140,6 +140,8 @@ pub struct Body {
     state: State,
     boundary: Boundary,
     fixed: Vec<FixedCopy>,
+    /// Share of the prescribed displacements that holds now.
+    prescribed_share: f64,
     /// Copies of parts that were put to sleep, ascending; they are among `fixed` too.
     asleep: Vec<FixedCopy>,
     load: Vec<Vector3<f64>>,
@@ -229,6 +231,7 @@ impl Body {
             state: State::default(),
             boundary: Boundary::default(),
             fixed: Vec::new(),
+            prescribed_share: 1.0,
             asleep: Vec::new(),
             load: Vec::new(),
             mass: Vec::new(),

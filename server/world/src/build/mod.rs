@@ -139,6 +139,7 @@ impl Builder<'_> {
         }
         let mut body = SimBody::new(&spec.id, body, health);
         body.fixed_iterations = spec.mechanics.fixed_iterations;
+        body.displacement_over_s = spec.displacement_over_s;
         for (i, fix) in spec.fixes.iter().enumerate() {
             self.fix(&format!("{at}.fix.{i}"), fix, &mut body);
         }

@@ -76,7 +76,9 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
         let mut body = Body::new(mesh, *fine.body.material(), settings).ok()?;
         hold(&mut body, fine)?;
         load(&mut body, &fine.body)?;
-        bodies.push(SimBody::new(&spec.id, body, None));
+        let mut body = SimBody::new(&spec.id, body, None);
+        body.displacement_over_s = fine.displacement_over_s;
+        bodies.push(body);
     }
     let built = Built { bodies, probes: Vec::new(), warnings: Vec::new() };
     Some(Simulation::assemble(simulation.source().clone(), scene, built))

@@ -292,11 +292,12 @@ impl<'a> Run<'a> {
     }
 }
 
-/// When the last cut happens and the last tool has gone through its path [s].
+/// When the last cut happens, the last tool has gone through its path and what is held has arrived [s].
 fn last_event(scene: &CheckedScene) -> f64 {
+    let held = scene.bodies.iter().map(|body| body.displacement_over_s);
     let cuts = scene.cuts.iter().map(|cut| cut.at_s);
     let tools = scene.tools.iter().filter_map(|tool| tool.path.last()).map(|point| point.at_s);
-    cuts.chain(tools).fold(0.0, f64::max)
+    cuts.chain(tools).chain(held).fold(0.0, f64::max)
 }
 
 /// When the next cut happens or tool begins, after `time_s` [s].
@@ -308,12 +309,14 @@ fn next_event(scene: &CheckedScene, time_s: f64) -> Option<f64> {
     cuts.chain(tools).filter(|at| *at >= after).min_by(f64::total_cmp)
 }
 
-/// Whether a tool is on its path at `time_s` [s].
+/// Whether a tool is on its path at `time_s` [s], or what is held on its way.
 fn acts(scene: &CheckedScene, time_s: f64) -> bool {
-    scene.tools.iter().any(|tool| match &tool.path[..] {
-        [first, .., last] => first.at_s <= time_s && (time_s <= last.at_s || tool.repeat_s.is_some()),
-        _ => false,
-    })
+    let arriving = scene.bodies.iter().any(|body| time_s < body.displacement_over_s);
+    arriving
+        || scene.tools.iter().any(|tool| match &tool.path[..] {
+            [first, .., last] => first.at_s <= time_s && (time_s <= last.at_s || tool.repeat_s.is_some()),
+            _ => false,
+        })
 }
 
 /// Makes the first steps again with more iterations, to tell how many it takes.

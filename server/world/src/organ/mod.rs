@@ -7,28 +7,31 @@ mod distance;
 mod shapes;
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use scindo_physics::mesh::TetMesh;
+use serde::{Deserialize, Serialize};
 
 use crate::mesh_in::implicit::triangulate;
 use crate::mesh_in::{LatticeReport, MeshInError, Observer, SurfaceMesh, lattice_observed};
 
-/// A shape.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+/// Shapes that the program makes itself; long axis along x, top towards +z, centred at x = y = 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Organ {
-    /// Two lobes with a groove, 160 mm.
+    /// Two lobes with a groove, 160 × 104 × 63 mm, from z = 0 up.
     #[default]
     Liver,
-    /// A bean with a growth on one end, 112 mm.
+    /// A bean with a growth on one end, 112 × 66 × 48 mm, from z = 0 up.
     Kidney,
-    /// A tube that forks, 120 mm.
+    /// A tube that forks, 120 × 84 × 20 mm, its axis at z = 0.
     Vessel,
-    /// A thin dome over a ring, 132 mm.
+    /// A thin dome over a ring, 132 × 132 × 38 mm, from z = 0 up.
     Diaphragm,
-    /// A muscle between a tendon and three strands, 190 mm.
+    /// A muscle between a tendon and three strands, 190 × 62 × 34 mm, its axis at z = 0.
     Tendon,
-    /// A folded half dome, 132 mm.
+    /// A folded half dome, 132 × 92 × 62 mm, flat below at z = 0.
     Brain,
-    /// The last joint of a finger, 62 mm.
+    /// The last joint of a finger, pad up, 62 × 36 × 30 mm, from z = 0 up.
     Fingertip,
 }
 

@@ -34,18 +34,6 @@ pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
     if check.findings.is_empty() { Ok(scene) } else { Err(check.findings) }
 }
 
-fn shape(shape: RawOrganShape) -> Organ {
-    match shape {
-        RawOrganShape::Liver => Organ::Liver,
-        RawOrganShape::Kidney => Organ::Kidney,
-        RawOrganShape::Vessel => Organ::Vessel,
-        RawOrganShape::Diaphragm => Organ::Diaphragm,
-        RawOrganShape::Tendon => Organ::Tendon,
-        RawOrganShape::Brain => Organ::Brain,
-        RawOrganShape::Fingertip => Organ::Fingertip,
-    }
-}
-
 struct Check<'a> {
     raw: &'a RawScene,
     findings: Vec<Finding>,
@@ -119,6 +107,7 @@ impl Check<'_> {
             damping_mass_1_s: body.rayleigh.mass_1_s,
             damping_stiffness_s: body.rayleigh.stiffness_s,
             fixes: self.fixes(&at, &body.fix),
+            displacement_over_s: body.displacement_over_s,
             loads: self.loads(&at, &body.load),
             look: self.look(&format!("{at}.look"), body.look.as_ref()),
         }
@@ -186,7 +175,7 @@ impl Check<'_> {
             return self.grid(&format!("{at}.grid"), grid);
         }
         let organ = mesh.organ.as_ref();
-        let shape = organ.map_or(Organ::default(), |organ| shape(organ.shape));
+        let shape = organ.map_or(Organ::default(), |organ| organ.shape);
         MeshSource::Organ { shape, cells: organ.map_or(4, |organ| organ.cells) as usize }
     }
 

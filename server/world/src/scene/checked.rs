@@ -63,6 +63,8 @@ pub struct BodySpec {
     pub damping_stiffness_s: f64,
     /// Held parts.
     pub fixes: Vec<FixSpec>,
+    /// Time over which displacements of held parts grow to their prescribed values [s].
+    pub displacement_over_s: f64,
     /// Constant loads.
     pub loads: Vec<LoadSpec>,
     /// How it is drawn.

@@ -16,6 +16,8 @@ use schemars::JsonSchema;
 use scindo_physics::material::Material;
 use serde::{Deserialize, Serialize};
 
+use crate::organ::Organ;
+
 /// A vector or point in world axes.
 pub type Vec3 = [f64; 3];
 
@@ -136,6 +138,10 @@ pub struct RawBody {
     /// Held or displaced parts.
     #[serde(default)]
     pub fix: Vec<RawFix>,
+    /// Time over which every `displacement_m` of its fixes grows from zero [s]; 0: at once.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "1 lets a body follow what would turn its elements inside out at once"))]
+    pub displacement_over_s: f64,
     /// Constant loads.
     #[serde(default)]
     pub load: Vec<RawLoad>,
@@ -250,31 +256,10 @@ pub enum RawPattern {
 pub struct RawOrgan {
     /// Which.
     #[serde(default)]
-    pub shape: RawOrganShape,
+    pub shape: Organ,
     /// Lattice cells along its longest side.
     #[schemars(range(min = 4, max = 128), extend("x-next" = "20 to 24 cells run in real time"))]
     pub cells: u32,
-}
-
-/// Shapes that the program makes itself; long axis along x, top towards +z, centred at x = y = 0.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RawOrganShape {
-    /// Two lobes with a groove, 160 × 104 × 63 mm, from z = 0 up.
-    #[default]
-    Liver,
-    /// A bean with a growth on one end, 112 × 66 × 48 mm, from z = 0 up.
-    Kidney,
-    /// A tube that forks, 120 × 84 × 20 mm, its axis at z = 0.
-    Vessel,
-    /// A thin dome over a ring, 132 × 132 × 38 mm, from z = 0 up.
-    Diaphragm,
-    /// A muscle between a tendon and three strands, 190 × 62 × 34 mm, its axis at z = 0.
-    Tendon,
-    /// A folded half dome, 132 × 92 × 62 mm, flat below at z = 0.
-    Brain,
-    /// The last joint of a finger, pad up, 62 × 36 × 30 mm, from z = 0 up.
-    Fingertip,
 }
 
 /// A skin finer than the elements.

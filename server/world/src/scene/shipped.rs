@@ -33,7 +33,7 @@ pub const SHIPPED: [ShippedScene; 7] = [
     scene!("kidney", "A growth on a kidney is undercut by a blade and lifted with forceps"),
     scene!("brain", "A soft folded lobe is cut along its top and held open by two retractors"),
     scene!("tendon", "A muscle under tension loses one of its three strands, cut along element faces"),
-    scene!("diaphragm", "A thin dome is pushed in, swings back with little damping and is slit"),
+    scene!("diaphragm", "A thin dome is pushed in, springs back and is slit beside its opening"),
     scene!("vessel", "The fork of a stretched blood vessel is slit and gapes (neo-Hookean)"),
     scene!("fingertip", "A rod rolls over a finger's pad, nearly incompressible, around a bone"),
 ];

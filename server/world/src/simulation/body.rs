@@ -3,7 +3,8 @@
 use std::mem::Discriminant;
 use std::sync::Arc;
 
-use scindo_physics::body::{Body, ElementKind, Notice, SolveReport};
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, ElementKind, Notice, PointSpring, SolveReport};
 use scindo_physics::cut::IncisionMark;
 use scindo_physics::estimate::{MeshError, StressRecovery};
 
@@ -31,6 +32,8 @@ pub struct SimBody {
     pub rest_volume_m3: f64,
     /// Whether a fixed number of iterations is meant, whatever residual they leave.
     pub fixed_iterations: bool,
+    /// Time over which displacements of held parts grow to their prescribed values [s].
+    pub displacement_over_s: f64,
     watch: Watch,
     /// What was told of the last step.
     pub(crate) noticed: Option<Discriminant<Notice>>,
@@ -53,6 +56,7 @@ impl SimBody {
             health,
             rest_volume_m3,
             fixed_iterations: false,
+            displacement_over_s: 0.0,
             watch: Watch::default(),
             noticed: None,
             recovery: StressRecovery::default(),
@@ -62,6 +66,19 @@ impl SimBody {
             marks: Vec::new(),
             marks_are_old: true,
         }
+    }
+
+    /// One step, which ends at `time_s` [s].
+    pub(crate) fn step(
+        &mut self,
+        (time_s, h): (f64, f64),
+        gravity_m_s2: Vector3<f64>,
+        springs: &[PointSpring],
+    ) -> SolveReport {
+        let over_s = self.displacement_over_s;
+        self.body.set_prescribed_share(if time_s < over_s { time_s / over_s } else { 1.0 });
+        let solve = self.body.step(h, gravity_m_s2, springs);
+        self.as_it_ended(solve)
     }
 
     /// Topology epoch; rises with every cut that did something and with every reset.
@@ -177,7 +194,7 @@ impl SimBody {
 
     /// The report without elements that were inverted at the predictor alone, as where a held place is moved far
     /// at once: what counts is what the step ended with.
-    pub(crate) fn as_it_ended(&self, solve: SolveReport) -> SolveReport {
+    fn as_it_ended(&self, solve: SolveReport) -> SolveReport {
         if solve.inverted_pieces == 0 || self.body.least_volume_ratio() <= 0.0 {
             return solve;
         }

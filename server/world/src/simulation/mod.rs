@@ -187,9 +187,9 @@ impl Simulation {
     }
 
     fn deform(&mut self) {
+        let (when, gravity) = ((self.time_s(), self.scene.step_s), self.scene.gravity_m_s2);
         for (i, body) in self.bodies.iter_mut().enumerate() {
-            let solve = body.body.step(self.scene.step_s, self.scene.gravity_m_s2, self.contacts.springs(i));
-            let solve = body.as_it_ended(solve);
+            let solve = body.step(when, gravity, self.contacts.springs(i));
             self.report.bodies[i].solve = solve;
             body.has_stepped(&solve, &mut self.report);
         }
