@@ -475,3 +475,60 @@ async fn nobody_there_is_said_clearly() {
     let error = Link::connect(config).await.err().unwrap();
     assert!(error.to_string().contains("no scindo server answers at tcp/127.0.0.1:9"), "{error}");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_may_change_is_listed_with_its_range_and_changes() {
+    let mut running = Running::start();
+    let link = running.link(Role::Client, "operator").await;
+    let stiffness = || async {
+        let params = link.params().await.unwrap().params;
+        params.into_iter().find(|param| param.key == "body.block.young_pa").unwrap()
+    };
+    let before = stiffness().await;
+    assert!(
+        before.value.parse::<f64>().unwrap() == 5e4 && before.min < 5e4 && before.max > 5e4,
+        "{before:?}"
+    );
+    link.set("body.block.young_pa", "8e4").await.unwrap();
+    assert_eq!(stiffness().await.value.parse::<f64>().unwrap(), 8e4);
+    let refused = link.set("body.block.young_pa", &format!("{:e}", 10.0 * before.max)).await.unwrap_err();
+    assert!(matches!(&refused, LinkError::Refused { code, .. } if code == "cannot-set"), "{refused}");
+    assert_eq!(stiffness().await.value.parse::<f64>().unwrap(), 8e4);
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cut_that_was_taken_back_is_still_a_duplicate() {
+    let mut running = Running::start();
+    let link = running.link(Role::Client, "script").await;
+    let mut mirror = link.mirror("block").await.unwrap();
+    let whole = mirror.next().await.unwrap().topology.triangle_count;
+    let tool = link.tool("scalpel").await.unwrap();
+    let command = scindo_client::messages::CutCommand {
+        client_id: "script".into(),
+        tool_id: "scalpel".into(),
+        seq: 1,
+        body_id: "block".into(),
+        sweep: sweep(0.033),
+        ..Default::default()
+    };
+    assert_eq!(tool.cutter.send(command.clone()).await.unwrap().outcome(), Outcome::Applied);
+    until("the cut is shown", || mirror.latest().is_some_and(|s| s.topology.triangle_count > whole)).await;
+    link.undo().await.unwrap();
+    until("it is gone", || mirror.latest().is_some_and(|s| s.topology.triangle_count == whole)).await;
+    assert_eq!(tool.cutter.send(command).await.unwrap().outcome(), Outcome::Duplicate);
+    let nothing = link.undo().await.unwrap_err();
+    assert!(matches!(&nothing, LinkError::Refused { code, .. } if code == "cannot-undo"), "{nothing}");
+    assert_eq!(mirror.latest().unwrap().topology.triangle_count, whole);
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_runs_one_scene_loads_no_other() {
+    let mut running = Running::start();
+    let link = running.link(Role::Client, "operator").await;
+    assert!(link.scenes().await.unwrap().scenes.is_empty());
+    let refused = link.load("kidney").await.unwrap_err();
+    assert!(matches!(&refused, LinkError::Refused { code, .. } if code == "not-supported"), "{refused}");
+    running.end();
+}
