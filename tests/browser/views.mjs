@@ -24,6 +24,9 @@ await run(async () => {
   await keysAndButtons(page);
   await nothingOverlaps(page);
   await saysThatItIsStalled(page);
+  await changesWhatTheSlidersSay(page);
+  await takesACutBack(page);
+  await changesTheScene(page);
   await page.close();
   await saysThatThereIsNoWebGl();
 }, () => browser.close());
@@ -176,6 +179,53 @@ async function saysThatItIsStalled(page) {
     process.kill(Number(server), "SIGCONT");
   }
   await until(page, "and that it goes on", MINUTE, () => document.getElementById("link").dataset.state === "live");
+}
+
+/** A slider shows the value of the scene; moved, it changes the server's, which the tray asks for when it opens. */
+async function changesWhatTheSlidersSay(page) {
+  const tray = page.locator("#view-toggle");
+  if ((await tray.getAttribute("aria-pressed")) === "true") await tray.click();
+  await tray.click();
+  const row = page.locator("#params .param", { hasText: "shelf young" });
+  await row.waitFor({ timeout: MINUTE });
+  const words = () => row.locator("output").textContent();
+  const before = await words();
+  hold(/^6\.00e4 Pa$|^60000 Pa$/.test(before), `the slider shows the stiffness of the scene (${before})`);
+  await row.locator("input").evaluate((slider) => {
+    slider.value = String(Number(slider.value) + 60);
+    slider.dispatchEvent(new Event("input"));
+    slider.dispatchEvent(new Event("change"));
+  });
+  const after = await words();
+  hold(after !== before, `it moves (${after})`);
+  await until(page, "the server says that it has changed", MINUTE, () => /young_pa = /.test(document.getElementById("log").textContent));
+  await tray.click();
+  await page.evaluate(() => document.querySelector("#params .sliders").replaceChildren());
+  await tray.click();
+  await row.waitFor({ timeout: MINUTE });
+  hold((await words()) === after, `and shows what the server has when it is asked again (${await words()})`);
+  await picture(page, "views-8-sliders.png");
+}
+
+/** The end that was cut off comes back, and then the slit closes. */
+async function takesACutBack(page) {
+  const lips = () => page.evaluate(() => window.scindo.bodies()[0].lipTriangles);
+  await until(page, "two cuts are there", MINUTE, () => window.scindo.bodies()[0].simTimeS > 2.4);
+  for (let left = await lips(); left > 0; left = await lips()) {
+    await page.keyboard.press("u");
+    await until(page, `a cut with ${left} wound triangles is taken back`, MINUTE, (left) => window.scindo.bodies()[0].lipTriangles < left, left);
+  }
+  hold(await page.isDisabled("#undo"), "nothing is left to be undone");
+  await picture(page, "views-9-undone.png");
+}
+
+async function changesTheScene(page) {
+  const choice = page.locator("#scene-choice");
+  hold((await choice.inputValue()) === "views" && (await choice.locator("option").count()) > 5, "the scene that runs is chosen among those that ship");
+  await choice.selectOption("kidney");
+  await until(page, "another scene is drawn", MINUTE, () => window.scindo.bodies().length === 1 && window.scindo.bodies()[0].id === "kidney" && window.scindo.bodies()[0].vertices > 0);
+  await until(page, "the page is live again", MINUTE, () => document.getElementById("link").dataset.state === "live");
+  await picture(page, "views-10-kidney.png");
 }
 
 async function saysThatThereIsNoWebGl() {

@@ -4,7 +4,7 @@ import { boundsOf, PRESETS, type Preset, type Stage } from "./stage";
 import type { Hand, HandMode } from "./hand";
 import type { Help } from "./help";
 import type { Relay } from "./relay";
-import type { Session } from "./session";
+import { NO_OPERATOR, type Session } from "./session";
 import type { View } from "./view";
 import { length } from "./units";
 
@@ -74,9 +74,11 @@ export class Bar {
     document.getElementById("hint")!.textContent = HINTS[this.hand.mode];
     this.pause.querySelector("span")!.textContent = this.session.paused ? "Go on" : "Pause";
     this.pause.querySelector("path")!.setAttribute("d", this.session.paused ? "M7 5l12 7-12 7z" : "M8 5v14M16 5v14");
-    this.pause.disabled = this.reset.disabled = this.session.readOnly;
-    this.undo.disabled = this.session.readOnly || !this.hasCuts;
-    this.step.disabled = this.session.readOnly || !this.session.paused;
+    const { operator, paused } = this.session;
+    this.pause.disabled = this.reset.disabled = !operator;
+    this.undo.disabled = !operator || !this.hasCuts;
+    this.step.disabled = !operator || !paused;
+    this.pause.parentElement!.title = operator ? "" : NO_OPERATOR;
   }
 
   fit(preset?: Preset): void {

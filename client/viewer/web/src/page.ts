@@ -27,7 +27,7 @@ export function start(canvas: HTMLCanvasElement): void {
 
 class Page {
   private readonly session: Session = {
-    bodies: new Map(), tools: new Map(), toolId: "", clientId: "", readOnly: false, paused: false,
+    bodies: new Map(), tools: new Map(), toolId: "", clientId: "", readOnly: false, operator: false, paused: false,
   };
   private readonly relay = new Relay((message, bytes) => this.receive(message, bytes), (open) => this.panel.showConnection(open));
   private readonly stage: Stage;
@@ -69,6 +69,7 @@ class Page {
         this.session.clientId = message.value.clientId;
         this.session.toolId = message.value.toolId;
         this.session.readOnly = message.value.readOnly;
+        this.session.operator = message.value.operator;
         this.panel.showHello(message.value);
         this.bar.refresh();
         this.view.ask(true);

@@ -3,7 +3,7 @@
 import { Param_Kind, type Param, type ParamsReply, type ScenesReply } from "../gen/scindo/v1/server_pb";
 import { element } from "./dom";
 import type { Relay } from "./relay";
-import type { Session } from "./session";
+import { NO_OPERATOR, type Session } from "./session";
 
 /** Positions of a slider. */
 const STEPS = 400;
@@ -25,7 +25,10 @@ export class Params {
 
   /** The tray was opened, or another scene runs. */
   ask(): void {
-    if (this.session.readOnly) return;
+    if (!this.session.operator) {
+      this.list.replaceChildren(element("p", "note", NO_OPERATOR));
+      return;
+    }
     this.relay.call({ case: "params", value: {} });
     this.relay.call({ case: "scenes", value: {} });
   }
