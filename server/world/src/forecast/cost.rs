@@ -22,19 +22,32 @@ pub struct Cost {
 pub struct Prices {
     /// Of every step [s].
     steps_s: Vec<f64>,
+    /// Iterations of every step since the last jump, of all bodies.
+    iterations: Vec<u32>,
     /// Steps that were jumped over, at the price of those before them [s].
     rested: (u64, f64),
 }
 
 impl Prices {
-    pub fn add(&mut self, seconds: f64) {
+    pub fn add(&mut self, seconds: f64, iterations: u32) {
         self.steps_s.push(seconds);
+        self.iterations.push(iterations);
+    }
+
+    /// Whether the price no longer falls: the last quarter of the steps took as many iterations as the one
+    /// before it. A body that has come to rest goes on getting cheaper for a while.
+    pub fn are_settled(&self) -> bool {
+        let n = self.iterations.len();
+        let sum = |from: usize, to: usize| self.iterations[from..to].iter().sum::<u32>();
+        let quarter = n / 4;
+        quarter > 0 && 10 * sum(n - quarter, n) >= 9 * sum(n - 2 * quarter, n - quarter)
     }
 
     /// So many steps at rest, which were not made.
     pub fn rested(&mut self, steps: u64) {
         self.rested.0 += steps;
         self.rested.1 += steps as f64 * self.last();
+        self.iterations.clear();
     }
 
     /// Price of a run that goes on for `left` steps.
@@ -75,7 +88,7 @@ mod tests {
     #[test]
     fn a_run_that_rests_is_cheaper_than_its_first_steps() {
         let mut prices = Prices::default();
-        (0..10).for_each(|i| prices.add(if i < 5 { 0.010 } else { 0.002 }));
+        (0..10).for_each(|i| prices.add(if i < 5 { 0.010 } else { 0.002 }, 1));
         let cost = prices.cost(Ending::Rest, 90);
         assert!((cost.mean_ms - (50.0 + 10.0 + 180.0) / 100.0).abs() < 1e-9, "{cost:?}");
         assert!((cost.moving_ms - 6.0).abs() < 1e-9 && (cost.last_ms - 2.0).abs() < 1e-9, "{cost:?}");
@@ -85,8 +98,19 @@ mod tests {
     #[test]
     fn a_jump_costs_what_rest_costs() {
         let mut prices = Prices::default();
-        (0..10).for_each(|_| prices.add(0.004));
+        (0..10).for_each(|_| prices.add(0.004, 1));
         prices.rested(90);
         assert!((prices.cost(Ending::End, 0).mean_ms - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_price_that_falls_is_not_settled() {
+        let mut prices = Prices::default();
+        for (iterations, settled) in
+            [80, 40, 20, 10, 10, 10, 10, 10].into_iter().zip([false; 4].into_iter().chain([true; 4]))
+        {
+            prices.add(0.001, iterations);
+            assert_eq!(prices.are_settled(), settled, "{:?}", prices.iterations);
+        }
     }
 }

@@ -238,9 +238,9 @@ impl<'a> Run<'a> {
     }
 
     fn record(&mut self, cpu_s: f64) {
-        self.prices.add(cpu_s);
         let time_s = self.simulation.time_s();
         let report = self.simulation.report();
+        self.prices.add(cpu_s, report.bodies.iter().map(|body| body.solve.iterations).sum());
         for event in report.events.iter().filter(|event| event.level >= Level::Warning) {
             let body = event.body.as_deref().unwrap_or("scene");
             let text = format!("body.{body}: {}", event.message);
@@ -260,7 +260,7 @@ impl<'a> Run<'a> {
 
     fn rests(&self) -> bool {
         let acting = acts(self.simulation.scene(), self.simulation.time_s());
-        !acting && self.watches.iter().all(|watch| watch.rests(self.static_only))
+        !acting && self.watches.iter().all(|watch| watch.rests(self.static_only)) && self.prices.are_settled()
     }
 
     /// To the step that begins at `at_s` [s]; what lies between is at rest.
