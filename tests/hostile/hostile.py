@@ -206,7 +206,7 @@ def stopped_viewers(attacker, watch, calm, endpoint):
 
 
 def large_messages(endpoint, pid, seconds):
-    """Four clients send messages of a megabyte: memory returns."""
+    """Four clients send messages of a megabyte: memory returns, shared memory too."""
     start = resident_mb(pid)
     sessions = [Session(endpoint, "scindo", "main") for _ in range(4)]
     payload, sent, end = b"\xff" * (1 << 20), 0, time.monotonic() + seconds

@@ -141,9 +141,11 @@ fn open(
         settings.push(("connect/endpoints", list(connect)));
     }
     if !from_file {
-        // Deterministic: only what was named, no discovery.
+        // Deterministic: only what was named, no discovery. No shared memory: each client on this machine would
+        // bring 16 MB that stay mapped when it is gone.
         settings.extend(
             [
+                ("transport/shared_memory/enabled", "false"),
                 ("scouting/multicast/enabled", "false"),
                 ("scouting/gossip/enabled", "false"),
                 ("scouting/delay", "50"),
