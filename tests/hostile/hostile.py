@@ -4,9 +4,12 @@ A healthy client watches frames all the time. Gaps between its frames are held a
 on a machine that stalls by itself, against the longest gap of a calm stretch.
 
     python tests/hostile/hostile.py SCINDO ARTIFACTS PORT PAGE_PORT
+
+SCINDO_HOSTILE_SECONDS: how long messages of a megabyte are sent (default 8).
 """
 
 import collections
+import os
 import pathlib
 import random
 import re
@@ -28,6 +31,7 @@ CLIENT = "hostile"
 TOOL = "scalpel"
 # A stalled machine may be this many times slower than it was when nobody attacked.
 SLACK = 4.0
+LARGE_MESSAGES_S = float(os.environ.get("SCINDO_HOSTILE_SECONDS", "8"))
 # Only a server that hangs makes anything take this long [s].
 PATIENCE = 240.0
 
@@ -318,7 +322,7 @@ def attack(server, endpoint, page):
     cuts(attacker, watch, calm)
     reset(attacker, calm)
     orders(attacker)
-    large_messages(endpoint, server.pid, 8.0)
+    large_messages(endpoint, server.pid, LARGE_MESSAGES_S)
     browsers(page, calm)
     for segments in hostile_cuts(random.Random(3)):
         attacker.cut(segments)

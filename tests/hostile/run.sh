@@ -10,4 +10,4 @@ mkdir -p "$keep"
 ulimit -n 8192 2>/dev/null || true
 port=$(python3 tests/free_port.py)
 page=$(python3 tests/free_port.py)
-timeout 600 "$python" tests/hostile/hostile.py "$bin/scindo" "$keep" "$port" "$page"
+timeout $((600 + ${SCINDO_HOSTILE_SECONDS:-8})) "$python" tests/hostile/hostile.py "$bin/scindo" "$keep" "$port" "$page"
