@@ -43,6 +43,14 @@ export class Curves {
     this.timer = window.setInterval(() => Object.values(this.charts!).forEach((chart) => chart.draw()), REFRESH_MS);
   }
 
+  /** Another scene has other tools and energies. */
+  restart(): void {
+    if (!this.on) return;
+    this.forces.clear();
+    this.show(false);
+    this.show(true);
+  }
+
   tool(state: ToolState): void {
     if (!this.charts) return;
     const f = state.forceN;

@@ -132,8 +132,11 @@ class Page {
     this.panel.countPicture(now);
   }
 
-  /** Another scene, or the same from a server that came back: bodies it does not know leave the picture. */
+  /** Another scene, or the same from a server that came back: bodies and tools it does not know leave the picture. */
   private takeInfo(info: SessionInfo): void {
+    const tools = info.tools.map((tool) => tool.id);
+    [...this.session.tools.keys()].filter((id) => !tools.includes(id)).forEach((id) => this.forgetTool(id));
+    this.curves.restart();
     this.panel.showInfo(info);
     this.params.setScene(info.scene);
     if (this.view.isOpen) this.params.ask();

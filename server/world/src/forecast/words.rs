@@ -27,9 +27,16 @@ pub fn warnings(scene: &CheckedScene, forecast: &mut Forecast) {
             found.push(unconverged(&at, spec, body, forecast.steps));
         }
         if body.inverted_elements > 0 || body.least_volume_ratio <= 0.0 {
+            let at_once = spec.displacement_over_s == 0.0;
+            let displaced = at_once && spec.fixes.iter().any(|fix| fix.displacement_m.norm() > 0.0);
+            let slower = if displaced {
+                "; write displacement_over_s = 1 to let what is held arrive slowly"
+            } else {
+                ""
+            };
             found.push(format!(
                 "{at}: elements turn inside out (up to {}, least volume ratio {}): the body is too soft for its \
-                 loads, or its mesh too coarse; raise young_pa, take law = \"neo-hookean\", or hold more of it",
+                 loads, or its mesh too coarse; raise young_pa, take law = \"neo-hookean\", or hold more of it{slower}",
                 body.inverted_elements.max(1),
                 digits(body.least_volume_ratio)
             ));

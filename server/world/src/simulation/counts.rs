@@ -227,10 +227,13 @@ impl Watch {
         }
         let least = body.least_volume_ratio();
         if inverted > 0 || least <= 0.0 {
+            let displaced = body.fixed_nodes().iter().any(|held| held.displacement_m.norm() > 0.0);
+            let slower =
+                if displaced { ", and displacement_over_s lets what is held arrive slowly" } else { "" };
             add(format!(
                 "{inverted} of {steps} steps held inverted elements, up to {} of them, and the least det F is now \
                  {least:.3}: the loads are too much for the stiffness or for the region that holds it; law = \
-                 \"neo-hookean\" resists inversion",
+                 \"neo-hookean\" resists inversion{slower}",
                 self.counts.most_inverted
             ));
         }
