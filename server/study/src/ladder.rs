@@ -2,13 +2,15 @@
 //!
 //! On level i the mesh is f_i times finer than the scene's and the frame is divided into n_i steps with
 //! n_i ∝ f_i, so that all errors vanish along the ladder, the mixed ones too. n_0 is chosen by pilot
-//! runs on the coarsest mesh, so that mesh and step leave errors of like size. Levels that ended are
-//! never thrown away: the reference is the [`limit`](crate::limit) of those there are.
+//! runs on the coarsest mesh, so that mesh and step leave errors of like size. They go on to steps far
+//! shorter than those that are chosen: steps that damp a vibration away agree with each other, and not
+//! with what the scene does. What the step leaves at the finest level is added to the error bar. Levels
+//! that ended are never thrown away: the reference is the [`limit`](crate::limit) of those there are.
 
 use crate::axes::{Factor, Setting, step};
 use crate::case::sight::{SAME, Sight, largest_change};
 use crate::design::Configuration;
-use crate::limit::{UNKNOWN, limit};
+use crate::limit::{Limit, UNKNOWN, limit};
 use crate::recommend::percent;
 use crate::reference::Reference;
 use crate::runner::{Ask, PATIENCE, Runner, fits};
@@ -29,7 +31,7 @@ pub struct Ladder {
 }
 
 /// Most steps per frame on the coarsest mesh, and levels of a ladder of steps alone.
-const MOST_STEPS: u32 = 8;
+const MOST_STEPS: u32 = 16;
 const MOST_LEVELS: usize = 8;
 
 /// Error bar at which a reference is good enough.
@@ -89,6 +91,8 @@ pub struct Climb<'a> {
     law: &'a str,
     /// Steps per frame on the coarsest mesh.
     n0: u32,
+    /// What n_0 steps per frame leave on the coarsest mesh: a norm as that of [`Series`].
+    by_step: f64,
     rungs: Vec<Rung>,
     /// Why it does not go on, where that is final.
     over: Option<String>,
@@ -111,7 +115,7 @@ impl<'a> Climb<'a> {
         if !usable(&first) {
             return Err(format!("{}: {}", ladder.words, first.reason));
         }
-        let mut climb = Self { ladder, law, n0: 1, rungs: Vec::new(), over: None };
+        let mut climb = Self { ladder, law, n0: 1, by_step: 0.0, rungs: Vec::new(), over: None };
         climb.choose_steps(&first.series, runner, keep_s);
         climb.push(0, first);
         if climb.n0 > 1 {
@@ -122,23 +126,21 @@ impl<'a> Climb<'a> {
         Ok(Some(climb))
     }
 
-    /// Doubles the steps per frame until their error is no larger than that of the mesh.
+    /// The fewest steps per frame whose error is no larger than that of the mesh, by the shortest steps there
+    /// is time for.
     fn choose_steps(&mut self, first: &Series, runner: &mut dyn Runner, keep_s: f64) {
         if self.ladder.step_s.is_none() || self.ladder.meshes.len() < 2 {
             return;
         }
         let Some(finer) = self.pilot(1, 1, runner, keep_s) else { return };
         let by_mesh = finer.minus(first).norm();
-        let mut last = first.clone();
-        while self.n0 < MOST_STEPS {
-            let Some(next) = self.pilot(0, 2 * self.n0, runner, keep_s) else { return };
-            let by_step = next.minus(&last).norm();
-            if by_step <= 0.5 * by_mesh {
-                return;
-            }
-            self.n0 *= 2;
-            last = next;
+        let mut pilots = vec![first.clone()];
+        while 1 << pilots.len() <= MOST_STEPS
+            && let Some(next) = self.pilot(0, 1 << pilots.len(), runner, keep_s)
+        {
+            pilots.push(next);
         }
+        (self.n0, self.by_step) = fewest_steps(&pilots, by_mesh);
     }
 
     /// A pilot run, where it takes no more than a tenth of the time there is.
@@ -214,14 +216,20 @@ impl<'a> Climb<'a> {
         pairs.fold(0.0, f64::max)
     }
 
-    fn limit(&self) -> Option<crate::limit::Limit> {
+    fn limit(&self) -> Option<Limit> {
         let levels: Vec<(f64, &Series)> = self.rungs.iter().map(|rung| (rung.size, &rung.series)).collect();
         limit(&levels, self.wander() <= SAME)
     }
 
     /// Present error bar.
     pub fn bar(&self) -> f64 {
-        self.limit().map_or(UNKNOWN, |limit| limit.error_bar)
+        self.limit().map_or(UNKNOWN, |limit| self.with_step(&limit))
+    }
+
+    /// The error bar of a limit with what the step leaves at the finest level, which is of first order at worst.
+    fn with_step(&self, limit: &Limit) -> f64 {
+        let finest = self.ladder.level(self.rungs.len().saturating_sub(1), self.n0).1;
+        limit.error_bar + self.by_step * f64::from(self.n0) / f64::from(finest) / limit.value.norm()
     }
 
     /// The reference from the levels that ended.
@@ -256,16 +264,48 @@ impl<'a> Climb<'a> {
             words += &format!(". The next level gave no result ({why})");
         }
         Ok(Reference {
+            error_bar: self.with_step(&limit),
             series: limit.value,
             goal: None,
-            error_bar: limit.error_bar,
             law: self.law.to_owned(),
             source: words,
         })
     }
 }
 
+/// Of runs with 1, 2, 4, … steps per frame, the fewest whose error is at most half of `by_mesh`, and that error:
+/// the distance to the last run, whose own is taken for that to the one before it.
+fn fewest_steps(pilots: &[Series], by_mesh: f64) -> (u32, f64) {
+    let [.., before, last] = pilots else { return (1, 0.0) };
+    let own = last.minus(before).norm();
+    let error = |run: &Series| last.minus(run).norm().max(own);
+    let enough = pilots.iter().position(|run| error(run) <= 0.5 * by_mesh).unwrap_or(pilots.len() - 1);
+    (1 << enough, error(&pilots[enough]))
+}
+
 /// Whether a run may be part of a reference: it ended, and the solver with it.
 fn usable(trial: &Trial) -> bool {
     trial.is_done() && trial.reason.is_empty()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Amplitude that implicit Euler leaves of a vibration with n steps per frame, 1 without damping.
+    fn damped(n: u32) -> Series {
+        let u = 0.2 + 0.8 * (-12.0 / f64::from(n)).exp();
+        Series { frames: vec![0], displacement_m: vec![u, 0.0, 0.0], energy_j: vec![u] }
+    }
+
+    #[test]
+    fn steps_that_damp_a_vibration_away_are_not_enough_because_they_agree() {
+        let pilots = [1, 2, 4, 8, 16].map(damped);
+        assert!(pilots[1].minus(&pilots[0]).norm() < 0.01, "the longest steps agree");
+        let (n0, error) = fewest_steps(&pilots, 0.1);
+        assert_eq!(n0, 16);
+        assert!((error - pilots[4].minus(&pilots[3]).norm()).abs() < 1e-12);
+        assert_eq!(fewest_steps(&pilots, 10.0).0, 1);
+        assert_eq!(fewest_steps(&pilots[..1], 0.1), (1, 0.0));
+    }
 }
