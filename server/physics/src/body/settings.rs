@@ -152,8 +152,9 @@ impl BodySettings {
         let steps = self.newton_steps(law);
         let precision =
             if self.arithmetic(law) == Arithmetic::Double { Precision::Double } else { Precision::Mixed };
-        // A single solve has to reach the tolerance by itself.
-        let tolerance = if steps == 1 { self.solver.tolerance } else { FORCING };
+        // The last of a fixed number of solves has to reach the tolerance by itself.
+        let last = steps == 1 || self.is_linearised(law);
+        let tolerance = if last { self.solver.tolerance } else { FORCING };
         let linear =
             LinearSettings { method: self.method, precision, iterations: self.solver.iterations, tolerance };
         // Without inertia the projected tangent costs three times as many steps as the exact one.

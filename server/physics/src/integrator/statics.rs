@@ -19,12 +19,14 @@ pub struct StaticProblem<'a> {
     pub load: &'a [Vector3<f64>],
     /// The tangent that stands for the positive semidefinite Hessian: projected or held.
     pub definite: Tangent,
+    /// Ψ where the gradient was last asked for [J].
+    stored: f64,
 }
 
 impl<'a> StaticProblem<'a> {
     /// The problem with the projected tangent.
     pub fn new(model: &'a Model, load: &'a [Vector3<f64>]) -> Self {
-        Self { model, load, definite: Tangent::Projected }
+        Self { model, load, definite: Tangent::Projected, stored: 0.0 }
     }
 
     /// −f·(x − X): relative to rest, so that it is not large where the work is small.
@@ -40,9 +42,9 @@ impl Potential for StaticProblem<'_> {
     }
 
     fn gradient(&mut self, team: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
-        let energy = self.model.internal_forces_by(team, x, g);
+        self.stored = self.model.internal_forces_by(team, x, g);
         g.iter_mut().zip(self.load).for_each(|(g, f)| *g -= f);
-        energy + self.work(x)
+        self.stored + self.work(x)
     }
 
     fn pattern(&mut self) -> BlockCsr<f64> {
@@ -56,6 +58,10 @@ impl Potential for StaticProblem<'_> {
 
     fn loads(&mut self, loads: &mut [Vector3<f64>]) {
         loads.copy_from_slice(self.load);
+    }
+
+    fn stored(&self) -> f64 {
+        self.stored
     }
 }
 

@@ -30,6 +30,12 @@ pub trait Potential {
 
     /// Writes the forces [N] against which the residual is measured: loads, inertia.
     fn loads(&mut self, loads: &mut [Vector3<f64>]);
+
+    /// Elastic energy [J] where the gradient was last asked for; 0 where there is none. What is held by
+    /// displacements alone has no loads to measure the residual against.
+    fn stored(&self) -> f64 {
+        0.0
+    }
 }
 
 /// Which Hessian Newton's method asks for.
@@ -48,7 +54,7 @@ pub struct NewtonSettings {
     /// Most Newton steps.
     pub steps: u32,
     /// Stop at √(gᵀM⁻¹g) ≤ tolerance · reference; reference is the norm of the loads, or of the first
-    /// gradient where that is larger.
+    /// gradient where that is larger, and at least 10⁻³ √(2Ψ).
     pub tolerance: f64,
     /// Most halvings of a step: 8 as a rule, 20 to recover from ruined states.
     pub halvings: u32,
@@ -126,6 +132,9 @@ pub struct Newton {
 const ARMIJO: f64 = 1e-4;
 /// Differences of Φ below this part of the largest |Φ| met are rounding.
 const ROUNDING: f64 = 1e-12;
+/// Least reference, over the norm √(2Ψ) of the elastic forces: without loads, and with what is held where it was,
+/// only rounding is left to measure a residual against.
+const LEAST_REFERENCE: f64 = 1e-3;
 /// Iterations of conjugate gradients where a factorisation failed, if not more were allowed.
 const INSTEAD_OF_FACTORS: u32 = 500;
 /// Steps without half the residual after which rounding is what is left of it.
@@ -255,7 +264,8 @@ impl Newton {
         potential.loads(&mut self.loads);
         self.solver.filter(&mut self.loads);
         let norm = self.solver.norm(&self.g);
-        report.reference = self.solver.norm(&self.loads).max(*first.get_or_insert(norm));
+        let least = LEAST_REFERENCE * (2.0 * potential.stored().max(0.0)).sqrt();
+        report.reference = self.solver.norm(&self.loads).max(*first.get_or_insert(norm)).max(least);
         report.residual = if report.reference > 0.0 { norm / report.reference } else { norm };
         report.stop = StopReason::Converged;
         norm <= self.settings.tolerance * report.reference

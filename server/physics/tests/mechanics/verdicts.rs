@@ -65,6 +65,30 @@ fn unconverged_means_the_same_on_every_path() {
     }
 }
 
+/// A specimen that is drawn out between two clamps and carries no load: nothing but what holds it, and soon
+/// nothing that moves.
+#[test]
+fn what_is_driven_by_its_supports_alone_converges() {
+    let newmark = Scheme::Newmark { beta: 0.25, gamma: 0.5 };
+    for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2, newmark, Scheme::Static] {
+        for law in [Law::Linear, Law::Corotational, Law::StVenantKirchhoff, Law::NeoHookean] {
+            let solver = PcgSettings { iterations: 2000, tolerance: 1e-4 };
+            let settings = BodySettings { scheme, solver, ..BodySettings::default() };
+            let mut body = held(law, settings);
+            let rest = body.rest_positions();
+            let end: Vec<u32> = (0..rest.len() as u32).filter(|&n| rest[n as usize].x > 0.2 - 1e-9).collect();
+            body.fix(&end, [true; 3], V::new(0.03, 0.0, 0.02)).unwrap();
+            for step in 1..=60 {
+                body.set_prescribed_share(f64::min(1.0, f64::from(step) / 25.0));
+                let report = body.step(0.02, V::zeros(), &[]);
+                assert_eq!(report.outcome, Outcome::Advanced);
+                assert!(!report.is_unconverged(), "{scheme:?}, {law:?}, step {step}: {report:?}");
+            }
+            assert!(body.elastic_energy() > 1e-4);
+        }
+    }
+}
+
 #[test]
 fn explicit_steps_have_no_tolerance_to_miss() {
     let mut body = held(Law::Linear, BodySettings { scheme: Scheme::Rk4, ..solver(50) });

@@ -280,6 +280,7 @@ impl Dynamics {
             f_ext: &self.f_ext,
             springs: &self.active,
             definite: if single { Tangent::Held } else { Tangent::Projected },
+            stored: 0.0,
             scratch: &mut self.scratch,
             force: &mut self.force,
         };

@@ -43,6 +43,8 @@ pub(super) struct StepPotential<'a> {
     pub springs: &'a [ActiveSpring],
     /// The tangent that stands for a positive semidefinite one.
     pub definite: Tangent,
+    /// Ψ where the gradient was last asked for [J].
+    pub stored: f64,
     /// Room for differences of positions and forces.
     pub scratch: &'a mut [Vector3<f64>],
     pub force: &'a mut [Vector3<f64>],
@@ -100,7 +102,8 @@ impl Potential for StepPotential<'_> {
     }
 
     fn gradient(&mut self, team: &mut Team, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
-        self.model.internal_forces_by(team, x, g) + self.rest(x, Some(g))
+        self.stored = self.model.internal_forces_by(team, x, g);
+        self.stored + self.rest(x, Some(g))
     }
 
     fn pattern(&mut self) -> BlockCsr<f64> {
@@ -123,6 +126,10 @@ impl Potential for StepPotential<'_> {
 
     fn loads(&mut self, loads: &mut [Vector3<f64>]) {
         loads.copy_from_slice(self.f_ext);
+    }
+
+    fn stored(&self) -> f64 {
+        self.stored
     }
 }
 
