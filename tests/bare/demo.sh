@@ -30,7 +30,7 @@ while IFS='=' read -r name value; do environment+=("$name=$value"); done < <(env
 
 start=$SECONDS
 web=$(python3 tests/free_port.py)
-in_root "${environment[@]}" /src/deploy/demo --listen "tcp/127.0.0.1:$(python3 tests/free_port.py)" \
+become_in_root "${environment[@]}" /src/deploy/demo --listen "tcp/127.0.0.1:$(python3 tests/free_port.py)" \
   --viewer "$web" --seconds 7200 >"$pristine.demo.log" 2>&1 &
 started=$!
 until grep -q "viewer  " "$pristine.demo.log"; do

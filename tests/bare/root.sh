@@ -18,7 +18,11 @@ leave() {
   # Nothing below may still be mounted when the folder goes.
   grep -q " $root" /proc/mounts || rm -rf "$root"
 }
-in_root() { chroot "$root" /usr/bin/env -i HOME=/root LANG=C.UTF-8 PATH=/usr/local/bin:/usr/bin:/bin:/usr/sbin:/sbin "$@"; }
+in_root() { (become_in_root "$@"); }
+# Takes the place of the shell, so that what is started with & is the command itself and can be ended.
+become_in_root() {
+  exec chroot "$root" /usr/bin/env -i HOME=/root LANG=C.UTF-8 PATH=/usr/local/bin:/usr/bin:/bin:/usr/sbin:/sbin "$@"
+}
 port_file=tests/free_port.py
 
 command -v debootstrap >/dev/null || apt-get install -y -qq --no-install-recommends debootstrap >/dev/null

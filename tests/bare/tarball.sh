@@ -10,7 +10,7 @@ packages=$(cd "${1:-package}" && pwd)
 demonstrate() {
   local web
   web=$(python3 tests/free_port.py)
-  in_root "$@" --listen "tcp/127.0.0.1:$(python3 tests/free_port.py)" --viewer "$web" --seconds 600 &
+  become_in_root "$@" --listen "tcp/127.0.0.1:$(python3 tests/free_port.py)" --viewer "$web" --seconds 600 &
   started=$!
   python3 tests/package/fetch.py "http://127.0.0.1:$web"
   [ -z "${SCINDO_BARE_PICTURE:-}" ] || chromium --headless --no-sandbox --disable-gpu --use-angle=swiftshader \
