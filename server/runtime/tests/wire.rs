@@ -9,7 +9,7 @@ use scindo::engine::Engine;
 use scindo::server::{Server, ServerConfig};
 use scindo::session::{NetworkConfig, Sessions};
 use scindo_client::messages::{
-    BladeSegment, HapticContact, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,
+    BladeSegment, CutCommand, HapticContact, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,
     cut_ack::Outcome,
     haptic_contact,
     tool_sample::Mode,
@@ -106,6 +106,18 @@ fn sweep(x: f64) -> Vec<BladeSegment> {
     let segment =
         |y: f64| BladeSegment { tip_m: Some(Vec3 { x, y, z: -0.01 }), heel_m: Some(Vec3 { x, y, z: 0.03 }) };
     vec![segment(-0.01), segment(0.02), segment(0.05)]
+}
+
+/// The first cut of the client "script" with its scalpel.
+fn cut_of_script() -> CutCommand {
+    CutCommand {
+        client_id: "script".into(),
+        tool_id: "scalpel".into(),
+        seq: 1,
+        body_id: "block".into(),
+        sweep: sweep(0.033),
+        ..CutCommand::default()
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -216,14 +228,7 @@ async fn a_cut_sent_twice_is_applied_once() {
     let mut running = Running::start();
     let link = running.link(Role::Client, "script").await;
     let tool = link.tool("scalpel").await.unwrap();
-    let command = scindo_client::messages::CutCommand {
-        client_id: "script".into(),
-        tool_id: "scalpel".into(),
-        seq: 1,
-        body_id: "block".into(),
-        sweep: sweep(0.033),
-        ..Default::default()
-    };
+    let command = cut_of_script();
     let first = tool.cutter.send(command.clone()).await.unwrap();
     let second = tool.cutter.send(command).await.unwrap();
     assert_eq!(first.outcome(), Outcome::Applied);
@@ -504,14 +509,7 @@ async fn a_cut_that_was_taken_back_is_still_a_duplicate() {
     let mut mirror = link.mirror("block").await.unwrap();
     let whole = mirror.next().await.unwrap().topology.triangle_count;
     let tool = link.tool("scalpel").await.unwrap();
-    let command = scindo_client::messages::CutCommand {
-        client_id: "script".into(),
-        tool_id: "scalpel".into(),
-        seq: 1,
-        body_id: "block".into(),
-        sweep: sweep(0.033),
-        ..Default::default()
-    };
+    let command = cut_of_script();
     assert_eq!(tool.cutter.send(command.clone()).await.unwrap().outcome(), Outcome::Applied);
     until("the cut is shown", || mirror.latest().is_some_and(|s| s.topology.triangle_count > whole)).await;
     link.undo().await.unwrap();

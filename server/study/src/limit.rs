@@ -5,7 +5,7 @@
 //! u_n the finest solution, the error bar is
 //!
 //! - 1.25 ‖u* − u_n‖ + σ, and at least the distance to the limit without the finest level, where the
-//!   observed order is plausible;
+//!   observed order is plausible; at least 1.25 ‖u_n − u_{n−1}‖ where that is more than the change before it;
 //! - 1.25 max‖u_i − u_n‖ / min(1, r − 1) with r = h_first / h_n, where it is not, or only two levels
 //!   ended: the spread of the levels, as if they converged by first order. Nothing is extrapolated then.
 //!
@@ -72,10 +72,14 @@ fn extrapolated(sizes: &[f64], levels: &[Series]) -> Option<Limit> {
     let (value, sigma) = fit(sizes, levels, order);
     let finest = &levels[n - 1];
     let last_change = finest.minus(&levels[n - 2]).norm();
+    let change_before = levels[n - 2].minus(&levels[n - 3]).norm();
     if sigma > SCATTER * last_change || !value.is_finite() || value.norm() == 0.0 {
         return None;
     }
     let mut bar = SAFETY * value.minus(finest).norm() + sigma;
+    if last_change > change_before {
+        bar = bar.max(SAFETY * last_change);
+    }
     if n > 3 {
         let before = &levels[..n - 1];
         let (earlier, _) = fit(&sizes[..n - 1], before, best_order(&sizes[..n - 1], before).unwrap_or(1.0));
@@ -169,6 +173,17 @@ mod tests {
         let series = sizes.map(|h| power(h, 1.0));
         let levels: Vec<_> = sizes.iter().copied().zip(&series).collect();
         assert!(limit(&levels, false).unwrap().order.is_none());
+    }
+
+    /// A region that the levels select a little differently: they come nearer, and not evenly.
+    #[test]
+    fn changes_that_grow_again_are_within_the_bar() {
+        let sizes = [1.0, 0.66, 0.5, 0.33];
+        let series = [0.9912, 1.0018, 1.0014, 1.0042].map(|u| of(&[u, -0.3 * u, 0.0]));
+        let levels: Vec<_> = sizes.iter().copied().zip(&series).collect();
+        let found = limit(&levels, true).unwrap();
+        let last = series[3].minus(&series[2]).norm() / series[3].norm();
+        assert!(found.error_bar > 1.2 * last, "{last} ± {}", found.error_bar);
     }
 
     #[test]
