@@ -63,6 +63,8 @@ const RIGHT: f64 = 22.0;
 const BOTTOM: f64 = 58.0;
 const LANE: f64 = 34.0;
 const ROW: f64 = 24.0;
+/// Width of a character of a tick's label, at most.
+const CHARACTER: f64 = 8.5;
 
 /// An error bar that many times smaller than every error is not drawn.
 const FAR_BELOW: f64 = 20.0;
@@ -131,7 +133,10 @@ impl Plot {
             }
         }
         for tick in x.ticks().iter().filter(|tick| tick.labelled) {
-            let (at, label) = (x.at(tick.value), tick_time(tick.value));
+            let label = tick_time(tick.value);
+            // A label at the end of the axis stays in the picture.
+            let half = 0.5 * CHARACTER * label.chars().count() as f64;
+            let at = x.at(tick.value).min(self.size[0] - half);
             let _ = writeln!(
                 out,
                 "<text class=\"tick\" x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
