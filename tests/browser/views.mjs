@@ -186,7 +186,7 @@ async function changesWhatTheSlidersSay(page) {
   const tray = page.locator("#view-toggle");
   if ((await tray.getAttribute("aria-pressed")) === "true") await tray.click();
   await tray.click();
-  const row = page.locator("#params .param", { hasText: "shelf young" });
+  const row = page.locator("#params .param[title*='body.shelf.young_pa']");
   await row.waitFor({ timeout: MINUTE });
   const words = () => row.locator("output").textContent();
   const before = await words();

@@ -10,6 +10,11 @@ const STEPS = 400;
 /** A slider that moves tells the server this often. */
 const TELL_MS = 120;
 
+const NAMES: Record<string, string> = {
+  "rayleigh.mass": "drag", "rayleigh.stiffness": "viscosity",
+  "solver.iterations": "iterations", "solver.tolerance": "tolerance", young: "stiffness", poisson: "Poisson’s ratio",
+};
+
 export class Params {
   private readonly box = document.getElementById("params")!;
   private readonly scenes = element("div", "line");
@@ -62,7 +67,12 @@ export class Params {
     // A slider in the hand is not taken away.
     if (active instanceof HTMLInputElement && this.list.contains(active)) return;
     const known = params.filter((param) => param.kind !== Param_Kind.UNSPECIFIED);
-    this.list.replaceChildren(...(known.length > 0 ? [element("h2", "", "Parameters")] : []), ...known.map((param) => this.row(param)));
+    this.list.replaceChildren();
+    let group = "";
+    for (const param of known) {
+      if (groupOf(param.key) !== group) this.list.append(element("h2", "", (group = groupOf(param.key))));
+      this.list.append(this.row(param));
+    }
   }
 
   private row(param: Param): HTMLElement {
@@ -110,9 +120,16 @@ function input(type: string): HTMLInputElement {
   return node;
 }
 
-/** `body.liver.young_pa` is "liver young". */
+/** `body.liver.young_pa` belongs to "liver". */
+function groupOf(key: string): string {
+  const [table, id] = key.split(".");
+  return table === "body" ? id : table;
+}
+
+/** `body.liver.solver.iterations` is "iterations". */
 function nameOf(key: string): string {
-  return key.replace(/^(body|world)\./, "").replace(/_(pa|m_s2|s|1_s)$/, "").replaceAll(/[._]/g, " ");
+  const words = key.replace(/^body\.[^.]*\.|^(world|effects)\./, "").replace(/_(pa|m_s2|s|1_s)$/, "");
+  return NAMES[words] ?? words.replaceAll(/[._]/g, " ");
 }
 
 /** Where a value lies between the ends of its slider, 0 to 1. */
