@@ -8,12 +8,25 @@ import pathlib
 import re
 import subprocess
 import sys
+import time
+
+from client import Session
 
 README = pathlib.Path(__file__).resolve().parents[2] / "README.md"
 NAMED = {"zenoh", "numpy", "google"}
 
 
+def wait_for_the_server(endpoint):
+    """A reader of README.md has a server that runs; here it was started a moment ago."""
+    session, end = Session(endpoint, "scindo", "main"), time.monotonic() + 60
+    while not list(session.zenoh.get(session.key("rpc/schema"), timeout=2.0)):
+        assert time.monotonic() < end, "no server answers"
+        time.sleep(0.1)
+    session.zenoh.close()
+
+
 def main():
+    wait_for_the_server(sys.argv[1])
     blocks = re.findall(r"^```python\n(.*?)^```$", README.read_text(), re.MULTILINE | re.DOTALL)
     assert len(blocks) == 1, f"one block of Python in README.md: {len(blocks)}"
     imports = set()

@@ -90,7 +90,7 @@ fn serve(
     let mut sessions =
         open_sessions(&network, args.listen.is_empty() && viewer.is_none() && pace.steps.is_some())?;
     let viewer = viewer.map(|address| start_viewer(&foreground, address, (args, &network))).transpose()?;
-    announce(scene, args, sessions.as_ref().map_or(&[], |_| &network.listen), viewer);
+    let listen: &[String] = if sessions.is_some() { &network.listen } else { &[] };
     let rates = scene.checked().publish;
     let mut config = ServerConfig {
         realm: args.realm.clone(),
@@ -108,6 +108,10 @@ fn serve(
     loop {
         let started = Instant::now();
         let server = Server::start(engine, sessions, &config)?;
+        if config.scene_seq == 0 {
+            // Whoever waits for these lines gets answers.
+            announce(scene, args, listen, viewer);
+        }
         let ended = foreground.block_on(wait(&server, args, &config))?;
         let steps = server.steps();
         if let Ended::Next(next) = ended {
