@@ -29,6 +29,7 @@ environment=()
 while IFS='=' read -r name value; do environment+=("$name=$value"); done < <(env | grep -iE '^(https?_proxy|no_proxy|cargo_http_|npm_config_|ssl_cert|node_extra_ca)' || true)
 
 start=$SECONDS
+: >"$pristine.demo.log"
 web=$(python3 tests/free_port.py)
 become_in_root "${environment[@]}" /src/deploy/demo --listen "tcp/127.0.0.1:$(python3 tests/free_port.py)" \
   --viewer "$web" --seconds 7200 >"$pristine.demo.log" 2>&1 &
