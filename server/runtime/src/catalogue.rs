@@ -14,7 +14,7 @@ use crate::inbox::Refusal;
 #[derive(Debug, Clone)]
 enum Source {
     Shipped(ShippedScene),
-    /// The one that the server was started with, where it does not ship or has overrides.
+    /// The one that the server was started with.
     Own(Box<Scene>),
 }
 

@@ -10,6 +10,7 @@ const STEPS = 400;
 /** A slider that moves tells the server this often. */
 const TELL_MS = 120;
 
+/** What users call the keys of a body, where these are called otherwise. */
 const NAMES: Record<string, string> = {
   "rayleigh.mass": "drag", "rayleigh.stiffness": "viscosity",
   "solver.iterations": "iterations", "solver.tolerance": "tolerance", young: "stiffness", poisson: "Poisson’s ratio",
