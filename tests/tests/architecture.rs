@@ -87,3 +87,23 @@ fn physics_and_collision_stay_pure() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
+
+/// The state of the cuts is a matter of physics; the others ask the body.
+#[test]
+fn nothing_but_physics_and_its_studies_knows_the_state_of_the_cuts() {
+    let mut wrong = Vec::new();
+    for room in ["../server/world", "../server/runtime", "../client"] {
+        let mut open = vec![std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(room)];
+        while let Some(path) = open.pop() {
+            if path.is_dir() {
+                open.extend(std::fs::read_dir(&path).expect("readable").map(|e| e.expect("entry").path()));
+            } else if path.extension().is_some_and(|end| end == "rs") {
+                let text = std::fs::read_to_string(&path).expect("readable");
+                if text.contains("CutMesh") {
+                    wrong.push(path.display().to_string());
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

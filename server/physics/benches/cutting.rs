@@ -184,7 +184,7 @@ fn growth(mesh: &TetMesh, repeats: usize) {
             sum += seconds;
             slowest = slowest.max(seconds);
         }
-        assert_eq!(body.cut_mesh().components().len(), 2, "the plane takes the body apart");
+        assert_eq!(body.components().len(), 2, "the plane takes the body apart");
         sum / f64::from(ADVANCES + 1)
     });
     say("one advance of a hundred, whole body", advance, &format!("slowest {:.3} ms", slowest * 1e3));
@@ -224,14 +224,14 @@ fn enriched_elements(mesh: &TetMesh, repeats: usize) {
         let mut same = body_of_pieces(&cut, law);
         assert!([&mut plain, &mut cut, &mut same].into_iter().all(|b| b.set_operator(choice)));
         let mut pieces = vec![0u32; mesh.tets.len()];
-        cut.cut_mesh().pieces().iter().for_each(|piece| pieces[piece.element as usize] += 1);
+        cut.pieces().iter().for_each(|piece| pieces[piece.element as usize] += 1);
         let enriched = pieces.iter().filter(|&&n| n > 1).count();
         let share = enriched as f64 / mesh.tets.len() as f64;
         // Two bodies at a time: a third would push the others out of the cache.
         let [times, inherent] = [&mut cut, &mut same].map(|body| steps(&mut [&mut plain, body], repeats));
         let cost = |times: &[[f64; 2]], i: usize| (times[1][i] / times[0][i] - 1.0) / share + 1.0;
         // New copies per new piece, over nodes per tet.
-        let copies = (cut.cut_mesh().n_copies() as f64 / mesh.nodes.len() as f64 - 1.0) / share;
+        let copies = (cut.n_copies() as f64 / mesh.nodes.len() as f64 - 1.0) / share;
         say(&format!("step, {law:?} {choice:?}, uncut"), times[0], "");
         say(&format!("step, {law:?} {choice:?}, {enriched} elements enriched"), times[1], "");
         println!(
@@ -272,8 +272,8 @@ fn hundred_cuts(mesh: &TetMesh, repeats: usize) {
                 cut.cut(&sweep, k + 1).expect("the sweep is well formed");
             }
             let growth = |n: fn(&Body) -> usize| n(&cut) as f64 / n(&plain) as f64;
-            let copies = growth(|b| b.cut_mesh().n_copies());
-            let pieces = growth(|b| b.cut_mesh().pieces().len());
+            let copies = growth(|b| b.n_copies());
+            let pieces = growth(|b| b.pieces().len());
             let lanes = growth(lanes);
             let times = steps(&mut [&mut plain, &mut cut], repeats);
             let slower = [0, 1].map(|i| times[1][i] / times[0][i]);
@@ -290,7 +290,7 @@ fn hundred_cuts(mesh: &TetMesh, repeats: usize) {
 /// Groups of pieces of one element with the same copies: what is computed with.
 fn lanes(body: &Body) -> usize {
     let mut groups: Vec<(u32, [u32; 4])> =
-        body.cut_mesh().pieces().iter().map(|piece| (piece.element, piece.copies)).collect();
+        body.pieces().iter().map(|piece| (piece.element, piece.copies)).collect();
     groups.sort_unstable();
     groups.dedup();
     groups.len()
@@ -299,15 +299,14 @@ fn lanes(body: &Body) -> usize {
 /// A body with an element for every piece of another and a node for every copy, numbered along the
 /// longest axis: the same work per iteration without any cut.
 fn body_of_pieces(cut: &Body, law: Law) -> Body {
-    let state = cut.cut_mesh();
-    let x = state.rest_positions();
+    let x = cut.rest_positions();
     let mut order: Vec<u32> = (0..x.len() as u32).collect();
     let key = |c: u32| x[c as usize].map(|x| (1e9 * x).round() as i64);
     order.sort_by_key(|&c| (key(c).z, key(c).y, key(c).x, c));
     let mut number = vec![0; x.len()];
     (0u32..).zip(&order).for_each(|(n, &c)| number[c as usize] = n);
     let nodes = order.iter().map(|&c| x[c as usize]).collect();
-    let mut pieces: Vec<_> = state.pieces().to_vec();
+    let mut pieces: Vec<_> = cut.pieces().to_vec();
     pieces.sort_by_key(|piece| piece.element);
     let tets = pieces.iter().map(|piece| piece.copies.map(|c| number[c as usize])).collect();
     body(&TetMesh { nodes, tets }, law)

@@ -57,7 +57,7 @@ pub fn at_rest(bodies: &[String]) -> Vec<String> {
 /// or `stop` was raised.
 pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) -> Option<Vec<Wear>> {
     let mut simulation = Simulation::with_options(scene, base_dir, BuildOptions::default()).ok()?;
-    let [low, high] = simulation.bodies().first()?.body.cut_mesh().mesh().bounds();
+    let [low, high] = simulation.bodies().first()?.body.mesh().bounds();
     let mut random = Random(4);
     let (mut cut_ms, mut found) = (0.0, Vec::new());
     for cut in 1..=CUTS[2] {
@@ -68,15 +68,15 @@ pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) ->
         let report = simulation.step(&Inputs { cuts, ..Inputs::default() });
         cut_ms += 1e3 * report.seconds.of(Stage::Cuts);
         if CUTS.contains(&cut) {
-            let mesh = simulation.bodies().first()?.body.cut_mesh();
+            let body = &simulation.bodies().first()?.body;
             found.push(Wear {
                 cuts: cut,
-                quality: mesh.mesh().quality().min_mean_ratio.0,
-                elements: mesh.mesh().tets.len(),
-                pieces: mesh.pieces().len(),
-                nodes: mesh.n_copies(),
-                least_fraction: mesh.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min),
-                parts: mesh.components().len(),
+                quality: body.mesh().quality().min_mean_ratio.0,
+                elements: body.mesh().tets.len(),
+                pieces: body.pieces().len(),
+                nodes: body.n_copies(),
+                least_fraction: body.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min),
+                parts: body.components().len(),
                 cut_ms,
             });
         }

@@ -58,7 +58,7 @@ impl Probe {
         rest_m: Vector3<f64>,
         side: Option<Vector3<f64>>,
     ) -> Result<Self, Outside> {
-        let mesh = of.cut_mesh().mesh();
+        let mesh = of.mesh();
         let towards = side.map_or(Vector3::zeros(), |side| side.normalize() * (SIDE_STEP * cell_size(mesh)));
         let aim = rest_m + towards;
         let element = element_at(mesh, aim)
@@ -81,16 +81,16 @@ impl Probe {
     /// Follows a change of topology: takes the copies of the piece the point belongs to, after looking
     /// for its element where cuts change the mesh.
     pub fn follow(&mut self, of: &Body) {
-        let cut = of.cut_mesh();
+        let mesh = of.mesh();
         if of.node_origins().is_some() {
             let aim = self.rest_m + self.towards;
-            let element = deepest(cut.mesh(), aim);
-            let corners = cut.mesh().corners(element);
+            let element = deepest(mesh, aim);
+            let corners = mesh.corners(element);
             self.element = element as u32;
             self.weights = barycentric(&corners, self.rest_m);
             self.lookup = barycentric(&corners, aim);
         }
-        let copies = cut.pieces()[cut.piece_at(self.element, self.lookup) as usize].copies;
+        let copies = of.pieces()[of.piece_at(self.element, self.lookup) as usize].copies;
         self.carriers = of.carriers(self.element, copies, self.weights);
     }
 
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn side_chooses_the_element_where_the_point_lies_between_two() {
         let (body, point) = (block(), Vector3::new(0.25, 0.25, 0.5));
-        let mesh = body.cut_mesh().mesh();
+        let mesh = body.mesh();
         let centre_z = |side: Vector3<f64>| {
             let probe = Probe::bind("p", 0, &body, point, Some(side)).unwrap();
             assert!((probe.position(&mesh.nodes) - point).norm() < 1e-14);

@@ -112,8 +112,7 @@ impl BodySnapshot {
         if self.id != body.id {
             self.id = body.id.clone();
         }
-        let mesh = body.body.cut_mesh();
-        self.epoch = mesh.epoch();
+        self.epoch = body.epoch();
         self.iterations = report.solve.iterations;
         self.residual = if report.solve.residual.is_finite() { report.solve.residual } else { f64::MAX };
         self.tolerance = report.solve.tolerance;

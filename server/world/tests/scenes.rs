@@ -63,7 +63,7 @@ fn a_block_cut_along_its_faces_comes_apart_and_its_probes_and_groups_follow() {
 fn the_first_cut_opens_the_block() {
     let mut sim = start("first-cut.toml", &[]);
     run(&mut sim, 0.6);
-    let tags = &sim.bodies()[0].body.cut_mesh().surface().tags;
+    let tags = &sim.bodies()[0].body.surface().tags;
     assert!(tags.contains(&1));
 }
 
@@ -87,7 +87,7 @@ fn an_organ_from_a_surface_file_is_cut_across() {
         start("organ-surface.toml", &[&file, "body.organ.mesh.cells=12", "body.organ.mesh.scale=0.001", cut]);
     assert!(sim.warnings().is_empty(), "{:?}", sim.warnings());
     run(&mut sim, 0.1);
-    assert_eq!(sim.bodies()[0].body.cut_mesh().components().len(), 2);
+    assert_eq!(sim.bodies()[0].body.components().len(), 2);
     let millimetres = start("organ-surface.toml", &[&file, "body.organ.mesh.cells=8"]);
     assert!(
         millimetres.warnings().iter().any(|w| w.contains("scale = 0.001")),
@@ -108,7 +108,7 @@ fn the_demonstration_dents_is_cut_and_opens() {
     assert!(pressed > 0.3, "the finger feels {} N", finger.force_n);
     run(&mut sim, 14.6);
     let body = &sim.bodies()[0].body;
-    let lips = body.cut_mesh().surface().tags.iter().filter(|tag| **tag > 0).count();
+    let lips = body.surface().tags.iter().filter(|tag| **tag > 0).count();
     assert!(lips > 50, "{lips} triangles on lips");
     let open = sim.probe_position(&sim.probes()[1]) - sim.probe_position(&sim.probes()[0]);
     assert!(open.norm() > rest.norm() + 5e-4, "lips were {} m apart and are {} m", rest.norm(), open.norm());

@@ -85,7 +85,7 @@ fn a_half_cut_beam_opens_and_probes_stay_on_their_side() {
     let at = |i: usize| sim.probe_position(&sim.probes()[i]);
     let gap = at(0).z - at(1).z;
     assert!(gap > 5e-4, "the lips are {gap} m apart");
-    let surface = sim.bodies()[0].body.cut_mesh().surface();
+    let surface = sim.bodies()[0].body.surface();
     assert!(surface.tags.contains(&1));
 }
 
@@ -160,7 +160,7 @@ fn cuts_of_clients_come_back_with_their_number() {
     assert!(b.request == 8 && *b.result.as_ref().unwrap() > 0);
     assert!(c.result.as_ref().unwrap_err().contains("there are: beam"));
     assert!(d.result.as_ref().unwrap_err().contains("not finite"));
-    let tags = &sim.bodies()[0].body.cut_mesh().surface().tags;
+    let tags = &sim.bodies()[0].body.surface().tags;
     assert_eq!(tags.iter().copied().max(), Some(1), "connected requests are one incision");
 }
 

@@ -14,6 +14,7 @@ mod shape;
 mod sleep;
 mod snapping;
 mod statics;
+mod topology;
 mod undo;
 
 #[doc(hidden)]
@@ -342,24 +343,6 @@ impl Body {
         matches!(self.path, Path::Fast(_))
     }
 
-    /// Finite elements of the uncut body.
-    pub fn n_elements(&self) -> usize {
-        self.shape.n_elements(self.cut_mesh.mesh())
-    }
-
-    /// Pieces that cuts made of the elements; as many as elements in a body that cannot be cut.
-    pub fn n_pieces(&self) -> usize {
-        match self.shape.kind() {
-            ElementKind::Tet4 => self.cut_mesh.pieces().len(),
-            _ => self.n_elements(),
-        }
-    }
-
-    /// Nodes of the uncut body, with those that quadratic elements add.
-    pub fn n_nodes(&self) -> usize {
-        self.rest.len() + self.cut_mesh.mesh().nodes.len() - self.cut_mesh.n_copies()
-    }
-
     /// Rest position of every node [m]: copies, then the nodes that quadratic elements add.
     pub fn rest_positions(&self) -> &[Vector3<f64>] {
         &self.rest
@@ -416,7 +399,7 @@ impl Body {
     }
 
     /// What is shown and touched, closed and 2-manifold: skin and lips, or without a skin the boundary
-    /// of the elements and lips. Changes with the epoch of [`cut_mesh`](Self::cut_mesh) and not else.
+    /// of the elements and lips. Changes only when the [`epoch`](Self::epoch) does.
     pub fn surface(&self) -> &Surface {
         self.skin.as_ref().map_or(self.cut_mesh.surface(), Skin::surface)
     }
@@ -428,11 +411,6 @@ impl Body {
             Some(skin) => skin.incision_marks(&self.cut_mesh),
             None => self.cut_mesh.incision_marks(),
         }
-    }
-
-    /// Mesh, pieces, copies and the boundary of the elements.
-    pub fn cut_mesh(&self) -> &CutMesh {
-        &self.cut_mesh
     }
 
     /// Material constants.

@@ -49,10 +49,12 @@ mod locate;
 mod cut_mesh;
 mod incision_mark;
 mod solid;
+mod flaws;
 
 pub use blade::{BladeSweep, CutError, CutLimits, CutReport, MAX_SEGMENTS, NewCopy, Work};
 pub use components::Components;
 pub use cut_mesh::{CutMesh, SweepUnderWay};
+pub use flaws::Flaws;
 pub(crate) use front::{Front, Surroundings, sweep_triangles};
 pub use incision_mark::{IncisionMark, MarkPoint};
 pub use pending::PendingFace;

@@ -1,9 +1,10 @@
-//! The linear tetrahedra that stress is recovered from: of a model, or of a cut mesh.
+//! The linear tetrahedra that stress is recovered from: of a model, or of a body.
 
 use nalgebra::Vector3;
 
 use crate::assembly::{ElementKind, Model};
-use crate::cut::{CutMesh, Piece};
+use crate::body::Body;
+use crate::cut::Piece;
 use crate::mesh::TetMesh;
 
 /// Linear tetrahedra on copies.
@@ -16,7 +17,7 @@ pub trait Tets {
     fn tet(&self, e: usize) -> ([u32; 4], [Vector3<f64>; 4], f64);
 }
 
-/// The pieces of a cut mesh.
+/// The pieces of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct CutTets<'a> {
     mesh: &'a TetMesh,
@@ -25,9 +26,9 @@ pub struct CutTets<'a> {
 }
 
 impl<'a> CutTets<'a> {
-    /// The pieces of this mesh, as it is cut now.
-    pub fn new(cut: &'a CutMesh) -> Self {
-        Self { mesh: cut.mesh(), pieces: cut.pieces(), n_copies: cut.n_copies() }
+    /// The pieces of a body of linear tetrahedra, as it is cut now.
+    pub fn new(body: &'a Body) -> Self {
+        Self { mesh: body.mesh(), pieces: body.pieces(), n_copies: body.n_copies() }
     }
 }
 

@@ -21,7 +21,7 @@ fn a_body_in_free_fall_falls_with_g_and_does_not_deform() {
     let expected = h * h * n * (n + 1.0) / 2.0 * DOWN; // implicit Euler's sum
     assert!((fallen - expected).norm() < 1e-9 * expected.norm(), "{fallen} {expected}");
     assert!((body.momentum() - body.total_mass() * n * h * DOWN).norm() < 1e-9);
-    let rest = body.cut_mesh().rest_positions();
+    let rest = body.rest_positions().to_vec();
     for (x, rest) in body.positions().iter().zip(rest) {
         assert!((x - rest - fallen).norm() < 1e-6 * 0.1);
     }
@@ -138,7 +138,7 @@ fn weight_rests_on_the_clamp() {
     assert!((reaction + weight).norm() < 1e-4 * weight.norm(), "{reaction} {weight}");
     assert!(body.velocities().iter().all(|v| v.norm() < 1e-5));
     for &n in &clamp {
-        assert_eq!(body.positions()[n as usize], body.cut_mesh().mesh().nodes[n as usize]);
+        assert_eq!(body.positions()[n as usize], body.mesh().nodes[n as usize]);
     }
 }
 
@@ -149,7 +149,7 @@ fn prescribed_surfaces_carry_a_homogeneous_strain_inside() {
         Material { rayleigh: Rayleigh { mass_1_s: 50.0, stiffness_s: 0.05 }, ..SOFT },
         settings(300, 1e-7),
     );
-    let nodes = body.cut_mesh().mesh().nodes.clone();
+    let nodes = body.mesh().nodes.clone();
     let strain = |x: &Vector3<f64>| Vector3::new(0.1 * x.x + 0.05 * x.y, -0.02 * x.y, 0.03 * x.z);
     for (n, x) in nodes.iter().enumerate() {
         if x.iter().any(|&c| c == 0.0 || c == 0.1) {

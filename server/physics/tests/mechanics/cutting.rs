@@ -116,7 +116,7 @@ fn a_cut_exactly_through_clamped_nodes_leaves_both_lips_clamped() {
         let arithmetic = general.then_some(Arithmetic::Double);
         let settings = BodySettings { arithmetic, ..settings(200, 1e-5) };
         let mut body = cube(4, SOFT, settings);
-        let rest = body.cut_mesh().mesh().nodes.clone();
+        let rest = body.mesh().nodes.clone();
         let clamp: Vec<u32> = (0..rest.len() as u32).filter(|&n| rest[n as usize].y == 0.0).collect();
         body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
         body.cut(&slice(0.05, -0.5, 0.5), 1).unwrap();
@@ -124,7 +124,7 @@ fn a_cut_exactly_through_clamped_nodes_leaves_both_lips_clamped() {
         for _ in 0..20 {
             body.step(0.01, DOWN, &[]);
         }
-        let node = body.cut_mesh().copy_node().to_vec();
+        let node = body.node_of_copy().to_vec();
         let copies: Vec<usize> = (0..node.len()).filter(|&c| rest[node[c] as usize].y == 0.0).collect();
         assert_eq!(copies.len(), 25 + 5);
         let moved = |c: &&usize| body.positions()[**c] != rest[node[**c] as usize];
@@ -175,12 +175,12 @@ fn reset_heals_a_cut_and_keeps_the_clamp() {
     let mut body = cube(3, SOFT, settings(50, 1e-6));
     let clamp = left_face(&body);
     body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
-    let copies = body.cut_mesh().n_copies();
+    let copies = body.n_copies();
     let report = body.cut(&slice(0.05, -0.5, 0.5), 1).unwrap();
     body.step(0.01, DOWN, &[]);
     body.reset().unwrap();
-    assert_eq!((body.cut_mesh().n_copies(), body.parts().len()), (copies, 1));
-    assert!(body.cut_mesh().epoch() > report.epoch);
+    assert_eq!((body.n_copies(), body.parts().len()), (copies, 1));
+    assert!(body.epoch() > report.epoch);
     for _ in 0..10 {
         body.step(0.01, DOWN, &[]);
     }
@@ -190,10 +190,10 @@ fn reset_heals_a_cut_and_keeps_the_clamp() {
 #[test]
 fn a_refused_sweep_changes_nothing() {
     let mut body = cube(2, SOFT, settings(50, 1e-6));
-    let epoch = body.cut_mesh().epoch();
+    let epoch = body.epoch();
     assert!(body.cut(&BladeSweep { segments: vec![] }, 1).is_err());
     assert!(body.cut(&slice(f64::NAN, 0.0, 1.0), 1).is_err());
-    assert_eq!(body.cut_mesh().epoch(), epoch);
+    assert_eq!(body.epoch(), epoch);
 }
 
 /// The half-cut beam, cut along a layer of nodes: the reference duplicates those nodes by hand.
@@ -225,9 +225,9 @@ fn half_cut_beam_agrees_with_the_reference() {
         let report = body.solve_static(Vector3::new(9.81, 0.0, 0.0), &StaticSettings::default()).unwrap();
         assert!(report.converged, "{report:?}");
         let u = body.positions()[3685] - nodes[3685];
-        let lips: Vec<Vector3<f64>> = (0..body.cut_mesh().n_copies())
+        let lips: Vec<Vector3<f64>> = (0..body.n_copies())
             .filter(|&c| {
-                let rest = nodes[body.cut_mesh().copy_node()[c] as usize];
+                let rest = nodes[body.node_of_copy()[c] as usize];
                 (rest - Vector3::new(0.0, 0.03, 0.1)).norm() < 1e-9
             })
             .map(|c| body.positions()[c])

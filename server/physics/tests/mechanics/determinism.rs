@@ -23,7 +23,7 @@ fn bar(threads: usize, portable: bool) -> Body {
 }
 
 fn push(body: &Body, height: f64) -> PointSpring {
-    let copies = body.cut_mesh().pieces()[6_000].copies;
+    let copies = body.pieces()[6_000].copies;
     PointSpring {
         copies,
         weights: [0.25; 4],
@@ -96,7 +96,7 @@ fn degenerate_elements_change_none_of_that() {
     let mut hashes = Vec::new();
     for threads in [1, 2, 3] {
         let mut body = ruined_cube(threads);
-        let last = *body.cut_mesh().pieces().last().unwrap();
+        let last = *body.pieces().last().unwrap();
         let grab = PointSpring {
             copies: last.copies,
             weights: [0.1, 0.2, 0.3, 0.4],

@@ -51,6 +51,6 @@ pub fn cube(cells: usize, material: Material, settings: BodySettings) -> Body {
 
 /// The nodes at x = 0 of a bar.
 pub fn left_face(body: &Body) -> Vec<u32> {
-    let nodes = &body.cut_mesh().mesh().nodes;
+    let nodes = &body.mesh().nodes;
     (0..nodes.len() as u32).filter(|&n| nodes[n as usize].x == 0.0).collect()
 }

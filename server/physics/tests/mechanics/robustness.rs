@@ -12,7 +12,7 @@ fn is_finite(body: &Body) -> bool {
 
 /// Largest difference between present and rest edge lengths, relative to the size of the body.
 fn shape_error(body: &Body) -> f64 {
-    let (x, mesh) = (body.positions(), body.cut_mesh().mesh());
+    let (x, mesh) = (body.positions(), body.mesh());
     let length = |x: &[Vector3<f64>], a: u32, b: u32| (x[a as usize] - x[b as usize]).norm();
     mesh.tets
         .iter()
@@ -94,12 +94,12 @@ fn input_without_meaning_changes_nothing() {
 fn reset_returns_to_the_start() {
     let mut body = cube(2, SOFT, settings(50, 1e-6));
     let rest = body.positions().to_vec();
-    let epoch = body.cut_mesh().epoch();
+    let epoch = body.epoch();
     body.step(0.1, DOWN, &[]);
     body.reset().unwrap();
     assert_eq!(body.positions(), rest);
     assert!(body.velocities().iter().all(|v| *v == Vector3::zeros()));
-    assert!(body.cut_mesh().epoch() > epoch);
+    assert!(body.epoch() > epoch);
 }
 
 /// A stiff cube that turns by 2, 4 and 8 rad in a step: one linear solve from the predictor would gain

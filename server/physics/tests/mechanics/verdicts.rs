@@ -139,12 +139,12 @@ fn a_part_that_sleeps_stays_where_it_is_and_the_rest_goes_on() {
         let part = body.parts().free.iter().position(|&free| free).unwrap();
         let copies: Vec<usize> =
             (0..body.positions().len()).filter(|&c| body.parts().of_copy[c] as usize == part).collect();
-        let (epoch, before) = (body.cut_mesh().epoch(), body.positions().to_vec());
+        let (epoch, before) = (body.epoch(), body.positions().to_vec());
         let mut centres = Vec::new();
         body.part_centres(&mut centres);
         assert!(centres[part].x > 0.113 && centres[1 - part].x < 0.113, "{centres:?}");
         assert!(body.put_to_sleep(part) && !body.put_to_sleep(part) && body.sleeps());
-        assert!(body.cut_mesh().epoch() > epoch && !body.parts().any_free());
+        assert!(body.epoch() > epoch && !body.parts().any_free());
         for _ in 0..10 {
             let report = body.step(0.01, DOWN, &[]);
             falling.step(0.01, DOWN, &[]);

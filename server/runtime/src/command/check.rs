@@ -181,7 +181,7 @@ impl Found {
 }
 
 fn in_words(body: &SimBody) -> String {
-    let (size, nodes) = (body.size(), body.body.cut_mesh().mesh().nodes.len());
+    let (size, nodes) = (body.size(), body.body.mesh().nodes.len());
     let [low, high] = body.corners_m().map(|corner| scindo_world::scene::coordinates(&corner));
     let mut words = format!(
         "  body {}: {} elements, {nodes} nodes, {} surface triangles, {:.4e} m3\n    from {low} to {high} m",
@@ -203,7 +203,7 @@ fn body_as_json(body: &SimBody) -> Value {
     json!({
         "id": &*body.id,
         "elements": size.elements,
-        "nodes": body.body.cut_mesh().mesh().nodes.len(),
+        "nodes": body.body.mesh().nodes.len(),
         "surface_vertices": size.vertices,
         "surface_triangles": size.triangles,
         "min_m": min_m,

@@ -194,11 +194,11 @@ fn with_probes(scene: &Scene) -> Result<Scene, SceneError> {
 /// Centroids of elements, one out of each of [`POINTS`] slices along the longest side of a body: the
 /// one deepest below the surface.
 fn points(body: &scindo_world::simulation::SimBody) -> Vec<[f64; 3]> {
-    let mesh = body.body.cut_mesh().mesh();
+    let mesh = body.body.mesh();
     let [low, high] = mesh.bounds();
     let axis = (high - low).imax();
     let x = body.body.rest_positions();
-    let skin: Vec<_> = body.body.cut_mesh().surface().vertices.iter().map(|v| v.position(x)).collect();
+    let skin: Vec<_> = body.body.surface().vertices.iter().map(|v| v.position(x)).collect();
     let skin: Vec<_> = skin.iter().step_by(skin.len().div_ceil(500).max(1)).collect();
     let every = mesh.tets.len().div_ceil(2_000).max(1);
     let mut best = [const { None::<(f64, [f64; 3])> }; POINTS];

@@ -47,7 +47,7 @@ pub fn largest_change<'a>(a: &'a [Sight], b: &'a [Sight]) -> Option<(&'a Sight, 
 pub fn look(simulation: &Simulation) -> Vec<Sight> {
     let mut seen = Vec::new();
     for (spec, body) in simulation.scene().bodies.iter().zip(simulation.bodies()) {
-        let mesh = body.body.cut_mesh().mesh();
+        let mesh = body.body.mesh();
         let fixes = spec.fixes.iter().enumerate().map(|(i, fix)| (format!("fix.{i}"), &fix.region));
         let loads = spec.loads.iter().enumerate().map(|(i, load)| (format!("load.{i}"), &load.region));
         let regions: Vec<(String, &Region)> = fixes.chain(loads).collect();

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector3;
 use scindo_physics::body::Body;
-use scindo_physics::cut::CutMesh;
+use scindo_physics::cut::Surface;
 
 /// A picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,13 +25,18 @@ const EYE: Vector3<f64> = Vector3::new(0.55, -0.75, 0.42);
 
 /// A body as it is now.
 pub fn body(body: &Body, caption: impl Into<String>) -> Picture {
-    surface(body.cut_mesh(), body.positions(), Vector3::y(), caption)
+    surface(body.surface(), body.positions(), Vector3::y(), caption)
 }
 
-/// The surface of a cut mesh with copies at `x` [m], drawn with `up` upwards.
-pub fn surface(mesh: &CutMesh, x: &[Vector3<f64>], up: Vector3<f64>, caption: impl Into<String>) -> Picture {
-    let points: Vec<Vector3<f64>> = mesh.surface().vertices.iter().map(|v| v.position(x)).collect();
-    let svg = draw(&points, &mesh.surface().triangles, &mesh.surface().tags, up);
+/// A surface with copies at `x` [m], drawn with `up` upwards.
+pub fn surface(
+    surface: &Surface,
+    x: &[Vector3<f64>],
+    up: Vector3<f64>,
+    caption: impl Into<String>,
+) -> Picture {
+    let points: Vec<Vector3<f64>> = surface.vertices.iter().map(|v| v.position(x)).collect();
+    let svg = draw(&points, &surface.triangles, &surface.tags, up);
     Picture { caption: caption.into(), svg }
 }
 

@@ -34,7 +34,7 @@ fn rest(surface: &SurfaceBvh, flat: &Vector3<f64>, normal: &Vector3<f64>, reach:
 
 /// Mean edge of the elements [m].
 fn edge(body: &Body) -> f64 {
-    let mesh = body.cut_mesh().mesh();
+    let mesh = body.mesh();
     let sum: f64 = (0..mesh.tets.len()).map(|e| mesh.longest_edge(e)).sum();
     sum / mesh.tets.len() as f64
 }

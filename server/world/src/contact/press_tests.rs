@@ -71,8 +71,8 @@ impl Table {
             self.body.cut(&sweep, incision).unwrap();
         }
         self.body.surface_positions(&mut self.positions);
-        let mesh = self.body.cut_mesh();
-        self.contacts.update_surface(0, mesh.epoch(), mesh.surface(), &self.positions).unwrap();
+        let body = &self.body;
+        self.contacts.update_surface(0, body.epoch(), body.surface(), &self.positions).unwrap();
         self.contacts.detect(&mut self.tools);
         self.body.step(STEP_S, V::zeros(), self.contacts.springs(0));
         self.contacts.collect(0, self.body.spring_forces());
@@ -163,10 +163,9 @@ fn an_open_wound_lets_the_tool_in_and_closed_skin_does_not() {
 
 /// Positions with the two sides of the cut at x = 1 mm moved apart by `gap` each, more at the top.
 fn opened_by(body: &Body, gap: f64) -> Vec<V> {
-    let mesh = body.cut_mesh();
     let mut x = body.positions().to_vec();
     let mut side = vec![0.0f64; x.len()];
-    let surface = mesh.surface();
+    let surface = body.surface();
     // Every lip triangle knows its side by its normal; its copies go along with it.
     for (triangle, _) in surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag > 0) {
         let [p, q, r] = triangle.map(|v| surface.vertices[v as usize].position(&x));
@@ -190,13 +189,12 @@ fn opened_by(body: &Body, gap: f64) -> Vec<V> {
 #[test]
 fn a_blade_cuts_what_it_passes_and_feels_nothing() {
     let mut table = Table::new(ToolShape::Blade { length_m: 0.03, thickness_m: 0.0005 });
-    let uncut = table.body.cut_mesh().n_copies();
+    let uncut = table.body.n_copies();
     for i in 0..60 {
         let pose = Isometry3::translation(0.001, -0.045 + 0.0015 * f64::from(i), -0.012);
         assert_eq!(table.step(pose, ToolMode::Cut), V::zeros());
     }
-    let mesh = table.body.cut_mesh();
-    assert!(mesh.n_copies() > uncut + 10);
-    let tags: std::collections::BTreeSet<u32> = mesh.surface().tags.iter().copied().collect();
+    assert!(table.body.n_copies() > uncut + 10);
+    let tags: std::collections::BTreeSet<u32> = table.body.surface().tags.iter().copied().collect();
     assert_eq!(tags.into_iter().collect::<Vec<_>>(), [0, 1], "one incision");
 }

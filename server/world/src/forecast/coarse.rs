@@ -86,7 +86,7 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
 
 /// The uncut body with fewer elements, or as it is where it has no more.
 fn coarser(body: &Body, elements: f64) -> Option<TetMesh> {
-    let mesh = body.cut_mesh().mesh();
+    let mesh = body.mesh();
     if mesh.tets.len() as f64 <= 1.5 * elements {
         return Some(mesh.clone());
     }

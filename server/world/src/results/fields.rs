@@ -118,11 +118,11 @@ impl Points {
 impl Solid {
     fn add(&mut self, number: i32, sim: &SimBody) {
         let body = &sim.body;
-        let solid = body.cut_mesh().solid();
+        let solid = body.solid();
         let stresses = body.cauchy_stresses();
         let first = self.points.add(body, &solid.vertices);
         for (tet, &p) in solid.tets.iter().zip(&solid.piece) {
-            let (piece, stress) = (&body.cut_mesh().pieces()[p as usize], &stresses[p as usize]);
+            let (piece, stress) = (&body.pieces()[p as usize], &stresses[p as usize]);
             self.tets.push(tet.map(|vertex| first + vertex));
             self.body.push(number);
             self.element.push(piece.element as i32);

@@ -346,7 +346,6 @@ fn body_summary(
     mesh_error: Option<MeshError>,
 ) -> BodySummary {
     let body = &sim.body;
-    let mesh = body.cut_mesh();
     let surface = body.surface();
     let mut lips: Vec<u32> = surface.tags.iter().copied().filter(|tag| *tag > 0).collect();
     let lip_triangles = lips.len();
@@ -362,12 +361,12 @@ fn body_summary(
         unknowns: 3 * body.rest_positions().len(),
         pieces: body.n_pieces(),
         copies: body.rest_positions().len(),
-        parts: mesh.components().len(),
+        parts: body.components().len(),
         surface_vertices: surface.vertices.len(),
         surface_triangles: surface.triangles.len(),
         lip_triangles,
         incisions: lips.len(),
-        epoch: mesh.epoch(),
+        epoch: body.epoch(),
         mass_kg: body.total_mass(),
         rest_volume_m3: sim.rest_volume_m3,
         volume_m3: body.volume(),

@@ -47,7 +47,7 @@ pub struct SimBody {
 
 impl SimBody {
     pub(crate) fn new(id: &str, body: Body, health: Option<MeshHealth>) -> Self {
-        let rest_volume_m3 = body.cut_mesh().copy_volume().iter().sum();
+        let rest_volume_m3 = body.rest_volume();
         Self {
             id: id.into(),
             body,
@@ -83,7 +83,7 @@ impl SimBody {
 
     /// Topology epoch; rises with every cut that did something and with every reset.
     pub fn epoch(&self) -> u32 {
-        self.body.cut_mesh().epoch()
+        self.body.epoch()
     }
 
     /// The sizes that costs follow from.

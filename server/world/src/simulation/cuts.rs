@@ -265,7 +265,7 @@ impl Cuts {
             if !at.allowed {
                 return Err(SWITCHED_OFF.into());
             }
-            work.book((cut.cut_mesh().n_copies() + cut.n_elements()) / NODES_PER_FRAGMENT);
+            work.book((cut.n_copies() + cut.n_elements()) / NODES_PER_FRAGMENT);
             self.history.before(body, &at.bodies[body], &job.blade, job.incision);
             let cut = &mut at.bodies[body].body;
             cut.begin_cut(&job.blade, job.incision).map_err(|error| error.to_string())?;

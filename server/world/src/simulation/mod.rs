@@ -177,7 +177,7 @@ impl Simulation {
         if self.tools.any_active() {
             for (i, body) in self.bodies.iter_mut().enumerate() {
                 let (shown, positions) = body.surface_now();
-                let epoch = shown.cut_mesh().epoch();
+                let epoch = shown.epoch();
                 if let Err(error) = self.contacts.update_surface(i, epoch, shown.surface(), positions) {
                     self.report.tell(Level::Error, "contact-surface", &body.id, error.to_string());
                 }

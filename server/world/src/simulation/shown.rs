@@ -12,7 +12,7 @@ const MOSTLY: f64 = 0.5;
 /// Triangles of the present epoch, where they rest, and what holds them. Triangles of parts that sleep are not in
 /// the view.
 pub fn topology(body: &Body) -> SurfaceTopology {
-    let (mesh, surface) = (body.cut_mesh(), body.surface());
+    let surface = body.surface();
     let rest = body.rest_positions();
     let held = held_copies(body);
     let awake = |triangle: &[u32; 3]| !body.is_asleep(surface.vertices[triangle[0] as usize].copies[0]);
@@ -28,7 +28,7 @@ pub fn topology(body: &Body) -> SurfaceTopology {
         slots.filter(|&(&copy, _)| held[copy as usize]).map(|(_, weight)| weight).sum::<f64>() > MOSTLY
     };
     SurfaceTopology {
-        epoch: mesh.epoch(),
+        epoch: body.epoch(),
         vertex_count: surface.vertices.len() as u32,
         triangles,
         tags,
@@ -41,11 +41,10 @@ pub fn topology(body: &Body) -> SurfaceTopology {
 /// Von Mises stress [Pa] of every surface vertex into `out`: the mean over the pieces around each copy,
 /// weighted by volume, interpolated as positions are.
 pub fn surface_stress(body: &Body, out: &mut Vec<f32>) {
-    let mesh = body.cut_mesh();
-    let mut mean = vec![(0.0, 0.0); mesh.n_copies()];
-    for (p, (piece, stress)) in mesh.pieces().iter().zip(&body.cauchy_stresses()).enumerate() {
+    let mut mean = vec![(0.0, 0.0); body.n_copies()];
+    for (p, (piece, stress)) in body.pieces().iter().zip(&body.cauchy_stresses()).enumerate() {
         let stress = von_mises(stress);
-        for (&copy, volume) in piece.copies.iter().zip(mesh.piece_node_volume(p)) {
+        for (&copy, volume) in piece.copies.iter().zip(body.piece_volumes(p)) {
             let (sum, weight) = &mut mean[copy as usize];
             (*sum, *weight) = (*sum + stress * volume, *weight + volume);
         }
@@ -70,10 +69,9 @@ pub fn von_mises(stress: &Matrix3<f64>) -> f64 {
 
 /// Per copy: its node is held along some axis.
 fn held_copies(body: &Body) -> Vec<bool> {
-    let mesh = body.cut_mesh();
     let fixed = body.fixed_nodes();
     let is_held = |node: &u32| fixed.binary_search_by_key(node, |f| f.node).is_ok();
-    mesh.copy_node().iter().map(is_held).collect()
+    body.node_of_copy().iter().map(is_held).collect()
 }
 
 /// The slot with the largest weight.

@@ -1,13 +1,14 @@
 //! 5, 6, 9, 12 and 13: halved edges, random cuts, branches, moving tissue, clamps.
 
-use super::flaws::{Flaws, mass_of_parts, shells};
+use super::flaws::{mass_of_parts, tell};
 use super::support::{DOWN, L, SOFT, Shaped, V, clamp_left, cube, damped, nodes, plane, slice};
 use crate::random::Random;
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::Evidence;
 use crate::stress::view;
 use crate::stress::watch::{Common, Watch, charts};
-use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::{BladeSweep, Flaws, Piece};
+use scindo_physics::mesh::TetMesh;
 
 /// Case 5.
 pub const HALVED: Case = Case {
@@ -116,10 +117,10 @@ fn halved(setting: &Setting) -> Result<Evidence, Trouble> {
     let same = found[0].mesh.surface() == found[2].mesh.surface();
     evidence.exactly("bits of the surface that differ when repeated", usize::from(!same), 0);
     evidence.exactly("parts after all three planes", there[0], 8);
-    flaws.tell(&mut evidence);
+    tell(&flaws, &mut evidence);
     evidence.pictures.push(view::surface(
-        &found[0].mesh,
-        &apart(&found[0]),
+        found[0].mesh.surface(),
+        &apart(found[0].mesh.mesh(), found[0].mesh.pieces(), &found[0].x),
         V::y(),
         "The parts, drawn apart",
     ));
@@ -127,14 +128,13 @@ fn halved(setting: &Setting) -> Result<Evidence, Trouble> {
 }
 
 /// Positions with the parts moved away from each other, for a picture.
-fn apart(body: &Shaped) -> Vec<V> {
-    let mesh = &body.mesh;
-    let middle = body.x.iter().sum::<V>() / body.x.len() as f64;
-    let mut root: Vec<usize> = (0..body.x.len()).collect();
+fn apart(mesh: &TetMesh, pieces: &[Piece], x: &[V]) -> Vec<V> {
+    let middle = x.iter().sum::<V>() / x.len() as f64;
+    let mut root: Vec<usize> = (0..x.len()).collect();
     // Few copies: passing labels on until nothing changes is short and clear.
     loop {
         let mut changed = false;
-        for piece in mesh.pieces() {
+        for piece in pieces {
             let least = piece.copies.iter().map(|&c| root[c as usize]).min().unwrap_or(0);
             for &copy in &piece.copies {
                 changed |= root[copy as usize] != least;
@@ -145,10 +145,10 @@ fn apart(body: &Shaped) -> Vec<V> {
             break;
         }
     }
-    let mut sums = vec![(V::zeros(), 0.0); body.x.len()];
-    for (p, piece) in mesh.pieces().iter().enumerate() {
-        let centre: V = mesh.mesh().corners(piece.element as usize).iter().sum::<V>() / 4.0;
-        let weight = mesh.piece_node_volume(p).iter().sum::<f64>();
+    let mut sums = vec![(V::zeros(), 0.0); x.len()];
+    for piece in pieces {
+        let centre: V = mesh.corners(piece.element as usize).iter().sum::<V>() / 4.0;
+        let weight = piece.fraction * mesh.volume(piece.element as usize);
         let sum = &mut sums[root[piece.copies[0] as usize]];
         *sum = (sum.0 + weight * centre, sum.1 + weight);
     }
@@ -156,7 +156,7 @@ fn apart(body: &Shaped) -> Vec<V> {
         let (sum, weight) = sums[root[c]];
         if weight > 0.0 { (sum / weight - middle) * 0.25 } else { V::zeros() }
     };
-    (0..body.x.len()).map(|c| body.x[c] + shift(c)).collect()
+    (0..x.len()).map(|c| x[c] + shift(c)).collect()
 }
 
 fn random(setting: &Setting) -> Result<Evidence, Trouble> {
@@ -181,7 +181,7 @@ fn random(setting: &Setting) -> Result<Evidence, Trouble> {
             let point = middle(&watch) + random.vector(0.1 * L);
             let report = watch.cut(&plane(point, random.vector(1.0), 3.0 * L), k + 1)?;
             refused += report.refused_edges;
-            flaws.merge(Flaws::of(watch.body.cut_mesh()));
+            flaws.merge(watch.body.flaws());
             watch.steps(4);
         }
         evidence.tell(format!("parts, seed {seed}"), watch.body.parts().len() as f64, "");
@@ -193,16 +193,15 @@ fn random(setting: &Setting) -> Result<Evidence, Trouble> {
             "off",
         );
         let body = watch.finish(&mut common, &mut energies, &mut iterations);
-        let rest = Shaped::new(body.cut_mesh().clone());
-        let drawn = apart(&rest);
+        let drawn = apart(body.mesh(), body.pieces(), body.rest_positions());
         evidence.pictures.push(view::surface(
-            &rest.mesh,
+            body.surface(),
             &drawn,
             V::y(),
             format!("Seed {seed}: the parts at rest, drawn apart"),
         ));
     }
-    flaws.tell(&mut evidence);
+    tell(&flaws, &mut evidence);
     energies.lines.truncate(4);
     evidence.charts.extend([energies, iterations]);
     common.tell(&mut evidence);
@@ -239,13 +238,13 @@ fn branches(setting: &Setting) -> Result<Evidence, Trouble> {
         evidence.exactly(format!("parts, {name}"), body.topology()[0], expected);
         flaws.merge(Flaws::of(&body.mesh));
         evidence.pictures.push(view::surface(
-            &body.mesh,
-            &apart(&body),
+            body.mesh.surface(),
+            &apart(body.mesh.mesh(), body.mesh.pieces(), &body.x),
             V::z(),
             format!("{name}, drawn apart"),
         ));
     }
-    flaws.tell(&mut evidence);
+    tell(&flaws, &mut evidence);
     evidence.notes.push(
         "The third arm of the Y has to reach over the bend: a bent sheet is flat within an element, so that an \
          arm that begins exactly on the bend can leave a bridge of less than one element."
@@ -276,11 +275,10 @@ fn moving(setting: &Setting) -> Result<Evidence, Trouble> {
         let s = at.x - 0.75 * L + 1.5 * L * f64::from(k) / 150.0;
         let blade = [V::new(s, time - 0.5 * L, at.z), V::new(s, time + 1.5 * L, at.z)];
         watch.cut(&BladeSweep { segments: vec![blade] }, 1)?;
-        let mesh = watch.body.cut_mesh();
         let through = watch.body.parts().len() > 1;
         if k < 120 {
             early += usize::from(through);
-            torn += usize::from(shells(mesh.surface()) > 1 && !through);
+            torn += usize::from(watch.body.surface().n_shells() > 1 && !through);
         }
         if k == 90 {
             evidence.pictures.push(view::body(&watch.body, "On the way through"));
@@ -291,7 +289,7 @@ fn moving(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.exactly("steps with more than one closed surface before", torn, 0);
     evidence.exactly("parts at the end", watch.body.parts().len(), 2);
     evidence.tell("fastest material at the start", v.iter().map(V::norm).fold(0.0, f64::max), "m/s");
-    Flaws::of(watch.body.cut_mesh()).tell(&mut evidence);
+    tell(&watch.body.flaws(), &mut evidence);
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
     evidence.pictures.push(view::body(&body, "At the end"));
     evidence.charts.extend([energies, iterations]);
@@ -309,7 +307,7 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     let clamp = clamp_left(&mut body)?;
     let mut watch = Watch::new("beside", body, 0.01, DOWN);
     watch.cut(&slice(0.04, -5.0, 5.0), 1)?;
-    flaws.merge(Flaws::of(watch.body.cut_mesh()));
+    flaws.merge(watch.body.flaws());
     let free = watch.body.parts().free.iter().filter(|free| **free).count();
     evidence.exactly("free parts, cut beside the clamp", free, 1);
     let fallen = |watch: &Watch| -> (V, f64) {
@@ -338,11 +336,11 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.pictures.push(view::body(&body, "Cut beside the clamp, after 0.2 s"));
     // Through the clamp.
     let mut body = setting.body(cube(4), damped(0.5, 0.005), 200, 1e-5)?;
-    let clamp = nodes(body.cut_mesh().mesh(), |X| X.y == 0.0);
+    let clamp = nodes(body.mesh(), |X| X.y == 0.0);
     body.fix(&clamp, [true; 3], V::zeros())?;
     let mut watch = Watch::new("through", body, 0.01, DOWN);
     watch.cut(&slice(0.55, -5.0, 5.0), 1)?;
-    flaws.merge(Flaws::of(watch.body.cut_mesh()));
+    flaws.merge(watch.body.flaws());
     let held = watch.body.parts().free.iter().filter(|free| !**free).count();
     evidence.exactly("clamped parts, cut through the clamp", held, 2);
     watch.steps(50);
@@ -355,16 +353,16 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     body.fix(&clamp, [true; 3], V::zeros())?;
     let mut watch = Watch::new("along nodes", body, 0.01, DOWN);
     watch.cut(&slice(0.5, -5.0, 5.0), 1)?;
-    flaws.merge(Flaws::of(watch.body.cut_mesh()));
+    flaws.merge(watch.body.flaws());
     watch.steps(50);
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
-    let copies = body.cut_mesh().copy_node().iter().zip(body.positions().iter().zip(body.rest_positions()));
+    let copies = body.node_of_copy().iter().zip(body.positions().iter().zip(body.rest_positions()));
     let clamped = copies.filter(|(node, _)| clamp.contains(node));
     let (all, still) =
         clamped.fold((0, 0), |(all, still), (_, (x, X))| (all + 1, still + usize::from(x == X)));
     evidence.exactly("copies of clamped nodes, cut along nodes", all, clamp.len() + 5);
     evidence.exactly("of these, moved", all - still, 0);
-    flaws.tell(&mut evidence);
+    tell(&flaws, &mut evidence);
     evidence.charts.extend([energies, iterations]);
     common.tell(&mut evidence);
     Ok(evidence)

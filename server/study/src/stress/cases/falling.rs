@@ -1,6 +1,6 @@
 //! 7 and 8: what is cut loose falls.
 
-use super::flaws::{Flaws, mass_of_parts};
+use super::flaws::{mass_of_parts, tell};
 use super::support::{DOWN, L, SOFT, V, clamp_left, cube, slice};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::Evidence;
@@ -58,10 +58,9 @@ fn fragments_of(body: &Body) -> Vec<Fragment> {
         fragment.centre += m * body.positions()[c];
         fragment.momentum += m * body.velocities()[c];
     }
-    let mesh = body.cut_mesh();
-    for piece in mesh.pieces() {
+    for piece in body.pieces() {
         let part = parts.of_copy[piece.copies[0] as usize] as usize;
-        let volume = piece.fraction * mesh.mesh().volume(piece.element as usize);
+        let volume = piece.fraction * body.mesh().volume(piece.element as usize);
         all[part].weighed += body.material().density_kg_m3 * volume;
     }
     all.iter_mut().for_each(|fragment| fragment.centre /= fragment.mass);
@@ -108,32 +107,26 @@ fn freed_node(setting: &Setting) -> Result<Evidence, Trouble> {
         [tip, node + depth * V::new(3.0 * angle.cos(), 2.0, 3.0 * angle.sin())]
     };
     watch.cut(&BladeSweep { segments: (0..=24).map(turn).collect() }, 1)?;
-    let mesh = watch.body.cut_mesh();
-    let components = mesh.components();
+    let components = watch.body.components();
     evidence.exactly("parts", components.len(), 2);
     let freed = components.volume.iter().fold(f64::INFINITY, |a, b| a.min(*b));
     let tiny = |part: usize| {
         let of = |p: &&scindo_physics::cut::Piece| {
             watch.body.parts().of_copy[p.copies[0] as usize] as usize == part
         };
-        mesh.pieces().iter().filter(of).map(|p| p.fraction).fold(0.0, f64::max)
+        watch.body.pieces().iter().filter(of).map(|p| p.fraction).fold(0.0, f64::max)
     };
     let largest = (0..watch.body.parts().len()).map(tiny).fold(f64::INFINITY, f64::min);
     evidence.tell("volume of the fragment over that of the cube", freed / L.powi(3), "");
     evidence.at_most("largest fraction of an element in it", largest, 1e-3, "");
-    Flaws::of(mesh).tell(&mut evidence);
+    tell(&watch.body.flaws(), &mut evidence);
     let fall = fall(&mut watch, 0.01, 40, -DOWN);
     evidence.exactly("fragments that hang on nothing", fall.free, 1);
     evidence.at_most("its momentum against density × volume × g × time", fall.momentum, 1e-3, "off");
     evidence.at_most("its way against free fall", fall.way, 1e-3, "off");
     evidence.at_most("mass of the parts against density × volume", mass_of_parts(&watch.body), 1e-10, "off");
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
-    evidence.pictures.push(view::surface(
-        body.cut_mesh(),
-        &body.cut_mesh().rest_positions(),
-        V::y(),
-        "The cut, at rest",
-    ));
+    evidence.pictures.push(view::surface(body.surface(), body.rest_positions(), V::y(), "The cut, at rest"));
     evidence.charts.extend([energies, iterations]);
     common.tell(&mut evidence);
     Ok(evidence)
@@ -152,7 +145,7 @@ fn fragments(setting: &Setting) -> Result<Evidence, Trouble> {
         for (incision, at) in [(1, 0.300_001), (2, 0.251), (3, 0.77)] {
             watch.cut(&slice(at, -5.0, 5.0), incision)?;
         }
-        Flaws::of(watch.body.cut_mesh()).tell(&mut evidence);
+        tell(&watch.body.flaws(), &mut evidence);
         let fall = fall(&mut watch, 0.01, 40, DOWN);
         evidence.exactly(format!("free fragments, {name}"), fall.free, if clamped { 3 } else { 4 });
         evidence.at_most(format!("momentum of a fragment, {name}"), fall.momentum, 1e-6, "off");

@@ -1,6 +1,6 @@
 //! 10 and 11: a cut that grows tick by tick, and one that is made again and again.
 
-use super::flaws::{Flaws, shells};
+use super::flaws::tell;
 use super::support::{L, SOFT, V, block, cube, nodes, plane};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::chart::{Chart, Line};
@@ -8,7 +8,7 @@ use crate::stress::evidence::Evidence;
 use crate::stress::view;
 use crate::stress::watch::{Common, Watch, charts};
 use scindo_physics::body::Body;
-use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::cut::{BladeSweep, CutMesh, Flaws};
 
 /// Case 10.
 pub const GROWTH: Case = Case {
@@ -42,10 +42,9 @@ pub const AGAIN: Case = Case {
 const CELL: f64 = 0.01;
 
 /// Area [m²] of the lips at rest, and how far along x they reach [m].
-fn wound(mesh: &CutMesh) -> (f64, f64) {
-    let rest = mesh.rest_positions();
-    let surface = mesh.surface();
-    let place = |v: u32| surface.vertices[v as usize].position(&rest);
+fn wound(body: &Body) -> (f64, f64) {
+    let surface = body.surface();
+    let place = |v: u32| surface.vertices[v as usize].position(body.rest_positions());
     let (mut area, mut reach) = (0.0, 0.0_f64);
     for (t, _) in surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag > 0) {
         let [a, b, c] = t.map(place);
@@ -66,7 +65,7 @@ fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut common = Common::default();
     let (mut energies, mut iterations) = charts();
     let mut body = setting.body(block([10.0 * CELL, 3.0 * CELL, 4.0 * CELL], [10, 3, 4]), SOFT, 300, 1e-6)?;
-    let clamp = nodes(body.cut_mesh().mesh(), |X| X.z == 0.0);
+    let clamp = nodes(body.mesh(), |X| X.z == 0.0);
     body.fix(&clamp, [true; 3], V::zeros())?;
     let mut watch = Watch::new("", body, 0.01, V::new(-2.0, 0.0, 9.0));
     let height = 2.03 * CELL;
@@ -87,7 +86,7 @@ fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
             (after.3[1] - before.3[1]).abs() / before.3[1].max(1e-9),
         ];
         change = worst.into_iter().fold(change, f64::max);
-        let (now, reach) = wound(watch.body.cut_mesh());
+        let (now, reach) = wound(&watch.body);
         shrunk += usize::from(now < area * (1.0 - 1e-12));
         area = now;
         growth.push([watch.time(), 1e4 * area]);
@@ -100,7 +99,7 @@ fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
         watch.step();
         if tick == 70 {
             evidence.pictures.push(view::surface(
-                watch.body.cut_mesh(),
+                watch.body.surface(),
                 watch.body.positions(),
                 V::z(),
                 "The blade has come two thirds of the way",
@@ -113,7 +112,7 @@ fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.at_most("largest distance of the wound behind the blade", lag, 1.0, "cells");
     evidence.at_most("largest change of mass, momenta and energies by a tick", change, 1e-12, "");
     evidence.tell("area of the lips at the end", 1e4 * area, "cm²");
-    Flaws::of(watch.body.cut_mesh()).tell(&mut evidence);
+    tell(&watch.body.flaws(), &mut evidence);
     watch.finish(&mut common, &mut energies, &mut iterations);
     let mut chart = Chart::new("the wound grows", "time [s]", "area of both lips [cm²]");
     chart.lines.push(Line { name: "area".into(), points: growth });
@@ -141,8 +140,8 @@ fn again(setting: &Setting) -> Result<Evidence, Trouble> {
     for (what, added) in ["parts", "pieces", "copies", "surface triangles"].into_iter().zip(added) {
         evidence.exactly(format!("{what} added by fifty more"), added, 0);
     }
-    evidence.exactly("shells of the surface", shells(body.mesh.surface()), 2);
-    Flaws::of(&body.mesh).tell(&mut evidence);
-    evidence.pictures.push(view::surface(&body.mesh, &body.x, V::y(), "After 51 sweeps"));
+    evidence.exactly("shells of the surface", body.mesh.surface().n_shells(), 2);
+    tell(&Flaws::of(&body.mesh), &mut evidence);
+    evidence.pictures.push(view::surface(body.mesh.surface(), &body.x, V::y(), "After 51 sweeps"));
     Ok(evidence)
 }

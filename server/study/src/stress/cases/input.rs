@@ -36,7 +36,7 @@ const TINY: f64 = 5e-324;
 
 fn bits(body: &Body) -> Vec<u64> {
     let state = body.positions().iter().chain(body.velocities());
-    state.flat_map(|v| v.iter().map(|c| c.to_bits())).chain([u64::from(body.cut_mesh().epoch())]).collect()
+    state.flat_map(|v| v.iter().map(|c| c.to_bits())).chain([u64::from(body.epoch())]).collect()
 }
 
 fn is_finite(body: &Body) -> bool {

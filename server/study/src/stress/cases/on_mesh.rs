@@ -1,6 +1,6 @@
 //! 2, 3 and 4: cuts through nodes, along edges and along faces of the mesh.
 
-use super::flaws::Flaws;
+use super::flaws::tell;
 use super::support::{DOWN, SOFT, Shaped, V, block, nodes, plane};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::{Evidence, short};
@@ -8,7 +8,7 @@ use crate::stress::view;
 use crate::stress::watch::{Common, Watch, charts};
 use nalgebra::Rotation3;
 use scindo_physics::body::{Arithmetic, Body, BodySettings, PcgSettings};
-use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::{BladeSweep, Flaws};
 use scindo_physics::mesh::{TetMesh, tet_volume};
 
 /// Case 2.
@@ -77,7 +77,7 @@ fn exact(setting: &Setting, mesh: TetMesh, clamped: fn(&V) -> bool) -> Result<Bo
         ..BodySettings::default()
     };
     let mut body = setting.with(mesh, SOFT, settings)?;
-    let clamp = nodes(body.cut_mesh().mesh(), clamped);
+    let clamp = nodes(body.mesh(), clamped);
     body.fix(&clamp, [true; 3], V::zeros())?;
     Ok(body)
 }
@@ -89,9 +89,8 @@ fn far_side(X: &V) -> bool {
 
 /// Where the middle of every element is that is one piece; none for the others.
 fn middles(body: &Body) -> Vec<Option<V>> {
-    let mesh = body.cut_mesh();
-    let mut middle = vec![None; mesh.mesh().tets.len()];
-    for piece in mesh.pieces().iter().filter(|piece| piece.fraction == 1.0) {
+    let mut middle = vec![None; body.mesh().tets.len()];
+    for piece in body.pieces().iter().filter(|piece| piece.fraction == 1.0) {
         let sum: V = piece.copies.iter().map(|&c| body.positions()[c as usize]).sum();
         middle[piece.element as usize] = Some(sum / 4.0);
     }
@@ -116,8 +115,8 @@ fn on_mesh(setting: &Setting, normals: &[V]) -> Result<Evidence, Trouble> {
             let mut watch = Watch::new(name.clone(), exact(setting, mesh(), |X| X.x == 0.0)?, 0.01, DOWN);
             let point = centre + shift * normal.normalize();
             watch.cut(&plane(point, *normal, 3.0 * EDGE_M), 1)?;
-            flaws.merge(Flaws::of(watch.body.cut_mesh()));
-            let parts = watch.body.cut_mesh().components();
+            flaws.merge(watch.body.flaws());
+            let parts = watch.body.components();
             evidence.exactly(format!("parts, {name}, shifted by {} m", short(shift)), parts.len(), 2);
             if shift == 0.0 {
                 let sum: f64 = parts.volume.iter().sum();
@@ -146,7 +145,7 @@ fn on_mesh(setting: &Setting, normals: &[V]) -> Result<Evidence, Trouble> {
             );
         }
     }
-    flaws.tell(&mut evidence);
+    tell(&flaws, &mut evidence);
     evidence.charts.extend([energies, iterations]);
     common.tell(&mut evidence);
     Ok(evidence)
@@ -207,12 +206,12 @@ fn face(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.exactly("parts, cut through", parts, 2);
     evidence.exactly("pieces, cut through", pieces, before[1]);
     evidence.exactly("copies more, cut through", copies - before[2], 25);
-    Flaws::of(&whole.mesh).tell(&mut evidence);
+    tell(&Flaws::of(&whole.mesh), &mut evidence);
     let least = |body: &Body| {
         let volume = |p: &scindo_physics::cut::Piece| {
-            p.fraction * tet_volume(&body.cut_mesh().mesh().corners(p.element as usize))
+            p.fraction * tet_volume(&body.mesh().corners(p.element as usize))
         };
-        let all = body.cut_mesh().pieces().iter().map(volume);
+        let all = body.pieces().iter().map(volume);
         all.fold(f64::INFINITY, f64::min)
     };
 
@@ -220,11 +219,7 @@ fn face(setting: &Setting) -> Result<Evidence, Trouble> {
     cut.cut(&sweep(0.5), 1)?;
     let twins = duplicated(0.5);
     let by_hand = Watch::new("nodes duplicated", exact(setting, twins, far_side)?, 0.01, DOWN);
-    evidence.exactly(
-        "copies, cut half through",
-        cut.body.cut_mesh().n_copies(),
-        by_hand.body.cut_mesh().n_copies(),
-    );
+    evidence.exactly("copies, cut half through", cut.body.n_copies(), by_hand.body.n_copies());
     evidence.at_least(
         "smallest piece over smallest element",
         least(&cut.body) / least(&by_hand.body),

@@ -38,7 +38,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
             // A tetrahedron with one node beyond the plane keeps t³ there, t of each edge.
             let at = 0.5 + fraction.cbrt() / 6.0;
             watch.cut(&slice(at, -5.0, 0.5), 1)?;
-            let least = watch.body.cut_mesh().pieces().iter().map(|p| p.fraction).fold(1.0, f64::min);
+            let least = watch.body.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min);
             evidence.at_most(
                 format!("smallest piece of the cut meant to leave {}", short(fraction)),
                 (least / fraction - 1.0).abs(),
@@ -50,7 +50,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
         for _ in 0..STEPS {
             most = most.max(watch.step().iterations);
             let v = watch.body.velocities();
-            let vertices = &watch.body.cut_mesh().surface().vertices;
+            let vertices = &watch.body.surface().vertices;
             copy = v.iter().map(V::norm).fold(copy, f64::max);
             material = vertices.iter().map(|vertex| vertex.position(v).norm()).fold(material, f64::max);
         }

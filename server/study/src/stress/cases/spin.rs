@@ -238,7 +238,7 @@ fn free_spin(setting: &Setting) -> Result<Evidence, Trouble> {
     momenta.lines.push(Line { name: "BDF2, 10 rad/s, 20 ms".into(), points: end.path });
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
     evidence.pictures.push(view::surface(
-        body.cut_mesh(),
+        body.surface(),
         body.positions(),
         V::z(),
         "After two seconds of spin, BDF2",

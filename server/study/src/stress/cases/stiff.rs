@@ -158,7 +158,12 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
         iterations.lines.push(Line { name: name.to_owned(), points: counts });
         let rest = CutMesh::new(mesh.clone())?;
         let x: Vec<V> = mesh.nodes.iter().zip(&u).map(|(X, u)| X + u).collect();
-        evidence.pictures.push(view::surface(&rest, &x, V::y(), format!("{name}, after half a second")));
+        evidence.pictures.push(view::surface(
+            rest.surface(),
+            &x,
+            V::y(),
+            format!("{name}, after half a second"),
+        ));
     }
     evidence.charts.extend([energies, iterations]);
     Ok(evidence)
@@ -243,7 +248,7 @@ fn incompressible(setting: &Setting) -> Result<Evidence, Trouble> {
         evidence.tell(format!("the same without remedy, {name}"), off(&plain), "off");
         evidence.tell(format!("iterations to equilibrium, {name}"), f64::from(end.iterations), "");
         evidence.pictures.push(view::surface(
-            remedied.cut_mesh(),
+            remedied.surface(),
             remedied.positions(),
             V::z(),
             format!("{name} in equilibrium"),

@@ -48,7 +48,7 @@ pub fn nodes(mesh: &TetMesh, chosen: impl Fn(&V) -> bool) -> Vec<u32> {
 
 /// Clamps the nodes at x = 0.
 pub fn clamp_left(body: &mut Body) -> Result<Vec<u32>, Trouble> {
-    let clamp = nodes(body.cut_mesh().mesh(), |X| X.x == 0.0);
+    let clamp = nodes(body.mesh(), |X| X.x == 0.0);
     body.fix(&clamp, [true; 3], V::zeros())?;
     Ok(clamp)
 }
