@@ -29,7 +29,8 @@ pub mod solver;
 pub mod integrator;
 pub mod estimate;
 pub mod body;
+mod disjoint;
 mod numbering;
-mod room;
+mod reserve;
 #[cfg(test)]
 mod testing;

@@ -1,6 +1,6 @@
 //! Where the members of a short list are, out of very many numbered things.
 
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 
 /// The place of things in a list. It is never cleared: a place counts if the list has the thing there.
 #[derive(Clone, Debug, Default)]
@@ -10,9 +10,9 @@ pub struct Numbering {
 
 impl Numbering {
     /// Room for things with numbers below `n`, and half as many again.
-    pub fn with_room(n: usize) -> Self {
+    pub fn with_capacity(n: usize) -> Self {
         let mut place = Vec::new();
-        resize_with_room(&mut place, n, 0);
+        resize_reserving(&mut place, n, 0);
         Self { place }
     }
 
@@ -20,7 +20,7 @@ impl Numbering {
     pub fn note(&mut self, list: &[u32], first: usize) {
         for (place, &thing) in (first as u32..).zip(&list[first..]) {
             if thing as usize >= self.place.len() {
-                resize_with_room(&mut self.place, thing as usize + 1, 0);
+                resize_reserving(&mut self.place, thing as usize + 1, 0);
             }
             self.place[thing as usize] = place;
         }

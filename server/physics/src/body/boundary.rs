@@ -6,7 +6,7 @@ use super::shape::Shape;
 use super::{Body, BodyError, Path};
 use crate::cut::CutMesh;
 use crate::operator::FixedCopy;
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;
 
@@ -135,14 +135,14 @@ impl Boundary {
     /// Totals are kept.
     pub fn node_loads(&self, mesh: &CutMesh, n: usize, load: &mut Vec<Vector3<f64>>) {
         load.clear();
-        resize_with_room(load, n, Vector3::zeros());
+        resize_reserving(load, n, Vector3::zeros());
         self.add_loads(mesh, load);
     }
 
     /// The same after a cut, where `load` was told before it: point forces are on the copies they were on.
     pub fn loads_of_new_copies(&self, mesh: &CutMesh, load: &mut Vec<Vector3<f64>>) {
         if self.spread_force.is_empty() {
-            resize_with_room(load, mesh.n_copies(), Vector3::zeros());
+            resize_reserving(load, mesh.n_copies(), Vector3::zeros());
         } else {
             self.node_loads(mesh, mesh.n_copies(), load);
         }

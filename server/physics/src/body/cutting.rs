@@ -8,7 +8,7 @@ use crate::cut::{
     BladeSweep, CutError, CutLimits, CutReport, NewCopy, Piece, SweepUnderWay, Work, swept_area,
 };
 use crate::integrator::LooseParts;
-use crate::room::{refill, resize_with_room};
+use crate::reserve::{refill, resize_reserving};
 
 /// What comparing one triangle of a sweep with one element costs when a body is cut along its faces, as a
 /// part of a fragment looked at.
@@ -150,15 +150,15 @@ impl Body {
 
     fn inherit(&mut self, report: &CutReport) {
         let n = self.cut_mesh.n_copies();
-        resize_with_room(&mut self.state.x, n, Vector3::zeros());
-        resize_with_room(&mut self.state.v, n, Vector3::zeros());
+        resize_reserving(&mut self.state.x, n, Vector3::zeros());
+        resize_reserving(&mut self.state.v, n, Vector3::zeros());
         for new in &report.new_copies {
             let (copy, parent) = (new.copy as usize, new.parent as usize);
             self.state.x[copy] = self.state.x[parent];
             self.state.v[copy] = self.state.v[parent];
         }
         let known = self.split_from.len();
-        resize_with_room(&mut self.split_from, n, 0);
+        resize_reserving(&mut self.split_from, n, 0);
         for (from, new) in self.split_from[known..].iter_mut().zip(&report.new_copies) {
             *from = new.parent;
         }
@@ -182,14 +182,14 @@ impl Body {
     /// `new`: what belongs to copies that were there stays where it is.
     fn follow_new_copies(&mut self, new: &[NewCopy]) {
         let known = self.rest.len();
-        resize_with_room(&mut self.rest, self.cut_mesh.n_copies(), Vector3::zeros());
+        resize_reserving(&mut self.rest, self.cut_mesh.n_copies(), Vector3::zeros());
         for (rest, new) in self.rest[known..].iter_mut().zip(new) {
             *rest = self.cut_mesh.mesh().nodes[self.cut_mesh.copy_node()[new.copy as usize] as usize];
         }
         self.follow_masses();
         self.find_fixed();
         self.boundary.loads_of_new_copies(&self.cut_mesh, &mut self.load);
-        self.reunion.follow(&mut self.parts, &self.cut_mesh, new, &self.mass, &self.fixed);
+        self.connectivity.follow(&mut self.parts, &self.cut_mesh, new, &self.mass, &self.fixed);
         self.follow_parts();
     }
 

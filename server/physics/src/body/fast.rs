@@ -7,7 +7,7 @@ use crate::cut::CutMesh;
 use crate::element::{Simd, deformation_gradient, piece_energy};
 use crate::integrator::{ImplicitEuler, LooseParts, Notice, SpinGuard, State, StepInputs, StepOutcome};
 use crate::operator::{Elastic, FixedCopy, StiffModes, degenerate_elements};
-use crate::room::{refill, resize_with_room};
+use crate::reserve::{refill, resize_reserving};
 use crate::team::Team;
 
 /// A step that fails is tried again in 2 and then in 4 parts.
@@ -97,8 +97,8 @@ impl Fast {
         self.integrator.resize(mesh.n_copies());
         self.integrator.set_stiff_modes(self.stiff_modes(mesh));
         // A step fills them; it must not have to make room.
-        resize_with_room(&mut self.before.x, mesh.n_copies(), Vector3::zeros());
-        resize_with_room(&mut self.before.v, mesh.n_copies(), Vector3::zeros());
+        resize_reserving(&mut self.before.x, mesh.n_copies(), Vector3::zeros());
+        resize_reserving(&mut self.before.v, mesh.n_copies(), Vector3::zeros());
     }
 
     /// Everything that is derived from the parts of a body with these rest positions [m] and masses [kg].

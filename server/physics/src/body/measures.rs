@@ -135,7 +135,7 @@ impl Body {
 
     /// Estimate of the discretisation error; only of linear tetrahedra, cut or not.
     pub fn mesh_error(&self, recovery: &mut StressRecovery) -> Option<MeshError> {
-        let tets = CutTets::new(self);
+        let tets = CutTets::new(self.mesh(), self.pieces(), self.n_copies());
         let (law, lame) = (self.material.law, self.material.lame());
         matches!(self.shape, Shape::Tet4).then(|| recovery.estimate(&tets, &self.state.x, law, lame))
     }

@@ -2,6 +2,7 @@
 
 mod ablation;
 mod boundary;
+mod cost;
 mod cutting;
 mod error;
 mod fast;
@@ -35,13 +36,13 @@ use nalgebra::Vector3;
 pub use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::element::Simd;
-use crate::integrator::{DynamicsInputs, LooseParts, Reunion, State, StepInputs};
+use crate::integrator::{DynamicsInputs, LocalConnectivity, LooseParts, State, StepInputs};
 pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
 use crate::material::{Material, Rayleigh};
 use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
-use crate::room::{refill, resize_with_room};
+use crate::reserve::{refill, resize_reserving};
 use crate::skin::{Skin, SkinSettings, SkinShape};
 use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};
@@ -150,7 +151,7 @@ pub struct Body {
     /// The copy that every copy was split from, itself where it was there from the start.
     split_from: Vec<u32>,
     parts: LooseParts,
-    reunion: Reunion,
+    connectivity: LocalConnectivity,
     range: Range,
     path: Path,
     team: Team,
@@ -238,7 +239,7 @@ impl Body {
             mass: Vec::new(),
             split_from: Vec::new(),
             parts: LooseParts::default(),
-            reunion: Reunion::with_room(cut_mesh.n_copies()),
+            connectivity: LocalConnectivity::with_capacity(cut_mesh.n_copies()),
             range: Range::default(),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
@@ -519,7 +520,7 @@ impl Body {
         refill(&mut self.split_from, 0..self.cut_mesh.n_copies() as u32);
         refill(&mut self.state.x, self.rest.iter().copied());
         self.state.v.fill(Vector3::zeros());
-        resize_with_room(&mut self.state.v, self.rest.len(), Vector3::zeros());
+        resize_reserving(&mut self.state.v, self.rest.len(), Vector3::zeros());
         self.spring_forces.clear();
     }
 }

@@ -1,10 +1,10 @@
 //! How a body is discretised and solved, and which combinations the fast path can take.
 
-use super::{Ablation, BodyError, CuttingMethod, LooseRule};
+use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
 use crate::assembly::{ElementKind, Volumetric};
 use crate::integrator::{MassKind, Scheme};
 use crate::material::Law;
-use crate::operator::{OperatorChoice, cost};
+use crate::operator::OperatorChoice;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// How a body is solved.

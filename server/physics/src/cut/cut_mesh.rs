@@ -5,26 +5,26 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::mesh::{MeshError, TetMesh};
-use crate::room::leave_room;
+use crate::reserve::reserve_half_again;
 
-use super::blade::{BladeSweep, CutError, CutLimits, CutReport, Work};
-use super::components::Components;
-use super::copies::CopyTable;
-use super::crossings::Crossings;
-use super::detect::{Deformed, Detector, Place, Record};
-use super::fragments::Fragments;
-use super::front::{Front, Surroundings, sweep_triangles};
-use super::incision_sets::IncisionSets;
-use super::locate::piece_at;
-use super::marks::Ascending;
-use super::pending::{Pending, PendingFace, Pieces};
-use super::pieces::{Piece, PieceTable};
-use super::runs::Runs;
-use super::separate::{Separator, Sheet};
-use super::surface::Surface;
-use super::surface_builder::{Change, Material, SurfaceBuilder};
-use super::sweep_triangle::SweepTriangle;
-use super::traces::{TraceLine, Traces};
+use super::drawn::pending::{Pending, PendingFace, Pieces};
+use super::drawn::traces::{TraceLine, Traces};
+use super::shell::surface::Surface;
+use super::shell::surface_builder::{Change, Material, SurfaceBuilder};
+use super::sweep::bit_marks::Ascending;
+use super::sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, Work};
+use super::sweep::detect::{Deformed, Detector, Place, Record};
+use super::sweep::front::{Front, Surroundings, sweep_triangles};
+use super::sweep::separate::{Separator, Sheet};
+use super::sweep::sweep_triangle::SweepTriangle;
+use super::topology::components::Components;
+use super::topology::copies::CopyTable;
+use super::topology::crossings::Crossings;
+use super::topology::fragments::Fragments;
+use super::topology::incision_sets::IncisionSets;
+use super::topology::locate::piece_at;
+use super::topology::pieces::{Piece, PieceTable};
+use super::topology::runs::Runs;
 
 /// What a fragment costs to separate and to follow with pieces, copies and surface, in fragments looked at.
 const SEPARATION: usize = 20;
@@ -97,12 +97,12 @@ impl CutMesh {
             copies.update(&mesh, node, &fragments, &mut pieces, &mut new_copies);
         }
         copies.changed.clear();
-        copies.leave_room(mesh.tets.len());
+        copies.reserve_half_again(mesh.tets.len());
         let (builder, mut surface) =
             SurfaceBuilder::build(&Material { mesh: &mesh, fragments: &fragments, pieces: &pieces });
-        leave_room(&mut surface.vertices);
-        leave_room(&mut surface.triangles);
-        leave_room(&mut surface.tags);
+        reserve_half_again(&mut surface.vertices);
+        reserve_half_again(&mut surface.triangles);
+        reserve_half_again(&mut surface.tags);
         let (n_nodes, n_elements) = (mesh.nodes.len(), mesh.tets.len());
         Ok(Self {
             runs: Runs::new(&mesh),
@@ -113,12 +113,12 @@ impl CutMesh {
             surface,
             builder,
             sets: IncisionSets::default(),
-            crossings: Crossings::with_room(n_nodes),
+            crossings: Crossings::with_capacity(n_nodes),
             pending: Pending::default(),
             fronts: BTreeMap::new(),
             traces: Traces::default(),
-            detector: Detector::with_room(n_nodes, n_elements),
-            separator: Separator::with_room(n_elements),
+            detector: Detector::with_capacity(n_nodes, n_elements),
+            separator: Separator::with_capacity(n_elements),
             order: Ascending::default(),
             epoch,
             inexact: false,

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::cut_mesh::CutMesh;
-use super::surface::Surface;
+use super::shell::surface::Surface;
+use crate::disjoint::{find, join};
 
 /// What is wrong with cut states: counts that must be zero, errors that must be rounding.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -88,20 +89,9 @@ impl Surface {
 fn parts_by_copies(mesh: &CutMesh) -> usize {
     let mut root: Vec<u32> = (0..mesh.n_copies() as u32).collect();
     for piece in mesh.pieces() {
-        piece.copies[1..].iter().for_each(|&copy| join(&mut root, piece.copies[0], copy));
+        for &copy in &piece.copies[1..] {
+            join(&mut root, piece.copies[0], copy);
+        }
     }
     (0..root.len() as u32).filter(|&c| find(&mut root, c) == c).count()
-}
-
-fn find(root: &mut [u32], mut a: u32) -> u32 {
-    while root[a as usize] != a {
-        root[a as usize] = root[root[a as usize] as usize];
-        a = root[a as usize];
-    }
-    a
-}
-
-fn join(root: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (find(root, a), find(root, b));
-    root[a.max(b) as usize] = a.min(b);
 }

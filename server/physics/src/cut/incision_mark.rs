@@ -1,12 +1,12 @@
 //! What a blade has drawn on the surface without taking the material apart: where it entered elements
-//! that it has not left yet, or only scratched. Shown as lines, its [`traces`](super::traces) follow the
+//! that it has not left yet, or only scratched. Shown as lines, its [`traces`](super::drawn::traces) follow the
 //! blade at once, while the cut lags by at most one element.
 
 use nalgebra::Vector3;
 
 use super::cut_mesh::CutMesh;
-use super::surface::{SurfaceVertex, bind};
-use super::traces::TraceLine;
+use super::drawn::traces::TraceLine;
+use super::shell::surface::{SurfaceVertex, bind};
 
 /// A point on the surface: Σ weights · vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::cut_mesh::CutMesh;
-use super::surface::{SurfaceVertex, bind};
+use super::shell::surface::{SurfaceVertex, bind};
 
 /// Tetrahedra without overlap; their volumes add up to that of the body, in every configuration.
 #[derive(Clone, Debug, Default, PartialEq)]

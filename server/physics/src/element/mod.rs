@@ -16,4 +16,4 @@ pub use lanes::{Ids, LANES, Lanes, Simd, Vector8};
 pub use polar::polar_rotation;
 pub use polar_lanes::{Mat3, polar_newton};
 pub use spring::Spring;
-pub use tet4::{deformation_gradient, piece_energy, piece_forces};
+pub use tet4::{TET_EDGES, deformation_gradient, piece_energy, piece_forces};

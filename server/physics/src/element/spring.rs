@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::assembly::Tangent;
+use crate::material::Tangent;
 
 /// Below this fraction of the rest length a spring has no direction.
 const NO_DIRECTION: f64 = 1e-12;

@@ -11,8 +11,8 @@
 
 use nalgebra::Vector3;
 
+use super::TET_EDGES;
 use super::quadrature::tet_degree_5;
-use crate::mesh::TET_EDGES;
 
 /// Share of the lumped (HRZ) mass that each corner gets.
 pub const HRZ_CORNER: f64 = 1.0 / 36.0;

@@ -5,6 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::material::{Lame, Law};
 
+/// The six edges of a tetrahedron as pairs of local node numbers.
+pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
 /// F = Σ_a x_a ⊗ g_a [1], with current corners `x` [m] and rest gradients `g` [1/m].
 pub fn deformation_gradient(x: &[Vector3<f64>; 4], g: &[Vector3<f64>; 4]) -> Matrix3<f64> {
     (1..4).fold(Matrix3::zeros(), |F, a| F + (x[a] - x[0]) * g[a].transpose())

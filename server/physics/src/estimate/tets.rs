@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use crate::assembly::{ElementKind, Model};
-use crate::body::Body;
 use crate::cut::Piece;
 use crate::mesh::TetMesh;
 
@@ -26,9 +25,9 @@ pub struct CutTets<'a> {
 }
 
 impl<'a> CutTets<'a> {
-    /// The pieces of a body of linear tetrahedra, as it is cut now.
-    pub fn new(body: &'a Body) -> Self {
-        Self { mesh: body.mesh(), pieces: body.pieces(), n_copies: body.n_copies() }
+    /// The `pieces` of linear tetrahedra that a body with this rest mesh and so many copies consists of.
+    pub fn new(mesh: &'a TetMesh, pieces: &'a [Piece], n_copies: usize) -> Self {
+        Self { mesh, pieces, n_copies }
     }
 }
 

@@ -19,7 +19,7 @@ use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded,
     Spring, StiffModes, Substitution, Sum, SystemOperator, block_of, filter, invert, padded,
 };
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 use crate::solver::{Pcg, PcgReport, PcgSettings, StopReason};
 use crate::team::{Team, blocks};
 
@@ -126,11 +126,11 @@ impl ImplicitEuler {
 
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
-        resize_with_room(&mut self.predicted, n, Vector3::zeros());
+        resize_reserving(&mut self.predicted, n, Vector3::zeros());
         for v in [&mut self.f_int, &mut self.damping, &mut self.scratch, &mut self.delta] {
-            resize_with_room(v, n, [0.0; 4]);
+            resize_reserving(v, n, [0.0; 4]);
         }
-        resize_with_room(&mut self.diagonal, n, [0.0; 8]);
+        resize_reserving(&mut self.diagonal, n, [0.0; 8]);
         self.partial.resize(n.div_ceil(BLOCK), 0.0);
         self.made_for = None;
         self.sprung.clear();

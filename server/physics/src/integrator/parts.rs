@@ -7,10 +7,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::reunion::find;
 use crate::cut::Piece;
+use crate::disjoint::{find, join};
 use crate::operator::FixedCopy;
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 
 /// Connected parts of a body, by copy.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,15 +39,12 @@ impl LooseParts {
             if group.iter().all(|&copy| root[copy as usize] == first) {
                 continue;
             }
-            let a = find(&mut root, group[0]);
             for &copy in &group[1..] {
-                let b = find(&mut root, copy);
-                let a = find(&mut root, a);
-                root[a.max(b) as usize] = a.min(b);
+                join(&mut root, group[0], copy);
             }
         }
         let mut parts = Self::default();
-        resize_with_room(&mut parts.of_copy, n, 0);
+        resize_reserving(&mut parts.of_copy, n, 0);
         let mut n_parts = 0;
         for copy in 0..n {
             let r = find(&mut root, copy as u32) as usize;

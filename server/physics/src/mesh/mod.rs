@@ -25,8 +25,7 @@ use nalgebra::Vector3;
 /// about 1e-15.
 pub const DEGENERATE_VOLUME: f64 = 1e-12;
 
-/// The six edges of a tetrahedron as pairs of local node numbers.
-pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+pub use crate::element::TET_EDGES;
 
 /// Face `a` lies opposite local node `a`; counter-clockwise from outside for a positive tet.
 pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];

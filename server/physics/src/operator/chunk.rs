@@ -3,15 +3,15 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::carriers::Merged;
 use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
 use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
+use super::shared_lanes::Merged;
 use super::{Padded, padded};
 use crate::element::{LANES, Simd};
 use crate::mesh::TetMesh;
 use crate::numbering::Numbering;
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 
 #[derive(Clone, Debug)]
 pub struct Chunk {
@@ -67,8 +67,8 @@ impl Chunk {
         }
         let n = plan.copies.len() + 1;
         let (mut x, mut positions) = (Vec::new(), Vec::new());
-        resize_with_room(&mut x, n, [0.0; 4]);
-        resize_with_room(&mut positions, n, [0.0; 4]);
+        resize_reserving(&mut x, n, [0.0; 4]);
+        resize_reserving(&mut positions, n, [0.0; 4]);
         Self {
             region,
             batches: Batches::new(&plan.nodes, rest, n),

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::BLOCK;
 use crate::element::{Ids, LANES};
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
 /// body of a few thousand pieces still has work for several threads.
@@ -199,7 +199,7 @@ impl Gather {
 
     /// Adds copies to chunks: number of the chunk, its copies, and the first that it did not have.
     pub fn append<'a>(&mut self, chunks: impl Iterator<Item = (usize, &'a [u32], usize)>, n_copies: usize) {
-        resize_with_room(&mut self.pairs, n_copies, [0; 2]);
+        resize_reserving(&mut self.pairs, n_copies, [0; 2]);
         for (chunk, copies, known) in chunks {
             let first = self.first_row[chunk];
             for (row, &copy) in (first..).zip(copies).skip(known) {

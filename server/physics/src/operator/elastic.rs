@@ -2,18 +2,18 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::carriers::{Carriers, LaneChanges};
 use super::chunk::{Chunk, NewLane};
 use super::chunks::{Gather, NO_PIECE, region_of_elements};
 use super::kernel::{Block6, Coefficients};
 use super::rows::{Sum, gather_direction};
+use super::shared_lanes::{LaneChanges, SharedLanes};
 use super::{BLOCK, LinearOperator, Padded};
 use crate::cut::Piece;
 use crate::element::Simd;
 use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
 use crate::numbering::Numbering;
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks, ranges};
 
 /// Most lanes of one chunk: four copies each must leave room in 16-bit local numbers.
@@ -37,7 +37,7 @@ pub enum OperatorChoice {
 pub struct Elastic {
     simd: Simd,
     /// Which pieces have a lane, and what it integrates.
-    carriers: Carriers,
+    shared_lanes: SharedLanes,
     /// Region of every element; cuts do not change it.
     region_of_element: Vec<u32>,
     n_regions: usize,
@@ -85,7 +85,7 @@ impl Elastic {
         let (region_of_element, n_regions) = region_of_elements(&centres);
         let mut elastic = Self {
             simd,
-            carriers: Carriers::new(mesh.tets.len(), pieces),
+            shared_lanes: SharedLanes::new(mesh.tets.len(), pieces),
             region_of_element,
             n_regions,
             chunks: Vec::new(),
@@ -95,12 +95,12 @@ impl Elastic {
             choice: OperatorChoice::Auto,
             made_with: None,
             version: 0,
-            numbering: Numbering::with_room(pieces.len()),
+            numbering: Numbering::with_capacity(pieces.len()),
             marks: Marks::default(),
         };
         elastic.marks.put_on(&LaneChanges::default(), pieces.len());
         let mut members = vec![Some(Vec::new()); n_regions];
-        for (p, merged) in (0u32..).zip(elastic.carriers.merged()).filter(|(_, m)| m.count > 0) {
+        for (p, merged) in (0u32..).zip(elastic.shared_lanes.merged()).filter(|(_, m)| m.count > 0) {
             let region = elastic.region_of_element[merged.piece.element as usize] as usize;
             members[region]
                 .iter_mut()
@@ -116,7 +116,7 @@ impl Elastic {
     /// material before. Chunks without changes stay as they are, the others are amended, and arranged
     /// anew once they have grown by a quarter.
     pub fn follow(&mut self, mesh: &TetMesh, pieces: &[Piece], changed: &[u32], n_copies: usize) {
-        let changes = self.carriers.follow(pieces, changed);
+        let changes = self.shared_lanes.follow(pieces, changed);
         let region_of = |p: u32| self.region_of_element[pieces[p as usize].element as usize] as usize;
         let mut affected = vec![false; self.n_regions];
         changes.amended.iter().for_each(|&p| affected[region_of(p)] = true);
@@ -134,7 +134,7 @@ impl Elastic {
         }
         // Chunks that got copies and how many they had; what goes to regions that are arranged anew.
         let (mut grown, mut outgrown) = (Vec::new(), vec![None; self.n_regions]);
-        let merged = self.carriers.merged();
+        let merged = self.shared_lanes.merged();
         for (k, chunk) in self.chunks.iter_mut().enumerate().rev().filter(|(_, c)| affected[c.region]) {
             // New lanes go to the last chunk of their region.
             let added = std::mem::take(&mut added[chunk.region]);
@@ -166,7 +166,7 @@ impl Elastic {
     /// Divides the carriers `members` of regions into chunks, in place of those there were.
     fn plan(&mut self, mesh: &TetMesh, members: Vec<Option<Vec<NewLane>>>) {
         self.chunks.retain(|chunk| members[chunk.region].is_none());
-        let merged = self.carriers.merged();
+        let merged = self.shared_lanes.merged();
         for (region, members) in members.into_iter().enumerate() {
             let Some(mut members) = members else { continue };
             members.sort_unstable_by_key(|lane| lane.piece);
@@ -352,7 +352,7 @@ impl Elastic {
     /// Rotation of every piece at the last update.
     pub fn rotations(&self) -> Vec<Matrix3<f32>> {
         let of_lane = self.lane_rotations();
-        self.carriers.of_piece().iter().map(|&carrier| of_lane[carrier as usize]).collect()
+        self.shared_lanes.of_piece().iter().map(|&carrier| of_lane[carrier as usize]).collect()
     }
 
     /// Rotation of every piece that has a lane.
@@ -375,7 +375,7 @@ impl Elastic {
             }
         }
         // A carrier comes before what its lane integrates with it.
-        for (p, &carrier) in self.carriers.of_piece().iter().enumerate() {
+        for (p, &carrier) in self.shared_lanes.of_piece().iter().enumerate() {
             places[p] = places[carrier as usize];
         }
         places
@@ -389,7 +389,7 @@ impl Elastic {
 
     /// Number of pieces.
     pub fn n_pieces(&self) -> usize {
-        self.carriers.of_piece().len()
+        self.shared_lanes.of_piece().len()
     }
 
     /// Number of lanes that are computed with: pieces of one element with the same copies share one.
@@ -409,8 +409,8 @@ struct Marks {
 
 impl Marks {
     fn put_on(&mut self, changes: &LaneChanges, n_pieces: usize) {
-        resize_with_room(&mut self.amended, n_pieces, false);
-        resize_with_room(&mut self.source, n_pieces, false);
+        resize_reserving(&mut self.amended, n_pieces, false);
+        resize_reserving(&mut self.source, n_pieces, false);
         self.set(changes, true);
     }
 

@@ -11,7 +11,7 @@
 use nalgebra::Matrix3;
 
 use super::Padded;
-use super::carriers::Merged;
+use super::shared_lanes::Merged;
 use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
 use crate::mesh::TetMesh;
 

@@ -1,10 +1,9 @@
 //! Linear operators on the copies of a body: K̂ matrix-free, and the system matrix of a step.
 
-mod carriers;
+mod shared_lanes;
 mod chunk;
 mod chunks;
 mod composite_diagonal;
-pub mod cost;
 mod elastic;
 mod kernel;
 mod edges;

@@ -2,7 +2,7 @@
 //! they are not stiff.
 
 use super::{BLOCK, Block6, FixedCopy, Padded, Substitution};
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// Block-Jacobi preconditioner M⁻¹: one symmetric positive definite 3×3 matrix per copy.
@@ -42,7 +42,7 @@ impl Inverse3 {
 impl BlockJacobi {
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
-        resize_with_room(&mut self.inverse, n, Inverse3::default());
+        resize_reserving(&mut self.inverse, n, Inverse3::default());
     }
 
     /// Changes the variables that the blocks belong to; who writes the inverses writes those of TᵀA T.

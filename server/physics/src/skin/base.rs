@@ -1,6 +1,6 @@
 //! The boundary of the uncut mesh: faces, and the edges and corners they share through the solid.
 
-use crate::cut::fragments::{Fragments, NONE};
+use crate::cut::topology::fragments::{Fragments, NONE};
 use crate::mesh::{TET_FACES, TetMesh};
 
 /// One boundary face of the uncut mesh.

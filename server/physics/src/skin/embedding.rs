@@ -6,7 +6,7 @@ use super::base::Base;
 use super::incision_mark::lift;
 use super::misfit::Misfit;
 use super::sheet::{Sheet, SkinShape};
-use super::stitch::{Change, Cloth, Seams};
+use super::stitch::{Change, SkinJoin, SkinSource};
 use crate::cut::{CutMesh, IncisionMark, Surface};
 
 /// Most parts of an edge.
@@ -72,7 +72,7 @@ pub struct Skin {
     /// As it was put on.
     uncut: Sheet,
     sheet: Sheet,
-    seams: Seams,
+    join: SkinJoin,
     surface: Surface,
     epoch: u32,
     misfit: Option<Misfit>,
@@ -106,7 +106,7 @@ impl Skin {
             base,
             uncut: sheet.clone(),
             sheet,
-            seams: Seams::default(),
+            join: SkinJoin::default(),
             surface: Surface::default(),
             epoch: cut.epoch(),
             misfit: None,
@@ -141,7 +141,7 @@ impl Skin {
 
     /// Forgets the surface and sews it from nothing.
     fn sew_anew(&mut self, cut: &CutMesh) {
-        self.seams = Seams::default();
+        self.join = SkinJoin::default();
         self.surface = Surface::default();
         let fragments: Vec<u32> = (0..cut.fragments.tets.len() as u32).collect();
         let pieces: Vec<u32> = (0..cut.pieces().len() as u32).collect();
@@ -151,8 +151,8 @@ impl Skin {
     fn sew(&mut self, cut: &CutMesh, change: Change) {
         if self.misfit.is_none() {
             let snapping = self.settings.snapping;
-            let mut cloth = Cloth { cut, base: &self.base, sheet: &mut self.sheet, snapping };
-            let sewn = self.seams.sew(&mut cloth, change, &mut self.surface);
+            let mut source = SkinSource { cut, base: &self.base, sheet: &mut self.sheet, snapping };
+            let sewn = self.join.sew(&mut source, change, &mut self.surface);
             self.misfit = match self.sheet.conflicts {
                 0 => sewn.err(),
                 _ => Some(Misfit::SharedEdge),
@@ -172,7 +172,7 @@ impl Skin {
     /// Numbers of triangles and vertices before doubled edges are divided, and of those edges.
     #[cfg(test)]
     pub fn sizes(&self) -> [usize; 3] {
-        self.seams.sizes()
+        self.join.sizes()
     }
 
     /// The same skin, sewn from nothing: what the surface has to be.
@@ -196,7 +196,7 @@ impl Skin {
         }
         let mut marks = Vec::new();
         for line in cut.trace_lines() {
-            lift(&self.base, &self.sheet, (&self.seams, &self.surface), cut, &line, &mut marks);
+            lift(&self.base, &self.sheet, (&self.join, &self.surface), cut, &line, &mut marks);
         }
         marks
     }
@@ -213,7 +213,7 @@ impl Skin {
 
     /// Skin triangles that the last cut made anew; the others stayed as they were.
     pub fn renewed(&self) -> usize {
-        self.seams.renewed()
+        self.join.renewed()
     }
 
     /// Resolution and way of cutting.

@@ -10,8 +10,8 @@
 
 use super::base::Base;
 use super::sheet::Sheet;
-use super::stitch::Seams;
-use crate::cut::traces::{TraceLine, part_inside};
+use super::stitch::SkinJoin;
+use crate::cut::drawn::traces::{TraceLine, part_inside};
 use crate::cut::{CutMesh, IncisionMark, MarkPoint, Surface};
 
 /// Parts of a line shorter than this share of it are left out: they lie in a corner of a triangle.
@@ -21,7 +21,7 @@ const SHORT: f64 = 1e-6;
 pub fn lift(
     base: &Base,
     sheet: &Sheet,
-    (seams, surface): (&Seams, &Surface),
+    (join, surface): (&SkinJoin, &Surface),
     cut: &CutMesh,
     line: &TraceLine,
     out: &mut Vec<IncisionMark>,
@@ -36,7 +36,7 @@ pub fn lift(
     for &t in &sheet.over[f as usize] {
         let corners = sheet.corners[t as usize].map(|p| sheet.point_on(base, f, p));
         let Some(parts) = clip(&corners, &ends) else { continue };
-        let vertices = surface.triangles[seams.of_skin(t) as usize].map(|v| surface.vertices[v as usize]);
+        let vertices = surface.triangles[join.of_skin(t) as usize].map(|v| surface.vertices[v as usize]);
         let ends = parts.map(|weights| MarkPoint { vertices, weights });
         out.push(IncisionMark { incision: line.incision, ends });
     }

@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 
 use super::base::Base;
 use super::sheet::{Claim, Sheet};
-use crate::cut::fragments::{FragmentVertex, NONE};
+use crate::cut::topology::fragments::{FragmentVertex, NONE};
 
 /// Share of a triangle or an edge below which a point lies on its border.
 ///

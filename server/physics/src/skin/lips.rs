@@ -4,7 +4,7 @@ use super::base::Base;
 use super::misfit::Misfit;
 use super::sheet::Sheet;
 use crate::cut::CutMesh;
-use crate::cut::fragments::NONE;
+use crate::cut::topology::fragments::NONE;
 use crate::mesh::TET_FACES;
 
 /// Fragment and the vertex opposite: a face of the fragments.

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use robust::Coord3D;
 
 use super::base::Base;
-use crate::cut::fragments::{FragmentVertex, NONE};
+use crate::cut::topology::fragments::{FragmentVertex, NONE};
 
 /// Where a skin rests [m] over a point of the boundary [m] with its outward unit normal.
 pub type SkinShape<'a> = dyn FnMut(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;

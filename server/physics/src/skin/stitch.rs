@@ -13,12 +13,12 @@ use super::base::Base;
 use super::lips::{Corner, Face, Lip, fill, is_lip};
 use super::misfit::Misfit;
 use super::sheet::Sheet;
-use crate::cut::fragments::{FragmentVertex, NONE};
-use crate::cut::joined::{Joined, Place};
+use crate::cut::shell::joined::{Joined, Place};
+use crate::cut::topology::fragments::{FragmentVertex, NONE};
 use crate::cut::{CutMesh, Surface, SurfaceVertex};
 
 /// What is sewn.
-pub struct Cloth<'a> {
+pub struct SkinSource<'a> {
     /// The body.
     pub cut: &'a CutMesh,
     /// Boundary of the uncut body.
@@ -47,7 +47,7 @@ enum Owner {
 
 /// The surface and what it consists of.
 #[derive(Clone, Debug, Default)]
-pub struct Seams {
+pub struct SkinJoin {
     joined: Joined,
     parts: Parts,
     /// Surface triangles that nothing uses.
@@ -75,7 +75,7 @@ impl Parts {
     }
 }
 
-impl Seams {
+impl SkinJoin {
     /// Skin triangles that the last change made anew.
     pub fn renewed(&self) -> usize {
         self.renewed
@@ -93,18 +93,23 @@ impl Seams {
     }
 
     /// Brings `surface` up to date; where skin and lips do not fit, it is not usable.
-    pub fn sew(&mut self, cloth: &mut Cloth, change: Change, surface: &mut Surface) -> Result<(), Misfit> {
+    pub fn sew(
+        &mut self,
+        source: &mut SkinSource,
+        change: Change,
+        surface: &mut Surface,
+    ) -> Result<(), Misfit> {
         self.joined.begin(surface);
-        self.parts.on_face.resize(cloth.base.faces.len(), BTreeSet::new());
+        self.parts.on_face.resize(source.base.faces.len(), BTreeSet::new());
         let mut faces = BTreeSet::new();
-        let lips = self.cut_the_skin(cloth, change, &mut faces)?;
-        self.lay_skin(cloth, change, &mut faces, surface)?;
-        self.fill_lips(cloth, &lips, surface)?;
+        let lips = self.cut_the_skin(source, change, &mut faces)?;
+        self.lay_skin(source, change, &mut faces, surface)?;
+        self.fill_lips(source, &lips, surface)?;
         self.give_numbers_back(surface);
         if self.joined.is_open() {
             return Err(Misfit::OpenSeam);
         }
-        let mut placed = Placed { cut: cloth.cut, sheet: cloth.sheet, parts: &self.parts };
+        let mut placed = Placed { cut: source.cut, sheet: source.sheet, parts: &self.parts };
         self.joined.number(&mut placed, surface);
         for lip in lips.iter().filter_map(|lip| self.parts.lips.get(lip)) {
             placed.place_middle(lip, surface);
@@ -119,11 +124,11 @@ impl Seams {
     /// into the skin. Returns the new ones; `faces` receives the boundary faces that this concerns.
     fn cut_the_skin(
         &mut self,
-        cloth: &mut Cloth,
+        source: &mut SkinSource,
         change: Change,
         faces: &mut BTreeSet<u32>,
     ) -> Result<Vec<Face>, Misfit> {
-        let Cloth { cut, base, snapping, .. } = *cloth;
+        let SkinSource { cut, base, snapping, .. } = *source;
         let mut todo = self.lips_around(cut, change);
         let mut made: BTreeMap<Face, Lip> = BTreeMap::new();
         while !todo.is_empty() {
@@ -132,18 +137,18 @@ impl Seams {
             }
             let present: Vec<Face> = todo.iter().copied().filter(|&lip| is_lip(cut, lip)).collect();
             let new: Vec<Lip> =
-                present.iter().map(|&lip| Lip::new(base, cut, cloth.sheet, snapping, lip)).collect();
-            new.iter().for_each(|lip| lip.cut(base, cloth.sheet, snapping));
+                present.iter().map(|&lip| Lip::new(base, cut, source.sheet, snapping, lip)).collect();
+            new.iter().for_each(|lip| lip.cut(base, source.sheet, snapping));
             made.extend(present.into_iter().zip(new));
             // Where the skin was split, the borders of other lips have more edges now.
             todo = BTreeSet::new();
-            for f in std::mem::take(&mut cloth.sheet.split) {
+            for f in std::mem::take(&mut source.sheet.split) {
                 faces.insert(f);
                 todo.extend(&self.parts.on_face[f as usize]);
             }
         }
         for (&face, lip) in &mut made {
-            lip.find_chains(cloth.sheet)?;
+            lip.find_chains(source.sheet)?;
             for border in lip.borders.iter().flatten() {
                 faces.insert(border.face);
                 self.parts.on_face[border.face as usize].insert(face);
@@ -201,13 +206,13 @@ impl Seams {
     /// Skin triangles over all faces that this change concerns: pieces, neighbours.
     fn lay_skin(
         &mut self,
-        cloth: &Cloth,
+        source: &SkinSource,
         change: Change,
         faces: &mut BTreeSet<u32>,
         surface: &mut Surface,
     ) -> Result<(), Misfit> {
-        let Cloth { cut, base, .. } = *cloth;
-        let sheet = &*cloth.sheet;
+        let SkinSource { cut, base, .. } = *source;
+        let sheet = &*source.sheet;
         let of_fragments = change.fragments.iter().map(|&t| cut.fragments.element[t as usize]);
         let of_pieces = change.pieces.iter().map(|&p| cut.pieces()[p as usize].element);
         faces.extend(of_fragments.chain(of_pieces).flat_map(|e| base.faces_of(e)));
@@ -281,12 +286,12 @@ impl Seams {
     }
 
     /// Triangles of new lips, joined to each other, to the lips beside them and to the skin.
-    fn fill_lips(&mut self, cloth: &Cloth, lips: &[Face], surface: &mut Surface) -> Result<(), Misfit> {
-        let f = &cloth.cut.fragments;
+    fn fill_lips(&mut self, source: &SkinSource, lips: &[Face], surface: &mut Surface) -> Result<(), Misfit> {
+        let f = &source.cut.fragments;
         for &face in lips {
             let Some(mut lip) = self.parts.lips.remove(&face) else { continue };
             let (t, k) = (face.0 as usize, face.1 as usize);
-            let (ring, parts) = lip.ring(cloth.cut, cloth.sheet, face);
+            let (ring, parts) = lip.ring(source.cut, source.sheet, face);
             let (n, mut edges) = (ring.len(), BTreeMap::new());
             for corners in fill(n, parts) {
                 let s = self.new_triangle(Owner::Lip(face), surface);

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use super::base::Base;
 use super::insert::{ON, Target};
 use super::sheet::Sheet;
-use crate::cut::fragments::{FragmentVertex, NONE};
+use crate::cut::topology::fragments::{FragmentVertex, NONE};
 
 /// A way on from a point.
 enum Step {

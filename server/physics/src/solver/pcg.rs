@@ -6,7 +6,7 @@
 use super::algebraic_error::AlgebraicError;
 use super::report::StopReason;
 use crate::operator::{Advance, BLOCK, BlockJacobi, LinearOperator, Padded, Sum, block_of, rows};
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// When to stop.
@@ -47,7 +47,7 @@ impl Pcg {
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
         for v in [&mut self.r, &mut self.z, &mut self.p, &mut self.q] {
-            resize_with_room(v, n, [0.0; 4]);
+            resize_reserving(v, n, [0.0; 4]);
         }
         self.partial.resize(n.div_ceil(BLOCK), 0.0);
     }

@@ -1,7 +1,7 @@
 //! Random cuts: whatever the blade does, the state stays whole.
 
 use super::*;
-use crate::cut::fragments::MAX_FRAGMENTS_PER_ELEMENT;
+use crate::cut::topology::fragments::MAX_FRAGMENTS_PER_ELEMENT;
 
 #[test]
 fn twenty_random_planes_through_one_ring() {

@@ -6,12 +6,20 @@
 //! with the node's number: the *real* copy; the others are virtual.
 
 use crate::mesh::TetMesh;
-use crate::room::{empty_with_room, leave_room};
+use crate::reserve::{reserve_half_again, reserved};
 
-use super::blade::NewCopy;
 use super::fragments::{Fragments, NONE};
 use super::pieces::PieceTable;
 use super::slot::slot_of;
+
+/// A node copy made by a cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NewCopy {
+    /// Id of the new copy.
+    pub copy: u32,
+    /// The copy it was split from; position, velocity and warm start are inherited from it.
+    pub parent: u32,
+}
 
 /// The copies and the elements around every node.
 #[derive(Clone, Debug, Default)]
@@ -69,12 +77,12 @@ impl CopyTable {
     }
 
     /// Room for cuts through a body of so many elements.
-    pub fn leave_room(&mut self, n_elements: usize) {
+    pub fn reserve_half_again(&mut self, n_elements: usize) {
         self.visited.resize(n_elements, 0);
-        self.changed = empty_with_room(n_elements / 8, 0);
-        leave_room(&mut self.node);
-        leave_room(&mut self.volume);
-        leave_room(&mut self.visited);
+        self.changed = reserved(n_elements / 8, 0);
+        reserve_half_again(&mut self.node);
+        reserve_half_again(&mut self.volume);
+        reserve_half_again(&mut self.visited);
     }
 
     /// The copies of node `i` whose material contains the node itself, ascending: one, or more where a

@@ -3,6 +3,8 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use crate::cut::topology::copies::NewCopy;
+
 /// Most segments one [`BladeSweep`] may have; a longer path is sent in parts.
 pub const MAX_SEGMENTS: usize = 1024;
 
@@ -30,15 +32,6 @@ impl BladeSweep {
             None => Ok(()),
         }
     }
-}
-
-/// A node copy made by a cut.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NewCopy {
-    /// Id of the new copy.
-    pub copy: u32,
-    /// The copy it was split from; position, velocity and warm start are inherited from it.
-    pub parent: u32,
 }
 
 /// What a sweep did to the topology.

@@ -1,19 +1,19 @@
-//! Marks on numbered things: a set that is cleared at once, and a set that is read out in order.
+//! BitMarks on numbered things: a set that is cleared at once, and a set that is read out in order.
 
-use crate::room::empty_with_room;
+use crate::reserve::reserved;
 
 /// Up to eight kinds of marks on numbered things, one bit each, so that all marks of a body are near
 /// the core; taking them off costs what setting them did.
 #[derive(Clone, Debug, Default)]
-pub struct Marks {
+pub struct BitMarks {
     of: Vec<u8>,
     marked: Vec<u32>,
 }
 
-impl Marks {
+impl BitMarks {
     /// Room for marks on numbers below `n`, half as many again, and an eighth of them marked at a time.
-    pub fn with_room(n: usize) -> Self {
-        Self { of: empty_with_room(n + n / 2, 0), marked: empty_with_room(n / 8, 0) }
+    pub fn with_capacity(n: usize) -> Self {
+        Self { of: reserved(n + n / 2, 0), marked: reserved(n / 8, 0) }
     }
 
     /// Takes off all marks; the numbers are below `n` from now on.
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn marks_of_different_kinds_come_and_go_on_their_own() {
-        let mut marks = Marks::default();
+        let mut marks = BitMarks::default();
         marks.restart(2);
         assert!(marks.insert(1, 1) && !marks.insert(1, 1) && marks.insert(1, 4));
         marks.remove(1, 1);

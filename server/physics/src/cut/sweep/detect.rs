@@ -3,18 +3,18 @@
 use nalgebra::Vector3;
 
 use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
-use crate::room::{empty_with_room, resize_with_room};
+use crate::reserve::{reserved, resize_reserving};
 
+use super::bit_marks::{Ascending, BitMarks};
 use super::blade::Work;
-use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
-use super::fragments::{Fragments, NONE};
-use super::incision_sets::IncisionSets;
-use super::marks::{Ascending, Marks};
-use super::pieces::PieceTable;
-use super::runs::Runs;
-use super::slot::slot_of;
 use super::sweep_triangle::SweepTriangle;
-use super::traces::{Traces, line_across};
+use crate::cut::drawn::traces::{Traces, line_across};
+use crate::cut::topology::crossings::{Crossings, EdgeSet, SNAP, edge_key};
+use crate::cut::topology::fragments::{Fragments, NONE};
+use crate::cut::topology::incision_sets::IncisionSets;
+use crate::cut::topology::pieces::PieceTable;
+use crate::cut::topology::runs::Runs;
+use crate::cut::topology::slot::slot_of;
 
 /// The mark of fragments that are touched.
 const TOUCHED: u8 = 1;
@@ -69,7 +69,7 @@ pub struct Detector {
     node_beyond: Vec<u8>,
     /// Pieces of the candidates.
     near: Vec<u32>,
-    marks: Marks,
+    marks: BitMarks,
     order: Ascending,
     position: Vec<Vector3<f64>>,
     position_stamp: Vec<u32>,
@@ -123,22 +123,22 @@ impl Record<'_> {
 
 impl Detector {
     /// Room for an uncut body and for what cuts add.
-    pub fn with_room(n_nodes: usize, n_elements: usize) -> Self {
-        let mut detector = Self { marks: Marks::with_room(n_elements), ..Self::default() };
-        resize_with_room(&mut detector.beyond, n_nodes, 0);
-        resize_with_room(&mut detector.node_beyond, n_nodes, 0);
+    pub fn with_capacity(n_nodes: usize, n_elements: usize) -> Self {
+        let mut detector = Self { marks: BitMarks::with_capacity(n_elements), ..Self::default() };
+        resize_reserving(&mut detector.beyond, n_nodes, 0);
+        resize_reserving(&mut detector.node_beyond, n_nodes, 0);
         detector.make_room(n_nodes);
-        detector.candidates = empty_with_room(n_elements / 16, (0, Vector3::zeros(), Vector3::zeros()));
-        detector.near = empty_with_room(n_elements / 16, 0);
-        detector.touched = empty_with_room(n_elements / 8, 0);
+        detector.candidates = reserved(n_elements / 16, (0, Vector3::zeros(), Vector3::zeros()));
+        detector.near = reserved(n_elements / 16, 0);
+        detector.touched = reserved(n_elements / 8, 0);
         detector
     }
 
     fn make_room(&mut self, n_vertices: usize) {
-        resize_with_room(&mut self.position, n_vertices, Vector3::zeros());
-        resize_with_room(&mut self.position_stamp, n_vertices, 0);
-        resize_with_room(&mut self.side, n_vertices, 0.0);
-        resize_with_room(&mut self.side_stamp, n_vertices, 0);
+        resize_reserving(&mut self.position, n_vertices, Vector3::zeros());
+        resize_reserving(&mut self.position_stamp, n_vertices, 0);
+        resize_reserving(&mut self.side, n_vertices, 0.0);
+        resize_reserving(&mut self.side_stamp, n_vertices, 0);
     }
 
     /// Copies of the candidate pieces whose box overlaps that of the blade segment.
@@ -331,7 +331,7 @@ impl Detector {
         }
     }
 
-    /// Marks faces that lie in the plane of the triangle where the sweep passes through them.
+    /// BitMarks faces that lie in the plane of the triangle where the sweep passes through them.
     fn test_flat_faces(
         &mut self,
         body: &Deformed,
@@ -350,7 +350,7 @@ impl Detector {
         }
     }
 
-    /// Marks a closed face if a triangle passes between the centres of the two fragments it joins.
+    /// BitMarks a closed face if a triangle passes between the centres of the two fragments it joins.
     fn test_face(
         &mut self,
         body: &Deformed,

@@ -1,7 +1,7 @@
 //! Material pieces: the face-connected components of the fragments of one element.
 
 use crate::mesh::TetMesh;
-use crate::room::leave_room;
+use crate::reserve::reserve_half_again;
 
 use super::fragments::{Fragments, NONE};
 use super::slot::slot_of;
@@ -57,11 +57,11 @@ impl PieceTable {
             members: Vec::new(),
             kept: Vec::new(),
         };
-        leave_room(&mut table.pieces);
-        leave_room(&mut table.node_volume);
-        leave_room(&mut table.first_fragment);
-        leave_room(&mut table.next_in_element);
-        leave_room(&mut table.label);
+        reserve_half_again(&mut table.pieces);
+        reserve_half_again(&mut table.node_volume);
+        reserve_half_again(&mut table.first_fragment);
+        reserve_half_again(&mut table.next_in_element);
+        reserve_half_again(&mut table.label);
         table
     }
 

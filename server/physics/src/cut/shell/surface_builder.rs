@@ -10,12 +10,12 @@
 //! changed fragments anew, and to walk the cycles that pass one of their corners.
 
 use crate::mesh::{TET_FACES, TetMesh};
-use crate::room::leave_room;
+use crate::reserve::reserve_half_again;
 
-use super::fragments::{FragmentVertex, Fragments, NONE};
 use super::joined::{Joined, Place};
-use super::pieces::PieceTable;
 use super::surface::{Surface, SurfaceVertex, bind};
+use crate::cut::topology::fragments::{FragmentVertex, Fragments, NONE};
+use crate::cut::topology::pieces::PieceTable;
 
 /// What the surface is made from.
 pub struct Material<'a> {
@@ -56,7 +56,7 @@ impl SurfaceBuilder {
         let (mut builder, mut surface) = (Self::default(), Surface::default());
         let all: Vec<u32> = (0..material.fragments.tets.len() as u32).collect();
         builder.update(material, &Change { fragments: &all, moved: &[], pieces: &[] }, &mut surface);
-        leave_room(&mut builder.face_at);
+        reserve_half_again(&mut builder.face_at);
         (builder, surface)
     }
 

@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 use robust::Coord3D;
 
-use super::traces::part_inside;
+use crate::cut::drawn::traces::part_inside;
 
 /// Relative error that distances from a plane are allowed before a box counts as on one side of it: four
 /// orders above that of double precision.

@@ -13,8 +13,8 @@ use nalgebra::Vector3;
 
 use crate::mesh::TET_FACES;
 
-use super::crossings::SNAP;
-use super::fragments::{FragmentVertex, Fragments};
+use crate::cut::topology::crossings::SNAP;
+use crate::cut::topology::fragments::{FragmentVertex, Fragments};
 
 /// Share of a face by which a line may be off the way of the blade: half of the finest skin triangle.
 const RESOLUTION: f64 = 1.0 / 64.0;

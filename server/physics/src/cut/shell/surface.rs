@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 
 use crate::mesh::TetMesh;
 
-use super::fragments::{FragmentVertex, NONE};
-use super::pieces::PieceTable;
-use super::slot::slot_of;
+use crate::cut::topology::fragments::{FragmentVertex, NONE};
+use crate::cut::topology::pieces::PieceTable;
+use crate::cut::topology::slot::slot_of;
 
 /// A surface point bound to the material: x = Σ weights · x\[copies\].
 #[derive(Clone, Copy, Debug, PartialEq)]

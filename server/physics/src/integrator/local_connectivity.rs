@@ -1,4 +1,4 @@
-//! Whether what a cut touched still hangs together close to the cut.
+//! Whether a body still hangs together after a cut, found out close to the cut.
 //!
 //! Most cuts are incisions: around their front the two lips are one. To see that, no more has to be
 //! looked at than what the cut changed, and then the parts of the body are those it had. Only where
@@ -6,13 +6,14 @@
 
 use super::parts::LooseParts;
 use crate::cut::{CutMesh, NewCopy};
+use crate::disjoint::{find, join};
 use crate::numbering::Numbering;
 use crate::operator::FixedCopy;
-use crate::room::resize_with_room;
+use crate::reserve::resize_reserving;
 
 /// Scratch of a look at what a cut changed.
 #[derive(Clone, Debug, Default)]
-pub struct Reunion {
+pub struct LocalConnectivity {
     numbering: Numbering,
     /// Copies on the changed pieces, and of what others were split from.
     copies: Vec<u32>,
@@ -20,10 +21,10 @@ pub struct Reunion {
     root: Vec<u32>,
 }
 
-impl Reunion {
+impl LocalConnectivity {
     /// Room for cuts through a body of so many copies.
-    pub fn with_room(n_copies: usize) -> Self {
-        Self { numbering: Numbering::with_room(n_copies), ..Self::default() }
+    pub fn with_capacity(n_copies: usize) -> Self {
+        Self { numbering: Numbering::with_capacity(n_copies), ..Self::default() }
     }
 
     /// Brings `parts` up to date after a cut, the last one of `mesh`, that made the copies `new`.
@@ -36,7 +37,7 @@ impl Reunion {
         mass: &[f64],
         fixed: &[FixedCopy],
     ) {
-        resize_with_room(&mut parts.of_copy, mass.len(), 0);
+        resize_reserving(&mut parts.of_copy, mass.len(), 0);
         for new in new {
             parts.of_copy[new.copy as usize] = parts.of_copy[new.parent as usize];
         }
@@ -81,22 +82,10 @@ impl Reunion {
                 self.numbering.find(&self.copies, copy).map_or(0, |at| at as u32)
             }
         });
-        let mut a = find(&mut self.root, first);
         for other in others {
-            let b = find(&mut self.root, other);
-            self.root[a.max(b) as usize] = a.min(b);
-            a = a.min(b);
+            join(&mut self.root, first, other);
         }
     }
-}
-
-/// The root of `a`; the way there becomes shorter.
-pub fn find(root: &mut [u32], mut a: u32) -> u32 {
-    while root[a as usize] != a {
-        root[a as usize] = root[root[a as usize] as usize];
-        a = root[a as usize];
-    }
-    a
 }
 
 #[cfg(test)]
@@ -116,7 +105,7 @@ mod tests {
         let hold = |&copy: &u32| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] };
         let fixed: Vec<FixedCopy> = held.iter().map(hold).collect();
         let mut parts = LooseParts::new(cut.pieces(), cut.copy_volume(), &fixed);
-        let mut reunion = Reunion::default();
+        let mut connectivity = LocalConnectivity::default();
         // Incisions and cuts right through, across elements and (the whole numbers) along their faces.
         let places = [(2.3, 3.1), (1.0, 2.5), (2.3, 4.5), (1.0, 4.5), (3.0, 4.5), (3.0, 1.5), (0.4, 4.5)];
         let mut sizes = Vec::new();
@@ -125,11 +114,11 @@ mod tests {
             let sweep = BladeSweep { segments: vec![at(-0.5), at(depth)] };
             let report = cut.sweep(&cut.rest_positions(), &sweep, incision).unwrap();
             let mass = cut.copy_volume();
-            reunion.follow(&mut parts, &cut, &report.new_copies, mass, &fixed);
+            connectivity.follow(&mut parts, &cut, &report.new_copies, mass, &fixed);
             assert_eq!(parts, LooseParts::new(cut.pieces(), mass, &fixed), "incision {incision}");
             sizes.push(parts.len());
             // What hangs together is seen close to the cut.
-            assert!(parts.len() > 1 || reunion.holds(&parts, &cut, &report.new_copies));
+            assert!(parts.len() > 1 || connectivity.holds(&parts, &cut, &report.new_copies));
         }
         assert_eq!(sizes, [1, 1, 2, 3, 4, 4, 5]);
     }

@@ -4,7 +4,7 @@
 //! the first crossing wins. The parameter is the same in the rest and in the deformed configuration,
 //! because the map is affine on a piece.
 
-use crate::room::leave_room;
+use crate::reserve::reserve_half_again;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
@@ -63,10 +63,10 @@ struct OfEdge {
 
 impl Crossings {
     /// Room for a cut through a body of so many nodes.
-    pub fn with_room(n_nodes: usize) -> Self {
+    pub fn with_capacity(n_nodes: usize) -> Self {
         let mut crossings = Self { at_vertex: vec![false; n_nodes], ..Self::default() };
         crossings.by_edge.reserve(n_nodes / 8);
-        leave_room(&mut crossings.at_vertex);
+        reserve_half_again(&mut crossings.at_vertex);
         crossings
     }
 

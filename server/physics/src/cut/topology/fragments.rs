@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use crate::mesh::{TET_FACES, TetMesh};
-use crate::room::leave_room;
+use crate::reserve::reserve_half_again;
 
 use super::incision_sets::IncisionSets;
 use super::slot::slot_of;
@@ -125,25 +125,25 @@ impl Fragments {
         };
         let every_corner: Vec<(u32, u8)> = (0..n as u32).flat_map(|t| (0..4).map(move |k| (t, k))).collect();
         fragments.split_stars(&every_corner, |_, _, _| {});
-        fragments.leave_room();
+        fragments.reserve_half_again();
         fragments
     }
 
     /// Room for a cut, so that the first one does not have to move everything.
-    fn leave_room(&mut self) {
-        leave_room(&mut self.vertices);
-        leave_room(&mut self.on);
-        leave_room(&mut self.tets);
-        leave_room(&mut self.element);
-        leave_room(&mut self.piece);
-        leave_room(&mut self.fraction);
-        leave_room(&mut self.neighbour);
-        leave_room(&mut self.tag);
-        leave_room(&mut self.along);
-        leave_room(&mut self.next_in_element);
-        leave_room(&mut self.next_in_piece);
-        leave_room(&mut self.visited);
-        leave_room(&mut self.claimed);
+    fn reserve_half_again(&mut self) {
+        reserve_half_again(&mut self.vertices);
+        reserve_half_again(&mut self.on);
+        reserve_half_again(&mut self.tets);
+        reserve_half_again(&mut self.element);
+        reserve_half_again(&mut self.piece);
+        reserve_half_again(&mut self.fraction);
+        reserve_half_again(&mut self.neighbour);
+        reserve_half_again(&mut self.tag);
+        reserve_half_again(&mut self.along);
+        reserve_half_again(&mut self.next_in_element);
+        reserve_half_again(&mut self.next_in_piece);
+        reserve_half_again(&mut self.visited);
+        reserve_half_again(&mut self.claimed);
     }
 
     /// Tags boundary faces of the uncut state by their mesh nodes in ascending order.

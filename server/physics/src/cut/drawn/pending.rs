@@ -7,11 +7,11 @@ use nalgebra::Vector3;
 
 use crate::mesh::{TET_EDGES, TetMesh};
 
-use super::crossings::Crossings;
-use super::fragments::{FragmentVertex, Fragments};
-use super::incision_sets::IncisionSets;
-use super::pieces::PieceTable;
-use super::surface::{SurfaceVertex, bind};
+use crate::cut::shell::surface::{SurfaceVertex, bind};
+use crate::cut::topology::crossings::Crossings;
+use crate::cut::topology::fragments::{FragmentVertex, Fragments};
+use crate::cut::topology::incision_sets::IncisionSets;
+use crate::cut::topology::pieces::PieceTable;
 
 /// Where an incision passes through one fragment that it has not left yet.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use crate::numbering::Numbering;
 
 /// Which piece's lane integrates which pieces.
 #[derive(Debug, Default)]
-pub struct Carriers {
+pub struct SharedLanes {
     /// For every piece its carrier: the first piece of its element with the same copies.
     of_piece: Vec<u32>,
     /// For every piece what its lane integrates, if it has one.
@@ -42,7 +42,7 @@ pub struct LaneChanges {
     pub added: Vec<[u32; 2]>,
 }
 
-impl Carriers {
+impl SharedLanes {
     /// The carriers among the `pieces` of so many elements.
     pub fn new(n_elements: usize, pieces: &[Piece]) -> Self {
         let mut carriers = Self { first_in_element: vec![NO_PIECE; n_elements], ..Self::default() };
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn pieces_with_the_same_copies_go_together_until_a_cut_separates_them() {
         let whole = [piece(0, 1.0, [0, 1, 2, 3]), piece(1, 1.0, [1, 2, 3, 4])];
-        let mut carriers = Carriers::new(2, &whole);
+        let mut carriers = SharedLanes::new(2, &whole);
         assert_eq!(carriers.of_piece(), [0, 1]);
         // A stab: three pieces of element 0, all with its nodes.
         let mut pieces = whole.to_vec();

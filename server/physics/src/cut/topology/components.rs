@@ -23,7 +23,7 @@ impl Components {
         self.volume.is_empty()
     }
 
-    pub(super) fn of(fragments: &Fragments, pieces: &PieceTable) -> Self {
+    pub(in crate::cut) fn of(fragments: &Fragments, pieces: &PieceTable) -> Self {
         let n = pieces.pieces.len();
         let mut parts = Self { of_piece: vec![NONE; n], volume: Vec::new() };
         let mut stack = Vec::new();

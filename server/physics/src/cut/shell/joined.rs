@@ -6,8 +6,8 @@
 //! vertex that loses its last corner makes room for the last one, as does a triangle.
 
 use super::doubled_edges::{DoubledEdges, next};
-use super::fragments::NONE;
 use super::surface::{Surface, SurfaceVertex};
+use crate::cut::topology::fragments::NONE;
 
 /// Says where vertices are; corners are 3·triangle + k.
 pub trait Place {

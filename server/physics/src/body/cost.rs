@@ -4,8 +4,8 @@
 //! differ in the last bits, so a choice by the clock would make the bits of a run depend on the load of
 //! the machine. Only their ratios matter, and these hardly differ between machines.
 
-use super::OperatorChoice;
 use crate::material::Law;
+use crate::operator::OperatorChoice;
 use crate::solver::PcgSettings;
 
 /// Up to so many pieces the stiffness stays in the caches from one application to the next.

@@ -4,7 +4,7 @@
 //! wait for each of them. So room is written to when it is made.
 
 /// Gives a vector `n` entries; where it has to move, to a place with room for half as many again.
-pub fn resize_with_room<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
+pub fn resize_reserving<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
     if n > v.capacity() {
         v.reserve_exact(n + n / 2 - v.len());
         v.resize(n + n / 2, value.clone());
@@ -19,14 +19,14 @@ pub fn refill<T: Clone>(v: &mut Vec<T>, mut entries: impl ExactSizeIterator<Item
         && let Some(first) = entries.next()
     {
         let n = entries.len() + 1;
-        resize_with_room(v, n, first);
+        resize_reserving(v, n, first);
         v.truncate(1);
     }
     v.extend(entries);
 }
 
 /// Room for half as many entries again.
-pub fn leave_room<T: Copy>(entries: &mut Vec<T>) {
+pub fn reserve_half_again<T: Copy>(entries: &mut Vec<T>) {
     let n = entries.len();
     if let Some(&last) = entries.last() {
         entries.reserve_exact(n / 2);
@@ -36,7 +36,7 @@ pub fn leave_room<T: Copy>(entries: &mut Vec<T>) {
 }
 
 /// An empty list with room for `n` entries.
-pub fn empty_with_room<T: Copy>(n: usize, entry: T) -> Vec<T> {
+pub fn reserved<T: Copy>(n: usize, entry: T) -> Vec<T> {
     let mut entries = Vec::new();
     entries.resize(n, entry);
     entries.clear();

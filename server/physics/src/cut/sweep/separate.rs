@@ -10,14 +10,14 @@
 use std::collections::VecDeque;
 
 use crate::mesh::{TET_EDGES, TET_FACES};
-use crate::room::empty_with_room;
+use crate::reserve::reserved;
 
-use super::crossings::{Crossings, EdgeSet, SNAP, edge_key};
-use super::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
-use super::incision_sets::IncisionSets;
-use super::marks::{Ascending, Marks};
-use super::pending::Pending;
-use super::traces::{Bisection, Traces};
+use super::bit_marks::{Ascending, BitMarks};
+use crate::cut::drawn::pending::Pending;
+use crate::cut::drawn::traces::{Bisection, Traces};
+use crate::cut::topology::crossings::{Crossings, EdgeSet, SNAP, edge_key};
+use crate::cut::topology::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
+use crate::cut::topology::incision_sets::IncisionSets;
 
 /// The mark of fragments that were touched or bisected.
 const ACTIVE: u8 = 1;
@@ -47,7 +47,7 @@ pub struct Separator {
     /// Fragments that were touched or bisected.
     active: Vec<u32>,
     /// What is known of the fragments.
-    marks: Marks,
+    marks: BitMarks,
     order: Ascending,
     wedge: Vec<u32>,
     halves: Vec<Halves>,
@@ -88,15 +88,15 @@ impl Sheet<'_> {
 
 impl Separator {
     /// Room for a cut through a body of so many elements.
-    pub fn with_room(n_elements: usize) -> Self {
+    pub fn with_capacity(n_elements: usize) -> Self {
         let n = n_elements / 8;
         Self {
-            elements: empty_with_room(n, 0),
-            changed: empty_with_room(n, 0),
-            active: empty_with_room(n, 0),
-            marks: Marks::with_room(n_elements),
-            corners: empty_with_room(2 * n, (0, 0)),
-            queue: empty_with_room(n, 0).into(),
+            elements: reserved(n, 0),
+            changed: reserved(n, 0),
+            active: reserved(n, 0),
+            marks: BitMarks::with_capacity(n_elements),
+            corners: reserved(2 * n, (0, 0)),
+            queue: reserved(n, 0).into(),
             ..Self::default()
         }
     }
