@@ -116,11 +116,11 @@ impl Body {
             self.inherit(report);
             match &mut self.path {
                 Path::Fast(fast) => {
-                    fast.follow_cut(&self.cut_mesh);
+                    fast.follow_cut(&self.cut_mesh, &report.new_copies);
                     self.follow_new_copies(&report.new_copies);
                 }
                 Path::General(_) => {
-                    self.rebuild_general()?;
+                    self.follow_general(&report.new_copies)?;
                     self.follow_topology();
                 }
             }
@@ -162,6 +162,17 @@ impl Body {
         for (from, new) in self.split_from[known..].iter_mut().zip(&report.new_copies) {
             *from = new.parent;
         }
+    }
+
+    /// The model of the pieces and copies after a cut that made the copies `new`; integrators go on.
+    fn follow_general(&mut self, new: &[NewCopy]) -> Result<(), BodyError> {
+        let general = General::new(&self.shape, &self.cut_mesh, &self.material, &self.settings)?;
+        if let Path::General(before) = std::mem::replace(&mut self.path, Path::General(Box::new(general)))
+            && let Path::General(general) = &mut self.path
+        {
+            general.dynamics.continue_from(before.dynamics, new);
+        }
+        Ok(())
     }
 
     /// The model of the present pieces and copies; integrators start afresh from the present state.

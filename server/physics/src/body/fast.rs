@@ -1,14 +1,18 @@
-//! The fast path: linear tetrahedra, matrix-free in single precision, one linear solve per step.
+//! The fast path: linear tetrahedra, matrix-free in single precision, one linear solve per step (two of
+//! Newmark's method).
 
 use nalgebra::Vector3;
 
 use super::{Outcome, SolveReport};
-use crate::cut::CutMesh;
+use crate::cut::{CutMesh, NewCopy};
 use crate::element::{Simd, deformation_gradient, piece_energy};
-use crate::integrator::{ImplicitEuler, LooseParts, Notice, SpinGuard, State, StepInputs, StepOutcome};
-use crate::operator::{Elastic, FixedCopy, StiffModes, degenerate_elements};
+use crate::integrator::{
+    LinearStep, LooseParts, Multistep, Notice, Scheme, SpinGuard, State, StepInputs, StepOutcome, WEIGHTLESS,
+};
+use crate::material::Material;
+use crate::operator::{BLOCK, Elastic, FixedCopy, Place, StiffModes, degenerate_elements};
 use crate::reserve::{refill, resize_reserving};
-use crate::team::Team;
+use crate::team::{Team, blocks};
 
 /// A step that fails is tried again in 2 and then in 4 parts.
 const MOST_HALVINGS: u32 = 2;
@@ -28,16 +32,17 @@ const MOST_SPIN_HALVINGS: u32 = 4;
 /// Part of the energy that may appear from nowhere: rounding.
 const GAIN: f64 = 1e-6;
 
-/// A copy lighter than this [kg] has no inertia that single precision could hold.
-const WEIGHTLESS: f64 = 1e-30;
-
 /// What the fast path remembers and works with.
 #[derive(Debug)]
 pub(super) struct Fast {
     pub simd: Simd,
     pub elastic: Elastic,
     pub mass_f32: Vec<f32>,
-    integrator: ImplicitEuler,
+    integrator: LinearStep,
+    multistep: Multistep,
+    /// Where the rotation of every piece is kept, for the energy of Newmark's method.
+    places: Vec<Place>,
+    partial: Vec<f64>,
     /// Degenerate elements of the mesh, ascending.
     degenerate: Vec<u32>,
     weightless: Vec<Weightless>,
@@ -54,12 +59,15 @@ struct Weightless {
 }
 
 impl Fast {
-    pub fn new(simd: Simd, mesh: &CutMesh, at_start: bool) -> Self {
+    pub fn new(simd: Simd, mesh: &CutMesh, scheme: Scheme, at_start: bool) -> Self {
         Self {
             simd,
             elastic: Elastic::new(simd, mesh.mesh(), mesh.pieces(), mesh.n_copies()),
             mass_f32: Vec::new(),
-            integrator: ImplicitEuler::new(at_start),
+            integrator: LinearStep::new(at_start),
+            multistep: Multistep::new(scheme),
+            places: Vec::new(),
+            partial: Vec::new(),
             degenerate: degenerate_elements(mesh.mesh()),
             weightless: Vec::new(),
             before: State::default(),
@@ -67,13 +75,16 @@ impl Fast {
         }
     }
 
-    /// Arranges the pieces after a cut; those that were there before keep their rotation.
-    pub fn follow_cut(&mut self, mesh: &CutMesh) {
+    /// Arranges the pieces after a cut that made the copies `new`; those that were there before keep their
+    /// rotation, and all of the material what is remembered of earlier steps.
+    pub fn follow_cut(&mut self, mesh: &CutMesh, new: &[NewCopy]) {
+        self.multistep.inherit(new);
         self.elastic.follow(mesh.mesh(), mesh.pieces(), mesh.changed_pieces(), mesh.n_copies());
     }
 
-    /// Arranges the pieces anew, without memory of their rotations.
+    /// Arranges the pieces anew, without memory of their rotations and of earlier steps.
     pub fn rebuild(&mut self, mesh: &CutMesh) {
+        self.multistep.forget();
         let choice = self.elastic.choice();
         self.elastic = Elastic::new(self.simd, mesh.mesh(), mesh.pieces(), mesh.n_copies());
         self.elastic.set_choice(choice);
@@ -85,7 +96,7 @@ impl Fast {
         StiffModes::new(mesh.mesh(), mesh.pieces(), mesh.n_copies(), &self.degenerate)
     }
 
-    /// [`ImplicitEuler::stiff_motions`].
+    /// [`LinearStep::stiff_motions`].
     pub fn stiff_motions(&self) -> [usize; 3] {
         self.integrator.stiff_motions()
     }
@@ -95,6 +106,11 @@ impl Fast {
         refill(&mut self.mass_f32, mass.iter().map(|&m| m as f32));
         self.weightless = find_weightless(mesh, mass);
         self.integrator.resize(mesh.n_copies());
+        self.multistep.resize(mesh.n_copies());
+        if self.multistep.is_newmark() {
+            self.places = self.elastic.places();
+            self.partial.resize(mesh.pieces().len().div_ceil(BLOCK), 0.0);
+        }
         self.integrator.set_stiff_modes(self.stiff_modes(mesh));
         // A step fills them; it must not have to make room.
         resize_reserving(&mut self.before.x, mesh.n_copies(), Vector3::zeros());
@@ -111,17 +127,89 @@ impl Fast {
         &self.before
     }
 
-    /// Advances by `dt_s`; a step that does not stay finite is taken back and tried again in smaller
-    /// parts, then given up.
+    /// What was remembered of earlier steps no longer holds: energy was put in or taken out.
+    pub fn forget_energy(&mut self) {
+        self.multistep.forget_energy();
+    }
+
+    /// [`Multistep::still`].
+    pub fn still(&mut self, copies: &[u32], state: &State) {
+        self.multistep.still(copies, state);
+    }
+
+    /// Advances by the step of `inputs` with the scheme of the body, or with implicit Euler where a guard
+    /// asks for it.
     pub fn step(
         &mut self,
         team: &mut Team,
         mesh: &CutMesh,
         state: &mut State,
-        (dt_s, inputs): (f64, &StepInputs<'_>),
-        spring_forces: &mut Vec<Vector3<f64>>,
+        inputs: &StepInputs<'_>,
+        (rest, spring_forces): (&[Vector3<f64>], &mut Vec<Vector3<f64>>),
     ) -> SolveReport {
         self.before.copy_from(state);
+        let (scheme, notice) = self.multistep.choose(state, inputs, &mut self.spin);
+        if self.multistep.starts_newmark(scheme) {
+            let Self { elastic, integrator, multistep, mass_f32, .. } = self;
+            let inputs = StepInputs { mass_f32, ..*inputs };
+            integrator.accelerate(team, elastic, state, &inputs, multistep.acceleration_mut());
+        }
+        if self.multistep.is_newmark() {
+            let Self { multistep, elastic, places, partial, .. } = self;
+            let stored = || held_energy(team, mesh, (elastic, places), &state.x, (inputs.material, partial));
+            multistep.begin_energy(state, inputs, rest, stored);
+        }
+        let mut report = self.attempts(team, mesh, state, (scheme, inputs), spring_forces);
+        let mut made_with = if report.substeps == 1 { scheme } else { Scheme::ImplicitEuler };
+        if self.multistep.is_newmark() && report.outcome == Outcome::Advanced {
+            let driven = is_driven(&self.before, inputs.fixed);
+            if let Some(excess_j) = self.excess(team, mesh, state, inputs, (rest, driven))
+                && made_with != Scheme::ImplicitEuler
+            {
+                state.copy_from(&self.before);
+                made_with = Scheme::ImplicitEuler;
+                let iterations = report.iterations;
+                report = self.attempts(team, mesh, state, (made_with, inputs), spring_forces);
+                report.iterations += iterations;
+                report.notice = report.notice.or(Some(Notice::EnergyGained { excess_j }));
+                if report.outcome == Outcome::Advanced {
+                    // The energy that is there now is what there is.
+                    self.multistep.forget_energy();
+                }
+            }
+        }
+        report.notice = report.notice.or(notice);
+        if report.outcome == Outcome::Advanced {
+            self.multistep.push((&self.before, state), inputs, made_with);
+        }
+        report
+    }
+
+    /// Energy [J] that a step of Newmark's method put in from nowhere.
+    fn excess(
+        &mut self,
+        team: &mut Team,
+        mesh: &CutMesh,
+        state: &State,
+        inputs: &StepInputs<'_>,
+        (rest, driven): (&[Vector3<f64>], bool),
+    ) -> Option<f64> {
+        let Self { multistep, elastic, places, partial, before, .. } = self;
+        let stored = held_energy(team, mesh, (elastic, places), &state.x, (inputs.material, partial));
+        multistep.end_energy((before, state), inputs, (rest, stored), driven)
+    }
+
+    /// Makes the step with one scheme; where that does not stay finite it is taken back and tried again in
+    /// smaller parts with implicit Euler, then given up.
+    fn attempts(
+        &mut self,
+        team: &mut Team,
+        mesh: &CutMesh,
+        state: &mut State,
+        (scheme, inputs): (Scheme, &StepInputs<'_>),
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) -> SolveReport {
+        let dt_s = inputs.h;
         let mut report = SolveReport::default();
         // Springs put in energy that is not known here.
         let turns = inputs.springs.is_empty()
@@ -130,13 +218,14 @@ impl Fast {
         let (mut failed, mut gained) = (0, false);
         for halvings in 0..=MOST_SPIN_HALVINGS {
             report.substeps = 1 << halvings;
+            let scheme = if report.substeps == 1 { scheme } else { Scheme::ImplicitEuler };
             let inputs = StepInputs { h: dt_s / f64::from(report.substeps), mass_f32: &[], ..*inputs };
             let slowed = self.spin.limit(state, inputs.mass, inputs.parts, (inputs.h, LARGEST_TURN));
             report.notice = match slowed {
                 Some(angle_rad) => Some(Notice::SpinLimited { angle_rad, largest_rad: LARGEST_TURN }),
                 None => gained.then_some(Notice::SpinDivided { substeps: report.substeps }),
             };
-            let finite = self.try_step(team, state, &inputs, &mut report, spring_forces);
+            let finite = self.try_step(team, state, (scheme, &inputs), &mut report, spring_forces);
             if team.told_to_stop() {
                 state.copy_from(&self.before);
                 spring_forces.clear();
@@ -170,22 +259,24 @@ impl Fast {
         &mut self,
         team: &mut Team,
         state: &mut State,
-        inputs: &StepInputs<'_>,
+        (scheme, inputs): (Scheme, &StepInputs<'_>),
         report: &mut SolveReport,
         spring_forces: &mut Vec<Vector3<f64>>,
     ) -> bool {
         (report.residual, report.algebraic_error) = (0.0, 0.0);
         for _ in 0..report.substeps {
-            let Self { elastic, integrator, mass_f32, .. } = self;
-            let inputs = StepInputs { mass_f32, ..*inputs };
+            let Self { elastic, integrator, multistep, mass_f32, .. } = self;
+            let history = multistep.extrapolate(team, state, (scheme, inputs.h));
+            let solves = Multistep::solves(scheme, inputs.material.law);
+            let inputs = StepInputs { mass_f32, history, solves, ..*inputs };
             let StepOutcome { solve, inverted_pieces, refused_springs, finite } =
                 integrator.step(team, elastic, state, &inputs, spring_forces);
-            report.newton_steps += 1;
+            report.newton_steps += solves;
             report.iterations += solve.iterations;
             report.residual = report.residual.max(solve.residual);
             report.stop = solve.stop;
-            // δ minimises an energy times h², so that its norm is √J times h.
-            report.algebraic_error = report.algebraic_error.max(solve.algebraic_error / inputs.h);
+            // δ minimises an energy times s, so that its norm is √J times √s.
+            report.algebraic_error = report.algebraic_error.max(solve.algebraic_error / inputs.root_s());
             report.inverted_pieces = inverted_pieces;
             report.refused_springs = refused_springs;
             if !finite {
@@ -215,6 +306,47 @@ impl Fast {
             }
         }
     }
+}
+
+/// Whether prescribed copies move in a step from `before`.
+fn is_driven(before: &State, fixed: &[FixedCopy]) -> bool {
+    let moves = |f: &FixedCopy| (0..3).any(|k| f.axes[k] && f.position_m[k] != before.x[f.copy as usize][k]);
+    fixed.iter().any(moves)
+}
+
+/// Elastic energy [J] at `x` [m] with the rotations of the last update, by one entry of `partial` per block of
+/// pieces. Where these are not those of `x`, it is a little more than the energy.
+fn held_energy(
+    team: &mut Team,
+    mesh: &CutMesh,
+    (elastic, places): (&Elastic, &[Place]),
+    x: &[Vector3<f64>],
+    (material, partial): (&Material, &mut [f64]),
+) -> f64 {
+    let lame = material.lame();
+    team.for_blocks(blocks(partial, 1), |block, partial| {
+        let first = block * BLOCK;
+        let pieces = &mesh.pieces()[first..mesh.pieces().len().min(first + BLOCK)];
+        partial[0] = pieces
+            .iter()
+            .zip(&places[first..])
+            .map(|(piece, place)| {
+                let e = piece.element as usize;
+                let F = deformation_gradient(
+                    &piece.copies.map(|copy| x[copy as usize]),
+                    &mesh.mesh().gradients(e),
+                );
+                let volume = piece.fraction * mesh.mesh().volume(e);
+                if !material.law.rotates() {
+                    return piece_energy(material.law, lame, &F, volume);
+                }
+                let R = elastic.rotation(*place).map(f64::from);
+                let stretch = R.tr_mul(&F).trace() - 3.0;
+                volume * (lame.mu * (F - R).norm_squared() + 0.5 * lame.lambda * stretch * stretch)
+            })
+            .sum();
+    });
+    partial.iter().sum()
 }
 
 /// Kinetic and elastic energy of the free parts, and Σ f·x of gravity and loads on them [J].

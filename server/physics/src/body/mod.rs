@@ -209,6 +209,7 @@ impl Body {
     ) -> Result<Self, BodyError> {
         material.check()?;
         settings.check(material.law)?;
+        settings.scheme.check()?;
         let mut settings = settings;
         if settings.arithmetic.is_none()
             && settings.arithmetic(material.law) == Arithmetic::Single
@@ -220,7 +221,7 @@ impl Body {
         cut_mesh.set_exact(!settings.ablation.exact_predicates);
         let path = if settings.arithmetic(material.law) == Arithmetic::Single {
             let simd = if settings.portable { Simd::Baseline } else { Simd::detect() };
-            let mut fast = Fast::new(simd, &cut_mesh, settings.ablation.predictor);
+            let mut fast = Fast::new(simd, &cut_mesh, settings.scheme, settings.ablation.predictor);
             fast.elastic.set_choice(settings.operator(material.law, cut_mesh.pieces().len()));
             Path::Fast(Box::new(fast))
         } else {
@@ -282,7 +283,7 @@ impl Body {
 
     /// Makes the step on the path of this body.
     fn advance(&mut self, dt_s: f64, gravity: Vector3<f64>, springs: &[PointSpring]) -> SolveReport {
-        let Self { cut_mesh, team, state, spring_forces, load, fixed, mass, parts, .. } = self;
+        let Self { cut_mesh, team, state, spring_forces, load, fixed, mass, parts, rest, .. } = self;
         let report = match &mut self.path {
             Path::Fast(fast) => {
                 let inputs = StepInputs {
@@ -296,8 +297,10 @@ impl Body {
                     springs,
                     material: &self.material,
                     solver: self.settings.solver,
+                    history: None,
+                    solves: 1,
                 };
-                fast.step(team, cut_mesh, state, (dt_s, &inputs), spring_forces)
+                fast.step(team, cut_mesh, state, &inputs, (rest, spring_forces))
             }
             Path::General(general) => {
                 let inputs = DynamicsInputs { h: dt_s, gravity, load, fixed, springs };
@@ -451,9 +454,10 @@ impl Body {
             return Ok(());
         }
         self.material = material;
-        // The fast path is given its constants with every step.
-        if let Path::General(general) = &mut self.path {
-            general.dynamics.set_material(material);
+        match &mut self.path {
+            // It is given its constants with every step.
+            Path::Fast(fast) => fast.forget_energy(),
+            Path::General(general) => general.dynamics.set_material(material),
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
 use crate::assembly::{ElementKind, Volumetric};
-use crate::integrator::{MassKind, Scheme};
+use crate::integrator::{MassKind, Multistep, Scheme};
 use crate::material::Law;
 use crate::operator::OperatorChoice;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
@@ -101,7 +101,8 @@ impl BodySettings {
             (self.element == ElementKind::Tet10, "element tet10"),
             (self.element == ElementKind::Hex8, "element hex8"),
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
-            (self.scheme != Scheme::ImplicitEuler, "an integrator other than implicit-euler"),
+            (self.scheme.is_explicit(), "an explicit integrator"),
+            (self.scheme == Scheme::Static, "the static integrator"),
             (self.method != Method::Pcg, "a solver other than pcg"),
             (self.mass != MassKind::Lumped, "consistent mass"),
             (self.volumetric != Volumetric::Full, "a locking remedy"),
@@ -177,7 +178,8 @@ impl BodySettings {
     /// Predicted seconds of a step of the fast path on one thread.
     pub fn fast_seconds(&self, law: Law, pieces: usize) -> f64 {
         let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
-        cost::step_seconds(law, pieces, self.solver, assembled)
+        let solves = f64::from(Multistep::solves(self.scheme, law));
+        solves * cost::step_seconds(law, pieces, self.solver, assembled)
     }
 
     /// Iterations of relaxation per step, if that is how the body is solved.

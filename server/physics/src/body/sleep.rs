@@ -24,8 +24,9 @@ impl Body {
             self.asleep.push(FixedCopy { copy, axes: [true; 3], position_m });
             self.state.v[copy as usize] = Vector3::zeros();
         }
-        if let Path::General(general) = &mut self.path {
-            general.dynamics.still(&copies, &self.state);
+        match &mut self.path {
+            Path::Fast(fast) => fast.still(&copies, &self.state),
+            Path::General(general) => general.dynamics.still(&copies, &self.state),
         }
         self.asleep.sort_unstable_by_key(|held| held.copy);
         self.cut_mesh.raise_epoch();

@@ -2,11 +2,16 @@
 
 mod dynamics;
 mod free_motion;
-mod implicit_euler;
+mod guard;
+mod history;
+mod multistep;
+pub(crate) mod increment;
+mod linear_step;
 mod parts;
 mod local_connectivity;
 mod spin;
 mod springs;
+mod step_inputs;
 mod statics;
 mod relaxation;
 
@@ -15,15 +20,21 @@ pub use dynamics::{
     LEAST_NEWTON_STEPS, MassKind, Notice, Scheme, stable_step,
 };
 pub use free_motion::{FreeMotion, free_motions};
-pub use implicit_euler::{ImplicitEuler, StepInputs, StepOutcome};
+pub use history::History;
+pub use increment::Increment;
+pub use linear_step::LinearStep;
 pub use local_connectivity::LocalConnectivity;
+pub use multistep::Multistep;
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};
 pub use spin::SpinGuard;
 pub use springs::{PointSpring, SpringKind};
 pub use statics::{StaticProblem, find_equilibrium, prescribe};
+pub use step_inputs::{StepHistory, StepInputs, StepOutcome};
 
 use nalgebra::Vector3;
+
+use crate::operator::FixedCopy;
 
 /// What a body remembers from step to step, one entry per copy.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,6 +43,18 @@ pub struct State {
     pub x: Vec<Vector3<f64>>,
     /// Velocities [m/s].
     pub v: Vec<Vector3<f64>>,
+}
+
+/// A copy lighter than this [kg] has no inertia that single precision could hold.
+pub const WEIGHTLESS: f64 = 1e-30;
+
+/// Sets the prescribed directions of `v` to 0.
+fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
+    for f in fixed {
+        for axis in (0..3).filter(|&axis| f.axes[axis]) {
+            v[f.copy as usize][axis] = 0.0;
+        }
+    }
 }
 
 impl State {

@@ -64,9 +64,18 @@ pub struct ActiveSpring {
 }
 
 impl ActiveSpring {
-    /// Starts a spring at the predicted positions; `None` if it is not usable: a number that is not
-    /// finite, no normal, a copy that does not exist.
+    /// Starts a spring at the predicted positions; `None` if it is not [usable](Self::usable).
     pub fn new(spring: &PointSpring, predicted: &[Vector3<f64>]) -> Option<Self> {
+        let mut active = Self::usable(spring, predicted.len())?;
+        if active.pull(active.point(predicted)).is_none() {
+            active.mode = Mode::Off;
+        }
+        Some(active)
+    }
+
+    /// A spring on a body of `n_copies`; `None` if a number in it is not finite, it has no normal, or a copy
+    /// does not exist.
+    pub fn usable(spring: &PointSpring, n_copies: usize) -> Option<Self> {
         let mut spring = *spring;
         let direction_ok = match &mut spring.kind {
             SpringKind::OneSided { normal, offset_m } => {
@@ -78,18 +87,11 @@ impl ActiveSpring {
             SpringKind::Hold { target_m } => target_m.iter().all(|t| t.is_finite()),
         };
         let usable = direction_ok
-            && spring.copies.iter().all(|&c| (c as usize) < predicted.len())
+            && spring.copies.iter().all(|&c| (c as usize) < n_copies)
             && spring.weights.iter().all(|w| w.is_finite())
             && (0.0..=1e15).contains(&spring.stiffness_n_m)
             && spring.max_force_n >= 0.0;
-        if !usable {
-            return None;
-        }
-        let mut active = Self { spring, mode: Mode::Linear };
-        if active.pull(active.point(predicted)).is_none() {
-            active.mode = Mode::Off;
-        }
-        Some(active)
+        usable.then_some(Self { spring, mode: Mode::Linear })
     }
 
     /// x_p = Σ w x of the four copies.

@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Matrix4, Vector3};
 
 use crate::cut::CutMesh;
-use crate::cut::topology::fragments::NONE;
 use crate::cut::shell::surface_builder::{Material, SurfaceBuilder};
+use crate::cut::topology::fragments::NONE;
 use crate::mesh::TET_FACES;
 use crate::testing::{Random, surface_is_closed_and_manifold};
 

@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 use super::Scheme;
 use super::mass::Mass;
 use crate::assembly::BlockCsr;
+use crate::integrator::hold;
 use crate::integrator::springs::ActiveSpring;
 use crate::material::Rayleigh;
 use crate::operator::FixedCopy;
@@ -124,14 +125,6 @@ fn start(q: &mut [Vector3<f64>]) {
     for (i, q) in q.iter_mut().enumerate() {
         let t = (i + 1) as f64;
         *q = Vector3::new(0.754_877_666, 0.569_840_291, 0.438_579_021).map(|step| (t * step).fract() - 0.5);
-    }
-}
-
-fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
-    for f in fixed {
-        for axis in (0..3).filter(|&axis| f.axes[axis]) {
-            v[f.copy as usize][axis] = 0.0;
-        }
     }
 }
 

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::critical_step::stable_step;
-use super::{Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, Notice, Scheme, finite, hold};
+use super::{Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, Notice, Scheme, finite};
 use crate::assembly::Tangent;
-use crate::integrator::State;
+use crate::integrator::{State, hold};
 use crate::material::Law;
 use crate::operator::FixedCopy;
 use crate::team::Team;

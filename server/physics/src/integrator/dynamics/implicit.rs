@@ -2,12 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN};
-use super::potential::{Increment, StepPotential};
+use super::potential::StepPotential;
 use super::{
     Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, LEAST_NEWTON_STEPS, Notice, Scheme, finite,
 };
 use crate::assembly::Tangent;
+use crate::integrator::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN};
+use crate::integrator::increment::{Increment, bdf2_history, newmark_history};
 use crate::integrator::{FreeMotion, State};
 use crate::material::Law;
 use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
@@ -189,28 +190,24 @@ impl Dynamics {
                 self.x_a.copy_from_slice(x);
                 self.x_v.copy_from_slice(x);
                 self.next.x.copy_from_slice(x);
-                Increment { A: 0.0, B: 0.0 }
+                Increment::NONE
             }
             Scheme::Bdf2 => {
                 let before = &self.history.before;
-                let h = 2.0 / 3.0 * h;
                 for c in 0..x.len() {
-                    self.x_v[c] = (4.0 * x[c] - before.x[c]) / 3.0;
-                    self.x_a[c] = self.x_v[c] + h * (4.0 * v[c] - before.v[c]) / 3.0;
+                    let known = [[&x[c], &v[c]], [&before.x[c], &before.v[c]]];
+                    [self.x_v[c], self.x_a[c]] = bdf2_history(h, known[0], known[1]);
                     self.next.x[c] = self.x_a[c];
                 }
-                Increment { A: 1.0 / (h * h), B: 1.0 / h }
+                Increment::bdf2(h)
             }
             Scheme::Newmark { beta, gamma } => {
-                let B = gamma / (beta * h);
                 for c in 0..x.len() {
-                    let a = self.acceleration[c];
-                    self.x_a[c] = x[c] + h * v[c] + h * h * (0.5 - beta) * a;
-                    // v⁺ = ṽ + B (x⁺ − x_a) with ṽ = v + h (1 − γ) a.
-                    self.x_v[c] = self.x_a[c] - (v[c] + h * (1.0 - gamma) * a) / B;
+                    let known = [&x[c], &v[c], &self.acceleration[c]];
+                    [self.x_v[c], self.x_a[c]] = newmark_history(h, (beta, gamma), known);
                     self.next.x[c] = x[c] + h * v[c];
                 }
-                Increment { A: 1.0 / (beta * h * h), B }
+                Increment::newmark(h, beta, gamma)
             }
             _ => {
                 for c in 0..x.len() {
@@ -218,7 +215,7 @@ impl Dynamics {
                     self.x_a[c] = x[c] + h * v[c];
                     self.next.x[c] = self.x_a[c];
                 }
-                Increment { A: 1.0 / (h * h), B: 1.0 / h }
+                Increment::euler(h)
             }
         };
         self.prescribe(inputs);

@@ -7,7 +7,6 @@
 
 mod critical_step;
 mod explicit;
-mod guard;
 mod implicit;
 mod mass;
 mod potential;
@@ -25,17 +24,19 @@ use thiserror::Error;
 
 use super::State;
 use super::free_motion::{FreeMotion, free_motions};
+use super::history::History;
 use super::parts::{LooseParts, Translations};
 use super::relaxation::Relaxation;
 use super::spin::SpinGuard;
 use super::springs::{ActiveSpring, PointSpring};
 use crate::assembly::{BlockCsr, Model, Tangent};
+use crate::cut::NewCopy;
+use crate::integrator::guard::Ledger;
 use crate::material::Material;
 use crate::operator::{FixedCopy, StiffModes};
 use crate::solver::{Newton, NewtonSettings};
 use crate::team::Team;
 use critical_step::PowerIteration;
-use guard::{History, Ledger};
 use mass::Mass;
 
 /// Positions beyond this [m] count as not finite.
@@ -109,11 +110,7 @@ pub struct Dynamics {
 impl Dynamics {
     /// Prepares the motion of `model`, which is made of `material`.
     pub fn new(model: Model, material: Material, settings: DynamicsSettings) -> Result<Self, DynamicsError> {
-        if let Scheme::Newmark { beta, gamma } = settings.scheme
-            && !(beta > 0.0 && beta <= 1.0 && (0.5..=2.0).contains(&gamma))
-        {
-            return Err(DynamicsError::Newmark { beta, gamma });
-        }
+        settings.scheme.check()?;
         let n = model.n_nodes();
         let zeros = || vec![Vector3::zeros(); n];
         let mass = Mass::new(&model, material.density_kg_m3, settings.mass);
@@ -151,6 +148,15 @@ impl Dynamics {
             material,
             settings,
         })
+    }
+
+    /// Goes on with what `before` remembers, whose model was cut since: the cut made the nodes `new`. Forces
+    /// jump at a cut, so that Newmark's method starts from a new acceleration.
+    pub fn continue_from(&mut self, before: Dynamics, new: &[NewCopy]) {
+        if !matches!(self.settings.scheme, Scheme::Newmark { .. }) {
+            self.history = before.history;
+            self.history.inherit(new);
+        }
     }
 
     /// The model that moves.
@@ -371,13 +377,4 @@ impl Dynamics {
 fn finite(state: &State) -> bool {
     let fine = |v: &Vector3<f64>| v.iter().all(|c| c.abs() < FARTHEST);
     state.x.iter().all(fine) && state.v.iter().all(fine)
-}
-
-/// Sets the prescribed directions of `v` to 0.
-fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
-    for f in fixed {
-        for axis in (0..3).filter(|&axis| f.axes[axis]) {
-            v[f.copy as usize][axis] = 0.0;
-        }
-    }
 }

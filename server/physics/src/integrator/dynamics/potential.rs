@@ -14,18 +14,10 @@ use nalgebra::Vector3;
 
 use super::mass::Mass;
 use crate::assembly::{BlockCsr, Model, Tangent};
+use crate::integrator::increment::Increment;
 use crate::integrator::springs::ActiveSpring;
 use crate::solver::{Curvature, Potential};
 use crate::team::Team;
-
-/// a⁺ = A (x⁺ − x_a), v⁺ = B (x⁺ − x_v).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Increment {
-    /// A [1/s²].
-    pub A: f64,
-    /// B [1/s].
-    pub B: f64,
-}
 
 /// Φ of one step; borrows what it is made from.
 pub(super) struct StepPotential<'a> {

@@ -1,5 +1,6 @@
 //! What can be chosen: scheme, mass, Newton's method, limits of explicit steps.
 
+use super::DynamicsError;
 use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
 
 /// A time integration scheme. h is the step, a = M⁻¹ (f_ext − f_int − D v).
@@ -38,6 +39,16 @@ impl Scheme {
     /// Whether the scheme solves no system, so that its step is limited by Δt_c.
     pub fn is_explicit(self) -> bool {
         matches!(self, Self::SymplecticEuler | Self::Midpoint | Self::Rk4)
+    }
+
+    /// Whether the scheme's parameters are in their range.
+    pub fn check(self) -> Result<(), DynamicsError> {
+        match self {
+            Self::Newmark { beta, gamma } if !(beta > 0.0 && beta <= 1.0 && (0.5..=2.0).contains(&gamma)) => {
+                Err(DynamicsError::Newmark { beta, gamma })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Name as in scene files.

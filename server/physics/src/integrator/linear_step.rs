@@ -1,26 +1,29 @@
-//! Implicit Euler, linearised at the inertial predictor.
+//! A step of an implicit scheme by linear solves, each linearised at its predictor.
 //!
 //! # Derivation
-//! M (v⁺ − v)/h = f_ext − f_int(x⁺) − D v⁺ with x⁺ = x̂ + δ, x̂ = x + h v, v⁺ = v + δ/h and
-//! f_int(x⁺) ≈ f_int(x̂) + K̂ δ, D = α M + β K̂ gives
+//! M a⁺ = f_ext − f_int(x⁺) − D v⁺ with a⁺ = A (x⁺ − x_a), v⁺ = B (x⁺ − x_v) (the
+//! [increment](super::increment) of a scheme), x⁺ = x̂ + δ, f_int(x⁺) ≈ f_int(x̂) + K̂ δ, D = α M + β K̂,
+//! s = 1/A, r = B/A and v̂ = B (x̂ − x_v) gives
 //!
-//!   [(1 + hα) M + (h² + hβ) K̂] δ = h² (f_ext − f_int(x̂) − α M v − β K̂ v)
+//!   [(1 + rα) M + (s + rβ) K̂] δ = s (f_ext − f_int(x̂) − α M v̂ − β K̂ v̂) − M (x̂ − x_a)
 //!
-//! Linearised at x_n instead, a spinning body gains energy; from the predictor it never does.
-//! K̂ turns with the material, so β leaves rigid motion alone.
+//! The predictor is x̂ = x_a, so that the last term is 0 in the first solve. For implicit Euler s = h²,
+//! r = h, x̂ = x + h v and v̂ = v. Linearised at x_n instead, a spinning body gains energy; from the
+//! predictor it never does. K̂ turns with the material, so β leaves rigid motion alone.
 
 use nalgebra::Vector3;
 
-use super::State;
-use super::parts::{LooseParts, Translations};
-use super::springs::{ActiveSpring, PointSpring};
-use crate::material::Material;
+use super::parts::Translations;
+use super::springs::ActiveSpring;
+use super::step_inputs::{StepInputs, StepOutcome};
+use super::{State, WEIGHTLESS, hold};
+use crate::material::Rayleigh;
 use crate::operator::{
-    BLOCK, Block6, BlockJacobi, CompositeDiagonal, Elastic, ElasticUpdate, FixedCopy, LinearOperator, Padded,
-    Spring, StiffModes, Substitution, Sum, SystemOperator, block_of, filter, invert, padded,
+    BLOCK, Block6, BlockJacobi, CompositeDiagonal, Elastic, FixedCopy, LinearOperator, Padded, Spring,
+    StiffModes, Substitution, Sum, SystemOperator, block_of, filter, invert, padded,
 };
 use crate::reserve::resize_reserving;
-use crate::solver::{Pcg, PcgReport, PcgSettings, StopReason};
+use crate::solver::{Pcg, PcgReport, StopReason};
 use crate::team::{Team, blocks};
 
 /// Springs may open, close or reach their cap this often within one step.
@@ -29,47 +32,9 @@ const SPRING_PASSES: usize = 3;
 /// loads, so that a body at rest is not solved for rounding noise.
 const LOAD_FLOOR: f64 = 0.01;
 
-/// What a step is made from.
-#[derive(Clone, Copy, Debug)]
-pub struct StepInputs<'a> {
-    /// Length of the step h [s].
-    pub h: f64,
-    /// Acceleration of gravity [m/s²].
-    pub gravity: Vector3<f64>,
-    /// Mass of every copy [kg].
-    pub mass: &'a [f64],
-    /// The same in single precision.
-    pub mass_f32: &'a [f32],
-    /// Load on every copy [N], gravity not included.
-    pub load: &'a [Vector3<f64>],
-    /// Prescribed copies.
-    pub fixed: &'a [FixedCopy],
-    /// Connected parts.
-    pub parts: &'a LooseParts,
-    /// Springs of this step.
-    pub springs: &'a [PointSpring],
-    /// Material constants.
-    pub material: &'a Material,
-    /// When to stop the solver.
-    pub solver: PcgSettings,
-}
-
-/// How a step went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StepOutcome {
-    /// How the last linear solve went; iterations are those of all passes.
-    pub solve: PcgReport,
-    /// Pieces with det F ≤ 0 at the predictor.
-    pub inverted_pieces: usize,
-    /// Springs that were left out because a number in them is not usable.
-    pub refused_springs: usize,
-    /// Whether everything stayed finite. If not, the state was left as it was.
-    pub finite: bool,
-}
-
-/// The integrator's scratch vectors, one entry per copy.
+/// The scratch vectors of a step, one entry per copy.
 #[derive(Debug, Default)]
-pub struct ImplicitEuler {
+pub struct LinearStep {
     /// Linearise at the positions of the last step.
     at_start: bool,
     predicted: Vec<Vector3<f64>>,
@@ -77,7 +42,7 @@ pub struct ImplicitEuler {
     damping: Vec<Padded>,
     scratch: Vec<Padded>,
     delta: Vec<Padded>,
-    /// Blocks of (1 + hα) M + (h² + hβ) K̂, springs not included.
+    /// Blocks of (1 + rα) M + (s + rβ) K̂, springs not included.
     diagonal: Vec<Block6>,
     preconditioner: BlockJacobi,
     /// What `diagonal` and `preconditioner` were made for: version of K̂ and mass factor.
@@ -117,7 +82,7 @@ struct Stiff {
 /// Most copies that a spring's weights are expected on in the new variables.
 const SPRING_ROW: usize = 64;
 
-impl ImplicitEuler {
+impl LinearStep {
     /// An integrator without memory. `at_start` linearises at the positions of the last step, which
     /// only a test of tests wants.
     pub fn new(at_start: bool) -> Self {
@@ -158,6 +123,9 @@ impl ImplicitEuler {
 
     /// Advances `state` by h, unless something turns out not to be finite. The force of every
     /// spring goes to `spring_forces`, in the order of the inputs.
+    ///
+    /// Several solves are Newton's method with full steps and the held tangent: each starts from x⁺ of the
+    /// one before, and counts its residual against the loads of the first.
     pub fn step(
         &mut self,
         team: &mut Team,
@@ -167,31 +135,95 @@ impl ImplicitEuler {
         spring_forces: &mut Vec<Vector3<f64>>,
     ) -> StepOutcome {
         self.predict(team, state, inputs);
-        let inverted_pieces = self.update_operator(team, elastic, state, inputs);
         self.start_springs(inputs);
         let mut solve = PcgReport::default();
+        let (mut inverted_pieces, mut finite) = (0, true);
+        for number in 0..inputs.solves.max(1) {
+            let inverted = self.update_operator(team, elastic, state, inputs);
+            if number == 0 {
+                inverted_pieces = inverted;
+            }
+            self.improve(team, (elastic, inputs), state, number == 0, &mut solve);
+            finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
+            if !finite {
+                break;
+            }
+        }
+        if finite {
+            self.commit(team, state, inputs, spring_forces);
+        }
+        let refused_springs = inputs.springs.len() - self.active.len();
+        StepOutcome { solve, inverted_pieces, refused_springs, finite }
+    }
+
+    /// One linear solve for δ, made again while springs open, close or reach their cap in it.
+    fn improve(
+        &mut self,
+        team: &mut Team,
+        (elastic, inputs): (&mut Elastic, &StepInputs<'_>),
+        state: &State,
+        first: bool,
+        solve: &mut PcgReport,
+    ) {
         self.delta.fill([0.0; 4]);
         self.translations.restart(inputs.parts);
         for pass in 0..SPRING_PASSES {
             self.complete_operator(elastic, inputs);
             self.balance_parts(state, inputs);
-            self.residual(team, elastic, state, inputs, pass);
-            let report = self.solve(team, elastic, inputs, pass);
+            self.residual(team, elastic, state, inputs, (pass, first));
+            let report = self.solve(team, elastic, inputs, first && pass == 0);
             // A pass that has nothing left to do estimates no error.
             let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
-            solve = PcgReport { iterations: solve.iterations + report.iterations, algebraic_error, ..report };
+            *solve =
+                PcgReport { iterations: solve.iterations + report.iterations, algebraic_error, ..report };
             self.balance_parts(state, inputs);
             if report.stop == StopReason::NonFinite || !self.springs_changed(inputs, pass) {
                 break;
             }
         }
-        let finite = solve.stop != StopReason::NonFinite && self.commit(team, state, inputs, spring_forces);
-        let refused_springs = inputs.springs.len() - self.active.len();
-        StepOutcome { solve, inverted_pieces, refused_springs, finite }
+    }
+
+    /// Acceleration [m/s²] of every copy at `state`, which Newmark's method starts from; 0 in prescribed
+    /// directions and where there is no mass.
+    pub fn accelerate(
+        &mut self,
+        team: &mut Team,
+        elastic: &mut Elastic,
+        state: &State,
+        inputs: &StepInputs<'_>,
+        acceleration: &mut [Vector3<f64>],
+    ) {
+        self.predicted.copy_from_slice(&state.x);
+        elastic.update_chunks(team, &inputs.elastic_update(), &state.x);
+        team.for_blocks(blocks(&mut self.f_int, BLOCK), |block, f| elastic.forces(block, f));
+        self.made_for = None;
+        let Rayleigh { stiffness_s: beta, mass_1_s: alpha } = inputs.material.rayleigh;
+        self.damping.fill([0.0; 4]);
+        if beta > 0.0 {
+            self.scratch.iter_mut().zip(&state.v).for_each(|(out, v)| *out = padded(v));
+            elastic.apply(team, &self.scratch, &mut self.damping); // scale · K̂ v
+        }
+        let beta = beta / inputs.elastic_update().scale;
+        for (c, a) in acceleration.iter_mut().enumerate() {
+            let applied = inputs.mass[c] * (inputs.gravity - alpha * state.v[c]) + inputs.load[c];
+            *a = applied - unpadded(&self.f_int[c]) - beta * unpadded(&self.damping[c]);
+        }
+        self.start_springs(inputs);
+        for spring in &self.active {
+            let force = spring.potential(spring.point(&state.x)).force;
+            spring.carriers().for_each(|(c, w)| acceleration[c] += w * force);
+        }
+        for (a, &m) in acceleration.iter_mut().zip(inputs.mass) {
+            *a = if m > WEIGHTLESS { *a / m } else { Vector3::zeros() };
+        }
+        hold(inputs.fixed, acceleration);
     }
 
     fn predict(&mut self, team: &mut Team, state: &State, inputs: &StepInputs<'_>) {
         team.for_blocks(blocks(&mut self.predicted, BLOCK), |block, predicted| {
+            if let Some(history) = inputs.history {
+                return predicted.copy_from_slice(block_of(history.x_a, block));
+            }
             let known = block_of(&state.x, block).iter().zip(block_of(&state.v, block));
             for (predicted, (x, v)) in predicted.iter_mut().zip(known) {
                 *predicted = x + inputs.h * v;
@@ -213,15 +245,22 @@ impl ImplicitEuler {
         inputs: &StepInputs<'_>,
     ) -> usize {
         let (h, beta) = (inputs.h, inputs.material.rayleigh.stiffness_s);
-        let with = elastic_update(inputs);
+        let with = inputs.elastic_update();
         let scale = with.scale;
         let at = if self.at_start { &state.x } else { &self.predicted };
         let inverted = elastic.update_chunks(team, &with, at);
         self.sum_chunks(team, elastic, inputs);
         if self.damps(inputs) {
-            let moved = self.predicted.iter().zip(&state.x);
-            for (v, (predicted, x)) in self.scratch.iter_mut().zip(moved) {
-                *v = padded(&((predicted - x) / h));
+            // Prescribed motion takes part with the velocity that it has in the step.
+            let from = inputs.history.map_or(&state.x[..], |history| history.x_v);
+            let moved = self.predicted.iter().zip(from);
+            match inputs.history {
+                None => self.scratch.iter_mut().zip(moved).for_each(|(v, (to, x))| {
+                    *v = padded(&((to - x) / h));
+                }),
+                Some(history) => self.scratch.iter_mut().zip(moved).for_each(|(v, (to, x))| {
+                    *v = padded(&(history.increment.B * (to - x)));
+                }),
             }
             elastic.apply(team, &self.scratch, &mut self.damping); // s K̂ v
             // From x_n on, the predictor is h v away: f_int(x̂) ≈ f_int(x_n) + h K̂ v.
@@ -239,7 +278,7 @@ impl ImplicitEuler {
 
     /// Internal forces and, where it changed, the diagonal of A and its inverse, without springs.
     fn sum_chunks(&mut self, team: &mut Team, elastic: &Elastic, inputs: &StepInputs<'_>) {
-        let factor = mass_factor(inputs);
+        let factor = inputs.mass_factor();
         let made_for = Some((elastic.version(), factor));
         let axes = |f: &FixedCopy| (f.copy, f.axes);
         let f_int = blocks(&mut self.f_int, BLOCK);
@@ -285,8 +324,8 @@ impl ImplicitEuler {
             (stiff.left, stiff.stale) = (left, false);
             self.preconditioner.set_substitution(T);
         }
-        let with = elastic_update(inputs);
-        let mass = (inputs.mass_f32, mass_factor(inputs));
+        let with = inputs.elastic_update();
+        let mass = (inputs.mass_f32, inputs.mass_factor());
         stiff.composite.update(team, (elastic, &with), mass, &mut self.diagonal);
         for copy in stiff.composite.copies() {
             self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], [false; 3]);
@@ -306,7 +345,7 @@ impl ImplicitEuler {
     /// Spring terms of the operator and of the preconditioner.
     fn complete_operator(&mut self, elastic: &mut Elastic, inputs: &StepInputs<'_>) {
         self.terms.clear();
-        self.terms.extend(self.active.iter().filter_map(|s| s.term(inputs.h * inputs.h)));
+        self.terms.extend(self.active.iter().filter_map(|s| s.term(inputs.s())));
         let axes_of = |copy: u32| {
             let found = inputs.fixed.binary_search_by_key(&copy, |f| f.copy);
             found.map_or([false; 3], |f| inputs.fixed[f].axes)
@@ -351,17 +390,19 @@ impl ImplicitEuler {
         if !inputs.parts.any_free() {
             return;
         }
-        let factor = mass_factor(inputs);
-        let h2 = inputs.h * inputs.h;
+        let factor = inputs.mass_factor();
+        let s = inputs.s();
         self.translations.begin(inputs.parts, factor);
         for (c, delta) in self.delta.iter().enumerate() {
             let moved = self.translations.shift[inputs.parts.of_copy[c] as usize] + unpadded(delta);
-            let missing = h2 * external(c, state, inputs) - factor * inputs.mass[c] * moved;
+            let external =
+                inputs.external(c, state, &self.predicted) - inputs.inertia(c, &self.predicted) / s;
+            let missing = s * external - factor * inputs.mass[c] * moved;
             self.translations.add(inputs.parts, c, missing);
         }
         for spring in &self.active {
             let point = self.point_of(spring, inputs);
-            let (S, f) = (h2 * spring.stiffness(), h2 * spring.force(point));
+            let (S, f) = (s * spring.stiffness(), s * spring.force(point));
             self.translations.add_spring(inputs.parts, spring.main_copy(), S, f);
         }
         self.translations.solve(inputs.parts);
@@ -378,50 +419,51 @@ impl ImplicitEuler {
         self.predicted[c] + self.translations.shift[part] + unpadded(&self.delta[c])
     }
 
-    /// r = b − A δ into the solver's residual; on the first pass also the norm of the loads.
+    /// r = b − A δ into the solver's residual; on the first pass of the first solve also the norm of the loads.
     fn residual(
         &mut self,
         team: &mut Team,
         elastic: &mut Elastic,
         state: &State,
         inputs: &StepInputs<'_>,
-        pass: usize,
+        (pass, first): (usize, bool),
     ) {
-        let (h2, factor) = (inputs.h * inputs.h, mass_factor(inputs));
+        let (s, factor) = (inputs.s(), inputs.mass_factor());
         let damped = self.damps(inputs);
         if pass > 0 {
             system(elastic, &[], inputs).apply(team, &self.delta, &mut self.scratch);
         }
-        let (f_int, damping, solved) = (&self.f_int, &self.damping, &self.scratch);
+        let (f_int, damping, solved, predicted) =
+            (&self.f_int, &self.damping, &self.scratch, &self.predicted);
         let (M, shift) = (&self.preconditioner, &self.translations.shift);
         let results = (blocks(&mut self.pcg.r, BLOCK), blocks(&mut self.partial, 1));
         team.for_blocks(results, |block, (r, partial)| {
             let mut load = Sum::default();
             for (i, (r, M)) in r.iter_mut().zip(M.block(block)).enumerate() {
                 let c = block * BLOCK + i;
-                let mut f = external(c, state, inputs) - unpadded(&f_int[c]);
+                let mut f = inputs.external(c, state, predicted) - unpadded(&f_int[c]);
                 if damped {
                     f -= unpadded(&damping[c]);
                 }
                 let moved = shift[inputs.parts.of_copy[c] as usize];
-                *r = padded(&(h2 * f - factor * inputs.mass[c] * moved));
+                *r = padded(&(s * f - factor * inputs.mass[c] * moved - inputs.inertia(c, predicted)));
                 if pass > 0 {
                     for k in 0..4 {
                         r[k] -= solved[c][k];
                     }
                 } else {
-                    let weight = padded(&(h2 * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
+                    let weight = padded(&(s * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
                     load.add(&weight, &M.times(&weight)); // M⁻¹ is 0 where a copy is fixed
                 }
             }
             partial[0] = load.total();
         });
-        if pass == 0 {
+        if first && pass == 0 {
             let loads = if self.preconditioner.substitution().is_empty() {
                 self.partial.iter().sum::<f64>().max(0.0).sqrt()
             } else {
                 for (c, load) in self.scratch.iter_mut().enumerate() {
-                    *load = padded(&(h2 * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
+                    *load = padded(&(s * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
                 }
                 filter(inputs.fixed, &mut self.scratch);
                 self.pcg.norm(team, &self.preconditioner, &self.scratch)
@@ -429,7 +471,7 @@ impl ImplicitEuler {
             self.reference = LOAD_FLOOR * loads;
         }
         for spring in &self.active {
-            let f = h2 * spring.force(self.point_of(spring, inputs));
+            let f = s * spring.force(self.point_of(spring, inputs));
             for (c, w) in spring.carriers() {
                 let r = &mut self.pcg.r[c];
                 (0..3).for_each(|k| r[k] += (w * f[k]) as f32);
@@ -438,17 +480,17 @@ impl ImplicitEuler {
         filter(inputs.fixed, &mut self.pcg.r);
     }
 
-    /// Improves δ. The residual counts against that of the first pass, or the loads, if larger.
+    /// Improves δ. The residual counts against that of the first pass of the step, or the loads, if larger.
     fn solve(
         &mut self,
         team: &mut Team,
         elastic: &mut Elastic,
         inputs: &StepInputs<'_>,
-        pass: usize,
+        first: bool,
     ) -> PcgReport {
         let Self { pcg, preconditioner, terms, delta, reference, .. } = self;
         let rz = pcg.precondition(team, preconditioner);
-        if pass == 0 {
+        if first {
             *reference = reference.max(rz.max(0.0).sqrt());
         }
         let mut A = system(elastic, terms, inputs);
@@ -467,14 +509,8 @@ impl ImplicitEuler {
         changed
     }
 
-    /// Writes x⁺, v⁺ and the spring forces, if all of them are finite.
-    fn commit(
-        &mut self,
-        team: &mut Team,
-        state: &mut State,
-        inputs: &StepInputs<'_>,
-        spring_forces: &mut Vec<Vector3<f64>>,
-    ) -> bool {
+    /// Moves the predictor to x⁺ = x̂ + δ; whether all of it is finite.
+    fn move_predictor(&mut self, team: &mut Team, inputs: &StepInputs<'_>) -> bool {
         let bound = 1e15; // m: far outside any scene, far inside the range of single precision
         let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.parts.of_copy);
         let results = (blocks(&mut self.predicted, BLOCK), blocks(&mut self.partial, 1));
@@ -487,9 +523,17 @@ impl ImplicitEuler {
             }
             partial[0] = f64::from(u8::from(finite));
         });
-        if self.partial.contains(&0.0) {
-            return false;
-        }
+        !self.partial.contains(&0.0)
+    }
+
+    /// Writes x⁺, v⁺ and the spring forces.
+    fn commit(
+        &mut self,
+        team: &mut Team,
+        state: &mut State,
+        inputs: &StepInputs<'_>,
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) {
         spring_forces.clear();
         let mut active = self.active.iter();
         for &accepted in &self.accepted {
@@ -497,16 +541,24 @@ impl ImplicitEuler {
             let force = spring.map(|s| s.force(s.point(&self.predicted)));
             spring_forces.push(force.unwrap_or_else(Vector3::zeros));
         }
-        // The shortest steps have no finite inverse; nothing moves in them.
-        let (predicted, rate) = (&self.predicted, (1.0 / inputs.h).min(f64::MAX));
+        let (predicted, rate, x_v) = (&self.predicted, inputs.rate(), inputs.history.map(|h| h.x_v));
         let results = (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK));
         team.for_blocks(results, |block, (x, v)| {
-            for ((x, v), next) in x.iter_mut().zip(v).zip(block_of(predicted, block)) {
-                *v = (next - *x) * rate;
-                *x = *next;
+            let next = block_of(predicted, block);
+            match x_v {
+                None => x.iter_mut().zip(v).zip(next).for_each(|((x, v), next)| {
+                    *v = (next - *x) * rate;
+                    *x = *next;
+                }),
+                Some(x_v) => {
+                    let from = block_of(x_v, block);
+                    x.iter_mut().zip(v).zip(next.iter().zip(from)).for_each(|((x, v), (next, from))| {
+                        *v = (next - from) * rate;
+                        *x = *next;
+                    });
+                }
             }
         });
-        true
     }
 }
 
@@ -518,32 +570,10 @@ fn system<'a>(
     SystemOperator {
         elastic,
         mass: inputs.mass_f32,
-        mass_factor: mass_factor(inputs) as f32,
+        mass_factor: inputs.mass_factor() as f32,
         springs,
         fixed: inputs.fixed,
     }
-}
-
-/// K̂ and its factor h² + hβ.
-fn elastic_update(inputs: &StepInputs<'_>) -> ElasticUpdate {
-    let (h, material) = (inputs.h, inputs.material);
-    ElasticUpdate {
-        lame: material.lame(),
-        law: material.law,
-        scale: h * h + h * material.rayleigh.stiffness_s,
-    }
-}
-
-/// 1 + hα.
-fn mass_factor(inputs: &StepInputs<'_>) -> f64 {
-    1.0 + inputs.h * inputs.material.rayleigh.mass_1_s
-}
-
-/// m g + load − α m v of one copy [N].
-#[inline(always)]
-fn external(c: usize, state: &State, inputs: &StepInputs<'_>) -> Vector3<f64> {
-    let drag = inputs.material.rayleigh.mass_1_s;
-    inputs.mass[c] * (inputs.gravity - drag * state.v[c]) + inputs.load[c]
 }
 
 #[inline(always)]

@@ -1,0 +1,65 @@
+//! What every implicit scheme makes of the end of a step: a⁺ = A (x⁺ − x_a), v⁺ = B (x⁺ − x_v).
+//!
+//! | scheme | A | B | x_v | x_a |
+//! |---|---|---|---|---|
+//! | implicit Euler | 1/h² | 1/h | x | x + h v |
+//! | BDF2, k = 2h/3 | 1/k² | 1/k | (4x − x₋)/3 | x_v + k (4v − v₋)/3 |
+//! | Newmark | 1/(βh²) | γ/(βh) | x_a − (v + h(1−γ)a)/B | x + h v + h²(½−β) a |
+//!
+//! # Source
+//! Newmark 1959; Hairer, Wanner, *Solving Ordinary Differential Equations II*, ch. V.1 (BDF2).
+
+use nalgebra::Vector3;
+
+/// The factors of a scheme.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Increment {
+    /// A [1/s²].
+    pub A: f64,
+    /// B [1/s].
+    pub B: f64,
+}
+
+impl Increment {
+    /// No inertia: x⁺ is an equilibrium.
+    pub const NONE: Self = Self { A: 0.0, B: 0.0 };
+
+    /// Implicit Euler with step `h` [s].
+    pub fn euler(h: f64) -> Self {
+        Self { A: 1.0 / (h * h), B: 1.0 / h }
+    }
+
+    /// BDF2 with constant step `h` [s].
+    pub fn bdf2(h: f64) -> Self {
+        Self::euler(2.0 / 3.0 * h)
+    }
+
+    /// Newmark's method with step `h` [s].
+    pub fn newmark(h: f64, beta: f64, gamma: f64) -> Self {
+        Self { A: 1.0 / (beta * h * h), B: gamma / (beta * h) }
+    }
+}
+
+/// (x_v, x_a) of one copy in BDF2: from positions and velocities now and before.
+#[inline(always)]
+pub fn bdf2_history(
+    h: f64,
+    [x, v]: [&Vector3<f64>; 2],
+    [x_before, v_before]: [&Vector3<f64>; 2],
+) -> [Vector3<f64>; 2] {
+    let k = 2.0 / 3.0 * h;
+    let x_v = (4.0 * x - x_before) / 3.0;
+    [x_v, x_v + k * (4.0 * v - v_before) / 3.0]
+}
+
+/// (x_v, x_a) of one copy in Newmark's method: from position, velocity and acceleration now.
+#[inline(always)]
+pub fn newmark_history(
+    h: f64,
+    (beta, gamma): (f64, f64),
+    [x, v, a]: [&Vector3<f64>; 3],
+) -> [Vector3<f64>; 2] {
+    let x_a = x + h * v + h * h * (0.5 - beta) * a;
+    // v⁺ = ṽ + B (x⁺ − x_a) with ṽ = v + h (1 − γ) a.
+    [x_a - (v + h * (1.0 - gamma) * a) / Increment::newmark(h, beta, gamma).B, x_a]
+}

@@ -1,0 +1,165 @@
+//! BDF2 and Newmark's method: the same motion on both paths, their order, and what a cut does to them.
+
+use nalgebra::Vector3;
+use scindo_allocations::allocations;
+use scindo_physics::body::{
+    Arithmetic, Body, BodySettings, Notice, Outcome, PointSpring, Scheme, SpringKind,
+};
+use scindo_physics::cut::BladeSweep;
+use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::mesh::{BoxPattern, box_mesh};
+
+use crate::{DOWN, SOFT, cube, left_face, settings};
+
+const NEWMARK: Scheme = Scheme::AVERAGE_ACCELERATION;
+
+/// A beam that is held at its left end, in free vibration under its weight.
+fn beam(law: Law, rayleigh: Rayleigh, settings: BodySettings) -> Body {
+    let mesh = box_mesh(Vector3::zeros(), Vector3::new(0.2, 0.05, 0.05), [8, 2, 2], BoxPattern::Tet6);
+    let mut body = Body::new(mesh, Material { law, rayleigh, ..SOFT }, settings).unwrap();
+    let held = left_face(&body);
+    body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+    body
+}
+
+fn with(scheme: Scheme, arithmetic: Arithmetic, tolerance: f64) -> BodySettings {
+    BodySettings { scheme, arithmetic: Some(arithmetic), ..settings(500, tolerance) }
+}
+
+/// Largest distance between the nodes of two bodies [m].
+fn apart(a: &Body, b: &Body) -> f64 {
+    a.positions().iter().zip(b.positions()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn both_paths_move_alike() {
+    let damped = Rayleigh { mass_1_s: 0.5, stiffness_s: 0.002 };
+    for scheme in [Scheme::Bdf2, NEWMARK] {
+        for law in [Law::Linear, Law::Corotational] {
+            for rayleigh in [Rayleigh::default(), damped] {
+                let mut fast = beam(law, rayleigh, with(scheme, Arithmetic::Single, 1e-6));
+                let mut general = beam(law, rayleigh, with(scheme, Arithmetic::Double, 1e-9));
+                assert!(fast.is_fast() && !general.is_fast());
+                for step in 0..60 {
+                    let reports = [fast.step(0.004, DOWN, &[]), general.step(0.004, DOWN, &[])];
+                    assert!(reports.iter().all(|r| r.outcome == Outcome::Advanced), "{reports:?}");
+                    assert!(reports[0].residual <= 1e-6 && reports[0].algebraic_error >= 0.0);
+                    let euler = matches!(reports[0].notice, Some(Notice::Started));
+                    assert_eq!(euler, scheme == Scheme::Bdf2 && step == 0, "{:?}", reports[0].notice);
+                }
+                let (sag, apart) =
+                    (apart(&fast, &beam(law, rayleigh, settings(1, 0.5))), apart(&fast, &general));
+                // The corotational tangents differ: held rotations against the projected one.
+                let bound = if law == Law::Linear { 1e-4 } else { 1e-2 };
+                assert!(apart < bound * sag, "{scheme:?} {law:?} {rayleigh:?}: {apart} m of {sag} m");
+            }
+        }
+    }
+}
+
+/// Distance of a run with step `h` from one with a sixteenth of it after 0.16 s, cut half through at half the
+/// time.
+fn error_with_cut(scheme: Scheme, arithmetic: Arithmetic, law: Law, h: f64) -> (f64, u32) {
+    let run = |h: f64| {
+        let mut body =
+            beam(law, Rayleigh { mass_1_s: 0.0, stiffness_s: 0.01 }, with(scheme, arithmetic, 1e-7));
+        let n = (0.16 / h).round() as u32;
+        let mut restarts = 0;
+        for step in 0..n {
+            if step == n / 2 {
+                let segment = |y: f64| [Vector3::new(0.09, y, -0.3), Vector3::new(0.09, y, 0.3)];
+                let made = body.cut(&BladeSweep { segments: vec![segment(0.3), segment(0.02)] }, 1).unwrap();
+                assert!(!made.new_copies.is_empty());
+            }
+            let report = body.step(h, DOWN, &[]);
+            assert_eq!(report.outcome, Outcome::Advanced, "{report:?}");
+            restarts += u32::from(matches!(report.notice, Some(Notice::Started)));
+        }
+        (body, restarts)
+    };
+    let ((fine, _), (coarse, restarts)) = (run(h / 16.0), run(h));
+    (apart(&fine, &coarse), restarts)
+}
+
+#[test]
+fn a_cut_neither_restarts_a_scheme_nor_costs_it_its_order() {
+    for scheme in [Scheme::Bdf2, NEWMARK] {
+        for (arithmetic, law) in [
+            (Arithmetic::Single, Law::Linear),
+            (Arithmetic::Single, Law::Corotational),
+            (Arithmetic::Mixed, Law::StVenantKirchhoff),
+        ] {
+            let [coarse, fine] = [0.004, 0.002].map(|h| error_with_cut(scheme, arithmetic, law, h));
+            let order = (coarse.0 / fine.0).log2();
+            println!("{scheme:?} {arithmetic:?} {law:?}: {coarse:?} {fine:?}, order {order:.2}");
+            assert!(order > 1.7, "{scheme:?} {arithmetic:?} {law:?}: {coarse:?} {fine:?}, order {order}");
+            assert_eq!(coarse.1, u32::from(scheme == Scheme::Bdf2), "only the first step starts anew");
+        }
+    }
+}
+
+/// A free cube that turns fast: whatever the scheme does, no energy appears.
+#[test]
+fn a_spinning_body_gains_no_energy() {
+    for scheme in [Scheme::Bdf2, NEWMARK] {
+        for omega in [3.0, 30.0, 120.0] {
+            let mut body =
+                cube(3, Material { young_pa: 1e6, ..SOFT }, with(scheme, Arithmetic::Single, 1e-5));
+            let spin = Vector3::new(0.3, 0.2, 1.0).normalize() * omega;
+            let v: Vec<_> =
+                body.rest_positions().iter().map(|X| spin.cross(&(X - Vector3::repeat(0.05)))).collect();
+            body.set_state(&body.rest_positions().to_vec(), &v).unwrap();
+            let start = body.kinetic_energy() + body.elastic_energy();
+            for _ in 0..200 {
+                let report = body.step(0.01, Vector3::zeros(), &[]);
+                assert_eq!(report.outcome, Outcome::Advanced);
+                let energy = body.kinetic_energy() + body.elastic_energy();
+                assert!(energy < 1.02 * start, "{scheme:?} {omega}: {energy} of {start} J, {report:?}");
+            }
+        }
+    }
+}
+
+/// Newmark's average acceleration keeps the energy of a linear body that vibrates, over many periods.
+#[test]
+fn newmark_keeps_energy_in_single_precision() {
+    let mut body = beam(Law::Linear, Rayleigh::default(), with(NEWMARK, Arithmetic::Single, 1e-6));
+    let x: Vec<_> = body.rest_positions().iter().map(|X| X + Vector3::y() * X.x * X.x).collect();
+    body.set_state(&x, &vec![Vector3::zeros(); x.len()]).unwrap();
+    let start = body.elastic_energy();
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for _ in 0..2000 {
+        assert_eq!(body.step(0.002, Vector3::zeros(), &[]).notice, None);
+        let energy = body.kinetic_energy() + body.elastic_energy();
+        (least, most) = (least.min(energy), most.max(energy));
+    }
+    assert!(least > 0.99 * start && most < 1.01 * start, "{least} … {most} of {start} J");
+}
+
+/// The bits do not depend on the number of threads, and a steady step allocates nothing, contacts included.
+#[test]
+fn threads_do_not_change_a_bit_and_nothing_is_allocated() {
+    for scheme in [Scheme::Bdf2, NEWMARK] {
+        for law in [Law::Linear, Law::Corotational] {
+            let run = |threads| {
+                let settings = BodySettings { threads, ..with(scheme, Arithmetic::Single, 1e-4) };
+                let mut body = beam(law, Rayleigh { mass_1_s: 0.1, stiffness_s: 0.001 }, settings);
+                let kind = SpringKind::OneSided { normal: Vector3::y(), offset_m: 0.0 };
+                let (copies, weights) = (body.pieces()[70].copies, [0.25; 4]);
+                let spring = PointSpring { copies, weights, kind, stiffness_n_m: 50.0, max_force_n: 1.0 };
+                (0..8).for_each(|_| {
+                    body.step(0.004, DOWN, &[spring]);
+                });
+                let before = allocations();
+                (0..8).for_each(|_| {
+                    body.step(0.004, DOWN, &[spring]);
+                });
+                let made = allocations() - before;
+                (body.positions().to_vec(), body.velocities().to_vec(), made)
+            };
+            let [one, two, three] = [1, 2, 3].map(run);
+            assert_eq!(one.2, 0, "{scheme:?} {law:?}");
+            assert!(one == two && one == three, "{scheme:?} {law:?}");
+        }
+    }
+}
