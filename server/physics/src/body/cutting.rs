@@ -249,7 +249,7 @@ impl Body {
 
     fn follow_parts(&mut self) {
         if let Path::Fast(fast) = &mut self.path {
-            fast.follow_parts(&self.rest, &self.mass, &self.parts);
+            fast.follow_parts((&self.rest, &self.mass), &self.parts, &self.fixed);
         }
         self.range.follow(&self.rest, &self.parts, &self.fixed);
     }

@@ -7,7 +7,8 @@ use super::{Outcome, SolveReport};
 use crate::cut::{CutMesh, NewCopy};
 use crate::element::{Simd, deformation_gradient, piece_energy};
 use crate::integrator::{
-    LinearStep, LooseParts, Multistep, Notice, Scheme, SpinGuard, State, StepInputs, StepOutcome, WEIGHTLESS,
+    FreeMotion, Inertia, LinearStep, LooseParts, Multistep, Notice, Scheme, SpinGuard, State, StepInputs,
+    StepOutcome, WEIGHTLESS, free_motions, why_no_equilibrium,
 };
 use crate::material::Material;
 use crate::operator::{BLOCK, Elastic, FixedCopy, Place, StiffModes, degenerate_elements};
@@ -39,7 +40,10 @@ pub(super) struct Fast {
     pub elastic: Elastic,
     pub mass_f32: Vec<f32>,
     integrator: LinearStep,
+    scheme: Scheme,
     multistep: Multistep,
+    /// Of an equilibrium: rigid motions of held parts that nothing holds.
+    free_motions: Vec<FreeMotion>,
     /// Where the rotation of every piece is kept, for the energy of Newmark's method.
     places: Vec<Place>,
     partial: Vec<f64>,
@@ -65,7 +69,9 @@ impl Fast {
             elastic: Elastic::new(simd, mesh.mesh(), mesh.pieces(), mesh.n_copies()),
             mass_f32: Vec::new(),
             integrator: LinearStep::new(at_start),
+            scheme,
             multistep: Multistep::new(scheme),
+            free_motions: Vec::new(),
             places: Vec::new(),
             partial: Vec::new(),
             degenerate: degenerate_elements(mesh.mesh()),
@@ -118,8 +124,16 @@ impl Fast {
     }
 
     /// Everything that is derived from the parts of a body with these rest positions [m] and masses [kg].
-    pub fn follow_parts(&mut self, rest: &[Vector3<f64>], mass: &[f64], parts: &LooseParts) {
+    pub fn follow_parts(
+        &mut self,
+        (rest, mass): (&[Vector3<f64>], &[f64]),
+        parts: &LooseParts,
+        fixed: &[FixedCopy],
+    ) {
         self.spin.follow(rest, mass, parts);
+        if self.scheme == Scheme::Static {
+            self.free_motions = free_motions(parts, rest, fixed);
+        }
     }
 
     /// The state before the last step.
@@ -148,6 +162,13 @@ impl Fast {
         (rest, spring_forces): (&[Vector3<f64>], &mut Vec<Vector3<f64>>),
     ) -> SolveReport {
         self.before.copy_from(state);
+        if matches!(inputs.inertia, Inertia::None { .. })
+            && let Some(notice) = self.why_no_equilibrium(inputs, rest)
+        {
+            spring_forces.clear();
+            spring_forces.resize(inputs.springs.len(), Vector3::zeros());
+            return SolveReport { outcome: Outcome::Refused, notice: Some(notice), ..SolveReport::default() };
+        }
         let (scheme, notice) = self.multistep.choose(state, inputs, &mut self.spin);
         if self.multistep.starts_newmark(scheme) {
             let Self { elastic, integrator, multistep, mass_f32, .. } = self;
@@ -178,11 +199,23 @@ impl Fast {
                 }
             }
         }
-        report.notice = report.notice.or(notice);
+        let underheld = self.free_motions.first().map(|&motion| Notice::Underheld { motion, driven: false });
+        report.notice = report.notice.or(notice).or(underheld);
         if report.outcome == Outcome::Advanced {
             self.multistep.push((&self.before, state), inputs, made_with);
         }
         report
+    }
+
+    /// What keeps the body from an equilibrium, before the step.
+    fn why_no_equilibrium(&self, inputs: &StepInputs<'_>, rest: &[Vector3<f64>]) -> Option<Notice> {
+        if self.free_motions.is_empty() && !inputs.parts.any_free() {
+            return None;
+        }
+        let force = |(m, f): (&f64, &Vector3<f64>)| *m * inputs.gravity + f;
+        let f_ext: Vec<_> = inputs.mass.iter().zip(inputs.load).map(force).collect();
+        let held = (&self.free_motions[..], inputs.parts);
+        why_no_equilibrium(held, inputs.material.law, rest, &f_ext, !inputs.springs.is_empty())
     }
 
     /// Energy [J] that a step of Newmark's method put in from nowhere.
@@ -219,7 +252,9 @@ impl Fast {
         for halvings in 0..=MOST_SPIN_HALVINGS {
             report.substeps = 1 << halvings;
             let scheme = if report.substeps == 1 { scheme } else { Scheme::ImplicitEuler };
-            let inputs = StepInputs { h: dt_s / f64::from(report.substeps), mass_f32: &[], ..*inputs };
+            let solves = if scheme == Scheme::ImplicitEuler { 1 } else { inputs.solves };
+            let inputs =
+                StepInputs { h: dt_s / f64::from(report.substeps), mass_f32: &[], solves, ..*inputs };
             let slowed = self.spin.limit(state, inputs.mass, inputs.parts, (inputs.h, LARGEST_TURN));
             report.notice = match slowed {
                 Some(angle_rad) => Some(Notice::SpinLimited { angle_rad, largest_rad: LARGEST_TURN }),
@@ -267,9 +302,9 @@ impl Fast {
         for _ in 0..report.substeps {
             let Self { elastic, integrator, multistep, mass_f32, .. } = self;
             let history = multistep.extrapolate(team, state, (scheme, inputs.h));
-            let solves = Multistep::solves(scheme, inputs.material.law);
-            let inputs = StepInputs { mass_f32, history, solves, ..*inputs };
-            let StepOutcome { solve, inverted_pieces, refused_springs, finite } =
+            let inertia = history.map_or(inputs.inertia, Inertia::Remembered);
+            let inputs = StepInputs { mass_f32, inertia, ..*inputs };
+            let StepOutcome { solve, solves, inverted_pieces, refused_springs, finite } =
                 integrator.step(team, elastic, state, &inputs, spring_forces);
             report.newton_steps += solves;
             report.iterations += solve.iterations;

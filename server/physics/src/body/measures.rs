@@ -4,9 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::shape::Shape;
 use super::{Body, Path};
-use crate::cut::Piece;
-use crate::element::{deformation_gradient, piece_energy, piece_forces};
+use crate::element::piece_energy;
 use crate::estimate::{CutTets, MeshError, StressRecovery};
+use crate::operator::exact;
 
 /// Elements that are so flat that a motion of theirs is far stiffer than the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -154,16 +154,8 @@ impl Body {
         if let Path::General(general) = &self.path {
             return general.model().internal_forces(&self.state.x, f_int);
         }
-        let (law, lame) = (self.material.law, self.material.lame());
-        let mut energy = 0.0;
-        for d in self.deformed_pieces() {
-            energy += piece_energy(law, lame, &d.F, d.volume);
-            let P = law.stress(&d.F, lame);
-            for (&copy, force) in d.piece.copies.iter().zip(piece_forces(&P, &d.g, d.volume)) {
-                f_int[copy as usize] += force;
-            }
-        }
-        energy
+        let material = (self.material.law, self.material.lame());
+        exact::internal_forces(&self.cut_mesh, material, &self.state.x, f_int)
     }
 
     /// Sum of the forces [N] that hold the prescribed directions of `nodes` against elasticity,
@@ -204,22 +196,7 @@ impl Body {
         self.mass.iter().zip(values).map(|(m, v)| *m * v).sum()
     }
 
-    fn deformed_pieces(&self) -> impl Iterator<Item = Deformed<'_>> {
-        let mesh = self.cut_mesh.mesh();
-        self.cut_mesh.pieces().iter().map(move |piece| {
-            let e = piece.element as usize;
-            let g = mesh.gradients(e);
-            let F = deformation_gradient(&piece.copies.map(|c| self.state.x[c as usize]), &g);
-            Deformed { piece, F, g, volume: piece.fraction * mesh.volume(e) }
-        })
+    fn deformed_pieces(&self) -> impl Iterator<Item = exact::Deformed<'_>> {
+        exact::deformed_pieces(&self.cut_mesh, &self.state.x)
     }
-}
-
-/// A piece in its present configuration.
-struct Deformed<'a> {
-    piece: &'a Piece,
-    F: Matrix3<f64>,
-    g: [Vector3<f64>; 4],
-    /// w V [m³] at rest.
-    volume: f64,
 }

@@ -36,7 +36,7 @@ use nalgebra::Vector3;
 pub use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::element::Simd;
-use crate::integrator::{DynamicsInputs, LocalConnectivity, LooseParts, State, StepInputs};
+use crate::integrator::{DynamicsInputs, Inertia, LocalConnectivity, LooseParts, State, StepInputs};
 pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
 use crate::material::{Material, Rayleigh};
 use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
@@ -296,9 +296,12 @@ impl Body {
                     parts,
                     springs,
                     material: &self.material,
-                    solver: self.settings.solver,
-                    history: None,
-                    solves: 1,
+                    solver: self.settings.solver(self.material.law),
+                    inertia: match self.settings.scheme {
+                        Scheme::Static => Inertia::None { mesh: cut_mesh, relax: self.settings.relaxation },
+                        _ => Inertia::Euler,
+                    },
+                    solves: self.settings.solves(self.material.law),
                 };
                 fast.step(team, cut_mesh, state, &inputs, (rest, spring_forces))
             }

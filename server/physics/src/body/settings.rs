@@ -64,6 +64,9 @@ const SINGLE_TOLERANCE: f64 = 1e-7;
 /// Newton steps where none are asked for: nonlinear laws in motion, and equilibria.
 const NEWTON_STEPS: u32 = 20;
 const STATIC_NEWTON_STEPS: u32 = 100;
+/// Linear solves of an equilibrium of the linear law in single precision: one, and those that look whether
+/// its residual is what its recurrence says.
+const STATIC_SOLVES: u32 = 5;
 /// Largest forcing term η of inexact Newton methods (Eisenstat, Walker 1996).
 const FORCING: f64 = 0.1;
 
@@ -102,7 +105,7 @@ impl BodySettings {
             (self.element == ElementKind::Hex8, "element hex8"),
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
             (self.scheme.is_explicit(), "an explicit integrator"),
-            (self.scheme == Scheme::Static, "the static integrator"),
+            (self.scheme == Scheme::Static && law.rotates(), "the static integrator with a law that rotates"),
             (self.method != Method::Pcg, "a solver other than pcg"),
             (self.mass != MassKind::Lumped, "consistent mass"),
             (self.volumetric != Volumetric::Full, "a locking remedy"),
@@ -115,7 +118,7 @@ impl BodySettings {
     /// path can be taken and the tolerance allows it, else mixed; double without a solver.
     pub fn arithmetic(&self, law: Law) -> Arithmetic {
         let fast = self.why_general(law).is_none() && self.reaches_single();
-        self.arithmetic.unwrap_or(match (self.scheme.is_explicit() || self.relaxation, fast) {
+        self.arithmetic.unwrap_or(match (self.scheme.is_explicit() || (self.relaxation && !fast), fast) {
             (true, _) => Arithmetic::Double,
             (false, true) => Arithmetic::Single,
             (false, false) => Arithmetic::Mixed,
@@ -137,6 +140,25 @@ impl BodySettings {
             _ if easy => 1,
             _ => NEWTON_STEPS,
         })
+    }
+
+    /// When a linear solve of the fast path stops. That of an equilibrium may make all iterations that Newton's
+    /// method would get.
+    pub(super) fn solver(&self, law: Law) -> PcgSettings {
+        let steps = match self.scheme {
+            Scheme::Static if !self.relaxation => self.newton_steps(law),
+            _ => 1,
+        };
+        PcgSettings { iterations: self.solver.iterations.saturating_mul(steps), ..self.solver }
+    }
+
+    /// Most linear solves of a step of the fast path.
+    pub(super) fn solves(&self, law: Law) -> u32 {
+        match self.scheme {
+            Scheme::Static if self.relaxation => 1,
+            Scheme::Static => STATIC_SOLVES,
+            scheme => Multistep::solves(scheme, law),
+        }
     }
 
     /// Whether a step is a fixed number of linear solves by design, so that it has converged when the
@@ -178,7 +200,7 @@ impl BodySettings {
     /// Predicted seconds of a step of the fast path on one thread.
     pub fn fast_seconds(&self, law: Law, pieces: usize) -> f64 {
         let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
-        let solves = f64::from(Multistep::solves(self.scheme, law));
+        let solves = if self.scheme == Scheme::Static { 1.0 } else { f64::from(self.solves(law)) };
         solves * cost::step_seconds(law, pieces, self.solver, assembled)
     }
 

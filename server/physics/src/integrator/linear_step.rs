@@ -15,15 +15,16 @@ use nalgebra::Vector3;
 
 use super::parts::Translations;
 use super::springs::ActiveSpring;
-use super::step_inputs::{StepInputs, StepOutcome};
+use super::step_inputs::{Inertia, KnownLoads, StepInputs, StepOutcome};
 use super::{State, WEIGHTLESS, hold};
 use crate::material::Rayleigh;
+use crate::operator::exact;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, Elastic, FixedCopy, LinearOperator, Padded, Spring,
     StiffModes, Substitution, Sum, SystemOperator, block_of, filter, invert, padded,
 };
 use crate::reserve::resize_reserving;
-use crate::solver::{Pcg, PcgReport, StopReason};
+use crate::solver::{LEAST_REFERENCE, Pcg, PcgReport, StopReason};
 use crate::team::{Team, blocks};
 
 /// Springs may open, close or reach their cap this often within one step.
@@ -63,6 +64,14 @@ pub struct LinearStep {
     terms: Vec<Spring>,
     translations: Translations,
     reference: f64,
+    /// Of an equilibrium: internal forces [N] and energy [J] at the predictor in double precision.
+    exact: Vec<Vector3<f64>>,
+    stored: f64,
+    /// Residual that the last solve began with, over the reference.
+    began: f64,
+    /// Of relaxation: what its search was begun with, and where the last step ended.
+    searched: Option<KnownLoads>,
+    ended: Vec<Vector3<f64>>,
 }
 
 /// How degenerate elements are kept from costing iterations.
@@ -98,6 +107,7 @@ impl LinearStep {
         resize_reserving(&mut self.diagonal, n, [0.0; 8]);
         self.partial.resize(n.div_ceil(BLOCK), 0.0);
         self.made_for = None;
+        self.searched = None;
         self.sprung.clear();
         self.preconditioner.resize(n);
         self.pcg.resize(n);
@@ -134,26 +144,80 @@ impl LinearStep {
         inputs: &StepInputs<'_>,
         spring_forces: &mut Vec<Vector3<f64>>,
     ) -> StepOutcome {
+        if inputs.relaxes() && self.goes_on(elastic, state, inputs) {
+            return self.relax(team, elastic, state, inputs, spring_forces);
+        }
         self.predict(team, state, inputs);
         self.start_springs(inputs);
         let mut solve = PcgReport::default();
-        let (mut inverted_pieces, mut finite) = (0, true);
+        let (mut inverted_pieces, mut finite, mut solves) = (0, true, 0);
+        let mut began = f64::INFINITY;
         for number in 0..inputs.solves.max(1) {
             let inverted = self.update_operator(team, elastic, state, inputs);
             if number == 0 {
                 inverted_pieces = inverted;
             }
+            let known = solve.iterations;
             self.improve(team, (elastic, inputs), state, number == 0, &mut solve);
+            solves += 1;
             finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
-            if !finite {
+            // In an equilibrium each solve begins with the true residual, where the one before only knew that
+            // of its recurrence. If that is no smaller than before, rounding is what is left.
+            let none_left = solve.iterations == known;
+            let rounding = number > 0 && !none_left && self.began > 0.5 * began;
+            if rounding && !inputs.moves() && solve.stop == StopReason::Converged {
+                (solve.stop, solve.residual) = (StopReason::Stagnated, self.began);
+            }
+            let done = none_left || rounding || solve.stop == StopReason::IterationLimit;
+            if !finite || team.told_to_stop() || (!inputs.moves() && done) {
                 break;
             }
+            began = self.began;
         }
         if finite {
             self.commit(team, state, inputs, spring_forces);
         }
+        self.searched = None;
+        if finite && inputs.relaxes() && inputs.springs.is_empty() {
+            self.searched.get_or_insert_default().note(inputs);
+            self.ended.clone_from(&state.x);
+        }
         let refused_springs = inputs.springs.len() - self.active.len();
-        StepOutcome { solve, inverted_pieces, refused_springs, finite }
+        StepOutcome { solve, solves, inverted_pieces, refused_springs, finite }
+    }
+
+    /// Whether nothing was changed from outside since the last step.
+    fn goes_on(&self, elastic: &Elastic, state: &State, inputs: &StepInputs<'_>) -> bool {
+        let made_for = Some((elastic.version(), inputs.mass_factor()));
+        let same = |known| inputs.is_loaded_as(known) && self.made_for == made_for && self.ended == state.x;
+        self.searched.as_ref().is_some_and(same)
+    }
+
+    /// Goes on with the search of the last step: the same direction, as if the steps were one.
+    fn relax(
+        &mut self,
+        team: &mut Team,
+        elastic: &mut Elastic,
+        state: &mut State,
+        inputs: &StepInputs<'_>,
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) -> StepOutcome {
+        self.predicted.copy_from_slice(&state.x);
+        self.delta.fill([0.0; 4]);
+        self.translations.restart(inputs.parts);
+        let Self { pcg, preconditioner, delta, reference, .. } = self;
+        let mut A = system(elastic, &[], inputs);
+        let solve = pcg.go_on(team, &mut A, preconditioner, delta, (*reference, inputs.solver));
+        let finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
+        if finite {
+            self.commit(team, state, inputs, spring_forces);
+            self.ended.copy_from_slice(&state.x);
+        }
+        // What the recurrence takes for the end is looked at again by forces.
+        if !finite || solve.stop == StopReason::Converged {
+            self.searched = None;
+        }
+        StepOutcome { solve, solves: 1, finite, ..StepOutcome::default() }
     }
 
     /// One linear solve for δ, made again while springs open, close or reach their cap in it.
@@ -171,7 +235,7 @@ impl LinearStep {
             self.complete_operator(elastic, inputs);
             self.balance_parts(state, inputs);
             self.residual(team, elastic, state, inputs, (pass, first));
-            let report = self.solve(team, elastic, inputs, first && pass == 0);
+            let report = self.solve(team, elastic, inputs, (pass, first));
             // A pass that has nothing left to do estimates no error.
             let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
             *solve =
@@ -221,8 +285,12 @@ impl LinearStep {
 
     fn predict(&mut self, team: &mut Team, state: &State, inputs: &StepInputs<'_>) {
         team.for_blocks(blocks(&mut self.predicted, BLOCK), |block, predicted| {
-            if let Some(history) = inputs.history {
-                return predicted.copy_from_slice(block_of(history.x_a, block));
+            match inputs.inertia {
+                Inertia::Euler => {}
+                Inertia::Remembered(history) => {
+                    return predicted.copy_from_slice(block_of(history.x_a, block));
+                }
+                Inertia::None { .. } => return predicted.copy_from_slice(block_of(&state.x, block)),
             }
             let known = block_of(&state.x, block).iter().zip(block_of(&state.v, block));
             for (predicted, (x, v)) in predicted.iter_mut().zip(known) {
@@ -250,17 +318,19 @@ impl LinearStep {
         let at = if self.at_start { &state.x } else { &self.predicted };
         let inverted = elastic.update_chunks(team, &with, at);
         self.sum_chunks(team, elastic, inputs);
+        if let Inertia::None { mesh, .. } = inputs.inertia {
+            self.exact.resize(self.predicted.len(), Vector3::zeros());
+            let material = (inputs.material.law, inputs.material.lame());
+            self.stored = exact::internal_forces(mesh, material, &self.predicted, &mut self.exact);
+        }
         if self.damps(inputs) {
             // Prescribed motion takes part with the velocity that it has in the step.
-            let from = inputs.history.map_or(&state.x[..], |history| history.x_v);
-            let moved = self.predicted.iter().zip(from);
-            match inputs.history {
-                None => self.scratch.iter_mut().zip(moved).for_each(|(v, (to, x))| {
-                    *v = padded(&((to - x) / h));
-                }),
-                Some(history) => self.scratch.iter_mut().zip(moved).for_each(|(v, (to, x))| {
+            let scratch = self.scratch.iter_mut().zip(&self.predicted);
+            match inputs.inertia {
+                Inertia::Remembered(history) => scratch.zip(history.x_v).for_each(|((v, to), x)| {
                     *v = padded(&(history.increment.B * (to - x)));
                 }),
+                _ => scratch.zip(&state.x).for_each(|((v, to), x)| *v = padded(&((to - x) / h))),
             }
             elastic.apply(team, &self.scratch, &mut self.damping); // s K̂ v
             // From x_n on, the predictor is h v away: f_int(x̂) ≈ f_int(x_n) + h K̂ v.
@@ -273,7 +343,7 @@ impl LinearStep {
 
     /// Whether K̂ v takes part.
     fn damps(&self, inputs: &StepInputs<'_>) -> bool {
-        self.at_start || inputs.material.rayleigh.stiffness_s > 0.0
+        inputs.moves() && (self.at_start || inputs.material.rayleigh.stiffness_s > 0.0)
     }
 
     /// Internal forces and, where it changed, the diagonal of A and its inverse, without springs.
@@ -435,13 +505,15 @@ impl LinearStep {
         }
         let (f_int, damping, solved, predicted) =
             (&self.f_int, &self.damping, &self.scratch, &self.predicted);
+        let exact = (!inputs.moves()).then_some(&self.exact);
         let (M, shift) = (&self.preconditioner, &self.translations.shift);
         let results = (blocks(&mut self.pcg.r, BLOCK), blocks(&mut self.partial, 1));
         team.for_blocks(results, |block, (r, partial)| {
             let mut load = Sum::default();
             for (i, (r, M)) in r.iter_mut().zip(M.block(block)).enumerate() {
                 let c = block * BLOCK + i;
-                let mut f = inputs.external(c, state, predicted) - unpadded(&f_int[c]);
+                let elastic = exact.map_or_else(|| unpadded(&f_int[c]), |exact| exact[c]);
+                let mut f = inputs.external(c, state, predicted) - elastic;
                 if damped {
                     f -= unpadded(&damping[c]);
                 }
@@ -468,7 +540,7 @@ impl LinearStep {
                 filter(inputs.fixed, &mut self.scratch);
                 self.pcg.norm(team, &self.preconditioner, &self.scratch)
             };
-            self.reference = LOAD_FLOOR * loads;
+            self.reference = self.least_reference(loads, inputs);
         }
         for spring in &self.active {
             let f = s * spring.force(self.point_of(spring, inputs));
@@ -480,18 +552,30 @@ impl LinearStep {
         filter(inputs.fixed, &mut self.pcg.r);
     }
 
+    /// What the residual counts against at least, where √(fᵀM⁻¹f) of the loads is `loads`. Of an equilibrium
+    /// it is the loads themselves, or a part of the elastic energy where displacements alone hold the body.
+    fn least_reference(&self, loads: f64, inputs: &StepInputs<'_>) -> f64 {
+        if inputs.moves() {
+            return LOAD_FLOOR * loads;
+        }
+        loads.max(LEAST_REFERENCE * (2.0 * self.stored.max(0.0)).sqrt())
+    }
+
     /// Improves δ. The residual counts against that of the first pass of the step, or the loads, if larger.
     fn solve(
         &mut self,
         team: &mut Team,
         elastic: &mut Elastic,
         inputs: &StepInputs<'_>,
-        first: bool,
+        (pass, first): (usize, bool),
     ) -> PcgReport {
-        let Self { pcg, preconditioner, terms, delta, reference, .. } = self;
+        let Self { pcg, preconditioner, terms, delta, reference, began, .. } = self;
         let rz = pcg.precondition(team, preconditioner);
-        if first {
+        if first && pass == 0 {
             *reference = reference.max(rz.max(0.0).sqrt());
+        }
+        if pass == 0 {
+            *began = if *reference > 0.0 { rz.max(0.0).sqrt() / *reference } else { 0.0 };
         }
         let mut A = system(elastic, terms, inputs);
         pcg.run(team, &mut A, preconditioner, delta, (rz, *reference, inputs.solver))
@@ -541,7 +625,11 @@ impl LinearStep {
             let force = spring.map(|s| s.force(s.point(&self.predicted)));
             spring_forces.push(force.unwrap_or_else(Vector3::zeros));
         }
-        let (predicted, rate, x_v) = (&self.predicted, inputs.rate(), inputs.history.map(|h| h.x_v));
+        let (predicted, rate) = (&self.predicted, inputs.rate());
+        let x_v = match inputs.inertia {
+            Inertia::Remembered(history) => Some(history.x_v),
+            Inertia::Euler | Inertia::None { .. } => None,
+        };
         let results = (blocks(&mut state.x, BLOCK), blocks(&mut state.v, BLOCK));
         team.for_blocks(results, |block, (x, v)| {
             let next = block_of(predicted, block);

@@ -17,7 +17,7 @@ mod relaxation;
 
 pub use dynamics::{
     Dynamics, DynamicsError, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings,
-    LEAST_NEWTON_STEPS, MassKind, Notice, Scheme, stable_step,
+    LEAST_NEWTON_STEPS, MassKind, Notice, Scheme, stable_step, why_no_equilibrium,
 };
 pub use free_motion::{FreeMotion, free_motions};
 pub use history::History;
@@ -30,7 +30,7 @@ pub use relaxation::{Relaxation, RelaxationReport};
 pub use spin::SpinGuard;
 pub use springs::{PointSpring, SpringKind};
 pub use statics::{StaticProblem, find_equilibrium, prescribe};
-pub use step_inputs::{StepHistory, StepInputs, StepOutcome};
+pub use step_inputs::{Inertia, StepHistory, StepInputs, StepOutcome};
 
 use nalgebra::Vector3;
 

@@ -38,7 +38,7 @@ impl Multistep {
     }
 
     fn remembers(&self) -> bool {
-        self.scheme != Scheme::ImplicitEuler
+        matches!(self.scheme, Scheme::Bdf2 | Scheme::Newmark { .. })
     }
 
     /// Whether acceleration and energy are followed from step to step.
@@ -102,7 +102,7 @@ impl Multistep {
         spin: &mut SpinGuard,
     ) -> (Scheme, Option<Notice>) {
         if !self.remembers() {
-            return (Scheme::ImplicitEuler, None);
+            return (self.scheme, None);
         }
         if !self.history.continues(state) {
             self.forget();

@@ -6,6 +6,7 @@ use super::State;
 use super::increment::Increment;
 use super::parts::LooseParts;
 use super::springs::PointSpring;
+use crate::cut::CutMesh;
 use crate::material::Material;
 use crate::operator::{ElasticUpdate, FixedCopy};
 use crate::solver::{PcgReport, PcgSettings};
@@ -33,10 +34,28 @@ pub struct StepInputs<'a> {
     pub material: &'a Material,
     /// When to stop the solver.
     pub solver: PcgSettings,
-    /// What the scheme makes of earlier steps; `None` is implicit Euler, which needs nothing but the state.
-    pub history: Option<StepHistory<'a>>,
-    /// Linear solves of the step, each from where the one before led; at least 1.
+    /// What the scheme makes of inertia.
+    pub inertia: Inertia<'a>,
+    /// Linear solves of the step, each from where the one before led; at least 1. Those of an equilibrium end
+    /// earlier where it is reached.
     pub solves: u32,
+}
+
+/// What a scheme makes of inertia.
+#[derive(Clone, Copy, Debug)]
+pub enum Inertia<'a> {
+    /// Implicit Euler: x_v = x and x_a = x + h v, from nothing but the state.
+    Euler,
+    /// A scheme that remembers earlier steps.
+    Remembered(StepHistory<'a>),
+    /// None: the step ends in equilibrium with the loads, at rest (A = B = 0, and s = 1).
+    None {
+        /// The pieces, for a residual in double precision: without inertia, single precision would leave more
+        /// of it than most tolerances.
+        mesh: &'a CutMesh,
+        /// Go on with the search of the last step where nothing was changed from outside (Nienhuys 2003, §3.3).
+        relax: bool,
+    },
 }
 
 /// A scheme's increment, with x_a and x_v of every copy [m].
@@ -53,34 +72,67 @@ pub struct StepHistory<'a> {
 impl StepInputs<'_> {
     /// s = 1/A [s²]: what forces are multiplied with.
     pub(super) fn s(&self) -> f64 {
-        self.history.map_or(self.h * self.h, |history| 1.0 / history.increment.A)
+        match self.inertia {
+            Inertia::Euler => self.h * self.h,
+            Inertia::Remembered(history) => 1.0 / history.increment.A,
+            Inertia::None { .. } => 1.0,
+        }
     }
 
     /// r = B/A [s].
     pub(super) fn r(&self) -> f64 {
-        self.history.map_or(self.h, |history| history.increment.B / history.increment.A)
+        match self.inertia {
+            Inertia::Euler => self.h,
+            Inertia::Remembered(history) => history.increment.B / history.increment.A,
+            Inertia::None { .. } => 0.0,
+        }
     }
 
     /// √s [s]: δ minimises an energy times s.
     pub fn root_s(&self) -> f64 {
-        self.history.map_or(self.h, |history| history.increment.A.sqrt().recip())
+        match self.inertia {
+            Inertia::Euler => self.h,
+            Inertia::Remembered(history) => history.increment.A.sqrt().recip(),
+            Inertia::None { .. } => 1.0,
+        }
     }
 
     /// B [1/s]. The shortest steps have no finite inverse; nothing moves in them.
     pub(super) fn rate(&self) -> f64 {
-        self.history.map_or((1.0 / self.h).min(f64::MAX), |history| history.increment.B)
+        match self.inertia {
+            Inertia::Euler => (1.0 / self.h).min(f64::MAX),
+            Inertia::Remembered(history) => history.increment.B,
+            Inertia::None { .. } => 0.0,
+        }
+    }
+
+    /// Whether there is inertia.
+    pub(super) fn moves(&self) -> bool {
+        !matches!(self.inertia, Inertia::None { .. })
+    }
+
+    /// Whether the search of the last step goes on.
+    pub(super) fn relaxes(&self) -> bool {
+        matches!(self.inertia, Inertia::None { relax: true, .. })
     }
 
     /// v̂ = B (x̂ − x_v) of copy `c`, which the predictor x̂ takes for its velocity.
     #[inline(always)]
     fn predicted_velocity(&self, c: usize, state: &State, predicted: &[Vector3<f64>]) -> Vector3<f64> {
-        self.history.map_or_else(|| state.v[c], |h| h.increment.B * (predicted[c] - h.x_v[c]))
+        match &self.inertia {
+            Inertia::Euler => state.v[c],
+            Inertia::Remembered(h) => h.increment.B * (predicted[c] - h.x_v[c]),
+            Inertia::None { .. } => Vector3::zeros(),
+        }
     }
 
     /// M (x̂ − x_a) of copy `c`, and 0 for implicit Euler, which makes one solve from x_a.
     #[inline(always)]
     pub(super) fn inertia(&self, c: usize, predicted: &[Vector3<f64>]) -> Vector3<f64> {
-        self.history.map_or_else(Vector3::zeros, |h| self.mass[c] * (predicted[c] - h.x_a[c]))
+        match &self.inertia {
+            Inertia::Remembered(h) => self.mass[c] * (predicted[c] - h.x_a[c]),
+            Inertia::Euler | Inertia::None { .. } => Vector3::zeros(),
+        }
     }
 
     /// m g + load − α m v̂ of copy `c` [N].
@@ -98,9 +150,36 @@ impl StepInputs<'_> {
         ElasticUpdate { lame: self.material.lame(), law, scale }
     }
 
-    /// 1 + rα.
+    /// 1 + rα; 0 without inertia.
     pub(super) fn mass_factor(&self) -> f64 {
-        1.0 + self.r() * self.material.rayleigh.mass_1_s
+        if self.moves() { 1.0 + self.r() * self.material.rayleigh.mass_1_s } else { 0.0 }
+    }
+
+    /// Whether both steps have the same loads and prescribed positions, and none has springs.
+    pub(super) fn is_loaded_as(&self, known: &KnownLoads) -> bool {
+        self.springs.is_empty()
+            && known.gravity == self.gravity
+            && known.load == self.load
+            && known.fixed == self.fixed
+    }
+}
+
+/// The loads of a step, to be compared with those of the next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct KnownLoads {
+    gravity: Vector3<f64>,
+    load: Vec<Vector3<f64>>,
+    fixed: Vec<FixedCopy>,
+}
+
+impl KnownLoads {
+    /// Takes down those of `inputs`.
+    pub(super) fn note(&mut self, inputs: &StepInputs<'_>) {
+        self.gravity = inputs.gravity;
+        self.load.clear();
+        self.load.extend_from_slice(inputs.load);
+        self.fixed.clear();
+        self.fixed.extend_from_slice(inputs.fixed);
     }
 }
 
@@ -109,6 +188,8 @@ impl StepInputs<'_> {
 pub struct StepOutcome {
     /// How the last linear solve went; iterations are those of all passes.
     pub solve: PcgReport,
+    /// Linear solves made.
+    pub solves: u32,
     /// Pieces with det F ≤ 0 at the predictor.
     pub inverted_pieces: usize,
     /// Springs that were left out because a number in them is not usable.

@@ -5,6 +5,7 @@ mod chunk;
 mod chunks;
 mod composite_diagonal;
 mod elastic;
+pub mod exact;
 mod kernel;
 mod edges;
 mod preconditioner;

@@ -23,6 +23,7 @@ pub use block_jacobi::DiagonalInverse;
 pub use constraint::Filter;
 pub use eigen::{EigenError, EigenSettings, Modes, natural_frequencies};
 pub use linear::{LinearSettings, LinearSolver, Method, Precision};
+pub(crate) use newton::LEAST_REFERENCE;
 pub use newton::{Curvature, Newton, NewtonReport, NewtonSettings, Potential};
 pub use pcg::{Pcg, PcgReport, PcgSettings};
 pub use report::{LinearReport, StopReason};

@@ -134,7 +134,7 @@ const ARMIJO: f64 = 1e-4;
 const ROUNDING: f64 = 1e-12;
 /// Least reference, over the norm √(2Ψ) of the elastic forces: without loads, and with what is held where it was,
 /// only rounding is left to measure a residual against.
-const LEAST_REFERENCE: f64 = 1e-3;
+pub const LEAST_REFERENCE: f64 = 1e-3;
 /// Iterations of conjugate gradients where a factorisation failed, if not more were allowed.
 const INSTEAD_OF_FACTORS: u32 = 500;
 /// Steps without half the residual after which rounding is what is left of it.

@@ -41,6 +41,9 @@ pub struct Pcg {
     p: Vec<Padded>,
     q: Vec<Padded>,
     partial: Vec<f64>,
+    /// rᵀM⁻¹r and β where the last run ended.
+    rz: f64,
+    beta: f64,
 }
 
 impl Pcg {
@@ -77,12 +80,26 @@ impl Pcg {
         A: &mut impl LinearOperator,
         M: &BlockJacobi,
         x: &mut [Padded],
-        (mut rz, reference, settings): (f64, f64, PcgSettings),
+        (rz, reference, settings): (f64, f64, PcgSettings),
     ) -> PcgReport {
+        (self.rz, self.beta) = (rz, 0.0);
+        self.go_on(team, A, M, x, (reference, settings))
+    }
+
+    /// Goes on where the last run ended, as if both were one: with the same A, which nobody applied meanwhile,
+    /// and the same M. `x` is added to.
+    pub fn go_on(
+        &mut self,
+        team: &mut Team,
+        A: &mut impl LinearOperator,
+        M: &BlockJacobi,
+        x: &mut [Padded],
+        (reference, settings): (f64, PcgSettings),
+    ) -> PcgReport {
+        let (mut rz, mut beta) = (self.rz, self.beta);
         let target = settings.tolerance * reference;
         let mut report = PcgReport::default();
         let mut error = AlgebraicError::default();
-        let mut beta = 0.0;
         loop {
             // rᵀM⁻¹r is not negative: M⁻¹ is positive semidefinite.
             let norm = rz.max(0.0).sqrt();
@@ -119,6 +136,7 @@ impl Pcg {
             let next = self.advance(team, M, x, alpha); // x += α p, r −= α q, z = M⁻¹ r, rᵀz
             beta = next / rz;
             rz = next;
+            (self.rz, self.beta) = (rz, beta);
             report.iterations += 1;
         }
     }

@@ -207,7 +207,7 @@ fn what_does_not_go_together_is_refused() {
     let with = settings();
     let single = BodySettings { arithmetic: Some(Arithmetic::Single), ..with };
     refused(Law::NeoHookean, single, "single precision does not go with a law");
-    refused(Law::Linear, BodySettings { scheme: Scheme::Static, ..single }, "the static integrator");
+    refused(Law::Corotational, BodySettings { scheme: Scheme::Static, ..single }, "the static integrator");
     refused(Law::Linear, BodySettings { scheme: Scheme::Rk4, ..single }, "an explicit integrator");
     refused(Law::Linear, BodySettings { method: Method::Cholesky, ..single }, "a solver other than pcg");
     let mixed = BodySettings { arithmetic: Some(Arithmetic::Mixed), scheme: Scheme::Rk4, ..with };

@@ -8,6 +8,7 @@ mod conservation;
 mod cutting;
 mod determinism;
 mod dynamics;
+mod equilibrium;
 mod multistep;
 mod reference;
 mod repeated_solves;

@@ -9,7 +9,7 @@ use super::{
 use crate::assembly::Tangent;
 use crate::integrator::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN};
 use crate::integrator::increment::{Increment, bdf2_history, newmark_history};
-use crate::integrator::{FreeMotion, State};
+use crate::integrator::{FreeMotion, LooseParts, State};
 use crate::material::Law;
 use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
 use crate::team::Team;
@@ -85,18 +85,11 @@ impl Dynamics {
         self.history.contacts = self.contacts();
     }
 
-    /// What keeps the body from an equilibrium: a part that hangs on nothing, or a rigid motion that nothing
-    /// holds and the loads drive. A rotation by a finite angle ends somewhere; the linear law knows none.
+    /// [`why_no_equilibrium`].
     fn why_no_equilibrium(&self) -> Option<Notice> {
-        if self.parts.any_free() {
-            return Some(Notice::LooseBody);
-        }
-        let endless = |m: &&FreeMotion| m.is_translation() || self.model.law() == Law::Linear;
-        let driven = |m: &&FreeMotion| m.is_driven(&self.parts, self.model.rest(), &self.f_ext);
-        let found = self.free_motions.iter().filter(endless).find(driven);
-        // Springs may hold what the boundary conditions do not.
-        let motion = found.filter(|_| self.active.is_empty())?;
-        Some(Notice::Underheld { motion: *motion, driven: true })
+        let held = (&self.free_motions[..], &self.parts);
+        let springs = !self.active.is_empty();
+        why_no_equilibrium(held, self.model.law(), self.model.rest(), &self.f_ext, springs)
     }
 
     /// Energy [J] in `self.next` that came from nowhere, if it is more than the scheme may gain.
@@ -359,6 +352,25 @@ impl Dynamics {
         }
         ruined
     }
+}
+
+/// What keeps a body from an equilibrium: a part that hangs on nothing, or a rigid motion that nothing
+/// holds and the loads `f_ext` [N] drive. A rotation by a finite angle ends somewhere; the linear law knows
+/// none. Springs may hold what the boundary conditions do not.
+pub fn why_no_equilibrium(
+    (free_motions, parts): (&[FreeMotion], &LooseParts),
+    law: Law,
+    rest: &[Vector3<f64>],
+    f_ext: &[Vector3<f64>],
+    springs: bool,
+) -> Option<Notice> {
+    if parts.any_free() {
+        return Some(Notice::LooseBody);
+    }
+    let endless = |m: &&FreeMotion| m.is_translation() || law == Law::Linear;
+    let driven = |m: &&FreeMotion| m.is_driven(parts, rest, f_ext);
+    let motion = free_motions.iter().filter(endless).find(driven).filter(|_| !springs)?;
+    Some(Notice::Underheld { motion: *motion, driven: true })
 }
 
 /// The report of a step that is a fixed number of linear solves by design: how well the last of them was

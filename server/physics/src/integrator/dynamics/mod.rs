@@ -14,6 +14,7 @@ mod report;
 mod settings;
 
 pub use critical_step::stable_step;
+pub use implicit::why_no_equilibrium;
 pub use report::{DynamicsOutcome, DynamicsReport, Notice};
 pub use settings::{DynamicsSettings, LEAST_NEWTON_STEPS, MassKind, Scheme};
 

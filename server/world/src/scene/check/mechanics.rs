@@ -174,7 +174,7 @@ impl Check<'_> {
             Some(RawPrecision::Single) => {
                 if let Some(why) = m.why_general() {
                     let what = format!("found `single` with {why}, allowed: mixed, double");
-                    let next = "single precision needs tet4, linear or corotational, implicit-euler, bdf2 or newmark, pcg, \
+                    let next = "single precision needs tet4, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law), pcg, \
                                 lumped mass, no locking remedy and one Newton step";
                     self.conflict(key, what, next);
                 }
