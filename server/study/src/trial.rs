@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use cpu_time::ThreadTime;
-use scindo_world::build::BuildOptions;
+use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::Inputs;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::{Level, Simulation, Stage, StepReport};

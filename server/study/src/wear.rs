@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
-use scindo_world::build::BuildOptions;
+use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::{CutRequest, Inputs};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::{Simulation, Stage};

@@ -27,7 +27,7 @@ pub mod tool;
 pub mod contact;
 
 // scene to bodies: regions, loads, meshes
-pub mod build;
+pub mod assemble;
 
 // recorded material points
 pub mod probe;

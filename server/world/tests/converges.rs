@@ -130,7 +130,7 @@ fn a_part_that_falls_out_of_the_scene_sleeps() {
         young_pa = 1e5\npoisson = 0.4\ndensity_kg_m3 = 1000\nfix = [{ where = { slab = { axis = \"x\", from = 0, to = 0 } } }]\n";
     let scene = Scene::from_toml(text).unwrap();
     let run = |threads| {
-        let options = scindo_world::build::BuildOptions { threads, ..Default::default() };
+        let options = scindo_world::assemble::BuildOptions { threads, ..Default::default() };
         let mut sim = Simulation::with_options(&scene, Path::new(""), options).unwrap();
         let mut told = Vec::new();
         for _ in 0..100 {

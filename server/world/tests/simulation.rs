@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use scindo_world::build::BuildOptions;
+use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::{CutRequest, Inputs, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-use scindo_world::build::BuildOptions;
+use scindo_world::assemble::BuildOptions;
 use scindo_world::doubts;
 use scindo_world::forecast::{Effort, Forecast, forecast};
 use scindo_world::plan::Plan;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use scindo_proto::KeySpace;
 use scindo_proto::endpoint::bulk_endpoint;
 use scindo_view::{ViewConfig, Viewer};
-use scindo_world::build::BuildOptions;
+use scindo_world::assemble::BuildOptions;
 use scindo_world::doubts;
 use scindo_world::results::Results;
 use scindo_world::scene::{SHIPPED, Scene, ShippedScene};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use scindo_physics::mesh::TetMesh;
-use scindo_world::build::region::select;
+use scindo_world::assemble::region::select;
 use scindo_world::scene::Region;
 use scindo_world::simulation::Simulation;
 use serde::{Deserialize, Serialize};

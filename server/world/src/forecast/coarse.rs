@@ -9,7 +9,7 @@ use scindo_physics::body::{Body, ElementKind, Volumetric};
 use scindo_physics::mesh::TetMesh;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
-use crate::build::{Built, mechanics};
+use crate::assemble::{Built, mechanics};
 use crate::mesh_in::{SurfaceMesh, lattice_from_surface};
 use crate::simulation::{SimBody, Simulation};
 

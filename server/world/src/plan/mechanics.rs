@@ -3,7 +3,7 @@
 use scindo_physics::body::{Arithmetic, OperatorChoice};
 
 use super::{BodySize, Plan, count};
-use crate::build::mechanics;
+use crate::assemble::mechanics;
 use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod};
 use crate::scene::{BodySpec, CheckedScene, Mechanics};
 

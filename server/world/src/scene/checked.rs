@@ -7,7 +7,7 @@ use super::raw::{
     RawCutMethod, RawElement, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawOperator,
     RawPrecision,
 };
-use crate::build::mechanics;
+use crate::assemble::mechanics;
 use crate::inputs::{ToolMode, ToolShape};
 use crate::organ::Organ;
 

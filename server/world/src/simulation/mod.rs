@@ -35,7 +35,7 @@ pub(crate) use stopwatch::processor_seconds;
 pub use stopwatch::{Stage, StageSeconds};
 pub use undo::{MAX_UNDO, Undone};
 
-use crate::build::{self, BuildOptions, Built};
+use crate::assemble::{self, BuildOptions, Built};
 use crate::contact::Contacts;
 use crate::doubts;
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
@@ -95,7 +95,7 @@ impl Simulation {
         options: BuildOptions,
         observer: &Observer<'_>,
     ) -> Result<Self, SceneError> {
-        let mut built = build::build(scene, base_dir, options, observer)?;
+        let mut built = assemble::build(scene, base_dir, options, observer)?;
         let (source, scene) = (scene.clone(), scene.checked().clone());
         built.warnings.extend(doubts::of(&scene, &mut built.bodies));
         Ok(Self::assemble(source, scene, built))
@@ -330,7 +330,7 @@ impl Simulation {
         if solver != known {
             body.set_solver(solver).map_err(|error| error.to_string())?;
         }
-        body.set_constants(build::constants(spec)).map_err(|error| error.to_string())?;
+        body.set_constants(assemble::constants(spec)).map_err(|error| error.to_string())?;
         if stiffness != spec.young_pa {
             self.contacts.set_stiffness(index, spec.young_pa, &mut self.tools);
         }
