@@ -4,6 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
+/// Most tools of a simulation, those of the scene and those brought by clients.
+pub const MAX_TOOLS: usize = 64;
+
 /// Geometry of a rigid tool in its own axes: tip in the origin, shaft along +z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToolShape {

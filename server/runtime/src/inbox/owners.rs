@@ -5,8 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use scindo_proto::messages::{DeviceCapability, ToolSample};
-use scindo_world::inputs::ToolInput;
-use scindo_world::tool::MAX_TOOLS;
+use scindo_world::inputs::{MAX_TOOLS, ToolInput};
 
 use super::early::{EarlyPoses, PATIENCE};
 use super::{Refusal, refuse};

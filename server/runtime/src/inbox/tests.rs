@@ -4,7 +4,7 @@ use super::cut_log::{MAX_ANSWERS, MAX_WAITING_CUTS};
 use super::early::PATIENCE;
 use super::*;
 use scindo_proto::messages::{BladeSegment, Pose, ToolShape, Vec3};
-use scindo_world::tool::MAX_TOOLS;
+use scindo_world::inputs::MAX_TOOLS;
 
 fn inbox() -> Inbox {
     Inbox::new([Arc::from("beam")], [Arc::from("scalpel")])

@@ -22,9 +22,9 @@ use scindo_collision::SurfaceError;
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::{Surface, SurfaceVertex};
 
-use crate::inputs::ToolMode;
+use crate::inputs::{MAX_TOOLS, ToolMode};
 use crate::tool::geometry::core_radius;
-use crate::tool::{MAX_TOOLS, Tool, Tools};
+use crate::tool::{Tool, Tools};
 use compliance::Compliance;
 use press::{Bearing, MAX_POINTS};
 use spring::material_points;

@@ -8,9 +8,8 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Unit, Vector3};
 
-use crate::inputs::{ToolMode, ToolShape};
+use crate::inputs::{MAX_TOOLS, ToolMode, ToolShape};
 use crate::organ::Organ;
-use crate::tool::MAX_TOOLS;
 
 use super::checked::*;
 use super::problem::{Fault, nearest_word};

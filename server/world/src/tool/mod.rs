@@ -19,13 +19,11 @@ use crate::contact::compliance::Compliance;
 use crate::contact::grab::Grip;
 use crate::contact::press::Press;
 use crate::contact::proxy::Proxy;
-use crate::inputs::{ToolInput, ToolMode, ToolShape};
+use crate::inputs::{MAX_TOOLS, ToolInput, ToolMode, ToolShape};
 use crate::scene::checked::ToolSpec;
 use blade::{BladeEdge, IncisionNumbers};
 use script::Script;
 
-/// Most tools of a simulation, those of the scene and those brought by clients.
-pub const MAX_TOOLS: usize = 64;
 /// Owner of a tool that a script moves.
 pub const SCRIPT: &str = "script";
 /// Spring of a tool that a client brought [N/m] and its largest force [N].
