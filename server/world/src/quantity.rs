@@ -52,6 +52,15 @@ pub fn digits(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
+/// A point [m] with as many digits as one reads: four of its largest coordinate.
+pub fn coordinates(point_m: &[f64; 3]) -> String {
+    let largest = point_m.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
+    let digits = if largest > 0.0 { (3 - largest.log10().floor() as i32).clamp(0, 12) as usize } else { 0 };
+    // As text and back: without the zeros at the end.
+    let rounded = point_m.map(|c| format!("{c:.digits$}").parse().unwrap_or(c) + 0.0);
+    format!("{rounded:?}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,5 +77,12 @@ mod tests {
         assert_eq!(memory(2.7e9), "2.7 GB");
         assert_eq!(percent(0.163), "16.3 %");
         assert_eq!(digits(-0.000_012), "-1.20e-5");
+    }
+    #[test]
+    fn places_have_the_digits_one_reads() {
+        assert_eq!(coordinates(&[-0.046_536_258, 0.0029, 0.0]), "[-0.04654, 0.0029, 0.0]");
+        assert_eq!(coordinates(&[0.0, 12.345_67, -3.0]), "[0.0, 12.35, -3.0]");
+        assert_eq!(coordinates(&[0.0, -1e-9, 0.2]), "[0.0, 0.0, 0.2]");
+        assert_eq!(coordinates(&[0.0; 3]), "[0.0, 0.0, 0.0]");
     }
 }

@@ -8,7 +8,7 @@ use scindo_world::assemble::BuildOptions;
 use scindo_world::doubts;
 use scindo_world::forecast::{Effort, Forecast, forecast};
 use scindo_world::plan::Plan;
-use scindo_world::quantity::duration;
+use scindo_world::quantity::{coordinates, duration};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::{SimBody, Simulation};
 use serde_json::{Value, json};
@@ -182,7 +182,7 @@ impl Found {
 
 fn in_words(body: &SimBody) -> String {
     let (size, nodes) = (body.size(), body.body.mesh().nodes.len());
-    let [low, high] = body.corners_m().map(|corner| scindo_world::scene::coordinates(&corner));
+    let [low, high] = body.corners_m().map(|corner| coordinates(&corner));
     let mut words = format!(
         "  body {}: {} elements, {nodes} nodes, {} surface triangles, {:.4e} m3\n    from {low} to {high} m",
         body.id, size.elements, size.triangles, body.rest_volume_m3

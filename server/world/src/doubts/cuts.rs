@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 
 use super::bounds;
-use crate::quantity::length;
-use crate::scene::{CheckedScene, CutPath, CutSpec, coordinates};
+use crate::quantity::{coordinates, length};
+use crate::scene::{CheckedScene, CutPath, CutSpec};
 use crate::simulation::SimBody;
 
 /// How far from the skin, in cells, a point of a path may lie.

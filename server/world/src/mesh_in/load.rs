@@ -6,7 +6,7 @@ use std::path::Path;
 use scindo_physics::mesh::TetMesh;
 use serde::Serialize;
 
-use crate::scene::coordinates;
+use crate::quantity::coordinates;
 
 use super::{
     LatticeReport, MeshFile, MeshInError, Observer, VolumeHealth, lattice_observed, read_mesh, repair_volume,

@@ -28,7 +28,6 @@ pub use checked::{
     Mechanics, MeshSource, Newmark, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
 };
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};
-pub use problem::coordinates;
 pub use problem::{Fault, Place, Problem, SceneError};
 pub use schema::{json_schema, key_reference};
 pub use shipped::{DEMONSTRATION, SHIPPED, ShippedScene};

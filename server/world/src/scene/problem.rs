@@ -4,6 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::quantity::coordinates;
+
 /// Where in a scene a problem lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -172,15 +174,6 @@ pub enum Fault {
     },
 }
 
-/// A point [m] with as many digits as one reads: four of its largest coordinate.
-pub fn coordinates(point_m: &[f64; 3]) -> String {
-    let largest = point_m.iter().fold(0.0, |largest: f64, c| largest.max(c.abs()));
-    let digits = if largest > 0.0 { (3 - largest.log10().floor() as i32).clamp(0, 12) as usize } else { 0 };
-    // As text and back: without the zeros at the end.
-    let rounded = point_m.map(|c| format!("{c:.digits$}").parse().unwrap_or(c) + 0.0);
-    format!("{rounded:?}")
-}
-
 /// ", did you mean `x`?" or the list of what is known.
 fn hint(suggestion: &Option<String>, known: &[String]) -> String {
     match suggestion {
@@ -227,17 +220,4 @@ pub(crate) fn nearest_word<'a>(found: &str, known: impl IntoIterator<Item = &'a 
         .filter(|(likeness, _)| *likeness > 0.8)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, word)| word.to_owned())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::coordinates;
-
-    #[test]
-    fn places_have_the_digits_one_reads() {
-        assert_eq!(coordinates(&[-0.046_536_258, 0.0029, 0.0]), "[-0.04654, 0.0029, 0.0]");
-        assert_eq!(coordinates(&[0.0, 12.345_67, -3.0]), "[0.0, 12.35, -3.0]");
-        assert_eq!(coordinates(&[0.0, -1e-9, 0.2]), "[0.0, 0.0, 0.2]");
-        assert_eq!(coordinates(&[0.0; 3]), "[0.0, 0.0, 0.0]");
-    }
 }
