@@ -39,6 +39,15 @@ impl Mesh {
             ),
         }
     }
+
+    /// Nodes along the longest way through the mesh.
+    pub fn nodes_along(&self) -> f64 {
+        let [low, high] = self.bounds();
+        let (extent, nodes) = (high - low, self.n_nodes() as f64);
+        let along = extent.amax() * (nodes / extent.product()).cbrt();
+        // A flat mesh fills no volume; no way has more nodes than there are.
+        if along.is_finite() { along.min(nodes) } else { nodes }
+    }
 }
 
 /// A mesh and what was found and repaired in its file.

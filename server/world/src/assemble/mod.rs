@@ -2,8 +2,6 @@
 
 pub mod region;
 
-pub mod mechanics;
-
 mod mesh;
 
 mod skin;
@@ -107,12 +105,12 @@ impl Builder<'_> {
         }
         let doubts = mesh::doubts_about_scale(mesh.bounds(), spec);
         self.doubts.extend(doubts.into_iter().map(|doubt| (at.clone(), doubt)));
-        let along = mechanics::nodes_along(mesh.bounds(), mesh.n_nodes());
+        let along = mesh.nodes_along();
         let settings = BodySettings {
-            solver: mechanics::linear(&spec.mechanics, along, spec.poisson),
+            solver: spec.mechanics.linear_solver(along, spec.poisson),
             threads: self.options.threads,
             portable: self.options.portable,
-            ..mechanics::settings(&spec.mechanics)
+            ..spec.mechanics.body_settings()
         };
         let made = match mesh {
             mesh::Mesh::Tets(mesh) => Body::new(mesh, material(spec), settings),
@@ -126,7 +124,7 @@ impl Builder<'_> {
                 return None;
             }
         };
-        let law = mechanics::law(&spec.mechanics);
+        let law = spec.mechanics.constitutive_law();
         if settings.arithmetic(law) == Arithmetic::Single && !body.is_fast() {
             let doubt =
                 "most elements are too flat for single precision: mixed precision is taken, which costs more";
@@ -219,7 +217,7 @@ fn material(spec: &BodySpec) -> Material {
         poisson: spec.poisson,
         density_kg_m3: spec.density_kg_m3,
         rayleigh: rayleigh(spec),
-        law: mechanics::law(&spec.mechanics),
+        law: spec.mechanics.constitutive_law(),
     }
 }
 

@@ -9,7 +9,7 @@ use scindo_physics::body::{Body, ElementKind, Volumetric};
 use scindo_physics::mesh::TetMesh;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
-use crate::assemble::{Built, mechanics};
+use crate::assemble::Built;
 use crate::mesh_in::{SurfaceMesh, lattice_from_surface};
 use crate::simulation::{SimBody, Simulation};
 
@@ -62,7 +62,7 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
     for (spec, fine) in scene.bodies.iter_mut().zip(simulation.bodies()) {
         spec.skin = None;
         let mesh = coarser(&fine.body, elements)?;
-        let wanted = mechanics::settings(&spec.mechanics);
+        let wanted = spec.mechanics.body_settings();
         let volumetric = match wanted.volumetric {
             Volumetric::Selective => Volumetric::Full,
             other => other,

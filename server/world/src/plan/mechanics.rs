@@ -3,7 +3,6 @@
 use scindo_physics::body::{Arithmetic, OperatorChoice};
 
 use super::{BodySize, Plan, count};
-use crate::assemble::mechanics;
 use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod};
 use crate::scene::{BodySpec, CheckedScene, Mechanics};
 
@@ -98,7 +97,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         _ => format!("pcg, {} x {:e}, {precision}", size.iterations, m.tolerance),
     };
     let path = if m.arithmetic() == Arithmetic::Single {
-        let operator = match mechanics::settings(m).operator(mechanics::law(m), size.elements) {
+        let operator = match m.body_settings().operator(m.constitutive_law(), size.elements) {
             OperatorChoice::Assembled => "assembled",
             _ => "matrix-free",
         };
@@ -118,7 +117,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
 fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
     let elements = size.elements as f64;
     if m.arithmetic() == Arithmetic::Single {
-        return mechanics::settings(m).fast_seconds(mechanics::law(m), size.elements);
+        return m.body_settings().fast_seconds(m.constitutive_law(), size.elements);
     }
     let (points, nodes_of_element, blocks_of_row) = match (m.element, m.locking) {
         (RawElement::Tet4, RawLocking::NodeAveraged) => (2.0, 4.0, 60.0),

@@ -1,13 +1,8 @@
 //! A scene as ready objects: names resolved to indices, words to types, lists to vectors.
 
 use nalgebra::{Unit, Vector3};
-use scindo_physics::body::Arithmetic;
 
-use super::raw::{
-    RawCutMethod, RawElement, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawOperator,
-    RawPrecision,
-};
-use crate::assemble::mechanics;
+use super::mechanics::Mechanics;
 use crate::inputs::{ToolMode, ToolShape};
 use crate::organ::Organ;
 
@@ -91,68 +86,6 @@ pub struct SkinSpec {
     pub snapping: f64,
     /// Surface it rests on as path and metres per length unit; none: the one the mesh was made from.
     pub surface: Option<(String, f64)>,
-}
-
-/// How a body is computed: a combination that goes together.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mechanics {
-    /// Finite element.
-    pub element: RawElement,
-    /// Constitutive law.
-    pub law: RawLaw,
-    /// Time integration.
-    pub integrator: RawIntegrator,
-    /// Parameters of Newmark's method, used by it alone.
-    pub newmark: Newmark,
-    /// Mass matrix.
-    pub mass: RawMass,
-    /// Remedy against locking.
-    pub locking: RawLocking,
-    /// Linear solver.
-    pub method: RawMethod,
-    /// Arithmetic; none: as the other settings allow.
-    pub precision: Option<RawPrecision>,
-    /// Most Newton steps per step of time; none: as law and integrator call for.
-    pub newton_steps: Option<u32>,
-    /// How single precision applies the stiffness; `None`: what costs less.
-    pub operator: Option<RawOperator>,
-    /// Most iterations of a linear solve; none: as the mesh calls for.
-    pub iterations: Option<u32>,
-    /// Whether so many iterations are meant, whatever residual they leave.
-    pub fixed_iterations: bool,
-    /// Relative preconditioned residual at which the solver stops.
-    pub tolerance: f64,
-    /// How cuts are made.
-    pub cutting: RawCutMethod,
-    /// What becomes of parts without a held node.
-    pub loose: RawLoose,
-}
-
-/// Parameters of Newmark's method.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Newmark {
-    /// β, weight of the new acceleration in the positions.
-    pub beta: f64,
-    /// γ, weight of the new acceleration in the velocities.
-    pub gamma: f64,
-}
-
-impl Mechanics {
-    /// What keeps the body from the fast path, which runs in single precision; none if nothing does.
-    pub fn why_general(&self) -> Option<&'static str> {
-        mechanics::settings(self).why_general(mechanics::law(self))
-    }
-
-    /// Whether an equilibrium is approached by relaxation, step after step.
-    pub fn relaxes(&self) -> bool {
-        self.method == RawMethod::Relaxation
-    }
-
-    /// The arithmetic that is used: single where it can be and the tolerance allows, else mixed;
-    /// double without a solver.
-    pub fn arithmetic(&self) -> Arithmetic {
-        mechanics::settings(self).arithmetic(mechanics::law(self))
-    }
 }
 
 /// Where the elements of a body come from.

@@ -13,6 +13,8 @@ pub mod problem;
 
 mod schema;
 
+mod mechanics;
+
 pub mod checked;
 
 mod check;
@@ -25,9 +27,10 @@ use std::path::{Path, PathBuf};
 
 pub use checked::{
     BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec, LookSpec,
-    Mechanics, MeshSource, Newmark, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
+    MeshSource, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
 };
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};
+pub use mechanics::{Mechanics, Newmark};
 pub use problem::{Fault, Place, Problem, SceneError};
 pub use schema::{json_schema, key_reference};
 pub use shipped::{DEMONSTRATION, SHIPPED, ShippedScene};

@@ -2,7 +2,8 @@
 
 use scindo_physics::body::Arithmetic;
 
-use super::super::checked::{CellSplit, Mechanics, MeshSource, Newmark};
+use super::super::checked::{CellSplit, MeshSource};
+use super::super::mechanics::{Mechanics, Newmark};
 use super::super::raw::*;
 use super::Check;
 
