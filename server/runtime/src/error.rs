@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use scindo_proto::KeyError;
 use scindo_study::StudyError;
 use scindo_study::stress::StressError;
-use scindo_world::mesh_in::MeshInError;
+use scindo_world::format::MeshInError;
 use scindo_world::results::ResultsError;
 use scindo_world::scene::SceneError;
 use thiserror::Error;

@@ -14,11 +14,11 @@ pub mod scene;
 // what comes from outside into a step
 pub mod inputs;
 
+// bytes of mesh files
+pub mod format;
+
 // mesh files → checked tetrahedra
 pub mod mesh_in;
-
-// bodies of our own making
-pub mod organ;
 
 // rigid tools: where hands and scripts hold them
 pub mod tool;

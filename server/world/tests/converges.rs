@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use scindo_world::inputs::Inputs;
-use scindo_world::organ::Organ;
+use scindo_world::mesh_in::Organ;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 

@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
+use scindo_world::format::{MeshFile, read_mesh_bytes};
 use scindo_world::inputs::Inputs;
-use scindo_world::mesh_in::{MeshFile, read_mesh_bytes};
 use scindo_world::results::Results;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use scindo_world::inputs::{Inputs, Wants};
-use scindo_world::organ::Organ;
+use scindo_world::mesh_in::Organ;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;

@@ -5,9 +5,10 @@ use std::path::Path;
 use nalgebra::Vector3;
 use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh, graded_hexes};
 
+use crate::format::MeshInError;
 use crate::mesh_in::{
-    MeshHealth, MeshInError, Observer, VolumeHealth, body_bytes, check_scale, components, load_surface,
-    load_volume, memory_for_meshes,
+    MeshHealth, Observer, VolumeHealth, body_bytes, check_scale, components, load_surface, load_volume,
+    memory_for_meshes,
 };
 use crate::quantity::memory;
 use crate::scene::{BodySpec, CellSplit, Fault, MeshSource};

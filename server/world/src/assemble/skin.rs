@@ -8,7 +8,7 @@ use scindo_physics::body::Body;
 use scindo_physics::skin::SkinSettings;
 
 use super::mesh::fault;
-use crate::mesh_in::{MeshFile, SurfaceMesh, read_mesh};
+use crate::format::{MeshFile, SurfaceMesh, read_mesh};
 use crate::scene::{Fault, MeshSource, SkinSpec};
 
 /// How far the skin may lie off the elements' boundary, in mean edges of elements.

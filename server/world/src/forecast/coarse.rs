@@ -10,7 +10,8 @@ use scindo_physics::mesh::TetMesh;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
 use crate::assemble::Built;
-use crate::mesh_in::{SurfaceMesh, lattice_from_surface};
+use crate::format::SurfaceMesh;
+use crate::mesh_in::lattice_from_surface;
 use crate::simulation::{SimBody, Simulation};
 
 /// Elements of the two copies.

@@ -5,7 +5,8 @@
 
 use serde::Serialize;
 
-use super::lattice::CELLS;
+/// Fewest and most lattice cubes across the longest side.
+pub const CELLS: std::ops::RangeInclusive<usize> = 2..=256;
 
 /// Tetrahedra per cube of lattice volume, those at the surface included.
 const TETS_PER_CUBE: f64 = 12.5;
@@ -53,6 +54,11 @@ pub fn estimate(size_m: [f64; 3], volume_m3: f64, cells: usize) -> MeshEstimate 
 pub fn largest(size_m: [f64; 3], volume_m3: f64, bytes: f64) -> usize {
     let fits = |cells: &usize| estimate(size_m, volume_m3, *cells).bytes <= bytes;
     CELLS.rev().find(fits).unwrap_or(*CELLS.start())
+}
+
+/// Most cells that may be asked for.
+pub fn most_cells() -> usize {
+    *CELLS.end()
 }
 
 /// Bytes that a body of so many tetrahedra takes.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::SurfaceMesh;
+use crate::format::SurfaceMesh;
 
 /// Corner c of a cube is at (c & 1, c >> 1 & 1, c >> 2); the tets go round the diagonal 0–7.
 const KUHN: [[usize; 4]; 6] =

@@ -6,11 +6,11 @@ use std::path::Path;
 use scindo_physics::mesh::TetMesh;
 use serde::Serialize;
 
+use super::health::volume::{VolumeHealth, repair_volume};
+use super::lattice::{LatticeReport, lattice_observed};
+use super::progress::Observer;
+use crate::format::{MeshFile, MeshInError, read_mesh};
 use crate::quantity::coordinates;
-
-use super::{
-    LatticeReport, MeshFile, MeshInError, Observer, VolumeHealth, lattice_observed, read_mesh, repair_volume,
-};
 
 /// What was found in a mesh file and what was done about it. Prints as a few lines of text.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use scindo_physics::mesh::TetMesh;
 
-use super::MeshInError;
-use crate::results::vtu::{Cells, Grid, save_grid};
+use crate::format::MeshInError;
+use crate::format::vtu::{Cells, Grid, save_grid};
 
 /// Writes a mesh in the format of the extension: `.vtu`, `.vtk` (legacy, text) or `.msh` (Gmsh 2.2, text).
 pub fn write_mesh(path: &Path, mesh: &TetMesh) -> Result<(), MeshInError> {

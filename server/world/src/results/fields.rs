@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 use scindo_physics::body::Body;
 use scindo_physics::cut::SurfaceVertex;
 
-use super::vtu::{Cells, Field, FieldValues, Grid, VtuError, save_grid, save_vtm};
+use crate::format::vtu::{Cells, Field, FieldValues, Grid, VtuError, save_grid, save_vtm};
 use crate::simulation::{SimBody, Simulation, von_mises};
 
 /// Copy of a point that is not at a node.

@@ -4,8 +4,6 @@
 //! A run that is interrupted still leaves complete files, as long as `finish` is called; what was
 //! recorded up to the last second survives even a kill.
 
-pub mod vtu;
-
 mod machine;
 
 mod summary;
@@ -23,6 +21,7 @@ use thiserror::Error;
 pub use machine::Machine;
 pub use summary::{BodySummary, Summary, Timing};
 
+use crate::format::vtu;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 use fields::{write_blocks, write_fields};

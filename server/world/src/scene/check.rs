@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use nalgebra::{Unit, Vector3};
 
 use crate::inputs::{MAX_TOOLS, ToolMode, ToolShape};
-use crate::organ::Organ;
+use crate::mesh_in::Organ;
 
 use super::checked::*;
 use super::problem::{Fault, nearest_word};

@@ -4,7 +4,7 @@ use nalgebra::{Unit, Vector3};
 
 use super::mechanics::Mechanics;
 use crate::inputs::{ToolMode, ToolShape};
-use crate::organ::Organ;
+use crate::mesh_in::Organ;
 
 /// A scene whose values are all in range and fit each other. Files are not opened yet.
 #[derive(Debug, Clone)]

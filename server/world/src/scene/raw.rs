@@ -16,7 +16,7 @@ use schemars::JsonSchema;
 use scindo_physics::material::Material;
 use serde::{Deserialize, Serialize};
 
-use crate::organ::Organ;
+use crate::mesh_in::Organ;
 
 /// A vector or point in world axes.
 pub type Vec3 = [f64; 3];

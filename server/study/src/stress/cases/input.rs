@@ -11,8 +11,8 @@ use scindo_physics::body::{Body, Outcome, PointSpring, SpringKind};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::Material;
 use scindo_physics::mesh::TetMesh;
+use scindo_world::format::read_mesh_bytes;
 use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolMode, ToolShape};
-use scindo_world::mesh_in::read_mesh_bytes;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::weld;
+use crate::format::{MeshInError, SurfaceMesh};
 use crate::mesh_in::triangle_tree::TriangleTree;
-use crate::mesh_in::{MeshInError, SurfaceMesh};
 
 /// Largest share of useless triangles that is accepted.
 pub const MAX_DEGENERATE_TRIANGLES: f64 = 0.5;

@@ -7,7 +7,7 @@ use scindo_physics::mesh::{DEGENERATE_VOLUME, TetMesh};
 use serde::Serialize;
 
 use super::{connectivity, weld};
-use crate::mesh_in::{MeshInError, VolumeMesh};
+use crate::format::{MeshInError, VolumeMesh};
 
 /// Largest share of useless tetrahedra that is removed rather than refused.
 pub const MAX_DEGENERATE_TETS: f64 = 0.01;

@@ -17,14 +17,12 @@ use nalgebra::Vector3;
 use scindo_physics::mesh::TetMesh;
 use serde::Serialize;
 
-use super::estimate::{MeshEstimate, estimate, largest, memory_for_meshes};
+use super::estimate::{CELLS, MeshEstimate, estimate, largest, memory_for_meshes};
 use super::health::surface::{CleanSurface, SurfaceHealth, clean_surface};
-use super::{MeshInError, Meshing, Observer, SurfaceMesh};
+use super::progress::{Meshing, Observer};
+use crate::format::{MeshInError, SurfaceMesh};
 use crate::quantity::{digits, memory};
 use bcc::Bcc;
-
-/// Fewest and most lattice cubes across the longest side.
-pub const CELLS: std::ops::RangeInclusive<usize> = 2..=256;
 
 /// Components smaller than this share of the volume are dropped (crumbs of thin parts).
 const CRUMB: f64 = 0.005;

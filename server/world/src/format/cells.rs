@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::mesh_in::MeshInError;
-use crate::mesh_in::{MeshFile, SurfaceMesh, VolumeMesh};
+use super::error::MeshInError;
+use super::mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
 
 /// What a cell of a file contributes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 //! VTK file formats, "Cell types" (vtkCellType.h).
 
 use super::cells::{CellKind, CellSoup};
-use crate::mesh_in::MeshInError;
+use super::error::MeshInError;
 
 /// What a VTK cell type contributes to a mesh.
 pub fn kind(vtk_type: i64) -> CellKind {

@@ -5,9 +5,9 @@ use std::io::Cursor;
 use nalgebra::Vector3;
 
 use super::cells::{CellKind, CellSoup, zero_based};
+use super::error::MeshInError;
+use super::mesh_file::MeshFile;
 use super::scanner::Scanner;
-use crate::mesh_in::MeshFile;
-use crate::mesh_in::MeshInError;
 
 /// Reads the positions and faces of all objects and groups in the file; materials are not looked at.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {

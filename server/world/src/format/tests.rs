@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::mesh_in::{SurfaceMesh, read_mesh};
+use crate::format::{SurfaceMesh, read_mesh};
 
 const OBJ: &str = "# cube\nmtllib cube.mtl\no cube\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     vn 0 0 1\ng bottom\nusemtl red\nf 1//1 4//1 3//1 2//1\ng rest\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf -8 -4 -1\nf 1 8 4\n";

@@ -11,8 +11,10 @@ use schemars::JsonSchema;
 use scindo_physics::mesh::TetMesh;
 use serde::{Deserialize, Serialize};
 
-use crate::mesh_in::implicit::triangulate;
-use crate::mesh_in::{LatticeReport, MeshInError, Observer, SurfaceMesh, lattice_observed};
+use super::implicit::triangulate;
+use super::lattice::{LatticeReport, lattice_observed};
+use super::progress::Observer;
+use crate::format::{MeshInError, SurfaceMesh};
 
 /// Shapes that the program makes itself; long axis along x, top towards +z, centred at x = y = 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]

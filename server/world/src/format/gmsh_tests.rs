@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::mesh_in::{MeshFile, MeshInError, VolumeMesh, read_mesh_bytes};
+use crate::format::{MeshFile, MeshInError, VolumeMesh, read_mesh_bytes};
 
 const V1: &str = "$NOD\n5\n10 0 0 0\n20 1 0 0\n30 0 1 0\n40 0 0 1\n7 1 1 1\n$ENDNOD\n\
     $ELM\n3\n1 2 1 1 3 10 20 30\n2 4 1 1 4 10 20 30 40\n3 4 1 1 4 20 30 40 7\n$ENDELM\n";

@@ -5,8 +5,8 @@ use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 
 use super::cells::{CellKind, CellSoup, zero_based};
-use crate::mesh_in::MeshFile;
-use crate::mesh_in::MeshInError;
+use super::error::MeshInError;
+use super::mesh_file::MeshFile;
 
 /// One row of any element: the parser fills what a surface needs and drops the rest (colours, normals, …).
 struct Row {

@@ -6,10 +6,10 @@
 use nalgebra::Vector3;
 
 use super::cells::{CellSoup, zero_based};
+use super::error::MeshInError;
+use super::mesh_file::MeshFile;
 use super::scanner::{ByteOrder, Encoding, Scanner};
 use super::vtk_cells;
-use crate::mesh_in::MeshFile;
-use crate::mesh_in::MeshInError;
 
 /// Reads a legacy VTK file; point and cell data are not looked at.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {

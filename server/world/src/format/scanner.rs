@@ -3,7 +3,7 @@
 //! Every count read from a file passes [`Scanner::count`], which compares it with the bytes that are
 //! left, so that no allocation is larger than the file justifies.
 
-use crate::mesh_in::MeshInError;
+use super::error::MeshInError;
 
 /// Largest number of nodes or elements accepted from a file (indices are `u32`).
 pub const MAX_ITEMS: u64 = 200_000_000;

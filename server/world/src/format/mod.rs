@@ -1,9 +1,13 @@
-//! Readers: the bytes of a mesh file → a typed mesh.
+//! Files of meshes: their bytes → a typed mesh, and grids with fields → a file.
 //!
-//! Every reader checks counts against the bytes that are there before it allocates, and indices
+//! A file holds either a *volume* (tetrahedra: `.msh`, `.vtk`, `.vtu`) or a *surface* (triangles: `.obj`,
+//! `.stl`, `.ply`, and `.vtk`, `.vtu`, `.vtp`, `.msh` without tetrahedra). Readers work on bytes in memory;
+//! [`read_mesh`] alone opens files. Every reader checks counts against the bytes that are there before it allocates, and indices
 //! against the nodes that are there before it hands anything on; faults name file, place and what was
 //! expected.
 
+mod error;
+mod mesh_file;
 mod scanner;
 mod cells;
 mod gmsh;
@@ -14,12 +18,36 @@ mod vtk_xml;
 mod obj;
 mod stl;
 mod ply;
+pub mod vtu;
 
 use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::{MeshFile, MeshInError};
+pub use error::MeshInError;
+pub use mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
+
+/// Largest mesh file that is opened [bytes].
+pub const MAX_FILE_BYTES: u64 = 2 << 30;
+
+/// Reads a mesh file; the format follows from the extension, or from the first bytes when there is none.
+pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
+    let io = |source| MeshInError::Io { path: path.to_path_buf(), source };
+    let file = path.display().to_string();
+    let length = std::fs::metadata(path).map_err(io)?.len();
+    if length > MAX_FILE_BYTES {
+        return Err(MeshInError::Limit {
+            file,
+            place: "file".into(),
+            what: "bytes".into(),
+            value: length,
+            limit: MAX_FILE_BYTES,
+            reason: "no mesh file may be larger".into(),
+        });
+    }
+    let bytes = std::fs::read(path).map_err(io)?;
+    read_mesh_bytes(&file, &bytes)
+}
 
 /// Reads a mesh from memory; `file` is its name (its extension chooses the format).
 pub fn read_mesh_bytes(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {

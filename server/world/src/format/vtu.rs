@@ -284,7 +284,7 @@ fn array(out: &mut impl Write, array: &Array, data: &[u8]) -> io::Result<()> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::mesh_in::{MeshFile, read_mesh_bytes};
+    use crate::format::{MeshFile, read_mesh_bytes};
 
     const TETS: [[u32; 4]; 1] = [[0, 1, 2, 3]];
 

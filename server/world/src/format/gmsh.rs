@@ -6,9 +6,9 @@
 use nalgebra::Vector3;
 
 use super::cells::{CellKind, CellSoup};
+use super::error::MeshInError;
+use super::mesh_file::MeshFile;
 use super::scanner::{ByteOrder, Encoding, Scanner};
-use crate::mesh_in::MeshFile;
-use crate::mesh_in::MeshInError;
 
 /// Reads a Gmsh file of any of the three formats.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {

@@ -11,12 +11,12 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::cells::{CellSoup, zero_based};
+use super::error::MeshInError;
+use super::mesh_file::MeshFile;
 use super::scanner::ByteOrder;
 use super::vtk_array::{Array, DataArray, Storage};
 use super::vtk_cells;
 use super::vtk_legacy::monotone_offsets;
-use crate::mesh_in::MeshFile;
-use crate::mesh_in::MeshInError;
 
 /// Reads a `.vtu` or `.vtp` file; point and cell data are not looked at.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {

@@ -5,8 +5,8 @@ use std::io::Cursor;
 use nalgebra::Vector3;
 
 use super::cells::{CellKind, CellSoup, zero_based};
-use crate::mesh_in::MeshFile;
-use crate::mesh_in::MeshInError;
+use super::error::MeshInError;
+use super::mesh_file::MeshFile;
 
 /// Bytes of a binary header with the triangle count, and of one triangle.
 const HEADER: usize = 84;
