@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use crossbeam_channel::bounded;
 use scindo_proto::messages::SessionInfo;
 use scindo_proto::{Chunk, KeySpace, Role, Topic};
-use scindo_world::probe::Probe;
+use scindo_world::body::Probe;
 use scindo_world::snapshot::Snapshot;
 use triple_buffer::{Output, triple_buffer};
 use zenoh::Wait as _;

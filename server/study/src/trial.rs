@@ -305,7 +305,7 @@ impl Running {
 
     fn displacements(&self) -> Vec<f64> {
         let simulation = &self.simulation;
-        let of = |probe: &scindo_world::probe::Probe| {
+        let of = |probe: &scindo_world::body::Probe| {
             let u = simulation.probe_position(probe) - probe.rest_m;
             [u.x, u.y, u.z]
         };

@@ -29,8 +29,11 @@ pub mod contact;
 // scene to bodies: regions, loads, meshes
 pub mod assemble;
 
-// recorded material points
-pub mod probe;
+// what a step says about itself
+pub mod report;
+
+// bodies as the world knows them, and recorded material points
+pub mod body;
 
 // touch at the pace of a hand, for haptic clients
 pub mod contact_model;

@@ -9,6 +9,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::body::BodySize;
 use crate::inputs::Wants;
 use crate::scene::CheckedScene;
 use crate::scene::raw::RawCutMethod;
@@ -46,21 +47,6 @@ pub struct Effect {
 pub struct Plan {
     /// In the order of the step.
     pub effects: Vec<Effect>,
-}
-
-/// Sizes of a body that its costs follow from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodySize {
-    /// Elements.
-    pub elements: usize,
-    /// Copies of nodes, with those on mid-edges.
-    pub nodes: usize,
-    /// Surface vertices.
-    pub vertices: usize,
-    /// Surface triangles.
-    pub triangles: usize,
-    /// Most iterations of a linear solve.
-    pub iterations: u32,
 }
 
 impl Plan {

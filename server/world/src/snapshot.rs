@@ -9,9 +9,10 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use scindo_physics::body::Body;
 
+pub use crate::body::SurfaceTopology;
+use crate::body::{Probe, SimBody, StepCounts};
 use crate::inputs::{ToolMode, ToolShape, Wants};
-use crate::probe::Probe;
-use crate::simulation::{BodyReport, Energy, SimBody, StepCounts, StepReport};
+use crate::report::{BodyReport, Energy, StepReport};
 use crate::tool::{Tool, Tools};
 
 /// The state after one step.
@@ -174,25 +175,6 @@ impl ToolSnapshot {
         self.seq = tool.seq;
         self.client_time_ns = tool.client_time_ns;
     }
-}
-
-/// Triangles of a body's surface; immutable, one object per epoch.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct SurfaceTopology {
-    /// Rises whenever the triangles change.
-    pub epoch: u32,
-    /// Vertices that the triangles refer to.
-    pub vertex_count: u32,
-    /// Counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Per triangle: 0 = skin, n > 0 = lip of incision n.
-    pub tags: Vec<u32>,
-    /// Where the vertices rest [m].
-    pub rest: Vec<[f32; 3]>,
-    /// Per vertex: it moves with held nodes.
-    pub held: Vec<bool>,
-    /// Per vertex: its part of the body hangs on a held node.
-    pub hangs: Vec<bool>,
 }
 
 /// One tool.

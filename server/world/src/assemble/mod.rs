@@ -12,10 +12,9 @@ use scindo_physics::assembly::ModelError;
 use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants};
 use scindo_physics::material::{Material, MaterialError, Rayleigh};
 
+use crate::body::{Probe, SimBody};
 use crate::mesh_in::{MeshHealth, Observer};
-use crate::probe::Probe;
 use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
-use crate::simulation::SimBody;
 
 /// How bodies are computed; belongs to the machine, not to the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,10 +3,9 @@
 use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 
-use super::bounds;
+use crate::body::{SimBody, bounds};
 use crate::quantity::{coordinates, length};
 use crate::scene::{CheckedScene, CutPath, CutSpec};
-use crate::simulation::SimBody;
 
 /// How far from the skin, in cells, a point of a path may lie.
 const NEAR: f64 = 2.0;

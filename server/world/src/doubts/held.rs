@@ -1,9 +1,9 @@
 //! Bodies and parts that nothing holds.
 
+use crate::body::SimBody;
 use crate::quantity::{mass, percent};
 use crate::scene::raw::RawIntegrator;
 use crate::scene::{BodySpec, CheckedScene, MeshSource};
-use crate::simulation::SimBody;
 
 /// Share of gravity along an axis that counts as a pull.
 const PULL: f64 = 0.01;

@@ -1,10 +1,10 @@
 //! What meshing lost, and elements that a law or a load does not suit.
 
+use crate::body::SimBody;
 use crate::mesh_in::{LatticeReport, MeshHealth, VolumeHealth, most_cells};
 use crate::quantity::{coordinates, length, percent};
 use crate::scene::BodySpec;
 use crate::scene::raw::{RawElement, RawLocking};
-use crate::simulation::SimBody;
 
 /// Share of its volume that a mesh may lose or gain.
 const VOLUME: f64 = 0.03;

@@ -13,10 +13,8 @@ mod tools;
 
 mod world;
 
-use nalgebra::Vector3;
-
+use crate::body::{SimBody, bounds};
 use crate::scene::CheckedScene;
-use crate::simulation::SimBody;
 
 pub use cuts::after_the_end;
 
@@ -31,12 +29,6 @@ pub(crate) fn of(scene: &CheckedScene, bodies: &mut [SimBody]) -> Vec<String> {
     cuts::doubts(&scene.cuts, bodies, &mut doubts);
     tools::doubts(&scene.tools, bodies, &mut doubts);
     doubts
-}
-
-/// Corners of the box around some points [m].
-pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
-    let none = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-    points.into_iter().fold(none, |(low, high), point| (low.inf(point), high.sup(point)))
 }
 
 /// Longest side of the box around a body [m].

@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{bounds, longest_side};
+use super::longest_side;
+use crate::body::{SimBody, bounds};
 use crate::inputs::{ToolMode, ToolShape};
 use crate::quantity::length;
 use crate::scene::ToolSpec;
-use crate::simulation::SimBody;
 
 /// A blade may be so many times as long as the longest body.
 const BLADE: f64 = 10.0;

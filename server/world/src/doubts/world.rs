@@ -1,10 +1,10 @@
 //! Doubts about the scene as a whole: nothing in it, steps that are too long, gravity in other units.
 
 use super::longest_side;
+use crate::body::SimBody;
 use crate::quantity::{digits, duration, length};
 use crate::scene::CheckedScene;
 use crate::scene::raw::RawIntegrator;
-use crate::simulation::SimBody;
 
 /// Gravity above this [m/s²] is hardly in m/s²: that of Jupiter is 25.
 const GRAVITY: f64 = 50.0;

@@ -10,9 +10,10 @@ use scindo_physics::mesh::TetMesh;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
 use crate::assemble::Built;
+use crate::body::SimBody;
 use crate::format::SurfaceMesh;
 use crate::mesh_in::lattice_from_surface;
-use crate::simulation::{SimBody, Simulation};
+use crate::simulation::Simulation;
 
 /// Elements of the two copies.
 const ELEMENTS: [f64; 2] = [1_500.0, 6_000.0];

@@ -20,9 +20,10 @@ use serde::Serialize;
 pub use cost::Cost;
 
 use crate::inputs::Inputs;
+use crate::report::Level;
 use crate::scene::CheckedScene;
 use crate::scene::raw::RawIntegrator;
-use crate::simulation::{Level, Simulation, processor_seconds};
+use crate::simulation::{Simulation, processor_seconds};
 use cost::Prices;
 use watch::Watch;
 

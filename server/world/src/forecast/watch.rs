@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use scindo_physics::body::{Outcome, SolveReport};
 
 use super::{BodyForecast, Ending, Source};
-use crate::simulation::SimBody;
+use crate::body::{SimBody, bounds};
 
 /// At rest the speed times the time since the last event is this share of the displacement: an exponential
 /// approach has 0.3 % of its way left then.
@@ -32,7 +32,7 @@ pub struct Watch {
 
 impl Watch {
     pub fn new(body: &SimBody) -> Self {
-        let (low, high) = crate::doubts::bounds(body.body.rest_positions());
+        let (low, high) = bounds(body.body.rest_positions());
         let solver = body.body.settings().solver;
         Self {
             size_m: (high - low).max(),

@@ -2,7 +2,8 @@
 
 use scindo_physics::body::{Arithmetic, OperatorChoice};
 
-use super::{BodySize, Plan, count};
+use super::{Plan, count};
+use crate::body::BodySize;
 use crate::scene::raw::{RawElement, RawIntegrator, RawLaw, RawLocking, RawMass, RawMethod};
 use crate::scene::{BodySpec, CheckedScene, Mechanics};
 

@@ -15,8 +15,9 @@ use nalgebra::{Matrix3, Vector3};
 use scindo_physics::body::Body;
 use scindo_physics::cut::SurfaceVertex;
 
+use crate::body::{SimBody, von_mises};
 use crate::format::vtu::{Cells, Field, FieldValues, Grid, VtuError, save_grid, save_vtm};
-use crate::simulation::{SimBody, Simulation, von_mises};
+use crate::simulation::Simulation;
 
 /// Copy of a point that is not at a node.
 const NONE: i32 = -1;

@@ -5,8 +5,10 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::machine::Machine;
+use crate::body::{Probe, SimBody};
 use crate::plan::Plan;
-use crate::simulation::{Event, Level, SimBody, Simulation, Stage, StepReport};
+use crate::report::{Event, Level, Stage, StepReport};
+use crate::simulation::Simulation;
 
 /// Most events that a summary lists; the rest is counted.
 const MAX_EVENTS: usize = 200;
@@ -334,7 +336,7 @@ fn event_summary(step: u64, event: &Event) -> EventSummary {
     }
 }
 
-fn probe_summary(probe: &crate::probe::Probe, simulation: &Simulation) -> ProbeSummary {
+fn probe_summary(probe: &Probe, simulation: &Simulation) -> ProbeSummary {
     let x = simulation.probe_position(probe);
     ProbeSummary { id: probe.id.clone(), position_m: x.into(), displacement_m: (x - probe.rest_m).into() }
 }

@@ -14,11 +14,11 @@ use nalgebra::Vector3;
 use scindo_physics::cut::{BladeSweep, CutReport, MAX_SEGMENTS, Work};
 use scindo_physics::skin::Skin;
 
-use super::body::SimBody;
 use super::incision::incision_along;
-use super::report::{Level, StepReport};
 use super::undo::{History, Undone};
+use crate::body::SimBody;
 use crate::inputs::{CutOutcome, CutRequest};
+use crate::report::{Level, StepReport};
 use crate::scene::{CutPath, CutSpec};
 use crate::tool::Tools;
 
@@ -444,8 +444,9 @@ mod tests {
     use std::path::Path;
 
     use crate::inputs::Inputs;
+    use crate::report::Level;
     use crate::scene::Scene;
-    use crate::simulation::{Level, Simulation};
+    use crate::simulation::Simulation;
 
     const SCENE: &str = r#"
         schema = 1

@@ -5,7 +5,7 @@ use scindo_collision::SurfaceBvh;
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::skin::{Penetration, incision};
 
-use super::body::SimBody;
+use crate::body::SimBody;
 
 /// Most places of the blade between two points of the path.
 const MAX_PLACES: usize = 16;

@@ -4,14 +4,6 @@
 
 mod stopwatch;
 
-mod report;
-
-mod counts;
-
-mod body;
-
-mod shown;
-
 mod cuts;
 
 mod incision;
@@ -27,21 +19,18 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Vector3;
 use scindo_physics::body::{BodyError, PcgSettings};
 
-pub use body::SimBody;
-pub use counts::StepCounts;
-pub use report::{BodyReport, Energy, Event, Level, StepReport};
-pub(crate) use shown::von_mises;
 pub(crate) use stopwatch::processor_seconds;
-pub use stopwatch::{Stage, StageSeconds};
 pub use undo::{MAX_UNDO, Undone};
 
 use crate::assemble::{self, BuildOptions, Built};
+use crate::body::BodySize;
+pub use crate::body::{Probe, SimBody, StepCounts};
 use crate::contact::Contacts;
 use crate::doubts;
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
 use crate::mesh_in::Observer;
-use crate::plan::{BodySize, Plan};
-use crate::probe::Probe;
+use crate::plan::Plan;
+pub use crate::report::{BodyReport, Energy, Event, Level, Stage, StageSeconds, StepReport};
 use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
 use crate::snapshot::{Snapshot, Sources};
 use crate::tool::Tools;

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::body::SimBody;
-use super::report::{Level, StepReport};
+use crate::body::SimBody;
+use crate::report::{Level, StepReport};
 
 /// Every so many steps somebody looks.
 const EVERY: u64 = 25;

@@ -4,11 +4,10 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::Vector3;
 use scindo_physics::body::{BodyError, BodyTopology};
 use scindo_physics::cut::{BladeSweep, CutReport};
 
-use super::body::SimBody;
+use crate::body::{SimBody, bounds};
 
 /// Incisions that can be taken back.
 pub const MAX_UNDO: usize = 8;
@@ -117,11 +116,7 @@ impl History {
 
 /// Whether the box around the sweep meets the box around the body.
 fn meets(body: &SimBody, blade: &BladeSweep) -> bool {
-    let around = |points: &mut dyn Iterator<Item = &Vector3<f64>>| {
-        let none = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        points.fold(none, |(low, high), point| (low.inf(point), high.sup(point)))
-    };
-    let (low, high) = around(&mut body.body.positions().iter());
-    let (from, to) = around(&mut blade.segments.iter().flatten());
+    let (low, high) = bounds(body.body.positions());
+    let (from, to) = bounds(blade.segments.iter().flatten());
     (0..3).all(|k| to[k] >= low[k] && from[k] <= high[k])
 }

@@ -4,10 +4,27 @@ use nalgebra::{Matrix3, Vector3};
 use scindo_physics::body::Body;
 use scindo_physics::cut::SurfaceVertex;
 
-use crate::snapshot::SurfaceTopology;
-
 /// Share of a vertex' weight on held nodes from which it counts as held.
 const MOSTLY: f64 = 0.5;
+
+/// Triangles of a body's surface; immutable, one object per epoch.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SurfaceTopology {
+    /// Rises whenever the triangles change.
+    pub epoch: u32,
+    /// Vertices that the triangles refer to.
+    pub vertex_count: u32,
+    /// Counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Per triangle: 0 = skin, n > 0 = lip of incision n.
+    pub tags: Vec<u32>,
+    /// Where the vertices rest [m].
+    pub rest: Vec<[f32; 3]>,
+    /// Per vertex: it moves with held nodes.
+    pub held: Vec<bool>,
+    /// Per vertex: its part of the body hangs on a held node.
+    pub hangs: Vec<bool>,
+}
 
 /// Triangles of the present epoch, where they rest, and what holds them. Triangles of parts that sleep are not in
 /// the view.

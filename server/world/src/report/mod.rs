@@ -1,13 +1,15 @@
 //! What a step says about itself.
 
+mod stages;
+
 use std::mem::{Discriminant, discriminant};
 use std::sync::Arc;
 
 use scindo_physics::body::{Notice, Outcome, SolveReport};
 use scindo_physics::estimate::MeshError;
 
-use super::stopwatch::StageSeconds;
 use crate::inputs::CutOutcome;
+pub use stages::{Stage, StageSeconds};
 
 /// How a step went. The buffers are reused from step to step.
 #[derive(Debug, Clone, Default)]

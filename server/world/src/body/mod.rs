@@ -1,5 +1,11 @@
 //! A body of the simulation: mechanics plus what the world knows about it.
 
+mod counts;
+
+mod probe;
+
+mod shown;
+
 use std::mem::Discriminant;
 use std::sync::Arc;
 
@@ -8,12 +14,13 @@ use scindo_physics::body::{Body, ElementKind, Notice, PointSpring, SolveReport};
 use scindo_physics::cut::IncisionMark;
 use scindo_physics::estimate::{MeshError, StressRecovery};
 
-use super::counts::{StepCounts, Watch};
-use super::report::{Energy, StepReport};
-use super::shown;
 use crate::mesh_in::MeshHealth;
-use crate::plan::BodySize;
-use crate::snapshot::SurfaceTopology;
+use crate::report::{Energy, StepReport};
+pub use counts::StepCounts;
+use counts::Watch;
+pub use probe::Probe;
+pub use shown::SurfaceTopology;
+pub(crate) use shown::von_mises;
 
 /// A deformable body with its name and its groups of held nodes.
 #[derive(Debug)]
@@ -43,6 +50,21 @@ pub struct SimBody {
     surface_is_old: bool,
     marks: Vec<IncisionMark>,
     marks_are_old: bool,
+}
+
+/// Sizes of a body that its costs follow from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BodySize {
+    /// Elements.
+    pub elements: usize,
+    /// Copies of nodes, with those on mid-edges.
+    pub nodes: usize,
+    /// Surface vertices.
+    pub vertices: usize,
+    /// Surface triangles.
+    pub triangles: usize,
+    /// Most iterations of a linear solve.
+    pub iterations: u32,
 }
 
 impl SimBody {
@@ -106,7 +128,7 @@ impl SimBody {
 
     /// Corners of the box around the body as it lies [m].
     pub fn corners_m(&self) -> [[f64; 3]; 2] {
-        let (low, high) = crate::doubts::bounds(self.body.positions());
+        let (low, high) = bounds(self.body.positions());
         [low.into(), high.into()]
     }
 
@@ -256,4 +278,10 @@ impl SimBody {
         let body = &self.body;
         self.topology.get_or_insert_with(|| Arc::new(shown::topology(body))).clone()
     }
+}
+
+/// Corners of the box around some points [m].
+pub(crate) fn bounds<'a>(points: impl IntoIterator<Item = &'a Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
+    let none = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    points.into_iter().fold(none, |(low, high), point| (low.inf(point), high.sup(point)))
 }

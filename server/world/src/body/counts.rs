@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use scindo_physics::body::{Body, Method, Notice, Outcome, Scheme, SolveReport, StopReason};
 
-use super::report::{Level, StepReport};
+use crate::report::{Level, StepReport};
 
 /// A trouble is over after this many steps without it.
 const CALM: u64 = 50;
