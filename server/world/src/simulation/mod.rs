@@ -8,6 +8,8 @@ mod cuts;
 
 mod incision;
 
+mod fill;
+
 mod sleep;
 
 mod undo;
@@ -32,9 +34,10 @@ use crate::mesh_in::Observer;
 use crate::plan::Plan;
 pub use crate::report::{BodyReport, Energy, Event, Level, Stage, StageSeconds, StepReport};
 use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
-use crate::snapshot::{Snapshot, Sources};
+use crate::snapshot::Snapshot;
 use crate::tool::Tools;
 use cuts::{Cuts, Theatre};
+use fill::Sources;
 use sleep::Sleep;
 use stopwatch::Stopwatch;
 
@@ -284,9 +287,9 @@ impl Simulation {
 
     /// Fills a snapshot of the present state: surfaces only as `wants` says.
     pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
-        let (steps, time_s) = (self.steps, self.time_s());
+        (snapshot.step, snapshot.time_s) = (self.steps, self.time_s());
         let Self { bodies, report, tools, probes, .. } = self;
-        snapshot.fill(steps, time_s, wants, Sources { bodies, report, tools, probes });
+        Sources { bodies, report, tools, probes }.fill(wants, snapshot);
     }
 
     /// Changes one value of the scene while it runs: a [`LiveKey`], within its range.
