@@ -41,7 +41,7 @@ const NODES_PER_FRAGMENT: usize = 4;
 const MAX_WAITING: usize = 256;
 
 /// What a cut works on.
-pub(crate) struct Theatre<'a> {
+pub(crate) struct CutContext<'a> {
     pub bodies: &'a mut [SimBody],
     pub tools: &'a mut Tools,
     pub report: &'a mut StepReport,
@@ -160,7 +160,7 @@ impl Cuts {
     }
 
     /// Cuts that the schedule has for the time up to `time_s` [s].
-    pub fn apply_schedule(&mut self, time_s: f64, at: &mut Theatre<'_>) {
+    pub fn apply_schedule(&mut self, time_s: f64, at: &mut CutContext<'_>) {
         while let Some(due) = self.schedule.get(self.next).filter(|cut| cut.at_s <= time_s) {
             if at.bodies[due.body].body.is_being_cut() {
                 return;
@@ -186,7 +186,7 @@ impl Cuts {
     }
 
     /// Queues cuts that clients asked for; each gets an outcome, in this step or a later one.
-    pub fn queue_requests(&mut self, requests: &[CutRequest], at: &mut Theatre<'_>) {
+    pub fn queue_requests(&mut self, requests: &[CutRequest], at: &mut CutContext<'_>) {
         for request in requests {
             match self.job_of(request, at) {
                 Ok(job) => self.waiting.push_back(job),
@@ -198,7 +198,7 @@ impl Cuts {
     }
 
     /// Queues cuts that blades made by moving, through every body they meet.
-    pub fn queue_blades(&mut self, at: &mut Theatre<'_>) {
+    pub fn queue_blades(&mut self, at: &mut CutContext<'_>) {
         for tool in 0..at.tools.len() {
             let Some((blade, incision)) = at.tools.take_sweep(tool, self.least_move_m) else { continue };
             if let Some(job) = self.waiting.iter_mut().rfind(|job| job.incision == incision)
@@ -217,7 +217,7 @@ impl Cuts {
     }
 
     /// Makes queued cuts, in order, as far as the work of one step goes.
-    pub fn work_off(&mut self, at: &mut Theatre<'_>) {
+    pub fn work_off(&mut self, at: &mut CutContext<'_>) {
         let mut work = Work::new(WORK_PER_STEP);
         while let Some(mut job) = self.waiting.pop_front() {
             let Some(result) = self.go_on(&mut job, &mut work, at) else {
@@ -235,7 +235,7 @@ impl Cuts {
         &mut self,
         job: &mut Job,
         work: &mut Work,
-        at: &mut Theatre<'_>,
+        at: &mut CutContext<'_>,
     ) -> Option<Result<usize, String>> {
         while let Some(&body) = job.bodies.last() {
             if work.is_done() {
@@ -258,7 +258,7 @@ impl Cuts {
         body: usize,
         job: &mut Job,
         work: &mut Work,
-        at: &mut Theatre<'_>,
+        at: &mut CutContext<'_>,
     ) -> Result<Option<CutReport>, String> {
         let cut = &mut at.bodies[body].body;
         if !job.begun {
@@ -281,7 +281,7 @@ impl Cuts {
     }
 
     /// The place in the queue for a request.
-    fn job_of(&mut self, request: &CutRequest, at: &mut Theatre<'_>) -> Result<Job, String> {
+    fn job_of(&mut self, request: &CutRequest, at: &mut CutContext<'_>) -> Result<Job, String> {
         let wanted = |body: &SimBody| request.body.as_ref().is_none_or(|id| *id == body.id);
         if !at.bodies.iter().any(wanted) {
             let known: Vec<&str> = at.bodies.iter().map(|body| &*body.id).collect();
@@ -325,7 +325,7 @@ impl Cuts {
         body: usize,
         blade: &BladeSweep,
         incision: u32,
-        at: &mut Theatre<'_>,
+        at: &mut CutContext<'_>,
     ) -> Result<CutReport, String> {
         if !at.allowed {
             return Err(SWITCHED_OFF.into());

@@ -36,7 +36,7 @@ pub use crate::report::{BodyReport, Energy, Event, Level, Stage, StageSeconds, S
 use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
 use crate::snapshot::Snapshot;
 use crate::tool::Tools;
-use cuts::{Cuts, Theatre};
+use cuts::{CutContext, Cuts};
 use fill::Sources;
 use sleep::Sleep;
 use stopwatch::Stopwatch;
@@ -154,7 +154,7 @@ impl Simulation {
         let Self { cuts, bodies, tools, report, probes, .. } = self;
         let before = cuts.applied();
         let estimates = self.scene.effects.error_estimate == Some(true);
-        let at = &mut Theatre { bodies, tools, report, allowed, estimates };
+        let at = &mut CutContext { bodies, tools, report, allowed, estimates };
         // A cut at t = 0 is there before the first step, hence at the time this step starts from.
         cuts.apply_schedule(time_s - self.scene.step_s, at);
         cuts.queue_requests(requests, at);
