@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use scindo_proto::limits::MAX_CONTACTS;
 use scindo_proto::messages::{self as wire, HapticContact, haptic_contact};
 use scindo_proto::{Chunk, KeySpace, Topic, encode, encoding};
-use scindo_world::contact_model::{ContactMode, ContactModels, ContactPlane, LocalContact, ToolQuery};
+use scindo_world::contact::model::{ContactMode, ContactModels, ContactPlane, LocalContact, ToolQuery};
 use scindo_world::inputs::{ToolInput, ToolShape};
 use scindo_world::snapshot::Snapshot;
 use triple_buffer::Output;

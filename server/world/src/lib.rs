@@ -35,15 +35,7 @@ pub mod report;
 // bodies as the world knows them, and recorded material points
 pub mod body;
 
-// touch at the pace of a hand, for haptic clients
-pub mod contact_model;
-
-pub mod plan;
-
 pub mod simulation;
-
-// allowed, but hardly meant
-pub mod doubts;
 
 // what a scene will do, from its first steps
 pub mod forecast;

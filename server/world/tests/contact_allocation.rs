@@ -10,7 +10,7 @@ use scindo_allocations::{Counting, allocations};
 use scindo_physics::cut::CutMesh;
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_world::contact::Contacts;
-use scindo_world::contact_model::{ContactModels, ToolQuery};
+use scindo_world::contact::model::{ContactModels, ToolQuery};
 use scindo_world::inputs::{ToolInput, ToolMode, ToolShape};
 use scindo_world::scene::checked::ToolSpec;
 use scindo_world::snapshot::{BodySnapshot, Snapshot, SurfaceTopology, ToolSnapshot};

@@ -8,7 +8,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use scindo_world::doubts;
+use scindo_world::assemble::doubts;
 use scindo_world::forecast::{Effort, forecast};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;

@@ -4,13 +4,11 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
-use scindo_world::assemble::BuildOptions;
-use scindo_world::doubts;
+use scindo_world::assemble::{BuildOptions, doubts};
 use scindo_world::forecast::{Effort, Forecast, forecast};
-use scindo_world::plan::Plan;
 use scindo_world::quantity::{coordinates, duration};
 use scindo_world::scene::Scene;
-use scindo_world::simulation::{SimBody, Simulation};
+use scindo_world::simulation::{Plan, SimBody, Simulation};
 use serde_json::{Value, json};
 
 use crate::cli::CheckArgs;

@@ -1,5 +1,7 @@
 //! From checked objects to bodies: meshes opened, nodes selected, forces shared, probes bound.
 
+pub mod doubts;
+
 pub mod region;
 
 mod mesh;
@@ -65,7 +67,9 @@ pub fn build(
     if builder.findings.is_empty() {
         let mut warnings = builder.warnings;
         warnings.extend(builder.doubts.into_iter().map(|(at, doubt)| format!("{at}: {doubt}")));
-        Ok(Built { bodies: bodies.into_iter().flatten().collect(), probes, warnings })
+        let mut bodies: Vec<SimBody> = bodies.into_iter().flatten().collect();
+        warnings.extend(doubts::of(checked, &mut bodies));
+        Ok(Built { bodies, probes, warnings })
     } else {
         // A body of the wrong size is why regions and probes miss it.
         let doubts = builder.doubts.into_iter();

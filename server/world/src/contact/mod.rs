@@ -10,6 +10,7 @@
 //! Tissue force and reaction therefore come from the same solve and balance to rounding.
 //! Nothing here allocates while topologies and tools stay the same.
 
+pub mod model;
 pub mod surface;
 pub mod proxy;
 pub mod press;

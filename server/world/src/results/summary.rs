@@ -6,9 +6,8 @@ use serde_json::Value;
 
 use super::machine::Machine;
 use crate::body::{Probe, SimBody};
-use crate::plan::Plan;
 use crate::report::{Event, Level, Stage, StepReport};
-use crate::simulation::Simulation;
+use crate::simulation::{Plan, Simulation};
 
 /// Most events that a summary lists; the rest is counted.
 const MAX_EVENTS: usize = 200;

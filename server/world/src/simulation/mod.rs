@@ -2,6 +2,8 @@
 //!
 //! [`Simulation::step`] is the table of contents of the system; each line is one stage, timed.
 
+mod plan;
+
 mod stopwatch;
 
 mod cuts;
@@ -28,16 +30,15 @@ use crate::assemble::{self, BuildOptions, Built};
 use crate::body::BodySize;
 pub use crate::body::{Probe, SimBody, StepCounts};
 use crate::contact::Contacts;
-use crate::doubts;
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
 use crate::mesh_in::Observer;
-use crate::plan::Plan;
 pub use crate::report::{BodyReport, Energy, Event, Level, Stage, StageSeconds, StepReport};
 use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
 use crate::snapshot::Snapshot;
 use crate::tool::Tools;
 use cuts::{CutContext, Cuts};
 use fill::Sources;
+pub use plan::Plan;
 use sleep::Sleep;
 use stopwatch::Stopwatch;
 
@@ -87,9 +88,8 @@ impl Simulation {
         options: BuildOptions,
         observer: &Observer<'_>,
     ) -> Result<Self, SceneError> {
-        let mut built = assemble::build(scene, base_dir, options, observer)?;
+        let built = assemble::build(scene, base_dir, options, observer)?;
         let (source, scene) = (scene.clone(), scene.checked().clone());
-        built.warnings.extend(doubts::of(&scene, &mut built.bodies));
         Ok(Self::assemble(source, scene, built))
     }
 
