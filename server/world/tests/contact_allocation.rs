@@ -128,7 +128,7 @@ fn steady_contact_does_not_allocate() {
         let start = Instant::now();
         tools.advance(0.02 * round as f64, &inputs);
         contacts.update_surface(0, body.epoch(), surface, positions).unwrap();
-        contacts.detect(&mut tools);
+        contacts.detect(&tools);
         contacts.collect(0, &forces[..contacts.springs(0).len()]);
         contacts.react(&mut tools);
         in_step += start.elapsed().as_secs_f64();

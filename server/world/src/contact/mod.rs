@@ -17,16 +17,17 @@ pub mod press;
 pub mod spring;
 pub mod grab;
 pub mod compliance;
+pub mod hand;
 
 use nalgebra::Vector3;
 use scindo_collision::SurfaceError;
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::{Surface, SurfaceVertex};
 
-use crate::inputs::{MAX_TOOLS, ToolMode};
+use crate::inputs::MAX_TOOLS;
 use crate::tool::geometry::core_radius;
 use crate::tool::{Tool, Tools};
-use compliance::Compliance;
+use hand::Hand;
 use press::{Bearing, MAX_POINTS};
 use spring::material_points;
 use surface::ContactSurface;
@@ -60,6 +61,8 @@ struct Sums {
 pub struct Contacts {
     surfaces: Vec<ContactSurface>,
     bodies: Vec<BodyContacts>,
+    /// One per tool, in their order.
+    hands: Vec<Hand>,
     sums: Vec<Sums>,
 }
 
@@ -76,13 +79,14 @@ impl Contacts {
             springs: Vec::with_capacity(SPRING_CAPACITY),
             behind: Vec::with_capacity(SPRING_CAPACITY),
         });
+        self.hands.reserve(MAX_TOOLS);
         self.sums.reserve(MAX_TOOLS);
     }
 
-    /// The stiffness of `body` [Pa] changed: what the tools have learned of its compliance is out of date.
-    pub fn set_stiffness(&mut self, body: usize, young_pa: f64, tools: &mut Tools) {
+    /// The stiffness of `body` [Pa] changed: what the hands have learned of its compliance is out of date.
+    pub fn set_stiffness(&mut self, body: usize, young_pa: f64) {
         self.bodies[body].young_pa = young_pa;
-        tools.iter_mut().for_each(|tool| tool.compliance = None);
+        self.hands.iter_mut().for_each(Hand::forget_compliance);
     }
 
     /// Takes in where the surface of `body` is now; after a change of epoch also its topology.
@@ -107,83 +111,40 @@ impl Contacts {
         self.surfaces[body].forget_motion();
     }
 
+    /// Back to the start of the scene: nothing is touched or held, nothing known of the tissue.
+    pub fn reset(&mut self, tools: &Tools) {
+        self.keep_up_with(tools);
+        for (hand, tool) in self.hands.iter_mut().zip(tools.iter()) {
+            hand.let_go(&tool.pose);
+            hand.forget_compliance();
+        }
+    }
+
+    /// The hand on tool number `index`; none before the first [`detect`](Self::detect) with it.
+    pub fn hand(&self, index: usize) -> Option<&Hand> {
+        self.hands.get(index)
+    }
+
     /// Moves every proxy and turns what is touched or held into springs.
-    pub fn detect(&mut self, tools: &mut Tools) {
+    pub fn detect(&mut self, tools: &Tools) {
         for body in &mut self.bodies {
             body.springs.clear();
             body.behind.clear();
         }
-        for (index, tool) in (0u32..).zip(tools.iter_mut()) {
-            if tool.mode != ToolMode::Grab {
-                tool.grip.open();
-            }
-            if tool.touches() {
-                tool.proxy.ride(tool.shape, &self.surfaces);
-                tool.proxy.follow(tool.shape, &tool.pose, &self.surfaces);
-                self.press(index, tool);
-            } else {
-                tool.proxy.release(&tool.pose);
-                tool.press.release();
-                if tool.mode == ToolMode::Grab {
-                    tool.grip.hold(&tool.pose, core_radius(tool.shape), &self.surfaces);
-                    self.pull(index, tool);
-                }
-            }
+        self.keep_up_with(tools);
+        let Self { surfaces, bodies, hands, .. } = self;
+        for ((index, tool), hand) in (0u32..).zip(tools.iter()).zip(hands) {
+            hand.follow(tool, surfaces);
+            press(index, tool, hand, surfaces, bodies);
+            pull(index, tool, hand, surfaces, bodies);
         }
     }
 
-    /// One-sided springs of a tool that touches.
-    fn press(&mut self, index: u32, tool: &mut Tool) {
-        tool.press.update(tool.shape, tool.proxy.pose(), &tool.pose, &self.surfaces);
-        let Some(normal) = tool.press.normal() else { return };
-        if let Some(body) = tool.press.bearings().first().map(|bearing| bearing.body)
-            && tool.compliance.is_none_or(|(known, _)| known != body)
-        {
-            let guess = Compliance::new(self.bodies[body].young_pa, core_radius(tool.shape));
-            tool.compliance = Some((body, guess));
-        }
-        for bearing in tool.press.bearings() {
-            let body = &mut self.bodies[bearing.body];
-            let Some(tree) = self.surfaces[bearing.body].tree() else { continue };
-            let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
-            let spring = (tool.stiffness_n_m, tool.max_force_n);
-            // From the tool into the tissue.
-            body.press(index, spring, -normal, bearing, place);
-        }
-    }
-
-    /// Three-axis springs of a tool that holds.
-    fn pull(&mut self, index: u32, tool: &Tool) {
-        let (body, held) = tool.grip.held();
-        if held.is_empty() {
-            return;
-        }
-        let Some(tree) = self.surfaces[body].tree() else { return };
-        let body = &mut self.bodies[body];
-        let each = 1.0 / held.len() as f64;
-        for point in held {
-            let corners = tree.corners(point.triangle).map(|v| v as usize);
-            let places = tree.triangle(point.triangle);
-            let target = (tool.pose * point.in_tool).coords;
-            let pulled = target - point.point;
-            let (springs, behind) = (&mut body.springs, &mut body.behind);
-            material_points(corners.map(|v| &body.vertices[v]), point.barycentric, |vertex, share| {
-                // A corner stands in for the point: it is pulled by the same way.
-                let at = if share == 1.0 {
-                    point.point
-                } else {
-                    places[corner_of(&vertex, corners.map(|v| &body.vertices[v]))]
-                };
-                springs.push(PointSpring {
-                    copies: vertex.copies,
-                    weights: vertex.weights,
-                    kind: SpringKind::Hold { target_m: at + pulled },
-                    stiffness_n_m: tool.stiffness_n_m * each * share,
-                    max_force_n: tool.max_force_n * each * share,
-                });
-                behind.push((index, 0.0));
-            });
-        }
+    /// One hand per tool: those of tools that have left go, new tools stand behind the others.
+    fn keep_up_with(&mut self, tools: &Tools) {
+        let mut left = tools.iter().peekable();
+        self.hands.retain(|hand| left.next_if(|tool| hand.is_on(tool)).is_some());
+        self.hands.extend(left.map(Hand::new));
     }
 
     /// Springs on `body` for this step's solve.
@@ -214,9 +175,9 @@ impl Contacts {
     /// Gives every tool the reaction to what its springs did since the last call.
     pub fn react(&mut self, tools: &mut Tools) {
         self.sums.resize(tools.len(), Sums::default());
-        for (tool, sums) in tools.iter_mut().zip(&self.sums) {
+        for ((tool, hand), sums) in tools.iter_mut().zip(&mut self.hands).zip(&self.sums) {
             tool.force_n = -sums.force;
-            let Some((_, compliance)) = &mut tool.compliance else { continue };
+            let Some(compliance) = hand.compliance() else { continue };
             if sums.stiffness > 0.0 && sums.normal_force < 0.95 * tool.max_force_n {
                 let (before, after) = (sums.before / sums.stiffness, sums.after / sums.stiffness);
                 compliance.learn(before, after, sums.normal_force);
@@ -230,6 +191,56 @@ impl Contacts {
     /// Box around the surface of `body` [m]; `None` when it has none or is switched off.
     pub fn bounds(&self, body: usize) -> Option<[Vector3<f64>; 2]> {
         self.surfaces[body].tree()?.bounds()
+    }
+}
+
+/// One-sided springs of a tool that touches.
+fn press(index: u32, tool: &Tool, hand: &mut Hand, surfaces: &[ContactSurface], bodies: &mut [BodyContacts]) {
+    let Some(normal) = hand.press().normal() else { return };
+    if let Some(body) = hand.press().bearings().first().map(|bearing| bearing.body) {
+        hand.meet(body, bodies[body].young_pa, core_radius(tool.shape));
+    }
+    for bearing in hand.press().bearings() {
+        let body = &mut bodies[bearing.body];
+        let Some(tree) = surfaces[bearing.body].tree() else { continue };
+        let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
+        let spring = (tool.stiffness_n_m, tool.max_force_n);
+        // From the tool into the tissue.
+        body.press(index, spring, -normal, bearing, place);
+    }
+}
+
+/// Three-axis springs of a tool that holds.
+fn pull(index: u32, tool: &Tool, hand: &Hand, surfaces: &[ContactSurface], bodies: &mut [BodyContacts]) {
+    let (body, held) = hand.grip().held();
+    if held.is_empty() {
+        return;
+    }
+    let Some(tree) = surfaces[body].tree() else { return };
+    let body = &mut bodies[body];
+    let each = 1.0 / held.len() as f64;
+    for point in held {
+        let corners = tree.corners(point.triangle).map(|v| v as usize);
+        let places = tree.triangle(point.triangle);
+        let target = (tool.pose * point.in_tool).coords;
+        let pulled = target - point.point;
+        let (springs, behind) = (&mut body.springs, &mut body.behind);
+        material_points(corners.map(|v| &body.vertices[v]), point.barycentric, |vertex, share| {
+            // A corner stands in for the point: it is pulled by the same way.
+            let at = if share == 1.0 {
+                point.point
+            } else {
+                places[corner_of(&vertex, corners.map(|v| &body.vertices[v]))]
+            };
+            springs.push(PointSpring {
+                copies: vertex.copies,
+                weights: vertex.weights,
+                kind: SpringKind::Hold { target_m: at + pulled },
+                stiffness_n_m: tool.stiffness_n_m * each * share,
+                max_force_n: tool.max_force_n * each * share,
+            });
+            behind.push((index, 0.0));
+        });
     }
 }
 

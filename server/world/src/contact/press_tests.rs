@@ -73,7 +73,7 @@ impl Table {
         self.body.surface_positions(&mut self.positions);
         let body = &self.body;
         self.contacts.update_surface(0, body.epoch(), body.surface(), &self.positions).unwrap();
-        self.contacts.detect(&mut self.tools);
+        self.contacts.detect(&self.tools);
         self.body.step(STEP_S, V::zeros(), self.contacts.springs(0));
         self.contacts.collect(0, self.body.spring_forces());
         self.contacts.react(&mut self.tools);
@@ -83,6 +83,10 @@ impl Table {
         assert!(on_tool.norm() < 3.0 + 1e-6, "{on_tool}");
         assert!(self.body.positions().iter().flatten().all(|x| x.is_finite()));
         on_tool
+    }
+
+    fn hand(&self) -> &Hand {
+        self.contacts.hand(0).unwrap()
     }
 
     fn at(&mut self, x: f64, y: f64, z: f64) -> V {
@@ -111,7 +115,7 @@ fn pressing_builds_up_a_steady_force_that_vanishes_on_release() {
         let spread =
             late.iter().fold(f64::MIN, |a, &f| a.max(f)) - late.iter().fold(f64::MAX, |a, &f| a.min(f));
         assert!(spread < 0.02 * force.z, "{spread} of {force}");
-        let series = table.tools.iter().next().unwrap().contact_stiffness_n_m();
+        let series = table.hand().in_series_with(400.0);
         assert!(series > 10.0 && series < 400.0, "{series}");
         assert_eq!(table.at(0.003, 0.002, radius_m + 0.02), V::zeros());
     }
@@ -125,7 +129,7 @@ fn a_jab_is_capped_and_forgotten_within_a_second() {
     // 80 mm in one step, to the far side of the block, held there, and out again.
     for _ in 0..5 {
         table.at(0.001, 0.001, -0.05);
-        let proxy = table.tools.iter().next().unwrap().proxy_pose().translation.z;
+        let proxy = table.hand().proxy_pose().translation.z;
         let floor = table.body.positions().iter().map(|x| x.z).fold(f64::MAX, f64::min);
         assert!(proxy > floor + 0.002, "{proxy} {floor}");
     }
@@ -155,7 +159,7 @@ fn an_open_wound_lets_the_tool_in_and_closed_skin_does_not() {
     for pose in [above, inside] {
         table.body.set_state(&opened, &rest).unwrap();
         let force = table.step(pose, ToolMode::Touch);
-        let proxy = *table.tools.iter().next().unwrap().proxy_pose();
+        let proxy = *table.hand().proxy_pose();
         assert!((proxy.translation.vector - pose.translation.vector).norm() < 1e-9, "{proxy}");
         assert_eq!(force, V::zeros());
     }

@@ -6,7 +6,7 @@ use scindo_physics::mesh::{BoxPattern, box_mesh};
 use std::sync::Arc;
 
 use super::*;
-use crate::inputs::{ToolInput, ToolShape};
+use crate::inputs::{ToolInput, ToolMode, ToolShape};
 use crate::scene::checked::ToolSpec;
 
 type V = Vector3<f64>;
@@ -21,6 +21,7 @@ struct Bench {
     positions: Vec<[f32; 3]>,
     tools: Tools,
     contacts: Contacts,
+    owner: Arc<str>,
     time_s: f64,
 }
 
@@ -45,7 +46,7 @@ impl Bench {
         contacts.add_body(1e4, true);
         let body = CutMesh::new(mesh).unwrap();
         let tools = Tools::new(&[spec]);
-        Self { body, x, positions: Vec::new(), tools, contacts, time_s: 0.0 }
+        Self { body, x, positions: Vec::new(), tools, contacts, owner: Arc::from("test"), time_s: 0.0 }
     }
 
     fn step(&mut self, tip: V, mode: ToolMode) -> &Tool {
@@ -57,7 +58,7 @@ impl Bench {
         self.time_s += 0.005;
         let sample = ToolInput {
             id: Arc::from("probe"),
-            owner: Arc::from("test"),
+            owner: Arc::clone(&self.owner),
             pose,
             velocity_m_s: V::zeros(),
             mode,
@@ -71,8 +72,12 @@ impl Bench {
         let places = surface.vertices.iter().map(|v| v.position(&self.x));
         self.positions.extend(places.map(|p| [p.x as f32, p.y as f32, p.z as f32]));
         self.contacts.update_surface(0, self.body.epoch(), surface, &self.positions).unwrap();
-        self.contacts.detect(&mut self.tools);
+        self.contacts.detect(&self.tools);
         self.tools.iter().next().unwrap()
+    }
+
+    fn proxy(&self) -> Isometry3<f64> {
+        *self.contacts.hand(0).unwrap().proxy_pose()
     }
 
     /// Forces of all springs with the nodes where they are.
@@ -106,14 +111,16 @@ fn a_jab_of_ten_metres_per_second_does_not_pass() {
         let mut bench = Bench::new(BALL);
         let aside = V::new(0.0017 * f64::from(i), -0.0011 * f64::from(i), 0.0);
         bench.step(V::new(0.0, 0.0, 0.02) + aside, ToolMode::Touch);
-        let proxy = *bench.step(V::new(0.003, 0.0, -0.03) + aside, ToolMode::Touch).proxy_pose();
+        bench.step(V::new(0.003, 0.0, -0.03) + aside, ToolMode::Touch);
+        let proxy = bench.proxy();
         assert!((proxy.translation.z - 0.002).abs() < 1e-5, "{proxy}");
         let force = bench.solve();
         assert!(force.z < -4.9 && force.norm() < 5.0 + 1e-9, "capped: {force}");
-        let proxy = *bench.step(V::new(0.0, 0.01, -0.08) + aside, ToolMode::Touch).proxy_pose();
+        bench.step(V::new(0.0, 0.01, -0.08) + aside, ToolMode::Touch);
+        let proxy = bench.proxy();
         assert!(proxy.translation.z > 0.0019);
-        let tool = bench.step(V::new(0.0, 0.0, 0.02) + aside, ToolMode::Touch);
-        assert_eq!(*tool.proxy_pose(), tool.pose, "free again");
+        let pose = bench.step(V::new(0.0, 0.0, 0.02) + aside, ToolMode::Touch).pose;
+        assert_eq!(bench.proxy(), pose, "free again");
         assert_eq!(bench.solve(), V::zeros());
     }
 }
@@ -123,9 +130,46 @@ fn a_teleport_through_the_body_stays_on_its_side() {
     let mut bench = Bench::new(ROD);
     bench.step(V::new(0.01, 0.02, 0.05), ToolMode::Touch);
     for _ in 0..10 {
-        let proxy = *bench.step(V::new(-0.02, 0.0, -0.5), ToolMode::Touch).proxy_pose();
+        bench.step(V::new(-0.02, 0.0, -0.5), ToolMode::Touch);
+        let proxy = bench.proxy();
         assert!(proxy.translation.z > 0.0019, "{proxy}");
     }
+}
+
+#[test]
+fn a_hand_over_does_not_drag_the_proxy_along() {
+    let mut bench = Bench::new(BALL);
+    let (above, below) = (V::new(0.0, 0.0, 0.02), V::new(0.0, 0.0, -0.05));
+    bench.step(above, ToolMode::Touch);
+    bench.owner = Arc::from("another");
+    let pose = bench.step(below, ToolMode::Touch).pose;
+    assert_eq!(bench.proxy(), pose);
+    bench.step(above, ToolMode::Touch);
+    assert!(bench.proxy().translation.z < -0.0119, "stopped at the lower side");
+}
+
+#[test]
+fn hands_stay_with_their_tools_when_a_guest_leaves() {
+    let mut bench = Bench::new(BALL);
+    let guest = |id: &str, x: f64| ToolInput {
+        id: Arc::from(id),
+        owner: Arc::from(id),
+        pose: Isometry3::translation(x, 0.0, 0.03),
+        velocity_m_s: V::zeros(),
+        mode: ToolMode::Touch,
+        shape: Some(BALL),
+        seq: 1,
+        client_time_ns: 0,
+    };
+    let proxies = |bench: &Bench| -> Vec<f64> {
+        (0..bench.tools.len()).map(|i| bench.contacts.hand(i).unwrap().proxy_pose().translation.x).collect()
+    };
+    bench.tools.advance(0.005, &[guest("a", 0.01), guest("b", 0.02), guest("c", 0.03)]);
+    bench.contacts.detect(&bench.tools);
+    assert_eq!(proxies(&bench), [0.0, 0.01, 0.02, 0.03]);
+    bench.tools.advance(0.01, &[guest("b", 0.02), guest("c", 0.03), guest("d", 0.04)]);
+    bench.contacts.detect(&bench.tools);
+    assert_eq!(proxies(&bench), [0.0, 0.02, 0.03, 0.04]);
 }
 
 #[test]
@@ -134,7 +178,8 @@ fn the_proxy_slides_on_a_plane() {
     bench.step(V::new(-0.05, 0.0, 0.01), ToolMode::Touch);
     for i in 0..=100 {
         let x = -0.05 + 0.001 * f64::from(i);
-        let proxy = bench.step(V::new(x, 0.5 * x, -0.003), ToolMode::Touch).proxy_pose();
+        bench.step(V::new(x, 0.5 * x, -0.003), ToolMode::Touch);
+        let proxy = bench.proxy();
         let tip = proxy.translation.vector;
         assert!((tip - V::new(x, 0.5 * x, 0.002)).norm() < 1e-5, "{tip} at {x}");
     }
@@ -150,7 +195,8 @@ fn a_rising_surface_carries_the_proxy() {
             x.z += 0.02;
         }
         let top = bench.x.iter().map(|x| x.z).fold(f64::MIN, f64::max);
-        let proxy = *bench.step(tip, ToolMode::Touch).proxy_pose();
+        bench.step(tip, ToolMode::Touch);
+        let proxy = bench.proxy();
         assert!((proxy.translation.z - top - 0.002).abs() < 2e-5, "{proxy} above {top}");
     }
 }
@@ -162,8 +208,8 @@ fn a_turning_shaft_stops_at_the_surface() {
     for i in 0..8 {
         // The shaft tips over and down into the slab, 20 degrees a step.
         let turn = UnitQuaternion::from_axis_angle(&V::x_axis(), 0.35 * f64::from(i));
-        let tool = bench.step_posed(Isometry3::from_parts(tip, turn), ToolMode::Touch);
-        let heel = crate::tool::geometry::core(tool.shape, tool.proxy_pose())[1];
+        let shape = bench.step_posed(Isometry3::from_parts(tip, turn), ToolMode::Touch).shape;
+        let heel = crate::tool::geometry::core(shape, &bench.proxy())[1];
         assert!(heel.z > 0.002 - 2e-4, "step {i}: heel at {heel}");
     }
     assert!(bench.solve().z < -0.5);
@@ -213,9 +259,8 @@ fn a_sample_that_is_not_finite_is_ignored_and_counted() {
     let mut bench = Bench::new(BALL);
     let good = bench.step(V::new(0.0, 0.0, 0.01), ToolMode::Touch).pose;
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
-        let tool = bench.step(V::new(0.0, bad, 0.01), ToolMode::Touch);
-        assert_eq!(tool.pose, good);
-        assert_eq!(*tool.proxy_pose(), good);
+        let pose = bench.step(V::new(0.0, bad, 0.01), ToolMode::Touch).pose;
+        assert_eq!((pose, bench.proxy()), (good, good));
     }
     assert_eq!(bench.tools.refused_samples(), 3);
 }
@@ -223,7 +268,8 @@ fn a_sample_that_is_not_finite_is_ignored_and_counted() {
 #[test]
 fn a_tool_that_starts_inside_is_put_outside() {
     let mut bench = Bench::new(BALL);
-    let proxy = *bench.step(V::new(0.004, 0.0, -0.002), ToolMode::Touch).proxy_pose();
+    bench.step(V::new(0.004, 0.0, -0.002), ToolMode::Touch);
+    let proxy = bench.proxy();
     assert!((proxy.translation.vector - V::new(0.004, 0.0, 0.002)).norm() < 1e-5, "{proxy}");
 }
 
@@ -232,7 +278,7 @@ fn a_body_that_is_switched_off_is_not_touched() {
     let mut bench = Bench::new(BALL);
     bench.contacts = Contacts::default();
     bench.contacts.add_body(1e4, false);
-    let tool = bench.step(V::new(0.0, 0.0, -0.002), ToolMode::Touch);
-    assert_eq!(*tool.proxy_pose(), tool.pose);
+    let pose = bench.step(V::new(0.0, 0.0, -0.002), ToolMode::Touch).pose;
+    assert_eq!(bench.proxy(), pose);
     assert!(bench.contacts.springs(0).is_empty());
 }

@@ -3,6 +3,8 @@
 use scindo_physics::body::Body;
 
 use crate::body::{Probe, SimBody};
+use crate::contact::Contacts;
+use crate::contact::hand::Hand;
 use crate::inputs::Wants;
 use crate::report::{BodyReport, StepReport};
 use crate::snapshot::{BodySnapshot, Snapshot, ToolSnapshot};
@@ -13,6 +15,7 @@ pub(crate) struct Sources<'a> {
     pub bodies: &'a mut [SimBody],
     pub report: &'a StepReport,
     pub tools: &'a Tools,
+    pub contacts: &'a Contacts,
     pub probes: &'a [Probe],
 }
 
@@ -37,7 +40,9 @@ impl Sources<'_> {
             out.probes.extend(self.probes.iter().map(position));
         }
         out.tools.resize_with(self.tools.len(), ToolSnapshot::default);
-        self.tools.iter().zip(&mut out.tools).for_each(|(tool, out)| fill_tool(out, tool));
+        for (i, (tool, out)) in self.tools.iter().zip(&mut out.tools).enumerate() {
+            fill_tool(out, tool, self.contacts.hand(i));
+        }
     }
 }
 
@@ -91,7 +96,7 @@ fn hide_sleepers(body: &Body, positions: &mut [[f32; 3]]) {
     }
 }
 
-fn fill_tool(out: &mut ToolSnapshot, tool: &Tool) {
+fn fill_tool(out: &mut ToolSnapshot, tool: &Tool, hand: Option<&Hand>) {
     if out.id != tool.id {
         out.id = tool.id.clone();
     }
@@ -100,14 +105,15 @@ fn fill_tool(out: &mut ToolSnapshot, tool: &Tool) {
     }
     out.shape = tool.shape;
     out.pose = tool.pose;
-    out.proxy = *tool.proxy_pose();
+    out.proxy = hand.map_or(tool.pose, |hand| *hand.proxy_pose());
     out.velocity_m_s = tool.velocity_m_s;
     out.mode = tool.mode;
     out.force_n = tool.force_n;
     out.stiffness_n_m = tool.stiffness_n_m;
-    out.contact_stiffness_n_m = tool.contact_stiffness_n_m();
+    out.contact_stiffness_n_m =
+        hand.map_or(tool.stiffness_n_m, |hand| hand.in_series_with(tool.stiffness_n_m));
     out.max_force_n = tool.max_force_n;
-    out.held_m = tool.held_point();
+    out.held_m = hand.and_then(Hand::held_point);
     out.seq = tool.seq;
     out.client_time_ns = tool.client_time_ns;
 }

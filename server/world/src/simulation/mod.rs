@@ -175,7 +175,7 @@ impl Simulation {
                 }
             }
         }
-        self.contacts.detect(&mut self.tools);
+        self.contacts.detect(&self.tools);
     }
 
     fn deform(&mut self) {
@@ -227,6 +227,7 @@ impl Simulation {
             probe.follow(&self.bodies[probe.body].body);
         }
         self.tools.reset();
+        self.contacts.reset(&self.tools);
         self.cuts.reset();
         self.steps = 0;
         self.total = StageSeconds::default();
@@ -288,8 +289,8 @@ impl Simulation {
     /// Fills a snapshot of the present state: surfaces only as `wants` says.
     pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
         (snapshot.step, snapshot.time_s) = (self.steps, self.time_s());
-        let Self { bodies, report, tools, probes, .. } = self;
-        Sources { bodies, report, tools, probes }.fill(wants, snapshot);
+        let Self { bodies, report, tools, contacts, probes, .. } = self;
+        Sources { bodies, report, tools, contacts, probes }.fill(wants, snapshot);
     }
 
     /// Changes one value of the scene while it runs: a [`LiveKey`], within its range.
@@ -324,7 +325,7 @@ impl Simulation {
         }
         body.set_constants(assemble::constants(spec)).map_err(|error| error.to_string())?;
         if stiffness != spec.young_pa {
-            self.contacts.set_stiffness(index, spec.young_pa, &mut self.tools);
+            self.contacts.set_stiffness(index, spec.young_pa);
         }
         Ok(())
     }

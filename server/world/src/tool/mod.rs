@@ -3,8 +3,8 @@
 //! # Order in a step
 //! 1. [`Tools::advance`]: poses and modes of this step, from scripts and clients.
 //! 2. [`Tools::take_sweep`] per tool: what its blade cut since it last cut; goes to `Body::cut`.
-//! 3. [`Contacts`](crate::contact::Contacts): surfaces, proxies, springs, and after the solve the
-//!    reactions, which end up in [`Tool::force_n`].
+//! 3. contact: surfaces, proxies, springs, and after the solve the reactions, which end up in
+//!    [`Tool::force_n`].
 
 pub mod blade;
 pub mod geometry;
@@ -15,10 +15,6 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use scindo_physics::cut::BladeSweep;
 
-use crate::contact::compliance::Compliance;
-use crate::contact::grab::Grip;
-use crate::contact::press::Press;
-use crate::contact::proxy::Proxy;
 use crate::inputs::{MAX_TOOLS, ToolInput, ToolMode, ToolShape};
 use crate::scene::checked::ToolSpec;
 use blade::{BladeEdge, IncisionNumbers};
@@ -54,22 +50,17 @@ pub struct Tool {
     pub seq: u64,
     /// The client's clock at that sample [ns].
     pub client_time_ns: u64,
-    /// Where the tissue lets it be.
-    pub(crate) proxy: Proxy,
-    /// How it presses.
-    pub(crate) press: Press,
-    /// What it holds.
-    pub(crate) grip: Grip,
-    /// Body that it touched last, and how its tissue gives way under it; none before the first touch.
-    pub(crate) compliance: Option<(usize, Compliance)>,
     edge: BladeEdge,
     script: Option<Script>,
     round: u64,
     declared: bool,
+    number: u64,
+    hand_overs: u64,
+    jumps: u64,
 }
 
 impl Tool {
-    fn new(id: &str, shape: ToolShape, (stiffness_n_m, max_force_n): (f64, f64)) -> Self {
+    fn new(number: u64, id: &str, shape: ToolShape, (stiffness_n_m, max_force_n): (f64, f64)) -> Self {
         Self {
             id: id.into(),
             shape,
@@ -82,34 +73,29 @@ impl Tool {
             force_n: Vector3::zeros(),
             seq: 0,
             client_time_ns: 0,
-            proxy: Proxy::default(),
-            press: Press::new(),
-            grip: Grip::new(),
-            compliance: None,
             edge: BladeEdge::default(),
             script: None,
             round: 0,
             declared: false,
+            number,
+            hand_overs: 0,
+            jumps: 0,
         }
     }
 
-    /// Where the tissue lets the tool be.
-    pub fn proxy_pose(&self) -> &Isometry3<f64> {
-        self.proxy.pose()
+    /// A number that no other tool of the simulation has or had.
+    pub fn number(&self) -> u64 {
+        self.number
     }
 
-    /// Middle of the tissue in its grip [m]; none when it holds nothing.
-    pub fn held_point(&self) -> Option<Vector3<f64>> {
-        let held = if self.mode == ToolMode::Grab { self.grip.held().1 } else { &[] };
-        let sum: Vector3<f64> = held.iter().map(|held| held.point).sum();
-        (!held.is_empty()).then(|| sum / held.len() as f64)
+    /// How often it went to another owner; what it touched and held is let go then.
+    pub fn hand_overs(&self) -> u64 {
+        self.hand_overs
     }
 
-    /// Stiffness of hand spring and tissue in series [N/m]: how force changes with the pose within
-    /// a step. The hand's alone before the first touch.
-    pub fn contact_stiffness_n_m(&self) -> f64 {
-        let series = |(_, compliance): (usize, Compliance)| compliance.in_series_with(self.stiffness_n_m);
-        self.compliance.map_or(self.stiffness_n_m, series)
+    /// How often its script began anew: it is then elsewhere without having moved there.
+    pub fn jumps(&self) -> u64 {
+        self.jumps
     }
 
     /// Whether the tool is a blade that cuts now. It then passes through tissue: what it meets it
@@ -126,9 +112,7 @@ impl Tool {
     fn hand_over(&mut self, owner: &Arc<str>) {
         if self.owner != *owner {
             self.owner = Arc::clone(owner);
-            self.proxy.release(&self.pose);
-            self.press.release();
-            self.grip.open();
+            self.hand_overs += 1;
         }
     }
 }
@@ -137,6 +121,8 @@ impl Tool {
 #[derive(Debug, Clone)]
 pub struct Tools {
     tools: Vec<Tool>,
+    /// How many there have been.
+    made: u64,
     numbers: IncisionNumbers,
     script: Arc<str>,
     nobody: Arc<str>,
@@ -147,14 +133,15 @@ pub struct Tools {
 impl Tools {
     /// The tools of a scene.
     pub fn new(specs: &[ToolSpec]) -> Self {
-        let declared = specs.iter().map(|spec| {
-            let mut tool = Tool::new(&spec.id, spec.shape, (spec.stiffness_n_m, spec.max_force_n));
+        let declared = (0..).zip(specs).map(|(number, spec)| {
+            let mut tool = Tool::new(number, &spec.id, spec.shape, (spec.stiffness_n_m, spec.max_force_n));
             tool.script = Script::new(&spec.path, spec.repeat_s);
             tool.declared = true;
             tool
         });
         Self {
             tools: declared.collect(),
+            made: specs.len() as u64,
             numbers: IncisionNumbers::default(),
             script: Arc::from(SCRIPT),
             nobody: Arc::from(""),
@@ -222,7 +209,7 @@ impl Tools {
                     tool.hand_over(&self.script);
                     if tool.round != scripted.round {
                         tool.round = scripted.round;
-                        tool.proxy.release(&tool.pose);
+                        tool.jumps += 1;
                         tool.edge = BladeEdge::default();
                     }
                     tool.mode = scripted.mode;
@@ -243,7 +230,8 @@ impl Tools {
         let index = match (sane, known, sample.shape) {
             (true, Some(index), _) => index,
             (true, None, Some(shape)) if self.tools.len() < MAX_TOOLS => {
-                self.tools.push(Tool::new(&sample.id, shape, GUEST_SPRING));
+                self.tools.push(Tool::new(self.made, &sample.id, shape, GUEST_SPRING));
+                self.made += 1;
                 self.tools.len() - 1
             }
             _ => {
@@ -271,20 +259,15 @@ impl Tools {
         tool.edge.advance(edge, least_m, &mut self.numbers)
     }
 
-    /// Back to the start of the scene: guests leave, nothing is held or touched. Incision numbers
-    /// go on rising.
+    /// Back to the start of the scene: guests leave, nobody holds a tool. Incision numbers go on
+    /// rising.
     pub fn reset(&mut self) {
         self.tools.retain(|tool| tool.declared);
         for tool in &mut self.tools {
-            let pose = tool.pose;
-            tool.proxy.release(&pose);
-            tool.press.release();
-            tool.grip.open();
             tool.edge = BladeEdge::default();
             tool.owner = Arc::clone(&self.nobody);
             tool.mode = ToolMode::Hover;
             tool.force_n = Vector3::zeros();
-            tool.compliance = None;
             tool.round = 0;
         }
         self.time_s = None;

@@ -47,7 +47,7 @@ fn a_script_gives_way_to_a_hand_and_takes_over_again() {
     let tool = tools.iter().next().unwrap();
     assert_eq!((&*tool.owner, tool.mode, tool.seq), ("someone", ToolMode::Touch, 7));
     assert_eq!(tool.pose.translation.x, 5.0);
-    assert_eq!(*tool.proxy_pose(), tool.pose, "a hand-over does not drag the proxy along");
+    assert_eq!(tool.hand_overs(), 2, "from nobody to the script, and on to the hand");
     tools.advance(0.5, &[]);
     let tool = tools.iter().next().unwrap();
     assert_eq!(&*tool.owner, "script");

@@ -1,0 +1,125 @@
+//! What the hand feels through one tool: where tissue lets the tool be, where it bears, what it holds.
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::contact::compliance::Compliance;
+use crate::contact::grab::Grip;
+use crate::contact::press::Press;
+use crate::contact::proxy::Proxy;
+use crate::contact::surface::ContactSurface;
+use crate::inputs::ToolMode;
+use crate::tool::Tool;
+use crate::tool::geometry::core_radius;
+
+/// The contact of one tool, from step to step.
+#[derive(Debug, Clone)]
+pub struct Hand {
+    /// Number of the tool.
+    tool: u64,
+    hand_overs: u64,
+    jumps: u64,
+    proxy: Proxy,
+    press: Press,
+    grip: Grip,
+    /// Body that it touched last, and how its tissue gives way under it; none before the first touch.
+    compliance: Option<(usize, Compliance)>,
+}
+
+impl Hand {
+    /// A hand that has not touched anything yet.
+    pub fn new(tool: &Tool) -> Self {
+        Self {
+            tool: tool.number(),
+            hand_overs: 0,
+            jumps: 0,
+            proxy: Proxy::default(),
+            press: Press::new(),
+            grip: Grip::new(),
+            compliance: None,
+        }
+    }
+
+    /// Whether it is the hand on `tool`.
+    pub fn is_on(&self, tool: &Tool) -> bool {
+        self.tool == tool.number()
+    }
+
+    /// Where the tissue lets the tool be.
+    pub fn proxy_pose(&self) -> &Isometry3<f64> {
+        self.proxy.pose()
+    }
+
+    /// How it presses.
+    pub fn press(&self) -> &Press {
+        &self.press
+    }
+
+    /// What it holds.
+    pub fn grip(&self) -> &Grip {
+        &self.grip
+    }
+
+    /// Middle of the tissue in its grip [m]; none when it holds nothing.
+    pub fn held_point(&self) -> Option<Vector3<f64>> {
+        let held = self.grip.held().1;
+        let sum: Vector3<f64> = held.iter().map(|held| held.point).sum();
+        (!held.is_empty()).then(|| sum / held.len() as f64)
+    }
+
+    /// Stiffness [N/m] of the tool's spring, `stiffness_n_m`, and tissue in series: how force changes with the
+    /// pose within a step. The spring's alone before the first touch.
+    pub fn in_series_with(&self, stiffness_n_m: f64) -> f64 {
+        self.compliance.map_or(stiffness_n_m, |(_, compliance)| compliance.in_series_with(stiffness_n_m))
+    }
+
+    /// Lets go of everything, with the tool at `pose`.
+    pub fn let_go(&mut self, pose: &Isometry3<f64>) {
+        self.proxy.release(pose);
+        self.press.release();
+        self.grip.open();
+    }
+
+    /// Goes with the tool to where it is now, and finds what it touches or holds there.
+    pub fn follow(&mut self, tool: &Tool, surfaces: &[ContactSurface]) {
+        if self.hand_overs != tool.hand_overs() {
+            self.hand_overs = tool.hand_overs();
+            self.let_go(&tool.pose);
+        }
+        if self.jumps != tool.jumps() {
+            self.jumps = tool.jumps();
+            self.proxy.release(&tool.pose);
+        }
+        if tool.mode != ToolMode::Grab {
+            self.grip.open();
+        }
+        if tool.touches() {
+            self.proxy.ride(tool.shape, surfaces);
+            self.proxy.follow(tool.shape, &tool.pose, surfaces);
+            self.press.update(tool.shape, self.proxy.pose(), &tool.pose, surfaces);
+        } else {
+            self.proxy.release(&tool.pose);
+            self.press.release();
+            if tool.mode == ToolMode::Grab {
+                self.grip.hold(&tool.pose, core_radius(tool.shape), surfaces);
+            }
+        }
+    }
+
+    /// Touches `body` with Young's modulus `young_pa` [Pa] under a patch of `radius_m` [m]: a first guess
+    /// of its compliance if it is not the body touched last.
+    pub fn meet(&mut self, body: usize, young_pa: f64, radius_m: f64) {
+        if self.compliance.is_none_or(|(known, _)| known != body) {
+            self.compliance = Some((body, Compliance::new(young_pa, radius_m)));
+        }
+    }
+
+    /// How the tissue gives way under it, once it has touched some.
+    pub fn compliance(&mut self) -> Option<&mut Compliance> {
+        self.compliance.as_mut().map(|(_, compliance)| compliance)
+    }
+
+    /// Forgets how the tissue gives way.
+    pub fn forget_compliance(&mut self) {
+        self.compliance = None;
+    }
+}
