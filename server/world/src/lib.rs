@@ -1,47 +1,49 @@
 //! The world: what stands between a scene file and a running simulation.
 //!
-//! The modules read in the direction the data flows: a scene file is parsed and checked
-//! ([`scene`]), its meshes are read, made or lifted from a surface, tools touch the bodies,
-//! [`simulation`] steps them, a local contact model and a snapshot leave for other threads,
-//! and results are written.
+//! The modules stand in the order in which the data goes through them, and each knows only those before it: a
+//! scene is parsed and checked ([`scene`]), bodies are made of it ([`assemble`]), tools touch them
+//! ([`contact`]), [`simulation`] steps them, and snapshots and results leave for other threads and the disk.
 //!
 //! Units are SI everywhere and stand in the names: metres, seconds, newtons, pascals, kilograms.
 
-// Each module is announced on its own line, in data-flow order.
-
-pub mod scene;
+// numbers in the words that people read
+pub mod quantity;
 
 // what comes from outside into a step
 pub mod inputs;
 
-// bytes of mesh files
+// bytes of mesh files → points and cells, and back
 pub mod format;
 
-// mesh files → checked tetrahedra
+// points and cells, or a shape of our own → checked tetrahedra
 pub mod mesh_in;
 
-// rigid tools: where hands and scripts hold them
-pub mod tool;
-
-// tools on bodies: proxies, springs, reactions
-pub mod contact;
-
-// scene to bodies: regions, loads, meshes
-pub mod assemble;
+// text of a scene → checked objects
+pub mod scene;
 
 // what a step says about itself
 pub mod report;
 
-// bodies as the world knows them, and recorded material points
+// a body as the world knows it, and its recorded points
 pub mod body;
 
+// checked objects → bodies, and doubts about them
+pub mod assemble;
+
+// rigid tools: where hands and scripts hold them
+pub mod tool;
+
+// what other threads see of a step
+pub mod snapshot;
+
+// tools on bodies: proxies, springs, reactions, and touch at the pace of a hand
+pub mod contact;
+
+// the step, and the plan of what it costs
 pub mod simulation;
 
 // what a scene will do, from its first steps
 pub mod forecast;
 
-pub mod quantity;
-
-pub mod snapshot;
-
+// what stays on disk
 pub mod results;

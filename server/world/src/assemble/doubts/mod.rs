@@ -1,7 +1,7 @@
 //! Doubts about a built scene: what is allowed but hardly meant. Each is one sentence that says where, what,
 //! and what to do about it.
 //!
-//! Nothing is solved here; what takes steps to find out is in [`forecast`](crate::forecast).
+//! Nothing is solved here; what takes steps to find out is left to the forecast.
 
 mod held;
 
