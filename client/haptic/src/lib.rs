@@ -13,7 +13,7 @@
 //! * [`safety`]: when force is allowed (watchdog, engagement), energy (passivity), clamp and slew.
 //! * [`tick`]: one millisecond, the table of contents of the client.
 //! * [`haptic_loop`]: absolute deadlines, and [`statistics`] of what was achieved.
-//! * [`recorder`]: every tick as a line of CSV, written by another thread; [`force_plot`]: drawn when the run ends.
+//! * [`log`]: every tick as a line of CSV, written by another thread, and the plot of the force when the run ends.
 //! * [`live`]: figures while the loop runs.
 //! * [`link`]: contact messages in, poses out, on threads of their own.
 //! * [`command`]: the command line and the summary.
@@ -37,9 +37,7 @@ pub mod blend;
 
 pub mod safety;
 
-pub mod recorder;
-
-pub mod force_plot;
+pub mod log;
 
 pub mod live;
 

@@ -5,7 +5,7 @@ use crate::clock::LoopClock;
 use crate::constants::{PERIOD_S, POSE_QUEUE};
 use crate::contact_model::{ContactInbox, ContactSlot, contact_slot};
 use crate::device::{Capability, DeviceState, ToolMode};
-use crate::recorder::LogRow;
+use crate::log::row::LogRow;
 use crate::safety::flag;
 use crate::statistics::LinkReport;
 use crossbeam_channel::{Receiver, Sender, TryRecvError};

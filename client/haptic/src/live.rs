@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{RecvTimeoutError, Sender};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::recorder::LogRow;
+use crate::log::row::LogRow;
 use crate::safety::flag;
 
 /// How often the line on a terminal changes.

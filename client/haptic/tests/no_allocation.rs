@@ -7,7 +7,7 @@ use scindo_allocations::{Counting, allocations};
 use scindo_haptic::contact_model::{ContactModel, contact_slot};
 use scindo_haptic::device::path::{Path, Touch};
 use scindo_haptic::device::simulated::{Hand, SimulatedDevice};
-use scindo_haptic::recorder::Recorder;
+use scindo_haptic::log::recorder::Recorder;
 use scindo_haptic::tick::{HapticTick, Limits, Ports, TickTime};
 use scindo_proto::messages::{Contact, HapticContact, Pose, Vec3, Vec3f, haptic_contact};
 use std::sync::Arc;

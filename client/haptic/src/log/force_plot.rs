@@ -7,7 +7,7 @@ use std::path::Path;
 use plotters::prelude::*;
 use plotters::style::FontTransform;
 
-use crate::recorder::LogRow;
+use super::row::LogRow;
 use crate::safety::flag;
 
 /// Most bins of a trace: more than a picture has pixels in a row.

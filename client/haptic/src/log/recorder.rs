@@ -2,10 +2,10 @@
 //!
 //! The loop offers rows and never waits: where the queue is full the row is dropped and counted.
 
+use super::force_plot::Trace;
+use super::row::LogRow;
 use crate::constants::LOG_QUEUE_ROWS;
-use crate::force_plot::Trace;
 use crossbeam_channel::{Receiver, Sender, TryRecvError};
-use nalgebra::Vector3;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::thread::JoinHandle;
@@ -17,31 +17,6 @@ const POLL: Duration = Duration::from_millis(5);
 /// First line of the file.
 pub const HEADER: &str = "time_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,tissue_x_n,tissue_y_n,tissue_z_n,\
                           force_x_n,force_y_n,force_z_n,contact_seq,contact_age_ms,epoch,energy_j,flags";
-
-/// One tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LogRow {
-    /// Loop clock [s].
-    pub time_s: f64,
-    /// Tip [m].
-    pub position_m: Vector3<f64>,
-    /// Velocity of the tip [m/s].
-    pub velocity_m_s: Vector3<f64>,
-    /// Force of the tissue before blend and safety [N].
-    pub tissue_n: Vector3<f64>,
-    /// Force that left [N].
-    pub force_n: Vector3<f64>,
-    /// Contact message in use.
-    pub contact_seq: u64,
-    /// Its age [ms].
-    pub contact_age_ms: f64,
-    /// Its topology.
-    pub epoch: u32,
-    /// Energy of the passivity observer [J].
-    pub energy_j: f64,
-    /// See [`crate::safety::flag`].
-    pub flags: u32,
-}
 
 /// Loop side of the log.
 pub struct LogQueue(Sender<LogRow>);
@@ -114,6 +89,7 @@ fn write_row(out: &mut impl Write, row: &LogRow) -> std::io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     fn row(seq: u64) -> LogRow {
         let zero = Vector3::zeros();
