@@ -10,7 +10,7 @@
 //! shorten the time it has.
 
 use crate::constants::{EPOCH_BLEND_NS, MAX_BLEND_NS, MIN_BLEND_NS};
-use crate::contact_model::ContactModel;
+use crate::contact::model::ContactModel;
 use nalgebra::Vector3;
 
 /// The offset that is falling.

@@ -52,7 +52,7 @@ pub fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact_model::contact_slot;
+    use crate::contact::model::contact_slot;
     use crate::tick::Ports;
     use crate::tick::fixture::{FakeDevice, LIMITS};
     use std::sync::Arc;

@@ -6,8 +6,8 @@
 //!
 //! # Layout, in the order of the data
 //! * [`device`]: where the hand is; the simulated device and the path its hand follows.
-//! * [`contact_model`]: the newest contact message, parsed, ordered and handed over without a lock.
-//! * [`contact_law`]: force of the tissue at the current tip.
+//! * [`contact`]: the newest message, parsed, ordered and handed over without a lock, and the force of the
+//!   tissue at the current tip.
 //! * [`virtual_coupling`]: stiffness and damping that the device can render passively.
 //! * [`blend`]: force continuity when the model changes.
 //! * [`safety`]: when force is allowed (watchdog, engagement), energy (passivity), clamp and slew.
@@ -27,9 +27,7 @@ pub mod clock;
 
 pub mod device;
 
-pub mod contact_model;
-
-pub mod contact_law;
+pub mod contact;
 
 pub mod virtual_coupling;
 

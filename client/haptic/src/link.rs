@@ -3,7 +3,7 @@
 
 use crate::clock::LoopClock;
 use crate::constants::{PERIOD_S, POSE_QUEUE};
-use crate::contact_model::{ContactInbox, ContactSlot, contact_slot};
+use crate::contact::model::{ContactInbox, ContactSlot, contact_slot};
 use crate::device::{Capability, DeviceState, ToolMode};
 use crate::log::row::LogRow;
 use crate::safety::flag;

@@ -2,8 +2,8 @@
 
 use crate::blend::Blend;
 use crate::constants::PERIOD_S;
-use crate::contact_law::ContactLaw;
-use crate::contact_model::ContactSlot;
+use crate::contact::law::ContactLaw;
+use crate::contact::model::ContactSlot;
 use crate::device::{DeviceState, HapticDevice};
 use crate::link::PoseQueue;
 use crate::live::Meter;

@@ -15,7 +15,7 @@
 //! Colgate and Schenkel 1997, eq. 8; Colgate, Stanley and Brown 1995; Adams and Hannaford 1999.
 
 use crate::constants::{PERIOD_S, VIRTUAL_DAMPING_SHARE};
-use crate::contact_law::PlaneLoads;
+use crate::contact::law::PlaneLoads;
 use crate::device::{Capability, DeviceState};
 use nalgebra::{Matrix3, Vector3};
 
@@ -100,8 +100,8 @@ fn balance(device_m: &Vector3<f64>, k_vc: f64, loads: &PlaneLoads) -> Vector3<f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact_law::ContactLaw;
-    use crate::contact_model::{ContactModel, ContactPlane};
+    use crate::contact::law::ContactLaw;
+    use crate::contact::model::{ContactModel, ContactPlane};
     use crate::device::ToolMode;
     use crate::device::simulated::CAPABILITY;
 

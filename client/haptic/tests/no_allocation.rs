@@ -4,7 +4,7 @@
 
 use nalgebra::Vector3;
 use scindo_allocations::{Counting, allocations};
-use scindo_haptic::contact_model::{ContactModel, contact_slot};
+use scindo_haptic::contact::model::{ContactModel, contact_slot};
 use scindo_haptic::device::path::{Path, Touch};
 use scindo_haptic::device::simulated::{Hand, SimulatedDevice};
 use scindo_haptic::log::recorder::Recorder;

@@ -14,7 +14,7 @@ use crate::constants::{
     ENGAGE_RAMP_NS, FREE_FORCE_N, FREE_SPACE_NS, HOLD_DAMPING_NS_M, LOST_NS, MAX_JUMP_M, MAX_SPEED_M_S,
     PERIOD_S, RAMP_DOWN_NS, SILENT_ZERO_NS,
 };
-use crate::contact_model::ContactModel;
+use crate::contact::model::ContactModel;
 use crate::device::DeviceState;
 use nalgebra::Vector3;
 

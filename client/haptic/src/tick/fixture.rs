@@ -1,7 +1,7 @@
 //! A contact stream and a device made for tests.
 
 use super::{HapticTick, Limits, Ports, TickOutput, TickTime};
-use crate::contact_model::{ContactInbox, contact_slot};
+use crate::contact::model::{ContactInbox, contact_slot};
 use crate::device::simulated::CAPABILITY;
 use crate::device::{Capability, DeviceState, HapticDevice, ToolMode};
 use nalgebra::Vector3;

@@ -80,7 +80,7 @@ fn stiff_tissue_on_a_hand_does_not_chatter() {
     let touch =
         Touch { point_m: Vector3::zeros(), direction: -Vector3::z(), depth_m: 0.005, clearance_m: 0.02 };
     let device = SimulatedDevice::new(Path::press(&touch), Hand::default());
-    let (mut input, contacts) = crate::contact_model::contact_slot();
+    let (mut input, contacts) = crate::contact::model::contact_slot();
     let alive = Arc::new(AtomicBool::new(true));
     let mut tick = HapticTick::new(
         Box::new(device),
@@ -91,7 +91,7 @@ fn stiff_tissue_on_a_hand_does_not_chatter() {
     for ms in 0..2600u64 {
         if ms % 5 == 0 {
             let message = contact(ms / 5 + 1, 0.0, 20_000.0);
-            input.write(crate::contact_model::ContactModel::parse(&message, ms * MS).unwrap());
+            input.write(crate::contact::model::ContactModel::parse(&message, ms * MS).unwrap());
         }
         let output = tick.tick(TickTime { now_ns: ms * MS, elapsed_s: 1e-3 });
         if ms > 2300 {

@@ -11,8 +11,8 @@
 //! # Source
 //! The message `scindo.v1.Contact` (`proto/scindo/v1/tool.proto`).
 
+use super::model::{ContactModel, ContactPlane};
 use crate::constants::{EXTRAPOLATION_STEPS, MAX_EXTRAPOLATION_S, PATCH_FADE};
-use crate::contact_model::{ContactModel, ContactPlane};
 use nalgebra::Vector3;
 use scindo_proto::limits::MAX_CONTACTS;
 
