@@ -2,11 +2,13 @@
 
 mod arguments;
 
+mod error;
+
 mod summary;
 
 use crate::clock::LoopClock;
 use crate::device::HapticDevice;
-use crate::device::path::{Path, PathError, Touch};
+use crate::device::path::{Path, Touch};
 use crate::device::simulated::{Hand, SimulatedDevice};
 use crate::haptic_loop;
 use crate::link::{self, HeldTool, ToolRequest};
@@ -15,66 +17,16 @@ use crate::log::force_plot::{self, Trace};
 use crate::log::recorder::{LogQueue, Recorder};
 use crate::statistics::LoopReport;
 use crate::tick::{HapticTick, Ports};
-use scindo_client::{Link, LinkConfig, LinkError, Role};
+use scindo_client::{Link, LinkConfig, Role};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 pub use arguments::{Arguments, Cli, DeviceKind};
+pub use error::CommandError;
 pub use summary::Summary;
 
 use arguments::check;
-
-/// Why the program ends early.
-#[derive(Debug, thiserror::Error)]
-pub enum CommandError {
-    /// An argument that cannot be used.
-    #[error("{what} = {found}: {next}")]
-    Argument {
-        /// Which.
-        what: &'static str,
-        /// What stood there.
-        found: String,
-        /// What to do.
-        next: String,
-    },
-    /// The path of the hand.
-    #[error(transparent)]
-    Path(#[from] PathError),
-    /// The network.
-    #[error(transparent)]
-    Link(#[from] LinkError),
-    /// A file or thread.
-    #[error("{what}: {source}")]
-    Io {
-        /// What was tried.
-        what: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The whole run passed without one contact message.
-    #[error("no contact message arrived for tool '{tool}' in {seconds:.1} s; {hint}")]
-    NoContact {
-        /// The tool.
-        tool: String,
-        /// How long.
-        seconds: f64,
-        /// What to look at.
-        hint: &'static str,
-    },
-}
-
-impl CommandError {
-    /// 2: bad input; 1: the thing asked for failed.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Argument { .. }
-            | Self::Path(_)
-            | Self::Link(LinkError::Config { .. } | LinkError::Key(_)) => 2,
-            Self::Link(_) | Self::Io { .. } | Self::NoContact { .. } => 1,
-        }
-    }
-}
 
 /// Runs the client until its time is over, Ctrl-C or SIGTERM.
 pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use scindo_client::messages::{ToolShape, tool_shape};
 use scindo_program::Manual;
 
-use super::CommandError;
+use super::error::CommandError;
 use crate::constants::{DEFAULT_MAX_FORCE_N, DEFAULT_SLEW_N_S, RAMP_DOWN_NS};
 use crate::device::Capability;
 use crate::tick::Limits;
