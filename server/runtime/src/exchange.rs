@@ -1,5 +1,7 @@
 //! What the threads share: newest inputs, who waits for what, and the way out.
 
+pub mod meter;
+
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -12,7 +14,7 @@ use scindo_world::simulation::Level;
 
 use crate::convert::unix_ns;
 use crate::inbox::Inbox;
-use crate::stats::Meter;
+use meter::Meter;
 
 /// Messages that may wait for the publisher; beyond it events are dropped and counted.
 pub const OUTGOING: usize = 1024;

@@ -1,90 +1,13 @@
-//! Rates and costs between two reports, and what the inbox tells for them.
+//! What a report tells of bodies, tools and refused messages.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::sync::Arc;
 
 use scindo_proto::messages::{BodyStats, Counter, ToolStats};
 use scindo_world::snapshot::{BodySnapshot, ToolSnapshot};
 
 use crate::exchange::Exchange;
-
-/// Counts of one interval.
-#[derive(Debug, Default)]
-struct Interval {
-    steps: u64,
-    stages: Vec<(&'static str, f64)>,
-    contacts: BTreeMap<Arc<str>, u64>,
-}
-
-/// Written by the simulation and contact threads, read by the publisher. Each holds the lock
-/// for a few additions.
-#[derive(Debug)]
-pub struct Meter {
-    interval: Mutex<(Instant, Interval)>,
-}
-
-/// Means over the interval that ended.
-#[derive(Debug, Default)]
-pub struct Rates {
-    /// Length of the interval [s].
-    pub seconds: f64,
-    /// Steps per second.
-    pub step_hz: f64,
-    /// Mean duration of each stage [ms].
-    pub stages_ms: Vec<(&'static str, f64)>,
-    /// Contact messages per second, by tool.
-    pub contact_hz: BTreeMap<Arc<str>, f64>,
-}
-
-impl Default for Meter {
-    fn default() -> Self {
-        Self { interval: Mutex::new((Instant::now(), Interval::default())) }
-    }
-}
-
-impl Meter {
-    /// A step ended.
-    pub fn step(&self, stages: impl Iterator<Item = (&'static str, f64)>) {
-        let interval = &mut self.lock().1;
-        interval.steps += 1;
-        for (name, seconds) in stages {
-            match interval.stages.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, sum)) => *sum += seconds,
-                None => interval.stages.push((name, seconds)),
-            }
-        }
-    }
-
-    /// A contact message left.
-    pub fn contact(&self, tool: &Arc<str>) {
-        let interval = &mut self.lock().1;
-        match interval.contacts.get_mut(tool) {
-            Some(count) => *count += 1,
-            None => {
-                interval.contacts.insert(tool.clone(), 1);
-            }
-        }
-    }
-
-    /// Ends the interval and begins the next.
-    pub fn read(&self) -> Rates {
-        let (since, interval) = std::mem::replace(&mut *self.lock(), (Instant::now(), Interval::default()));
-        let seconds = since.elapsed().as_secs_f64().max(1e-9);
-        let steps = interval.steps.max(1) as f64;
-        let to_ms = |(name, sum): (&'static str, f64)| (name, 1e3 * sum / steps);
-        Rates {
-            seconds,
-            step_hz: interval.steps as f64 / seconds,
-            stages_ms: interval.stages.into_iter().map(to_ms).collect(),
-            contact_hz: interval.contacts.into_iter().map(|(t, n)| (t, n as f64 / seconds)).collect(),
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, (Instant, Interval)> {
-        self.interval.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
+use crate::exchange::meter::Rates;
 
 /// What the inbox knows at the time of a report, copied so that nobody waits for the report.
 pub struct Told {
