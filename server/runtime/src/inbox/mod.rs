@@ -17,6 +17,8 @@ pub mod early;
 
 pub mod cut_log;
 
+mod refusal;
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests;
@@ -25,24 +27,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use scindo_proto::messages::{self as wire, CutAck, CutCommand, DeviceCapability, ToolSample, cut_ack};
+use scindo_proto::messages::{CutAck, CutCommand, DeviceCapability, ToolSample, cut_ack};
 use scindo_world::inputs::{CutOutcome, Inputs, ToolInput};
 
 pub use cut_log::{Answering, Cut};
 use cut_log::{CutLog, answer};
 use owners::Owners;
 pub use owners::{Change, MAX_POSE_RATE};
-
-/// Why a message is refused; the reason is counted and, for cuts, answered.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
-    /// Stable name, such as `not-owner`.
-    pub code: &'static str,
-    /// What is wrong.
-    pub message: String,
-    /// What to do next.
-    pub hint: &'static str,
-}
+pub use refusal::Refusal;
+use refusal::refuse;
 
 /// See the module.
 #[derive(Debug, Default)]
@@ -183,16 +176,6 @@ impl Inbox {
     pub fn cuts_applied(&self) -> u64 {
         self.cuts.applied()
     }
-}
-
-impl From<Refusal> for wire::Error {
-    fn from(refusal: Refusal) -> Self {
-        Self { code: refusal.code.to_owned(), message: refusal.message, hint: refusal.hint.to_owned() }
-    }
-}
-
-fn refuse(code: &'static str, message: String, hint: &'static str) -> Refusal {
-    Refusal { code, message, hint }
 }
 
 fn same_key(key_tool: &str, tool: &str) -> Result<(), Refusal> {

@@ -8,7 +8,7 @@ use scindo_proto::messages::{DeviceCapability, ToolSample};
 use scindo_world::inputs::{MAX_TOOLS, ToolInput};
 
 use super::early::{EarlyPoses, PATIENCE};
-use super::{Refusal, refuse};
+use super::refusal::{Refusal, refuse};
 use crate::convert::to_tool_input;
 
 /// Poses per second and tool that are taken; twice what a 1 kHz device sends.
