@@ -12,6 +12,7 @@ use scindo_proto::messages::{
     StepRequest, UndoRequest,
 };
 use scindo_proto::{FILE_DESCRIPTOR_SET, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
+use scindo_world::inputs::{ToolInput, ToolShape};
 use zenoh::Wait as _;
 use zenoh::query::Query;
 
@@ -102,19 +103,18 @@ impl RpcThread {
     /// Owners and epochs as they are now.
     fn info_now(&self) -> SessionInfo {
         let mut info = self.info.clone();
-        let inbox = self.exchange.inbox();
-        for held in inbox.held() {
+        let held: Vec<ToolInput> = self.exchange.inbox().held().cloned().collect();
+        for held in held {
             match info.tools.iter_mut().find(|tool| *tool.id == *held.id) {
                 Some(tool) => tool.owner = held.owner.to_string(),
                 None => info.tools.push(scindo_proto::messages::ToolInfo {
                     id: held.id.to_string(),
                     shape: held.shape.as_ref().map(crate::convert::to_shape),
                     owner: held.owner.to_string(),
-                    cuts: matches!(held.shape, Some(scindo_world::inputs::ToolShape::Blade { .. })),
+                    cuts: matches!(held.shape, Some(ToolShape::Blade { .. })),
                 }),
             }
         }
-        drop(inbox);
         for (index, body) in info.bodies.iter_mut().enumerate() {
             body.epoch = self.exchange.epoch(index);
         }
