@@ -5,8 +5,14 @@ use std::process::ExitCode;
 use clap::Parser;
 use scindo_program::Manual;
 
-use crate::cli::{Cli, Command};
 use crate::error::RuntimeError;
+use cli::{Cli, Command};
+
+pub mod cli;
+
+mod say;
+
+pub mod progress;
 
 pub mod run;
 

@@ -1,7 +1,7 @@
 //! The scindo server.
 //!
 //! # Layout, along the way of the data
-//! * [`cli`], [`command`], [`progress`]: what the user asked for, and how it goes.
+//! * [`command`]: what the user asked for, and how it goes.
 //! * [`session`]: the two zenoh sessions, haptic and bulk.
 //! * [`convert`]: between the types of the world and the messages of the wire.
 //! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
@@ -22,13 +22,7 @@
 //! | `watchdog` | breaks off steps that keep orders waiting; ends a process that does not end | its period |
 //! | zenoh's own | decode, check, store in the inbox | nothing |
 
-mod say;
-
-pub mod cli;
-
 pub mod command;
-
-pub mod progress;
 
 pub mod error;
 

@@ -11,10 +11,10 @@ use scindo_study::recommend::percent;
 use scindo_study::{CaseResult, Settings, StudyResult};
 use serde_json::json;
 
+use super::cli::AccuracyArgs;
+use super::say::say;
 use super::study_progress::StudyProgress;
-use crate::cli::AccuracyArgs;
 use crate::error::RuntimeError;
-use crate::say::say;
 
 /// Runs the study; Ctrl-C ends it after the step it is in, and what is finished is kept and shown.
 pub fn accuracy(args: &AccuracyArgs) -> Result<ExitCode, RuntimeError> {

@@ -11,10 +11,10 @@ use scindo_world::scene::Scene;
 use scindo_world::simulation::{Plan, SimBody, Simulation};
 use serde_json::{Value, json};
 
-use crate::cli::CheckArgs;
+use super::cli::CheckArgs;
+use super::progress::Share;
+use super::say::say;
 use crate::error::RuntimeError;
-use crate::progress::Share;
-use crate::say::say;
 
 /// A single step that takes this much longer than the whole forecast may is not waited for.
 const PATIENCE: u32 = 8;

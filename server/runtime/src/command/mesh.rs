@@ -5,10 +5,10 @@ use std::process::ExitCode;
 use scindo_world::mesh_in::{load_any, write_mesh};
 use serde_json::json;
 
-use crate::cli::MeshArgs;
+use super::cli::MeshArgs;
+use super::progress::Share;
+use super::say::say;
 use crate::error::RuntimeError;
-use crate::progress::Share;
-use crate::say::say;
 
 /// Reads, repairs or fills, writes.
 pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {

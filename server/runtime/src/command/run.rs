@@ -17,13 +17,13 @@ use serde_json::json;
 use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
 
+use super::cli::{DemoArgs, RunArgs, ServeArgs};
+use super::progress::{Progress, Share};
+use super::say::say;
 use crate::catalogue::Catalogue;
-use crate::cli::{DemoArgs, RunArgs, ServeArgs};
 use crate::engine::Engine;
 use crate::error::RuntimeError;
 use crate::orders::Operators;
-use crate::progress::{Progress, Share};
-use crate::say::say;
 use crate::server::{Server, ServerConfig};
 use crate::session::{NetworkConfig, Sessions, local};
 use crate::sim::Pace;

@@ -9,9 +9,9 @@ use scindo_study::stress::{self, CaseReport, Progress, Row, Settings, Status, Su
 use serde_json::json;
 
 use super::accuracy::{bar, listen};
-use crate::cli::StressArgs;
+use super::cli::StressArgs;
+use super::say::say;
 use crate::error::RuntimeError;
-use crate::say::say;
 
 /// Runs the cases and writes the page; Ctrl-C ends it after the cases that are being run.
 pub fn stress(args: &StressArgs) -> Result<ExitCode, RuntimeError> {
