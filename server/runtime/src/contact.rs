@@ -19,8 +19,8 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority, Reliability};
 use zenoh::{Session, Wait as _};
 
-use crate::convert::{to_pose, unix_ns};
 use crate::exchange::Exchange;
+use crate::wire::convert::{to_pose, unix_ns};
 
 /// How often an idle thread looks for somebody who holds a tool.
 const IDLE: Duration = Duration::from_millis(5);

@@ -16,8 +16,8 @@ use scindo_world::simulation::{SimBody, Simulation, StepReport};
 use scindo_world::snapshot::Snapshot;
 use scindo_world::tool::SCRIPT;
 
-use crate::convert::{to_param, to_shape, to_vec3};
 use crate::error::RuntimeError;
+use crate::wire::convert::{to_param, to_shape, to_vec3};
 
 /// See the module.
 pub struct Engine {

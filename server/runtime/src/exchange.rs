@@ -12,8 +12,8 @@ use scindo_proto::messages::{CutAck, Event, ParamsReply, Plan, event};
 use scindo_world::inputs::Wants;
 use scindo_world::simulation::Level;
 
-use crate::convert::unix_ns;
 use crate::inbox::Inbox;
+use crate::wire::convert::unix_ns;
 use meter::Meter;
 
 /// Messages that may wait for the publisher; beyond it events are dropped and counted.

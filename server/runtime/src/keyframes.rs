@@ -2,7 +2,7 @@
 //!
 //! An answer is as long as a surface, and its client may not read. A few threads send answers, so that neither
 //! the publisher nor the answers to others wait for one client; zenoh closes the link to a client that has
-//! taken nothing for a second ([`crate::session`]).
+//! taken nothing for a second ([`crate::wire::session`]).
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

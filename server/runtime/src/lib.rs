@@ -2,10 +2,9 @@
 //!
 //! # Layout, along the way of the data
 //! * [`command`]: what the user asked for, and how it goes.
-//! * [`session`]: the two zenoh sessions, haptic and bulk.
-//! * [`convert`]: between the types of the world and the messages of the wire.
+//! * [`wire`]: the two zenoh sessions, haptic and bulk; who may pause, reset and change the simulation; between
+//!   the types of the world and the messages.
 //! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
-//! * [`orders`]: who may pause, reset and change the simulation.
 //! * [`exchange`]: what the threads share.
 //! * [`engine`], [`sim`]: the simulation thread.
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
@@ -26,11 +25,7 @@ pub mod command;
 
 pub mod error;
 
-pub mod session;
-
-pub mod orders;
-
-pub mod convert;
+pub mod wire;
 
 pub mod inbox;
 

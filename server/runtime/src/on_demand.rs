@@ -11,9 +11,9 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority, Reliability};
 use zenoh::{Session, Wait as _};
 
-use crate::convert::{ProbeName, STRESS, to_measures, to_stress};
 use crate::error::{RuntimeError, words};
 use crate::exchange::Exchange;
+use crate::wire::convert::{ProbeName, STRESS, to_measures, to_stress};
 
 /// Fields and measures come at most this often: colours and curves need less than motion.
 const PERIOD: Duration = Duration::from_millis(50);

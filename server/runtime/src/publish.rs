@@ -20,13 +20,13 @@ use zenoh::qos::{CongestionControl, Priority, Reliability};
 use zenoh::query::Queryable;
 use zenoh::{Session, Wait as _};
 
-use crate::convert::{ProbeName, to_frame, to_tool_state, to_topology, unix_ns};
 use crate::error::{RuntimeError, words};
 use crate::exchange::{Exchange, OUTGOING, Outgoing};
 use crate::keyframes::Keyframes;
 use crate::on_demand::OnDemand;
-use crate::session::Sessions;
 use crate::stats::{Told, body_stats};
+use crate::wire::convert::{ProbeName, to_frame, to_tool_state, to_topology, unix_ns};
+use crate::wire::session::Sessions;
 
 /// The thread looks for keyframe queries and its end at least this often.
 const LOOK: Duration = Duration::from_millis(20);

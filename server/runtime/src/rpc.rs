@@ -109,7 +109,7 @@ impl RpcThread {
                 Some(tool) => tool.owner = held.owner.to_string(),
                 None => info.tools.push(scindo_proto::messages::ToolInfo {
                     id: held.id.to_string(),
-                    shape: held.shape.as_ref().map(crate::convert::to_shape),
+                    shape: held.shape.as_ref().map(crate::wire::convert::to_shape),
                     owner: held.owner.to_string(),
                     cuts: matches!(held.shape, Some(ToolShape::Blade { .. })),
                 }),

@@ -15,7 +15,6 @@ use zenoh::query::Queryable;
 
 use crate::catalogue::Catalogue;
 use crate::contact::{ContactConfig, ContactThread};
-use crate::convert::ProbeName;
 use crate::engine::Engine;
 use crate::error::{RuntimeError, words};
 use crate::exchange::{ANSWERS, Exchange, OUTGOING};
@@ -23,9 +22,10 @@ use crate::inbox::Inbox;
 use crate::publish::{PublishThread, Published, Sources};
 use crate::receive::Receivers;
 use crate::rpc::{self, RpcThread};
-use crate::session::Sessions;
 use crate::sim::{Command, Pace, SimThread};
 use crate::watchdog;
+use crate::wire::convert::ProbeName;
+use crate::wire::session::Sessions;
 
 /// Orders that may wait for the simulation thread.
 const WAITING_ORDERS: usize = 16;

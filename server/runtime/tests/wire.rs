@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use scindo::engine::Engine;
 use scindo::server::{Server, ServerConfig};
-use scindo::session::{NetworkConfig, Sessions};
+use scindo::wire::session::{NetworkConfig, Sessions};
 use scindo_client::messages::{
     BladeSegment, CutCommand, HapticContact, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,
     cut_ack::Outcome,

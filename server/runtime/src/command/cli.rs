@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand};
 use scindo_program::Manual;
 
-use crate::orders::Operators;
+use crate::wire::orders::Operators;
 
 /// Deforms and cuts soft bodies in real time and serves them over the network.
 ///

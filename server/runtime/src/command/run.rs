@@ -23,10 +23,10 @@ use super::say::say;
 use crate::catalogue::Catalogue;
 use crate::engine::Engine;
 use crate::error::RuntimeError;
-use crate::orders::Operators;
 use crate::server::{Server, ServerConfig};
-use crate::session::{NetworkConfig, Sessions, local};
 use crate::sim::Pace;
+use crate::wire::orders::Operators;
+use crate::wire::session::{NetworkConfig, Sessions, local};
 
 /// Where the demonstration's page is served.
 const DEMONSTRATION_VIEWER: &str = "127.0.0.1:8080";

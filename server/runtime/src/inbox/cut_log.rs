@@ -8,7 +8,7 @@ use scindo_proto::messages::{self as wire, CutAck, CutCommand, cut_ack};
 use scindo_world::inputs::{CutOutcome, CutRequest};
 
 use super::refusal::{Refusal, refuse};
-use crate::convert::from_vec3;
+use crate::wire::convert::from_vec3;
 
 /// Cuts that may be without an answer, in the queue here or in the simulation's.
 pub const MAX_WAITING_CUTS: usize = 64;

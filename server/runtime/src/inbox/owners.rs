@@ -9,7 +9,7 @@ use scindo_world::inputs::{MAX_TOOLS, ToolInput};
 
 use super::early::{EarlyPoses, PATIENCE};
 use super::refusal::{Refusal, refuse};
-use crate::convert::to_tool_input;
+use crate::wire::convert::to_tool_input;
 
 /// Poses per second and tool that are taken; twice what a 1 kHz device sends.
 pub const MAX_POSE_RATE: u32 = 2000;
