@@ -2,13 +2,13 @@
 //!
 //! # Layout, along the way of the data
 //! * [`command`]: what the user asked for, and how it goes.
-//! * [`wire`]: the two zenoh sessions, haptic and bulk; who may pause, reset and change the simulation; between
-//!   the types of the world and the messages.
+//! * [`wire`]: the two zenoh sessions, haptic and bulk, and who may give orders through them; messages from the
+//!   types of the world and back.
 //! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
 //! * [`exchange`]: what the threads share.
-//! * [`engine`], [`sim`]: the simulation thread.
+//! * [`sim`]: the simulation thread.
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
-//! * [`publish`], [`keyframes`], [`stats`]: the publication thread, and those that answer late joiners.
+//! * [`publish`]: the publication thread, and those that answer late joiners.
 //! * [`rpc`]: questions and orders.
 //! * [`server`]: starts and ends all of these.
 //!
@@ -33,21 +33,11 @@ pub mod receive;
 
 pub mod exchange;
 
-pub mod engine;
-
 pub mod sim;
 
 pub mod contact;
 
-pub mod on_demand;
-
 pub mod publish;
-
-pub mod keyframes;
-
-pub mod stats;
-
-pub mod catalogue;
 
 pub mod rpc;
 

@@ -1,6 +1,12 @@
 //! The publication thread: surfaces and tool states of the newest snapshot at each topic's rate,
 //! keyframes on query, answers, events, the plan, statistics. The simulation never waits for it.
 
+pub mod on_demand;
+
+pub mod keyframes;
+
+pub mod stats;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -22,11 +28,11 @@ use zenoh::{Session, Wait as _};
 
 use crate::error::{RuntimeError, words};
 use crate::exchange::{Exchange, OUTGOING, Outgoing};
-use crate::keyframes::Keyframes;
-use crate::on_demand::OnDemand;
-use crate::stats::{Told, body_stats};
 use crate::wire::convert::{ProbeName, to_frame, to_tool_state, to_topology, unix_ns};
 use crate::wire::session::Sessions;
+use keyframes::Keyframes;
+use on_demand::OnDemand;
+use stats::{Told, body_stats};
 
 /// The thread looks for keyframe queries and its end at least this often.
 const LOOK: Duration = Duration::from_millis(20);

@@ -1,5 +1,7 @@
 //! Questions and orders under `rpc/`: one thread answers them in turn.
 
+pub mod catalogue;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -16,9 +18,9 @@ use scindo_world::inputs::{ToolInput, ToolShape};
 use zenoh::Wait as _;
 use zenoh::query::Query;
 
-use crate::catalogue::Catalogue;
 use crate::exchange::Exchange;
 use crate::sim::{Command, Order};
+use catalogue::Catalogue;
 
 /// Questions that may wait; beyond it they are refused at once.
 pub const WAITING: usize = 32;

@@ -13,15 +13,15 @@ use triple_buffer::{Output, triple_buffer};
 use zenoh::Wait as _;
 use zenoh::query::Queryable;
 
-use crate::catalogue::Catalogue;
 use crate::contact::{ContactConfig, ContactThread};
-use crate::engine::Engine;
 use crate::error::{RuntimeError, words};
 use crate::exchange::{ANSWERS, Exchange, OUTGOING};
 use crate::inbox::Inbox;
 use crate::publish::{PublishThread, Published, Sources};
 use crate::receive::Receivers;
+use crate::rpc::catalogue::Catalogue;
 use crate::rpc::{self, RpcThread};
+use crate::sim::engine::Engine;
 use crate::sim::{Command, Pace, SimThread};
 use crate::watchdog;
 use crate::wire::convert::ProbeName;

@@ -1,5 +1,7 @@
 //! The simulation thread: orders, inputs, step, report, snapshots, pace.
 
+pub mod engine;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -12,9 +14,9 @@ use scindo_world::simulation::Level;
 use scindo_world::snapshot::Snapshot;
 use triple_buffer::Input;
 
-use crate::engine::Engine;
 use crate::exchange::{Exchange, Outgoing};
 use crate::inbox::{Answering, Refusal};
+use engine::Engine;
 
 /// How often a simulation that holds still looks for new listeners.
 const STILL: Duration = Duration::from_millis(10);

@@ -5,8 +5,8 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use scindo::engine::Engine;
 use scindo::server::{Server, ServerConfig};
+use scindo::sim::engine::Engine;
 use scindo::wire::session::{NetworkConfig, Sessions};
 use scindo_client::messages::{
     BladeSegment, CutCommand, HapticContact, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,

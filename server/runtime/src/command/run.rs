@@ -20,11 +20,11 @@ use tokio::task::JoinHandle;
 use super::cli::{DemoArgs, RunArgs, ServeArgs};
 use super::progress::{Progress, Share};
 use super::say::say;
-use crate::catalogue::Catalogue;
-use crate::engine::Engine;
 use crate::error::RuntimeError;
+use crate::rpc::catalogue::Catalogue;
 use crate::server::{Server, ServerConfig};
 use crate::sim::Pace;
+use crate::sim::engine::Engine;
 use crate::wire::orders::Operators;
 use crate::wire::session::{NetworkConfig, Sessions, local};
 
