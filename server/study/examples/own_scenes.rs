@@ -13,8 +13,8 @@ use std::sync::atomic::AtomicBool;
 
 use scindo_study::case::Truth;
 use scindo_study::error::Errors;
-use scindo_study::recommend::percent;
 use scindo_study::trial::{self, Limits, Trial};
+use scindo_study::words::percent;
 use scindo_study::{CaseResult, Settings, run};
 
 /// Mesh and step of the check, relative to the scene's.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::words::short;
+
 /// What is varied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -210,16 +212,6 @@ fn cells_label([x, y, z]: [usize; 3]) -> String {
     format!("{x}×{y}×{z}")
 }
 
-/// A number with four significant digits and no trailing zeros.
-pub fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let digits = 3 - value.abs().log10().floor() as i32;
-    let text = format!("{value:.*}", digits.clamp(0, 12) as usize);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,8 +221,6 @@ mod tests {
         assert_eq!(step(0.04).label, "40 ms");
         assert_eq!(step(0.0025).label, "2.5 ms");
         assert_eq!(tolerance(&["b".into()], 1e-6).label, "1e-6");
-        assert_eq!(short(1234.6), "1235");
-        assert_eq!(short(0.012346), "0.01235");
     }
 
     #[test]

@@ -11,11 +11,11 @@ use crate::axes::{Factor, Setting, step};
 use crate::case::sight::{SAME, Sight, largest_change};
 use crate::design::Configuration;
 use crate::limit::{Limit, UNKNOWN, limit};
-use crate::recommend::percent;
 use crate::reference::Reference;
 use crate::runner::{Ask, PATIENCE, Runner, fits};
 use crate::series::Series;
 use crate::trial::Trial;
+use crate::words::percent;
 
 /// A way to a reference.
 #[derive(Debug, Clone)]

@@ -14,6 +14,8 @@
 //! Everything is a scene with changed keys, run by `scindo-world`: the study knows no mechanics,
 //! and what a scene refuses is a result here like any other.
 
+pub mod words;
+
 pub mod axes;
 
 pub mod case;

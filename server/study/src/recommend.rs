@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::pareto::front;
 use crate::sources::{Source, Sources};
+use crate::words::{percent, short};
 
 /// What is recommended, in indices of the points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -82,7 +83,6 @@ pub fn recommend(budget_ms: f64, error_bar: f64, candidates: &[Candidate<'_>]) -
 
 /// Number of points, by rank of cost, among those that cannot be told apart.
 fn words(advice: &Recommendation, candidates: &[Candidate<'_>], alike: usize) -> String {
-    let short = crate::axes::short;
     let (budget, bar) = (short(advice.budget_ms), percent(advice.error_bar));
     let told = |i: usize| {
         let c = candidates[i];
@@ -116,23 +116,6 @@ fn words(advice: &Recommendation, candidates: &[Candidate<'_>], alike: usize) ->
         None => text += " Nothing that was tried is more accurate by more than the bar.",
     }
     text
-}
-
-/// A relative error in per cent with two significant digits.
-pub fn percent(error: f64) -> String {
-    if !error.is_finite() {
-        return "–".to_owned();
-    }
-    let value = 100.0 * error;
-    if value != 0.0 && value < 0.001 { format!("{value:.1e} %") } else { format!("{} %", two_digits(value)) }
-}
-
-fn two_digits(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let digits = (1 - value.abs().log10().floor() as i32).clamp(0, 6);
-    format!("{value:.*}", digits as usize)
 }
 
 #[cfg(test)]
@@ -195,13 +178,5 @@ mod tests {
         assert!(r.words.starts_with("Nothing fits into 0.5 ms; the fastest is fast"));
         let nothing = recommend(1.0, f64::INFINITY, &[]);
         assert_eq!(nothing.words, "No configuration gave a result whose error is known.");
-    }
-
-    #[test]
-    fn per_cents() {
-        assert_eq!(percent(0.0312), "3.1 %");
-        assert_eq!(percent(1.234), "123 %");
-        assert_eq!(percent(0.00012), "0.012 %");
-        assert_eq!(percent(3e-9), "3.0e-7 %");
     }
 }

@@ -13,12 +13,13 @@ use crate::design::{Configuration, design};
 use crate::error::Errors;
 use crate::ladder::{Climb, Ladder};
 use crate::pareto::front;
-use crate::recommend::{Candidate, Recommendation, percent, recommend};
+use crate::recommend::{Candidate, Recommendation, recommend};
 use crate::reference::{self, Reference};
 use crate::runner::{Ask, PATIENCE, Runner, fits};
 use crate::sources::peel;
 use crate::study::{CaseResult, Outcome};
 use crate::trial::{Protocol, Trial};
+use crate::words::{percent, short};
 
 /// Share of a scene's time that is kept for configurations while the reference climbs, and for what
 /// comes after them.
@@ -444,8 +445,4 @@ fn words_again(
 
 fn seconds(seconds: f64) -> String {
     if seconds < 100.0 { format!("{seconds:.0} s") } else { format!("{:.1} min", seconds / 60.0) }
-}
-
-fn short(value: f64) -> String {
-    crate::axes::short(value)
 }

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use scindo_study::axes::Factor;
-use scindo_study::recommend::percent;
+use scindo_study::words::percent;
 use scindo_study::{CaseResult, Settings, StudyResult};
 use serde_json::json;
 

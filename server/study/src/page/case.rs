@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use super::plot::{Failure, Mark, Plot};
 use super::{escape, prose, style, time, wear};
-use crate::axes::{Factor, short};
+use crate::axes::Factor;
 use crate::case::Case;
 use crate::error::Errors;
-use crate::recommend::percent;
 use crate::sources::{Source, Sources};
 use crate::study::{CaseResult, Outcome};
 use crate::trial::Protocol;
+use crate::words::{percent, short};
 
 /// A picture that stands alone, with its own style.
 pub fn picture(result: &CaseResult) -> String {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::scale::Scale;
 use super::{escape, time};
-use crate::recommend::percent;
+use crate::words::{percent, short};
 
 /// A point with a result.
 #[derive(Debug, Clone)]
@@ -391,10 +391,10 @@ fn tick_time(milliseconds: f64) -> String {
     } else {
         (milliseconds * 1e3, "µs")
     };
-    format!("{} {unit}", crate::axes::short(value))
+    format!("{} {unit}", short(value))
 }
 
 fn tick_percent(error: f64) -> String {
     let value = 100.0 * error;
-    if value < 0.9e-3 { format!("{value:.0e} %") } else { format!("{} %", crate::axes::short(value)) }
+    if value < 0.9e-3 { format!("{value:.0e} %") } else { format!("{} %", short(value)) }
 }

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::{escape, time};
-use crate::recommend::percent;
 use crate::study::{CaseResult, StudyResult};
+use crate::words::percent;
 
 /// Heading, how to read it, and the cases at a glance.
 pub fn opening(study: &StudyResult) -> String {

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use super::{escape, prose, time};
 use crate::axes::Factor;
-use crate::recommend::percent;
 use crate::study::{CaseResult, Outcome};
 use crate::wear::{CUTS, Wear};
+use crate::words::percent;
 
 /// The table; empty where a case compares no methods of cutting.
 pub fn table(result: &CaseResult) -> String {

@@ -1,0 +1,47 @@
+//! Numbers for people.
+
+/// A number with four significant digits and no trailing zeros.
+pub fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let digits = 3 - value.abs().log10().floor() as i32;
+    let text = format!("{value:.*}", digits.clamp(0, 12) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// A relative error in per cent with two significant digits.
+pub fn percent(error: f64) -> String {
+    if !error.is_finite() {
+        return "–".to_owned();
+    }
+    let value = 100.0 * error;
+    if value != 0.0 && value < 0.001 { format!("{value:.1e} %") } else { format!("{} %", two_digits(value)) }
+}
+
+fn two_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (1 - value.abs().log10().floor() as i32).clamp(0, 6);
+    format!("{value:.*}", digits as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn four_digits_are_enough() {
+        assert_eq!(short(1234.6), "1235");
+        assert_eq!(short(0.012346), "0.01235");
+    }
+
+    #[test]
+    fn per_cents() {
+        assert_eq!(percent(0.0312), "3.1 %");
+        assert_eq!(percent(1.234), "123 %");
+        assert_eq!(percent(0.00012), "0.012 %");
+        assert_eq!(percent(3e-9), "3.0e-7 %");
+    }
+}
