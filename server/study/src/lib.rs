@@ -5,7 +5,7 @@
 //! [`design`] picks the configurations; a [`trial`] runs one and times it, [`wear`] looks
 //! at a mesh after many cuts; [`reference`] says what
 //! the right answer is and how well it is known, for a scene by climbing a [`ladder`] of refinements to
-//! its [`limit`] as far as the time goes; [`error`] compares; [`pareto`] keeps the
+//! its [`limit`] as far as the time goes; [`distance`] compares; [`pareto`] keeps the
 //! configurations that nothing beats; [`sources`] tells which source of error dominates there;
 //! [`recommend`] picks one for a time budget; [`store`] keeps what is finished on disk; [`page`]
 //! writes it for people. [`bench`] makes the runs within the time that [`forecast`] expects; `survey`
@@ -40,7 +40,7 @@ pub mod runner;
 
 pub mod forecast;
 
-pub mod error;
+pub mod distance;
 
 pub mod pareto;
 

@@ -13,7 +13,7 @@ use crate::axes::{Factor, block};
 use crate::bench::Bench;
 use crate::case::{self, Case, Wishes};
 use crate::design::{Configuration, narrow};
-use crate::error::Errors;
+use crate::distance::Errors;
 use crate::recommend::Recommendation;
 use crate::reference::Reference;
 use crate::sources::Sources;

@@ -10,7 +10,7 @@ use crate::bench::Bench;
 use crate::case::sight::{SAME, largest_change};
 use crate::case::{Case, Truth};
 use crate::design::{Configuration, design};
-use crate::error::Errors;
+use crate::distance::Errors;
 use crate::ladder::{Climb, Ladder};
 use crate::pareto::front;
 use crate::recommend::{Candidate, Recommendation, recommend};

@@ -5,7 +5,7 @@ use super::shared::{LAWS, axes, labels, load, names};
 use super::{Case, Plan, Truth};
 use crate::axes::{Axis, Factor, block, cells, elements, iterations, step, steps, tolerance, words};
 use crate::design::{Block, Configuration};
-use crate::error::Goal;
+use crate::distance::Goal;
 use crate::trial::Protocol;
 
 const SCENE: &str = include_str!("../../cases/bar.toml");

@@ -5,7 +5,7 @@ use super::shared::{axes, labels, load, names};
 use super::{Case, Truth};
 use crate::axes::{Factor, cells, elements};
 use crate::design::Block;
-use crate::error::Goal;
+use crate::distance::Goal;
 use crate::series::Series;
 use crate::trial::Protocol;
 

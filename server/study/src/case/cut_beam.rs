@@ -5,7 +5,7 @@ use super::gold::Gold;
 use super::shared::{LAWS, axes, labels, load, names};
 use crate::axes::{Factor, cells, elements};
 use crate::design::Block;
-use crate::error::Goal;
+use crate::distance::Goal;
 use crate::trial::Protocol;
 
 /// The case.

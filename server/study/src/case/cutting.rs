@@ -6,7 +6,7 @@ use super::gold::Gold;
 use super::shared::{load, names};
 use crate::axes::{Axis, Factor, Setting, on_bodies, tolerances, words};
 use crate::design::Block;
-use crate::error::Goal;
+use crate::distance::Goal;
 use crate::trial::Protocol;
 
 /// Names of the ways to cut, labels of [`Factor::Cutting`].

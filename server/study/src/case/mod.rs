@@ -28,7 +28,7 @@ pub use scene::{Wishes, from_scene};
 
 use crate::axes::{Axis, Factor, Setting};
 use crate::design::{Block, Configuration};
-use crate::error::Goal;
+use crate::distance::Goal;
 use crate::ladder::Ladder;
 use crate::series::Series;
 use crate::trial::Protocol;

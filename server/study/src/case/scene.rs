@@ -12,7 +12,7 @@ use super::vary::{self, OWN, Subject};
 use super::{Case, Truth};
 use crate::axes::{Axis, Factor, Setting, on_bodies, tolerance};
 use crate::design::Configuration;
-use crate::error::Goal;
+use crate::distance::Goal;
 use crate::ladder::Ladder;
 use crate::trial::Protocol;
 

@@ -6,7 +6,7 @@ use super::plot::{Failure, Mark, Plot};
 use super::{escape, prose, style, time, wear};
 use crate::axes::Factor;
 use crate::case::Case;
-use crate::error::Errors;
+use crate::distance::Errors;
 use crate::sources::{Source, Sources};
 use crate::study::{CaseResult, Outcome};
 use crate::trial::Protocol;
