@@ -9,9 +9,10 @@ use crate::axes::Factor;
 use crate::case::{Case, Truth};
 use crate::design::Configuration;
 use crate::forecast::Forecast;
+use crate::progress::Progress;
 use crate::runner::{Ask, Runner};
+use crate::settings::Settings;
 use crate::store::{Store, fingerprint};
-use crate::study::{Progress, Settings};
 use crate::trial::{self, Limits, Protocol, Status, Trial, one_line};
 use crate::wear::{self, Wear};
 

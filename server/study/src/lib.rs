@@ -54,6 +54,12 @@ pub mod table;
 
 pub mod page;
 
+pub mod settings;
+
+pub mod progress;
+
+pub mod result;
+
 pub mod bench;
 
 mod survey;
@@ -66,4 +72,7 @@ mod random;
 #[allow(non_snake_case)] // the symbols of the field: X, K, M
 pub mod stress;
 
-pub use study::{CaseResult, Outcome, Progress, Settings, StudyError, StudyResult, run};
+pub use progress::Progress;
+pub use result::{CaseResult, Outcome, StudyResult};
+pub use settings::Settings;
+pub use study::{StudyError, run};

@@ -2,69 +2,21 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use scindo_world::scene::{Scene, SceneError};
-use serde::Serialize;
 use thiserror::Error;
 
 use crate::axes::{Factor, block};
 use crate::bench::Bench;
 use crate::case::{self, Case, Wishes};
-use crate::design::{Configuration, narrow};
-use crate::distance::Errors;
-use crate::recommend::Recommendation;
-use crate::reference::Reference;
-use crate::sources::Sources;
+use crate::design::narrow;
+use crate::progress::Progress;
+use crate::result::StudyResult;
+use crate::settings::{SCENE_S, Settings};
 use crate::store::{Origin, Store};
 use crate::survey;
 use crate::table::Table;
-use crate::trial::Trial;
-
-/// What is asked for.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// Names of cases (see [`case::NAMES`]) and paths of scene files.
-    pub cases: Vec<String>,
-    /// Where the results go; finished points there are taken over.
-    pub out: PathBuf,
-    /// Coarse meshes and short runs only.
-    pub quick: bool,
-    /// Time that the study may take [s]; none: as long as the cases of the program take, and
-    /// [`SCENE_S`] for a scene.
-    pub within_s: Option<f64>,
-    /// Recommend a configuration that fits this time per solution or frame [ms].
-    pub budget_ms: Option<f64>,
-    /// Simulated time of scenes in motion [s].
-    pub seconds: Option<f64>,
-    /// Factors and the labels that are kept of them; factors that are not named keep all.
-    pub only: Vec<(Factor, Vec<String>)>,
-    /// Replaces the meshes: cells along the longest side.
-    pub cells: Vec<usize>,
-    /// Raised from elsewhere to end the study; what is finished is kept and shown.
-    pub stop: Arc<AtomicBool>,
-}
-
-/// Time that a scene's study may take where nothing is said [s]; in a quick study.
-pub const SCENE_S: [f64; 2] = [300.0, 40.0];
-
-/// How far it is.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Progress {
-    /// Case that is worked on.
-    pub case: String,
-    /// What is run now.
-    pub what: String,
-    /// Points of this case done; 0 while its reference is computed.
-    pub done: usize,
-    /// Points of this case in all; 0 before they are known.
-    pub total: usize,
-    /// When this case began and must end [s since the study began]; infinite without a budget.
-    pub case_s: [f64; 2],
-    /// Something to be said once, such as the estimate.
-    pub note: Option<String>,
-}
 
 /// Why there is no study.
 #[derive(Debug, Error)]
@@ -98,89 +50,6 @@ pub enum StudyError {
         /// What the system says.
         source: io::Error,
     },
-}
-
-/// A configuration and what became of it.
-#[derive(Debug, Clone)]
-pub struct Outcome {
-    /// What was run.
-    pub configuration: Configuration,
-    /// How it went.
-    pub trial: Trial,
-    /// How far from the reference; none without result or reference.
-    pub errors: Option<Errors>,
-    /// Where its error comes from; known on the Pareto front.
-    pub sources: Option<Sources>,
-}
-
-impl Outcome {
-    /// Cost and error, not finite where there is no result.
-    pub fn point(&self) -> (f64, f64) {
-        (self.trial.cost.median_ms, self.errors.map_or(f64::INFINITY, |errors| errors.l2))
-    }
-}
-
-/// What came out for a case.
-#[derive(Debug, Clone)]
-pub struct CaseResult {
-    /// The case.
-    pub case: Case,
-    /// The right answer, or why there is none.
-    pub reference: Result<Reference, String>,
-    /// All points, the base first.
-    pub points: Vec<Outcome>,
-    /// Indices of the Pareto front, by rising cost.
-    pub front: Vec<usize>,
-    /// The recommendation, where one was asked for.
-    pub recommendation: Option<Recommendation>,
-    /// Points that were planned and not run, because they did not fit into the time or the budget.
-    pub left_out: usize,
-    /// What the reader should know: what was left out, what regions select.
-    pub notes: Vec<String>,
-    /// Whether every point was run.
-    pub complete: bool,
-}
-
-/// What came out.
-#[derive(Debug, Clone)]
-pub struct StudyResult {
-    /// Case after case.
-    pub cases: Vec<CaseResult>,
-    /// Build and machine.
-    pub origin: Origin,
-    /// Points taken over from an earlier study.
-    pub resumed: usize,
-    /// Wall time of this study [s].
-    pub seconds: f64,
-    /// Load of the machine when it began and ended (one-minute average); none where unknown.
-    pub load: [Option<f64>; 2],
-    /// Whether it was ended early.
-    pub interrupted: bool,
-}
-
-/// Figures of a study in short, for `--json`.
-#[derive(Debug, Clone, Serialize)]
-pub struct Counts {
-    /// Points in all.
-    pub points: usize,
-    /// Those without a result.
-    pub failures: usize,
-}
-
-impl CaseResult {
-    /// How many points there are, and how many gave no result.
-    pub fn counts(&self) -> Counts {
-        let failures = self.points.iter().filter(|point| !point.trial.is_done()).count();
-        Counts { points: self.points.len(), failures }
-    }
-}
-
-impl StudyResult {
-    /// Whether every case gave at least one result.
-    pub fn has_results(&self) -> bool {
-        let counts = self.cases.iter().map(CaseResult::counts);
-        !self.cases.is_empty() && counts.into_iter().all(|counts| counts.points > counts.failures)
-    }
 }
 
 /// Runs a study and writes `points.csv`, `study.json`, a picture per case and `index.html`.

@@ -15,9 +15,9 @@ use crate::ladder::{Climb, Ladder};
 use crate::pareto::front;
 use crate::recommend::{Candidate, Recommendation, recommend};
 use crate::reference::{self, Reference};
+use crate::result::{CaseResult, Outcome};
 use crate::runner::{Ask, PATIENCE, Runner, fits};
 use crate::sources::peel;
-use crate::study::{CaseResult, Outcome};
 use crate::trial::{Protocol, Trial};
 use crate::words::{percent, short};
 

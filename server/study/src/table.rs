@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::axes::Factor;
 use crate::case::Case;
-use crate::study::{Outcome, StudyResult};
+use crate::result::{Outcome, StudyResult};
 use crate::wear::CUTS;
 
 /// The file.

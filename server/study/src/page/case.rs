@@ -7,8 +7,8 @@ use super::{escape, prose, style, time, wear};
 use crate::axes::Factor;
 use crate::case::Case;
 use crate::distance::Errors;
+use crate::result::{CaseResult, Outcome};
 use crate::sources::{Source, Sources};
-use crate::study::{CaseResult, Outcome};
 use crate::trial::Protocol;
 use crate::words::{percent, short};
 

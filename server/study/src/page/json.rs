@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::axes::Factor;
-use crate::study::{CaseResult, Outcome, StudyResult};
+use crate::result::{CaseResult, Outcome, StudyResult};
 
 /// `study.json`.
 pub fn study(study: &StudyResult) -> Value {

@@ -18,7 +18,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::study::StudyResult;
+use crate::result::StudyResult;
 
 /// Writes `index.html`, `study.json` and `pareto-<case>.svg`, each whole or not at all.
 ///

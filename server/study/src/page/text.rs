@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{escape, time};
-use crate::study::{CaseResult, StudyResult};
+use crate::result::{CaseResult, StudyResult};
 use crate::words::percent;
 
 /// Heading, how to read it, and the cases at a glance.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{escape, prose, time};
 use crate::axes::Factor;
-use crate::study::{CaseResult, Outcome};
+use crate::result::{CaseResult, Outcome};
 use crate::wear::{CUTS, Wear};
 use crate::words::percent;
 
