@@ -4,7 +4,7 @@
 //! reference; its [`axes`] say what is varied (law, element, mesh, step, …) as keys of the scene;
 //! [`design`] picks the configurations; a [`trial`] runs one and times it, [`wear`] looks
 //! at a mesh after many cuts; [`reference`] says what
-//! the right answer is and how well it is known, for a scene by climbing a [`ladder`] of refinements to
+//! the right answer is and how well it is known, for a scene by a [`climb`] along refinements to
 //! its [`limit`] as far as the time goes; [`distance`] compares; [`pareto`] keeps the
 //! configurations that nothing beats; [`sources`] tells which source of error dominates there;
 //! [`recommend`] picks one for a time budget; [`store`] keeps what is finished on disk; [`page`]
@@ -34,7 +34,7 @@ pub mod richardson;
 
 pub mod limit;
 
-pub mod ladder;
+pub mod climb;
 
 pub mod runner;
 

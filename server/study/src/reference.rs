@@ -26,7 +26,7 @@ pub struct Reference {
 }
 
 /// Takes a stored reference, or computes one with `run`. That of a scene takes as long as it is given:
-/// see [`Climb`](crate::ladder::Climb).
+/// see [`Climb`](crate::climb::Climb).
 ///
 /// # Errors
 /// Why none could be computed.

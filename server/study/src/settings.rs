@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::axes::Factor;
 
-/// Cases, time and what is kept of them.
+/// Which cases, in which time, and narrowed to what.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// Names of cases (see [`NAMES`](crate::case::NAMES)) and paths of scene files.

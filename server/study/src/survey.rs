@@ -8,10 +8,10 @@
 use crate::axes::Factor;
 use crate::bench::Bench;
 use crate::case::sight::{SAME, largest_change};
-use crate::case::{Case, Truth};
+use crate::case::{Case, Ladder, Truth};
+use crate::climb::Climb;
 use crate::design::{Configuration, design};
 use crate::distance::Errors;
-use crate::ladder::{Climb, Ladder};
 use crate::pareto::front;
 use crate::recommend::{Candidate, Recommendation, recommend};
 use crate::reference::{self, Reference};

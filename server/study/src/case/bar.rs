@@ -1,8 +1,8 @@
 //! The drooping bar: at rest against stored solutions, in motion against its own limit.
 
+use super::definition::{Case, Plan, Truth};
 use super::gold::Gold;
 use super::shared::{LAWS, axes, labels, load, names};
-use super::{Case, Plan, Truth};
 use crate::axes::{Axis, Factor, block, cells, elements, iterations, step, steps, tolerance, words};
 use crate::design::{Block, Configuration};
 use crate::distance::Goal;

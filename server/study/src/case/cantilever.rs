@@ -1,8 +1,8 @@
 //! Nienhuys' cantilever: small strain, against beam theory.
 
+use super::definition::{Case, Truth};
 use super::gold::{Point, probes_override};
 use super::shared::{axes, labels, load, names};
-use super::{Case, Truth};
 use crate::axes::{Factor, cells, elements};
 use crate::design::Block;
 use crate::distance::Goal;

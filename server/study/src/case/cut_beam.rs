@@ -1,6 +1,6 @@
 //! Schoch's beam, half cut, under gravity: against stored solutions.
 
-use super::Case;
+use super::definition::Case;
 use super::gold::Gold;
 use super::shared::{LAWS, axes, labels, load, names};
 use crate::axes::{Factor, cells, elements};

@@ -1,7 +1,7 @@
 //! Schoch's beam, half cut in three ways: inside the elements, along their faces, and by a mesh that
 //! was made with the cut. Each under gravity, under a dead force and under a prescribed strip.
 
-use super::Case;
+use super::definition::Case;
 use super::gold::Gold;
 use super::shared::{load, names};
 use crate::axes::{Axis, Factor, Setting, on_bodies, tolerances, words};

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::Truth;
+use super::definition::Truth;
 use crate::series::Series;
 
 /// A file of reference solutions.

@@ -5,15 +5,15 @@ use std::path::Path;
 use scindo_world::scene::{CheckedScene, Scene, SceneError};
 use scindo_world::simulation::Simulation;
 
+use super::definition::{Case, Truth};
 use super::gold::{Point, probe_tables};
+use super::ladder::Ladder;
 use super::refine::{Split, aligned, levels, uneven};
 use super::subdivide::Subdivisions;
 use super::vary::{self, OWN, Subject};
-use super::{Case, Truth};
 use crate::axes::{Axis, Factor, Setting, on_bodies, tolerance};
 use crate::design::Configuration;
 use crate::distance::Goal;
-use crate::ladder::Ladder;
 use crate::trial::Protocol;
 
 /// Points that are compared where the scene has no probe, per body.

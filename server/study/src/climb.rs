@@ -7,7 +7,8 @@
 //! with what the scene does. What the step leaves at the finest level is added to the error bar. Levels
 //! that ended are never thrown away: the reference is the [`limit`](crate::limit) of those there are.
 
-use crate::axes::{Factor, Setting, step};
+use crate::axes::step;
+use crate::case::Ladder;
 use crate::case::sight::{SAME, Sight, largest_change};
 use crate::design::Configuration;
 use crate::limit::{Limit, UNKNOWN, limit};
@@ -17,63 +18,11 @@ use crate::series::Series;
 use crate::trial::Trial;
 use crate::words::percent;
 
-/// A way to a reference.
-#[derive(Debug, Clone)]
-pub struct Ladder {
-    /// Element, integrator, … of its runs; mesh and step are replaced.
-    pub configuration: Configuration,
-    /// Meshes, coarse to fine; their size is the factor f. Empty where the mesh cannot be refined.
-    pub meshes: Vec<Setting>,
-    /// Frame [s] that the steps divide; none for statics.
-    pub step_s: Option<f64>,
-    /// Element and integrator in words.
-    pub words: String,
-}
-
-/// Most steps per frame on the coarsest mesh, and levels of a ladder of steps alone.
+/// Most steps per frame on the coarsest mesh.
 const MOST_STEPS: u32 = 16;
-const MOST_LEVELS: usize = 8;
 
 /// Error bar at which a reference is good enough.
 const ENOUGH: f64 = 2e-3;
-
-impl Ladder {
-    /// Its run on mesh `mesh` with `n` steps per frame.
-    pub fn at(&self, mesh: usize, n: u32) -> Configuration {
-        let mut configuration = self.configuration.clone();
-        if let Some(mesh) = self.meshes.get(mesh) {
-            configuration = configuration.with(Factor::Mesh, mesh);
-        }
-        if let Some(step_s) = self.step_s {
-            configuration = configuration.with(Factor::Step, &step(step_s / f64::from(n)));
-        }
-        configuration
-    }
-
-    /// Levels there are.
-    fn len(&self) -> usize {
-        match (self.meshes.len(), self.step_s) {
-            (0 | 1, None) => 1,
-            (0 | 1, Some(_)) => MOST_LEVELS,
-            (n, _) => n,
-        }
-    }
-
-    /// Mesh and steps per frame of a level.
-    fn level(&self, i: usize, n0: u32) -> (usize, u32) {
-        if self.meshes.len() < 2 {
-            return (0, n0 << i);
-        }
-        let ratio = self.meshes[i].size / self.meshes[0].size;
-        (i, ((f64::from(n0) * ratio).round() as u32).max(1))
-    }
-
-    /// Size h of a level: that of its elements, or of its step where the mesh stays.
-    fn size(&self, i: usize, n0: u32) -> f64 {
-        let (mesh, n) = self.level(i, n0);
-        if self.meshes.len() < 2 { 1.0 / f64::from(n) } else { 1.0 / self.meshes[mesh].size }
-    }
-}
 
 /// A level that ended.
 #[derive(Debug, Clone)]
@@ -167,7 +116,7 @@ impl<'a> Climb<'a> {
     /// The next level.
     pub fn next(&self) -> Option<Configuration> {
         let i = self.rungs.len();
-        (i < self.ladder.len()).then(|| {
+        (i < self.ladder.levels()).then(|| {
             let (mesh, n) = self.ladder.level(i, self.n0);
             self.ladder.at(mesh, n)
         })

@@ -1,0 +1,58 @@
+//! The runs that a reference can be climbed along: mesh and step are refined together, level by level.
+
+use crate::axes::{Factor, Setting, step};
+use crate::design::Configuration;
+
+/// A way to a reference.
+#[derive(Debug, Clone)]
+pub struct Ladder {
+    /// Element, integrator, … of its runs; mesh and step are replaced.
+    pub configuration: Configuration,
+    /// Meshes, coarse to fine; their size is the factor f. Empty where the mesh cannot be refined.
+    pub meshes: Vec<Setting>,
+    /// Frame [s] that the steps divide; none for statics.
+    pub step_s: Option<f64>,
+    /// Element and integrator in words.
+    pub words: String,
+}
+
+/// Levels of a ladder of steps alone.
+const MOST_LEVELS: usize = 8;
+
+impl Ladder {
+    /// Its run on mesh `mesh` with `n` steps per frame.
+    pub fn at(&self, mesh: usize, n: u32) -> Configuration {
+        let mut configuration = self.configuration.clone();
+        if let Some(mesh) = self.meshes.get(mesh) {
+            configuration = configuration.with(Factor::Mesh, mesh);
+        }
+        if let Some(step_s) = self.step_s {
+            configuration = configuration.with(Factor::Step, &step(step_s / f64::from(n)));
+        }
+        configuration
+    }
+
+    /// How many levels there are.
+    pub fn levels(&self) -> usize {
+        match (self.meshes.len(), self.step_s) {
+            (0 | 1, None) => 1,
+            (0 | 1, Some(_)) => MOST_LEVELS,
+            (n, _) => n,
+        }
+    }
+
+    /// Mesh and steps per frame of level `i`, with `n0` steps on the coarsest mesh.
+    pub fn level(&self, i: usize, n0: u32) -> (usize, u32) {
+        if self.meshes.len() < 2 {
+            return (0, n0 << i);
+        }
+        let ratio = self.meshes[i].size / self.meshes[0].size;
+        (i, ((f64::from(n0) * ratio).round() as u32).max(1))
+    }
+
+    /// Size h of a level: that of its elements, or of its step where the mesh stays.
+    pub fn size(&self, i: usize, n0: u32) -> f64 {
+        let (mesh, n) = self.level(i, n0);
+        if self.meshes.len() < 2 { 1.0 / f64::from(n) } else { 1.0 / self.meshes[mesh].size }
+    }
+}
