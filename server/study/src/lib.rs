@@ -50,8 +50,6 @@ pub mod recommend;
 
 pub mod store;
 
-pub mod table;
-
 pub mod page;
 
 pub mod settings;

@@ -11,12 +11,12 @@ use crate::axes::{Factor, block};
 use crate::bench::Bench;
 use crate::case::{self, Case, Wishes};
 use crate::design::narrow;
+use crate::page::table::Table;
 use crate::progress::Progress;
 use crate::result::StudyResult;
 use crate::settings::{SCENE_S, Settings};
 use crate::store::{Origin, Store};
 use crate::survey;
-use crate::table::Table;
 
 /// Why there is no study.
 #[derive(Debug, Error)]

@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
+use super::html::{escape, prose, time};
 use super::plot::{Failure, Mark, Plot};
-use super::{escape, prose, style, time, wear};
+use super::{style, wear};
 use crate::axes::Factor;
 use crate::case::Case;
 use crate::distance::Errors;

@@ -1,4 +1,6 @@
-//! What people read: one self-contained page, a picture per case, and the same as JSON.
+//! What people read: one self-contained page, a picture per case, and the same as JSON and as a table.
+
+pub(crate) mod html;
 
 mod case;
 
@@ -11,6 +13,8 @@ mod scale;
 pub(crate) mod style;
 
 mod text;
+
+pub mod table;
 
 mod wear;
 
@@ -54,45 +58,4 @@ fn html(study: &StudyResult) -> String {
     out += &text::method(study);
     out += "</main>\n</body>\n</html>\n";
     out
-}
-
-/// Text for HTML and SVG.
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-/// Prose for HTML: what stands in backticks is code.
-fn prose(text: &str) -> String {
-    let part =
-        |(i, part): (usize, &str)| if i % 2 == 1 { format!("<code>{part}</code>") } else { part.to_owned() };
-    escape(text).split('`').enumerate().map(part).collect()
-}
-
-/// Milliseconds for people: three digits, seconds from a thousand on.
-fn time(milliseconds: f64) -> String {
-    if !milliseconds.is_finite() || milliseconds <= 0.0 {
-        return "–".to_owned();
-    }
-    let (value, unit) = if milliseconds >= 999.5 { (milliseconds / 1e3, "s") } else { (milliseconds, "ms") };
-    let digits = (2 - value.log10().floor() as i32).clamp(0, 3) as usize;
-    format!("{value:.digits$} {unit}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_stands_in_backticks_is_code() {
-        assert_eq!(prose("`xfem` & no"), "<code>xfem</code> &amp; no");
-    }
-
-    #[test]
-    fn times_for_people() {
-        assert_eq!(time(0.01234), "0.012 ms");
-        assert_eq!(time(1.234), "1.23 ms");
-        assert_eq!(time(123.4), "123 ms");
-        assert_eq!(time(12345.0), "12.3 s");
-        assert_eq!(time(f64::NAN), "–");
-    }
 }

@@ -3,8 +3,8 @@
 
 use std::fmt::Write as _;
 
+use super::html::{escape, time};
 use super::scale::Scale;
-use super::{escape, time};
 use crate::words::{percent, short};
 
 /// A point with a result.

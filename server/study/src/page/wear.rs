@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{escape, prose, time};
+use super::html::{escape, prose, time};
 use crate::axes::Factor;
 use crate::result::{CaseResult, Outcome};
 use crate::wear::{CUTS, Wear};

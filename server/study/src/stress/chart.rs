@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::page::escape;
+use crate::page::html::escape;
 
 /// A line.
 #[derive(Debug, Clone, PartialEq)]

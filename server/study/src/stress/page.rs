@@ -6,7 +6,8 @@ use super::case::{CaseReport, Status};
 use super::evidence::{Bound, Figure, short};
 use super::mutation::Row;
 use super::{SuiteReport, view};
-use crate::page::{escape, style};
+use crate::page::html::escape;
+use crate::page::style;
 
 /// Marks of states, lines of charts, cards of cases.
 const STYLE: &str = "
