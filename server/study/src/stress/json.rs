@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::case::CaseReport;
+use super::case::{CaseReport, Status};
 use super::evidence::{Bound, Figure};
 use super::mutation::Row;
-use super::{Status, SuiteReport};
+use super::suite::SuiteReport;
 
 /// `stress.json`.
 pub fn suite(report: &SuiteReport, table: Option<&[Row]>) -> Value {

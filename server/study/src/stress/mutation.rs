@@ -2,8 +2,8 @@
 
 use scindo_physics::body::Ablation;
 
-use super::case::{Setting, Status};
-use super::{Progress, Settings, StressError, run_cases, select};
+use super::case::{CaseReport, Setting, Status};
+use super::suite::{Progress, Settings, StressError, run_cases, select};
 
 /// A part of the method that is taken out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,7 +102,7 @@ pub fn table(settings: &Settings, progress: &mut dyn FnMut(Progress<'_>)) -> Res
     let row = |mutation: Mutation| {
         let reports = run_cases(&cases, &mutation.setting(), settings, progress);
         let failed = reports.iter().filter(|(report, _)| report.status == Status::Failed);
-        let first = |report: &super::CaseReport| report.failures().into_iter().next().unwrap_or_default();
+        let first = |report: &CaseReport| report.failures().into_iter().next().unwrap_or_default();
         Row {
             mutation,
             failed: failed.map(|(report, _)| Failed { name: report.case.name, why: first(report) }).collect(),

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use super::case::{CaseReport, Status};
 use super::evidence::{Bound, Figure, short};
 use super::mutation::Row;
-use super::{SuiteReport, view};
+use super::suite::SuiteReport;
+use super::view;
 use crate::page::html::escape;
 use crate::page::style;
 
