@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use crate::axes::Factor;
 use crate::case::{Case, Truth};
 use crate::design::Configuration;
+use crate::design::axes::Factor;
 use crate::forecast::Forecast;
 use crate::progress::Progress;
 use crate::runner::{Ask, Runner};

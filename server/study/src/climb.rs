@@ -7,10 +7,10 @@
 //! with what the scene does. What the step leaves at the finest level is added to the error bar. Levels
 //! that ended are never thrown away: the reference is the [`limit`](crate::limit) of those there are.
 
-use crate::axes::step;
 use crate::case::Ladder;
 use crate::case::sight::{SAME, Sight, largest_change};
 use crate::design::Configuration;
+use crate::design::axes::step;
 use crate::limit::{Limit, UNKNOWN, limit};
 use crate::reference::Reference;
 use crate::runner::{Ask, PATIENCE, Runner, fits};

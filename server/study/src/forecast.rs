@@ -1,8 +1,8 @@
 //! How long a run will take: work relative to the scene as it stands, times what such work took so far.
 
-use crate::axes::Factor;
 use crate::case::{Case, Truth};
 use crate::design::Configuration;
+use crate::design::axes::Factor;
 use crate::trial::Protocol;
 
 /// Runs that ended, by kind and work.
@@ -75,8 +75,8 @@ pub fn work(case: &Case, configuration: &Configuration) -> f64 {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::axes::step;
     use crate::case::builtin;
+    use crate::design::axes::step;
 
     #[test]
     fn a_run_of_the_same_kind_tells_most() {

@@ -16,8 +16,6 @@
 
 pub mod words;
 
-pub mod axes;
-
 pub mod case;
 
 pub mod design;

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::axes::{Factor, Setting};
 use crate::case::{Case, Plan, Truth};
 use crate::design::Configuration;
+use crate::design::axes::{Factor, Setting};
 use crate::richardson::{Limit, extrapolate};
 use crate::series::Series;
 use crate::trial::Trial;
@@ -128,7 +128,7 @@ fn together(plan: &Plan, law: &str, start: &Series, space: Option<Limit>, time: 
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::axes::{block, step};
+    use crate::design::axes::{block, step};
     use crate::trial::{Cost, Status};
 
     /// u = 2 + 3/n² + 4 Δt, at every frame.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::axes::Factor;
+use crate::design::axes::Factor;
 
 /// Which cases, in which time, and narrowed to what.
 #[derive(Debug, Clone)]

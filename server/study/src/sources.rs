@@ -10,9 +10,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::axes::{Factor, Setting, step, tolerance};
 use crate::case::Case;
 use crate::design::Configuration;
+use crate::design::axes::{Factor, Setting, step, tolerance};
 use crate::reference::Reference;
 use crate::series::Series;
 use crate::trial::Trial;

@@ -7,9 +7,9 @@ use std::sync::atomic::Ordering;
 use scindo_world::scene::{Scene, SceneError};
 use thiserror::Error;
 
-use crate::axes::{Factor, block};
 use crate::bench::Bench;
 use crate::case::{self, Case, Wishes};
+use crate::design::axes::{Factor, block};
 use crate::design::narrow;
 use crate::page::table::Table;
 use crate::progress::Progress;

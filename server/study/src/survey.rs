@@ -5,11 +5,11 @@
 //! cheap ones first, then neighbours of the best that fits the budget. What is recommended is run once
 //! more before it is.
 
-use crate::axes::Factor;
 use crate::bench::Bench;
 use crate::case::sight::{SAME, largest_change};
 use crate::case::{Case, Ladder, Truth};
 use crate::climb::Climb;
+use crate::design::axes::Factor;
 use crate::design::{Configuration, design};
 use crate::distance::Errors;
 use crate::pareto::front;

@@ -7,10 +7,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use scindo_study::axes::{Factor, Setting};
 use scindo_study::case::{Ladder, Truth};
 use scindo_study::climb::Climb;
 use scindo_study::design::Configuration;
+use scindo_study::design::axes::{Factor, Setting};
 use scindo_study::limit::UNKNOWN;
 use scindo_study::runner::{Ask, Runner};
 use scindo_study::series::Series;

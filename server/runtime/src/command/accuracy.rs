@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use scindo_study::axes::Factor;
+use scindo_study::design::axes::Factor;
 use scindo_study::words::percent;
 use scindo_study::{CaseResult, Settings, StudyResult};
 use serde_json::json;

@@ -3,7 +3,7 @@
 use super::definition::{Case, Plan, Truth};
 use super::gold::Gold;
 use super::shared::{LAWS, axes, labels, load, names};
-use crate::axes::{Axis, Factor, block, cells, elements, iterations, step, steps, tolerance, words};
+use crate::design::axes::{Axis, Factor, block, cells, elements, iterations, step, steps, tolerance, words};
 use crate::design::{Block, Configuration};
 use crate::distance::Goal;
 use crate::trial::Protocol;

@@ -24,8 +24,8 @@ pub fn builtin(name: &str, quick: bool) -> Option<Case> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axes::Factor;
     use crate::case::definition::Truth;
+    use crate::design::axes::Factor;
     use crate::design::design;
 
     #[test]

@@ -3,8 +3,8 @@
 use super::definition::{Case, Truth};
 use super::gold::{Point, probes_override};
 use super::shared::{axes, labels, load, names};
-use crate::axes::{Factor, cells, elements};
 use crate::design::Block;
+use crate::design::axes::{Factor, cells, elements};
 use crate::distance::Goal;
 use crate::series::Series;
 use crate::trial::Protocol;

@@ -3,8 +3,8 @@
 use super::definition::Case;
 use super::gold::Gold;
 use super::shared::{LAWS, axes, labels, load, names};
-use crate::axes::{Factor, cells, elements};
 use crate::design::Block;
+use crate::design::axes::{Factor, cells, elements};
 use crate::distance::Goal;
 use crate::trial::Protocol;
 

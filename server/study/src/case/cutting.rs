@@ -4,8 +4,8 @@
 use super::definition::Case;
 use super::gold::Gold;
 use super::shared::{load, names};
-use crate::axes::{Axis, Factor, Setting, on_bodies, tolerances, words};
 use crate::design::Block;
+use crate::design::axes::{Axis, Factor, Setting, on_bodies, tolerances, words};
 use crate::distance::Goal;
 use crate::trial::Protocol;
 

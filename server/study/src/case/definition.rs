@@ -3,7 +3,7 @@
 use scindo_world::scene::Scene;
 
 use super::ladder::Ladder;
-use crate::axes::{Axis, Factor, Setting};
+use crate::design::axes::{Axis, Factor, Setting};
 use crate::design::{Block, Configuration};
 use crate::distance::Goal;
 use crate::series::Series;

@@ -1,7 +1,7 @@
 //! The runs that a reference can be climbed along: mesh and step are refined together, level by level.
 
-use crate::axes::{Factor, Setting, step};
 use crate::design::Configuration;
+use crate::design::axes::{Factor, Setting, step};
 
 /// A way to a reference.
 #[derive(Debug, Clone)]

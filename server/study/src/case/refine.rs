@@ -7,7 +7,7 @@
 use scindo_world::scene::{BodySpec, CellSplit, CheckedScene, CutPath, MeshSource, Region};
 
 use super::subdivide::Subdivisions;
-use crate::axes::Setting;
+use crate::design::axes::Setting;
 
 /// Factors that are tried for levels, about √2 apart.
 pub const FACTORS: [f64; 10] = [0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0];

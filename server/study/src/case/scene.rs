@@ -11,8 +11,8 @@ use super::ladder::Ladder;
 use super::refine::{Split, aligned, levels, uneven};
 use super::subdivide::Subdivisions;
 use super::vary::{self, OWN, Subject};
-use crate::axes::{Axis, Factor, Setting, on_bodies, tolerance};
 use crate::design::Configuration;
+use crate::design::axes::{Axis, Factor, Setting, on_bodies, tolerance};
 use crate::distance::Goal;
 use crate::trial::Protocol;
 

@@ -2,7 +2,7 @@
 
 use scindo_world::scene::Scene;
 
-use crate::axes::{Axis, Factor, precisions, threads, tolerances, words};
+use crate::design::axes::{Axis, Factor, precisions, threads, tolerances, words};
 
 /// All laws.
 pub const LAWS: [&str; 4] = ["linear", "corotational", "stvk", "neo-hookean"];

@@ -6,8 +6,8 @@ use serde_json::Value;
 use super::refine::{cells, levels};
 use super::shared::LAWS;
 use super::subdivide::Subdivisions;
-use crate::axes::{Axis, Factor, Setting, on_bodies, step, threads, tolerance};
 use crate::design::Block;
+use crate::design::axes::{Axis, Factor, Setting, on_bodies, step, threads, tolerance};
 
 /// Label of a base that has no word of its own.
 pub const OWN: &str = "as in the scene";

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::axes::Factor;
+use crate::design::axes::Factor;
 use crate::result::{CaseResult, Outcome, StudyResult};
 
 /// `study.json`.

@@ -4,8 +4,8 @@ use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::axes::Factor;
 use crate::case::Case;
+use crate::design::axes::Factor;
 use crate::result::{Outcome, StudyResult};
 use crate::wear::CUTS;
 

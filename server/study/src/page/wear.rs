@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::html::{escape, prose, time};
-use crate::axes::Factor;
+use crate::design::axes::Factor;
 use crate::result::{CaseResult, Outcome};
 use crate::wear::{CUTS, Wear};
 use crate::words::percent;

@@ -3,7 +3,8 @@
 //! A [`case`] is a set-up of a few lines with a rule that it passes or fails; [`cases`] lists all of
 //! them. A [`watch`] steps a body and holds it to what every case must keep: finite numbers, mass,
 //! momentum, energy, whole steps. What a case leaves is [`evidence`]: figures with their bounds,
-//! [`chart`]s over time, pictures ([`view`]). [`suite`] runs them. [`mutation`] takes parts of the method away and tells
+//! [`chart`]s over time, pictures ([`view`]). [`suite`] runs them. [`mutation`] takes parts of the method
+//! away and tells
 //! which cases notice; [`page`] and [`json`] write it down.
 //!
 //! A case knows no clock and no chance: it gives the same figures on every run. Times stand apart.

@@ -1,10 +1,12 @@
 //! Which configurations are tried: one factor at a time around a base, and factorial blocks.
 
+pub mod axes;
+
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::axes::{Axis, Factor, Setting};
+use axes::{Axis, Factor, Setting};
 
 /// One setting for every axis of a case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -127,7 +129,7 @@ pub fn narrow(axes: &mut [Axis], factor: Factor, labels: &[String]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::axes::{threads, words};
+    use super::axes::{threads, words};
 
     fn axes() -> Vec<Axis> {
         let bodies = ["b".to_owned()];
