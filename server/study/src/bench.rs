@@ -13,8 +13,8 @@ use crate::progress::Progress;
 use crate::runner::{Ask, Runner};
 use crate::settings::Settings;
 use crate::store::{Store, fingerprint};
+use crate::trial::wear::{self, Wear};
 use crate::trial::{self, Limits, Protocol, Status, Trial, one_line};
-use crate::wear::{self, Wear};
 
 /// Where runs are made.
 pub struct Bench<'a> {

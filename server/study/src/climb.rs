@@ -8,14 +8,14 @@
 //! that ended are never thrown away: the reference is the [`limit`](crate::limit) of those there are.
 
 use crate::case::Ladder;
-use crate::case::sight::{SAME, Sight, largest_change};
 use crate::design::Configuration;
 use crate::design::axes::step;
 use crate::limit::{Limit, UNKNOWN, limit};
 use crate::reference::Reference;
 use crate::runner::{Ask, PATIENCE, Runner, fits};
-use crate::series::Series;
 use crate::trial::Trial;
+use crate::trial::series::Series;
+use crate::trial::sight::{SAME, Sight, largest_change};
 use crate::words::percent;
 
 /// Most steps per frame on the coarsest mesh.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::series::Series;
+use crate::trial::series::Series;
 
 /// What a case is asked for: one number.
 #[derive(Debug, Clone, PartialEq)]

@@ -22,10 +22,6 @@ pub mod design;
 
 pub mod trial;
 
-pub mod wear;
-
-pub mod series;
-
 pub mod reference;
 
 pub mod richardson;

@@ -13,7 +13,7 @@
 //! Eça, Hoekstra, *A procedure for the estimation of the numerical uncertainty of CFD calculations
 //! based on grid refinement studies*, J. Comput. Phys. 262 (2014), 104–130; safety factors there.
 
-use crate::series::Series;
+use crate::trial::series::Series;
 
 /// Orders that are looked for. A higher one, seen on few levels, is chance: 2 is assumed then.
 const ORDERS: [f64; 2] = [0.5, 2.0];

@@ -6,8 +6,8 @@ use crate::case::{Case, Plan, Truth};
 use crate::design::Configuration;
 use crate::design::axes::{Factor, Setting};
 use crate::richardson::{Limit, extrapolate};
-use crate::series::Series;
 use crate::trial::Trial;
+use crate::trial::series::Series;
 
 /// The reference of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -5,7 +5,7 @@
 //! Error bar: 1.25 |u*−u₃| where p is plausible, 3 |u*−u₃| with p = 1 where it is not
 //! (grid convergence index, Roache 1994).
 
-use crate::series::Series;
+use crate::trial::series::Series;
 
 /// Orders that are believed.
 const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.5..=4.5;

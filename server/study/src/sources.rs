@@ -14,8 +14,8 @@ use crate::case::Case;
 use crate::design::Configuration;
 use crate::design::axes::{Factor, Setting, step, tolerance};
 use crate::reference::Reference;
-use crate::series::Series;
 use crate::trial::Trial;
+use crate::trial::series::Series;
 
 /// A source of error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

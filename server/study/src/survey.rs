@@ -6,7 +6,6 @@
 //! more before it is.
 
 use crate::bench::Bench;
-use crate::case::sight::{SAME, largest_change};
 use crate::case::{Case, Ladder, Truth};
 use crate::climb::Climb;
 use crate::design::axes::Factor;
@@ -18,6 +17,7 @@ use crate::reference::{self, Reference};
 use crate::result::{CaseResult, Outcome};
 use crate::runner::{Ask, PATIENCE, Runner, fits};
 use crate::sources::peel;
+use crate::trial::sight::{SAME, largest_change};
 use crate::trial::{Protocol, Trial};
 use crate::words::{percent, short};
 

@@ -13,7 +13,7 @@ use scindo_study::design::Configuration;
 use scindo_study::design::axes::{Factor, Setting};
 use scindo_study::limit::UNKNOWN;
 use scindo_study::runner::{Ask, Runner};
-use scindo_study::series::Series;
+use scindo_study::trial::series::Series;
 use scindo_study::trial::{Status, Trial};
 use scindo_study::{Settings, StudyResult, run};
 

@@ -6,8 +6,8 @@ use super::shared::{axes, labels, load, names};
 use crate::design::Block;
 use crate::design::axes::{Factor, cells, elements};
 use crate::distance::Goal;
-use crate::series::Series;
 use crate::trial::Protocol;
+use crate::trial::series::Series;
 
 /// Length, height, depth [m]; Young's modulus [Pa]; load [N].
 const BEAM: Beam = Beam { l: 1.2, h: 0.2, d: 0.3, young: 1e6, force: 3.0 };

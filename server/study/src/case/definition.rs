@@ -6,8 +6,8 @@ use super::ladder::Ladder;
 use crate::design::axes::{Axis, Factor, Setting};
 use crate::design::{Block, Configuration};
 use crate::distance::Goal;
-use crate::series::Series;
 use crate::trial::Protocol;
+use crate::trial::series::Series;
 
 /// A case of the study.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::definition::Truth;
-use crate::series::Series;
+use crate::trial::series::Series;
 
 /// A file of reference solutions.
 #[derive(Debug, Clone, Deserialize)]

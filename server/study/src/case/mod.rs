@@ -22,8 +22,6 @@ mod refine;
 
 mod subdivide;
 
-pub mod sight;
-
 mod gold;
 
 mod shared;

@@ -128,8 +128,8 @@ pub fn narrow(axes: &mut [Axis], factor: Factor, labels: &[String]) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use super::axes::{threads, words};
+    use super::*;
 
     fn axes() -> Vec<Axis> {
         let bodies = ["b".to_owned()];

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::case::Case;
 use crate::design::axes::Factor;
 use crate::result::{Outcome, StudyResult};
-use crate::wear::CUTS;
+use crate::trial::wear::CUTS;
 
 /// The file.
 #[derive(Debug)]

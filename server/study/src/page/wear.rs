@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::html::{escape, prose, time};
 use crate::design::axes::Factor;
 use crate::result::{CaseResult, Outcome};
-use crate::wear::{CUTS, Wear};
+use crate::trial::wear::{CUTS, Wear};
 use crate::words::percent;
 
 /// The table; empty where a case compares no methods of cutting.

@@ -4,8 +4,7 @@
 //! them. A [`watch`] steps a body and holds it to what every case must keep: finite numbers, mass,
 //! momentum, energy, whole steps. What a case leaves is [`evidence`]: figures with their bounds,
 //! [`chart`]s over time, pictures ([`view`]). [`suite`] runs them. [`mutation`] takes parts of the method
-//! away and tells
-//! which cases notice; [`page`] and [`json`] write it down.
+//! away and tells which cases notice; [`page`] and [`json`] write it down.
 //!
 //! A case knows no clock and no chance: it gives the same figures on every run. Times stand apart.
 

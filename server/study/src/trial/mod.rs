@@ -1,5 +1,11 @@
 //! One run of one configuration: set up, solve or step, time it, and say how it ended.
 
+pub mod series;
+
+pub mod sight;
+
+pub mod wear;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,9 +18,9 @@ use scindo_world::scene::Scene;
 use scindo_world::simulation::{Level, Simulation, Stage, StepReport};
 use serde::{Deserialize, Serialize};
 
-use crate::case::sight::{self, Sight};
-use crate::series::Series;
-use crate::wear::Wear;
+use series::Series;
+use sight::Sight;
+use wear::Wear;
 
 /// What a run computes.
 #[derive(Debug, Clone, Copy, PartialEq)]
