@@ -7,12 +7,12 @@
 //! with what the scene does. What the step leaves at the finest level is added to the error bar. Levels
 //! that ended are never thrown away: the reference is the [`limit`](crate::limit) of those there are.
 
+use crate::bench::runner::{Ask, PATIENCE, Runner, fits};
 use crate::case::Ladder;
 use crate::design::Configuration;
 use crate::design::axes::step;
 use crate::limit::{Limit, UNKNOWN, limit};
 use crate::reference::Reference;
-use crate::runner::{Ask, PATIENCE, Runner, fits};
 use crate::trial::Trial;
 use crate::trial::series::Series;
 use crate::trial::sight::{SAME, Sight, largest_change};

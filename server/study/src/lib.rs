@@ -30,10 +30,6 @@ pub mod limit;
 
 pub mod climb;
 
-pub mod runner;
-
-pub mod forecast;
-
 pub mod distance;
 
 pub mod pareto;
@@ -42,13 +38,9 @@ pub mod sources;
 
 pub mod recommend;
 
-pub mod store;
-
 pub mod page;
 
 pub mod settings;
-
-pub mod progress;
 
 pub mod result;
 
@@ -64,7 +56,7 @@ mod random;
 #[allow(non_snake_case)] // the symbols of the field: X, K, M
 pub mod stress;
 
-pub use progress::Progress;
+pub use bench::progress::Progress;
 pub use result::{CaseResult, Outcome, StudyResult};
 pub use settings::Settings;
 pub use study::{StudyError, run};

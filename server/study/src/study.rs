@@ -8,14 +8,14 @@ use scindo_world::scene::{Scene, SceneError};
 use thiserror::Error;
 
 use crate::bench::Bench;
+use crate::bench::progress::Progress;
+use crate::bench::store::{Origin, Store};
 use crate::case::{self, Case, Wishes};
 use crate::design::axes::{Factor, block};
 use crate::design::narrow;
 use crate::page::table::Table;
-use crate::progress::Progress;
 use crate::result::StudyResult;
 use crate::settings::{SCENE_S, Settings};
-use crate::store::{Origin, Store};
 use crate::survey;
 
 /// Why there is no study.

@@ -6,6 +6,7 @@
 //! more before it is.
 
 use crate::bench::Bench;
+use crate::bench::runner::{Ask, PATIENCE, Runner, fits};
 use crate::case::{Case, Ladder, Truth};
 use crate::climb::Climb;
 use crate::design::axes::Factor;
@@ -15,7 +16,6 @@ use crate::pareto::front;
 use crate::recommend::{Candidate, Recommendation, recommend};
 use crate::reference::{self, Reference};
 use crate::result::{CaseResult, Outcome};
-use crate::runner::{Ask, PATIENCE, Runner, fits};
 use crate::sources::peel;
 use crate::trial::sight::{SAME, largest_change};
 use crate::trial::{Protocol, Trial};

@@ -12,7 +12,7 @@ use thiserror::Error;
 use super::case::{Case, CaseReport, Setting, Status};
 use super::cases;
 use super::evidence::{Bound, Evidence, Figure};
-use crate::store::Origin;
+use crate::bench::store::Origin;
 
 /// What is run.
 #[derive(Debug, Clone, Default)]

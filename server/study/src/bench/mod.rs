@@ -1,5 +1,13 @@
 //! Runs configurations, keeps what ended, watches the time and tells how far it is.
 
+pub mod runner;
+
+pub mod forecast;
+
+pub mod store;
+
+pub mod progress;
+
 use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,13 +16,13 @@ use std::time::Instant;
 use crate::case::{Case, Truth};
 use crate::design::Configuration;
 use crate::design::axes::Factor;
-use crate::forecast::Forecast;
-use crate::progress::Progress;
-use crate::runner::{Ask, Runner};
 use crate::settings::Settings;
-use crate::store::{Store, fingerprint};
 use crate::trial::wear::{self, Wear};
 use crate::trial::{self, Limits, Protocol, Status, Trial, one_line};
+use forecast::Forecast;
+use progress::Progress;
+use runner::{Ask, Runner};
+use store::{Store, fingerprint};
 
 /// Where runs are made.
 pub struct Bench<'a> {
