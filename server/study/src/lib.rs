@@ -24,12 +24,6 @@ pub mod trial;
 
 pub mod reference;
 
-pub mod richardson;
-
-pub mod limit;
-
-pub mod climb;
-
 pub mod distance;
 
 pub mod pareto;

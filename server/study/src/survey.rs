@@ -8,13 +8,12 @@
 use crate::bench::Bench;
 use crate::bench::runner::{Ask, PATIENCE, Runner, fits};
 use crate::case::{Case, Ladder, Truth};
-use crate::climb::Climb;
 use crate::design::axes::Factor;
 use crate::design::{Configuration, design};
 use crate::distance::Errors;
 use crate::pareto::front;
 use crate::recommend::{Candidate, Recommendation, recommend};
-use crate::reference::{self, Reference};
+use crate::reference::{Climb, Reference, settle};
 use crate::result::{CaseResult, Outcome};
 use crate::sources::peel;
 use crate::trial::sight::{SAME, largest_change};
@@ -51,7 +50,7 @@ pub fn study(bench: &mut Bench<'_>, mut case: Case, seconds: f64) -> CaseResult 
         _ => {
             let cap_s = 10.0 * RUN_S[usize::from(bench.settings().quick)];
             let mut on = bench.on(&case);
-            reference::settle(&case, &mut |c| {
+            settle(&case, &mut |c| {
                 let cap_s = cap_s.min(on.left_s());
                 on.run(c, Ask { timed: false, cap_s })
             })

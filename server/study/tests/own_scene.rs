@@ -9,10 +9,10 @@ use std::sync::atomic::AtomicBool;
 
 use scindo_study::bench::runner::{Ask, Runner};
 use scindo_study::case::{Ladder, Truth};
-use scindo_study::climb::Climb;
 use scindo_study::design::Configuration;
 use scindo_study::design::axes::{Factor, Setting};
-use scindo_study::limit::UNKNOWN;
+use scindo_study::reference::Climb;
+use scindo_study::reference::limit::UNKNOWN;
 use scindo_study::trial::series::Series;
 use scindo_study::trial::{Status, Trial};
 use scindo_study::{Settings, StudyResult, run};

@@ -5,14 +5,14 @@
 //! runs on the coarsest mesh, so that mesh and step leave errors of like size. They go on to steps far
 //! shorter than those that are chosen: steps that damp a vibration away agree with each other, and not
 //! with what the scene does. What the step leaves at the finest level is added to the error bar. Levels
-//! that ended are never thrown away: the reference is the [`limit`](crate::limit) of those there are.
+//! that ended are never thrown away: the reference is the [`limit`](super::limit) of those there are.
 
+use super::limit::{Limit, UNKNOWN, limit};
+use super::value::Reference;
 use crate::bench::runner::{Ask, PATIENCE, Runner, fits};
 use crate::case::Ladder;
 use crate::design::Configuration;
 use crate::design::axes::step;
-use crate::limit::{Limit, UNKNOWN, limit};
-use crate::reference::Reference;
 use crate::trial::Trial;
 use crate::trial::series::Series;
 use crate::trial::sight::{SAME, Sight, largest_change};

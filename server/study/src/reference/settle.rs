@@ -1,32 +1,15 @@
-//! What the right answer is, and how well it is known.
+//! References that are stored, or extrapolated from a plan of runs.
 
-use serde::Serialize;
-
+use super::richardson::{Limit, extrapolate};
+use super::value::Reference;
 use crate::case::{Case, Plan, Truth};
 use crate::design::Configuration;
 use crate::design::axes::{Factor, Setting};
-use crate::richardson::{Limit, extrapolate};
 use crate::trial::Trial;
 use crate::trial::series::Series;
 
-/// The reference of a case.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Reference {
-    /// The field.
-    #[serde(skip)]
-    pub series: Series,
-    /// The goal, where it is known better than the field.
-    pub goal: Option<f64>,
-    /// Relative half-width of its error bar: below it no error can be told.
-    pub error_bar: f64,
-    /// The law it was computed with.
-    pub law: String,
-    /// Where it comes from, in words.
-    pub source: String,
-}
-
 /// Takes a stored reference, or computes one with `run`. That of a scene takes as long as it is given:
-/// see [`Climb`](crate::climb::Climb).
+/// see [`Climb`](super::climb::Climb).
 ///
 /// # Errors
 /// Why none could be computed.

@@ -1,0 +1,15 @@
+//! What the right answer is, and how well it is known.
+
+pub mod value;
+
+pub mod richardson;
+
+pub mod limit;
+
+pub mod settle;
+
+pub mod climb;
+
+pub use climb::Climb;
+pub use settle::settle;
+pub use value::Reference;
