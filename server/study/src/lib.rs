@@ -26,12 +26,6 @@ pub mod reference;
 
 pub mod distance;
 
-pub mod pareto;
-
-pub mod sources;
-
-pub mod recommend;
-
 pub mod page;
 
 pub mod settings;
@@ -39,6 +33,8 @@ pub mod settings;
 pub mod result;
 
 pub mod bench;
+
+pub mod advice;
 
 mod survey;
 

@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
+use crate::advice::recommend::Recommendation;
+use crate::advice::sources::Sources;
 use crate::bench::store::Origin;
 use crate::case::Case;
 use crate::design::Configuration;
 use crate::distance::Errors;
-use crate::recommend::Recommendation;
 use crate::reference::Reference;
-use crate::sources::Sources;
 use crate::trial::Trial;
 
 /// A configuration and what became of it.

@@ -5,17 +5,17 @@
 //! cheap ones first, then neighbours of the best that fits the budget. What is recommended is run once
 //! more before it is.
 
+use crate::advice::pareto::front;
+use crate::advice::recommend::{Candidate, Recommendation, recommend};
+use crate::advice::sources::peel;
 use crate::bench::Bench;
 use crate::bench::runner::{Ask, PATIENCE, Runner, fits};
 use crate::case::{Case, Ladder, Truth};
 use crate::design::axes::Factor;
 use crate::design::{Configuration, design};
 use crate::distance::Errors;
-use crate::pareto::front;
-use crate::recommend::{Candidate, Recommendation, recommend};
 use crate::reference::{Climb, Reference, settle};
 use crate::result::{CaseResult, Outcome};
-use crate::sources::peel;
 use crate::trial::sight::{SAME, largest_change};
 use crate::trial::{Protocol, Trial};
 use crate::words::{percent, short};

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use super::html::{escape, prose, time};
 use super::plot::{Failure, Mark, Plot};
 use super::{style, wear};
+use crate::advice::sources::{Source, Sources};
 use crate::case::Case;
 use crate::design::axes::Factor;
 use crate::distance::Errors;
 use crate::result::{CaseResult, Outcome};
-use crate::sources::{Source, Sources};
 use crate::trial::Protocol;
 use crate::words::{percent, short};
 

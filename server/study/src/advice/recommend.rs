@@ -6,8 +6,8 @@
 
 use serde::Serialize;
 
-use crate::pareto::front;
-use crate::sources::{Source, Sources};
+use super::pareto::front;
+use super::sources::{Source, Sources};
 use crate::words::{percent, short};
 
 /// What is recommended, in indices of the points.
