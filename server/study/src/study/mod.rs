@@ -1,5 +1,7 @@
 //! The study: every case, configuration after configuration, then the pages.
 
+mod survey;
+
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -16,7 +18,6 @@ use crate::design::narrow;
 use crate::page::table::Table;
 use crate::result::StudyResult;
 use crate::settings::{SCENE_S, Settings};
-use crate::survey;
 
 /// Why there is no study.
 #[derive(Debug, Error)]
