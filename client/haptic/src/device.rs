@@ -52,13 +52,21 @@ pub struct Capability {
     pub workspace_radius_m: f64,
 }
 
+/// The device does not answer: unplugged, switched off, or its driver failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeviceGone;
+
 /// A kinesthetic device with three degrees of freedom in force.
 pub trait HapticDevice: Send {
     /// What it can do.
     fn capability(&self) -> Capability;
 
     /// State now. `elapsed_s` is the time since the last call: one period, more after a stall.
-    fn read(&mut self, elapsed_s: f64) -> DeviceState;
+    ///
+    /// # Errors
+    /// The device does not answer. It is asked again at the next tick, so that one that was unplugged comes back
+    /// when it is plugged in; until then it gets no force. The call must not wait for the device.
+    fn read(&mut self, elapsed_s: f64) -> Result<DeviceState, DeviceGone>;
 
     /// Force on the hand [N], held until the next call.
     fn write(&mut self, force_n: Vector3<f64>);

@@ -32,9 +32,11 @@ pub mod flag {
     pub const SLEWED: u32 = 1 << 8;
     /// Ticks were missed before this one.
     pub const MISSED: u32 = 1 << 9;
+    /// The device did not answer.
+    pub const GONE: u32 = 1 << 10;
 
     /// Faults of the device: the force is cut to zero at once.
-    pub const DEVICE_FAULTS: u32 = NOT_FINITE | JUMP | OVER_SPEED;
+    pub const DEVICE_FAULTS: u32 = NOT_FINITE | JUMP | OVER_SPEED | GONE;
     /// What the server is told about.
     pub const FAULTS: u32 = STALE | LOST | DEVICE_FAULTS;
 }

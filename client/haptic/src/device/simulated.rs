@@ -6,7 +6,7 @@
 //! client commands. Symplectic Euler in steps of at most one millisecond.
 
 use super::path::Path;
-use super::{Capability, DeviceState, HapticDevice};
+use super::{Capability, DeviceGone, DeviceState, HapticDevice};
 use crate::constants::PERIOD_S;
 use nalgebra::Vector3;
 
@@ -93,18 +93,18 @@ impl HapticDevice for SimulatedDevice {
         CAPABILITY
     }
 
-    fn read(&mut self, elapsed_s: f64) -> DeviceState {
+    fn read(&mut self, elapsed_s: f64) -> Result<DeviceState, DeviceGone> {
         let steps = ((elapsed_s / PERIOD_S).round() as usize).clamp(1, MAX_CATCH_UP);
         for _ in 0..steps {
             self.advance(PERIOD_S);
         }
         let target = self.path.at(self.time_s);
-        DeviceState {
+        Ok(DeviceState {
             position_m: self.position_m,
             velocity_m_s: self.velocity_m_s,
             orientation: target.orientation,
             mode: target.mode,
-        }
+        })
     }
 
     fn write(&mut self, force_n: Vector3<f64>) {
@@ -120,11 +120,11 @@ mod tests {
     fn a_free_hand_follows_its_path_and_a_force_displaces_it_by_its_grip() {
         let path = Path::still(Vector3::new(0.1, 0.0, 0.0));
         let mut device = SimulatedDevice::new(path, Hand::default());
-        assert_eq!(device.read(PERIOD_S).position_m, Vector3::new(0.1, 0.0, 0.0));
+        assert_eq!(device.read(PERIOD_S).unwrap().position_m, Vector3::new(0.1, 0.0, 0.0));
         device.write(Vector3::new(0.0, 0.0, 1.0));
-        let mut state = device.read(PERIOD_S);
+        let mut state = device.read(PERIOD_S).unwrap();
         for _ in 0..2000 {
-            state = device.read(PERIOD_S);
+            state = device.read(PERIOD_S).unwrap();
         }
         assert!((state.position_m.z - 1.0 / 250.0).abs() < 1e-9, "{}", state.position_m.z);
         assert!(state.velocity_m_s.norm() < 1e-9);
@@ -138,9 +138,9 @@ mod tests {
         one.write(Vector3::x());
         many.write(Vector3::x());
         for _ in 0..20 {
-            many.read(PERIOD_S);
+            many.read(PERIOD_S).unwrap();
         }
-        one.read(20.0 * PERIOD_S);
+        one.read(20.0 * PERIOD_S).unwrap();
         assert_eq!(one.read(PERIOD_S), many.read(PERIOD_S));
     }
 }

@@ -15,36 +15,33 @@ use crate::constants::{
     PERIOD_S, RAMP_DOWN_NS, SILENT_ZERO_NS,
 };
 use crate::contact::model::ContactModel;
-use crate::device::DeviceState;
+use crate::device::{DeviceGone, DeviceState, ToolMode};
 use nalgebra::Vector3;
 
 /// Watches the device: what it reports must be finite, continuous and not too fast.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DeviceGuard {
     last: Option<DeviceState>,
+    /// Whether the device did not answer last time; where it comes back is no jump.
+    gone: bool,
 }
 
 impl DeviceGuard {
     /// The state to go on with (always finite) and the fault flags found. `elapsed_s` since the last
     /// call: after a stall the hand may be further away.
-    pub fn check(&mut self, state: DeviceState, elapsed_s: f64) -> (DeviceState, u32) {
+    pub fn check(&mut self, read: Result<DeviceState, DeviceGone>, elapsed_s: f64) -> (DeviceState, u32) {
+        let was_gone = std::mem::replace(&mut self.gone, read.is_err());
+        let Ok(state) = read else { return (self.at_rest(ToolMode::Hover), flag::GONE) };
         let finite = state.position_m.iter().chain(state.velocity_m_s.iter()).all(|v| v.is_finite())
             && state.orientation.iter().all(|v| v.is_finite());
         if !finite {
-            let rest = DeviceState {
-                position_m: Vector3::zeros(),
-                velocity_m_s: Vector3::zeros(),
-                orientation: [0.0, 0.0, 0.0, 1.0],
-                mode: state.mode,
-            };
-            return (
-                DeviceState { velocity_m_s: Vector3::zeros(), ..self.last.unwrap_or(rest) },
-                flag::NOT_FINITE,
-            );
+            return (self.at_rest(state.mode), flag::NOT_FINITE);
         }
         let mut flags = 0;
         let ticks = (elapsed_s / PERIOD_S).max(1.0);
-        if self.last.is_some_and(|last| (state.position_m - last.position_m).norm() > MAX_JUMP_M * ticks) {
+        if !was_gone
+            && self.last.is_some_and(|last| (state.position_m - last.position_m).norm() > MAX_JUMP_M * ticks)
+        {
             flags |= flag::JUMP;
         }
         if state.velocity_m_s.norm() > MAX_SPEED_M_S {
@@ -52,6 +49,17 @@ impl DeviceGuard {
         }
         self.last = Some(state);
         (state, flags)
+    }
+
+    /// Where the hand was last, at rest; `mode` if it was nowhere yet.
+    fn at_rest(&self, mode: ToolMode) -> DeviceState {
+        let nowhere = DeviceState {
+            position_m: Vector3::zeros(),
+            velocity_m_s: Vector3::zeros(),
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            mode,
+        };
+        DeviceState { velocity_m_s: Vector3::zeros(), ..self.last.unwrap_or(nowhere) }
     }
 }
 
@@ -289,15 +297,15 @@ mod tests {
     #[test]
     fn the_guard_finds_jumps_speed_and_nan_and_stays_finite() {
         let mut guard = DeviceGuard::default();
-        assert_eq!(guard.check(state(0.5, 0.0), PERIOD_S).1, 0);
-        assert_eq!(guard.check(state(0.515, 0.0), PERIOD_S).1, 0);
-        assert_eq!(guard.check(state(0.54, 0.0), PERIOD_S).1, flag::JUMP);
-        assert_eq!(guard.check(state(0.54, 2.1), PERIOD_S).1, flag::OVER_SPEED);
-        let (held, flags) = guard.check(state(f64::NAN, 0.0), PERIOD_S);
+        assert_eq!(guard.check(Ok(state(0.5, 0.0)), PERIOD_S).1, 0);
+        assert_eq!(guard.check(Ok(state(0.515, 0.0)), PERIOD_S).1, 0);
+        assert_eq!(guard.check(Ok(state(0.54, 0.0)), PERIOD_S).1, flag::JUMP);
+        assert_eq!(guard.check(Ok(state(0.54, 2.1)), PERIOD_S).1, flag::OVER_SPEED);
+        let (held, flags) = guard.check(Ok(state(f64::NAN, 0.0)), PERIOD_S);
         assert_eq!((held.position_m.x, flags), (0.54, flag::NOT_FINITE));
-        assert_eq!(guard.check(state(0.6, 0.0), 5.0 * PERIOD_S).1, 0, "60 mm in a stall of five ticks");
+        assert_eq!(guard.check(Ok(state(0.6, 0.0)), 5.0 * PERIOD_S).1, 0, "60 mm in a stall of five ticks");
         assert_eq!(
-            DeviceGuard::default().check(state(f64::INFINITY, 0.0), PERIOD_S).0.position_m,
+            DeviceGuard::default().check(Ok(state(f64::INFINITY, 0.0)), PERIOD_S).0.position_m,
             Vector3::zeros()
         );
     }

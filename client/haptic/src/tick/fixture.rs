@@ -3,10 +3,10 @@
 use super::{HapticTick, Limits, Ports, TickOutput, TickTime};
 use crate::contact::model::{ContactInbox, contact_slot};
 use crate::device::simulated::CAPABILITY;
-use crate::device::{Capability, DeviceState, HapticDevice, ToolMode};
+use crate::device::{Capability, DeviceGone, DeviceState, HapticDevice, ToolMode};
 use nalgebra::Vector3;
 use scindo_proto::messages::{Contact, HapticContact, Pose, Vec3, Vec3f, haptic_contact};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 pub const MS: u64 = 1_000_000;
@@ -43,7 +43,7 @@ pub fn contact(seq: u64, force_n: f64, stiffness_n_m: f32) -> HapticContact {
 
 /// A device that reports what the test says and keeps what it was given.
 #[derive(Clone)]
-pub struct FakeDevice(Arc<Mutex<(DeviceState, Vector3<f64>)>>);
+pub struct FakeDevice(Arc<Mutex<(DeviceState, Vector3<f64>)>>, Arc<AtomicBool>);
 
 impl FakeDevice {
     pub fn new() -> Self {
@@ -53,12 +53,16 @@ impl FakeDevice {
             orientation: [0.0, 0.0, 0.0, 1.0],
             mode: ToolMode::Touch,
         };
-        Self(Arc::new(Mutex::new((state, Vector3::zeros()))))
+        Self(Arc::new(Mutex::new((state, Vector3::zeros()))), Arc::default())
     }
 
     pub fn place(&self, position_m: Vector3<f64>, velocity_m_s: Vector3<f64>) {
         let mut inner = self.0.lock().unwrap();
         (inner.0.position_m, inner.0.velocity_m_s) = (position_m, velocity_m_s);
+    }
+
+    pub fn unplug(&self, gone: bool) {
+        self.1.store(gone, Ordering::Relaxed);
     }
 
     pub fn given(&self) -> Vector3<f64> {
@@ -71,8 +75,8 @@ impl HapticDevice for FakeDevice {
         CAPABILITY
     }
 
-    fn read(&mut self, _elapsed_s: f64) -> DeviceState {
-        self.0.lock().unwrap().0
+    fn read(&mut self, _elapsed_s: f64) -> Result<DeviceState, DeviceGone> {
+        if self.1.load(Ordering::Relaxed) { Err(DeviceGone) } else { Ok(self.0.lock().unwrap().0) }
     }
 
     fn write(&mut self, force_n: Vector3<f64>) {

@@ -52,6 +52,26 @@ fn the_token_of_the_server_counts_as_the_stream_does() {
 }
 
 #[test]
+fn a_device_that_is_unplugged_gets_no_force_and_comes_back_through_free_space() {
+    let mut rig = Rig::engaged(LIMITS);
+    let pressed = rig.run(400, Some(&|seq| contact(seq, 2.0, 300.0)));
+    assert!(pressed.last().unwrap().force_n.z > 1.9);
+    rig.device.unplug(true);
+    let gone = rig.run(300, Some(&|seq| contact(seq, 2.0, 300.0)));
+    assert!(gone.iter().all(|o| o.force_n == Vector3::zeros() && o.flags & flag::GONE != 0));
+    // It comes back somewhere else, which is no jump; first without force, then as before.
+    rig.device.place(Vector3::new(0.0, 0.1, 0.0), Vector3::zeros());
+    rig.device.unplug(false);
+    let back = rig.run(300, Some(&|seq| contact(seq, 2.0, 300.0)));
+    assert!(back.iter().all(|o| o.force_n == Vector3::zeros() && o.flags & flag::DEVICE_FAULTS == 0));
+    rig.device.place(Vector3::zeros(), Vector3::zeros());
+    rig.run(1, Some(&free)); // the way back in one tick is a jump
+    rig.run(600, Some(&free));
+    let again = rig.run(400, Some(&|seq| contact(seq, 2.0, 300.0)));
+    assert!(again.last().unwrap().force_n.z > 1.9);
+}
+
+#[test]
 fn a_jump_or_nan_of_the_device_cuts_the_force_at_once() {
     for bad in [Vector3::new(0.0, 0.0, 0.03), Vector3::new(f64::NAN, 0.0, 0.0)] {
         let mut rig = Rig::engaged(LIMITS);
