@@ -20,13 +20,15 @@ async fn main() -> Result<(), LinkError> {
     let coordinates =
         surface.frame.positions.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let coordinates: Vec<f64> = coordinates.map(f64::from).collect(); // x, y, z of every vertex [m]
-    let top = coordinates
-        .chunks_exact(3)
-        .fold([0.0, 0.0, f64::MIN], |top, p| if p[2] > top[2] { [p[0], p[1], p[2]] } else { top });
-    println!("body {}: {} vertices, the highest at {top:.3?} m", body.id, coordinates.len() / 3);
+    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+    for (i, &coordinate) in coordinates.iter().enumerate() {
+        (low[i % 3], high[i % 3]) = (low[i % 3].min(coordinate), high[i % 3].max(coordinate));
+    }
+    let top = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), high[2]];
+    println!("body {}: {} vertices, from {low:.3?} to {high:.3?} m", body.id, coordinates.len() / 3);
     let above = |x: f64, z: f64| Vec3 { x: top[0] + x, y: top[1], z: top[2] + z };
 
-    // A sphere of 5 mm comes down onto the highest vertex at 1 cm/s.
+    // A sphere of 5 mm comes down onto the middle of the body at 1 cm/s.
     let mut tool = link.tool("press-example").await?;
     for millisecond in 0..1500_u32 {
         let height = 0.010 - 1e-5 * f64::from(millisecond); // of the sphere's centre
@@ -45,9 +47,11 @@ async fn main() -> Result<(), LinkError> {
         tokio::time::sleep(Duration::from_millis(1)).await;
     }
 
-    // A blade through the same place, from above and half a centimetre deep; applied exactly once.
-    let edge = |z: f64| BladeSegment { tip_m: Some(above(-0.01, z)), heel_m: Some(above(0.01, z)) };
-    let answer = tool.cutter.cut(&body.id, vec![edge(0.01), edge(-0.005)]).await?;
+    // A blade across the body through the same place, from above to the middle; applied exactly once.
+    let middle = 0.5 * (low[2] + high[2]);
+    let at = |y: f64, z: f64| Some(Vec3 { x: top[0], y, z });
+    let edge = |z: f64| BladeSegment { tip_m: at(low[1] - 0.01, z), heel_m: at(high[1] + 0.01, z) };
+    let answer = tool.cutter.cut(&body.id, vec![edge(high[2] + 0.01), edge(middle)]).await?;
     println!("cut: {}, {} elements", answer.outcome().as_str_name(), answer.elements_cut);
     Ok(())
 }
