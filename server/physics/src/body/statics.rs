@@ -138,9 +138,9 @@ impl Body {
             *r = padded(&(residual / size));
         }
         let r = pcg.r.clone();
-        let reference = pcg.norm(team, &M, &r);
+        let reference = pcg.norm(team, &mut M, &r);
         let mut K = SystemOperator { elastic, mass: mass_f32, mass_factor: 0.0, springs: &[], fixed };
-        let report = pcg.solve(team, &mut K, &M, &mut delta, (reference, linear));
+        let report = pcg.solve(team, &mut K, &mut M, &mut delta, (reference, linear));
         let direction = delta.iter().map(|d| size * Vector3::new(d[0], d[1], d[2]).map(f64::from)).collect();
         (direction, report.iterations)
     }

@@ -538,7 +538,7 @@ impl LinearStep {
                     *load = padded(&(s * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
                 }
                 filter(inputs.fixed, &mut self.scratch);
-                self.pcg.norm(team, &self.preconditioner, &self.scratch)
+                self.pcg.norm(team, &mut self.preconditioner, &self.scratch)
             };
             self.reference = self.least_reference(loads, inputs);
         }

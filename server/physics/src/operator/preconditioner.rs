@@ -1,7 +1,7 @@
 //! The inverse of the 3×3 diagonal blocks, one per copy; on degenerate elements in variables in which
 //! they are not stiff.
 
-use super::{BLOCK, Block6, FixedCopy, Padded, Substitution};
+use super::{BLOCK, Block6, FixedCopy, Iterate, Padded, Preconditioner, Substitution, Sum, block_of, rows};
 use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
@@ -82,6 +82,52 @@ impl BlockJacobi {
     #[inline(always)]
     pub fn block(&self, block: usize) -> &[Inverse3] {
         &self.inverse[block * BLOCK..((block + 1) * BLOCK).min(self.inverse.len())]
+    }
+}
+
+impl Preconditioner for BlockJacobi {
+    fn enter(&self, r: &mut [Padded]) {
+        self.substitution.fold(r);
+    }
+
+    fn apply(&mut self, team: &mut Team, r: &[Padded], z: &mut [Padded], partial: &mut [f64]) -> f64 {
+        let M = &*self;
+        team.for_blocks((blocks(z, BLOCK), blocks(partial, 1)), |block, (z, partial)| {
+            partial[0] = rows::precondition(M.block(block), block_of(r, block), z);
+        });
+        self.substitution.unfold(z);
+        partial.iter().sum()
+    }
+
+    fn advance(&mut self, team: &mut Team, alpha: f32, pq: [&[Padded]; 2], iterate: Iterate<'_>) -> f64 {
+        let Iterate { x, r, z, partial } = iterate;
+        let M = &*self;
+        let state = (blocks(x, BLOCK), blocks(r, BLOCK), blocks(z, BLOCK), blocks(partial, 1));
+        team.for_blocks(state, |block, (x, r, z, partial)| {
+            let pq = pq.map(|v| block_of(v, block));
+            partial[0] = rows::advance_solution(alpha, pq, M.block(block), [x, r, z]);
+        });
+        self.substitution.unfold(z);
+        partial.iter().sum()
+    }
+
+    fn norm(&mut self, team: &mut Team, v: &[Padded], z: &mut [Padded], partial: &mut [f64]) -> f64 {
+        let v = if self.substitution.is_empty() {
+            v
+        } else {
+            z.copy_from_slice(v);
+            self.substitution.fold(z);
+            z
+        };
+        let M = &*self;
+        team.for_blocks(blocks(partial, 1), |block, partial| {
+            let mut sum = Sum::default();
+            for (v, M) in block_of(v, block).iter().zip(M.block(block)) {
+                sum.add(v, &M.times(v));
+            }
+            partial[0] = sum.total();
+        });
+        partial.iter().sum::<f64>().max(0.0).sqrt()
     }
 }
 

@@ -1,13 +1,13 @@
-//! Conjugate gradients with the block-Jacobi preconditioner.
+//! Conjugate gradients with any preconditioner.
 //!
 //! Vectors are single precision, scalar products double. The loop stops on the *preconditioned*
 //! residual √(rᵀM⁻¹r): the plain norm is blind to slivers, whose forces are 1e-9 of the others.
 
 use super::algebraic_error::AlgebraicError;
 use super::report::StopReason;
-use crate::operator::{Advance, BLOCK, BlockJacobi, LinearOperator, Padded, Sum, block_of, rows};
+use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Preconditioner};
 use crate::reserve::resize_reserving;
-use crate::team::{Team, blocks};
+use crate::team::Team;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ impl Pcg {
         &mut self,
         team: &mut Team,
         A: &mut impl LinearOperator,
-        M: &BlockJacobi,
+        M: &mut impl Preconditioner,
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
     ) -> PcgReport {
@@ -78,7 +78,7 @@ impl Pcg {
         &mut self,
         team: &mut Team,
         A: &mut impl LinearOperator,
-        M: &BlockJacobi,
+        M: &mut impl Preconditioner,
         x: &mut [Padded],
         (rz, reference, settings): (f64, f64, PcgSettings),
     ) -> PcgReport {
@@ -92,7 +92,7 @@ impl Pcg {
         &mut self,
         team: &mut Team,
         A: &mut impl LinearOperator,
-        M: &BlockJacobi,
+        M: &mut impl Preconditioner,
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
     ) -> PcgReport {
@@ -121,7 +121,7 @@ impl Pcg {
             // p ← z + β p, q = A p, pᵀA p
             let out = Advance { p: &mut self.p, q: &mut self.q, partial: &mut self.partial };
             let curvature = A.advance(team, beta as f32, &self.z, out);
-            M.substitution().fold(&mut self.q);
+            M.enter(&mut self.q);
             if !curvature.is_finite() {
                 report.stop = StopReason::NonFinite;
                 return report;
@@ -133,7 +133,9 @@ impl Pcg {
             let alpha = rz / curvature;
             error.add(alpha * rz);
             report.algebraic_error = error.norm();
-            let next = self.advance(team, M, x, alpha); // x += α p, r −= α q, z = M⁻¹ r, rᵀz
+            // x += α p, r −= α q, z = M⁻¹ r, rᵀz
+            let Self { r, z, p, q, partial, .. } = self;
+            let next = M.advance(team, alpha as f32, [p, q], Iterate { x, r, z, partial });
             beta = next / rz;
             rz = next;
             (self.rz, self.beta) = (rz, beta);
@@ -142,50 +144,14 @@ impl Pcg {
     }
 
     /// √(vᵀM⁻¹v), the norm that `reference` is to be given in.
-    pub fn norm(&mut self, team: &mut Team, M: &BlockJacobi, v: &[Padded]) -> f64 {
-        let v = if M.substitution().is_empty() {
-            v
-        } else {
-            self.z.copy_from_slice(v);
-            M.substitution().fold(&mut self.z);
-            &self.z
-        };
-        team.for_blocks(blocks(&mut self.partial, 1), |block, partial| {
-            let mut sum = Sum::default();
-            for (v, M) in block_of(v, block).iter().zip(M.block(block)) {
-                sum.add(v, &M.times(v));
-            }
-            partial[0] = sum.total();
-        });
-        self.partial.iter().sum::<f64>().max(0.0).sqrt()
+    pub fn norm(&mut self, team: &mut Team, M: &mut impl Preconditioner, v: &[Padded]) -> f64 {
+        M.norm(team, v, &mut self.z, &mut self.partial)
     }
 
     /// z = M⁻¹ r of the residual just put into `self.r`; returns rᵀz.
-    pub fn precondition(&mut self, team: &mut Team, M: &BlockJacobi) -> f64 {
-        M.substitution().fold(&mut self.r);
-        let r = &self.r;
-        let state = (blocks(&mut self.z, BLOCK), blocks(&mut self.partial, 1));
-        team.for_blocks(state, |block, (z, partial)| {
-            partial[0] = rows::precondition(M.block(block), block_of(r, block), z);
-        });
-        M.substitution().unfold(&mut self.z);
-        self.partial.iter().sum()
-    }
-
-    fn advance(&mut self, team: &mut Team, M: &BlockJacobi, x: &mut [Padded], alpha: f64) -> f64 {
-        let (p, q, alpha) = (&self.p, &self.q, alpha as f32);
-        let state = (
-            blocks(x, BLOCK),
-            blocks(&mut self.r, BLOCK),
-            blocks(&mut self.z, BLOCK),
-            blocks(&mut self.partial, 1),
-        );
-        team.for_blocks(state, |block, (x, r, z, partial)| {
-            let pq = [block_of(p, block), block_of(q, block)];
-            partial[0] = rows::advance_solution(alpha, pq, M.block(block), [x, r, z]);
-        });
-        M.substitution().unfold(&mut self.z);
-        self.partial.iter().sum()
+    pub fn precondition(&mut self, team: &mut Team, M: &mut impl Preconditioner) -> f64 {
+        M.enter(&mut self.r);
+        M.apply(team, &self.r, &mut self.z, &mut self.partial)
     }
 }
 
@@ -193,6 +159,7 @@ impl Pcg {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::operator::BlockJacobi;
 
     /// The path graph's Laplacian plus a shift, on all three components.
     struct Chain {
@@ -221,10 +188,10 @@ mod tests {
         pcg.resize(n);
         pcg.r.fill([1.0, -2.0, 0.5, 0.0]);
         let b = pcg.r.clone();
-        let reference = pcg.norm(&mut team, &M, &b);
+        let reference = pcg.norm(&mut team, &mut M, &b);
         let mut x = vec![[0.0; 4]; n];
         let settings = PcgSettings { iterations, tolerance: 1e-5 };
-        let report = pcg.solve(&mut team, &mut Chain { shift }, &M, &mut x, (reference, settings));
+        let report = pcg.solve(&mut team, &mut Chain { shift }, &mut M, &mut x, (reference, settings));
         (report, x)
     }
 
