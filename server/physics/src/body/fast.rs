@@ -182,21 +182,23 @@ impl Fast {
         }
         let mut report = self.attempts(team, mesh, state, (scheme, inputs), spring_forces);
         let mut made_with = if report.substeps == 1 { scheme } else { Scheme::ImplicitEuler };
-        if self.multistep.is_newmark() && report.outcome == Outcome::Advanced {
+        if self.multistep.is_newmark() {
             let driven = is_driven(&self.before, inputs.fixed);
-            if let Some(excess_j) = self.excess(team, mesh, state, inputs, (rest, driven))
-                && made_with != Scheme::ImplicitEuler
-            {
+            let excess = match report.outcome {
+                Outcome::Advanced => self.excess(team, mesh, state, inputs, (rest, driven)),
+                _ => None,
+            };
+            if let (Some(excess_j), true) = (excess, made_with != Scheme::ImplicitEuler) {
                 state.copy_from(&self.before);
                 made_with = Scheme::ImplicitEuler;
                 let iterations = report.iterations;
                 report = self.attempts(team, mesh, state, (made_with, inputs), spring_forces);
                 report.iterations += iterations;
                 report.notice = report.notice.or(Some(Notice::EnergyGained { excess_j }));
-                if report.outcome == Outcome::Advanced {
-                    // The energy that is there now is what there is.
-                    self.multistep.forget_energy();
-                }
+            }
+            if excess.is_some() || report.outcome != Outcome::Advanced {
+                // The energy that is there now is what there is.
+                self.multistep.forget_energy();
             }
         }
         let underheld = self.free_motions.first().map(|&motion| Notice::Underheld { motion, driven: false });
