@@ -1,4 +1,4 @@
-//! What is near: the closest point of a surface, and every triangle near a capsule.
+//! Proximity queries: the closest point of a surface, and all triangles near a capsule.
 
 use crate::Capsule;
 use crate::distance::{
@@ -15,16 +15,16 @@ type V = Vector3<f64>;
 pub struct ClosestPoint {
     /// The triangle it lies on.
     pub triangle: u32,
-    /// Its barycentric coordinates there.
+    /// Barycentric coordinates on that triangle.
     pub barycentric: [f64; 3],
-    /// Where it is [m].
+    /// Position of the point [m].
     pub point: V,
     /// Outward unit normal: the face's, or the angle-weighted mean at an edge or a vertex.
     pub normal: V,
     /// Distance to the query point [m], negative inside.
     ///
-    /// Where two sheets of a surface overlap or coincide, as the lips of a closed cut do, the side
-    /// told by the nearest sheet may be wrong; [`SurfaceBvh::contains`] is not misled.
+    /// Where two sheets of a surface overlap or coincide, as the lips of a closed cut do, the sign given by
+    /// the nearest sheet may be wrong. [`SurfaceBvh::contains`] is not affected.
     pub signed_distance: f64,
 }
 
@@ -39,7 +39,7 @@ pub struct NearTriangle {
     pub distance: f64,
 }
 
-/// A leaf's answer with its squared distance as cost.
+/// A candidate of a leaf, with its squared distance as cost.
 struct Candidate<T> {
     cost: f32,
     value: T,
@@ -88,8 +88,8 @@ impl SurfaceBvh {
         Some(NearTriangle { triangle, closest, distance: closest.distance_squared.sqrt() })
     }
 
-    /// Visits every triangle no farther from the surface of `capsule` than `reach` [m].
-    /// The order is the same in every run.
+    /// Visits every triangle no farther from the surface of `capsule` than `reach` [m]. The order is the same
+    /// in every run.
     pub fn triangles_near(&self, capsule: &Capsule, reach: f64, mut visit: impl FnMut(NearTriangle)) {
         let limit = capsule.radius + reach;
         let limit_squared = limit * limit;
@@ -108,8 +108,8 @@ impl SurfaceBvh {
         });
     }
 
-    /// Outward unit normal at a point of a triangle: the face's inside it, the pseudo-normal on
-    /// its edges and corners, which tells inside from outside everywhere on a closed surface.
+    /// Outward unit normal at a point of a triangle. Inside the triangle it is that of the face, on edges and
+    /// corners the pseudo-normal, which separates inside from outside everywhere on a closed surface.
     ///
     /// # Source
     /// Bærentzen and Aanæs, Signed distance computation using the angle weighted pseudonormal
@@ -132,7 +132,7 @@ impl SurfaceBvh {
             .unwrap_or_else(V::z)
     }
 
-    /// Outward normal of a triangle, as long as twice its area [m²].
+    /// Outward normal of a triangle, with a length of twice the area [m²].
     pub fn area_normal(&self, triangle: u32) -> V {
         let [a, b, c] = self.triangle(triangle);
         (b - a).cross(&(c - a))

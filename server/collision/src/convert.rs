@@ -4,17 +4,17 @@ use nalgebra::Vector3;
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
 
-/// A surface position as `f64` vector [m].
+/// A surface position as an `f64` vector [m].
 pub(crate) fn widen(p: [f32; 3]) -> Vector3<f64> {
     Vector3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 
-/// parry's vector as `f64` vector [m].
+/// A vector of parry as an `f64` vector [m].
 pub(crate) fn from_parry(v: Vector) -> Vector3<f64> {
     Vector3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z))
 }
 
-/// The smallest box around some surface positions.
+/// The smallest axis-aligned box around some surface positions.
 pub(crate) fn aabb_of(points: impl IntoIterator<Item = [f32; 3]>) -> Aabb {
     let mut mins = Vector::splat(f32::MAX);
     let mut maxs = Vector::splat(f32::MIN);

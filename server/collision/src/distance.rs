@@ -1,8 +1,8 @@
 //! Closest points between points, segments and triangles, safe for degenerate input.
 //!
 //! # Source
-//! Ericson, Real-Time Collision Detection (2005), §5.1. Triangles without area fall back to
-//! their edges, segments without length to a point, so no result is ever non-finite.
+//! Ericson, Real-Time Collision Detection (2005), §5.1. Triangles without area are treated as their edges,
+//! segments without length as points, so every result is finite.
 
 use nalgebra::Vector3;
 
@@ -68,7 +68,7 @@ pub fn closest_point_on_triangle(p: V, triangle: &[V; 3]) -> [f64; 3] {
     closest_edge_point(p, triangle)
 }
 
-/// The closest point on the boundary of a triangle.
+/// Barycentric coordinates of the point on the boundary of a triangle closest to `p`.
 fn closest_edge_point(p: V, triangle: &[V; 3]) -> [f64; 3] {
     let mut best = [1.0, 0.0, 0.0];
     let mut best_squared = f64::INFINITY;
@@ -99,7 +99,7 @@ pub fn closest_segment_segment(p: [V; 2], q: [V; 2]) -> [f64; 2] {
     }
     let (b, c) = (d1.dot(&d2), d1.dot(&r));
     let denominator = a * e - b * b;
-    // Parallel segments: any parameter serves, the clamps below choose a pair.
+    // Parallel segments: any parameter is valid, and the clamps below choose a pair.
     let mut s =
         if denominator > 1e-14 * a * e { ((b * f - c * e) / denominator).clamp(0.0, 1.0) } else { 0.0 };
     let mut t = (b * s + f) / e;
@@ -113,7 +113,7 @@ pub fn closest_segment_segment(p: [V; 2], q: [V; 2]) -> [f64; 2] {
     [s, t]
 }
 
-/// Closest pair of segment `segment` and a triangle.
+/// Closest pair of `segment` and a triangle.
 pub fn closest_segment_triangle(segment: [V; 2], triangle: &[V; 3]) -> SegmentTriangle {
     let [a, b] = segment;
     let mut best = pair(segment, triangle, 0.0, closest_point_on_triangle(a, triangle));
@@ -153,7 +153,7 @@ fn pair(segment: [V; 2], triangle: &[V; 3], parameter: f64, w: [f64; 3]) -> Segm
     }
 }
 
-/// The point where a segment passes through the inside of a triangle.
+/// The point where a segment passes through the interior of a triangle, if it does.
 fn crossing(segment: [V; 2], triangle: &[V; 3]) -> Option<SegmentTriangle> {
     let [a, b] = segment;
     let normal = (triangle[1] - triangle[0]).cross(&(triangle[2] - triangle[0]));

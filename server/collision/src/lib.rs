@@ -1,17 +1,16 @@
 //! Broad and narrow phase over deforming surfaces.
 //!
-//! A [`SurfaceBvh`] holds the triangles of one closed surface in a bounding volume hierarchy
-//! (parry3d's), built once per topology and refitted in place whenever the surface moved. It
-//! answers what a rigid tool needs to know: the closest point and the side it lies on, the
-//! triangles near a capsule, and the first impact of a capsule that moves while the surface
-//! moves. Spheres, probes and blades are all capsules: a core segment and a radius.
+//! A [`SurfaceBvh`] holds the triangles of one closed surface in a bounding volume hierarchy (that of
+//! parry3d). It is built once per topology and refitted in place whenever the surface moved. It answers three
+//! queries for a rigid tool: the closest point and its side, the triangles near a capsule, and the first
+//! impact of a moving capsule on the moving surface. Spheres, probes and blades are all capsules: a core
+//! segment and a radius.
 //!
-//! The crate knows surfaces and capsules, not bodies, tissue or forces. Positions are metres.
-//! The tree stores `f32`, as surfaces arrive; distances are computed in `f64`, because the lips
-//! of a cut hold triangles so thin that single precision has no normal for them.
+//! The crate knows surfaces and capsules, but no bodies, tissue or forces. Positions are in metres. The tree
+//! stores `f32`, the format in which surfaces arrive. Distances are computed in `f64`, because the lips of a
+//! cut contain triangles so thin that single precision has no normal for them.
 //!
-//! Order of the modules: conversions, distances between two primitives, the tree, what is near,
-//! what will be hit.
+//! Order of the modules: conversions, distances between two primitives, the tree, proximity queries, impacts.
 
 mod convert;
 mod distance;
@@ -30,7 +29,7 @@ pub use sweep::{CapsuleMotion, Impact, SWEEP_TOLERANCE_M};
 
 use nalgebra::Vector3;
 
-/// A segment swept by a sphere: the shape of every rigid tool. Equal ends make a sphere.
+/// A segment swept by a sphere: the shape of every rigid tool. A core with equal ends is a sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Capsule {
     /// The two ends of the core segment [m].
@@ -40,7 +39,7 @@ pub struct Capsule {
 }
 
 impl Capsule {
-    /// The point of the core at `parameter` in 0..=1 [m].
+    /// The point of the core at `parameter` in 0..=1 [m], 0 at the first end.
     pub fn core_point(&self, parameter: f64) -> Vector3<f64> {
         self.core[0] + (self.core[1] - self.core[0]) * parameter
     }

@@ -1,4 +1,4 @@
-//! The tree over one surface's triangles: built per topology, refitted per motion.
+//! The tree over the triangles of one surface: built once per topology, refitted after every motion.
 
 use crate::convert::{aabb_of, from_parry, widen};
 use nalgebra::Vector3;
@@ -20,7 +20,7 @@ pub enum SurfaceError {
         /// Number of vertices given.
         vertices: usize,
     },
-    /// A refit with another number of vertices: the topology changed.
+    /// A refit has another number of vertices, so the topology has changed.
     #[error(
         "refit with {found} vertices on a surface of {expected}; after a change of topology build \
          a new tree"
@@ -35,9 +35,9 @@ pub enum SurfaceError {
 
 /// Bounding volume hierarchy over the triangles of one closed surface.
 ///
-/// Holds the surface twice: where it was before the last [`refit`](Self::refit) and where it is
-/// now. Every leaf box covers both, so that the same tree serves swept queries on the motion
-/// in between. Triangles are counter-clockwise seen from outside.
+/// It holds the surface twice: before the last [`refit`](Self::refit) and at present. Every leaf box covers
+/// both, so the same tree serves swept queries on the motion in between. Triangles are counter-clockwise seen
+/// from outside.
 #[derive(Debug, Clone)]
 pub struct SurfaceBvh {
     triangles: Vec<[u32; 3]>,
@@ -46,16 +46,17 @@ pub struct SurfaceBvh {
     star_offsets: Vec<u32>,
     star: Vec<u32>,
     tree: Bvh,
-    /// Leaves in the order of the tree's memory: refitting in it is kind to the cache.
+    /// Leaves in the order of the tree's memory. Refitting in this order is fast, since it walks the memory
+    /// forward.
     order: Vec<u32>,
     kept_vertices: u64,
 }
 
 impl SurfaceBvh {
-    /// Builds the tree. `positions` in metres; a non-finite one is taken as the origin and counted.
+    /// Builds the tree. `positions` are in metres; a non-finite one is replaced by the origin and counted.
     ///
     /// # Errors
-    /// When a triangle names a vertex that is not there.
+    /// If a triangle names a vertex that does not exist.
     pub fn new(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<Self, SurfaceError> {
         for (triangle, corners) in triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= positions.len()) {
@@ -87,12 +88,12 @@ impl SurfaceBvh {
         })
     }
 
-    /// Moves the surface to `positions` [m] and refits the tree in place; what was current becomes
-    /// [previous](Self::previous_triangle). A non-finite vertex keeps its place and is counted.
-    /// Linear in the number of triangles, without allocation.
+    /// Moves the surface to `positions` [m] and refits the tree in place. The positions so far become the
+    /// [previous](Self::previous_triangle) ones. A non-finite vertex keeps its position and is counted. The
+    /// cost is linear in the number of triangles, without allocation.
     ///
     /// # Errors
-    /// When the number of vertices changed; the surface is then as it was.
+    /// If the number of vertices changed. The surface is not changed then.
     pub fn refit(&mut self, positions: &[[f32; 3]]) -> Result<(), SurfaceError> {
         if positions.len() != self.positions.len() {
             return Err(SurfaceError::VertexCount { found: positions.len(), expected: self.positions.len() });
@@ -107,7 +108,7 @@ impl SurfaceBvh {
         Ok(())
     }
 
-    /// Forgets the last motion, as after a reset: the surface is taken to have stood still.
+    /// Forgets the last motion, e.g. after a reset: swept queries see a surface at rest.
     pub fn forget_motion(&mut self) {
         self.previous.copy_from_slice(&self.positions);
         self.refit_boxes();
@@ -119,7 +120,7 @@ impl SurfaceBvh {
             let corners = [self.positions[a], self.positions[b], self.positions[c]];
             let before = [self.previous[a], self.previous[b], self.previous[c]];
             let aabb = aabb_of(corners.into_iter().chain(before));
-            // No margin: the leaf takes the box as it is; every leaf exists since `new`.
+            // No margin: the leaf takes the box as it is. Every leaf exists since `new`.
             let _ = self.tree.update_partially_if_present(aabb, leaf, 0.0);
         }
         self.tree.refit_without_opt();
@@ -140,7 +141,7 @@ impl SurfaceBvh {
         self.triangles[index as usize]
     }
 
-    /// Corner positions of triangle `index` now [m].
+    /// Present corner positions of triangle `index` [m].
     pub fn triangle(&self, index: u32) -> [Vector3<f64>; 3] {
         self.triangles[index as usize].map(|v| widen(self.positions[v as usize]))
     }
@@ -150,8 +151,8 @@ impl SurfaceBvh {
         self.triangles[index as usize].map(|v| widen(self.previous[v as usize]))
     }
 
-    /// Lower and upper corner of a box around the surface, now and before the last refit [m];
-    /// `None` without triangles.
+    /// Lower and upper corner of a box around the surface, at present and before the last refit [m]; `None`
+    /// without triangles.
     pub fn bounds(&self) -> Option<[Vector3<f64>; 2]> {
         (!self.triangles.is_empty()).then(|| {
             let aabb = self.tree.root_aabb();
@@ -159,18 +160,18 @@ impl SurfaceBvh {
         })
     }
 
-    /// How many non-finite vertex positions were refused so far.
+    /// Number of non-finite vertex positions refused so far.
     pub fn refused_vertices(&self) -> u64 {
         self.kept_vertices
     }
 
-    /// Triangles around a vertex.
+    /// Triangles around vertex `vertex`.
     pub(crate) fn star(&self, vertex: u32) -> &[u32] {
         let v = vertex as usize;
         &self.star[self.star_offsets[v] as usize..self.star_offsets[v + 1] as usize]
     }
 
-    /// The tree; leaf `i` is triangle `i`.
+    /// The tree. Its leaf `i` is triangle `i`.
     pub(crate) fn tree(&self) -> &Bvh {
         &self.tree
     }

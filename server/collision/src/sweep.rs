@@ -1,9 +1,9 @@
-//! What will be hit: the first impact of a moving capsule on a moving surface.
+//! The first impact of a moving capsule on a moving surface.
 //!
-//! Each triangle near the path is treated by conservative advancement: the closest points give a
-//! direction that separates the two convex shapes; along it they close the gap no faster than
-//! their fastest vertices, so time advances by gap / speed until the gap is gone. A sphere on a
-//! plane takes one step, a capsule on an edge a few.
+//! Each triangle near the path is treated by conservative advancement. The closest points give a direction
+//! that separates the two convex shapes. Along it they close the gap no faster than their fastest vertices,
+//! so time advances by gap / speed until the gap is gone. A sphere on a plane takes one step, a capsule on an
+//! edge a few.
 //!
 //! # Source
 //! Mirtich, Impulse-based dynamic simulation of rigid body systems (1996), §2.3.2; the
@@ -21,13 +21,13 @@ type V = Vector3<f64>;
 /// far above the rounding of `f32` positions within a metre of the origin.
 pub const SWEEP_TOLERANCE_M: f64 = 1e-6;
 
-/// Approach that is still taken for sliding along a touched triangle [m per sweep].
+/// Largest approach that still counts as sliding along a touched triangle [m per sweep].
 const SLIDING_M: f64 = 1e-9;
 
-/// Advancement steps per triangle; what has not converged then counts as hit, which is safe.
+/// Most advancement steps per triangle. What has not converged by then counts as hit, which is safe.
 const MAX_ADVANCES: usize = 96;
 
-/// A capsule on its way: both ends of its core move along straight lines.
+/// A moving capsule. Both ends of its core move along straight lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CapsuleMotion {
     /// Core at time 0 [m].
@@ -45,20 +45,20 @@ impl CapsuleMotion {
     }
 }
 
-/// First touch of a capsule and a surface.
+/// First contact of a moving capsule with a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impact {
-    /// When, as fraction of the motion, 0..=1.
+    /// Time of the impact, as a fraction of the motion, 0..=1.
     pub time: f64,
     /// The triangle that was hit.
     pub triangle: u32,
-    /// Where on it.
+    /// Barycentric coordinates on that triangle.
     pub barycentric: [f64; 3],
-    /// Where in space, at that time [m].
+    /// Place of the impact in space, at that time [m].
     pub point: V,
     /// Unit direction from the surface to the capsule.
     pub normal: V,
-    /// Where on the core, 0..=1.
+    /// Position along the core, 0..=1.
     pub parameter: f64,
 }
 
@@ -66,17 +66,17 @@ pub struct Impact {
 type TriangleMotion = ([V; 3], [V; 3]);
 
 impl SurfaceBvh {
-    /// First impact of the moving capsule on the surface as it stands now.
+    /// First impact of the moving capsule on the surface at rest in its present state.
     ///
-    /// A capsule that already touches a triangle hits it at time 0 if it moves into it, and not at
-    /// all if it moves away. Triangles seen from behind never stop anything, so what started
-    /// inside can leave.
+    /// A capsule that already touches a triangle hits it at time 0 if it moves into it, and not at all if it
+    /// moves away. Triangles seen from behind never stop anything, so a capsule that started inside can
+    /// leave.
     pub fn sweep(&self, motion: &CapsuleMotion) -> Option<Impact> {
         self.sweep_triangles(motion, |t| (self.triangle(t), [V::zeros(); 3]))
     }
 
-    /// First impact of the moving capsule on the surface while the surface makes its last
-    /// motion, from before the last refit to now.
+    /// First impact of the moving capsule on the surface while the surface makes its last motion, from before
+    /// the last refit to the present state.
     pub fn sweep_moving(&self, motion: &CapsuleMotion) -> Option<Impact> {
         self.sweep_triangles(motion, |t| {
             let (from, to) = (self.previous_triangle(t), self.triangle(t));
@@ -108,7 +108,7 @@ impl SurfaceBvh {
     }
 }
 
-/// A box around the capsule moving along a line: what the tree is searched with.
+/// A box around the capsule that moves along a line. The tree is searched with it.
 struct Path {
     from: V,
     along: V,
@@ -164,6 +164,7 @@ fn impact(
         let (normal, distance) = separation(&closest, face)?;
         let gap = distance - motion.radius;
         let approach = approach_speed(normal, core_motion, displacement);
+        // A normal along which the shapes do not approach separates them for the rest of the motion.
         if approach <= 0.0 {
             return None;
         }
@@ -179,6 +180,7 @@ fn impact(
                 parameter: closest.parameter,
             });
         }
+        // Half the tolerance ahead of contact, so that the next step ends within the tolerance.
         time += (gap - 0.5 * SWEEP_TOLERANCE_M) / approach;
         if time > limit {
             return None;
@@ -187,8 +189,8 @@ fn impact(
     None
 }
 
-/// Unit direction from the triangle to the core and their distance [m]; the face normal where
-/// the core passes through. `None` where there is neither.
+/// Unit direction from the triangle to the core, and their distance [m]. Where the core passes through the
+/// triangle, the direction is the face normal. `None` where there is neither.
 fn separation(closest: &SegmentTriangle, face: V) -> Option<(V, f64)> {
     let apart = closest.on_segment - closest.on_triangle;
     let distance = apart.norm();
@@ -199,7 +201,8 @@ fn separation(closest: &SegmentTriangle, face: V) -> Option<(V, f64)> {
     }
 }
 
-/// How fast core and triangle approach each other along `normal`, at most [m per unit of time].
+/// Upper bound of the speed at which core and triangle approach each other along `normal` [m per unit of
+/// time].
 fn approach_speed(normal: V, core: [V; 2], triangle: &[V; 3]) -> f64 {
     let core = (-normal.dot(&core[0])).max(-normal.dot(&core[1]));
     let triangle = triangle.iter().map(|v| normal.dot(v)).fold(f64::NEG_INFINITY, f64::max);

@@ -1,4 +1,4 @@
-//! Inside or outside, by counting signed crossings along a ray.
+//! Inside or outside, from the signed crossings along a ray.
 
 use crate::surface_bvh::{SurfaceBvh, node_bounds};
 use nalgebra::Vector3;
@@ -6,16 +6,16 @@ use parry3d::partitioning::TraversalAction;
 
 type V = Vector3<f64>;
 
-/// The ray runs along +x: the plane across it is then (y, z), without any rotation.
+/// The ray runs along +x, so the plane across it is (y, z) without any rotation.
 const ALONG: usize = 0;
 
 impl SurfaceBvh {
-    /// Whether `p` [m] lies inside the body the surface encloses.
+    /// Whether `p` [m] lies inside the body enclosed by the surface.
     ///
-    /// Counts how often a ray from `p` leaves minus how often it enters. Overlapping and coinciding
-    /// sheets count separately, so the lips of a closed or pressed-shut cut do not mislead it. The
-    /// side of an edge is computed from its lower to its higher vertex, so that a ray through a
-    /// shared edge meets exactly one of its two triangles.
+    /// Counts how often a ray from `p` leaves, minus how often it enters. Overlapping and coinciding sheets
+    /// count separately, so the lips of a closed or pressed-shut cut do not falsify the result. The side of
+    /// an edge is computed from its lower to its higher vertex, so a ray through a shared edge meets exactly
+    /// one of its two triangles.
     pub fn contains(&self, p: V) -> bool {
         let mut winding = 0i32;
         self.tree().traverse(|node| {

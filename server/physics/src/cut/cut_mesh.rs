@@ -26,10 +26,10 @@ use super::topology::locate::piece_at;
 use super::topology::pieces::{Piece, PieceTable};
 use super::topology::runs::Runs;
 
-/// What a fragment costs to separate and to follow with pieces, copies and surface, in fragments looked at.
+/// Cost of separating a fragment and updating pieces, copies and surface, in fragments examined.
 const SEPARATION: usize = 20;
 
-/// A sweep that is taken in parts.
+/// A sweep that is taken in parts, between [`CutMesh::begin_sweep`] and [`CutMesh::complete`].
 #[derive(Clone, Debug)]
 pub struct SweepUnderWay {
     triangles: Vec<SweepTriangle>,
@@ -39,17 +39,17 @@ pub struct SweepUnderWay {
 }
 
 impl SweepUnderWay {
-    /// The incision it belongs to.
+    /// The incision that this sweep continues.
     pub fn incision(&self) -> u32 {
         self.incision
     }
 }
 
-/// A tet mesh with everything that cuts have made of it.
+/// A tet mesh with the topology that cuts have given it.
 ///
-/// Copies 0..n_nodes are the nodes of the rest mesh, further ones are appended and never removed.
-/// A rest mesh that hangs together only in a node or an edge gets extra copies at once: material
-/// is connected through faces and through nothing else.
+/// Copies 0..n_nodes are the nodes of the rest mesh; further ones are appended and never removed. Material is
+/// connected only through faces. A rest mesh whose parts meet only in a node or an edge therefore gets extra
+/// copies from the start.
 #[derive(Clone, Debug)]
 pub struct CutMesh {
     mesh: TetMesh,
@@ -72,7 +72,7 @@ pub struct CutMesh {
 }
 
 impl CutMesh {
-    /// Whether signs are exact, as they are from the start; others are only for a test of tests.
+    /// Whether signs are exact. They are by default; only a test of the tests turns this off.
     #[doc(hidden)]
     pub fn set_exact(&mut self, exact: bool) {
         self.inexact = !exact;
@@ -83,8 +83,8 @@ impl CutMesh {
         Self::with_lips(mesh, &BTreeMap::new(), 0)
     }
 
-    /// The state of a mesh that was cut along its faces: `lips` names the incision of boundary faces by
-    /// their nodes in ascending order, 0 and absent is skin.
+    /// The state of a mesh that was cut along its faces. `lips` gives the incision of boundary faces, by
+    /// their nodes in ascending order; 0 or absent is skin.
     pub fn with_lips(mesh: TetMesh, lips: &BTreeMap<[u32; 3], u32>, epoch: u32) -> Result<Self, MeshError> {
         mesh.check()?;
         let mut fragments = Fragments::new(&mesh);
@@ -92,6 +92,7 @@ impl CutMesh {
         let mut pieces = PieceTable::new(&mesh);
         let mut copies = CopyTable::new(&mesh, &pieces);
         let mut new_copies = Vec::new();
+        // Vertices beyond those of the nodes belong to parts that meet only in a node or an edge.
         for v in mesh.nodes.len()..fragments.vertices.len() {
             let [node, ..] = fragments.vertices[v].nodes;
             copies.update(&mesh, node, &fragments, &mut pieces, &mut new_copies);
@@ -125,7 +126,7 @@ impl CutMesh {
         })
     }
 
-    /// The rest mesh; no cut changes it.
+    /// The rest mesh. Cuts do not change it.
     pub fn mesh(&self) -> &TetMesh {
         &self.mesh
     }
@@ -135,38 +136,38 @@ impl CutMesh {
         &self.pieces.pieces
     }
 
-    /// Pieces that the last sweep took apart, made, or gave other copies, ascending.
+    /// Pieces that the last sweep split, created or gave other copies, ascending.
     pub fn changed_pieces(&self) -> &[u32] {
         &self.copies.changed
     }
 
-    /// Fragments that the last sweep made, bisected or opened.
+    /// Fragments that the last sweep created, bisected or opened.
     pub(crate) fn changed_fragments(&self) -> &[u32] {
         &self.separator.changed
     }
 
-    /// Number of node copies.
+    /// Number of node copies, each with three degrees of freedom.
     pub fn n_copies(&self) -> usize {
         self.copies.node.len()
     }
 
-    /// Mesh node of every copy; the rest position of a copy is that of its node.
+    /// Mesh node of every copy. The rest position of a copy is that of its node.
     pub fn copy_node(&self) -> &[u32] {
         &self.copies.node
     }
 
-    /// The copies of `node` whose material contains the node itself, ascending: one, or more where a cut
-    /// passes exactly through it.
+    /// The copies of `node` whose material contains the node itself, ascending. There is one, or more where a
+    /// cut passes exactly through the node.
     pub fn copies_with_node(&self, node: u32) -> Vec<u32> {
         self.copies.with_node(&self.mesh, node, &self.fragments, &self.pieces)
     }
 
-    /// Copies of the pieces that have this copy.
+    /// Copies of all pieces that use this copy.
     pub(crate) fn tets_around(&self, copy: u32) -> Vec<[u32; 4]> {
         self.copies.tets_around(copy, &self.pieces)
     }
 
-    /// Σ over pieces of ∫ N_a dV [m³] per copy; its mass is density times this.
+    /// Σ over pieces of ∫ N_a dV [m³] per copy. The mass of a copy is the density times this.
     pub fn copy_volume(&self) -> &[f64] {
         &self.copies.volume
     }
@@ -181,17 +182,17 @@ impl CutMesh {
         self.pieces.node_products(&self.mesh, p as u32, &self.fragments)
     }
 
-    /// Rises whenever the topology changes.
+    /// Topology epoch: rises whenever the topology or its surface changes.
     pub fn epoch(&self) -> u32 {
         self.epoch
     }
 
-    /// What is shown of the mesh has changed without a cut.
+    /// Raises the epoch because the displayed mesh changed without a cut.
     pub(crate) fn raise_epoch(&mut self) {
         self.epoch += 1;
     }
 
-    /// Gives an earlier state an epoch of its own, when it becomes the present one again.
+    /// Sets the epoch of an earlier state that becomes the present one again.
     pub(crate) fn set_epoch(&mut self, epoch: u32) {
         self.epoch = epoch;
     }
@@ -201,13 +202,13 @@ impl CutMesh {
         &self.surface
     }
 
-    /// Where incisions have entered elements that they do not take apart yet; to be shown with the
-    /// [`surface`](Self::surface), which lags the blade by what is told here.
+    /// Where incisions have entered elements that they have not cut apart yet. Shown together with the
+    /// [`surface`](Self::surface), which lags the blade by these faces.
     pub fn pending_faces(&self) -> Vec<PendingFace> {
         self.pending.faces(&self.pending_pieces())
     }
 
-    /// Where blades went over the boundary without opening it.
+    /// Lines where blades passed over the boundary without opening it.
     pub(crate) fn trace_lines(&self) -> Vec<TraceLine> {
         self.traces.lines(&self.fragments, |vertices, incision| {
             let on = vertices.map(|v| self.sets.contains(self.fragments.on[v as usize], incision));
@@ -224,7 +225,7 @@ impl CutMesh {
         Pieces { mesh, fragments, pieces, crossings, sets }
     }
 
-    /// Loose parts and their rest volumes.
+    /// Loose parts of the body and their rest volumes.
     pub fn components(&self) -> Components {
         Components::of(&self.fragments, &self.pieces)
     }
@@ -234,12 +235,12 @@ impl CutMesh {
         self.copies.node.iter().map(|&n| self.mesh.nodes[n as usize]).collect()
     }
 
-    /// The piece of an element that holds the point with these barycentric coordinates.
+    /// The piece of an element that contains the point with these barycentric coordinates.
     pub fn piece_at(&self, element: u32, barycentric: [f64; 4]) -> u32 {
         piece_at(&self.mesh, &self.fragments, element, barycentric)
     }
 
-    /// Undoes all cuts; the epoch keeps rising.
+    /// Undoes all cuts. The epoch keeps rising.
     pub fn reset(&mut self) -> Result<(), MeshError> {
         let (epoch, inexact) = (self.epoch + 1, self.inexact);
         *self = Self::new(std::mem::take(&mut self.mesh))?;
@@ -249,9 +250,9 @@ impl CutMesh {
 
     /// Cuts along the surface the blade swept, given the current position [m] of every copy.
     ///
-    /// Successive sweeps with the same incision id continue one incision: the blade position the last
-    /// one ended with goes along with the material and is where this one begins. An incision never
-    /// cuts its own lips, so a stroke that crosses itself takes a new id there.
+    /// Successive sweeps with the same incision id continue one incision: the last blade position moves with
+    /// the material, and the next sweep starts there. An incision never cuts its own lips, so a stroke that
+    /// crosses itself needs a new id at the crossing.
     pub fn sweep(
         &mut self,
         x: &[Vector3<f64>],
@@ -264,9 +265,9 @@ impl CutMesh {
         Ok(self.complete(sweep, &mut work))
     }
 
-    /// Begins a sweep that is taken in parts, as [`sweep`](Self::sweep) makes it whole: then
-    /// [`detect`](Self::detect) with the same positions until it says true, then
-    /// [`complete`](Self::complete). Until then no other sweep may begin. The result has the same bits,
+    /// Begins a sweep that is taken in parts. [`sweep`](Self::sweep) does the same in one call. Next come
+    /// calls of [`detect`](Self::detect) with the same positions until it returns `true`, then
+    /// [`complete`](Self::complete). No other sweep may begin before that. The result has the same bits,
     /// however many parts there are.
     pub fn begin_sweep(
         &mut self,
@@ -286,6 +287,7 @@ impl CutMesh {
         if let Some(copy) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
             return Err(CutError::NonFinitePosition { copy });
         }
+        // The sweep starts where the material has carried the last blade position of this incision.
         let mut triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
         triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
         let bounds = bounds(&triangles, blade);
@@ -301,8 +303,8 @@ impl CutMesh {
         Ok(SweepUnderWay { triangles, incision, place, most_fragments: limits.fragments })
     }
 
-    /// Looks for where the sweep crosses the body at the positions `x` [m] it began with; true when all was
-    /// looked at.
+    /// Searches for crossings of the sweep with the body at the positions `x` [m] it began with. Returns
+    /// `true` when the search is complete.
     pub fn detect(&mut self, x: &[Vector3<f64>], sweep: &mut SweepUnderWay, work: &mut Work) -> bool {
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
@@ -311,7 +313,7 @@ impl CutMesh {
         self.detector.run(&body, &sweep.triangles, &mut record, (&mut sweep.place, work))
     }
 
-    /// Separates what the sweep was found to cut, at once.
+    /// Separates everything that the detection found to be cut, in one call.
     pub fn complete(&mut self, sweep: SweepUnderWay, work: &mut Work) -> CutReport {
         let SweepUnderWay { incision, most_fragments, .. } = sweep;
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
@@ -327,7 +329,7 @@ impl CutMesh {
         report
     }
 
-    /// Pieces, copies and surface of what the separator changed.
+    /// Updates pieces, copies and surface after a separation.
     fn follow_separation(&mut self) -> CutReport {
         let mut report = CutReport {
             elements_cut: self.separator.elements.len(),
@@ -348,7 +350,7 @@ impl CutMesh {
         }
         self.order.sort(&mut self.copies.changed);
         if !self.separator.changed.is_empty() {
-            // Faces that are halved or opened but take no piece apart change the surface alone.
+            // Faces that are halved or opened without splitting a piece change only the surface.
             self.epoch += 1;
             let material = Material { mesh: &self.mesh, fragments: &self.fragments, pieces: &self.pieces };
             let Separator { changed, moved, .. } = &self.separator;

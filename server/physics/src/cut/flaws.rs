@@ -1,4 +1,4 @@
-//! What is true of every cut state, whatever was cut, checked.
+//! Checks of what must hold in every cut state, whatever was cut.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,21 +6,22 @@ use super::cut_mesh::CutMesh;
 use super::shell::surface::Surface;
 use crate::disjoint::{find, join};
 
-/// What is wrong with cut states: counts that must be zero, errors that must be rounding.
+/// Violations of the invariants of cut states: counts must be zero, errors must be at rounding level.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Flaws {
-    /// Places at which the surface is not closed and 2-manifold ([`Surface::n_defects`]).
+    /// Defects that keep the surface from being closed and 2-manifold ([`Surface::n_defects`]).
     pub surface: usize,
     /// Largest |Σ w_c − 1| over the fractions w_c of an element's pieces.
     pub fractions: f64,
-    /// |volume of the copies, and within the surface, over that of the mesh − 1|, the larger.
+    /// The larger of two relative volume errors |V / V_mesh − 1|: V summed over the copies, and V enclosed by
+    /// the surface.
     pub volume: f64,
-    /// Parts counted by the material that hangs together, less those counted by shared copies.
+    /// Difference between two counts of loose parts: by connected material, and by shared copies.
     pub parts: usize,
 }
 
 impl Flaws {
-    /// The flaws of a cut state.
+    /// Measures all flaws of one cut state.
     pub fn of(mesh: &CutMesh) -> Self {
         let rest = mesh.mesh();
         let total: f64 = rest.volumes().iter().sum();
@@ -38,7 +39,7 @@ impl Flaws {
         }
     }
 
-    /// Takes over what is worse in `other`.
+    /// Adds the defects of `other` and keeps the larger of every other flaw.
     pub fn merge(&mut self, other: Flaws) {
         self.surface += other.surface;
         self.fractions = self.fractions.max(other.fractions);
@@ -48,10 +49,12 @@ impl Flaws {
 }
 
 impl Surface {
-    /// Directed edges that have no opposite or are there twice, and vertices whose link is not one cycle.
+    /// Number of directed edges without an opposite or present twice, and of vertices whose link is not one
+    /// cycle.
     pub fn n_defects(&self) -> usize {
         let mut wrong = 0;
         let mut edges = BTreeSet::new();
+        // Per vertex a, for every triangle at it, the opposite edge from b to c.
         let mut link: BTreeMap<u32, BTreeMap<u32, u32>> = BTreeMap::new();
         for t in &self.triangles {
             for k in 0..3 {
@@ -63,6 +66,7 @@ impl Surface {
         wrong += edges.iter().filter(|&&(a, b)| !edges.contains(&(b, a))).count();
         for next in link.values() {
             let Some(&first) = next.keys().next() else { continue };
+            // The vertex is manifold if one cycle passes every edge of its link.
             let (mut at, mut length) = (first, 0);
             while let Some(&b) = next.get(&at) {
                 (at, length) = (b, length + 1);
@@ -75,7 +79,7 @@ impl Surface {
         wrong
     }
 
-    /// Closed shells, which share no vertex.
+    /// Number of closed shells. Two shells share no vertex.
     pub fn n_shells(&self) -> usize {
         let mut root: Vec<u32> = (0..self.vertices.len() as u32).collect();
         for t in &self.triangles {

@@ -1,6 +1,7 @@
-//! What a blade has drawn on the surface without taking the material apart: where it entered elements
-//! that it has not left yet, or only scratched. Shown as lines, its [`traces`](super::drawn::traces) follow the
-//! blade at once, while the cut lags by at most one element.
+//! Lines that a blade has drawn on the surface without cutting the material apart: where it has entered
+//! elements but not left them, or only scratched. They are displayed from the
+//! [`traces`](super::drawn::traces), which follow the blade at once, while the cut lags by at most one
+//! element.
 
 use nalgebra::Vector3;
 
@@ -11,7 +12,7 @@ use super::shell::surface::{SurfaceVertex, bind};
 /// A point on the surface: Σ weights · vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkPoint {
-    /// Vertices around it, or thrice the point itself.
+    /// Surface vertices around the point, or three times the point itself.
     pub vertices: [SurfaceVertex; 3],
     /// Weight of each, Σ = 1.
     pub weights: [f64; 3],
@@ -22,17 +23,17 @@ pub struct MarkPoint {
 pub struct IncisionMark {
     /// The incision.
     pub incision: u32,
-    /// From where to where.
+    /// Start and end of the line.
     pub ends: [MarkPoint; 2],
 }
 
 impl MarkPoint {
-    /// A point bound to the material.
+    /// A mark point at a surface vertex.
     pub fn at(vertex: SurfaceVertex) -> Self {
         Self { vertices: [vertex; 3], weights: [1.0, 0.0, 0.0] }
     }
 
-    /// Position [m], given the position of every copy.
+    /// Position [m] at the positions `x` of the copies.
     pub fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
         let held = self.vertices.iter().zip(&self.weights).filter(|(_, w)| **w != 0.0);
         held.map(|(vertex, &w)| vertex.position(x) * w).sum()
@@ -40,13 +41,13 @@ impl MarkPoint {
 }
 
 impl CutMesh {
-    /// Marks on the [`surface`](Self::surface), by incision and place: where a blade went and the
-    /// incision has not opened.
+    /// Marks on the [`surface`](Self::surface) where a blade went and its incision has not opened, ordered by
+    /// incision, fragment and face.
     pub fn incision_marks(&self) -> Vec<IncisionMark> {
         self.trace_lines().iter().map(|line| self.mark(line)).collect()
     }
 
-    /// A line on the boundary of a fragment, bound to its piece.
+    /// Binds a line on the boundary of a fragment to its piece.
     pub(crate) fn mark(&self, line: &TraceLine) -> IncisionMark {
         let piece = self.fragments.piece[line.fragment as usize];
         let ends = line.ends.map(|end| MarkPoint::at(bind(self.mesh(), &self.pieces, piece, &end)));

@@ -4,21 +4,21 @@
 //! A cut never edits the element mesh. Three layers follow from each other, each a pure function of
 //! the one before:
 //!
-//! 1. [`fragments`](topology::fragments): a conforming tet mesh *inside* the elements, at first one fragment per element,
-//!    refined by bisecting edges where a blade crosses them. Cut faces are opened here and nowhere
-//!    else.
-//! 2. [`pieces`](topology::pieces): the face-connected components of the fragments of one element. A linear element
-//!    has a constant deformation gradient per piece, so mechanics needs only its volume fraction.
-//! 3. [`copies`](topology::copies): the components of the pieces around a node. Each is one set of degrees of freedom.
+//! 1. [`fragments`](topology::fragments): a conforming tet mesh *inside* the elements, at first one fragment
+//!    per element, refined by bisecting edges where a blade crosses them. Cut faces are opened only here.
+//! 2. [`pieces`](topology::pieces): the face-connected components of the fragments of one element. A linear
+//!    element has a constant deformation gradient per piece, so mechanics needs only its volume fraction.
+//! 3. [`copies`](topology::copies): the components of the pieces around a node. Each is one set of degrees of
+//!    freedom.
 //!
-//! Crack fronts, branches, crossings and re-cuts need no case analysis: they are what connectivity
-//! says they are.
+//! Crack fronts, branches, crossings and repeated cuts need no case analysis: they follow from the
+//! connectivity.
 //!
 //! # Limit
-//! Between the edges it crosses a sheet is flat, so a bend inside an element is cut off by a chord. A
-//! branch that is to come off another incision's bend begins a little before it, as a blade does that
-//! reaches into the wound; one that begins exactly there may end before the lip. Vertices at bends would
-//! mend that, but a blade that trembles bends all the time.
+//! A sheet is flat between the edges it crosses, so a bend inside an element is cut off by a chord. A branch
+//! that is to leave another incision at its bend must begin a little before the bend, like a blade that
+//! reaches into the wound. A branch that begins exactly at the bend may end before the lip. Vertices at bends
+//! would cure that, but a trembling blade bends all the time.
 //!
 //! # Source
 //! Molino, Bao, Fedkiw 2004; Sifakis, Der, Fedkiw 2007; Wang, Jiang, Schroeder, Teran 2014 (virtual

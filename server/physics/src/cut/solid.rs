@@ -1,7 +1,8 @@
-//! The material as tetrahedra that fill it once: the fragments of all pieces, each bound to its piece.
+//! The material as tetrahedra that fill it without overlap: the fragments of all pieces, each bound to its
+//! piece.
 //!
-//! A cut element counts in mechanics as one whole tetrahedron per piece, and these overlap. What is to be
-//! drawn, sliced or measured is this.
+//! Mechanics treats every piece of a cut element as one whole tetrahedron, and these overlap. Drawing,
+//! slicing and measuring use the [`Solid`] instead.
 
 use std::collections::BTreeMap;
 
@@ -11,19 +12,19 @@ use super::shell::surface::{SurfaceVertex, bind};
 /// Tetrahedra without overlap; their volumes add up to that of the body, in every configuration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Solid {
-    /// Points of the material; the two sides of a cut have each their own.
+    /// Points of the material. The two sides of a cut have separate points.
     pub vertices: Vec<SurfaceVertex>,
     /// Vertex ids, positively oriented at rest.
     pub tets: Vec<[u32; 4]>,
-    /// Piece each tetrahedron is part of.
+    /// Piece each tetrahedron belongs to.
     pub piece: Vec<u32>,
 }
 
 impl CutMesh {
-    /// The fragments of all pieces.
+    /// The fragments of all pieces as one mesh, built anew at each call.
     pub fn solid(&self) -> Solid {
         let mut solid = Solid::default();
-        // Two pieces share a point where they share the copies that move it.
+        // Two pieces share a point exactly where they share the copies that move it.
         let mut ids: BTreeMap<(u32, [u32; 4]), u32> = BTreeMap::new();
         let fragments = &self.fragments;
         for (t, tet) in fragments.tets.iter().enumerate() {

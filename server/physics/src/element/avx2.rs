@@ -17,7 +17,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use super::lanes::{Ids, Lanes, Vector8};
 
-/// Eight lanes in one AVX register. To be used only inside functions that enable AVX2 and FMA.
+/// Eight lanes in one AVX register, for use only inside functions that enable AVX2 and FMA.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub struct Register(__m256);
@@ -185,7 +185,8 @@ unsafe fn pair(low: __m128, high: __m128) -> __m256 {
     unsafe { _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low), high) }
 }
 
-/// Pairs of rows (0 | 4), (1 | 5), (2 | 6), (3 | 7) of four numbers to the first three columns.
+/// Transposes pairs of rows (0 | 4), (1 | 5), (2 | 6), (3 | 7) of four numbers into their first three
+/// columns.
 #[inline(always)]
 unsafe fn columns([r04, r15, r26, r37]: [__m256; 4]) -> [Register; 3] {
     // SAFETY: only reached from functions that enable AVX2.
@@ -200,7 +201,7 @@ unsafe fn columns([r04, r15, r26, r37]: [__m256; 4]) -> [Register; 3] {
     }
 }
 
-/// Three columns to pairs of rows (x, y, z, 0): (0 | 4), (1 | 5), (2 | 6), (3 | 7).
+/// Transposes three columns into pairs of rows (x, y, z, 0): (0 | 4), (1 | 5), (2 | 6), (3 | 7).
 #[inline(always)]
 unsafe fn rows(x: __m256, y: __m256, z: __m256) -> [__m256; 4] {
     // SAFETY: only reached from functions that enable AVX2.
@@ -224,7 +225,7 @@ mod tests {
 
     const N: usize = 11;
 
-    /// What every method gives for some rows; run for registers and for plain lanes.
+    /// Results of every method for some rows, to compare registers with plain lanes.
     #[inline(always)]
     fn everything<V: Vector8>(x: &[[f32; 4]; N], ids: &[Ids; 2]) -> (Vec<Lanes>, Vec<u8>, Vec<f32>) {
         let wide: Vec<[f64; 4]> = x.iter().map(|r| [r[0] + 1e6, r[1], r[2], 0.0].map(f64::from)).collect();

@@ -1,12 +1,12 @@
 //! Eight single-precision numbers that are computed together.
 //!
-//! Kernels are written once over [`Vector8`]. [`Lanes`] is its portable form and the form in memory;
-//! on x86-64 the same kernels run on AVX2 registers behind run-time detection. (Leaving it to the
-//! compiler to find vectors in plain arrays costs a factor of four.)
+//! Kernels are written once, over [`Vector8`]. [`Lanes`] is its portable implementation and the form in
+//! memory. On x86-64 the same kernels run on AVX2 registers, chosen by run-time detection. (Leaving the
+//! vectorisation of plain arrays to the compiler costs a factor of four.)
 //!
-//! Code over [`Vector8`] keeps to loops and plain arrays: the closures of `array::map` and
-//! `array::from_fn` are compiled without the instruction set of the kernel around them, and a single
-//! call that is not inlined costs more than the arithmetic in it.
+//! Code over [`Vector8`] uses only loops and plain arrays. The closures of `array::map` and `array::from_fn`
+//! are compiled without the instruction set of the kernel around them, and a single call that is not inlined
+//! costs more than its arithmetic.
 
 #![allow(unsafe_code)] // unchecked rows; vector instructions are in `avx2`
 
@@ -23,19 +23,20 @@ pub struct Lanes(
     pub [f32; LANES],
 );
 
-/// The instruction set the kernels use.
+/// The instruction set that the kernels use.
 ///
-/// AVX2 contracts multiply-adds, so the two differ in the last bits; each alone is reproducible.
+/// AVX2 contracts multiply-adds, so the results of the two differ in the last bits. Each alone is
+/// reproducible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Simd {
-    /// What every machine of the architecture has. Same bits on every such machine.
+    /// Instructions that every machine of the architecture has. All such machines compute the same bits.
     Baseline,
     /// AVX2 with fused multiply-add.
     Avx2,
 }
 
 impl Simd {
-    /// The best set of this machine.
+    /// The best instruction set of this machine.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
@@ -45,7 +46,7 @@ impl Simd {
     }
 }
 
-/// Row numbers of eight lanes.
+/// Row numbers of the eight lanes.
 pub type Ids = [u16; LANES];
 
 /// Arithmetic on eight lanes.
@@ -54,9 +55,9 @@ pub trait Vector8:
 {
     /// The same number in every lane.
     fn splat(value: f32) -> Self;
-    /// From memory.
+    /// Reads eight numbers from memory.
     fn load(lanes: &Lanes) -> Self;
-    /// To memory.
+    /// Writes eight numbers to memory.
     fn store(self) -> Lanes;
     /// self · b + c, fused where the machine can.
     fn mul_add(self, b: Self, c: Self) -> Self;
@@ -64,7 +65,7 @@ pub trait Vector8:
     fn recip(self) -> Self;
     /// √self.
     fn sqrt(self) -> Self;
-    /// One bit per lane, lane 0 lowest: whether it is above `threshold`. NaN is not.
+    /// One bit per lane, lane 0 lowest: set if the lane is above `threshold`. It is not set for NaN.
     fn above(self, threshold: f32) -> u8;
 
     /// Rows `ids` of `x` as vectors of x, y and z.
@@ -73,8 +74,8 @@ pub trait Vector8:
     /// All `ids` are below the length of `x`.
     unsafe fn gather(x: &[[f32; 4]], ids: &Ids) -> [Self; 3];
 
-    /// Rows `to` minus rows `from` of `x`, subtracted in double precision and then rounded: the
-    /// error is relative to the difference, not to the distance from the origin.
+    /// Rows `to` minus rows `from` of `x`, subtracted in double precision and then rounded. The error is
+    /// relative to the difference, not to the distance from the origin.
     ///
     /// # Safety
     /// All numbers in `from` and `to` are below the length of `x`.

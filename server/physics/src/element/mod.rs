@@ -1,5 +1,5 @@
-//! Elements: the linear tetrahedron with the rotation of its deformation gradient, the quadratic
-//! tetrahedron, the trilinear hexahedron, and the spring between two nodes.
+//! Elements: the linear tetrahedron and the rotation of its deformation gradient, the quadratic tetrahedron,
+//! the trilinear hexahedron, and the spring between two nodes.
 
 mod polar;
 mod lanes;

@@ -1,18 +1,18 @@
-//! Rotation of one deformation gradient, for every F: stretched, inverted, flat, zero.
+//! Rotation of one deformation gradient, for every F: stretched, inverted, flat or zero.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-/// Steps are capped at |ω| = 0.5, that is at 106° per iteration.
+/// Steps are capped at |ω| = 0.5, which is 106° per iteration.
 const LARGEST_STEP: f64 = 0.5;
-/// Curvatures count by size, so that every step descends, and at least this much of ‖F‖.
+/// Curvatures are used by magnitude, so that every step descends, and are at least this share of ‖F‖.
 const HESSIAN_FLOOR: f64 = 1e-9;
 const MOST_ITERATIONS: usize = 60;
 
 /// The rotation R that maximises tr(RᵀF), starting from `warm`.
 ///
 /// For det F < 0 this is the proper rotation that leaves the smallest singular value negative, so a
-/// corotational element is pushed back the short way. Where F does not define a rotation (rank ≤ 1)
-/// the result stays as near to `warm` as F allows, which keeps it steady in time.
+/// corotational element is pushed back the short way. Where F does not define a rotation (rank ≤ 1), the
+/// result stays as close to `warm` as F allows. This keeps it continuous in time.
 ///
 /// # Derivation
 /// With B = RᵀF, −tr(exp(−\[θ\])B) = −tr B + θ·g + ½ θᵀHθ + …, g_i = ε_ijk B_jk,
@@ -37,6 +37,7 @@ pub fn polar_rotation(F: &Matrix3<f64>, warm: &Matrix3<f64>) -> Matrix3<f64> {
         let eigen = H.symmetric_eigen();
         let lowest = eigen.eigenvalues.imin();
         let least = eigen.eigenvalues[lowest];
+        // The gradient vanishes at every stationary point; only a maximum of the trace ends the search.
         if g.norm() < 1e-14 {
             if least > -1e-12 {
                 break;
@@ -61,7 +62,7 @@ pub fn polar_rotation(F: &Matrix3<f64>, warm: &Matrix3<f64>) -> Matrix3<f64> {
     q.to_rotation_matrix().into_inner()
 }
 
-/// The unit quaternion ((1−|ω|²), 2ω)/(1+|ω|²), a turn by 4·atan|ω| about ω.
+/// The unit quaternion ((1−|ω|²), 2ω)/(1+|ω|²), a rotation by 4·atan|ω| about ω.
 fn cayley(omega: Vector3<f64>) -> UnitQuaternion<f64> {
     let w = omega.norm_squared();
     let v = 2.0 * omega;

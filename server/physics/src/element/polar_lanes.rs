@@ -5,29 +5,28 @@ use super::Vector8;
 /// A 3×3 matrix in every lane, row by row.
 pub type Mat3<V> = [V; 9];
 
-/// Below det F / (‖F‖/√3)³ = 0.01 a lane is inverted, flat or needle-like, and Newton's inverse
-/// loses digits there: the caller takes the guarded rotation instead. So it does where ‖F‖² leaves
-/// single precision.
+/// Below det F / (‖F‖/√3)³ = 0.01 a lane is inverted, flat or needle-like, and Newton's inverse loses digits.
+/// The caller then uses the guarded rotation. The same holds where ‖F‖² leaves the range of single precision.
 const WELL_CONDITIONED: f32 = 0.01;
 /// Above this det F / (‖F‖/√3)³ no stretch is further than 0.18 from 1, and the error e ← e²/2(1+e)
 /// of three plain iterations is below 2e-8.
 const NEARLY_RIGID: f32 = 0.95;
 /// Above this the stretches are within 0.6 … 1.5 and four plain iterations reach 1e-8.
 const MODERATE: f32 = 0.75;
-/// All lanes.
+/// Mask of all lanes.
 const ALL: u8 = u8::MAX;
 
-/// Polar rotations by Newton's iteration X ← ½(ζX + X⁻ᵀ/ζ), and one bit per lane that tells whether
-/// it can be trusted.
+/// Polar rotations by Newton's iteration X ← ½(ζX + X⁻ᵀ/ζ), and one bit per lane that is set if its rotation
+/// can be trusted.
 ///
-/// ζ = √(‖X⁻¹‖/‖X‖) (Frobenius) for the first two of five iterations. Batches whose lanes are all
-/// stretched little (which det F tells) make three or four with ζ = 1. Error against the SVD 3e-7.
+/// ζ = √(‖X⁻¹‖/‖X‖) (Frobenius) for the first two of five iterations. Batches whose lanes are all stretched
+/// little, as det F shows, take three or four iterations with ζ = 1. The error against the SVD is 3e-7.
 ///
 /// # Source
 /// Higham 1986, "Computing the polar decomposition, with applications".
 #[inline(always)]
 pub fn polar_newton<V: Vector8>(F: &Mat3<V>) -> (Mat3<V>, u8) {
-    // Size does not matter to the rotation, but it would to the cubes and squares below.
+    // Scaling F leaves the rotation unchanged, and keeps the cubes and squares below in range.
     let shrink = (norm_squared(F) * V::splat(1.0 / 3.0)).sqrt().recip();
     let mut X = *F;
     for i in 0..9 {

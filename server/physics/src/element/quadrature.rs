@@ -53,13 +53,13 @@ pub fn cube_gauss(n: usize) -> Vec<QuadraturePoint> {
     points
 }
 
-/// Points with barycentric coordinates (a, a, a, 1 − 3a) in all orders.
+/// Points with barycentric coordinates (a, a, a, 1 − 3a) in every order.
 fn corner_orbit(a: f64) -> [Vector3<f64>; 4] {
     let b = 1.0 - 3.0 * a;
     [Vector3::repeat(a), Vector3::new(b, a, a), Vector3::new(a, b, a), Vector3::new(a, a, b)]
 }
 
-/// Points with barycentric coordinates (a, a, ½ − a, ½ − a) in all orders.
+/// Points with barycentric coordinates (a, a, ½ − a, ½ − a) in every order.
 fn edge_orbit(a: f64) -> [Vector3<f64>; 6] {
     let b = 0.5 - a;
     [

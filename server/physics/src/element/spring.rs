@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::material::Tangent;
 
-/// Below this fraction of the rest length a spring has no direction.
+/// A spring shorter than this fraction of its rest length has no direction.
 const NO_DIRECTION: f64 = 1e-12;
 
 /// A linear spring along the line between two nodes: ψ = k/2 (l − L)² \[J\].
@@ -21,7 +21,7 @@ pub struct Spring {
 }
 
 impl Spring {
-    /// Unit direction from `xa` to `xb` and the length [m]; no direction for coinciding ends.
+    /// Unit direction from `xa` to `xb`, and the length [m]. Coinciding ends have no direction.
     fn direction(&self, xa: &Vector3<f64>, xb: &Vector3<f64>) -> (Vector3<f64>, f64) {
         let d = xb - xa;
         let length = d.norm();
@@ -37,14 +37,14 @@ impl Spring {
         0.5 * self.stiffness_n_m * (self.direction(xa, xb).1 - self.rest_length_m).powi(2)
     }
 
-    /// ∂ψ/∂x_b = k (l − L) n [N]; that of the other end is its opposite.
+    /// ∂ψ/∂x_b = k (l − L) n [N]. The force at the other end is its negative.
     pub fn force(&self, xa: &Vector3<f64>, xb: &Vector3<f64>) -> Vector3<f64> {
         let (n, length) = self.direction(xa, xb);
         self.stiffness_n_m * (length - self.rest_length_m) * n
     }
 
-    /// ∂²ψ/∂x_b² = k n nᵀ + k (1 − L/l)(I − n nᵀ) [N/m]; a compressed spring has a negative second
-    /// part, which is left out unless the tangent is [`Tangent::Exact`].
+    /// ∂²ψ/∂x_b² = k n nᵀ + k (1 − L/l)(I − n nᵀ) [N/m]. The second part is negative for a compressed spring
+    /// and is then omitted, unless the tangent is [`Tangent::Exact`].
     pub fn stiffness(&self, xa: &Vector3<f64>, xb: &Vector3<f64>, kind: Tangent) -> Matrix3<f64> {
         let (n, length) = self.direction(xa, xb);
         let along = n * n.transpose();

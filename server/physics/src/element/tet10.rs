@@ -1,5 +1,4 @@
-//! The quadratic tetrahedron with ten nodes: corners, then the middles of the edges
-//! [`TET_EDGES`].
+//! The quadratic tetrahedron with ten nodes: corners, then the midpoints of the edges [`TET_EDGES`].
 //!
 //! On a straight-sided element the four-point rule integrates the linear stiffness exactly; a single
 //! point would leave rank 6 of 24. Row sums of the mass matrix are negative at corners (−m/20), so the
@@ -27,7 +26,7 @@ fn barycentric(xi: &Vector3<f64>) -> [f64; 4] {
     [1.0 - xi.x - xi.y - xi.z, xi.x, xi.y, xi.z]
 }
 
-/// Shape functions at ξ: L_a (2 L_a − 1) at corners, 4 L_a L_b at middles.
+/// Shape functions at ξ: L_a (2 L_a − 1) at corners, 4 L_a L_b at midpoints.
 pub fn shape(xi: &Vector3<f64>) -> [f64; 10] {
     let L = barycentric(xi);
     std::array::from_fn(|n| {

@@ -1,5 +1,5 @@
-//! The linear tetrahedron in double precision: the reference the fast kernels are held against, and
-//! what energies, reactions and static residuals are computed with.
+//! The linear tetrahedron in double precision. It is the reference for the fast kernels, and computes
+//! energies, reactions and static residuals.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,7 +18,7 @@ pub fn piece_energy(law: Law, lame: Lame, F: &Matrix3<f64>, volume_m3: f64) -> f
     volume_m3 * law.energy(F, lame)
 }
 
-/// Internal forces f_a = w V P g_a [N] of a piece, to be subtracted from the loads.
+/// Internal forces f_a = w V P g_a [N] of a piece. They are subtracted from the loads.
 pub fn piece_forces(stress: &Matrix3<f64>, g: &[Vector3<f64>; 4], volume_m3: f64) -> [Vector3<f64>; 4] {
     let f = [1, 2, 3].map(|a| volume_m3 * (stress * g[a]));
     [-(f[0] + f[1] + f[2]), f[0], f[1], f[2]]

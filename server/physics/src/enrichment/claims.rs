@@ -1,31 +1,31 @@
-//! What the thesis says about the critical time step of cut elements, and what comes out.
+//! Claims of the thesis on the critical time step of cut elements, compared with computed results.
 
 use super::{
     CutElement, Enrichment, EnrichmentError, Lumping, StepFigure, cut_places, regular_tet, thesis_figures,
 };
 
-/// A statement of Jeřábková 2007 §3.2, held against what is computed here.
+/// A statement of Jeřábková 2007 §3.2, compared with what is computed here.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Claim {
     /// Figure or equation.
     pub place: &'static str,
-    /// What is printed.
+    /// The statement as printed.
     pub printed: &'static str,
-    /// Whether it is so.
+    /// Whether the computation confirms it.
     pub holds: bool,
-    /// What comes out, in figures.
+    /// The computed values.
     pub found: String,
-    /// What to do instead, or what follows.
+    /// The correction, or what follows from the result.
     pub instead: &'static str,
 }
 
-/// Ends of the bar at which a claim is tried.
+/// Position of the cut near an end of the bar at which a claim is tested.
 const SLIVER: f64 = 1e-4;
-/// Places of the cut on each curve.
+/// Positions of the cut on each curve.
 const PLACES: usize = 60;
 
-/// All claims of the section. Nothing in them is written down beforehand but the words: the figures and
-/// whether a claim holds are computed.
+/// All claims of the section. Only their wording is fixed in advance: the values, and whether a claim holds,
+/// are computed.
 pub fn thesis_claims() -> Result<Vec<Claim>, EnrichmentError> {
     let figures = thesis_figures(&cut_places(PLACES))?;
     Ok(vec![
@@ -40,7 +40,7 @@ pub fn thesis_claims() -> Result<Vec<Claim>, EnrichmentError> {
     ])
 }
 
-/// Least and largest value of one curve; (∞, 0) if there is none.
+/// Smallest and largest value of one curve; (∞, 0) if there is none.
 fn range(figures: &[StepFigure], number: &str, lumping: Lumping) -> (f64, f64) {
     let curves = figures.iter().filter(|f| f.number == number).flat_map(|f| &f.curves);
     let of = curves.filter(|c| c.lumping == lumping);

@@ -1,4 +1,4 @@
-//! One element that is cut in two: stiffness in every basis, critical time step.
+//! One element cut in two: its stiffness in every basis, and its critical time step.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use thiserror::Error;
@@ -8,7 +8,7 @@ use super::{Enrichment, Lumping, Piece, Side, bar_pieces, tet_pieces};
 use crate::material::Lame;
 use crate::mesh::{tet_gradients, tet_volume};
 
-/// Why there is no answer for a cut element.
+/// Why a cut element cannot be analysed.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum EnrichmentError {
     /// The cut leaves one side without material or goes through a node.
@@ -17,14 +17,14 @@ pub enum EnrichmentError {
     /// The mass matrix is singular in double precision.
     #[error("the mass matrix is singular: pivot {pivot} of the scaled matrix is {value:e}")]
     SingularMass {
-        /// Number of the degree of freedom.
+        /// Index of the degree of freedom.
         pivot: usize,
-        /// Its pivot; 1 for a mass matrix without coupling.
+        /// Its pivot. A mass matrix without coupling has pivots of 1.
         value: f64,
     },
 }
 
-/// A bar or a linear tet that is cut in two, in its rest configuration and for small strains.
+/// A bar or a linear tet cut in two, in its rest configuration and for small strains.
 #[derive(Clone, Debug)]
 pub struct CutElement {
     /// Stiffness of the uncut element [N/m], (d n) × (d n), direction fastest.
@@ -36,7 +36,7 @@ pub struct CutElement {
 }
 
 impl CutElement {
-    /// A bar of length 1, E = A = ρ = 1 (they drop out of all ratios), cut at `c` in (0, 1).
+    /// A bar of length 1, E = A = ρ = 1 (they cancel in all ratios), cut at `c` in (0, 1).
     pub fn unit_bar(c: f64) -> Result<Self, EnrichmentError> {
         Ok(Self {
             whole: DMatrix::from_row_slice(2, 2, &[1.0, -1.0, -1.0, 1.0]),
@@ -100,10 +100,10 @@ impl CutElement {
         K
     }
 
-    /// ω_max [rad/s] of K − ω² M.
+    /// Largest angular frequency ω_max [rad/s] of K − ω² M.
     pub fn omega_max(&self, enrichment: Enrichment, lumping: Lumping) -> Result<f64, EnrichmentError> {
-        // Such a mass gives the same frequencies in every basis, for they span the same displacements;
-        // that of the pieces does not become singular as one of them gets small.
+        // Such a mass has the same frequencies in every basis, for all bases span the same displacements. The
+        // basis of copies does not become singular as a piece gets small.
         let enrichment = if lumping.is_of_the_pieces() { Enrichment::Substitution } else { enrichment };
         let M =
             self.mass(enrichment, lumping).kronecker(&DMatrix::identity(self.dimensions, self.dimensions));
@@ -116,7 +116,7 @@ impl CutElement {
         largest_frequency(&self.whole, &DMatrix::from_diagonal_element(size, size, self.node_mass()))
     }
 
-    /// Critical time step over that of the uncut element with masses m/n.
+    /// Critical time step relative to that of the uncut element with masses m/n.
     pub fn critical_step_ratio(
         &self,
         enrichment: Enrichment,

@@ -1,4 +1,4 @@
-//! Forces and tangent of a linear tet that is cut in two, in blocks of u and a as the papers have them.
+//! Forces and tangent of a linear tet cut in two, in blocks of u and a as in the papers.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,7 +6,7 @@ use super::{Enrichment, EnrichmentError, Side, tet_stiffness};
 use crate::material::{Lame, Law, SignedSvd, Tangent};
 use crate::mesh::{tet_gradients, tet_volume};
 
-/// One vector or displacement for each node, of the standard and of the added degrees of freedom.
+/// One vector per node for the standard and for the added degrees of freedom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UA {
     /// Standard degrees of freedom u_i, or the forces f_i on them.
@@ -31,9 +31,9 @@ pub struct EnrichedTangent {
 /// An enriched linear tet: Jeřábková 2007 §§3.1.2–3.1.4 and 3.3, Schoch et al. 2013 §4.3, with their
 /// misprints corrected.
 ///
-/// With Ψ_ai and Ψ_bi, the values of ψ_i above (H = +1) and below the cut, and p_aj = p_0j + u_j +
-/// Ψ_aj a_j (3.25), p_bj alike (3.26), a piece is an element of volume V_a or V_b whose nodes are at
-/// p_a or p_b, and with f_ai the force of the whole element in that position on its node i
+/// Ψ_ai and Ψ_bi are the values of ψ_i above (H = +1) and below the cut, p_aj = p_0j + u_j + Ψ_aj a_j (3.25),
+/// and p_bj alike (3.26). A piece is an element of volume V_a or V_b with its nodes at p_a or p_b. With f_ai,
+/// the force of the whole element in that position on its node i,
 ///
 ///   f_i = V_a/V f_ai + V_b/V f_bi,  f_i^a = V_a/V Ψ_ai f_ai + V_b/V Ψ_bi f_bi
 ///
@@ -43,13 +43,13 @@ pub struct EnrichedTangent {
 /// | corotational | R_a Σ_j K_ij (R_aᵀ p_aj − p_0j) | R_a K_ij R_aᵀ | (3.24), (3.27), (3.53)–(3.56); Schoch (69)–(71) |
 /// | St. Venant–Kirchhoff | V F_a S_a β_i | by the chain rule | (3.34), (3.35), (3.57), (3.58) |
 ///
-/// Corrected: the sum of (3.23) runs over all 2n degrees of freedom and p_0 of a is 0; (2.27), (3.33)
-/// need the dyad F = I + Σ u_i ⊗ β_i; S Fᵀ of (3.31), (3.34)–(3.36) is the transpose of the first
-/// Piola–Kirchhoff stress F S, and f_i = V F S β_i; H_j in Schoch's (61) second case is −1; the
-/// conditions of Schoch's (71) are swapped. R K Rᵀ of (3.51) is not the derivative of the corotational
-/// force but the part of it with the rotation held, which is positive semidefinite.
+/// Corrected: the sum of (3.23) runs over all 2n degrees of freedom and p_0 of a is 0; (2.27), (3.33) need
+/// the dyad F = I + Σ u_i ⊗ β_i; S Fᵀ of (3.31), (3.34)–(3.36) is the transpose of the first Piola–Kirchhoff
+/// stress F S, and f_i = V F S β_i; H_j in Schoch's (61) second case is −1; the conditions of Schoch's (71)
+/// are swapped. R K Rᵀ of (3.51) is not the derivative of the corotational force. It is the part with the
+/// rotation held, which is positive semidefinite.
 ///
-/// For [`Enrichment::Substitution`] u and a are the copies of the two sides, see
+/// For [`Enrichment::Substitution`] u and a are the copies of the two sides; see
 /// [`Enrichment::coefficients`].
 #[derive(Clone, Debug)]
 pub struct EnrichedTet {
@@ -59,13 +59,13 @@ pub struct EnrichedTet {
     volume: f64,
     lame: Lame,
     sides: [Side; 4],
-    /// Of sides L and R.
+    /// Volume fractions of sides L and R.
     fractions: [f64; 2],
 }
 
 impl EnrichedTet {
-    /// The tet with `corners` [m] whose nodes are on `sides` of the cut, and which has the part
-    /// `above` = V_a/V of its volume above it (side R, H = +1).
+    /// The tet with `corners` [m] whose nodes are on `sides` of the cut. The part `above` = V_a/V of its
+    /// volume lies above the cut (side R, H = +1).
     pub fn new(
         corners: &[Vector3<f64>; 4],
         lame: Lame,
@@ -102,7 +102,7 @@ impl EnrichedTet {
         f
     }
 
-    /// J^X = ∂f^X/∂(u, a) [N/m] at the displacements `q` [m]; of the corotational law with the rotations
+    /// J^X = ∂f^X/∂(u, a) [N/m] at the displacements `q` [m]. For the corotational law the rotations are
     /// held.
     pub fn tangent(&self, enrichment: Enrichment, law: Law, q: &UA) -> EnrichedTangent {
         let zero = [[Matrix3::zeros(); 4]; 4];
@@ -128,7 +128,7 @@ impl EnrichedTet {
         [(Side::Left, self.fractions[0]), (Side::Right, self.fractions[1])]
     }
 
-    /// (3.25), (3.26): where the nodes of the piece on `side` are [m].
+    /// (3.25), (3.26): node positions [m] of the piece on `side`.
     fn positions(&self, enrichment: Enrichment, side: Side, q: &UA) -> [Vector3<f64>; 4] {
         std::array::from_fn(|j| {
             let [u, a] = enrichment.coefficients(side, self.sides[j]);
@@ -222,7 +222,7 @@ mod tests {
         EnrichedTet::new(&corners, LAME, SIDES, ABOVE).unwrap()
     }
 
-    /// Displacements without symmetry, pieces turned and stretched.
+    /// Displacements without symmetry, with rotated and stretched pieces.
     fn state() -> UA {
         let wave = |k: usize| Vector3::from_fn(|r, _| 0.35 * ((7 * k + 3 * r) as f64 * 1.7).sin());
         UA { u: std::array::from_fn(wave), a: std::array::from_fn(|i| wave(i + 4)) }
@@ -273,8 +273,8 @@ mod tests {
         }
     }
 
-    /// The forces in the papers' formulas are those of the laws: f_i = V P β_i with P of [`Law`]. Plain
-    /// St. Venant–Kirchhoff is meant; the state has no stretch below where the law is continued.
+    /// The forces in the papers' formulas are those of the laws: f_i = V P β_i with P of [`Law`]. The papers
+    /// mean plain St. Venant–Kirchhoff; no stretch of this state is below the point of continuation.
     #[test]
     fn forces_are_those_of_the_laws() {
         let tet = tet();
@@ -288,7 +288,7 @@ mod tests {
         }
     }
 
-    /// J^X is the derivative of f^X; for the corotational law where nothing is strained.
+    /// J^X is the derivative of f^X. The corotational law is tested in the unstrained state.
     #[test]
     fn tangent_is_the_derivative_of_the_forces() {
         let tet = tet();

@@ -1,34 +1,34 @@
-//! The critical time step of cut elements as the thesis plots it: curves of its Figs. 3.10–3.12.
+//! The critical time step of cut elements as plotted in the thesis: the curves of its Figs. 3.10–3.12.
 
 use nalgebra::Vector3;
 
 use super::{CutElement, Enrichment, EnrichmentError, Lumping};
 use crate::material::Lame;
 
-/// One figure, to be plotted: the critical time step against where the cut is.
+/// One figure to plot: the critical time step against the position of the cut.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepFigure {
     /// Number in Jeřábková 2007.
     pub number: &'static str,
-    /// What is shown.
+    /// Title of the figure.
     pub title: &'static str,
-    /// Label of the horizontal axis, 0 … 1; the vertical one is Δt_c/Δt_c⁰, 0 … 1.2, with Δt_c⁰ of the
-    /// uncut element with masses m/n.
+    /// Label of the horizontal axis, 0 … 1. The vertical axis is Δt_c/Δt_c⁰, 0 … 1.2, where Δt_c⁰ belongs to
+    /// the uncut element with masses m/n.
     pub abscissa: &'static str,
-    /// The curves.
+    /// The curves of the figure.
     pub curves: Vec<StepCurve>,
 }
 
-/// One curve.
+/// One curve of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepCurve {
     /// Label in the legend.
     pub name: &'static str,
-    /// The basis.
+    /// The basis of the curve.
     pub enrichment: Enrichment,
-    /// The mass matrix.
+    /// The mass matrix of the curve.
     pub lumping: Lumping,
-    /// (place of the cut, Δt_c/Δt_c⁰).
+    /// Points (position of the cut, Δt_c/Δt_c⁰).
     pub points: Vec<[f64; 2]>,
 }
 
@@ -44,7 +44,7 @@ impl StepCurve {
     }
 }
 
-/// The masses of the figures, with their labels.
+/// Mass matrices in the figures, with their labels.
 const MASSES: [(&str, Lumping); 6] = [
     ("consistent", Lumping::Consistent),
     ("row sums (3.42), (3.43)", Lumping::RowSum),
@@ -54,7 +54,7 @@ const MASSES: [(&str, Lumping); 6] = [
     ("masses of the copies", Lumping::Copies),
 ];
 
-/// `n` places of a cut in (0, 1), symmetric, half of them close to the ends, from 1e-4 on.
+/// `n` positions of a cut in (0, 1), symmetric, half of them close to the ends, from 1e-4 on.
 pub fn cut_places(n: usize) -> Vec<f64> {
     let near = (n / 4).max(2);
     let mut low: Vec<f64> = (0..near).map(|i| 1e-4 * 300_f64.powf(i as f64 / near as f64)).collect();
@@ -66,7 +66,8 @@ pub fn cut_places(n: usize) -> Vec<f64> {
     low
 }
 
-/// Figs. 3.10(a), 3.10(b), what 3.10(b) was drawn with, 3.11 and 3.12, at these places of the cut.
+/// Figs. 3.10(a), 3.10(b), the data that 3.10(b) was drawn with, 3.11 and 3.12, at these positions of the
+/// cut.
 pub fn thesis_figures(places: &[f64]) -> Result<Vec<StepFigure>, EnrichmentError> {
     let c = "position of the cut c";
     let bar = |number, title, enrichment| -> Result<StepFigure, EnrichmentError> {
@@ -110,8 +111,8 @@ fn tet_figure(places: &[f64]) -> Result<StepFigure, EnrichmentError> {
     })
 }
 
-/// A regular tet, ν = 0.35, with the part `v` of its volume and its first `below` nodes (1, or else 2)
-/// below a plane that divides all edges it cuts in the same ratio.
+/// A regular tet, ν = 0.35. A plane that divides all edges it cuts in the same ratio has the part `v` of the
+/// volume and the first `below` nodes (1, or else 2) below it.
 pub fn regular_tet(below: usize, v: f64) -> Result<CutElement, EnrichmentError> {
     let x = |x, y, z| Vector3::new(x, y, z);
     let corners = [x(1.0, 1.0, 1.0), x(1.0, -1.0, -1.0), x(-1.0, 1.0, -1.0), x(-1.0, -1.0, 1.0)];

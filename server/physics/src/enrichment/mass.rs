@@ -4,29 +4,29 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use super::{CutElement, Enrichment, EnrichmentError, Side};
 
-/// How the mass of a cut element is put on its degrees of freedom; formulas in [`super`].
+/// How the mass of a cut element is distributed to its degrees of freedom; formulas in [`super`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lumping {
     /// Full matrix ∫ρ N_i N_j over standard and enriched functions.
     Consistent,
-    /// Row sums, inside the standard and inside the enriched block.
+    /// Row sums within the standard block and within the enriched block.
     RowSum,
     /// Diagonal of the consistent matrix, scaled to the mass of the element.
     Hrz,
     /// As [`Hrz`](Self::Hrz), with the enriched block scaled to its own row-sum mass.
     HrzBlockMass,
     /// The weighted diagonal as printed in the thesis, (3.44) and (3.45): m M_ii / Σ_j M_ij. It does not
-    /// keep the mass: it gives 4/3 m for a bar and 1.6 m for a tet.
+    /// conserve mass: the total is 4/3 m for a bar and 1.6 m for a tet.
     HrzAsPrinted,
-    /// m/n, and (m/n) times the mean of ψ_i² for enriched degrees of freedom.
+    /// m/n, and for enriched degrees of freedom (m/n) times the mean of ψ_i².
     Menouillard,
-    /// The masses of the copies ρ ∫ N_i dV over the piece, seen in the basis: a 2×2 block for every node,
-    /// M_ua included. The only one of the lumped masses that weighs each piece as what it is.
+    /// The masses of the copies, ρ ∫ N_i dV over the piece, expressed in the basis: a 2×2 block for every
+    /// node, M_ua included. It is the only lumped mass that gives each piece its true weight.
     Copies,
 }
 
 impl Lumping {
-    /// All of them, in the order of the table.
+    /// All lumpings, in the order of the table.
     pub const ALL: [Self; 7] = [
         Self::Consistent,
         Self::RowSum,
@@ -37,7 +37,8 @@ impl Lumping {
         Self::Copies,
     ];
 
-    /// Whether the matrix is the same linear map in every basis, so that frequencies do not depend on it.
+    /// Whether the matrix is the same linear map in every basis, so that the frequencies are independent of
+    /// it.
     pub fn is_of_the_pieces(self) -> bool {
         matches!(self, Self::Consistent | Self::Copies)
     }
@@ -55,7 +56,7 @@ impl CutElement {
             return self.copy_mass(enrichment);
         }
         let n = self.n_nodes();
-        // The two diagonal blocks and what each of them should weigh.
+        // The two diagonal blocks, and below the mass that each should have.
         let block = |b: usize| consistent.view((b * n, b * n), (n, n));
         let mut lumped = DMatrix::zeros(2 * n, 2 * n);
         let standard_scale = self.mass_kg() / block(0).trace();
@@ -67,7 +68,7 @@ impl CutElement {
                 (Enrichment::Substitution, _) => block(b).sum() / block(b).trace(),
                 _ => standard_scale,
             };
-            // What the printed formula calls m: for substitution that of the piece.
+            // The m of the printed formula. For substitution it is the mass of the piece.
             let m = if enrichment == Enrichment::Substitution { block(b).sum() } else { self.mass_kg() };
             for i in 0..n {
                 lumped[(b * n + i, b * n + i)] = match lumping {
@@ -114,11 +115,11 @@ impl CutElement {
         M
     }
 
-    /// Inertia [kg] of the two pieces L and R against moving each as a whole, 2 × 2. What it should be is
-    /// the diagonal of their masses.
+    /// Inertia [kg] of the two pieces L and R against translation of each as a whole, 2 × 2. It should be the
+    /// diagonal matrix of their masses.
     ///
-    /// A rigid translation of the pieces by d_L, d_R is q = T d in the degrees of freedom of the basis,
-    /// and Tᵀ M T what resists it.
+    /// A rigid translation of the pieces by d_L, d_R is q = T d in the degrees of freedom of the basis, so
+    /// the inertia is Tᵀ M T.
     pub fn piece_inertia(&self, enrichment: Enrichment, lumping: Lumping) -> Matrix2<f64> {
         let n = self.n_nodes();
         let mut T = DMatrix::zeros(2 * n, 2);
@@ -134,8 +135,8 @@ impl CutElement {
         Matrix2::new(inertia[(0, 0)], inertia[(0, 1)], inertia[(1, 0)], inertia[(1, 1)])
     }
 
-    /// Accelerations of the pieces L and R in free fall, over g: under their true weights and with the
-    /// inertia that the mass matrix gives them. Should be 1.
+    /// Accelerations of the pieces L and R in free fall, relative to g: under their true weights, with the
+    /// inertia that the mass matrix gives them. They should be 1.
     pub fn free_fall(&self, enrichment: Enrichment, lumping: Lumping) -> Result<[f64; 2], EnrichmentError> {
         let weight = Vector2::from_fn(|p, _| self.mass_kg() * self.pieces()[p].fraction);
         let inertia = self.piece_inertia(enrichment, lumping);

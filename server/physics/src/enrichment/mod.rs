@@ -1,13 +1,13 @@
-//! Enriched elements: an element cut in two, seen through the bases of the extended finite element
-//! method, and the critical time step each basis and mass lumping allows.
+//! Enriched elements: an element cut in two, seen through the bases of the extended finite element method,
+//! and the critical time step that each basis and mass lumping allows.
 //!
-//! The solver works with pieces and copies ([`crate::cut`]). The enrichments of the literature span
-//! the same displacements; they are linear changes of variables, and differ in conditioning and, with
-//! lumped masses, in the step an explicit integrator may take. This module makes that comparison:
-//! [`EnrichedView`] writes a whole cut body in any of the bases, whatever its law; [`EnrichedTet`] has
-//! the forces and stiffness blocks of one element as the papers print them, put right; [`CutElement`]
-//! the masses and the critical time step; [`thesis_figures`] and [`thesis_claims`] the published curves
-//! and what is true of them.
+//! The solver works with pieces and copies ([`crate::cut`]). The enrichments of the literature span the same
+//! displacements and are linear changes of variables. They differ in conditioning and, with lumped masses, in
+//! the step that an explicit integrator may take. This module makes that comparison. [`EnrichedView`] writes
+//! a whole cut body in any of the bases, whatever its law. [`EnrichedTet`] has the forces and stiffness
+//! blocks of one element as in the papers, with corrections. [`CutElement`] computes the masses and the
+//! critical time step. [`thesis_figures`] computes the published curves, and [`thesis_claims`] tests the
+//! claims about them.
 //!
 //! # Definitions
 //! The cut divides an element into side L (H = −1) and side R (H = +1); H_i is the side of node i.

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix4, Vector4};
 
 use super::{EnrichmentError, Side};
 
-/// What one side of a cut element contributes.
+/// Volume fraction and moments of one side of a cut element.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Piece {
     /// w = |Ω_piece| / |Ω_e|.
@@ -18,7 +18,7 @@ pub fn bar_pieces(c: f64) -> Result<[Piece; 2], EnrichmentError> {
     if !(c > 0.0 && c < 1.0) {
         return Err(EnrichmentError::NotCut);
     }
-    // ∫_0^c of (1−x)², x(1−x), x², without cancellation for small c; R is the mirror image.
+    // ∫_0^c of (1−x)², x(1−x), x², in a form without cancellation for small c. R is the mirror image.
     let below = |c: f64| [c - c * c + c.powi(3) / 3.0, c * c * (0.5 - c / 3.0), c.powi(3) / 3.0];
     let [aa, ab, bb] = below(c);
     let left = DMatrix::from_row_slice(2, 2, &[aa, ab, ab, bb]);
@@ -27,9 +27,8 @@ pub fn bar_pieces(c: f64) -> Result<[Piece; 2], EnrichmentError> {
     Ok([Piece { fraction: c, moments: left }, Piece { fraction: 1.0 - c, moments: right }])
 }
 
-/// Sides of the nodes and pieces [L, R] of a tet that is cut where the linear interpolant of
-/// `levels` vanishes: side L where it is negative. Every node must be off the cut and both sides
-/// must have one.
+/// Sides of the nodes, and pieces [L, R], of a tet cut where the linear interpolant of `levels` vanishes.
+/// Side L is where it is negative. No node may lie on the cut, and each side must have a node.
 pub fn tet_pieces(levels: [f64; 4]) -> Result<([Side; 4], [Piece; 2]), EnrichmentError> {
     if levels.iter().any(|&level| level == 0.0 || !level.is_finite()) {
         return Err(EnrichmentError::NotCut);
@@ -42,11 +41,12 @@ pub fn tet_pieces(levels: [f64; 4]) -> Result<([Side; 4], [Piece; 2]), Enrichmen
         return Err(EnrichmentError::NotCut);
     }
     let corner = |a: usize| Vector4::from_fn(|k, _| f64::from(u8::from(k == a)));
-    // Where the edge from a to b crosses the cut, in barycentric coordinates.
+    // The point where the edge from a to b crosses the cut, in barycentric coordinates.
     let crossing = |a: usize, b: usize| {
         let t = levels[a] / (levels[a] - levels[b]);
         (1.0 - t) * corner(a) + t * corner(b)
     };
+    // One node against three makes a tet and a prism, two against two make two prisms.
     let part = |own: &[usize], other: &[usize]| match (own, other) {
         ([a], [b, c, d]) => vec![[corner(*a), crossing(*a, *b), crossing(*a, *c), crossing(*a, *d)]],
         ([b, c, d], [a]) => prism(
@@ -62,12 +62,12 @@ pub fn tet_pieces(levels: [f64; 4]) -> Result<([Side; 4], [Piece; 2]), Enrichmen
     Ok((sides, [tet_piece(&part(&left, &right)), tet_piece(&part(&right, &left))]))
 }
 
-/// Three tets that fill the prism between the triangles `p` and `q`.
+/// Three tets that fill the prism between triangles `p` and `q`.
 fn prism(p: [Vector4<f64>; 3], q: [Vector4<f64>; 3]) -> Vec<[Vector4<f64>; 4]> {
     vec![[p[0], p[1], p[2], q[2]], [p[0], p[1], q[1], q[2]], [p[0], q[0], q[1], q[2]]]
 }
 
-/// Sum over sub-tets with barycentric corners λ_0 … λ_3. The shape functions are the barycentric
+/// Sums over sub-tets with barycentric corners λ_0 … λ_3. The shape functions are the barycentric
 /// coordinates, so ∫ N Nᵀ = |Ω_s|/20 (s sᵀ + Σ_k λ_k λ_kᵀ) with s = Σ_k λ_k.
 fn tet_piece(sub_tets: &[[Vector4<f64>; 4]]) -> Piece {
     let mut fraction = 0.0;

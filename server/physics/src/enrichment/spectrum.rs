@@ -1,4 +1,4 @@
-//! Largest frequency of a small generalised eigenproblem.
+//! The largest frequency of a small generalised eigenproblem.
 
 use nalgebra::DMatrix;
 
@@ -7,11 +7,11 @@ use super::EnrichmentError;
 /// A pivot of the scaled mass matrix below this is round-off.
 const SMALLEST_PIVOT: f64 = 1e-13;
 
-/// ω_max [rad/s] with K q = ω² M q for symmetric positive semidefinite K [N/m] and positive definite
-/// M [kg], dense, all at once: for matrices of single elements.
+/// ω_max [rad/s] with K q = ω² M q, for symmetric positive semidefinite K [N/m] and positive definite M [kg].
+/// It uses dense matrices and is meant for single elements.
 ///
-/// M is scaled to a unit diagonal, S M S = L Lᵀ with S = diag(M)^−½, so that masses many orders of
-/// magnitude apart do no harm; then ω² are the eigenvalues of L⁻¹ S K S L⁻ᵀ.
+/// M is scaled to a unit diagonal, S M S = L Lᵀ with S = diag(M)^−½, so that masses many orders of magnitude
+/// apart do no harm. Then ω² are the eigenvalues of L⁻¹ S K S L⁻ᵀ.
 pub fn largest_frequency(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Result<f64, EnrichmentError> {
     let n = M.nrows();
     let mut scale = Vec::with_capacity(n);

@@ -1,4 +1,4 @@
-//! A whole cut body in the degrees of freedom of an enrichment: a change of variables over its copies.
+//! A whole cut body in the degrees of freedom of an enrichment: a linear change of variables from its copies.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -10,8 +10,8 @@ use crate::operator::FixedCopy;
 /// The linear map q = C p between the positions q of the copies of a body and the degrees of freedom
 /// p = [X + u; a] of an enrichment.
 ///
-/// Degrees of freedom are numbered as copies are: number i < n_nodes is X_i + u_i, and a copy that a
-/// cut added has the number of its a. On the copies c of one node, with one a_j for every added copy j,
+/// Degrees of freedom are numbered like copies. Number i < n_nodes is X_i + u_i, and the a of a copy added by
+/// a cut has the number of that copy. On the copies c of one node, with one a_j for every added copy j,
 ///
 ///   q_c = X_i + u_i + Σ_j ψ_j(c) a_j
 ///
@@ -23,20 +23,20 @@ use crate::operator::FixedCopy;
 /// | [`Substitution`](Enrichment::Substitution) | q_c is the degree of freedom itself |
 ///
 /// where H_j = ±1 is the side of its cut on which copy j has its material. For one cut these are the
-/// functions of [`Enrichment::coefficients`]; any number of crossing and branching cuts is covered
-/// because copies are what cuts made of a node (Jeřábková 2007 §3.1.1 needs a hierarchy of cuts for
-/// this). The same change of variables turns forces and matrices around: f̃ = Cᵀ f, Ã = Cᵀ A C, so it
-/// holds for every constitutive law. The reference of a is 0, that of X + u is X.
+/// functions of [`Enrichment::coefficients`]. Any number of crossing and branching cuts is covered, because
+/// copies are what cuts made of a node (Jeřábková 2007 §3.1.1 needs a hierarchy of cuts for this). The same
+/// change of variables transforms forces and matrices: f̃ = Cᵀ f, Ã = Cᵀ A C. It therefore holds for every
+/// constitutive law. The reference of a is 0, that of X + u is X.
 ///
-/// This is a way to look at the solution. The solver works on copies, where 3×3 diagonal blocks make
-/// small pieces harmless; here they do not.
+/// This view serves analysis only. The solver works on copies, where 3×3 diagonal blocks make small pieces
+/// harmless; in these variables they are not harmless.
 #[derive(Clone, Debug)]
 pub struct EnrichedView {
     enrichment: Enrichment,
     n: usize,
     /// Nodes with more than one copy.
     nodes: Vec<EnrichedNode>,
-    /// Enriched node of every copy.
+    /// Enriched node of every copy, if its node has several copies.
     node_of: Vec<Option<u32>>,
 }
 
@@ -44,7 +44,7 @@ pub struct EnrichedView {
 #[derive(Clone, Debug)]
 struct EnrichedNode {
     copies: Vec<u32>,
-    /// C of these copies.
+    /// C restricted to these copies.
     C: DMatrix<f64>,
     /// C⁻¹.
     inverse: DMatrix<f64>,
@@ -56,9 +56,8 @@ impl EnrichedView {
         Self::oriented(cut.copy_node(), enrichment, |_| Side::Right)
     }
 
-    /// The view of copies that belong to the nodes `copy_node`, where copy i is a copy of node i as long
-    /// as there are nodes; `side` is asked for the side of every further copy. The sides turn the signs
-    /// of a and nothing else.
+    /// The view for copies of the nodes `copy_node`, where copy i is a copy of node i as long as there are
+    /// nodes. `side` gives the side of every further copy. The sides only change the signs of a.
     pub fn oriented(copy_node: &[u32], enrichment: Enrichment, side: impl Fn(u32) -> Side) -> Self {
         let mut node_of = vec![None; copy_node.len()];
         let mut nodes: Vec<EnrichedNode> = Vec::new();
@@ -81,17 +80,17 @@ impl EnrichedView {
         Self { enrichment, n: copy_node.len(), nodes, node_of }
     }
 
-    /// The basis.
+    /// The basis of the view.
     pub fn enrichment(&self) -> Enrichment {
         self.enrichment
     }
 
-    /// Number of degrees of freedom (vectors), which is that of the copies.
+    /// Number of degrees of freedom (vectors), equal to the number of copies.
     pub fn len(&self) -> usize {
         self.n
     }
 
-    /// Whether there is no copy at all.
+    /// Whether there is no copy.
     pub fn is_empty(&self) -> bool {
         self.n == 0
     }
@@ -131,8 +130,7 @@ impl EnrichedView {
         }
     }
 
-    /// Ã = Cᵀ A C of a stiffness, mass or system matrix on copies. The pattern follows from that of A
-    /// alone.
+    /// Ã = Cᵀ A C of a stiffness, mass or system matrix on copies. Its pattern depends only on that of A.
     pub fn matrix(&self, A: &BlockCsr<f64>) -> BlockCsr<f64> {
         let single = |c: u32| [(c, 1.0)];
         let terms = |c: u32| -> Vec<(u32, f64)> {
@@ -141,6 +139,7 @@ impl EnrichedView {
                 None => single(c).to_vec(),
             }
         };
+        // The pattern comes first, so that the blocks can be added in place.
         let mut rows = vec![Vec::new(); self.n];
         for r in 0..self.n {
             let columns: Vec<u32> =
@@ -166,11 +165,11 @@ impl EnrichedView {
         out
     }
 
-    /// What prescribed copies mean for the degrees of freedom, or `None` where it is more than a
-    /// prescription: where some copies of a node are held and others are not, unless the held ones are
-    /// degrees of freedom themselves. That is so for all of them under substitution and for the node's
-    /// own copy in the shifted enrichment, and never in that by H: this is why shifting makes boundary
-    /// conditions simple.
+    /// Constraints on the degrees of freedom that follow from constraints on copies. The result is `None`
+    /// where a simple constraint does not suffice: where some copies of a node are held and others are not,
+    /// unless the held ones are degrees of freedom themselves. Under substitution this is so for all copies,
+    /// in the shifted enrichment for the node's own copy, and in that by H for none. This is why shifting
+    /// makes boundary conditions simple.
     pub fn fixed(&self, fixed: &[FixedCopy]) -> Option<Vec<FixedCopy>> {
         let mut out: Vec<FixedCopy> =
             fixed.iter().filter(|f| self.node_of[f.copy as usize].is_none()).copied().collect();
@@ -186,6 +185,8 @@ impl EnrichedView {
                     .map(|&copy| of(copy).filter(|f| f.axes[axis]).map(|f| f.position_m[axis]))
                     .collect();
                 for (i, dof) in dofs.iter_mut().enumerate() {
+                    // All copies of the node are held: invert C. If only some are, their row of C must be
+                    // that of the identity.
                     if held.iter().all(Option::is_some) {
                         let position = (0..held.len()).map(|j| node.inverse[(i, j)] * held[j].unwrap_or(0.0));
                         (dof.axes[axis], dof.position_m[axis]) = (true, position.sum());
@@ -205,7 +206,7 @@ impl EnrichedView {
 }
 
 impl EnrichedNode {
-    /// Degrees of freedom in the row of `copy`, with their factors.
+    /// Degrees of freedom in the row of `copy`, with their coefficients.
     fn row(&self, copy: u32) -> Vec<(u32, f64)> {
         let i = self.copies.iter().position(|&c| c == copy).unwrap_or(0);
         let entry = |(j, &dof): (usize, &u32)| (dof, self.C[(i, j)]);
@@ -213,13 +214,13 @@ impl EnrichedNode {
     }
 }
 
-/// C and C⁻¹ of a node with one added copy for each of `signs`.
+/// C and C⁻¹ of a node with one added copy per entry of `signs`.
 fn matrices(enrichment: Enrichment, signs: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
     let k = signs.len() + 1;
     if enrichment == Enrichment::Substitution {
         return (DMatrix::identity(k, k), DMatrix::identity(k, k));
     }
-    // ψ_j on copy j and on all others, without its sign.
+    // ψ_j on copy j and on all others, up to its sign.
     let (here, elsewhere) = match enrichment {
         Enrichment::Heaviside => (1.0, -1.0),
         Enrichment::OwnSide => (0.0, 1.0),

@@ -1,9 +1,8 @@
-//! The error of the mesh by stress recovery.
+//! Estimates the discretisation error by stress recovery.
 //!
-//! A linear tetrahedron has constant stress. Averaged to the copies and interpolated linearly, the
-//! stress σ* is more accurate than σ_h itself, and their difference estimates the error:
-//! η_e² = ∫_e (σ* − σ_h) : C⁻¹ : (σ* − σ_h). Averages belong to *copies*, so they never reach across a
-//! cut.
+//! A linear tetrahedron has constant stress. The stress σ*, averaged to the copies and interpolated linearly,
+//! is more accurate than σ_h itself. Their difference estimates the error: η_e² = ∫_e (σ* − σ_h) : C⁻¹ : (σ*
+//! − σ_h). Averages belong to *copies*, so they never reach across a cut.
 //!
 //! # Source
 //! Zienkiewicz, Zhu 1987, *A simple error estimator and adaptive procedure*; on deforming tissue:
@@ -14,7 +13,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::tets::Tets;
 use crate::material::{Lame, Law};
 
-/// Estimate of the error of the mesh.
+/// Estimate of the discretisation error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeshError {
     /// η = √Σ η_e² [√J]: estimate of ‖u − u_h‖_E, where ‖e‖²_E = ∫ σ(e) : C⁻¹ : σ(e).
@@ -23,11 +22,11 @@ pub struct MeshError {
     pub energy_norm: f64,
     /// η / √(‖u_h‖²_E + η²): the part of the energy norm that the mesh misses.
     pub relative: f64,
-    /// Pieces left out because they are inverted or flat; their stress means nothing.
+    /// Pieces left out because they are inverted or flat. Their stress has no meaning.
     pub left_out: usize,
 }
 
-/// Recovers stress; keeps its memory from call to call.
+/// Recovers stress. It reuses its memory from call to call.
 #[derive(Clone, Debug, Default)]
 pub struct StressRecovery {
     stress: Vec<Matrix3<f64>>,
@@ -36,14 +35,14 @@ pub struct StressRecovery {
     eta_squared: Vec<f64>,
 }
 
-/// Pieces flatter than this are left out.
+/// Pieces flatter than this are left out of the estimate.
 const FLATTEST: f64 = 0.05;
 
 impl StressRecovery {
     /// Estimates the error of the mesh at the positions `x` [m], one per copy.
     ///
-    /// Stress is that of Cauchy, σ = P Fᵀ / det F, in the world; for the linear law, which knows no
-    /// difference between the two, P itself.
+    /// The stress is that of Cauchy, σ = P Fᵀ / det F, in world axes. The linear law does not distinguish the
+    /// two, so P itself is used.
     pub fn estimate(&mut self, tets: &impl Tets, x: &[Vector3<f64>], law: Law, lame: Lame) -> MeshError {
         let mut error = MeshError::default();
         self.stress.clear();
@@ -58,7 +57,7 @@ impl StressRecovery {
                 copies.iter().zip(&gradients).map(|(&c, g)| x[c as usize] * g.transpose()).sum();
             let (stress, volume) = cauchy(&F, volume, law, lame);
             error.left_out += usize::from(volume == 0.0);
-            // The volume waits where the estimate will stand.
+            // The volume is stored where the estimate will be.
             self.stress.push(stress);
             self.eta_squared.push(volume);
             for &c in &copies {
@@ -66,6 +65,7 @@ impl StressRecovery {
                 self.weight[c as usize] += volume;
             }
         }
+        // From sums weighted by volume to means: the recovered stress of each copy.
         for (stress, &weight) in self.recovered.iter_mut().zip(&self.weight) {
             if weight > 0.0 {
                 *stress /= weight;
@@ -101,7 +101,7 @@ impl StressRecovery {
     }
 }
 
-/// Cauchy stress [Pa] and present volume [m³]; nothing of a piece that is flat or inverted.
+/// Cauchy stress [Pa] and present volume [m³]; both zero for a piece that is flat or inverted.
 fn cauchy(F: &Matrix3<f64>, volume: f64, law: Law, lame: Lame) -> (Matrix3<f64>, f64) {
     let P = law.stress(F, lame);
     if law == Law::Linear {

@@ -1,4 +1,4 @@
-//! The linear tetrahedra that stress is recovered from: of a model, or of a body.
+//! The linear tetrahedra from which stress is recovered: those of a model, or the pieces of a body.
 
 use nalgebra::Vector3;
 
@@ -6,7 +6,7 @@ use crate::assembly::{ElementKind, Model};
 use crate::cut::Piece;
 use crate::mesh::TetMesh;
 
-/// Linear tetrahedra on copies.
+/// Linear tetrahedra whose corners are copies.
 pub trait Tets {
     /// Number of tetrahedra or pieces.
     fn count(&self) -> usize;
@@ -25,7 +25,7 @@ pub struct CutTets<'a> {
 }
 
 impl<'a> CutTets<'a> {
-    /// The `pieces` of linear tetrahedra that a body with this rest mesh and so many copies consists of.
+    /// The `pieces` of linear tetrahedra of a body with rest mesh `mesh` and `n_copies` copies.
     pub fn new(mesh: &'a TetMesh, pieces: &'a [Piece], n_copies: usize) -> Self {
         Self { mesh, pieces, n_copies }
     }
@@ -47,7 +47,7 @@ impl Tets for CutTets<'_> {
     }
 }
 
-/// The linear tetrahedra of a model; none of a model with other elements.
+/// The linear tetrahedra of a model. A model with other elements has none.
 impl Tets for Model {
     fn count(&self) -> usize {
         if self.kind() == ElementKind::Tet4 { self.n_elements() } else { 0 }

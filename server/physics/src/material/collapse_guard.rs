@@ -1,21 +1,20 @@
-//! What keeps stable Neo-Hookean from staying a point.
+//! Keeps stable Neo-Hookean elements from staying collapsed to a point.
 //!
-//! F = 0 is an equilibrium of that law, and from anywhere near it the force back is too weak to
-//! matter. Where ‖F‖ < 0.05 the energy is therefore the corotational one, which pushes outwards with
-//! full force; between 0.05 and 0.1 the two *energies* are blended, twice continuously
-//! differentiable, so that stress and tangent remain derivatives and a line search may trust them.
-//! Nothing changes above 0.1 (at rest ‖F‖ = √3).
+//! F = 0 is an equilibrium of that law, and the restoring force anywhere near it is too weak to matter. Where
+//! ‖F‖ < 0.05 the energy is therefore the corotational one, which pushes outwards with full force. Between
+//! 0.05 and 0.1 the two *energies* are blended. The blend is twice continuously differentiable, so stress and
+//! tangent remain derivatives and a line search may trust them. Nothing changes above 0.1 (at rest ‖F‖ = √3).
 //!
 //! # Derivation
-//! ψ = ψ_N + w(I) (ψ_C − ψ_0 − ψ_N), I = ‖F‖². The constant ψ_0 is the least ψ_C − ψ_N on the outer
-//! bound, so that the bracket is positive and the blend falls outwards all the way: no new minimum.
+//! ψ = ψ_N + w(I) (ψ_C − ψ_0 − ψ_N), I = ‖F‖². The constant ψ_0 is the smallest ψ_C − ψ_N on the outer bound.
+//! The bracket is therefore positive and the blend falls outwards everywhere: there is no new minimum.
 
 use nalgebra::Vector3;
 
 use super::principal::Principal;
 use super::{Corotational, Lame};
 
-/// ‖F‖² below which the corotational energy stands alone, and above which it is absent.
+/// ‖F‖² below which only the corotational energy acts, and above which it is absent.
 const INNER: f64 = 0.05 * 0.05;
 const OUTER: f64 = 0.1 * 0.1;
 
@@ -24,7 +23,7 @@ pub(super) fn acts(square: f64) -> bool {
     square < OUTER
 }
 
-/// An energy density [J/m³] with its derivatives by stretch.
+/// An energy density [J/m³] with its derivatives by the stretches.
 pub(super) struct Sample {
     pub energy: f64,
     pub principal: Principal,
@@ -66,8 +65,8 @@ fn corotational(sigma: &Vector3<f64>, lame: Lame) -> Sample {
     Sample { energy, principal: Corotational(lame).principal(sigma) }
 }
 
-/// ψ_0 [J/m³]: ψ_C − ψ_N where it is least for ‖F‖ ≤ 0.1, at σ_i = 0.1/√3. There ψ_N differs from its
-/// value at 0 by less than 1 % of what is at stake.
+/// ψ_0 [J/m³]: ψ_C − ψ_N at σ_i = 0.1/√3, where it is smallest for ‖F‖ ≤ 0.1. There ψ_N differs from its
+/// value at 0 by less than 1 % of the difference.
 fn offset(lame: Lame, energy_at_zero: f64) -> f64 {
     let sigma = Vector3::repeat((OUTER / 3.0).sqrt());
     corotational(&sigma, lame).energy - energy_at_zero

@@ -1,7 +1,7 @@
 //! Corotational elasticity: Hooke's law in the frame of the polar rotation R of F = R S.
 //!
-//! With the *exact* polar rotation the stress is the derivative of an energy. With a lagged one it
-//! is not, and the body creeps.
+//! With the *exact* polar rotation the stress is the derivative of an energy. With a lagged rotation it is
+//! not, and the body creeps.
 //!
 //! # Source
 //! Chao, Pinkall, Sanan, Schröder 2010, "A simple geometric model for elastic deformations";
@@ -19,7 +19,7 @@ pub struct Corotational(
     pub Lame,
 );
 
-/// Where σ_i + σ_j → 0 the rotation jumps and the energy has a ridge; its curvature is cut off here.
+/// Where σ_i + σ_j → 0 the rotation jumps and the energy has a ridge. The curvature is capped at this sum.
 const LEAST_SUM: f64 = 1e-6;
 
 impl Corotational {
@@ -33,7 +33,7 @@ impl Corotational {
         self.energy_and_stress(F).1
     }
 
-    /// Both with one decomposition.
+    /// Energy and stress from one decomposition.
     pub fn energy_and_stress(&self, F: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
         let Lame { mu, lambda } = self.0;
         let R = SignedSvd::new(F).rotation();
@@ -41,9 +41,9 @@ impl Corotational {
         (mu * d.norm_squared() + 0.5 * lambda * theta * theta, 2.0 * mu * d + lambda * theta * R)
     }
 
-    /// ∂P/∂F [Pa]. Eigenvalues: 2μ and, once, 2μ + 3λ on the six symmetric modes U sym Vᵀ, and
-    /// t_ij = 2μ + (λ tr(S − I) − 2μ)·2/(σ_i + σ_j) on the three twists, which compression makes
-    /// negative. `Held` sets the twists to 0: R C Rᵀ, which the stiffness-warping solver uses.
+    /// ∂P/∂F [Pa]. Its eigenvalues are 2μ and, once, 2μ + 3λ on the six symmetric modes U sym Vᵀ, and t_ij =
+    /// 2μ + (λ tr(S − I) − 2μ)·2/(σ_i + σ_j) on the three twists. Compression makes the t_ij negative. `Held`
+    /// sets the twists to 0, which gives R C Rᵀ, the tangent of the stiffness-warping solver.
     pub fn tangent(&self, F: &Matrix3<f64>, kind: Tangent) -> Matrix9 {
         let svd = SignedSvd::new(F);
         let mut principal = self.principal(&svd.sigma);
@@ -55,7 +55,7 @@ impl Corotational {
         principal.hessian(&svd)
     }
 
-    /// ψ = μ Σ (σ_i − 1)² + λ/2 (Σ σ_i − 3)² by its stretches.
+    /// ψ = μ Σ (σ_i − 1)² + λ/2 (Σ σ_i − 3)² as a function of its stretches.
     pub(super) fn principal(&self, sigma: &Vector3<f64>) -> Principal {
         let Lame { mu, lambda } = self.0;
         let theta = sigma.sum() - 3.0;
@@ -68,7 +68,7 @@ impl Corotational {
         }
     }
 
-    /// θ = tr(RᵀF − I) = Σ σ_i − 3 by its stretches: its gradient is R, its Hessian ∂R/∂F.
+    /// θ = tr(RᵀF − I) = Σ σ_i − 3 as a function of its stretches. Its gradient is R, its Hessian ∂R/∂F.
     pub(super) fn theta_principal(sigma: &Vector3<f64>) -> Principal {
         let twist = PAIRS.map(|(i, j)| 2.0 / (sigma[i] + sigma[j]).max(LEAST_SUM));
         Principal { slope: Vector3::repeat(1.0), twist: twist.into(), ..Principal::default() }

@@ -1,11 +1,11 @@
-//! Central differences of a triad, for the tests of the laws.
+//! Central differences of energy and stress, for the tests of the laws.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::Matrix9;
 
-/// Deformation gradients: rest, stretched and turned, strongly compressed, inverted, nearly flat,
-/// with repeated stretches, and with one just beside a repeated one.
+/// Deformation gradients: rest, stretched and rotated, strongly compressed, inverted, nearly flat, with
+/// repeated stretches, and with one stretch just beside a repeated one.
 pub fn samples() -> Vec<Matrix3<f64>> {
     let turned = Rotation3::new(Vector3::new(0.4, -1.1, 0.7)).into_inner();
     let sheared = Matrix3::new(1.2, 0.3, -0.1, 0.05, 0.8, 0.2, -0.3, 0.1, 1.1);
@@ -25,7 +25,7 @@ pub fn samples() -> Vec<Matrix3<f64>> {
     ]
 }
 
-/// Holds P against ∂ψ/∂F and ∂P/∂F against differences of P at F.
+/// Compares P with differences of ψ, and ∂P/∂F with differences of P, at F.
 pub fn assert_triad(
     F: &Matrix3<f64>,
     energy: impl Fn(&Matrix3<f64>) -> f64,
@@ -35,7 +35,7 @@ pub fn assert_triad(
     assert_triad_within(F, 1e-5, 1e-6, energy, stress, tangent);
 }
 
-/// The same with differences over ±`h` and a bound relative to 1 + size.
+/// The same with differences over ±`h` and a tolerance relative to 1 + size.
 pub fn assert_triad_within(
     F: &Matrix3<f64>,
     h: f64,
@@ -46,7 +46,7 @@ pub fn assert_triad_within(
 ) {
     let (psi, P, dP) = (energy(F), stress(F), tangent(F));
     assert!((dP - dP.transpose()).norm() < 1e-9 * (1.0 + dP.norm()), "tangent not symmetric at {F}");
-    // Round-off of the differences themselves.
+    // Round-off in the differences themselves.
     let noise = 4e-16 * (1.0 + psi.abs()) / h;
     for n in 0..9 {
         let mut dF = Matrix3::zeros();

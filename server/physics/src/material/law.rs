@@ -1,15 +1,15 @@
-//! The choice of a law, and the same three questions to each.
+//! The constitutive law of a body, chosen at run time: energy, stress and tangent of each.
 
 use nalgebra::Matrix3;
 
 use super::{Corotational, Lame, Linear, Matrix9, NeoHookean, StVenantKirchhoff};
 
-/// The constitutive laws that can be chosen.
+/// The constitutive laws to choose from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Law {
-    /// Small strains and small rotations: cheapest, wrong as soon as the body turns.
+    /// Small strains and small rotations: cheapest, and wrong as soon as the body rotates.
     Linear,
-    /// Small strains in a frame that turns with the material: the robust default.
+    /// Small strains in a frame that rotates with the material: the robust default.
     #[default]
     Corotational,
     /// Hooke's law between Green strain and second Piola–Kirchhoff stress, continued below a stretch
@@ -19,15 +19,15 @@ pub enum Law {
     NeoHookean,
 }
 
-/// Which tangent ∂P/∂F is asked for.
+/// Which tangent ∂P/∂F is evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tangent {
-    /// The derivative of the stress; indefinite under compression.
+    /// The derivative of the stress. It is indefinite under compression.
     Exact,
-    /// The exact one with its negative eigenvalues set to 0: Newton's method always descends.
+    /// The exact tangent with negative eigenvalues set to 0, so that Newton's method always descends.
     #[default]
     Projected,
-    /// Corotational: with the rotation held, R C Rᵀ. Other laws: as projected.
+    /// Corotational law: the tangent with the rotation held, R C Rᵀ. Other laws: as projected.
     Held,
 }
 
@@ -35,7 +35,7 @@ impl Law {
     /// Every law, in the order of the enumeration.
     pub const ALL: [Law; 4] = [Law::Linear, Law::Corotational, Law::StVenantKirchhoff, Law::NeoHookean];
 
-    /// Energy density ψ(F) [J/m³], 0 at rest. Not finite only if F is not, or overflows.
+    /// Energy density ψ(F) [J/m³], 0 at rest. It is finite unless F is not finite or the value overflows.
     pub fn energy(self, F: &Matrix3<f64>, lame: Lame) -> f64 {
         match self {
             Law::Linear => Linear(lame).energy(F),
@@ -55,7 +55,7 @@ impl Law {
         }
     }
 
-    /// ψ [J/m³] and P [Pa] in one go.
+    /// ψ [J/m³] and P [Pa] in one call. The corotational law decomposes F only once for both.
     pub fn energy_and_stress(self, F: &Matrix3<f64>, lame: Lame) -> (f64, Matrix3<f64>) {
         match self {
             Law::Corotational => Corotational(lame).energy_and_stress(F),
@@ -63,7 +63,7 @@ impl Law {
         }
     }
 
-    /// ∂P/∂F [Pa], on F stacked by columns.
+    /// ∂P/∂F [Pa], with F stacked by columns.
     pub fn tangent(self, F: &Matrix3<f64>, lame: Lame, kind: Tangent) -> Matrix9 {
         match self {
             Law::Linear => Linear(lame).tangent(),
@@ -73,7 +73,7 @@ impl Law {
         }
     }
 
-    /// Whether elements carry a rotation of their own.
+    /// Whether the law uses the rotation of each element.
     pub fn rotates(self) -> bool {
         matches!(self, Law::Corotational)
     }

@@ -1,5 +1,5 @@
-//! What every law has to hold: finite everywhere, objective, Hooke's at small strain, projected
-//! tangents without negative eigenvalues.
+//! Properties of every law: finite everywhere, objective, Hooke's law at small strain, projected tangents
+//! without negative eigenvalues.
 
 use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
 use proptest::prelude::*;
@@ -76,7 +76,7 @@ fn rest_is_at_rest() {
     }
 }
 
-/// With the Lamé constants re-mapped the Neo-Hookean law too is Hooke's at rest.
+/// With its Lamé constants re-mapped, the Neo-Hookean law is also Hooke's law at rest.
 #[test]
 fn every_law_is_hookes_at_small_strain() {
     for lame in [LAME, Lame { mu: 1.0, lambda: 500.0 }, Lame { mu: 1.0, lambda: -0.3 }] {
@@ -102,7 +102,7 @@ fn a_non_finite_state_has_no_finite_energy() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(500))]
 
-    /// ψ(QF) = ψ(F), P(QF) = Q P(F), and with the axes of the material turned, ψ(FQ) = ψ(F).
+    /// ψ(QF) = ψ(F) and P(QF) = Q P(F). With the axes of the material rotated, ψ(FQ) = ψ(F).
     #[test]
     fn objective_and_isotropic(f in prop::array::uniform9(-1.5..1.5f64), q in prop::array::uniform3(-3.0..3.0f64), size in -3..1i32) {
         let F = Matrix3::from_row_slice(&f) * 10f64.powi(size);
@@ -111,7 +111,7 @@ proptest! {
             let (energy, P) = (law.energy(&F, LAME), law.stress(&F, LAME));
             prop_assert!((law.energy(&(Q * F), LAME) - energy).abs() < 1e-10 * (1.0 + energy));
             prop_assert!((law.energy(&(F * Q), LAME) - energy).abs() < 1e-10 * (1.0 + energy));
-            // The rotation of a nearly flat inverted element is as good as its stretches differ.
+            // The rotation of a nearly flat inverted element is only as accurate as its stretches differ.
             let sigma = SignedSvd::new(&F).sigma;
             if sigma[1] + sigma[2] > 1e-3 * sigma[0] {
                 let error = (law.stress(&(Q * F), LAME) - Q * P).norm();

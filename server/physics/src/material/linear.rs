@@ -7,7 +7,7 @@ use nalgebra::Matrix3;
 
 use super::{Lame, Matrix9};
 
-/// The small-strain law. Not objective: a rotation alone gives stress.
+/// The small-strain law. It is not objective: a rotation alone causes stress.
 #[derive(Clone, Copy, Debug)]
 pub struct Linear(
     /// Elastic constants.
@@ -31,7 +31,7 @@ impl Linear {
         2.0 * self.0.mu * eps + Matrix3::from_diagonal_element(self.0.lambda * eps.trace())
     }
 
-    /// ∂P/∂F = 2μ sym + λ I⊗I [Pa]: the same for every F, positive semidefinite.
+    /// ∂P/∂F = 2μ sym + λ I⊗I [Pa], the same for every F and positive semidefinite.
     pub fn tangent(&self) -> Matrix9 {
         let Lame { mu, lambda } = self.0;
         Matrix9::from_fn(|m, n| {
@@ -41,7 +41,7 @@ impl Linear {
         })
     }
 
-    /// θ = tr ε [1], the change of volume to first order.
+    /// θ = tr ε [1], the change of volume to first order in the strain.
     pub fn theta(F: &Matrix3<f64>) -> f64 {
         F.trace() - 3.0
     }

@@ -1,8 +1,8 @@
-//! What a body is made of: elastic constants, density, damping and the constitutive law.
+//! The material of a body: elastic constants, density, damping and the constitutive law.
 //!
-//! A law is the triad energy density ψ(F) [J/m³], first Piola–Kirchhoff stress P(F) = ∂ψ/∂F [Pa]
-//! and tangent ∂P/∂F [Pa], one file each, checked against finite differences there. A law has no
-//! state besides F.
+//! A law consists of the energy density ψ(F) [J/m³], the first Piola–Kirchhoff stress P(F) = ∂ψ/∂F [Pa] and
+//! the tangent ∂P/∂F [Pa]. Each law has its own file, which checks the three against finite differences. A
+//! law has no state besides F.
 
 #[cfg(test)]
 mod finite_difference;
@@ -30,7 +30,7 @@ use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
-/// ∂²ψ/∂F² on F stacked by columns: entry (row, column) of F has index row + 3·column.
+/// ∂²ψ/∂F² with F stacked by columns: entry (row, column) of F has index row + 3·column.
 pub type Matrix9 = nalgebra::SMatrix<f64, 9, 9>;
 
 /// Isotropic elastic material of one body.
@@ -48,8 +48,8 @@ pub struct Material {
     pub law: Law,
 }
 
-/// Coefficients of Rayleigh damping D = α M + β K̂, with K̂ rotated along with the material, so that
-/// β does not damp rigid motion.
+/// Coefficients of Rayleigh damping D = α M + β K̂. K̂ rotates with the material, so β does not damp rigid
+/// motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rayleigh {
     /// α [1/s], ≥ 0: drag of the surroundings.
@@ -97,7 +97,7 @@ impl Material {
         Lame { mu: E / (2.0 * (1.0 + nu)), lambda: E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
     }
 
-    /// Tells whether every constant is finite and in its range.
+    /// Checks that every constant is finite and in its range.
     pub fn check(&self) -> Result<(), MaterialError> {
         let within = |quantity, found: f64, range: RangeInclusive<f64>| {
             if range.contains(&found) { Ok(()) } else { Err(MaterialError { quantity, found, range }) }

@@ -2,8 +2,8 @@
 //! with I = ‖F‖², J = det F, α = 1 + μ/λ − μ/(4λ). Finite for every F, also inverted.
 //!
 //! μ = 4/3 μ_L and λ = λ_L + 5/6 μ_L of the Lamé constants μ_L, λ_L make it Hooke's law at small
-//! strain. Near F = 0 a [collapse guard](super::collapse_guard) keeps the element from staying a
-//! point.
+//! μ = 4/3 μ_L and λ = λ_L + 5/6 μ_L of the Lamé constants μ_L, λ_L make it Hooke's law at small strain. A
+//! [collapse guard](super::collapse_guard) near F = 0 lets an element recover that has collapsed to a point.
 //!
 //! # Source
 //! Smith, de Goes, Kim 2018, "Stable Neo-Hookean flesh simulation", eqs. 14 and 16; constants §3.4;
@@ -15,10 +15,10 @@ use super::collapse_guard::{self, Sample};
 use super::principal::{PAIRS, Principal};
 use super::{Lame, Matrix9, SignedSvd, Tangent};
 
-/// The law; safe only under a line search.
+/// The stable Neo-Hookean law. It is safe only under a line search.
 #[derive(Clone, Copy, Debug)]
 pub struct NeoHookean {
-    /// Elastic constants as Hooke's law knows them.
+    /// Elastic constants of Hooke's law at small strain.
     lame: Lame,
     /// μ [Pa] of the law.
     mu: f64,
@@ -33,12 +33,12 @@ pub(super) fn cofactor(F: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 impl NeoHookean {
-    /// The law that is `lame` at small strain.
+    /// The law whose small-strain limit is Hooke's law with `lame`.
     pub fn new(lame: Lame) -> Self {
         Self { lame, mu: 4.0 / 3.0 * lame.mu, lambda: lame.lambda + 5.0 / 6.0 * lame.mu }
     }
 
-    /// λ [Pa] in front of ½(J − α)².
+    /// λ [Pa], the factor of ½(J − α)².
     pub fn lambda(&self) -> f64 {
         self.lambda
     }
@@ -81,12 +81,13 @@ impl NeoHookean {
     /// ψ without the guard.
     fn unguarded_energy(&self, square: f64, J: f64) -> f64 {
         let (volume, offset) = (J - 1.0, self.volume_offset());
-        // (J − α)² − (1 − α)² and the logarithm of (I + 1)/4, both written from rest.
+        // Both (J − α)² − (1 − α)² and the logarithm of (I + 1)/4 are expanded about the rest state, which
+        // avoids cancellation there.
         let shear = square - 3.0 - (0.25 * (square - 3.0)).ln_1p();
         0.5 * self.mu * shear + 0.5 * self.lambda * volume * (volume - 2.0 * offset)
     }
 
-    /// ψ and its derivatives by stretch, with the guard.
+    /// ψ and its derivatives by the stretches, with the guard.
     pub(super) fn guarded(&self, sigma: &Vector3<f64>) -> Sample {
         let energy = self.unguarded_energy(sigma.norm_squared(), sigma.product());
         let law = Sample { energy, principal: self.principal(sigma) };
@@ -110,7 +111,7 @@ impl NeoHookean {
         }
     }
 
-    /// θ = J − 1 = σ1 σ2 σ3 − 1 by its stretches: its gradient is cof F.
+    /// θ = J − 1 = σ1 σ2 σ3 − 1 as a function of its stretches. Its gradient is cof F.
     pub(super) fn theta_principal(sigma: &Vector3<f64>) -> Principal {
         let mut theta = Principal { twist: *sigma, flip: -sigma, ..Principal::default() };
         for (k, (i, j)) in PAIRS.into_iter().enumerate() {
@@ -151,7 +152,7 @@ mod tests {
         assert!(law.energy(&Matrix3::identity()).abs() < 1e-15);
     }
 
-    /// Sizes inside, across and outside the guard: the triad stays a triad.
+    /// Sizes inside, across and outside the guard: stress and tangent stay the derivatives of the energy.
     #[test]
     fn guarded_triad_agrees_with_finite_differences() {
         let turned = Rotation3::new(Vector3::new(0.4, -1.1, 0.7)).into_inner();
@@ -180,7 +181,7 @@ mod tests {
         }
     }
 
-    /// From a point outwards the energy falls: the guard leaves no place to rest.
+    /// The energy falls outwards from a point: the guard adds no equilibrium.
     #[test]
     fn collapsed_elements_are_pushed_outwards() {
         for lame in [LAME, Lame { mu: 1.0, lambda: -0.3 }, Lame { mu: 1.0, lambda: 300.0 }] {

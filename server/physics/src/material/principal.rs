@@ -1,7 +1,7 @@
-//! Isotropic laws in their principal axes: stress and tangent from the derivatives by stretch.
+//! Isotropic laws in their principal axes: stress and tangent from the derivatives by the stretches.
 //!
-//! For F = U diag(σ) Vᵀ and ψ(σ) the tangent has three eigenmodes that scale the axes, coupled by
-//! ∂²ψ/∂σ_i∂σ_j, and for each pair of axes one that twists them and one that flips them.
+//! For F = U diag(σ) Vᵀ and ψ(σ) the tangent has three eigenmodes that scale the axes and are coupled by
+//! ∂²ψ/∂σ_i∂σ_j. For each pair of axes it has one more that twists and one that flips them.
 //!
 //! # Source
 //! Smith, de Goes, Kim 2019, "Analytic eigensystems for isotropic distortion energies", §4.
@@ -32,7 +32,7 @@ impl Principal {
         svd.compose(&self.slope)
     }
 
-    /// The same with every negative eigenvalue set to 0: the nearest positive semidefinite tangent.
+    /// The same with every negative eigenvalue set to 0, which is the nearest positive semidefinite tangent.
     pub fn projected(mut self) -> Self {
         let eigen = self.scaling.symmetric_eigen();
         if eigen.eigenvalues.min() < 0.0 {
@@ -44,13 +44,13 @@ impl Principal {
         self
     }
 
-    /// ∂²ψ/∂F², on F stacked by columns.
+    /// ∂²ψ/∂F², with F stacked by columns.
     pub fn hessian(&self, svd: &SignedSvd) -> Matrix9 {
         let SignedSvd { U, V, .. } = svd;
         let mut H = Matrix9::zeros();
         for column in 0..3 {
             for row in 0..3 {
-                // dF = e_row ⊗ e_column seen along the principal axes.
+                // dF = e_row ⊗ e_column in the principal axes.
                 let d = U.row(row).transpose() * V.row(column);
                 let mut response = Matrix3::from_diagonal(&(self.scaling * d.diagonal()));
                 for (k, (i, j)) in PAIRS.into_iter().enumerate() {

@@ -1,7 +1,7 @@
-//! ψ(F) = ψ_μ(F) + λ/2 θ(F)²: the part that locks near incompressibility, apart from the rest.
+//! ψ(F) = ψ_μ(F) + λ/2 θ(F)²: separates the term that locks near incompressibility from the rest.
 //!
-//! Selective reduced integration takes the second term at one point of a hexahedron; node-averaged
-//! tetrahedra put the mean of θ around a node in its place. θ is 0 at rest.
+//! Selective reduced integration evaluates the second term at one point of a hexahedron. Node-averaged
+//! tetrahedra replace θ by its mean around a node. θ is 0 at rest.
 //!
 //! | law | θ | λ |
 //! |---|---|---|
@@ -9,7 +9,7 @@
 //! | corotational | tr(RᵀF − I) | λ |
 //! | stable Neo-Hookean | det F − 1 | λ + 5/6 μ |
 //!
-//! St. Venant–Kirchhoff continued through inversion has no such form.
+//! St. Venant–Kirchhoff continued through inversion cannot be written in this form.
 
 use nalgebra::Matrix3;
 
@@ -44,7 +44,7 @@ impl Law {
 }
 
 impl Split {
-    /// λ [Pa] in front of ½ θ².
+    /// λ [Pa], the factor of ½ θ².
     pub fn lambda(&self) -> f64 {
         match self.law {
             Splittable::NeoHookean => NeoHookean::new(self.lame).lambda(),
@@ -52,7 +52,7 @@ impl Split {
         }
     }
 
-    /// θ(F) [1], the change of volume.
+    /// θ(F) [1], the measure of volume change in the table of this module.
     pub fn theta(&self, F: &Matrix3<f64>) -> f64 {
         match self.law {
             Splittable::Linear => Linear::theta(F),
@@ -75,7 +75,7 @@ impl Split {
         self.pressure_tangent(F, 1.0, Tangent::Exact)
     }
 
-    /// p ∂²θ/∂F² [Pa] with the pressure p = λ θ̄ [Pa]: the rest of the second derivative of λ/2 θ̄²
+    /// p ∂²θ/∂F² [Pa] with the pressure p = λ θ̄ [Pa]. This is the part of the second derivative of λ/2 θ̄²
     /// besides λ ∂θ⊗∂θ. Projected: its positive semidefinite part; held: 0.
     pub fn pressure_tangent(&self, F: &Matrix3<f64>, p: f64, kind: Tangent) -> Matrix9 {
         if matches!(self.law, Splittable::Linear) || matches!(kind, Tangent::Held) {

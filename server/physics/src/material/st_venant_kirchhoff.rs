@@ -1,9 +1,9 @@
 //! St. Venant–Kirchhoff elasticity, ψ = μ E:E + λ/2 tr²E with E = ½(FᵀF − I), made invertible.
 //!
-//! Plain, its uniaxial stiffness ∝ 3σ² − 1 turns negative at σ = 1/√3 and the mirror image σ = −1 is
-//! a state without energy: an inverted element stays inverted. Below a stretch σ_c the energy is
-//! therefore continued so that the stress goes on linearly through σ = 0 and pushes every element
-//! back. Above σ_c nothing changes.
+//! The plain law has a uniaxial stiffness ∝ 3σ² − 1, which turns negative at σ = 1/√3, and its mirror image σ
+//! = −1 has no energy: an inverted element stays inverted. Below a stretch σ_c the energy is therefore
+//! continued so that the stress passes linearly through σ = 0 and pushes every element back. Above σ_c
+//! nothing changes.
 //!
 //! # Source
 //! Irving, Teran, Fedkiw 2004, "Invertible finite elements for robust simulation of large
@@ -11,17 +11,17 @@
 //! invertible elasticity".
 //!
 //! # Derivation
-//! In principal stretches ψ = μ Σ g(σ_i) + λ/2 (Σ e(σ_i))² with e = (σ² − 1)/2 and g = e². Below σ_c
-//! g continues as its second-order Taylor polynomial and e as a straight line, reached over a width
-//! w in which e″ falls from 1 to 0. g″ and e′² are positive there, so ψ is convex in every stretch,
-//! and twice continuously differentiable across σ_c.
+//! In principal stretches ψ = μ Σ g(σ_i) + λ/2 (Σ e(σ_i))² with e = (σ² − 1)/2 and g = e². Below σ_c, g
+//! continues as its second-order Taylor polynomial. e continues as a straight line, reached over a width w in
+//! which e″ falls from 1 to 0. g″ and e′² are positive there, so ψ is convex in every stretch, and twice
+//! continuously differentiable across σ_c.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::principal::{PAIRS, Principal};
 use super::{Lame, Matrix9, SignedSvd, Tangent};
 
-/// The law, with the stretch below which it is continued.
+/// The law, and the stretch below which it is continued.
 #[derive(Clone, Copy, Debug)]
 pub struct StVenantKirchhoff {
     /// Elastic constants.
@@ -30,13 +30,13 @@ pub struct StVenantKirchhoff {
     pub continued_below: f64,
 }
 
-/// σ_c: there the plain uniaxial stiffness (3σ² − 1)/2 is still positive.
+/// σ_c, where the plain uniaxial stiffness (3σ² − 1)/2 is still positive.
 const CONTINUED_BELOW: f64 = 0.65;
 
-/// w [1], over which e straightens.
+/// w [1], the width over which e straightens.
 const STRAIGHTENS_OVER: f64 = 0.12;
 
-/// Below this distance of two stretches their difference quotient is replaced by its limit.
+/// Distance of two stretches below which their difference quotient is replaced by its limit.
 const SAME: f64 = 1e-6;
 
 /// A function of one stretch with its first two derivatives.
@@ -48,7 +48,7 @@ impl StVenantKirchhoff {
         Self { lame, continued_below: CONTINUED_BELOW }
     }
 
-    /// The law as published, which does not recover from inversion.
+    /// The law as published. It does not recover from inversion.
     pub fn plain(lame: Lame) -> Self {
         Self { lame, continued_below: f64::NEG_INFINITY }
     }
@@ -84,7 +84,7 @@ impl StVenantKirchhoff {
         }
     }
 
-    /// E = ½(FᵀF − I) if it is certain without a decomposition that every stretch is above σ_c.
+    /// E = ½(FᵀF − I), if no decomposition is needed to know that every stretch is above σ_c.
     fn untouched(&self, F: &Matrix3<f64>) -> Option<Matrix3<f64>> {
         let E = 0.5 * (F.transpose() * F - Matrix3::identity());
         // Every eigenvalue (σ² − 1)/2 of E is at least −‖E‖.
@@ -94,7 +94,7 @@ impl StVenantKirchhoff {
         (above || limit == f64::NEG_INFINITY).then_some(E)
     }
 
-    /// e(σ) = (σ² − 1)/2, below σ_c on its way to a straight line.
+    /// e(σ) = (σ² − 1)/2. Below σ_c it bends into a straight line.
     fn green(&self, sigma: f64) -> Jet {
         let t = self.continued_below - sigma;
         if t <= 0.0 || t.is_nan() {
@@ -170,7 +170,7 @@ mod tests {
         }
     }
 
-    /// ψ, P and ∂P/∂F do not jump at σ_c.
+    /// ψ, P and ∂P/∂F are continuous at σ_c.
     #[test]
     fn twice_continuous_where_the_continuation_begins() {
         let law = StVenantKirchhoff::invertible(LAME);

@@ -7,16 +7,17 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Sweeps over the three pairs of columns. Convergence is quadratic: five reach round-off.
+/// Most sweeps over the three pairs of columns. Convergence is quadratic: five reach round-off.
 const SWEEPS: usize = 12;
 
-/// Cosine of the angle between two columns below which they count as orthogonal: their rounding.
+/// Cosine of the angle between two columns below which they count as orthogonal. It is of the order of
+/// rounding.
 const ORTHOGONAL: f64 = 4e-16;
 
 /// F = U diag(σ) Vᵀ with det U = det V = +1.
 ///
-/// σ1 ≥ σ2 ≥ |σ3|: only the smallest may be negative, and is exactly when det F < 0. Columns that F
-/// leaves open (rank ≤ 1) are completed so that U Vᵀ turns as little as possible; F = 0 gives I.
+/// σ1 ≥ σ2 ≥ |σ3|. Only the smallest may be negative, and it is negative exactly when det F < 0. Columns that
+/// F leaves undetermined (rank ≤ 1) are completed so that U Vᵀ rotates as little as possible; F = 0 gives I.
 #[derive(Clone, Copy, Debug)]
 pub struct SignedSvd {
     /// Principal directions in space, one per column.
@@ -28,7 +29,7 @@ pub struct SignedSvd {
 }
 
 impl SignedSvd {
-    /// Decomposes `F`. A non-finite `F` gives non-finite stretches and the identity twice.
+    /// Decomposes `F`. A non-finite `F` gives non-finite stretches, and the identity for U and V.
     pub fn new(F: &Matrix3<f64>) -> Self {
         let size = F.amax();
         if !(size > 0.0 && size.is_finite()) {
@@ -70,8 +71,8 @@ impl SignedSvd {
     }
 }
 
-/// Turns columns `p` and `q` of `B` (and of `V` with them) until they are orthogonal; tells whether
-/// they were not.
+/// Rotates columns `p` and `q` of `B`, and of `V` with them, until they are orthogonal. Returns whether they
+/// were not orthogonal before.
 fn orthogonalise(B: &mut Matrix3<f64>, V: &mut Matrix3<f64>, p: usize, q: usize) -> bool {
     let (a, b) = (B.column(p).norm_squared(), B.column(q).norm_squared());
     let c = B.column(p).dot(&B.column(q));
@@ -89,8 +90,7 @@ fn orthogonalise(B: &mut Matrix3<f64>, V: &mut Matrix3<f64>, p: usize, q: usize)
     true
 }
 
-/// Longest column of `B` first, shortest last; every exchange changes one sign, so that `V` stays a
-/// rotation.
+/// Sorts the columns of `B` by falling length. Every exchange changes one sign, so `V` stays a rotation.
 fn sort_columns(B: &mut Matrix3<f64>, V: &mut Matrix3<f64>) {
     for (p, q) in [(0, 1), (1, 2), (0, 1)] {
         if B.column(p).norm_squared() < B.column(q).norm_squared() {
@@ -104,7 +104,7 @@ fn sort_columns(B: &mut Matrix3<f64>, V: &mut Matrix3<f64>) {
     }
 }
 
-/// `w` under the smallest rotation that takes unit vector `from` to `to`.
+/// Applies to `w` the smallest rotation that takes unit vector `from` to `to`.
 fn least_turn(from: &Vector3<f64>, to: &Vector3<f64>, w: &Vector3<f64>) -> Vector3<f64> {
     let axis = from.cross(to);
     let cosine = from.dot(to);
@@ -112,7 +112,7 @@ fn least_turn(from: &Vector3<f64>, to: &Vector3<f64>, w: &Vector3<f64>) -> Vecto
         let turned = w + axis.cross(w) + axis.cross(&axis.cross(w)) / (1.0 + cosine);
         (turned - to * to.dot(&turned)).normalize()
     } else {
-        // Half a turn about `w` itself, which is orthogonal to `from`.
+        // A half turn about `w` itself, which is orthogonal to `from`.
         (w - to * to.dot(w)).normalize()
     }
 }

@@ -5,10 +5,10 @@ use thiserror::Error;
 /// A rest mesh that mechanics cannot use, with the place and the value found.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum MeshError {
-    /// No tetrahedron at all.
+    /// The mesh has no tetrahedron.
     #[error("the mesh has no tetrahedra; give a volumetric mesh, or a surface to be filled")]
     Empty,
-    /// More nodes or tets than 32-bit ids leave room for.
+    /// There are more nodes or tets than 32-bit ids can number.
     #[error("the mesh has {found} nodes or tets, at most {limit} are supported; coarsen it")]
     TooLarge {
         /// Count found.

@@ -16,8 +16,8 @@ pub struct HexMesh {
 }
 
 impl HexMesh {
-    /// Tells whether the mesh can be simulated: finite nodes, indices in range, every node used,
-    /// det J > 0 at every corner and in the middle of every element.
+    /// Checks that the mesh can be simulated: finite nodes, indices in range, every node used, det J > 0 at
+    /// every corner and in the middle of every element.
     pub fn check(&self) -> Result<(), MeshError> {
         if self.hexes.is_empty() {
             return Err(MeshError::Empty);
@@ -55,7 +55,7 @@ impl HexMesh {
         let least_m3 = DEGENERATE_VOLUME * size.powi(3);
         let corners = (0..8).map(hex8::corner);
         for xi in corners.chain(std::iter::once(Vector3::zeros())) {
-            // 8 det J is the volume the element would have with this Jacobian everywhere.
+            // 8 det J is the volume the element would have if the Jacobian were the same everywhere.
             let volume_m3 = 8.0 * hex8::jacobian(&X, &xi).determinant();
             if volume_m3.abs() <= least_m3 {
                 return Err(MeshError::Degenerate { tet: element, volume_m3, least_m3 });
@@ -72,9 +72,9 @@ impl HexMesh {
         self.hexes[e].map(|n| self.nodes[n as usize])
     }
 
-    /// Six tetrahedra per element around its diagonal 0–7, on the same nodes: of [`box_hexes`] this is
-    /// [`box_mesh`](super::box_mesh) with [`BoxPattern::Tet6`](super::BoxPattern). Faces match where
-    /// neighbours have parallel axes.
+    /// Divides every element into six tetrahedra around its diagonal 0–7, on the same nodes. For
+    /// [`box_hexes`] the result is [`box_mesh`](super::box_mesh) with
+    /// [`BoxPattern::Tet6`](super::BoxPattern). Faces match where neighbours have parallel axes.
     pub fn to_tets(&self) -> TetMesh {
         TetMesh { nodes: self.nodes.clone(), tets: split_cells(&self.nodes, &self.hexes) }
     }
@@ -94,7 +94,7 @@ pub fn box_hexes(min: Vector3<f64>, max: Vector3<f64>, cells: [usize; 3]) -> Hex
     graded_hexes(&ticks(0), &ticks(1), &ticks(2))
 }
 
-/// Hexahedra of a box whose cells end at the rising coordinates `x`, `y`, `z` [m].
+/// Hexahedra of a box whose cell boundaries lie at the ascending coordinates `x`, `y`, `z` [m].
 pub fn graded_hexes(x: &[f64], y: &[f64], z: &[f64]) -> HexMesh {
     let mut mesh = HexMesh::default();
     for &z in z {

@@ -1,7 +1,7 @@
 //! The rest mesh: nodes, linear tetrahedra, their volumes and their orientation.
 //!
-//! A mesh is only ever *read* by the rest of the crate: cutting separates material inside the
-//! elements and never edits this structure; cutting along faces ([`crate::snap`]) makes another one.
+//! The rest of the crate only *reads* a mesh. Cutting separates material inside the elements and never edits
+//! this structure; cutting along faces ([`crate::snap`]) makes a new mesh.
 
 mod box_mesh;
 mod error;
@@ -19,7 +19,7 @@ pub use tet10_mesh::Tet10Mesh;
 
 use nalgebra::Vector3;
 
-/// A tet whose volume is below this fraction of (longest edge)³ carries no usable gradient.
+/// A tet with a volume below this fraction of (longest edge)³ has no usable gradient.
 ///
 /// A needle of aspect 1e-4 still has 1e-8, a regular tet 0.118; rounding of the determinant is
 /// about 1e-15.
@@ -39,7 +39,7 @@ pub struct TetMesh {
     pub tets: Vec<[u32; 4]>,
 }
 
-/// What [`TetMesh::repaired`] changed.
+/// Counts of what [`TetMesh::repaired`] changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshRepairs {
     /// Tets that were listed with negative orientation and had two nodes swapped.
@@ -49,8 +49,8 @@ pub struct MeshRepairs {
 }
 
 impl TetMesh {
-    /// Builds a mesh from raw arrays: flips negatively oriented tets, drops unused nodes, and
-    /// refuses what cannot be simulated.
+    /// Builds a mesh from raw arrays. It flips negatively oriented tets, drops unused nodes, and refuses a
+    /// mesh that cannot be simulated.
     pub fn repaired(nodes: Vec<Vector3<f64>>, tets: Vec<[u32; 4]>) -> Result<(Self, MeshRepairs), MeshError> {
         let mut mesh = Self { nodes, tets };
         mesh.check_nodes_and_indices()?;
@@ -66,8 +66,8 @@ impl TetMesh {
         Ok((mesh, repairs))
     }
 
-    /// Tells whether the mesh can be simulated: finite nodes, indices in range, every node used,
-    /// every tet positively oriented and of usable volume.
+    /// Checks that the mesh can be simulated: finite nodes, indices in range, every node used, every tet
+    /// positively oriented and of usable volume.
     pub fn check(&self) -> Result<(), MeshError> {
         self.check_nodes_and_indices()?;
         for e in 0..self.tets.len() {
@@ -115,7 +115,7 @@ impl TetMesh {
         Ok(())
     }
 
-    /// Removes nodes that no tet uses, keeping the order of the others; returns how many.
+    /// Removes nodes that no tet uses, keeps the order of the others, and returns the number removed.
     pub fn drop_unused_nodes(&mut self) -> usize {
         let mut used = vec![false; self.nodes.len()];
         for &node in self.tets.iter().flatten() {
@@ -144,7 +144,7 @@ impl TetMesh {
         self.tets[e].map(|n| self.nodes[n as usize])
     }
 
-    /// Signed rest volume [m³] of tet `e`, positive for a well oriented one.
+    /// Signed rest volume [m³] of tet `e`, positive if it is well oriented.
     pub fn volume(&self, e: usize) -> f64 {
         tet_volume(&self.corners(e))
     }

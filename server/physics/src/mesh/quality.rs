@@ -3,7 +3,7 @@
 use super::{TET_EDGES, TET_FACES, TetMesh, tet_volume};
 use nalgebra::Vector3;
 
-/// Quality figures of one tet.
+/// Quality measures of one tet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TetQuality {
     /// Mean ratio 12 (3|V|)^⅔ / Σ l², with the sign of V: 1 regular, 0 flat, negative inverted.
@@ -17,10 +17,10 @@ pub struct TetQuality {
     pub max_dihedral_rad: f64,
 }
 
-/// Worst figures over a mesh.
+/// Worst and mean quality of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshQuality {
-    /// Smallest mean ratio and the tet that has it.
+    /// Smallest mean ratio, and the tet with it.
     pub min_mean_ratio: (f64, usize),
     /// Average mean ratio.
     pub mean_mean_ratio: f64,

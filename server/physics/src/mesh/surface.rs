@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// A triangle that belongs to exactly one tet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoundaryFace {
-    /// The tet it bounds.
+    /// The tet whose face it is.
     pub tet: u32,
     /// Local number of the node of that tet opposite this face, 0..4.
     pub opposite: u8,
@@ -15,7 +15,7 @@ pub struct BoundaryFace {
 }
 
 impl TetMesh {
-    /// Faces with one tet only, sorted by tet and local face number.
+    /// Faces with only one tet, sorted by tet and local face number.
     pub fn boundary_faces(&self) -> Vec<BoundaryFace> {
         let mut keyed: Vec<([u32; 3], BoundaryFace)> = Vec::with_capacity(4 * self.tets.len());
         for (e, tet) in self.tets.iter().enumerate() {

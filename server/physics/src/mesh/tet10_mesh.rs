@@ -1,4 +1,4 @@
-//! Quadratic tetrahedra: the corners of a linear mesh and the middles of its edges.
+//! Quadratic tetrahedra: the corners of a linear mesh and the midpoints of its edges.
 
 use nalgebra::Vector3;
 
@@ -7,9 +7,9 @@ use super::{TET_EDGES, TetMesh};
 /// Straight-sided ten-node tetrahedra in their rest configuration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tet10Mesh {
-    /// Rest positions [m]: first the nodes of the linear mesh, then the middles of its edges.
+    /// Rest positions [m]: first the nodes of the linear mesh, then the midpoints of its edges.
     pub nodes: Vec<Vector3<f64>>,
-    /// Node ids of every tet: four corners, then the middles of [`TET_EDGES`].
+    /// Node ids of every tet: four corners, then the midpoints of [`TET_EDGES`].
     pub tets: Vec<[u32; 10]>,
     /// The two corners of every mid-edge node, smaller id first; sorted.
     pub edges: Vec<[u32; 2]>,
@@ -39,7 +39,7 @@ impl Tet10Mesh {
         Self { nodes, tets, edges }
     }
 
-    /// Number of corner nodes; they come first.
+    /// Number of corner nodes, which come before all mid-edge nodes.
     pub fn n_corners(&self) -> usize {
         self.nodes.len() - self.edges.len()
     }
@@ -55,7 +55,7 @@ mod tests {
         let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(2.0), [2; 3], BoxPattern::Tet6);
         let quadratic = Tet10Mesh::new(&mesh);
         assert_eq!(quadratic.n_corners(), 27);
-        // The nodes of the box with twice the cells are exactly corners and middles of Kuhn tets.
+        // The nodes of the box with twice as many cells are exactly the corners and midpoints of Kuhn tets.
         assert_eq!(quadratic.nodes.len(), 125);
         for (tet, corners) in quadratic.tets.iter().zip(&mesh.tets) {
             assert_eq!(tet[..4], corners[..]);

@@ -1,4 +1,4 @@
-//! The boundary of the uncut mesh: faces, and the edges and corners they share through the solid.
+//! The boundary of the uncut mesh: its faces, and the edges and corners that connected faces share.
 
 use crate::cut::topology::fragments::{Fragments, NONE};
 use crate::mesh::{TET_FACES, TetMesh};
@@ -12,9 +12,9 @@ pub struct BaseFace {
     pub nodes: [u32; 3],
     /// Edge from node k to the next, shared with the face beside it.
     pub edges: [u32; 3],
-    /// Whether the edge is numbered in the direction of this face.
+    /// Whether the shared edge runs in the direction of this face.
     pub forward: [bool; 3],
-    /// Corner at node k, shared by the faces of one fan around it.
+    /// Corner at node k, shared by the faces of one fan around the node.
     pub corners: [u32; 3],
 }
 
@@ -32,7 +32,7 @@ pub struct Base {
 }
 
 impl Base {
-    /// Boundary of fragments that nothing has cut yet.
+    /// The boundary of a fragment mesh without cuts.
     pub fn new(mesh: &TetMesh, fragments: &Fragments) -> Self {
         let mut base = Self { face_at: vec![NONE; 4 * mesh.tets.len()], ..Self::default() };
         let mut place = Vec::new();
@@ -51,6 +51,7 @@ impl Base {
                 }
             }
         }
+        // Half-edges are paired through the solid, so parts that meet only in a node or an edge stay apart.
         let beside = |h: usize| {
             let (e, k) = place[h / 3];
             let (far, slot, edge) = fragments.around_edge(e, k, h % 3);
@@ -65,6 +66,7 @@ impl Base {
                 }
                 base.n_edges += 1;
             }
+            // A corner is shared by all faces of one fan; the walk numbers the whole fan.
             let mut corner = h;
             if base.faces[h / 3].corners[h % 3] == NONE {
                 while base.faces[corner / 3].corners[corner % 3] == NONE {
@@ -83,7 +85,7 @@ impl Base {
         self.face_at[at..at + 4].iter().copied().filter(|&f| f != NONE)
     }
 
-    /// The boundary face that the face of fragment `t` opposite its vertex `face` lies in, if it is
+    /// The boundary face that contains the face of fragment `t` opposite its vertex `face`, if that face is
     /// part of the skin.
     pub fn under(&self, mesh: &TetMesh, fragments: &Fragments, t: u32, face: usize) -> Option<u32> {
         let e = fragments.element[t as usize] as usize;

@@ -1,4 +1,4 @@
-//! A skin embedded in a body.
+//! A skin embedded in a body, and its settings and errors.
 
 use thiserror::Error;
 
@@ -9,18 +9,18 @@ use super::sheet::{Sheet, SkinShape};
 use super::stitch::{Change, SkinJoin, SkinSource};
 use crate::cut::{CutMesh, IncisionMark, Surface};
 
-/// Most parts of an edge.
+/// Most parts into which an edge of an element is divided.
 const MAX_DIVISIONS: usize = 32;
-/// Most skin triangles.
+/// Most skin triangles of one body: a bound on memory.
 const MAX_TRIANGLES: usize = 4_000_000;
 
-/// Resolution of a skin and how it is cut.
+/// Resolution of a skin, and how cuts divide it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkinSettings {
     /// Parts of each edge of the boundary: n² skin triangles per boundary face.
     pub divisions: usize,
-    /// Relative distance in [0, 0.5] from which a corner of a skin triangle is moved onto the cut curve
-    /// instead of the triangle split; 0 splits always.
+    /// Relative distance in [0, 0.5] within which a corner of a skin triangle is moved onto the cut curve
+    /// instead of splitting the triangle. 0 always splits.
     pub snapping: f64,
 }
 
@@ -30,13 +30,13 @@ impl Default for SkinSettings {
     }
 }
 
-/// Why there is no skin.
+/// Why no skin could be made.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SkinError {
     /// The number of divisions is out of range.
     #[error("a skin divides the edges of the elements in 1 to {MAX_DIVISIONS} parts, not in {found}")]
     Divisions {
-        /// Parts asked for.
+        /// Number requested.
         found: usize,
     },
     /// The skin would have too many triangles.
@@ -44,19 +44,19 @@ pub enum SkinError {
         "the skin would have {found} triangles, at most {MAX_TRIANGLES} are allowed; use fewer divisions"
     )]
     TooFine {
-        /// Triangles asked for.
+        /// Number requested.
         found: usize,
     },
     /// The snapping distance is out of range.
     #[error("the snapping distance of a skin is a share from 0 to 0.5, not {found}")]
     Snapping {
-        /// Distance asked for.
+        /// Distance requested.
         found: f64,
     },
-    /// The body is cut already.
+    /// The body has already been cut.
     #[error("a skin is put on an uncut body; reset the body first")]
     AlreadyCut,
-    /// A place of the skin is not usable.
+    /// The shape function returned a position that is not finite.
     #[error("skin point {point} has a place that is not finite")]
     NonFinitePlace {
         /// Index of the point.
@@ -64,12 +64,12 @@ pub enum SkinError {
     },
 }
 
-/// A skin and the surface that it and the lips make.
+/// A skin, and the surface that it makes together with the lips.
 #[derive(Clone, Debug)]
 pub struct Skin {
     settings: SkinSettings,
     base: Base,
-    /// As it was put on.
+    /// The skin before all cuts, for a reset.
     uncut: Sheet,
     sheet: Sheet,
     join: SkinJoin,
@@ -79,8 +79,8 @@ pub struct Skin {
 }
 
 impl Skin {
-    /// Puts a skin on an uncut body. `shape` says where the skin rests [m] over a point of the boundary
-    /// [m] with its unit normal; the identity follows the boundary.
+    /// Puts a skin on an uncut body. `shape` returns the rest position [m] of the skin for a point of the
+    /// boundary [m] and its unit normal. The identity follows the boundary.
     pub fn new(cut: &CutMesh, settings: SkinSettings, shape: &mut SkinShape<'_>) -> Result<Self, SkinError> {
         let SkinSettings { divisions, snapping } = settings;
         if !(1..=MAX_DIVISIONS).contains(&divisions) {
@@ -115,8 +115,8 @@ impl Skin {
         Ok(skin)
     }
 
-    /// Follows the cuts of the body, and its reset. What it costs is what the last cut changed, as long as it
-    /// is told of every one.
+    /// Updates the skin after a cut or a reset of the body. The cost depends on what the last cut changed, as
+    /// long as this is called after every cut.
     pub fn follow(&mut self, cut: &CutMesh) {
         if self.epoch == cut.epoch() {
             return;
@@ -134,12 +134,12 @@ impl Skin {
         }
     }
 
-    /// Follows a body that takes up an earlier state, in which this skin was its own.
+    /// Adopts the epoch of a body that returned to an earlier state, together with the skin of that state.
     pub(crate) fn set_epoch(&mut self, epoch: u32) {
         self.epoch = epoch;
     }
 
-    /// Forgets the surface and sews it from nothing.
+    /// Discards the surface and builds it from nothing.
     fn sew_anew(&mut self, cut: &CutMesh) {
         self.join = SkinJoin::default();
         self.surface = Surface::default();
@@ -163,7 +163,7 @@ impl Skin {
         }
     }
 
-    /// Makes the next cut find that the skin does not fit; only for tests of what happens then.
+    /// Makes the next cut find that the skin does not fit. Only tests of that case use it.
     #[doc(hidden)]
     pub fn spoil(&mut self) {
         self.sheet.conflicts += 1;
@@ -175,7 +175,7 @@ impl Skin {
         self.join.sizes()
     }
 
-    /// The same skin, sewn from nothing: what the surface has to be.
+    /// The same skin, built from nothing: the reference for its surface.
     #[cfg(test)]
     pub fn sewn_anew(&self, cut: &CutMesh) -> Self {
         let mut other = self.clone();
@@ -188,7 +188,7 @@ impl Skin {
         &self.surface
     }
 
-    /// What incisions have drawn on skin and lips without opening them, on the triangles of the
+    /// Lines that incisions have drawn on skin and lips without opening them, on the triangles of the
     /// [`surface`](Self::surface).
     pub fn incision_marks(&self, cut: &CutMesh) -> Vec<IncisionMark> {
         if self.misfit.is_some() {
@@ -201,22 +201,22 @@ impl Skin {
         marks
     }
 
-    /// Whether skin and lips could be sewn together; if not, the surface is the boundary of the elements.
+    /// Whether skin and lips could be joined. If not, the surface is the boundary of the elements.
     pub fn fits(&self) -> bool {
         self.misfit.is_none()
     }
 
-    /// Why they could not.
+    /// Why skin and lips could not be joined, if so.
     pub fn misfit(&self) -> Option<Misfit> {
         self.misfit
     }
 
-    /// Skin triangles that the last cut made anew; the others stayed as they were.
+    /// Number of skin triangles that the last cut renewed. All others stayed unchanged.
     pub fn renewed(&self) -> usize {
         self.join.renewed()
     }
 
-    /// Resolution and way of cutting.
+    /// Resolution and way of cutting, as given at creation.
     pub fn settings(&self) -> SkinSettings {
         self.settings
     }

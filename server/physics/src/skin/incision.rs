@@ -1,8 +1,8 @@
-//! Incisions as deep as a tool goes into the skin.
+//! Incisions as deep as a tool is pressed into the skin.
 //!
-//! A tool that draws over the skin is known by where it touches, the outward normal there and how far it
-//! is pressed in. The blade that makes this incision reaches from that depth to just above the skin; what
-//! it opens are the elements that it cuts through, so the wound is never deeper than the penetration.
+//! A tool drawn over the skin is described by its contact points, the outward normals there and its
+//! penetration depths. The blade of the incision reaches from that depth to just above the skin. It opens
+//! only the elements that it cuts through, so the wound is never deeper than the penetration.
 //!
 //! # Source
 //! Jeřábková 2007, 4.1.3 and fig. 4.7: cut path on the surface and depth below it make the wound.
@@ -11,18 +11,18 @@ use nalgebra::Vector3;
 
 use crate::cut::BladeSweep;
 
-/// How far the blade stands out of the skin, as a share of the largest depth: the skin between two
-/// places may be curved.
+/// Height of the blade above the skin, as a share of the largest depth. The skin between two contact points
+/// may be curved.
 const STANDS_OUT: f64 = 0.5;
 
-/// One place of a tool on its way over the skin.
+/// One contact point of a tool on its path over the skin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Penetration {
-    /// Where it touches the skin [m].
+    /// Contact point on the skin [m].
     pub point_m: Vector3<f64>,
-    /// Outward normal there, of any length but zero.
+    /// Outward normal there, of any length except zero.
     pub normal: Vector3<f64>,
-    /// How far its tip is below the skin [m]; 0 only scratches it.
+    /// Depth of the tip below the skin [m]. 0 only scratches it.
     pub depth_m: f64,
 }
 

@@ -1,12 +1,14 @@
 //! Marks of incisions on the skin: lines on the boundary, lifted to the skin triangles over it.
 //!
 //! # Limit
-//! A blade leaves a line where it reaches the boundary of the elements. Where the skin stands off that
-//! farther than the blade goes in, as it may over the middle of large faces of a body that bulges, nothing
-//! is drawn, and a very shallow scratch has gaps there. Lines found on the skin triangles themselves would
-//! close them, but not fit the cut: its curve is where the blade crosses edges of the boundary, a blade
-//! that is not along the normal crosses the skin over another place, even another face, than the boundary,
-//! and a line beside the curve would stay there when the lips open.
+//! A blade leaves a line where it reaches the boundary of the elements. The skin may stand farther off the
+//! boundary than the blade goes in, e.g. over the middle of large faces of a bulging body. Nothing is drawn
+//! there, and a very shallow scratch has gaps.
+//!
+//! Lines found on the skin triangles themselves would close the gaps but not match the cut. The cut curve
+//! lies where the blade crosses edges of the boundary. A blade that is not along the normal crosses the skin
+//! over another place than the boundary, even over another face. A line beside the curve would remain when
+//! the lips open.
 
 use super::base::Base;
 use super::sheet::Sheet;
@@ -14,10 +16,10 @@ use super::stitch::SkinJoin;
 use crate::cut::drawn::traces::{TraceLine, part_inside};
 use crate::cut::{CutMesh, IncisionMark, MarkPoint, Surface};
 
-/// Parts of a line shorter than this share of it are left out: they lie in a corner of a triangle.
+/// Shortest part of a line, as a share of it. Shorter parts lie in a corner of a triangle and are left out.
 const SHORT: f64 = 1e-6;
 
-/// Appends the parts of a line, one for every skin triangle over it; a line on a lip stays as it is.
+/// Appends the parts of a line, one for every skin triangle over it. A line on a lip is not divided.
 pub fn lift(
     base: &Base,
     sheet: &Sheet,
@@ -42,7 +44,8 @@ pub fn lift(
     }
 }
 
-/// The part of a line inside a triangle, both in coordinates on one face, as coordinates in the triangle.
+/// Clips a line to a triangle. Both are in coordinates on one face; the result is in coordinates of the
+/// triangle.
 fn clip(triangle: &[[f64; 3]; 3], line: &[[f64; 3]; 2]) -> Option<[[f64; 3]; 2]> {
     let [a, b, c] = triangle;
     let whole = Sheet::area(a, b, c);

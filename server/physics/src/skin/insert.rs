@@ -1,8 +1,8 @@
-//! Vertices of the cut curve become skin points.
+//! Turns vertices of the cut curve into skin points.
 //!
-//! A vertex is found again by its place, to the bit: all copies of a fragment vertex share it. A new
-//! one takes over a grid point that lies there (or, with snapping, near there), else it splits an edge
-//! or a triangle.
+//! A vertex is recognised by its place, to the bit, because all copies of a fragment vertex share it. A new
+//! vertex takes over a grid point that lies there (or, with snapping, near there). Otherwise it splits an
+//! edge or a triangle.
 
 use std::cmp::Ordering;
 
@@ -10,33 +10,35 @@ use super::base::Base;
 use super::sheet::{Claim, Sheet};
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
 
-/// Share of a triangle or an edge below which a point lies on its border.
+/// Share of a triangle or edge below which a point counts as lying on the border.
 ///
 /// Far above rounding of coordinates (1e-16), far below what shows.
 pub const ON: f64 = 1e-9;
 
-/// Share below which two vertices are one point: the same crossing on both lips of an older cut.
+/// Share below which two vertices are the same point, e.g. one crossing on both lips of an older cut.
 const SAME: f64 = 1e-12;
 
-/// Where a new point goes.
+/// Where a new point is inserted.
 enum Spot {
-    /// Onto a point that is there already.
+    /// At an existing point.
     Point(u32),
-    /// Onto an edge, this far from its start.
+    /// On a half-edge, at this parameter from its start.
     Edge(u32, f64),
-    /// Into a triangle, with these coordinates.
+    /// Inside a triangle, at these barycentric coordinates.
     Inside(u32, [f64; 3]),
 }
 
 impl Sheet {
-    /// The skin point that stands for a fragment vertex over face `f`. `snapping` in [0, 0.5]: the
-    /// relative distance from which a corner is moved instead of its triangle split.
+    /// The skin point that represents a fragment vertex over face `f`. `snapping` in [0, 0.5] is the relative
+    /// distance within which a corner is moved instead of splitting its triangle.
     pub fn insert_point(&mut self, base: &Base, f: u32, at: &FragmentVertex, snapping: f64) -> u32 {
         let face = &base.faces[f as usize];
         let w = Self::coordinates(base, f, at);
         if let Some(k) = (0..3).find(|&k| w[(k + 1) % 3] == 0.0 && w[(k + 2) % 3] == 0.0) {
             return self.corner_point[face.corners[k] as usize];
         }
+        // Edges are shared by two faces, so a vertex on one is claimed in the direction of the edge, not of
+        // the face.
         let side = (0..3).find(|&k| w[(k + 2) % 3] == 0.0);
         let claim: Claim = match side {
             Some(k) => {
@@ -77,7 +79,7 @@ impl Sheet {
         point
     }
 
-    /// Where a point goes that lies on side `k` of the face.
+    /// Where to insert a point on side `k` of the face.
     fn spot_on_side(&self, base: &Base, f: u32, k: usize, w: &[f64; 3], snapping: f64) -> Spot {
         let along = |w: &[f64; 3]| w[(k + 1) % 3] / (w[k] + w[(k + 1) % 3]);
         let mut best = (f64::INFINITY, NONE, 0.0);
@@ -103,7 +105,7 @@ impl Sheet {
         Spot::Edge(h, s)
     }
 
-    /// Where a point goes that lies inside the face.
+    /// Where to insert a point inside the face.
     fn spot_inside(&self, base: &Base, f: u32, w: &[f64; 3], snapping: f64) -> Spot {
         let mut best = (f64::NEG_INFINITY, NONE, [0.0; 3]);
         for &t in &self.over[f as usize] {
@@ -116,6 +118,7 @@ impl Sheet {
         let (_, t, share) = best;
         let near = (0..3).max_by(|&i, &j| share[i].total_cmp(&share[j])).unwrap_or(0);
         let point = self.corners[t as usize][near];
+        // A point on the border of the face belongs to two faces and must not move.
         let inside = self.point_on(base, f, point).iter().all(|&w| w > 0.0);
         let gap = 1.0 - share[near];
         if inside && gap <= SAME {
@@ -127,7 +130,7 @@ impl Sheet {
                 return Spot::Point(point);
             }
         }
-        // On an edge, on one of a cut first.
+        // Next an edge, preferably one of an existing cut.
         let opposite = |k: usize| 3 * t + (k as u32 + 1) % 3;
         let within =
             |k: &usize| share[*k] <= ON && self.face[self.twin[opposite(*k) as usize] as usize / 3] == f;
@@ -141,7 +144,8 @@ impl Sheet {
         Spot::Inside(t, share)
     }
 
-    /// Coordinates of a point of face `f` in triangle `t`; −∞ where the triangle has no area.
+    /// Barycentric coordinates in triangle `t` of a point of face `f`. They are −∞ where the triangle has no
+    /// area.
     pub fn shares(&self, base: &Base, f: u32, t: u32, w: &[f64; 3]) -> [f64; 3] {
         let [p, q, r] = self.corners[t as usize].map(|p| self.point_on(base, f, p));
         let parts = [Self::area(w, &q, &r), Self::area(&p, w, &r), Self::area(&p, &q, w)];
@@ -149,7 +153,7 @@ impl Sheet {
         if sum > 0.0 { parts.map(|a| a / sum) } else { [f64::NEG_INFINITY; 3] }
     }
 
-    /// Rest place of a point that moves to `w` on face `f`: where the skin is there now.
+    /// Rest position of point `p` after a move to `w` on face `f`: the skin as it is there now.
     pub fn place_at(&self, base: &Base, f: u32, p: u32, w: &[f64; 3]) -> nalgebra::Vector3<f64> {
         let mut best = (f64::NEG_INFINITY, self.points[p as usize].place);
         for &t in &self.over[f as usize] {
@@ -166,8 +170,8 @@ impl Sheet {
         best.1
     }
 
-    /// Whether the point at corner `h` may move to the target: no triangle may turn over and no cut may
-    /// run through it.
+    /// Whether the point at corner `h` may move to the target. No triangle may turn over, and no cut may run
+    /// through the point.
     pub fn can_move(&self, base: &Base, h: u32, point: u32, target: &Target) -> bool {
         let at = Sheet::vertex(base, target);
         let start = if self.from(h) == point { h } else { h / 3 * 3 + (h + 1) % 3 };
@@ -182,7 +186,7 @@ impl Sheet {
         })
     }
 
-    /// The target as a combination of nodes.
+    /// The target as a combination of mesh nodes.
     pub fn vertex(base: &Base, target: &Target) -> FragmentVertex {
         let mut at = FragmentVertex { nodes: [NONE; 4], weights: [0.0; 4] };
         let parts = base.faces[target.f as usize].nodes.into_iter().zip(target.w).filter(|(_, w)| *w != 0.0);
@@ -197,6 +201,6 @@ impl Sheet {
 pub struct Target {
     /// The face.
     pub f: u32,
-    /// Coordinates there.
+    /// Barycentric coordinates on the face.
     pub w: [f64; 3],
 }

@@ -7,15 +7,15 @@ use crate::cut::CutMesh;
 use crate::cut::topology::fragments::NONE;
 use crate::mesh::TET_FACES;
 
-/// Fragment and the vertex opposite: a face of the fragments.
+/// A fragment face: the fragment, and the slot of the vertex opposite.
 pub type Face = (u32, u8);
 
-/// What a corner of a surface triangle is.
+/// The origin of a corner of a surface triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Corner {
     /// A skin point.
     Skin(u32),
-    /// A vertex of the fragments.
+    /// A fragment vertex.
     Lip(u32),
     /// The middle of a lip.
     Middle,
@@ -24,35 +24,35 @@ pub enum Corner {
 /// One edge of the cut curve: where a lip meets the boundary of the uncut mesh.
 #[derive(Clone, Debug)]
 pub struct Border {
-    /// Fragment below the skin beside it.
+    /// Fragment below the skin next to the border.
     pub below: u32,
-    /// Boundary face below.
+    /// Boundary face below the border.
     pub face: u32,
     /// Skin points at its ends.
     pub ends: [u32; 2],
-    /// Skin half-edges along it, with the skin that stays on this side to the left.
+    /// Skin half-edges along it. The skin on this side of the cut is to their left.
     pub chain: Vec<u32>,
 }
 
 /// The triangles of one lip face.
 #[derive(Clone, Debug, Default)]
 pub struct Lip {
-    /// Its triangles.
+    /// Numbers of its surface triangles.
     pub triangles: Vec<u32>,
-    /// Where its edges meet the skin.
+    /// Per edge where it meets the skin, if it does.
     pub borders: [Option<Border>; 3],
-    /// Half-edges along each of its edges, in its own direction.
+    /// Surface half-edges along each of its edges, in the direction of the edge.
     pub outline: [Vec<u32>; 3],
 }
 
-/// Whether a face of the fragments is a lip.
+/// Whether a fragment face is a lip.
 pub fn is_lip(cut: &CutMesh, (t, k): Face) -> bool {
     let f = &cut.fragments;
     f.neighbour[t as usize][k as usize] == NONE && f.tag[t as usize][k as usize] != 0
 }
 
 impl Lip {
-    /// Finds where a lip face meets the skin, and inserts the ends of those edges as skin points.
+    /// Finds where a lip meets the skin, and inserts the ends of those edges as skin points.
     pub fn new(base: &Base, cut: &CutMesh, sheet: &mut Sheet, snapping: f64, (t, k): Face) -> Self {
         let f = &cut.fragments;
         let mut lip = Self::default();
@@ -70,14 +70,14 @@ impl Lip {
         lip
     }
 
-    /// Cuts the skin along its borders.
+    /// Cuts the skin along the borders of the lip.
     pub fn cut(&self, base: &Base, sheet: &mut Sheet, snapping: f64) {
         for border in self.borders.iter().flatten() {
             sheet.cut_along(base, border.face, border.ends[0], border.ends[1], snapping);
         }
     }
 
-    /// Finds the skin half-edges along its borders.
+    /// Finds the skin half-edges along the borders.
     pub fn find_chains(&mut self, sheet: &Sheet) -> Result<(), Misfit> {
         for border in self.borders.iter_mut().flatten() {
             let [from, to] = border.ends;
@@ -91,14 +91,14 @@ impl Lip {
         Ok(())
     }
 
-    /// Corners all around it, and how many parts each of its edges has.
+    /// Corners around the lip, and the number of parts of each of its edges.
     pub fn ring(&self, cut: &CutMesh, sheet: &Sheet, (t, k): Face) -> (Vec<Corner>, [usize; 3]) {
         let mut ring = Vec::with_capacity(6);
         let mut parts = [1; 3];
         for (edge, border) in self.borders.iter().enumerate() {
             match border {
                 Some(border) => {
-                    // The lip runs against the skin.
+                    // The border of a lip runs opposite to the skin.
                     ring.extend(border.chain.iter().rev().map(|&h| Corner::Skin(sheet.to(h))));
                     parts[edge] = border.chain.len();
                 }
@@ -112,8 +112,8 @@ impl Lip {
     }
 }
 
-/// Triangles that fill an outline whose three sides have these parts, by their corners in the ring (the
-/// number of corners stands for the middle); both lips of a cut are filled alike.
+/// Triangles that fill an outline whose three sides have `parts` parts. Corners are indices into the ring;
+/// `n`, the length of the ring, stands for the middle. Both lips of a cut are filled alike.
 pub fn fill(n: usize, parts: [usize; 3]) -> Vec<[usize; 3]> {
     if n == 3 {
         return vec![[0, 1, 2]];

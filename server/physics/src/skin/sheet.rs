@@ -1,4 +1,4 @@
-//! The skin triangles over the boundary faces, and how they are split.
+//! The skin triangles over the boundary faces, and the operations that split them.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +8,21 @@ use robust::Coord3D;
 use super::base::Base;
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
 
-/// Where a skin rests [m] over a point of the boundary [m] with its outward unit normal.
+/// Rest position [m] of the skin for a point of the boundary [m] and its outward unit normal.
 pub type SkinShape<'a> = dyn FnMut(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;
 
-/// A skin point.
+/// A vertex of the skin.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// Where it lies on the boundary of the uncut mesh.
     pub at: FragmentVertex,
     /// Rest position [m].
     pub place: Vector3<f64>,
-    /// Whether a vertex of the fragments stands for it: it stays where it is on the boundary.
+    /// Whether the point represents a fragment vertex. Such a point never moves on the boundary.
     pub claimed: bool,
 }
 
-/// Identity of a place on the boundary: edge or face, and the bits of the coordinates there.
+/// Key of a place on the boundary: edge or face, and the bits of the coordinates there.
 pub type Claim = (u32, [u64; 3]);
 
 /// A closed triangulation; half-edge 3·t + k runs from corner k to the next of triangle t.
@@ -34,26 +34,26 @@ pub struct Sheet {
     pub corners: Vec<[u32; 3]>,
     /// Opposite of each half-edge.
     pub twin: Vec<u32>,
-    /// Chain each half-edge belongs to where the skin is cut, else [`NONE`].
+    /// Chain of each half-edge where the skin is cut, else [`NONE`].
     pub chain: Vec<u32>,
     /// Boundary face under each triangle.
     pub face: Vec<u32>,
     /// Triangles over each boundary face.
     pub over: Vec<Vec<u32>>,
-    /// Boundary faces over which triangles were added since this was emptied.
+    /// Boundary faces over which triangles were added since the caller last emptied this list.
     pub split: Vec<u32>,
     /// Points along each inserted edge of the cut curve.
     pub chains: Vec<Vec<u32>>,
     /// Point at each corner of the boundary.
     pub corner_point: Vec<u32>,
-    /// Points that stand for vertices of the fragments.
+    /// Points that represent fragment vertices, by their place.
     pub claims: BTreeMap<Claim, u32>,
-    /// Edges that two parts of the cut curve would share: never in a conforming one.
+    /// Number of skin edges that two parts of the cut curve would share. A conforming cut curve has none.
     pub conflicts: usize,
 }
 
 impl Sheet {
-    /// Every boundary face divided into `n`² triangles; a point at `flat` [m] rests at
+    /// Divides every boundary face into `n`² triangles. A point at `flat` [m] on the boundary rests at
     /// `shape(flat, normal)`.
     pub fn new(base: &Base, nodes: &[Vector3<f64>], n: usize, shape: &mut SkinShape<'_>) -> Self {
         let mut sheet = Self {
@@ -61,6 +61,7 @@ impl Sheet {
             over: vec![Vec::new(); base.faces.len()],
             ..Self::default()
         };
+        // Points on edges and corners are shared, so the faces meet without gaps.
         let mut on_edge: Vec<Vec<u32>> = vec![Vec::new(); base.n_edges];
         let mut seam: BTreeMap<(u32, usize), u32> = BTreeMap::new();
         for (f, face) in (0u32..).zip(&base.faces) {
@@ -82,6 +83,8 @@ impl Sheet {
                     }
                 }
             }
+            // Half-edges inside a face find their opposite here, those on its border by their parts of the
+            // edge.
             let inner: BTreeMap<(u32, u32), u32> = sheet.over[f as usize]
                 .iter()
                 .flat_map(|&t| (0..3).map(move |k| 3 * t + k))
@@ -94,6 +97,7 @@ impl Sheet {
                 }
             }
         }
+        // Normals belong to the flat skin, before any point is moved off it.
         let normals = sheet.normals(nodes);
         for (point, normal) in sheet.points.iter_mut().zip(&normals) {
             point.place = shape(&flat(&point.at, nodes), normal);
@@ -143,7 +147,7 @@ impl Sheet {
         self.points.len() as u32 - 1
     }
 
-    /// Joins half-edge `h` on the border of its face to the one on the face beside it.
+    /// Joins half-edge `h` on the border of its face to its opposite on the neighbouring face.
     fn sew(
         &mut self,
         face: &super::base::BaseFace,
@@ -175,7 +179,7 @@ impl Sheet {
         normals.iter().map(|n| n.try_normalize(0.0).unwrap_or_default()).collect()
     }
 
-    /// Appends a triangle without neighbours.
+    /// Appends a triangle without neighbours and returns its number.
     pub fn push(&mut self, corners: [u32; 3], face: u32) -> u32 {
         let t = self.corners.len() as u32;
         self.corners.push(corners);
@@ -203,29 +207,29 @@ impl Sheet {
         self.twin[h as usize] = g;
     }
 
-    /// The half-edge from `p` to `q` over face `f`.
+    /// The half-edge from `p` to `q` over face `f`, if there is one.
     pub fn half_edge(&self, f: u32, p: u32, q: u32) -> Option<u32> {
         let half_edges = self.over[f as usize].iter().flat_map(|&t| (0..3).map(move |k| 3 * t + k));
         half_edges.into_iter().find(|&h| self.from(h) == p && self.to(h) == q)
     }
 
-    /// Coordinates of a point of the boundary on face `f`.
+    /// Barycentric coordinates on face `f` of a point of the boundary.
     pub fn coordinates(base: &Base, f: u32, at: &FragmentVertex) -> [f64; 3] {
         base.faces[f as usize].nodes.map(|node| at.weight_of(node))
     }
 
-    /// Coordinates of skin point `p` on face `f`.
+    /// Barycentric coordinates of skin point `p` on face `f`.
     pub fn point_on(&self, base: &Base, f: u32, p: u32) -> [f64; 3] {
         Self::coordinates(base, f, &self.points[p as usize].at)
     }
 
-    /// Twice the signed area of a triangle on a face, in units of that of the face; its sign is exact.
+    /// Twice the signed area of a triangle on a face, relative to that of the face. The sign is exact.
     pub fn area(p: &[f64; 3], q: &[f64; 3], r: &[f64; 3]) -> f64 {
         let c = |v: &[f64; 3]| Coord3D { x: v[0], y: v[1], z: v[2] };
         robust::orient3d(c(p), c(q), c(r), Coord3D { x: 0.0, y: 0.0, z: 0.0 })
     }
 
-    /// Splits the edge of half-edge `h` at the point `w`, in both triangles beside it.
+    /// Splits the edge of half-edge `h` at point `w`, in both triangles beside it.
     pub fn split_edge(&mut self, h: u32, w: u32) {
         let (p, q, g, chain) = (self.from(h), self.to(h), self.twin[h as usize], self.chain[h as usize]);
         let (near, far) = (self.halve(h, w), self.halve(g, w));
@@ -240,8 +244,8 @@ impl Sheet {
         }
     }
 
-    /// Halves the triangle of half-edge `h` at the point `w` on it; returns the half-edge from `w` to
-    /// the old end.
+    /// Halves the triangle of half-edge `h` at point `w` on that half-edge. Returns the half-edge from `w` to
+    /// its old end.
     fn halve(&mut self, h: u32, w: u32) -> u32 {
         let (t, k) = (h / 3, h % 3);
         let [first, second] = [(k + 1) % 3, (k + 2) % 3];
@@ -257,7 +261,7 @@ impl Sheet {
         3 * new + k
     }
 
-    /// Splits triangle `t` in three around the point `w`.
+    /// Splits triangle `t` into three around point `w`.
     pub fn split_triangle(&mut self, t: u32, w: u32) {
         let [p, q, r] = self.corners[t as usize];
         let f = self.face[t as usize];
@@ -273,7 +277,7 @@ impl Sheet {
         self.link(3 * third + 1, 3 * t + 2);
     }
 
-    /// Half-edges that leave the first point of `h`, all around it.
+    /// All half-edges that leave the first point of `h`.
     pub fn around(&self, h: u32) -> Vec<u32> {
         let mut out = vec![h];
         let mut next = self.twin[(h / 3 * 3 + (h + 2) % 3) as usize];
@@ -284,14 +288,14 @@ impl Sheet {
         out
     }
 
-    /// Adds a point.
+    /// Adds a point and returns its number.
     pub fn add_point(&mut self, at: FragmentVertex, place: Vector3<f64>, claimed: bool) -> u32 {
         self.points.push(Point { at, place, claimed });
         self.points.len() as u32 - 1
     }
 }
 
-/// The point of the boundary itself [m].
+/// The point on the boundary itself [m], without the shape of the skin.
 fn flat(at: &FragmentVertex, nodes: &[Vector3<f64>]) -> Vector3<f64> {
     at.nodes.iter().zip(&at.weights).filter(|(n, _)| **n != NONE).map(|(&n, &w)| nodes[n as usize] * w).sum()
 }

@@ -1,9 +1,9 @@
-//! Skin triangles and lips sewn into one closed surface, again wherever a cut changed something.
+//! Joins skin triangles and lips into one closed surface, and updates it wherever a cut changed something.
 //!
-//! What a cut changes: the lips on fragments that are new, were bisected or opened or whose piece has
-//! other copies, the lips across their edges, the skin over faces where the curve went or whose element
-//! has such a fragment or piece, and the lips whose border lies over a face where the skin was split.
-//! All else stays as it is.
+//! A cut changes four things. Lips change on fragments that are new, bisected or opened or whose piece has
+//! other copies, and so do the lips across their edges. The skin changes over faces where the cut curve went
+//! or whose element has such a fragment or piece. Lips also change where the skin over the face at their
+//! border was split. Everything else stays as it is.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,7 +17,7 @@ use crate::cut::shell::joined::{Joined, Place};
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
 use crate::cut::{CutMesh, Surface, SurfaceVertex};
 
-/// What is sewn.
+/// The state from which the surface is built.
 pub struct SkinSource<'a> {
     /// The body.
     pub cut: &'a CutMesh,
@@ -25,43 +25,43 @@ pub struct SkinSource<'a> {
     pub base: &'a Base,
     /// The skin.
     pub sheet: &'a mut Sheet,
-    /// Share of an edge within which skin points are moved onto the curve.
+    /// Share of an edge within which skin points are moved onto the cut curve.
     pub snapping: f64,
 }
 
-/// Fragments and pieces that are not what they were.
+/// Fragments and pieces that the last cut changed.
 #[derive(Clone, Copy, Debug)]
 pub struct Change<'a> {
     /// Fragments that are new, were bisected or had a face opened.
     pub fragments: &'a [u32],
-    /// Pieces that were taken apart, made, or have other copies.
+    /// Pieces that were split, created or given other copies.
     pub pieces: &'a [u32],
 }
 
-/// What a surface triangle is.
+/// The skin triangle or lip to which a surface triangle belongs.
 #[derive(Clone, Copy, Debug)]
 enum Owner {
     Skin(u32),
     Lip(Face),
 }
 
-/// The surface and what it consists of.
+/// The joined surface: its connectivity, and the origin of its triangles.
 #[derive(Clone, Debug, Default)]
 pub struct SkinJoin {
     joined: Joined,
     parts: Parts,
-    /// Surface triangles that nothing uses.
+    /// Numbers of surface triangles that are no longer in use.
     free: Vec<u32>,
     renewed: usize,
 }
 
-/// What surface triangles are, and where skin triangles and lips are among them.
+/// The origin of every surface triangle, and the surface triangles of skin and lips.
 #[derive(Clone, Debug, Default)]
 struct Parts {
     owner: Vec<Owner>,
     corners: Vec<[Corner; 3]>,
     piece: Vec<u32>,
-    /// Surface triangle of each skin triangle.
+    /// Surface triangle of each skin triangle, or [`NONE`].
     of_skin: Vec<u32>,
     lips: BTreeMap<Face, Lip>,
     /// Lips with a border over each boundary face.
@@ -69,14 +69,14 @@ struct Parts {
 }
 
 impl Parts {
-    /// A half-edge of the skin as one of the surface.
+    /// The half-edge of the surface for a half-edge of the skin.
     fn half_edge(&self, h: u32) -> u32 {
         3 * self.of_skin[h as usize / 3] + h % 3
     }
 }
 
 impl SkinJoin {
-    /// Skin triangles that the last change made anew.
+    /// Number of skin triangles that the last change renewed.
     pub fn renewed(&self) -> usize {
         self.renewed
     }
@@ -92,7 +92,7 @@ impl SkinJoin {
         self.parts.of_skin[t as usize]
     }
 
-    /// Brings `surface` up to date; where skin and lips do not fit, it is not usable.
+    /// Updates `surface`. After an error it is not usable.
     pub fn sew(
         &mut self,
         source: &mut SkinSource,
@@ -120,8 +120,8 @@ impl SkinJoin {
         Ok(())
     }
 
-    /// Takes off the lips that are not what they were, and inserts the borders of those in their place
-    /// into the skin. Returns the new ones; `faces` receives the boundary faces that this concerns.
+    /// Removes the lips that changed and inserts the borders of the new ones into the skin. Returns the new
+    /// lips; `faces` receives the boundary faces affected.
     fn cut_the_skin(
         &mut self,
         source: &mut SkinSource,
@@ -140,13 +140,14 @@ impl SkinJoin {
                 present.iter().map(|&lip| Lip::new(base, cut, source.sheet, snapping, lip)).collect();
             new.iter().for_each(|lip| lip.cut(base, source.sheet, snapping));
             made.extend(present.into_iter().zip(new));
-            // Where the skin was split, the borders of other lips have more edges now.
+            // Splitting the skin gives the borders of other lips more edges, so these lips are redone too.
             todo = BTreeSet::new();
             for f in std::mem::take(&mut source.sheet.split) {
                 faces.insert(f);
                 todo.extend(&self.parts.on_face[f as usize]);
             }
         }
+        // Only now is the skin final, so that borders can be traced along its edges.
         for (&face, lip) in &mut made {
             lip.find_chains(source.sheet)?;
             for border in lip.borders.iter().flatten() {
@@ -159,7 +160,7 @@ impl SkinJoin {
         Ok(lips)
     }
 
-    /// Lips, present and past, on what changed and across its edges.
+    /// Old and new lips on the changed fragments and pieces, and across their edges.
     fn lips_around(&self, cut: &CutMesh, change: Change) -> BTreeSet<Face> {
         let f = &cut.fragments;
         let mut lips = BTreeSet::new();
@@ -189,7 +190,7 @@ impl SkinJoin {
         }
     }
 
-    /// A surface triangle for `owner`.
+    /// Returns a surface triangle for `owner`: a free one, or a new one.
     fn new_triangle(&mut self, owner: Owner, surface: &mut Surface) -> u32 {
         let t = self.free.pop().unwrap_or_else(|| {
             let t = self.joined.add(0, surface);
@@ -203,7 +204,7 @@ impl SkinJoin {
         t
     }
 
-    /// Skin triangles over all faces that this change concerns: pieces, neighbours.
+    /// Lays the skin triangles over all affected faces: assigns their pieces and joins neighbours.
     fn lay_skin(
         &mut self,
         source: &SkinSource,
@@ -230,6 +231,7 @@ impl SkinJoin {
         for &f in faces.iter() {
             self.find_pieces(cut, base, sheet, f)?;
         }
+        // Skin edges on the cut curve stay open; the lips are joined there.
         for h in faces.iter().flat_map(|&f| &sheet.over[f as usize]).flat_map(|&t| 3 * t..3 * t + 3) {
             let here = self.parts.half_edge(h);
             if sheet.chain[h as usize] == NONE {
@@ -244,7 +246,8 @@ impl SkinJoin {
         Ok(())
     }
 
-    /// The pieces below the skin over face `f`: from the borders on, as far as no other lies between.
+    /// Finds the pieces below the skin over face `f`. The flood starts at the borders and stops at the cut
+    /// curve.
     fn find_pieces(&mut self, cut: &CutMesh, base: &Base, sheet: &Sheet, f: u32) -> Result<(), Misfit> {
         let parts = &mut self.parts;
         let mut stack = Vec::new();
@@ -270,6 +273,7 @@ impl SkinJoin {
                 }
             }
         }
+        // A face without borders, or a part of it that no border reaches, takes the piece found below it.
         let mut whole = None;
         for &t in &sheet.over[f as usize] {
             let s = parts.of_skin[t as usize] as usize;
@@ -285,7 +289,8 @@ impl SkinJoin {
         Ok(())
     }
 
-    /// Triangles of new lips, joined to each other, to the lips beside them and to the skin.
+    /// Creates the triangles of new lips and joins them to each other, to the neighbouring lips and to the
+    /// skin.
     fn fill_lips(&mut self, source: &SkinSource, lips: &[Face], surface: &mut Surface) -> Result<(), Misfit> {
         let f = &source.cut.fragments;
         for &face in lips {
@@ -309,6 +314,7 @@ impl SkinJoin {
                     self.joined.join(h, twin);
                 }
             }
+            // The outline is recorded edge by edge: the skin and the lips beside it are joined along it.
             let mut first = 0;
             for (edge, &count) in parts.iter().enumerate() {
                 let along = (first..first + count).map(|i| edges[&[i, (i + 1) % n]]);
@@ -327,6 +333,7 @@ impl SkinJoin {
             }
             self.parts.lips.insert(face, lip);
         }
+        // Lips meet across edges inside the body only once all of them have their triangles.
         for &(t, k) in lips {
             for edge in (0..3).filter(|&edge| self.parts.lips[&(t, k)].borders[edge].is_none()) {
                 let (s, j, other) = f.around_edge(t, k as usize, edge);
@@ -342,7 +349,7 @@ impl SkinJoin {
         Ok(())
     }
 
-    /// Surface triangles that are left over make room for the last ones.
+    /// Removes unused surface triangles; the last triangles take their numbers.
     fn give_numbers_back(&mut self, surface: &mut Surface) {
         let mut free = std::mem::take(&mut self.free);
         free.sort_unstable_by(|s, t| t.cmp(s));
@@ -371,7 +378,7 @@ impl SkinJoin {
     }
 }
 
-/// Where the vertices of the surface are.
+/// Places the vertices of the surface.
 struct Placed<'a> {
     cut: &'a CutMesh,
     sheet: &'a Sheet,
@@ -383,7 +390,7 @@ impl Placed<'_> {
         self.parts.corners[c as usize / 3][c as usize % 3]
     }
 
-    /// Puts the middle of a lip into the centroid of its outline, once that has its vertices.
+    /// Puts the middle of a lip at the centroid of its outline, once the outline has its vertices.
     fn place_middle(&self, lip: &Lip, surface: &mut Surface) {
         let Some(&first) = lip.triangles.first() else { return };
         if self.corner(3 * first + 2) != Corner::Middle {
@@ -399,7 +406,7 @@ impl Placed<'_> {
 }
 
 impl Place for Placed<'_> {
-    /// On the skin where one of the corners is, in the element that has to extrapolate least.
+    /// On the skin if one of the corners is, and in the element that has to extrapolate least.
     fn vertex(&mut self, cycle: &[u32]) -> SurfaceVertex {
         let mut best: Option<(f64, SurfaceVertex)> = None;
         let mut seen = NONE;
@@ -423,7 +430,7 @@ impl Place for Placed<'_> {
                 let piece = self.parts.piece[cycle[0] as usize / 3];
                 on_fragment(self.cut, piece, &self.cut.fragments.vertices[v as usize])
             }
-            // A middle is placed when its neighbours are.
+            // The middle of a lip is placed after its neighbours.
             _ => SurfaceVertex { copies: [0; 4], weights: [0.0; 4] },
         }
     }
@@ -434,7 +441,7 @@ impl Place for Placed<'_> {
     }
 }
 
-/// The piece of its element that a part of boundary face `f` belongs to.
+/// The piece of one of the fragments below boundary face `f`.
 fn piece_under(cut: &CutMesh, base: &Base, f: u32) -> Option<u32> {
     let fragments = &cut.fragments;
     let e = base.faces[f as usize].element;
@@ -455,7 +462,7 @@ fn rest_place(cut: &CutMesh, vertex: &SurfaceVertex) -> Vector3<f64> {
     vertex.copies.iter().zip(&vertex.weights).map(|(&c, &w)| node(c) * w).sum()
 }
 
-/// A rest place in the coordinates of a piece's element.
+/// A rest position in the barycentric coordinates of a piece's element.
 fn in_element(cut: &CutMesh, piece: u32, place: &Vector3<f64>) -> SurfaceVertex {
     let piece = &cut.pieces()[piece as usize];
     let e = piece.element as usize;
@@ -468,7 +475,7 @@ fn in_element(cut: &CutMesh, piece: u32, place: &Vector3<f64>) -> SurfaceVertex 
     SurfaceVertex { copies: piece.copies, weights }
 }
 
-/// A vertex of the fragments on the copies of a piece.
+/// A fragment vertex, expressed by the copies of a piece.
 fn on_fragment(cut: &CutMesh, piece: u32, v: &FragmentVertex) -> SurfaceVertex {
     let piece = &cut.pieces()[piece as usize];
     let nodes = cut.mesh().tets[piece.element as usize];

@@ -1,8 +1,8 @@
-//! Edges of the cut curve become chains of skin edges.
+//! Turns edges of the cut curve into chains of skin edges.
 //!
-//! A walk from one end straight to the other, over one boundary face: along an edge where one lies on
-//! the line, through a corner where the line meets one, else by splitting the edge it crosses (or,
-//! with snapping, by moving a corner onto the line). Edges that were cut before are never crossed.
+//! A walk goes straight from one end to the other, over one boundary face. It follows an edge that lies on
+//! the line, passes through a corner on the line, or splits the edge it crosses (or, with snapping, moves a
+//! corner onto the line). It never crosses an edge of an earlier cut.
 
 use std::collections::VecDeque;
 
@@ -11,15 +11,15 @@ use super::insert::{ON, Target};
 use super::sheet::Sheet;
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
 
-/// A way on from a point.
+/// The next step of a walk.
 enum Step {
     To(u32),
-    /// Across this half-edge, this far from its start.
+    /// Across this half-edge, at this parameter from its start.
     Across(u32, f64),
 }
 
 impl Sheet {
-    /// Points along the cut between two points over face `f`, if one was inserted.
+    /// Points along the cut between two points over face `f`, if that cut was inserted.
     pub fn cut_between(&self, f: u32, from: u32, to: u32) -> Option<Vec<u32>> {
         for &t in &self.over[f as usize] {
             for k in 0..3 {
@@ -82,7 +82,7 @@ impl Sheet {
         Some(path)
     }
 
-    /// The way on from point `at` towards `to`.
+    /// The next step from point `at` towards `to`.
     fn step(&self, base: &Base, f: u32, at: u32, to: u32) -> Option<Step> {
         let fan: Vec<(u32, usize)> = self.over[f as usize]
             .iter()
@@ -113,7 +113,7 @@ impl Sheet {
         found
     }
 
-    /// Goes through the edge of half-edge `h`; returns the point there.
+    /// Crosses the edge of half-edge `h` and returns the point there.
     fn cross(&mut self, base: &Base, f: u32, h: u32, s: f64, snapping: f64) -> u32 {
         let [a, b] = [self.from(h), self.to(h)];
         let [pa, pb] = [a, b].map(|p| self.points[p as usize]);
@@ -136,7 +136,7 @@ impl Sheet {
         point
     }
 
-    /// The way over the fewest uncut edges, where rounding bars the straight one.
+    /// The path over the fewest uncut edges, for cases where rounding blocks the straight one.
     fn shortest(&self, f: u32, from: u32, to: u32) -> Vec<u32> {
         let mut before: Vec<(u32, u32)> = vec![(from, NONE)];
         let mut queue = VecDeque::from([from]);

@@ -1,7 +1,7 @@
-//! Removal of degenerate elements in passes, as long as there are fewer after each.
+//! Removes degenerate elements, in passes as long as their number falls.
 //!
 //! # Source
-//! Nienhuys 2003, §3.2.3. Elements that cannot be collapsed stay: removing them, as there, would lose
+//! Nienhuys 2003, §3.2.3. Unlike there, elements that cannot be collapsed are kept: removing them would lose
 //! mass and open cracks, and they are not inverted.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,13 +13,13 @@ use super::complex::{Complex, barycentric};
 use super::shape::{FLAT, Kind, aspect, kind, opposite};
 use crate::mesh::TET_EDGES;
 
-/// How far from the ends of an edge, relative to it, a new node has to be.
+/// Least distance of a new node from the ends of its edge, relative to the edge.
 const INSIDE: f64 = 1e-3;
 
-/// What cleaning did.
+/// Counts and node changes of one cleaning.
 #[derive(Clone, Debug, Default)]
 pub struct Cleaned {
-    /// Nodes that are gone, and what they were merged with.
+    /// Removed nodes, and the nodes they were merged with.
     pub merged: BTreeMap<u32, u32>,
     /// Collapsed edges.
     pub collapses: usize,
@@ -29,7 +29,7 @@ pub struct Cleaned {
     pub left: usize,
 }
 
-/// Removes degenerate elements among `region` and what replaces them.
+/// Removes degenerate elements in `region`, and among the elements that replace them.
 pub fn clean(complex: &mut Complex, region: BTreeSet<u32>) -> Cleaned {
     let mut cleaned = Cleaned::default();
     let mut region: Vec<u32> = region.into_iter().collect();
@@ -80,7 +80,7 @@ fn remove(complex: &mut Complex, t: u32, cleaned: &mut Cleaned) {
     if done.is_none() {
         complex.undo(start);
         splits = 0;
-        // The way of needles for all: the shortest edge first.
+        // Fall back to what is done with needles: collapse an edge, the shortest first.
         let mut edges = TET_EDGES;
         edges.sort_by(|e, f| (x[e[0]] - x[e[1]]).norm().total_cmp(&(x[f[0]] - x[f[1]]).norm()));
         done = edges.into_iter().find_map(|[i, j]| collapse(complex, tet[i], tet[j], floor));
@@ -92,7 +92,7 @@ fn remove(complex: &mut Complex, t: u32, cleaned: &mut Cleaned) {
     }
 }
 
-/// The node of edge `e` that lies close to the edge opposite, and where on that.
+/// The place on the edge opposite `e` that lies closest to an end of `e`: its parameter, and that end.
 fn meet_spindle(x: &[Vector3<f64>; 4], e: [usize; 2]) -> Option<(f64, usize)> {
     let [a, b] = opposite(e);
     let axis = x[b] - x[a];
@@ -105,7 +105,7 @@ fn meet_spindle(x: &[Vector3<f64>; 4], e: [usize; 2]) -> Option<(f64, usize)> {
     inside(s).then_some((s, k))
 }
 
-/// Where two edges come closest, along each.
+/// Parameters, along each, of the closest points of two edges.
 fn meet_sliver(x: &[Vector3<f64>; 4], e: [usize; 2], f: [usize; 2]) -> Option<[f64; 2]> {
     let (d, c, between) = (x[e[1]] - x[e[0]], x[f[1]] - x[f[0]], x[f[0]] - x[e[0]]);
     let (dd, cc, dc) = (d.norm_squared(), c.norm_squared(), d.dot(&c));
@@ -115,7 +115,7 @@ fn meet_sliver(x: &[Vector3<f64>; 4], e: [usize; 2], f: [usize; 2]) -> Option<[f
     (inside(s) && inside(r)).then_some([s, r])
 }
 
-/// Barycentric coordinates of the foot of the perpendicular from a node to the face opposite, in the
+/// Barycentric coordinates of the foot of the perpendicular from a node to the opposite face, in the node
 /// order of that face.
 fn foot(x: &[Vector3<f64>; 4], apex: usize) -> Option<[f64; 3]> {
     let face = crate::mesh::TET_FACES[apex].map(|k| x[k]);

@@ -1,7 +1,7 @@
-//! Collapsing an edge, and splitting edges and faces.
+//! Collapses edges, and splits edges and faces.
 //!
-//! A collapse is done only where it changes neither the topology (link condition) nor the volume, and
-//! where everything around it becomes better shaped than the element it is to remove.
+//! A collapse is made only where it changes neither the topology (link condition) nor the volume, and where
+//! every element around ends up better shaped than the element to be removed.
 //!
 //! # Source
 //! Nienhuys 2003, §3.2.3. Link condition: Dey, Edelsbrunner, Guha, Nekhayev 1999, "Topology preserving
@@ -15,10 +15,10 @@ use super::complex::{Complex, FaceKey, det, face_key};
 use super::node::{NEW, SnapNode};
 use super::shape::aspect;
 
-/// The ghost node.
+/// The ghost node: one apex beyond all boundary faces, which closes the links of boundary nodes.
 const GHOST: u32 = u32::MAX;
 
-/// Largest change of volume by a collapse, relative to the elements around it: rounding only.
+/// Largest change of volume by a collapse, relative to the elements around it. It only allows for rounding.
 const VOLUME: f64 = 1e-11;
 
 /// A collapsed edge.
@@ -26,11 +26,11 @@ const VOLUME: f64 = 1e-11;
 pub struct Collapse {
     /// The node that remains.
     pub kept: u32,
-    /// The node that is gone.
+    /// The node that was removed.
     pub gone: u32,
 }
 
-/// Merges the ends of an edge at one of them or in its middle, if there is a place where topology and
+/// Merges the ends of an edge, at one of them or in its middle. It does so only at a place where topology and
 /// volume stay and every element around has an aspect ratio above `floor`.
 pub fn collapse(complex: &mut Complex, a: u32, b: u32, floor: f64) -> Option<Collapse> {
     if !link_condition(complex, a, b) {
@@ -57,7 +57,7 @@ pub fn collapse(complex: &mut Complex, a: u32, b: u32, floor: f64) -> Option<Col
     Some(Collapse { kept, gone })
 }
 
-/// Whether merging leaves sound elements of the same volume.
+/// Whether merging leaves well-shaped elements of the same total volume.
 fn improves(complex: &Complex, kept: u32, gone: u32, place: &SnapNode, floor: f64) -> bool {
     let mut tets: Vec<u32> = complex.around(kept).to_vec();
     tets.extend(complex.around(gone).iter().filter(|&&t| !complex.tet(t).contains(&kept)));
@@ -119,7 +119,7 @@ fn link_condition(complex: &Complex, a: u32, b: u32) -> bool {
         && nodes(&of_a).intersection(&nodes(&of_b)).all(|n| edge_nodes.contains(n))
 }
 
-/// Triangles opposite a node, those of the ghost elements beyond the boundary too.
+/// Triangles opposite a node, including those of the ghost elements beyond the boundary.
 fn link(complex: &Complex, n: u32) -> BTreeSet<FaceKey> {
     let mut link = BTreeSet::new();
     for &t in complex.around(n) {
@@ -135,7 +135,7 @@ fn link(complex: &Complex, n: u32) -> BTreeSet<FaceKey> {
     link
 }
 
-/// The other two nodes of a triangle that has `n`.
+/// The other two nodes of a triangle, if it has `n`.
 fn without(&[p, q, r]: &FaceKey, n: u32) -> Option<[u32; 2]> {
     match n {
         _ if n == p => Some([q, r]),
@@ -145,22 +145,22 @@ fn without(&[p, q, r]: &FaceKey, n: u32) -> Option<[u32; 2]> {
     }
 }
 
-/// Puts a new node on the edge from `a` to `b`, at `s` from `a`, and splits the elements around it.
+/// Adds a node on the edge from `a` to `b`, at parameter `s` from `a`, and splits the elements around it.
 pub fn split_edge(complex: &mut Complex, a: u32, b: u32, s: f64) -> u32 {
     let place = SnapNode::between(&[&complex.nodes[a as usize], &complex.nodes[b as usize]], &[1.0 - s, s]);
     split(complex, place, &[a, b])
 }
 
-/// Puts a new node on the face of `t` opposite its local node `k`, at these barycentric coordinates,
-/// and splits the elements beside it.
+/// Adds a node on the face of `t` opposite its local node `k`, at these barycentric coordinates, and splits
+/// the elements next to it.
 pub fn split_face(complex: &mut Complex, t: u32, k: usize, weights: [f64; 3]) -> u32 {
     let face = complex.face(t, k);
     let place = SnapNode::between(&face.map(|n| &complex.nodes[n as usize]), &weights);
     split(complex, place, &face)
 }
 
-/// A new node inside the edge or face with these nodes: every element that has all of them becomes
-/// as many as there are nodes.
+/// Adds a node inside the edge or face with these nodes. Every element with all of them is divided into as
+/// many as there are nodes.
 fn split(complex: &mut Complex, place: SnapNode, nodes: &[u32]) -> u32 {
     let m = complex.add_node(place);
     let holds = |tet: &[u32]| nodes.iter().all(|n| tet.contains(n));

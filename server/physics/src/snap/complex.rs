@@ -7,27 +7,27 @@ use nalgebra::{Matrix3, Vector3};
 use super::node::SnapNode;
 use crate::mesh::TET_FACES;
 
-/// Nodes of a face in ascending order: its name, whichever element it is seen from.
+/// Nodes of a face in ascending order: a key that is the same from both of its elements.
 pub type FaceKey = [u32; 3];
 
-/// The name of the face with these nodes.
+/// The key of the face with these nodes.
 pub fn face_key(mut nodes: [u32; 3]) -> FaceKey {
     nodes.sort_unstable();
     nodes
 }
 
-/// Elements, the nodes they stand on, and the faces that incisions have marked.
+/// Elements, their nodes, and the faces that incisions have marked.
 #[derive(Clone, Debug, Default)]
 pub struct Complex {
-    /// Nodes; those that no element uses any more are dropped at the end.
+    /// All nodes. Those that no element uses any more are dropped at the end of the cut.
     pub nodes: Vec<SnapNode>,
     /// Node ids per element, positively oriented.
     tets: Vec<[u32; 4]>,
     alive: Vec<bool>,
     /// Elements around every node.
     around: Vec<Vec<u32>>,
-    /// Incision per face: of a lip where the face is on the surface, else of a face that is
-    /// selected but held together by all its nodes.
+    /// Incision per face: of a lip if the face is on the surface, else of a face that is selected but still
+    /// closed.
     tags: BTreeMap<FaceKey, u32>,
     journal: Vec<Edit>,
 }
@@ -42,7 +42,7 @@ enum Edit {
     Tagged(FaceKey, Option<u32>),
 }
 
-/// A moment to return to.
+/// A state of the complex to return to.
 #[derive(Clone, Copy, Debug)]
 pub struct Mark(usize);
 
@@ -57,12 +57,12 @@ impl Complex {
         Self { nodes, tets: tets.to_vec(), alive, around, tags, journal: Vec::new() }
     }
 
-    /// Number of elements that there ever were.
+    /// Number of element slots, including removed elements.
     pub fn n_slots(&self) -> usize {
         self.tets.len()
     }
 
-    /// Whether element `t` is still there.
+    /// Whether element `t` has not been removed.
     pub fn is_alive(&self, t: u32) -> bool {
         self.alive[t as usize]
     }
@@ -94,7 +94,7 @@ impl Complex {
         self.around(p).iter().find(shares).copied()
     }
 
-    /// Incision that marked a face.
+    /// Incision that marked a face, if any.
     pub fn tag(&self, key: &FaceKey) -> Option<u32> {
         self.tags.get(key).copied()
     }

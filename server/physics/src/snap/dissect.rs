@@ -1,6 +1,6 @@
-//! Dissection: nodes are duplicated by the connected components of the elements around them.
+//! Dissection: duplicates nodes by the connected components of the elements around them.
 //!
-//! Two elements around a node belong together if they share a face at that node that is not selected.
+//! Two elements at a node are connected if they share a face at that node that is not selected.
 //!
 //! # Source
 //! Nienhuys 2003, §3.2 and ch. 7.
@@ -11,7 +11,7 @@ use super::complex::{Complex, face_key};
 use super::memory::Memory;
 use super::shape::star_volume;
 
-/// A node made of another one.
+/// A node that was split off another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Duplicate {
     /// The new node.
@@ -20,10 +20,10 @@ pub struct Duplicate {
     pub parent: u32,
 }
 
-/// Splits `nodes` along all marked faces. The component with the lowest element keeps the node;
-/// loads are shared by volume.
+/// Splits `nodes` along all marked faces. The component with the lowest element keeps the node. Loads are
+/// divided by volume.
 pub fn dissect(complex: &mut Complex, nodes: &BTreeSet<u32>, memories: &mut [&mut Memory]) -> Vec<Duplicate> {
-    // Both lips of a face carry its mark, so marks are taken down by element for the while.
+    // After the split both lips of a face need its mark, so marks are kept per element meanwhile.
     let mut marked = Vec::new();
     for (&[p, q, r], &tag) in complex.tags() {
         for &t in complex.around(p) {
@@ -64,8 +64,8 @@ pub fn dissect(complex: &mut Complex, nodes: &BTreeSet<u32>, memories: &mut [&mu
     duplicates
 }
 
-/// Puts `to` in the place of `from` under some elements; their marked faces stay marked, since a face
-/// may have both its elements among them.
+/// Replaces `from` by `to` in some elements. Their marked faces stay marked, since both elements of a face
+/// may be among them.
 fn rename_all(complex: &mut Complex, tets: &[u32], from: u32, to: u32) {
     let mut marked = Vec::new();
     for &t in tets {
@@ -79,7 +79,7 @@ fn rename_all(complex: &mut Complex, tets: &[u32], from: u32, to: u32) {
     }
 }
 
-/// Elements around `n` by what hangs together at it, each ascending, by their lowest element.
+/// Connected components of the elements around `n`, each ascending, ordered by their lowest element.
 fn components_around(complex: &Complex, n: u32) -> Vec<Vec<u32>> {
     let mut left: BTreeSet<u32> = complex.around(n).iter().copied().collect();
     let mut components = Vec::new();

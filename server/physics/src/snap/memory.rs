@@ -1,4 +1,4 @@
-//! What an incision has crossed and not yet cut, and the nodes that lie on it.
+//! What an incision has crossed but not cut yet, and the nodes on its cut surface.
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use super::complex::Complex;
 /// Nodes of an edge in ascending order.
 pub type EdgeKey = [u32; 2];
 
-/// Where a sweep crosses an edge: a point of the material, which goes along with it.
+/// Where a sweep crosses an edge. It is a point of the material and moves with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// Where along the edge, from its lower node.
+    /// Parameter along the edge, from its lower node.
     pub t: f64,
     /// Whether the lower node of the edge lies below the sweep, against its normal.
     pub upwards: bool,
@@ -20,7 +20,8 @@ pub struct Crossing {
     pub normal: Vector3<f64>,
 }
 
-/// An edge counts as halved within this fraction of its length: rounding only.
+/// Tolerance, relative to the length of an edge, within which the edge counts as halved. It only allows for
+/// rounding.
 const HALVED: f64 = 1e-9;
 
 /// The record of one incision.
@@ -54,7 +55,7 @@ impl Crossing {
 }
 
 impl Memory {
-    /// Follows the duplication of node `from` as `to`: elements `tets` stand on `to` now.
+    /// Updates the record after node `from` was duplicated as `to` for the elements `tets`.
     pub fn duplicate(&mut self, complex: &Complex, from: u32, to: u32, tets: &[u32]) {
         if let Some(&normal) = self.on.get(&from) {
             self.on.insert(to, normal);
@@ -64,22 +65,22 @@ impl Memory {
             let Some(at) = edge.iter().position(|&n| n == from) else { continue };
             let other = edge[1 - at];
             if tets.iter().any(|&t| complex.tet(t).contains(&other)) {
-                // The new node has the highest number of all.
+                // The new node has the highest number of all, so it comes second in the edge.
                 more.push(([other, to], if at == 0 { crossing.turned() } else { *crossing }));
             }
         }
         self.crossings.extend(more);
     }
 
-    /// Forgets what a new cut surface has settled: edges at its nodes.
+    /// Removes the crossings that a new cut surface has settled: those of edges at its nodes.
     pub fn settle(&mut self, nodes: impl Iterator<Item = (u32, Vector3<f64>)>) {
         self.on.extend(nodes);
         let on = &self.on;
         self.crossings.retain(|edge, _| !edge.iter().any(|n| on.contains_key(n)));
     }
 
-    /// Forgets edges that the mesh no longer has, and renumbers: `number` of a node that is gone is
-    /// none, or that of the node it was merged with.
+    /// Removes edges that the mesh no longer has, and renumbers the nodes. `number` of a removed node is
+    /// `None`, or that of the node it was merged with.
     pub fn renumber(&mut self, complex: &Complex, number: impl Fn(u32) -> Option<u32>) {
         let crossings = std::mem::take(&mut self.crossings);
         for ([a, b], crossing) in crossings {

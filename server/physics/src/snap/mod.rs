@@ -1,7 +1,7 @@
-//! Cutting along element faces with nodes moved onto the sweep.
+//! Cutting along element faces, with nodes moved onto the sweep.
 //!
-//! The other way to cut a body: the element mesh itself is changed, so that the number of elements
-//! stays nearly the same and every element stays a plain one. Four actions in sequence:
+//! This is the other way to cut a body: it changes the element mesh itself. The number of elements stays
+//! nearly the same, and every element stays an ordinary one. Four steps in sequence:
 //!
 //! 1. [`select`]: the sweep is intersected with the edges of the mesh, each crossing marks the nearer
 //!    node, and faces whose three nodes are marked form the cut surface.
@@ -10,19 +10,18 @@
 //! 3. [`dissect`]: nodes are duplicated by the connected components of the elements around them.
 //! 4. [`clean`]: degenerate elements are removed by splitting and collapsing edges.
 //!
-//! [`Snapper`] runs them and remembers, per incision, what a sweep has crossed but not yet cut.
+//! [`Snapper`] runs them. Per incision it remembers what a sweep has crossed but not cut yet.
 //!
 //! # Invariants
-//! The volume, hence the mass, is that of the body before; no element is inverted by a cut; an
-//! element may become flat, never flatter than [`relocate::LEAST_ASPECT`] by a node that moved.
-//! Signs are exact and lengths are only ever compared with lengths: the same cut in millimetres
-//! and in metres gives the same mesh.
+//! A cut keeps the volume, hence the mass, and inverts no element. An element may become flat, but a moved
+//! node never makes it flatter than [`relocate::LEAST_ASPECT`]. Signs are exact and lengths are only compared
+//! with lengths, so the same cut in millimetres and in metres gives the same mesh.
 //!
 //! # Source
-//! Nienhuys 2003, *Cutting in deformable objects*, §3.2. What is different here: faces are selected
-//! only between elements on different sides of the sweep, so that the cut surface does not branch;
-//! nodes on a curved skin move so that the volume stays; a node whose move would nearly invert an
-//! element stays where it is; elements that cannot be collapsed are kept instead of removed.
+//! Nienhuys 2003, *Cutting in deformable objects*, §3.2. Four things differ here. Faces are selected only
+//! between elements on different sides of the sweep, so the cut surface does not branch. Nodes on a curved
+//! skin move so that the volume stays. A node whose move would nearly invert an element stays where it is.
+//! Elements that cannot be collapsed are kept instead of removed.
 
 pub mod node;
 pub mod complex;

@@ -1,11 +1,11 @@
-//! A node with everything that must stay consistent when the mesh around it changes.
+//! A node with all data that must stay consistent when the mesh around it changes.
 
 use nalgebra::Vector3;
 
-/// Origin of a node that no node of the mesh before the cut became.
+/// Origin of a node that did not exist before the cut.
 pub const NEW: u32 = u32::MAX;
 
-/// A node of a body, in both configurations, with what is prescribed on it.
+/// A node of a body in both configurations, with its loads and constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SnapNode {
     /// Rest position [m].
@@ -14,14 +14,14 @@ pub struct SnapNode {
     pub x: Vector3<f64>,
     /// Velocity [m/s].
     pub v: Vector3<f64>,
-    /// Axes along which the displacement is prescribed, and the displacement [m]. Such a node is
-    /// neither moved nor collapsed; all duplicates of it are held alike.
+    /// Axes along which the displacement is prescribed, and the displacement [m]. Such a node is neither
+    /// moved nor collapsed. All duplicates of it get the same constraint.
     pub fixed: Option<([bool; 3], Vector3<f64>)>,
     /// Force on the node itself [N].
     pub point_force: Vector3<f64>,
     /// Force spread over the material around the node [N].
     pub spread_force: Vector3<f64>,
-    /// The node it was before the cut, or [`NEW`].
+    /// Its number before the cut, or [`NEW`].
     pub origin: u32,
 }
 

@@ -1,13 +1,13 @@
-//! Moving nodes of the cut surface onto the sweep.
+//! Moves nodes of the cut surface onto the sweep.
 //!
-//! A node moves through the material: to a material point of an element beside it, which has a place
-//! in the reference and one in the deformed configuration, and a velocity. So the field that the body
-//! had is sampled anew, and a rigid motion stays one.
+//! A node moves to a material point of an element next to it. That point has a position in the reference and
+//! one in the deformed configuration, and a velocity. The existing fields of the body are thus sampled anew,
+//! and a rigid motion stays rigid.
 //!
-//! A node inside goes to the foot of the perpendicular in the deformed configuration. On the skin it
-//! moves along the plane through it that keeps the volume, which is the skin where that is flat, and
-//! on a crease along the crease; corners stay. This contains the rule of the source (projection on
-//! the intersection of sweep and skin), which is made for flat skins.
+//! A node inside the body goes to the foot of the perpendicular in the deformed configuration. A node on the
+//! skin moves in the plane through it that keeps the volume, which is the skin itself where that is flat. A
+//! node on a crease moves along the crease, and a corner stays. This contains the rule of the source
+//! (projection on the intersection of sweep and skin), which is made for flat skins.
 //!
 //! # Source
 //! Nienhuys 2003, §3.2.2.
@@ -34,15 +34,15 @@ const CREASE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Cosine of the bend up to which a crease goes on through a node.
 const STRAIGHT: f64 = 0.9;
 
-/// Sine of the angle between sweep and skin below which there is no way along the skin.
+/// Sine of the angle between sweep and skin below which a node cannot reach the sweep along the skin.
 const LEAST_ANGLE: f64 = 0.1;
 
-/// How far outside its element the new place may be, in barycentric coordinates: rounding inside the
-/// body, the bend of the skin on it.
+/// How far outside its element the new place may lie, in barycentric coordinates: inside the body only
+/// rounding, on the skin also its curvature.
 const OUTSIDE: f64 = 1e-9;
 const OUTSIDE_ON_SKIN: f64 = 0.1;
 
-/// Which way a node can go in the reference configuration.
+/// Directions in which a node may move in the reference configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Freedom {
     Space,
@@ -53,8 +53,8 @@ enum Freedom {
     None,
 }
 
-/// Moves as many of the nodes onto the sweep as can go there, the closest first; a move may make room
-/// for another one, so it goes on as long as any is made. Returns how many nodes stay off the sweep.
+/// Moves as many nodes onto the sweep as possible, the closest first. A move may make another one possible,
+/// so passes go on until none succeeds. Returns the number of nodes that stay off the sweep.
 pub fn relocate_all(complex: &mut Complex, nodes: Vec<u32>, marks: &BTreeMap<u32, NodeMark>) -> usize {
     let mut waiting = nodes;
     waiting.sort_by(|p, q| marks[p].distance.total_cmp(&marks[q].distance).then(p.cmp(q)));
@@ -67,7 +67,7 @@ pub fn relocate_all(complex: &mut Complex, nodes: Vec<u32>, marks: &BTreeMap<u32
     }
 }
 
-/// Moves node `n` onto the sweep near `mark`; `false` if it has to stay where it is.
+/// Moves node `n` onto the sweep near `mark`. Returns `false` if it has to stay.
 fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
     let node = complex.nodes[n as usize];
     if node.fixed.is_some() {
@@ -82,7 +82,7 @@ fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
     true
 }
 
-/// The material point of the star of `n` that lies on the sweep.
+/// The material point in the star of `n` that lies on the sweep.
 fn target(complex: &Complex, n: u32, mark: &NodeMark, freedom: Freedom) -> Option<SnapNode> {
     let node = &complex.nodes[n as usize];
     // Distance from the sweep [m], positive along its normal.
@@ -112,8 +112,8 @@ fn target(complex: &Complex, n: u32, mark: &NodeMark, freedom: Freedom) -> Optio
     best.map(|b| b.1)
 }
 
-/// Barycentric coordinates in `t` of the rest position of `n` moved by what `way` makes of Fᵀ n, the
-/// normal of the sweep pulled back to the reference configuration.
+/// Barycentric coordinates in `t` of the displaced rest position of `n`. The displacement is `way` applied to
+/// Fᵀ n, the normal of the sweep pulled back to the reference configuration.
 fn along(
     complex: &Complex,
     t: u32,
@@ -128,7 +128,7 @@ fn along(
     barycentric(&rest, &moved)
 }
 
-/// How the skin around `n` lets it move.
+/// The freedom that the skin around `n` leaves it.
 fn freedom(complex: &Complex, n: u32) -> Freedom {
     let mut skin: Vec<([u32; 3], Vector3<f64>, Option<u32>)> = Vec::new();
     for &t in complex.around(n) {
@@ -151,14 +151,14 @@ fn freedom(complex: &Complex, n: u32) -> Freedom {
     for (&m, faces) in &beside {
         let [i, j] = faces[..] else { return Freedom::None };
         let cosine = skin[i].1.dot(&skin[j].1) / (skin[i].1.norm() * skin[j].1.norm());
-        // A flat face has no direction; what is beside it counts as a crease.
+        // A flat face has no direction, so its edges count as creases.
         if cosine.is_nan() || cosine < CREASE || skin[i].2 != skin[j].2 {
             creases.push(m);
         }
     }
     let up: Vector3<f64> = skin.iter().map(|face| face.1).sum();
     let size: f64 = skin.iter().map(|face| face.1.norm()).sum();
-    // At the tip of an incision the two lips face each other and cancel.
+    // At the tip of an incision the normals of the two lips cancel.
     let up = if up.norm() > 1e-9 * size { up.normalize() } else { Vector3::zeros() };
     let rest = |m: u32| complex.nodes[m as usize].rest;
     match creases[..] {
@@ -175,7 +175,7 @@ fn freedom(complex: &Complex, n: u32) -> Freedom {
     }
 }
 
-/// Whether all elements around `n` keep enough of their volume and of their shape.
+/// Whether all elements around `n` keep enough of their volume and shape.
 fn stays_sound(complex: &Complex, n: u32, moved: &SnapNode) -> bool {
     complex.around(n).iter().all(|&t| {
         let at = complex.tet(t).map(|m| m == n);

@@ -1,10 +1,10 @@
-//! The cut surface: faces of the mesh that stand for the sweep.
+//! Selects the cut surface: the faces of the mesh that represent the sweep.
 //!
-//! Every edge that the sweep crosses marks the node closest to the crossing. A face is selected when
-//! its nodes are marked, when the sweep has passed through an element beside it, and when the two
-//! elements beside it lie on different sides of the sweep. The last condition is not in the source,
-//! whose cut surfaces may branch: without it an element with four marked nodes may lose all its
-//! faces, and faces nearly perpendicular to the sweep are pressed flat.
+//! Every edge that the sweep crosses marks the node closest to the crossing. A face is selected under three
+//! conditions: its nodes are marked, the sweep has passed through an element next to it, and its two elements
+//! lie on different sides of the sweep. The last condition is not in the source, whose cut surfaces may
+//! branch. Without it an element with four marked nodes may lose all its faces, and faces nearly
+//! perpendicular to the sweep are pressed flat.
 //!
 //! # Source
 //! Nienhuys 2003, §3.2.1.
@@ -18,13 +18,13 @@ use super::memory::{Crossing, Memory};
 use crate::cut::SweepTriangle;
 use crate::mesh::TET_EDGES;
 
-/// Crossed edges after which the sweep has passed through an element.
+/// Number of crossed edges from which the sweep has passed through an element.
 const PASSED: usize = 3;
 
-/// A marked node: the closest crossing of its edges.
+/// The mark of a node: the closest crossing on its edges.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeMark {
-    /// The crossing now [m].
+    /// The crossing at present [m].
     pub point: Vector3<f64>,
     /// Unit normal of the sweep there.
     pub normal: Vector3<f64>,
@@ -41,8 +41,8 @@ pub struct Selection {
     pub faces: BTreeSet<FaceKey>,
 }
 
-/// Intersects the sweep with the edges of the mesh. Of several crossings of one edge by one incision
-/// the first counts.
+/// Intersects the sweep with the edges of the mesh. If an incision crosses an edge several times, its first
+/// crossing counts.
 pub fn cross(complex: &Complex, triangles: &[SweepTriangle], memory: &mut Memory) {
     let boxes: Vec<(u32, [Vector3<f64>; 2])> = (0..complex.n_slots() as u32)
         .map(|t| {
@@ -58,7 +58,7 @@ pub fn cross(complex: &Complex, triangles: &[SweepTriangle], memory: &mut Memory
             let (tet, x) = (complex.tet(*t), complex.now(*t));
             let side = x.map(|x| triangle.side(&x));
             for [i, j] in TET_EDGES {
-                // A node exactly on the plane counts as above it, for every edge alike.
+                // A node exactly on the plane counts as above it, in the same way for every edge.
                 if (side[i] >= 0.0) == (side[j] >= 0.0) || !triangle.holds_line(&x[i], &x[j]) {
                     continue;
                 }
@@ -66,7 +66,7 @@ pub fn cross(complex: &Complex, triangles: &[SweepTriangle], memory: &mut Memory
                 let edge = [tet[lower], tet[upper]];
                 let t = side[lower] / (side[lower] - side[upper]);
                 let crossing = Crossing { t, upwards: side[lower] >= 0.0, normal };
-                // A node of the cut surface is there already.
+                // The closest node already lies on the cut surface: this edge needs no other.
                 if !memory.on.contains_key(&crossing.near(&edge)) {
                     memory.crossings.entry(edge).or_insert(crossing);
                 }
@@ -75,7 +75,7 @@ pub fn cross(complex: &Complex, triangles: &[SweepTriangle], memory: &mut Memory
     }
 }
 
-/// Marks nodes and selects faces from the crossings of the incision so far.
+/// Marks nodes and selects faces from all crossings of the incision so far.
 pub fn select(complex: &Complex, memory: &Memory) -> Selection {
     let mut selection = Selection { marks: marks(complex, memory), faces: BTreeSet::new() };
     let mut crossed: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -117,8 +117,7 @@ fn marks(complex: &Complex, memory: &Memory) -> BTreeMap<u32, NodeMark> {
     marks
 }
 
-/// Whether the face of `t` opposite local node `k` is marked and the sweep runs between the elements
-/// beside it.
+/// Whether the face of `t` opposite local node `k` is marked and the sweep runs between its two elements.
 fn separates(complex: &Complex, memory: &Memory, marks: &BTreeMap<u32, NodeMark>, t: u32, k: usize) -> bool {
     let face = complex.face(t, k);
     let marked = |n: &u32| marks.contains_key(n) || memory.on.contains_key(n);
@@ -130,7 +129,7 @@ fn separates(complex: &Complex, memory: &Memory, marks: &BTreeMap<u32, NodeMark>
     let Some(plane) = nearest else { return false };
     let above = |t: u32| {
         let apex = complex.tet(t).into_iter().find(|n| !face.contains(n)).filter(|n| !marked(n));
-        // An element with four marked nodes is on the side where its middle is.
+        // An element with four marked nodes is on the side of its centroid.
         let at = match apex {
             Some(apex) => complex.nodes[apex as usize].x,
             None => complex.now(t).iter().sum::<Vector3<f64>>() / 4.0,
@@ -140,8 +139,8 @@ fn separates(complex: &Complex, memory: &Memory, marks: &BTreeMap<u32, NodeMark>
     above(t) != above(other)
 }
 
-/// A sweep that comes in small parts may put the three nodes of a face on the cut surface one after
-/// the other, none of them through an element beside it. Such faces belong to the surface.
+/// Adds faces whose three nodes are on the cut surface although no element next to them was passed. A sweep
+/// in small parts leaves such notches: it puts the nodes of a face on the surface one by one.
 fn close_notches(complex: &Complex, memory: &Memory, selection: &mut Selection) {
     let new: BTreeSet<u32> = selection.faces.iter().flatten().copied().collect();
     let normal = |n: &u32| match selection.marks.get(n) {
@@ -165,7 +164,7 @@ fn close_notches(complex: &Complex, memory: &Memory, selection: &mut Selection) 
                 complex.tet(t).iter().all(|n| normal(n).is_some()) && (0..4).any(cut)
             };
             let is_cut = selection.faces.contains(&key) || complex.tag(&key).is_some();
-            // The side of an element with four nodes on the surface is settled by its first face.
+            // The first face of an element with four nodes on the surface already settled its side.
             if is_cut || decided(*t) || decided(other) {
                 continue;
             }
@@ -183,7 +182,7 @@ fn close_notches(complex: &Complex, memory: &Memory, selection: &mut Selection) 
     selection.faces.extend(faces);
 }
 
-/// An element all of whose nodes are marked stays with one of its neighbours instead of falling out.
+/// Keeps an element whose nodes are all marked with one of its neighbours, so that it does not fall out.
 fn spare_single_elements(complex: &Complex, memory: &Memory, selection: &mut Selection) {
     let marked = |n: &u32| selection.marks.contains_key(n) || memory.on.contains_key(n);
     let mut beside: BTreeSet<u32> = BTreeSet::new();

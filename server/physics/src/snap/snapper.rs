@@ -1,4 +1,4 @@
-//! A cut along element faces, from the sweep to the new mesh.
+//! A cut along element faces, from the blade sweep to the new mesh.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,26 +14,26 @@ use super::select::{Selection, cross, select};
 use crate::cut::{BladeSweep, CutError, Front, Surroundings, sweep_triangles};
 use crate::mesh::TetMesh;
 
-/// What a cut did.
+/// Counts of what one cut did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SnapReport {
     /// Faces selected by this sweep.
     pub faces: usize,
-    /// Elements beside them.
+    /// Elements next to these faces.
     pub elements: usize,
     /// Nodes moved onto the sweep.
     pub moved: usize,
-    /// Nodes of the cut surface that had to stay where they were, off the sweep.
+    /// Nodes of the cut surface that could not move and stay off the sweep.
     pub refused: usize,
     /// Nodes duplicated.
     pub duplicated: usize,
     /// Edges collapsed.
     pub collapses: usize,
-    /// Nodes added on edges and faces to collapse degenerate elements.
+    /// Nodes added on edges and faces in order to collapse degenerate elements.
     pub splits: usize,
-    /// Degenerate elements that could not be collapsed.
+    /// Degenerate elements that remain because they could not be collapsed.
     pub degenerate: usize,
-    /// Edges crossed that no selected face stands for yet: the cut lags there.
+    /// Crossed edges that no selected face represents yet. The cut lags there.
     pub pending: usize,
 }
 
@@ -42,13 +42,13 @@ pub struct SnapReport {
 pub struct SnapCut {
     /// Elements and rest positions.
     pub mesh: TetMesh,
-    /// Everything about every node of it.
+    /// State and origin of every node of the mesh.
     pub nodes: Vec<SnapNode>,
-    /// New nodes that were split from others.
+    /// Nodes that were split off others by this cut.
     pub duplicates: Vec<Duplicate>,
 }
 
-/// Cuts of one body along its faces; remembers unfinished incisions.
+/// Cuts one body along its faces, and remembers unfinished incisions.
 #[derive(Clone, Debug, Default)]
 pub struct Snapper {
     memories: BTreeMap<u32, Memory>,
@@ -57,7 +57,7 @@ pub struct Snapper {
 }
 
 impl Snapper {
-    /// A mesh in which only what shares a face shares nodes, as after a cut.
+    /// A copy of the mesh in which only elements that share a face share nodes, as after a cut.
     pub fn prepared(mesh: &TetMesh) -> TetMesh {
         let nodes = (0u32..).zip(&mesh.nodes).map(|(n, &rest)| SnapNode::at_rest(rest, n)).collect();
         let mut complex = Complex::new(nodes, &mesh.tets, BTreeMap::new());
@@ -66,16 +66,16 @@ impl Snapper {
         TetMesh { nodes: complex.nodes.iter().map(|n| n.rest).collect(), tets }
     }
 
-    /// Incision of every face of the surface that is a lip, and of faces selected but still closed.
+    /// Incision of every surface face that is a lip, and of selected faces that are still closed.
     pub fn tags(&self) -> &BTreeMap<FaceKey, u32> {
         &self.tags
     }
 
-    /// Cuts along the surface the blade swept, in the present configuration of `nodes`. No mesh comes
-    /// back where nothing is to be cut yet.
+    /// Cuts along the surface that the blade swept, in the present configuration of `nodes`. Returns no mesh
+    /// as long as nothing can be cut.
     ///
     /// # Errors
-    /// As for [`crate::cut::CutMesh::sweep`]; nothing is changed then.
+    /// Those of [`crate::cut::CutMesh::sweep`]. Nothing is changed then.
     pub fn cut(
         &mut self,
         tets: &[[u32; 4]],
@@ -106,7 +106,7 @@ impl Snapper {
         Ok((report, Some(cut)))
     }
 
-    /// Moves nodes, opens faces, cleans up.
+    /// Moves nodes, opens the selected faces and removes degenerate elements.
     fn open(
         &mut self,
         mut complex: Complex,
@@ -119,6 +119,8 @@ impl Snapper {
             self.fronts.iter().filter(|(id, _)| **id != incision).map(|(id, f)| (*id, f.ends(x))).collect();
         let mut report = SnapReport { faces: selection.faces.len(), ..SnapReport::default() };
         let surface: BTreeSet<u32> = selection.faces.iter().flatten().copied().collect();
+        // Nodes move before the faces open: a node still has all of its elements then, and moves for both
+        // lips.
         let wanted: Vec<u32> = surface.iter().copied().filter(|n| selection.marks.contains_key(n)).collect();
         report.moved = wanted.len();
         report.refused = relocate_all(&mut complex, wanted, &selection.marks);
@@ -129,6 +131,7 @@ impl Snapper {
             beside.extend(around_face(&complex, key));
         }
         report.elements = beside.len();
+        // A marked face with elements on both sides is still closed, and its nodes may have to be split.
         let closed: BTreeSet<u32> = complex
             .tags()
             .keys()
@@ -149,6 +152,7 @@ impl Snapper {
         report.splits = cleaned.splits;
         report.degenerate = cleaned.left;
 
+        // Nodes that no element uses are dropped, so everything remembered by node number has to follow.
         let number = numbers(&complex);
         let find = |mut n: u32| {
             while let Some(&kept) = cleaned.merged.get(&n) {
@@ -162,6 +166,7 @@ impl Snapper {
         self.memories
             .retain(|id, memory| *id == incision || !memory.crossings.is_empty() || !memory.on.is_empty());
         let cut = compact(&complex, &number, &duplicates);
+        // The fronts are bound to elements, which have new numbers as well.
         self.tags = tags_of(&complex, &number);
         report.pending = self.memories.get(&incision).map_or(0, |memory| memory.crossings.len());
         let complex = Complex::new(cut.nodes.clone(), &cut.mesh.tets, BTreeMap::new());
@@ -174,7 +179,7 @@ impl Snapper {
         (report, cut)
     }
 
-    /// Remembers where the blade was last by the material it passed through.
+    /// Remembers the last blade position by the material it passed through.
     fn remember(&mut self, blade: &BladeSweep, incision: u32, complex: &Complex, x: &[Vector3<f64>]) {
         let Some(last) = blade.segments.last() else { return };
         let (from, to) = (last[0].inf(&last[1]), last[0].sup(&last[1]));
@@ -196,7 +201,7 @@ fn around_face(complex: &Complex, [p, q, r]: FaceKey) -> Vec<u32> {
     complex.around(p).iter().copied().filter(holds).collect()
 }
 
-/// New number of every node that an element still uses.
+/// The new number of every node that an element still uses.
 fn numbers(complex: &Complex) -> Vec<Option<u32>> {
     let mut next = 0;
     let mut number = |n: usize| {

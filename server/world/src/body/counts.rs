@@ -1,4 +1,5 @@
-//! What went wrong in the steps of a body: counted apart, told once when it begins and once when it is over.
+//! Counts the troubles in the steps of a body by kind, and reports each once when it begins and once when it
+//! is over.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -7,36 +8,36 @@ use scindo_physics::body::{Body, Method, Notice, Outcome, Scheme, SolveReport, S
 
 use crate::report::{Level, StepReport};
 
-/// A trouble is over after this many steps without it.
+/// Steps without a trouble after which it counts as over.
 const CALM: u64 = 50;
 
-/// Above this share of unconverged steps the run as a whole counts as failed.
+/// Share of unconverged steps above which the run as a whole counts as failed.
 const MOSTLY: f64 = 0.5;
 
-/// Steps of one body, counted apart by what went wrong in them.
+/// Steps of one body, counted by what went wrong in them. One step may count in several fields.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StepCounts {
-    /// Steps asked for.
+    /// Steps requested.
     pub steps: u64,
-    /// Ended above their tolerance.
+    /// Steps that ended above their tolerance.
     pub unconverged: u64,
-    /// Could not be made as asked: the body stood still.
+    /// Steps refused because they could not be made as requested. The body stood still.
     pub refused: u64,
-    /// Failed as a whole and were made in parts.
+    /// Steps that failed as a whole and were divided.
     pub divided: u64,
-    /// Failed in parts as well: the body was put back, at rest.
+    /// Steps that also failed when divided. The body was put back, at rest.
     pub rolled_back: u64,
-    /// Held inverted elements.
+    /// Steps that ended with inverted elements.
     pub inverted: u64,
-    /// Largest residual of the unconverged steps, over that of the loads.
+    /// Largest residual of the unconverged steps, relative to that of the loads.
     pub worst_residual: f64,
-    /// Most parts of a divided step.
+    /// Most parts into which a step was divided.
     pub most_parts: u32,
-    /// Most inverted elements of a step.
+    /// Most inverted elements in a step.
     pub most_inverted: usize,
 }
 
-/// What can go wrong in a step.
+/// Kinds of trouble in a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Trouble {
     Unconverged,
@@ -50,7 +51,7 @@ impl Trouble {
     const ALL: [Self; 5] =
         [Self::Unconverged, Self::Refused, Self::Divided, Self::RolledBack, Self::Inverted];
 
-    /// Name of its events.
+    /// Name of its events in the report.
     fn name(self) -> &'static str {
         match self {
             Self::Unconverged => "step-unconverged",
@@ -68,7 +69,7 @@ impl Trouble {
         }
     }
 
-    /// Whether it happened in the step.
+    /// Whether the trouble occurred in the step.
     fn is_in(self, solve: &SolveReport) -> bool {
         match self {
             Self::Unconverged => solve.is_unconverged(),
@@ -79,7 +80,7 @@ impl Trouble {
         }
     }
 
-    /// How its first step is told.
+    /// Message for its first step.
     fn begins(self, solve: &SolveReport) -> String {
         match self {
             Self::Unconverged => {
@@ -101,7 +102,7 @@ impl Trouble {
         }
     }
 
-    /// What its steps did.
+    /// Phrase for its past steps in the closing message.
     fn past(self) -> &'static str {
         match self {
             Self::Unconverged => "ended above the tolerance",
@@ -117,26 +118,26 @@ fn refusal(notice: Option<Notice>) -> String {
     notice.map_or_else(|| "step or gravity is not usable".into(), |why| why.to_string())
 }
 
-/// A trouble that goes on.
+/// A trouble from its first step until it is over.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Spell {
-    /// Steps with it since it began; 0: it does not go on.
+    /// Steps with the trouble since it began. 0: there is none.
     steps: u64,
-    /// Steps since it began.
+    /// All steps since it began.
     of: u64,
-    /// Steps since it was last seen.
+    /// Steps since its last occurrence.
     calm: u64,
 }
 
-/// Follows the steps of one body.
+/// Observes the steps of one body.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Watch {
-    /// Since the start or the last reset.
+    /// Counts since the start or the last reset.
     pub counts: StepCounts,
     spells: [Spell; 5],
     /// Why the first refused step was refused.
     refused_for: Option<Notice>,
-    /// How far the first step that left any sensible range would have gone.
+    /// How far the first step that left every sensible range would have gone.
     out_of_range: Option<Notice>,
     /// Why the solver stopped in the worst unconverged step.
     stop: StopReason,
@@ -145,8 +146,8 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Counts a step and tells what begins and what is over. A fixed number of iterations that is meant
-    /// is counted, not told.
+    /// Counts a step, and reports troubles that begin or end. If the scene sets a fixed number of iterations,
+    /// unconverged steps are counted but not reported.
     pub fn follow(&mut self, body: &Arc<str>, solve: &SolveReport, fixed: bool, report: &mut StepReport) {
         self.count(solve);
         for (trouble, spell) in Trouble::ALL.into_iter().zip(&mut self.spells) {
@@ -199,7 +200,7 @@ impl Watch {
         }
     }
 
-    /// One line per trouble that the body has had, with numbers and what to do about it.
+    /// One line per trouble that the body has had, with numbers and a remedy.
     pub fn warnings(&self, id: &str, body: &Body, fixed: bool) -> Vec<String> {
         let StepCounts { steps, refused, divided, rolled_back, inverted, .. } = self.counts;
         let mut lines = Vec::new();
@@ -225,6 +226,7 @@ impl Watch {
                 self.counts.most_parts
             ));
         }
+        // The present state counts too, even if no step was counted as inverted.
         let least = body.least_volume_ratio();
         if inverted > 0 || least <= 0.0 {
             let displaced = body.fixed_nodes().iter().any(|held| held.displacement_m.norm() > 0.0);
@@ -269,7 +271,7 @@ impl Watch {
     }
 }
 
-/// What to do about steps that end above their tolerance.
+/// A remedy for steps that end above their tolerance.
 fn advice(body: &Body, stop: StopReason, residual: f64) -> String {
     let (settings, law) = (body.settings(), body.material().law);
     let solver = settings.solver;
@@ -290,8 +292,8 @@ fn advice(body: &Body, stop: StopReason, residual: f64) -> String {
     format!("raise solver.iterations to about {about}, or say solver.fixed_iterations = true")
 }
 
-/// Iterations that reach `tolerance` where `made` of them left `residual`: conjugate gradients lower it by
-/// about the same factor in every iteration.
+/// Iterations that reach `tolerance`, estimated from `made` iterations that left `residual`. Conjugate
+/// gradients lower the residual by about the same factor in every iteration.
 fn needed_iterations(made: u32, residual: f64, tolerance: f64) -> u32 {
     let decades = |residual: f64| -residual.clamp(1e-12, 0.5).log10();
     let needed = 1.2 * f64::from(made) * decades(tolerance) / decades(residual);
@@ -318,7 +320,7 @@ mod tests {
         let (mut watch, mut report) = (Watch::default(), StepReport::default());
         let body: Arc<str> = "b".into();
         for step in 0..200 {
-            // In every third of the first ninety steps, and never again.
+            // In every third of the first ninety steps, then never again.
             let residual = if step < 90 && step % 3 == 0 { 0.5 } else { 1e-4 };
             watch.follow(&body, &solve(residual, 0), false, &mut report);
         }

@@ -1,4 +1,4 @@
-//! A body of the simulation: mechanics plus what the world knows about it.
+//! A body of the simulation: its mechanics, and the data that scene and reports attach to it.
 
 mod counts;
 
@@ -25,24 +25,24 @@ pub(crate) use shown::von_mises;
 /// A deformable body with its name and its groups of held nodes.
 #[derive(Debug)]
 pub struct SimBody {
-    /// Name.
+    /// Name in the scene, events and messages.
     pub id: Arc<str>,
-    /// Its mechanics.
+    /// Mechanics: mesh, state, material and integrator.
     pub body: Body,
     /// Held nodes, one group per `fix` of the scene, ascending.
     pub fix_groups: Vec<Vec<u32>>,
-    /// The same before the first cut that changed the mesh.
+    /// The same groups before the first cut that changed the mesh.
     fix_groups_uncut: Option<Vec<Vec<u32>>>,
-    /// What was found and repaired in its mesh file; none for a body without a file.
+    /// Faults found and repaired in its mesh file. `None` for a body without a file.
     pub health: Option<MeshHealth>,
     /// Volume at rest [m³].
     pub rest_volume_m3: f64,
-    /// Whether a fixed number of iterations is meant, whatever residual they leave.
+    /// Whether the scene sets a fixed number of iterations and accepts any residual.
     pub fixed_iterations: bool,
-    /// Time over which displacements of held parts grow to their prescribed values [s].
+    /// Time over which prescribed displacements grow to their full value [s].
     pub displacement_over_s: f64,
     watch: Watch,
-    /// What was told of the last step.
+    /// The kind of notice reported for the last step, so that it is not repeated.
     pub(crate) noticed: Option<Discriminant<Notice>>,
     recovery: StressRecovery,
     topology: Option<Arc<SurfaceTopology>>,
@@ -52,12 +52,12 @@ pub struct SimBody {
     marks_are_old: bool,
 }
 
-/// Sizes of a body that its costs follow from.
+/// Sizes of a body that determine its costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodySize {
     /// Elements.
     pub elements: usize,
-    /// Copies of nodes, with those on mid-edges.
+    /// Node copies, including those of mid-edge nodes.
     pub nodes: usize,
     /// Surface vertices.
     pub vertices: usize,
@@ -90,7 +90,7 @@ impl SimBody {
         }
     }
 
-    /// One step, which ends at `time_s` [s].
+    /// Makes one step that ends at `time_s` [s].
     pub(crate) fn step(
         &mut self,
         (time_s, h): (f64, f64),
@@ -103,12 +103,12 @@ impl SimBody {
         self.as_it_ended(solve)
     }
 
-    /// Topology epoch; rises with every cut that did something and with every reset.
+    /// Topology epoch. It rises with every cut that changed something, and with every reset.
     pub fn epoch(&self) -> u32 {
         self.body.epoch()
     }
 
-    /// The sizes that costs follow from.
+    /// The sizes that determine its costs.
     pub fn size(&self) -> BodySize {
         let surface = self.body.surface();
         BodySize {
@@ -120,19 +120,19 @@ impl SimBody {
         }
     }
 
-    /// Edge [m] of a lattice cell that six tetrahedra of mean volume would fill, or one hexahedron.
+    /// Edge [m] of a lattice cell filled by six tetrahedra of mean volume, or by one hexahedron.
     pub fn cell_m(&self) -> f64 {
         let per_cell = if self.body.settings().element == ElementKind::Hex8 { 1.0 } else { 6.0 };
         (per_cell * self.rest_volume_m3 / self.size().elements as f64).cbrt()
     }
 
-    /// Corners of the box around the body as it lies [m].
+    /// Corners of the box around the body in its present state [m].
     pub fn corners_m(&self) -> [[f64; 3]; 2] {
         let (low, high) = bounds(self.body.positions());
         [low.into(), high.into()]
     }
 
-    /// Nodes of parts that something holds; the others fall for ever, or sleep.
+    /// Nodes of parts that something holds. Other parts fall without end, or sleep.
     pub fn held_nodes(&self) -> impl Iterator<Item = usize> + '_ {
         let (parts, sleeps) = (self.body.parts(), self.body.sleeps());
         let is_held = |part: Option<&u32>| part.is_none_or(|&part| !parts.free[part as usize]);
@@ -141,7 +141,8 @@ impl SimBody {
         })
     }
 
-    /// Largest displacement of a node of a held part now [m]; of any node, where nothing is held.
+    /// Largest present displacement of a node in the parts that are held [m]; of any node, if nothing is
+    /// held.
     pub fn displacement_m(&self) -> f64 {
         let (x, rest) = (self.body.positions(), self.body.rest_positions());
         let farthest = |nodes: &mut dyn Iterator<Item = usize>| {
@@ -154,7 +155,7 @@ impl SimBody {
         }
     }
 
-    /// Surface positions [m], computed when they are asked for and old.
+    /// Surface positions [m]. They are recomputed at the first call after a motion.
     pub fn surface_positions(&mut self) -> &[[f32; 3]] {
         if self.surface_is_old {
             self.body.surface_positions(&mut self.surface);
@@ -163,13 +164,13 @@ impl SimBody {
         &self.surface
     }
 
-    /// Surface positions [m] as last computed, with the body they belong to.
+    /// Surface positions [m], recomputed if out of date, together with the body.
     pub(crate) fn surface_now(&mut self) -> (&Body, &[[f32; 3]]) {
         self.surface_positions();
         (&self.body, &self.surface)
     }
 
-    /// Surface velocities [m/s] into `out`.
+    /// Writes the surface velocities [m/s] into `out`.
     pub fn surface_velocities(&self, out: &mut Vec<[f32; 3]>) {
         let v = self.body.velocities();
         out.clear();
@@ -179,12 +180,12 @@ impl SimBody {
         }));
     }
 
-    /// Von Mises stress on the surface [Pa] into `out`.
+    /// Writes the von Mises stress on the surface [Pa] into `out`.
     pub fn surface_stress(&self, out: &mut Vec<f32>) {
         shown::surface_stress(&self.body, out);
     }
 
-    /// Ends [m] of the lines that incisions have drawn on the surface without opening it, into `out`.
+    /// Lines that incisions have drawn on the surface without opening it: writes their ends [m] into `out`.
     pub fn incision_marks(&mut self, out: &mut Vec<[[f32; 3]; 2]>) {
         if self.marks_are_old {
             self.marks = self.body.incision_marks();
@@ -197,25 +198,25 @@ impl SimBody {
         );
     }
 
-    /// What went wrong in the steps since the start or the last reset.
+    /// Counts of troubles in the steps since the start or the last reset.
     pub fn counts(&self) -> StepCounts {
         self.watch.counts
     }
 
-    /// One line for each kind of trouble since the start or the last reset, with what to do about it.
+    /// One line for each kind of trouble since the start or the last reset, with a remedy.
     pub fn troubles(&self) -> Vec<String> {
         self.watch.warnings(&self.id, &self.body, self.fixed_iterations)
     }
 
-    /// Why the run counts as failed: steps that were refused or rolled back, more than half of the steps
-    /// above their tolerance, or an equilibrium that was not reached. A fixed number of iterations that
-    /// is meant excuses the last two.
+    /// Why the run counts as failed, if it does. Reasons are steps that were refused or rolled back, more
+    /// than half of the steps above their tolerance, and an equilibrium that was not reached. A fixed number
+    /// of iterations set by the scene excuses the last two.
     pub fn failure(&self) -> Option<String> {
         self.watch.failure(&self.id, &self.body, self.fixed_iterations)
     }
 
-    /// The report without elements that were inverted at the predictor alone, as where a held place is moved far
-    /// at once: what counts is what the step ended with.
+    /// The report without elements that were inverted only at the predictor, e.g. where a held place moves
+    /// far in one step. Only the end of the step counts.
     fn as_it_ended(&self, solve: SolveReport) -> SolveReport {
         if solve.inverted_pieces == 0 || self.body.least_volume_ratio() <= 0.0 {
             return solve;
@@ -223,39 +224,39 @@ impl SimBody {
         SolveReport { inverted_pieces: 0, ..solve }
     }
 
-    /// Takes note of how a step went.
+    /// Records the outcome of a step.
     pub(crate) fn has_stepped(&mut self, solve: &SolveReport, report: &mut StepReport) {
         self.has_moved();
         self.watch.follow(&self.id, solve, self.fixed_iterations, report);
         report.tell_of_solve(&self.id, solve, &mut self.noticed);
     }
 
-    /// Forgets what went wrong.
+    /// Forgets all troubles after a reset.
     pub(crate) fn has_been_reset(&mut self) {
         self.watch = Watch::default();
     }
 
-    /// Kinetic and elastic energy.
+    /// Present kinetic and elastic energy.
     pub fn energy(&self) -> Energy {
         Energy { kinetic_j: self.body.kinetic_energy(), elastic_j: self.body.elastic_energy() }
     }
 
-    /// Estimate of the discretisation error; only of bodies of tet4.
+    /// Estimate of the discretisation error. `None` for elements other than tet4.
     pub fn mesh_error(&mut self) -> Option<MeshError> {
         self.body.mesh_error(&mut self.recovery)
     }
 
-    /// To be told whenever the body moved.
+    /// Must be called whenever the body moved.
     pub(crate) fn has_moved(&mut self) {
         self.surface_is_old = true;
     }
 
-    /// To be told whenever a blade went through the body, whether or not it opened something.
+    /// Must be called whenever a blade passed through the body, even if it opened nothing.
     pub(crate) fn has_been_swept(&mut self) {
         self.marks_are_old = true;
     }
 
-    /// To be told whenever the body was cut or reset.
+    /// Must be called whenever the body was cut or reset.
     pub(crate) fn has_changed_topology(&mut self) {
         self.topology = None;
         self.surface_is_old = true;
@@ -263,7 +264,8 @@ impl SimBody {
         self.follow_nodes();
     }
 
-    /// Groups of nodes after a cut that changed the mesh: a duplicate is in the groups of its node.
+    /// Updates the groups of held nodes after a cut that changed the mesh: a duplicate belongs to the groups
+    /// of its node.
     fn follow_nodes(&mut self) {
         let Some(origins) = self.body.node_origins() else { return };
         let uncut = self.fix_groups_uncut.get_or_insert_with(|| self.fix_groups.clone());
@@ -273,7 +275,7 @@ impl SimBody {
         }
     }
 
-    /// Triangles of the present epoch; made when first asked for.
+    /// Triangles of the present epoch, computed at the first call in an epoch.
     pub fn topology(&mut self) -> Arc<SurfaceTopology> {
         let body = &self.body;
         self.topology.get_or_insert_with(|| Arc::new(shown::topology(body))).clone()

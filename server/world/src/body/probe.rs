@@ -1,48 +1,49 @@
-//! Probes: material points whose path is recorded.
+//! Probes: material points whose positions are recorded.
 //!
-//! A probe is bound to an element and barycentric coordinates at rest. On a cut, `side` says
-//! which piece it belongs to: the one that lies next to the point in that direction.
+//! A probe is bound to an element and barycentric coordinates at rest. On a cut, `side` selects its piece:
+//! the one next to the point in that direction.
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_collision::{barycentric_point, closest_point_on_triangle};
 use scindo_physics::body::Body;
 use scindo_physics::mesh::TetMesh;
 
-/// How far a point is moved towards its side before it is looked up, relative to the element.
+/// Distance, relative to the element, by which a point is moved towards its side before its piece is looked
+/// up.
 /// Far above rounding, far below any piece that can be seen.
 const SIDE_STEP: f64 = 1e-6;
 
-/// How far outside an element a point still counts as inside, in barycentric units.
+/// Distance outside an element at which a point still counts as inside, in barycentric units.
 const INSIDE: f64 = 1e-9;
 
-/// A material point.
+/// A material point that is recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
-    /// Name.
+    /// Name in the scene and in the records.
     pub id: String,
-    /// Index of the body.
+    /// Index of the body, in the order of the scene.
     pub body: usize,
     /// Rest position [m].
     pub rest_m: Vector3<f64>,
-    /// Element it lies in.
+    /// Element that contains it.
     pub element: u32,
     /// Barycentric coordinates of the point in that element; Σ = 1.
     pub weights: [f64; 4],
-    /// Barycentric coordinates by which its piece is looked up: the point, moved to its side.
+    /// Barycentric coordinates for the lookup of its piece: those of the point, moved to its side.
     pub lookup: [f64; 4],
-    /// From the point a little to its side [m].
+    /// The short vector from the point to its side [m].
     towards: Vector3<f64>,
-    /// The copies (and further nodes of the element) it moves with, and their shape functions there;
-    /// follows the topology.
+    /// The copies (and further nodes of the element) that carry it, with their shape functions at the point.
+    /// They change with the topology.
     pub carriers: Vec<(u32, f64)>,
 }
 
-/// Where a point lies that is in no element.
+/// A point that lies in no element, and its distance from the mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outside {
     /// The nearest point of the mesh [m].
     pub nearest_m: Vector3<f64>,
-    /// How far away that is [m].
+    /// Distance of the point from it [m].
     pub distance_m: f64,
 }
 
@@ -78,8 +79,8 @@ impl Probe {
         })
     }
 
-    /// Follows a change of topology: takes the copies of the piece the point belongs to, after looking
-    /// for its element where cuts change the mesh.
+    /// Updates the probe after a change of topology: takes the copies of the piece that contains the point.
+    /// Where cuts change the mesh, its element is looked up first.
     pub fn follow(&mut self, of: &Body) {
         let mesh = of.mesh();
         if of.node_origins().is_some() {
@@ -94,7 +95,7 @@ impl Probe {
         self.carriers = of.carriers(self.element, copies, self.weights);
     }
 
-    /// Current position [m], given the position of every node.
+    /// Present position [m] at the node positions `x`.
     pub fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
         self.carriers.iter().map(|(node, weight)| x[*node as usize] * *weight).sum()
     }
@@ -106,13 +107,13 @@ fn cell_size(mesh: &TetMesh) -> f64 {
     (6.0 * volume / mesh.tets.len().max(1) as f64).cbrt()
 }
 
-/// The element that a point lies in.
+/// The element that contains a point, if any.
 fn element_at(mesh: &TetMesh, point: Vector3<f64>) -> Option<usize> {
     let element = deepest(mesh, point);
     (depth(mesh, point, element) >= -INSIDE).then_some(element)
 }
 
-/// The element in which a point lies deepest; of equal ones the first.
+/// The element in which a point lies deepest; of equals the first.
 fn deepest(mesh: &TetMesh, point: Vector3<f64>) -> usize {
     let all = (0..mesh.tets.len()).map(|e| (depth(mesh, point, e), e));
     all.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).map_or(0, |(_, e)| e)

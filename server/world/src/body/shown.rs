@@ -1,33 +1,32 @@
-//! What a viewer is told of a body beside where its surface is: rest, held parts, stress.
+//! Data of a body for viewers besides the surface positions: rest positions, held parts, stress.
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_physics::body::Body;
 use scindo_physics::cut::SurfaceVertex;
 
-/// Share of a vertex' weight on held nodes from which it counts as held.
+/// Share of a vertex's weight on held nodes above which the vertex counts as held.
 const MOSTLY: f64 = 0.5;
 
-/// Triangles of a body's surface; immutable, one object per epoch.
+/// Triangles of a body's surface. It never changes; every epoch has its own object.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SurfaceTopology {
     /// Rises whenever the triangles change.
     pub epoch: u32,
-    /// Vertices that the triangles refer to.
+    /// Number of vertices that the triangles refer to.
     pub vertex_count: u32,
-    /// Counter-clockwise seen from outside.
+    /// Vertex numbers, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Per triangle: 0 = skin, n > 0 = lip of incision n.
     pub tags: Vec<u32>,
-    /// Where the vertices rest [m].
+    /// Rest positions of the vertices [m].
     pub rest: Vec<[f32; 3]>,
-    /// Per vertex: it moves with held nodes.
+    /// Per vertex whether it moves with held nodes.
     pub held: Vec<bool>,
-    /// Per vertex: its part of the body hangs on a held node.
+    /// Per vertex whether its part of the body contains a held node.
     pub hangs: Vec<bool>,
 }
 
-/// Triangles of the present epoch, where they rest, and what holds them. Triangles of parts that sleep are not in
-/// the view.
+/// Triangles of the present epoch, their rest positions, and what holds them. Sleeping parts are not shown.
 pub fn topology(body: &Body) -> SurfaceTopology {
     let surface = body.surface();
     let rest = body.rest_positions();
@@ -55,8 +54,8 @@ pub fn topology(body: &Body) -> SurfaceTopology {
     }
 }
 
-/// Von Mises stress [Pa] of every surface vertex into `out`: the mean over the pieces around each copy,
-/// weighted by volume, interpolated as positions are.
+/// Writes the von Mises stress [Pa] of every surface vertex into `out`. It is the mean over the pieces around
+/// each copy, weighted by volume and interpolated like positions.
 pub fn surface_stress(body: &Body, out: &mut Vec<f32>) {
     let mut mean = vec![(0.0, 0.0); body.n_copies()];
     for (p, (piece, stress)) in body.pieces().iter().zip(&body.cauchy_stresses()).enumerate() {
@@ -84,7 +83,7 @@ pub fn von_mises(stress: &Matrix3<f64>) -> f64 {
     (1.5 * deviator.norm_squared()).sqrt()
 }
 
-/// Per copy: its node is held along some axis.
+/// Per copy whether its node is held along some axis.
 fn held_copies(body: &Body) -> Vec<bool> {
     let fixed = body.fixed_nodes();
     let is_held = |node: &u32| fixed.binary_search_by_key(node, |f| f.node).is_ok();

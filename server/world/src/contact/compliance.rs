@@ -1,15 +1,15 @@
-//! How far the tissue gives way under a tool, learned from the steps themselves.
+//! Estimates the compliance of the tissue under a tool from the steps themselves.
 //!
-//! A one-sided spring with force f after a step stands at depth f / k, so a step tells how far the
-//! tissue moved (depth before minus depth after) for how much more force. Their ratio is the
-//! compliance that a prediction over one step needs; inertia and damping are in it.
+//! A one-sided spring with force f after a step is at depth f / k. A step therefore tells how far the tissue
+//! moved (depth before minus depth after) for how much more force. The ratio is the compliance that a
+//! prediction over one step needs. Inertia and damping are included.
 
-/// Change of force below which a step says nothing [N], and the same as part of the force.
+/// Least change of force from which a step tells anything [N], and the same relative to the force.
 const LEAST_CHANGE_N: f64 = 1e-3;
 const LEAST_CHANGE: f64 = 0.02;
 /// Weight of a new sample in the running mean.
 const LEARNING: f64 = 0.2;
-/// The estimate stays within this factor of the first guess, either way.
+/// Largest factor, up or down, between the estimate and the first guess.
 const LIMIT: f64 = 20.0;
 
 /// Running estimate of the compliance under one tool [m/N].
@@ -21,19 +21,19 @@ pub struct Compliance {
 }
 
 impl Compliance {
-    /// Starts from `E a` as stiffness of tissue with Young's modulus `E` [Pa] under a patch of radius
-    /// `a` [m]: within a factor of two of Boussinesq's punch, and the same for every mesh.
+    /// Starts from the stiffness `E a` of tissue with Young's modulus `E` [Pa] under a patch of radius `a`
+    /// [m]. That is within a factor of two of Boussinesq's punch, and the same for every mesh.
     pub fn new(young_pa: f64, patch_radius_m: f64) -> Self {
         let guess = 1.0 / (young_pa * patch_radius_m).clamp(1.0, 1e6);
         Self { guess, estimate: guess, force_before: 0.0 }
     }
 
-    /// The estimate [m/N].
+    /// The present estimate [m/N].
     pub fn value(&self) -> f64 {
         self.estimate
     }
 
-    /// Takes in a step: depths before and after [m] and the normal force after [N].
+    /// Learns from one step: depths before and after [m], and the normal force after [N].
     pub fn learn(&mut self, depth_before: f64, depth_after: f64, force: f64) {
         let change = force - self.force_before;
         self.force_before = force;
@@ -46,7 +46,7 @@ impl Compliance {
         self.estimate += LEARNING * (sample - self.estimate);
     }
 
-    /// The contact is gone: the next begins without force, and with the estimate kept.
+    /// Ends the contact. The next one begins without force, but with the present estimate.
     pub fn release(&mut self) {
         self.force_before = 0.0;
     }
@@ -74,7 +74,7 @@ mod tests {
             compliance.learn(depth_before, device - indentation, force);
         }
         assert!(force > 0.8);
-        // The tissue also gave way for the step before, so the sample is the tissue's own.
+        // The tissue also yielded in the step before, so the sample is that of the tissue alone.
         assert!((compliance.value() * k_tissue - 1.0).abs() < 0.01);
         compliance.learn(1.0, 0.0, force + 0.1);
         assert!(compliance.value() <= 20.0 / 1500.0);

@@ -1,4 +1,4 @@
-//! Tissue held by a tool: material points bound when the grip closes, pulled along by the tool.
+//! Tissue held by a tool: material points bound when the grip closes, and pulled along with the tool.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -7,23 +7,23 @@ use scindo_collision::barycentric_point;
 
 /// Most material points in one grip.
 pub const MAX_HELD: usize = 7;
-/// How far beyond the tool's radius it can take hold [m].
+/// Largest distance beyond the tool's radius at which it can take hold [m].
 const REACH_M: f64 = 0.004;
 
-/// One point of the surface in the grip.
+/// One surface point in the grip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
-    /// Triangle of the surface.
+    /// Triangle of the body's surface.
     pub triangle: u32,
-    /// Where on it.
+    /// Barycentric coordinates on it.
     pub barycentric: [f64; 3],
-    /// Where the tool holds it, in tool axes [m].
+    /// Position at which the tool holds it, in tool axes [m].
     pub in_tool: Point3<f64>,
-    /// Where it is now [m].
+    /// Present position [m].
     pub point: Vector3<f64>,
 }
 
-/// What one tool holds.
+/// The tissue that one tool holds.
 #[derive(Debug, Clone, Default)]
 pub struct Grip {
     body: usize,
@@ -33,12 +33,12 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// A grip that holds nothing, with room for all it can.
+    /// An empty grip with memory for all points it can hold.
     pub fn new() -> Self {
         Self { held: Vec::with_capacity(MAX_HELD), ..Self::default() }
     }
 
-    /// Lets go.
+    /// Releases all points.
     pub fn open(&mut self) {
         self.held.clear();
         self.closed = false;
@@ -49,8 +49,8 @@ impl Grip {
         (self.body, &self.held)
     }
 
-    /// Closes on the tissue nearest to the tip, once per grip, and keeps what it holds up to
-    /// date. `radius` of the tool and of the ring of points taken [m].
+    /// Closes on the tissue nearest to the tip, once per grip, and then updates the points it holds. `radius`
+    /// [m] is that of the tool and of the ring of points taken.
     pub fn hold(&mut self, tool: &Isometry3<f64>, radius: f64, surfaces: &[ContactSurface]) {
         if self.closed {
             self.refresh(radius, surfaces);
@@ -76,6 +76,7 @@ impl Grip {
         let Some(tree) = surfaces[body].tree() else { return };
         let across = middle.normal.cross(&Vector3::ith(middle.normal.iamin(), 1.0)).normalize();
         let along = middle.normal.cross(&across);
+        // One point in the middle and a ring around it, so that the grip also transmits rotation.
         for i in 0..MAX_HELD {
             let angle = std::f64::consts::TAU * i as f64 / (MAX_HELD - 1) as f64;
             let ring = if i == 0 { 0.0 } else { radius.max(0.5 * REACH_M) };
@@ -92,7 +93,7 @@ impl Grip {
         }
     }
 
-    /// Follows the held points; after a change of topology takes the nearest of the new surface.
+    /// Updates the held points. After a change of topology each becomes the nearest point of the new surface.
     fn refresh(&mut self, radius: f64, surfaces: &[ContactSurface]) {
         let Some(surface) = surfaces.get(self.body) else { return self.held.clear() };
         let Some(tree) = surface.tree() else { return self.held.clear() };

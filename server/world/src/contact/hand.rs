@@ -1,4 +1,4 @@
-//! What the hand feels through one tool: where tissue lets the tool be, where it bears, what it holds.
+//! The contact of one tool: where tissue lets it be, where it presses, and what it holds.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -11,22 +11,22 @@ use crate::inputs::ToolMode;
 use crate::tool::Tool;
 use crate::tool::geometry::core_radius;
 
-/// The contact of one tool, from step to step.
+/// The contact state of one tool, kept from step to step.
 #[derive(Debug, Clone)]
 pub struct Hand {
-    /// Number of the tool.
+    /// Number of the tool; see [`Tool::number`].
     tool: u64,
     hand_overs: u64,
     jumps: u64,
     proxy: Proxy,
     press: Press,
     grip: Grip,
-    /// Body that it touched last, and how its tissue gives way under it; none before the first touch.
+    /// Body that it touched last, and the compliance of its tissue; `None` before the first contact.
     compliance: Option<(usize, Compliance)>,
 }
 
 impl Hand {
-    /// A hand that has not touched anything yet.
+    /// The state of a tool that has not touched anything yet.
     pub fn new(tool: &Tool) -> Self {
         Self {
             tool: tool.number(),
@@ -39,47 +39,47 @@ impl Hand {
         }
     }
 
-    /// Whether it is the hand on `tool`.
+    /// Whether this is the hand on `tool`.
     pub fn is_on(&self, tool: &Tool) -> bool {
         self.tool == tool.number()
     }
 
-    /// Where the tissue lets the tool be.
+    /// The pose to which the tissue restricts the tool.
     pub fn proxy_pose(&self) -> &Isometry3<f64> {
         self.proxy.pose()
     }
 
-    /// How it presses.
+    /// Where and how the tool presses.
     pub fn press(&self) -> &Press {
         &self.press
     }
 
-    /// What it holds.
+    /// The tissue that the tool holds.
     pub fn grip(&self) -> &Grip {
         &self.grip
     }
 
-    /// Middle of the tissue in its grip [m]; none when it holds nothing.
+    /// Centroid of the tissue in its grip [m]; `None` if it holds nothing.
     pub fn held_point(&self) -> Option<Vector3<f64>> {
         let held = self.grip.held().1;
         let sum: Vector3<f64> = held.iter().map(|held| held.point).sum();
         (!held.is_empty()).then(|| sum / held.len() as f64)
     }
 
-    /// Stiffness [N/m] of the tool's spring, `stiffness_n_m`, and tissue in series: how force changes with the
-    /// pose within a step. The spring's alone before the first touch.
+    /// Stiffness [N/m] of the tool's spring, `stiffness_n_m`, in series with the tissue: the change of force
+    /// with the pose within a step. Before the first contact it is that of the spring alone.
     pub fn in_series_with(&self, stiffness_n_m: f64) -> f64 {
         self.compliance.map_or(stiffness_n_m, |(_, compliance)| compliance.in_series_with(stiffness_n_m))
     }
 
-    /// Lets go of everything, with the tool at `pose`.
+    /// Releases everything, with the tool at `pose`.
     pub fn let_go(&mut self, pose: &Isometry3<f64>) {
         self.proxy.release(pose);
         self.press.release();
         self.grip.open();
     }
 
-    /// Goes with the tool to where it is now, and finds what it touches or holds there.
+    /// Follows the tool to its present pose, and finds what it touches or holds there.
     pub fn follow(&mut self, tool: &Tool, surfaces: &[ContactSurface]) {
         if self.hand_overs != tool.hand_overs() {
             self.hand_overs = tool.hand_overs();
@@ -105,20 +105,20 @@ impl Hand {
         }
     }
 
-    /// Touches `body` with Young's modulus `young_pa` [Pa] under a patch of `radius_m` [m]: a first guess
-    /// of its compliance if it is not the body touched last.
+    /// Records contact with `body` of Young's modulus `young_pa` [Pa] under a patch of `radius_m` [m]. If
+    /// another body was touched last, the compliance starts from a first guess.
     pub fn meet(&mut self, body: usize, young_pa: f64, radius_m: f64) {
         if self.compliance.is_none_or(|(known, _)| known != body) {
             self.compliance = Some((body, Compliance::new(young_pa, radius_m)));
         }
     }
 
-    /// How the tissue gives way under it, once it has touched some.
+    /// The learned compliance; `None` before the first contact.
     pub fn compliance(&mut self) -> Option<&mut Compliance> {
         self.compliance.as_mut().map(|(_, compliance)| compliance)
     }
 
-    /// Forgets how the tissue gives way.
+    /// Discards the learned compliance.
     pub fn forget_compliance(&mut self) {
         self.compliance = None;
     }

@@ -1,14 +1,14 @@
 //! Contact of tools and bodies in a step: surfaces, proxies, springs, reactions.
 //!
 //! # Order in a step
-//! 1. after all cuts, [`Contacts::update_surface`] per body with its surface positions now;
-//! 2. [`Contacts::detect`]: proxies move, touched points become springs;
-//! 3. per body, the integrator's solve with [`Contacts::springs`];
-//! 4. per body, [`Contacts::collect`] with the force of every spring from that solve;
+//! 1. After all cuts, [`Contacts::update_surface`] per body with its present surface positions.
+//! 2. [`Contacts::detect`]: proxies move, and touched points become springs.
+//! 3. Per body, the integrator's solve with [`Contacts::springs`].
+//! 4. Per body, [`Contacts::collect`] with the force of every spring from that solve.
 //! 5. [`Contacts::react`]: each tool receives exactly minus the sum of its springs' forces.
 //!
-//! Tissue force and reaction therefore come from the same solve and balance to rounding.
-//! Nothing here allocates while topologies and tools stay the same.
+//! Tissue force and reaction come from the same solve and therefore balance to rounding. Nothing here
+//! allocates while topologies and tools stay the same.
 
 pub mod model;
 pub mod surface;
@@ -32,16 +32,16 @@ use press::{Bearing, MAX_POINTS};
 use spring::material_points;
 use surface::ContactSurface;
 
-/// Springs reserved per body: every tool with all its points, three springs each.
+/// Springs for which memory is reserved per body: every tool with all its points, three springs each.
 const SPRING_CAPACITY: usize = MAX_TOOLS * MAX_POINTS * 3;
 
-/// Springs on one body and the tools behind them.
+/// Springs on one body, and the tools they belong to.
 #[derive(Debug, Clone)]
 struct BodyContacts {
     young_pa: f64,
     vertices: Vec<SurfaceVertex>,
     springs: Vec<PointSpring>,
-    /// Tool and depth before the solve [m], per spring.
+    /// Per spring its tool, and its depth before the solve [m].
     behind: Vec<(u32, f64)>,
 }
 
@@ -56,19 +56,19 @@ struct Sums {
     stiffness: f64,
 }
 
-/// All contacts of a step.
+/// All contacts between tools and bodies in a step.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts {
     surfaces: Vec<ContactSurface>,
     bodies: Vec<BodyContacts>,
-    /// One per tool, in their order.
+    /// One hand per tool, in the order of the tools.
     hands: Vec<Hand>,
     sums: Vec<Sums>,
 }
 
 impl Contacts {
-    /// Registers the next body, in the order of the scene. `young_pa`: its stiffness [Pa];
-    /// `on`: whether tools touch it.
+    /// Registers the next body, in the order of the scene. `young_pa` is its Young's modulus [Pa], and `on`
+    /// whether tools touch it.
     pub fn add_body(&mut self, young_pa: f64, on: bool) {
         let mut surface = ContactSurface::default();
         surface.switch(on);
@@ -83,16 +83,16 @@ impl Contacts {
         self.sums.reserve(MAX_TOOLS);
     }
 
-    /// The stiffness of `body` [Pa] changed: what the hands have learned of its compliance is out of date.
+    /// Changes the Young's modulus of `body` [Pa]. The hands discard the compliance they have learned.
     pub fn set_stiffness(&mut self, body: usize, young_pa: f64) {
         self.bodies[body].young_pa = young_pa;
         self.hands.iter_mut().for_each(Hand::forget_compliance);
     }
 
-    /// Takes in where the surface of `body` is now; after a change of epoch also its topology.
+    /// Takes over the present surface of `body`, and its topology if the epoch changed.
     ///
     /// # Errors
-    /// When surface and positions do not belong together.
+    /// If surface and positions do not belong together.
     pub fn update_surface(
         &mut self,
         body: usize,
@@ -106,12 +106,12 @@ impl Contacts {
         Ok(())
     }
 
-    /// Takes `body` to have stood still since its last update, as after a reset.
+    /// Forgets the last motion of `body`, e.g. after a reset.
     pub fn forget_motion(&mut self, body: usize) {
         self.surfaces[body].forget_motion();
     }
 
-    /// Back to the start of the scene: nothing is touched or held, nothing known of the tissue.
+    /// Returns to the start of the scene: nothing is touched or held, and no compliance is learned.
     pub fn reset(&mut self, tools: &Tools) {
         self.keep_up_with(tools);
         for (hand, tool) in self.hands.iter_mut().zip(tools.iter()) {
@@ -120,12 +120,12 @@ impl Contacts {
         }
     }
 
-    /// The hand on tool number `index`; none before the first [`detect`](Self::detect) with it.
+    /// The hand on tool number `index`; `None` before the first [`detect`](Self::detect) with it.
     pub fn hand(&self, index: usize) -> Option<&Hand> {
         self.hands.get(index)
     }
 
-    /// Moves every proxy and turns what is touched or held into springs.
+    /// Moves every proxy, and converts what is touched or held to springs.
     pub fn detect(&mut self, tools: &Tools) {
         for body in &mut self.bodies {
             body.springs.clear();
@@ -140,19 +140,19 @@ impl Contacts {
         }
     }
 
-    /// One hand per tool: those of tools that have left go, new tools stand behind the others.
+    /// Keeps one hand per tool. Hands of removed tools are dropped, those of new tools appended.
     fn keep_up_with(&mut self, tools: &Tools) {
         let mut left = tools.iter().peekable();
         self.hands.retain(|hand| left.next_if(|tool| hand.is_on(tool)).is_some());
         self.hands.extend(left.map(Hand::new));
     }
 
-    /// Springs on `body` for this step's solve.
+    /// Springs on `body` for the solve of this step.
     pub fn springs(&self, body: usize) -> &[PointSpring] {
         &self.bodies[body].springs
     }
 
-    /// Takes in the force on `body` of each of its springs from the solve [N], in their order.
+    /// Records the force of each spring on `body` from the solve [N], in the order of the springs.
     pub fn collect(&mut self, body: usize, forces: &[Vector3<f64>]) {
         let body = &self.bodies[body];
         for ((spring, &(tool, depth)), force) in body.springs.iter().zip(&body.behind).zip(forces) {
@@ -172,7 +172,7 @@ impl Contacts {
         }
     }
 
-    /// Gives every tool the reaction to what its springs did since the last call.
+    /// Gives every tool the reaction to the forces its springs have exerted since the last call.
     pub fn react(&mut self, tools: &mut Tools) {
         self.sums.resize(tools.len(), Sums::default());
         for ((tool, hand), sums) in tools.iter_mut().zip(&mut self.hands).zip(&self.sums) {
@@ -194,7 +194,7 @@ impl Contacts {
     }
 }
 
-/// One-sided springs of a tool that touches.
+/// Adds the one-sided springs of a tool that presses.
 fn press(index: u32, tool: &Tool, hand: &mut Hand, surfaces: &[ContactSurface], bodies: &mut [BodyContacts]) {
     let Some(normal) = hand.press().normal() else { return };
     if let Some(body) = hand.press().bearings().first().map(|bearing| bearing.body) {
@@ -205,12 +205,12 @@ fn press(index: u32, tool: &Tool, hand: &mut Hand, surfaces: &[ContactSurface], 
         let Some(tree) = surfaces[bearing.body].tree() else { continue };
         let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
         let spring = (tool.stiffness_n_m, tool.max_force_n);
-        // From the tool into the tissue.
+        // The spring pushes from the tool into the tissue.
         body.press(index, spring, -normal, bearing, place);
     }
 }
 
-/// Three-axis springs of a tool that holds.
+/// Adds the three-axis springs of a tool that holds tissue.
 fn pull(index: u32, tool: &Tool, hand: &Hand, surfaces: &[ContactSurface], bodies: &mut [BodyContacts]) {
     let (body, held) = hand.grip().held();
     if held.is_empty() {
@@ -226,7 +226,7 @@ fn pull(index: u32, tool: &Tool, hand: &Hand, surfaces: &[ContactSurface], bodie
         let pulled = target - point.point;
         let (springs, behind) = (&mut body.springs, &mut body.behind);
         material_points(corners.map(|v| &body.vertices[v]), point.barycentric, |vertex, share| {
-            // A corner stands in for the point: it is pulled by the same way.
+            // A corner that represents the point is pulled by the same displacement.
             let at = if share == 1.0 {
                 point.point
             } else {
@@ -270,7 +270,7 @@ impl BodyContacts {
     }
 }
 
-/// Which of the corners a material point is.
+/// Index of the corner that a material point is.
 fn corner_of(vertex: &SurfaceVertex, corners: [&SurfaceVertex; 3]) -> usize {
     corners.iter().position(|corner| *corner == vertex).unwrap_or(0)
 }

@@ -1,10 +1,10 @@
-//! How a tool presses: one direction, a fixed stencil of points on the tool, smooth shares.
+//! How a tool presses: one direction, a fixed stencil of points on the tool, and smooth shares.
 //!
-//! The tool's reaction is along the line from device to proxy, as for any god-object. The tissue
-//! is pushed against that direction where rays from a stencil on the tool meet it: eight points
-//! along a shaft, the pole and a ring around it on a ball. A point bears in proportion to its depth.
-//! Stencil, direction and shares change smoothly with pose and surface, so a steady hand feels a
-//! steady force; which triangles the proxy happens to rest on does not matter.
+//! The tool's reaction is along the line from device to proxy, as for any god-object. The tissue is pushed
+//! against that direction at the points where rays from a stencil on the tool meet it: eight points along a
+//! shaft, the pole and a ring around it on a ball. Each point bears in proportion to its depth. Stencil,
+//! direction and shares change smoothly with pose and surface, so a steady hand feels a steady force. The
+//! triangles on which the proxy happens to rest have no influence.
 
 use nalgebra::{Isometry3, Vector3};
 use scindo_collision::{Capsule, CapsuleMotion};
@@ -13,50 +13,50 @@ use crate::contact::surface::ContactSurface;
 use crate::inputs::ToolShape;
 use crate::tool::geometry::{capsule, core_length};
 
-/// Most points at which one tool bears on tissue.
+/// Most bearing points of one tool.
 pub const MAX_POINTS: usize = 8;
-/// Distance from the proxy at which a surface no longer counts as touched, in radii ...
+/// Distance of a surface from the proxy beyond which it does not count as touched, in radii ...
 const MARGIN_RADII: f64 = 0.05;
 /// ... but at least this [m].
 const LEAST_MARGIN_M: f64 = 2e-5;
-/// Offset between device and proxy from which on their line is the direction [m]; below, the
-/// normal of the touched surface takes over.
+/// Offset between device and proxy above which their line is the direction [m]. Below it, the normal of the
+/// touched surface is used.
 const CLEAR_OFFSET_M: f64 = 5e-5;
-/// Half angle of the cone within which the direction stays as it is (cosine), like dry friction of
-/// 0.18: a proxy on the facets of a dent wanders by as much while the hand is still.
+/// Cosine of the half angle of the cone within which the direction is kept, like dry friction of 0.18. While
+/// the hand is still, a proxy on the facets of a dent wanders by as much.
 const STICK_COSINE: f64 = 0.984;
-/// Weight of the present step in the running direction: a tenth, since the facets of a dent turn
-/// the line from device to proxy to and fro from step to step.
+/// Weight of the present step in the running direction. It is small because the facets of a dent turn the
+/// line from device to proxy back and forth from step to step.
 const TURN: f64 = 0.1;
-/// Weight of the present step in the running shares. Shares that followed at once
-/// would swing: who bears more sinks the tissue under it and then bears less.
+/// Weight of the present step in the running shares. Shares that followed at once would oscillate: a point
+/// that bears more sinks the tissue under it, and then bears less.
 const FOLLOW: f64 = 0.3;
-/// Share below which a point is left out.
+/// Share below which a point is omitted.
 const LEAST_SHARE: f64 = 1e-3;
-/// Points of a ball's ring and its radius in ball radii.
+/// Number of points on a ball's ring, and the ring's radius in ball radii.
 const RING: usize = 6;
 const RING_RADIUS: f64 = 0.6;
 
-/// The nearest place of the surfaces to a tool.
+/// The surface place nearest to a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
     /// Index of the body.
     pub body: usize,
-    /// Triangle of its surface, and where on it.
+    /// Triangle of the body's surface.
     pub triangle: u32,
     /// Barycentric coordinates of the place.
     pub barycentric: [f64; 3],
-    /// Where it is [m].
+    /// Position in space [m].
     pub point: Vector3<f64>,
-    /// Unit, from the tissue to the tool.
+    /// Unit normal, from the tissue to the tool.
     pub normal: Vector3<f64>,
     /// Distance between tool and surface [m].
     pub gap: f64,
-    /// Where on the tool's core, 0..=1.
+    /// Position along the tool's core, 0..=1.
     pub parameter: f64,
 }
 
-/// The surface place nearest to a capsule outside the bodies, no farther than `reach` [m].
+/// The surface place nearest to a capsule that is outside the bodies, no farther than `reach` [m].
 pub fn nearest(tool: &Capsule, surfaces: &[ContactSurface], reach: f64) -> Option<Nearest> {
     let found = surfaces.iter().enumerate().filter_map(|(body, surface)| {
         let tree = surface.tree()?;
@@ -81,13 +81,13 @@ pub fn touched(proxy: &Capsule, surfaces: &[ContactSurface]) -> Option<Nearest> 
     nearest(proxy, surfaces, (MARGIN_RADII * proxy.radius).max(LEAST_MARGIN_M))
 }
 
-/// Unit direction in which the touched tissue pushes the tool.
+/// Unit direction in which the touched tissue pushes back the tool.
 pub fn push_direction(at: &Nearest, proxy: &Capsule, device: &Capsule) -> Vector3<f64> {
     let offset = proxy.core_point(at.parameter) - device.core_point(at.parameter);
     (offset + at.normal * CLEAR_OFFSET_M).try_normalize(1e-9).unwrap_or(at.normal)
 }
 
-/// The direction held so far, turned no more than it must be to have `target` in its cone.
+/// Turns the direction `held` so far by no more than needed to have `target` in its cone.
 pub fn held_direction(held: Vector3<f64>, target: Vector3<f64>) -> Vector3<f64> {
     let cosine = held.dot(&target);
     if cosine >= STICK_COSINE {
@@ -97,24 +97,24 @@ pub fn held_direction(held: Vector3<f64>, target: Vector3<f64>) -> Vector3<f64> 
     target * STICK_COSINE + aside * (1.0 - STICK_COSINE * STICK_COSINE).sqrt()
 }
 
-/// One point at which a tool bears on tissue.
+/// One point at which a tool presses on tissue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bearing {
     /// Index of the body.
     pub body: usize,
     /// Triangle of its surface.
     pub triangle: u32,
-    /// Where on the triangle.
+    /// Barycentric coordinates on the triangle.
     pub barycentric: [f64; 3],
-    /// Where in space [m].
+    /// Position in space [m].
     pub point: Vector3<f64>,
-    /// How far the tool at the device is beyond the point, against the direction [m].
+    /// How far the tool at the device pose lies beyond the point, against the direction [m].
     pub depth: f64,
     /// Share of the tool's stiffness; all shares sum to at most 1.
     pub share: f64,
 }
 
-/// How one tool presses, from step to step.
+/// The pressing of one tool, smoothed over the steps.
 #[derive(Debug, Clone, Default)]
 pub struct Press {
     direction: Option<Direction>,
@@ -129,28 +129,28 @@ struct Direction {
 }
 
 impl Press {
-    /// A press with room for all its points.
+    /// A press with memory for all its points.
     pub fn new() -> Self {
         Self { bearings: Vec::with_capacity(MAX_POINTS), ..Self::default() }
     }
 
-    /// Direction in which the tissue pushes the tool; none while nothing is touched.
+    /// Direction in which the tissue pushes the tool; `None` while nothing is touched.
     pub fn normal(&self) -> Option<Vector3<f64>> {
         self.direction.map(|direction| direction.normal)
     }
 
-    /// Where the tool bears.
+    /// Points at which the tool presses.
     pub fn bearings(&self) -> &[Bearing] {
         &self.bearings
     }
 
-    /// The tool lets go of what it pressed.
+    /// Releases the tissue that the tool pressed on.
     pub fn release(&mut self) {
         self.direction = None;
         self.bearings.clear();
     }
 
-    /// Finds where the tool bears with its proxy and its device where they are now.
+    /// Finds the bearing points at the present poses of proxy and device.
     pub fn update(
         &mut self,
         shape: ToolShape,
@@ -181,7 +181,7 @@ impl Press {
         }
     }
 
-    /// Shares go towards the proportions of the depths.
+    /// Moves the shares towards the proportions of the depths.
     fn follow_shares(&mut self, depths: &[f64; MAX_POINTS], fresh: bool) {
         let sum: f64 = depths.iter().sum();
         if sum <= 0.0 {
@@ -194,7 +194,7 @@ impl Press {
     }
 }
 
-/// The direction turned some way towards `target`, its frame carried along without twist.
+/// Turns the direction towards `target` by its weight, and carries its frame along without twist.
 fn turned(before: Option<Direction>, target: Vector3<f64>) -> Direction {
     let normal = match before {
         Some(before) => {
@@ -210,15 +210,15 @@ fn turned(before: Option<Direction>, target: Vector3<f64>) -> Direction {
     Direction { normal, across }
 }
 
-/// A point of the stencil: where on the core, how far aside, how far below the core the tool's
-/// surface lies there.
+/// A stencil point: its position along the core, its offset to the side, and the depth of the tool's surface
+/// below the core there.
 struct StencilPoint {
     parameter: f64,
     aside: Vector3<f64>,
     below: f64,
 }
 
-/// Point `i` of the stencil of a shape; a ball has one less than a shaft.
+/// Point `i` of the stencil of a shape. A ball has one point fewer than a shaft.
 fn stencil(i: usize, shape: ToolShape, direction: &Direction) -> Option<StencilPoint> {
     let ToolShape::Sphere { radius_m } = shape else {
         let parameter = i as f64 / (MAX_POINTS - 1) as f64;
@@ -239,15 +239,16 @@ fn stencil(i: usize, shape: ToolShape, direction: &Direction) -> Option<StencilP
     })
 }
 
-/// Looks from the proxy against `normal` for tissue, down to where the device has the tool.
+/// Casts a ray from the proxy against `normal`, down to the tool at the device pose, and returns the tissue
+/// it meets.
 fn cast(
     point: &StencilPoint,
     (proxy, device): (&Capsule, &Capsule),
     normal: Vector3<f64>,
     surfaces: &[ContactSurface],
 ) -> Option<Bearing> {
-    // On the device's line, at the proxy's height: the proxy itself wanders in its dent, and a
-    // stencil that wandered along would dent the tissue now here, now there.
+    // The ray starts on the device's line, at the height of the proxy. The proxy itself wanders in its dent,
+    // and a stencil that wandered along would dent the tissue in changing places.
     let at_device = device.core_point(point.parameter);
     let height = normal.dot(&(proxy.core_point(point.parameter) - at_device));
     let start = at_device + point.aside + normal * (height + proxy.radius);

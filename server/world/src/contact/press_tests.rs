@@ -53,7 +53,7 @@ impl Table {
         Self { body, tools: Tools::new(&[spec]), contacts, positions: Vec::new(), steps: 0 }
     }
 
-    /// One whole step; the force on the tool.
+    /// Makes one whole step and returns the force on the tool.
     fn step(&mut self, pose: Isometry3<f64>, mode: ToolMode) -> V {
         self.steps += 1;
         let sample = ToolInput {
@@ -107,7 +107,7 @@ fn pressing_builds_up_a_steady_force_that_vanishes_on_release() {
             force = table.at(0.003, 0.002, radius_m - 0.01);
             steady.push(force.z);
         }
-        // Ten millimetres into 8 kPa: below the hand's spring, above a tenth of it.
+        // Ten millimetres into 8 kPa: less than the hand's spring, more than a tenth of it.
         assert!(force.z > 0.3 && force.z < 4.0, "{force}");
         // The small ball rests in the dent of a single node, on its slope.
         assert!(radius_m < 0.01 || force.xy().norm() < 0.15 * force.z, "{force}");
@@ -126,7 +126,7 @@ fn a_jab_is_capped_and_forgotten_within_a_second() {
     let mut table = Table::new(ToolShape::Sphere { radius_m: 0.002 });
     let rest = table.body.positions().to_vec();
     table.at(0.0, 0.0, 0.03);
-    // 80 mm in one step, to the far side of the block, held there, and out again.
+    // 80 mm in one step, to the far side of the block; held there, and out again.
     for _ in 0..5 {
         table.at(0.001, 0.001, -0.05);
         let proxy = table.hand().proxy_pose().translation.z;
@@ -150,7 +150,7 @@ fn an_open_wound_lets_the_tool_in_and_closed_skin_does_not() {
     let edge = |y: f64| [V::new(0.001, y, -0.03), V::new(0.001, y, 0.01)];
     let sweep = BladeSweep { segments: (0..=20).map(|i| edge(-0.05 + 0.005 * f64::from(i))).collect() };
     table.body.cut(&sweep, 1).unwrap();
-    // Pulled open by hand: the halves of the top are moved apart.
+    // Pulled open by hand: the halves of the top move apart.
     let opened: Vec<V> = opened_by(&table.body, 0.008);
     let rest = vec![V::zeros(); opened.len()];
     table.body.set_state(&opened, &rest).unwrap();
@@ -170,7 +170,7 @@ fn opened_by(body: &Body, gap: f64) -> Vec<V> {
     let mut x = body.positions().to_vec();
     let mut side = vec![0.0f64; x.len()];
     let surface = body.surface();
-    // Every lip triangle knows its side by its normal; its copies go along with it.
+    // The normal of a lip triangle tells its side, and its copies move with it.
     for (triangle, _) in surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag > 0) {
         let [p, q, r] = triangle.map(|v| surface.vertices[v as usize].position(&x));
         let normal = (q - p).cross(&(r - p));

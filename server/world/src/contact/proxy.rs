@@ -1,8 +1,9 @@
-//! The proxy (god-object): where the tissue lets a tool be, while the device is where the hand is.
+//! The proxy (god-object) is the pose to which the tissue restricts a tool. The device is at the pose of the
+//! hand.
 //!
-//! A proxy only moves along swept paths, so it cannot pass through a surface however far the hand
-//! jumps. It is first carried along by a surface that moves onto it, then goes towards the device,
-//! stops at the first impact and slides on along the planes it touches.
+//! A proxy only moves along swept paths, so it cannot pass through a surface, however far the hand jumps.
+//! First a surface that moves onto it carries it along. Then it goes towards the device, stops at the first
+//! impact and slides along the planes it touches.
 //!
 //! # Source
 //! Zilles and Salisbury, A constraint-based god-object method for haptic display (1995); for
@@ -16,17 +17,17 @@ use crate::contact::surface::ContactSurface;
 use crate::inputs::ToolShape;
 use crate::tool::geometry::{capsule, core, core_radius};
 
-/// Sweeps per tick while going towards the device: stops and slides.
+/// Most sweeps per tick on the way to the device, each ending in a stop or a slide.
 const MAX_SLIDES: usize = 10;
-/// Sweeps per tick while surfaces move over the resting proxy.
+/// Most sweeps per tick while surfaces move over the resting proxy.
 const MAX_CARRIES: usize = 4;
-/// Corrections per tick of what still overlaps.
+/// Most corrections per tick of remaining overlap.
 const MAX_PUSHES: usize = 8;
-/// Largest rotation of one sweep [rad]; the core's ends move on chords, not arcs.
+/// Largest rotation of one sweep [rad]. The ends of the core move on chords, not arcs.
 const MAX_TURN_RAD: f64 = 0.1;
 /// Most sweeps spent on one tick's rotation.
 const MAX_TURNS: usize = 32;
-/// Points of the core that are held against the inside of a body.
+/// Points of the core that are tested for lying inside a body.
 const INSIDE_SAMPLES: usize = 5;
 
 /// A plane the proxy touches while it slides.
@@ -55,21 +56,21 @@ impl Proxy {
         &self.pose
     }
 
-    /// Puts the proxy where the device is, whatever is there; the next [`follow`](Self::follow)
-    /// starts anew from the device's pose and is pushed out of what it finds itself in.
+    /// Puts the proxy at the pose of the device, even inside tissue. The next [`follow`](Self::follow) starts
+    /// from there, and pushes the proxy out of any tissue it is in.
     pub fn release(&mut self, device: &Isometry3<f64>) {
         self.pose = *device;
         self.engaged = false;
     }
 
-    /// Puts the proxy where another proxy is that met the same surfaces.
+    /// Takes over the pose of another proxy that has met the same surfaces.
     pub fn seat(&mut self, pose: &Isometry3<f64>) {
         self.pose = *pose;
         self.engaged = true;
     }
 
-    /// Moves with surfaces that came over the resting proxy in their last motion. To be called
-    /// once per motion, before [`follow`](Self::follow).
+    /// Moves with surfaces that passed over the resting proxy in their last motion. Must be called once per
+    /// motion, before [`follow`](Self::follow).
     pub fn ride(&mut self, shape: ToolShape, surfaces: &[ContactSurface]) {
         if self.engaged {
             self.carry(shape, surfaces);
@@ -104,14 +105,14 @@ impl Proxy {
             };
             let before = weighted(&tree.previous_triangle(impact.triangle), &impact);
             let after = weighted(&tree.triangle(impact.triangle), &impact);
-            // What the surface still gains on the proxy after the impact, made up for.
+            // Compensate how far the surface still advances relative to the proxy after the impact.
             let gain = impact.normal.dot(&(after - before - push)) * (1.0 - impact.time);
             push += impact.normal * (gain.max(0.0) + SWEEP_TOLERANCE_M);
         }
         self.pose.translation.vector += push;
     }
 
-    /// Goes towards `goal`, stops at impacts and slides along what it touches.
+    /// Moves towards `goal`, stops at impacts and slides along touched planes.
     fn slide(&mut self, shape: ToolShape, goal: &Isometry3<f64>, surfaces: &[ContactSurface]) {
         let mut touched = [None; 4];
         let mut count = 0;
@@ -129,7 +130,7 @@ impl Proxy {
                     if count == 0 || moved < SWEEP_TOLERANCE_M {
                         return;
                     }
-                    // Round the corner: from here straight to the goal again.
+                    // Past the corner, go straight to the goal again.
                     touched = [None; 4];
                     count = 0;
                 }
@@ -143,8 +144,8 @@ impl Proxy {
         }
     }
 
-    /// Moves out of what the proxy still overlaps: at its start, after a cut, or where surfaces
-    /// close in from several sides.
+    /// Moves the proxy out of remaining overlap: at its start, after a cut, or where surfaces close in from
+    /// several sides.
     fn push_out(&mut self, shape: ToolShape, surfaces: &[ContactSurface]) {
         for _ in 0..MAX_PUSHES {
             let body = capsule(shape, &self.pose);
@@ -158,7 +159,7 @@ impl Proxy {
     }
 }
 
-/// The displacement that takes a capsule out of a surface, `None` if it is clear of it.
+/// The displacement that takes a capsule out of a surface; `None` if they do not overlap.
 fn overlap(tree: &SurfaceBvh, capsule: &Capsule) -> Option<Vector3<f64>> {
     let [lower, upper] = tree.bounds()?;
     let in_box = |p: &Vector3<f64>| (0..3).all(|i| p[i] >= lower[i] && p[i] <= upper[i]);
@@ -181,7 +182,7 @@ fn overlap(tree: &SurfaceBvh, capsule: &Capsule) -> Option<Vector3<f64>> {
     (shallow > SWEEP_TOLERANCE_M).then(|| direction * (shallow + 0.5 * SWEEP_TOLERANCE_M))
 }
 
-/// The goal, moved so that no touched point of the tool goes into its plane.
+/// The goal, moved so that no touched point of the tool enters its plane.
 fn along_planes(
     shape: ToolShape,
     pose: &Isometry3<f64>,
@@ -190,7 +191,7 @@ fn along_planes(
 ) -> Isometry3<f64> {
     let mut target = *goal;
     let from = core(shape, pose);
-    // A few rounds: leaving one plane may enter another.
+    // Several rounds, since leaving one plane may enter another.
     for _ in 0..8 {
         let mut inside = false;
         for plane in touched.iter().flatten() {
@@ -231,7 +232,7 @@ fn distance(shape: ToolShape, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64
     (to[0] - from[0]).norm().max((to[1] - from[1]).norm())
 }
 
-/// The tip moves straight, the orientation by the shortest turn.
+/// Interpolates a pose: the tip moves straight, the orientation along the shortest rotation.
 fn between(from: &Isometry3<f64>, to: &Isometry3<f64>, s: f64) -> Isometry3<f64> {
     let tip = from.translation.vector.lerp(&to.translation.vector, s);
     let rotation = from.rotation.try_slerp(&to.rotation, s, 1e-12).unwrap_or(to.rotation);

@@ -1,13 +1,13 @@
-//! From a point of a surface triangle to springs on the node copies that carry it.
+//! Converts a point of a surface triangle to springs on the node copies that carry it.
 
 use scindo_physics::cut::SurfaceVertex;
 
-/// Share of a point's stiffness below which a copy is left out.
+/// Share of a point's stiffness below which a copy is omitted.
 const LEAST_WEIGHT: f64 = 1e-9;
 
-/// Hands out material points that together are one point of a triangle: one of share 1 where at
-/// most four copies carry it, else one per corner with the corner's barycentric coordinate as
-/// share, so that force and moment on the tissue are the same.
+/// Calls `emit` with material points that together represent one point of a triangle. If at most four copies
+/// carry the point, it is a single one with share 1. Otherwise there is one per corner with the barycentric
+/// coordinate of the corner as its share. Force and moment on the tissue are the same.
 pub fn material_points(
     corners: [&SurfaceVertex; 3],
     barycentric: [f64; 3],
@@ -16,6 +16,7 @@ pub fn material_points(
     let mut copies = [corners[0].copies[0]; 12];
     let mut weights = [0.0; 12];
     let mut count = 0;
+    // Corners often share copies, so their weights are merged.
     for (vertex, w) in corners.iter().zip(barycentric) {
         for (&copy, &weight) in vertex.copies.iter().zip(&vertex.weights) {
             if (w * weight).abs() < LEAST_WEIGHT {

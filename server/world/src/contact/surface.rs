@@ -1,8 +1,8 @@
-//! The surface of one body as contact sees it: a tree per topology, refitted per motion.
+//! The surface of one body for contact: one tree per topology, refitted after every motion.
 
 use scindo_collision::{SurfaceBvh, SurfaceError};
 
-/// One body's surface; empty until its first update.
+/// The surface of one body. It is empty until its first update.
 #[derive(Debug, Clone, Default)]
 pub struct ContactSurface {
     tree: Option<SurfaceBvh>,
@@ -11,11 +11,11 @@ pub struct ContactSurface {
 }
 
 impl ContactSurface {
-    /// Brings the surface to `positions` [m]: refits in place within an epoch, builds a new tree
-    /// when the epoch differs. Returns whether it was built anew.
+    /// Moves the surface to `positions` [m]. It refits in place within an epoch, and builds a new tree when
+    /// the epoch differs. Returns whether it built one.
     ///
     /// # Errors
-    /// When triangles and positions do not belong together; the surface is then as it was.
+    /// If triangles and positions do not belong together. The surface is not changed then.
     pub fn update(
         &mut self,
         epoch: u32,
@@ -32,7 +32,7 @@ impl ContactSurface {
         }
     }
 
-    /// Takes the body out of contact, or back in.
+    /// Includes the body in contact or excludes it.
     pub fn switch(&mut self, on: bool) {
         self.off = !on;
     }
@@ -42,12 +42,12 @@ impl ContactSurface {
         self.tree.as_ref().filter(|_| !self.off)
     }
 
-    /// The topology the tree belongs to.
+    /// The topology epoch to which the tree belongs.
     pub fn epoch(&self) -> u32 {
         self.epoch
     }
 
-    /// Takes the surface to have stood still since the last update, as after a reset.
+    /// Forgets the motion of the last update, e.g. after a reset.
     pub fn forget_motion(&mut self) {
         if let Some(tree) = &mut self.tree {
             tree.forget_motion();

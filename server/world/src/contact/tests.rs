@@ -53,7 +53,7 @@ impl Bench {
         self.step_posed(Isometry3::translation(tip.x, tip.y, tip.z), mode)
     }
 
-    /// One step up to the solve.
+    /// One step without the solve.
     fn step_posed(&mut self, pose: Isometry3<f64>, mode: ToolMode) -> &Tool {
         self.time_s += 0.005;
         let sample = ToolInput {
@@ -80,7 +80,7 @@ impl Bench {
         *self.contacts.hand(0).unwrap().proxy_pose()
     }
 
-    /// Forces of all springs with the nodes where they are.
+    /// Forces of all springs at the present node positions.
     fn forces(&self) -> Vec<V> {
         let force = |spring: &PointSpring| {
             let x: V = spring.copies.iter().zip(spring.weights).map(|(&c, w)| self.x[c as usize] * w).sum();
@@ -95,7 +95,7 @@ impl Bench {
         self.contacts.springs(0).iter().map(force).collect()
     }
 
-    /// Reactions for nodes that stay where they are.
+    /// Reactions if the nodes do not move.
     fn solve(&mut self) -> V {
         let forces = self.forces();
         self.contacts.collect(0, &forces);
@@ -206,7 +206,7 @@ fn a_turning_shaft_stops_at_the_surface() {
     let mut bench = Bench::new(ROD);
     let tip = Translation3::new(0.0, 0.0, 0.012);
     for i in 0..8 {
-        // The shaft tips over and down into the slab, 20 degrees a step.
+        // The shaft tilts over into the slab, 20 degrees per step.
         let turn = UnitQuaternion::from_axis_angle(&V::x_axis(), 0.35 * f64::from(i));
         let shape = bench.step_posed(Isometry3::from_parts(tip, turn), ToolMode::Touch).shape;
         let heel = crate::tool::geometry::core(shape, &bench.proxy())[1];
@@ -230,7 +230,7 @@ fn force_and_reaction_balance_and_grow_with_depth() {
             let on_tissue = bench.solve();
             let on_tool = bench.tools.iter().next().unwrap().force_n;
             assert!((on_tissue + on_tool).norm() < 1e-12);
-            // The springs of a shaft add up to the tool's; a ball's edges lie less deep.
+            // The springs of a shaft add up to that of the tool. The edges of a ball lie less deep.
             let full = 500.0 * depth;
             assert!(on_tool.z > 0.5 * full && on_tool.z < 1.02 * full, "{on_tool} of {full}");
             assert!(on_tool.xy().norm() < 0.05 * full, "{on_tool}");
@@ -249,7 +249,7 @@ fn a_grip_pulls_what_it_took_and_lets_go() {
     assert!((force - V::new(0.5, 0.0, 1.5)).norm() < 1e-4, "{force}");
     bench.step(V::new(0.001, 0.0, 0.006), ToolMode::Hover);
     assert!(bench.contacts.springs(0).is_empty());
-    // Too far away to take anything.
+    // Too far away to grip anything.
     bench.step(V::new(0.0, 0.0, 0.05), ToolMode::Grab);
     assert!(bench.contacts.springs(0).is_empty());
 }

@@ -1,4 +1,4 @@
-//! Gathering cells from a file: tetrahedra make a volume mesh, faces a surface.
+//! Gathers the cells of a file: tetrahedra make a volume mesh, faces a surface.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::error::MeshInError;
 use super::mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
 
-/// What a cell of a file contributes.
+/// Contribution of a cell of a file to the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellKind {
     /// The first four nodes are the corners of a tetrahedron; `order` > 1 has more nodes after them.
@@ -31,7 +31,7 @@ pub enum CellKind {
     Refused(&'static str),
 }
 
-/// Cells of one file, as they are read.
+/// The cells of one file, gathered while reading.
 #[derive(Default)]
 pub struct CellSoup {
     tets: Vec<[i64; 4]>,
@@ -41,7 +41,8 @@ pub struct CellSoup {
 }
 
 impl CellSoup {
-    /// Adds one cell; false when its node count does not fit its kind. Refused kinds are the caller's error.
+    /// Adds one cell. Returns `false` if its node count does not fit its kind. The caller must not add
+    /// refused kinds.
     #[must_use]
     pub fn add(&mut self, kind: CellKind, nodes: &[i64]) -> bool {
         match (kind, nodes) {
@@ -69,7 +70,7 @@ impl CellSoup {
         true
     }
 
-    /// Shifts the node indices of everything added since `mark` by `first_node` (files in several pieces).
+    /// Shifts the node indices of everything added since `mark` by `first_node`, for files in several pieces.
     pub fn shift_since(&mut self, mark: (usize, usize), first_node: i64) {
         self.tets[mark.0..].iter_mut().flatten().for_each(|n| *n += first_node);
         self.triangles[mark.1..].iter_mut().flatten().for_each(|n| *n += first_node);
@@ -80,8 +81,8 @@ impl CellSoup {
         (self.tets.len(), self.triangles.len())
     }
 
-    /// Maps the file's node tags to indices with `index_of` and makes the mesh: a volume as soon as
-    /// there is a tetrahedron, otherwise a surface.
+    /// Maps the file's node tags to indices with `index_of` and makes the mesh: a volume if there is any
+    /// tetrahedron, otherwise a surface.
     pub fn finish(
         self,
         file: &str,
@@ -121,12 +122,12 @@ impl CellSoup {
     }
 }
 
-/// Index in a file that counts its nodes from zero.
+/// Index lookup for a file that counts its nodes from zero.
 pub fn zero_based(n_nodes: usize) -> impl Fn(i64) -> Option<u32> {
     move |node| u32::try_from(node).ok().filter(|&n| (n as usize) < n_nodes)
 }
 
-/// Tags → indices for all cells; the error names the cell and the tag without a node.
+/// Converts the tags of all cells to indices. The error names the cell and the tag without a node.
 fn corners<const N: usize>(
     cells: &[[i64; N]],
     index_of: impl Fn(i64) -> Option<u32>,

@@ -1,4 +1,4 @@
-//! What can be wrong with a mesh file: where, what was found, what was expected, what to do.
+//! Errors of mesh files: where, what was found, what was expected, what to do.
 
 use std::path::PathBuf;
 
@@ -28,37 +28,37 @@ pub enum MeshInError {
         file: String,
         /// Line or byte of the fault.
         place: String,
-        /// What the format asks for here.
+        /// What the format requires here.
         expected: String,
-        /// What stands there.
+        /// What the file has instead.
         found: String,
     },
-    /// The format is followed, but this part of it is not read.
+    /// The file follows the format, but this feature is not supported.
     #[error("'{file}', {place}: {what} is not supported; {instead}")]
     Unsupported {
         /// File name.
         file: String,
         /// Line or byte.
         place: String,
-        /// The feature.
+        /// The feature in words.
         what: String,
         /// What to do instead.
         instead: String,
     },
-    /// A count announced by the file is larger than its bytes or than the limit allows.
+    /// A count announced by the file exceeds its bytes or the limit.
     #[error("'{file}', {place}: announces {value} {what}, but {reason} (at most {limit})")]
     Limit {
         /// File name.
         file: String,
         /// Line or byte.
         place: String,
-        /// What is counted.
+        /// The item counted.
         what: String,
         /// Announced count.
         value: u64,
         /// Largest admissible count.
         limit: u64,
-        /// Why that is the limit.
+        /// Reason for that limit.
         reason: String,
     },
     /// An element names a node that does not exist.
@@ -174,12 +174,12 @@ pub enum MeshInError {
         /// The factor.
         scale: f64,
     },
-    /// A mesh could not be written.
+    /// The mesh could not be written.
     #[error("cannot write mesh '{}': {reason}", path.display())]
     Write {
-        /// Where to.
+        /// Path of the output file.
         path: PathBuf,
-        /// Why not.
+        /// Reason in words.
         reason: String,
     },
 }

@@ -177,7 +177,7 @@ impl Content {
         let mut nodes = Vec::new();
         while done < total {
             let at = scanner.clone();
-            // Text: one element a line. Binary: blocks of elements of one type.
+            // Text has one element per line, binary has blocks of elements of one type.
             let block = match format.encoding {
                 Encoding::Text => {
                     scanner.integer("an element number")?;
@@ -277,7 +277,7 @@ impl Content {
     }
 }
 
-/// Binary data begins after the newline of the line before it.
+/// Moves to the start of binary data, which follows the newline of the line before it.
 fn binary_starts(scanner: &mut Scanner, format: Format) {
     if format.encoding != Encoding::Text {
         scanner.line();
@@ -292,7 +292,7 @@ fn size(scanner: &mut Scanner, format: Format, what: &str, bytes_each: usize) ->
     scanner.bounded(value, what, bytes_each)
 }
 
-/// Block count of a 4.1 section; the total and the tag range are not needed.
+/// Block count of a 4.1 section. The total and the tag range are not needed.
 fn section_header(scanner: &mut Scanner, format: Format, what: &str) -> Result<usize, MeshInError> {
     let blocks = size(scanner, format, "blocks", 1)?;
     size(scanner, format, what, 1)?;

@@ -1,4 +1,5 @@
-//! Tests of the Gmsh reader: every format gives the same two tetrahedra; damage gives errors with places.
+//! Tests of the Gmsh reader: every format gives the same two tetrahedra, and damaged files give errors with
+//! their place.
 
 use nalgebra::Vector3;
 

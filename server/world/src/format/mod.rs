@@ -1,10 +1,10 @@
-//! Files of meshes: their bytes → a typed mesh, and grids with fields → a file.
+//! Mesh files: reads their bytes into a typed mesh, and writes grids with fields.
 //!
 //! A file holds either a *volume* (tetrahedra: `.msh`, `.vtk`, `.vtu`) or a *surface* (triangles: `.obj`,
 //! `.stl`, `.ply`, and `.vtk`, `.vtu`, `.vtp`, `.msh` without tetrahedra). Readers work on bytes in memory;
-//! [`read_mesh`] alone opens files. Every reader checks counts against the bytes that are there before it allocates, and indices
-//! against the nodes that are there before it hands anything on; faults name file, place and what was
-//! expected.
+//! only [`read_mesh`] opens files. Before it allocates, every reader checks counts against the bytes that are
+//! there. Before it returns, it checks indices against the nodes. Errors name the file, the place and what
+//! was expected.
 
 mod error;
 mod mesh_file;
@@ -27,10 +27,10 @@ use nalgebra::Vector3;
 pub use error::MeshInError;
 pub use mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
 
-/// Largest mesh file that is opened [bytes].
+/// Largest mesh file accepted [bytes].
 pub const MAX_FILE_BYTES: u64 = 2 << 30;
 
-/// Reads a mesh file; the format follows from the extension, or from the first bytes when there is none.
+/// Reads a mesh file. The format follows from the extension, or from the first bytes if there is none.
 pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
     let io = |source| MeshInError::Io { path: path.to_path_buf(), source };
     let file = path.display().to_string();
@@ -49,7 +49,7 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
     read_mesh_bytes(&file, &bytes)
 }
 
-/// Reads a mesh from memory; `file` is its name (its extension chooses the format).
+/// Reads a mesh from memory. `file` is its name, whose extension chooses the format.
 pub fn read_mesh_bytes(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let extension =
         Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();

@@ -9,14 +9,14 @@ use super::error::MeshInError;
 use super::mesh_file::MeshFile;
 use super::scanner::Scanner;
 
-/// Reads the positions and faces of all objects and groups in the file; materials are not looked at.
+/// Reads the positions and faces of all objects and groups in the file. Materials are ignored.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     let mut cursor = Cursor::new(bytes);
     let (models, _) =
         tobj::load_obj_buf(&mut cursor, &options, |_| Ok(Default::default())).map_err(|error| {
             let mut scanner = Scanner::new(file, bytes);
-            // tobj reads line by line: the fault is in the line that ends where the cursor stands.
+            // tobj reads line by line, so the fault is in the line that ends at the cursor.
             let read = (cursor.position() as usize).min(bytes.len()).saturating_sub(1);
             let _ = scanner.take(read, "lines already read");
             MeshInError::Syntax {
@@ -41,7 +41,7 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
             polygon.clear();
             polygon.extend(model.mesh.indices.iter().skip(corner).take(size).map(|&i| first + i64::from(i)));
             corner += size;
-            // Faces of fewer than three corners (points and lines in disguise) carry no area.
+            // Faces with fewer than three corners (points and lines in disguise) have no area.
             let _ = cells.add(CellKind::Polygon, &polygon);
         }
     }

@@ -8,7 +8,7 @@ use super::cells::{CellKind, CellSoup, zero_based};
 use super::error::MeshInError;
 use super::mesh_file::MeshFile;
 
-/// One row of any element: the parser fills what a surface needs and drops the rest (colours, normals, …).
+/// One row of any element. The parser fills what a surface needs and drops the rest (colours, normals, …).
 struct Row {
     position: [f64; 3],
     corners: Vec<i64>,
@@ -96,7 +96,7 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
         }
     }
     for row in rows("tristrips") {
-        // Strips are separated by -1.
+        // -1 separates strips.
         for strip in row.corners.split(|&i| i == -1).filter(|s| s.len() >= 3) {
             let _ = cells.add(CellKind::Strip, strip);
         }

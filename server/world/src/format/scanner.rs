@@ -1,7 +1,8 @@
-//! A cursor over the bytes of a mesh file: words, numbers and binary blocks, with places for errors.
+//! A cursor over the bytes of a mesh file: reads words, numbers and binary blocks, and gives places for
+//! errors.
 //!
-//! Every count read from a file passes [`Scanner::count`], which compares it with the bytes that are
-//! left, so that no allocation is larger than the file justifies.
+//! Every count read from a file passes [`Scanner::count`], which compares it with the remaining bytes. No
+//! allocation is therefore larger than the file justifies.
 
 use super::error::MeshInError;
 
@@ -40,7 +41,7 @@ impl<'a> Scanner<'a> {
         Scanner { file, bytes, position: 0 }
     }
 
-    /// Name of the file.
+    /// Name of the file, for errors.
     pub fn file(&self) -> &'a str {
         self.file
     }
@@ -50,13 +51,13 @@ impl<'a> Scanner<'a> {
         self.bytes.len() - self.position
     }
 
-    /// "line 12 (byte 345)" of the next byte.
+    /// "line 12 (byte 345)" for the next byte.
     pub fn place(&self) -> String {
         let newlines = self.bytes[..self.position].iter().filter(|&&b| b == b'\n').count();
         format!("line {} (byte {})", newlines + 1, self.position)
     }
 
-    /// The error "expected … here", quoting what stands there.
+    /// The error "expected … here", with a quotation of what is found.
     pub fn expected(&self, expected: impl Into<String>) -> MeshInError {
         let rest = &self.bytes[self.position..];
         let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
@@ -87,7 +88,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// True when only white space is left.
+    /// Skips white space and returns whether the end is reached.
     pub fn at_end(&mut self) -> bool {
         self.skip_white();
         self.position == self.bytes.len()
@@ -111,7 +112,7 @@ impl<'a> Scanner<'a> {
         Ok(word)
     }
 
-    /// The rest of the current line, moving to the next one.
+    /// The rest of the current line. Moves to the next line.
     pub fn line(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.position..];
         let length = rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len());
@@ -120,7 +121,7 @@ impl<'a> Scanner<'a> {
         line.strip_suffix(b"\r").unwrap_or(line)
     }
 
-    /// Moves just behind the next occurrence of `marker`; false (and no move) when there is none.
+    /// Moves just behind the next occurrence of `marker`. Returns `false`, without moving, if there is none.
     pub fn skip_past(&mut self, marker: &[u8]) -> bool {
         let rest = &self.bytes[self.position..];
         match rest.windows(marker.len().max(1)).position(|w| w == marker) {
@@ -154,24 +155,24 @@ impl<'a> Scanner<'a> {
         Ok(taken)
     }
 
-    /// A text integer.
+    /// The next word as an integer.
     pub fn integer(&mut self, expected: &str) -> Result<i64, MeshInError> {
         self.parsed(expected)
     }
 
-    /// A text real number (Fortran-style `1d-3` is not read).
+    /// The next word as a real number. Fortran-style `1d-3` is not supported.
     pub fn real(&mut self, expected: &str) -> Result<f64, MeshInError> {
         self.parsed(expected)
     }
 
-    /// A text count of `what`, each of which takes at least `bytes_each` bytes of the rest of the file.
+    /// The next word as a count of `what`, each of which takes at least `bytes_each` of the remaining bytes.
     pub fn count(&mut self, what: &str, bytes_each: usize) -> Result<usize, MeshInError> {
         let start = self.clone();
         let value: u64 = self.parsed(&format!("the number of {what}"))?;
         start.bounded(value, what, bytes_each)
     }
 
-    /// Checks a count that was read by other means.
+    /// Checks a count that was read in another way.
     pub fn bounded(&self, value: u64, what: &str, bytes_each: usize) -> Result<usize, MeshInError> {
         let by_size = (self.remaining() / bytes_each.max(1)) as u64;
         let limit = by_size.min(MAX_ITEMS);
@@ -192,7 +193,7 @@ impl<'a> Scanner<'a> {
         Ok(value as usize)
     }
 
-    /// An integer of `width` bytes (1, 4 or 8), or a word in a text section.
+    /// An integer of `width` bytes (1, 4 or 8), or the next word in a text section.
     pub fn stored_integer(
         &mut self,
         encoding: Encoding,
@@ -209,7 +210,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// A real number of `width` bytes (4 or 8), or a word in a text section.
+    /// A real number of `width` bytes (4 or 8), or the next word in a text section.
     pub fn stored_real(&mut self, encoding: Encoding, width: usize, what: &str) -> Result<f64, MeshInError> {
         match encoding {
             Encoding::Text => self.real(what),

@@ -12,7 +12,7 @@ use super::mesh_file::MeshFile;
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
-/// Reads all facets; normals are recomputed from the corners by whoever needs them.
+/// Reads all facets. Their normals are ignored; users recompute them from the corners.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let binary_count = binary_count(bytes);
     let fault = |number: usize, expected: &str, found: String| MeshInError::Syntax {
@@ -53,15 +53,16 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     cells.finish(file, vertices, zero_based(n))
 }
 
-/// A binary file may start with "solid" all the same: its header is blanked, the reader goes by it.
+/// Blanks the header of a binary file. It may also start with "solid", by which the reader recognises text
+/// files.
 fn blank_header(bytes: &[u8]) -> Vec<u8> {
     let mut owned = bytes.to_vec();
     owned[..80].fill(0);
     owned
 }
 
-/// The text of a file with any number of solids as that of a single one, in lower case; `None` when the
-/// last solid is not closed (the file was cut off).
+/// Converts a text file with any number of solids to one with a single solid, in lower case. `None` if the
+/// last solid is not closed, since the file was cut off.
 fn one_solid(bytes: &[u8]) -> Option<Vec<u8>> {
     let text = String::from_utf8_lossy(bytes).to_ascii_lowercase();
     let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();

@@ -19,7 +19,7 @@ const MSH: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1
     $Elements\n1\n1 4 2 1 1 1 2 3 4\n$EndElements\n";
 
 fn binary_stl() -> Vec<u8> {
-    // The header lies: it starts like a text file.
+    // The header is misleading: it starts like a text file.
     let mut bytes = b"solid by a liar".to_vec();
     bytes.resize(80, b' ');
     bytes.extend(2u32.to_le_bytes());

@@ -8,7 +8,7 @@ use flate2::read::ZlibDecoder;
 
 use super::scanner::{ByteOrder, binary_integer, binary_real};
 
-/// Largest decoded array [bytes]; a compressed block cannot announce more.
+/// Largest decoded array [bytes]. A compressed block cannot announce more.
 const MAX_ARRAY_BYTES: u64 = 2 << 30;
 
 /// How a file stores its binary arrays.
@@ -17,13 +17,13 @@ pub struct Storage<'a> {
     pub order: ByteOrder,
     /// Width of header integers [bytes].
     pub header_width: usize,
-    /// zlib blocks.
+    /// Whether data is stored in zlib blocks.
     pub compressed: bool,
     /// Appended data: whether it is base64, and its bytes.
     pub appended: Option<(bool, &'a [u8])>,
 }
 
-/// A `<DataArray>` as it stands in the XML.
+/// A `<DataArray>` as found in the XML, not decoded.
 pub struct DataArray {
     /// "Float32", "Int64", …
     pub type_name: String,
@@ -37,9 +37,9 @@ pub struct DataArray {
 
 /// Decoded values.
 pub enum Array {
-    /// From an integer type.
+    /// Values of an integer type.
     Integers(Vec<i64>),
-    /// From a real type.
+    /// Values of a real type.
     Reals(Vec<f64>),
 }
 
@@ -54,7 +54,7 @@ impl Array {
 }
 
 impl Storage<'_> {
-    /// Decodes one array; the error says what is wrong with it.
+    /// Decodes one array. The error describes the fault.
     pub fn decode(&self, array: &DataArray) -> Result<Array, String> {
         let (is_real, width) = match array.type_name.as_str() {
             "Float32" => (true, 4),
@@ -99,7 +99,7 @@ impl Storage<'_> {
         u64::try_from(value).map_err(|_| "a negative length in the header".into())
     }
 
-    /// Length header(s) and data: `[n_bytes][data]`, or compressed
+    /// Reads length header(s) and data: `[n_bytes][data]`, or compressed
     /// `[n_blocks][block_bytes][last_block_bytes][compressed_bytes…][blocks…]`.
     fn block(&self, source: &mut dyn ByteSource) -> Result<Vec<u8>, String> {
         let first = self.header(source)?;
@@ -147,13 +147,13 @@ fn decode_text(text: &str, is_real: bool) -> Result<Array, String> {
     })
 }
 
-/// Bytes that are handed out from the front.
+/// A source of bytes that are taken from the front.
 trait ByteSource {
     /// The next `n` bytes.
     fn take(&mut self, n: u64) -> Result<Vec<u8>, String>;
     /// Upper bound of the bytes left.
     fn left(&self) -> u64;
-    /// The header is over: base64 writers may have padded here.
+    /// Called at the end of the header, where base64 writers may have padded.
     fn end_of_group(&mut self) {}
 }
 
@@ -175,10 +175,10 @@ impl ByteSource for Raw<'_> {
     }
 }
 
-/// Base64 text; padding may stand in the middle (VTK pads the header on its own, others do not).
+/// Base64 text. Padding may occur in the middle: VTK pads the header separately, others do not.
 struct Base64<'a> {
     text: &'a [u8],
-    /// Decoded but not handed out yet.
+    /// Decoded, but not taken yet.
     ready: Vec<u8>,
 }
 

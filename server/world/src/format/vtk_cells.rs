@@ -6,7 +6,7 @@
 use super::cells::{CellKind, CellSoup};
 use super::error::MeshInError;
 
-/// What a VTK cell type contributes to a mesh.
+/// The contribution of a VTK cell type to a mesh.
 pub fn kind(vtk_type: i64) -> CellKind {
     use CellKind::{Ignored, Pixel, Polygon, Quad, Refused, Strip, Tetrahedron, Triangle};
     match vtk_type {
@@ -28,7 +28,7 @@ pub fn kind(vtk_type: i64) -> CellKind {
     }
 }
 
-/// Adds a cell; `place` is asked only for an error.
+/// Adds a cell. `place` is called only for an error.
 pub fn add(
     cells: &mut CellSoup,
     file: &str,

@@ -11,7 +11,7 @@ use super::mesh_file::MeshFile;
 use super::scanner::{ByteOrder, Encoding, Scanner};
 use super::vtk_cells;
 
-/// Reads a legacy VTK file; point and cell data are not looked at.
+/// Reads a legacy VTK file. Point and cell data are ignored.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let mut scanner = Scanner::new(file, bytes);
     let at = scanner.clone();
@@ -80,7 +80,7 @@ struct Content {
 }
 
 impl Content {
-    /// Binary data begins after the newline of its keyword line.
+    /// Moves to the start of binary data, which follows the newline of its keyword line.
     fn data_starts(&self, scanner: &mut Scanner) {
         if self.encoding != Encoding::Text {
             scanner.line();
@@ -198,7 +198,7 @@ impl Content {
         Ok(())
     }
 
-    /// `FIELD name n`, then n arrays `name components tuples type` with data; all skipped.
+    /// Skips `FIELD name n` and its n arrays `name components tuples type` with their data.
     fn skip_fields(&self, scanner: &mut Scanner) -> Result<(), MeshInError> {
         scanner.word("a field name")?;
         let arrays = scanner.count("arrays", 4)?;
@@ -244,7 +244,7 @@ fn skip_metadata(scanner: &mut Scanner) {
     while !scanner.line().is_empty() && scanner.remaining() > 0 {}
 }
 
-/// Offsets as indices when they rise and stay within `n_entries`.
+/// Offsets as indices, if they ascend and stay within `n_entries`.
 pub fn monotone_offsets(raw: Vec<i64>, n_entries: usize) -> Option<Vec<usize>> {
     let offsets: Vec<usize> = raw.into_iter().map(usize::try_from).collect::<Result<_, _>>().ok()?;
     let rising = offsets.windows(2).all(|w| w[0] <= w[1]);

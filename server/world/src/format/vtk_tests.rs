@@ -1,4 +1,4 @@
-//! Tests of the VTK readers, legacy and XML, with small files written out here.
+//! Tests of the VTK readers, legacy and XML, with small files written here.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -178,7 +178,7 @@ fn xml_damage_is_an_error() {
     assert!(message.contains("vtkLZ4DataCompressor"), "{message}");
 }
 
-/// Every byte in turn takes values that break numbers, counts, tags and base64.
+/// Every byte in turn takes values that damage numbers, counts, tags and base64.
 #[test]
 fn mutated_xml_never_panics() {
     for style in STYLES {

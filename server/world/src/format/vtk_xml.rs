@@ -18,7 +18,7 @@ use super::vtk_array::{Array, DataArray, Storage};
 use super::vtk_cells;
 use super::vtk_legacy::monotone_offsets;
 
-/// Reads a `.vtu` or `.vtp` file; point and cell data are not looked at.
+/// Reads a `.vtu` or `.vtp` file. Point and cell data are ignored.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let document = Document::parse(file, bytes)?;
     let mut points: Vec<Vector3<f64>> = Vec::new();
@@ -43,7 +43,7 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     cells.finish(file, points, zero_based(n))
 }
 
-/// The XML part of a file: which arrays there are, with their text, and the appended bytes.
+/// The XML part of a file: its arrays with their text, and the appended bytes.
 struct Document<'a> {
     file: &'a str,
     pieces: usize,
@@ -245,7 +245,8 @@ fn attribute(tag: &BytesStart, name: &str) -> Option<String> {
     tag.try_get_attribute(name).ok().flatten().map(|a| a.value.to_string())
 }
 
-/// Everything before `<AppendedData`, and its encoding ("raw" or "base64") with the bytes behind the `_`.
+/// Splits a file at `<AppendedData`. Returns all before it and, if present, whether the data is base64 with
+/// the bytes behind the `_`.
 fn split_appended(bytes: &[u8]) -> (&[u8], Option<(bool, &[u8])>) {
     let marker = b"<AppendedData";
     let Some(start) = bytes.windows(marker.len()).position(|w| w == marker) else { return (bytes, None) };

@@ -1,4 +1,5 @@
-//! ParaView files: `.vtu` grids of tetrahedra and `.vtp` surfaces with fields, `.vtm` that names both, `.pvd` series.
+//! Writes ParaView files: `.vtu` grids of tetrahedra and `.vtp` surfaces with fields, `.vtm` files that group
+//! them, `.pvd` series.
 //!
 //! # Source
 //! "VTK File Formats" (vtk.org): XML, base64 inline, 64-bit headers, little endian. Header and data of
@@ -18,7 +19,7 @@ const VTK_TETRA: u8 = 10;
 /// Components of a symmetric tensor in VTK's order; ParaView shows these names.
 const TENSOR_COMPONENTS: [&str; 6] = ["XX", "YY", "ZZ", "XY", "YZ", "XZ"];
 
-/// The cells of a file, and with them its kind.
+/// The cells of a file, which also determine its kind.
 #[derive(Clone, Copy, Debug)]
 pub enum Cells<'a> {
     /// Tetrahedra, positively oriented: a `.vtu` file.
@@ -30,17 +31,17 @@ pub enum Cells<'a> {
 /// Values at points or in cells.
 #[derive(Clone, Copy, Debug)]
 pub enum FieldValues<'a> {
-    /// One real each.
+    /// One real per entry.
     Scalars(&'a [f64]),
-    /// Three reals each.
+    /// Three reals per entry.
     Vectors(&'a [Vector3<f64>]),
-    /// A symmetric tensor each, in VTK's order: xx, yy, zz, xy, yz, xz.
+    /// A symmetric tensor per entry, in VTK's order: xx, yy, zz, xy, yz, xz.
     SymmetricTensors(&'a [[f64; 6]]),
-    /// One integer each (tags, numbers).
+    /// One integer per entry (tags, numbers).
     Integers(&'a [i32]),
 }
 
-/// A named field. The unit belongs into the name: `displacement_m`, `von_mises_pa`.
+/// A named field. The name includes the unit: `displacement_m`, `von_mises_pa`.
 #[derive(Clone, Copy, Debug)]
 pub struct Field<'a> {
     /// Name shown by ParaView.
@@ -49,7 +50,7 @@ pub struct Field<'a> {
     pub values: FieldValues<'a>,
 }
 
-/// What a file holds.
+/// Contents of a file: points, cells and fields.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid<'a> {
     /// Positions [m].
@@ -60,7 +61,7 @@ pub struct Grid<'a> {
     pub point_fields: &'a [Field<'a>],
     /// Fields in cells.
     pub cell_fields: &'a [Field<'a>],
-    /// Simulation time [s] of a state whose points are current positions; none for a mesh alone.
+    /// Simulation time [s] of a state whose points are current positions; `None` for a mesh alone.
     pub time_s: Option<f64>,
 }
 
@@ -72,9 +73,9 @@ pub enum VtuError {
     FieldLength {
         /// Name of the field.
         field: String,
-        /// Entries.
+        /// Entries found.
         found: usize,
-        /// Points or cells.
+        /// Number of points or cells.
         expected: usize,
         /// "points" or "cells".
         place: &'static str,
@@ -84,12 +85,12 @@ pub enum VtuError {
     Index {
         /// Number of the cell.
         cell: usize,
-        /// The index.
+        /// The point index found.
         point: u32,
-        /// Points.
+        /// Number of points.
         n_points: usize,
     },
-    /// The disk said no.
+    /// The operating system could not write the file.
     #[error("cannot write the grid: {0}")]
     Io(#[from] io::Error),
 }
@@ -134,7 +135,7 @@ pub fn write_grid(out: &mut impl Write, grid: &Grid) -> Result<(), VtuError> {
     Ok(())
 }
 
-/// The first lines of a file.
+/// Writes the first lines of a file.
 fn begin(out: &mut impl Write, kind: &str, version: &str) -> io::Result<()> {
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     writeln!(
@@ -143,7 +144,8 @@ fn begin(out: &mut impl Write, kind: &str, version: &str) -> io::Result<()> {
     )
 }
 
-/// Time and meaning of the points. A number says the latter: common readers refuse text in field data.
+/// Writes the time and the meaning of the points. The meaning is encoded as a number, because common readers
+/// refuse text in field data.
 fn state(out: &mut impl Write, time_s: f64) -> io::Result<()> {
     writeln!(out, "<!-- points: current positions [m]; displacement_m: current minus rest position -->")?;
     writeln!(out, "<FieldData>")?;
@@ -158,7 +160,7 @@ fn state(out: &mut impl Write, time_s: f64) -> io::Result<()> {
     writeln!(out, "</FieldData>")
 }
 
-/// Writes a `.vtm`: named blocks and the file of each, relative to the `.vtm`.
+/// Writes a `.vtm`: the names of blocks and the file of each, relative to the `.vtm`.
 pub fn save_vtm(path: &Path, blocks: &[(&str, &str)]) -> io::Result<()> {
     let mut out = BufWriter::new(File::create(path)?);
     begin(&mut out, "vtkMultiBlockDataSet", "1.0")?;
@@ -171,7 +173,7 @@ pub fn save_vtm(path: &Path, blocks: &[(&str, &str)]) -> io::Result<()> {
     out.flush()
 }
 
-/// Writes a `.pvd` series: times [s] and the files of each, relative to the `.pvd`.
+/// Writes a `.pvd` series: times [s] and the files for each, relative to the `.pvd`.
 pub fn save_pvd(path: &Path, series: &[(f64, Vec<String>)]) -> io::Result<()> {
     let mut out = BufWriter::new(File::create(path)?);
     begin(&mut out, "Collection", "0.1")?;
@@ -186,7 +188,7 @@ pub fn save_pvd(path: &Path, series: &[(f64, Vec<String>)]) -> io::Result<()> {
     out.flush()
 }
 
-/// Cells as VTK wants them.
+/// Cells in the arrays that VTK expects.
 struct CellArrays {
     connectivity: Vec<i64>,
     /// End of each cell in the connectivity.
@@ -253,12 +255,12 @@ fn vector_bytes(values: &[Vector3<f64>]) -> Vec<u8> {
     values.iter().flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>()).collect()
 }
 
-/// What a reader must know about an array.
+/// Attributes of a data array.
 struct Array<'a> {
     kind: &'a str,
     name: &'a str,
     components: usize,
-    /// Empty: they have no names.
+    /// Names of the components; empty if they have none.
     component_names: &'a [&'a str],
 }
 

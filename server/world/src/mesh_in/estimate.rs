@@ -1,40 +1,40 @@
-//! What a lattice will take, before it is made: tetrahedra, memory and time.
+//! Estimates the size, memory and time of a lattice before it is made.
 //!
-//! The figures were measured on lattices of a liver and a scan from 16 to 128 cells across; they hold for a
-//! body that is simulated afterwards, which needs more memory than the meshing.
+//! The constants were measured on lattices of a liver and a scan from 16 to 128 cells across. They include
+//! the simulation of the body afterwards, which needs more memory than the meshing.
 
 use serde::Serialize;
 
-/// Fewest and most lattice cubes across the longest side.
+/// Allowed numbers of lattice cubes across the longest side.
 pub const CELLS: std::ops::RangeInclusive<usize> = 2..=256;
 
-/// Tetrahedra per cube of lattice volume, those at the surface included.
+/// Tetrahedra per cube of lattice volume, including those at the surface.
 const TETS_PER_CUBE: f64 = 12.5;
-/// Bytes per tetrahedron of the mesh and of the body that is made of it.
+/// Bytes per tetrahedron, for the mesh and the body made of it.
 const BYTES_PER_TET: f64 = 800.0;
-/// Bytes per node of the lattice around the body.
+/// Bytes per node of the lattice, including nodes outside the body.
 const BYTES_PER_NODE: f64 = 60.0;
-/// Seconds per tetrahedron: splitting, repair, measures, the body.
+/// Seconds per tetrahedron, for splitting, repair, measurement and the body.
 const SECONDS_PER_TET: f64 = 5e-6;
-/// Seconds per node of the lattice: inside or outside.
+/// Seconds per node of the lattice, for the inside test.
 const SECONDS_PER_NODE: f64 = 1.5e-6;
 /// Share of the free memory that a mesh may take.
 const SHARE: f64 = 0.8;
 
-/// What a mesh takes.
+/// Estimated cost of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MeshEstimate {
     /// Lattice cubes across the longest side.
     pub cells: usize,
-    /// Tetrahedra.
+    /// Expected number of tetrahedra.
     pub tets: f64,
     /// Memory [bytes].
     pub bytes: f64,
-    /// Time on this machine, roughly [s].
+    /// Rough time on this machine [s].
     pub seconds: f64,
 }
 
-/// A lattice of `cells` cubes across a body of this size [m] and volume [m³].
+/// Cost of a lattice of `cells` cubes across, for a body of this size [m] and volume [m³].
 pub fn estimate(size_m: [f64; 3], volume_m3: f64, cells: usize) -> MeshEstimate {
     let longest_m = size_m.into_iter().fold(0.0, f64::max);
     let spacing_m = longest_m / cells as f64;
@@ -56,22 +56,22 @@ pub fn largest(size_m: [f64; 3], volume_m3: f64, bytes: f64) -> usize {
     CELLS.rev().find(fits).unwrap_or(*CELLS.start())
 }
 
-/// Most cells that may be asked for.
+/// Most cells that a user may request.
 pub fn most_cells() -> usize {
     *CELLS.end()
 }
 
-/// Bytes that a body of so many tetrahedra takes.
+/// Memory [bytes] of a body of `tets` tetrahedra.
 pub fn body_bytes(tets: f64) -> f64 {
     tets * BYTES_PER_TET
 }
 
-/// Memory that a mesh may take on this machine [bytes]; endless where the system does not tell.
+/// Memory available for meshes on this machine [bytes]; infinite where the system does not report it.
 pub fn memory_for_meshes() -> f64 {
     let meminfo = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let available = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
     let kibibytes = available.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<f64>().ok());
-    // In a container the limit may be lower than what the machine has.
+    // In a container the limit may be lower than the memory of the machine.
     let read = |path: &str| std::fs::read_to_string(path).ok()?.trim().parse::<f64>().ok();
     let group = read("/sys/fs/cgroup/memory.max")
         .map(|most| most - read("/sys/fs/cgroup/memory.current").unwrap_or(0.0));

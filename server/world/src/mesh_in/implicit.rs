@@ -10,16 +10,16 @@ use nalgebra::Vector3;
 
 use crate::format::SurfaceMesh;
 
-/// Corner c of a cube is at (c & 1, c >> 1 & 1, c >> 2); the tets go round the diagonal 0–7.
+/// Corner c of a cube is at (c & 1, c >> 1 & 1, c >> 2). The tets surround the diagonal 0–7.
 const KUHN: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
-/// Halvings of a grid edge when a vertex is placed: 2⁻³⁰ of it.
+/// Bisections of a grid edge that place a vertex, to 2⁻³⁰ of the edge.
 const BISECTIONS: usize = 30;
 
 /// Triangulates the zero set of `f` within a box, on a grid of cubes of side `spacing` [m].
 ///
-/// The surface is closed when `f` is positive on the border of the box. Vertices lie on the zero set.
+/// The surface is closed if `f` is positive on the border of the box. Vertices lie on the zero set.
 pub fn triangulate(
     name: &str,
     f: &dyn Fn(&Vector3<f64>) -> f64,
@@ -42,7 +42,7 @@ pub fn triangulate(
             for i in 0..cubes[0] {
                 let corners: [usize; 8] =
                     std::array::from_fn(|c| march.grid.node([i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)]));
-                // Most cubes lie wholly on one side.
+                // Most cubes lie entirely on one side.
                 let inside = corners.iter().filter(|&&n| march.values[n] < 0.0).count();
                 if inside % 8 != 0 {
                     KUHN.iter().for_each(|tet| march.tet(tet.map(|c| corners[c])));
@@ -104,7 +104,8 @@ impl March<'_> {
         }
     }
 
-    /// The vertex on a grid edge whose ends lie on different sides.
+    /// The vertex on a grid edge whose ends lie on different sides. Tets that share the edge share the
+    /// vertex.
     fn vertex(&mut self, [a, b]: [usize; 2]) -> u32 {
         let next = self.surface.vertices.len() as u32;
         let vertex = *self.vertex_on.entry([a.min(b), a.max(b)]).or_insert(next);

@@ -1,4 +1,4 @@
-//! From a path to tetrahedra: what the scene and `scindo mesh` call.
+//! Loads a mesh from a path as tetrahedra, for scenes and `scindo mesh`.
 
 use std::fmt;
 use std::path::Path;
@@ -12,7 +12,7 @@ use super::progress::Observer;
 use crate::format::{MeshFile, MeshInError, read_mesh};
 use crate::quantity::coordinates;
 
-/// What was found in a mesh file and what was done about it. Prints as a few lines of text.
+/// Faults found in a mesh file, and their repair. It prints as a few lines of text.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum MeshHealth {
@@ -22,8 +22,8 @@ pub enum MeshHealth {
     Surface(LatticeReport),
 }
 
-/// Reads a volumetric mesh (`mesh = { file = … }`) and repairs it; `scale` turns its unit into metres.
-/// `weld` joins nodes at the same place.
+/// Reads a volumetric mesh (`mesh = { file = … }`) and repairs it. `scale` converts its unit to metres.
+/// `weld` merges nodes at the same place.
 pub fn load_volume(path: &Path, scale: f64, weld: bool) -> Result<(TetMesh, VolumeHealth), MeshInError> {
     match read_mesh(path)? {
         MeshFile::Volume(volume) => repair_volume(&volume, scale, weld),
@@ -54,7 +54,7 @@ pub fn load_surface(
     }
 }
 
-/// Reads either: tetrahedra are repaired, a surface is filled with `cells` cubes across.
+/// Reads a volume or a surface: tetrahedra are repaired, a surface is filled with `cells` cubes across.
 pub fn load_any(
     path: &Path,
     cells: usize,
@@ -80,7 +80,7 @@ impl fmt::Display for MeshHealth {
 }
 
 impl MeshHealth {
-    /// Corners of the box around the file's points, in metres.
+    /// Corners of the box around the file's points [m].
     pub fn corners_m(&self) -> [[f64; 3]; 2] {
         match self {
             MeshHealth::Volume(health) => [health.min_m, health.max_m],
@@ -88,7 +88,7 @@ impl MeshHealth {
         }
     }
 
-    /// All parts but one were dropped.
+    /// Records that all parts but one were dropped.
     pub(crate) fn keeps_one_part(&mut self) {
         match self {
             MeshHealth::Volume(health) => health.components = 1,

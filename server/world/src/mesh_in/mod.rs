@@ -1,4 +1,4 @@
-//! Meshes in: what a file holds, or a shape of our own → checked and repaired → tetrahedra.
+//! Imports meshes: a file or a built-in shape is checked, repaired and turned into tetrahedra.
 //!
 //! Volumes (tetrahedra) are checked and repaired. Surfaces (triangles), closed or dirty, are filled with a
 //! lattice of tetrahedra whose boundary follows them.

@@ -1,17 +1,17 @@
-//! What is told while a mesh is made.
+//! Progress reports of mesh generation.
 
 use super::estimate::MeshEstimate;
 
-/// How far the making of a mesh has come.
+/// Progress of mesh generation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meshing {
-    /// What is done now.
+    /// Name of the present stage.
     pub stage: &'static str,
-    /// Share of the whole that is done, 0 to 1.
+    /// Share of the whole work done, 0 to 1.
     pub done: f64,
-    /// What it will take altogether.
+    /// Estimated size and cost of the whole mesh.
     pub estimate: MeshEstimate,
 }
 
-/// Hears how far the making of a mesh has come; from several threads.
+/// Receives progress reports, possibly from several threads.
 pub type Observer<'a> = dyn Fn(Meshing) + Sync + 'a;

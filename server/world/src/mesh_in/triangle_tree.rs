@@ -1,4 +1,4 @@
-//! A tree of boxes over triangles: crossings of a segment, and the generalised winding number.
+//! A tree of boxes over triangles, for the crossings of a segment and the generalised winding number.
 //!
 //! # Source
 //! Barill, Dickson, Schmidt, Levin, Jacobson 2018, "Fast winding numbers for soups and clouds" (the
@@ -6,18 +6,18 @@
 
 use nalgebra::Vector3;
 
-/// Triangles in a leaf.
+/// Most triangles in a leaf.
 const LEAF: usize = 4;
-/// A box is summarised when the query is farther than this many radii from its centre.
+/// A box is approximated by its dipole when the query is farther than this many radii from its centre.
 const FAR: f64 = 2.3;
 /// Slack of the barycentric test, so that a segment through an edge hits one of its triangles.
 const EDGE_SLACK: f64 = 1e-9;
 
-/// Boxes, dipoles and triangles; children of node `i` are `left` and `left + 1`.
+/// Boxes, dipoles and triangles. The children of node `i` are `first` and `first + 1`.
 pub struct TriangleTree {
     nodes: Vec<Node>,
     corners: Vec<[Vector3<f64>; 3]>,
-    /// Number of each stored triangle in the list the tree was built from.
+    /// Number of each stored triangle in the list from which the tree was built.
     source: Vec<u32>,
 }
 
@@ -52,7 +52,7 @@ impl TriangleTree {
         tree
     }
 
-    /// Corners of all triangles [m].
+    /// Corners of all triangles [m], in the order of the tree.
     pub fn triangles(&self) -> &[[Vector3<f64>; 3]] {
         &self.corners
     }
@@ -85,8 +85,8 @@ impl TriangleTree {
         }
     }
 
-    /// Parameters t in [0, 1] where the segment `a + t (b − a)` meets triangles, sorted, with the
-    /// triangles' numbers.
+    /// Parameters t in [0, 1] where the segment `a + t (b − a)` meets triangles, ascending, each with the
+    /// number of its triangle.
     pub fn crossings(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Vec<(f64, u32)> {
         let mut hits = Vec::new();
         let mut stack = vec![0u32];
@@ -108,7 +108,7 @@ impl TriangleTree {
         hits
     }
 
-    /// Generalised winding number at `q`: 1 inside and 0 outside a closed, outward oriented surface,
+    /// Generalised winding number at `q`: 1 inside and 0 outside a closed, outward oriented surface, values
     /// in between near holes.
     pub fn winding_number(&self, q: &Vector3<f64>) -> f64 {
         let mut sum = 0.0;
@@ -126,7 +126,7 @@ impl TriangleTree {
                     sum += solid_angle(q, &self.corners[i as usize]);
                 }
             } else {
-                // Median splits: the depth is at most log2(n) + 1, far below 62.
+                // Median splits bound the depth by log2(n) + 1, far below 62.
                 stack[depth] = node.first;
                 stack[depth + 1] = node.first + 1;
                 depth += 2;
@@ -159,7 +159,7 @@ impl Node {
         Node { low, high, centre, area_normal, radius: radius_squared.sqrt(), first: 0, count: 0 }
     }
 
-    /// Slab test, with the slack that keeps boundary hits.
+    /// Slab test with a slack that keeps hits on the boundary.
     fn meets_segment(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
         let (mut enter, mut leave) = (-EDGE_SLACK, 1.0 + EDGE_SLACK);
         let slack = EDGE_SLACK * (self.radius + (b - a).norm());
@@ -180,7 +180,7 @@ impl Node {
     }
 }
 
-/// Where the segment meets the triangle: t in [0, 1], if it does (Möller, Trumbore 1997).
+/// Parameter t in [0, 1] where the segment meets the triangle, if it does (Möller, Trumbore 1997).
 fn segment_triangle(a: &Vector3<f64>, b: &Vector3<f64>, [p, q, r]: &[Vector3<f64>; 3]) -> Option<f64> {
     let d = b - a;
     let (e1, e2) = (q - p, r - p);

@@ -1,4 +1,4 @@
-//! Meshes out again: `scindo mesh IN -o OUT` writes tetrahedra as `.vtu`, `.vtk` or `.msh`.
+//! Writes meshes: `scindo mesh IN -o OUT` writes tetrahedra as `.vtu`, `.vtk` or `.msh`.
 
 use std::fmt::Write;
 use std::path::Path;

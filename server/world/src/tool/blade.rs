@@ -1,26 +1,26 @@
-//! What a cutting blade leaves behind: the surface its edge sweeps.
+//! The surface that the edge of a cutting blade sweeps.
 
 use nalgebra::Vector3;
 use scindo_physics::cut::BladeSweep;
 
-/// Moves shorter than this are not worth a cut even at the end of an incision [m].
+/// Shortest move that is still cut at the end of an incision [m].
 const LEAST_MOVE_M: f64 = 1e-6;
 
-/// Numbers for incisions, shared by everything that cuts; 0 means skin and is never given out.
+/// Source of incision numbers, shared by everything that cuts. 0 means skin and is never issued.
 #[derive(Debug, Clone, Default)]
 pub struct IncisionNumbers {
     last: u32,
 }
 
 impl IncisionNumbers {
-    /// A number not used before.
+    /// The next unused incision number.
     pub fn fresh(&mut self) -> u32 {
         self.last += 1;
         self.last
     }
 }
 
-/// The edge of one blade while it cuts.
+/// The edge of one blade, and what it has swept since its last cut.
 #[derive(Debug, Clone, Default)]
 pub struct BladeEdge {
     cutting: Option<Cutting>,
@@ -34,9 +34,9 @@ struct Cutting {
 }
 
 impl BladeEdge {
-    /// Feeds the edge [tip, heel] of this step [m], `None` when the blade does not cut. Returns what
-    /// to cut and under which incision number once the edge moved by `least_m` [m], or when the
-    /// incision ends. The number stays the same until the blade stops cutting.
+    /// Feeds the edge [tip, heel] of this step [m], or `None` if the blade does not cut. Returns the sweep to
+    /// cut and its incision number once the edge has moved by `least_m` [m], or when the incision ends. The
+    /// number stays the same until the blade stops cutting.
     pub fn advance(
         &mut self,
         edge: Option<[Vector3<f64>; 2]>,

@@ -1,4 +1,4 @@
-//! The geometry of a tool in space: every shape is a core segment with a radius.
+//! The geometry of a tool: every shape is a core segment with a radius.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use scindo_collision::Capsule;

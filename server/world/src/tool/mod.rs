@@ -2,9 +2,8 @@
 //!
 //! # Order in a step
 //! 1. [`Tools::advance`]: poses and modes of this step, from scripts and clients.
-//! 2. [`Tools::take_sweep`] per tool: what its blade cut since it last cut; goes to `Body::cut`.
-//! 3. contact: surfaces, proxies, springs, and after the solve the reactions, which end up in
-//!    [`Tool::force_n`].
+//! 2. [`Tools::take_sweep`] per tool: what its blade swept since its last cut, for `Body::cut`.
+//! 3. Contact: surfaces, proxies, springs. After the solve it writes the reactions to [`Tool::force_n`].
 
 pub mod blade;
 pub mod geometry;
@@ -20,33 +19,33 @@ use crate::scene::checked::ToolSpec;
 use blade::{BladeEdge, IncisionNumbers};
 use script::Script;
 
-/// Owner of a tool that a script moves.
+/// Owner name of a tool that a script moves.
 pub const SCRIPT: &str = "script";
-/// Spring of a tool that a client brought [N/m] and its largest force [N].
+/// Spring of a tool that a client declared [N/m], and its largest force [N].
 const GUEST_SPRING: (f64, f64) = (800.0, 8.0);
 
-/// One rigid tool.
+/// One rigid tool and its state in this step.
 #[derive(Debug, Clone)]
 pub struct Tool {
-    /// Name.
+    /// Name, unique in the simulation.
     pub id: Arc<str>,
-    /// Geometry.
+    /// Shape and dimensions.
     pub shape: ToolShape,
-    /// Client that holds it, `script`, or empty.
+    /// Name of the client that holds it, `script`, or empty if nobody does.
     pub owner: Arc<str>,
-    /// Where the hand holds it, tool axes to world axes; the translation is the tip [m].
+    /// Pose of the hand, tool axes to world axes. The translation is the tip [m].
     pub pose: Isometry3<f64>,
     /// Velocity of the tip [m/s].
     pub velocity_m_s: Vector3<f64>,
-    /// What the hand does.
+    /// Touch, grab, cut or hover, as the hand or the script requests.
     pub mode: ToolMode,
-    /// Spring between hand and tissue [N/m].
+    /// Stiffness of the spring between hand and tissue [N/m].
     pub stiffness_n_m: f64,
-    /// Largest force [N].
+    /// Largest force of that spring [N].
     pub max_force_n: f64,
     /// Force of the tissue on the tool from the last solve [N].
     pub force_n: Vector3<f64>,
-    /// Sequence number of the newest sample used.
+    /// Sequence number of the newest sample used; set by the client.
     pub seq: u64,
     /// The client's clock at that sample [ns].
     pub client_time_ns: u64,
@@ -83,23 +82,23 @@ impl Tool {
         }
     }
 
-    /// A number that no other tool of the simulation has or had.
+    /// A number that no other tool of the simulation has ever had.
     pub fn number(&self) -> u64 {
         self.number
     }
 
-    /// How often it went to another owner; what it touched and held is let go then.
+    /// Number of changes of owner. At each one the tool releases what it touches and holds.
     pub fn hand_overs(&self) -> u64 {
         self.hand_overs
     }
 
-    /// How often its script began anew: it is then elsewhere without having moved there.
+    /// Number of restarts of its script. At each one the tool is elsewhere without having moved there.
     pub fn jumps(&self) -> u64 {
         self.jumps
     }
 
-    /// Whether the tool is a blade that cuts now. It then passes through tissue: what it meets it
-    /// parts instead of pushing.
+    /// Whether the tool is a blade that cuts now. A cutting blade passes through tissue: it parts what it
+    /// meets instead of pushing it.
     pub fn cuts(&self) -> bool {
         self.mode == ToolMode::Cut && matches!(self.shape, ToolShape::Blade { .. })
     }
@@ -117,11 +116,11 @@ impl Tool {
     }
 }
 
-/// All tools, those of the scene first.
+/// All tools: first those of the scene, then those of clients.
 #[derive(Debug, Clone)]
 pub struct Tools {
     tools: Vec<Tool>,
-    /// How many there have been.
+    /// Number of tools created so far.
     made: u64,
     numbers: IncisionNumbers,
     script: Arc<str>,
@@ -131,7 +130,7 @@ pub struct Tools {
 }
 
 impl Tools {
-    /// The tools of a scene.
+    /// The tools of a scene, with nobody holding them.
     pub fn new(specs: &[ToolSpec]) -> Self {
         let declared = (0..).zip(specs).map(|(number, spec)| {
             let mut tool = Tool::new(number, &spec.id, spec.shape, (spec.stiffness_n_m, spec.max_force_n));
@@ -150,7 +149,7 @@ impl Tools {
         }
     }
 
-    /// The tools, those of the scene first.
+    /// All tools, those of the scene first.
     pub fn iter(&self) -> std::slice::Iter<'_, Tool> {
         self.tools.iter()
     }
@@ -174,19 +173,19 @@ impl Tools {
         self.tools.iter().any(|tool| tool.mode != ToolMode::Hover)
     }
 
-    /// Samples refused so far: not finite, or a guest without shape or room.
+    /// Samples refused so far: not finite, or from a guest without a shape or beyond the limit of tools.
     pub fn refused_samples(&self) -> u64 {
         self.refused
     }
 
-    /// A number for an incision that does not come from a tool's blade.
+    /// A number for an incision that no blade of a tool makes.
     pub fn fresh_incision(&mut self) -> u32 {
         self.numbers.fresh()
     }
 
-    /// Poses and modes for the step that ends at `time_s` [s]. A tool with a sample is held by its
-    /// client; one without goes back to its script, hovers where it is, or, if the scene does
-    /// not declare it, is removed. A non-finite sample leaves the tool as it was and is counted.
+    /// Sets poses and modes for the step that ends at `time_s` [s]. A tool with a sample is held by its
+    /// client. A tool without one returns to its script, hovers where it is, or is removed if the scene does
+    /// not declare it. A non-finite sample leaves the tool unchanged and is counted.
     pub fn advance(&mut self, time_s: f64, samples: &[ToolInput]) {
         let elapsed = self.time_s.map_or(0.0, |before| time_s - before);
         self.time_s = Some(time_s);
@@ -202,6 +201,8 @@ impl Tools {
                 Some(script) => {
                     let scripted = script.at(time_s);
                     let moved = scripted.pose.translation.vector - tool.pose.translation.vector;
+                    // A velocity needs two poses of the same round under the same owner; else the move is a
+                    // jump.
                     let held_on = tool.owner == self.script && tool.round == scripted.round;
                     let steady = held_on && elapsed > 0.0;
                     tool.velocity_m_s = if steady { moved / elapsed } else { Vector3::zeros() };
@@ -251,15 +252,15 @@ impl Tools {
         tool.client_time_ns = sample.client_time_ns;
     }
 
-    /// What tool `index` cut since its last sweep, and the number of its incision; `None` while its
-    /// blade moved less than `least_m` [m]. To be asked once per step of every tool.
+    /// The sweep of tool `index` since its last cut, and the number of its incision. `None` while the blade
+    /// has moved less than `least_m` [m]. Must be called once per step for every tool.
     pub fn take_sweep(&mut self, index: usize, least_m: f64) -> Option<(BladeSweep, u32)> {
         let tool = &mut self.tools[index];
         let edge = tool.cuts().then(|| geometry::core(tool.shape, &tool.pose));
         tool.edge.advance(edge, least_m, &mut self.numbers)
     }
 
-    /// Back to the start of the scene: guests leave, nobody holds a tool. Incision numbers go on
+    /// Returns to the start of the scene: guests leave, and nobody holds a tool. Incision numbers keep
     /// rising.
     pub fn reset(&mut self) {
         self.tools.retain(|tool| tool.declared);

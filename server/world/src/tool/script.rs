@@ -1,7 +1,7 @@
-//! A tool that follows keyframes of a scene instead of a hand.
+//! A tool moved by the keyframes of a scene instead of a hand.
 //!
-//! Tip positions are interpolated by cubic Hermite polynomials per axis whose slopes are the
-//! weighted harmonic means of the neighbouring differences: smooth, and never beyond the keyframes.
+//! Tip positions are interpolated per axis by cubic Hermite polynomials. Their slopes are the weighted
+//! harmonic means of the neighbouring differences, so the path is smooth and never overshoots a keyframe.
 //!
 //! # Source
 //! Fritsch and Butland, A method for constructing local monotone piecewise cubic interpolants
@@ -12,18 +12,18 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::inputs::ToolMode;
 use crate::scene::checked::PathPoint;
 
-/// Where a scripted tool is and what it does at one time.
+/// Pose and mode of a scripted tool at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScriptedPose {
     /// Tool axes to world axes.
     pub pose: Isometry3<f64>,
-    /// What the tool does.
+    /// Mode of the keyframe in force.
     pub mode: ToolMode,
-    /// How many rounds have been completed; the pose jumps when it rises.
+    /// Number of completed rounds. The pose jumps when it rises.
     pub round: u64,
 }
 
-/// Keyframes by rising time.
+/// Keyframes by ascending time.
 #[derive(Debug, Clone)]
 pub struct Script {
     path: Vec<PathPoint>,
@@ -31,13 +31,13 @@ pub struct Script {
 }
 
 impl Script {
-    /// A script; `None` without keyframes. `repeat_s`: it starts again after this time [s].
+    /// A script; `None` without keyframes. It restarts every `repeat_s` [s], if given.
     pub fn new(path: &[PathPoint], repeat_s: Option<f64>) -> Option<Self> {
         (!path.is_empty()).then(|| Self { path: path.to_vec(), repeat_s })
     }
 
-    /// Pose and mode at simulated time `time_s` [s]. Before the first keyframe the tool hovers at
-    /// it; after the last it stays.
+    /// Pose and mode at simulated time `time_s` [s]. Before the first keyframe the tool hovers at it. After
+    /// the last it stays there.
     pub fn at(&self, time_s: f64) -> ScriptedPose {
         let (time_s, round) = match self.repeat_s {
             Some(period) if period > 0.0 => (time_s.rem_euclid(period), (time_s / period) as u64),
@@ -83,7 +83,8 @@ fn hermite(p0: Vector3<f64>, m0: Vector3<f64>, p1: Vector3<f64>, m1: Vector3<f64
 }
 
 fn posed(tip: Vector3<f64>, toward: Vector3<f64>, mode: ToolMode, round: u64) -> ScriptedPose {
-    // Opposite to +z any half turn across the shaft will do: tools are round about their shaft.
+    // For a direction opposite to +z any half turn across the shaft is right: tools are rotationally
+    // symmetric about their shaft.
     let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &toward)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     let pose = Isometry3::from_parts(Translation3::from(tip), rotation);

@@ -1,4 +1,4 @@
-//! Who moves a tool, and what happens when that changes.
+//! Ownership of tools, and what happens when it changes.
 
 use nalgebra::Unit;
 

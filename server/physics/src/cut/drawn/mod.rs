@@ -1,4 +1,4 @@
-//! Where blades have gone without opening anything yet: lines on the surface, faces inside elements.
+//! Traces of blades that have opened nothing yet: lines on the surface, faces inside elements.
 
 pub(crate) mod traces;
 pub(crate) mod pending;

@@ -1,5 +1,5 @@
-//! What an incision has entered but not taken apart yet: the cut lags the blade there by at most one
-//! element, and this is where it shows how far the blade is.
+//! Parts of an incision that have entered the material but not separated it yet. The cut lags the blade by at
+//! most one element; these faces show how far the blade is.
 
 use std::collections::BTreeSet;
 
@@ -13,24 +13,24 @@ use crate::cut::topology::fragments::{FragmentVertex, Fragments};
 use crate::cut::topology::incision_sets::IncisionSets;
 use crate::cut::topology::pieces::PieceTable;
 
-/// Where an incision passes through one fragment that it has not left yet.
+/// The section of an incision through one fragment that it has not left yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PendingFace {
     /// The incision.
     pub incision: u32,
-    /// Where it crosses the fragment's edges and corners, in order around the face: two (a line), three
-    /// or four points of the material.
+    /// Points where it crosses the fragment's edges and corners, in order around the section: two (a line),
+    /// three or four points of the material.
     pub corners: Vec<SurfaceVertex>,
 }
 
-/// Fragments that may be pending, by incision.
+/// Pairs of incision and fragment where the incision may be pending.
 #[derive(Clone, Debug, Default)]
 pub struct Pending {
     of: BTreeSet<(u32, u32)>,
 }
 
 impl Pending {
-    /// Remembers whether the incision is pending in fragment `t`.
+    /// Records whether the incision is pending in fragment `t`.
     pub fn set(&mut self, incision: u32, t: u32, pending: bool) {
         if pending {
             self.of.insert((incision, t));
@@ -39,7 +39,7 @@ impl Pending {
         }
     }
 
-    /// Fragment `new` was a part of `old`: whatever was pending there may be so in both.
+    /// Fragment `new` was split from `old`. Incisions pending there may now be pending in both.
     pub fn inherit(&mut self, incisions: &[u32], old: u32, new: u32) {
         for &incision in incisions {
             if self.of.contains(&(incision, old)) {
@@ -48,20 +48,20 @@ impl Pending {
         }
     }
 
-    /// All incisions with something pending, ascending.
+    /// Collects all incisions with something pending, ascending, into `out`.
     pub fn incisions(&self, out: &mut Vec<u32>) {
         out.clear();
         out.extend(self.of.iter().map(|p| p.0));
         out.dedup();
     }
 
-    /// The faces, by incision and fragment.
+    /// The pending faces, ordered by incision and fragment.
     pub fn faces(&self, body: &Pieces) -> Vec<PendingFace> {
         self.of.iter().filter_map(|&(incision, t)| body.face(incision, t)).collect()
     }
 }
 
-/// What the faces are made from.
+/// The state from which pending faces are computed.
 pub struct Pieces<'a> {
     /// Rest mesh.
     pub mesh: &'a TetMesh,

@@ -1,11 +1,12 @@
-//! Where the blades of incisions went over the surface, as far as it has not opened there.
+//! Lines where the blades of incisions went over the surface, as far as it has not opened there.
 //!
-//! A sweep leaves a line on every boundary face of a fragment that it crosses, in coordinates of the
-//! face: it goes with the material, from where the blade came down to where it is. Lines that go on
-//! almost straight are one, and what lies on a line already is not kept twice, so the number of lines
-//! follows from the way of the blade and not from that of its samples. When a face is bisected, its
-//! lines are. Where the incision opens, the lips show it, and the lines on the face that opened go: also
-//! those on parts of it that the lips do not border, for the cut is straight where the blade was not.
+//! A sweep leaves a line on every boundary face of a fragment that it crosses. The line is stored in
+//! coordinates of the face, so it moves with the material, from where the blade came down to where it is. A
+//! line that continues another almost straight is joined to it, and a line that lies on another is dropped.
+//! The number of lines therefore depends on the path of the blade, not on how often it was sampled. When a
+//! face is bisected, so are its lines. Where the incision opens, the lips show it, and the lines on the
+//! opened face are removed. This includes lines on parts of it that no lip borders, for the cut is straight
+//! where the blade was not.
 
 use std::collections::BTreeMap;
 
@@ -16,30 +17,31 @@ use crate::mesh::TET_FACES;
 use crate::cut::topology::crossings::SNAP;
 use crate::cut::topology::fragments::{FragmentVertex, Fragments};
 
-/// Share of a face by which a line may be off the way of the blade: half of the finest skin triangle.
+/// Largest distance of a line from the path of the blade, as a share of a face: half of the finest skin
+/// triangle.
 const RESOLUTION: f64 = 1.0 / 64.0;
 
-/// Share of a face below which a line is none: a crossing this close to a corner is the corner.
+/// Shortest line, as a share of a face. A crossing this close to a corner is the corner.
 const SHORT: f64 = 4.0 * SNAP;
 
-/// Most lines of one incision on a face: a blade that scrubs one place draws no more there.
+/// Most lines of one incision on a face. A blade that scrubs one place draws no more there.
 const MOST: usize = 256;
 
-/// Coordinates on a face, one for each corner, Σ = 1.
+/// Barycentric coordinates on a face, Σ = 1.
 pub type Place = Vector3<f64>;
 
 #[derive(Clone, Copy, Debug)]
 struct Line {
     ends: [Place; 2],
-    /// How far it may be off by now.
+    /// Bound on its distance from the path of the blade, which grows as the line is extended.
     off: f64,
 }
 
-/// What an incision has drawn on a face, maybe nothing yet.
+/// The lines that one incision has drawn on a face. There may be none yet.
 #[derive(Clone, Debug)]
 struct Drawing {
     incision: u32,
-    /// The number that parts of a face share which the incision itself has bisected.
+    /// Number shared by the parts of a face that this incision itself has bisected.
     kin: u32,
     lines: Vec<Line>,
 }
@@ -51,18 +53,18 @@ pub struct TraceLine {
     pub incision: u32,
     /// The fragment.
     pub fragment: u32,
-    /// Its face: the one opposite this vertex.
+    /// Slot of its face: the one opposite this vertex.
     pub face: usize,
-    /// From where to where.
+    /// Start and end of the line.
     pub ends: [FragmentVertex; 2],
 }
 
 /// The bisection of a boundary face.
 #[derive(Clone, Copy, Debug)]
 pub struct Bisection {
-    /// The face (4·fragment + slot) as it was, and at the first end of the edge.
+    /// The face (4·fragment + slot) before, and afterwards the part at the first end of the edge.
     pub old: u32,
-    /// The one at the other end.
+    /// The part at the other end of the edge.
     pub new: u32,
     /// Corners of the face that the edge joins.
     pub edge: [usize; 2],
@@ -72,7 +74,7 @@ pub struct Bisection {
     pub incision: u32,
 }
 
-/// The lines, by boundary face.
+/// All lines on boundary faces, keyed by 4·fragment + slot.
 #[derive(Clone, Debug, Default)]
 pub struct Traces {
     of_face: BTreeMap<u32, Vec<Drawing>>,
@@ -80,12 +82,12 @@ pub struct Traces {
 }
 
 impl Traces {
-    /// Whether there are none.
+    /// Whether no face has a drawing.
     pub fn is_empty(&self) -> bool {
         self.of_face.is_empty()
     }
 
-    /// What an incision has drawn on a face.
+    /// The drawing of an incision on a face, created if there is none.
     fn drawing(&mut self, face: u32, incision: u32) -> &mut Drawing {
         let drawings = self.of_face.entry(face).or_default();
         let known = drawings.iter().position(|drawing| drawing.incision == incision);
@@ -97,21 +99,21 @@ impl Traces {
         &mut drawings[at]
     }
 
-    /// Draws a line on a face (4·fragment + slot).
+    /// Adds a line to the drawing of an incision on a face (4·fragment + slot).
     pub fn draw(&mut self, face: u32, incision: u32, ends: [Place; 2]) {
         if (ends[1] - ends[0]).norm() > SHORT {
             self.drawing(face, incision).draw(ends);
         }
     }
 
-    /// A face has become one of another fragment.
+    /// Moves all drawings of a face when the face becomes one of another fragment.
     pub fn move_face(&mut self, from: u32, to: u32) {
         if let Some(drawings) = self.of_face.remove(&from) {
             self.of_face.insert(to, drawings);
         }
     }
 
-    /// A face was bisected from a point on one of its edges to the corner opposite.
+    /// Divides the drawings of a face bisected from a point on one of its edges to the opposite corner.
     pub fn bisect(&mut self, bisection: &Bisection) {
         let Bisection { old, new, incision, .. } = *bisection;
         self.drawing(old, incision);
@@ -127,7 +129,8 @@ impl Traces {
         self.of_face.insert(new, others);
     }
 
-    /// Forgets what an incision that has opened along an edge of this face drew on it.
+    /// Removes the lines on a face along whose edge the incision has opened, and on the other parts of that
+    /// face.
     pub fn open(&mut self, face: u32, incision: u32, fragments: &Fragments) {
         let known = self.of_face.get(&face).into_iter().flatten().find(|d| d.incision == incision);
         let Some(kin) = known.map(|drawing| drawing.kin) else { return };
@@ -143,9 +146,10 @@ impl Traces {
         }
     }
 
-    /// All lines, by incision, fragment and face; `is_left` says whether an incision has opened at one of
-    /// three vertices of a face and crosses no edge between them any more. Then it left the face where it
-    /// came in, and what it drew there is beside its lips; unless it ends there.
+    /// All lines, ordered by incision, fragment and face. `is_left` tells whether an incision has opened at
+    /// one of three vertices of a face and no longer crosses an edge between them. The blade then left the
+    /// face where it came in, so its lines there lie beside the lips and are omitted, unless the path ends
+    /// inside the face.
     pub fn lines(&self, fragments: &Fragments, is_left: impl Fn([u32; 3], u32) -> bool) -> Vec<TraceLine> {
         let mut lines = Vec::new();
         for (&face, drawings) in &self.of_face {
@@ -169,13 +173,13 @@ impl Traces {
 }
 
 impl Bisection {
-    /// The part of a line at the first or, `beyond`, at the second end of the edge.
+    /// The part of a line at the first end of the edge or, if `beyond`, at the second.
     fn part(&self, line: &Line, beyond: bool) -> Option<Line> {
         let ([i, j], s) = (self.edge, self.s);
-        // Positive on the side that is wanted.
+        // Positive on the side of the part.
         let sign = if beyond { -1.0 } else { 1.0 };
         let side = line.ends.map(|p| sign * (p[i] * s - p[j] * (1.0 - s)));
-        // The point on the edge takes the place of one end: it is `share` of that and the rest of the other.
+        // The point on the edge replaces one end: it is `share` of that end, and the rest of the other.
         let (gone, stays, share) = if beyond { (i, j, 1.0 - s) } else { (j, i, s) };
         let ends = part_inside([side])?.map(|r| line.ends[0].lerp(&line.ends[1], r)).map(|mut p| {
             p[stays] -= p[gone] * (1.0 - share) / share;
@@ -187,7 +191,7 @@ impl Bisection {
 }
 
 impl Drawing {
-    /// Whether the way begins or ends inside the face.
+    /// Whether the path begins or ends inside the face.
     fn ends_inside(&self) -> bool {
         let goes_on = |p: &Place, of: usize| {
             let others = self.lines.iter().enumerate().filter(|(other, _)| *other != of);
@@ -196,7 +200,7 @@ impl Drawing {
         self.lines.iter().enumerate().any(|(l, line)| !line.ends.iter().all(|p| goes_on(p, l)))
     }
 
-    /// Draws a line, or makes one longer that it goes on.
+    /// Extends the line that this one continues, or adds a new line.
     fn draw(&mut self, mut ends: [Place; 2]) {
         let joints = (0..self.lines.len()).flat_map(|l| [(l, 1, 0), (l, 1, 1), (l, 0, 0), (l, 0, 1)]);
         let gap = |&(l, i, j): &(usize, usize, usize)| (self.lines[l].ends[i] - ends[j]).norm();
@@ -216,7 +220,7 @@ impl Drawing {
 }
 
 impl Line {
-    /// Becomes longer at end `i`, from a place close to it to another one, unless the way bends there.
+    /// Extends the line at end `i` to `to`, unless the path bends there. `from` lies close to that end.
     fn go_on(&mut self, i: usize, from: &Place, to: &Place) -> bool {
         let (end, other) = (self.ends[i], self.ends[1 - i]);
         let longer = [other, *to];
@@ -229,7 +233,7 @@ impl Line {
     }
 }
 
-/// Distance of a place from a line.
+/// Distance of a place from a line, as a share of the face.
 fn distance(p: &Place, [a, b]: &[Place; 2]) -> f64 {
     let along = b - a;
     let length_squared = along.norm_squared();
@@ -237,7 +241,7 @@ fn distance(p: &Place, [a, b]: &[Place; 2]) -> f64 {
     (a + along * s - p).norm()
 }
 
-/// A place on a face with these corners as a vertex.
+/// The fragment vertex at a place on the face with these corners.
 fn vertex_at(p: &Place, [a, b, c]: [&FragmentVertex; 3]) -> FragmentVertex {
     let p = p.map(|w| w.max(0.0));
     let ab = p[0] + p[1];
@@ -247,8 +251,8 @@ fn vertex_at(p: &Place, [a, b, c]: [&FragmentVertex; 3]) -> FragmentVertex {
     FragmentVertex::between(&FragmentVertex::between(a, b, p[1] / ab), c, p[2] / (ab + p[2]))
 }
 
-/// The part of a line, from 0 to 1, in which quantities that are linear along it, given at its ends, are
-/// not negative.
+/// The part of a line, as parameters from 0 to 1, where all given quantities are ≥ 0. Each quantity is linear
+/// along the line and is given at its two ends.
 pub fn part_inside(quantities: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 2]> {
     let (mut from, mut to) = (0.0f64, 1.0f64);
     for [p, q] in quantities {
@@ -262,7 +266,8 @@ pub fn part_inside(quantities: impl IntoIterator<Item = [f64; 2]>) -> Option<[f6
     (from < to).then_some([from, to])
 }
 
-/// The line in which a plane crosses a triangle, given on which side of it the corners are.
+/// The line in which a plane crosses a triangle, from values proportional to the signed distances
+/// of its corners.
 pub fn line_across(side: [f64; 3]) -> Option<[Place; 2]> {
     let edges = [(0, 1), (1, 2), (2, 0)].into_iter().filter(|&(i, j)| side[i] * side[j] < 0.0);
     let edges = edges.map(|(i, j)| {

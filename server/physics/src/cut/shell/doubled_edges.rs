@@ -1,29 +1,29 @@
-//! Two different edges may join the same two surface vertices, e.g. the lips of a slit two faces
-//! wide. All but the first get a vertex in the middle, and their triangles a fan around the centroid,
-//! so that an edge is named by its ends.
+//! Two different edges may join the same two surface vertices, e.g. at the lips of a slit two faces wide. All
+//! but the first of them get a vertex in the middle, and their triangles are divided into fans around the
+//! centroid. Every edge is then identified by its ends.
 
 use std::collections::BTreeSet;
 
 use super::surface::{Surface, SurfaceVertex};
 
-/// The edges to divide, each by the smaller of its two half-edges.
+/// The edges to divide, each identified by the smaller of its two half-edges.
 #[derive(Clone, Debug, Default)]
 pub struct DoubledEdges {
     edges: BTreeSet<u32>,
 }
 
 impl DoubledEdges {
-    /// The edges.
+    /// The edges in ascending order.
     pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
         self.edges.iter().copied()
     }
 
-    /// Forgets an edge; whether it was known.
+    /// Forgets an edge and returns whether it was known.
     pub fn remove(&mut self, edge: u32) -> bool {
         self.edges.remove(&edge)
     }
 
-    /// Adds an edge.
+    /// Records an edge that has to be divided.
     pub fn insert(&mut self, edge: u32) {
         self.edges.insert(edge);
     }
@@ -34,8 +34,8 @@ impl DoubledEdges {
         self.edges.len()
     }
 
-    /// Looks at all edges around a vertex, each with the vertex at its other end: of those with the same
-    /// end the first stays whole.
+    /// Compares all edges around a vertex, each given with the vertex at its other end. Of edges with the
+    /// same end the first stays whole.
     pub fn compare(&mut self, around: &mut [(u32, u32)]) {
         around.sort_unstable();
         for same in around.chunk_by(|p, q| p.0 == q.0) {
@@ -44,9 +44,9 @@ impl DoubledEdges {
         }
     }
 
-    /// Appends the vertices in the middle of the edges and divides the triangles there: the first part
-    /// of each takes the place of the triangle, the others come behind all triangles. `middle` is the
-    /// vertex in the middle of corners 3·triangle + k of one triangle, which are these vertices.
+    /// Appends the vertices in the middle of the edges and divides the triangles there. The first part of a
+    /// triangle takes its number, the others are appended behind all triangles. `middle` returns the centroid
+    /// of corners 3·triangle + k of one triangle, whose vertices it is given.
     pub fn divide(
         &self,
         surface: &mut Surface,
@@ -55,6 +55,7 @@ impl DoubledEdges {
     ) {
         let mut halved: Vec<(u32, u32)> = Vec::with_capacity(2 * self.edges.len());
         let mut on_edges = Vec::with_capacity(self.edges.len());
+        // An edge is divided at one point, which both of its triangles use.
         for (&h, id) in self.edges.iter().zip(surface.vertices.len() as u32..) {
             let (triangle, k) = (surface.triangles[h as usize / 3], h as usize % 3);
             let ends = [k, (k + 1) % 3].map(|k| surface.vertices[triangle[k] as usize]);
@@ -66,6 +67,7 @@ impl DoubledEdges {
         for on_triangle in halved.chunk_by(|p, q| p.0 / 3 == q.0 / 3) {
             let t = on_triangle[0].0 / 3;
             let (triangle, tag) = (surface.triangles[t as usize], surface.tags[t as usize]);
+            // The outline of the triangle, with the new vertices in their order.
             let mut ring = Vec::with_capacity(6);
             for (h, corner) in (3 * t..).zip(triangle) {
                 ring.push(corner);
@@ -87,7 +89,7 @@ impl DoubledEdges {
     }
 }
 
-/// The half-edge behind `h` in its triangle.
+/// The next half-edge after `h` in its triangle.
 pub fn next(h: u32) -> u32 {
     h / 3 * 3 + (h + 1) % 3
 }

@@ -1,27 +1,28 @@
-//! A closed surface made of triangles that are joined edge by edge: who is beside whom, and which
-//! corners are one vertex.
+//! A closed surface of triangles joined edge by edge: which triangles are neighbours, and which corners are
+//! one vertex.
 //!
-//! What changes is told by triangle; everything else is found around it. Corners are one vertex exactly
-//! when the edges around them join them, so the surface is closed and 2-manifold by construction. A
-//! vertex that loses its last corner makes room for the last one, as does a triangle.
+//! The caller reports the triangles that changed; all other changes are found around them. Corners are one
+//! vertex exactly when the edges around them join them, so the surface is closed and 2-manifold by
+//! construction. Numbers stay dense: the last vertex takes the number of a vertex without corners, and the
+//! last triangle that of a removed triangle.
 
 use super::doubled_edges::{DoubledEdges, next};
 use super::surface::{Surface, SurfaceVertex};
 use crate::cut::topology::fragments::NONE;
 
-/// Says where vertices are; corners are 3·triangle + k.
+/// Where the vertices of the surface lie. Corners are numbered 3·triangle + k.
 pub trait Place {
-    /// Whether the vertex that a corner had may be that of the cycle it is in now.
+    /// Whether a cycle may keep the vertex that `corner` had before the change.
     fn stays(&self, _corner: u32, _cycle: &[u32]) -> bool {
         true
     }
-    /// The vertex of a cycle of corners.
+    /// The vertex in which the corners of a cycle meet.
     fn vertex(&mut self, cycle: &[u32]) -> SurfaceVertex;
-    /// The vertex in the middle of two or three corners of a triangle, which are these vertices.
+    /// The vertex at the centroid of two or three corners of one triangle, whose vertices are `of`.
     fn middle(&self, corners: &[u32], of: &[SurfaceVertex]) -> SurfaceVertex;
 }
 
-/// Triangles by number, half-edges 3·triangle + k from corner k to the next.
+/// Triangles by number. Half-edge 3·triangle + k runs from corner k to the next.
 #[derive(Clone, Debug, Default)]
 pub struct Joined {
     /// Opposite of each half-edge, or [`NONE`] while it is open.
@@ -30,15 +31,15 @@ pub struct Joined {
     corner: Vec<u32>,
     /// One corner of every surface vertex.
     representative: Vec<u32>,
-    /// Edges whose ends another edge joins too.
+    /// Edges whose two ends are also joined by another edge.
     doubled: DoubledEdges,
-    /// Triangles that changed, each once.
+    /// Triangles that changed in this round, each once.
     dirty: Vec<u32>,
     /// Per triangle the last round in which it changed.
     changed: Vec<u32>,
-    /// Per corner the last round that walked it.
+    /// Per corner the last round in which its cycle was walked.
     seen: Vec<u32>,
-    /// Per vertex the last round in which a cycle took its number, or it was claimed otherwise.
+    /// Per vertex the last round in which a cycle took its number or `claim` was called for it.
     claimed: Vec<u32>,
     /// Vertices that may have lost their last corner.
     doubtful: Vec<u32>,
@@ -50,7 +51,7 @@ pub struct Joined {
 }
 
 impl Joined {
-    /// Begins a change: takes the triangles of doubled edges back together.
+    /// Begins a change: undoes the division of doubled edges, so that every triangle is whole again.
     pub fn begin(&mut self, surface: &mut Surface) {
         self.round += 1;
         self.dirty.clear();
@@ -66,7 +67,7 @@ impl Joined {
         }
     }
 
-    /// A new triangle with a tag, open all around.
+    /// Adds a triangle with a tag and three open edges. Returns its number.
     pub fn add(&mut self, tag: u32, surface: &mut Surface) -> u32 {
         let t = self.changed.len() as u32;
         self.twin.extend([NONE; 3]);
@@ -78,19 +79,19 @@ impl Joined {
         t
     }
 
-    /// Tells that a triangle changed: its vertices are found again.
+    /// Reports that a triangle changed: its vertices are determined anew.
     pub fn touch(&mut self, t: u32) {
         if std::mem::replace(&mut self.changed[t as usize], self.round) != self.round {
             self.dirty.push(t);
         }
     }
 
-    /// Opposite of a half-edge, or [`NONE`].
+    /// Opposite of a half-edge, or [`NONE`] while it is open.
     pub fn twin(&self, h: u32) -> u32 {
         self.twin[h as usize]
     }
 
-    /// Takes a half-edge off the one opposite.
+    /// Separates a half-edge from its opposite.
     pub fn open(&mut self, h: u32) {
         let twin = std::mem::replace(&mut self.twin[h as usize], NONE);
         if twin != NONE {
@@ -99,7 +100,7 @@ impl Joined {
         }
     }
 
-    /// Joins two half-edges.
+    /// Makes two half-edges opposites of each other.
     pub fn join(&mut self, g: u32, h: u32) {
         if self.twin[g as usize] != h {
             self.open(g);
@@ -108,7 +109,7 @@ impl Joined {
         }
     }
 
-    /// Opens a triangle all around and forgets its vertices.
+    /// Opens all edges of a triangle and forgets its vertices.
     pub fn clear(&mut self, t: u32) {
         for h in 3 * t..3 * t + 3 {
             self.open(h);
@@ -119,11 +120,14 @@ impl Joined {
         }
     }
 
-    /// Removes a triangle that is open all around; the last one takes its number, which is returned.
+    /// Removes a triangle whose edges are all open. The last triangle takes its number. Returns the old
+    /// number of that one.
     pub fn remove(&mut self, t: u32, surface: &mut Surface) -> u32 {
         let last = self.changed.len() as u32 - 1;
         self.dirty.retain(|d| *d != t);
         if t != last {
+            // Everything that refers to a corner or half-edge of the last triangle has to follow its new
+            // number.
             for k in 0..3 {
                 let (from, to) = ((3 * last + k) as usize, (3 * t + k) as usize);
                 let twin = self.twin[from];
@@ -151,7 +155,7 @@ impl Joined {
         last
     }
 
-    /// Whether a triangle that changed is open somewhere.
+    /// Whether a changed triangle still has an open edge.
     pub fn is_open(&self) -> bool {
         self.dirty.iter().flat_map(|&t| 3 * t..3 * t + 3).any(|h| self.twin[h as usize] == NONE)
     }
@@ -162,7 +166,7 @@ impl Joined {
         [self.changed.len(), self.representative.len(), self.doubled.len()]
     }
 
-    /// Triangles of this change.
+    /// Triangles that changed in this round.
     pub fn touched(&self) -> &[u32] {
         &self.dirty
     }
@@ -172,12 +176,12 @@ impl Joined {
         self.corner[corner as usize]
     }
 
-    /// Whether the vertex was neither named nor claimed in this round; now it is.
+    /// Marks a vertex as up to date for this round. Returns whether it was not yet.
     pub fn claim(&mut self, vertex: u32) -> bool {
         std::mem::replace(&mut self.claimed[vertex as usize], self.round) != self.round
     }
 
-    /// Finds the vertices around what changed.
+    /// Determines the vertices around all changed triangles.
     pub fn number(&mut self, place: &mut impl Place, surface: &mut Surface) {
         let mut cycle = std::mem::take(&mut self.cycle);
         for i in 0..self.dirty.len() {
@@ -193,7 +197,7 @@ impl Joined {
         self.find_doubled_edges();
     }
 
-    /// The corner behind `c` around their vertex.
+    /// The next corner after `c` in the cycle around their vertex.
     fn next_around(&self, c: u32) -> u32 {
         self.twin[(c / 3 * 3 + (c + 2) % 3) as usize]
     }
@@ -208,7 +212,8 @@ impl Joined {
         }
     }
 
-    /// A cycle keeps the number of its vertex; of several that come from one vertex the first keeps it.
+    /// Numbers the vertex of a cycle. A cycle keeps its old number; if a vertex fell apart, its first cycle
+    /// keeps it.
     fn name(&mut self, cycle: &[u32], place: &mut impl Place, surface: &mut Surface) {
         let mut id = NONE;
         for &c in cycle {
@@ -242,6 +247,7 @@ impl Joined {
     fn drop_dead_vertices(&mut self, surface: &mut Surface) {
         let mut doubtful = std::mem::take(&mut self.doubtful);
         doubtful.retain(|&id| self.claimed[id as usize] != self.round);
+        // Highest number first: the vertex that takes over a free number is then never dead itself.
         doubtful.sort_unstable_by(|p, q| q.cmp(p));
         doubtful.dedup();
         for &id in &doubtful {
@@ -266,7 +272,7 @@ impl Joined {
         self.doubtful = doubtful;
     }
 
-    /// Looks for different edges between the same two vertices around every vertex that was walked.
+    /// Looks around every walked vertex for different edges with the same two ends.
     fn find_doubled_edges(&mut self) {
         let mut around = std::mem::take(&mut self.around);
         for i in 0..self.walked.len() {
@@ -285,7 +291,7 @@ impl Joined {
         self.around = around;
     }
 
-    /// Ends a change: divides doubled edges, and their triangles in a fan.
+    /// Ends a change: divides doubled edges in the middle and their triangles into fans.
     pub fn divide_doubled_edges(&self, place: &impl Place, surface: &mut Surface) {
         self.doubled.divide(surface, |h| self.twin[h as usize], |corners, of| place.middle(corners, of));
     }

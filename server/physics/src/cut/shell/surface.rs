@@ -1,7 +1,7 @@
 //! The surface of the fragment mesh: skin and the two lips of every cut, closed and 2-manifold.
 //!
-//! A triangle is a boundary face of a fragment; what joins the triangles is
-//! [`SurfaceBuilder`](super::surface_builder::SurfaceBuilder)'s matter.
+//! Each boundary face of a fragment is one triangle.
+//! [`SurfaceBuilder`](super::surface_builder::SurfaceBuilder) joins them.
 
 use nalgebra::Vector3;
 
@@ -27,19 +27,19 @@ pub struct Surface {
     pub triangles: Vec<[u32; 3]>,
     /// Per triangle 0 for skin, n > 0 for a lip of incision n.
     pub tags: Vec<u32>,
-    /// The vertices.
+    /// The vertices, each bound to the copies of one piece.
     pub vertices: Vec<SurfaceVertex>,
 }
 
 impl SurfaceVertex {
-    /// Position [m], given the position of every copy.
+    /// Position [m] at the positions `x` of the copies.
     pub fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
         self.copies.iter().zip(&self.weights).map(|(&c, &w)| x[c as usize] * w).sum()
     }
 }
 
 impl Surface {
-    /// Enclosed volume [m³], given the position of every copy: Σ p·(q × r)/6.
+    /// Enclosed volume [m³] at the positions `x` of the copies: Σ p·(q × r)/6.
     pub fn volume(&self, x: &[Vector3<f64>]) -> f64 {
         let points: Vec<Vector3<f64>> = self.vertices.iter().map(|v| v.position(x)).collect();
         let origin = points.first().copied().unwrap_or_default();
@@ -55,7 +55,7 @@ impl Surface {
     }
 }
 
-/// The vertex as mechanics moves it: weights on the copies of piece `p`.
+/// Expresses a fragment vertex by weights on the copies of piece `p`.
 pub fn bind(mesh: &TetMesh, pieces: &PieceTable, p: u32, v: &FragmentVertex) -> SurfaceVertex {
     let piece = &pieces.pieces[p as usize];
     let nodes = &mesh.tets[piece.element as usize];

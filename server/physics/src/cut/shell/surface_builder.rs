@@ -1,13 +1,13 @@
-//! Keeps the surface up to date: its cost is that of what a cut changed, not that of the body.
+//! Keeps the surface up to date at a cost that depends on what a cut changed, not on the size of the body.
 //!
-//! Boundary faces are [joined](super::joined) across an edge by walking through the solid around it, so
-//! what is joined is exactly what the material joins. Two lips that meet only in a fragment vertex get
-//! one surface vertex each.
+//! Boundary faces are [joined](super::joined) across an edge by walking through the solid around it, so the
+//! surface connects exactly what the material connects. Two lips that meet only in a fragment vertex get one
+//! surface vertex each.
 //!
-//! A boundary face never goes away, it only becomes smaller, so triangles keep their number. A pair of
-//! half-edges comes apart only if a fragment with one of them is bisected or opened there, and the
-//! new partner of each then lies on such a fragment too: it is enough to pair the half-edges of
-//! changed fragments anew, and to walk the cycles that pass one of their corners.
+//! A boundary face never disappears, it only shrinks, so triangles keep their numbers. A pair of half-edges
+//! separates only if a fragment with one of them is bisected or opened there. The new partner of each
+//! half-edge then lies on such a fragment too. It is therefore enough to pair the half-edges of changed
+//! fragments anew, and to walk the cycles through their corners.
 
 use crate::mesh::{TET_FACES, TetMesh};
 use crate::reserve::reserve_half_again;
@@ -17,7 +17,7 @@ use super::surface::{Surface, SurfaceVertex, bind};
 use crate::cut::topology::fragments::{FragmentVertex, Fragments, NONE};
 use crate::cut::topology::pieces::PieceTable;
 
-/// What the surface is made from.
+/// The state from which the surface follows.
 pub struct Material<'a> {
     /// Rest mesh.
     pub mesh: &'a TetMesh,
@@ -27,18 +27,19 @@ pub struct Material<'a> {
     pub pieces: &'a PieceTable,
 }
 
-/// What a sweep did to the fragments.
+/// The changes that a sweep made to the fragments.
 #[derive(Clone, Copy, Debug)]
 pub struct Change<'a> {
     /// Fragments that are new, were bisected or had a face opened, each once.
     pub fragments: &'a [u32],
-    /// Boundary faces (4·fragment + slot) that went from one fragment to another: from, to, in order.
+    /// Boundary faces (4·fragment + slot) that moved from one fragment to another, as [from, to] in the order
+    /// of the moves.
     pub moved: &'a [[u32; 2]],
-    /// Pieces that have other copies than before, ascending.
+    /// Pieces whose copies changed, ascending.
     pub pieces: &'a [u32],
 }
 
-/// Boundary faces and how they are joined.
+/// The boundary faces of the fragments and their adjacency.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceBuilder {
     /// Boundary faces as 4·fragment + slot of the opposite vertex; triangle f of the surface is face f.
@@ -46,7 +47,7 @@ pub struct SurfaceBuilder {
     /// Index into `faces` per 4·fragment + slot.
     face_at: Vec<u32>,
     joined: Joined,
-    /// Fragment vertex per corner 3·face + k when its cycle was last walked.
+    /// Fragment vertex of each corner 3·face + k when its cycle was last walked.
     source: Vec<u32>,
 }
 
@@ -60,7 +61,7 @@ impl SurfaceBuilder {
         (builder, surface)
     }
 
-    /// Brings the surface up to date after a change.
+    /// Updates the surface after a change.
     pub fn update(&mut self, material: &Material, change: &Change, surface: &mut Surface) {
         self.joined.begin(surface);
         self.collect_faces(material.fragments, change, surface);
@@ -72,7 +73,7 @@ impl SurfaceBuilder {
         self.joined.divide_doubled_edges(&placed, surface);
     }
 
-    /// Faces (4·fragment + slot) along an edge of a lip of this incision that the last update touched.
+    /// Faces (4·fragment + slot) next to a lip of this incision, as far as the last update touched the lip.
     pub fn faces_beside_lips(&self, surface: &Surface, incision: u32) -> impl Iterator<Item = u32> {
         let is_lip = move |f: u32| surface.tags[f as usize] == incision;
         let lips = self.joined.touched().iter().filter(move |f| is_lip(**f));
@@ -105,7 +106,7 @@ impl SurfaceBuilder {
         self.face_at.resize(4 * fragments.tets.len(), NONE);
         for &[from, to] in change.moved {
             let f = std::mem::replace(&mut self.face_at[from as usize], NONE);
-            // Faces that appeared since the last update are not known yet, wherever they were.
+            // A face that appeared since the last update has no number yet, wherever it was.
             if f != NONE {
                 self.face_at[to as usize] = f;
                 self.faces[f as usize] = to;
@@ -150,8 +151,8 @@ impl SurfaceBuilder {
         3 * self.face_at[4 * t as usize + opposite] + edge as u32
     }
 
-    /// Surface vertices of pieces that have other copies now, as far as they were not walked. All pieces
-    /// around a vertex have the same copies of the nodes it lies between, so any of them will do.
+    /// Binds the surface vertices of pieces with new copies again, unless their cycle was walked. All pieces
+    /// around a vertex have the same copies of the nodes that carry it, so any of them will do.
     fn bind_again(&mut self, material: &Material, pieces: &[u32], surface: &mut Surface) {
         let fragments = material.fragments;
         for &p in pieces {
@@ -180,7 +181,7 @@ fn corner_of(faces: &[u32], fragments: &Fragments, corner: u32) -> (u32, u32) {
     (face / 4, fragments.tets[face as usize / 4][slot])
 }
 
-/// Where the vertices of the surface are.
+/// Places surface vertices at the vertices of the fragments.
 struct Placed<'a> {
     material: &'a Material<'a>,
     faces: &'a [u32],
@@ -195,7 +196,7 @@ impl Placed<'_> {
 }
 
 impl Place for Placed<'_> {
-    /// A bisected face has a corner elsewhere than it had.
+    /// A corner of a bisected face moved to another fragment vertex, so it cannot keep its surface vertex.
     fn stays(&self, corner: u32, cycle: &[u32]) -> bool {
         let fragments = self.material.fragments;
         let (source, v) = (self.source[corner as usize], corner_of(self.faces, fragments, cycle[0]).1);

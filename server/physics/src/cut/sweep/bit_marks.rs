@@ -1,9 +1,9 @@
-//! BitMarks on numbered things: a set that is cleared at once, and a set that is read out in order.
+//! Marks on numbered items, cleared all at once, and a sort without comparisons.
 
 use crate::reserve::reserved;
 
-/// Up to eight kinds of marks on numbered things, one bit each, so that all marks of a body are near
-/// the core; taking them off costs what setting them did.
+/// Up to eight kinds of marks per item, one bit each. One byte per item keeps the marks of a whole body in
+/// the cache. Clearing costs as much as setting did.
 #[derive(Clone, Debug, Default)]
 pub struct BitMarks {
     of: Vec<u8>,
@@ -11,18 +11,19 @@ pub struct BitMarks {
 }
 
 impl BitMarks {
-    /// Room for marks on numbers below `n`, half as many again, and an eighth of them marked at a time.
+    /// Reserves memory for items below `n`, for half as many again, and for an eighth of them marked at a
+    /// time.
     pub fn with_capacity(n: usize) -> Self {
         Self { of: reserved(n + n / 2, 0), marked: reserved(n / 8, 0) }
     }
 
-    /// Takes off all marks; the numbers are below `n` from now on.
+    /// Clears all marks. Items are numbered below `n` from now on.
     pub fn restart(&mut self, n: usize) {
         self.marked.drain(..).for_each(|i| self.of[i as usize] = 0);
         self.of.resize(n, 0);
     }
 
-    /// Puts `mark` on `i`; says whether it was not there.
+    /// Sets `mark` on `i` and returns whether it was not set before.
     pub fn insert(&mut self, i: u32, mark: u8) -> bool {
         let at = i as usize;
         if at >= self.of.len() {
@@ -36,25 +37,25 @@ impl BitMarks {
         before & mark == 0
     }
 
-    /// Takes `mark` off `i`, which had a mark.
+    /// Clears `mark` on `i`, which must have been marked before.
     pub fn remove(&mut self, i: u32, mark: u8) {
         self.of[i as usize] &= !mark;
     }
 
-    /// Whether `mark` is on `i`, which had a mark.
+    /// Whether `mark` is set on `i`, which must have been marked before.
     pub fn contains(&self, i: u32, mark: u8) -> bool {
         self.of[i as usize] & mark != 0
     }
 }
 
-/// Puts numbers in order by setting a bit for each, without comparing any.
+/// Sorts numbers by setting one bit for each, without comparing any.
 #[derive(Clone, Debug, Default)]
 pub struct Ascending {
     bits: Vec<u64>,
 }
 
 impl Ascending {
-    /// Sorts `numbers` and leaves each once.
+    /// Sorts `numbers` and removes duplicates.
     pub fn sort(&mut self, numbers: &mut Vec<u32>) {
         let [mut first, mut end] = [self.bits.len(), 0];
         for &i in numbers.iter() {

@@ -1,11 +1,11 @@
-//! What goes into a cut and what comes out of it.
+//! Input and result of a cut: the blade sweep, the report, the limits and the errors.
 
 use nalgebra::Vector3;
 use thiserror::Error;
 
 use crate::cut::topology::copies::NewCopy;
 
-/// Most segments one [`BladeSweep`] may have; a longer path is sent in parts.
+/// Most segments of one [`BladeSweep`]. A longer path is sent in several sweeps.
 pub const MAX_SEGMENTS: usize = 1024;
 
 /// The surface a straight blade sweeps, sampled at successive moments.
@@ -19,7 +19,8 @@ pub struct BladeSweep {
 }
 
 impl BladeSweep {
-    /// Refuses what has no geometric meaning: no segment, too many, a non-finite coordinate.
+    /// Refuses a sweep without geometric meaning: no segment, too many segments, or a coordinate that is not
+    /// finite.
     pub fn check(&self) -> Result<(), CutError> {
         if self.segments.is_empty() {
             return Err(CutError::NoSegment);
@@ -43,33 +44,33 @@ pub struct CutReport {
     pub elements_cut: usize,
     /// Cut faces opened by this sweep; each shows on both lips.
     pub faces_opened: usize,
-    /// Edges that this incision crosses but that are not separated yet: the cut lags there by at
-    /// most one element.
+    /// Edges that this incision crosses but has not separated yet. The cut lags the blade there by at most
+    /// one element.
     pub pending_edges: usize,
-    /// Edges left whole because an element reached its cap of fragments.
+    /// Edges left whole because an element or the body reached its cap of fragments.
     pub refused_edges: usize,
     /// Topology epoch after the sweep.
     pub epoch: u32,
 }
 
-/// How much a body may hold before cuts that come over the network are refused.
+/// How far a body may be divided before further cuts by clients are refused.
 ///
 /// Few cuts need a tenth of it: a plane through every element makes six fragments and two pieces of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CutLimits {
-    /// Most fragments inside all elements together. A sweep that needs more leaves edges whole.
+    /// Most fragments in all elements together. A sweep that needs more leaves edges whole.
     pub fragments: usize,
-    /// Most pieces; a body that has more is not cut again.
+    /// Most pieces. A body with more is not cut again.
     pub pieces: usize,
-    /// Most node copies; a body that has more is not cut again.
+    /// Most node copies. A body with more is not cut again.
     pub copies: usize,
 }
 
 impl CutLimits {
-    /// What no body reaches.
+    /// No limits.
     pub const NONE: Self = Self { fragments: usize::MAX, pieces: usize::MAX, copies: usize::MAX };
 
-    /// Limits for a mesh of so many elements and nodes.
+    /// Limits for a mesh of `n_elements` elements and `n_nodes` nodes.
     pub fn of_mesh(n_elements: usize, n_nodes: usize) -> Self {
         Self {
             fragments: 8 * n_elements + 10_000,
@@ -78,7 +79,7 @@ impl CutLimits {
         }
     }
 
-    /// Refuses a further sweep through a body that holds so much.
+    /// Refuses another sweep through a body that already exceeds a limit.
     pub fn check(&self, fragments: usize, pieces: usize, copies: usize) -> Result<(), CutError> {
         let held = [
             ("fragments", fragments, self.fragments),
@@ -92,35 +93,35 @@ impl CutLimits {
     }
 }
 
-/// Work that may still be done, in fragments looked at; counted, so that it is the same on every machine.
+/// Budget of work, in fragments examined. Counting, unlike a clock, gives the same result on every machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Work {
     left: u64,
 }
 
 impl Work {
-    /// So much work.
+    /// A budget of `fragments` fragments.
     pub fn new(fragments: u64) -> Self {
         Self { left: fragments }
     }
 
-    /// As much as there is.
+    /// A budget that never runs out.
     pub fn unlimited() -> Self {
         Self { left: u64::MAX }
     }
 
-    /// Whether all of it was done.
+    /// Whether the budget is used up.
     pub fn is_done(&self) -> bool {
         self.left == 0
     }
 
-    /// Books what was done; more than was left counts as all.
+    /// Charges `fragments` to the budget, which never falls below zero.
     pub fn book(&mut self, fragments: usize) {
         self.left = self.left.saturating_sub(fragments as u64);
     }
 }
 
-/// Why a sweep was refused; the mesh is unchanged.
+/// Why a sweep was refused. The mesh is unchanged.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum CutError {
     /// The sweep holds no blade segment.
@@ -154,19 +155,19 @@ pub enum CutError {
         /// Number of copies.
         expected: usize,
     },
-    /// The body has been cut into as much as it may hold.
+    /// The body has reached a limit of [`CutLimits`].
     #[error(
         "the body holds {found} {what}, at most {limit} are allowed for cuts by clients; reset it to cut again"
     )]
     Full {
-        /// `fragments`, `pieces` or `copies`.
+        /// The quantity that reached its limit: `fragments`, `pieces` or `copies`.
         what: &'static str,
-        /// How many there are.
+        /// Count in the body.
         found: usize,
-        /// How many there may be.
+        /// Largest count allowed.
         limit: usize,
     },
-    /// One sweep is taken in parts and has not ended.
+    /// A sweep taken in parts has begun and is not complete.
     #[error("another sweep is under way; it has to end before the next one begins")]
     UnderWay,
     /// Incision id 0 is reserved for the skin.

@@ -16,13 +16,13 @@ use crate::cut::topology::pieces::PieceTable;
 use crate::cut::topology::runs::Runs;
 use crate::cut::topology::slot::slot_of;
 
-/// The mark of fragments that are touched.
+/// Mark of fragments that the sweep touches.
 const TOUCHED: u8 = 1;
 
-/// Boxes that are compared in the time in which one fragment is looked at.
+/// Number of box comparisons that cost as much as examining one fragment.
 const CANDIDATES_PER_FRAGMENT: usize = 16;
 
-/// How far the search for a sweep has come.
+/// Progress of the search for the crossings of a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     triangle: usize,
@@ -30,7 +30,7 @@ pub struct Place {
     touched: usize,
 }
 
-/// What detection reads of the body.
+/// The parts of the body that detection reads.
 pub struct Deformed<'a> {
     /// Rest mesh.
     pub mesh: &'a TetMesh,
@@ -56,18 +56,18 @@ impl Deformed<'_> {
     }
 }
 
-/// Scratch arrays of the detection, and its result: the fragments to look at.
+/// Result of the detection, the fragments to examine, and its scratch arrays.
 #[derive(Clone, Debug, Default)]
 pub struct Detector {
     /// Fragments that the sweep touches, ascending.
     pub touched: Vec<u32>,
     /// Pieces whose tet may meet the sweep, with the box around it [m].
     candidates: Vec<(u32, Vector3<f64>, Vector3<f64>)>,
-    /// For every copy one bit for each face of the box around the sweep that it lies beyond.
+    /// Per copy one bit for each face of the box around the sweep beyond which the copy lies.
     beyond: Vec<u8>,
-    /// Likewise for every node, where all of its copies do.
+    /// The same per node; a bit is set where it is set for all copies of the node.
     node_beyond: Vec<u8>,
-    /// Pieces of the candidates.
+    /// Scratch: ids of the candidate pieces.
     near: Vec<u32>,
     marks: BitMarks,
     order: Ascending,
@@ -80,15 +80,15 @@ pub struct Detector {
     triangle_stamp: u32,
 }
 
-/// The record a sweep leaves on the fragment mesh.
+/// The state of the fragment mesh in which detection records a sweep.
 pub struct Record<'a> {
-    /// Fragment mesh; vertices and faces get marked.
+    /// Fragment mesh. Vertices and faces get marked.
     pub fragments: &'a mut Fragments,
     /// Table of incision sets.
     pub sets: &'a mut IncisionSets,
     /// Crossings of edges.
     pub crossings: &'a mut Crossings,
-    /// Lines on the boundary.
+    /// Lines that blades drew on the boundary.
     pub traces: &'a mut Traces,
     /// Incision of the sweep.
     pub incision: u32,
@@ -99,7 +99,7 @@ impl Record<'_> {
         self.sets.contains(self.fragments.on[v as usize], self.incision)
     }
 
-    /// Whether the incision has opened along an edge of a boundary face.
+    /// Whether the incision has opened along an edge of a boundary face of `t`.
     fn is_open_beside(&self, t: u32, face: usize) -> bool {
         let f = &*self.fragments;
         let on = TET_FACES[face].map(|k| self.is_on(f.tets[t as usize][k]));
@@ -122,7 +122,7 @@ impl Record<'_> {
 }
 
 impl Detector {
-    /// Room for an uncut body and for what cuts add.
+    /// Reserves memory for an uncut body and for what cuts add.
     pub fn with_capacity(n_nodes: usize, n_elements: usize) -> Self {
         let mut detector = Self { marks: BitMarks::with_capacity(n_elements), ..Self::default() };
         resize_reserving(&mut detector.beyond, n_nodes, 0);
@@ -141,7 +141,7 @@ impl Detector {
         resize_reserving(&mut self.side_stamp, n_vertices, 0);
     }
 
-    /// Copies of the candidate pieces whose box overlaps that of the blade segment.
+    /// Copies of those candidate pieces whose bounding box overlaps that of the blade segment.
     pub fn tets_near(&self, [tip, heel]: &[Vector3<f64>; 2], pieces: &PieceTable) -> Vec<[u32; 4]> {
         let (from, to) = (tip.inf(heel), tip.sup(heel));
         let overlaps = |(_, low, high): &&(u32, Vector3<f64>, Vector3<f64>)| {
@@ -150,9 +150,8 @@ impl Detector {
         self.candidates.iter().filter(overlaps).map(|c| pieces.pieces[c.0 as usize].copies).collect()
     }
 
-    /// Finds the pieces whose tet has a bounding box that overlaps the one between two corners [m]: those
-    /// whose corners are not all beyond the same face of it. With the runs of the mesh and the node of
-    /// every copy.
+    /// Finds the pieces whose tet may meet the box between two corners [m]: those whose four corners are not
+    /// all beyond the same face of the box. `runs` and the node of every copy rule out most elements early.
     pub fn find_candidates(
         &mut self,
         body: &Deformed,
@@ -169,6 +168,7 @@ impl Detector {
         let (of_nodes, further) = self.beyond.split_at(n_nodes);
         self.node_beyond.clear();
         self.node_beyond.extend_from_slice(of_nodes);
+        // A node is beyond a face only if all of its copies are.
         for (&node, beyond) in copy_node[n_nodes..].iter().zip(further) {
             self.node_beyond[node as usize] &= beyond;
         }
@@ -186,7 +186,7 @@ impl Detector {
         }));
     }
 
-    /// Begins to look for a sweep among the candidates.
+    /// Starts the search for a sweep among the candidates.
     pub fn begin(&mut self, fragments: &Fragments) -> Place {
         self.touched.clear();
         self.sweep_stamp += 1;
@@ -195,8 +195,9 @@ impl Detector {
         Place::default()
     }
 
-    /// Records crossings, vertices on the sheet and faces along it, from `place` on; true when `touched` is
-    /// complete, false when the work was done before. In how many parts it is done makes no difference.
+    /// Records crossings, vertices on the sheet and faces along it, starting at `place`. Returns `true` when
+    /// `touched` is complete, `false` when the budget ran out first. The number of parts has no influence on
+    /// the result.
     pub fn run(
         &mut self,
         body: &Deformed,
@@ -225,12 +226,12 @@ impl Detector {
         if !self.mark_faces_at_the_sheet(body, triangles, record, (place, work)) {
             return false;
         }
-        // The order in which fragments are separated must not depend on that of the triangles.
+        // The order in which fragments are separated must not depend on the order of the triangles.
         self.order.sort(&mut self.touched);
         true
     }
 
-    /// Returns the number of fragments that were looked at.
+    /// Tests all fragments of piece `p` against one triangle and returns their number.
     fn test_piece(
         &mut self,
         body: &Deformed,
@@ -259,7 +260,7 @@ impl Detector {
         looked_at
     }
 
-    /// Draws where the triangle crosses the boundary faces of fragment `t`.
+    /// Records the lines in which the triangle crosses the boundary faces of fragment `t`.
     fn draw_lines(&self, triangle: &SweepTriangle, t: u32, side: &[f64; 4], record: &mut Record) {
         for (face, corners) in TET_FACES.iter().enumerate() {
             if record.fragments.neighbour[t as usize][face] != NONE {
@@ -293,7 +294,7 @@ impl Detector {
         self.side[k]
     }
 
-    /// Tests one edge whose ends lie on different sides of the plane, or one of them on it.
+    /// Tests one edge. Its ends lie on different sides of the plane, or one of them lies on it.
     fn test_edge(
         &mut self,
         triangle: &SweepTriangle,
@@ -320,7 +321,7 @@ impl Detector {
         }
     }
 
-    /// The vertex lies on the sheet: all fragments around it are touched.
+    /// Puts a vertex on the sheet and touches all fragments around it.
     fn put_on_sheet(&mut self, t: u32, v: u32, record: &mut Record) {
         let on = &mut record.fragments.on[v as usize];
         *on = record.sets.with(*on, record.incision);
@@ -331,7 +332,7 @@ impl Detector {
         }
     }
 
-    /// BitMarks faces that lie in the plane of the triangle where the sweep passes through them.
+    /// Marks the faces in the plane of the triangle that the sweep passes through.
     fn test_flat_faces(
         &mut self,
         body: &Deformed,
@@ -350,7 +351,7 @@ impl Detector {
         }
     }
 
-    /// BitMarks a closed face if a triangle passes between the centres of the two fragments it joins.
+    /// Marks a closed face if a triangle passes between the centres of the two fragments it joins.
     fn test_face(
         &mut self,
         body: &Deformed,
@@ -378,8 +379,8 @@ impl Detector {
         }
     }
 
-    /// A bent sheet may run through the three vertices of a face that lies in none of its planes.
-    /// True when all touched fragments were looked at.
+    /// Tests all faces with a vertex on the sheet. A bent sheet may run through the three vertices of a face
+    /// that lies in the plane of no triangle. Returns `true` when all touched fragments were examined.
     fn mark_faces_at_the_sheet(
         &mut self,
         body: &Deformed,

@@ -1,21 +1,22 @@
-//! The front of an incision: where the blade was last, remembered as points of the material.
+//! The front of an incision: the last blade position, remembered as points of the material.
 //!
-//! Tissue moves between two samples of a blade. Taking the last blade position along with the
-//! material and sweeping on from there keeps the incision in one piece (Nienhuys, ch. 3.3, reports
-//! the gaps that appear otherwise).
+//! Tissue moves between two samples of a blade. The last blade position is therefore carried along with the
+//! material, and the next sweep starts from there. This keeps the incision connected. Nienhuys, ch. 3.3,
+//! reports the gaps that appear otherwise.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::blade::BladeSweep;
 use super::sweep_triangle::SweepTriangle;
 
-/// Stretches a blade position in the air is remembered by.
+/// Number of equal parts of the blade. Where an end of a part is in the air, the nearest material is
+/// remembered for it.
 const AIR_PARTS: usize = 16;
 
-/// Most points a blade position is remembered by; a finer mesh is sampled.
+/// Cap on the points that remember one blade position. On a finer mesh only every n-th point is kept.
 const MAX_POINTS: usize = 256;
 
-/// Relative length by which a sweep reaches beyond its border and back over the last one.
+/// Relative length by which a sweep is extended beyond its border and back over the previous one.
 ///
 /// A blade that ends exactly on the skin, or starts exactly where the last sweep ended, must not
 /// miss an edge there by a rounding error. The same order as the snapping of crossings.
@@ -24,9 +25,9 @@ const OVERREACH: f64 = 1e-6;
 /// One remembered point.
 #[derive(Clone, Copy, Debug)]
 struct FrontPoint {
-    /// Where along the blade, 0 at the tip, 1 at the heel.
+    /// Position along the blade: 0 at the tip, 1 at the heel.
     s: f64,
-    /// The material that carries it.
+    /// The material point that carries it.
     anchor: Anchor,
 }
 
@@ -35,7 +36,7 @@ struct FrontPoint {
 struct Anchor {
     copies: [u32; 4],
     weights: [f64; 4],
-    /// Where it was when remembered [m].
+    /// Its position when it was remembered [m].
     at: Vector3<f64>,
 }
 
@@ -51,7 +52,7 @@ impl Anchor {
     }
 }
 
-/// The body a blade position is remembered in.
+/// The body in which a blade position is remembered.
 pub struct Surroundings<'a> {
     /// Copies of the tets the blade may pass through.
     pub near: &'a [[u32; 4]],
@@ -69,10 +70,10 @@ pub struct Front {
 }
 
 impl Front {
-    /// Remembers the blade `segment` by the material it passes through: by the points where it enters
-    /// and leaves a tet, so that between them the front stays straight however the body deforms. Parts
-    /// of it in the air go with the nearest material, so that tissue which moves onto the blade is cut
-    /// from its skin on.
+    /// Remembers the blade `segment` by the material it passes through: by the points where it enters and
+    /// leaves a tet. Between these points the front stays straight, however the body deforms. Parts of the
+    /// blade in the air follow the nearest material, so tissue that moves onto the blade is cut from its skin
+    /// on.
     pub fn remember(segment: &[Vector3<f64>; 2], body: &Surroundings) -> Self {
         let passages: Vec<[FrontPoint; 2]> =
             body.near.iter().filter_map(|&copies| passage(segment, copies, body.x)).collect();
@@ -84,9 +85,11 @@ impl Front {
             points.extend(in_air.iter().filter_map(|&k| air_point(segment, k, nearest[k]?, body)));
         }
         points.sort_by(|p, q| p.s.total_cmp(&q.s));
+        // Tets next to each other leave and enter at the same point: one of the two is enough.
         points.dedup_by(|q, p| q.s - p.s < 1e-9);
         let stride = points.len().div_ceil(MAX_POINTS).max(1);
         let mut points: Vec<FrontPoint> = points.into_iter().step_by(stride).collect();
+        // Ends beyond the outermost material follow the nearest remembered point.
         if let (Some(&first), Some(&last)) = (points.first(), points.last()) {
             if first.s > 0.0 {
                 points.insert(0, FrontPoint { s: 0.0, ..first });
@@ -98,12 +101,12 @@ impl Front {
         Self { segment: *segment, points }
     }
 
-    /// The two ends of the front where the material is now [m].
+    /// The two ends of the front at the present positions `x` of the copies [m].
     pub fn ends(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; 2] {
         self.now(x).ends()
     }
 
-    /// The front where the material is now: its two ends if nothing has moved.
+    /// The front at the present positions of the copies: only its two ends if nothing has moved.
     fn now(&self, x: &[Vector3<f64>]) -> Row {
         let shifts: Vec<Vector3<f64>> =
             self.points.iter().map(|p| p.anchor.position(x) - p.anchor.at).collect();
@@ -117,7 +120,7 @@ impl Front {
     }
 }
 
-/// A blade position as a polyline: points and where along the blade they are.
+/// A blade position as a polyline: points, and where along the blade each of them is.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     s: Vec<f64>,
@@ -133,7 +136,8 @@ impl Row {
         [self.points[0], self.points[self.points.len() - 1]]
     }
 
-    /// Points of this row at the places of another one; both are straight or of the same places.
+    /// Points of this row at the positions of `other` along the blade. Both rows are straight or have the
+    /// same positions.
     fn at_places_of(&self, other: &Row) -> Vec<Vector3<f64>> {
         if self.s == other.s {
             return self.points.clone();
@@ -142,7 +146,7 @@ impl Row {
     }
 }
 
-/// Triangles of a sweep that continues `front`, with the overreach applied.
+/// Triangles of a sweep that continues `front`, overreach included.
 pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f64>]) -> Vec<SweepTriangle> {
     let mut rows: Vec<Row> = Vec::with_capacity(blade.segments.len() + 1);
     rows.extend(front.map(|f| f.now(x)));
@@ -164,13 +168,13 @@ pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f
     triangles
 }
 
-/// What the blade swept between two rows, by pairs of neighbouring points.
+/// Quadrilaterals swept between two rows, one for each pair of neighbouring points.
 fn quads(pair: &[Row]) -> Vec<[Vector3<f64>; 4]> {
     let (from, to) = (&pair[0].points, pair[1].at_places_of(&pair[0]));
     (1..from.len()).map(|k| [from[k - 1], from[k], to[k], to[k - 1]]).collect()
 }
 
-/// Widens every row at both ends, moves the first row back and the last one on.
+/// Widens every row at both ends, and extends the sweep before its first row and beyond its last.
 fn overreach(rows: &mut [Row]) {
     let length = |r: &Row| (r.ends()[1] - r.ends()[0]).norm();
     let reach = OVERREACH * rows.iter().map(length).fold(0.0, f64::max);
@@ -203,7 +207,7 @@ fn unit(v: Vector3<f64>) -> Vector3<f64> {
     v.try_normalize(0.0).unwrap_or_default()
 }
 
-/// Where the segment enters and leaves a tet, if it passes through it.
+/// Where the segment enters and leaves a tet, if it passes through.
 fn passage(segment: &[Vector3<f64>; 2], copies: [u32; 4], x: &[Vector3<f64>]) -> Option<[FrontPoint; 2]> {
     let [from, to] = [barycentric(&segment[0], &copies, x)?, barycentric(&segment[1], &copies, x)?];
     let (mut enter, mut leave) = (0.0f64, 1.0f64);
@@ -227,18 +231,18 @@ fn passage(segment: &[Vector3<f64>; 2], copies: [u32; 4], x: &[Vector3<f64>]) ->
     Some([point(enter)?, point(leave)?])
 }
 
-/// Where along the blade the end of a stretch in the air is.
+/// Position along the blade of division `k`.
 fn air_place(k: usize) -> f64 {
     k as f64 / AIR_PARTS as f64
 }
 
-/// A point in the air goes with the material closest to it, around the closest copy.
+/// The front point for division `k` in the air: it follows the closest material around the closest copy.
 fn air_point(segment: &[Vector3<f64>; 2], k: usize, nearest: u32, body: &Surroundings) -> Option<FrontPoint> {
     let s = air_place(k);
     Some(FrontPoint { s, anchor: nearest_anchor(&at(segment, s), &(body.around)(nearest), body.x)? })
 }
 
-/// For each end of a stretch the copy closest to the blade there, if there is one.
+/// For each division of the blade the closest copy among those whose foot on the blade rounds to it.
 fn nearest_copies([tip, heel]: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> [Option<u32>; AIR_PARTS + 1] {
     let axis = heel - tip;
     let length_squared = axis.norm_squared();
@@ -255,7 +259,7 @@ fn nearest_copies([tip, heel]: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> [Optio
     best.map(|b| b.1)
 }
 
-/// The material point of these tets closest to a point outside of them.
+/// The material point of these tets closest to a point outside them.
 fn nearest_anchor(point: &Vector3<f64>, tets: &[[u32; 4]], x: &[Vector3<f64>]) -> Option<Anchor> {
     let mut best: Option<(f64, Anchor)> = None;
     for &copies in tets {
@@ -271,7 +275,7 @@ fn nearest_anchor(point: &Vector3<f64>, tets: &[[u32; 4]], x: &[Vector3<f64>]) -
     best.map(|b| b.1)
 }
 
-/// Barycentric coordinates of the point in the tet, which may lie outside of it.
+/// Barycentric coordinates of a point with respect to a tet. The point may lie outside.
 fn barycentric(point: &Vector3<f64>, copies: &[u32; 4], x: &[Vector3<f64>]) -> Option<[f64; 4]> {
     let [o, a, b, c] = copies.map(|c| x[c as usize]);
     let w = Matrix3::from_columns(&[a - o, b - o, c - o]).try_inverse()? * (point - o);

@@ -1,4 +1,4 @@
-//! What a blade does: where its sweep crosses the material, and which fragments that takes apart.
+//! From a blade sweep to separated fragments: where the sweep crosses the material, and what it cuts apart.
 
 pub(crate) mod blade;
 pub(crate) mod bit_marks;

@@ -1,11 +1,11 @@
-//! From crossings to separated material: bisect what a sheet cuts completely, then open the faces
-//! along it.
+//! From crossings to separated material: bisects the fragments that a sheet cuts completely, then opens the
+//! faces along it.
 //!
-//! A fragment is cut completely by an incision when its vertices off the sheet fall apart once the
-//! crossed edges are taken away. Only then are the crossed edges between the parts bisected, in every
-//! fragment around them, so the fragment mesh stays conforming; the faces between the halves lie along
-//! the sheet. A fragment that the sheet has entered but not left keeps its crossings and waits: the cut
-//! lags the blade by at most one element.
+//! An incision cuts a fragment completely when removing the crossed edges disconnects the fragment's vertices
+//! off the sheet. Only then are the crossed edges between the parts bisected, in every fragment around them,
+//! so the fragment mesh stays conforming. The faces between the halves lie along the sheet. A fragment that
+//! the sheet has entered but not left keeps its crossings and waits. The cut therefore lags the blade by at
+//! most one element.
 
 use std::collections::VecDeque;
 
@@ -19,13 +19,13 @@ use crate::cut::topology::crossings::{Crossings, EdgeSet, SNAP, edge_key};
 use crate::cut::topology::fragments::{FragmentVertex, Fragments, Halves, MAX_FRAGMENTS_PER_ELEMENT, NONE};
 use crate::cut::topology::incision_sets::IncisionSets;
 
-/// The mark of fragments that were touched or bisected.
+/// Mark of fragments that this sweep touched or bisected.
 const ACTIVE: u8 = 1;
-/// The mark of fragments in the queue, and of the one that was last taken from it.
+/// Mark of fragments in the queue, and of the one taken from it last.
 const QUEUED: u8 = 2;
-/// The mark of fragments that had a crossed edge when they were last looked at.
+/// Mark of fragments that had a crossed edge when last examined.
 const CROSSED: u8 = 4;
-/// The mark of fragments that were bisected or had a face opened.
+/// Mark of fragments that were bisected or had a face opened.
 const CHANGED: u8 = 8;
 
 /// Work list and result of a separation.
@@ -35,18 +35,19 @@ pub struct Separator {
     pub elements: Vec<u32>,
     /// Fragments that were bisected or had a face opened by this sweep.
     pub changed: Vec<u32>,
-    /// Boundary faces (4·fragment + slot) that went from one fragment to another: from, to, in order.
+    /// Boundary faces (4·fragment + slot) that moved from one fragment to another, as [from, to] in the order
+    /// of the moves.
     pub moved: Vec<[u32; 2]>,
     /// Number of faces opened.
     pub faces_opened: usize,
     /// Edges that are crossed but not separated.
     pub pending: EdgeSet,
-    /// Edges left whole because of the cap.
+    /// Edges left whole because an element or the body reached its cap of fragments.
     pub refused: EdgeSet,
     queue: VecDeque<u32>,
     /// Fragments that were touched or bisected.
     active: Vec<u32>,
-    /// What is known of the fragments.
+    /// Marks of the fragments: `ACTIVE`, `QUEUED`, `CROSSED`, `CHANGED`.
     marks: BitMarks,
     order: Ascending,
     wedge: Vec<u32>,
@@ -57,7 +58,7 @@ pub struct Separator {
     apexes: Vec<u32>,
 }
 
-/// What a separation changes.
+/// The state that a separation reads and changes.
 pub struct Sheet<'a> {
     /// Fragment mesh.
     pub fragments: &'a mut Fragments,
@@ -65,13 +66,13 @@ pub struct Sheet<'a> {
     pub sets: &'a mut IncisionSets,
     /// Crossings of edges.
     pub crossings: &'a mut Crossings,
-    /// What incisions have entered and not left.
+    /// Fragments that incisions have entered and not left.
     pub waiting: &'a mut Pending,
-    /// Lines on the boundary.
+    /// Lines that blades drew on the boundary.
     pub traces: &'a mut Traces,
-    /// The incision that is worked off.
+    /// The incision to separate.
     pub incision: u32,
-    /// Most fragments that the body may hold; edges that need more stay whole.
+    /// Cap on the fragments of the whole body. An edge whose bisection would exceed it stays whole.
     pub most_fragments: usize,
 }
 
@@ -80,14 +81,14 @@ impl Sheet<'_> {
         self.sets.contains(self.fragments.on[v as usize], self.incision)
     }
 
-    /// Parameter at which the incision crosses the edge (a, b), if it does and both ends are off it.
+    /// Parameter at which the incision crosses the edge (a, b), if it does and neither end lies on it.
     fn crossing(&self, a: u32, b: u32) -> Option<f64> {
         if self.is_on(a) || self.is_on(b) { None } else { self.crossings.get(a, b, self.incision) }
     }
 }
 
 impl Separator {
-    /// Room for a cut through a body of so many elements.
+    /// Reserves memory for a cut through a body of `n_elements` elements.
     pub fn with_capacity(n_elements: usize) -> Self {
         let n = n_elements / 8;
         Self {
@@ -101,7 +102,7 @@ impl Separator {
         }
     }
 
-    /// Separates what the sheet cuts completely among `touched` fragments and their neighbours.
+    /// Separates what the sheet cuts completely, among the `touched` fragments and their neighbours.
     pub fn run(&mut self, touched: &[u32], sheet: &mut Sheet) {
         self.elements.clear();
         self.changed.clear();
@@ -126,7 +127,7 @@ impl Separator {
         self.count_pending(sheet);
     }
 
-    /// Puts fragment `t` in the queue, unless it waits there already.
+    /// Queues fragment `t`, unless it is queued already.
     fn look_at_later(&mut self, t: u32) {
         if self.marks.insert(t, ACTIVE) {
             self.active.push(t);
@@ -136,8 +137,8 @@ impl Separator {
         }
     }
 
-    /// A crossed edge between two parts of fragment `t`, if the sheet takes it apart. Without one,
-    /// nothing but the bisection of another fragment's edge will change this one.
+    /// A crossed edge between two parts of fragment `t`, if the sheet cuts the fragment completely. If there
+    /// is none, only the bisection of an edge it shares with another fragment can change `t`.
     fn edge_to_bisect(&mut self, t: u32, sheet: &Sheet) -> Option<(u32, u32, f64)> {
         let tet = sheet.fragments.tets[t as usize];
         let mut part = [0usize, 1, 2, 3];
@@ -164,11 +165,13 @@ impl Separator {
         })
     }
 
-    /// Bisects the edge (a, b) at `s` in all fragments around it, unless an element would exceed its
-    /// cap.
+    /// Bisects the edge (a, b) at `s` in all fragments around it. Returns `false` if the element or the body
+    /// would exceed its cap.
     fn bisect(&mut self, t: u32, [a, b]: [u32; 2], s: f64, sheet: &mut Sheet) -> bool {
         let fragments = &mut *sheet.fragments;
         fragments.wedge(t, a, b, &mut self.wedge);
+        // The cheap bound comes first: only elements that could reach their cap have their share of the wedge
+        // counted.
         let full = |e: u32| {
             let (present, most) = (fragments.count[e as usize], usize::from(MAX_FRAGMENTS_PER_ELEMENT));
             let more = || self.wedge.iter().filter(|&&w| fragments.element[w as usize] == e).count();
@@ -181,10 +184,12 @@ impl Separator {
         let m = fragments.vertices.len() as u32;
         let [at_a, at_b] = [a, b].map(|v| fragments.vertices[v as usize]);
         fragments.vertices.push(FragmentVertex::between(&at_a, &at_b, s));
+        // The new vertex lies on every incision that holds both ends of the edge, and on this one.
         let both = sheet.sets.both(fragments.on[a as usize], fragments.on[b as usize]);
         fragments.on.push(sheet.sets.with(both, sheet.incision));
         let along = sheet.sets.with(IncisionSets::EMPTY, sheet.incision);
         fragments.bisect(&self.wedge, [a, b], (m, s), along, &mut self.halves);
+        // A bisection may complete the cut of any fragment of the wedge, so all are examined again.
         for k in 0..self.halves.len() {
             let h = self.halves[k];
             sheet.waiting.inherit(&self.waiting, h.old, h.new);
@@ -203,7 +208,7 @@ impl Separator {
         true
     }
 
-    /// Gives lines on boundary faces to the parts that these have now.
+    /// Divides the lines on bisected boundary faces among the two halves.
     fn pass_on_lines(&self, m: u32, s: f64, sheet: &mut Sheet) {
         let f = &*sheet.fragments;
         for &Halves { old, new, slot } in &self.halves {
@@ -226,8 +231,8 @@ impl Separator {
         }
     }
 
-    /// Gives the crossings of *other* incisions on (a, b) to its halves, and to the new edges from `m`
-    /// into the fragments where their line across a face demands one.
+    /// Divides the crossings of *other* incisions on (a, b) among its halves. A new edge from `m` into a
+    /// fragment gets one where the line of an incision across a face passes through it.
     fn pass_on_crossings(&mut self, [a, b]: [u32; 2], m: u32, s: f64, sheet: &mut Sheet) {
         let incision = sheet.incision;
         let others: Vec<u32> =
@@ -243,6 +248,7 @@ impl Separator {
                 sheet.crossings.insert(m, b, other, (t - s) / (1.0 - s));
             }
         }
+        // New edges lead from m to the vertices of the wedge other than a and b.
         self.apexes.clear();
         for h in &self.halves {
             for v in sheet.fragments.tets[h.old as usize] {
@@ -270,8 +276,8 @@ impl Separator {
         }
     }
 
-    /// Opens every active face that the incision runs along and whose three vertices lie on it; then
-    /// gives every lip its own vertices.
+    /// Opens every face of the active fragments that the incision runs along and whose three vertices lie on
+    /// it. Each lip then gets its own vertices.
     fn open_faces(&mut self, sheet: &mut Sheet) {
         self.corners.clear();
         for &t in &self.active {
@@ -288,6 +294,7 @@ impl Separator {
                 let back = sheet.fragments.face_towards(n, t);
                 sheet.fragments.open(t, face, sheet.incision);
                 self.faces_opened += 1;
+                // Both sides changed, and the stars at their corners may have fallen apart.
                 for (t, face) in [(t, Some(face)), (n, back)] {
                     if self.marks.insert(t, CHANGED) {
                         self.changed.push(t);
@@ -298,6 +305,7 @@ impl Separator {
             }
         }
         self.order.sort(&mut self.elements);
+        // A vertex split from another one still has the crossings of the edges it took over.
         let crossings = &mut *sheet.crossings;
         sheet.fragments.split_stars(&self.corners, |fragments, old, [t, new]| {
             if crossings.reach(old) {
@@ -324,9 +332,9 @@ impl Separator {
     }
 }
 
-/// Where an incision crosses the new edge (m, c) of the triangle (a, b, c), m = (1 − s) a + s b: it
-/// must if it enters through the half on the side of `a` and leaves through the half on the side of
-/// `b`. Returns the parameter from m to c of the straight line between the two crossings.
+/// Where an incision crosses the new edge (m, c) of the triangle (a, b, c), with m = (1 − s) a + s b. It must
+/// cross it if it enters through the half on the side of `a` and leaves through the half on the side of `b`.
+/// Returns the parameter, from m to c, of the straight line between the two crossings.
 fn crossing_of_median(crossings: &Crossings, [a, b, c, m]: [u32; 4], s: f64, incision: u32) -> Option<f64> {
     let only = |p: Option<[f64; 3]>, q: Option<[f64; 3]>| match (p, q) {
         (Some(x), None) | (None, Some(x)) => Some(x),

@@ -1,16 +1,16 @@
 //! One triangle of a swept blade and exact tests against segments.
 //!
-//! Signs come from Shewchuk's adaptive predicate, so a segment is on one side, on the other, or
-//! exactly on the plane, and every triangle of a sweep agrees about a shared border. Borders count as
-//! inside: a segment that passes through the seam of two triangles is never missed.
+//! Signs come from Shewchuk's adaptive predicate. A segment end is therefore on one side, on the other, or
+//! exactly on the plane, and all triangles of a sweep agree about a shared border. Borders count as inside,
+//! so a segment through the seam of two triangles is never missed.
 
 use nalgebra::Vector3;
 use robust::Coord3D;
 
 use crate::cut::drawn::traces::part_inside;
 
-/// Relative error that distances from a plane are allowed before a box counts as on one side of it: four
-/// orders above that of double precision.
+/// Relative error allowed for distances from a plane before a box counts as entirely on one side. It is four
+/// orders of magnitude above that of double precision.
 const ROUNDING: f64 = 1e-12;
 
 /// A triangle in the deformed configuration [m], with its bounds.
@@ -30,12 +30,12 @@ pub struct SweepTriangle {
     normal: Vector3<f64>,
     /// |q − p| |r − p| [m²], the scale of rounding in `normal`.
     scale: f64,
-    /// Signs are exact; only a test of tests wants others.
+    /// Whether signs are exact. Only a test of the tests clears it.
     pub exact: bool,
 }
 
 impl SweepTriangle {
-    /// The triangle, unless it has no area.
+    /// The triangle, or none if it has no area.
     pub fn new(p: Vector3<f64>, q: Vector3<f64>, r: Vector3<f64>) -> Option<Self> {
         let normal = (q - p).cross(&(r - p));
         let double_area = normal.norm();
@@ -51,19 +51,19 @@ impl SweepTriangle {
         })
     }
 
-    /// The same triangle where the blade itself swept only a part of it.
+    /// The same triangle, of which the blade itself swept only the part `drawn`. The rest is overreach.
     pub fn with_drawn(self, drawn: [Vector3<f64>; 3]) -> Self {
         Self { drawn, ..self }
     }
 
-    /// Six times the signed volume spanned with `x`; its sign is exact.
+    /// Six times the signed volume of the tetrahedron spanned with `x` [m³]. The sign is exact.
     pub fn side(&self, x: &Vector3<f64>) -> f64 {
         let [p, q, r] = &self.corners;
         self.orient(p, q, r, x)
     }
 
-    /// Whether the line through `a` and `b`, which lie on different sides of the plane or one of
-    /// them on it, meets the triangle, its border included.
+    /// Whether the line through `a` and `b` meets the triangle, its border included. The two points must lie
+    /// on different sides of the plane, or one of them on it.
     pub fn holds_line(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> bool {
         let [p, q, r] = &self.corners;
         let s = [self.orient(a, b, p, q), self.orient(a, b, q, r), self.orient(a, b, r, p)];
@@ -82,7 +82,8 @@ impl SweepTriangle {
         apart && (s != 0.0 || t != 0.0) && self.holds_line(a, b)
     }
 
-    /// The part, from 0 to 1, of a segment in the plane that lies in what the blade itself swept.
+    /// The part of a segment in the plane, as parameters from 0 to 1, that lies in the area the blade itself
+    /// swept.
     pub fn part_of(&self, segment: &[Vector3<f64>; 2]) -> Option<[f64; 2]> {
         let [p, q, r] = self.drawn;
         let normal = (q - p).cross(&(r - p));
@@ -95,13 +96,13 @@ impl SweepTriangle {
         }))
     }
 
-    /// Whether the bounding box overlaps another one.
+    /// Whether the bounding box overlaps the box between `low` and `high`.
     pub fn overlaps(&self, low: &Vector3<f64>, high: &Vector3<f64>) -> bool {
         (0..3).all(|k| self.low[k] <= high[k] && low[k] <= self.high[k])
     }
 
-    /// Whether the plane may pass through a box; false only where every point of the box is on one side,
-    /// whatever the rounding.
+    /// Whether the plane may pass through a box. It is false only where every point of the box is on one
+    /// side, whatever the rounding.
     pub fn may_cross(&self, low: &Vector3<f64>, high: &Vector3<f64>) -> bool {
         let half = (high - low) * 0.5;
         let from = low + half - self.corners[0];

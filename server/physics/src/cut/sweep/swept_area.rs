@@ -1,4 +1,4 @@
-//! How much of a sweep lies inside a body.
+//! The area of a sweep that lies inside a body.
 
 use nalgebra::Vector3;
 
@@ -6,7 +6,8 @@ use super::blade::BladeSweep;
 use super::front::sweep_triangles;
 use crate::mesh::TET_FACES;
 
-/// A sweep is moved by this part of its size, so that what lies along faces is counted on one side of them.
+/// Distance, relative to its size, by which a sweep triangle is moved along its normal. A sweep along faces
+/// is then counted on one side of them only.
 const NUDGE: f64 = 1e-9;
 
 /// Area [m²] of the sweep inside tetrahedra with corners `x` [m].
@@ -32,7 +33,7 @@ pub fn swept_area(tets: &[[u32; 4]], x: &[Vector3<f64>], blade: &BladeSweep) -> 
     area
 }
 
-/// Area of the part of a triangle inside a tetrahedron, whichever way that is oriented.
+/// Area [m²] of the part of a triangle inside a tetrahedron of either orientation.
 fn area_inside(triangle: &[Vector3<f64>; 3], tet: &[Vector3<f64>; 4]) -> f64 {
     let mut polygon: Vec<Vector3<f64>> = triangle.to_vec();
     let middle = tet.iter().sum::<Vector3<f64>>() / 4.0;
@@ -48,7 +49,7 @@ fn area_inside(triangle: &[Vector3<f64>; 3], tet: &[Vector3<f64>; 4]) -> f64 {
     0.5 * fan.sum::<Vector3<f64>>().norm()
 }
 
-/// The part of a convex polygon where `inside` ≥ 0, a linear function (Sutherland, Hodgman 1974).
+/// The part of a convex polygon where the linear function `inside` is ≥ 0 (Sutherland, Hodgman 1974).
 fn clipped(polygon: &[Vector3<f64>], inside: impl Fn(&Vector3<f64>) -> f64) -> Vec<Vector3<f64>> {
     let mut part = Vec::with_capacity(polygon.len() + 1);
     for (k, p) in polygon.iter().enumerate() {

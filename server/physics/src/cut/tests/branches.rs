@@ -1,9 +1,9 @@
-//! Branches that begin exactly where another incision is: on its middle, at its end.
+//! Branches that begin exactly on another incision: in its middle or at its end.
 
 use super::kinds::upright;
 use super::*;
 
-/// Bodies of several meshes: the box, its numbers of cells, how they are divided.
+/// Boxes of several meshes: numbers of cells, and the pattern that divides them.
 fn bodies() -> Vec<([usize; 3], BoxPattern)> {
     vec![
         ([5; 3], BoxPattern::Tet6),
@@ -13,7 +13,7 @@ fn bodies() -> Vec<([usize; 3], BoxPattern)> {
     ]
 }
 
-/// The third cut begins on a straight arm of a bent one, or ends there.
+/// The third cut begins or ends on a straight arm of a bent one.
 #[test]
 fn a_branch_from_the_middle_of_an_arm_takes_the_body_apart() {
     for (cells, pattern) in bodies() {
@@ -30,8 +30,8 @@ fn a_branch_from_the_middle_of_an_arm_takes_the_body_apart() {
     }
 }
 
-/// A stroke that stops inside the body, in an element it has not left, and goes on from there in another
-/// direction: a bend of the same incision.
+/// A stroke stops inside the body, in an element it has not left, and continues in another direction: a bend
+/// of the same incision.
 #[test]
 fn going_on_from_where_a_stroke_has_ended() {
     for (cells, pattern) in bodies() {

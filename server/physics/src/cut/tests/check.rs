@@ -1,5 +1,5 @@
-//! Independent checks of a cut state, written without the code under test where it matters: the
-//! surface from its triangle list alone, the copies by union-find over all fragment faces.
+//! Independent checks of a cut state. Where it matters they do not use the code under test: the surface is
+//! checked from its triangle list alone, the copies by union-find over all fragment faces.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use crate::cut::topology::fragments::NONE;
 use crate::mesh::TET_FACES;
 use crate::testing::{Random, surface_is_closed_and_manifold};
 
-/// All checks.
+/// Runs all checks.
 pub fn everything(cut: &CutMesh) {
     surface_is_closed_and_manifold(cut.surface());
     volumes(cut);
@@ -22,7 +22,7 @@ pub fn everything(cut: &CutMesh) {
     solid_fills_the_surface(cut);
 }
 
-/// The tetrahedra of the solid are positive at rest, and fill the surface wherever its copies are put.
+/// The tetrahedra of the solid are positive at rest and fill the surface, wherever its copies are.
 pub fn solid_fills_the_surface(cut: &CutMesh) {
     let solid = cut.solid();
     let volumes = |x: &[Vector3<f64>]| -> Vec<f64> {
@@ -81,7 +81,7 @@ pub fn volumes(cut: &CutMesh) {
     assert!((parts - total).abs() < 1e-10 * total);
 }
 
-/// Fragments have the volume their weights say, never negative; neighbours share exactly a face.
+/// Fragments have the volume that their weights give, never negative. Neighbours share exactly one face.
 pub fn fragments_conform(cut: &CutMesh) {
     let f = &cut.fragments;
     for t in 0..f.tets.len() {
@@ -184,7 +184,7 @@ pub fn copies_are_components(cut: &CutMesh) {
     assert_eq!(n_copies, cut.n_copies(), "unused copies");
 }
 
-/// However the copies move, all fragments agree about where a vertex is, and so does the surface.
+/// However the copies move, all fragments agree on the position of a vertex, and so does the surface.
 pub fn material_hangs_together(cut: &CutMesh) {
     let f = &cut.fragments;
     let mut random = Random(7);
@@ -203,8 +203,8 @@ pub fn material_hangs_together(cut: &CutMesh) {
     }
 }
 
-/// The surface that was kept up to date cut by cut is joined like one built from the fragments alone,
-/// and its vertices are where the fragments are.
+/// The surface kept up to date cut by cut has the same connectivity as one built from the fragments alone,
+/// and its vertices lie where the fragments are.
 pub fn surface_is_that_of_a_new_build(cut: &CutMesh) {
     let f = &cut.fragments;
     let (fresh, _) = SurfaceBuilder::build(&Material { mesh: cut.mesh(), fragments: f, pieces: &cut.pieces });

@@ -42,8 +42,8 @@ fn two_hundred_small_advances_equal_the_whole_cut() {
     }
 }
 
-/// A tenth of an element at a time: what the blade has entered and not left is told, lies where the
-/// blade was, reaches no further back than an element, and is gone when the cut is through.
+/// A tenth of an element at a time. What the blade has entered and not left is reported, lies where the blade
+/// was, reaches back at most one element, and is gone when the cut is through.
 #[test]
 fn what_is_pending_is_within_one_element_of_the_blade() {
     let (cells, z) = (6, 0.47);
@@ -81,8 +81,8 @@ fn single_segments_continue_the_incision() {
     assert_eq!(body.cut.components().len(), 2);
 }
 
-/// The tissue translates at 1 m/s and turns while the blade passes: the incision stays connected, so
-/// it takes the body apart.
+/// The tissue translates at 1 m/s and rotates while the blade passes. The incision stays connected, so it
+/// cuts the body apart.
 #[test]
 fn an_incision_stays_connected_while_the_tissue_moves() {
     let mut body = Body::new([0.1; 3], [6; 3], BoxPattern::Tet6);
@@ -101,7 +101,7 @@ fn an_incision_stays_connected_while_the_tissue_moves() {
     assert_eq!(body.cut.components().len(), 2, "{:?}", body.cut.components().volume);
 }
 
-/// The tissue waves through and through, at up to 1 m/s, not as a rigid body.
+/// The tissue deforms in waves, at up to 1 m/s, and does not move as a rigid body.
 #[test]
 fn an_incision_stays_connected_while_the_tissue_waves() {
     for (amplitude, cells) in [(0.002, 6), (0.005, 6), (0.01, 5), (0.01, 9)] {
@@ -145,8 +145,8 @@ fn a_closed_curve_cuts_a_plug_out() {
     }
 }
 
-/// A hand trembles: while the blade goes on by a fiftieth of an element, it is off its path by as much as
-/// a tenth. No chip comes off, and nothing stays joined.
+/// A hand trembles: while the blade advances by a fiftieth of an element, it is off its path by up to a
+/// tenth. No chip comes off, and nothing stays connected.
 #[test]
 fn a_blade_that_trembles_cuts_like_a_steady_one() {
     let h = 1.0 / 6.0;

@@ -1,5 +1,5 @@
-//! Every kind of cut there is: bent, curved, sawn, branching, beginning and ending inside; and the same
-//! in every unit of length.
+//! Cuts of every kind: bent, curved, sawn, branching, beginning and ending inside. The result is the same in
+//! every unit of length.
 
 use super::*;
 use std::f64::consts::{PI, TAU};
@@ -36,9 +36,9 @@ fn a_curved_path_whole_and_in_pieces() {
     }
 }
 
-/// Two arms in one bent stroke, then the third one from where they meet: Y. A fourth: X. The lip of a
-/// bent stroke is straight inside an element, so the third arm begins a little behind the bend; where
-/// it crosses that lip more than once, chips fall out.
+/// Two arms in one bent stroke, then a third from where they meet: Y. A fourth makes an X. The lip of a bent
+/// stroke is straight inside an element, so the third arm begins a little behind the bend. Where it crosses
+/// that lip more than once, chips fall out.
 #[test]
 fn arms_that_meet_in_a_line() {
     for middle in [[0.5, 0.5], [0.47, 0.56]] {
@@ -65,7 +65,7 @@ fn arms_that_meet_in_a_line() {
     }
 }
 
-/// The blade appears inside the material and stops inside it: a crack with a closed front.
+/// The blade appears and stops inside the material: a crack with a closed front.
 #[test]
 fn a_crack_inside_the_body_reaches_no_skin() {
     let mut body = Body::unit(7);
@@ -85,7 +85,7 @@ fn a_crack_inside_the_body_reaches_no_skin() {
     assert!(body.cut.components().len() >= 2);
 }
 
-/// To and fro, each stroke further than the last, in one incision.
+/// Back and forth, each stroke longer than the last, in one incision.
 #[test]
 fn sawing() {
     let mut body = Body::unit(5);
@@ -98,7 +98,7 @@ fn sawing() {
     assert_eq!(body.cut.components().len(), 2);
 }
 
-/// A stroke that crosses its own beginning takes a new id where it does: the tongue falls out.
+/// A stroke that crosses its own beginning gets a new id there, and the tongue falls out.
 #[test]
 fn a_loop_that_crosses_itself() {
     let mut body = Body::unit(6);
@@ -142,7 +142,7 @@ fn all_kinds(unit: f64, pattern: BoxPattern) -> Body {
     body
 }
 
-/// Micrometres to kilometres: what counts is the shape, not its size.
+/// From micrometres to kilometres: only the shape counts, not its size.
 #[test]
 fn every_kind_of_cut_in_every_unit() {
     for pattern in [BoxPattern::Tet6, BoxPattern::Tet5 { parity: false }] {

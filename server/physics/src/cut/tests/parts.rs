@@ -1,4 +1,4 @@
-//! Sweeps that are taken in parts give what they give at once.
+//! A sweep taken in parts gives the same result as in one call.
 
 use super::*;
 use crate::cut::{CutError, CutLimits, Work};
@@ -12,7 +12,7 @@ fn zigzag(random: &mut Random, segments: usize) -> BladeSweep {
 /// Fragments, pieces, volumes, nodes of copies, triangles and tags.
 type Bits = (Vec<[u32; 4]>, Vec<[u32; 4]>, Vec<u64>, Vec<u32>, Vec<[u32; 3]>, Vec<u32>);
 
-/// Everything that a later step or sweep reads, in bits.
+/// Everything that a later step or sweep reads, bit by bit.
 fn bits(cut: &CutMesh) -> Bits {
     let volumes = cut.copy_volume().iter().map(|v| v.to_bits()).collect();
     let copies = cut.pieces().iter().map(|p| p.copies).collect();

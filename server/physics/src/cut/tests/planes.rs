@@ -58,7 +58,7 @@ fn planes_through_nodes_and_edges() {
     }
 }
 
-/// All edges across the plane are hit in the middle; the numbering of the mesh does not matter.
+/// The plane halves all edges across it. The numbering of the mesh has no influence.
 #[test]
 fn all_edges_halved_in_any_numbering() {
     let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [3; 3], BoxPattern::Tet6);

@@ -60,7 +60,7 @@ fn random_sweeps_keep_everything_whole() {
     }
 }
 
-/// Fifty sweeps through each body. A change of the algorithm wants all 200 bodies, which take minutes:
+/// Fifty sweeps through each body. After a change of the algorithm run all 200 bodies, which takes minutes:
 /// `SCINDO_LONG_TESTS=1 cargo test -p scindo-physics fifty_random`.
 #[test]
 fn fifty_random_sweeps_through_each_body() {

@@ -1,4 +1,4 @@
-//! Input that a sweep refuses, leaving everything as it was; and going back to the start.
+//! Input that a sweep refuses without changing anything, and the reset of all cuts.
 
 use super::*;
 use crate::cut::CutError;

@@ -3,7 +3,7 @@
 use super::fragments::{Fragments, NONE};
 use super::pieces::PieceTable;
 
-/// Connected components of the pieces. Part 0 holds piece 0.
+/// Loose parts: connected components of the pieces. Part 0 contains piece 0.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Components {
     /// Part of each piece, length n_pieces.
@@ -18,7 +18,7 @@ impl Components {
         self.volume.len()
     }
 
-    /// Whether there is no part at all (never so for a checked mesh).
+    /// Whether there is no part at all. A checked mesh always has one.
     pub fn is_empty(&self) -> bool {
         self.volume.is_empty()
     }

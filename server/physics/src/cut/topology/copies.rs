@@ -1,9 +1,9 @@
 //! Node copies: the connected components of the pieces around a node.
 //!
-//! Around node i every piece of every element that has i is a vertex of a graph; two pieces are
-//! linked where they share a closed fragment face on an element face that contains i. Each
-//! component is one copy of i. The component that holds the node's own material keeps the copy
-//! with the node's number: the *real* copy; the others are virtual.
+//! The pieces of all elements at node i are the vertices of a graph. Two pieces are linked where they share a
+//! closed fragment face on an element face that contains i. Each component is one copy of i. The component
+//! with the node's own material keeps the copy with the node's number, the *real* copy; the others are
+//! virtual.
 
 use crate::mesh::TetMesh;
 use crate::reserve::{reserve_half_again, reserved};
@@ -21,35 +21,36 @@ pub struct NewCopy {
     pub parent: u32,
 }
 
-/// The copies and the elements around every node.
+/// The copies of all nodes, and the elements around every node.
 #[derive(Clone, Debug, Default)]
 pub struct CopyTable {
-    /// Mesh node of each copy.
+    /// Mesh node of each copy. Copies 0..n_nodes are the nodes themselves.
     pub node: Vec<u32>,
     /// Σ over pieces of ∫ N_a dV [m³] per copy.
     pub volume: Vec<f64>,
     around_start: Vec<u32>,
     around: Vec<u32>,
-    /// Pieces that got another copy since this was last cleared; some more than once.
+    /// Pieces whose copies changed since the caller last cleared this list. A piece may appear more than
+    /// once.
     pub changed: Vec<u32>,
     visited: Vec<u32>,
     stamp: u32,
     stack: Vec<u32>,
     components: Vec<Around>,
-    /// Pieces of all components, one after the other.
+    /// Scratch: pieces of all components, one component after the other.
     members: Vec<u32>,
 }
 
 /// A component of the pieces around one node.
 #[derive(Clone, Debug)]
 struct Around {
-    /// Where its pieces are among the members.
+    /// Range of its pieces in `members`.
     members: std::ops::Range<usize>,
     parent: u32,
 }
 
 impl CopyTable {
-    /// One copy per node, before [`update`](Self::update) looked at the connectivity.
+    /// One copy per node, before [`update`](Self::update) examines the connectivity.
     pub fn new(mesh: &TetMesh, pieces: &PieceTable) -> Self {
         let n = mesh.nodes.len();
         let mut around_start = vec![0u32; n + 1];
@@ -76,7 +77,7 @@ impl CopyTable {
         Self { node: (0..n as u32).collect(), volume, around_start, around, ..Self::default() }
     }
 
-    /// Room for cuts through a body of so many elements.
+    /// Reserves memory for cuts through a body of `n_elements` elements.
     pub fn reserve_half_again(&mut self, n_elements: usize) {
         self.visited.resize(n_elements, 0);
         self.changed = reserved(n_elements / 8, 0);
@@ -85,8 +86,8 @@ impl CopyTable {
         reserve_half_again(&mut self.visited);
     }
 
-    /// The copies of node `i` whose material contains the node itself, ascending: one, or more where a
-    /// cut passes exactly through it, and each lip has the node.
+    /// The copies of node `i` whose material contains the node itself, ascending. There is one, or more where
+    /// a cut passes exactly through the node and each lip has it.
     pub fn with_node(&self, mesh: &TetMesh, i: u32, fragments: &Fragments, pieces: &PieceTable) -> Vec<u32> {
         let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
         let mut found = Vec::new();
@@ -104,7 +105,7 @@ impl CopyTable {
         found
     }
 
-    /// Copies of the pieces that have this copy.
+    /// Copies of all pieces that use this copy.
     pub fn tets_around(&self, copy: u32, pieces: &PieceTable) -> Vec<[u32; 4]> {
         let i = self.node[copy as usize] as usize;
         let elements = &self.around[self.around_start[i] as usize..self.around_start[i + 1] as usize];
@@ -113,7 +114,7 @@ impl CopyTable {
         all.filter(|copies| copies.contains(&copy)).collect()
     }
 
-    /// Recomputes the copies of node `i` and appends what is new to `new_copies`.
+    /// Recomputes the copies of node `i` and appends the new ones to `new_copies`.
     pub fn update(
         &mut self,
         mesh: &TetMesh,
@@ -128,7 +129,7 @@ impl CopyTable {
             let parent = component.parent;
             let mut same = (0..components.len()).filter(|&c| components[c].parent == parent);
             let first = same.clone().next();
-            // Nothing has to be looked for where the component keeps its copy to itself.
+            // A component that keeps its copy to itself needs no search for the node.
             let alone = same.clone().nth(1).is_none();
             let heir = same.find(|&c| alone || self.holds_node(&components[c], i, fragments, pieces));
             let id = if heir.or(first) == Some(k) {
@@ -141,6 +142,7 @@ impl CopyTable {
                 new_copies.push(NewCopy { copy, parent });
                 copy
             };
+            // Pieces of a new component change their copy; the volume of a copy is summed anew.
             for k in component.members.clone() {
                 let p = self.members[k];
                 let piece = &mut pieces.pieces[p as usize];

@@ -1,21 +1,22 @@
 //! Where incisions cross fragment edges that are not separated yet.
 //!
-//! One parameter per edge and incision, computed once and shared by every fragment around the edge:
-//! the first crossing wins. The parameter is the same in the rest and in the deformed configuration,
-//! because the map is affine on a piece.
+//! There is one parameter per edge and incision. It is computed once, by the first crossing, and shared by
+//! every fragment around the edge. It is the same in the rest and in the deformed configuration, because the
+//! map is affine on a piece.
 
 use crate::reserve::reserve_half_again;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// A crossing this close to an end of its edge, relative to the edge, is the end itself.
+/// A crossing closer than this to an end of its edge, relative to the edge, is the end itself.
 ///
 /// Two crossings closer than this would make slivers that carry nothing but rounding errors. It is
 /// far above rounding (1e-16) and far below what a blade resolves.
 pub const SNAP: f64 = 1e-6;
 
-/// Multiplicative hash of an edge key; keys are made by this program, so no flooding defence.
+/// Multiplicative hash of an edge key. The keys come from this program, so they need no defence against
+/// flooding.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EdgeHasher(u64);
 
@@ -39,30 +40,30 @@ impl Hasher for EdgeHasher {
 /// Set of edge keys.
 pub type EdgeSet = HashSet<u64, BuildHasherDefault<EdgeHasher>>;
 
-/// The key of the edge between two vertices, whichever way round.
+/// The key of the edge between two vertices, independent of their order.
 pub fn edge_key(a: u32, b: u32) -> u64 {
     u64::from(a.min(b)) << 32 | u64::from(a.max(b))
 }
 
-/// Pending crossings by edge.
+/// Crossings of edges that are not separated yet.
 #[derive(Clone, Debug, Default)]
 pub struct Crossings {
     by_edge: HashMap<u64, OfEdge, BuildHasherDefault<EdgeHasher>>,
-    /// Per vertex whether an edge there was ever crossed; beyond the end none was. Most vertices that are
-    /// asked for lie on a sheet and have no such edge: they need no look into the table.
+    /// Per vertex whether an edge at it was ever crossed; vertices beyond the end have none. Most vertices in
+    /// question lie on a sheet and have no such edge, which saves a look into the table.
     at_vertex: Vec<bool>,
 }
 
-/// The crossings of one edge: incision, and parameter counted from the vertex with the smaller id.
+/// The crossings of one edge: incision, and parameter from the vertex with the smaller id.
 #[derive(Clone, Debug)]
 struct OfEdge {
     first: (u32, f64),
-    /// Hardly any edge is crossed more than once.
+    /// All crossings but the first. Hardly any edge has them.
     further: Vec<(u32, f64)>,
 }
 
 impl Crossings {
-    /// Room for a cut through a body of so many nodes.
+    /// Reserves memory for a cut through a body of `n_nodes` nodes.
     pub fn with_capacity(n_nodes: usize) -> Self {
         let mut crossings = Self { at_vertex: vec![false; n_nodes], ..Self::default() };
         crossings.by_edge.reserve(n_nodes / 8);
@@ -70,7 +71,7 @@ impl Crossings {
         crossings
     }
 
-    /// Whether any edge at the vertex was ever crossed.
+    /// Whether any edge at vertex `v` was ever crossed.
     pub fn reach(&self, v: u32) -> bool {
         self.at_vertex.get(v as usize) == Some(&true)
     }
@@ -79,20 +80,20 @@ impl Crossings {
         if self.reach(a) && self.reach(b) { self.by_edge.get(&edge_key(a, b)) } else { None }
     }
 
-    /// Parameter, counted from `a` to `b`, at which the incision crosses the edge.
+    /// Parameter from `a` to `b` at which the incision crosses the edge.
     pub fn get(&self, a: u32, b: u32, incision: u32) -> Option<f64> {
         let OfEdge { first, further } = self.of_edge(a, b)?;
         let t = if first.0 == incision { first.1 } else { further.iter().find(|c| c.0 == incision)?.1 };
         Some(if a < b { t } else { 1.0 - t })
     }
 
-    /// All crossings of the edge, parameters counted from the vertex with the smaller id.
+    /// All crossings of the edge, with parameters from the vertex with the smaller id.
     pub fn of(&self, a: u32, b: u32) -> impl Iterator<Item = (u32, f64)> + '_ {
         let found = self.of_edge(a, b);
         found.into_iter().flat_map(|of| std::iter::once(of.first).chain(of.further.iter().copied()))
     }
 
-    /// Records a crossing at `t` from `a` to `b`, unless the incision has one there already.
+    /// Records a crossing at `t` from `a` to `b`. An earlier crossing by the same incision stays.
     pub fn insert(&mut self, a: u32, b: u32, incision: u32, t: f64) {
         let t = if a < b { t } else { 1.0 - t };
         let last = a.max(b) as usize;

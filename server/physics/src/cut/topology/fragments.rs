@@ -1,9 +1,9 @@
 //! The fragment mesh: a conforming tet mesh inside the elements.
 //!
-//! A fragment vertex is an affine combination of the nodes of one element. Two fragments are
-//! connected through a face exactly when they name each other as neighbours; a cut removes that link
-//! and tags both sides. Vertices are shared by a face-connected star of fragments and by nothing
-//! else, so lips never share a vertex except on the crack front.
+//! A fragment vertex is an affine combination of the nodes of one element. Two fragments are connected
+//! through a face exactly when they list each other as neighbours; a cut removes that link and tags both
+//! sides. Only a face-connected star of fragments shares a vertex, so lips share no vertex except on the
+//! crack front.
 
 use std::collections::BTreeMap;
 
@@ -13,16 +13,16 @@ use crate::reserve::reserve_half_again;
 use super::incision_sets::IncisionSets;
 use super::slot::slot_of;
 
-/// No neighbour, no next entry.
+/// Marks a missing neighbour and the end of a list.
 pub const NONE: u32 = u32::MAX;
 
-/// Most fragments one element may hold; a sweep that needs more is refused there.
+/// Most fragments in one element. A bisection that needs more is refused.
 ///
-/// One plane makes at most 6 of 1; 256 leaves room for some 20 planes through one element while a
-/// pathological sweep stays bounded in memory.
+/// One plane makes at most 6 of 1. A cap of 256 allows some 20 planes through one element, and bounds the
+/// memory of a pathological sweep.
 pub const MAX_FRAGMENTS_PER_ELEMENT: u16 = 256;
 
-/// A point of the material: Σ weights · nodes, the nodes all of one element.
+/// A point of the material: Σ weights · nodes, where all nodes belong to one element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FragmentVertex {
     /// Mesh nodes; [`NONE`] in unused slots, which come last.
@@ -52,7 +52,7 @@ impl FragmentVertex {
         v
     }
 
-    /// Weight of local node `a` of an element with these nodes.
+    /// Weight of mesh node `node`, 0 if the vertex does not depend on it.
     pub fn weight_of(&self, node: u32) -> f64 {
         slot_of(&self.nodes, node).map_or(0.0, |slot| self.weights[slot])
     }
@@ -78,7 +78,7 @@ pub struct Fragments {
     pub neighbour: Vec<[u32; 4]>,
     /// Tag of each boundary face: 0 skin, else the incision that opened it.
     pub tag: Vec<[u32; 4]>,
-    /// Set of incisions known to run between the two sides of each face.
+    /// Incisions known to run between the two sides of each face, as a set.
     pub along: Vec<[u32; 4]>,
     /// Next fragment of the same element.
     pub next_in_element: Vec<u32>,
@@ -93,14 +93,14 @@ pub struct Fragments {
     star: Vec<(u32, u8)>,
 }
 
-/// The two fragments an edge bisection made of one.
+/// The two fragments that the bisection of an edge made of one.
 #[derive(Clone, Copy, Debug)]
 pub struct Halves {
-    /// Keeps the id of the fragment that was split and the end `a` of the edge.
+    /// The half at end `a` of the edge. It keeps the id of the fragment that was split.
     pub old: u32,
-    /// The appended fragment, at the end `b`.
+    /// The appended half, at end `b`.
     pub new: u32,
-    /// Slot of `a` in the fragment that was split: its face there went over to `new`.
+    /// Slot of `a` in the fragment that was split. Its face opposite `a` now belongs to `new`.
     pub slot: u8,
 }
 
@@ -129,7 +129,7 @@ impl Fragments {
         fragments
     }
 
-    /// Room for a cut, so that the first one does not have to move everything.
+    /// Reserves memory for a cut, so that the first cut does not reallocate every array.
     fn reserve_half_again(&mut self) {
         reserve_half_again(&mut self.vertices);
         reserve_half_again(&mut self.on);
@@ -146,7 +146,7 @@ impl Fragments {
         reserve_half_again(&mut self.claimed);
     }
 
-    /// Tags boundary faces of the uncut state by their mesh nodes in ascending order.
+    /// Tags boundary faces of the uncut state. `tags` is keyed by their mesh nodes in ascending order.
     pub fn tag_boundary(&mut self, mesh: &TetMesh, tags: &BTreeMap<[u32; 3], u32>) {
         if tags.is_empty() {
             return;
@@ -160,7 +160,7 @@ impl Fragments {
         }
     }
 
-    /// Fragments of element `e`.
+    /// Fragments of element `e`, the first one first.
     pub fn of_element(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
         std::iter::successors(Some(e), |&t| Some(self.next_in_element[t as usize]).filter(|&n| n != NONE))
     }
@@ -170,7 +170,7 @@ impl Fragments {
         slot_of(&self.tets[t as usize], v)
     }
 
-    /// Face of fragment `n` through which `t` is its neighbour.
+    /// Face of fragment `n` that it shares with `t`.
     pub fn face_towards(&self, n: u32, t: u32) -> Option<usize> {
         slot_of(&self.neighbour[n as usize], t)
     }
@@ -199,7 +199,7 @@ impl Fragments {
         let (Some(c), Some(d), None) = (others.next(), others.next(), others.next()) else { return };
         for (mut opposite, mut pivot) in [(c, d), (d, c)] {
             let mut current = t;
-            // Leave through the face opposite `opposite`; it holds a, b and `pivot`.
+            // Leave through the face opposite `opposite`. It contains a, b and `pivot`.
             while let Some(face) = self.slot(current, opposite) {
                 let next = self.neighbour[current as usize][face];
                 if next == NONE {
@@ -217,9 +217,10 @@ impl Fragments {
         }
     }
 
-    /// The boundary face on the far side of the solid wedge around an edge of the boundary face of
-    /// fragment `t` opposite its vertex `face`; `edge` runs from corner `edge` to the next of
-    /// [`TET_FACES`]. Returns fragment, face and edge there, which runs the other way.
+    /// Walks through the solid wedge around an edge, from one boundary face to the other. The walk starts at
+    /// the face of fragment `t` opposite its vertex `face`; the edge runs from its corner `edge` to the next
+    /// in the order of [`TET_FACES`]. Returns fragment, face and edge at the far side, where the edge runs
+    /// the other way.
     pub fn around_edge(&self, t: u32, face: usize, edge: usize) -> (u32, usize, usize) {
         let (mut t, corners) = (t as usize, TET_FACES[face]);
         let to = self.tets[t][corners[(edge + 1) % 3]];
@@ -239,9 +240,9 @@ impl Fragments {
         (t as u32, exit, far.unwrap_or(0))
     }
 
-    /// Bisects the edge (a, b) at the new vertex `m` in every fragment of its `wedge`; the faces
-    /// between the halves are marked as lying `along` the given set of incisions. `halves` receives
-    /// one entry per fragment of the wedge.
+    /// Bisects the edge (a, b) at the new vertex `m` in every fragment of its `wedge`. The faces between the
+    /// halves are marked as lying `along` the given set of incisions. `halves` receives one entry per
+    /// fragment of the wedge.
     pub fn bisect(
         &mut self,
         wedge: &[u32],
@@ -263,6 +264,7 @@ impl Fragments {
             let mut far = self.tets[o];
             far[ia] = m;
             let mut neighbour = self.neighbour[o];
+            // Inside the wedge the far half borders its own near half, and the far halves of its neighbours.
             neighbour[ib] = old;
             for (face, n) in neighbour.iter_mut().enumerate() {
                 if face != ia && face != ib && *n != NONE {
@@ -275,6 +277,7 @@ impl Fragments {
             self.push(o, far, neighbour, self.fraction[o] * (1.0 - t));
             self.tag.push(tag);
             self.along.push(along_far);
+            // The face opposite `a` goes to the far half, so the fragment behind it gets a new neighbour.
             let outer = neighbour[ia];
             if outer != NONE
                 && let Some(back) = self.face_towards(outer, old)
@@ -289,7 +292,7 @@ impl Fragments {
         }
     }
 
-    /// Appends a fragment of the same element and piece as fragment `o`, right behind it.
+    /// Appends a fragment with the element, piece and lists of fragment `o`, right behind it in the lists.
     fn push(&mut self, o: usize, tet: [u32; 4], neighbour: [u32; 4], fraction: f64) {
         let id = self.tets.len() as u32;
         self.tets.push(tet);
@@ -318,9 +321,9 @@ impl Fragments {
         self.tag[t as usize][face] = tag;
     }
 
-    /// Restores the rule that a vertex is shared only by a face-connected star: of the stars found at
-    /// the given corners (fragment, slot) the first keeps the vertex, each other one gets its own.
-    /// `renamed(fragments, old vertex, [fragment, new vertex])` is called for every renamed corner.
+    /// Restores the rule that only a face-connected star shares a vertex. Of the stars at the given corners
+    /// (fragment, slot) the first keeps the vertex, and each other one gets its own. `renamed(fragments, old
+    /// vertex, [fragment, new vertex])` is called for every renamed corner.
     pub fn split_stars(&mut self, corners: &[(u32, u8)], mut renamed: impl FnMut(&Self, u32, [u32; 2])) {
         self.stamp += 1;
         self.visited.resize(self.tets.len(), [0; 4]);
@@ -347,8 +350,8 @@ impl Fragments {
         }
     }
 
-    /// Fills `self.star` with the corners at the vertex of corner (t, k) that are reached through
-    /// closed faces, and marks them visited.
+    /// Fills `self.star` with the corners at the vertex of corner (t, k) that closed faces connect with it,
+    /// and marks them as visited.
     fn collect_star(&mut self, t: u32, k: u8) {
         let v = self.tets[t as usize][k as usize];
         self.star.clear();
@@ -373,7 +376,7 @@ impl Fragments {
     }
 }
 
-/// Links tets across faces that exactly two of them use, from opposite sides.
+/// Links tets across faces that exactly two of them have, seen from opposite sides.
 fn face_neighbours(tets: &[[u32; 4]]) -> Vec<[u32; 4]> {
     let mut faces: Vec<([u32; 3], u32, bool)> = Vec::with_capacity(4 * tets.len());
     for (t, tet) in tets.iter().enumerate() {

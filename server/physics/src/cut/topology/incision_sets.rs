@@ -1,18 +1,18 @@
 //! Sets of incision ids, each stored once and named by a number.
 //!
-//! Nearly every vertex and face lies on no incision or on one; a table of the few distinct sets
-//! keeps the per-vertex record at four bytes.
+//! Nearly every vertex and face lies on no incision or on one. A table of the few distinct sets keeps the
+//! record per vertex at four bytes.
 
 use std::collections::BTreeMap;
 
-/// Table of distinct sets; a set is its index here.
+/// Table of distinct sets. A set is identified by its index here.
 #[derive(Clone, Debug)]
 pub struct IncisionSets {
     sets: Vec<Vec<u32>>,
-    /// The member of every set that has one, else 0, which is no incision.
+    /// Per set its member if it has exactly one, else 0, which is no incision.
     only: Vec<u32>,
     ids: BTreeMap<Vec<u32>, u32>,
-    /// The incision that was last added to nothing, and the set of it alone.
+    /// The incision last added to the empty set, and the set of it alone.
     latest: [u32; 2],
 }
 
@@ -37,13 +37,13 @@ impl IncisionSets {
         }
     }
 
-    /// The set with the incision added.
+    /// The set with the incision added to it.
     pub fn with(&mut self, set: u32, incision: u32) -> u32 {
         if self.contains(set, incision) {
             return set;
         }
         if set == Self::EMPTY {
-            // Asked for again and again while one incision is worked off.
+            // The same incision is asked for again and again while its sweep is separated.
             if self.latest[0] != incision {
                 self.latest = [incision, self.id_of(vec![incision])];
             }

@@ -1,4 +1,4 @@
-//! Which piece a material point belongs to.
+//! Finds the piece to which a material point belongs.
 
 use nalgebra::{Matrix4, Vector4};
 

@@ -1,6 +1,6 @@
-//! What is connected to what: fragments inside the elements, pieces of them, copies of the nodes.
+//! The connectivity of the material: fragments inside the elements, pieces made of them, copies of the nodes.
 //!
-//! Each is a pure function of the one before; a cut opens faces between fragments and nothing else.
+//! Each is a pure function of the one before. A cut only opens faces between fragments.
 
 pub(crate) mod slot;
 pub(crate) mod incision_sets;

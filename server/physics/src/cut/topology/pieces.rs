@@ -6,7 +6,7 @@ use crate::reserve::reserve_half_again;
 use super::fragments::{Fragments, NONE};
 use super::slot::slot_of;
 
-/// One connected piece of material inside one element: what mechanics sees as an element.
+/// One connected piece of material inside one element. Mechanics treats it as an element.
 ///
 /// A linear tet has a constant deformation gradient per piece, so its energy, force and stiffness
 /// are those of the whole element on the piece's own copies, times `fraction`.
@@ -20,10 +20,10 @@ pub struct Piece {
     pub copies: [u32; 4],
 }
 
-/// All pieces. Piece e < n_elements is the first of element e; later ones are appended.
+/// All pieces. Piece e < n_elements is the first of element e; cuts append the others.
 #[derive(Clone, Debug, Default)]
 pub struct PieceTable {
-    /// The pieces.
+    /// The pieces by id. No id ever changes.
     pub pieces: Vec<Piece>,
     /// ∫ N_a dV [m³] over each piece.
     pub node_volume: Vec<[f64; 4]>,
@@ -35,7 +35,7 @@ pub struct PieceTable {
     label: Vec<u32>,
     stack: Vec<u32>,
     members: Vec<u32>,
-    /// Present pieces of an element and what they were part of before.
+    /// Scratch: present pieces of an element, each with the piece it was part of before.
     kept: Vec<[u32; 2]>,
 }
 
@@ -65,7 +65,7 @@ impl PieceTable {
         table
     }
 
-    /// Pieces of element `e`.
+    /// Pieces of element `e`, the first one first.
     pub fn of_element(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
         std::iter::successors(Some(e), |&p| Some(self.next_in_element[p as usize]).filter(|&n| n != NONE))
     }
@@ -77,9 +77,9 @@ impl PieceTable {
         })
     }
 
-    /// Recomputes the pieces of element `e` from its fragments. Components only ever refine: one
-    /// component of an old piece keeps its id, the others are appended with the same copies. Pieces that
-    /// came apart go to `changed`, with what became of them.
+    /// Recomputes the pieces of element `e` from its fragments. Components only ever become finer: one
+    /// component of an old piece keeps its id, and the others are appended with the same copies. Pieces that
+    /// came apart are appended to `changed`, together with the parts that they became.
     pub fn update(&mut self, mesh: &TetMesh, e: u32, fragments: &mut Fragments, changed: &mut Vec<u32>) {
         let first = changed.len();
         let mut members = std::mem::take(&mut self.members);
@@ -100,12 +100,14 @@ impl PieceTable {
             kept.push([id, old]);
             self.flood(seed, id, fragments);
         }
+        // Only pieces that came apart have to be measured again.
         for &[p, old] in &kept {
             self.first_fragment[p as usize] = NONE;
             if kept.iter().filter(|k| k[1] == old).count() > 1 {
                 changed.push(p);
             }
         }
+        // In reverse, since every fragment goes to the head of the list of its piece.
         for &t in members.iter().rev() {
             let p = self.label[t as usize];
             fragments.piece[t as usize] = p;
@@ -118,7 +120,7 @@ impl PieceTable {
         (self.members, self.kept) = (members, kept);
     }
 
-    /// Fraction and ∫ N_a dV of piece `p` from its fragments.
+    /// Computes the fraction and ∫ N_a dV of piece `p` from its fragments.
     fn measure(&mut self, mesh: &TetMesh, p: u32, fragments: &Fragments) {
         let e = self.pieces[p as usize].element as usize;
         let nodes = mesh.tets[e];
@@ -140,7 +142,7 @@ impl PieceTable {
         self.node_volume[p as usize] = integral.map(|sum| 0.25 * self.element_volume[e] * sum);
     }
 
-    /// Labels everything reachable from `seed` inside its element through closed faces.
+    /// Labels all fragments of one element that closed faces connect with `seed`.
     fn flood(&mut self, seed: u32, id: u32, fragments: &Fragments) {
         let e = fragments.element[seed as usize];
         self.label[seed as usize] = id;
@@ -165,8 +167,8 @@ impl PieceTable {
         id
     }
 
-    /// ∫ N_a N_b dV [m³] over piece `p`: over a fragment T with corner values N(v) it is
-    /// |T|/20 Σ_v Σ_w N_a(v) N_b(w) (1 + δ_vw).
+    /// ∫ N_a N_b dV [m³] over piece `p`. A fragment T with corner values N(v) contributes |T|/20 Σ_v Σ_w
+    /// N_a(v) N_b(w) (1 + δ_vw).
     pub fn node_products(&self, mesh: &TetMesh, p: u32, fragments: &Fragments) -> [[f64; 4]; 4] {
         let e = self.pieces[p as usize].element as usize;
         let nodes = mesh.tets[e];

@@ -1,9 +1,9 @@
-//! Runs of consecutive elements and the nodes they are on: where all nodes of a run are out of reach,
-//! none of its elements has to be looked at.
+//! Runs of consecutive elements and their nodes. Where all nodes of a run are out of reach, none of its
+//! elements has to be examined.
 
 use crate::mesh::TetMesh;
 
-/// Elements of a run. Neighbours mostly have close numbers, so that a run has far fewer nodes than corners.
+/// Elements per run. Neighbours mostly have close numbers, so a run has far fewer nodes than element corners.
 const ELEMENTS: usize = 64;
 
 /// The nodes of every run, each once.
@@ -16,7 +16,7 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// The runs of a mesh; cuts do not change them.
+    /// The runs of a mesh. Cuts do not change them.
     pub fn new(mesh: &TetMesh) -> Self {
         let mut runs = Self { n_elements: mesh.tets.len(), nodes: Vec::new(), first: vec![0] };
         let mut last_run = vec![0; mesh.nodes.len()];
@@ -31,8 +31,8 @@ impl Runs {
         runs
     }
 
-    /// The elements of all runs whose nodes are not all beyond the same plane: `beyond` has a bit for
-    /// each plane that a node is beyond.
+    /// The elements of all runs whose nodes are not all beyond the same plane. `beyond` has, per node, one
+    /// bit for each plane that the node is beyond.
     pub fn within_reach<'a>(&'a self, beyond: &'a [u8]) -> impl Iterator<Item = u32> + 'a {
         let runs = self.first.windows(2).enumerate();
         let runs = runs.filter(|(_, bounds)| {

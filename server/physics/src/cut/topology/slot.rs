@@ -1,7 +1,7 @@
 //! Which of four slots holds a number.
 
-/// The first slot that holds `number`. Looks at all four: where a number is cannot be predicted, and a
-/// branch that is guessed wrong costs more than four comparisons.
+/// The first slot that holds `number`. All four are compared: the position cannot be predicted, and a
+/// mispredicted branch costs more than four comparisons.
 #[inline(always)]
 pub fn slot_of(slots: &[u32; 4], number: u32) -> Option<usize> {
     let held = (0..4).fold(0, |held, k| held | u32::from(slots[k] == number) << k);

@@ -1,4 +1,4 @@
-//! What a blade has drawn on a skin without opening it.
+//! Lines that a blade has drawn on a skin without opening it.
 
 use super::*;
 use crate::cut::IncisionMark;
@@ -14,7 +14,7 @@ fn on_box(p: &Vector3<f64>) -> bool {
     p.iter().any(|c| c.abs() < 1e-9 || (c - 1.0).abs() < 1e-9)
 }
 
-/// Farthest that a place on the way of a blade is from all marks [m].
+/// Largest distance of a place on the blade's path from all marks [m].
 fn missed(marks: &[IncisionMark], x: &[Vector3<f64>], way: impl Iterator<Item = Vector3<f64>>) -> f64 {
     let lines: Vec<[Vector3<f64>; 2]> = marks.iter().map(|mark| mark.ends.map(|e| e.position(x))).collect();
     let distance = |p: &Vector3<f64>, [a, b]: &[Vector3<f64>; 2]| {
@@ -38,7 +38,7 @@ fn a_scratch_shallower_than_the_elements_is_drawn_from_end_to_end_and_opens_noth
                 let report = body.sweep(&incision(&path).segments, 1);
                 assert_eq!((report.elements_cut, report.new_copies.len()), (0, 0));
             }
-            // What another incision does does not take it away.
+            // Cuts of another incision do not remove it.
             body.sweep(&[[v(0.9, 0.9, 0.99), v(0.9, 0.9, 1.1)], [v(0.95, 0.9, 0.99), v(0.95, 0.9, 1.1)]], 2);
             let marks = match settings {
                 Some(_) => body.skin.incision_marks(&body.cut),
@@ -48,7 +48,7 @@ fn a_scratch_shallower_than_the_elements_is_drawn_from_end_to_end_and_opens_noth
             let drawn = length(&marks, &body.x, |p| (p.z - 1.0).abs() < 1e-9);
             let asked: f64 =
                 (0..400).map(|k| (on(f64::from(k + 1) / 400.0) - on(f64::from(k) / 400.0)).norm()).sum();
-            // Within a share of an element that is finer than any skin.
+            // The tolerance is a share of an element finer than any skin.
             let element = 1.0 / cells as f64;
             let off = missed(&marks, &body.x, (0..=400).map(|k| on(f64::from(k) / 400.0)));
             assert!(off < element / 32.0, "{off} with {cells} cells in {parts} parts");

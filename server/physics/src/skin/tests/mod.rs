@@ -51,7 +51,7 @@ impl Body {
         self.sweep(&square(point, normal, reach), incision)
     }
 
-    /// Closed, 2-manifold, fitting, enclosing what it did uncut to the tolerance.
+    /// Closed, 2-manifold, fitting, and enclosing the volume of the uncut body within the tolerance.
     fn check(&self, tolerance: f64) {
         assert!(self.skin.fits(), "skin and lips do not fit");
         surface_is_closed_and_manifold(self.skin.surface());
@@ -67,7 +67,7 @@ impl Body {
     }
 }
 
-/// Every vertex on the copies of one piece, all vertices of a triangle in one loose part.
+/// Every vertex is bound to the copies of one piece, and all vertices of a triangle to one loose part.
 fn bound_to_pieces(cut: &CutMesh, surface: &Surface) {
     let n = cut.n_copies();
     let mut part: Vec<usize> = (0..n).collect();
@@ -280,7 +280,7 @@ fn a_skin_that_does_not_fit_leaves_the_boundary_until_the_reset() {
     assert_eq!(body.skin.misfit(), Some(Misfit::SharedEdge));
     assert_eq!(body.skin.surface(), body.cut.surface());
     surface_is_closed_and_manifold(body.skin.surface());
-    // Later cuts and marks go on, on the boundary of the elements.
+    // Later cuts and marks still work, on the boundary of the elements.
     body.cut_plane(v(0.5, 0.5, 1.0), v(0.1, 0.2, 1.0), 0.3, 3);
     assert_eq!(body.skin.surface(), body.cut.surface());
     assert_eq!(body.skin.incision_marks(&body.cut).len(), body.cut.incision_marks().len());

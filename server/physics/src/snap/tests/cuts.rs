@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Planes through the unit cube, some of them along faces of the mesh or through its nodes.
+/// Planes through the unit cube, some of them along mesh faces or through mesh nodes.
 fn planes() -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let middle = v(0.5, 0.5, 0.5);
     vec![
@@ -38,8 +38,8 @@ fn a_plane_parts_the_body_in_two_on_the_plane() {
     }
 }
 
-/// A plane that halves every edge it crosses: all choose the node on the same side, so that these have
-/// room to move.
+/// A plane that halves every edge it crosses. All edges choose the node on the same side, which leaves these
+/// nodes space to move.
 #[test]
 fn a_plane_that_halves_every_edge_has_nearly_all_lip_nodes_on_it() {
     for pattern in [BoxPattern::Tet6, BoxPattern::Tet5 { parity: false }, BoxPattern::Octahedral6] {

@@ -36,7 +36,7 @@ fn volume(complex: &Complex) -> f64 {
     alive.map(|t| det(&complex.rest(t)) / 6.0).sum()
 }
 
-/// A node inside the box, pressed towards a place until elements are flat.
+/// A node inside the box, moved towards a place until elements are flat.
 #[test]
 fn flat_elements_go_and_the_volume_stays() {
     // Node 0,0,0 of the inner grid is 2,2,2 of a 4×4×4 box; its neighbours are a cell away.

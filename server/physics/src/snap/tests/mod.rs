@@ -72,8 +72,8 @@ impl Sample {
         nodes
     }
 
-    /// No element inverted in either configuration, volume as before, one set of degrees of freedom
-    /// per node, surface closed and 2-manifold.
+    /// No element is inverted in either configuration, the volume is as before, every node has one set of
+    /// degrees of freedom, and the surface is closed and 2-manifold.
     fn check(&self) {
         self.mesh.check().unwrap();
         for tet in &self.mesh.tets {
@@ -88,7 +88,7 @@ impl Sample {
         assert!((enclosed / volume - 1.0).abs() < 1e-10);
     }
 
-    /// Puts an affine map and an affine velocity on the body.
+    /// Applies an affine map and an affine velocity to the body.
     fn deform(&mut self, F: Matrix3<f64>, L: Matrix3<f64>) {
         for node in &mut self.nodes {
             node.x = F * node.rest;

@@ -1,23 +1,23 @@
-//! No pops: a new model takes over from the last one without a step in force, and what is touched
-//! keeps its number while the tool slides.
+//! Continuity of the rendered force: a new model replaces the last one without a step in force, and a touched
+//! feature keeps its number while the tool slides.
 
 use nalgebra::Vector3;
 
 use super::plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact, MAX_CONTACTS};
 
-/// Difference of force below which nothing is blended [N].
+/// Difference of force too small to be felt, below which nothing is blended [N].
 const UNFELT_N: f64 = 1e-6;
-/// Planes with normals at least this alike (cosine) may be the same feature.
+/// Least cosine between the normals of two planes that may be the same feature.
 const ALIKE: f64 = 0.9;
 
-/// Gives out feature numbers.
+/// Source of feature numbers.
 #[derive(Debug, Clone, Default)]
 pub struct FeatureNumbers {
     last: u64,
 }
 
 impl FeatureNumbers {
-    /// Numbers the planes of `new`: those near a plane of `old` with a like normal keep its number.
+    /// Numbers the planes of `new`. A plane close to one of `old` with a similar normal keeps its number.
     pub fn carry_over(&mut self, old: &LocalContact, new: &mut LocalContact) {
         let mut taken = [false; MAX_CONTACTS];
         for plane in &mut new.planes {
@@ -41,9 +41,9 @@ impl FeatureNumbers {
     }
 }
 
-/// Adds to `new` a plane of constant force that makes up for the part of the change of force, at
-/// the pose of `new`, that exceeds `limit_n` [N]. As every model is held against the one before,
-/// the rest of a change is worked off by at most `limit_n` per model.
+/// Limits the change of force between two models at the pose of `new` to `limit_n` [N]. It adds a plane of
+/// constant force to `new` that compensates the excess. Every model is compared with the one before, so a
+/// larger change is spread over several models, `limit_n` each.
 pub fn limit_step(old: &LocalContact, new: &mut LocalContact, limit_n: f64) {
     let before = old.force_at(new.pose_used.translation.vector);
     let now = new.force_at(new.pose_used.translation.vector);
@@ -53,7 +53,7 @@ pub fn limit_step(old: &LocalContact, new: &mut LocalContact, limit_n: f64) {
         return;
     }
     let made_up: Vector3<f64> = change * (-excess / change.norm());
-    // The blend needs a seat of its own; the last plane matters least.
+    // The blend needs a plane of its own. The last plane matters least.
     new.planes.truncate(MAX_CONTACTS - 1);
     new.planes.push(ContactPlane {
         point_m: new.pose_used.translation.vector,

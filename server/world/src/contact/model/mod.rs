@@ -1,22 +1,20 @@
-//! The local contact model: what the contact thread makes of the newest snapshot and the newest
-//! pose of a tool, at 200 Hz or more, whatever the rate of the steps.
+//! The local contact model. The contact thread computes it from the newest snapshot and the newest pose of a
+//! tool, at 200 Hz or more, independent of the step rate.
 //!
 //! # Order on the contact thread
-//! 1. [`ContactModels::take`] whenever there is a new snapshot: copies its surfaces and refits its
-//!    own trees;
-//! 2. [`ContactModels::evaluate`] for every held tool with its newest pose; the answer goes on the
-//!    wire as it is.
+//! 1. [`ContactModels::take`] for every new snapshot: copies its surfaces and refits its own trees.
+//! 2. [`ContactModels::evaluate`] for every held tool with its newest pose. The result is sent as it is.
 //!
 //! # Force
-//! One plane stands for the touch: its normal n is the line from device to proxy at the newest pose.
-//! The last solve gave the force f₀ for the pose p₀; a change of pose is answered by hand and tissue
-//! in series, k_s:
+//! One plane represents the contact. Its normal n is the line from device to proxy at the newest pose. The
+//! last solve gave the force f₀ for the pose p₀. A change of pose is answered by hand and tissue in series,
+//! k_s:
 //!
 //! f = f₀·n + k_s (p₀ − p)·n, and k_s d at the depth d behind the surface if there was no force.
 //!
-//! Between snapshots the surface is extrapolated by the velocity it has by itself: its own minus
-//! what the tool imparts, v_tool (1 − k_s / k) along the normal. A model takes over from the one
-//! before without a step in force ([`continuity`]).
+//! Between snapshots the surface is extrapolated with the velocity it has without the tool: its own minus
+//! what the tool imparts, v_tool (1 − k_s / k) along the normal. A model replaces the one before without a
+//! step in force ([`continuity`]).
 
 pub mod plane;
 pub mod continuity;
@@ -35,38 +33,38 @@ use continuity::{FeatureNumbers, limit_step};
 pub use plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact};
 use scindo_collision::Capsule;
 
-/// How fast force may change from model to model beyond what the planes say [N/s].
+/// Largest rate at which force may change from model to model beyond what the planes predict [N/s].
 const SLEW_N_S: f64 = 50.0;
-/// Longest time between two models that the slew limit is stretched over [s].
+/// Longest time between two models for which the slew limit is scaled [s].
 const LONGEST_TICK_S: f64 = 0.01;
-/// How long after a snapshot its surface is extrapolated, in intervals between snapshots.
+/// Longest extrapolation of a surface after its snapshot, in intervals between snapshots.
 const HORIZON: f64 = 1.5;
 /// Bounds of that interval [s].
 const INTERVAL_S: (f64, f64) = (1e-3, 0.1);
-/// Bounds of the validity of a model [s].
+/// Bounds of the time for which a model is valid [s].
 const VALIDITY_S: (f64, f64) = (0.03, 0.2);
-/// Planes are told of this long before the tool reaches them [s], at least within this [m].
+/// Planes are sent this long before the tool reaches them [s], and at least within this distance [m].
 const AHEAD_S: f64 = 0.02;
 const LEAST_AHEAD_M: f64 = 0.002;
 const MOST_AHEAD_M: f64 = 0.02;
-/// Damping per stiffness [s] and its bound [N·s/m]; well under what desktop devices absorb.
+/// Damping per stiffness [s], and its bound [N·s/m], which is well below what desktop devices absorb.
 const DAMPING_S: f64 = 1e-3;
 const MAX_DAMPING_NS_M: f64 = 2.0;
-/// Planes are trusted at least this far around their point [m].
+/// Least radius around their point within which planes are trusted [m].
 const LEAST_PATCH_M: f64 = 0.003;
 
-/// The newest of a tool as the contact thread knows it.
+/// Newest state of a tool, as the contact thread received it.
 #[derive(Debug, Clone)]
 pub struct ToolQuery {
-    /// Name.
+    /// Name of the tool.
     pub id: Arc<str>,
-    /// Geometry.
+    /// Shape and dimensions.
     pub shape: ToolShape,
     /// Tool axes to world axes; the translation is the tip [m].
     pub pose: Isometry3<f64>,
     /// Velocity of the tip [m/s].
     pub velocity_m_s: Vector3<f64>,
-    /// What the hand does.
+    /// Touch, grab, cut or hover.
     pub mode: ToolMode,
 }
 
@@ -84,7 +82,7 @@ pub struct ContactModels {
     refused_surfaces: u64,
 }
 
-/// What is kept of one tool between models.
+/// State of one tool between models.
 #[derive(Debug, Clone)]
 struct ToolModel {
     id: Arc<str>,
@@ -98,8 +96,8 @@ struct ToolModel {
 }
 
 impl ContactModels {
-    /// Takes in a snapshot at time `now_s` [s] of the caller's clock. A body without positions, or
-    /// whose positions do not belong to its topology, keeps the surface it had.
+    /// Takes over a snapshot at time `now_s` [s] of the caller's clock. A body keeps its surface if its
+    /// positions are missing or do not belong to its topology.
     pub fn take(&mut self, snapshot: &Snapshot, now_s: f64) {
         if let Some(before) = self.taken_s {
             let interval = (now_s - before).clamp(INTERVAL_S.0, INTERVAL_S.1);
@@ -124,15 +122,15 @@ impl ContactModels {
         for tool in &snapshot.tools {
             let index = self.model_of(&tool.id, now_s);
             let model = &mut self.tools[index];
-            // The step knows on which side of the tissue the tool is; its word counts.
+            // The step knows on which side of the tissue the tool is, so its proxy is taken.
             model.proxy.seat(&tool.proxy);
             model.proxy.ride(tool.shape, &self.surfaces);
             model.seen = Some(tool.clone());
         }
     }
 
-    /// The model for a tool at its newest pose, at time `now_s` [s] of the caller's clock. A pose
-    /// that is not finite is refused and counted; the answer is then for the last good one.
+    /// The model for a tool at its newest pose, at time `now_s` [s] of the caller's clock. A pose that is not
+    /// finite is refused and counted, and the model of the last valid pose is returned.
     pub fn evaluate(&mut self, query: &ToolQuery, now_s: f64) -> &LocalContact {
         let index = self.model_of(&query.id, now_s);
         let finite = query.velocity_m_s.iter().all(|v| v.is_finite());
@@ -157,12 +155,12 @@ impl ContactModels {
         &model.now
     }
 
-    /// Poses refused so far.
+    /// Number of poses refused so far.
     pub fn refused_poses(&self) -> u64 {
         self.refused_poses
     }
 
-    /// Surfaces refused so far.
+    /// Number of surfaces refused so far.
     pub fn refused_surfaces(&self) -> u64 {
         self.refused_surfaces
     }
@@ -183,24 +181,24 @@ impl ContactModels {
     }
 }
 
-/// What all tools of one tick share.
+/// Data that all tools of one tick share.
 struct Frame<'a> {
     surfaces: &'a [ContactSurface],
     velocities: &'a [Vec<[f32; 3]>],
-    /// How far the surfaces are extrapolated [s].
+    /// Time for which the surfaces are extrapolated [s].
     ahead_s: f64,
     validity_s: f64,
     step: u64,
     time_s: f64,
 }
 
-/// What the last step knew of the tool.
+/// What the last step knew about the tool.
 struct Anchor {
     pose: Isometry3<f64>,
     velocity: Vector3<f64>,
-    /// Force of the touch on the tool [N]; zero if it did not touch.
+    /// Contact force on the tool [N]; zero if it did not touch.
     force: Vector3<f64>,
-    /// Hand alone and hand with tissue [N/m].
+    /// Stiffness of the hand alone, and of hand and tissue in series [N/m].
     hand: f64,
     series: f64,
     max_force: f64,
@@ -258,7 +256,7 @@ impl ToolModel {
         }
     }
 
-    /// The plane of a tool that touches or may soon.
+    /// Adds the plane of a tool that touches tissue or may do so soon.
     fn touch(&mut self, query: &ToolQuery, anchor: &Anchor, frame: &Frame<'_>) {
         self.proxy.follow(query.shape, &query.pose, frame.surfaces);
         let ahead = (query.velocity_m_s.norm() * AHEAD_S).clamp(LEAST_AHEAD_M, MOST_AHEAD_M);
@@ -267,7 +265,7 @@ impl ToolModel {
         let place = match touched(&at_proxy, frame.surfaces) {
             Some(place) => {
                 let target = push_direction(&place, &at_proxy, &at_device);
-                // Where the step pressed is where the model presses, unless it has to turn.
+                // The model presses in the direction of the step, unless the contact requires a turn.
                 let held = anchor.force.try_normalize(1e-6);
                 let normal = held.map_or(target, |held| held_direction(held, target));
                 Some(Nearest { normal, ..place })
@@ -281,7 +279,7 @@ impl ToolModel {
         self.now.epoch = frame.surfaces[place.body].epoch();
     }
 
-    /// The pull of held tissue, along all axes.
+    /// Adds the pull of held tissue, along all axes.
     fn hold(&mut self, query: &ToolQuery, anchor: &Anchor) {
         let Some(seen) = &self.seen else { return };
         if seen.mode != ToolMode::Grab {
@@ -309,7 +307,7 @@ fn damping(stiffness: f64) -> f64 {
     (stiffness * DAMPING_S).min(MAX_DAMPING_NS_M)
 }
 
-/// The plane of a place with its force at the newest pose.
+/// The contact plane at a surface place, with its force at the newest pose.
 fn plane_of(
     place: &Nearest,
     at_device: &Capsule,
@@ -322,6 +320,8 @@ fn plane_of(
     let before = capsule(query.shape, &anchor.pose).core_point(place.parameter);
     let force_before = anchor.force.dot(&normal);
     let pressed = force_before > 0.0;
+    // The tissue yields to the tool at a share of the tool's velocity. The model adds that motion itself, so
+    // it must not be extrapolated too.
     let mut by_itself = surface_velocity(place, frame);
     if pressed && anchor.hand > 0.0 {
         let yielding = 1.0 - anchor.series / anchor.hand;
@@ -329,6 +329,7 @@ fn plane_of(
     }
     let shift = by_itself * frame.ahead_s;
     let depth = at_device.radius - normal.dot(&(device - place.point - shift));
+    // A contact continues the force of the last solve. A new one starts from its depth.
     let force = if pressed {
         force_before + anchor.series * normal.dot(&(before - device + shift))
     } else {
@@ -346,13 +347,13 @@ fn plane_of(
         tangential_stiffness_n_m: 0.0,
         damping_ns_m: damping(anchor.series),
         surface_velocity_m_s: by_itself,
-        // Clients measure from the tip, which a shaft's contact may be far from.
+        // Clients measure from the tip, which may be far from the contact of a shaft.
         patch_radius_m: aside + (2.0 * at_device.radius).max(LEAST_PATCH_M),
         feature_id: 0,
     }
 }
 
-/// Velocity of the touched point of the surface [m/s]; zero where it is not known.
+/// Velocity of the touched surface point [m/s]; zero if it is not known.
 fn surface_velocity(place: &Nearest, frame: &Frame<'_>) -> Vector3<f64> {
     let Some(tree) = frame.surfaces[place.body].tree() else { return Vector3::zeros() };
     let velocities = &frame.velocities[place.body];

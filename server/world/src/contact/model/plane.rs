@@ -1,27 +1,27 @@
-//! What a haptic client needs to render a touch at 1 kHz on its own: planes with linearised force.
+//! What a haptic client needs to render contact at 1 kHz on its own: planes with a linearised force.
 
 use nalgebra::{Isometry3, Vector3};
 
 /// Most planes of one model.
 pub const MAX_CONTACTS: usize = 8;
 
-/// Number of the plane that hides a change of model; see [`super::continuity`].
+/// Feature number of the plane that hides a change of model; see [`super::continuity`].
 pub const BLEND_FEATURE: u64 = u64::MAX;
 
-/// One contact plane. Force on the tool with its tip at p:
+/// One contact plane. The force on the tool with its tip at p is
 /// n · max(0, force·n − stiffness (p − tip used)·n).
 ///
-/// Before the touch `force_n`·n is negative, −stiffness · gap, so that the client's force starts
-/// from zero in the very tick in which the tip crosses the plane.
+/// Before contact `force_n`·n is negative, −stiffness · gap. The client's force therefore starts from zero in
+/// the very tick in which the tip crosses the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPlane {
-    /// On the surface [m].
+    /// A point of the plane on the surface [m].
     pub point_m: Vector3<f64>,
-    /// Unit, from the tissue to the tool.
+    /// Unit normal, from the tissue to the tool.
     pub normal: Vector3<f64>,
-    /// Distance of the tool from the plane [m]; negative: penetration.
+    /// Distance of the tool from the plane [m]. Negative values are penetration.
     pub gap_m: f64,
-    /// Force of the tissue on the tool at the pose used [N]; along −normal: not yet touching.
+    /// Force of the tissue on the tool at the pose used [N]. Along −normal the tool does not touch yet.
     pub force_n: Vector3<f64>,
     /// Loss of force per metre along the normal [N/m].
     pub stiffness_n_m: f64,
@@ -29,23 +29,23 @@ pub struct ContactPlane {
     pub tangential_stiffness_n_m: f64,
     /// Force against relative velocity along the normal [N·s/m].
     pub damping_ns_m: f64,
-    /// How the surface moves by itself, not because the tool pushes it [m/s].
+    /// Velocity of the surface without the push of the tool [m/s].
     pub surface_velocity_m_s: Vector3<f64>,
-    /// Tip distance from the point, across the normal, within which the plane is trusted [m].
+    /// Distance of the tip from the point, across the normal, up to which the plane is trusted [m].
     pub patch_radius_m: f64,
-    /// Stays the same while the tool touches the same place.
+    /// Number that stays the same while the tool touches the same place.
     pub feature_id: u64,
 }
 
-/// State of a touch.
+/// State of the contact of a tool.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ContactMode {
-    /// Nothing within reach.
+    /// No surface within reach: no plane.
     #[default]
     Free,
-    /// Planes hold.
+    /// Planes act on the tool.
     Contact,
-    /// The blade cuts; no plane holds it back.
+    /// The blade cuts, and no plane resists it.
     Cutting,
     /// The tool holds tissue.
     Hold,
@@ -54,23 +54,23 @@ pub enum ContactMode {
 /// A local contact model of one tool.
 #[derive(Debug, Clone)]
 pub struct LocalContact {
-    /// State of the touch.
+    /// State of the contact.
     pub mode: ContactMode,
-    /// At most eight planes.
+    /// At most [`MAX_CONTACTS`] planes.
     pub planes: Vec<ContactPlane>,
-    /// Index of the body of the first plane; none when there is no plane.
+    /// Index of the body of the first plane; `None` without planes.
     pub body: Option<usize>,
     /// Topology epoch of that body.
     pub epoch: u32,
     /// The pose about which the planes are linearised.
     pub pose_used: Isometry3<f64>,
-    /// After this the client ramps down [s].
+    /// Time after which the client must fade out the force [s].
     pub validity_s: f64,
     /// Largest force to render [N].
     pub max_force_n: f64,
     /// Largest stiffness to render [N/m].
     pub max_stiffness_n_m: f64,
-    /// Step and simulated time [s] of the snapshot.
+    /// Number of the step that the snapshot shows.
     pub step: u64,
     /// Simulated time of the snapshot [s].
     pub time_s: f64,
@@ -94,7 +94,7 @@ impl Default for LocalContact {
 }
 
 impl LocalContact {
-    /// Force of the tissue on a tool with its tip at `p` [N]: the law clients evaluate.
+    /// Force of the tissue on a tool with its tip at `p` [N]. Clients evaluate the same law.
     pub fn force_at(&self, p: Vector3<f64>) -> Vector3<f64> {
         let moved = p - self.pose_used.translation.vector;
         self.planes.iter().map(|plane| plane.force_at(moved)).sum()

@@ -14,7 +14,7 @@ const BALL: ToolShape = ToolShape::Sphere { radius_m: 0.004 };
 const HAND: f64 = 800.0;
 const TISSUE: f64 = 500.0;
 
-/// A slab whose top gives way like a spring to a tool pressed on it.
+/// A slab whose top yields like a spring to a tool pressed on it.
 struct Tissue {
     vertices: Vec<SurfaceVertex>,
     rest: Vec<V>,
@@ -88,7 +88,7 @@ fn query(tip: V, velocity: V, mode: ToolMode) -> ToolQuery {
     ToolQuery { id: Arc::from("probe"), shape: BALL, pose: pose(tip), velocity_m_s: velocity, mode }
 }
 
-/// What a client feels each millisecond, and the truth.
+/// The force that a client renders each millisecond, and the true force.
 fn press(contact_stiffness: f64, tip_at: impl Fn(f64) -> V) -> Vec<(V, f64)> {
     let mut tissue = Tissue::new(contact_stiffness);
     let mut models = ContactModels::default();
@@ -126,7 +126,7 @@ fn force_starts_from_zero_and_stays_continuous_while_pressing() {
         assert!(peak > 1.5);
         for (i, pair) in felt.windows(2).enumerate() {
             let step = (pair[1].0 - pair[0].0).norm();
-            // What the hand's own motion makes within a tick, and the slew limit of a model.
+            // The step caused by the hand's own motion within a tick, plus the slew limit of a model.
             assert!(step < HAND * 6e-5 + SLEW_N_S * 0.005, "{step} N at {i} ms");
             if pair[0].0 == V::zeros() {
                 assert!(step < 0.06, "pop of {step} N at {i} ms");

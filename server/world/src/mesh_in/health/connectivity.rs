@@ -1,12 +1,12 @@
-//! How the tets of a mesh hang together.
+//! Connectivity of the tets of a mesh.
 
 use std::collections::BTreeMap;
 
 use scindo_physics::mesh::{TET_FACES, TetMesh};
 
-/// Counts over faces and boundary edges.
+/// Counts over the faces and boundary edges of a mesh.
 pub struct Connectivity {
-    /// Parts connected over faces.
+    /// Parts connected through faces.
     pub components: usize,
     /// Faces with more than two tets.
     pub overfull_faces: usize,
@@ -14,7 +14,7 @@ pub struct Connectivity {
     pub non_manifold_edges: usize,
 }
 
-/// Counts for a mesh.
+/// Computes the counts for a mesh.
 pub fn of(mesh: &TetMesh) -> Connectivity {
     let faces = sorted_faces(mesh);
     let overfull_faces = faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 2).count();
@@ -56,7 +56,7 @@ pub fn components(mesh: &TetMesh) -> (Vec<u32>, usize) {
     (component.into_iter().flatten().collect(), count as usize)
 }
 
-/// Tets across each tet's faces.
+/// For every tet the tets across its faces.
 fn face_neighbours(mesh: &TetMesh) -> Vec<Vec<u32>> {
     let mut neighbours = vec![Vec::with_capacity(4); mesh.tets.len()];
     for same in sorted_faces(mesh).chunk_by(|a, b| a.0 == b.0) {
@@ -68,7 +68,7 @@ fn face_neighbours(mesh: &TetMesh) -> Vec<Vec<u32>> {
     neighbours
 }
 
-/// Every face of every tet: sorted nodes and the tet, in order.
+/// Every face of every tet as sorted nodes and the tet, in ascending order.
 fn sorted_faces(mesh: &TetMesh) -> Vec<([u32; 3], u32)> {
     let mut faces = Vec::with_capacity(4 * mesh.tets.len());
     for (e, tet) in mesh.tets.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What is wrong with a mesh, what was repaired, and whether its size can be meant.
+//! Faults of a mesh, their repair, and the plausibility of its size.
 
 mod weld;
 pub mod connectivity;

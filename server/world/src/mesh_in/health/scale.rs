@@ -1,26 +1,26 @@
-//! Does the size of a body fit its stiffness and density, or was the file in millimetres?
+//! Checks that the size of a body fits its stiffness and density, to detect files in millimetres.
 
 use std::fmt;
 
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Largest side [m] that is taken for a body a person would press and cut.
+/// Largest side [m] plausible for a body that a person presses and cuts.
 const LARGEST_BODY_M: f64 = 3.0;
-/// Smallest longest side [m].
+/// Smallest plausible longest side [m].
 const SMALLEST_BODY_M: f64 = 1e-3;
-/// Longest side [m] that a suggested scale aims at (organs: 0.03 to 0.5 m).
+/// Longest side [m] at which a suggested scale aims (organs: 0.03 to 0.5 m).
 const TYPICAL_BODY_M: f64 = 0.15;
-/// A standing body that its own weight compresses by more than this share collapses.
+/// Compression by its own weight above which a standing body collapses.
 const COLLAPSE: f64 = 0.5;
-/// Below this compression in a step the body is so stiff for its size that it looks rigid.
+/// Compression by its own weight below which a body is so stiff for its size that it looks rigid.
 const RIGID: f64 = 1e-9;
 
-/// A suspicion about units, with the figures behind it.
+/// A suspected error in units, with the numbers behind it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum ScaleWarning {
-    /// The body is larger than anything pressed and cut: the file is likely in mm, cm or dm.
+    /// The body is larger than anything that is pressed and cut. The file is likely in mm, cm or dm.
     TooLarge {
         /// Longest side as scaled now [m].
         longest_m: f64,
@@ -41,16 +41,17 @@ pub enum ScaleWarning {
         /// Stiffness [Pa] that would keep it below 10 %.
         stiff_enough_pa: f64,
     },
-    /// A wave crosses the body in far less than a microsecond, and weight does nothing: stiffness or density is off.
+    /// A wave crosses the body in far less than a microsecond and its weight has no effect: stiffness or
+    /// density is wrong.
     Rigid {
         /// Compression under its own weight, ρ g L / E.
         sag: f64,
-        /// Time a pressure wave takes across, L / √(E/ρ) [s].
+        /// Time that a pressure wave takes to cross, L / √(E/ρ) [s].
         crossing_s: f64,
     },
-    /// A density no tissue or technical material has.
+    /// The density is that of no tissue or technical material.
     Density {
-        /// As given [kg/m³].
+        /// Density given [kg/m³].
         density_kg_m3: f64,
     },
 }
@@ -96,8 +97,8 @@ fn unit_of(scale: f64) -> &'static str {
     }
 }
 
-/// Compares the size of a body with its material. `scale` is the factor already applied to the file,
-/// so that suggestions replace it.
+/// Compares the size of a body with its material. `scale` is the factor already applied to the file;
+/// suggestions replace it.
 pub fn check_scale(
     min_m: &Vector3<f64>,
     max_m: &Vector3<f64>,
@@ -118,7 +119,7 @@ pub fn check_scale(
     }
     let sag = density_kg_m3 * STANDARD_GRAVITY * longest_m / young_pa;
     if !warnings.is_empty() {
-        // A wrong unit explains the rest.
+        // A wrong unit explains all further suspicions.
         return warnings;
     }
     if sag > COLLAPSE {
@@ -131,7 +132,7 @@ pub fn check_scale(
     warnings
 }
 
-/// The scale among m, dm, cm, mm, µm that brings the body nearest to an organ's size.
+/// The scale among m, dm, cm, mm and µm that brings the body closest to the size of an organ.
 fn suggestion(longest_m: f64, scale: f64) -> f64 {
     let in_file = longest_m / scale;
     let distance = |s: f64| (in_file * s / TYPICAL_BODY_M).ln().abs();
@@ -164,7 +165,7 @@ mod tests {
         );
         let text = warnings(16.0, 1.0, 1060.0, 1e6)[0].to_string();
         assert!(text.contains("scale = 0.01") && text.contains("centimetres"), "{text}");
-        // Scaled already, but by the wrong factor: the suggestion replaces the factor.
+        // Scaled already, but by the wrong factor. The suggestion replaces the factor.
         assert!(
             warnings(16.0, 0.1, 1060.0, 1e6)
                 .iter()

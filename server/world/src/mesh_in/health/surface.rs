@@ -1,7 +1,7 @@
-//! Cleaning a surface from a file, and telling what was wrong with it.
+//! Cleans a surface from a file, and reports what was wrong with it.
 //!
-//! Dirty surfaces are accepted (the lattice needs only inside and outside), but everything found is
-//! counted: whoever meshes an organ wants to know that its scan has holes.
+//! Dirty surfaces are accepted, since the lattice only needs inside and outside. Everything found is counted,
+//! because the user wants to know that a scan has holes.
 
 use std::collections::BTreeMap;
 
@@ -13,42 +13,42 @@ use super::weld;
 use crate::format::{MeshInError, SurfaceMesh};
 use crate::mesh_in::triangle_tree::TriangleTree;
 
-/// Largest share of useless triangles that is accepted.
+/// Largest accepted share of triangles without area.
 pub const MAX_DEGENERATE_TRIANGLES: f64 = 0.5;
 
 /// A triangle whose area is below this fraction of (longest edge)² has no direction.
 const FLAT_TRIANGLE: f64 = 1e-10;
 
-/// What was found in a surface, counted before and after cleaning.
+/// Faults of a surface, counted before and after cleaning.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SurfaceHealth {
     /// Vertices in the file.
     pub vertices: usize,
     /// Triangles in the file (polygons already split).
     pub triangles: usize,
-    /// Vertices merged with another one at the same place.
+    /// Vertices merged with another at the same place.
     pub welded_vertices: usize,
     /// Triangles without area, removed.
     pub degenerate_triangles: usize,
     /// Triangles on the same three vertices as another one, removed.
     pub duplicate_triangles: usize,
-    /// Triangles turned round to agree with their neighbours.
+    /// Triangles reversed to agree with their neighbours.
     pub flipped_triangles: usize,
-    /// The surface faced inwards and was turned inside out.
+    /// Whether the surface faced inwards and was turned inside out.
     pub was_inside_out: bool,
     /// Connected sheets.
     pub components: usize,
-    /// Edges with one triangle.
+    /// Edges with only one triangle.
     pub boundary_edges: usize,
-    /// Holes: connected chains of such edges.
+    /// Holes: connected chains of edges with only one triangle.
     pub holes: usize,
     /// Edges with more than two triangles.
     pub non_manifold_edges: usize,
-    /// Edges whose two triangles could not be made to agree (a one-sided surface).
+    /// Edges whose two triangles could not be made to agree, as on a one-sided surface.
     pub one_sided_edges: usize,
     /// Edges that pass through another triangle.
     pub self_intersections: usize,
-    /// Enclosed volume [m³]; of an open surface, that of the cone over its holes from the middle.
+    /// Enclosed volume [m³]. For an open surface, holes are closed by cones from the middle.
     pub volume_m3: f64,
     /// Smallest corner of the bounding box [m].
     pub min_m: [f64; 3],
@@ -57,21 +57,22 @@ pub struct SurfaceHealth {
 }
 
 impl SurfaceHealth {
-    /// No holes, no edges with more than two triangles, no self-intersections.
+    /// Whether there are no holes, no edges with more than two triangles and no self-intersections.
     pub fn is_clean(&self) -> bool {
         self.boundary_edges + self.non_manifold_edges + self.one_sided_edges + self.self_intersections == 0
     }
 }
 
-/// A welded, consistently and outward oriented surface, ready for questions.
+/// A welded, consistently outward oriented surface, ready for inside tests.
 pub struct CleanSurface {
     /// Name of the file.
     pub file: String,
-    /// Boxes and winding numbers.
+    /// Tree for crossings and winding numbers.
     pub tree: TriangleTree,
 }
 
-/// Welds, removes and orients; `scale` turns the file's unit into metres.
+/// Welds vertices, removes useless triangles and orients the rest. `scale` converts the file's unit to
+/// metres.
 pub fn clean_surface(
     surface: &SurfaceMesh,
     scale: f64,
@@ -101,7 +102,7 @@ fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> (Vector3<f64>, Vector3<
     points.fold(start, |(low, high), p| (low.inf(&p), high.sup(&p)))
 }
 
-/// Triangles on welded vertices, without flat and doubled ones.
+/// Triangles on welded vertices, without flat and duplicate ones.
 fn kept_triangles(
     surface: &SurfaceMesh,
     vertices: &[Vector3<f64>],
@@ -153,13 +154,14 @@ fn edges_of(triangles: &[[u32; 3]]) -> EdgeTriangles {
     edges
 }
 
-/// Makes neighbours agree (the larger area wins) and turns sheets outward; counts what it sees.
+/// Makes neighbours agree (the larger area wins) and turns sheets outward. Counts the faults it sees.
 fn orient(
     triangles: &mut [[u32; 3]],
     vertices: &[Vector3<f64>],
     middle: Vector3<f64>,
     health: &mut SurfaceHealth,
 ) {
+    // Neighbours over an edge agree if they run through it in opposite directions.
     let edges = edges_of(triangles);
     let mut neighbours: Vec<Vec<(u32, bool)>> = vec![Vec::new(); triangles.len()];
     for sharing in edges.values() {
@@ -177,6 +179,7 @@ fn orient(
 
     let sheets = sheets(&neighbours, health);
     health.components = sheets.len();
+    // Per sheet, reverse the triangles of the orientation with the smaller area.
     for sheet in &sheets {
         let area = |turned: bool| -> f64 {
             let chosen = sheet.iter().filter(|(_, t)| *t == turned);
@@ -191,8 +194,8 @@ fn orient(
     turn_outward(triangles, vertices, middle, &sheets, health);
 }
 
-/// Turns everything round when it encloses negative volume, then single sheets that do and that do
-/// not lie within another one (those are cavities).
+/// Reverses everything if it encloses negative volume. Then reverses single sheets that do and that do not
+/// lie within another one, since those within one are cavities.
 fn turn_outward(
     triangles: &mut [[u32; 3]],
     vertices: &[Vector3<f64>],
@@ -223,7 +226,7 @@ fn turn_outward(
     }
 }
 
-/// Connected sheets over edges with two triangles: (triangle, whether it disagrees with the first).
+/// Connected sheets over edges with two triangles: (triangle, whether it disagrees with the first one).
 fn sheets(neighbours: &[Vec<(u32, bool)>], health: &mut SurfaceHealth) -> Vec<Vec<(u32, bool)>> {
     let mut turned: Vec<Option<bool>> = vec![None; neighbours.len()];
     let mut sheets = Vec::new();
@@ -278,13 +281,13 @@ fn area_normal(vertices: &[Vector3<f64>], triangle: &[u32; 3]) -> Vector3<f64> {
     0.5 * (b - a).cross(&(c - a))
 }
 
-/// Volume of the cones from `apex` over all triangles [m³]; the enclosed volume when they close.
+/// Volume of the cones from `apex` over all triangles [m³]. For a closed surface this is the enclosed volume.
 pub fn enclosed_volume(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], apex: Vector3<f64>) -> f64 {
     let cone = |t: &[u32; 3]| area_normal(vertices, t).dot(&(vertices[t[0] as usize] - apex)) / 3.0;
     triangles.iter().map(cone).sum()
 }
 
-/// Edges that pass through a triangle with which they share no vertex.
+/// Number of edges that pass through a triangle with which they share no vertex.
 fn self_intersections(vertices: &[Vector3<f64>], triangles: &[[u32; 3]], tree: &TriangleTree) -> usize {
     let edges: Vec<[u32; 2]> = edges_of(triangles).into_keys().collect();
     let pierces = |&[a, b]: &[u32; 2]| {

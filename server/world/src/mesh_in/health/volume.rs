@@ -1,4 +1,4 @@
-//! Checking and repairing a tetrahedral mesh from a file, loudly.
+//! Checks and repairs a tetrahedral mesh from a file, and reports every repair.
 
 use std::collections::BTreeSet;
 
@@ -9,23 +9,23 @@ use serde::Serialize;
 use super::{connectivity, weld};
 use crate::format::{MeshInError, VolumeMesh};
 
-/// Largest share of useless tetrahedra that is removed rather than refused.
+/// Largest share of useless tetrahedra that is removed. A mesh with more is refused.
 pub const MAX_DEGENERATE_TETS: f64 = 0.01;
 
-/// What was found in a volume mesh, and its figures after repair.
+/// Faults of a volume mesh, and its measures after repair.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct VolumeHealth {
     /// Nodes of the repaired mesh.
     pub nodes: usize,
     /// Tetrahedra of the repaired mesh.
     pub tets: usize,
-    /// Tetrahedra listed inside out, turned round.
+    /// Inverted tetrahedra, reversed.
     pub flipped_tets: usize,
     /// Tetrahedra without volume, removed.
     pub degenerate_tets: usize,
     /// Tetrahedra on the same four nodes as another one, removed.
     pub duplicate_tets: usize,
-    /// Nodes merged with another one at the same place.
+    /// Nodes merged with another at the same place.
     pub welded_nodes: usize,
     /// Nodes that no tetrahedron uses, dropped.
     pub unused_nodes: usize,
@@ -45,12 +45,12 @@ pub struct VolumeHealth {
     pub min_m: [f64; 3],
     /// Largest corner of the bounding box [m].
     pub max_m: [f64; 3],
-    /// What the file holds and is not used.
+    /// Contents of the file that are not used.
     pub notes: Vec<String>,
 }
 
-/// Turns a volume mesh from a file into one that can be simulated; `scale` turns its unit into metres,
-/// `weld` joins nodes at the same place, which a mesh that was made with its cut has on purpose.
+/// Turns a volume mesh from a file into one that can be simulated. `scale` converts its unit to metres.
+/// `weld` merges nodes at the same place; a mesh generated with a cut in it has such nodes on purpose.
 pub fn repair_volume(
     volume: &VolumeMesh,
     scale: f64,
@@ -86,13 +86,13 @@ pub fn repair_volume(
             health.flipped_tets += 1;
         }
     }
-    // Merged nodes are unused now, too, but they were counted.
+    // Merged nodes are now unused too, but are already counted.
     health.unused_nodes = mesh.drop_unused_nodes().saturating_sub(health.welded_nodes);
     measure(&mesh, &mut health);
     Ok((mesh, health))
 }
 
-/// Removes tets that repeat a node, have no volume, or repeat another tet.
+/// Removes tets that repeat a node, have no volume, or duplicate another tet.
 fn remove_useless(mesh: &mut TetMesh, health: &mut VolumeHealth) {
     let mut seen = BTreeSet::new();
     let mut kept = Vec::with_capacity(mesh.tets.len());
@@ -154,7 +154,7 @@ mod tests {
         volume.tets.push(volume.tets[20]);
         let [a, b, c, _] = volume.tets[30];
         volume.tets.push([a, b, c, c]);
-        // Tet 0 gets its own copy of a node; two nodes stand alone.
+        // Tet 0 gets its own copy of a node. Two nodes belong to no tet.
         let own = volume.nodes.len() as u32;
         volume.nodes.push(volume.nodes[volume.tets[0][1] as usize]);
         volume.tets[0][1] = own;
@@ -171,7 +171,7 @@ mod tests {
         let mut volume = from_box();
         let n = volume.nodes.len() as u32;
         let beyond = |x: &Vector3<f64>| x.x > 0.5 + 1e-9;
-        // What lies beyond x = 0.5 gets nodes of its own there.
+        // The side beyond x = 0.5 gets its own nodes there.
         let nodes = volume.nodes.clone();
         volume.nodes.extend(nodes.iter());
         for tet in &mut volume.tets {

@@ -1,11 +1,11 @@
-//! Points at the same place.
+//! Finds points at the same place.
 
 use nalgebra::Vector3;
 
 /// For every point the first point at the same place, and how many points that merges.
 ///
-/// Points are the same when they round to the same multiple of `tolerance`; points astride a rounding
-/// border stay apart, which is harmless here: exporters repeat coordinates exactly.
+/// Points coincide when they round to the same multiple of `tolerance`. Points on two sides of a rounding
+/// border stay apart. This is harmless, since exporters repeat coordinates exactly.
 pub fn coincident(points: &[Vector3<f64>], tolerance: f64) -> (Vec<u32>, usize) {
     let step = if tolerance > 0.0 { tolerance } else { f64::MIN_POSITIVE };
     // Adding 0.0 turns -0.0 into 0.0.

@@ -1,8 +1,8 @@
 //! The body-centred cubic lattice: nodes, edges and tetrahedra by index arithmetic.
 //!
-//! Nodes are the corners of cubes of side h and their centres. Every pair of neighbouring centres makes
-//! a tetrahedron with each side of the square between them: two opposite edges of length h (*long*), four of
-//! √3/2 h (*short*), all tets congruent, dihedral angles 60° and 90°.
+//! Nodes are the corners and the centres of cubes of side h. Every pair of neighbouring centres makes a
+//! tetrahedron with each side of the square between them. It has two opposite edges of length h (*long*) and
+//! four of √3/2 h (*short*). All tets are congruent, with dihedral angles of 60° and 90°.
 //!
 //! # Source
 //! Labelle, Shewchuk 2007, "Isosurface stuffing", §3.
@@ -36,8 +36,8 @@ impl Edge {
 }
 
 impl Bcc {
-    /// A lattice with `cells` cubes along the longest side of the box, and a margin of cubes that lie
-    /// wholly outside it.
+    /// A lattice with `cells` cubes along the longest side of the box, and a margin of cubes entirely outside
+    /// it.
     pub fn around(low: Vector3<f64>, high: Vector3<f64>, cells: usize) -> Self {
         let size = high - low;
         let spacing = size.max() / cells as f64;
@@ -74,7 +74,7 @@ impl Bcc {
         self.origin + Vector3::from(ijk.map(|c| (c as f64 + shift) * self.spacing))
     }
 
-    /// Whether an edge is of length h (corner–corner or centre–centre).
+    /// Whether an edge has length h (corner–corner or centre–centre).
     pub fn is_long(&self, edge: Edge) -> bool {
         ((edge.a as usize) < self.n_corners()) == ((edge.b as usize) < self.n_corners())
     }
@@ -114,7 +114,8 @@ impl Bcc {
         }
     }
 
-    /// The edges that `wanted` picks, each once, in a fixed order. (All of them would be seven per node.)
+    /// The edges for which `wanted` is true, each once, in a fixed order. (There are seven edges per node in
+    /// all.)
     pub fn edges(&self, wanted: impl Fn(Edge) -> bool) -> Vec<Edge> {
         let mut edges = Vec::new();
         let mut keep = |a: u32, b: u32| {

@@ -1,4 +1,5 @@
-//! Thin parts of a surface that the lattice has lost: where the surface lies farther than a cell from its mesh.
+//! Detects thin parts of a surface that the lattice has lost: where the surface lies farther than a cell from
+//! its mesh.
 
 use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
@@ -7,10 +8,10 @@ use scindo_physics::mesh::TetMesh;
 use super::LatticeReport;
 use crate::mesh_in::health::surface::CleanSurface;
 
-/// Triangles that are looked at, at most.
+/// Most triangles that are sampled.
 const SAMPLES: usize = 4000;
 
-/// Enters how much of `surface` has no element of `mesh` within a cell.
+/// Records in `report` how much of `surface` has no element of `mesh` within a cell.
 pub fn measure(surface: &CleanSurface, mesh: &TetMesh, report: &mut LatticeReport) {
     let positions: Vec<[f32; 3]> = mesh.nodes.iter().map(|x| [x.x as f32, x.y as f32, x.z as f32]).collect();
     let skin: Vec<[u32; 3]> = mesh.boundary_faces().iter().map(|face| face.nodes).collect();

@@ -1,9 +1,9 @@
-//! A boundary that is a closed 2-manifold, and no crumbs.
+//! Makes the boundary a closed 2-manifold, and removes crumbs.
 //!
-//! Where the boundary touches itself in a node or an edge, parts would hang together by a hinge
-//! that no material has. Nodes are doubled when the tets around them fall apart into groups without
-//! common faces; what is left (an edge or a node with two fans of boundary faces but connected
-//! material) loses the smaller fan.
+//! Where the boundary touches itself in a node or an edge, parts would be connected by a hinge that no
+//! material has. Nodes are doubled where the tets around them fall into groups without common faces. In the
+//! remaining cases an edge or a node has two fans of boundary faces although the material is connected; the
+//! smaller fan is removed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use scindo_physics::mesh::TetMesh;
 use super::LatticeReport;
 use crate::mesh_in::health::connectivity::components;
 
-/// Rounds of repair; each removes tets, and two or three are typical.
+/// Most rounds of repair. Each removes tets; two or three are typical.
 const ROUNDS: usize = 64;
 
 /// Doubles nodes and removes tets until the boundary is 2-manifold.
@@ -53,8 +53,8 @@ fn remove(mesh: &mut TetMesh, doomed: impl Fn(u32) -> bool) {
     });
 }
 
-/// Gives every group of tets around a node that hangs together over faces at that node its own
-/// copy of the node; returns the number of new nodes.
+/// Gives every group of tets around a node its own copy of the node, where a group is connected over faces at
+/// that node. Returns the number of new nodes.
 fn split_nodes(mesh: &mut TetMesh) -> usize {
     let boundary: BTreeSet<u32> = mesh.boundary_faces().iter().flat_map(|f| f.nodes).collect();
     let mut stars: BTreeMap<u32, Vec<u32>> = boundary.into_iter().map(|n| (n, Vec::new())).collect();
@@ -80,9 +80,10 @@ fn split_nodes(mesh: &mut TetMesh) -> usize {
     added
 }
 
-/// Groups of tets of a star that are connected over faces containing the node.
+/// Groups of tets of a star that are connected over faces at the node.
 fn groups_around(mesh: &TetMesh, node: u32, star: &[u32]) -> Vec<Vec<u32>> {
-    // Seen from the node a tet is a triangle of the other three nodes; faces are its edges.
+    // Seen from the node, a tet is the triangle of its other three nodes, and its faces are the edges of that
+    // triangle.
     let others = |tet: u32| mesh.tets[tet as usize].iter().copied().filter(|&n| n != node);
     let mut edges: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
     for &tet in star {
@@ -94,7 +95,8 @@ fn groups_around(mesh: &TetMesh, node: u32, star: &[u32]) -> Vec<Vec<u32>> {
     connected(star, edges.values().map(Vec::as_slice))
 }
 
-/// Connected groups of `members`, where each link joins all it lists. Groups in order of their first member.
+/// Connected groups of `members`, where each link joins all members it lists. Groups are ordered by their
+/// first member.
 fn connected<'a>(members: &[u32], links: impl Iterator<Item = &'a [u32]>) -> Vec<Vec<u32>> {
     let index = |m: u32| members.binary_search(&m).unwrap_or(0);
     let mut parent: Vec<usize> = (0..members.len()).collect();
@@ -118,7 +120,7 @@ fn connected<'a>(members: &[u32], links: impl Iterator<Item = &'a [u32]>) -> Vec
     groups.into_values().collect()
 }
 
-/// Tets to remove because the boundary meets itself in an edge or in a node.
+/// Tets to remove because the boundary touches itself in an edge or a node.
 fn pinching_tets(mesh: &TetMesh) -> BTreeSet<u32> {
     let skin = mesh.boundary_faces();
     let mut by_edge: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
@@ -132,12 +134,13 @@ fn pinching_tets(mesh: &TetMesh) -> BTreeSet<u32> {
     }
     let mut doomed = BTreeSet::new();
     for ([a, b], _) in by_edge.iter().filter(|(_, faces)| faces.len() > 2) {
-        // Remove the smallest wedge of tets around the edge.
+        // Of the wedges of tets around the edge, remove the smallest.
         let wedges = wedges_around(mesh, *a, *b);
         let volume = |w: &Vec<u32>| w.iter().map(|&t| mesh.volume(t as usize)).sum::<f64>();
         let smallest = wedges.iter().min_by(|x, y| volume(x).total_cmp(&volume(y)).then(x.cmp(y)));
         doomed.extend(smallest.into_iter().flatten());
     }
+    // Edges first: removing them may already resolve the nodes.
     if !doomed.is_empty() {
         return doomed;
     }

@@ -1,8 +1,9 @@
-//! Surface → tetrahedra: a body-centred cubic lattice whose nodes and cut edges lie on the surface.
+//! Fills a surface with tetrahedra: a body-centred cubic lattice whose nodes and cut edges lie on the
+//! surface.
 //!
-//! Inside and outside come from the generalised winding number, so holes are closed by a plausible membrane and
-//! overlapping sheets do not matter; crossing points come from the triangles themselves. The
-//! boundary of the result is the skin at the resolution of the lattice: closed and 2-manifold.
+//! Inside and outside come from the generalised winding number, so holes are closed by a plausible membrane
+//! and overlapping sheets do not matter. Crossing points come from the triangles themselves. The boundary of
+//! the result is the surface at the resolution of the lattice, closed and 2-manifold.
 //!
 //! # Source
 //! Labelle, Shewchuk 2007, "Isosurface stuffing: fast tetrahedral meshes with good dihedral angles";
@@ -24,17 +25,17 @@ use crate::format::{MeshInError, SurfaceMesh};
 use crate::quantity::{digits, memory};
 use bcc::Bcc;
 
-/// Components smaller than this share of the volume are dropped (crumbs of thin parts).
+/// Share of the volume below which components are dropped as crumbs of thin parts.
 const CRUMB: f64 = 0.005;
 
-/// Shares of the time after which repair and measures begin.
+/// Shares of the total time after which repair and measurement begin.
 const REPAIR: f64 = 0.45;
 const MEASURES: f64 = 0.8;
 
-/// What came of a surface.
+/// Result of filling a surface: faults found, sizes, repairs and quality.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LatticeReport {
-    /// What was found in the surface.
+    /// Faults found in the surface.
     pub surface: SurfaceHealth,
     /// Cubes across the longest side.
     pub cells: usize,
@@ -48,15 +49,15 @@ pub struct LatticeReport {
     pub warped_nodes: usize,
     /// Lattice edges cut by the surface.
     pub cut_edges: usize,
-    /// Crossings without a triangle (holes), placed where the winding number is ½.
+    /// Crossings in holes, where no triangle is; placed where the winding number is ½.
     pub hole_crossings: usize,
-    /// Nodes doubled where the boundary touched itself.
+    /// Nodes doubled because the boundary touched itself there.
     pub split_nodes: usize,
     /// Tetrahedra removed to keep the boundary 2-manifold.
     pub removed_tets: usize,
     /// Connected parts kept.
     pub components: usize,
-    /// Connected parts dropped because they are crumbs.
+    /// Connected parts dropped as crumbs.
     pub dropped_components: usize,
     /// Smallest dihedral angle [degrees].
     pub min_dihedral_deg: f64,
@@ -68,13 +69,13 @@ pub struct LatticeReport {
     pub volume_m3: f64,
     /// (volume of the tetrahedra − volume of the surface) / volume of the surface.
     pub volume_error: f64,
-    /// Share of the surface that has no tetrahedron within a cell: thin parts that were lost.
+    /// Share of the surface without a tetrahedron within a cell, where thin parts were lost.
     pub lost_share: f64,
-    /// The point of the surface that is farthest from every tetrahedron, where a part was lost [m].
+    /// The point of the surface farthest from every tetrahedron [m], where a part was lost.
     pub lost_near_m: [f64; 3],
 }
 
-/// Fills a surface, given in the file's unit (`scale` turns it into metres), with `cells` cubes across.
+/// Fills a surface with `cells` cubes across its longest side. `scale` converts the file's unit to metres.
 pub fn lattice_from_surface(
     surface: &SurfaceMesh,
     cells: usize,
@@ -83,10 +84,10 @@ pub fn lattice_from_surface(
     lattice_observed(surface, cells, scale, &|_| ())
 }
 
-/// The same, telling `observer` how far it has come.
+/// The same, with progress reports to `observer`.
 ///
 /// # Errors
-/// What is wrong with the surface or the numbers, or that the mesh would not fit into memory.
+/// Faults of the surface or the arguments, or a mesh that would not fit into memory.
 pub fn lattice_observed(
     surface: &SurfaceMesh,
     cells: usize,
@@ -121,7 +122,7 @@ pub fn lattice_observed(
     Ok((mesh, report))
 }
 
-/// What the mesh will take, or that it is too much for this machine.
+/// The estimated cost of the mesh, or an error if this machine has too little memory for it.
 fn affordable(file: &str, health: &SurfaceHealth, cells: usize) -> Result<MeshEstimate, MeshInError> {
     let size_m = [0, 1, 2].map(|axis| health.max_m[axis] - health.min_m[axis]);
     let expected = estimate(size_m, health.volume_m3, cells);

@@ -1,4 +1,5 @@
-//! Signs, crossings, warping and splitting: lattice tets in, tets that end at the surface out.
+//! Classifies nodes, finds crossings, warps nodes and splits tets: the lattice becomes tets that end at the
+//! surface.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -8,24 +9,24 @@ use super::LatticeReport;
 use super::bcc::{Bcc, Edge};
 use crate::mesh_in::health::surface::CleanSurface;
 
-/// A crossing nearer to a node than this fraction of the edge pulls the node onto the surface.
+/// Fraction of an edge within which a crossing pulls the node onto the surface.
 ///
 /// # Source
-/// Labelle, Shewchuk 2007, Table 1: (0.24999, 0.41189) keeps every dihedral angle above 10.7° when the
-/// cut points are consistent, which crossings of real triangles are only nearly.
+/// Labelle, Shewchuk 2007, Table 1: (0.24999, 0.41189) keeps every dihedral angle above 10.7° if the cut
+/// points are consistent. Crossings of real triangles are only nearly consistent.
 const ALPHA_LONG: f64 = 0.249_99;
 const ALPHA_SHORT: f64 = 0.411_89;
 
-/// Steps of bisection where a crossing has no triangle: 2⁻²⁰ of an edge.
+/// Bisections for a crossing without a triangle, to 2⁻²⁰ of an edge.
 const BISECTIONS: usize = 20;
 
-/// Nodes between two words about how far it has come.
+/// Nodes between two progress reports.
 const PORTION: usize = 1 << 16;
-/// Shares of the time of meshing after which nodes are classified and edges crossed.
+/// Shares of the meshing time after which nodes are classified and edges crossed.
 const CLASSIFIED: f64 = 0.25;
 const CROSSED: f64 = 0.35;
 
-/// Which side of the surface a node is on.
+/// The side of the surface on which a node lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
     Inside,
@@ -42,11 +43,11 @@ struct Cut {
     from_inside: f64,
     inside: u32,
     outside: u32,
-    /// No triangle there.
+    /// Whether no triangle is there.
     in_hole: bool,
 }
 
-/// Makes the tetrahedra.
+/// Makes the tetrahedra of the lattice inside the surface.
 pub fn stuff(
     lattice: &Bcc,
     surface: &CleanSurface,
@@ -61,7 +62,7 @@ pub fn stuff(
         (0..lattice.n_nodes() as u32).map(|n| lattice.position(n)).collect();
     report.warped_nodes = warp(lattice, &cuts, &mut sides, &mut positions);
 
-    // The crossings that are left become nodes; the order of bisection is that of `Crossing::key`.
+    // The remaining crossings become nodes. Edges are bisected in the order of `Crossing::key`.
     let mut crossings: Vec<Crossing> = Vec::new();
     for cut in &cuts {
         if sides[cut.inside as usize] == Side::Inside && sides[cut.outside as usize] == Side::Outside {
@@ -83,7 +84,7 @@ pub fn stuff(
     mesh
 }
 
-/// Inside means a winding number above ½.
+/// A point is inside if its winding number is above ½.
 fn is_inside(surface: &CleanSurface, point: &Vector3<f64>) -> bool {
     surface.tree.winding_number(point) > 0.5
 }
@@ -114,11 +115,12 @@ fn cut_edges(lattice: &Bcc, surface: &CleanSurface, sides: &[Side]) -> Vec<Cut> 
         .collect()
 }
 
-/// Where the segment from inside `p` to outside `q` leaves the body, and whether it does so in a hole.
+/// Parameter at which the segment from `p` inside to `q` outside leaves the body, and whether that is in a
+/// hole.
 fn crossing(surface: &CleanSurface, p: &Vector3<f64>, q: &Vector3<f64>) -> (f64, bool) {
     let hits = surface.tree.crossings(p, q);
     let at = |t: f64| p + t * (q - p);
-    // Several hits: the first one behind which the point is outside.
+    // Of several hits, take the first behind which the point is outside.
     for (i, &(t, _)) in hits.iter().enumerate() {
         let next = hits.get(i + 1).map_or(1.0, |h| h.0);
         let is_last = i + 1 == hits.len();
@@ -131,11 +133,11 @@ fn crossing(surface: &CleanSurface, p: &Vector3<f64>, q: &Vector3<f64>) -> (f64,
         let middle = 0.5 * (low + high);
         if is_inside(surface, &at(middle)) { low = middle } else { high = middle }
     }
-    // A node that lies on the surface may be taken for either side: that is not a hole.
+    // A node on the surface may be classified either way, which is not a hole.
     (0.5 * (low + high), low > 0.0 && high < 1.0)
 }
 
-/// Moves nodes that a crossing comes close to onto it, the closest first; returns how many.
+/// Moves nodes close to a crossing onto it, the closest first. Returns the number moved.
 fn warp(lattice: &Bcc, cuts: &[Cut], sides: &mut [Side], positions: &mut [Vector3<f64>]) -> usize {
     let mut pulls: Vec<(f64, u32, usize)> = Vec::new();
     for (i, cut) in cuts.iter().enumerate() {
@@ -150,7 +152,7 @@ fn warp(lattice: &Bcc, cuts: &[Cut], sides: &mut [Side], positions: &mut [Vector
     pulls.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
     let mut warped = 0;
     for (_, node, i) in pulls {
-        // A crossing counts only while both its ends are where the lattice put them.
+        // A crossing counts only while both its ends are at their lattice positions.
         if sides[cuts[i].inside as usize] != Side::On && sides[cuts[i].outside as usize] != Side::On {
             sides[node as usize] = Side::On;
             positions[node as usize] = cuts[i].point;
@@ -164,7 +166,7 @@ fn warp(lattice: &Bcc, cuts: &[Cut], sides: &mut [Side], positions: &mut [Vector
 struct Crossing {
     edge: Edge,
     node: u32,
-    /// Edges are bisected in the order of this key: it decides the diagonals of cut faces.
+    /// Edges are bisected in the order of this key, which decides the diagonals of cut faces.
     key: (bool, f64),
 }
 
@@ -176,8 +178,8 @@ struct Splitter<'a> {
 }
 
 impl Splitter<'_> {
-    /// Adds the part of a tet that lies inside. Edges are bisected in one global order, so that
-    /// the two tets at a face split it alike.
+    /// Appends the inside part of a tet to `out`. Edges are bisected in one global order, so the two tets at
+    /// a face split it alike.
     fn inner_part(&self, tet: [u32; 4], out: &mut Vec<[u32; 4]>) {
         let side = |n: u32| self.sides[n as usize];
         if tet.iter().all(|&n| side(n) != Side::Inside) {
@@ -195,7 +197,7 @@ impl Splitter<'_> {
         self.inner_part(keeps_j, out);
     }
 
-    /// The crossed edge of a tet that is bisected first: local nodes and the crossing's node.
+    /// The crossed edge of a tet that is bisected first, as local nodes, and the node of its crossing.
     fn first_crossing(&self, tet: &[u32; 4]) -> Option<(usize, usize, u32)> {
         let mut first: Option<(&Crossing, usize, usize)> = None;
         for i in 0..4 {

@@ -10,8 +10,8 @@ fn fill(vertices: Vec<Vector3<f64>>, triangles: Vec<[u32; 3]>, cells: usize) -> 
     lattice_from_surface(&surface, cells, 1.0).unwrap()
 }
 
-/// Every edge of the boundary has two faces that run through it in opposite directions, and the faces
-/// around every boundary node form one fan.
+/// Every boundary edge has two faces that run through it in opposite directions, and the faces around every
+/// boundary node form one fan.
 fn assert_closed_manifold(mesh: &TetMesh) {
     mesh.check().unwrap();
     let skin = mesh.boundary_faces();
@@ -158,7 +158,7 @@ fn impossible_requests_are_refused() {
 proptest::proptest! {
     #![proptest_config(proptest::prelude::ProptestConfig { cases: 96, failure_persistence: None, ..Default::default() })]
 
-    /// Soups of triangles with no order at all: a sound mesh, or a refusal in words.
+    /// Unordered soups of triangles give a valid mesh, or an error message.
     #[test]
     fn any_soup_gives_a_manifold_or_an_error(
         points in proptest::collection::vec(proptest::array::uniform3(-1.0f64..1.0), 4..14),

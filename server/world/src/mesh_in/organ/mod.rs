@@ -1,7 +1,7 @@
-//! Bodies of our own making: organ-like shapes from implicit surfaces, by name.
+//! Built-in bodies: organ-like shapes from implicit surfaces, selected by name.
 //!
-//! The program triangulates them and fills the triangles with a lattice on the same path as a surface
-//! file of a user. They are made whenever they are needed, so that no file goes with the program.
+//! The program triangulates them and fills the triangles with a lattice, on the same path as a surface file
+//! of a user. They are generated whenever they are needed, so the program ships no mesh files.
 
 mod distance;
 mod shapes;
@@ -16,7 +16,7 @@ use super::lattice::{LatticeReport, lattice_observed};
 use super::progress::Observer;
 use crate::format::{MeshInError, SurfaceMesh};
 
-/// Shapes that the program makes itself; long axis along x, top towards +z, centred at x = y = 0.
+/// Built-in shapes, with their long axis along x, top towards +z, centred at x = y = 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Organ {
@@ -37,7 +37,8 @@ pub enum Organ {
     Fingertip,
 }
 
-/// A signed distance [m], the box [m] it lies in, and the side of the cubes it is triangulated on [m].
+/// A signed distance [m], the box that contains the shape [m], and the side of the cubes that triangulate it
+/// [m].
 struct Solid {
     distance: fn(&Vector3<f64>) -> f64,
     low: [f64; 3],
@@ -46,7 +47,7 @@ struct Solid {
 }
 
 impl Organ {
-    /// Every shape.
+    /// Every shape, in the order of the enumeration.
     pub const ALL: [Self; 7] = [
         Self::Liver,
         Self::Kidney,
@@ -57,7 +58,7 @@ impl Organ {
         Self::Fingertip,
     ];
 
-    /// The name in scenes and on the command line.
+    /// Name in scenes and on the command line, in kebab case.
     pub fn name(self) -> &'static str {
         match self {
             Self::Liver => "liver",
@@ -70,7 +71,7 @@ impl Organ {
         }
     }
 
-    /// The shape with this name.
+    /// The shape with this name, if there is one.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|organ| organ.name() == name)
     }
@@ -88,24 +89,24 @@ impl Organ {
         Solid { distance, low, high, spacing_m }
     }
 
-    /// Its triangulated skin [m].
+    /// Its triangulated surface [m].
     pub fn surface(self) -> SurfaceMesh {
         let Solid { distance, low, high, spacing_m } = self.solid();
         triangulate(self.name(), &distance, low.into(), high.into(), spacing_m)
     }
 
-    /// The shape filled with a lattice of `cells` cubes along its longest side [m].
+    /// The shape filled with a lattice of `cells` cubes along its longest side. Positions are in metres.
     ///
     /// # Errors
-    /// `cells` outside the range of the lattice.
+    /// If `cells` is outside the range of the lattice.
     pub fn mesh(self, cells: usize) -> Result<(TetMesh, LatticeReport), MeshInError> {
         self.observed(cells, &|_| ())
     }
 
-    /// The same, telling `observer` how far it has come.
+    /// The same, with progress reports to `observer`.
     ///
     /// # Errors
-    /// As [`Organ::mesh`].
+    /// Those of [`Organ::mesh`].
     pub fn observed(
         self,
         cells: usize,

@@ -1,6 +1,6 @@
-//! The shapes: each a signed distance, the box around it and how finely it is triangulated.
+//! The shapes, each a signed distance.
 //!
-//! All lie with their long axis along x, their top towards +z, centred at x = y = 0.
+//! All have their long axis along x and their top towards +z, and are centred at x = y = 0.
 
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ pub fn liver(x: &Vector3<f64>) -> f64 {
 /// A bean with a hollow on its inner side (+y) and a growth on top of one end, 112 × 66 × 48 mm, from
 /// z = 0 up.
 pub fn kidney(x: &Vector3<f64>) -> f64 {
-    // Bent about z: the ends lie further along +y than the middle.
+    // Bent about z: the ends lie farther along +y than the middle.
     let bent = at(x.x, x.y - 5.0 * x.x * x.x + 0.008, x.z);
     let bean = ellipsoid(&bent, at(0.0, 0.0, 0.022), at(0.056, 0.029, 0.022));
     let hilum = ellipsoid(x, at(0.0, 0.030, 0.022), at(0.014, 0.016, 0.009));
@@ -79,7 +79,7 @@ pub fn tendon(x: &Vector3<f64>) -> f64 {
 /// A half dome with winding folds, 132 × 92 × 62 mm, flat below at z = 0.
 pub fn brain(x: &Vector3<f64>) -> f64 {
     let dome = ellipsoid(x, at(0.0, 0.0, 0.016), at(0.066, 0.046, 0.046));
-    // Folds about 16 mm apart that wind and meet; none on the underside.
+    // Winding folds about 16 mm apart that meet; none on the underside.
     let k = 2.0 * PI / 0.034;
     let (u, v, w) = (k * x.x, k * x.y, k * x.z);
     let warp = 1.3 * (0.45 * u + 1.0).sin() + 0.9 * (0.6 * v).cos();
