@@ -140,7 +140,7 @@ impl Dynamics {
         a: &mut [Vector3<f64>],
     ) {
         let rayleigh = self.material.rayleigh;
-        self.model.internal_forces(x, &mut self.force);
+        self.model.internal_forces_by(team, x, &mut self.force);
         if rayleigh.stiffness_s > 0.0 {
             self.model.add_rotated_stiffness_times(rayleigh.stiffness_s, x, v, &mut self.force);
         }

@@ -38,7 +38,7 @@ impl Dynamics {
             report.notice = Some(why);
             return;
         }
-        let (elastic, kinetic) = (self.model.energy(&state.x), self.mass.kinetic(&state.v));
+        let (elastic, kinetic) = (self.model.energy_by(team, &state.x), self.mass.kinetic(&state.v));
         self.ledger.begin(kinetic + elastic + self.load_energy(&state.x));
         let (scheme, notice) = self.choose(scheme, state, inputs);
         let underheld = self.free_motions.first().map(|&motion| Notice::Underheld { motion, driven: false });
@@ -169,7 +169,7 @@ impl Dynamics {
             self.acceleration[c] = increment.A * (x - self.x_a[c]);
         }
         report.kinetic_j = self.mass.kinetic(&self.next.v);
-        let elastic_j = self.model.energy(&self.next.x);
+        let elastic_j = self.model.energy_by(team, &self.next.x);
         report.elastic_j = Some(elastic_j);
         finite(&self.next) && (report.kinetic_j + elastic_j).is_finite()
     }
