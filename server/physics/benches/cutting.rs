@@ -1,13 +1,14 @@
-//! What cutting costs: `cargo bench -p scindo-physics --bench cutting`; `-- --quick` runs everything
-//! once on a small body. One thread.
+//! Measures what cutting costs: `cargo bench -p scindo-physics --bench cutting`. `-- --quick` runs
+//! everything once on a small body. One thread.
 //!
-//! - Insertion: a sweep through 1 000 elements of a body of 20 870 tets, topology alone and the whole
-//!   body with all that its next step needs; the same in a body and in one four times as long, and in
-//!   advances of a hundredth; building the uncut state.
-//! - Steps: what an enriched element (one that a cut divides) costs beside a plain one, and what a step
-//!   costs after 100 cuts beside the growth of the copies. Every solve makes the same number of
-//!   iterations, and the bodies compared are stepped in turns, so that a busy moment of the machine hits
-//!   all of them.
+//! - Insertion: a sweep through 1 000 elements of a body of 20 870 tets. Measured are the topology alone,
+//!   the whole body with all that its next step needs, the same sweep in a body and in one four times as
+//!   long, the same cut in a hundred advances, and building the uncut state.
+//! - Steps: the cost of an enriched element (one that a cut divides) against a plain one, and the cost of
+//!   a step after 100 cuts against the growth of the copies. Every solve makes the same number of
+//!   iterations. The bodies compared are stepped in turns, so that a busy moment of the machine hits all
+//!   of them.
+//! - Skin: the time a skin takes to follow a cut, early and late in a hundred of them.
 
 use std::time::Instant;
 
@@ -69,7 +70,7 @@ fn block(cells: usize, tets: usize) -> TetMesh {
 fn body(mesh: &TetMesh, law: Law) -> Body {
     let solver = PcgSettings { iterations: ITERATIONS, tolerance: 0.0 };
     let settings = BodySettings { solver, threads: 1, ..BodySettings::default() };
-    // Held on a face that every cut reaches: of a part in free fall nothing would be left to solve.
+    // Held on faces that every cut reaches: a part in free fall would leave the solver nothing to do.
     let held = |n: &u32| mesh.nodes[*n as usize].z == 0.0 || mesh.nodes[*n as usize].y == 0.0;
     let clamp: Vec<u32> = (0..mesh.nodes.len() as u32).filter(held).collect();
     let mut body = Body::new(mesh.clone(), material(law), settings).expect("the material is usual");
@@ -77,12 +78,12 @@ fn body(mesh: &TetMesh, law: Law) -> Body {
     body
 }
 
-/// A blade along y at the place `x`; the plane it moves in is oblique to the lattice.
+/// A blade along y at `x` [m]; the plane it moves in is oblique to the lattice.
 fn blade(x: f64) -> [Vector3<f64>; 2] {
     [Vector3::new(x, -0.01, 0.0521 + 0.1 * x), Vector3::new(x, 0.11, 0.0532 + 0.1 * x)]
 }
 
-/// How far [m] that blade goes to cut about as many elements as are wanted.
+/// Position [m] at which that blade has cut about `elements` elements, by bisection.
 fn reach(mesh: &TetMesh, elements: usize) -> f64 {
     let uncut = CutMesh::new(mesh.clone()).expect("a block can be cut");
     let (mut short, mut long) = (0.0, 1.1 * SIZE_M);
@@ -107,7 +108,7 @@ fn insertion(mesh: &TetMesh, elements: usize, repeats: usize) {
     let x = uncut.rest_positions();
     let mut cut = 0;
     let topology = best_and_median(repeats, || {
-        // Not a clone: that would have no room left for a cut.
+        // Not a clone: a clone has no spare capacity for the cut.
         let mut mesh = CutMesh::new(mesh.clone()).expect("a block can be cut");
         let (report, seconds) = timed(|| mesh.sweep(&x, &sweep, 1));
         cut = report.expect("the sweep is well formed").elements_cut;
@@ -131,8 +132,9 @@ fn insertion(mesh: &TetMesh, elements: usize, repeats: usize) {
     }
 }
 
-/// A cut costs what it cuts: the same sweep in a body and in one four times as long, in turns; and a
-/// second one beside it, which makes the stiffness of some places be arranged anew.
+/// A cut should cost what it cuts, whatever the size of the body: the same sweep in a body and in one
+/// four times as long, in turns. A second sweep beside the first forces part of the stiffness to be
+/// arranged anew.
 fn longer_body(cells: usize, elements: usize, repeats: usize) {
     let block = |length: usize| {
         let size = Vector3::new(length as f64 * SIZE_M, SIZE_M, SIZE_M);
@@ -190,7 +192,7 @@ fn growth(mesh: &TetMesh, repeats: usize) {
     say("one advance of a hundred, whole body", advance, &format!("slowest {:.3} ms", slowest * 1e3));
 }
 
-/// Times of a step of several bodies [s], taken in turns: best and median of each.
+/// Times [s] of a step of several bodies stepped in turns: best and median of each. Two rounds warm up.
 fn steps(bodies: &mut [&mut Body], repeats: usize) -> Vec<[f64; 2]> {
     let mut seconds = vec![Vec::new(); bodies.len()];
     for _ in 0..repeats + 2 {
@@ -203,9 +205,10 @@ fn steps(bodies: &mut [&mut Body], repeats: usize) -> Vec<[f64; 2]> {
     seconds.into_iter().map(|mut s| sorted(s.split_off(2))).collect()
 }
 
-/// Planes through every second layer of cells: the more elements are enriched the surer the quotient.
-/// The linear law also by the tets: assembled there are no elements, and an enriched one shows as more
-/// pairs of neighbours; its cost is then given in plain elements by the tets, too.
+/// Cost of a step after planes have cut every second layer of cells: the more elements are enriched, the
+/// more certain is the quotient. The linear law is measured matrix-free and assembled. An assembled
+/// stiffness has no elements: an enriched one only adds pairs of neighbours. Its cost is therefore also
+/// given in plain elements of the matrix-free product.
 ///
 /// # Source
 /// What an enriched element costs over a standard one: Jeřábková 2007, §3.3 (2.2 to 4 ×, by operations).
@@ -287,7 +290,8 @@ fn hundred_cuts(mesh: &TetMesh, repeats: usize) {
     }
 }
 
-/// Groups of pieces of one element with the same copies: what is computed with.
+/// Number of groups of pieces of one element that share all four copies; a kernel computes one lane per
+/// group.
 fn lanes(body: &Body) -> usize {
     let mut groups: Vec<(u32, [u32; 4])> =
         body.pieces().iter().map(|piece| (piece.element, piece.copies)).collect();
@@ -296,8 +300,8 @@ fn lanes(body: &Body) -> usize {
     groups.len()
 }
 
-/// A body with an element for every piece of another and a node for every copy, numbered along the
-/// longest axis: the same work per iteration without any cut.
+/// An uncut body with an element for every piece of `cut` and a node for every copy, numbered along the
+/// longest axis. An iteration does the same work without any cut.
 fn body_of_pieces(cut: &Body, law: Law) -> Body {
     let x = cut.rest_positions();
     let mut order: Vec<u32> = (0..x.len() as u32).collect();
@@ -312,7 +316,7 @@ fn body_of_pieces(cut: &Body, law: Law) -> Body {
     body(&TetMesh { nodes, tets }, law)
 }
 
-/// What a skin needs to follow a cut: a hundred equal ones side by side, the first ten beside the last.
+/// Time a skin takes to follow a cut: a hundred equal cuts side by side, the first ten against the last.
 fn skin(mesh: &TetMesh, repeats: usize) {
     let settings = SkinSettings { divisions: 3, snapping: 0.25 };
     let top = mesh.nodes.iter().fold(0.0_f64, |top, node| top.max(node.z));

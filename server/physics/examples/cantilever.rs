@@ -1,4 +1,4 @@
-//! A cantilever: a bar that is held at one end sags under its weight until it rests, then it is cut.
+//! A cantilever: a bar held at one end sags under its weight until it rests. Then it is cut.
 //!
 //! `cargo run -p scindo-physics --example cantilever`
 

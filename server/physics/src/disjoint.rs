@@ -1,7 +1,7 @@
-//! Disjoint sets of numbered things (union–find): `root[a]` is another member of the set of `a`, or `a`
-//! itself where it stands for the set. The smallest member stands for it.
+//! Disjoint sets of numbered items (union–find). `root[a]` is another member of the set of `a`, or `a`
+//! itself if it represents the set. The smallest member represents it.
 
-/// The member that stands for the set of `a`; the way there becomes shorter.
+/// The representative of the set of `a`; shortens the path to it.
 pub fn find(root: &mut [u32], mut a: u32) -> u32 {
     while root[a as usize] != a {
         root[a as usize] = root[root[a as usize] as usize];
@@ -10,7 +10,7 @@ pub fn find(root: &mut [u32], mut a: u32) -> u32 {
     a
 }
 
-/// Unites the sets of `a` and `b`; the member that stands for both.
+/// Unites the sets of `a` and `b`. Returns their common representative.
 pub fn join(root: &mut [u32], a: u32, b: u32) -> u32 {
     let (a, b) = (find(root, a), find(root, b));
     root[a.max(b) as usize] = a.min(b);

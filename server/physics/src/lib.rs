@@ -1,11 +1,12 @@
 //! Continuum mechanics of one deformable, cuttable body.
 //!
-//! Modules stand in the order of the data: a [`mesh`] says where the material is at rest, a
-//! [`material`] what it is made of, an [`element`] how it resists, a [`cut`] which pieces and copies
-//! there are ([`snap`] cuts the mesh itself instead, [`enrichment`] looks at one cut element in the bases of the literature), an [`assembly`]
-//! the forces and matrices of any element with any law, an [`operator`] the fast way from
-//! displacements to forces, a [`solver`] inverts that, an
-//! [`integrator`] makes a step of it, and a [`body`] holds all of this together for the world.
+//! Modules stand in the order of the data. A [`mesh`] is the material at rest, a [`material`] its law and
+//! constants, an [`element`] its resistance to deformation. [`cut`] divides elements into pieces and
+//! nodes into copies; [`snap`] cuts the mesh itself instead. A [`skin`] is a finer surface that follows
+//! the cuts, and [`enrichment`] views one cut element in the bases of the literature. An [`assembly`]
+//! gives the forces and matrices of any element with any law; an [`operator`] is the fast way from
+//! displacements to forces. A [`solver`] inverts it, and an [`integrator`] makes a step of it. A [`body`]
+//! holds all of this together for the world.
 //!
 //! # Invariants
 //! No input or output, no clock, no thread that outlives its owner, no global state; the result of

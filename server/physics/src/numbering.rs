@@ -1,22 +1,22 @@
-//! Where the members of a short list are, out of very many numbered things.
+//! Positions of numbered items in a short list, found without a search.
 
 use crate::reserve::resize_reserving;
 
-/// The place of things in a list. It is never cleared: a place counts if the list has the thing there.
+/// Position of every item in a list. It is never cleared: a position is valid if the list has the item there.
 #[derive(Clone, Debug, Default)]
 pub struct Numbering {
     place: Vec<u32>,
 }
 
 impl Numbering {
-    /// Room for things with numbers below `n`, and half as many again.
+    /// Reserves memory for items with numbers below `n`, and for half as many again.
     pub fn with_capacity(n: usize) -> Self {
         let mut place = Vec::new();
         resize_reserving(&mut place, n, 0);
         Self { place }
     }
 
-    /// Takes down where the things of `list` from `first` on are.
+    /// Notes the positions of the items of `list` from `first` on.
     pub fn note(&mut self, list: &[u32], first: usize) {
         for (place, &thing) in (first as u32..).zip(&list[first..]) {
             if thing as usize >= self.place.len() {
@@ -26,14 +26,15 @@ impl Numbering {
         }
     }
 
-    /// Where the thing is in `list`, all of which was noted.
+    /// Position of `thing` in `list`, all of which must have been noted.
     #[inline]
     pub fn find(&self, list: &[u32], thing: u32) -> Option<usize> {
         let place = *self.place.get(thing as usize)? as usize;
         (list.get(place) == Some(&thing)).then_some(place)
     }
 
-    /// Appends the thing to `list`, all of which was noted, unless it is in it; says whether it was not.
+    /// Appends `thing` to `list`, all of which must have been noted, unless it is there. Returns whether
+    /// it was appended.
     pub fn insert(&mut self, list: &mut Vec<u32>, thing: u32) -> bool {
         if self.find(list, thing).is_some() {
             return false;
@@ -57,7 +58,7 @@ mod tests {
         assert_eq!(list, [9, 4, 7]);
         let found = [9, 4, 7, 0, 100].map(|thing| numbering.find(&list, thing));
         assert_eq!(found, [Some(0), Some(1), Some(2), None, None]);
-        // Another list: what was noted for the first one does not count.
+        // Another list: positions noted for the first one are not valid in it.
         numbering.note(&[7], 0);
         assert_eq!([9, 7, 4].map(|thing| numbering.find(&[7], thing)), [None, Some(0), None]);
     }

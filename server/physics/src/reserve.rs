@@ -1,9 +1,9 @@
-//! Room in lists for what cuts add.
+//! Spare capacity of vectors, for what cuts add.
 //!
-//! Memory that nobody has written to has no pages yet, and a cut that is made within milliseconds would
-//! wait for each of them. So room is written to when it is made.
+//! Memory that was never written to has no pages yet, and a cut made within milliseconds would wait for
+//! each of them. So spare capacity is written to when it is reserved.
 
-/// Gives a vector `n` entries; where it has to move, to a place with room for half as many again.
+/// Resizes `v` to `n` entries. If it has to move, it gets spare capacity for half as many again.
 pub fn resize_reserving<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
     if n > v.capacity() {
         v.reserve_exact(n + n / 2 - v.len());
@@ -12,7 +12,7 @@ pub fn resize_reserving<T: Clone>(v: &mut Vec<T>, n: usize, value: T) {
     v.resize(n, value);
 }
 
-/// Replaces all entries of a vector; where it has to move, it gets the same room.
+/// Replaces all entries of `v`. If it has to move, it gets spare capacity for half as many again.
 pub fn refill<T: Clone>(v: &mut Vec<T>, mut entries: impl ExactSizeIterator<Item = T>) {
     v.clear();
     if entries.len() > v.capacity()
@@ -25,7 +25,7 @@ pub fn refill<T: Clone>(v: &mut Vec<T>, mut entries: impl ExactSizeIterator<Item
     v.extend(entries);
 }
 
-/// Room for half as many entries again.
+/// Adds spare capacity for half as many entries again.
 pub fn reserve_half_again<T: Copy>(entries: &mut Vec<T>) {
     let n = entries.len();
     if let Some(&last) = entries.last() {
@@ -35,7 +35,7 @@ pub fn reserve_half_again<T: Copy>(entries: &mut Vec<T>) {
     }
 }
 
-/// An empty list with room for `n` entries.
+/// An empty vector with spare capacity for `n` entries.
 pub fn reserved<T: Copy>(n: usize, entry: T) -> Vec<T> {
     let mut entries = Vec::new();
     entries.resize(n, entry);

@@ -1,11 +1,10 @@
 //! A small team of threads that works on one step together.
 //!
-//! The caller's thread is member 0; the others spin briefly between phases and sleep between steps.
-//! Every phase is a fixed list of tasks. Each member starts on a range of its own, which keeps its
-//! part of the data near its core, and then helps with the others': a member that the machine has no
-//! time for delays nobody. Tasks write only their own blocks and partial results are summed in task
-//! order, so the result depends neither on the number of members nor on who did what. No phase
-//! allocates.
+//! The caller's thread is member 0; the others spin briefly between phases and sleep between steps. Every
+//! phase is a fixed list of tasks. Each member starts on a range of its own, which keeps its part of the
+//! data near its core, and then helps with the ranges of the others. A member that gets no processor time
+//! therefore delays nobody. Tasks write only their own blocks, and partial results are summed in task
+//! order. The result depends neither on the number of members nor on who did what. No phase allocates.
 
 #![allow(unsafe_code)] // sharing a borrowed closure and disjoint blocks with persistent threads
 
@@ -16,7 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 
-/// Idle members look this often for the next phase before they sleep (about 30 µs).
+/// Idle members look for the next phase this many times before they sleep (about 30 µs).
 const SPINS_BEFORE_SLEEP: u32 = 4_000;
 /// The caller gives up its time slice after this many looks at members that are still busy.
 const SPINS_BEFORE_YIELD: u32 = 2_000;
@@ -33,7 +32,7 @@ type Job = *const (dyn Fn(usize) + Sync);
 
 #[derive(Debug)]
 struct Shared {
-    /// What every member runs in the current phase; written only while nobody is inside.
+    /// Job that every member runs in the current phase; written only while nobody is inside.
     job: UnsafeCell<Option<Job>>,
     /// Number of the phase (upper half), [`CLOSED`], and how many members are inside (lower bits).
     gate: AtomicU64,
@@ -48,7 +47,7 @@ struct Shared {
 #[repr(align(128))]
 struct Counter(AtomicUsize);
 
-/// Nobody may enter the phase any more.
+/// Flag of the gate: nobody may enter the phase any more.
 const CLOSED: u64 = 1 << 31;
 const INSIDE: u64 = CLOSED - 1;
 const PHASE: u64 = 1 << 32;
@@ -78,7 +77,7 @@ impl Team {
         Ok(team)
     }
 
-    /// What runs on the team looks at `flag` and ends early when it is raised.
+    /// Sets the flag that work on the team checks; the work ends early when it is raised.
     pub fn set_stop_flag(&mut self, flag: Arc<AtomicBool>) {
         self.stop = Some(flag);
     }
@@ -102,6 +101,7 @@ impl Team {
         }
         let shared = Arc::clone(&self.shared);
         self.run(&|member| {
+            // The own range first, then what the others have left.
             for helped in (member..threads).chain(0..member) {
                 loop {
                     let t = shared.next[helped].0.fetch_add(1, Ordering::Relaxed);
@@ -115,7 +115,7 @@ impl Team {
         });
     }
 
-    /// Runs `job(0)` here and `job(member)` on every member that comes in time.
+    /// Runs `job(0)` here and `job(member)` on every member that enters before the caller is done.
     fn run(&mut self, job: &(dyn Fn(usize) + Sync)) {
         if self.members.is_empty() {
             return job(0);
@@ -132,6 +132,7 @@ impl Team {
             member.thread().unpark();
         }
         let own = catch_unwind(AssertUnwindSafe(|| job(0)));
+        // Late members stay outside; `job` must outlive those inside.
         shared.gate.fetch_or(CLOSED, Ordering::Relaxed);
         let mut spins = 0_u32;
         while shared.gate.load(Ordering::Acquire) & INSIDE > 0 {
@@ -195,12 +196,12 @@ impl Shared {
     }
 }
 
-/// Something that can be taken apart into blocks that do not overlap.
+/// A value that can be divided into blocks that do not overlap.
 ///
 /// # Safety
 /// Parts of different numbers must not overlap.
 pub unsafe trait Blocks: Sync {
-    /// One block.
+    /// One block; a mutable slice or a tuple of them.
     type Part;
     /// Number of blocks.
     fn count(&self) -> usize;
@@ -220,7 +221,7 @@ pub struct BlocksMut<'a, T> {
     slice: PhantomData<&'a mut [T]>,
 }
 
-/// Takes `slice` apart into blocks of `size`.
+/// Divides `slice` into blocks of `size` entries.
 pub fn blocks<T: Send>(slice: &mut [T], size: usize) -> BlocksMut<'_, T> {
     BlocksMut { start: slice.as_mut_ptr(), length: slice.len(), size: size.max(1), slice: PhantomData }
 }
@@ -253,7 +254,7 @@ pub struct RangesMut<'a, T> {
     slice: PhantomData<&'a mut [T]>,
 }
 
-/// Takes the ranges [first\[i\], first\[i + 1\]) out of `slice`; `first` must ascend and end within it.
+/// Divides `slice` into the ranges [first\[i\], first\[i + 1\]); `first` must ascend and end within it.
 pub fn ranges<'a, T: Send>(slice: &'a mut [T], first: &'a [u32]) -> RangesMut<'a, T> {
     assert!(first.is_sorted() && first.last().is_none_or(|&end| end as usize <= slice.len()));
     RangesMut { start: slice.as_mut_ptr(), first, slice: PhantomData }

@@ -1,4 +1,4 @@
-//! What the machine could do at best: memory bandwidth by working set, and multiply-adds.
+//! Limits of the machine: memory bandwidth by working set, and multiply-adds.
 
 use std::time::Instant;
 
@@ -8,16 +8,16 @@ use scindo_physics::team::{Team, blocks};
 /// Measured limits of this machine for one number of threads.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine {
-    /// Triad a = b + s c [byte/s] with all three arrays in the second-level cache, in the
-    /// third-level cache, and in memory.
+    /// Bandwidth of the triad a = b + s c [byte/s], with all three arrays in the second-level cache, in
+    /// the third-level cache, and in memory.
     pub bandwidth: [f64; 3],
     /// Multiply-adds in registers [flop/s].
     pub flops: f64,
 }
 
-/// Bytes of the three arrays together that stand for each level.
+/// Total size [byte] of the three arrays of the triad that measures each level.
 const WORKING_SETS: [usize; 3] = [384 << 10, 8 << 20, 192 << 20];
-/// Working sets up to these sizes [byte] count as within the second and third level.
+/// Largest working sets [byte] that fit the second-level and the third-level cache.
 const LEVELS: [usize; 2] = [512 << 10, 16 << 20];
 pub const LEVEL_NAMES: [&str; 3] = ["L2", "L3", "DRAM"];
 
@@ -29,7 +29,7 @@ impl Machine {
         Self { bandwidth, flops: multiply_adds(&mut team, if quick { 3 } else { 25 }) }
     }
 
-    /// Level that holds `bytes`, as an index.
+    /// Index into [`LEVEL_NAMES`] of the level that holds `bytes`; each thread has a second-level cache.
     pub fn level(bytes: usize, threads: usize) -> usize {
         LEVELS
             .iter()
@@ -38,7 +38,8 @@ impl Machine {
             .count()
     }
 
-    /// The least time [s] for `bytes` from a working set of `working_set` bytes and `flops`.
+    /// Least time [s] to stream `bytes` from a working set of `working_set` bytes or to make `flops`
+    /// operations, whichever takes longer.
     pub fn roof(&self, bytes: f64, working_set: usize, flops: f64, threads: usize) -> f64 {
         (bytes / self.bandwidth[Self::level(working_set, threads)]).max(flops / self.flops)
     }

@@ -1,9 +1,10 @@
-//! What a step costs, against what the machine could do: `cargo bench -p scindo-physics --bench bar`.
-//! `-- --quick` makes short runs that only check that the figures exist and the motion is right.
+//! Compares the cost of a step with the limits of the machine: `cargo bench -p scindo-physics --bench bar`.
+//! `-- --quick` makes short runs, which only check that the figures exist and the motion is right.
 //!
-//! All lines are measured in turns, so that a busy moment of the machine hits all of them; best is
-//! what the code can do, median and p99 what it did here. The roof is the least time that the bytes
-//! an iteration streams (at the bandwidth of the cache that holds them) or its operations would take.
+//! Lines are measured in turns, so that a busy moment of the machine hits all of them. The best time is
+//! what the code can do; median and p99 are what it did here. The roof is the least time that an
+//! iteration could take: that of streaming its bytes (at the bandwidth of the cache that holds them) or
+//! of its operations.
 
 #![allow(clippy::disallowed_methods, clippy::unwrap_used)] // a bench reads the clock
 #![allow(unsafe_code)] // multiply-adds in registers
@@ -34,20 +35,20 @@ const SOFT: Material = Material {
 };
 const LINEAR: Material = Material { law: Law::Linear, ..SOFT };
 const DOWN: Vector3<f64> = Vector3::new(0.0, -9.81, 0.0);
-/// Vector entries of 16 bytes that one solver iteration reads or writes per copy, and the mass.
+/// Bytes per copy that one solver iteration reads or writes: 13 vector entries of 16 bytes, and the mass.
 const VECTOR_BYTES: usize = 13 * 16 + 4;
 
 /// One line of the report.
 struct Line {
     name: String,
     threads: usize,
-    /// Makes one measurement: number of repetitions inside, and seconds of all of them.
+    /// Makes one measurement. Returns the number of repetitions in it and their total time [s].
     run: Box<dyn FnMut() -> (f64, f64)>,
     /// Seconds per repetition.
     times: Vec<f64>,
-    /// Pieces whose stiffness is applied once per repetition, if that is what is measured.
+    /// Number of pieces whose stiffness one repetition applies or updates; 0 if it does neither alone.
     pieces: usize,
-    /// Bytes that one repetition streams, the working set, and operations.
+    /// Per repetition: bytes streamed, working set [byte], operations [flop].
     work: (f64, usize, f64),
     target: &'static str,
 }
@@ -61,6 +62,7 @@ fn main() {
         let flops = machine.flops * 1e-9;
         println!("  {threads} thread(s): {l2:.0} / {l3:.0} / {dram:.1} GB/s, {flops:.0} GFLOP/s");
     }
+    // From whole steps down to their parts: solver iterations, the product with K, its update.
     let mut lines = Vec::new();
     for threads in [1, 2] {
         lines.push(steps("bar, 10 iterations", bar(SOFT, 10, 0.0, threads, false), threads, "1.5 / 1.0 ms"));
@@ -97,6 +99,7 @@ fn main() {
     // A word that is not a flag selects lines by name.
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     lines.retain(|line| wanted.is_empty() || wanted.iter().any(|word| line.name.contains(word.as_str())));
+    // In turns, each for at least 20 ms, so that a busy moment hits every line.
     for _ in 0..if quick { 3 } else { 60 } {
         for line in &mut lines {
             let start = Instant::now();
@@ -178,7 +181,7 @@ fn block(threads: usize) -> Body {
     clamped(boxed([1.0, 0.42, 0.08], [50, 21, 4]), LINEAR, settings)
 }
 
-/// Work of one iteration: bytes, working set, operations.
+/// Work of one solver iteration: bytes streamed, working set [byte], operations [flop].
 fn iteration_work(elastic: &Elastic, n: usize) -> (f64, usize, f64) {
     let bytes = elastic.bytes() + n * VECTOR_BYTES;
     let stiffness = if elastic.assembled() {
@@ -189,13 +192,13 @@ fn iteration_work(elastic: &Elastic, n: usize) -> (f64, usize, f64) {
     (bytes as f64, elastic.bytes() + n * (9 * 16), stiffness + (n * 50) as f64)
 }
 
-/// Milliseconds of whole steps.
+/// Times whole steps.
 fn steps(name: &str, mut body: Body, threads: usize, target: &'static str) -> Line {
     let (tets, n) = (body.pieces().len(), body.positions().len());
     let mut elastic = updated(&body, OperatorChoice::Auto, &mut Team::new(1).unwrap());
     elastic.set_choice(OperatorChoice::Auto);
     let (bytes, working_set, flops) = iteration_work(&elastic, n);
-    // What the warm-up needs is what a step of the measurement needs.
+    // The last step of the warm-up tells how many iterations a measured step makes.
     let mut iterations = 0;
     for _ in 0..5 {
         iterations = body.step(0.04, DOWN, &[]).iterations;
@@ -227,7 +230,7 @@ fn updated(body: &Body, choice: OperatorChoice, team: &mut Team) -> Elastic {
     elastic
 }
 
-/// Solver iterations on the static linear cube of 11³ × 6 tets, clamped at one side.
+/// Times solver iterations on the static linear cube of 11³ × 6 tets, clamped at one side.
 fn static_cube(threads: usize) -> Line {
     const ITERATIONS: u32 = 200;
     let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(0.1), [11; 3], BoxPattern::Tet6);
@@ -282,7 +285,7 @@ fn static_cube(threads: usize) -> Line {
     }
 }
 
-/// y = K̂ x over and over.
+/// Times y = K̂ x.
 fn applications(
     name: &str,
     mesh: TetMesh,
@@ -309,7 +312,7 @@ fn applications(
     Line { name, threads, run: Box::new(run), times: Vec::new(), pieces, work, target }
 }
 
-/// Rotations, forces, gradients and diagonal blocks.
+/// Times an update: rotations, forces, gradients and diagonal blocks.
 fn updates(mesh: TetMesh, choice: OperatorChoice) -> Line {
     let body = Body::new(mesh, SOFT, BodySettings::default()).unwrap();
     let (pieces, n) = (body.pieces().len(), body.positions().len());

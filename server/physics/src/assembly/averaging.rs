@@ -5,40 +5,42 @@
 //! (1 − κ) λ · mean of θ̄ over its four copies, and couples every two copies around a third.
 //!
 //! # Source
-//! Bonet, Burton 1998, "A simple average nodal pressure tetrahedral element"; the share κ that stays
-//! with the elements, of a λ of at most 25 μ: Puso, Solberg 2006, "A stabilized nodally integrated
-//! tetrahedral". A fixed share of λ itself would lock again as ν approaches ½.
+//! Bonet, Burton 1998, "A simple average nodal pressure tetrahedral element".
+//!
+//! Puso, Solberg 2006, "A stabilized nodally integrated tetrahedral": the share κ that stays with the
+//! elements, taken of λ, or of 25 μ where λ is larger. A fixed share of λ itself would lock again as ν
+//! approaches ½.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::BlockCsr;
 use crate::material::Lame;
 
-/// Most λ / μ of the energy that partly stays with the elements.
+/// Upper bound of λ / μ in the energy that partly stays with the elements.
 const STIFFEST: f64 = 25.0;
 
-/// Which pieces are around which copy, and which copies around which.
+/// Incidence of pieces around copies, and of copies around copies.
 #[derive(Clone, Debug)]
 pub(super) struct NodeAverage {
-    /// κ.
+    /// Share κ of the volumetric energy that stays with the elements, 0 … 1.
     pub kept: f64,
     /// V_n [m³].
     volume: Vec<f64>,
     /// Elements at node n are `around[around_first[n]..around_first[n + 1]]`.
     around_first: Vec<u32>,
     around: Vec<u32>,
-    /// Nodes of these elements, sorted.
+    /// Star of node n, the nodes of these elements, sorted: `star[star_first[n]..star_first[n + 1]]`.
     star_first: Vec<u32>,
     star: Vec<u32>,
     /// For each entry of `around`: position in the star of the element's four nodes.
     star_position: Vec<[u16; 4]>,
-    /// For each node i: nodes n with i in their star (the relation is symmetric: its own star), as
-    /// position of i in the star of n; same layout as `star`.
+    /// For every node n in the star of i: position of i in the star of n; same layout as `star`. The
+    /// relation is symmetric, so i is in the star of n.
     position_in_star_of: Vec<u16>,
 }
 
 impl NodeAverage {
-    /// κ where `kept` is asked for: that share of λ, or of 25 μ if λ is larger.
+    /// κ for the setting `kept`: that share of λ, or of 25 μ if λ is larger.
     pub fn share(kept: f64, Lame { mu, lambda }: Lame) -> f64 {
         if lambda > STIFFEST * mu { kept * STIFFEST * mu / lambda } else { kept }
     }
@@ -58,6 +60,7 @@ impl NodeAverage {
             star_position: Vec::new(),
             position_in_star_of: Vec::new(),
         };
+        // Positions in a star are found once, so that gradients are added without a search.
         for (n, list) in lists.iter().enumerate() {
             let tet = |e: u32| &connectivity[4 * e as usize..][..4];
             let mut star: Vec<u32> = list.iter().flat_map(|&e| tet(e)).copied().collect();
@@ -75,6 +78,7 @@ impl NodeAverage {
             table.star.extend_from_slice(&star);
             table.star_first.push(table.star.len() as u32);
         }
+        // The transposed positions: a row of the tangent gathers from the stars it is in.
         let position =
             |i: usize, n: u32| table.star(n as usize).partition_point(|s| (*s as usize) < i) as u16;
         let positions: Vec<u16> = (0..n_nodes)
@@ -94,12 +98,12 @@ impl NodeAverage {
         &self.star[self.star_range(n)]
     }
 
-    /// Total length of all stars.
+    /// Total length of all stars: the length of the gradients `c`.
     pub fn star_entries(&self) -> usize {
         self.star.len()
     }
 
-    /// θ̄_n from the θ_e of the elements.
+    /// θ̄_n from the θ_e of the elements; zero for a node without volume.
     pub fn average(&self, n: usize, theta: &[f64], volumes: &[f64]) -> f64 {
         if self.volume[n] == 0.0 {
             return 0.0;
@@ -160,6 +164,7 @@ impl NodeAverage {
             let factor = (1.0 - self.kept) * lambda / self.volume[n];
             let c_i = factor * c[star.start + self.position_in_star_of[k] as usize];
             let mut at = 0;
+            // Star and columns are both sorted, so the columns are walked once.
             for (j, c_j) in self.star[star.clone()].iter().zip(&c[star]) {
                 while columns[at] < *j {
                     at += 1;

@@ -9,7 +9,7 @@ const ROWS: usize = 256;
 
 /// A square sparse matrix of 3×3 blocks, one block row per node.
 ///
-/// The columns of a row are sorted, the diagonal block of every row is present.
+/// The columns of a row are sorted, and every row stores its diagonal block.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlockCsr<T> {
     /// Block row i is `first[i]..first[i + 1]`; length n_rows + 1.
@@ -40,13 +40,13 @@ impl<T: Copy + Default> BlockCsr<T> {
         self.first.len().saturating_sub(1)
     }
 
-    /// Positions of the blocks of row `i`.
+    /// Range of row `i` in [`columns`](Self::columns) and [`blocks`](Self::blocks).
     #[inline]
     pub fn row(&self, i: usize) -> std::ops::Range<usize> {
         self.first[i] as usize..self.first[i + 1] as usize
     }
 
-    /// Position of block (i, j), if it is stored.
+    /// Index of block (i, j) in [`blocks`](Self::blocks), if it is stored.
     pub fn position(&self, i: usize, j: u32) -> Option<usize> {
         let row = self.row(i);
         self.columns[row.clone()].binary_search(&j).ok().map(|k| row.start + k)
@@ -57,7 +57,7 @@ impl<T: Copy + Default> BlockCsr<T> {
         self.blocks.fill([T::default(); 9]);
     }
 
-    /// Whether the stored blocks stand at the same places.
+    /// Whether both matrices store the same blocks (i, j).
     pub fn same_pattern<U>(&self, other: &BlockCsr<U>) -> bool {
         self.first == other.first && self.columns == other.columns
     }
@@ -81,7 +81,7 @@ impl BlockCsr<f64> {
         }
     }
 
-    /// y = A x, by all members of a team; the same bits as [`multiply`](Self::multiply).
+    /// y = A x on all threads of a team; the same bits as [`multiply`](Self::multiply).
     pub fn multiply_by(&self, team: &mut Team, x: &[Vector3<f64>], y: &mut [Vector3<f64>]) {
         team.for_blocks(blocks(y, ROWS), |block, y| {
             for (i, y) in y.iter_mut().enumerate() {
@@ -136,7 +136,7 @@ impl BlockCsr<f64> {
         }
     }
 
-    /// Rounds to single precision; takes over the pattern if that of `single` is another.
+    /// Rounds to single precision. The pattern is copied only if that of `single` differs.
     pub fn to_f32(&self, single: &mut BlockCsr<f32>) {
         if !self.same_pattern(single) {
             single.first.clone_from(&self.first);

@@ -1,4 +1,4 @@
-//! From a mesh, a material and an element to a model.
+//! Builds a model from a mesh, a material and an element.
 
 use nalgebra::Vector3;
 
@@ -25,7 +25,7 @@ impl Model {
         model.finish()
     }
 
-    /// Linear tetrahedra of a cut mesh: one element per material piece, on its copies.
+    /// Linear tetrahedra of a cut mesh: one element per material piece, with the piece's copies as nodes.
     pub fn tet4_cut(cut: &CutMesh, material: &Material, volumetric: Volumetric) -> Result<Self, ModelError> {
         let mesh = cut.mesh();
         let mut model = Self::begin(ElementKind::Tet4, cut.rest_positions(), material, volumetric)?;
@@ -76,6 +76,7 @@ impl Model {
             let X = mesh.corners(e);
             model.connectivity.extend_from_slice(hex);
             let (mut volume, mut sum) = (0.0, [Vector3::zeros(); 8]);
+            // The map from the reference cube is not affine: gradients and det J differ between the points.
             for (xi, w) in &rule {
                 let (g, det) = hex8::gradients(&X, xi).ok_or(MeshError::Degenerate {
                     tet: e,
@@ -94,6 +95,7 @@ impl Model {
                 model.mean_gradients.extend(sum.map(|g| g / volume));
             }
             let M = hex8::shape_products(&X);
+            // The shape functions sum to one, so row sums of their products are their integrals.
             for (row, &node) in M.iter().zip(hex) {
                 let integral: f64 = row.iter().sum();
                 model.lumped[node as usize] += integral;
@@ -113,6 +115,7 @@ impl Model {
     ) -> Result<Self, ModelError> {
         material.check()?;
         let point = PointLaw { law: material.law, lame: material.lame() };
+        // A remedy belongs to one element and needs a law with a separate volumetric part.
         match (volumetric, kind) {
             (Volumetric::Full, _)
             | (Volumetric::NodeAveraged { .. }, ElementKind::Tet4)

@@ -21,7 +21,7 @@ impl Model {
         elements + averaged + self.spring_energy(x)
     }
 
-    /// Internal forces f = ∂Ψ/∂x [N], to be subtracted from the loads; returns Ψ \[J\].
+    /// Internal forces f = ∂Ψ/∂x [N], to be subtracted from the loads. Returns Ψ \[J\].
     pub fn internal_forces(&self, x: &[Vector3<f64>], f: &mut [Vector3<f64>]) -> f64 {
         let mut buffers = self.scratch.take();
         let averaged = self.average_volume(x, &mut buffers, false);
@@ -88,7 +88,7 @@ impl Model {
         }
     }
 
-    /// θ̄ of every node, and with `gradients` its derivatives; returns its energy \[J\].
+    /// Computes θ̄ of every node, and with `gradients` its derivatives. Returns the averaged energy \[J\].
     pub(super) fn average_volume(&self, x: &[Vector3<f64>], buffers: &mut Buffers, gradients: bool) -> f64 {
         let (Some(averaging), Some(split)) = (&self.averaging, self.point.split()) else {
             return 0.0;
@@ -114,8 +114,8 @@ impl Model {
         averaging.energy(split.lambda(), theta_bar)
     }
 
-    /// λ θ [Pa] of an element whose volumetric energy is (partly) averaged, and the share κ of λ/2 θ²
-    /// that is its own.
+    /// Volumetric factor λ θ [Pa] of an element, and the share κ of λ/2 θ² that stays with it. `None` if
+    /// nothing is averaged.
     fn averaged_element(&self, e: usize, split: &Split, theta: f64, buffers: &Buffers) -> Option<(f64, f64)> {
         let averaging = self.averaging.as_ref()?;
         let pressure =
@@ -144,7 +144,7 @@ impl Model {
         kind == Tangent::Held && self.point.law == Law::Corotational
     }
 
-    /// The split law if the volumetric energy is treated apart.
+    /// The split law if the volumetric energy is integrated by itself.
     fn remedy(&self) -> Option<Split> {
         if self.volumetric == Volumetric::Full { None } else { self.point.split() }
     }
@@ -205,6 +205,7 @@ impl Model {
             };
             add_forces(&P, g, w, f);
         }
+        // Volume at one point: at all eight it would lock.
         if let (Volumetric::Selective, Some(split)) = (self.volumetric, split) {
             let F = self.mean_gradient::<N>(e, &x);
             let (theta, lambda) = (split.theta(&F), split.lambda());
@@ -246,7 +247,8 @@ impl Model {
         let x = self.positions::<N>(e, x);
         let weights = self.weights(e);
         let split = self.remedy();
-        // With selective integration only shear and volume together are (nearly) semidefinite.
+        // With selective integration only the sum of shear and volume is (nearly) semidefinite, so the
+        // sum is projected at the end.
         let selective = self.volumetric == Volumetric::Selective;
         let held = self.holds_rotation(kind);
         let point_kind = if selective && !held { Tangent::Exact } else { kind };
@@ -275,7 +277,7 @@ impl Model {
         }
     }
 
-    /// The element's own part of the tangent with averaged volume.
+    /// Tangent ∂P/∂F of an element with averaged volume, without the coupling of its nodes through θ̄.
     fn averaged_tangent(
         &self,
         e: usize,
@@ -299,8 +301,8 @@ fn vec9(A: &Matrix3<f64>) -> SMatrix<f64, 9, 1> {
     SMatrix::<f64, 9, 1>::from_column_slice(A.as_slice())
 }
 
-/// Sets the negative eigenvalues of the 24×24 matrix of a hexahedron to zero, if it has any that
-/// matter.
+/// Sets the negative eigenvalues of the 24×24 matrix of a hexahedron to zero. A Cholesky factorisation
+/// tells first whether there are any beyond rounding.
 fn project_hexahedron(K: &mut [[f64; 9]]) {
     let mut A = SMatrix::<f64, 24, 24>::zeros();
     for a in 0..8 {

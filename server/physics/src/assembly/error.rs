@@ -6,7 +6,7 @@ use super::{ElementKind, Volumetric};
 use crate::material::{Law, MaterialError};
 use crate::mesh::MeshError;
 
-/// A combination of mesh, element, law and remedy that mechanics cannot use.
+/// A combination of mesh, element, law and remedy for which no model can be built.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ModelError {
     /// The mesh is unusable.
@@ -23,7 +23,7 @@ pub enum ModelError {
     Remedy {
         /// Element of the model.
         element: ElementKind,
-        /// Remedy asked for.
+        /// Remedy requested.
         remedy: Volumetric,
     },
     /// The law has no volumetric part that a remedy could treat apart.
@@ -34,13 +34,13 @@ pub enum ModelError {
     NoSplit {
         /// Law of the model.
         law: Law,
-        /// Remedy asked for.
+        /// Remedy requested.
         remedy: Volumetric,
     },
     /// The share of the element-wise volumetric energy is not a fraction.
     #[error("kept = {kept} is outside 0 … 1")]
     Kept {
-        /// Share found.
+        /// Share given.
         kept: f64,
     },
     /// A spring names a node that does not exist, or has an unusable number.

@@ -1,10 +1,10 @@
-//! What one quadrature point adds to the forces and to the tangent of its element.
+//! Contribution of one quadrature point to the forces and to the tangent of its element.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::material::Matrix9;
 
-/// F = Σ_a x_a ⊗ g_a, with differences to the first node so that rigid shifts cancel exactly.
+/// F = Σ_a x_a ⊗ g_a, from differences to the first node so that rigid shifts cancel exactly.
 #[inline]
 pub(super) fn deformation_gradient<const N: usize>(
     x: &[Vector3<f64>; N],

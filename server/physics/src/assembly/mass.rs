@@ -7,14 +7,14 @@ use super::{BlockCsr, ElementKind, Model};
 /// ∫ N_a N_b dV of the elements, upper triangles packed by rows.
 #[derive(Clone, Debug)]
 pub(super) enum Products {
-    /// The same for every element, times its volume.
+    /// Products per unit volume, the same for every element.
     Scaled(Vec<f64>),
-    /// One after the other [m³].
+    /// Products of every element, one element after the other [m³].
     PerElement(Vec<f64>),
 }
 
 impl Products {
-    /// (1 + δ_ab)/20.
+    /// Per unit volume of a linear tetrahedron: (1 + δ_ab)/20.
     pub fn linear_tet() -> Self {
         let M: [[f64; 4]; 4] =
             std::array::from_fn(|a| std::array::from_fn(|b| if a == b { 0.1 } else { 0.05 }));
@@ -28,13 +28,13 @@ pub(super) fn pack<const N: usize>(M: &[[f64; N]; N]) -> impl Iterator<Item = f6
 }
 
 impl Model {
-    /// Lets the nodes of every piece share its mass evenly instead of by ∫ N_a dV, for explicit schemes.
+    /// Divides the mass of every piece evenly among its nodes instead of by ∫ N_a dV, for explicit schemes.
     ///
-    /// A thin piece has nodes whose shape functions are small all over it. By their integrals these nodes
-    /// are almost without mass, and the critical time step vanishes with the thickness. Shared evenly, the
-    /// mass of a piece is its share w of what the element would have, as its stiffness is: its highest
-    /// frequency is that of the whole element, however it is cut. The mass of every node, and with it
-    /// momentum, is what it was before the cut; only within a cut element the centre of mass is not exact.
+    /// A thin piece has nodes whose shape functions are small everywhere in it. Integrals give these
+    /// nodes almost no mass, and the critical time step vanishes with the thickness. With an even division
+    /// a piece has the same fraction w of its element's mass as of its stiffness. Its highest frequency is
+    /// then that of the whole element, however it is cut. The mass of every node, and with it momentum, is
+    /// what it was before the cut. Only the centre of mass within a cut element is not exact.
     ///
     /// # Source
     /// Menouillard, Réthoré, Combescure, Bung 2006; Rozycki et al. 2008 (constant-strain elements).

@@ -5,8 +5,8 @@
 //! weights. With F = Σ_a x_a ⊗ ∇N_a at a point, the energy is Ψ = Σ w ψ(F), the internal force on
 //! node a is f_a = Σ w P(F) ∇N_a, and the tangent block is K_ab = Σ w ∇N_a · ∂P/∂F · ∇N_b.
 //!
-//! On cut tetrahedra each material piece is an element of its own on its copies, with the weight of
-//! its volume: exact, since F is constant in a linear tetrahedron.
+//! On cut tetrahedra each material piece is an element of its own on its copies, with its volume as
+//! weight. This is exact, since F is constant in a linear tetrahedron.
 //!
 //! # Source
 //! Zienkiewicz, Taylor, Zhu, *The Finite Element Method*; Bonet, Wood, *Nonlinear Continuum Mechanics

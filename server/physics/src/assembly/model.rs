@@ -1,5 +1,4 @@
-//! The discrete model: elements with their quadrature points, a law, and where the blocks of the
-//! tangent stand.
+//! The discrete model: elements with their quadrature points, a law, and the pattern of the tangent.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -11,7 +10,7 @@ use super::{BlockCsr, ModelError, kernel};
 use crate::element::Spring;
 use crate::material::{Lame, Law};
 
-/// The element of a model.
+/// Finite element of a model, and the points at which its energy is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ElementKind {
     /// Linear tetrahedron, one point.
@@ -46,15 +45,15 @@ impl ElementKind {
 /// How the volumetric part λ/2 θ² of the energy is integrated: remedies against locking near ν = ½.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Volumetric {
-    /// As the rest of the energy.
+    /// At the same points as the rest of the energy.
     #[default]
     Full,
     /// Tet4: with θ̄_n, the mean of θ over the elements at node n,
     /// (1 − kept) λ/2 Σ_n V_n θ̄_n² + kept λ/2 Σ_e V_e θ_e². Averages belong to copies, so they
     /// never cross a cut.
     NodeAveraged {
-        /// Share that stays with the elements, against checkerboards; 0.05 … 0.1. Of λ, or of 25 μ where λ is
-        /// larger, so that nothing locks near ν = ½.
+        /// Share that stays with the elements and suppresses checkerboards; usually 0.05 … 0.1. It is
+        /// taken of λ, or of 25 μ where λ is larger, so that nothing locks near ν = ½.
         kept: f64,
     },
     /// Hex8: at one point per element, with the mean gradients; shear stays at 2×2×2 points.
@@ -89,36 +88,36 @@ pub struct Model {
     pub(super) pattern: BlockCsr<f64>,
     /// Position in the tangent of every block (a, b) of every element.
     pub(super) slots: Vec<u32>,
-    /// Where node n stands in elements: entries e · nodes + a, by e, from `incident_first[n]` on.
+    /// Incidence of node n: entries e · nodes + a, ascending, from `incident_first[n]` on.
     pub(super) incident_first: Vec<u32>,
     pub(super) incident: Vec<u32>,
-    /// Where every [`ROWS`](super::parallel::ROWS) rows of the tangent begin.
+    /// First block of every [`ROWS`](super::parallel::ROWS) rows of the tangent, and the end of the last.
     pub(super) row_bounds: Vec<u32>,
     pub(super) scratch: Scratch,
 }
 
 impl Model {
-    /// The element.
+    /// Element type; fixed when the model is built.
     pub fn kind(&self) -> ElementKind {
         self.kind
     }
 
-    /// How the volumetric energy is integrated.
+    /// How the volumetric energy is integrated; fixed when the model is built.
     pub fn volumetric(&self) -> Volumetric {
         self.volumetric
     }
 
-    /// The constitutive law.
+    /// Constitutive law; fixed when the model is built.
     pub fn law(&self) -> Law {
         self.point.law
     }
 
-    /// The elastic constants.
+    /// Lamé parameters [Pa], the same for all elements.
     pub fn lame(&self) -> Lame {
         self.point.lame
     }
 
-    /// Changes the elastic constants; everything else is geometry and stays.
+    /// Changes the elastic constants and recomputes nothing else.
     pub fn set_lame(&mut self, lame: Lame) {
         self.point.lame = lame;
     }
@@ -144,7 +143,7 @@ impl Model {
         &self.connectivity[e * N..][..N]
     }
 
-    /// Rest volume [m³] of element `e`; of a piece, that of the piece.
+    /// Rest volume [m³] of element `e`; where the mesh is cut, that of the piece.
     pub fn volume(&self, e: usize) -> f64 {
         self.volumes[e]
     }
@@ -181,12 +180,12 @@ impl Model {
         std::array::from_fn(|a| x[nodes[a] as usize])
     }
 
-    /// One-dimensional springs between nodes.
+    /// One-dimensional springs between nodes, as given to [`with_springs`](Self::with_springs).
     pub fn springs(&self) -> &[Spring] {
         &self.springs
     }
 
-    /// The same model with these springs in place of those it had.
+    /// Replaces the springs and finds the pattern of the tangent anew.
     pub fn with_springs(mut self, springs: Vec<Spring>) -> Result<Self, ModelError> {
         let n = self.n_nodes();
         let usable = |s: &Spring| {
@@ -212,7 +211,7 @@ impl Model {
         matrix
     }
 
-    /// Finds which blocks there are and where those of each element stand.
+    /// Finds which blocks the tangent stores, and the position of those of each element.
     pub(super) fn find_pattern(&mut self) {
         let N = self.kind.nodes();
         let mut rows: Vec<Vec<u32>> = vec![Vec::new(); self.n_nodes()];
@@ -225,6 +224,7 @@ impl Model {
             rows[spring.a as usize].push(spring.b);
             rows[spring.b as usize].push(spring.a);
         }
+        // Averaging couples every two nodes around a third.
         if let Some(averaging) = &self.averaging {
             for node in 0..self.rest.len() {
                 let star = averaging.star(node);
@@ -236,6 +236,7 @@ impl Model {
         let mut pattern: BlockCsr<f64> = BlockCsr::with_rows(rows);
         pattern.blocks = Vec::new();
         self.slots.clear();
+        // Positions are looked up once, so that assembly adds without searching.
         for nodes in self.connectivity.chunks_exact(N) {
             for &a in nodes {
                 let row = pattern.row(a as usize);

@@ -1,6 +1,6 @@
-//! The same energies, forces and tangents by all members of a team, with the same bits for any number
-//! of them: elements write what they add into blocks of their own, then every node gathers its share in
-//! the order of the elements, which is the order in which the serial version adds.
+//! The same energies, forces and tangents on all threads of a team, with the same bits for any number of
+//! threads. Elements write their contributions into blocks of their own; then every node gathers its
+//! share in the order of the elements. The serial version adds in the same order.
 
 use nalgebra::Vector3;
 
@@ -13,11 +13,11 @@ use crate::team::{Team, blocks, ranges};
 const CHUNK: usize = 32;
 /// Nodes per task.
 pub(super) const ROWS: usize = 64;
-/// Blocks that elements hand over to nodes at a time: about 1 MB.
+/// Blocks that elements write before the nodes gather them: about 1 MB.
 const BATCH_BLOCKS: usize = 16_384;
 
 impl Model {
-    /// [`energy`](Self::energy) by a team.
+    /// [`energy`](Self::energy) on all threads of a team.
     pub fn energy_by(&self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
         if team.threads() == 1 {
             return self.energy(x);
@@ -29,7 +29,7 @@ impl Model {
         }
     }
 
-    /// [`internal_forces`](Self::internal_forces) by a team.
+    /// [`internal_forces`](Self::internal_forces) on all threads of a team.
     pub fn internal_forces_by(&self, team: &mut Team, x: &[Vector3<f64>], f: &mut [Vector3<f64>]) -> f64 {
         if team.threads() == 1 {
             return self.internal_forces(x, f);
@@ -41,7 +41,7 @@ impl Model {
         }
     }
 
-    /// [`tangent`](Self::tangent) by a team.
+    /// [`tangent`](Self::tangent) on all threads of a team.
     pub fn tangent_by(&self, team: &mut Team, x: &[Vector3<f64>], kind: Tangent, K: &mut BlockCsr<f64>) {
         if team.threads() == 1 {
             return self.tangent(x, kind, K);
@@ -81,6 +81,7 @@ impl Model {
                 f.copy_from_slice(&f_e);
             }
         });
+        // Each node adds in the order of the elements, whichever thread computed them.
         let forces = &*forces;
         team.for_blocks(blocks(f, ROWS), |chunk, f| {
             for (i, f) in f.iter_mut().enumerate() {
@@ -110,6 +111,7 @@ impl Model {
         next.clear();
         next.extend_from_slice(&self.incident_first[..self.n_nodes()]);
         let shared: &Buffers = &buffers;
+        // In batches, so that the blocks of all elements never have to be stored at once.
         for first in (0..self.n_elements()).step_by(per_batch) {
             let end = (first + per_batch).min(self.n_elements());
             let batch = &mut handed[..(end - first) * N * N];
@@ -118,6 +120,7 @@ impl Model {
                     self.element_tangent::<N>(first + chunk * CHUNK + i, x, kind, shared, part);
                 }
             });
+            // A task owns its rows. Every node goes on in its list where the last batch ended.
             let batch = &*batch;
             let rows = (ranges(&mut K.blocks, &self.row_bounds), blocks(next, ROWS));
             team.for_blocks(rows, |chunk, (rows, next)| {
@@ -136,6 +139,7 @@ impl Model {
                 }
             });
         }
+        // Averaging couples nodes across elements, so it is added by row.
         if let (Some(averaging), Some(split)) = (&self.averaging, self.point.split()) {
             team.for_blocks(ranges(&mut K.blocks, &self.row_bounds), |chunk, rows| {
                 let offset = self.row_bounds[chunk] as usize;
@@ -154,7 +158,7 @@ impl Model {
         self.incident_first[n] as usize..self.incident_first[n + 1] as usize
     }
 
-    /// Lists for every node where it stands in elements.
+    /// Lists for every node its entries in the elements, by counting.
     pub(super) fn find_incidence(&mut self) {
         let n = self.n_nodes();
         let mut first = vec![0_u32; n + 1];

@@ -25,13 +25,14 @@ impl PointLaw {
         self.law.tangent(F, self.lame, kind)
     }
 
-    /// The law taken apart, if it has a volumetric part λ/2 θ².
+    /// The law split into shear and volume, if it has a volumetric part λ/2 θ².
     pub fn split(&self) -> Option<Split> {
         self.law.split(self.lame)
     }
 }
 
-/// The nearest positive semidefinite matrix: negative eigenvalues set to zero.
+/// The nearest positive semidefinite matrix: negative eigenvalues set to zero. A matrix that is not
+/// finite is returned as it is.
 pub(super) fn projected<const N: usize>(A: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N>
 where
     nalgebra::Const<N>: nalgebra::DimSub<nalgebra::U1>,

@@ -1,5 +1,5 @@
-//! K̂ = Σ R K_e Rᵀ: the stiffness of small strains, turned with each element. It belongs to Rayleigh
-//! damping, whatever the law: viscosity that leaves rigid motion alone.
+//! K̂ = Σ R K_e Rᵀ: the small-strain stiffness, rotated with each element. Rayleigh damping uses it for
+//! every law, as a viscosity that does not resist rigid motion.
 //!
 //! With rotated gradients g′ = R ∇N at every quadrature point
 //! K̂_ab = Σ w (λ g′_a g′_bᵀ + μ g′_b g′_aᵀ + μ (g′_a·g′_b) I).
@@ -13,7 +13,7 @@ use super::{BlockCsr, Model};
 use crate::element::polar_rotation;
 use crate::material::Law;
 
-/// Most nodes of an element.
+/// Largest number of nodes per element, that of Tet10.
 const MOST_NODES: usize = 10;
 
 impl Model {

@@ -1,14 +1,14 @@
-//! What the calls of a model leave behind for the next one, so that repeated calls do not allocate.
+//! Buffers that the calls of a model reuse, so that repeated calls do not allocate.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nalgebra::{Matrix3, Vector3};
 
-/// The buffers of a model; a copy of it starts with its own.
+/// The buffers of a model; a clone of the model starts with empty ones.
 #[derive(Debug, Default)]
 pub(super) struct Scratch(Mutex<Buffers>);
 
-/// What the two passes of node averaging hand over.
+/// Intermediate results of node averaging, and those of the parallel passes in `work`.
 #[derive(Debug, Default)]
 pub(super) struct Buffers {
     pub(super) theta: Vec<f64>,
@@ -18,13 +18,13 @@ pub(super) struct Buffers {
     pub(super) work: Work,
 }
 
-/// What elements hand over to nodes.
+/// Contributions of elements, before the nodes gather them.
 #[derive(Debug, Default)]
 pub(super) struct Work {
     pub(super) energies: Vec<f64>,
     pub(super) forces: Vec<Vector3<f64>>,
     pub(super) blocks: Vec<[f64; 9]>,
-    /// Next entry of `incident` per node.
+    /// Next entry of `incident` that each node gathers.
     pub(super) next: Vec<u32>,
 }
 

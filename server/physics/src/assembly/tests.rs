@@ -1,5 +1,5 @@
-//! Forces are the gradient of the energy and tangents that of the forces, for every element, law and
-//! remedy; masses add up; nothing depends on what a call left behind.
+//! Forces are the gradient of the energy, and tangents that of the forces, for every element, law and
+//! remedy. Masses add up. No result depends on an earlier call.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,4 +1,4 @@
-//! Constraints and loads, told by node and applied by copy.
+//! Constraints and loads, given by node and applied by copy.
 
 use nalgebra::Vector3;
 
@@ -13,15 +13,15 @@ use crate::snap::node::NEW;
 /// A node whose displacement is prescribed in some directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedNode {
-    /// The node.
+    /// Index of the node; nodes that the element adds come after those of the mesh.
     pub node: u32,
     /// Which of x, y, z are prescribed.
     pub axes: [bool; 3],
-    /// Prescribed displacement from rest [m]; used where `axes` says so.
+    /// Prescribed displacement from rest [m]; only the components in `axes` are used.
     pub displacement_m: Vector3<f64>,
 }
 
-/// Constraints and loads as they were asked for; cuts do not change them.
+/// Constraints and loads as requested; cuts do not change them.
 #[derive(Clone, Debug, Default)]
 pub struct Boundary {
     /// At most one entry per node, ascending.
@@ -33,7 +33,7 @@ pub struct Boundary {
 }
 
 impl Boundary {
-    /// Constraints and loads that nodes carry along.
+    /// Collects the constraints and loads stored with nodes.
     pub fn of_nodes(nodes: &[SnapNode]) -> Self {
         let forces = |force: fn(&SnapNode) -> Vector3<f64>| -> Vec<Vector3<f64>> {
             let any = nodes.iter().any(|node| force(node) != Vector3::zeros());
@@ -50,7 +50,7 @@ impl Boundary {
         }
     }
 
-    /// Gives constraints and loads to the nodes they are on.
+    /// Stores constraints and loads with the nodes they act on.
     pub fn onto_nodes(&self, nodes: &mut [SnapNode]) {
         for fixed in &self.fixed {
             nodes[fixed.node as usize].fixed = Some((fixed.axes, fixed.displacement_m));
@@ -59,8 +59,8 @@ impl Boundary {
         nodes.iter_mut().zip(&self.spread_force).for_each(|(node, force)| node.spread_force = *force);
     }
 
-    /// What was asked for between `then` and `now`, on nodes that came from the `n` nodes of these
-    /// constraints and loads by `origins`; what is on nodes without an origin is left out.
+    /// Applies the requests made between `then` and `now`. `origins` maps their nodes to the `n` nodes of
+    /// `self`; requests on nodes without an origin are left out.
     pub fn take_changes(&mut self, then: &Self, now: &Self, origins: &[u32], n: usize) {
         let origin = |node: u32| origins.get(node as usize).copied().filter(|&o| o != NEW);
         for old in then.fixed.iter().filter(|f| now.fixed_at(f.node).is_none()) {
@@ -98,11 +98,13 @@ impl Boundary {
         self.fixed.binary_search_by_key(&node, |f| f.node).ok().map(|at| &self.fixed[at])
     }
 
-    /// A fixed node fixes the copies that hold the node's own material: one, which keeps the node's
-    /// number, and further ones if a cut passes exactly through the node, so that both lips have it.
-    /// Copies without that material stay free: fixing them would glue fragments to air.
-    /// `rest` are the rest positions of all copies [m], and of what the element adds; `share` of the prescribed
-    /// displacements is reached. Ascending.
+    /// Lists the fixed copies, ascending.
+    ///
+    /// A fixed node fixes the copies that hold the node's own material. One of them keeps the node's
+    /// number. There are more if a cut passes exactly through the node, because both lips then have it.
+    /// Copies without that material stay free: fixing them would glue fragments to air. `rest` are the
+    /// rest positions [m] of all copies and of the nodes that the element adds. `share` is the reached
+    /// fraction of the prescribed displacements.
     pub fn fixed_copies(
         &self,
         mesh: &CutMesh,
@@ -121,7 +123,7 @@ impl Boundary {
             let target = rest[f.node as usize] + share * f.displacement_m;
             let held = |copy: u32| FixedCopy { copy, axes: f.axes, position_m: target.into() };
             fixed.push(held(f.node));
-            // What an element adds to the nodes is not cut.
+            // Nodes that an element adds are never cut.
             if divided.get(f.node as usize) == Some(&true) {
                 let copies = mesh.copies_with_node(f.node).into_iter();
                 fixed.extend(copies.filter(|&copy| copy != f.node).map(held));
@@ -130,16 +132,17 @@ impl Boundary {
         fixed.sort_unstable_by_key(|f| f.copy);
     }
 
-    /// Writes the force on every one of `n` copies and further nodes [N] to `load`: point forces go to the
-    /// copy with the node's material, spread ones to all copies of the node by the volume they carry.
-    /// Totals are kept.
+    /// Writes the force [N] on every one of `n` copies and added nodes to `load`. A point force goes to
+    /// the copy with the node's material. A spread force goes to all copies of the node, by the volume
+    /// they carry. Totals are kept.
     pub fn node_loads(&self, mesh: &CutMesh, n: usize, load: &mut Vec<Vector3<f64>>) {
         load.clear();
         resize_reserving(load, n, Vector3::zeros());
         self.add_loads(mesh, load);
     }
 
-    /// The same after a cut, where `load` was told before it: point forces are on the copies they were on.
+    /// The same after a cut, with `load` from before it. Point forces stay on their copies, so only
+    /// spread forces are shared anew.
     pub fn loads_of_new_copies(&self, mesh: &CutMesh, load: &mut Vec<Vector3<f64>>) {
         if self.spread_force.is_empty() {
             resize_reserving(load, mesh.n_copies(), Vector3::zeros());
@@ -153,7 +156,7 @@ impl Boundary {
             *load += f;
         }
         if !self.spread_force.is_empty() {
-            // Nodes that an element adds have no copies: such elements are not cut.
+            // Nodes that an element adds have no copies, because such elements are not cut.
             for (load, f) in load.iter_mut().zip(&self.spread_force).skip(mesh.n_copies()) {
                 *load += f;
             }
@@ -170,8 +173,8 @@ impl Boundary {
 }
 
 impl Body {
-    /// Prescribes the displacement from rest [m] of `nodes` along `axes`. Asking again for a node
-    /// adds axes and replaces the displacement of those given.
+    /// Prescribes the displacement from rest [m] of `nodes` along `axes`. A second call for a node adds
+    /// axes and replaces the displacement along those given.
     pub fn fix(
         &mut self,
         nodes: &[u32],
@@ -199,8 +202,8 @@ impl Body {
         Ok(())
     }
 
-    /// Lets what is held reach `share` of its prescribed displacements with the next step; all of them at
-    /// first. A displacement that arrives at once turns soft elements inside out.
+    /// Sets the share of the prescribed displacements that the next step reaches; 1 at first. A
+    /// displacement that arrives at once turns soft elements inside out.
     pub fn set_prescribed_share(&mut self, share: f64) {
         if share == self.prescribed_share {
             return;
@@ -216,7 +219,7 @@ impl Body {
         self.range.follow(&self.rest, &self.parts, &self.fixed);
     }
 
-    /// Frees `nodes` again.
+    /// Frees `nodes` along all axes.
     pub fn release(&mut self, nodes: &[u32]) {
         self.boundary.fixed.retain(|f| !nodes.contains(&f.node));
         self.follow_boundary();
@@ -251,7 +254,7 @@ impl Body {
         self.spread("volume", &volume, force_n)
     }
 
-    /// ∫ N_a dV [m³] of the selected nodes, uncut.
+    /// ∫ N_a dV [m³] of the selected nodes in the uncut mesh; zero for the others.
     fn volumes(&self, selected: &[bool]) -> Vec<f64> {
         let mut volume = vec![0.0; selected.len()];
         if let (Path::General(general), false) = (&self.path, matches!(self.shape, Shape::Tet4)) {
@@ -272,7 +275,7 @@ impl Body {
         volume
     }
 
-    /// Nodes that can be held or loaded: those of the mesh, and what the element adds.
+    /// Number of nodes that can be held or loaded: those of the mesh and those the element adds.
     fn n_fixable(&self) -> usize {
         match &self.shape {
             Shape::Tet10(mesh) => mesh.nodes.len(),

@@ -1,14 +1,14 @@
-//! What the two ways to apply the stiffness cost, and which one costs less.
+//! Costs of the two ways to apply the stiffness, and the choice between them.
 //!
-//! The costs are those of the bench `bar` on one core, not of a measurement on the spot: the two ways
+//! The costs are constants from the bench `bar` on one core, not measured at run time. The two ways
 //! differ in the last bits, so a choice by the clock would make the bits of a run depend on the load of
-//! the machine. Only their ratios matter, and these hardly differ between machines.
+//! the machine. Only the ratios of the costs matter, and these hardly differ between machines.
 
 use crate::material::Law;
 use crate::operator::OperatorChoice;
 use crate::solver::PcgSettings;
 
-/// Up to so many pieces the stiffness stays in the caches from one application to the next.
+/// Up to this many pieces the stiffness stays in the caches from one application to the next.
 const CACHED_PIECES: usize = 60_000;
 
 /// Seconds per piece and application from rotated gradients, in the caches and beyond.
@@ -23,13 +23,13 @@ const VECTORS: f64 = 1.6e-9;
 /// Seconds per piece to assemble.
 const ASSEMBLY: f64 = 61e-9;
 
-/// Seconds per piece and step for forces and what else is not repeated; with rotations and without.
+/// Seconds per piece and step for forces and other work that is not repeated; with rotations and without.
 const STEP: [f64; 2] = [33e-9, 12e-9];
 
 /// Iterations that take the residual down to a tenth, on meshes of some thousand nodes.
 const ITERATIONS_PER_DECADE: f64 = 12.0;
 
-/// Seconds of a step of a body of so many pieces on one thread.
+/// Estimated time [s] of a step of a body of `pieces` pieces on one thread.
 pub fn step_seconds(law: Law, pieces: usize, solver: PcgSettings, assembled: bool) -> f64 {
     let beyond = usize::from(pieces > CACHED_PIECES);
     let turns = law != Law::Linear;
@@ -40,13 +40,13 @@ pub fn step_seconds(law: Law, pieces: usize, solver: PcgSettings, assembled: boo
     pieces as f64 * (step + expected_iterations(solver) * (application + VECTORS))
 }
 
-/// The way that costs less.
+/// The cheaper of the two ways.
 pub fn cheapest(law: Law, pieces: usize, solver: PcgSettings) -> OperatorChoice {
     let [free, assembled] = [false, true].map(|way| step_seconds(law, pieces, solver, way));
     if assembled < free { OperatorChoice::Assembled } else { OperatorChoice::MatrixFree }
 }
 
-/// Iterations that a step will make: those of the tolerance, but no more than allowed.
+/// Iterations that a step is expected to make: those of the tolerance, but no more than allowed.
 fn expected_iterations(solver: PcgSettings) -> f64 {
     let most = f64::from(solver.iterations);
     if solver.tolerance > 0.0 { most.min(-ITERATIONS_PER_DECADE * solver.tolerance.log10()) } else { most }

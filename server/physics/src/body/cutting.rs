@@ -1,4 +1,4 @@
-//! What a body does when its topology changes.
+//! How a body follows a change of its topology.
 
 use nalgebra::Vector3;
 
@@ -10,30 +10,30 @@ use crate::cut::{
 use crate::integrator::LooseParts;
 use crate::reserve::{refill, resize_reserving};
 
-/// What comparing one triangle of a sweep with one element costs when a body is cut along its faces, as a
-/// part of a fragment looked at.
+/// Pairs of sweep triangle and element that cost as much as one fragment, in a cut along faces.
 const SNAP_PAIRS_PER_FRAGMENT: usize = 4;
 
-/// Most pairs of blade segment and element of a cut along faces by a client, which is made at once.
+/// Largest number of pairs of blade segment and element in a cut along faces that was begun. Such a cut is
+/// made at once.
 const MAX_SNAP_PAIRS: usize = 4_000_000;
 
-/// A cut that is taken in parts.
+/// A cut that was begun and is not complete.
 #[derive(Debug)]
 pub(super) enum CutUnderWay {
     /// Pieces and copies: the sweep, and the positions it began with [m].
     Pieces(SweepUnderWay, Vec<Vector3<f64>>),
-    /// Along faces.
+    /// Along faces: the sweep and its incision.
     Faces(BladeSweep, u32),
 }
 
 impl Body {
-    /// Begins a cut that [`go_on_cutting`](Self::go_on_cutting) makes in parts, at the positions of now:
-    /// however the body moves meanwhile, the material that comes apart is what [`cut`](Self::cut) would have
-    /// taken apart now, to the bit.
+    /// Begins a cut at the present positions; [`go_on_cutting`](Self::go_on_cutting) makes it in parts.
+    /// However the body moves meanwhile, the same material comes apart as if [`cut`](Self::cut) were made
+    /// now, to the bit.
     ///
     /// # Errors
-    /// As [`cut`](Self::cut); also a body that is cut into as much as [`CutLimits::of_mesh`] allows, and one
-    /// that is being cut.
+    /// As [`cut`](Self::cut). Also if the body is cut into as much as [`CutLimits::of_mesh`] allows, or
+    /// is being cut.
     pub fn begin_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<(), BodyError> {
         self.may_be_cut()?;
         let mesh = self.cut_mesh.mesh();
@@ -54,8 +54,8 @@ impl Body {
         Ok(())
     }
 
-    /// Goes on with the cut that was begun, for as much work as is left; its report when it is made. None
-    /// while it is not, and where none was begun.
+    /// Continues the cut that was begun, until `work` is used up. Returns the report when the cut is
+    /// complete; `None` before that, and if no cut was begun.
     ///
     /// # Errors
     /// As [`cut`](Self::cut).
@@ -78,7 +78,7 @@ impl Body {
         }
     }
 
-    /// Whether a cut was begun and is not made.
+    /// Whether a cut was begun and is not complete.
     pub fn is_being_cut(&self) -> bool {
         self.under_way.is_some()
     }
@@ -94,8 +94,8 @@ impl Body {
         Ok(())
     }
 
-    /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were
-    /// split from, so the motion of the material does not change by the cut itself.
+    /// Cuts along the surface the blade swept. New copies inherit the state of the copies they were split
+    /// from, so the cut itself does not change the motion of the material.
     pub fn cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
         self.may_be_cut()?;
         if self.snap.is_some() {
@@ -106,12 +106,12 @@ impl Body {
         Ok(report)
     }
 
-    /// Everything that a cut of pieces and copies changes.
+    /// Brings the body up to date after a cut of pieces and copies.
     fn follow_cut(&mut self, report: &CutReport) -> Result<(), BodyError> {
         if let Some(skin) = &mut self.skin {
             skin.follow(&self.cut_mesh);
         }
-        // The surface may have changed alone, while a cut is still on its way through an element.
+        // While a cut is still on its way through an element, only the surface changes.
         if !self.cut_mesh.changed_pieces().is_empty() {
             self.inherit(report);
             match &mut self.path {
@@ -128,7 +128,7 @@ impl Body {
         Ok(())
     }
 
-    /// Area [m²] of the sweep inside the body as it lies now; what is cut already counts as well.
+    /// Area [m²] of the sweep inside the body at its present positions; parts that are already cut count too.
     pub fn swept_area(&self, blade: &BladeSweep) -> f64 {
         let mut seen = vec![false; self.cut_mesh.mesh().tets.len()];
         let first_of_element = |p: &&Piece| !std::mem::replace(&mut seen[p.element as usize], true);
@@ -137,7 +137,7 @@ impl Body {
         swept_area(&tets, &self.state.x, blade)
     }
 
-    /// Area [m²] at rest of the cut that an incision has opened: of one of its two lips.
+    /// Area [m²] at rest of the cut that an incision has opened, counting one of its two lips.
     pub fn opened_area(&self, incision: u32) -> f64 {
         let surface = self.cut_mesh.surface();
         let lips = surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag == incision);
@@ -164,7 +164,7 @@ impl Body {
         }
     }
 
-    /// The model of the pieces and copies after a cut that made the copies `new`; integrators go on.
+    /// Rebuilds the model after a cut that made the copies `new`; integrators continue.
     fn follow_general(&mut self, new: &[NewCopy]) -> Result<(), BodyError> {
         let general = General::new(&self.shape, &self.cut_mesh, &self.material, &self.settings)?;
         if let Path::General(before) = std::mem::replace(&mut self.path, Path::General(Box::new(general)))
@@ -175,22 +175,23 @@ impl Body {
         Ok(())
     }
 
-    /// The model of the present pieces and copies; integrators start afresh from the present state.
+    /// Rebuilds the model from the present pieces and copies; integrators start afresh from the present
+    /// state.
     pub(super) fn rebuild_general(&mut self) -> Result<(), BodyError> {
         let general = General::new(&self.shape, &self.cut_mesh, &self.material, &self.settings)?;
         self.path = Path::General(Box::new(general));
         Ok(())
     }
 
-    /// Everything that is derived from pieces and copies.
+    /// Updates everything derived from pieces and copies.
     pub(super) fn follow_topology(&mut self) {
         refill(&mut self.rest, self.shape.rest_positions(&self.cut_mesh).into_iter());
         self.follow_masses();
         self.follow_boundary();
     }
 
-    /// The same on the fast path, after a cut of elements without further nodes that made the copies
-    /// `new`: what belongs to copies that were there stays where it is.
+    /// The same on the fast path, after a cut that made the copies `new`, for elements without added
+    /// nodes. The data of earlier copies stays in place.
     fn follow_new_copies(&mut self, new: &[NewCopy]) {
         let known = self.rest.len();
         resize_reserving(&mut self.rest, self.cut_mesh.n_copies(), Vector3::zeros());
@@ -204,7 +205,7 @@ impl Body {
         self.follow_parts();
     }
 
-    /// Masses, and what the fast path derives from them.
+    /// Updates the masses, and what the fast path derives from them.
     fn follow_masses(&mut self) {
         let density = self.material.density_kg_m3;
         match &self.path {
@@ -219,7 +220,7 @@ impl Body {
         }
     }
 
-    /// What [`Ablation::piece_masses`](super::Ablation) asks for.
+    /// Applies [`Ablation::piece_masses`](super::Ablation): the copies of a node get equal masses.
     fn share_masses_evenly(&mut self) {
         let mut sum = vec![(0.0, 0.0); self.cut_mesh.mesh().nodes.len()];
         for (&node, m) in self.cut_mesh.copy_node().iter().zip(&self.mass) {
@@ -232,7 +233,7 @@ impl Body {
         }
     }
 
-    /// Everything that is derived from constraints and loads.
+    /// Updates everything derived from constraints and loads.
     pub(super) fn follow_boundary(&mut self) {
         self.find_fixed();
         self.boundary.node_loads(&self.cut_mesh, self.rest.len(), &mut self.load);

@@ -1,4 +1,4 @@
-//! Why a body cannot be made or changed as asked.
+//! Reasons why a body cannot be made or changed as requested.
 
 use thiserror::Error;
 
@@ -27,11 +27,11 @@ pub enum BodyError {
     /// Two settings that do not go together.
     #[error("{what} does not go with {with}; take {instead}")]
     Combination {
-        /// What was asked for.
+        /// The request that is refused.
         what: &'static str,
-        /// What it does not go with.
+        /// The setting it conflicts with.
         with: &'static str,
-        /// What can be asked for.
+        /// A setting that works instead.
         instead: &'static str,
     },
     /// A cut was refused.
@@ -64,12 +64,12 @@ pub enum BodyError {
     /// A force or displacement that is NaN, infinite or absurd.
     #[error("{quantity} = {found:?} must be finite and below 1e12 in size")]
     NonFinite {
-        /// What it is, with its unit.
+        /// Name of the quantity, with its unit.
         quantity: &'static str,
         /// Value found.
         found: [f64; 3],
     },
-    /// A static equilibrium was asked for, but a part of the body hangs on nothing.
+    /// A static equilibrium was requested, but a part of the body is held nowhere.
     #[error(
         "part {part} ({mass_kg:.3e} kg) is fixed nowhere, so it has no static equilibrium; fix it or use dynamics"
     )]
@@ -79,7 +79,7 @@ pub enum BodyError {
         /// Its mass [kg].
         mass_kg: f64,
     },
-    /// A load without anything to carry it.
+    /// A load on a selection that has no surface or volume to carry it.
     #[error(
         "the selected nodes hold no {carrier}, so {force_n:?} N cannot be shared over it; select more nodes"
     )]

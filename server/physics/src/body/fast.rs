@@ -1,4 +1,4 @@
-//! The fast path: linear tetrahedra, matrix-free in single precision, one linear solve per step (two of
+//! The fast path: linear tetrahedra, matrix-free in single precision, one linear solve per step (two with
 //! Newmark's method).
 
 use nalgebra::Vector3;
@@ -18,22 +18,23 @@ use crate::team::{Team, blocks};
 /// A step that fails is tried again in 2 and then in 4 parts.
 const MOST_HALVINGS: u32 = 2;
 
-/// A free part turns by at most this much [rad] in a step, or in a part of a divided one: implicit
-/// Euler leaves less than a sixteenth of such a spin, and what more it had.
+/// Largest turn [rad] of a free part in a step, or in a part of a divided step; a faster spin is slowed
+/// to it. Little is lost: implicit Euler leaves less than a sixteenth of such a spin.
 const LARGEST_TURN: f64 = 4.0;
 
-/// Where a free part turns by more in a step [rad], the energy of the free parts is looked at after it:
-/// a stiff part that turns far about another axis than one of its inertia turns on, from where it was
-/// linearised, by a finite angle, which a single linear solve takes for a strain.
+/// If a free part turns by more than this in a step [rad], the energy of the free parts is checked after it.
+///
+/// A rigid part that spins far from a principal axis precesses. One linear solve mistakes that finite
+/// rotation for strain and gains energy.
 const NOTABLE_TURN: f64 = 0.5;
 
-/// Such a step may be divided in 2, 4 and so on, this often.
+/// A step that gained energy is divided into 2, 4, … parts at most this often.
 const MOST_SPIN_HALVINGS: u32 = 4;
 
-/// Part of the energy that may appear from nowhere: rounding.
+/// Relative gain of energy that counts as rounding.
 const GAIN: f64 = 1e-6;
 
-/// What the fast path remembers and works with.
+/// State, operator and buffers of the fast path.
 #[derive(Debug)]
 pub(super) struct Fast {
     pub simd: Simd,
@@ -42,9 +43,9 @@ pub(super) struct Fast {
     integrator: LinearStep,
     scheme: Scheme,
     multistep: Multistep,
-    /// Of an equilibrium: rigid motions of held parts that nothing holds.
+    /// Rigid motions of held parts that the constraints leave free; found for equilibria only.
     free_motions: Vec<FreeMotion>,
-    /// Where the rotation of every piece is kept, for the energy of Newmark's method.
+    /// Where the operator keeps the rotation of every piece; for the energy of Newmark's method.
     places: Vec<Place>,
     partial: Vec<f64>,
     /// Degenerate elements of the mesh, ascending.
@@ -81,14 +82,14 @@ impl Fast {
         }
     }
 
-    /// Arranges the pieces after a cut that made the copies `new`; those that were there before keep their
-    /// rotation, and all of the material what is remembered of earlier steps.
+    /// Arranges the pieces after a cut that made the copies `new`. Earlier pieces keep their rotation,
+    /// and all material keeps its history of earlier steps.
     pub fn follow_cut(&mut self, mesh: &CutMesh, new: &[NewCopy]) {
         self.multistep.inherit(new);
         self.elastic.follow(mesh.mesh(), mesh.pieces(), mesh.changed_pieces(), mesh.n_copies());
     }
 
-    /// Arranges the pieces anew, without memory of their rotations and of earlier steps.
+    /// Arranges the pieces anew and forgets their rotations and the history of earlier steps.
     pub fn rebuild(&mut self, mesh: &CutMesh) {
         self.multistep.forget();
         let choice = self.elastic.choice();
@@ -97,17 +98,17 @@ impl Fast {
         self.degenerate = degenerate_elements(mesh.mesh());
     }
 
-    /// The stiff motions of degenerate elements, as they are cut now.
+    /// Stiff motions of the degenerate elements, as these are cut now.
     pub fn stiff_modes(&self, mesh: &CutMesh) -> Option<StiffModes> {
         StiffModes::new(mesh.mesh(), mesh.pieces(), mesh.n_copies(), &self.degenerate)
     }
 
-    /// [`LinearStep::stiff_motions`].
+    /// See [`LinearStep::stiff_motions`].
     pub fn stiff_motions(&self) -> [usize; 3] {
         self.integrator.stiff_motions()
     }
 
-    /// Everything else that is derived from pieces, copies and their mass [kg].
+    /// Updates everything else derived from pieces, copies and their mass [kg].
     pub fn follow_topology(&mut self, mesh: &CutMesh, mass: &[f64]) {
         refill(&mut self.mass_f32, mass.iter().map(|&m| m as f32));
         self.weightless = find_weightless(mesh, mass);
@@ -118,12 +119,12 @@ impl Fast {
             self.partial.resize(mesh.pieces().len().div_ceil(BLOCK), 0.0);
         }
         self.integrator.set_stiff_modes(self.stiff_modes(mesh));
-        // A step fills them; it must not have to make room.
+        // A step fills these and must not allocate.
         resize_reserving(&mut self.before.x, mesh.n_copies(), Vector3::zeros());
         resize_reserving(&mut self.before.v, mesh.n_copies(), Vector3::zeros());
     }
 
-    /// Everything that is derived from the parts of a body with these rest positions [m] and masses [kg].
+    /// Updates everything derived from the parts of a body with these rest positions [m] and masses [kg].
     pub fn follow_parts(
         &mut self,
         (rest, mass): (&[Vector3<f64>], &[f64]),
@@ -141,18 +142,18 @@ impl Fast {
         &self.before
     }
 
-    /// What was remembered of earlier steps no longer holds: energy was put in or taken out.
+    /// Forgets the energy of earlier steps, because energy was put in or taken out.
     pub fn forget_energy(&mut self) {
         self.multistep.forget_energy();
     }
 
-    /// [`Multistep::still`].
+    /// See [`Multistep::still`].
     pub fn still(&mut self, copies: &[u32], state: &State) {
         self.multistep.still(copies, state);
     }
 
-    /// Advances by the step of `inputs` with the scheme of the body, or with implicit Euler where a guard
-    /// asks for it.
+    /// Advances by the step of `inputs` with the scheme of the body, or with implicit Euler if a guard
+    /// demands it.
     pub fn step(
         &mut self,
         team: &mut Team,
@@ -209,7 +210,7 @@ impl Fast {
         report
     }
 
-    /// What keeps the body from an equilibrium, before the step.
+    /// The reason why the body has no equilibrium, found before the step.
     fn why_no_equilibrium(&self, inputs: &StepInputs<'_>, rest: &[Vector3<f64>]) -> Option<Notice> {
         if self.free_motions.is_empty() && !inputs.parts.any_free() {
             return None;
@@ -220,7 +221,7 @@ impl Fast {
         why_no_equilibrium(held, inputs.material.law, rest, &f_ext, !inputs.springs.is_empty())
     }
 
-    /// Energy [J] that a step of Newmark's method put in from nowhere.
+    /// Energy [J] that a step of Newmark's method gained without work; `None` within its allowance.
     fn excess(
         &mut self,
         team: &mut Team,
@@ -234,8 +235,9 @@ impl Fast {
         multistep.end_energy((before, state), inputs, (rest, stored), driven)
     }
 
-    /// Makes the step with one scheme; where that does not stay finite it is taken back and tried again in
-    /// smaller parts with implicit Euler, then given up.
+    /// Makes the step with one scheme. If the result is not finite or a free part gained energy, the step
+    /// is taken back and tried again in smaller parts with implicit Euler. If no attempt stays finite, the
+    /// body is held.
     fn attempts(
         &mut self,
         team: &mut Team,
@@ -246,7 +248,7 @@ impl Fast {
     ) -> SolveReport {
         let dt_s = inputs.h;
         let mut report = SolveReport::default();
-        // Springs put in energy that is not known here.
+        // Springs do work that is not known here, so the energy cannot be checked.
         let turns = inputs.springs.is_empty()
             && self.spin.exceeds(state, inputs.mass, inputs.parts, (dt_s, NOTABLE_TURN));
         let start = if turns { free_energy(mesh, state, inputs) } else { (0.0, 0.0) };
@@ -263,6 +265,7 @@ impl Fast {
                 None => gained.then_some(Notice::SpinDivided { substeps: report.substeps }),
             };
             let finite = self.try_step(team, state, (scheme, &inputs), &mut report, spring_forces);
+            // An interrupted step is taken back, so that the state is that of a whole step.
             if team.told_to_stop() {
                 state.copy_from(&self.before);
                 spring_forces.clear();
@@ -271,6 +274,7 @@ impl Fast {
             }
             if finite {
                 let (now, put_in) = if turns { free_energy(mesh, state, &inputs) } else { (0.0, 0.0) };
+                // Gravity and loads may do work; any further gain comes from the linearisation.
                 let (gain, work) = (now - start.0, put_in - start.1);
                 if gain - work <= GAIN * (start.0 + work.abs()) || halvings == MOST_SPIN_HALVINGS {
                     self.carry_weightless(mesh, state, inputs.mass, inputs.fixed);
@@ -285,13 +289,14 @@ impl Fast {
                 break;
             }
         }
+        // No attempt stayed finite: the body stays where it was, at rest.
         state.v.fill(Vector3::zeros());
         spring_forces.clear();
         spring_forces.resize(inputs.springs.len(), Vector3::zeros());
         SolveReport { outcome: Outcome::Held, ..report }
     }
 
-    /// Makes all parts of a step; `false` as soon as one does not stay finite.
+    /// Makes all parts of a step; returns `false` as soon as one is not finite.
     fn try_step(
         &mut self,
         team: &mut Team,
@@ -312,7 +317,7 @@ impl Fast {
             report.iterations += solve.iterations;
             report.residual = report.residual.max(solve.residual);
             report.stop = solve.stop;
-            // δ minimises an energy times s, so that its norm is √J times √s.
+            // δ minimises s times an energy, so its norm is in √J times √s.
             report.algebraic_error = report.algebraic_error.max(solve.algebraic_error / inputs.root_s());
             report.inverted_pieces = inverted_pieces;
             report.refused_springs = refused_springs;
@@ -326,7 +331,7 @@ impl Fast {
         true
     }
 
-    /// Moves copies without mass along with the rest of their piece: no force would do it.
+    /// Moves copies without mass along with the rest of their piece: no force would move them.
     fn carry_weightless(&self, mesh: &CutMesh, state: &mut State, mass: &[f64], fixed: &[FixedCopy]) {
         for Weightless { copy, piece } in &self.weightless {
             let rest = |c: u32| mesh.mesh().nodes[mesh.copy_node()[c as usize] as usize];
@@ -351,8 +356,8 @@ fn is_driven(before: &State, fixed: &[FixedCopy]) -> bool {
     fixed.iter().any(moves)
 }
 
-/// Elastic energy [J] at `x` [m] with the rotations of the last update, by one entry of `partial` per block of
-/// pieces. Where these are not those of `x`, it is a little more than the energy.
+/// Elastic energy [J] at `x` [m] with the rotations of the last update. Each block of pieces sums into
+/// one entry of `partial`. Where these rotations are not those of `x`, the result is slightly too large.
 fn held_energy(
     team: &mut Team,
     mesh: &CutMesh,

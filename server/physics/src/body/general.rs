@@ -18,17 +18,17 @@ use crate::operator::{FixedCopy, StiffModes, degenerate_elements};
 use crate::solver::{Newton, NewtonSettings, StopReason};
 use crate::team::Team;
 
-/// The motion of a body's model.
+/// The general path: integrator, density, and the stiff motions of degenerate elements.
 #[derive(Debug)]
 pub(super) struct General {
     pub dynamics: Dynamics,
     density_kg_m3: f64,
-    /// Of linear tetrahedra.
+    /// Stiff motions of degenerate elements; linear tetrahedra only.
     modes: Option<Arc<StiffModes>>,
 }
 
 impl General {
-    /// The model of `mesh` as it is cut now, without history.
+    /// Builds the model of `mesh` as it is cut now, without history.
     pub fn new(
         shape: &Shape,
         mesh: &CutMesh,

@@ -1,4 +1,4 @@
-//! What can be measured on a body. Double precision throughout, nothing here is part of a step.
+//! Quantities measured on a body, all in double precision. No step needs them.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,10 +8,10 @@ use crate::element::piece_energy;
 use crate::estimate::{CutTets, MeshError, StressRecovery};
 use crate::operator::exact;
 
-/// Elements that are so flat that a motion of theirs is far stiffer than the others.
+/// Counts of elements so flat that one of their motions is far stiffer than the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StiffMotions {
-    /// Their pieces.
+    /// Pieces of such elements.
     pub pieces: usize,
     /// Copies that the solver moves relative to others, so that these motions cost no iterations.
     pub substituted: usize,
@@ -42,9 +42,8 @@ impl Body {
         self.mass.iter().zip(&self.state.x).zip(&self.state.v).map(spin).sum()
     }
 
-    /// How the solver of the last step dealt with elements of the mesh that are so flat that one of
-    /// their motions is far stiffer than the others. All 0 in a sound mesh; quadratic and hexahedral
-    /// elements are not looked at.
+    /// How the solver of the last step treated elements so flat that one of their motions is far stiffer
+    /// than the others. All 0 in a sound mesh; quadratic and hexahedral elements are not examined.
     pub fn stiff_motions(&self) -> StiffMotions {
         let [pieces, substituted, left] = match &self.path {
             Path::Fast(fast) => fast.stiff_motions(),
@@ -91,8 +90,7 @@ impl Body {
         }
     }
 
-    /// Smallest det F of any piece [1], of any point of integration on the general path; ≤ 0 means
-    /// inverted.
+    /// Smallest det F of any piece [1], or of any quadrature point on the general path; ≤ 0 means inverted.
     pub fn least_volume_ratio(&self) -> f64 {
         let least = f64::min;
         match &self.path {
@@ -108,8 +106,8 @@ impl Body {
         }
     }
 
-    /// Cauchy stress P Fᵀ / det F of every piece [Pa], the mean over its element's points of
-    /// integration; 0 where it is flat or inverted.
+    /// Cauchy stress P Fᵀ / det F of every piece [Pa], averaged over the quadrature points of its
+    /// element; 0 where it is flat or inverted.
     pub fn cauchy_stresses(&self) -> Vec<Matrix3<f64>> {
         let (law, lame) = (self.material.law, self.material.lame());
         let stress = |F: &Matrix3<f64>| {
@@ -133,7 +131,7 @@ impl Body {
         }
     }
 
-    /// Estimate of the discretisation error; only of linear tetrahedra, cut or not.
+    /// Estimates the discretisation error of linear tetrahedra, cut or not; `None` for other elements.
     pub fn mesh_error(&self, recovery: &mut StressRecovery) -> Option<MeshError> {
         let tets = CutTets::new(self.mesh(), self.pieces(), self.n_copies());
         let (law, lame) = (self.material.law, self.material.lame());
@@ -147,7 +145,7 @@ impl Body {
         f_int
     }
 
-    /// Elastic energy [J], and the internal force on every node [N] into `f_int`.
+    /// Returns the elastic energy [J] and writes the internal force on every node [N] to `f_int`.
     pub(super) fn elastic_response(&self, f_int: &mut Vec<Vector3<f64>>) -> f64 {
         f_int.clear();
         f_int.resize(self.state.x.len(), Vector3::zeros());
@@ -158,9 +156,9 @@ impl Body {
         exact::internal_forces(&self.cut_mesh, material, &self.state.x, f_int)
     }
 
-    /// Sum of the forces [N] that hold the prescribed directions of `nodes` against elasticity,
-    /// gravity [m/s²] and loads (without the inertia of the nodes themselves). Where a cut passes exactly
-    /// through a held node every lip has it and is held: all of its copies count.
+    /// Sum of the forces [N] that hold the prescribed directions of `nodes` against elasticity, gravity
+    /// [m/s²] and loads, without the inertia of the nodes themselves. Where a cut passes exactly through
+    /// a held node, each lip has a held copy of it: all of them count.
     pub fn reaction(&self, nodes: &[u32], gravity: Vector3<f64>) -> Vector3<f64> {
         let f_int = self.internal_forces();
         let mut sum = Vector3::zeros();
@@ -175,7 +173,7 @@ impl Body {
         sum
     }
 
-    /// Position of every surface vertex [m], into `out`.
+    /// Writes the position of every surface vertex [m] to `out`.
     pub fn surface_positions(&self, out: &mut Vec<[f32; 3]>) {
         out.clear();
         out.extend(self.surface().vertices.iter().map(|vertex| {
@@ -184,7 +182,7 @@ impl Body {
         }));
     }
 
-    /// Force of gravity on node `c` [N], as the integrator has it.
+    /// Force of gravity on node `c` [N], as the integrator applies it.
     fn weight(&self, c: usize, gravity: Vector3<f64>) -> Vector3<f64> {
         match &self.path {
             Path::Fast(_) => self.mass[c] * gravity,

@@ -56,69 +56,68 @@ use range::{Beyond, Range};
 use shape::Shape;
 use snapping::SnapState;
 
-/// How a step of a body went.
+/// Result of one step of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolveReport {
-    /// Solver iterations, all parts of the step together.
+    /// Solver iterations, summed over all parts of the step.
     pub iterations: u32,
-    /// √(rᵀM⁻¹r) relative to the right-hand side, worst part of the step; of Newton's method, where the
-    /// step is nonlinear.
+    /// √(rᵀM⁻¹r) relative to the right-hand side, in the worst part of the step; that of Newton's method
+    /// if the step is nonlinear.
     pub residual: f64,
-    /// What `residual` has to reach; 0 where nothing is solved for, as in explicit integrators.
+    /// Value that `residual` has to reach; 0 if nothing is solved, as in explicit integrators.
     pub tolerance: f64,
-    /// Why the solver stopped last.
+    /// Why the last linear or Newton solve stopped.
     pub stop: StopReason,
-    /// What became of the step.
+    /// Whether the body advanced, and if not, why.
     pub outcome: Outcome,
-    /// Into how many equal parts the step was divided.
+    /// Number of equal parts into which the step was divided.
     pub substeps: u32,
-    /// Pieces (points of integration on the general path) with det F ≤ 0.
+    /// Pieces with det F ≤ 0; on the general path, quadrature points.
     pub inverted_pieces: usize,
-    /// Springs that were left out because a number in them is not usable.
+    /// Springs left out because one of their numbers is unusable.
     pub refused_springs: usize,
-    /// Newton steps, 1 where the step is one linear solve; 0 for explicit integrators.
+    /// Newton steps; 1 if the step is one linear solve, 0 for explicit integrators.
     pub newton_steps: u32,
-    /// Halvings of all line searches.
+    /// Halvings of the step length in all line searches.
     pub backtracks: u32,
-    /// Estimated algebraic error of the last linear solve in the energy norm [√J]; 0 where there is no
-    /// estimate.
+    /// Estimated algebraic error of the last linear solve in the energy norm [√J]; 0 without an estimate.
     pub algebraic_error: f64,
-    /// What was done differently from what was asked for.
+    /// What the step did differently from what was requested.
     pub notice: Option<Notice>,
 }
 
 impl SolveReport {
-    /// Whether the body advanced by a step whose residual is above its tolerance. It means the same on
-    /// every path: √(rᵀM⁻¹r) over that of the loads, after the linear solve where a step is one by
-    /// design, and after Newton's method otherwise.
+    /// Whether the body advanced by a step whose residual is above its tolerance. The residual is
+    /// √(rᵀM⁻¹r) over that of the loads on every path: after the linear solve if a step is one by design,
+    /// after Newton's method otherwise.
     pub fn is_unconverged(&self) -> bool {
         self.outcome == Outcome::Advanced && self.tolerance > 0.0 && self.residual > self.tolerance
     }
 
-    /// Whether the step failed as a whole and was made in parts. An explicit integrator's own
-    /// sub-steps do not count.
+    /// Whether the step failed as a whole and was made in parts. Sub-steps that an explicit integrator
+    /// plans do not count.
     pub fn is_divided(&self) -> bool {
         let planned = matches!(self.notice, Some(Notice::Divided { .. }));
         self.outcome == Outcome::Advanced && self.substeps > 1 && !planned
     }
 }
 
-/// What became of a step.
+/// How a step ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Outcome {
     /// The body advanced by the whole step.
     #[default]
     Advanced,
-    /// No subdivision stayed finite, or a part was drawn out of any sensible range (the notice says which):
-    /// the body is where it was, and at rest.
+    /// The body is where it was, and at rest. No subdivision stayed finite, or a part was drawn out far
+    /// beyond its size; the notice says which.
     Held,
-    /// The stop flag was raised: the body is as it was before the step.
+    /// The stop flag was raised; the body is as it was before the step.
     Interrupted,
-    /// The step length or the gravity is not usable; nothing was changed.
+    /// The step length or the gravity is unusable, or there is no equilibrium; nothing was changed.
     Refused,
 }
 
-/// Constants of the material that may change while a body moves.
+/// Material constants that may change while a body moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constants {
     /// Young's modulus E [Pa].
@@ -135,20 +134,20 @@ pub struct Body {
     cut_mesh: CutMesh,
     skin: Option<Skin>,
     shape: Shape,
-    /// Rest position of every node: copies, then what the element adds [m].
+    /// Rest position of every node [m]: copies first, then the nodes that the element adds.
     rest: Vec<Vector3<f64>>,
     material: Material,
     settings: BodySettings,
     state: State,
     boundary: Boundary,
     fixed: Vec<FixedCopy>,
-    /// Share of the prescribed displacements that holds now.
+    /// Share of the prescribed displacements that is applied now, 1 at first.
     prescribed_share: f64,
     /// Copies of parts that were put to sleep, ascending; they are among `fixed` too.
     asleep: Vec<FixedCopy>,
     load: Vec<Vector3<f64>>,
     mass: Vec<f64>,
-    /// The copy that every copy was split from, itself where it was there from the start.
+    /// The copy that each copy was split from; itself if it was there from the start.
     split_from: Vec<u32>,
     parts: LooseParts,
     connectivity: LocalConnectivity,
@@ -156,12 +155,12 @@ pub struct Body {
     path: Path,
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
-    /// Of a body that is cut along its faces.
+    /// State of cutting along faces; `None` for other bodies.
     snap: Option<Box<SnapState>>,
     under_way: Option<CutUnderWay>,
 }
 
-/// How a step is computed.
+/// The two ways to compute a step.
 #[derive(Debug)]
 enum Path {
     Fast(Box<Fast>),
@@ -169,8 +168,8 @@ enum Path {
 }
 
 impl Body {
-    /// A body at rest in the configuration of `mesh`, of the linear or quadratic tetrahedra that
-    /// `settings` asks for.
+    /// A body at rest in the configuration of `mesh`, made of linear or quadratic tetrahedra as
+    /// `settings` request.
     pub fn new(mesh: TetMesh, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
         let shape = match settings.element {
             ElementKind::Tet4 => Shape::Tet4,
@@ -211,6 +210,7 @@ impl Body {
         settings.check(material.law)?;
         settings.scheme.check()?;
         let mut settings = settings;
+        // Single precision is a default, so it yields where flat elements would turn forces into noise.
         if settings.arithmetic.is_none()
             && settings.arithmetic(material.law) == Arithmetic::Single
             && too_flat_for_single(cut_mesh.mesh())
@@ -259,9 +259,9 @@ impl Body {
 
     /// Advances by `dt_s` under gravity [m/s²], loads, constraints and springs.
     ///
-    /// The state stays finite whatever happens: a step that does not is taken back and tried again
-    /// in smaller parts, then given up and reported. So is a step that draws a part of the body out to many
-    /// times its size.
+    /// The state stays finite whatever happens. A step that does not stay finite is taken back and tried
+    /// again in smaller parts; if these fail too it is given up and reported. A step that draws a part of
+    /// the body out to many times its size is also taken back and reported.
     pub fn step(&mut self, dt_s: f64, gravity: Vector3<f64>, springs: &[PointSpring]) -> SolveReport {
         let usable = dt_s > 0.0 && dt_s.is_finite() && gravity.iter().all(|g| g.abs() < 1e12);
         if !usable {
@@ -335,12 +335,13 @@ impl Body {
         report.notice = Some(Notice::OutOfRange { stretch, size_m });
     }
 
-    /// Steps and static solves under way end as soon as `flag` is raised; the body then stays as it was.
+    /// Sets a flag that ends steps and static solves under way when it is raised; the body then stays as
+    /// it was.
     pub fn set_stop_flag(&mut self, flag: Arc<AtomicBool>) {
         self.team.set_stop_flag(flag);
     }
 
-    /// Force on the body [N] of every spring of the last step, in its order, from the same solve.
+    /// Force on the body [N] of every spring of the last step, in the order given, from the same solve.
     pub fn spring_forces(&self) -> &[Vector3<f64>] {
         &self.spring_forces
     }
@@ -355,8 +356,8 @@ impl Body {
         &self.rest
     }
 
-    /// Nodes that carry the point with barycentric coordinates `weights` in tet `tet` of the mesh,
-    /// whose piece is on `copies`, and the element's shape functions there; Σ = 1.
+    /// Nodes and shape functions (Σ = 1) of the point with barycentric coordinates `weights` in tet `tet`
+    /// of the mesh, whose piece is on `copies`.
     pub fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
         self.shape.carriers(tet, copies, weights)
     }
@@ -376,7 +377,7 @@ impl Body {
         &self.mass
     }
 
-    /// Puts a skin finer than the elements on the uncut body: [`Skin::new`].
+    /// Puts a skin finer than the elements on the uncut body; see [`Skin::new`].
     pub fn put_on_skin(
         &mut self,
         settings: SkinSettings,
@@ -399,20 +400,21 @@ impl Body {
         self.skin.as_ref()
     }
 
-    /// [`Skin::spoil`].
+    /// See [`Skin::spoil`].
     #[doc(hidden)]
     pub fn spoil_skin(&mut self) {
         self.skin.iter_mut().for_each(Skin::spoil);
     }
 
-    /// What is shown and touched, closed and 2-manifold: skin and lips, or without a skin the boundary
-    /// of the elements and lips. Changes only when the [`epoch`](Self::epoch) does.
+    /// The surface that is shown and touched, closed and 2-manifold. It consists of the skin, or without
+    /// one the boundary of the elements, and of the lips of cuts. It changes only when the
+    /// [`epoch`](Self::epoch) does.
     pub fn surface(&self) -> &Surface {
         self.skin.as_ref().map_or(self.cut_mesh.surface(), Skin::surface)
     }
 
-    /// What incisions have drawn on the [`surface`](Self::surface) without opening it yet. May change with
-    /// every cut, also where the topology does not.
+    /// Lines that incisions have drawn on the [`surface`](Self::surface) without opening it yet. They may
+    /// change with every cut, even one that leaves the topology alone.
     pub fn incision_marks(&self) -> Vec<IncisionMark> {
         match &self.skin {
             Some(skin) => skin.incision_marks(&self.cut_mesh),
@@ -420,19 +422,19 @@ impl Body {
         }
     }
 
-    /// Material constants.
+    /// Material with its present constants; see [`set_constants`](Self::set_constants).
     pub fn material(&self) -> &Material {
         &self.material
     }
 
-    /// Settings of the solver.
+    /// Settings the body was made with, and later changes to solver and operator.
     pub fn settings(&self) -> &BodySettings {
         &self.settings
     }
 
-    /// Changes when the linear solver stops, from the next step on.
+    /// Changes when the solver stops, from the next step on.
     pub fn set_solver(&mut self, solver: PcgSettings) -> Result<(), BodyError> {
-        // What path is taken is decided when the body is made.
+        // The path is chosen when the body is made, so the arithmetic stays.
         let arithmetic = Some(self.settings.arithmetic(self.material.law));
         let settings = BodySettings { solver, ..self.settings };
         BodySettings { arithmetic, ..settings }.check(self.material.law)?;
@@ -444,8 +446,8 @@ impl Body {
         Ok(())
     }
 
-    /// Changes elastic constants and damping, from the next step on. Positions and velocities stay;
-    /// constants that are what they were change nothing.
+    /// Changes elastic constants and damping, from the next step on. Positions and velocities stay. A
+    /// call with the present constants changes nothing.
     ///
     /// # Errors
     /// A constant outside its range ([`Material::check`]); the body is then as it was.
@@ -458,7 +460,7 @@ impl Body {
         }
         self.material = material;
         match &mut self.path {
-            // It is given its constants with every step.
+            // The fast path receives its constants with every step.
             Path::Fast(fast) => fast.forget_energy(),
             Path::General(general) => general.dynamics.set_material(material),
         }
@@ -466,8 +468,8 @@ impl Body {
     }
 
     /// Chooses how the stiffness is applied from the next step on; results agree to single precision.
-    /// [`OperatorChoice::Auto`] is what costs less. Says `false` where this body's elements, law or integrator take the general path, which always
-    /// assembles.
+    /// [`OperatorChoice::Auto`] takes the cheaper way. Returns `false`, and changes nothing, if the body
+    /// takes the general path, which always assembles.
     pub fn set_operator(&mut self, choice: OperatorChoice) -> bool {
         match &mut self.path {
             Path::Fast(fast) => {
@@ -501,8 +503,8 @@ impl Body {
         Ok(())
     }
 
-    /// Back to the start: uncut, undeformed, at rest. Constraints and loads stay; the epoch rises. A cut
-    /// that is being made is forgotten.
+    /// Returns the body to its start: uncut, undeformed, at rest. Constraints and loads stay, and the
+    /// epoch rises. A cut under way is dropped.
     pub fn reset(&mut self) -> Result<(), BodyError> {
         self.asleep.clear();
         self.under_way = None;

@@ -1,19 +1,19 @@
-//! Which meshes single precision is too coarse for.
+//! Meshes whose elements are too flat for single precision.
 //!
-//! The deformation gradient of an element is a sum of edges times gradients, F = Σ e_a ⊗ g_a. Where the element
-//! is flat these cancel: of edges of length L and a gradient |g| the rounding of F is 6e-8 L |g|, and a strain
-//! below that is noise, whose stress is a force from nowhere.
+//! The deformation gradient of an element is a sum of edges times gradients, F = Σ e_a ⊗ g_a. In a flat
+//! element these terms cancel. With edges of length L and a gradient |g| the rounding of F is 6e-8 L |g|.
+//! A strain below that is noise, and its stress is a spurious force.
 
 use nalgebra::Vector3;
 
 use crate::mesh::TetMesh;
 
-/// L |g| from which on noise counts, a strain of 2e-5: soft tissue under its own weight has 1e-3.
+/// L |g| above which noise counts. It is then a strain of 2e-5; soft tissue under its own weight has 1e-3.
 const FLAT: f64 = 300.0;
-/// One in so many elements may be as flat as it likes: the solver knows how to deal with slivers.
+/// One element in this many may be arbitrarily flat: the solver can deal with slivers.
 const ONE_IN: usize = 4;
 
-/// Whether so many elements are flat that the forces of the body as a whole would be noise.
+/// Whether so many elements are flat that the forces of the whole body would be noise.
 pub(super) fn too_flat_for_single(mesh: &TetMesh) -> bool {
     let flat = |e: &usize| {
         let most = mesh.gradients(*e).iter().map(Vector3::norm_squared).fold(0.0, f64::max);

@@ -1,21 +1,21 @@
-//! Whether a body is still within any sensible range, judged by how far its connected parts reach.
+//! Detects bodies that leave any sensible range, by the extent of their connected parts.
 //!
-//! A part that flies, falls or spins keeps its size, so none of that counts; a part that is drawn out to
-//! many times its size is either far too soft for its loads or computed wrongly, and its next step would
-//! only be worse. One pass over the positions, no allocation while the parts stay.
+//! A part that flies, falls or spins keeps its size, so none of that counts. A part that is drawn out to
+//! many times its size is either far too soft for its loads or computed wrongly. Its next step would only
+//! be worse. The check is one pass over the positions; it does not allocate while the parts stay.
 
 use nalgebra::Vector3;
 
 use crate::integrator::LooseParts;
 use crate::operator::FixedCopy;
 
-/// A part may reach this many times as far as it does at rest, or as its prescribed positions do.
+/// Largest extent of a part, as a multiple of that at rest or of that of its prescribed positions.
 const MOST_STRETCH: f64 = 10.0;
-/// A fragment counts as at least this part of the size of the body: single precision may blow up a crumb
+/// Least size of a fragment, as a fraction of the size of the body. Single precision may blow up a crumb
 /// without harm.
 const LEAST_SIZE: f64 = 0.1;
 
-/// How far the connected parts of a body may reach.
+/// Reference sizes of the connected parts of a body.
 #[derive(Debug, Default)]
 pub(super) struct Range {
     /// Of every part: the diagonal of its box at rest, or of its prescribed positions if larger [m].
@@ -23,12 +23,12 @@ pub(super) struct Range {
     boxes: Vec<Bounds>,
 }
 
-/// A part beyond its range.
+/// A part that reaches beyond its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Beyond {
-    /// Its reach over its size.
+    /// Its extent over its size.
     pub stretch: f64,
-    /// Its size [m].
+    /// Its reference size [m].
     pub size_m: f64,
 }
 
@@ -52,14 +52,15 @@ impl Bounds {
         }
     }
 
-    /// Length of the diagonal [m]; 0 of nothing.
+    /// Length of the diagonal [m]; 0 if empty.
     fn diagonal(&self) -> f64 {
         if self.low.x > self.high.x { 0.0 } else { (self.high - self.low).norm() }
     }
 }
 
 impl Range {
-    /// Takes over the parts, whose copies rest at `rest` [m], and their prescribed positions.
+    /// Takes reference sizes from `parts`, from the rest positions [m] of their copies and from what is
+    /// prescribed.
     pub fn follow(&mut self, rest: &[Vector3<f64>], parts: &LooseParts, fixed: &[FixedCopy]) {
         self.measure(rest, parts);
         self.size.clear();
@@ -72,7 +73,7 @@ impl Range {
         let least = LEAST_SIZE * whole.diagonal();
         self.boxes.fill(Bounds::NOTHING);
         for f in fixed {
-            // In directions that are not prescribed a node is at rest, for want of anything better.
+            // Directions that are not prescribed have no known target; their rest position stands in.
             let rest = rest[f.copy as usize];
             let at = Vector3::from_fn(|k, _| if f.axes[k] { f.position_m[k] } else { rest[k] });
             self.boxes[parts.of_copy[f.copy as usize] as usize].add(&at);
@@ -82,8 +83,8 @@ impl Range {
         }
     }
 
-    /// The part that reaches beyond its range by most in a step from `before` to `after` [m], and did not
-    /// before: a body that starts ruined may recover.
+    /// The part furthest beyond its range after a step from `before` to `after` [m], if it grew in that
+    /// step: a body that starts ruined may recover.
     pub fn beyond(
         &mut self,
         before: &[Vector3<f64>],
@@ -97,11 +98,11 @@ impl Range {
         (now > then).then_some(Beyond { stretch: now, size_m: self.size[at] })
     }
 
-    /// The largest stretch of a part beyond its range, and which part that is.
+    /// The largest stretch of a part beyond its range, and the index of that part.
     fn worst(&self) -> Option<(f64, usize)> {
         let stretch = |(part, (bounds, size)): (usize, (&Bounds, &f64))| (bounds.diagonal() / size, part);
         let stretches = self.boxes.iter().zip(&self.size).enumerate().map(stretch);
-        // A body without extent has no range.
+        // A body without extent has no reference size.
         let beyond = stretches.filter(|(s, part)| *s > MOST_STRETCH && self.size[*part] > 0.0);
         beyond.max_by(|a, b| a.0.total_cmp(&b.0))
     }

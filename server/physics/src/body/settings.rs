@@ -1,4 +1,4 @@
-//! How a body is discretised and solved, and which combinations the fast path can take.
+//! How a body is discretised and solved, and which combinations the fast path supports.
 
 use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
 use crate::assembly::{ElementKind, Volumetric};
@@ -7,51 +7,51 @@ use crate::material::Law;
 use crate::operator::OperatorChoice;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
-/// How a body is solved.
+/// Settings that are chosen when a body is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodySettings {
-    /// When the solver of a step stops: of one linear solve on the fast path, of Newton's method and
-    /// of each of its linear solves on the general one.
+    /// When the solver of a step stops. On the fast path this is the linear solve; on the general path it
+    /// is Newton's method and each of its linear solves.
     pub solver: PcgSettings,
     /// Number of threads that work on a step, the caller's included; at least 1, at most
     /// [`MOST_THREADS`](Self::MOST_THREADS).
     pub threads: usize,
-    /// Use only instructions that every machine has, for the same bits everywhere.
+    /// Use only instructions that every machine has, so that the bits are the same everywhere.
     pub portable: bool,
     /// Finite element. Only [`ElementKind::Tet4`] can be cut.
     pub element: ElementKind,
     /// Integration of the volumetric energy: a remedy against locking, or none.
     pub volumetric: Volumetric,
-    /// Time integration.
+    /// Time integration scheme; [`Scheme::Static`] for equilibria.
     pub scheme: Scheme,
-    /// Distribution of mass.
+    /// Lumped or consistent mass.
     pub mass: MassKind,
-    /// Linear solver.
+    /// Method of the linear solver.
     pub method: Method,
-    /// [`Scheme::Static`] by matrix-free relaxation: `solver.iterations` of it per step, which go on
-    /// where those of the last step ended. `method` is not used then.
+    /// Solve [`Scheme::Static`] by matrix-free relaxation: `solver.iterations` of it per step, continued
+    /// from step to step. `method` is then unused.
     pub relaxation: bool,
-    /// How the fast path applies the stiffness; what costs less with [`OperatorChoice::Auto`].
+    /// How the fast path applies the stiffness; [`OperatorChoice::Auto`] takes the cheaper way.
     pub operator: OperatorChoice,
-    /// Arithmetic; `None`: the fastest that the other settings allow, and mixed where most elements are too flat
-    /// for single precision.
+    /// Arithmetic. `None` takes the fastest that the other settings allow, and mixed arithmetic where too
+    /// many elements are too flat for single precision.
     pub arithmetic: Option<Arithmetic>,
-    /// Most Newton steps per step of time; `None`: as many as law and scheme call for.
+    /// Largest number of Newton steps per time step; `None` for as many as law and scheme need.
     pub newton_steps: Option<u32>,
-    /// How cuts are made.
+    /// Inside elements or along their faces.
     pub cutting: CuttingMethod,
-    /// What becomes of parts that a cut leaves without a held node.
+    /// What happens to parts that a cut leaves without a held node.
     pub loose: LooseRule,
-    /// Parts of the method that are taken out; for tests of tests.
+    /// Parts of the method that are switched off; only for checking the tests themselves.
     #[doc(hidden)]
     pub ablation: Ablation,
 }
 
-/// The arithmetic of a step. State and sums are in double precision always.
+/// The arithmetic of a step. State and sums are always in double precision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// Forces and solver in single precision: the fast path. Relative residuals below some 1e-6 are
-    /// those of the solver's recurrence, not true ones.
+    /// Forces and solver in single precision: the fast path. Relative residuals below some 1e-6 are those
+    /// of the solver's recurrence and not true ones.
     Single,
     /// Residuals and forces in double precision, the solver's work in single precision.
     Mixed,
@@ -59,13 +59,13 @@ pub enum Arithmetic {
     Double,
 }
 
-/// Tolerances below this are out of reach of single precision.
+/// Smallest tolerance that single precision can reach.
 const SINGLE_TOLERANCE: f64 = 1e-7;
-/// Newton steps where none are asked for: nonlinear laws in motion, and equilibria.
+/// Default numbers of Newton steps: for nonlinear laws in motion, and for equilibria.
 const NEWTON_STEPS: u32 = 20;
 const STATIC_NEWTON_STEPS: u32 = 100;
-/// Linear solves of an equilibrium of the linear law in single precision: one, and those that look whether
-/// its residual is what its recurrence says.
+/// Linear solves of an equilibrium of the linear law in single precision: one, and further ones that
+/// check whether the residual agrees with its recurrence.
 const STATIC_SOLVES: u32 = 5;
 /// Largest forcing term η of inexact Newton methods (Eisenstat, Walker 1996).
 const FORCING: f64 = 0.1;
@@ -93,10 +93,10 @@ impl Default for BodySettings {
 }
 
 impl BodySettings {
-    /// Most threads that may work on a step.
+    /// Largest number of threads that may work on a step.
     pub const MOST_THREADS: usize = 64;
 
-    /// What keeps a body of this law from the fast path; `None` if nothing does.
+    /// The setting that keeps a body of this law from the fast path; `None` if it can be taken.
     ///
     /// The fast path is single precision, matrix-free, with one linear solve per step.
     pub fn why_general(&self, law: Law) -> Option<&'static str> {
@@ -114,8 +114,8 @@ impl BodySettings {
         reasons.iter().find(|(general, _)| *general).map(|(_, why)| *why)
     }
 
-    /// The arithmetic of a body of this law: what was asked for, else single precision where the fast
-    /// path can be taken and the tolerance allows it, else mixed; double without a solver.
+    /// The arithmetic of a body of this law: the requested one; else single precision if the fast path
+    /// can be taken and reach the tolerance; else mixed. It is double if nothing is solved.
     pub fn arithmetic(&self, law: Law) -> Arithmetic {
         let fast = self.why_general(law).is_none() && self.reaches_single();
         self.arithmetic.unwrap_or(match (self.scheme.is_explicit() || (self.relaxation && !fast), fast) {
@@ -125,13 +125,13 @@ impl BodySettings {
         })
     }
 
-    /// A tolerance of 0 asks for a fixed number of iterations, which single precision can do.
+    /// A tolerance of 0 requests a fixed number of iterations, which single precision can do.
     fn reaches_single(&self) -> bool {
         self.solver.tolerance >= SINGLE_TOLERANCE || self.solver.tolerance == 0.0
     }
 
-    /// Most Newton steps per step of time: one linear solve from the predictor for laws that are
-    /// linear in the stretch, two for Newmark's method, which needs them.
+    /// Largest number of Newton steps per time step. Laws that are linear in the stretch need one linear
+    /// solve from the predictor; Newmark's method needs two.
     pub fn newton_steps(&self, law: Law) -> u32 {
         let easy = matches!(law, Law::Linear | Law::Corotational);
         self.newton_steps.unwrap_or(match self.scheme {
@@ -142,8 +142,8 @@ impl BodySettings {
         })
     }
 
-    /// When a linear solve of the fast path stops. That of an equilibrium may make all iterations that Newton's
-    /// method would get.
+    /// When a linear solve of the fast path stops. An equilibrium may use all the iterations that
+    /// Newton's method would get.
     pub(super) fn solver(&self, law: Law) -> PcgSettings {
         let steps = match self.scheme {
             Scheme::Static if !self.relaxation => self.newton_steps(law),
@@ -152,7 +152,7 @@ impl BodySettings {
         PcgSettings { iterations: self.solver.iterations.saturating_mul(steps), ..self.solver }
     }
 
-    /// Most linear solves of a step of the fast path.
+    /// Largest number of linear solves in a step of the fast path.
     pub(super) fn solves(&self, law: Law) -> u32 {
         match self.scheme {
             Scheme::Static if self.relaxation => 1,
@@ -161,16 +161,16 @@ impl BodySettings {
         }
     }
 
-    /// Whether a step is a fixed number of linear solves by design, so that it has converged when the
-    /// last of them has: motion of laws that are linear in the stretch, unless more Newton steps than
-    /// one are asked for. Everything else has converged when Newton's method has.
+    /// Whether a step is a fixed number of linear solves by design and has converged when the last of
+    /// them has. This holds for the motion of laws that are linear in the stretch, unless more than one
+    /// Newton step is requested. Every other step has converged when Newton's method has.
     pub fn is_linearised(&self, law: Law) -> bool {
         let easy = matches!(law, Law::Linear | Law::Corotational) && self.newton_steps.is_none();
         let implicit = !self.scheme.is_explicit() && self.scheme != Scheme::Static;
         implicit && (easy || self.newton_steps == Some(1))
     }
 
-    /// Newton's method of the general path.
+    /// Settings of Newton's method on the general path.
     pub(super) fn newton(&self, law: Law) -> NewtonSettings {
         let steps = self.newton_steps(law);
         let precision =
@@ -189,7 +189,7 @@ impl BodySettings {
         NewtonSettings { steps, halvings, tolerance: self.solver.tolerance, curvature, linear }
     }
 
-    /// How the fast path applies the stiffness of so many pieces.
+    /// How the fast path applies the stiffness of `pieces` pieces; never [`OperatorChoice::Auto`].
     pub fn operator(&self, law: Law, pieces: usize) -> OperatorChoice {
         match self.operator {
             OperatorChoice::Auto => cost::cheapest(law, pieces, self.solver),
@@ -197,7 +197,7 @@ impl BodySettings {
         }
     }
 
-    /// Predicted seconds of a step of the fast path on one thread.
+    /// Predicted time [s] of a step of the fast path on one thread.
     pub fn fast_seconds(&self, law: Law, pieces: usize) -> f64 {
         let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
         let solves = if self.scheme == Scheme::Static { 1.0 } else { f64::from(self.solves(law)) };
@@ -209,7 +209,7 @@ impl BodySettings {
         self.relaxation.then_some(self.solver.iterations)
     }
 
-    /// Tells whether every setting is in its range and goes with the others and `law`.
+    /// Checks that every setting is in its range and compatible with the others and with `law`.
     pub fn check(&self, law: Law) -> Result<(), BodyError> {
         let setting = |name, found: f64, allowed| Err(BodyError::Setting { name, found, allowed });
         if !(1..=Self::MOST_THREADS).contains(&self.threads) {

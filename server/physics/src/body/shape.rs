@@ -1,5 +1,5 @@
-//! What an element adds to the tetrahedra that surface and contact are made of: more nodes, other
-//! shape functions, other faces.
+//! What an element adds to the tetrahedra of surface and contact: more nodes, other shape functions,
+//! other faces.
 
 use nalgebra::Vector3;
 
@@ -12,10 +12,10 @@ use crate::mesh::{HexMesh, TET_EDGES, Tet10Mesh, TetMesh};
 /// Tetrahedra per hexahedron in [`HexMesh::to_tets`].
 const TETS_PER_HEX: usize = 6;
 
-/// The element of a body with what it needs beside the tet mesh.
+/// The element of a body, with the data it needs beside the tet mesh.
 #[derive(Debug)]
 pub(super) enum Shape {
-    /// The tets themselves; copies are all the nodes there are.
+    /// The tets themselves, with the copies as their only nodes.
     Tet4,
     /// Quadratic tets: mid-edge nodes follow the copies.
     Tet10(Tet10Mesh),
@@ -33,7 +33,7 @@ impl Shape {
         }
     }
 
-    /// Rest position [m] of every node: copies, then what the element adds.
+    /// Rest position [m] of every node: copies first, then the nodes that the element adds.
     pub fn rest_positions(&self, cut: &CutMesh) -> Vec<Vector3<f64>> {
         match self {
             Shape::Tet10(mesh) => mesh.nodes.clone(),
@@ -85,8 +85,8 @@ impl Shape {
         area
     }
 
-    /// Nodes that carry the point with barycentric coordinates `weights` in tet `tet`, whose piece is
-    /// on `copies`, and the shape functions there; Σ = 1.
+    /// Nodes and shape functions (Σ = 1) of the point with barycentric coordinates `weights` in tet
+    /// `tet`, whose piece is on `copies`.
     pub fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
         match self {
             Shape::Tet4 => copies.into_iter().zip(weights).collect(),
@@ -103,7 +103,7 @@ impl Shape {
         }
     }
 
-    /// Elements at rest: hexahedra where the tets are only their parts.
+    /// Number of elements at rest; hexahedra count as one each, not as six tets.
     pub fn n_elements(&self, mesh: &TetMesh) -> usize {
         match self {
             Shape::Hex8(mesh) => mesh.hexes.len(),
@@ -111,7 +111,7 @@ impl Shape {
         }
     }
 
-    /// Elements of the model that tet `tet` of the mesh belongs to.
+    /// Element of the model that contains tet `tet` of the mesh.
     pub fn element_of(&self, tet: usize) -> usize {
         match self {
             Shape::Hex8(_) => tet / TETS_PER_HEX,
@@ -120,7 +120,7 @@ impl Shape {
     }
 }
 
-/// The middles of the three edges of a face.
+/// Mid-edge nodes of the three edges of a face.
 fn middles_of(mesh: &Tet10Mesh, corners: &[u32; 4], tet: u32, face: &[u32; 3]) -> [u32; 3] {
     let local = face.map(|n| corners.iter().position(|&c| c == n).unwrap_or(0));
     [[0, 1], [1, 2], [2, 0]].map(|[i, j]| {

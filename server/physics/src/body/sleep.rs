@@ -1,7 +1,7 @@
 //! Parts that are put to sleep: they stay where they are and cost the solver nothing.
 //!
-//! A part that a cut has freed falls for ever. Far from everything it touches nothing any more, but its
-//! speed still grows, and with it the range of numbers that a step has to hold.
+//! A part that a cut has freed falls for ever. Once far away it touches nothing, but its speed still
+//! grows. So does the range of numbers that a step has to represent.
 
 use nalgebra::Vector3;
 
@@ -9,8 +9,8 @@ use super::{Body, Path};
 use crate::operator::FixedCopy;
 
 impl Body {
-    /// Puts a part that hangs on nothing to sleep: every copy of it is held where it is, at rest, until
-    /// [`reset`](Self::reset), or until a cut along faces numbers the nodes anew. The epoch rises. Returns
+    /// Puts a part that is held nowhere to sleep. Every copy of it is held where it is, at rest, until
+    /// [`reset`](Self::reset) or until a cut along faces renumbers the nodes. The epoch rises. Returns
     /// whether the part was free.
     pub fn put_to_sleep(&mut self, part: usize) -> bool {
         if !self.parts.free.get(part).copied().unwrap_or(false) {
@@ -44,7 +44,7 @@ impl Body {
         !self.asleep.is_empty()
     }
 
-    /// Mass centre [m] of every part, into `centres`.
+    /// Writes the centre of mass [m] of every part to `centres`.
     pub fn part_centres(&self, centres: &mut Vec<Vector3<f64>>) {
         centres.clear();
         centres.resize(self.parts.len(), Vector3::zeros());
@@ -56,7 +56,7 @@ impl Body {
         }
     }
 
-    /// The copies that constraints and sleep hold.
+    /// Collects the copies held by constraints or by sleep, ascending.
     pub(super) fn find_fixed(&mut self) {
         self.boundary.fixed_copies(&self.cut_mesh, &self.rest, self.prescribed_share, &mut self.fixed);
         if !self.asleep.is_empty() {

@@ -1,4 +1,4 @@
-//! Cutting along element faces: the mesh itself changes, and everything on it follows.
+//! Cutting along element faces: the mesh itself changes, and all data on it follows.
 
 use nalgebra::Vector3;
 
@@ -14,29 +14,29 @@ pub enum CuttingMethod {
     /// Pieces and copies inside the elements ([`crate::cut`]).
     #[default]
     Xfem,
-    /// Along element faces, nodes moved onto the sweep ([`crate::snap`]); only of tet4.
+    /// Along element faces, with nodes moved onto the sweep ([`crate::snap`]); tet4 only.
     Snap,
 }
 
-/// What becomes of a part that a cut leaves without any held node; for [`CuttingMethod::Snap`].
+/// What happens to a part that a cut leaves without any held node; for [`CuttingMethod::Snap`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LooseRule {
-    /// It is a free body.
+    /// It becomes a free body.
     #[default]
     Free,
     /// It is held where it is at the nodes of its largest skin face (Nienhuys 2003, §3.3).
     Pinned,
 }
 
-/// What a body that is cut along faces remembers.
+/// State of a body that is cut along faces.
 #[derive(Clone, Debug)]
 pub(super) struct SnapState {
     snapper: Snapper,
     start: Start,
-    /// Constraints and loads as the last cut left them, pins among them.
+    /// Constraints and loads after the last cut, including pins of loose parts.
     carried: Boundary,
     report: SnapReport,
-    /// Node of the uncut mesh that every node was, or [`crate::snap::node::NEW`].
+    /// For every node, the node of the uncut mesh that it was, or [`crate::snap::node::NEW`].
     origins: Vec<u32>,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct SnapState {
 #[derive(Clone, Debug)]
 struct Start {
     mesh: TetMesh,
-    /// Set by the first cut; takes on what is asked for after it.
+    /// Set by the first cut; later requests are added to it.
     boundary: Option<Boundary>,
 }
 
@@ -59,7 +59,7 @@ impl SnapState {
         }
     }
 
-    /// Remembers what was asked for since the last cut, for a reset.
+    /// Adds the requests made since the last cut to those that a reset restores.
     fn take_changes(&mut self, now: &Boundary) {
         let n = self.start.mesh.nodes.len();
         if let Some(start) = &mut self.start.boundary {
@@ -69,20 +69,21 @@ impl SnapState {
 }
 
 impl Body {
-    /// What the last cut along faces did; none for a body that is cut otherwise.
+    /// Report of the last cut along faces; `None` if the body is cut otherwise.
     pub fn snap_report(&self) -> Option<&SnapReport> {
         self.snap.as_deref().map(|snap| &snap.report)
     }
 
-    /// Per node, which node of the uncut mesh it was, [`crate::snap::node::NEW`] if none; none for a
-    /// body whose cuts leave the mesh alone.
+    /// For every node, the node of the uncut mesh that it was, or [`crate::snap::node::NEW`]. `None` if
+    /// cuts leave the mesh of the body alone.
     pub fn node_origins(&self) -> Option<&[u32]> {
         self.snap.as_deref().map(|snap| &snap.origins[..])
     }
 
-    /// Cuts along faces. Held nodes stay and all their duplicates are held; loads of a node that is
-    /// duplicated are shared by volume.
+    /// Cuts along faces. Held nodes stay in place, and all their duplicates are held. Loads of a
+    /// duplicated node are shared by volume.
     pub(super) fn snap_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
+        // On a clone of the state, so that a refused cut leaves the body as it was.
         let Some(mut snap) = self.snap.clone() else { return Ok(CutReport::default()) };
         let nodes = self.snap_nodes();
         let (report, cut) = snap.snapper.cut(&self.cut_mesh.mesh().tets, nodes, blade, incision)?;
@@ -94,6 +95,7 @@ impl Body {
             ..CutReport::default()
         };
         snap.report = report;
+        // Nothing came apart yet: only the report is new.
         let Some(cut) = cut else {
             self.snap = Some(snap);
             return Ok(told);
@@ -101,6 +103,7 @@ impl Body {
         told.epoch += 1;
         self.cut_mesh = CutMesh::with_lips(cut.mesh, snap.snapper.tags(), told.epoch)?;
         told.new_copies = cut.duplicates.iter().map(|d| NewCopy { copy: d.node, parent: d.parent }).collect();
+        // A reset must restore requests made since the last cut, but not the pins.
         snap.take_changes(&self.boundary);
         if snap.start.boundary.is_none() {
             snap.start.boundary = Some(self.boundary.clone());
@@ -122,8 +125,8 @@ impl Body {
         Ok(told)
     }
 
-    /// Back to the uncut mesh. Constraints and loads stay, on the nodes that theirs were; pins of loose
-    /// parts go, and so does what was asked for on nodes that cuts made.
+    /// Returns to the uncut mesh. Constraints and loads stay, on the nodes that theirs came from. Pins of
+    /// loose parts are removed, and so are requests on nodes that cuts made.
     pub(super) fn snap_reset(&mut self) -> Result<(), BodyError> {
         let Some(snap) = &mut self.snap else { return Ok(()) };
         let epoch = self.cut_mesh.epoch() + 1;
@@ -138,7 +141,7 @@ impl Body {
         self.follow_mesh()
     }
 
-    /// Everything that is derived from a mesh that is another one now.
+    /// Updates everything derived from the mesh after it was replaced.
     fn follow_mesh(&mut self) -> Result<(), BodyError> {
         match &mut self.path {
             Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
@@ -159,7 +162,7 @@ impl Body {
         nodes
     }
 
-    /// Holds every part that hangs on nothing at its largest skin face, where it is now.
+    /// Holds every part that is held nowhere at its largest skin face, in its present position.
     fn pin_loose_parts(&mut self) -> Result<(), BodyError> {
         let mesh = self.cut_mesh.mesh();
         let mut largest: Vec<Option<(f64, [u32; 3])>> = vec![None; self.parts.len()];

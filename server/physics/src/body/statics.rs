@@ -1,9 +1,9 @@
 //! Static equilibrium: f_int(x) = f_ext, solved by Newton's method with a line search.
 //!
-//! The residual is double precision, the directions come from the single-precision solver: each
-//! Newton step refines what the last one left. The tangent is K̂ (rotations held), which is
-//! positive semidefinite everywhere; it costs a few more steps than the exact one and never turns
-//! a descent direction uphill.
+//! The residual is in double precision, and the directions come from the single-precision solver: each
+//! Newton step refines the last. The tangent is K̂ (rotations held), which is positive semidefinite
+//! everywhere. It costs a few more steps than the exact tangent but never turns a descent direction
+//! uphill.
 
 use nalgebra::Vector3;
 
@@ -13,25 +13,25 @@ use crate::integrator::prescribe;
 use crate::operator::{BlockJacobi, CompositeDiagonal, ElasticUpdate, FixedCopy, SystemOperator, padded};
 use crate::solver::{Curvature, LinearSettings, NewtonSettings, Pcg, PcgSettings};
 
-/// When a static solve stops.
+/// Stopping criteria of a static solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticSettings {
-    /// Stop at ‖f_ext − f_int‖ ≤ tolerance · ‖f_ext‖ (or the first residual, if larger).
+    /// Relative residual to reach: ‖f_ext − f_int‖ ≤ tolerance · ‖f_ext‖ (or the first residual, if larger).
     pub tolerance: f64,
-    /// Most Newton steps.
+    /// Largest number of Newton steps.
     pub newton_steps: u32,
     /// When each linear solve stops.
     pub linear: PcgSettings,
 }
 
-/// How a static solve went.
+/// Result of a static solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StaticReport {
     /// Whether the tolerance was reached; if not, the body is at the best state found.
     pub converged: bool,
-    /// Newton steps made.
+    /// Newton steps that were made.
     pub newton_steps: u32,
-    /// Solver iterations of all steps.
+    /// Solver iterations, summed over all Newton steps.
     pub iterations: u32,
     /// Final residual relative to the loads.
     pub residual: f64,
@@ -43,11 +43,12 @@ impl Default for StaticSettings {
     }
 }
 
-/// Shortest step of the line search.
+/// Shortest step of the line search, as a fraction of the full one.
 const SHORTEST: f64 = 1.0 / 1024.0;
 
 impl Body {
-    /// Moves the body to its static equilibrium under gravity [m/s²], loads and constraints, at rest.
+    /// Moves the body to its static equilibrium under gravity [m/s²], loads and constraints; it is then
+    /// at rest.
     pub fn solve_static(
         &mut self,
         gravity: Vector3<f64>,
@@ -58,6 +59,7 @@ impl Body {
         }
         self.state.v.fill(Vector3::zeros());
         prescribe(&self.fixed, &mut self.state.x);
+        // The general path has its own Newton's method; only the stopping criteria are these.
         if let Path::General(general) = &self.path {
             let Self { team, state, load, fixed, .. } = self;
             let newton = self.settings.newton(self.material.law);
@@ -108,7 +110,7 @@ impl Body {
         }
     }
 
-    /// δ with K̂ δ ≈ residual at the present state, and the iterations it took.
+    /// Solves K̂ δ ≈ residual at the present state. Returns δ and the iterations it took.
     fn static_direction(
         &mut self,
         residual: &[Vector3<f64>],
@@ -124,6 +126,8 @@ impl Body {
         fast.elastic.update(team, &with, &state.x, &mut f, &mut diagonal);
         let mut M = BlockJacobi::default();
         M.resize(n);
+        // Degenerate elements would cost most of the iterations; the preconditioner substitutes their
+        // motions.
         if let Some(modes) = fast.stiff_modes(cut_mesh) {
             let (T, _) = modes.substitution(|copy| fixed.iter().any(|f| f.copy == copy));
             let mut composite = CompositeDiagonal::new(&modes, &T, &fast.elastic);
@@ -132,7 +136,7 @@ impl Body {
         }
         let Fast { elastic, mass_f32, .. } = &mut **fast;
         M.update(team, &diagonal, fixed);
-        // Scaled to 1, so that single precision does not mind how small the residual has become.
+        // Scaled to 1, so that single precision can represent the residual however small it has become.
         let size = norm(residual).max(f64::MIN_POSITIVE);
         for (r, residual) in pcg.r.iter_mut().zip(residual) {
             *r = padded(&(residual / size));
@@ -165,8 +169,8 @@ impl Newton {
         potential
     }
 
-    /// Moves along `direction` as far as the potential falls or, where it no longer can be told
-    /// apart, the residual; returns the new potential, or `None` with the body where it was.
+    /// Moves along `direction` until the potential falls or, where rounding hides that, the residual
+    /// halves. Returns the new potential, or `None` with the body where it was.
     fn search(&mut self, body: &mut Body, direction: &[Vector3<f64>], potential: f64) -> Option<f64> {
         let start = body.state.x.clone();
         let before = norm(&self.residual);

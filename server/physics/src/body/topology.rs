@@ -1,7 +1,7 @@
-//! What a body tells of its discretisation: elements, pieces, copies, parts, where its material rests.
+//! Queries of a body's discretisation: elements, pieces, copies, parts, rest positions.
 //!
-//! Nothing outside this crate reaches the state of the cuts itself, so that another discretisation can
-//! answer the same questions.
+//! Nothing outside this crate reads the state of the cuts itself, so another discretisation could answer
+//! the same queries.
 
 use nalgebra::Vector3;
 
@@ -16,8 +16,8 @@ impl Body {
         self.cut_mesh.epoch()
     }
 
-    /// The tetrahedra at rest that the body is cut in and drawn with: its elements, or six for every
-    /// hexahedron. Cuts change it only where they run along faces.
+    /// The tetrahedra at rest that are cut and drawn: the elements, or six tets for every hexahedron.
+    /// Only cuts along faces change them.
     pub fn mesh(&self) -> &TetMesh {
         self.cut_mesh.mesh()
     }
@@ -37,7 +37,7 @@ impl Body {
         self.shape.n_elements(self.cut_mesh.mesh())
     }
 
-    /// Pieces that cuts made of the elements; as many as elements in a body that cannot be cut.
+    /// Number of pieces that cuts made of the elements; that of the elements in a body that cannot be cut.
     pub fn n_pieces(&self) -> usize {
         match self.shape.kind() {
             ElementKind::Tet4 => self.cut_mesh.pieces().len(),
@@ -45,18 +45,18 @@ impl Body {
         }
     }
 
-    /// Nodes of the uncut body, with those that quadratic elements add.
+    /// Number of nodes of the uncut body, including those that quadratic elements add.
     pub fn n_nodes(&self) -> usize {
         self.rest.len() + self.cut_mesh.mesh().nodes.len() - self.cut_mesh.n_copies()
     }
 
-    /// Copies of the mesh's nodes, one set of degrees of freedom each; without the nodes that quadratic
-    /// elements add.
+    /// Number of copies of the mesh's nodes, without the nodes that quadratic elements add. Each copy has
+    /// its own degrees of freedom.
     pub fn n_copies(&self) -> usize {
         self.cut_mesh.n_copies()
     }
 
-    /// Node of the mesh that every copy is one of.
+    /// For every copy, the node of the mesh that it is a copy of.
     pub fn node_of_copy(&self) -> &[u32] {
         self.cut_mesh.copy_node()
     }
@@ -76,17 +76,17 @@ impl Body {
         self.cut_mesh.piece_at(tet, barycentric)
     }
 
-    /// Parts of the material that hang together through faces, and their rest volumes.
+    /// Parts of the material that are connected through faces, and their rest volumes.
     pub fn components(&self) -> Components {
         self.cut_mesh.components()
     }
 
-    /// The material as tetrahedra that fill it once, for export.
+    /// The material as tetrahedra that fill it without overlap, for export.
     pub fn solid(&self) -> Solid {
         self.cut_mesh.solid()
     }
 
-    /// What is wrong with the state of the cuts; nothing but rounding, whatever was cut.
+    /// Violations of the invariants of the cut state; beyond rounding there must be none, whatever was cut.
     pub fn flaws(&self) -> Flaws {
         Flaws::of(&self.cut_mesh)
     }

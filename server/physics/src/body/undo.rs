@@ -1,10 +1,10 @@
 //! Taking a cut back: the topology from before it, with the present motion.
 //!
-//! What a cut separated comes together again where its parts are now: a node takes the mean position
-//! and velocity of what it was split into, weighted by mass, so that the centre of mass and the momentum
-//! stay. The tissue is then stretched across the closed wound and pulls itself together.
+//! Material that a cut separated is joined where its parts are now. A node takes the mean position and
+//! velocity of the copies it was split into, weighted by mass, so centre of mass and momentum stay. The
+//! tissue is then stretched across the closed wound and contracts.
 //!
-//! A part that the cut had set free may have fallen far away. It goes back to where it was, at rest.
+//! A part that the cut had freed may have fallen far away. It returns to where it was, at rest.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ pub struct BodyTopology {
     boundary: Boundary,
     snap: Option<Box<SnapState>>,
     x: Vec<Vector3<f64>>,
-    /// Whether all of it was held, so that free parts are the work of cuts since then.
+    /// Whether every part was held then; if so, parts that are free now were freed by cuts since.
     held: bool,
 }
 
@@ -35,7 +35,7 @@ const ELEMENT_BYTES: usize = 2000;
 const TRIANGLE_BYTES: usize = 400;
 
 impl BodyTopology {
-    /// Memory that it takes, within a factor of about two.
+    /// Estimated memory [byte], within a factor of about two.
     pub fn bytes(&self) -> usize {
         let skin = self.skin.as_ref().map_or(0, |skin| skin.surface().triangles.len());
         ELEMENT_BYTES * self.cut_mesh.pieces().len()
@@ -44,7 +44,7 @@ impl BodyTopology {
 }
 
 impl Body {
-    /// The present topology, for [`restore`](Self::restore).
+    /// Takes a copy of the present topology, for [`restore`](Self::restore).
     pub fn topology(&self) -> BodyTopology {
         BodyTopology {
             cut_mesh: self.cut_mesh.clone(),
@@ -56,11 +56,11 @@ impl Body {
         }
     }
 
-    /// Takes back every cut since `topology` was taken from this body; the epoch rises. Mass stays, and
-    /// momentum and centre of mass but for parts that were cut off.
+    /// Takes back every cut since `topology` was taken from this body; the epoch rises. Mass stays.
+    /// Momentum and centre of mass stay too, unless a part was cut off.
     ///
     /// # Errors
-    /// Where the model cannot be built again.
+    /// If the model cannot be built again.
     pub fn restore(&mut self, topology: BodyTopology) -> Result<(), BodyError> {
         let epoch = self.cut_mesh.epoch() + 1;
         let before = Moving::of(self, topology.held);
@@ -78,6 +78,7 @@ impl Body {
         self.asleep.clear();
         self.split_from.truncate(self.cut_mesh.n_copies());
         (self.state.x, self.state.v) = state;
+        // Rotations and history of the cut state no longer apply: the integrator starts afresh.
         match &mut self.path {
             Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
             Path::General(_) => self.rebuild_general()?,
@@ -101,7 +102,7 @@ fn mean((mass, mx, mv): &Sum) -> Option<(Vector3<f64>, Vector3<f64>)> {
     (*mass > 0.0).then(|| (mx / *mass, mv / *mass))
 }
 
-/// How a body moved before it was changed.
+/// Motion of a body before its topology was replaced.
 struct Moving {
     mesh: TetMesh,
     x: Vec<Vector3<f64>>,
@@ -114,10 +115,10 @@ struct Moving {
 }
 
 impl Moving {
-    /// `held`: free parts are the work of cuts.
+    /// `held`: every part was held when the topology was taken, so free parts come from cuts.
     fn of(body: &Body, held: bool) -> Self {
         let free = |&part: &u32| held && body.parts.free[part as usize];
-        // Only a mesh that cuts have changed is looked at again.
+        // The mesh is needed only if cuts have changed it.
         let mesh = if body.snap.is_some() { body.cut_mesh.mesh().clone() } else { TetMesh::default() };
         Self {
             mesh,
@@ -136,8 +137,8 @@ impl Moving {
         }
     }
 
-    /// The first copies with all that was split from them, told by the parents of copies; where nothing is
-    /// left of one, `x` [m].
+    /// Joins every first copy with all copies split from it, which `split_from` tells. A copy of which
+    /// nothing is left goes to `x` [m].
     fn joined(&self, x: &[Vector3<f64>], split_from: &[u32]) -> Motion {
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); x.len()];
         for copy in (0..self.x.len()).filter(|&copy| !self.lost[copy]) {
@@ -150,8 +151,9 @@ impl Moving {
         sums.iter().zip(x).map(|(sum, x)| mean(sum).unwrap_or((*x, Vector3::zeros()))).unzip()
     }
 
-    /// The motion of the material points that are the nodes of `mesh`, another mesh of the same body: of
-    /// the nodes that lie there, else of the element around. Where a part was cut off, `x` [m].
+    /// Motion of the material points that are the nodes of `mesh`, another mesh of the same body: that of
+    /// nodes at the same place, else that of the element around. If a part was cut off, `x` [m] stands in
+    /// for the latter.
     fn on_mesh(&self, mesh: &TetMesh, x: &[Vector3<f64>]) -> Motion {
         let key = |point: &Vector3<f64>| [point.x, point.y, point.z].map(|c| (c + 0.0).to_bits());
         let mut there: BTreeMap<[u64; 3], Sum> = BTreeMap::new();
@@ -190,8 +192,8 @@ impl Moving {
         (sample(&self.x), sample(&self.v))
     }
 
-    /// Moves free nodes together so that momentum and centre of mass are what they were, but for what the
-    /// held ones put in.
+    /// Translates the free nodes so that momentum and centre of mass are again those from before, except
+    /// for what held nodes contribute.
     fn give_momentum_to(&self, body: &mut Body) {
         let held: Vec<u32> = body.fixed.iter().map(|fixed| fixed.copy).collect();
         let free = |c: usize| held.binary_search(&(c as u32)).is_err();

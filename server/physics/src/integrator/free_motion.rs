@@ -1,21 +1,22 @@
 //! Rigid motions that no prescribed direction resists.
 //!
-//! A part is held against t + ω × (x − c) if some prescribed direction e_k at x sees it: Σ a aᵀ over all
-//! of them, a = (e_k, (x − c) × e_k), is then positive definite. Its null vectors are the motions that
-//! are left. They are those of the rest configuration: a hinge or a pendulum counts as free.
+//! A part resists the rigid motion t + ω × (x − c) if the motion has a component along some prescribed
+//! direction e_k at x. It resists all of them if Σ a aᵀ over the prescribed directions, a = (e_k, (x − c)
+//! × e_k), is positive definite. The null vectors of this sum are the free motions. They are those of the
+//! rest configuration: a hinge or a pendulum counts as free.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::parts::LooseParts;
 use crate::operator::FixedCopy;
 
-/// Eigenvalues below this part of the trace are zero: an angle of 1e-6 that is held, or rounding.
+/// Eigenvalues below this fraction of the trace count as zero: rounding, or a held angle of 1e-6.
 const NULL: f64 = 1e-12;
 
-/// A rigid motion of a part of a body that nothing holds.
+/// A rigid motion of a part of a body that no prescribed direction resists.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeMotion {
-    /// The part.
+    /// Index of the part in [`LooseParts`].
     pub part: u32,
     /// Its mass [kg].
     pub mass_kg: f64,
@@ -93,7 +94,7 @@ fn frames(parts: &LooseParts, rest: &[Vector3<f64>]) -> Vec<(Vector3<f64>, f64)>
     boxes.into_iter().map(frame).collect()
 }
 
-/// A basis of what `held` does not hold: first the translations along the axes, then the rest.
+/// A basis of the null space of `held`: first the translations along the axes, then the rest.
 fn null_vectors(held: &Matrix6<f64>) -> Vec<Vector6<f64>> {
     let zero = NULL * held.trace();
     let mut basis: Vec<Vector6<f64>> =

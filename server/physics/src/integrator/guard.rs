@@ -1,6 +1,6 @@
-//! What tells that a scheme is out of its depth.
+//! Signs that a time integration scheme fails: energy from nowhere, and large turns.
 
-/// Book-keeping of energy: H = kinetic + elastic + loads and springs, which a step conserves.
+/// Energy balance of H = kinetic + elastic + loads and springs, which a step conserves.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ledger {
     /// H at the start of the run, plus what changes of loads and springs have put in since [J].
@@ -9,8 +9,8 @@ pub(crate) struct Ledger {
     end: f64,
 }
 
-/// Part of the energy that may appear from nowhere before a guard steps in: with schemes that should
-/// keep it, and with implicit Euler, which should lose some.
+/// Relative gain of energy at which a guard steps in: for schemes that should conserve energy, and for
+/// implicit Euler, which should lose some.
 pub(crate) const GAIN_CONSERVING: f64 = 0.01;
 pub(crate) const GAIN_DISSIPATING: f64 = 1e-4;
 
@@ -19,7 +19,7 @@ impl Ledger {
         self.reference = None;
     }
 
-    /// A step begins with energy `H` [J] under its own loads.
+    /// Begins a step with energy `H` [J] under its own loads; a jump since the last step is work of these.
     pub fn begin(&mut self, H: f64) {
         self.reference = Some(match self.reference {
             Some(reference) => reference + H - self.end,
@@ -27,14 +27,13 @@ impl Ledger {
         });
     }
 
-    /// Energy [J] above what there should be at most, if a state with energy `H` has more of it
-    /// than the `allowed` gain [J].
+    /// Excess of the energy `H` [J] over the reference, if it is more than the `allowed` gain [J].
     pub fn excess(&self, H: f64, allowed: f64) -> Option<f64> {
         let excess = H - self.reference.unwrap_or(H);
         (excess.is_nan() || excess > allowed).then_some(excess)
     }
 
-    /// The step ended with energy `H` [J]. Where prescribed nodes moved they put energy in.
+    /// Ends the step with energy `H` [J]. If `driven`, prescribed nodes moved and put energy in.
     pub fn end(&mut self, H: f64, driven: bool) {
         self.end = H;
         if driven {
@@ -43,6 +42,6 @@ impl Ledger {
     }
 }
 
-/// BDF2 serves while a body turns by less than this in one step [rad]. Up to 1.6 no energy is gained,
-/// from 2 on it is.
+/// BDF2 is used while a body turns by less than this in one step [rad]. Up to 1.6 it gains no energy;
+/// from 2 on it does.
 pub(crate) const LARGEST_TURN: f64 = 0.8;

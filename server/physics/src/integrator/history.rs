@@ -1,4 +1,4 @@
-//! What earlier steps left behind.
+//! States of earlier steps, for schemes that need them.
 
 use nalgebra::Vector3;
 
@@ -8,19 +8,19 @@ use crate::cut::NewCopy;
 /// The last two states.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// State before the last step, and the one that the last step left.
+    /// State before the last step; `last` is the one that the last step left.
     pub before: State,
     last: State,
     /// Length of the last step [s].
     pub h: f64,
-    /// Springs in contact at the end of it.
+    /// Number of springs in contact at the end of the last step.
     pub contacts: usize,
-    /// Whether there was a last step.
+    /// Whether there was a last step; without one the rest is invalid.
     pub known: bool,
 }
 
 impl History {
-    /// There was no last step.
+    /// Forgets the last step.
     pub fn forget(&mut self) {
         self.known = false;
         self.contacts = 0;
@@ -31,7 +31,7 @@ impl History {
         self.known && self.last == *state
     }
 
-    /// Copies that are held from now on, at the positions of `state`, have never moved.
+    /// Treats `copies`, which are held from now on, as if they had always rested at the positions of `state`.
     pub fn still(&mut self, copies: &[u32], state: &State) {
         if !self.known {
             return;
@@ -44,7 +44,7 @@ impl History {
         }
     }
 
-    /// A step of length `h` from `before` to `after` was made.
+    /// Records a step of length `h` [s] from `before` to `after`.
     pub fn push(&mut self, before: &State, after: &State, h: f64) {
         self.before.copy_from(before);
         self.last.copy_from(after);
@@ -52,7 +52,7 @@ impl History {
         self.known = true;
     }
 
-    /// A cut made the copies `new`, each of which was its parent until now.
+    /// Gives the copies `new`, which a cut made, the history of their parents.
     pub fn inherit(&mut self, new: &[NewCopy]) {
         if !self.known {
             return;

@@ -1,4 +1,4 @@
-//! What every implicit scheme makes of the end of a step: a⁺ = A (x⁺ − x_a), v⁺ = B (x⁺ − x_v).
+//! The form of the end of a step that all implicit schemes share: a⁺ = A (x⁺ − x_a), v⁺ = B (x⁺ − x_v).
 //!
 //! | scheme | A | B | x_v | x_a |
 //! |---|---|---|---|---|
@@ -11,7 +11,7 @@
 
 use nalgebra::Vector3;
 
-/// The factors of a scheme.
+/// Factors A and B of a scheme.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Increment {
     /// A [1/s²].

@@ -8,8 +8,8 @@
 //!   [(1 + rα) M + (s + rβ) K̂] δ = s (f_ext − f_int(x̂) − α M v̂ − β K̂ v̂) − M (x̂ − x_a)
 //!
 //! The predictor is x̂ = x_a, so that the last term is 0 in the first solve. For implicit Euler s = h²,
-//! r = h, x̂ = x + h v and v̂ = v. Linearised at x_n instead, a spinning body gains energy; from the
-//! predictor it never does. K̂ turns with the material, so β leaves rigid motion alone.
+//! r = h, x̂ = x + h v and v̂ = v. Linearised at x_n, a spinning body would gain energy; linearised at
+//! the predictor it never does. K̂ rotates with the material, so β does not damp rigid motion.
 
 use nalgebra::Vector3;
 
@@ -27,16 +27,16 @@ use crate::reserve::resize_reserving;
 use crate::solver::{LEAST_REFERENCE, Pcg, PcgReport, StopReason};
 use crate::team::{Team, blocks};
 
-/// Springs may open, close or reach their cap this often within one step.
+/// Largest number of passes of a linear solve, repeated while springs open, close or reach their cap.
 const SPRING_PASSES: usize = 3;
-/// The residual is measured against the right-hand side, but at least against this part of the
-/// loads, so that a body at rest is not solved for rounding noise.
+/// The residual is measured against the right-hand side, but at least against this fraction of the loads.
+/// A body at rest would otherwise be solved for rounding noise.
 const LOAD_FLOOR: f64 = 0.01;
 
 /// The scratch vectors of a step, one entry per copy.
 #[derive(Debug, Default)]
 pub struct LinearStep {
-    /// Linearise at the positions of the last step.
+    /// Linearise at the positions of the last step; only a mutation test sets it.
     at_start: bool,
     predicted: Vec<Vector3<f64>>,
     f_int: Vec<Padded>,
@@ -46,11 +46,11 @@ pub struct LinearStep {
     /// Blocks of (1 + rα) M + (s + rβ) K̂, springs not included.
     diagonal: Vec<Block6>,
     preconditioner: BlockJacobi,
-    /// What `diagonal` and `preconditioner` were made for: version of K̂ and mass factor.
+    /// State for which `diagonal` and `preconditioner` were computed: version of K̂ and mass factor.
     made_for: Option<(u64, f64)>,
-    /// The prescribed directions they were made for.
+    /// Prescribed directions for which they were computed.
     made_for_fixed: Vec<(u32, [bool; 3])>,
-    /// Of a body with degenerate elements.
+    /// Change of variables for a body with degenerate elements.
     stiff: Option<Box<Stiff>>,
     /// Copies whose entry of the preconditioner contains springs.
     sprung: Vec<u32>,
@@ -64,17 +64,17 @@ pub struct LinearStep {
     terms: Vec<Spring>,
     translations: Translations,
     reference: f64,
-    /// Of an equilibrium: internal forces [N] and energy [J] at the predictor in double precision.
+    /// For equilibria: internal forces [N] and energy [J] at the predictor in double precision.
     exact: Vec<Vector3<f64>>,
     stored: f64,
-    /// Residual that the last solve began with, over the reference.
+    /// Relative residual at the start of the last solve.
     began: f64,
-    /// Of relaxation: what its search was begun with, and where the last step ended.
+    /// For relaxation: loads that its search began with, and positions where the last step ended.
     searched: Option<KnownLoads>,
     ended: Vec<Vector3<f64>>,
 }
 
-/// How degenerate elements are kept from costing iterations.
+/// The change of variables that keeps degenerate elements from costing iterations.
 #[derive(Debug)]
 struct Stiff {
     modes: StiffModes,
@@ -88,12 +88,12 @@ struct Stiff {
     row: Vec<(u32, f64)>,
 }
 
-/// Most copies that a spring's weights are expected on in the new variables.
+/// Capacity for a spring's weights in the new variables: more copies are hardly ever needed.
 const SPRING_ROW: usize = 64;
 
 impl LinearStep {
-    /// An integrator without memory. `at_start` linearises at the positions of the last step, which
-    /// only a test of tests wants.
+    /// An integrator without history. `at_start` linearises at the positions of the last step; only a
+    /// mutation test sets it.
     pub fn new(at_start: bool) -> Self {
         Self { at_start, ..Self::default() }
     }
@@ -114,7 +114,7 @@ impl LinearStep {
         self.set_stiff_modes(None);
     }
 
-    /// Takes over the stiff motions of the degenerate elements of the present topology.
+    /// Sets the stiff motions of the degenerate elements of the present topology.
     pub fn set_stiff_modes(&mut self, modes: Option<StiffModes>) {
         self.preconditioner.set_substitution(Substitution::default());
         self.made_for = None;
@@ -124,18 +124,18 @@ impl LinearStep {
         });
     }
 
-    /// Pieces of degenerate elements, copies that are moved relative to others for them, and pieces
-    /// that keep a stiff motion; those of the last step.
+    /// Of the last step: pieces of degenerate elements, copies moved relative to others for them, and
+    /// pieces that keep a stiff motion.
     pub fn stiff_motions(&self) -> [usize; 3] {
         let (found, left) = self.stiff.as_ref().map_or((0, 0), |s| (s.modes.n_degenerate(), s.left));
         [found, self.preconditioner.substitution().len(), left]
     }
 
-    /// Advances `state` by h, unless something turns out not to be finite. The force of every
-    /// spring goes to `spring_forces`, in the order of the inputs.
+    /// Advances `state` by h if everything stays finite. The force of every spring is written to
+    /// `spring_forces`, in the order of the inputs.
     ///
-    /// Several solves are Newton's method with full steps and the held tangent: each starts from x⁺ of the
-    /// one before, and counts its residual against the loads of the first.
+    /// Several solves are Newton's method with full steps and the held tangent. Each starts from x⁺ of
+    /// the one before and measures its residual against the loads of the first.
     pub fn step(
         &mut self,
         team: &mut Team,
@@ -161,8 +161,8 @@ impl LinearStep {
             self.improve(team, (elastic, inputs), state, number == 0, &mut solve);
             solves += 1;
             finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
-            // In an equilibrium each solve begins with the true residual, where the one before only knew that
-            // of its recurrence. If that is no smaller than before, rounding is what is left.
+            // In an equilibrium each solve begins with the true residual, while the one before knew only
+            // its recurrence. A true residual that has not halved is rounding.
             let none_left = solve.iterations == known;
             let rounding = number > 0 && !none_left && self.began > 0.5 * began;
             if rounding && !inputs.moves() && solve.stop == StopReason::Converged {
@@ -177,6 +177,7 @@ impl LinearStep {
         if finite {
             self.commit(team, state, inputs, spring_forces);
         }
+        // Relaxation may continue this search in the next step if nothing changes until then.
         self.searched = None;
         if finite && inputs.relaxes() && inputs.springs.is_empty() {
             self.searched.get_or_insert_default().note(inputs);
@@ -186,14 +187,14 @@ impl LinearStep {
         StepOutcome { solve, solves, inverted_pieces, refused_springs, finite }
     }
 
-    /// Whether nothing was changed from outside since the last step.
+    /// Whether nothing has changed from outside since the last step.
     fn goes_on(&self, elastic: &Elastic, state: &State, inputs: &StepInputs<'_>) -> bool {
         let made_for = Some((elastic.version(), inputs.mass_factor()));
         let same = |known| inputs.is_loaded_as(known) && self.made_for == made_for && self.ended == state.x;
         self.searched.as_ref().is_some_and(same)
     }
 
-    /// Goes on with the search of the last step: the same direction, as if the steps were one.
+    /// Continues the search of the last step along its direction, as if both steps were one.
     fn relax(
         &mut self,
         team: &mut Team,
@@ -213,14 +214,14 @@ impl LinearStep {
             self.commit(team, state, inputs, spring_forces);
             self.ended.copy_from_slice(&state.x);
         }
-        // What the recurrence takes for the end is looked at again by forces.
+        // Convergence by the recurrence is checked in the next step, from forces.
         if !finite || solve.stop == StopReason::Converged {
             self.searched = None;
         }
         StepOutcome { solve, solves: 1, finite, ..StepOutcome::default() }
     }
 
-    /// One linear solve for δ, made again while springs open, close or reach their cap in it.
+    /// Makes one linear solve for δ, repeated while springs open, close or reach their cap in it.
     fn improve(
         &mut self,
         team: &mut Team,
@@ -236,7 +237,7 @@ impl LinearStep {
             self.balance_parts(state, inputs);
             self.residual(team, elastic, state, inputs, (pass, first));
             let report = self.solve(team, elastic, inputs, (pass, first));
-            // A pass that has nothing left to do estimates no error.
+            // A pass with nothing left to do estimates no error.
             let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
             *solve =
                 PcgReport { iterations: solve.iterations + report.iterations, algebraic_error, ..report };
@@ -247,8 +248,8 @@ impl LinearStep {
         }
     }
 
-    /// Acceleration [m/s²] of every copy at `state`, which Newmark's method starts from; 0 in prescribed
-    /// directions and where there is no mass.
+    /// Computes the acceleration [m/s²] of every copy at `state`, from which Newmark's method starts. It
+    /// is 0 in prescribed directions and where there is no mass.
     pub fn accelerate(
         &mut self,
         team: &mut Team,
@@ -304,7 +305,8 @@ impl LinearStep {
         }
     }
 
-    /// Rotations, forces, gradients and damping at the predictor.
+    /// Updates rotations, forces, gradients and damping at the predictor. Returns the number of inverted
+    /// pieces.
     fn update_operator(
         &mut self,
         team: &mut Team,
@@ -318,13 +320,14 @@ impl LinearStep {
         let at = if self.at_start { &state.x } else { &self.predicted };
         let inverted = elastic.update_chunks(team, &with, at);
         self.sum_chunks(team, elastic, inputs);
+        // Without inertia, single-precision forces would be too coarse for the residual.
         if let Inertia::None { mesh, .. } = inputs.inertia {
             self.exact.resize(self.predicted.len(), Vector3::zeros());
             let material = (inputs.material.law, inputs.material.lame());
             self.stored = exact::internal_forces(mesh, material, &self.predicted, &mut self.exact);
         }
         if self.damps(inputs) {
-            // Prescribed motion takes part with the velocity that it has in the step.
+            // Prescribed copies count with the velocity that they have in the step.
             let scratch = self.scratch.iter_mut().zip(&self.predicted);
             match inputs.inertia {
                 Inertia::Remembered(history) => scratch.zip(history.x_v).for_each(|((v, to), x)| {
@@ -333,7 +336,7 @@ impl LinearStep {
                 _ => scratch.zip(&state.x).for_each(|((v, to), x)| *v = padded(&((to - x) / h))),
             }
             elastic.apply(team, &self.scratch, &mut self.damping); // s K̂ v
-            // From x_n on, the predictor is h v away: f_int(x̂) ≈ f_int(x_n) + h K̂ v.
+            // Linearised at x_n, the predictor is h v away: f_int(x̂) ≈ f_int(x_n) + h K̂ v.
             let beta = if self.at_start { beta + h } else { beta };
             let factor = (beta / scale) as f32;
             self.damping.iter_mut().flatten().for_each(|v| *v *= factor); // β K̂ v
@@ -341,12 +344,12 @@ impl LinearStep {
         inverted
     }
 
-    /// Whether K̂ v takes part.
+    /// Whether the step has a damping term K̂ v.
     fn damps(&self, inputs: &StepInputs<'_>) -> bool {
         inputs.moves() && (self.at_start || inputs.material.rayleigh.stiffness_s > 0.0)
     }
 
-    /// Internal forces and, where it changed, the diagonal of A and its inverse, without springs.
+    /// Sums internal forces and, if it changed, the diagonal of A and its inverse, without springs.
     fn sum_chunks(&mut self, team: &mut Team, elastic: &Elastic, inputs: &StepInputs<'_>) {
         let factor = inputs.mass_factor();
         let made_for = Some((elastic.version(), factor));
@@ -384,7 +387,8 @@ impl LinearStep {
         }
     }
 
-    /// The blocks of the preconditioner in the variables in which degenerate elements are not stiff.
+    /// Replaces blocks of the preconditioner by those in variables in which degenerate elements are not
+    /// stiff.
     fn substitute(&mut self, team: &mut Team, elastic: &Elastic, inputs: &StepInputs<'_>) {
         let Some(stiff) = &mut self.stiff else { return };
         if stiff.stale {
@@ -412,7 +416,7 @@ impl LinearStep {
         }
     }
 
-    /// Spring terms of the operator and of the preconditioner.
+    /// Adds the springs to the operator and to the preconditioner.
     fn complete_operator(&mut self, elastic: &mut Elastic, inputs: &StepInputs<'_>) {
         self.terms.clear();
         self.terms.extend(self.active.iter().filter_map(|s| s.term(inputs.s())));
@@ -420,13 +424,14 @@ impl LinearStep {
             let found = inputs.fixed.binary_search_by_key(&copy, |f| f.copy);
             found.map_or([false; 3], |f| inputs.fixed[f].axes)
         };
+        // Springs of the last pass leave the preconditioner.
         for &copy in &self.sprung {
             self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
         }
         self.sprung.clear();
         match &mut self.stiff {
             None => self.sprung.extend(self.terms.iter().flat_map(|term| term.copies)),
-            // Springs hold on to the copies that theirs are moved relative to, too.
+            // A spring also acts on the copies relative to which its own are moved.
             Some(stiff) => {
                 for term in &self.terms {
                     term.expand(self.preconditioner.substitution(), &mut stiff.row);
@@ -434,6 +439,7 @@ impl LinearStep {
                 }
             }
         }
+        // `diagonal` itself stays without springs: they are in it only while the blocks are inverted.
         self.bare.clear();
         self.bare.extend(self.sprung.iter().map(|&copy| self.diagonal[copy as usize]));
         if let Some(stiff) = &mut self.stiff {
@@ -455,7 +461,7 @@ impl LinearStep {
         }
     }
 
-    /// Solves the translation equations of every free part for what is still missing.
+    /// Solves the translation equations of every free part for the imbalance that δ leaves.
     fn balance_parts(&mut self, state: &State, inputs: &StepInputs<'_>) {
         if !inputs.parts.any_free() {
             return;
@@ -478,7 +484,7 @@ impl LinearStep {
         self.translations.solve(inputs.parts);
     }
 
-    /// Where the point of a spring is with the present δ.
+    /// Position [m] of the point of a spring with the present δ.
     fn point_of(&self, spring: &ActiveSpring, inputs: &StepInputs<'_>) -> Vector3<f64> {
         spring.carriers().map(|(c, w)| w * self.position(c, inputs)).sum()
     }
@@ -489,7 +495,8 @@ impl LinearStep {
         self.predicted[c] + self.translations.shift[part] + unpadded(&self.delta[c])
     }
 
-    /// r = b − A δ into the solver's residual; on the first pass of the first solve also the norm of the loads.
+    /// Writes r = b − A δ to the solver; on the first pass of the first solve also sets the reference
+    /// from the loads.
     fn residual(
         &mut self,
         team: &mut Team,
@@ -500,6 +507,7 @@ impl LinearStep {
     ) {
         let (s, factor) = (inputs.s(), inputs.mass_factor());
         let damped = self.damps(inputs);
+        // On the first pass δ = 0.
         if pass > 0 {
             system(elastic, &[], inputs).apply(team, &self.delta, &mut self.scratch);
         }
@@ -530,6 +538,7 @@ impl LinearStep {
             }
             partial[0] = load.total();
         });
+        // A substitution mixes copies, so the norm of the loads then needs a pass of its own.
         if first && pass == 0 {
             let loads = if self.preconditioner.substitution().is_empty() {
                 self.partial.iter().sum::<f64>().max(0.0).sqrt()
@@ -542,6 +551,7 @@ impl LinearStep {
             };
             self.reference = self.least_reference(loads, inputs);
         }
+        // Springs reach few copies: they are added one by one.
         for spring in &self.active {
             let f = s * spring.force(self.point_of(spring, inputs));
             for (c, w) in spring.carriers() {
@@ -552,8 +562,8 @@ impl LinearStep {
         filter(inputs.fixed, &mut self.pcg.r);
     }
 
-    /// What the residual counts against at least, where √(fᵀM⁻¹f) of the loads is `loads`. Of an equilibrium
-    /// it is the loads themselves, or a part of the elastic energy where displacements alone hold the body.
+    /// Least reference of the residual, given the norm √(fᵀM⁻¹f) of the `loads`. For an equilibrium it is
+    /// that norm, or a fraction of √(2Ψ) if displacements alone load the body.
     fn least_reference(&self, loads: f64, inputs: &StepInputs<'_>) -> f64 {
         if inputs.moves() {
             return LOAD_FLOOR * loads;
@@ -561,7 +571,8 @@ impl LinearStep {
         loads.max(LEAST_REFERENCE * (2.0 * self.stored.max(0.0)).sqrt())
     }
 
-    /// Improves δ. The residual counts against that of the first pass of the step, or the loads, if larger.
+    /// Solves for δ. The reference is the residual of the first pass of the step, or that of the loads if
+    /// larger.
     fn solve(
         &mut self,
         team: &mut Team,
@@ -593,7 +604,7 @@ impl LinearStep {
         changed
     }
 
-    /// Moves the predictor to x⁺ = x̂ + δ; whether all of it is finite.
+    /// Moves the predictor to x⁺ = x̂ + δ. Returns whether all of it is finite.
     fn move_predictor(&mut self, team: &mut Team, inputs: &StepInputs<'_>) -> bool {
         let bound = 1e15; // m: far outside any scene, far inside the range of single precision
         let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.parts.of_copy);
@@ -610,7 +621,7 @@ impl LinearStep {
         !self.partial.contains(&0.0)
     }
 
-    /// Writes x⁺, v⁺ and the spring forces.
+    /// Writes x⁺ and v⁺ to `state`, and the spring forces.
     fn commit(
         &mut self,
         team: &mut Team,

@@ -1,8 +1,8 @@
-//! Whether a body still hangs together after a cut, found out close to the cut.
+//! Connected parts of a body after a cut, found from the neighbourhood of the cut.
 //!
-//! Most cuts are incisions: around their front the two lips are one. To see that, no more has to be
-//! looked at than what the cut changed, and then the parts of the body are those it had. Only where
-//! that does not tell is the whole body looked at.
+//! Most cuts are incisions: the two lips are joined around their front. The pieces that the cut changed
+//! then show that the parts of the body are still those from before. Only if they do not show it is the
+//! whole body searched.
 
 use super::parts::LooseParts;
 use crate::cut::{CutMesh, NewCopy};
@@ -11,18 +11,18 @@ use crate::numbering::Numbering;
 use crate::operator::FixedCopy;
 use crate::reserve::resize_reserving;
 
-/// Scratch of a look at what a cut changed.
+/// Buffers of the local search.
 #[derive(Clone, Debug, Default)]
 pub struct LocalConnectivity {
     numbering: Numbering,
-    /// Copies on the changed pieces, and of what others were split from.
+    /// Copies on the changed pieces, and on the elements around copies that others were split from.
     copies: Vec<u32>,
-    /// For each of them one that it hangs together with, up to a root.
+    /// Union–find: for each of these copies another one that it is connected to, up to a root.
     root: Vec<u32>,
 }
 
 impl LocalConnectivity {
-    /// Room for cuts through a body of so many copies.
+    /// Reserves memory for cuts through a body of `n_copies` copies.
     pub fn with_capacity(n_copies: usize) -> Self {
         Self { numbering: Numbering::with_capacity(n_copies), ..Self::default() }
     }
@@ -48,9 +48,10 @@ impl LocalConnectivity {
         }
     }
 
-    /// Whether of every part all that the cut changed hangs together by the changed pieces. A part can
-    /// only come apart into pieces of which each has one of these copies: a link that is gone was at a
-    /// changed piece, and had a copy that the piece still has or that its present one was split from.
+    /// Whether, in every part, the changed pieces connect all copies that the cut changed. No part has
+    /// then come apart. A lost connection ran through a changed piece, so each side of it has a copy of
+    /// that piece, or the copy that one was split from. These copies are still connected, and so are both
+    /// sides.
     fn holds(&mut self, parts: &LooseParts, mesh: &CutMesh, new: &[NewCopy]) -> bool {
         self.copies.clear();
         self.root.clear();
@@ -117,7 +118,7 @@ mod tests {
             connectivity.follow(&mut parts, &cut, &report.new_copies, mass, &fixed);
             assert_eq!(parts, LooseParts::new(cut.pieces(), mass, &fixed), "incision {incision}");
             sizes.push(parts.len());
-            // What hangs together is seen close to the cut.
+            // A body that stays connected is recognised near the cut.
             assert!(parts.len() > 1 || connectivity.holds(&parts, &cut, &report.new_copies));
         }
         assert_eq!(sizes, [1, 1, 2, 3, 4, 4, 5]);

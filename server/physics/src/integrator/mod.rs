@@ -1,4 +1,4 @@
-//! One step in time.
+//! Time integration: one step in time, or the way to an equilibrium.
 
 mod dynamics;
 mod free_motion;
@@ -36,7 +36,7 @@ use nalgebra::Vector3;
 
 use crate::operator::FixedCopy;
 
-/// What a body remembers from step to step, one entry per copy.
+/// Positions and velocities that a body keeps from step to step, one entry per copy.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// Positions [m].
@@ -45,7 +45,7 @@ pub struct State {
     pub v: Vec<Vector3<f64>>,
 }
 
-/// A copy lighter than this [kg] has no inertia that single precision could hold.
+/// A copy lighter than this [kg] has no inertia that single precision could represent.
 pub const WEIGHTLESS: f64 = 1e-30;
 
 /// Sets the prescribed directions of `v` to 0.
@@ -58,7 +58,7 @@ fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
 }
 
 impl State {
-    /// Copies `other` into this state without allocating, where the lengths agree.
+    /// Copies `other` into this state, without allocating if the lengths agree.
     pub fn copy_from(&mut self, other: &State) {
         self.x.clone_from(&other.x);
         self.v.clone_from(&other.v);

@@ -1,5 +1,5 @@
-//! What BDF2 and Newmark's method add to a step by linear solves: memory of earlier steps, and the guards
-//! that replace a step by one of implicit Euler where the scheme would not serve.
+//! What BDF2 and Newmark's method add to a step by linear solves: the history of earlier steps, and
+//! guards that replace a step by one of implicit Euler where the scheme would fail.
 
 use nalgebra::Vector3;
 
@@ -17,7 +17,7 @@ use crate::operator::BLOCK;
 use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
-/// The memory of a scheme; without any entries for implicit Euler, which needs none.
+/// History of a scheme; empty for implicit Euler, which needs none.
 #[derive(Debug, Default)]
 pub struct Multistep {
     scheme: Scheme,
@@ -32,7 +32,7 @@ pub struct Multistep {
 }
 
 impl Multistep {
-    /// The memory of `scheme`, empty.
+    /// An empty history of `scheme`.
     pub fn new(scheme: Scheme) -> Self {
         Self { scheme, ..Self::default() }
     }
@@ -61,15 +61,15 @@ impl Multistep {
         self.forget_energy();
     }
 
-    /// Forgets how much energy there was, which has changed from outside.
+    /// Forgets the energy of earlier steps, which has changed from outside.
     pub fn forget_energy(&mut self) {
         self.ledger.forget();
         self.stored_j = None;
     }
 
-    /// A cut made the copies `new`, each of which was its parent until now. Positions and velocities go on, but
-    /// forces jump where lips come apart, so that Newmark's method needs a new acceleration: with the one from
-    /// before the cut it would be of first order.
+    /// Gives the copies `new`, which a cut made, the history of their parents. Positions and velocities
+    /// continue, but forces jump where lips come apart. Newmark's method therefore needs a new
+    /// acceleration: with the old one it would be of first order.
     pub fn inherit(&mut self, new: &[NewCopy]) {
         if !self.remembers() {
             return;
@@ -85,7 +85,7 @@ impl Multistep {
         self.stored_j = None;
     }
 
-    /// [`History::still`].
+    /// See [`History::still`].
     pub fn still(&mut self, copies: &[u32], state: &State) {
         if self.remembers() {
             self.history.still(copies, state);
@@ -94,7 +94,7 @@ impl Multistep {
         }
     }
 
-    /// The scheme that this step can be made with, and why it is not the one that was chosen.
+    /// The scheme for this step, and the reason if it is not the chosen one.
     pub fn choose(
         &mut self,
         state: &State,
@@ -131,7 +131,7 @@ impl Multistep {
         matches!(scheme, Scheme::Newmark { .. }) && !self.history.known
     }
 
-    /// Room for that acceleration [m/s²].
+    /// Buffer for that acceleration [m/s²].
     pub fn acceleration_mut(&mut self) -> &mut Vec<Vector3<f64>> {
         &mut self.acceleration
     }
@@ -172,12 +172,12 @@ impl Multistep {
         Some(StepHistory { increment, x_a: &self.x_a, x_v: &self.x_v })
     }
 
-    /// Linear solves of a step: one of Newmark's method gains energy where the body turns.
+    /// Linear solves per step. Where the body may turn, Newmark's method needs two: with one it gains energy.
     pub fn solves(scheme: Scheme, law: Law) -> u32 {
         if matches!(scheme, Scheme::Newmark { .. }) && law.rotates() { 2 } else { 1 }
     }
 
-    /// Begins the book of energy of a step from `state`; `rest` [m] is where the loads have done no work, and
+    /// Begins the energy balance of a step from `state`. At `rest` [m] the loads have done no work;
     /// `stored` computes the elastic energy [J].
     pub fn begin_energy(
         &mut self,
@@ -190,8 +190,9 @@ impl Multistep {
         self.ledger.begin(kinetic(state, inputs) + stored_j + load_energy(&state.x, inputs, rest));
     }
 
-    /// Ends it at `state` after a step from `before`: energy [J] that came from nowhere, if it is more than a
-    /// conserving scheme may gain. `driven` says that prescribed copies moved and put energy in.
+    /// Ends the energy balance at `state` after a step from `before`. Returns the energy [J] gained
+    /// without work, if it is more than a conserving scheme may gain. `driven` tells that prescribed
+    /// copies moved and put energy in.
     pub fn end_energy(
         &mut self,
         (before, state): (&State, &State),
@@ -212,7 +213,7 @@ impl Multistep {
         excess
     }
 
-    /// Takes down a step from `before` to `state` that was made with `scheme`.
+    /// Records a step from `before` to `state` that was made with `scheme`.
     pub fn push(&mut self, (before, state): (&State, &State), inputs: &StepInputs<'_>, scheme: Scheme) {
         if !self.remembers() {
             return;
@@ -235,7 +236,7 @@ impl Multistep {
     }
 }
 
-/// Springs that push or pull where `x` puts their copies.
+/// Number of springs that push or pull when their copies are at `x`.
 fn contacts(inputs: &StepInputs<'_>, x: impl Fn(usize) -> Vector3<f64>) -> usize {
     let usable = inputs.springs.iter().filter_map(|spring| ActiveSpring::usable(spring, inputs.mass.len()));
     let point = |spring: &ActiveSpring| spring.carriers().map(|(c, w)| w * x(c)).sum();

@@ -34,7 +34,7 @@ impl LooseParts {
         let n = mass.len();
         let mut root: Vec<u32> = (0..n as u32).collect();
         for group in groups {
-            // Mostly the group hangs together already, and the paths to the root are short.
+            // Most groups are connected already, with short paths to the root.
             let first = root[group[0] as usize];
             if group.iter().all(|&copy| root[copy as usize] == first) {
                 continue;
@@ -61,7 +61,7 @@ impl LooseParts {
         parts
     }
 
-    /// Mass of every part and whether it is free, for these masses of its copies [kg].
+    /// Computes from the masses of the copies [kg] the mass of every part and whether it is free.
     pub(super) fn measure(&mut self, mass: &[f64], fixed: &[FixedCopy]) {
         self.mass.fill(0.0);
         for (&part, m) in self.of_copy.iter().zip(mass) {
@@ -84,7 +84,7 @@ impl LooseParts {
         self.mass.is_empty()
     }
 
-    /// Whether any part hangs on nothing.
+    /// Whether any part is held nowhere.
     pub fn any_free(&self) -> bool {
         self.free.contains(&true)
     }
@@ -114,7 +114,7 @@ impl Translations {
         self.rhs.resize(parts.len(), Vector3::zeros());
     }
 
-    /// Adds to the right side of the part of `copy`.
+    /// Adds `b` to the right-hand side of the part of `copy`.
     #[inline(always)]
     pub fn add(&mut self, parts: &LooseParts, copy: usize, b: Vector3<f64>) {
         self.rhs[parts.of_copy[copy] as usize] += b;

@@ -1,10 +1,10 @@
 //! Static relaxation: a few matrix-free iterations towards equilibrium per frame.
 //!
 //! The iterate *and* the search direction are kept from frame to frame, so that ten frames of ten
-//! iterations are one hundred iterations; the direction is given up only when loads, prescribed
-//! directions, the topology or the positions were changed from outside (Nienhuys 2003, §3.3).
-//! For a law that is not linear the conjugate gradients are those of Polak and Ribière with a secant
-//! along the line (Shewchuk 1994, §14), and a step is taken only if it lowers the potential.
+//! iterations are one hundred iterations. The direction is given up only when loads, prescribed
+//! directions, the topology or the positions were changed from outside (Nienhuys 2003, §3.3). For a
+//! nonlinear law the conjugate gradients are those of Polak and Ribière with a secant along the line
+//! (Shewchuk 1994, §14), and a step is taken only if it lowers the potential.
 
 use nalgebra::Vector3;
 
@@ -14,7 +14,7 @@ use crate::operator::FixedCopy;
 use crate::solver::{Curvature, DiagonalInverse, Filter, Potential, StopReason};
 use crate::team::Team;
 
-/// How a frame of relaxation went.
+/// Result of one frame of relaxation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RelaxationReport {
     /// Iterations of this frame.
@@ -55,7 +55,7 @@ pub struct Relaxation {
     length: f64,
 }
 
-/// Armijo's factor, and the part of |Π| that is rounding.
+/// Armijo's factor, and the fraction of |Π| that counts as rounding.
 const ARMIJO: f64 = 1e-4;
 const ROUNDING: f64 = 1e-12;
 const MOST_HALVINGS: u32 = 30;
@@ -66,12 +66,12 @@ impl Relaxation {
         Self { tolerance, ..Self::default() }
     }
 
-    /// Forgets everything: to be called when the topology or the material changed.
+    /// Forgets the search. Call it when the topology or the material has changed.
     pub fn forget(&mut self) {
         self.x.clear();
     }
 
-    /// Starts the search anew in the next frame, from the iterate: to be called when the potential
+    /// Makes the next frame start its search anew from the iterate. Call it when the potential has
     /// changed other than by its loads.
     pub fn restart_next(&mut self) {
         self.known_loads.clear();
@@ -124,7 +124,7 @@ impl Relaxation {
         report
     }
 
-    /// Takes over loads and constraints; whether the search must start anew.
+    /// Takes loads and constraints. Returns whether the search must start anew.
     fn follow(&mut self, potential: &mut dyn Potential, fixed: &[FixedCopy], x: &[Vector3<f64>]) -> bool {
         let n = x.len();
         let resized = self.g.len() != n || self.x.is_empty();
@@ -162,7 +162,7 @@ impl Relaxation {
         }
     }
 
-    /// One step along p; `false` if none lowers the potential.
+    /// Takes one step along p. Returns `false` if none lowers the potential.
     fn iterate(
         &mut self,
         team: &mut Team,
@@ -170,6 +170,7 @@ impl Relaxation {
         x: &mut [Vector3<f64>],
         report: &mut RelaxationReport,
     ) -> bool {
+        // If the conjugate direction fails, the steepest one is tried.
         for steepest in [false, true] {
             if steepest {
                 for (p, z) in self.p.iter_mut().zip(&self.z) {
@@ -206,7 +207,7 @@ impl Relaxation {
         false
     }
 
-    /// Potential and gradient at x + t p.
+    /// Returns the potential at x + t p and writes its gradient to `trial_g`.
     fn look(&mut self, team: &mut Team, potential: &mut dyn Potential, x: &[Vector3<f64>], t: f64) -> f64 {
         for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.p) {
             *trial = x + t * p;

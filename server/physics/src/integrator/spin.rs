@@ -5,11 +5,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::State;
 use super::parts::LooseParts;
 
-/// Angular velocities of the connected parts.
+/// Measures how fast connected parts turn, and slows free ones.
 #[derive(Clone, Debug, Default)]
 pub struct SpinGuard {
     parts: Vec<Spin>,
-    /// Smallest radius of gyration of a free part at rest about any of its axes [m]; infinite without.
+    /// Smallest radius of gyration of a free part at rest about any of its axes [m]; infinite if none is
+    /// free.
     least_radius: f64,
 }
 
@@ -43,7 +44,7 @@ impl SpinGuard {
         self.parts.resize(parts, Spin::default());
     }
 
-    /// Takes over the parts, whose copies rest at `rest` [m].
+    /// Adapts to the present parts, whose copies rest at `rest` [m].
     pub fn follow(&mut self, rest: &[Vector3<f64>], mass: &[f64], parts: &LooseParts) {
         self.resize(parts.len());
         self.least_radius = f64::INFINITY;
@@ -57,7 +58,7 @@ impl SpinGuard {
         }
     }
 
-    /// Masses, momenta and inertia of all parts.
+    /// Computes masses, momenta and inertia of all parts.
     fn measure(&mut self, x: &[Vector3<f64>], v: &[Vector3<f64>], mass: &[f64], parts: &LooseParts) {
         self.parts.fill(Spin::default());
         for (c, &m) in mass.iter().enumerate() {
@@ -82,8 +83,8 @@ impl SpinGuard {
         self.parts.iter().map(|part| part.velocity().norm()).fold(0.0, f64::max)
     }
 
-    /// Whether a free part may turn by more than `angle` [rad] in a step of `h` [s]: whether anything is
-    /// fast enough for that, and then whether a part with a thousandth of the mass does.
+    /// Whether a free part turns by more than `angle` [rad] in a step of `h` [s]. Parts with less than a
+    /// thousandth of the mass do not count. If no copy is fast enough, nothing is measured.
     pub fn exceeds(
         &mut self,
         state: &State,
@@ -100,9 +101,9 @@ impl SpinGuard {
         counted.into_iter().any(|(part, _)| h * part.velocity().norm() > angle)
     }
 
-    /// Whether nothing is fast enough for a free part to turn at `omega` [rad/s].
+    /// Whether no copy is fast enough for a free part to turn at `omega` [rad/s].
     fn too_slow(&self, state: &State, omega: f64) -> bool {
-        // Half the radius at rest: a part may be crushed.
+        // Half the radius at rest, because a part may be crushed.
         let slow = 0.5 * self.least_radius * omega;
         state.v.iter().all(|v| v.norm_squared() <= slow * slow)
     }
@@ -110,7 +111,7 @@ impl SpinGuard {
     /// Slows the spin of free parts that turn by more than `largest` [rad] in a step of `h` [s] to that;
     /// momentum and deformation stay. Returns the largest angle [rad] of a part that was slowed.
     ///
-    /// Parts that cannot turn so far, because nothing is fast enough, are not measured.
+    /// If no copy is fast enough for such a turn, nothing is measured.
     pub fn limit(
         &mut self,
         state: &mut State,
@@ -143,7 +144,7 @@ impl SpinGuard {
 mod tests {
     use super::*;
 
-    /// A tetrahedron that turns about `axis` and moves on, and one that is held.
+    /// A tetrahedron that turns with `omega` and moves on, and one that is held.
     fn state(omega: Vector3<f64>) -> (State, Vec<f64>, LooseParts) {
         let corners = [Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()];
         let x: Vec<Vector3<f64>> = corners.iter().chain(&corners).copied().collect();

@@ -11,11 +11,11 @@ pub struct PointSpring {
     pub copies: [u32; 4],
     /// Their weights, Σ = 1.
     pub weights: [f64; 4],
-    /// Where it pushes or pulls.
+    /// Direction and rest position.
     pub kind: SpringKind,
     /// Stiffness k [N/m], ≥ 0.
     pub stiffness_n_m: f64,
-    /// Largest force [N]; beyond it the spring pushes with just that.
+    /// Largest force [N]; a longer extension gives this force.
     pub max_force_n: f64,
 }
 
@@ -36,7 +36,7 @@ pub enum SpringKind {
     },
 }
 
-/// What a spring does within one linear solve.
+/// Mode of a spring, fixed within one linear solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
     Off,
@@ -100,8 +100,7 @@ impl ActiveSpring {
         copies.iter().zip(weights).map(|(&c, &w)| w * x[c as usize]).sum()
     }
 
-    /// Extension vector that k is multiplied with at `point`, `None` where a one-sided spring has
-    /// no contact.
+    /// Extension vector [m] at `point`, which k multiplies; `None` if a one-sided spring has no contact.
     fn pull(&self, point: Vector3<f64>) -> Option<Vector3<f64>> {
         match self.spring.kind {
             SpringKind::OneSided { normal, offset_m } => {
@@ -153,9 +152,9 @@ impl ActiveSpring {
         }
     }
 
-    /// Energy [J] of the spring with the point at `point`, whatever the mode: ½ k s² of the extension
-    /// s, beyond the cap f_max the line that continues it, f_max s − f_max²/(2k). Convex, and its
-    /// gradient is the force [N] at the point, turned round.
+    /// Energy [J] of the spring with the point at `point`, whatever the mode: ½ k s² of the extension s,
+    /// and beyond the cap f_max the line that continues it, f_max s − f_max²/(2k). It is convex, and its
+    /// gradient is minus the force on the point [N].
     pub fn potential(&self, point: Vector3<f64>) -> SpringResponse {
         let PointSpring { kind, stiffness_n_m: k, max_force_n: cap, .. } = self.spring;
         let Some(pull) = self.pull(point) else { return SpringResponse::default() };
@@ -194,7 +193,7 @@ impl ActiveSpring {
         })
     }
 
-    /// A copy that carries the point, to find its part by.
+    /// The copy with the largest weight, which tells the part of the point.
     pub fn main_copy(&self) -> usize {
         let heaviest = (0..4).fold(0, |best, a| {
             if self.spring.weights[a].abs() > self.spring.weights[best].abs() { a } else { best }

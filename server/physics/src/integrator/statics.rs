@@ -1,7 +1,7 @@
 //! Static equilibrium of a model: the minimum of Π(x) = Ψ(x) − f·(x − X).
 //!
 //! [`StaticProblem`] is that potential, for Newton's method ([`crate::solver::Newton`]) or for
-//! [`Relaxation`]; [`find_equilibrium`] does the whole with Newton.
+//! [`Relaxation`]; [`find_equilibrium`] minimises it by Newton's method.
 
 use nalgebra::Vector3;
 
@@ -13,13 +13,13 @@ use crate::team::Team;
 /// Potential energy Π(x) = Ψ(x) − f·(x − X) of a model under dead loads.
 #[derive(Clone, Copy, Debug)]
 pub struct StaticProblem<'a> {
-    /// The body.
+    /// The discretised body.
     pub model: &'a Model,
     /// Load on every node [N], gravity included.
     pub load: &'a [Vector3<f64>],
-    /// The tangent that stands for the positive semidefinite Hessian: projected or held.
+    /// The tangent to use where a positive semidefinite Hessian is needed: projected or held.
     pub definite: Tangent,
-    /// Ψ where the gradient was last asked for [J].
+    /// Ψ [J] at the positions of the last gradient.
     stored: f64,
 }
 
@@ -65,7 +65,7 @@ impl Potential for StaticProblem<'_> {
     }
 }
 
-/// Moves `x` [m] to equilibrium under `load` [N] and the prescribed positions, by Newton's method.
+/// Moves `x` [m] to the equilibrium of `problem` under the prescribed positions, by Newton's method.
 pub fn find_equilibrium(
     newton: &mut Newton,
     team: &mut Team,

@@ -1,4 +1,4 @@
-//! What a step by linear solves is made from, and how it went.
+//! Inputs and result of a step by linear solves.
 
 use nalgebra::Vector3;
 
@@ -11,7 +11,7 @@ use crate::material::Material;
 use crate::operator::{ElasticUpdate, FixedCopy};
 use crate::solver::{PcgReport, PcgSettings};
 
-/// What a step is made from.
+/// Inputs of one step.
 #[derive(Clone, Copy, Debug)]
 pub struct StepInputs<'a> {
     /// Length of the step h [s].
@@ -26,7 +26,7 @@ pub struct StepInputs<'a> {
     pub load: &'a [Vector3<f64>],
     /// Prescribed copies.
     pub fixed: &'a [FixedCopy],
-    /// Connected parts.
+    /// Connected parts of the body, and which of them are free.
     pub parts: &'a LooseParts,
     /// Springs of this step.
     pub springs: &'a [PointSpring],
@@ -34,26 +34,26 @@ pub struct StepInputs<'a> {
     pub material: &'a Material,
     /// When to stop the solver.
     pub solver: PcgSettings,
-    /// What the scheme makes of inertia.
+    /// How the scheme treats inertia.
     pub inertia: Inertia<'a>,
-    /// Linear solves of the step, each from where the one before led; at least 1. Those of an equilibrium end
-    /// earlier where it is reached.
+    /// Linear solves of the step, at least 1; each starts from the result of the one before. An
+    /// equilibrium ends earlier once it is reached.
     pub solves: u32,
 }
 
-/// What a scheme makes of inertia.
+/// How a scheme treats inertia.
 #[derive(Clone, Copy, Debug)]
 pub enum Inertia<'a> {
-    /// Implicit Euler: x_v = x and x_a = x + h v, from nothing but the state.
+    /// Implicit Euler: x_v = x and x_a = x + h v, from the state alone.
     Euler,
     /// A scheme that remembers earlier steps.
     Remembered(StepHistory<'a>),
     /// None: the step ends in equilibrium with the loads, at rest (A = B = 0, and s = 1).
     None {
-        /// The pieces, for a residual in double precision: without inertia, single precision would leave more
-        /// of it than most tolerances.
+        /// The pieces, for a residual in double precision. Without inertia the rounding of single
+        /// precision would exceed most tolerances.
         mesh: &'a CutMesh,
-        /// Go on with the search of the last step where nothing was changed from outside (Nienhuys 2003, §3.3).
+        /// Continue the search of the last step if nothing was changed from outside (Nienhuys 2003, §3.3).
         relax: bool,
     },
 }
@@ -61,16 +61,16 @@ pub enum Inertia<'a> {
 /// A scheme's increment, with x_a and x_v of every copy [m].
 #[derive(Clone, Copy, Debug)]
 pub struct StepHistory<'a> {
-    /// A and B.
+    /// Factors A and B of the scheme.
     pub increment: Increment,
-    /// x_a, which is the predictor too.
+    /// x_a of every copy [m]; it is the predictor, too.
     pub x_a: &'a [Vector3<f64>],
-    /// x_v.
+    /// x_v of every copy [m], from which v⁺ = B (x⁺ − x_v).
     pub x_v: &'a [Vector3<f64>],
 }
 
 impl StepInputs<'_> {
-    /// s = 1/A [s²]: what forces are multiplied with.
+    /// s = 1/A [s²], the factor of forces in the system of a step.
     pub(super) fn s(&self) -> f64 {
         match self.inertia {
             Inertia::Euler => self.h * self.h,
@@ -88,7 +88,7 @@ impl StepInputs<'_> {
         }
     }
 
-    /// √s [s]: δ minimises an energy times s.
+    /// √s [s]: δ minimises s times an energy.
     pub fn root_s(&self) -> f64 {
         match self.inertia {
             Inertia::Euler => self.h,
@@ -111,12 +111,12 @@ impl StepInputs<'_> {
         !matches!(self.inertia, Inertia::None { .. })
     }
 
-    /// Whether the search of the last step goes on.
+    /// Whether the step may continue the search of the last one.
     pub(super) fn relaxes(&self) -> bool {
         matches!(self.inertia, Inertia::None { relax: true, .. })
     }
 
-    /// v̂ = B (x̂ − x_v) of copy `c`, which the predictor x̂ takes for its velocity.
+    /// v̂ = B (x̂ − x_v), the velocity of copy `c` at the predictor x̂.
     #[inline(always)]
     fn predicted_velocity(&self, c: usize, state: &State, predicted: &[Vector3<f64>]) -> Vector3<f64> {
         match &self.inertia {
@@ -173,7 +173,7 @@ pub(super) struct KnownLoads {
 }
 
 impl KnownLoads {
-    /// Takes down those of `inputs`.
+    /// Records the loads of `inputs`.
     pub(super) fn note(&mut self, inputs: &StepInputs<'_>) {
         self.gravity = inputs.gravity;
         self.load.clear();
@@ -183,16 +183,16 @@ impl KnownLoads {
     }
 }
 
-/// How a step went.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepOutcome {
-    /// How the last linear solve went; iterations are those of all passes.
+    /// Report of the last linear solve; iterations are those of all passes.
     pub solve: PcgReport,
     /// Linear solves made.
     pub solves: u32,
     /// Pieces with det F ≤ 0 at the predictor.
     pub inverted_pieces: usize,
-    /// Springs that were left out because a number in them is not usable.
+    /// Springs left out because one of their numbers is unusable.
     pub refused_springs: usize,
     /// Whether everything stayed finite. If not, the state was left as it was.
     pub finite: bool,

@@ -17,21 +17,21 @@ use crate::reserve::resize_reserving;
 pub struct Chunk {
     /// Region of its elements.
     pub region: usize,
-    /// Lanes and copies there were when the chunk was planned, and the present number of lanes.
+    /// Numbers of lanes and copies when the chunk was planned; `n_lanes` is the present number.
     planned: [usize; 2],
     n_lanes: usize,
-    /// Copy of every local number, ascending; the last local number is the waste bin.
+    /// Copy of every local number, ascending. The last local number is the waste bin of unused lanes.
     pub copies: Vec<u32>,
     pieces: Vec<[u32; LANES]>,
     batches: Batches,
     positions: Vec<[f64; 4]>,
-    /// What the stiffness is applied to, by local number.
+    /// Vector that the stiffness is applied to, by local number.
     pub x: Vec<Padded>,
     /// Rest positions [m], for laws without rotation.
     rest: Vec<Vector3<f64>>,
-    /// The assembled stiffness, where that is in use.
+    /// The assembled stiffness, if it is in use.
     edges: Option<EdgeBlocks>,
-    /// Lanes (batch, lane) that have changed since it was.
+    /// Lanes (batch, lane) that have changed since it was assembled.
     unassembled: Vec<[usize; 2]>,
     /// Pieces with det F ≤ 0 at the last update.
     pub inverted: usize,
@@ -41,21 +41,21 @@ pub struct Chunk {
     pub first_row: usize,
 }
 
-/// A carrier that gets a lane, and the rotation to start with.
+/// A carrier (a piece that gets a lane), and the rotation to start with.
 #[derive(Clone, Copy, Debug)]
 pub struct NewLane {
-    /// The carrier.
+    /// Index of the carrier.
     pub piece: u32,
-    /// Its rotation.
+    /// Rotation R that its lane starts with.
     pub rotation: Matrix3<f32>,
 }
 
 impl Chunk {
-    /// Arranges the carriers `members` (ascending).
+    /// Arranges the carriers `members` (ascending) in batches.
     pub fn new(region: usize, members: &[NewLane], mesh: &TetMesh, merged: &[Merged]) -> Self {
         let pieces: Vec<u32> = members.iter().map(|lane| lane.piece).collect();
         let plan = plan_chunk(&pieces, |p| merged[p as usize].piece.copies);
-        // Room for what cuts add before the next plan.
+        // Spare capacity for what cuts add before the next plan.
         let mut rest = Vec::with_capacity(plan.pieces.len() + plan.pieces.len() / 4 + 1);
         for lanes in &plan.pieces {
             let mut batch = RestBatch::empty();
@@ -94,7 +94,7 @@ impl Chunk {
         lanes.filter(|&(p, ..)| p != NO_PIECE)
     }
 
-    /// All lanes in use, to be arranged anew with their rotations.
+    /// All lanes in use with their rotations, to be arranged anew.
     pub fn new_lanes(&self) -> impl Iterator<Item = NewLane> + '_ {
         self.lanes().map(|(piece, b, l)| NewLane { piece, rotation: self.rotation(b, l) })
     }
@@ -105,9 +105,9 @@ impl Chunk {
         Matrix3::from_fn(|i, j| rotation[3 * i + j].0[lane])
     }
 
-    /// Amends the copies and fractions of carriers that are marked and gives those `added` lanes. Copies
-    /// that are new to the chunk are new altogether, so that `copies` stays in order. Says `false` and
-    /// does nothing if the chunk has grown so much that packing and numbering anew pays.
+    /// Amends copies and fractions of the carriers marked in `is_amended`, and gives the `added` ones
+    /// lanes. Copies new to the chunk are new to the body, so `copies` stays in order. Returns `false`
+    /// and does nothing if the chunk has grown so much that packing and numbering it anew pays.
     pub fn follow(
         &mut self,
         mesh: &TetMesh,
@@ -127,6 +127,7 @@ impl Chunk {
             let held = piece.copies.into_iter().zip(mesh.tets[piece.element as usize]);
             new.extend(held.filter(|&(copy, _)| numbering.insert(&mut self.copies, copy)));
         }
+        // They were appended only to be numbered; a refusal must leave no trace.
         self.copies.truncate(known);
         let [planned_lanes, planned_copies] = self.planned;
         let n_copies = known + new.len();
@@ -176,7 +177,7 @@ impl Chunk {
         self.n_lanes
     }
 
-    /// Assembles the stiffness of the last update, or forgets what was assembled before.
+    /// Assembles the stiffness of the last update, or drops the assembled one if it is not `wanted`.
     pub fn assemble(&mut self, wanted: bool) {
         let Self { edges, batches, unassembled, .. } = self;
         match edges {
@@ -226,7 +227,7 @@ impl Chunk {
         }
     }
 
-    /// Rotations, gradients, internal forces `f` and diagonal blocks.
+    /// Updates rotations, gradients, internal forces `f` and diagonal blocks.
     pub fn update(
         &mut self,
         simd: Simd,

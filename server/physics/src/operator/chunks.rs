@@ -1,5 +1,6 @@
-//! How the pieces are shared out: chunks that fit the first-level cache, and inside them batches of
-//! eight pieces that, as far as possible, share no copy (so that no sum waits for the one before).
+//! Division of the pieces into chunks that fit the first-level cache, and of chunks into batches of eight
+//! pieces. As far as possible the pieces of a batch share no copy, so that no sum waits for the one
+//! before.
 //!
 //! The division depends on the mesh only, never on the number of threads. Every chunk sums into
 //! vectors of its own; copies on the border of chunks are then added up in chunk order.
@@ -13,17 +14,18 @@ use crate::reserve::resize_reserving;
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
 /// body of a few thousand pieces still has work for several threads.
 const CHUNK_PIECES: usize = 1024;
-/// Batches that are kept open while pieces are packed, one bit each; more separates neighbours better.
+/// Number of batches kept open while pieces are packed, one bit each; more of them separate neighbours
+/// better.
 const OPEN_BATCHES: usize = 32;
 
-/// No piece in this lane.
+/// Marks a lane without a piece.
 pub const NO_PIECE: u32 = u32::MAX;
 
 /// The pieces of one chunk in batches, with local numbers for their copies.
 #[derive(Clone, Debug)]
 pub struct ChunkPlan {
-    /// Copy of every local number, ascending. One more number, `copies.len()`, is the waste bin of
-    /// unused lanes.
+    /// Copy of every local number, ascending. One more number, `copies.len()`, is the waste bin: unused
+    /// lanes read and write there.
     pub copies: Vec<u32>,
     /// Piece in every lane of every batch, or [`NO_PIECE`].
     pub pieces: Vec<[u32; LANES]>,
@@ -31,8 +33,9 @@ pub struct ChunkPlan {
     pub nodes: Vec<[Ids; 4]>,
 }
 
-/// Region of every element, by recursive bisection of their rest centroids `centres`; also the number
-/// of regions. Cuts do not change it: a piece is in a chunk of its element's region.
+/// Divides the elements into regions by recursive bisection of their rest centroids `centres`. Returns
+/// the region of every element and the number of regions. Cuts do not change them: a piece is in a chunk
+/// of its element's region.
 pub fn region_of_elements(centres: &[Vector3<f64>]) -> (Vec<u32>, usize) {
     let mut order: Vec<u32> = (0..centres.len() as u32).collect();
     let mut chunk_of = vec![0; centres.len()];
@@ -90,8 +93,8 @@ pub fn plan_chunk(chunk: &[u32], copies_of: impl Fn(u32) -> [u32; 4]) -> ChunkPl
 }
 
 /// First-fit packing of `items`, local numbers below `n_locals`, into batches without a common number,
-/// over a short list of open batches; lanes hold item numbers. What is left at the end is packed
-/// without regard to numbers: lanes are summed one after the other.
+/// over a short list of open batches. Lanes hold item numbers. The items left at the end are packed
+/// regardless of their numbers, which is correct because lanes are summed one after the other.
 pub fn pack<const N: usize>(items: &[[u16; N]], n_locals: usize) -> Vec<[u32; LANES]> {
     let mut packing = Packing {
         full: Vec::with_capacity(items.len() / LANES + OPEN_BATCHES),
@@ -114,7 +117,7 @@ pub fn pack<const N: usize>(items: &[[u16; N]], n_locals: usize) -> Vec<[u32; LA
     full
 }
 
-/// Batches in the making.
+/// State of a packing.
 struct Packing {
     full: Vec<[u32; LANES]>,
     batches: [[u32; LANES]; OPEN_BATCHES],
@@ -162,12 +165,12 @@ impl Packing {
     }
 }
 
-/// Where the chunks' sums of every copy lie, in chunk order, within one vector for all chunks. Row 0
-/// of that vector is 0 for ever.
+/// Rows of the chunks' sums of every copy, in chunk order, within one vector for all chunks. Row 0 of
+/// that vector is always 0.
 #[derive(Clone, Debug, Default)]
 pub struct Gather {
-    /// First row of every chunk's own sums, and the end: its copies, the waste bin, and room for what
-    /// cuts add.
+    /// First row of every chunk's own sums, and the end. A chunk has rows for its copies, for the waste
+    /// bin and for copies that cuts add.
     pub first_row: Vec<u32>,
     /// Two rows per copy, row 0 where there are fewer: nearly all copies have no more.
     pairs: Vec<[u32; 2]>,
@@ -178,7 +181,7 @@ pub struct Gather {
 }
 
 impl Gather {
-    /// Lists the rows of every copy; every chunk has room for as many copies again.
+    /// Lists the rows of every copy. Every chunk gets rows for as many copies again.
     pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
         let mut gather = Self { first_row: vec![1], ..Self::default() };
         let mut row = 1;
@@ -190,14 +193,14 @@ impl Gather {
         gather
     }
 
-    /// Lists the rows of every copy anew, where every chunk is.
+    /// Lists the rows of every copy anew; chunks keep their rows.
     pub fn arrange<'a>(&mut self, chunks: impl Iterator<Item = &'a [u32]>, n_copies: usize) {
         self.pairs.clear();
         self.further.clear();
         self.append(chunks.zip(0..).map(|(copies, chunk)| (chunk, copies, 0)), n_copies);
     }
 
-    /// Adds copies to chunks: number of the chunk, its copies, and the first that it did not have.
+    /// Adds copies to chunks, each given by its number, its copies and the index of the first new one.
     pub fn append<'a>(&mut self, chunks: impl Iterator<Item = (usize, &'a [u32], usize)>, n_copies: usize) {
         resize_reserving(&mut self.pairs, n_copies, [0; 2]);
         for (chunk, copies, known) in chunks {
@@ -205,7 +208,7 @@ impl Gather {
             for (row, &copy) in (first..).zip(copies).skip(known) {
                 let [a, b] = &mut self.pairs[copy as usize];
                 let mut row = row;
-                // Rows in order: chunks may come in any.
+                // Rows are kept in order, although chunks may come in any order.
                 for place in [a, b] {
                     if *place == 0 || row < *place {
                         std::mem::swap(&mut row, place);
@@ -222,7 +225,7 @@ impl Gather {
         self.first_further.extend((0..=n_copies.div_ceil(BLOCK)).map(before));
     }
 
-    /// Whether every chunk still has its copies and the waste bin where it is.
+    /// Whether the rows of every chunk still suffice for its copies and the waste bin.
     pub fn holds<'a>(&self, chunks: impl ExactSizeIterator<Item = &'a [u32]>) -> bool {
         let rooms = self.first_row.windows(2).map(|bounds| (bounds[1] - bounds[0]) as usize);
         rooms.len() == chunks.len() && rooms.zip(chunks).all(|(room, copies)| copies.len() < room)
@@ -255,7 +258,7 @@ impl Gather {
         &self.pairs[block * BLOCK..((block + 1) * BLOCK).min(self.pairs.len())]
     }
 
-    /// What [`Self::pairs`] leaves out: copy within the block, and row.
+    /// The rows that [`Self::pairs`] leaves out: copy within the block, and row.
     #[inline(always)]
     pub fn further(&self, block: usize) -> impl Iterator<Item = (usize, usize)> {
         let further = self.first_further[block] as usize..self.first_further[block + 1] as usize;

@@ -1,7 +1,7 @@
 //! Diagonal blocks of TᵀA T for the copies that others are moved relative to.
 //!
-//! They come from the pieces' gradients in the new variables and not from the blocks of A, which would
-//! cancel: the stiff parts of A are 1/ε times as large as what remains of them.
+//! They are computed from the pieces' gradients in the new variables. The blocks of A would cancel: the
+//! stiff parts of A are 1/ε times as large as what remains of them.
 
 use super::elastic::Place;
 use super::kernel::Block6;
@@ -11,7 +11,7 @@ use crate::team::{Team, blocks};
 /// Copies per unit of work.
 const UNIT: usize = 16;
 
-/// The blocks, and what they are made from.
+/// The blocks, and the terms they are summed from.
 #[derive(Clone, Debug, Default)]
 pub struct CompositeDiagonal {
     copies: Vec<Copy>,
@@ -28,7 +28,7 @@ struct Copy {
     moved: Vec<(u32, f64)>,
 }
 
-/// What one piece adds to one block.
+/// Contribution of one piece to one block.
 #[derive(Clone, Copy, Debug)]
 struct Term {
     place: Place,

@@ -1,9 +1,9 @@
 //! The assembled stiffness of one chunk: one 3×3 block per pair of neighbouring copies.
 //!
-//! K̂ is symmetric and its rows add up to nothing (a translation strains nothing), so the blocks
-//! above the diagonal say everything: (K̂ u)_a = Σ_b K_ab (u_b − u_a). That is half the memory of
-//! block CSR, 40 bytes per pair, and about twice as fast as the tets themselves; but it has to be
-//! assembled, which only pays where the stiffness stays, that is for the linear law.
+//! K̂ is symmetric and its rows sum to zero (a translation causes no strain), so the blocks above the
+//! diagonal suffice: (K̂ u)_a = Σ_b K_ab (u_b − u_a). That is half the memory of block CSR, 40 bytes per
+//! pair, and about twice as fast as the tets themselves. But it has to be assembled, which only pays
+//! where the stiffness stays the same, as with the linear law, or is applied often.
 
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
@@ -38,7 +38,7 @@ pub struct EdgeBlocks {
 }
 
 impl EdgeBlocks {
-    /// The pairs of `tets`.
+    /// Lists the pairs of neighbours in `tets`.
     pub fn new(tets: &Batches) -> Self {
         let mut blocks = Self { batches: Vec::new(), slots: Vec::new(), pairs: Vec::new(), n_locals: 1 };
         let lanes = (0..tets.n_batches()).flat_map(|t| (0..LANES).map(move |lane| [t, lane]));
@@ -46,8 +46,8 @@ impl EdgeBlocks {
         blocks
     }
 
-    /// Follows a change: these lanes (batch, lane) of `tets` are new or have other local numbers. Pairs
-    /// that are not there yet are appended; those that nobody needs any more stay, with zeros.
+    /// Follows a change: these lanes (batch, lane) of `tets` are new or have other local numbers. New
+    /// pairs are appended; pairs that are no longer needed stay, with zeros.
     pub fn follow(&mut self, tets: &Batches, changed: impl Iterator<Item = [usize; 2]>) {
         let [before, waste] = [self.n_locals, tets.n_locals()].map(|n| (n - 1) as u16);
         for id in self.batches.iter_mut().flat_map(|b| b.nodes.as_flattened_mut()).filter(|id| **id == before)

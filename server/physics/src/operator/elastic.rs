@@ -16,14 +16,14 @@ use crate::numbering::Numbering;
 use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks, ranges};
 
-/// Most lanes of one chunk: four copies each must leave room in 16-bit local numbers.
+/// Largest number of lanes of one chunk: four copies each must leave room in 16-bit local numbers.
 const MOST_LANES: usize = 8192;
 
 /// How K̂ is applied.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OperatorChoice {
-    /// Assembled where the stiffness stays the same from step to step (the linear law), by the tets
-    /// where it turns with the material.
+    /// Assembled if the stiffness stays the same from step to step (the linear law), by the tets if it
+    /// rotates with the material.
     #[default]
     Auto,
     /// By the tets: 44 bytes and 130 operations per tet, nothing to assemble.
@@ -49,7 +49,7 @@ pub struct Elastic {
     /// Likewise, diagonal blocks of s K̂.
     diagonals: Vec<Block6>,
     choice: OperatorChoice,
-    /// What the chunks' stiffness was last made with, and whether it was assembled.
+    /// Coefficients of the last update, and whether the stiffness was assembled.
     made_with: Option<(Coefficients, bool)>,
     /// Counts the changes of the stiffness.
     version: u64,
@@ -58,7 +58,7 @@ pub struct Elastic {
     marks: Marks,
 }
 
-/// Where a piece is kept.
+/// Chunk, batch and lane of a piece; valid until the next cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     chunk: u32,
@@ -66,12 +66,12 @@ pub struct Place {
     lane: u32,
 }
 
-/// What an update is made with.
+/// Parameters of an update.
 #[derive(Clone, Copy, Debug)]
 pub struct ElasticUpdate {
-    /// Elastic constants.
+    /// Lamé parameters [Pa].
     pub lame: Lame,
-    /// The law: decides whether pieces rotate.
+    /// The law, which decides whether pieces rotate.
     pub law: Law,
     /// s, the factor of K̂ [s²].
     pub scale: f64,
@@ -113,8 +113,8 @@ impl Elastic {
 
     /// Follows a cut: the `changed` pieces (ascending) are new or have other copies or another fraction
     /// than before. A piece that gets a lane of its own inherits the rotation of the lane that had its
-    /// material before. Chunks without changes stay as they are, the others are amended, and arranged
-    /// anew once they have grown by a quarter.
+    /// material before. Chunks without changes stay as they are. The others are amended, or arranged anew
+    /// once they have grown by a quarter.
     pub fn follow(&mut self, mesh: &TetMesh, pieces: &[Piece], changed: &[u32], n_copies: usize) {
         let changes = self.shared_lanes.follow(pieces, changed);
         let region_of = |p: u32| self.region_of_element[pieces[p as usize].element as usize] as usize;
@@ -132,7 +132,7 @@ impl Elastic {
         for &[piece, source] in &changes.added {
             added[region_of(piece)].push(NewLane { piece, rotation: rotation(source) });
         }
-        // Chunks that got copies and how many they had; what goes to regions that are arranged anew.
+        // Chunks with new copies, and their number before; lanes of regions that are arranged anew.
         let (mut grown, mut outgrown) = (Vec::new(), vec![None; self.n_regions]);
         let merged = self.shared_lanes.merged();
         for (k, chunk) in self.chunks.iter_mut().enumerate().rev().filter(|(_, c)| affected[c.region]) {
@@ -146,6 +146,7 @@ impl Elastic {
             }
         }
         self.marks.take_off(&changes);
+        // A chunk that has outgrown its plan takes its whole region along.
         if outgrown.iter().any(Option::is_some) {
             for chunk in &self.chunks {
                 if let Some(members) = &mut outgrown[chunk.region] {
@@ -163,7 +164,7 @@ impl Elastic {
         }
     }
 
-    /// Divides the carriers `members` of regions into chunks, in place of those there were.
+    /// Divides the carriers `members` of regions into chunks, which replace those there were.
     fn plan(&mut self, mesh: &TetMesh, members: Vec<Option<Vec<NewLane>>>) {
         self.chunks.retain(|chunk| members[chunk.region].is_none());
         let merged = self.shared_lanes.merged();
@@ -176,8 +177,8 @@ impl Elastic {
         self.chunks.sort_by_key(|chunk| chunk.region);
     }
 
-    /// Arranges the sums of the present chunks; diagonal blocks of chunks that are not stale stay. The
-    /// chunks stay where they are if they have the room.
+    /// Arranges the sums of the present chunks. Chunks keep their rows if these suffice. Otherwise
+    /// diagonal blocks of chunks that are not stale move along.
     fn arrange_sums(&mut self, n_copies: usize) {
         let copies = self.chunks.iter().map(|c| &c.copies[..]);
         if self.gather.holds(copies.clone()) {
@@ -214,8 +215,7 @@ impl Elastic {
         self.choice
     }
 
-    /// Rises with every change of the stiffness: the diagonal blocks of an update are the same as
-    /// those of an earlier one with the same version.
+    /// Rises with every change of the stiffness. Updates with the same version have the same diagonal blocks.
     pub fn version(&self) -> u64 {
         self.version
     }
@@ -249,8 +249,8 @@ impl Elastic {
         inverted
     }
 
-    /// First half of an update: every chunk's own sums. Without rotations the stiffness changes only
-    /// if `with` or the pieces do, and what is left to do is one application.
+    /// First half of an update: every chunk's own sums. Without rotations the stiffness changes only if
+    /// `with` or the pieces do; otherwise one application is enough.
     pub(crate) fn update_chunks(
         &mut self,
         team: &mut Team,
@@ -336,7 +336,7 @@ impl Elastic {
         (self.gather.pairs(block), &self.sums)
     }
 
-    /// Adds what [`Self::sums`] leaves out to `y`; returns by how much that changes x·y.
+    /// Adds the rows that [`Self::sums`] leaves out to `y`. Returns the change of x·y.
     #[inline(always)]
     pub(super) fn add_further(&self, block: usize, x: &[Padded], y: &mut [Padded]) -> f64 {
         let mut product = Sum::default();
@@ -374,7 +374,7 @@ impl Elastic {
                 places[p as usize] = Place { chunk, batch: batch as u32, lane: lane as u32 };
             }
         }
-        // A carrier comes before what its lane integrates with it.
+        // A carrier precedes the other pieces of its lane.
         for (p, &carrier) in self.shared_lanes.of_piece().iter().enumerate() {
             places[p] = places[carrier as usize];
         }
@@ -398,7 +398,7 @@ impl Elastic {
     }
 }
 
-/// Which pieces a cut concerns; none between cuts.
+/// Marks of the pieces that a cut concerns; none between cuts.
 #[derive(Debug, Default)]
 struct Marks {
     /// Carriers whose lanes are to be amended.

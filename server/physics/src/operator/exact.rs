@@ -1,5 +1,5 @@
-//! The pieces of linear tetrahedra in double precision: what energies, reactions and the residuals of equilibria
-//! are computed with, where the kernels' single precision would show.
+//! Linear tetrahedra in double precision, for energies, reactions and the residuals of equilibria, where
+//! the single precision of the kernels would show.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -10,7 +10,7 @@ use crate::material::{Lame, Law};
 /// A piece in a configuration of the body.
 #[derive(Clone, Copy, Debug)]
 pub struct Deformed<'a> {
-    /// The piece.
+    /// The piece: its element, fraction and copies.
     pub piece: &'a Piece,
     /// Its deformation gradient F.
     pub F: Matrix3<f64>,
@@ -31,7 +31,7 @@ pub fn deformed_pieces<'a>(mesh: &'a CutMesh, x: &'a [Vector3<f64>]) -> impl Ite
     })
 }
 
-/// Elastic energy [J] at `x` [m], and the internal force on every copy [N] into `f_int`.
+/// Returns the elastic energy [J] at `x` [m] and writes the internal force on every copy [N] to `f_int`.
 pub fn internal_forces(
     mesh: &CutMesh,
     (law, lame): (Law, Lame),

@@ -15,7 +15,7 @@ use super::shared_lanes::Merged;
 use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
 use crate::mesh::TetMesh;
 
-/// What an application streams per batch of eight pieces.
+/// Data that one application streams, per batch of eight pieces.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 struct Batch {
@@ -26,7 +26,7 @@ struct Batch {
     nodes: [Ids; 4],
 }
 
-/// What only an update needs per batch.
+/// Data that only an update needs, per batch.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct RestBatch {
@@ -36,12 +36,12 @@ pub struct RestBatch {
     pub volume: Lanes,
     /// Rotation R of the last update, also the warm start of the next.
     pub rotation: Mat3<Lanes>,
-    /// How many pieces a lane integrates.
+    /// Number of pieces that each lane integrates.
     pub pieces: [u32; LANES],
 }
 
 impl RestBatch {
-    /// A batch without pieces: no volume, no rotation.
+    /// A batch without pieces: zero volume, R = I.
     pub fn empty() -> Self {
         let mut rotation: Mat3<Lanes> = Default::default();
         for i in 0..3 {
@@ -122,8 +122,8 @@ impl Batches {
         Self { live, rest, ratio: 0.0, n_locals }
     }
 
-    /// Makes room: `n_batches` in all, the further ones empty, and local numbers below `n_locals`, of
-    /// which the last is the waste bin, as it was before.
+    /// Grows to `n_batches` batches, the new ones empty, and to local numbers below `n_locals`. The last
+    /// local number becomes the waste bin.
     pub fn grow(&mut self, n_batches: usize, n_locals: usize) {
         assert!(n_batches >= self.live.len() && n_locals >= self.n_locals);
         let [before, waste] = [self.n_locals, n_locals].map(|n| (n - 1) as u16);
@@ -198,7 +198,7 @@ impl Batches {
         }
     }
 
-    /// Rotations, internal forces, rotated gradients and diagonal blocks at the positions in
+    /// Computes rotations, internal forces, rotated gradients and diagonal blocks at the positions in
     /// `locals`. Returns the number of pieces with det F ≤ 0.
     pub fn update(&mut self, simd: Simd, c: &Coefficients, locals: &mut Locals<'_>) -> usize {
         let n = self.n_locals;
@@ -231,7 +231,7 @@ fn dot<V: Vector8>(a: &[V; 3], b: &[V; 3]) -> V {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]))
 }
 
-/// The vector of corner 0, where the sum over the corners is 0.
+/// The vector of corner 0, given that the vectors of all corners sum to 0.
 #[inline(always)]
 fn minus_sum<V: Vector8>(v: &[[V; 3]; 3]) -> [V; 3] {
     [-(v[0][0] + v[1][0] + v[2][0]), -(v[0][1] + v[1][1] + v[2][1]), -(v[0][2] + v[1][2] + v[2][2])]
@@ -312,6 +312,7 @@ fn update_with<V: Vector8>(
             ]
         };
         let F = sum_of_outer_products(&e, &g);
+        // The linear law keeps R = I.
         if c.rotates {
             inverted += rotate(&F, rest);
         }
@@ -325,6 +326,7 @@ fn update_with<V: Vector8>(
         let P = piola_stress(&F, &R, two_mu_volume, ratio);
         scatter_forces(locals.f, nodes, &[product(&P, &g[0]), product(&P, &g[1]), product(&P, &g[2])]);
 
+        // R and √(2μ w V s) go into the gradients here, so that an application needs neither.
         let root = (two_mu_volume * V::splat(c.scale)).sqrt();
         let mut turned = [product(&R, &g[0]), product(&R, &g[1]), product(&R, &g[2])];
         for k in 0..3 {
@@ -346,6 +348,7 @@ fn update_with<V: Vector8>(
 fn rotate<V: Vector8>(F: &[[V; 3]; 3], rest: &mut RestBatch) -> usize {
     let F = [F[0][0], F[0][1], F[0][2], F[1][0], F[1][1], F[1][2], F[2][0], F[2][1], F[2][2]];
     let (R, trusted) = polar_newton(&F);
+    // Lanes that Newton's method cannot handle are rare and leave the hot loop.
     if trusted == u8::MAX {
         for i in 0..9 {
             rest.rotation[i] = R[i].store();

@@ -38,10 +38,10 @@ pub trait LinearOperator {
     /// y = A x. Both slices have one entry per copy.
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]);
 
-    /// p ← z + β p (z if β = 0), q = A p, and pᵀq: what a conjugate-gradient iteration does with A.
+    /// p ← z + β p (z if β = 0), q = A p, and pᵀq: the use of A in a conjugate-gradient iteration.
     ///
-    /// From β = 0 on, `p` must be the p of the call before: an operator may keep it. `partial` is
-    /// scratch with one entry per [`BLOCK`].
+    /// After a call with β = 0, `p` must be the p of the call before, because an operator may keep it.
+    /// `partial` is scratch with one entry per [`BLOCK`].
     fn advance(&mut self, team: &mut Team, beta: f32, z: &[Padded], out: Advance<'_>) -> f64 {
         let Advance { p, q, partial } = out;
         team.for_blocks(blocks(p, BLOCK), |block, p| {
@@ -57,7 +57,7 @@ pub trait LinearOperator {
     }
 }
 
-/// What [`LinearOperator::advance`] writes.
+/// Outputs of [`LinearOperator::advance`].
 #[derive(Debug)]
 pub struct Advance<'a> {
     /// The direction p.
@@ -68,7 +68,7 @@ pub struct Advance<'a> {
     pub partial: &'a mut [f64],
 }
 
-/// Block number `block` of a vector.
+/// Entries of block number `block` of a vector; the last block may be shorter.
 #[inline(always)]
 pub fn block_of<T>(v: &[T], block: usize) -> &[T] {
     &v[block * BLOCK..((block + 1) * BLOCK).min(v.len())]

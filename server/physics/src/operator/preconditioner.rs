@@ -7,9 +7,9 @@ use crate::team::{Team, blocks};
 
 /// Block-Jacobi preconditioner M⁻¹: one symmetric positive definite 3×3 matrix per copy.
 ///
-/// It makes the solver blind to the size of pieces: a sliver of 1e-15 of an element has a mass and
-/// a stiffness that are small alike. With a substitution T the blocks are those of TᵀA T, and the
-/// preconditioner is T M⁻¹ Tᵀ; residuals are kept as Tᵀr.
+/// It makes the solver insensitive to the size of pieces: mass and stiffness of a sliver of 1e-15 of an
+/// element are equally small. With a substitution T the blocks are those of TᵀA T, and the preconditioner
+/// is T M⁻¹ Tᵀ; residuals are kept as Tᵀr.
 #[derive(Clone, Debug, Default)]
 pub struct BlockJacobi {
     inverse: Vec<Inverse3>,
@@ -25,7 +25,7 @@ impl Inverse3 {
     /// M⁻¹ r.
     #[inline(always)]
     pub fn times(&self, r: &Padded) -> Padded {
-        // Written as three scaled columns, which is how a vector unit wants it.
+        // Written as three scaled columns, the form that suits a vector unit.
         let column = |j: usize| -> Padded { self.columns()[j].map(|m| m * r[j]) };
         let (a, b, c) = (column(0), column(1), column(2));
         std::array::from_fn(|i| a[i] + b[i] + c[i])
@@ -45,12 +45,12 @@ impl BlockJacobi {
         resize_reserving(&mut self.inverse, n, Inverse3::default());
     }
 
-    /// Changes the variables that the blocks belong to; who writes the inverses writes those of TᵀA T.
+    /// Changes the variables of the blocks: inverses written from now on must be those of TᵀA T.
     pub fn set_substitution(&mut self, substitution: Substitution) {
         self.substitution = substitution;
     }
 
-    /// T.
+    /// The substitution T; empty for T = 1.
     #[inline]
     pub fn substitution(&self) -> &Substitution {
         &self.substitution
@@ -131,7 +131,7 @@ impl Preconditioner for BlockJacobi {
     }
 }
 
-/// Below this trace the inverse would leave single precision; nothing that can be seen is as light.
+/// Below this trace the inverse would leave single precision; nothing visible is as light.
 const LEAST_TRACE: f64 = 1e-34;
 
 /// Inverse of a symmetric block by cofactors, scaled by its trace so that pieces of any size stay

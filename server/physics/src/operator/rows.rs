@@ -1,8 +1,8 @@
 //! The vector loops of a solver iteration over one block of copies.
 //!
-//! Vectors are single precision, scalar products double. On x86-64 the loops are written for AVX as well
-//! (the compiler's own idea of them is to transpose rows); the operations are the same one by one,
-//! so the bits are the same.
+//! Vectors are single precision, scalar products double. On x86-64 the loops are also written for AVX,
+//! because the compiler would transpose rows. The operations are the same one by one, so the bits are the
+//! same.
 
 #![allow(unsafe_code)] // vector instructions behind run-time detection
 
@@ -89,8 +89,8 @@ pub fn advance_solution(
 
 #[cfg(target_arch = "x86_64")]
 mod avx {
-    //! The same operations with two rows in a register. Each function returns how many rows it has
-    //! done, all but an odd last one.
+    //! The same operations with two rows in a register. Each function returns the number of rows it has
+    //! done: all but an odd last one.
 
     use std::arch::x86_64::{
         __m256, __m256d, _mm_loadu_ps, _mm_set1_ps, _mm256_add_pd, _mm256_add_ps, _mm256_castps256_ps128,
@@ -244,7 +244,7 @@ pub fn gather_direction(local: &mut [Padded], copies: &[u32], z: &[Padded], beta
     }
 }
 
-/// A scalar product in the making, in double precision.
+/// Accumulator of a scalar product, in double precision.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sum([f64; 4]);
 
@@ -257,7 +257,7 @@ impl Sum {
         }
     }
 
-    /// The sum.
+    /// Sum of the four lanes, in a fixed order.
     pub fn total(&self) -> f64 {
         (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
     }

@@ -1,14 +1,14 @@
-//! Pieces that deform as one.
+//! Lanes shared by pieces that deform as one.
 //!
-//! An incision that ends inside an element may divide it into pieces that still have all four copies
-//! in common. They have the same deformation gradient, so one lane integrates them, with the sum of
-//! their fractions; what a stab costs in a step follows from the copies it makes, not from the pieces.
+//! An incision that ends inside an element may divide it into pieces that still have all four copies in
+//! common. They have the same deformation gradient, so one lane integrates them, with the sum of their
+//! fractions. The cost of a stab in a step follows from the copies it makes and not from the pieces.
 
 use super::chunks::NO_PIECE;
 use crate::cut::Piece;
 use crate::numbering::Numbering;
 
-/// Which piece's lane integrates which pieces.
+/// Assignment of pieces to lanes. The *carrier* of a piece is the piece whose lane integrates it.
 #[derive(Debug, Default)]
 pub struct SharedLanes {
     /// For every piece its carrier: the first piece of its element with the same copies.
@@ -24,16 +24,16 @@ pub struct SharedLanes {
     numbering: Numbering,
 }
 
-/// The pieces of one carrier, as one.
+/// The pieces of one lane, merged into one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Merged {
     /// The carrier, with the sum of the fractions.
     pub piece: Piece,
-    /// How many pieces they are.
+    /// Number of pieces merged.
     pub count: u32,
 }
 
-/// What a cut did to the lanes.
+/// Changes of the lanes by a cut.
 #[derive(Debug, Default)]
 pub struct LaneChanges {
     /// Carriers that were carriers before and have other copies or other pieces now.
@@ -43,7 +43,7 @@ pub struct LaneChanges {
 }
 
 impl SharedLanes {
-    /// The carriers among the `pieces` of so many elements.
+    /// Finds the carriers among the `pieces` of `n_elements` elements.
     pub fn new(n_elements: usize, pieces: &[Piece]) -> Self {
         let mut carriers = Self { first_in_element: vec![NO_PIECE; n_elements], ..Self::default() };
         let all: Vec<u32> = (0..pieces.len() as u32).collect();
@@ -63,7 +63,7 @@ impl SharedLanes {
         for &p in changed {
             let element = pieces[p as usize].element;
             if self.numbering.insert(&mut self.elements, element) {
-                // Pieces that are new come from those that were there and changed.
+                // New pieces come from earlier ones of the same element, which have changed too.
                 let source = if (p as usize) < known { self.of_piece[p as usize] } else { NO_PIECE };
                 self.regroup(element, source, known, pieces, &mut changes);
             }
@@ -113,6 +113,7 @@ impl SharedLanes {
             if carrier != p {
                 continue;
             }
+            // No earlier piece has these copies, so this one carries all later ones that do.
             let of_lane = members[i..].iter().map(|&q| &pieces[q as usize]);
             let of_lane = of_lane.filter(|piece| piece.copies == pieces[p as usize].copies);
             let mut merged = Merged { piece: Piece { fraction: 0.0, ..pieces[p as usize] }, count: 0 };
@@ -135,7 +136,7 @@ impl SharedLanes {
         &self.of_piece
     }
 
-    /// For every piece what its lane integrates: nothing (count 0) if it has none.
+    /// For every piece what its lane integrates; count 0 if it has no lane.
     pub fn merged(&self) -> &[Merged] {
         &self.merged
     }

@@ -1,11 +1,11 @@
-//! Which elements of the rest mesh are so flat that one of their motions is far stiffer than the
-//! others, and the change of variables that takes these motions apart.
+//! Elements of the rest mesh so flat that one of their motions is far stiffer than the others, and the
+//! change of variables that separates these motions.
 //!
-//! The motion of a tetrahedron's corners strains it by H = Σ u_a ⊗ g_a. Where a corner is close to
-//! the plane of the others, or to their edge or corner, its gradient g_a is large, and those of some
-//! others are nearly opposite: u_a against the mean of these is the stiff motion. Taking it as a
-//! variable of its own leaves the others with g_b + λ_b g_a, which is as small as in a sound element.
-//! All measures are relative to the element: nothing depends on units.
+//! The motion of a tetrahedron's corners strains it by H = Σ u_a ⊗ g_a. If a corner is close to the plane
+//! of the others, or to their edge or corner, its gradient g_a is large. The gradients of some others are
+//! then nearly opposite, and the stiff motion is u_a relative to the mean of these. With this motion as a
+//! variable of its own the others have g_b + λ_b g_a, which is as small as in a sound element. All
+//! measures are relative to the element: nothing depends on units.
 
 use nalgebra::Vector3;
 
@@ -13,15 +13,15 @@ use super::Substitution;
 use crate::cut::Piece;
 use crate::mesh::TetMesh;
 
-/// V |g|² / L, stiffness of a corner over that of the longest edge, from which on a motion counts as
-/// stiff. It is 0.2 in a sound tetrahedron, and 3 where its height is 1/16 of that.
+/// V |g|² / L above which a motion counts as stiff: the stiffness of a corner over that of the longest
+/// edge. It is 0.2 in a sound tetrahedron, and 3 where its height is 1/16 of that.
 const STIFF: f64 = 3.0;
-/// A corner takes part in a stiff motion with a stiffness of at least this part of [`STIFF`].
+/// A corner takes part in a stiff motion if its stiffness is at least this fraction of [`STIFF`].
 const TAKES_PART: f64 = 0.1;
-/// A corner is not substituted for an element that makes up less of its stiffness: a sliver of an
+/// Least share of an element in the stiffness of a corner that is substituted for it: a sliver of an
 /// element must not take a whole one along.
 const LEAST_SHARE: f64 = 0.05;
-/// Most copies that one copy is moved relative to.
+/// Largest number of copies relative to which one copy is moved.
 const MOST_LEADERS: usize = 8;
 
 /// Elements of `mesh`, ascending, with a motion that is much stiffer than a sound element's.
@@ -38,15 +38,15 @@ pub fn degenerate_elements(mesh: &TetMesh) -> Vec<u32> {
 /// A piece on a copy of a degenerate element.
 #[derive(Clone, Copy, Debug)]
 pub struct NearPiece {
-    /// Its number.
+    /// Index of the piece.
     pub piece: u32,
-    /// Its copies.
+    /// Its four copies.
     pub copies: [u32; 4],
     /// Gradients of their shape functions at rest [1/m].
     pub g: [Vector3<f64>; 4],
     /// w V [m³].
     pub volume: f64,
-    /// |g|² from which on a motion is stiff [1/m²], and w V |g|² [m].
+    /// Limits above which a motion is stiff: of |g|² [1/m²], and of w V |g|² [m].
     stiff: [f64; 2],
 }
 
@@ -91,7 +91,7 @@ impl StiffModes {
             let stiff = STIFF * mesh.longest_edge(e);
             near.push(NearPiece { piece: p, copies: piece.copies, g, volume, stiff: [stiff / whole, stiff] });
         }
-        // The order of equal ones is that of the pieces.
+        // The sort is stable: equally stiff pieces stay in order.
         degenerate.sort_by(|a, b| b.1.total_cmp(&a.1));
         Some(Self { near, degenerate: degenerate.into_iter().map(|d| d.0).collect(), stiffness })
     }
@@ -119,6 +119,7 @@ impl StiffModes {
         let mut row = Vec::new();
         for &near in &self.degenerate {
             let piece = &self.near[near as usize];
+            // One substitution may leave another stiff motion of the same piece.
             loop {
                 row.clear();
                 row.extend(piece.copies.iter().copied().zip(piece.g));
@@ -129,8 +130,8 @@ impl StiffModes {
                     break;
                 }
                 let Some((a, g)) = self.pivot(piece, &row, most, &held) else {
-                    // What moves against held copies is as stiff as its own block says, and a sliver of an
-                    // element is not stiff.
+                    // The diagonal block already tells how stiff a motion against held copies is. A
+                    // sliver of an element is not stiff.
                     let moves = |r: &&(u32, Vector3<f64>)| {
                         !held(r.0) && r.1.norm_squared() >= TAKES_PART * piece.stiff[0]
                     };
@@ -152,8 +153,8 @@ impl StiffModes {
         (T, left)
     }
 
-    /// The copy to be substituted, with its gradient: the one with the largest, so that no λ exceeds 1,
-    /// unless that is held.
+    /// The copy to substitute, and its gradient: the largest, so that no λ exceeds 1, or a smaller one if
+    /// that is held.
     fn pivot(
         &self,
         piece: &NearPiece,

@@ -1,9 +1,9 @@
 //! A change of variables u = T û in which degenerate elements are no longer stiff: the displacement
 //! of some copies is written relative to that of others.
 //!
-//! A needle, sliver or cap of relative height ε resists one motion 1/ε times as much as a sound
-//! element: that of some copy a against a mean Σ λ_b u_b of the others. All diagonal blocks around it
-//! are that stiff, and no block-diagonal preconditioner can tell the soft motions of these copies
+//! A needle, sliver or cap of relative height ε resists one motion 1/ε times as much as a sound element:
+//! that of some copy a against a mean Σ λ_b u_b of the others. All diagonal blocks around it are that
+//! stiff, and no block-diagonal preconditioner can see the soft motions, in which these copies move
 //! together. With u_a = û_a + Σ λ_b û_b only the block of û_a is stiff, and conjugate gradients
 //! preconditioned by M⁻¹ = T diag(TᵀA T)⁻¹ Tᵀ take as many iterations as on a sound mesh.
 //!
@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 use super::Padded;
 
-/// What T can be applied to.
+/// Entries of the vectors that T can be applied to.
 pub trait Substitutable: Copy {
     /// self += factor · other.
     fn add_scaled(&mut self, other: &Self, factor: f64);
@@ -60,7 +60,7 @@ pub struct Substitution {
     leaders: Vec<(u32, f64)>,
     /// Step of every copy, `NONE` if it has none; empty if no copy has one.
     step_of: Vec<u32>,
-    /// Copies that some step leads back to, ascending, and the end of their entries in `entries`.
+    /// Copies b that some step refers to, ascending, and the end of their entries in `entries`.
     columns: Vec<(u32, u32)>,
     /// Columns of T of these copies: copy a and T_ab.
     entries: Vec<(u32, f64)>,
@@ -69,7 +69,7 @@ pub struct Substitution {
 const NONE: u32 = u32::MAX;
 
 impl Substitution {
-    /// No steps yet, on `n` copies.
+    /// The identity on `n` copies; [`push`](Self::push) adds steps.
     pub fn new(n: usize) -> Self {
         Self { step_of: vec![NONE; n], ..Self::default() }
     }
@@ -96,7 +96,7 @@ impl Substitution {
         self.steps.push((a, self.leaders.len() as u32));
     }
 
-    /// Works out the columns of T; to be called after the last [`push`](Self::push).
+    /// Computes the columns of T; call it after the last [`push`](Self::push).
     pub fn finish(&mut self) {
         let mut entries: Vec<(u32, u32, f64)> = Vec::new();
         let mut row = Vec::new();
@@ -124,7 +124,7 @@ impl Substitution {
         self.columns.iter().enumerate().map(column)
     }
 
-    /// A row vector on a few copies times T: copies that are led to are added or appended.
+    /// Multiplies a row vector on a few copies by T. Copies that steps refer to are added or appended.
     pub fn gather<V: Substitutable>(&self, row: &mut Vec<(u32, V)>) {
         let mut from = 0;
         loop {

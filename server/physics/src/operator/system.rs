@@ -7,11 +7,11 @@ use crate::team::{Team, blocks};
 /// A copy whose displacement is prescribed in some directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedCopy {
-    /// The copy.
+    /// Index of the copy.
     pub copy: u32,
     /// Which of x, y, z are prescribed.
     pub axes: [bool; 3],
-    /// Prescribed position [m]; used where `axes` says so.
+    /// Prescribed position [m]; only the components in `axes` are used.
     pub position_m: [f64; 3],
 }
 
@@ -22,7 +22,7 @@ pub struct Spring {
     pub copies: [u32; 4],
     /// Their weights, Σ = 1.
     pub weights: [f32; 4],
-    /// Unit direction of the only stiff direction, or `None` for all three.
+    /// Unit vector of the stiff direction, or `None` if all three are stiff.
     pub direction: Option<[f32; 3]>,
     /// Factor of J Jᵀ in the operator: h² k.
     pub stiffness: f32,

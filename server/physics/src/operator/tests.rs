@@ -161,7 +161,7 @@ fn the_linear_stiffness_is_made_once_and_forces_do_not_feel_how_far_the_body_is(
         elastic.follow(&mesh, &cut, &[70], n);
         elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
         assert!(elastic.version() > version);
-        // Only where the cut was, but no less than that.
+        // The update covers all that the cut changed: a fresh operator gives the same.
         let mut fresh = Elastic::new(Simd::detect(), &mesh, &cut, n);
         fresh.set_choice(choice);
         let (mut fresh_f, mut fresh_diagonal) = (f.clone(), diagonal.clone());
@@ -187,7 +187,7 @@ fn a_rotation_is_remembered_where_the_gradient_defines_none() {
     assert!(drift < 1e-6, "{drift:e}");
 }
 
-/// Cut after cut, chunks that are amended and now and then planned anew give what new ones give.
+/// After every cut, chunks that were amended or planned anew give the same results as new ones.
 #[test]
 fn amended_chunks_act_like_new_ones() {
     amended_chunks_act_like_new(Law::Corotational, OperatorChoice::MatrixFree);
@@ -251,8 +251,8 @@ fn one_element_per_piece(cut: &CutMesh) -> (TetMesh, Vec<Piece>) {
     (TetMesh { nodes: mesh.nodes.clone(), tets }, pieces)
 }
 
-/// Stabs hardly wider than an element divide elements, but hardly any node; the last incision goes
-/// through the whole body where they are and takes what they divided apart.
+/// Stabs hardly wider than an element divide elements, but hardly any node. The last incision goes
+/// through the whole body at the same place and separates what they divided.
 #[test]
 fn pieces_with_the_same_copies_share_a_lane_until_a_cut_separates_them() {
     let (mesh, _) = mesh();
@@ -273,8 +273,7 @@ fn pieces_with_the_same_copies_share_a_lane_until_a_cut_separates_them() {
         cut.sweep(&cut.rest_positions(), &sweep, k + 1).unwrap();
         let (pieces, n) = (cut.pieces(), cut.n_copies());
         elastic.follow(&mesh, pieces, cut.changed_pieces(), n);
-        // Pieces that were there keep the rotation of their lane, whether they have one of their own
-        // now or not.
+        // Earlier pieces keep the rotation of their lane, whether or not they have one of their own now.
         assert_eq!(before.0, elastic.rotations()[..before.1], "cut {k}");
         shared.push(pieces.len() - elastic.n_lanes());
 

@@ -1,6 +1,6 @@
 //! The algebraic error of conjugate gradients, estimated while they run.
 
-/// Iterations by which the estimate is late.
+/// Number of iterations by which the estimate lags.
 const DELAY: usize = 4;
 
 /// Estimate of ‖x* − x‖_A from the numbers that conjugate gradients compute anyway.

@@ -51,7 +51,8 @@ impl<T: Real> DiagonalInverse<T> {
     }
 }
 
-/// The matrix in the precision of the iteration; what is too light for it does not move.
+/// Rounds the matrix to the precision of the iteration. A block that overflows becomes 0: so light a copy
+/// does not move.
 fn rounded<T: Real>(M: Matrix3<f64>) -> Matrix3<T> {
     let rounded = M.map(T::of);
     if rounded.iter().all(|m| m.wide().is_finite()) { rounded } else { Matrix3::zeros() }

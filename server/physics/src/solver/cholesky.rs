@@ -48,7 +48,7 @@ struct Source {
 pub enum Failure {
     /// The pivot of this displacement (3 · copy + axis) is not positive.
     Pivot(u32),
-    /// The machine has not enough memory for the factors, or the matrix is too large for its indices.
+    /// There is not enough memory for the factors, or the matrix is too large for its indices.
     Memory,
 }
 
@@ -88,6 +88,7 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
         let symbolic =
             factorize_symbolic_cholesky(pattern, Side::Upper, Default::default(), Default::default())
                 .map_err(|_| Failure::Memory)?;
+        // All memory is reserved here, so that refactorising and solving allocate nothing.
         let need = symbolic
             .factorize_numeric_llt_scratch::<T>(Par::Seq, Default::default())
             .or(symbolic.solve_in_place_scratch::<T>(1, Par::Seq));
@@ -163,8 +164,8 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
     }
 }
 
-/// The displacement (3 · copy + axis) that faer means by the failed pivot `index`, which it counts from 1
-/// where L is stored by columns, and from 0 where it is stored by supernodes.
+/// The displacement (3 · copy + axis) of the failed pivot `index` of faer. faer counts it from 1 if L is
+/// stored by columns, and from 0 if it is stored by supernodes.
 fn displacement(symbolic: &SymbolicCholesky<u32>, index: usize) -> u32 {
     let from_zero = match symbolic.raw() {
         SymbolicCholeskyRaw::Simplicial(_) => index.saturating_sub(1),

@@ -16,9 +16,9 @@ use crate::assembly::BlockCsr;
 use crate::operator::{BLOCK, Substitutable, Substitution};
 use crate::team::{Team, blocks};
 
-/// The true residual is computed when the recursion says it fell by this factor (Clark et al. 2010).
+/// The true residual is computed when the recurrence reports a fall by this factor (Clark et al. 2010).
 const RELIABLE: f64 = 0.1;
-/// The solver gives up when the true residual has not halved this often in a row.
+/// The solver gives up when the true residual has failed to halve this many times in a row.
 const FUTILE: u32 = 2;
 
 /// A matrix that is multiplied row by row.
@@ -40,18 +40,18 @@ pub struct System<'a, T, A> {
     pub exact_inverse: &'a DiagonalInverse<f64>,
     /// M⁻¹ of `working`.
     pub inverse: &'a DiagonalInverse<T>,
-    /// T: M⁻¹ is of TᵀA T, residuals are kept as Tᵀr; empty for T = 1.
+    /// T: M⁻¹ is that of TᵀA T, and residuals are kept as Tᵀr; empty for T = 1.
     pub substitution: &'a Substitution,
     /// Whether M⁻¹ preconditions the iteration; the norm in which it stops is that of M⁻¹ anyway.
     pub preconditioned: bool,
 }
 
-/// When conjugate gradients stop.
+/// Stopping criteria of conjugate gradients.
 #[derive(Clone, Copy, Debug)]
 pub struct Stop {
-    /// At this √(rᵀM⁻¹r), not relative to anything.
+    /// √(rᵀM⁻¹r) to reach, not relative to anything.
     pub target: f64,
-    /// After so many iterations.
+    /// Largest number of iterations.
     pub iterations: u32,
 }
 
@@ -100,7 +100,7 @@ where
         self.p.fill(Vector3::zeros());
         let mut report = LinearReport::default();
         let mut error = AlgebraicError::default();
-        // The iteration works on r / scale, so that single precision does not mind the units.
+        // The iteration works on r / scale, so that units do not exhaust the range of single precision.
         let scale = self.true_residual(team, system, b, x);
         let mut checked = scale;
         report.residual = scale;
@@ -116,6 +116,7 @@ where
                 return report;
             }
             let curvature = self.direction(team, system, beta);
+            // Beyond a direction without positive curvature the iteration has no meaning.
             if !curvature.is_finite() || curvature <= 0.0 {
                 report.residual = self.true_residual(team, system, b, x);
                 report.algebraic_error = error.norm();
@@ -132,6 +133,7 @@ where
             report.iterations += 1;
             let norm = next.norm * scale;
             let last = report.iterations == stop.iterations;
+            // In single precision the recurrence drifts, so the true residual is checked on the way.
             let doubtful = size_of::<T>() == 4 && norm <= RELIABLE * checked;
             if norm <= stop.target || doubtful || last || !norm.is_finite() {
                 let known = self.true_residual(team, system, b, x);
@@ -140,6 +142,7 @@ where
                 report.algebraic_error = error.norm();
                 report.stop = verdict(known, stop.target);
                 futile = if known > 0.5 * checked { futile + 1 } else { 0 };
+                // A true residual that no longer falls is rounding.
                 if report.stop == StopReason::IterationLimit && futile == FUTILE && !last {
                     report.stop = StopReason::Stagnated;
                 }
@@ -213,8 +216,8 @@ where
         self.sums.iter().map(|s| s[0]).sum()
     }
 
-    /// x += scale · α p, r −= α q, z = M⁻¹ r. The solution is summed in double precision: rounding it
-    /// would be a force of A times the rounding.
+    /// x += scale · α p, r −= α q, z = M⁻¹ r. The solution is summed in double precision, because its
+    /// rounding error times A would act as a force.
     fn advance(
         &mut self,
         team: &mut Team,
@@ -223,7 +226,7 @@ where
         (alpha, scale): (f64, f64),
     ) -> Size {
         let (p, q, inverse) = (&self.p, &self.q, system.inverse);
-        // What x gets must be what r loses.
+        // x must gain exactly what r loses.
         let alpha = T::of(alpha);
         let step = alpha.wide() * scale;
         let state = (

@@ -16,7 +16,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Takes over which directions of which copies are prescribed.
+    /// Sets which directions of which copies are prescribed.
     pub fn set(&mut self, fixed: &[FixedCopy]) {
         self.held.clear();
         self.held.extend(fixed.iter().map(|f| (f.copy, f.axes)));

@@ -1,4 +1,4 @@
-//! A matrix in single precision that still knows how a body moves as a whole.
+//! A matrix in single precision whose rounding errors do not grow with the motion of the body as a whole.
 
 use nalgebra::Vector3;
 

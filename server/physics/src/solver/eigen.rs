@@ -19,11 +19,11 @@ use crate::team::Team;
 /// Which natural frequencies are computed and how exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EigenSettings {
-    /// How many of the lowest.
+    /// Number of frequencies to compute, from the lowest up.
     pub count: usize,
     /// Stop when no ω² changes by more than this, relatively, from one iteration to the next.
     pub tolerance: f64,
-    /// Most iterations.
+    /// Largest number of iterations.
     pub iterations: u32,
     /// σ [rad²/s²] ≥ 0: 0 for a body that is held, about ω₁² for one that is free.
     pub shift: f64,
@@ -48,13 +48,13 @@ pub struct Modes {
     pub converged: bool,
 }
 
-/// Why there are no natural frequencies.
+/// Reasons why natural frequencies cannot be computed.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum EigenError {
     /// K + σM or M is singular or indefinite.
     #[error("stiffness or mass is not positive definite: hold the body, or shift the stiffness by its mass")]
     Indefinite,
-    /// The factors do not fit.
+    /// The factors do not fit into memory.
     #[error("not enough memory for the factors of the stiffness")]
     Memory,
 }
@@ -73,12 +73,14 @@ pub fn natural_frequencies(
     let held: usize = fixed.iter().map(|f| f.axes.iter().filter(|held| **held).count()).sum();
     let free = (3 * n).saturating_sub(held);
     let count = settings.count.min(free);
+    // More vectors than frequencies: the extra ones speed up convergence.
     let size = (2 * count).min(count + 8).min(free);
     let mut modes = Modes::default();
     if count == 0 {
         modes.converged = true;
         return Ok(modes);
     }
+    // Factorised once; every iteration only solves with the factors.
     let mut shifted = K.clone();
     shifted.add_scaled(settings.shift, M);
     let mut factor = Cholesky::<f64>::default();
@@ -98,6 +100,7 @@ pub fn natural_frequencies(
             filter.apply(y);
             factor.solve(y, x, 1.0);
         }
+        // Y = (K + σM) X̄, so this is K + σM on the span of X̄.
         let projected = gram(&X, &Y);
         for (x, y) in X.iter().zip(&mut Y) {
             M.multiply_by(team, x, y);
@@ -134,7 +137,7 @@ fn gram(X: &[Vec<Vector3<f64>>], Y: &[Vec<Vector3<f64>>]) -> DMatrix<f64> {
     0.5 * (&G + G.transpose())
 }
 
-/// Eigenvalues, ascending, and M-orthonormal eigenvectors of A q = λ B q.
+/// Eigenvalues, ascending, and B-orthonormal eigenvectors of A q = λ B q.
 fn small_problem(A: &DMatrix<f64>, B: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
     let L = B.clone().cholesky()?.unpack();
     let left = L.solve_lower_triangular(A)?;

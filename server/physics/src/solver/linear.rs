@@ -19,7 +19,7 @@ use crate::team::{Team, blocks};
 /// How A x = b is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Conjugate gradients with nothing but the constraint filter: the thesis' modified CG.
+    /// Conjugate gradients with only the constraint filter: the thesis' modified CG.
     Cg,
     /// Conjugate gradients preconditioned by the inverse 3×3 diagonal blocks.
     #[default]
@@ -39,14 +39,14 @@ pub enum Precision {
     Double,
 }
 
-/// How and how far a linear system is solved.
+/// Method, precision and stopping criteria of a linear solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearSettings {
-    /// The method.
+    /// Method of the solve; may be changed between solves.
     pub method: Method,
-    /// The precision.
+    /// Precision of the work inside the solve.
     pub precision: Precision,
-    /// Most iterations; for a factorisation most solves with the factors.
+    /// Largest number of iterations; for a factorisation, of solves with the factors.
     pub iterations: u32,
     /// Stop at √(rᵀM⁻¹r) ≤ tolerance · reference, with M the 3×3 diagonal blocks of A.
     pub tolerance: f64,
@@ -64,7 +64,7 @@ const MOST_CORRECTIONS: u32 = 20;
 /// Solves linear systems again and again; nothing is allocated unless the pattern changes.
 #[derive(Debug, Default)]
 pub struct LinearSolver {
-    /// How and how far; may be changed between solves.
+    /// Settings; may be changed between solves.
     pub settings: LinearSettings,
     filter: Filter,
     inverse: DiagonalInverse<f64>,
@@ -77,7 +77,7 @@ pub struct LinearSolver {
     z: Vec<Vector3<f64>>,
 }
 
-/// What single-precision iterations need.
+/// Data of single-precision iterations.
 #[derive(Debug, Default)]
 struct Single {
     matrix: Differences,
@@ -86,7 +86,7 @@ struct Single {
     gradients: ConjugateGradients<f32>,
 }
 
-/// A factorisation and the pattern and matrix that it is of.
+/// A factorisation, and the pattern and matrix it belongs to.
 #[derive(Debug, Default)]
 struct Factors<T> {
     cholesky: Cholesky<T>,
@@ -102,20 +102,20 @@ impl LinearSolver {
         Self { settings, ..Self::default() }
     }
 
-    /// Takes over the stiff motions of degenerate elements, which are then kept from costing
-    /// iterations: the preconditioner works in other variables, in double precision. Not for
-    /// [`Method::Cg`], which has no preconditioner.
+    /// Sets the stiff motions of degenerate elements, so that they cost no extra iterations: the
+    /// preconditioner works in other variables, in double precision. They do not help [`Method::Cg`],
+    /// which has no preconditioner.
     pub fn set_stiff_modes(&mut self, modes: Option<Arc<StiffModes>>) {
         self.substituted = Substituted::new(modes);
     }
 
-    /// Pieces of degenerate elements, copies that are moved relative to others for them, and pieces
-    /// that keep a stiff motion; those of the last matrix.
+    /// For the last matrix: pieces of degenerate elements, copies moved relative to others for them, and
+    /// pieces that keep a stiff motion.
     pub fn stiff_motions(&self) -> [usize; 3] {
         self.substituted.counts()
     }
 
-    /// Takes over the values of a new matrix and which directions are prescribed.
+    /// Sets a new matrix and the prescribed directions.
     ///
     /// Must be called whenever either has changed, before [`solve`](Self::solve) and
     /// [`norm`](Self::norm); a matrix that stays is factorised only once.
@@ -147,7 +147,7 @@ impl LinearSolver {
     /// that is `None`), with the matrix of the last [`set_matrix`](Self::set_matrix).
     ///
     /// Prescribed directions of `x` stay as they are. Whatever happens, `x` is the best iterate found
-    /// and the report says how good it is; if it says [`StopReason::NonFinite`], `x` is useless.
+    /// and the report tells how good it is. After [`StopReason::NonFinite`] `x` is useless.
     pub fn solve(
         &mut self,
         team: &mut Team,
@@ -179,7 +179,7 @@ impl LinearSolver {
         let Self { filter, inverse, substituted, single, double, .. } = self;
         let (filter, exact_inverse) = (&*filter, &*inverse);
         let substitution = substituted.substitution();
-        // Rounding a matrix with entries 1/ε times as large as the others would spoil those.
+        // Rounding a matrix with entries 1/ε times as large as the others would spoil the small ones.
         if self.settings.precision == Precision::Double || !substitution.is_empty() {
             let system = System {
                 exact: A,
@@ -244,7 +244,7 @@ impl LinearSolver {
                 let stop = StopReason::NonPositiveCurvature;
                 LinearReport { residual, stop, pivot: Some(pivot), ..report }
             }
-            // No room for the factors: conjugate gradients need none.
+            // No memory for the factors: conjugate gradients need none.
             Err(Failure::Memory) => self.iterate(team, A, b, x, (stop, true)),
         }
     }
@@ -309,8 +309,9 @@ impl Correction<'_> {
                 report.iterations += 1;
                 report.refinements += 1;
                 corrections += 1;
-                // The correction was the error; what is left of it shrank as the residual did.
+                // The correction was the error before it; the remaining error shrank as the residual did.
                 report.algebraic_error = energy.max(0.0).sqrt() * (report.residual / before).min(1.0);
+                // A correction that hardly helps is the last one; a harmful one is taken back.
                 if report.residual > stop.target && report.residual > 0.5 * before {
                     if report.residual >= before {
                         add(x, self.z, -1.0);

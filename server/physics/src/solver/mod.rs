@@ -1,8 +1,8 @@
 //! Solution of A x = b, and of nonlinear equilibrium by Newton's method.
 //!
 //! Every solver stops on the *preconditioned* residual √(rᵀM⁻¹r), M the 3×3 diagonal blocks of A: the
-//! plain norm is blind to slivers. Each says how many iterations it made, how large the residual is
-//! and why it stopped; none iterates through a direction of non-positive curvature.
+//! plain norm is blind to slivers. Each reports its number of iterations, its residual and why it
+//! stopped. None iterates through a direction of non-positive curvature.
 
 mod real;
 mod report;

@@ -1,8 +1,8 @@
 //! Newton's method with backtracking: minimises a potential, whatever the start.
 //!
-//! H p = −∇Φ, then x ← x + t p with the first t ∈ {1, ½, ¼, …} that lowers Φ enough (Armijo 1966).
-//! A Φ that is not finite counts as +∞. Where p leads nowhere, the block-Jacobi gradient −M⁻¹∇Φ is
-//! tried; where that fails too no step is taken: an unchecked step can overflow.
+//! H p = −∇Φ, then x ← x + t p with the first t ∈ {1, ½, ¼, …} that lowers Φ enough (Armijo 1966). A Φ
+//! that is not finite counts as +∞. If p gives no descent, the block-Jacobi gradient −M⁻¹∇Φ is tried. If
+//! that fails too, no step is taken: an unchecked step can overflow.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::assembly::BlockCsr;
 use crate::operator::{FixedCopy, StiffModes};
 use crate::team::Team;
 
-/// Something with a minimum: potential energy, or that plus the inertia of a time step.
+/// A function to minimise: potential energy, or that plus the inertia of a time step.
 pub trait Potential {
     /// Φ(x) [J]; may be infinite or NaN where x is impossible.
     fn value(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64;
@@ -25,47 +25,47 @@ pub trait Potential {
     /// A zero matrix with the pattern of ∇²Φ.
     fn pattern(&mut self) -> BlockCsr<f64>;
 
-    /// H = ∇²Φ(x) [N/m], or a positive semidefinite approximation of it where `curvature` asks so.
+    /// H = ∇²Φ(x) [N/m], or a positive semidefinite approximation of it if `curvature` requests it.
     fn hessian(&mut self, team: &mut Team, x: &[Vector3<f64>], curvature: Curvature, H: &mut BlockCsr<f64>);
 
     /// Writes the forces [N] against which the residual is measured: loads, inertia.
     fn loads(&mut self, loads: &mut [Vector3<f64>]);
 
-    /// Elastic energy [J] where the gradient was last asked for; 0 where there is none. What is held by
-    /// displacements alone has no loads to measure the residual against.
+    /// Elastic energy [J] at the last gradient; 0 if there is none. A body under prescribed displacements
+    /// alone has no loads to measure the residual against, so this stands in.
     fn stored(&self) -> f64 {
         0.0
     }
 }
 
-/// Which Hessian Newton's method asks for.
+/// Which Hessian Newton's method uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Curvature {
-    /// The second derivative; a step at which it turns out indefinite is made with `Definite`.
+    /// The second derivative. A step at which it turns out indefinite is made with `Definite`.
     Exact,
     /// Projected to positive semidefinite: always a descent direction.
     #[default]
     Definite,
 }
 
-/// How and how far a potential is minimised.
+/// Settings of Newton's method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonSettings {
-    /// Most Newton steps.
+    /// Largest number of Newton steps.
     pub steps: u32,
     /// Stop at √(gᵀM⁻¹g) ≤ tolerance · reference; reference is the norm of the loads, or of the first
     /// gradient where that is larger, and at least 10⁻³ √(2Ψ).
     pub tolerance: f64,
-    /// Most halvings of a step: 8 as a rule, 20 to recover from ruined states.
+    /// Largest number of halvings of a step: usually 8, and 20 to recover from ruined states.
     pub halvings: u32,
-    /// Which Hessian.
+    /// Which Hessian to use.
     pub curvature: Curvature,
     /// The linear solver; its tolerance is the largest forcing term η.
     pub linear: LinearSettings,
 }
 
 impl NewtonSettings {
-    /// As `halvings`: full steps, unseen. Only to show what the line search is for.
+    /// Value of `halvings` for full steps without a check. Only to show what the line search is for.
     #[doc(hidden)]
     pub const UNCHECKED: u32 = u32::MAX;
 }
@@ -82,7 +82,7 @@ impl Default for NewtonSettings {
     }
 }
 
-/// How a minimisation went.
+/// Result of a minimisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NewtonReport {
     /// Newton steps made, gradient steps included.
@@ -105,18 +105,18 @@ pub struct NewtonReport {
     pub potential: f64,
     /// Algebraic error of the last linear solve [√J].
     pub algebraic_error: f64,
-    /// What the last linear solve and the line search after it left of the linearised equations,
-    /// √(rᵀM⁻¹r) over the reference: for steps that are a fixed number of linear solves by design.
+    /// Residual of the linearised equations after the last linear solve and its line search, √(rᵀM⁻¹r)
+    /// over the reference. It judges steps that are a fixed number of linear solves by design.
     pub linear_residual: f64,
-    /// The displacement (3 · copy + axis) whose pivot was not positive, where a factorisation of what must be
-    /// positive definite met one; conjugate gradients took its place.
+    /// The displacement (3 · copy + axis) whose pivot was not positive, if the factorisation of a matrix
+    /// that must be positive definite met one. Conjugate gradients then took its place.
     pub pivot: Option<u32>,
 }
 
 /// Newton's method with all its memory; reused from solve to solve without allocation.
 #[derive(Debug, Default)]
 pub struct Newton {
-    /// How and how far; may be changed between solves.
+    /// Settings; may be changed between solves.
     pub settings: NewtonSettings,
     solver: LinearSolver,
     hessian: BlockCsr<f64>,
@@ -132,12 +132,12 @@ pub struct Newton {
 const ARMIJO: f64 = 1e-4;
 /// Differences of Φ below this part of the largest |Φ| met are rounding.
 const ROUNDING: f64 = 1e-12;
-/// Least reference, over the norm √(2Ψ) of the elastic forces: without loads, and with what is held where it was,
-/// only rounding is left to measure a residual against.
+/// Least reference, relative to the norm √(2Ψ) of the elastic forces. Without loads, and with held nodes
+/// where they were, a residual could otherwise be measured only against rounding.
 pub const LEAST_REFERENCE: f64 = 1e-3;
-/// Iterations of conjugate gradients where a factorisation failed, if not more were allowed.
+/// Least number of iterations allowed to conjugate gradients after a failed factorisation.
 const INSTEAD_OF_FACTORS: u32 = 500;
-/// Steps without half the residual after which rounding is what is left of it.
+/// Steps without a halving of the residual after which it counts as rounding.
 const FUTILE_STEPS: u32 = 3;
 /// Halvings of a gradient step, whose length has no natural scale.
 const GRADIENT_HALVINGS: u32 = 40;
@@ -148,17 +148,17 @@ impl Newton {
         Self { settings, ..Self::default() }
     }
 
-    /// Takes over the stiff motions of degenerate elements, for the linear solver.
+    /// Sets the stiff motions of degenerate elements, for the linear solver.
     pub fn set_stiff_modes(&mut self, modes: Option<Arc<StiffModes>>) {
         self.solver.set_stiff_modes(modes);
     }
 
-    /// [`LinearSolver::stiff_motions`].
+    /// See [`LinearSolver::stiff_motions`].
     pub fn stiff_motions(&self) -> [usize; 3] {
         self.solver.stiff_motions()
     }
 
-    /// Prepares for potentials with the pattern of this one; to be called again when it changes.
+    /// Prepares for potentials with the pattern of this one; call it again when the pattern changes.
     pub fn prepare(&mut self, potential: &mut dyn Potential) {
         self.hessian = potential.pattern();
         let n = self.hessian.n_rows();
@@ -198,7 +198,7 @@ impl Newton {
                 report.stop = StopReason::Interrupted;
                 return report;
             }
-            // After the first step the previous preconditioner tells first whether all is done.
+            // After the first step, the previous preconditioner tells whether a new Hessian is needed at all.
             if first.is_some() && self.measure(potential, &mut report, &mut first) {
                 return report;
             }
@@ -214,6 +214,7 @@ impl Newton {
             }
             let (before, backtracks) = (report.residual, report.backtracks);
             let definite = self.direction(team, curvature, &mut report);
+            // An indefinite Hessian may point uphill: make this step with its projection.
             if !definite && curvature == Curvature::Exact {
                 curvature = Curvature::Definite;
                 continue;
@@ -225,6 +226,7 @@ impl Newton {
             let t =
                 if next.is_some() { 0.5_f64.powf(f64::from(report.backtracks - backtracks)) } else { 0.0 };
             report.linear_residual = before * (1.0 - t) + t * report.linear_residual;
+            // No descent along p: try the gradient.
             if next.is_none() {
                 self.solver.precondition(&self.minus_g, &mut self.p);
                 let slope = dot(&self.g, &self.p);
@@ -253,7 +255,7 @@ impl Newton {
         }
     }
 
-    /// Writes the residual into the report; whether the tolerance is reached.
+    /// Writes the residual into the report. Returns whether the tolerance is reached.
     fn measure(
         &mut self,
         potential: &mut dyn Potential,
@@ -271,7 +273,7 @@ impl Newton {
         norm <= self.settings.tolerance * report.reference
     }
 
-    /// p with H p ≈ −g; whether H showed no direction of non-positive curvature.
+    /// Computes p with H p ≈ −g. Returns whether H showed no direction of non-positive curvature.
     fn direction(&mut self, team: &mut Team, curvature: Curvature, report: &mut NewtonReport) -> bool {
         for (minus_g, g) in self.minus_g.iter_mut().zip(&self.g) {
             *minus_g = -g;
@@ -283,6 +285,7 @@ impl Newton {
         let tolerance = linear.tolerance.min(report.residual.sqrt()).max(needed.min(0.1));
         self.solver.settings = LinearSettings { tolerance, ..linear };
         let mut solved = self.solver.solve(team, &self.hessian, &self.minus_g, &mut self.p, None);
+        // A matrix that must be definite was not factorised: conjugate gradients take over.
         if let (Some(pivot), Curvature::Definite) = (solved.pivot, curvature) {
             report.pivot = Some(pivot);
             let iterations = linear.iterations.max(INSTEAD_OF_FACTORS);
@@ -301,8 +304,8 @@ impl Newton {
         definite
     }
 
-    /// The largest t ∈ {1, ½, …} that lowers Φ enough: Φ there, with x + t p in `trial` and its
-    /// gradient in `trial_g`; `None` if there is none.
+    /// Finds the largest t ∈ {1, ½, …} that lowers Φ enough. Returns Φ there, with x + t p in `trial` and
+    /// its gradient in `trial_g`; `None` if there is none.
     ///
     /// Close to the minimum Φ cannot resolve the decrease any more. There the slope decides instead
     /// (approximate Wolfe condition, Hager, Zhang 2005), or a gradient that is halved.
@@ -354,8 +357,8 @@ impl Newton {
     }
 }
 
-/// Tells when a minimisation has come down to rounding: the residual no longer falls, and what a step can
-/// gain is less than Φ resolves.
+/// Detects when a minimisation has come down to rounding: the residual no longer falls, and a step can
+/// gain less than Φ resolves.
 #[derive(Clone, Copy, Debug)]
 struct Floor {
     /// Smallest residual so far.
@@ -373,7 +376,7 @@ impl Default for Floor {
 }
 
 impl Floor {
-    /// Takes in the residual after a step; whether further steps are of no use.
+    /// Takes the residual after a step. Returns whether further steps are useless.
     fn is_reached(&mut self, residual: f64) -> bool {
         self.futile = if residual > 0.5 * self.least { self.futile + 1 } else { 0 };
         self.least = self.least.min(residual);

@@ -9,16 +9,16 @@ use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Precondit
 use crate::reserve::resize_reserving;
 use crate::team::Team;
 
-/// When to stop.
+/// Stopping criteria of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PcgSettings {
-    /// Most iterations, each one application of A.
+    /// Largest number of iterations, each one application of A.
     pub iterations: u32,
     /// Stop at √(rᵀM⁻¹r) ≤ tolerance · reference.
     pub tolerance: f64,
 }
 
-/// How a solve went.
+/// Result of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PcgReport {
     /// Iterations made.
@@ -34,8 +34,8 @@ pub struct PcgReport {
 /// Scratch vectors of the solver, one entry per copy; reused from solve to solve.
 #[derive(Clone, Debug, Default)]
 pub struct Pcg {
-    /// In: the residual b − A x of the start; out: of the result, by recursion, in the variables of
-    /// the preconditioner.
+    /// On input the residual b − A x of the start. On output that of the result, by recurrence, in the
+    /// variables of the preconditioner.
     pub r: Vec<Padded>,
     z: Vec<Padded>,
     p: Vec<Padded>,
@@ -73,7 +73,7 @@ impl Pcg {
         self.run(team, A, M, x, (start, reference, settings))
     }
 
-    /// The same where [`Self::precondition`] has just returned `rz`.
+    /// The same after [`Self::precondition`] has just returned `rz`.
     pub fn run(
         &mut self,
         team: &mut Team,
@@ -86,8 +86,8 @@ impl Pcg {
         self.go_on(team, A, M, x, (reference, settings))
     }
 
-    /// Goes on where the last run ended, as if both were one: with the same A, which nobody applied meanwhile,
-    /// and the same M. `x` is added to.
+    /// Continues where the last run ended, as if both were one. A and M must be the same, and A must not
+    /// have been applied meanwhile. The result is added to `x`.
     pub fn go_on(
         &mut self,
         team: &mut Team,
@@ -138,12 +138,13 @@ impl Pcg {
             let next = M.advance(team, alpha as f32, [p, q], Iterate { x, r, z, partial });
             beta = next / rz;
             rz = next;
+            // Kept for a later continuation.
             (self.rz, self.beta) = (rz, beta);
             report.iterations += 1;
         }
     }
 
-    /// √(vᵀM⁻¹v), the norm that `reference` is to be given in.
+    /// √(vᵀM⁻¹v), the norm in which `reference` is given.
     pub fn norm(&mut self, team: &mut Team, M: &mut impl Preconditioner, v: &[Padded]) -> f64 {
         M.norm(team, v, &mut self.z, &mut self.partial)
     }

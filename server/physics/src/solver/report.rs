@@ -1,4 +1,4 @@
-//! What every solver says about how it went.
+//! What every solver reports.
 
 /// Why a solver stopped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -6,7 +6,7 @@ pub enum StopReason {
     /// The residual fell below the tolerance.
     #[default]
     Converged,
-    /// The iterations ran out first; the residual says how good the result is.
+    /// The iterations ran out first; the residual tells how good the result is.
     IterationLimit,
     /// pᵀAp ≤ 0, or a pivot that is not positive: the operator is not positive definite; the iterate
     /// before it is returned (Steihaug 1983).
@@ -15,13 +15,13 @@ pub enum StopReason {
     Stagnated,
     /// No step along any direction tried lowers the potential; the iterate was left where it was.
     NoDescent,
-    /// The stop flag was raised; the residual says how good the result is.
+    /// The stop flag was raised; the residual tells how good the result is.
     Interrupted,
     /// A scalar product is NaN or infinite; the result must not be used.
     NonFinite,
 }
 
-/// How the solution of A x = b went.
+/// Result of a solution of A x = b.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinearReport {
     /// Iterations made, each one product with A; for a factorisation the solves with its factors.
@@ -32,8 +32,8 @@ pub struct LinearReport {
     pub stop: StopReason,
     /// Estimate of the algebraic error ‖x* − x‖_A, [√J] where A is a stiffness [N/m].
     pub algebraic_error: f64,
-    /// How often the residual was computed anew in double precision.
+    /// Number of times the residual was recomputed in double precision.
     pub refinements: u32,
-    /// The displacement (3 · copy + axis) whose pivot is not positive, where a factorisation met one.
+    /// The displacement (3 · copy + axis) whose pivot is not positive, if a factorisation met one.
     pub pivot: Option<u32>,
 }

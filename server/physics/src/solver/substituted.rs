@@ -17,23 +17,23 @@ pub struct Substituted {
     T: Substitution,
     /// Degenerate pieces that keep a stiff motion.
     left: usize,
-    /// What T was made for.
+    /// Prescribed directions for which T was found.
     made_for: Option<Vec<(u32, [bool; 3])>>,
 }
 
 impl Substituted {
-    /// The substitution that takes `modes` apart.
+    /// The substitution for `modes`; the first update finds it.
     pub fn new(modes: Option<Arc<StiffModes>>) -> Self {
         Self { modes, ..Self::default() }
     }
 
-    /// T; empty where there is nothing to take apart.
+    /// T; empty if nothing is substituted.
     pub fn substitution(&self) -> &Substitution {
         &self.T
     }
 
-    /// Degenerate pieces, copies that are moved relative to others, degenerate pieces that keep a stiff
-    /// motion.
+    /// Numbers of degenerate pieces, of copies moved relative to others, and of degenerate pieces that
+    /// keep a stiff motion.
     pub fn counts(&self) -> [usize; 3] {
         [self.modes.as_ref().map_or(0, |modes| modes.n_degenerate()), self.T.len(), self.left]
     }

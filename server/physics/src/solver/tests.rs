@@ -86,7 +86,7 @@ fn every_method_in_every_precision_finds_the_same_solution() {
         let size = exact.iter().map(|x| x.amax()).fold(0.0, f64::max);
         for how in ALL {
             let (report, x) = solved(&A, &fixed, how, 1);
-            // Without preconditioner the sliver is out of reach: that is what the report says.
+            // Without a preconditioner the sliver is out of reach, and the report must tell so.
             if how.0 == Method::Cg {
                 assert!(report.stop != StopReason::Converged || report.residual <= 1e-10, "{report:?}");
                 continue;

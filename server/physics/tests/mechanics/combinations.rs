@@ -1,5 +1,5 @@
-//! Every element with every law, integrator, solver, remedy and mass: what is accepted moves, what is
-//! not is refused.
+//! Every element with every law, integrator, solver, remedy and mass: accepted combinations move, the
+//! others are refused.
 
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
@@ -114,7 +114,7 @@ fn remedies_masses_and_precisions_step() {
     }
 }
 
-/// Relaxation goes on from step to step: many short steps end where Newton's method does at once.
+/// Relaxation continues from step to step: many short steps end where one of Newton's method does.
 #[test]
 fn relaxation_keeps_its_iterate() {
     for law in LAWS {

@@ -109,7 +109,7 @@ fn a_cut_through_the_clamp_glues_nothing_to_air() {
     assert!(((after[loose].1 - before[loose].1).y / expected - 1.0).abs() < 1e-6);
 }
 
-/// Cut exactly through a layer of nodes that ends in the clamp, both lips have those clamped nodes.
+/// After a cut exactly through a layer of nodes that ends in the clamp, both lips have the clamped nodes.
 #[test]
 fn a_cut_exactly_through_clamped_nodes_leaves_both_lips_clamped() {
     for general in [false, true] {
@@ -132,7 +132,7 @@ fn a_cut_exactly_through_clamped_nodes_leaves_both_lips_clamped() {
     }
 }
 
-/// Cut along the first layer of nodes behind the clamp the body falls; a cut along the clamp itself
+/// A cut along the first layer of nodes behind the clamp lets the body fall; a cut along the clamp itself
 /// frees nothing.
 #[test]
 fn what_holds_no_clamped_node_falls() {

@@ -89,8 +89,8 @@ fn ruined_cube(threads: usize) -> Body {
     body
 }
 
-/// Where the solver works in other variables: the same bits, no allocation, and springs on copies of
-/// flat elements cost no iterations.
+/// The same bits and no allocation, even if the solver works in other variables. Springs on copies of
+/// flat elements cost hardly any iterations.
 #[test]
 fn degenerate_elements_change_none_of_that() {
     let mut hashes = Vec::new();

@@ -171,7 +171,7 @@ fn prescribed_nodes_arrive_where_they_should() {
                 let c = f.copy as usize;
                 assert!((rig.state.x[c] - V::from(f.position_m)).norm() < 1e-15, "{scheme:?}");
                 let expected = if scheme == Scheme::Static { 0.0 } else { 0.5 };
-                // Schemes of second order alternate about it after the jump at the start.
+                // Schemes of second order oscillate about it after the jump at the start.
                 let tolerance =
                     if matches!(scheme, Scheme::Newmark { .. } | Scheme::Bdf2) { 0.6 } else { 1e-9 };
                 assert!((rig.state.v[c].y - expected).abs() < tolerance, "{scheme:?}: {}", rig.state.v[c]);
@@ -180,7 +180,7 @@ fn prescribed_nodes_arrive_where_they_should() {
     }
 }
 
-/// Case 8: every fragment of a cut body falls with g, clamped or not beside it.
+/// Case 8: the free fragment of a cut body falls with g, beside the clamped one.
 #[test]
 fn fragments_fall_freely_with_every_scheme() {
     let mesh = box_mesh(V::zeros(), V::new(0.4, 0.1, 0.1), [8, 2, 2], BoxPattern::Tet6);

@@ -1,5 +1,5 @@
-//! Equilibria of linear bodies on the fast path: the same as in double precision, searched for over many steps
-//! or at once.
+//! Equilibria of linear bodies on the fast path agree with those in double precision, whether they are
+//! searched over many steps or found at once.
 
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
@@ -67,13 +67,13 @@ fn single_precision_finds_the_equilibrium_of_double_precision() {
         }
         let (apart, sag) = (apart(&fast, &exact), sag(&exact));
         assert!(apart < 1e-3 * sag, "{apart} of {sag} m");
-        // What is in equilibrium stays there, and its residual says so.
+        // A body in equilibrium stays there and reports a small residual.
         let before = fast.positions().to_vec();
         let again = fast.step(0.02, DOWN, springs);
         assert!(!again.is_unconverged(), "{again:?}");
         let moved = fast.positions().iter().zip(&before).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         assert!(moved < 1e-4 * sag, "{moved} of {sag} m");
-        // The next time with a wound.
+        // The next round has a wound.
         assert!(fast.cut(&blade, 1).unwrap().elements_cut > 0 || !springs.is_empty());
         exact.cut(&blade, 1).unwrap();
     }
@@ -93,7 +93,7 @@ fn relaxation_goes_on_where_it_ended() {
     let ratio = many[7].residual / one[0].residual;
     assert!((0.999..1.001).contains(&ratio), "{ratio}");
     assert!(apart(&often, &once) < 1e-6 * sag(&once));
-    // To the end, where it stays; and back when the load changes.
+    // The search comes to its end and stays there; it returns when the load changes.
     let (mut body, _) = run(10, 100);
     let mut exact = beam(statics(Arithmetic::Double, 2000, 1e-10));
     exact.step(0.02, DOWN, &[]);
@@ -138,7 +138,7 @@ fn what_nothing_holds_has_no_equilibrium() {
     let report = body.step(0.02, DOWN, &[]);
     assert_eq!(report.outcome, Outcome::Refused);
     assert!(matches!(report.notice, Some(Notice::Underheld { driven: true, .. })), "{report:?}");
-    // What slides without being driven rests.
+    // A body that could slide but is not driven rests.
     let report = body.step(0.02, Vector3::x(), &[]);
     assert_eq!(report.outcome, Outcome::Advanced);
     assert!(matches!(report.notice, Some(Notice::Underheld { driven: false, .. })), "{report:?}");

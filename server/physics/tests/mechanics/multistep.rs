@@ -57,8 +57,8 @@ fn both_paths_move_alike() {
     }
 }
 
-/// Distance of a run with step `h` from one with a sixteenth of it after 0.16 s, cut half through at half the
-/// time.
+/// Distance after 0.16 s of a run with step `h` from one with a sixteenth of it, both cut half through at
+/// half the time; and how often the scheme started anew.
 fn error_with_cut(scheme: Scheme, arithmetic: Arithmetic, law: Law, h: f64) -> (f64, u32) {
     let run = |h: f64| {
         let mut body =
@@ -98,7 +98,7 @@ fn a_cut_neither_restarts_a_scheme_nor_costs_it_its_order() {
     }
 }
 
-/// A free cube that turns fast: whatever the scheme does, no energy appears.
+/// A free cube that turns fast gains no energy, whatever the scheme does.
 #[test]
 fn a_spinning_body_gains_no_energy() {
     for scheme in [Scheme::Bdf2, NEWMARK] {

@@ -1,4 +1,4 @@
-//! Ruined starts and input without meaning.
+//! Ruined starts and meaningless input.
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, Outcome, PointSpring, SpringKind};
@@ -102,8 +102,8 @@ fn reset_returns_to_the_start() {
     assert!(body.epoch() > epoch);
 }
 
-/// A stiff cube that turns by 2, 4 and 8 rad in a step: one linear solve from the predictor would gain
-/// energy, so the step is divided or the spin slowed, and it is said.
+/// A stiff cube that turns by 2, 4 and 8 rad in a step. One linear solve from the predictor would gain
+/// energy, so the step is divided or the spin slowed, and this is reported.
 #[test]
 fn a_free_body_that_turns_far_in_a_step_gains_no_energy() {
     let h = 0.2;

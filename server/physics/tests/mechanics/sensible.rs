@@ -1,4 +1,5 @@
-//! What a body says where it is held by too little, out of any range, or cut through what holds it.
+//! What a body reports if too little holds it, if it leaves any sensible range, or if it is cut through
+//! its support.
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, Method, Notice, Outcome, PcgSettings, Scheme, StopReason};
@@ -17,7 +18,7 @@ fn at_rest(method: Method) -> BodySettings {
     }
 }
 
-/// Nodes of a body that rest where `at` says.
+/// Nodes of a body whose rest position satisfies `at`.
 fn nodes(body: &Body, at: impl Fn(&Vector3<f64>) -> bool) -> Vec<u32> {
     (0u32..).zip(body.rest_positions()).filter(|(_, x)| at(x)).map(|(n, _)| n).collect()
 }
@@ -40,7 +41,7 @@ fn a_static_body_that_can_slide_is_refused_with_the_direction() {
     }
 }
 
-/// The pivots of what nothing holds are rounding of either sign, wherever they stand.
+/// The pivots of motions that nothing holds are rounding of either sign, wherever they stand.
 #[test]
 fn cholesky_ends_soundly_on_bodies_that_are_held_by_too_little() {
     for cells in [1, 2, 3] {
@@ -80,7 +81,7 @@ fn a_body_that_is_drawn_out_of_range_is_held_where_it_was() {
     assert_eq!(body.kinetic_energy(), 0.0);
     let most = body.positions().iter().zip(body.rest_positions()).map(|(x, X)| (x - X).norm());
     assert!(most.fold(0.0, f64::max) < 10.0 * size_m);
-    // Free fall is no such thing.
+    // Free fall does not count.
     let mut free = cube(3, SOFT, settings(20, 1e-4));
     for _ in 0..300 {
         assert_eq!(free.step(0.02, DOWN, &[]).outcome, Outcome::Advanced);
@@ -106,7 +107,7 @@ fn a_foil_hangs_as_it_does_in_double_precision() {
     };
     let ((thin_is_fast, thin), (thick_is_fast, thick)) = (hang(3e-5), hang(5e-3));
     assert!(!thin_is_fast && thick_is_fast);
-    // It stretches under its own weight, as much whatever its thickness.
+    // It stretches under its own weight, by the same amount whatever its thickness.
     assert!((thin / thick - 1.0).abs() < 0.2, "{thin} and {thick}");
 }
 
@@ -115,7 +116,7 @@ fn reactions_count_both_lips_of_a_held_node() {
     let mut body = cube(4, SOFT, at_rest(Method::Cholesky));
     let top = nodes(&body, |x| x.y > 0.1 - 1e-9);
     body.fix(&top, [true; 3], Vector3::zeros()).unwrap();
-    // Right through, exactly along a layer of nodes, held ones among them.
+    // Right through, exactly along a layer of nodes, some of them held.
     let segment = |y: f64| [Vector3::new(0.05, y, -0.5), Vector3::new(0.05, y, 0.5)];
     body.cut(&BladeSweep { segments: vec![segment(-0.5), segment(0.5)] }, 1).unwrap();
     assert_eq!(body.parts().len(), 2);

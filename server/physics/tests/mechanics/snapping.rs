@@ -113,7 +113,7 @@ fn a_reset_keeps_what_was_asked_for_after_the_cut_and_drops_the_pins() {
     assert!(body.fixed_nodes().len() > held.len(), "the part cut off is pinned");
     let origins = body.node_origins().unwrap().to_vec();
     let now = |origin: u32| origins.iter().position(|&o| o == origin).unwrap() as u32;
-    // Asked for on the cut body: one node held, one let go, one loaded.
+    // Requested on the cut body: one node held, one released, one loaded.
     let top = (0u32..).zip(body.rest_positions()).find(|(_, x)| **x == v(0.0, 0.0, 0.2)).unwrap().0;
     let pulled = origins[top as usize];
     let corner = (0u32..).zip(&origins).filter(|(n, o)| **o == pulled && *n != top).count();

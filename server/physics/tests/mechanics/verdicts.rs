@@ -1,5 +1,5 @@
-//! What a step says about itself: whether it converged, on every path, and what becomes of parts that sleep
-//! and of explicit steps after a cut.
+//! What a step reports: whether it converged, on every path. Also parts that sleep, and explicit steps
+//! after a cut.
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, Method, Notice, Outcome, Scheme, StopReason};
@@ -38,7 +38,7 @@ fn wall(x: f64, depth: f64) -> BladeSweep {
 
 #[test]
 fn unconverged_means_the_same_on_every_path() {
-    // Path and settings, and whether they are given enough.
+    // Path, law and settings, and whether the iterations are enough.
     let bdf2 = |iterations| BodySettings { scheme: Scheme::Bdf2, ..solver(iterations) };
     let direct = BodySettings { method: Method::Cholesky, ..solver(50) };
     let cases = [
@@ -65,8 +65,8 @@ fn unconverged_means_the_same_on_every_path() {
     }
 }
 
-/// A specimen that is drawn out between two clamps and carries no load: nothing but what holds it, and soon
-/// nothing that moves.
+/// A specimen stretched between two clamps without any load: only its supports act on it, and soon
+/// nothing moves.
 #[test]
 fn what_is_driven_by_its_supports_alone_converges() {
     let newmark = Scheme::Newmark { beta: 0.25, gamma: 0.5 };
@@ -97,8 +97,8 @@ fn explicit_steps_have_no_tolerance_to_miss() {
     assert!(!report.is_unconverged() && !report.is_divided() && report.tolerance == 0.0, "{report:?}");
 }
 
-/// The estimate of conjugate gradients is four iterations late and a lower bound, so it is no more than a
-/// power of ten from the truth: the distance to a solution that is far better.
+/// The estimate of conjugate gradients lags by four iterations and is a lower bound. It is within a power
+/// of ten of the truth, the distance to a far better solution.
 #[test]
 fn the_fast_path_reports_its_algebraic_error() {
     let (h, mut errors) = (0.02, Vec::new());
@@ -170,8 +170,8 @@ fn a_part_that_sleeps_stays_where_it_is_and_the_rest_goes_on() {
     }
 }
 
-/// Slivers of any thickness: the stable step is about that of the uncut body, and never shorter than that of
-/// its worst element by itself, for a piece shares its mass as its stiffness is shared.
+/// Slivers of any thickness: the stable step is about that of the uncut body. It is never shorter than
+/// that of the worst element by itself, because a piece shares its mass as it shares its stiffness.
 #[test]
 fn explicit_steps_stay_as_long_as_they_were_however_thin_a_cut_leaves_the_pieces() {
     for scheme in [Scheme::SymplecticEuler, Scheme::Midpoint, Scheme::Rk4] {

@@ -1,9 +1,9 @@
-//! The critical time step of explicit schemes: ω_max of K − ω² M by power iteration, and how long a
-//! step each scheme can make with it.
+//! The critical time step of explicit schemes: ω_max of K − ω² M by power iteration, and the longest
+//! stable step of each scheme for it.
 //!
-//! The power iteration keeps its directions (Lanczos 1950): the largest Ritz value of the same
-//! products M⁻¹K q converges far faster than the last iterate's Rayleigh quotient. Deterministic start,
-//! no reorthogonalisation, which the extreme value does not need (Paige 1980).
+//! The power iteration keeps its directions (Lanczos 1950). The largest Ritz value of the same products
+//! M⁻¹K q converges far faster than the Rayleigh quotient of the last iterate. The start is
+//! deterministic. There is no reorthogonalisation, which the extreme value does not need (Paige 1980).
 
 use nalgebra::Vector3;
 
@@ -16,13 +16,13 @@ use crate::material::Rayleigh;
 use crate::operator::FixedCopy;
 use crate::team::Team;
 
-/// Most products with K; far more than a mesh of good quality needs.
+/// Largest number of products with K; far more than a mesh of good quality needs.
 const MOST_PRODUCTS: usize = 300;
 /// Stop when the largest Ritz value changed by less than this, relative, in [`CALM`] products.
 const CONVERGED: f64 = 1e-12;
 const CALM: usize = 8;
 
-/// Memory of the iteration, one entry per node.
+/// Buffers of the iteration, one entry per node.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PowerIteration {
     /// Present and previous direction, M-orthonormal.
@@ -62,6 +62,7 @@ impl PowerIteration {
         start(&mut self.q);
         hold(fixed, &mut self.q);
         self.before.fill(Vector3::zeros());
+        // The norm in M does not see nodes without mass.
         self.weightless_stand_still(mass);
         let norm = (2.0 * mass.kinetic(&self.q)).sqrt();
         if norm.is_nan() || norm <= 0.0 {
@@ -85,6 +86,7 @@ impl PowerIteration {
             calm = if (value - largest).abs() <= CONVERGED * value.abs() { calm + 1 } else { 0 };
             largest = value;
             beta = (2.0 * mass.kinetic(&self.acceleration)).sqrt();
+            // β = 0 ends the Krylov space: its Ritz values are then eigenvalues.
             let exhausted = beta.is_nan() || beta <= 1e-14 * largest.abs();
             if calm == CALM || exhausted || !largest.is_finite() {
                 break;
@@ -105,8 +107,8 @@ impl PowerIteration {
         }
     }
 
-    /// Bound of the largest eigenvalue [1/s²] of M⁻¹ Σ k J Jᵀ over all springs, in contact or not:
-    /// by rows of M^−½ (…) M^−½ (Gershgorin).
+    /// Upper bound of the largest eigenvalue [1/s²] of M⁻¹ Σ k J Jᵀ over all springs, in contact or not,
+    /// by the rows of M^−½ (…) M^−½ (Gershgorin).
     pub fn spring_bound(&mut self, springs: &[ActiveSpring], mass: &[f64]) -> f64 {
         self.row.fill(0.0);
         for spring in springs {
@@ -120,7 +122,7 @@ impl PowerIteration {
     }
 }
 
-/// Deterministic, with a part in every direction: a Weyl sequence per axis.
+/// A deterministic start with a component in every direction: a Weyl sequence per axis.
 fn start(q: &mut [Vector3<f64>]) {
     for (i, q) in q.iter_mut().enumerate() {
         let t = (i + 1) as f64;
@@ -163,8 +165,8 @@ fn largest_eigenvalue(diagonal: &[f64], off: &[f64]) -> f64 {
     high
 }
 
-/// Growth of rounding noise that an explicit step may allow [1/s]: the midpoint rule amplifies every
-/// undamped oscillation.
+/// Growth of rounding noise that an explicit step may have [1/s]. It must not be zero: the midpoint rule
+/// amplifies every undamped oscillation.
 const NOISE_GROWTH: f64 = 1.0;
 
 /// Longest stable step [s] of an explicit `scheme` for a mode of frequency `omega` [rad/s] with the

@@ -10,15 +10,15 @@ use crate::material::Law;
 use crate::operator::FixedCopy;
 use crate::team::Team;
 
-/// Part of the longest stable step that is used.
+/// Fraction of the longest stable step that is used.
 const MARGIN: f64 = 0.95;
-/// ω_max of a body whose stiffness changes is computed again after so many steps.
+/// Steps after which ω_max is computed again, for a body whose stiffness changes.
 const RECHECK: u32 = 128;
 /// A step that did not stay finite is tried again with sub-steps half, then a quarter as long.
 const RETRIES: u32 = 2;
 
 impl Dynamics {
-    /// Makes the step into `self.next`.
+    /// Makes the step; the new state is in `self.next`.
     pub(super) fn explicit_step(
         &mut self,
         team: &mut Team,
@@ -29,7 +29,7 @@ impl Dynamics {
         let stable_s = self.stable_step(team, state, inputs.fixed);
         report.stable_step_s = Some(stable_s);
         let parts = (inputs.h / (MARGIN * stable_s) * (1.0 - 1e-9)).ceil().max(1.0);
-        // Saturates; a step of zero length that is stable divides into more parts than anyone allows.
+        // The cast saturates: a stable step of length zero needs more parts than anyone allows.
         let needed = if parts.is_nan() { u32::MAX } else { parts as u32 };
         if needed > self.settings.most_substeps.max(1) {
             report.outcome = DynamicsOutcome::Refused;
@@ -45,6 +45,7 @@ impl Dynamics {
             };
             let h = inputs.h / f64::from(report.substeps);
             self.next.copy_from(state);
+            // Prescribed nodes move at the constant velocity that reaches their target.
             for f in inputs.fixed {
                 let c = f.copy as usize;
                 for k in (0..3).filter(|&k| f.axes[k]) {
@@ -65,8 +66,9 @@ impl Dynamics {
         report.outcome = DynamicsOutcome::Held;
     }
 
-    /// Longest stable step [s] with the springs of this step.
+    /// Longest stable step [s], including the springs of this step.
     fn stable_step(&mut self, team: &mut Team, state: &State, fixed: &[FixedCopy]) -> f64 {
+        // Body and springs are bounded apart: springs change with every step, ω_max of the body does not.
         let body = match self.omega_squared {
             Some((omega_squared, left)) if left > 0 || self.model.law() == Law::Linear => {
                 self.omega_squared = Some((omega_squared, left.saturating_sub(1)));
@@ -84,7 +86,7 @@ impl Dynamics {
         stable_step(self.settings.scheme, (body + springs).sqrt(), self.material.rayleigh)
     }
 
-    /// One part of length `h` [s], which ends at the fraction `s` of the step.
+    /// Makes one part of length `h` [s], which ends at the fraction `s` of the step.
     fn substep(&mut self, team: &mut Team, state: &State, inputs: &DynamicsInputs<'_>, h: f64, s: f64) {
         let mut next = std::mem::take(&mut self.next);
         let [mut x, mut v, mut a, mut dx, mut dv] = std::mem::take(&mut self.stages);
@@ -119,6 +121,7 @@ impl Dynamics {
                 add(&mut next.x, h, &next.v);
             }
         }
+        // Set rather than integrated, so that prescribed nodes arrive without rounding.
         for f in inputs.fixed {
             let c = f.copy as usize;
             for k in (0..3).filter(|&k| f.axes[k]) {

@@ -16,15 +16,15 @@ use crate::team::Team;
 
 /// An element whose ‖F‖ is below this has collapsed.
 const COLLAPSED: f64 = 0.05;
-/// Newton steps that a step gets which gained energy with fewer.
+/// Least number of Newton steps allowed when a step is repeated because it failed or gained energy.
 const RETRY_STEPS: u32 = 20;
-/// Tolerance that such a step is solved to at least: with a coarse one it would gain energy again.
+/// Largest tolerance of such a repeated step: with a coarser one it would gain energy again.
 const RETRY_TOLERANCE: f64 = 1e-3;
 /// Halvings of a Newton step that recovers from a ruined state.
 const RECOVERY_HALVINGS: u32 = 20;
 
 impl Dynamics {
-    /// Makes the step into `self.next`.
+    /// Makes the step; the new state is in `self.next`.
     pub(super) fn implicit_step(
         &mut self,
         team: &mut Team,
@@ -43,6 +43,7 @@ impl Dynamics {
         let (scheme, notice) = self.choose(scheme, state, inputs);
         let underheld = self.free_motions.first().map(|&motion| Notice::Underheld { motion, driven: false });
         (report.scheme, report.notice) = (scheme, notice.or(underheld));
+        // Newmark's method needs the acceleration at the start of its first step.
         if let Scheme::Newmark { .. } = scheme
             && !self.history.known
         {
@@ -50,6 +51,7 @@ impl Dynamics {
             self.accelerate(team, &state.x, &state.v, inputs.fixed, &mut a);
             self.acceleration = a;
         }
+        // Prescribed motion does work that is not known here, so the energy is not judged then.
         let driven = inputs
             .fixed
             .iter()
@@ -63,7 +65,7 @@ impl Dynamics {
         if let (true, Some(excess_j)) = (advanced, excess) {
             report.notice = Some(Notice::EnergyGained { excess_j });
         }
-        // Implicit Euler, solved to the end, is what never fails.
+        // Implicit Euler, solved to a fine tolerance, is the fallback.
         let asked = self.settings.newton;
         let coarse = asked.steps < RETRY_STEPS || asked.tolerance > RETRY_TOLERANCE;
         let again = scheme != Scheme::ImplicitEuler || coarse;
@@ -85,14 +87,14 @@ impl Dynamics {
         self.history.contacts = self.contacts();
     }
 
-    /// [`why_no_equilibrium`].
+    /// See [`why_no_equilibrium`].
     fn why_no_equilibrium(&self) -> Option<Notice> {
         let held = (&self.free_motions[..], &self.parts);
         let springs = !self.active.is_empty();
         why_no_equilibrium(held, self.model.law(), self.model.rest(), &self.f_ext, springs)
     }
 
-    /// Energy [J] in `self.next` that came from nowhere, if it is more than the scheme may gain.
+    /// Energy [J] that `self.next` gained without work, if it is more than the scheme may gain.
     fn excess(&self, state: &State, energy: f64, scheme: Scheme, report: &DynamicsReport) -> Option<f64> {
         let moved = self.next.x.iter().zip(&state.x);
         let exchanged: f64 = self.f_ext.iter().zip(moved).map(|(f, (next, x))| f.dot(&(next - x))).sum();
@@ -100,7 +102,7 @@ impl Dynamics {
         self.ledger.excess(self.total_energy(report), gain * (energy + exchanged.abs()))
     }
 
-    /// The scheme that this step can be made with, and why it is not the one that was chosen.
+    /// The scheme for this step, and the reason if it is not the chosen one.
     fn choose(
         &mut self,
         scheme: Scheme,
@@ -127,7 +129,7 @@ impl Dynamics {
         (scheme, None)
     }
 
-    /// Springs that push or pull at the positions in `self.next`.
+    /// Number of springs that push or pull at the positions in `self.next`.
     fn contacts(&self) -> usize {
         self.active.iter().filter(|s| s.potential(s.point(&self.next.x)).energy > 0.0).count()
     }
@@ -137,7 +139,8 @@ impl Dynamics {
         report.kinetic_j + report.elastic_j.unwrap_or(0.0) + self.load_energy(&self.next.x)
     }
 
-    /// One step with one scheme and at most so many Newton steps; whether the result is finite.
+    /// Makes one attempt with one scheme and at most `steps` Newton steps. Returns whether the result is
+    /// finite.
     fn attempt(
         &mut self,
         team: &mut Team,
@@ -174,7 +177,7 @@ impl Dynamics {
         finite(&self.next) && (report.kinetic_j + elastic_j).is_finite()
     }
 
-    /// x_a, x_v and the predictor, which goes to `self.next.x`.
+    /// Computes x_a and x_v, and writes the predictor to `self.next.x`.
     fn predict(&mut self, state: &State, inputs: &DynamicsInputs<'_>, scheme: Scheme) -> Increment {
         let h = inputs.h;
         let State { x, v } = state;
@@ -223,9 +226,9 @@ impl Dynamics {
         }
     }
 
-    /// Newton's method from the predictor, before and after it the balance of momentum of loose parts:
-    /// what falls freely does so before the first iteration, and conjugate gradients, which find such
-    /// slow modes last, need not look for them.
+    /// Runs Newton's method from the predictor, and balances the momentum of loose parts before and after
+    /// it. A part in free fall then moves before the first iteration. Conjugate gradients find such slow
+    /// modes last and need not look for them.
     fn minimise(
         &mut self,
         team: &mut Team,
@@ -236,7 +239,7 @@ impl Dynamics {
     ) -> NewtonReport {
         let ruined = self.count_ruined(report);
         let settings = self.settings.newton;
-        // One solve of Newmark's equations gains energy where the body turns.
+        // With a single solve Newmark's method gains energy where the body turns.
         let least = if matches!(report.scheme, Scheme::Newmark { .. }) { 2 } else { 1 };
         let quadratic = matches!(self.model.law(), Law::Linear | Law::Corotational);
         let steps = match quadratic && !ruined && self.active.is_empty() {
@@ -247,8 +250,8 @@ impl Dynamics {
             report.notice = Some(Notice::Recovery);
         }
         let halvings = if ruined { RECOVERY_HALVINGS.max(settings.halvings) } else { settings.halvings };
-        // A step that is solved for only once is solved for well, with the rotations of the predictor:
-        // then implicit Euler gains no energy up to 2 rad per step; beyond, the ledger sees it.
+        // A step with a single solve uses the rotations of the predictor and a fine tolerance. Implicit
+        // Euler then gains no energy up to 2 rad per step; beyond that, the ledger detects it.
         let single = steps == 1;
         let mut linear = settings.linear;
         if single {
@@ -276,7 +279,7 @@ impl Dynamics {
         };
         let x = &mut self.next.x;
         if !phi.value(team, x).is_finite() {
-            // So fast that the predictor overflows: from where the body is.
+            // The velocity is so high that the predictor overflows: start from the present positions.
             x.copy_from_slice(&state.x);
             for f in inputs.fixed {
                 for k in (0..3).filter(|&k| f.axes[k]) {
@@ -306,13 +309,13 @@ impl Dynamics {
         done
     }
 
-    /// Translates every free part to where its momentum is balanced exactly, for an iteration that
-    /// stops early leaves a residual, which is momentum from nowhere.
+    /// Translates every free part to where its momentum is balanced exactly. An iteration that stops
+    /// early leaves a residual, which would be spurious momentum.
     fn balance_parts(&mut self, increment: Increment) {
         let factor = increment.A + self.material.rayleigh.mass_1_s * increment.B;
         let mut g = std::mem::take(&mut self.scratch);
         g.fill(Vector3::zeros());
-        // Internal forces and K̂ add up to nothing in every part; what is left is inertia and loads.
+        // Internal forces and K̂ sum to zero over every part; inertia and loads remain.
         let alpha = self.material.rayleigh.mass_1_s;
         let x = &self.next.x;
         for (s, from) in [(increment.A, &self.x_a), (alpha * increment.B, &self.x_v)] {
@@ -337,8 +340,8 @@ impl Dynamics {
         self.scratch = g;
     }
 
-    /// Counts inverted elements at the predictor into the report; whether any element is inverted or
-    /// collapsed.
+    /// Counts the inverted quadrature points at the predictor into the report. Returns whether any
+    /// element is inverted or collapsed.
     fn count_ruined(&self, report: &mut DynamicsReport) -> bool {
         let mut ruined = false;
         report.inverted = 0;
@@ -354,9 +357,9 @@ impl Dynamics {
     }
 }
 
-/// What keeps a body from an equilibrium: a part that hangs on nothing, or a rigid motion that nothing
-/// holds and the loads `f_ext` [N] drive. A rotation by a finite angle ends somewhere; the linear law knows
-/// none. Springs may hold what the boundary conditions do not.
+/// The reason why a body has no equilibrium: a part that is held nowhere, or a free rigid motion that the
+/// loads `f_ext` [N] drive. A finite rotation comes to an end, but the linear law knows no finite
+/// rotations. Springs may hold what the boundary conditions do not.
 pub fn why_no_equilibrium(
     (free_motions, parts): (&[FreeMotion], &LooseParts),
     law: Law,
@@ -373,8 +376,8 @@ pub fn why_no_equilibrium(
     Some(Notice::Underheld { motion: *motion, driven: true })
 }
 
-/// The report of a step that is a fixed number of linear solves by design: how well the last of them was
-/// solved, where Newton's method ended because there were no more.
+/// Report of a step that is a fixed number of linear solves by design. If Newton's method ran out of
+/// steps, the step is judged by the residual of its last solve.
 fn judged_by_its_solve(newton: NewtonReport, tolerance: f64) -> NewtonReport {
     if newton.stop != StopReason::IterationLimit {
         return newton;

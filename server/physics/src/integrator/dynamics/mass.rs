@@ -7,10 +7,10 @@ use crate::assembly::{BlockCsr, Model};
 use crate::solver::{LinearSettings, LinearSolver, Method, Precision};
 use crate::team::Team;
 
-/// M [kg].
+/// Mass matrix M [kg].
 #[derive(Debug)]
 pub(super) struct Mass {
-    /// Lumped masses [kg], one per node; they are M if there is no matrix.
+    /// Lumped masses [kg], one per node; they form M if there is no matrix.
     pub lumped: Vec<f64>,
     /// M, if consistent, and ρ ∫ N_a dV [kg].
     pub consistent: Option<(BlockCsr<f64>, Vec<f64>)>,
@@ -25,7 +25,7 @@ impl Mass {
             model.consistent_mass(density_kg_m3, &mut M);
             (M, model.shape_integrals().iter().map(|v| density_kg_m3 * v).collect())
         });
-        // Block-Jacobi preconditioned, M has a condition number that depends on the element only.
+        // With block-Jacobi preconditioning the condition number of M depends on the element type only.
         let linear = LinearSettings {
             method: Method::Pcg,
             precision: Precision::Double,
@@ -39,7 +39,7 @@ impl Mass {
         Self { lumped, consistent, solver }
     }
 
-    /// Weight of node `c` under gravity `g`: M g.
+    /// Weight [N] of node `c` under gravity `g` [m/s²]: its row of M g.
     #[inline]
     pub fn weight(&self, c: usize, g: Vector3<f64>) -> Vector3<f64> {
         match &self.consistent {
@@ -84,7 +84,7 @@ impl Mass {
         }
     }
 
-    /// a = M⁻¹ f; a node without mass does not accelerate. `held` directions are left to the caller.
+    /// a = M⁻¹ f; a node without mass does not accelerate. The caller treats held directions.
     pub fn solve(&mut self, team: &mut Team, f: &[Vector3<f64>], a: &mut [Vector3<f64>]) {
         match &self.consistent {
             None => {
@@ -98,7 +98,7 @@ impl Mass {
         }
     }
 
-    /// Takes over which directions are prescribed: M⁻¹ then acts on the others.
+    /// Sets the prescribed directions; M⁻¹ then acts on the others.
     pub fn hold(&mut self, fixed: &[crate::operator::FixedCopy]) {
         if let Some((M, _)) = &self.consistent {
             self.solver.set_matrix(M, fixed);

@@ -1,9 +1,9 @@
 //! Motion of a [`Model`]: every scheme, either mass, Rayleigh damping, contacts, guards.
 //!
-//! Explicit schemes check the critical time step and divide a step that is too long, or refuse it.
-//! Implicit schemes minimise the incremental potential of the step by Newton's method with
-//! backtracking, so that contacts, inverted elements and any law are treated alike. Whatever happens
-//! the state stays finite, and what was done differently from what was asked for is reported.
+//! Explicit schemes check the critical time step; they divide a step that is too long, or refuse it.
+//! Implicit schemes minimise the incremental potential of the step by Newton's method with backtracking,
+//! so that contacts, inverted elements and any law are treated alike. Whatever happens, the state stays
+//! finite. Every departure from what was requested is reported.
 
 mod critical_step;
 mod explicit;
@@ -43,7 +43,7 @@ use mass::Mass;
 /// Positions beyond this [m] count as not finite.
 const FARTHEST: f64 = 1e15;
 
-/// What a step is made from.
+/// Inputs of one step.
 #[derive(Clone, Copy, Debug)]
 pub struct DynamicsInputs<'a> {
     /// Length of the step h [s].
@@ -54,11 +54,11 @@ pub struct DynamicsInputs<'a> {
     pub load: &'a [Vector3<f64>],
     /// Prescribed nodes, with their positions at the end of the step.
     pub fixed: &'a [FixedCopy],
-    /// Springs of this step.
+    /// Contact and tool springs of this step, whose forces are reported in the same order.
     pub springs: &'a [PointSpring],
 }
 
-/// Settings that no step can be made with.
+/// Settings with which no step can be made.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum DynamicsError {
     /// Newmark's parameters are out of range.
@@ -71,7 +71,7 @@ pub enum DynamicsError {
     },
 }
 
-/// Integrates the motion of one body; holds all memory that a step needs.
+/// Integrates the motion of one body; owns all memory that a step needs.
 #[derive(Debug)]
 pub struct Dynamics {
     model: Model,
@@ -81,9 +81,9 @@ pub struct Dynamics {
     newton: Newton,
     relaxation: Relaxation,
     parts: LooseParts,
-    /// Of an equilibrium: rigid motions of held parts that nothing holds.
+    /// Rigid motions of held parts that the constraints leave free; found for equilibria only.
     free_motions: Vec<FreeMotion>,
-    /// Prescribed nodes that the parts were made with.
+    /// Prescribed nodes for which the parts were found.
     known_fixed: Option<Vec<FixedCopy>>,
     translations: Translations,
     active: Vec<ActiveSpring>,
@@ -96,12 +96,12 @@ pub struct Dynamics {
     acceleration: Vec<Vector3<f64>>,
     scratch: Vec<Vector3<f64>>,
     force: Vec<Vector3<f64>>,
-    /// Room for the stages of explicit schemes.
+    /// Buffers for the stages of explicit schemes.
     stages: [Vec<Vector3<f64>>; 5],
     damping: Option<BlockCsr<f64>>,
     tangent: Option<BlockCsr<f64>>,
     power: PowerIteration,
-    /// ω_max² [1/s²] without springs, and the explicit steps until it is computed again.
+    /// ω_max² [1/s²] without springs, and the number of explicit steps until it is computed again.
     omega_squared: Option<(f64, u32)>,
     history: History,
     ledger: Ledger,
@@ -109,7 +109,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Prepares the motion of `model`, which is made of `material`.
+    /// Prepares the motion of `model`, which has to be made of `material`.
     pub fn new(model: Model, material: Material, settings: DynamicsSettings) -> Result<Self, DynamicsError> {
         settings.scheme.check()?;
         let n = model.n_nodes();
@@ -151,8 +151,8 @@ impl Dynamics {
         })
     }
 
-    /// Goes on with what `before` remembers, whose model was cut since: the cut made the nodes `new`. Forces
-    /// jump at a cut, so that Newmark's method starts from a new acceleration.
+    /// Continues from `before`, whose model was cut since; the cut made the nodes `new`. Forces jump at a
+    /// cut, so Newmark's method starts from a new acceleration.
     pub fn continue_from(&mut self, before: Dynamics, new: &[NewCopy]) {
         if !matches!(self.settings.scheme, Scheme::Newmark { .. }) {
             self.history = before.history;
@@ -165,7 +165,7 @@ impl Dynamics {
         &self.model
     }
 
-    /// How motion is integrated.
+    /// Scheme, mass and solver settings in use.
     pub fn settings(&self) -> &DynamicsSettings {
         &self.settings
     }
@@ -175,25 +175,24 @@ impl Dynamics {
         &self.mass.lumped
     }
 
-    /// Takes over the stiff motions of the model's degenerate elements, which are then kept from
-    /// costing iterations.
+    /// Sets the stiff motions of the model's degenerate elements, so that they cost no extra iterations.
     pub fn set_stiff_modes(&mut self, modes: Option<Arc<StiffModes>>) {
         self.newton.set_stiff_modes(modes);
     }
 
-    /// Pieces of degenerate elements, copies that are moved relative to others for them, and pieces
-    /// that keep a stiff motion; those of the last step.
+    /// Of the last step: pieces of degenerate elements, copies moved relative to others for them, and
+    /// pieces that keep a stiff motion.
     pub fn stiff_motions(&self) -> [usize; 3] {
         self.newton.stiff_motions()
     }
 
-    /// Changes Newton's method and the iterations of relaxation, from the next step on.
+    /// Changes Newton's method and the number of relaxation iterations, from the next step on.
     pub fn set_solver(&mut self, newton: NewtonSettings, relaxation: Option<u32>) {
         (self.settings.newton, self.settings.relaxation) = (newton, relaxation);
     }
 
-    /// Changes elastic constants and damping, from the next step on; law and density stay. The energy of
-    /// the next step is booked afresh, because the elastic part of it jumps with the constants.
+    /// Changes elastic constants and damping from the next step on; law and density stay. The energy
+    /// balance starts anew, because the elastic energy jumps with the constants.
     pub fn set_material(&mut self, material: Material) {
         self.model.set_lame(material.lame());
         let (damped, model) = (material.rayleigh.stiffness_s > 0.0, &self.model);
@@ -204,8 +203,8 @@ impl Dynamics {
         self.restart();
     }
 
-    /// Force of gravity `g` [m/s²] on node `c` [N]: M g in motion. In an equilibrium, where no mass
-    /// matrix has to agree with it, the consistent load ρ ∫ N dV g.
+    /// Force of gravity `g` [m/s²] on node `c` [N]: M g in motion, the consistent load ρ ∫ N dV g in an
+    /// equilibrium, where no mass matrix has to agree with it.
     pub fn weight(&self, c: usize, g: Vector3<f64>) -> Vector3<f64> {
         match self.settings.scheme {
             Scheme::Static => self.material.density_kg_m3 * self.model.shape_integrals()[c] * g,
@@ -228,15 +227,15 @@ impl Dynamics {
         self.mass.kinetic(v)
     }
 
-    /// Forgets earlier steps. Called by the integrator itself where a state is not the one it left.
+    /// Forgets earlier steps. The integrator calls it itself if a state is not the one it left.
     pub fn restart(&mut self) {
         self.history.forget();
         self.ledger.forget();
         self.omega_squared = None;
     }
 
-    /// `copies` were stopped in `state` and are held from now on: the others go on as they did. What the
-    /// copies took with them leaves the book of energy.
+    /// Tells that `copies` were stopped in `state` and are held from now on. The history of the others
+    /// stays. The energy balance starts anew without that of the stopped copies.
     pub fn still(&mut self, copies: &[u32], state: &State) {
         self.history.still(copies, state);
         copies.iter().for_each(|&c| self.acceleration[c as usize] = Vector3::zeros());
@@ -319,7 +318,7 @@ impl Dynamics {
             })
     }
 
-    /// Finds the connected parts again if other directions are prescribed than before.
+    /// Finds the connected parts again if the prescribed directions have changed.
     fn follow_fixed(&mut self, fixed: &[FixedCopy]) {
         let same = |known: &Vec<FixedCopy>| {
             known.len() == fixed.len()
@@ -342,7 +341,7 @@ impl Dynamics {
         self.known_fixed = Some(fixed.to_vec());
     }
 
-    /// Loads and springs of the step.
+    /// Sets loads and usable springs of the step.
     fn begin(&mut self, state: &State, inputs: &DynamicsInputs<'_>) {
         for c in 0..self.f_ext.len() {
             self.f_ext[c] = self.weight(c, inputs.gravity) + inputs.load[c];
@@ -365,7 +364,7 @@ impl Dynamics {
         }
     }
 
-    /// Potential energy of springs and loads at `x` [J]; that of gravity is one of the loads.
+    /// Potential energy of springs and loads at `x` [J]; gravity is one of the loads.
     fn load_energy(&self, x: &[Vector3<f64>]) -> f64 {
         let moved = x.iter().zip(self.model.rest());
         let loads: f64 = self.f_ext.iter().zip(moved).map(|(f, (x, X))| f.dot(&(x - X))).sum();
@@ -374,7 +373,7 @@ impl Dynamics {
     }
 }
 
-/// Whether every number is finite and not absurd.
+/// Whether all numbers are finite and below [`FARTHEST`].
 fn finite(state: &State) -> bool {
     let fine = |v: &Vector3<f64>| v.iter().all(|c| c.abs() < FARTHEST);
     state.x.iter().all(fine) && state.v.iter().all(fine)

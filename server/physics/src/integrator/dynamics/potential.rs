@@ -19,7 +19,7 @@ use crate::integrator::springs::ActiveSpring;
 use crate::solver::{Curvature, Potential};
 use crate::team::Team;
 
-/// Φ of one step; borrows what it is made from.
+/// Φ of one step; borrows all its data.
 pub(super) struct StepPotential<'a> {
     pub model: &'a Model,
     pub mass: &'a Mass,
@@ -33,17 +33,17 @@ pub(super) struct StepPotential<'a> {
     /// Gravity and loads [N].
     pub f_ext: &'a [Vector3<f64>],
     pub springs: &'a [ActiveSpring],
-    /// The tangent that stands for a positive semidefinite one.
+    /// The tangent to use where a positive semidefinite one is needed.
     pub definite: Tangent,
-    /// Ψ where the gradient was last asked for [J].
+    /// Ψ [J] at the positions of the last gradient.
     pub stored: f64,
-    /// Room for differences of positions and forces.
+    /// Buffers for differences of positions and for forces.
     pub scratch: &'a mut [Vector3<f64>],
     pub force: &'a mut [Vector3<f64>],
 }
 
 impl StepPotential<'_> {
-    /// All but Ψ, and its gradient added to `g`, if wanted.
+    /// Φ without Ψ; adds its gradient to `g`, if given.
     fn rest(&mut self, x: &[Vector3<f64>], mut g: Option<&mut [Vector3<f64>]>) -> f64 {
         let Increment { A, B } = self.increment;
         let mut phi = 0.0;
@@ -70,7 +70,8 @@ impl StepPotential<'_> {
                 }
             }
         }
-        // The work of the loads, from x_a so that it is not large where little is done.
+        // The work of the loads is counted from x_a: from the origin it would be large even for small
+        // motions.
         for (c, (f, x)) in self.f_ext.iter().zip(x).enumerate() {
             phi -= f.dot(&(x - self.x_a[c]));
             if let Some(g) = g.as_deref_mut() {
@@ -125,8 +126,8 @@ impl Potential for StepPotential<'_> {
     }
 }
 
-/// Adds w_a w_b S of every pair of carriers. A pair that is not in the pattern is moved to the
-/// diagonal, which keeps the matrix positive semidefinite.
+/// Adds w_a w_b S for every pair of carriers. A pair that the pattern lacks is moved to the diagonal,
+/// which keeps the matrix positive semidefinite.
 fn add_spring(spring: &ActiveSpring, x: &[Vector3<f64>], H: &mut BlockCsr<f64>) {
     let S = spring.potential(spring.point(x)).stiffness;
     if S.amax() == 0.0 {

@@ -1,4 +1,4 @@
-//! What a step says about itself.
+//! What a step reports.
 
 use std::fmt;
 
@@ -8,122 +8,122 @@ use super::Scheme;
 use crate::integrator::FreeMotion;
 use crate::solver::NewtonReport;
 
-/// How a step of [`Dynamics`](super::Dynamics) went.
+/// Result of a step of [`Dynamics`](super::Dynamics).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DynamicsReport {
-    /// What became of the step.
+    /// Whether the body advanced, and if not, why.
     pub outcome: DynamicsOutcome,
-    /// The scheme that made it; another than the chosen one where a guard stepped in.
+    /// The scheme used; it differs from the chosen one if a guard replaced it.
     pub scheme: Scheme,
-    /// What the user should know, if anything.
+    /// A departure from what was requested, if there was one.
     pub notice: Option<Notice>,
-    /// Newton's method, last solve; linear iterations are those of the whole step. With
-    /// [`linearised`](super::DynamicsSettings::linearised) `residual` is that of the linear solve.
+    /// Newton's method in its last solve; linear iterations are those of the whole step. With
+    /// [`linearised`](super::DynamicsSettings::linearised), `residual` is that of the linear solve.
     pub newton: NewtonReport,
-    /// Into how many equal parts an explicit step was divided; 1 for implicit schemes.
+    /// Number of equal parts into which an explicit step was divided; 1 for implicit schemes.
     pub substeps: u32,
     /// Longest stable step [s] of an explicit scheme, as last computed.
     pub stable_step_s: Option<f64>,
     /// Quadrature points with det F ≤ 0 at the start of the step.
     pub inverted: usize,
-    /// Springs that were left out because a number in them is not usable.
+    /// Springs left out because one of their numbers is unusable.
     pub refused_springs: usize,
     /// Kinetic energy at the end [J].
     pub kinetic_j: f64,
-    /// Elastic energy at the end [J]; explicit schemes do not need it and leave it out.
+    /// Elastic energy at the end [J]; `None` for explicit schemes, which do not compute it.
     pub elastic_j: Option<f64>,
 }
 
-/// What became of a step.
+/// How a step ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DynamicsOutcome {
     /// The body advanced by the whole step.
     #[default]
     Advanced,
-    /// Nothing stayed finite: the body is where it was, and at rest.
+    /// No attempt stayed finite: the body is where it was, and at rest.
     Held,
-    /// The step cannot be made as asked; nothing was changed.
+    /// The step cannot be made as requested; nothing was changed.
     Refused,
     /// The stop flag was raised; the body is as it was.
     Interrupted,
 }
 
-/// Something that a step did differently from what was asked for, and why.
+/// Something that a step did differently from what was requested, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Notice {
-    /// h, gravity, a load or β, γ is not usable.
+    /// A length, gravity, load, position or velocity among the inputs is unusable.
     BadInput,
-    /// h is longer than what the explicit scheme can bear, and so many sub-steps were not allowed.
+    /// h exceeds the stable step of the explicit scheme, and the sub-steps it needs are not allowed.
     TooLong {
-        /// The step asked for [s].
+        /// The requested step [s].
         h_s: f64,
         /// Longest stable step [s].
         stable_s: f64,
         /// Sub-steps it would take.
         needed: u32,
     },
-    /// The explicit step was divided as its stability asks for.
+    /// The explicit step was divided into stable parts.
     Divided {
         /// Number of parts.
         substeps: u32,
         /// Longest stable step [s].
         stable_s: f64,
     },
-    /// The explicit step did not stay finite and was divided further than its stability asks for.
+    /// The explicit step did not stay finite and was divided further than its stability requires.
     DividedAgain {
         /// Number of parts.
         substeps: u32,
     },
-    /// BDF2: no usable history, the step was made with implicit Euler.
+    /// BDF2 has no usable history; the step was made with implicit Euler.
     Started,
-    /// BDF2: springs came into contact, the step was made with implicit Euler.
+    /// BDF2: springs came into contact; the step was made with implicit Euler.
     ContactOnset,
-    /// BDF2: the body turns too far in one step, it was made with implicit Euler.
+    /// BDF2: the body turns too far in one step, which was made with implicit Euler.
     Spinning {
         /// Angle per step [rad].
         angle_rad: f64,
     },
-    /// One linear solve per step: a free part turned too far in one step for that, and was slowed.
+    /// One linear solve per step: a free part turned too far for that in one step and was slowed.
     SpinLimited {
-        /// Angle per step before [rad].
+        /// Angle per step before it was slowed [rad].
         angle_rad: f64,
         /// Largest angle per step [rad].
         largest_rad: f64,
     },
-    /// One linear solve per step: loose parts turned far and gained energy, the step was divided.
+    /// One linear solve per step: free parts turned far and gained energy, so the step was divided.
     SpinDivided {
         /// Number of parts.
         substeps: u32,
     },
-    /// The step gained energy, it was made again with implicit Euler and as many Newton steps as needed.
+    /// The step gained energy and was repeated with implicit Euler and as many Newton steps as needed.
     EnergyGained {
-        /// Energy above what there was and what was put in [J].
+        /// Energy gained beyond the work that was put in [J].
         excess_j: f64,
     },
-    /// The elements were inverted or collapsed, more Newton steps were allowed than asked for.
+    /// Elements were inverted or collapsed, so more Newton steps were allowed than requested.
     Recovery,
-    /// A part of the body hangs on nothing: there is no equilibrium.
+    /// A part of the body is held nowhere, so there is no equilibrium.
     LooseBody,
-    /// A part is held, but not against every rigid motion: its equilibrium is one of many or, where the
-    /// loads drive the motion, does not exist.
+    /// A part is held, but not against every rigid motion. Its equilibrium is one of many; if the loads
+    /// drive the motion, there is none.
     Underheld {
-        /// The motion that is left, the first of them.
+        /// The first free motion found.
         motion: FreeMotion,
         /// Whether the loads drive it.
         driven: bool,
     },
     /// A factorisation met a pivot that is not positive; conjugate gradients solved instead.
     Pivot {
-        /// Its displacement: 3 · copy + axis.
+        /// The displacement it belongs to: 3 · copy + axis.
         displacement: u32,
     },
     /// The step was taken back because it did not stay finite.
     NotFinite,
-    /// The step was taken back because it drew a part of the body out of any sensible range.
+    /// The step was taken back because it drew a part of the body out far beyond its size.
     OutOfRange {
-        /// How far the part would reach, over its size.
+        /// Extent that the part would have, over its size.
         stretch: f64,
-        /// Its size: the diagonal of its box at rest, or of its prescribed positions if larger [m].
+        /// Its size [m]: the diagonal of its box at rest, or of its prescribed positions if larger.
         size_m: f64,
     },
 }
@@ -194,7 +194,7 @@ impl fmt::Display for Notice {
     }
 }
 
-/// A vector with the digits one reads.
+/// Formats a vector with about four significant digits.
 fn rounded(v: &Vector3<f64>) -> String {
     let size = v.amax().max(f64::MIN_POSITIVE);
     let digits = (3 - size.log10().floor() as i32).clamp(0, 12) as usize;

@@ -1,4 +1,4 @@
-//! What can be chosen: scheme, mass, Newton's method, limits of explicit steps.
+//! Settings of the integrator: scheme, mass, Newton's method, limits of explicit steps.
 
 use super::DynamicsError;
 use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
@@ -8,7 +8,7 @@ use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
 pub enum Scheme {
     /// No inertia: every step ends in equilibrium with the loads, at rest.
     Static,
-    /// v⁺ = v + h a(x, v), x⁺ = x + h v⁺. Explicit, first order, symplectic: no drift of energy.
+    /// v⁺ = v + h a(x, v), x⁺ = x + h v⁺. Explicit, first order, symplectic: energy does not drift.
     SymplecticEuler,
     /// Explicit midpoint rule (second-order Runge–Kutta). Amplifies undamped oscillations a little,
     /// by 1 + (ωh)⁴/8 per step.
@@ -18,12 +18,13 @@ pub enum Scheme {
     /// v⁺ = v + h a(x⁺, v⁺), x⁺ = x + h v⁺. Unconditionally stable, first order, dissipates.
     #[default]
     ImplicitEuler,
-    /// v⁺ = (4 v − v₋)/3 + ⅔ h a(x⁺, v⁺), x alike: second order, dissipates far less. Makes a step of
-    /// implicit Euler at the start, at contact onset and where the body turns too fast for it.
+    /// v⁺ = (4 v − v₋)/3 + ⅔ h a(x⁺, v⁺), x alike: second order, dissipates far less. The first step, a
+    /// step at contact onset and one where the body turns too fast are made with implicit Euler.
     Bdf2,
     /// x⁺ = x + h v + h² ((½ − β) a + β a⁺), v⁺ = v + h ((1 − γ) a + γ a⁺) (Newmark 1959).
-    /// β = ¼, γ = ½, the average acceleration, is of second order and dissipates nothing; with large
-    /// rotations it is not stable, so a step that gains energy is replaced by one of implicit Euler.
+    ///
+    /// β = ¼, γ = ½, the average acceleration, is of second order and dissipates nothing. With large
+    /// rotations it is not stable: a step that gains energy is replaced by one of implicit Euler.
     Newmark {
         /// β > 0.
         beta: f64,
@@ -36,7 +37,7 @@ impl Scheme {
     /// Average acceleration: β = ¼, γ = ½.
     pub const AVERAGE_ACCELERATION: Self = Self::Newmark { beta: 0.25, gamma: 0.5 };
 
-    /// Whether the scheme solves no system, so that its step is limited by Δt_c.
+    /// Whether the scheme solves no system; its step is then limited by Δt_c.
     pub fn is_explicit(self) -> bool {
         matches!(self, Self::SymplecticEuler | Self::Midpoint | Self::Rk4)
     }
@@ -51,7 +52,7 @@ impl Scheme {
         }
     }
 
-    /// Name as in scene files.
+    /// Name of the scheme in scene files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Static => "static",
@@ -75,29 +76,29 @@ pub enum MassKind {
     Consistent,
 }
 
-/// How motion is integrated.
+/// Settings of [`Dynamics`](super::Dynamics).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DynamicsSettings {
-    /// The scheme.
+    /// Time integration scheme.
     pub scheme: Scheme,
-    /// Distribution of mass.
+    /// Lumped or consistent mass.
     pub mass: MassKind,
-    /// A step is a fixed number of linear solves by design and is judged by how well the last of them
-    /// was solved, instead of by the residual of Newton's method.
+    /// A step is a fixed number of linear solves by design. It is judged by how well the last of them was
+    /// solved and not by the residual of Newton's method.
     pub linearised: bool,
-    /// Newton's method of implicit schemes. `steps` = 1 (2 for Newmark) is the fast path, one linear solve from the
-    /// predictor, which is taken for linear and corotational bodies that are in order; other laws,
-    /// inverted or collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
+    /// Newton's method of implicit schemes. `steps` = 1 (2 for Newmark) is the fast path, one linear
+    /// solve from the predictor. Linear and corotational bodies in order take it. Other laws, inverted or
+    /// collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
     pub newton: NewtonSettings,
-    /// [`Scheme::Static`]: so many iterations of matrix-free relaxation per step, which go on where
-    /// those of the last step ended, in place of Newton's method.
+    /// [`Scheme::Static`] only: number of iterations of matrix-free relaxation per step, in place of
+    /// Newton's method. They continue from step to step.
     pub relaxation: Option<u32>,
-    /// Explicit schemes: a step longer than what is stable is divided into at most so many parts; 1
-    /// refuses it.
+    /// Explicit schemes: largest number of parts into which a step longer than the stable one is divided;
+    /// 1 refuses such a step.
     pub most_substeps: u32,
 }
 
-/// Newton steps that a body gets which one linear solve cannot be trusted with.
+/// Least number of Newton steps where one linear solve cannot be trusted.
 pub const LEAST_NEWTON_STEPS: u32 = 3;
 
 impl Default for DynamicsSettings {
