@@ -1,4 +1,4 @@
-//! Compiles `scindo/v1/*.proto` without protoc and keeps the descriptor set for `rpc/schema`.
+//! Compiles `scindo/v1/*.proto` without protoc, and keeps the descriptor set for `rpc/schema`.
 
 use std::{env, error::Error, fs, path::PathBuf};
 

@@ -1,4 +1,4 @@
-//! What a decoded message must satisfy before anybody may use it.
+//! Checks that a decoded message must pass before it is used.
 //!
 //! * [`field`]: checks of single fields, naming message and field in the error.
 //! * [`tool`]: poses, cuts, contacts.

@@ -1,13 +1,14 @@
-//! Bytes ↔ messages. Order of the guards: encoding string, payload size, counts of repeated
-//! fields (by a walk over the wire format), protobuf decoding, then [`WireMessage::check`].
+//! Conversion between bytes and messages. The guards are applied in this order: encoding string, payload
+//! size, counts of repeated fields (by a walk over the wire format), protobuf decoding, then
+//! [`WireMessage::check`].
 
 use bytes::Bytes;
 use thiserror::Error;
 
-/// Why bytes from the wire are refused.
+/// Reason why bytes from the wire are refused.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum DecodeError {
-    /// The sample says it holds something else.
+    /// The sample states another encoding.
     #[error("encoding is '{found}', expected '{expected}'")]
     Encoding {
         /// Encoding of the expected message.
@@ -27,42 +28,42 @@ pub enum DecodeError {
         /// Largest size allowed.
         allowed: usize,
     },
-    /// Not the wire format of this message.
+    /// The payload is not the wire format of this message.
     #[error("{message}: malformed: {reason}")]
     Malformed {
         /// Message name.
         message: &'static str,
-        /// The decoder's words.
+        /// Message of the decoder.
         reason: String,
     },
-    /// A field without which the message means nothing.
+    /// A required field is absent.
     #[error("{message}: {field} is missing")]
     Missing {
         /// Message name.
         message: &'static str,
-        /// Field.
+        /// Field name.
         field: &'static str,
     },
-    /// A NaN or an infinity.
+    /// A number is a NaN or an infinity.
     #[error("{message}: {field} is {found}, not a finite number")]
     NonFinite {
         /// Message name.
         message: &'static str,
-        /// Field.
+        /// Field name.
         field: &'static str,
-        /// Value found.
+        /// The NaN or infinity that was found.
         found: f64,
     },
-    /// A value outside its range, or arrays that contradict their counts.
+    /// A value is outside its range, or arrays contradict their counts.
     #[error("{message}: {field} is {found}, allowed {allowed}")]
     OutOfRange {
         /// Message name.
         message: &'static str,
-        /// Field.
+        /// Field name.
         field: &'static str,
         /// Value found.
         found: String,
-        /// What is allowed.
+        /// The allowed range.
         allowed: String,
     },
 }
@@ -81,7 +82,7 @@ impl DecodeError {
     }
 }
 
-/// How often a repeated field may occur.
+/// Limit on the length of a repeated field.
 #[derive(Debug, Clone, Copy)]
 pub struct CountLimit {
     /// Field number.
@@ -92,14 +93,14 @@ pub struct CountLimit {
     pub allowed: usize,
 }
 
-/// A message of `scindo.v1` that travels alone.
+/// A message of `scindo.v1` that is sent on its own.
 pub trait WireMessage: prost::Message + prost::Name + Default {
     /// Largest payload [bytes].
     const MAX_BYTES: usize;
     /// Limits of the repeated fields.
     const MAX_COUNTS: &'static [CountLimit] = &[];
 
-    /// Ids, ranges, finiteness and agreement of counts with arrays.
+    /// Checks ids, ranges, finiteness, and agreement of counts with arrays.
     fn check(&self) -> Result<(), DecodeError>;
 }
 
@@ -108,12 +109,12 @@ pub fn encoding<M: WireMessage>() -> String {
     format!("application/protobuf;{}.{}", M::PACKAGE, M::NAME)
 }
 
-/// Payload of a message.
+/// Encodes a message.
 pub fn encode<M: WireMessage>(message: &M) -> Bytes {
     message.encode_to_vec().into()
 }
 
-/// Message of a payload. `bytes` fields of the message share the payload's memory.
+/// Decodes and checks a payload. `bytes` fields of the message share the payload's memory.
 pub fn decode<M: WireMessage>(payload: Bytes) -> Result<M, DecodeError> {
     if payload.len() > M::MAX_BYTES {
         return Err(DecodeError::TooLarge {
@@ -140,7 +141,7 @@ pub fn decode<M: WireMessage>(payload: Bytes) -> Result<M, DecodeError> {
     Ok(message)
 }
 
-/// [`decode`] of a sample that states its encoding.
+/// Like [`decode`], for a sample that states its encoding.
 pub fn decode_as<M: WireMessage>(stated: &str, payload: Bytes) -> Result<M, DecodeError> {
     let expected = encoding::<M>();
     if stated != expected {
@@ -154,7 +155,7 @@ fn truncated<M: WireMessage>() -> DecodeError {
     DecodeError::Malformed { message: M::NAME, reason: "truncated or invalid field structure".to_owned() }
 }
 
-/// How often field `tag` stands at the top level of `payload`; `None` if the structure is broken.
+/// Number of times that field `tag` occurs at the top level of `payload`. `None` if the structure is broken.
 fn count_occurrences(mut payload: &[u8], tag: u32) -> Option<usize> {
     let mut count = 0;
     while !payload.is_empty() {

@@ -1,12 +1,12 @@
-//! Endpoints of the two connections: poses, contacts and cuts go to the *haptic* endpoint,
-//! surfaces and reports to the *bulk* endpoint one port above, so that a mesh never delays a
-//! force. A client that reaches the haptic endpoint alone still gets everything, relayed.
+//! Endpoints of the two connections. Poses, contacts and cuts go to the *haptic* endpoint, surfaces and
+//! reports to the *bulk* endpoint one port above. A mesh therefore never delays a force. A client that
+//! reaches only the haptic endpoint still receives everything, relayed.
 
-/// The haptic endpoint of a server that was told nothing else.
+/// The default haptic endpoint of a server.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
 
-/// The bulk endpoint beside a haptic endpoint: the next port. `None` where the endpoint has no
-/// port that could be raised (`unixsock-stream/…`, port 0, port 65535).
+/// The bulk endpoint that belongs to a haptic endpoint: the next port. `None` if the endpoint has no port
+/// that could be raised (`unixsock-stream/…`, port 0, port 65535).
 pub fn bulk_endpoint(haptic: &str) -> Option<String> {
     let address_end = haptic.find(['?', '#']).unwrap_or(haptic.len());
     let (address, options) = haptic.split_at(address_end);

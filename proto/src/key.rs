@@ -7,8 +7,8 @@
 //! | `body/<id>/surface/frame` | `SurfaceFrame` | server → all |
 //! | `body/<id>/surface/topology` | `SurfaceTopology` | server → all |
 //! | `body/<id>/surface/keyframe` | `SurfaceKeyframe` | query |
-//! | `body/<id>/surface/field/<name>` | `SurfaceField` | server → who asks |
-//! | `measures` | `Measures` | server → who asks |
+//! | `body/<id>/surface/field/<name>` | `SurfaceField` | server → subscribers |
+//! | `measures` | `Measures` | server → subscribers |
 //! | `tool/<id>/pose` | `ToolSample` | client → server |
 //! | `tool/<id>/cut` | `CutCommand` | client → server |
 //! | `tool/<id>/cut_ack` | `CutAck` | server → client |
@@ -25,15 +25,15 @@ use thiserror::Error;
 
 use crate::limits::MAX_ID_BYTES;
 
-/// Why a key or a part of it is refused.
+/// Reason why a key or a part of it is refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum KeyError {
     /// A chunk is empty, too long, or has a character outside `[a-z0-9_-]`.
     #[error("{what} '{found}' is not a key chunk: 1 to {MAX_ID_BYTES} characters of a-z, 0-9, _ and -")]
     Chunk {
-        /// Which part of the key.
+        /// Role of the chunk in the key.
         what: &'static str,
-        /// What stood there (at most the first 64 characters).
+        /// The text of the chunk (at most the first 64 characters).
         found: String,
     },
     /// The key lies in another realm, session or wire version.
@@ -41,7 +41,7 @@ pub enum KeyError {
     Foreign {
         /// The prefix of this session.
         expected: String,
-        /// The key.
+        /// The refused key.
         found: String,
     },
     /// No topic has this form.
@@ -84,12 +84,12 @@ pub fn is_chunk(text: &str) -> bool {
         && text.bytes().all(|b| matches!(b, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-'))
 }
 
-/// Who a liveliness token stands for.
+/// Kind of participant that a liveliness token stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Role {
     /// The simulation server.
     Server,
-    /// Somebody who watches, perhaps with a mouse tool.
+    /// A viewer, perhaps with a mouse tool.
     Viewer,
     /// A haptic client.
     Haptic,
@@ -101,7 +101,7 @@ impl Role {
     /// Every role.
     pub const ALL: [Self; 4] = [Self::Server, Self::Viewer, Self::Haptic, Self::Client];
 
-    /// The chunk in a key.
+    /// The chunk that stands for the role in a key.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Server => "server",
@@ -112,34 +112,34 @@ impl Role {
     }
 }
 
-/// What can be asked under `rpc/`. Requests and replies: `PauseRequest`, `StepRequest`,
-/// `ResetRequest`, `SetRequest`, `UndoRequest`, `LoadRequest` → `RpcReply`; `info` → `SessionInfo`;
-/// `params` → `ParamsReply`; `scenes` → `ScenesReply`; `schema` → `SchemaReply`.
+/// Questions and orders under `rpc/`. Requests and replies: `PauseRequest`, `StepRequest`, `ResetRequest`,
+/// `SetRequest`, `UndoRequest`, `LoadRequest` → `RpcReply`; `info` → `SessionInfo`; `params` → `ParamsReply`;
+/// `scenes` → `ScenesReply`; `schema` → `SchemaReply`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verb {
-    /// What is running.
+    /// Describe the scene, its bodies and its tools.
     Info,
-    /// Load another scene.
+    /// Change to another scene.
     Load,
-    /// Back to the start of the scene.
+    /// Go back to the start of the scene.
     Reset,
-    /// Stop or continue.
+    /// Pause or continue.
     Pause,
-    /// Advance a paused simulation.
+    /// Advance a paused simulation by some steps.
     Step,
     /// Change one parameter.
     Set,
-    /// What may change while the scene runs.
+    /// List the parameters that `Set` may change, with values and ranges.
     Params,
     /// Take the last cut back.
     Undo,
-    /// Which scenes can be loaded.
+    /// List the scenes that can be loaded.
     Scenes,
     /// Keep the present state.
     Snapshot,
     /// Go back to a kept state.
     Restore,
-    /// Descriptors of the messages.
+    /// Return the descriptors of the messages.
     Schema,
 }
 
@@ -160,12 +160,12 @@ impl Verb {
         Self::Schema,
     ];
 
-    /// Whether it changes what everybody sees. Questions, which do not, anybody may ask.
+    /// Whether the verb changes what everybody sees. Anybody may ask the others, which are questions.
     pub fn is_order(self) -> bool {
         !matches!(self, Self::Info | Self::Schema | Self::Params | Self::Scenes)
     }
 
-    /// The chunk in a key.
+    /// The chunk that stands for the verb in a key.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Info => "info",
@@ -191,29 +191,29 @@ pub enum Topic {
     SurfaceFrame(Chunk),
     /// Triangles of a body's surface.
     SurfaceTopology(Chunk),
-    /// Both together, on query.
+    /// Positions and triangles together, on query.
     SurfaceKeyframe(Chunk),
-    /// A quantity on a body's surface: body and name of the quantity.
+    /// A quantity on a body's surface, by body and name of the quantity.
     SurfaceField(Chunk, Chunk),
     /// Probes and energies.
     Measures,
-    /// Where a client holds a tool.
+    /// Pose of a tool in a client's hand.
     ToolPose(Chunk),
     /// A cut command of a tool.
     ToolCut(Chunk),
     /// The answer to a cut command.
     ToolCutAck(Chunk),
-    /// What the device behind a tool can do.
+    /// Capability of the device behind a tool.
     ToolCapability(Chunk),
     /// The local contact model of a tool.
     ToolContact(Chunk),
-    /// What a viewer draws of a tool.
+    /// State of a tool, as viewers draw it.
     ToolState(Chunk),
     /// Rates, costs and health.
     Stats,
-    /// What happened.
+    /// Something that happened on the server.
     Event,
-    /// Which effects are on.
+    /// Active and inactive effects.
     Plan,
     /// A question or order to the server.
     Rpc(Verb),
@@ -249,7 +249,7 @@ impl Topic {
         let unknown = || KeyError::Unknown { found: suffix.chars().take(4 * MAX_ID_BYTES).collect() };
         let body = |id| Chunk::new("body id", id);
         let tool = |id| Chunk::new("tool id", id);
-        // No topic has more than five chunks; a sixth makes the key unknown.
+        // No topic has more than five chunks, so a sixth makes the key unknown.
         let chunks: Vec<&str> = suffix.splitn(7, '/').collect();
         Ok(match chunks.as_slice() {
             ["body", id, "surface", "frame"] => Self::SurfaceFrame(body(id)?),

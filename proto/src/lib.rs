@@ -1,12 +1,12 @@
-//! The wire of scindo: messages, keys, limits and the codec that guards them. No physics, no
-//! algorithm, no transport.
+//! The wire of scindo: messages, keys, limits, and the codec that guards them. It contains no physics, no
+//! algorithm and no transport.
 //!
 //! # Layout
 //! * [`messages`]: the structs generated from `scindo/v1/*.proto`.
 //! * [`key`]: the key space `<realm>/@v1/<session>/…`, built and parsed in one place.
-//! * [`endpoint`]: where the second connection of a client goes.
-//! * [`limits`]: how large, how many, how far; each constant with its reason.
-//! * [`check`]: what a decoded message must satisfy before anybody may use it.
+//! * [`endpoint`]: the endpoint of a client's second connection.
+//! * [`limits`]: limits on sizes, counts and values; each constant with its reason.
+//! * [`check`]: conditions that a decoded message must meet before it is used.
 //! * [`codec`]: bytes ↔ messages; sizes and counts are checked before anything is allocated.
 
 pub mod messages;

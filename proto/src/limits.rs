@@ -7,8 +7,8 @@ pub const MAX_ID_BYTES: usize = 64;
 /// Longest free text (messages, hints, plan reasons) [bytes].
 pub const MAX_TEXT_BYTES: usize = 4096;
 
-/// Most surface vertices of one body. 48 MB of positions: twenty times the finest organ of the
-/// reference models, and one frame still fits a gigabit link in half a second.
+/// Most surface vertices of one body. Their positions take 48 MB, twenty times the finest organ of the
+/// reference models. One frame still fits a gigabit link in half a second.
 pub const MAX_VERTICES: u32 = 4_000_000;
 
 /// Most surface triangles of one body (a closed surface has about twice as many as vertices).
@@ -47,7 +47,7 @@ pub const MAX_TOPOLOGY_BYTES: usize = MAX_TRIANGLES as usize * (TRIANGLE_BYTES +
 /// Largest field on a surface [bytes].
 pub const MAX_FIELD_BYTES: usize = MAX_VERTICES as usize * VALUE_BYTES + HEADER_BYTES;
 
-/// Most probes whose positions are told; those beyond it are recorded, not shown.
+/// Most probes whose positions are published. Further ones are recorded but not shown.
 pub const MAX_PROBES: usize = 256;
 
 /// Most layers of tissue that a body may be drawn with.
@@ -89,7 +89,7 @@ pub const MAX_TOOLS: usize = 64;
 /// Most entries of a list in a report (stages, counters, effects).
 pub const MAX_REPORT_ENTRIES: usize = 256;
 
-/// Most parameters that `rpc/params` lists: those of 256 bodies would not fit a report.
+/// Most parameters that `rpc/params` lists. Those of 256 bodies would not fit a report.
 pub const MAX_PARAMS: usize = 512;
 
 /// Most scenes that `rpc/scenes` lists.
@@ -110,9 +110,9 @@ pub const MAX_TOOL_M: f64 = 10.0;
 /// Largest force [N].
 pub const MAX_FORCE_N: f64 = 1.0e6;
 
-/// How far the norm of an orientation quaternion may be from one. Single precision devices round
-/// to 1e-7; a tolerance of 1e-3 forgives them and catches unset or scaled quaternions.
+/// Largest deviation of the norm of an orientation quaternion from one. Devices in single precision round to
+/// 1e-7. A tolerance of 1e-3 accepts them and catches unset or scaled quaternions.
 pub const QUATERNION_TOLERANCE: f64 = 1.0e-3;
 
-/// How far the norm of a contact normal may be from one.
+/// Largest deviation of the norm of a contact normal from one.
 pub const NORMAL_TOLERANCE: f64 = 1.0e-3;

@@ -1,25 +1,24 @@
 //! Force continuity when the contact changes.
 //!
-//! A new message would make the force jump. At its arrival the difference between the force that
-//! was felt and the force that the new model gives is taken as an offset, which falls linearly to
-//! zero over one contact period, and over at least 20 ms when a cut has changed the topology:
+//! A new message would make the force jump. When it arrives, the difference between the felt force and the
+//! force of the new model becomes an offset. The offset falls linearly to zero over one contact period. After
+//! a cut has changed the topology it takes at least 20 ms:
 //!
 //! f(t) = f_new(t) + (f_felt(t₀) − f_new(t₀)) · (1 − (t − t₀)/T_blend).
 //!
-//! A message that arrives while an offset still falls takes over what is left of it and does not
-//! shorten the time it has.
+//! A message that arrives while an offset still falls takes over the rest of it and keeps its remaining time.
 
 use crate::constants::{EPOCH_BLEND_NS, MAX_BLEND_NS, MIN_BLEND_NS};
 use crate::contact::model::ContactModel;
 use nalgebra::Vector3;
 
-/// The offset that is falling.
+/// The offset while it falls.
 #[derive(Debug, Clone, Copy)]
 pub struct Blend {
     offset_n: Vector3<f64>,
     from_ns: u64,
     duration_ns: u64,
-    /// What the law alone gave in the last tick [N].
+    /// Force of the contact law alone in the last tick [N].
     last_law_n: Vector3<f64>,
     last_arrival_ns: u64,
     last_key: (u64, u64),
@@ -66,7 +65,7 @@ impl Blend {
         self.last_epoch = model.epoch;
     }
 
-    /// What is left of the offset [N].
+    /// The rest of the offset [N].
     fn offset_at(&self, now_ns: u64) -> Vector3<f64> {
         let progress = now_ns.saturating_sub(self.from_ns) as f64 / self.duration_ns as f64;
         self.offset_n * (1.0 - progress).max(0.0)

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// Monotonic clock of the process: stamps ticks, poses and arrivals.
+/// Monotonic clock of the process. It stamps ticks, poses and arrivals.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopClock {
     origin: Instant,
@@ -15,12 +15,12 @@ impl Default for LoopClock {
 }
 
 impl LoopClock {
-    /// Since the clock was made [ns].
+    /// Time since the clock was created [ns].
     pub fn now_ns(&self) -> u64 {
         self.origin.elapsed().as_nanos() as u64
     }
 
-    /// When that is.
+    /// The instant at `ns` on this clock.
     pub fn instant(&self, ns: u64) -> Instant {
         self.origin + Duration::from_nanos(ns)
     }

@@ -1,4 +1,4 @@
-//! The client from the command line to its summary.
+//! Runs the client from its command line to its summary.
 
 mod arguments;
 
@@ -28,7 +28,7 @@ pub use summary::Summary;
 
 use arguments::check;
 
-/// Runs the client until its time is over, Ctrl-C or SIGTERM.
+/// Runs the client until its time is over, or until Ctrl-C or SIGTERM.
 pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
     let mut device = match arguments.device {
         DeviceKind::Sim => SimulatedDevice::at_rest(Hand::default()),
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
     })
 }
 
-/// Files that cannot be written are refused before the tool is held.
+/// Creates the output files. A file that cannot be written is refused before the tool is held.
 fn recorder(arguments: &Arguments) -> Result<(Option<LogQueue>, Option<Recorder>), CommandError> {
     if let Some(file) = &arguments.plot {
         std::fs::File::create(file).map_err(at(file))?;
@@ -106,7 +106,7 @@ fn recorder(arguments: &Arguments) -> Result<(Option<LogQueue>, Option<Recorder>
     Ok((Some(queue), Some(recorder)))
 }
 
-/// Waits for the last row, draws the plot, returns the rows in the log.
+/// Waits for the last row, draws the plot and returns the number of rows in the log.
 fn conclude_recording(
     arguments: &Arguments,
     recorder: Option<Recorder>,

@@ -1,4 +1,4 @@
-//! The contact that the server sends: the newest message, and the force that it means at the current tip.
+//! The contact that the server sends: the newest message, and the resulting force at the present tip.
 
 pub mod model;
 

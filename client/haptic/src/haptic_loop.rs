@@ -1,7 +1,7 @@
-//! The loop: absolute deadlines every millisecond, and what was achieved.
+//! The loop: absolute deadlines every millisecond, and the statistics of a run.
 //!
-//! A deadline that passed unused is counted and left behind; the next one keeps its place on the
-//! grid, so lateness never accumulates.
+//! A missed deadline is counted and skipped. The next one keeps its place on the grid, so lateness never
+//! accumulates.
 
 use crate::clock::LoopClock;
 use crate::constants::PERIOD_NS;
@@ -10,7 +10,7 @@ use crate::tick::{HapticTick, TickTime};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Ticks until `stop` or until `duration` is over.
+/// Ticks until `stop` is raised or `duration` has passed.
 pub fn run(
     mut tick: HapticTick,
     clock: LoopClock,
@@ -66,7 +66,7 @@ mod tests {
         let stop = AtomicBool::new(false);
         let report = run(tick, LoopClock::default(), &stop, Some(Duration::from_millis(200)));
         assert_eq!(report.lateness_ms.count, report.ticks);
-        // However late the loop woke: every millisecond until the last tick was used or is counted as missed.
+        // However late the loop woke: every millisecond up to the last tick was used or counts as missed.
         let passed = (report.seconds * 1e9).round() as u64 / PERIOD_NS;
         assert!(report.ticks + report.missed_ticks == passed && passed >= 200, "{report:?}");
     }

@@ -1,20 +1,21 @@
 //! The haptic client of scindo: a 1 kHz loop beside a device, on a local contact model.
 //!
-//! The server sends, 200 times a second or more, planes with a linearised force (*contact model*);
-//! it never streams a force. This crate renders the force from the newest model at 1 kHz, so that
-//! network delay ages the model but never sits inside the stiff loop.
+//! The server sends planes with a linearised force (*contact model*), 200 times a second or more. It never
+//! streams a force. This crate renders the force from the newest model at 1 kHz. Network delay therefore ages
+//! the model but never sits inside the stiff loop.
 //!
 //! # Layout, in the order of the data
-//! * [`device`]: where the hand is; the simulated device and the path its hand follows.
+//! * [`device`]: measures the hand; the simulated device and the path that its hand follows.
 //! * [`contact`]: the newest message, parsed, ordered and handed over without a lock, and the force of the
-//!   tissue at the current tip.
+//!   tissue at the present tip.
 //! * [`virtual_coupling`]: stiffness and damping that the device can render passively.
 //! * [`blend`]: force continuity when the model changes.
 //! * [`safety`]: when force is allowed (watchdog, engagement), energy (passivity), clamp and slew.
 //! * [`tick`]: one millisecond, the table of contents of the client.
-//! * [`haptic_loop`]: absolute deadlines, and [`statistics`] of what was achieved.
-//! * [`log`]: every tick as a line of CSV, written by another thread, and the plot of the force when the run ends.
-//! * [`live`]: figures while the loop runs.
+//! * [`haptic_loop`]: absolute deadlines, and [`statistics`] of the run.
+//! * [`log`]: every tick as a line of CSV, written by another thread, and the force plot at the end of the
+//!   run.
+//! * [`live`]: figures shown while the loop runs.
 //! * [`link`]: contact messages in, poses out, on threads of their own.
 //! * [`command`]: the command line and the summary.
 //!

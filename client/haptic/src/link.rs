@@ -1,5 +1,5 @@
-//! Contact messages in, poses out. Everything that may wait happens here, on threads of its own:
-//! zenoh's receiving thread fills the contact slot, the thread `haptic-pose` sends.
+//! Contact messages in, poses out. Everything that may wait happens here, on separate threads. zenoh's
+//! receiving thread fills the contact slot, and the thread `haptic-pose` sends.
 
 use crate::clock::LoopClock;
 use crate::constants::{PERIOD_S, POSE_QUEUE};
@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{JoinHandle, Thread};
 use std::time::Duration;
 
-/// Owner of a tool that the scene moves.
+/// Owner id of a tool that the scene moves.
 const SCRIPT: &str = "script";
 
 /// Longest sleep of the sender if nobody wakes it.
@@ -34,7 +34,7 @@ struct PoseSample {
     flags: u32,
 }
 
-/// Loop side of the pose queue.
+/// The loop's end of the pose queue.
 pub struct PoseQueue {
     sender: Sender<PoseSample>,
     thread: Thread,
@@ -43,8 +43,8 @@ pub struct PoseQueue {
 }
 
 impl PoseQueue {
-    /// Leaves a pose if one is due; `false` if there was no room. Never waits: the other end polls,
-    /// so the channel takes no lock, and waking a thread is one system call.
+    /// Queues a pose if one is due. Returns `false` if the queue was full. Never waits: the receiver polls,
+    /// so the channel takes no lock. Waking its thread is one system call.
     pub fn offer(&mut self, state: &DeviceState, row: &LogRow, now_ns: u64) -> bool {
         if now_ns < self.next_ns {
             return true;
@@ -64,30 +64,30 @@ impl PoseQueue {
     }
 }
 
-/// The tool as the wire should know it.
+/// The tool that the client wants to hold.
 #[derive(Debug, Clone)]
 pub struct ToolRequest {
     /// Id of the tool.
     pub id: String,
-    /// Its shape if the scene does not declare it.
+    /// Shape of the tool, used if the scene does not declare it.
     pub shape: ToolShape,
-    /// Poses per second.
+    /// Poses per second [Hz].
     pub pose_hz: f64,
-    /// The device that holds it.
+    /// Capability of the device that moves the tool.
     pub capability: Capability,
 }
 
-/// What the loop needs of the link.
+/// Connections of the loop to the network.
 pub struct LoopPorts {
-    /// Newest contact.
+    /// Newest contact model.
     pub contacts: ContactSlot,
-    /// Whether the server's token stands.
+    /// Whether the server's liveliness token is present.
     pub server_alive: Arc<AtomicBool>,
-    /// Poses to the server.
+    /// Queue of poses to the server.
     pub poses: PoseQueue,
 }
 
-/// A tool held over the network.
+/// A tool that this client holds over the network.
 pub struct HeldTool {
     inbox: Arc<Mutex<ContactInbox>>,
     sent: Arc<AtomicU64>,
@@ -97,7 +97,7 @@ pub struct HeldTool {
 }
 
 impl HeldTool {
-    /// Takes hold of the tool; must run inside a multi-threaded tokio runtime.
+    /// Takes hold of the tool. It must run inside a multi-threaded tokio runtime.
     pub async fn hold(
         link: &Link,
         tool: &ToolRequest,
@@ -106,7 +106,7 @@ impl HeldTool {
         let (slot, contacts) = contact_slot();
         let inbox = Arc::new(Mutex::new(ContactInbox::new(slot)));
         let shared = inbox.clone();
-        // Zenoh's receiving thread, the live figures and the final report lock it; the loop reads the slot.
+        // zenoh's receiving thread, the live figures and the final report lock it. The loop reads the slot.
         let stream = link
             .each_contact(&tool.id, move |message| {
                 let mut inbox = shared.lock().unwrap_or_else(PoisonError::into_inner);
@@ -128,13 +128,13 @@ impl HeldTool {
         Ok((Self { inbox, sent, sender: thread, _contacts: stream, _cutter: held.cutter }, ports))
     }
 
-    /// How many contacts were taken so far, for another thread to ask.
+    /// A function for another thread that returns the number of contacts taken so far.
     pub fn contact_count(&self) -> impl Fn() -> u64 + Send + use<> {
         let inbox = self.inbox.clone();
         move || inbox.lock().unwrap_or_else(PoisonError::into_inner).contacts()
     }
 
-    /// Figures of the link. Ends the sender; the loop's queue must be gone.
+    /// Waits for the sender to end and returns the figures of the link. The loop must have dropped its queue.
     pub fn finish(self) -> LinkReport {
         if self.sender.join().is_err() {
             tracing::error!("the pose sender panicked");
@@ -223,7 +223,7 @@ fn vec3(v: &Vector3<f64>) -> Vec3 {
     Vec3 { x: v.x, y: v.y, z: v.z }
 }
 
-/// A body to touch: its id and the point of its surface that lies furthest against `direction`.
+/// Finds a body to touch: its id, and the point of its surface that lies furthest against `direction`.
 pub async fn nearest_surface(
     link: &Link,
     body: Option<&str>,
@@ -242,12 +242,12 @@ pub async fn nearest_surface(
     Ok(point.map(|point| (info, point)))
 }
 
-/// Three little-endian `f32`.
+/// Decodes three little-endian `f32`.
 fn position(bytes: &[u8]) -> Vector3<f64> {
     Vector3::from_fn(|i, _| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|b| bytes[4 * i + b]))))
 }
 
-/// Warns where a script of the scene moves the tool that is asked for.
+/// Warns if a script of the scene moves the requested tool.
 pub async fn tell_of_script(link: &Link, tool: &str) -> Result<(), LinkError> {
     if is_scripted(&link.info().await?, tool) {
         tracing::warn!(
@@ -262,7 +262,7 @@ fn is_scripted(info: &messages::SessionInfo, tool: &str) -> bool {
     info.tools.iter().any(|known| known.id == tool && known.owner == SCRIPT)
 }
 
-/// A link of role `haptic`.
+/// Connects with the role `haptic`.
 pub async fn connect(config: LinkConfig) -> Result<Link, LinkError> {
     Link::connect(config).await
 }

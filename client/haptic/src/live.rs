@@ -1,6 +1,8 @@
-//! Figures while the loop runs: a line that is rewritten on a terminal, a line per second elsewhere.
+//! Figures while the loop runs: a terminal shows one line that is rewritten, other outputs get a line per
+//! second.
 //!
-//! The loop leaves its figures in a [`Meter`], with single atomic operations; another thread reads and prints them.
+//! The loop writes its figures to a [`Meter`] with single atomic operations. Another thread reads and prints
+//! them.
 
 use std::io::IsTerminal as _;
 use std::sync::Arc;
@@ -17,20 +19,20 @@ use crate::safety::flag;
 /// How often the line on a terminal changes.
 const TERMINAL_PERIOD: Duration = Duration::from_millis(100);
 
-/// How often a line is written where there is no terminal.
+/// How often a line is written without a terminal.
 const LINE_PERIOD: Duration = Duration::from_secs(1);
 
-/// What happened since somebody looked last. The loop writes it and waits for nobody.
+/// What happened since the last reading. The loop writes it without waiting.
 #[derive(Debug, Default)]
 pub struct Meter {
     ticks: AtomicU64,
     touch_ticks: AtomicU64,
-    /// Force at the last tick, and the largest since the last look [µN].
+    /// Force at the last tick, and largest force since the last reading [µN].
     force_un: AtomicU64,
     peak_un: AtomicU64,
-    /// Largest age of the contact in use since the last look [µs].
+    /// Largest age of the contact in use since the last reading [µs].
     age_us: AtomicU64,
-    /// All flags since the last look.
+    /// All flags raised since the last reading.
     flags: AtomicU32,
 }
 
@@ -46,7 +48,7 @@ impl Meter {
         self.flags.fetch_or(row.flags, Ordering::Relaxed);
     }
 
-    /// The figures of `elapsed`, in which `contacts` messages came; begins anew.
+    /// Returns the figures of the interval `elapsed`, in which `contacts` messages arrived, and resets them.
     fn take(&self, contacts: u64, elapsed: Duration) -> Figures {
         let per_second = |count: u64| count as f64 / elapsed.as_secs_f64().max(1e-9);
         Figures {
@@ -61,7 +63,7 @@ impl Meter {
     }
 }
 
-/// One line.
+/// The figures of one line.
 #[derive(Debug)]
 struct Figures {
     force_n: f64,
@@ -74,7 +76,7 @@ struct Figures {
 }
 
 impl Figures {
-    /// The state of the touch, worst first.
+    /// The worst present state of the touch.
     fn state(&self) -> &'static str {
         let has = |flags| self.flags & flags != 0;
         match () {
@@ -95,7 +97,7 @@ impl std::fmt::Display for Figures {
             f,
             "force {force_n:5.2} N (peak {peak_n:5.2})   loop {loop_hz:4.0} Hz   contact {contact_hz:4.0} Hz   "
         )?;
-        // Without any message the loop counts an age beyond every clock.
+        // Before the first message, the loop counts an age beyond every clock.
         if *age_ms < 1e5 {
             write!(f, "age {age_ms:5.1} ms   ")?;
         } else {
@@ -105,17 +107,17 @@ impl std::fmt::Display for Figures {
     }
 }
 
-/// Prints until it is ended.
+/// The thread that prints the figures.
 pub struct Live {
     stop: Sender<()>,
     thread: JoinHandle<()>,
 }
 
 impl Live {
-    /// Starts to print. `contacts` counts the messages that were taken so far.
+    /// Starts to print. `contacts` returns the number of messages taken so far.
     ///
     /// # Errors
-    /// What the system says when it has no thread.
+    /// The system cannot start another thread.
     pub fn start(meter: Arc<Meter>, contacts: impl Fn() -> u64 + Send + 'static) -> std::io::Result<Self> {
         let (stop, stopped) = crossbeam_channel::bounded::<()>(1);
         let terminal = std::io::stderr().is_terminal();
@@ -140,7 +142,7 @@ impl Live {
         Ok(Self { stop, thread })
     }
 
-    /// Ends the line.
+    /// Ends the thread and its line.
     pub fn end(self) {
         drop(self.stop);
         if self.thread.join().is_err() {

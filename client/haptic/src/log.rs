@@ -1,4 +1,4 @@
-//! What a run leaves behind: every tick as a line of CSV, and a picture of its force.
+//! Output of a run: every tick as a line of CSV, and a plot of its force.
 
 pub mod row;
 

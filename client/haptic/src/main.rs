@@ -1,4 +1,4 @@
-//! `scindo-haptic`: parse, run, print, exit code.
+//! `scindo-haptic`: parses arguments, runs the client, prints the summary and sets the exit code.
 
 use clap::{CommandFactory, Parser};
 use scindo_haptic::command::{Arguments, Cli, run};

@@ -1,8 +1,8 @@
 //! The safety stage: when force is allowed, how much of it, and how fast it may change.
 //!
-//! Order: [`watchdog`] (device faults, freshness, engagement) → [`passivity`] (energy) →
-//! [`limiter`] (slew and clamp, last, so that no later stage can undo it). The passivity observer
-//! integrates the force that really left.
+//! Order: [`watchdog`] (device faults, freshness, engagement) → [`passivity`] (energy) → [`limiter`] (slew
+//! and clamp). The limiter is last, so that no later stage can undo it. The passivity observer integrates the
+//! force that was really sent.
 
 pub mod watchdog;
 
@@ -12,17 +12,17 @@ pub mod limiter;
 
 /// Flags of one tick. `fault_flags` of a pose carries [`FAULTS`] of them.
 pub mod flag {
-    /// Force is not allowed yet: waiting for free space.
+    /// Force is not allowed yet: the tool must first be in free space.
     pub const WAITING: u32 = 1;
-    /// The contact is older than its validity; force ramps down or is zero.
+    /// The contact is older than its validity. Force ramps down or is zero.
     pub const STALE: u32 = 1 << 1;
     /// No contact for more than half a second.
     pub const LOST: u32 = 1 << 2;
     /// The device reported a value that is not finite.
     pub const NOT_FINITE: u32 = 1 << 3;
-    /// The device jumped.
+    /// The device reported an implausible jump.
     pub const JUMP: u32 = 1 << 4;
-    /// The device moved faster than a hand that works.
+    /// The device moved faster than a working hand can.
     pub const OVER_SPEED: u32 = 1 << 5;
     /// Damping was injected to keep the output passive.
     pub const PASSIVITY: u32 = 1 << 6;
@@ -37,6 +37,6 @@ pub mod flag {
 
     /// Faults of the device: the force is cut to zero at once.
     pub const DEVICE_FAULTS: u32 = NOT_FINITE | JUMP | OVER_SPEED | GONE;
-    /// What the server is told about.
+    /// Flags that the server receives.
     pub const FAULTS: u32 = STALE | LOST | DEVICE_FAULTS;
 }

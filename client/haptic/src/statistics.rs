@@ -1,4 +1,4 @@
-//! What was achieved: rates, jitter, round trips, largest force step. No allocation after start-up.
+//! Statistics of a run: rates, jitter, round trips, largest force step. No allocation after start-up.
 
 use serde::Serialize;
 
@@ -28,7 +28,7 @@ impl Histogram {
         self.max_ns = self.max_ns.max(ns);
     }
 
-    /// Duration below which a part `q` of the counted ones lies [ns], rounded up to its bucket.
+    /// Duration below which the fraction `q` of all durations lies [ns], rounded up to its bucket.
     pub fn quantile_ns(&self, q: f64) -> u64 {
         let rank = (q * self.count as f64).ceil().max(1.0) as u64;
         let mut seen = 0;
@@ -69,10 +69,10 @@ fn upper_bound(index: usize) -> u64 {
 /// Round trips from a pose to the contact that was computed for it.
 pub type RoundTrips = Histogram;
 
-/// Milliseconds.
+/// Quantiles of durations [ms].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// How many were counted.
+    /// Number of durations.
     pub count: u64,
     /// Median.
     pub p50: f64,
@@ -82,61 +82,61 @@ pub struct Quantiles {
     pub max: f64,
 }
 
-/// What the network side saw.
+/// Figures of the network side.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct LinkReport {
     /// Contact messages taken.
     pub contacts: u64,
-    /// Their mean rate between first and last [Hz].
+    /// Mean rate of the messages between first and last [Hz].
     pub contact_rate_hz: f64,
-    /// Missing sequence numbers.
+    /// Number of missing sequence numbers.
     pub contacts_lost: u64,
-    /// Messages that arrived after a newer one; dropped.
+    /// Messages that arrived after a newer one and were dropped.
     pub contacts_late: u64,
     /// Messages that could not be used.
     pub contacts_refused: u64,
-    /// Beginnings of a stream: one, and one more for each server that started anew.
+    /// Number of streams: the first one, and another for each restart of the server.
     pub contact_streams: u64,
     /// Longest time between two messages [ms].
     pub longest_contact_gap_ms: f64,
-    /// From sending a pose to the arrival of the first contact computed for it.
+    /// Time from sending a pose to the first contact computed for it [ms].
     pub round_trip_ms: Quantiles,
     /// Poses that reached the network.
     pub poses_sent: u64,
 }
 
-/// What the loop saw.
+/// Figures of the loop.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct LoopReport {
     /// Ticks done.
     pub ticks: u64,
-    /// Time from the first to the last [s].
+    /// Time from the first to the last tick [s].
     pub seconds: f64,
     /// Rate over that time [Hz].
     pub rate_hz: f64,
     /// Deadlines that passed without a tick.
     pub missed_ticks: u64,
-    /// How late ticks began.
+    /// Delay of the start of ticks [ms].
     pub lateness_ms: Quantiles,
-    /// How long ticks took.
+    /// Duration of ticks [ms].
     pub duration_ms: Quantiles,
     /// Largest force [N].
     pub max_force_n: f64,
-    /// Largest change of force between two ticks [N], cuts at device faults left out.
+    /// Largest change of force between two ticks [N], except cuts at device faults.
     pub max_force_step_n: f64,
-    /// The same per period [N/s].
+    /// The same change per period [N/s].
     pub max_slew_n_s: f64,
     /// Ticks with force on the hand.
     pub touch_ticks: u64,
-    /// Ticks on a contact that was too old.
+    /// Ticks on a contact that had outlived its validity.
     pub stale_ticks: u64,
-    /// Times that force was cut because of the device.
+    /// Number of times that a device fault cut the force.
     pub device_faults: u64,
     /// Lowest energy of the passivity observer [J].
     pub min_energy_j: f64,
-    /// Poses that found the queue full.
+    /// Poses dropped because the queue was full.
     pub poses_dropped: u64,
-    /// Rows of the log that found the queue full.
+    /// Rows of the log dropped because the queue was full.
     pub log_rows_dropped: u64,
 }
 

@@ -19,51 +19,51 @@ use nalgebra::Vector3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Injected damping of the passivity controller, in multiples of the device's own damping.
+/// Largest damping that the passivity controller injects, in multiples of the device's own damping.
 const MAX_INJECTED_DAMPING: f64 = 2.0;
 
-/// When a tick happens.
+/// The time of a tick.
 #[derive(Debug, Clone, Copy)]
 pub struct TickTime {
     /// Loop clock [ns].
     pub now_ns: u64,
-    /// Since the last tick [s]: one period, more after a stall.
+    /// Time since the last tick [s]: one period, more after a stall.
     pub elapsed_s: f64,
 }
 
-/// What the hand was given in one tick.
+/// Output of one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickOutput {
     /// Force on the hand [N].
     pub force_n: Vector3<f64>,
-    /// See [`flag`].
+    /// Flags of the tick, see [`flag`].
     pub flags: u32,
 }
 
 /// Hard limits of the session.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Clamp [N]; the device's own limit counts too.
+    /// Clamp [N]; the device's own limit also applies.
     pub max_force_n: f64,
     /// Slew limit [N/s].
     pub slew_n_s: f64,
 }
 
-/// Where the data of a tick comes from and goes to, beside the device.
+/// Inputs and outputs of a tick, other than the device.
 pub struct Ports {
-    /// Newest contact.
+    /// Newest contact model.
     pub contacts: ContactSlot,
-    /// Whether the server's liveliness token stands.
+    /// Whether the server's liveliness token is present.
     pub server_alive: Arc<AtomicBool>,
-    /// Poses to the server.
+    /// Queue of poses to the server.
     pub poses: Option<PoseQueue>,
-    /// Rows of the log.
+    /// Queue of log rows.
     pub log: Option<LogQueue>,
-    /// Figures to show while the loop runs.
+    /// Figures shown while the loop runs.
     pub meter: Option<Arc<Meter>>,
 }
 
-/// All state of the loop. One owner: the loop's thread.
+/// All state of the loop, owned by its thread.
 pub struct HapticTick {
     device: Box<dyn HapticDevice>,
     guard: DeviceGuard,
@@ -79,7 +79,7 @@ pub struct HapticTick {
 }
 
 impl HapticTick {
-    /// At rest, without force.
+    /// Creates the state at rest, without force.
     pub fn new(device: Box<dyn HapticDevice>, limits: Limits, ports: Ports) -> Self {
         let capability = device.capability();
         Self {
@@ -97,8 +97,8 @@ impl HapticTick {
         }
     }
 
-    /// One tick: device → contact → force of the tissue → what may leave → device, pose, log.
-    /// Takes no lock, allocates nothing, waits for nothing.
+    /// One tick: device → contact → force of the tissue → safety → device, pose, log. It takes no lock,
+    /// allocates nothing and waits for nothing.
     pub fn tick(&mut self, time: TickTime) -> TickOutput {
         let (state, faults) = self.guard.check(self.device.read(time.elapsed_s), time.elapsed_s);
         let model = *self.ports.contacts.read();
@@ -129,7 +129,7 @@ impl HapticTick {
         output
     }
 
-    /// What the safety stage lets through.
+    /// The part of the force that the safety stage lets through.
     fn release(
         &mut self,
         permit: &Permit,
@@ -181,12 +181,12 @@ impl HapticTick {
         self.last_force_n = row.force_n;
     }
 
-    /// Figures of all ticks so far; the loop adds its own.
+    /// Figures of all ticks so far. The loop adds its own figures.
     pub fn report(&self) -> LoopReport {
         self.report.clone()
     }
 
-    /// Closes the queues so that their threads can end.
+    /// Closes the queues, so that their threads can end.
     pub fn close(self) -> LoopReport {
         self.report
     }

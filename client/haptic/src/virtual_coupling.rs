@@ -1,5 +1,5 @@
-//! Virtual coupling: between device and tissue stands a massless proxy on a spring, just soft
-//! enough that the device can render the pair passively.
+//! Virtual coupling: a massless proxy on a spring stands between device and tissue. The spring is just soft
+//! enough for the device to render the pair passively.
 //!
 //! # Derivation
 //! A device with damping b renders a sampled wall of stiffness K and damping B passively if
@@ -39,7 +39,7 @@ impl VirtualCoupling {
         Self { stiffness_limit_n_m: passive.min(device.max_stiffness_n_m), damping_limit_ns_m: damping }
     }
 
-    /// Force of the tissue on the device [N]; `advice_n_m` is the server's limit of stiffness.
+    /// Force of the tissue on the device [N]. `advice_n_m` is the stiffness limit that the server advises.
     pub fn force(&self, state: &DeviceState, loads: &PlaneLoads, advice_n_m: f64) -> Vector3<f64> {
         let limit = self.stiffness_limit_n_m.min(advice_n_m);
         let proxy = match coupling_stiffness(loads.stiffness_bound(), limit) {
@@ -50,8 +50,8 @@ impl VirtualCoupling {
         elastic + self.damping(state, loads, &proxy, elastic.norm())
     }
 
-    /// −Σ b n n·(v − v_s) over the planes that load the tip, within the damping the device can
-    /// render, and never more than the elastic force: it neither pulls nor jumps at touch.
+    /// −Σ b n n·(v − v_s) over the planes that load the tip, limited to the damping that the device can
+    /// render. It never exceeds the elastic force, so it neither pulls nor jumps at touch.
     fn damping(
         &self,
         state: &DeviceState,
@@ -73,7 +73,7 @@ impl VirtualCoupling {
     }
 }
 
-/// K_vc of the derivation; `None`: rigid.
+/// K_vc of the derivation; `None` for a rigid coupling.
 fn coupling_stiffness(tissue_n_m: f64, limit_n_m: f64) -> Option<f64> {
     (tissue_n_m > limit_n_m).then(|| 1.0 / (1.0 / limit_n_m - 1.0 / tissue_n_m))
 }

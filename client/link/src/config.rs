@@ -1,4 +1,4 @@
-//! Whom to reach and who we are.
+//! Settings of a link: the server to reach and the identity of this client.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use scindo_proto::endpoint::DEFAULT_ENDPOINT;
 
 use crate::error::{LinkError, words};
 
-/// What [`crate::Link::connect`] needs to know.
+/// Settings for [`crate::Link::connect`].
 #[derive(Debug, Clone)]
 pub struct LinkConfig {
     /// First chunk of every key; one per laboratory.
@@ -17,19 +17,19 @@ pub struct LinkConfig {
     pub session: String,
     /// Zenoh endpoints of the server (or of a router before it), tried in this order.
     pub connect: Vec<String>,
-    /// What kind of participant we are.
+    /// Kind of participant.
     pub role: Role,
-    /// Our id, unique in the session: `[a-z0-9_-]{1,64}`. Tools are owned by it.
+    /// Id of this client, unique in the session: `[a-z0-9_-]{1,64}`. It owns the client's tools.
     pub id: String,
-    /// How long to try before [`crate::Link::connect`] gives up.
+    /// Time after which [`crate::Link::connect`] gives up.
     pub timeout: Duration,
-    /// A zenoh configuration (JSON5) to start from, for TLS, users and routers. Its connect
-    /// endpoints hold for both sessions if [`Self::connect`] is empty.
+    /// A zenoh configuration (JSON5) to start from, for TLS, users and routers. If [`Self::connect`] is
+    /// empty, its connect endpoints serve both sessions.
     pub zenoh_file: Option<PathBuf>,
 }
 
 impl LinkConfig {
-    /// A link to the default session on this machine.
+    /// Settings for the default session on this machine.
     pub fn new(role: Role, id: &str) -> Self {
         Self {
             realm: "scindo".to_owned(),
@@ -42,7 +42,7 @@ impl LinkConfig {
         }
     }
 
-    /// The same link to other endpoints.
+    /// The same settings with other endpoints.
     pub fn with_connect(mut self, endpoints: impl IntoIterator<Item = String>) -> Self {
         self.connect = endpoints.into_iter().collect();
         self
@@ -50,9 +50,9 @@ impl LinkConfig {
 
     /// Zenoh configuration of a session at one endpoint, or at those of the file.
     ///
-    /// No discovery: only the endpoint that was named. One at a time, because a client-mode session
-    /// with several waits for the first of them and never tries the others. It comes back by
-    /// itself after the server was away.
+    /// There is no discovery: only the named endpoint is used. Endpoints are tried one at a time, because a
+    /// client-mode session with several waits for the first and never tries the others. The session
+    /// reconnects by itself after the server was away.
     pub(crate) fn session_config(
         &self,
         endpoint: Option<&str>,

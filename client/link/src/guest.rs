@@ -1,7 +1,7 @@
 //! Tools held on behalf of guests, such as the browsers behind one viewer.
 //!
-//! The server releases a tool when the liveliness token of its owner goes. A program that serves
-//! many guests over one link therefore gives each guest's tool an owner, and a token, of its own.
+//! The server releases a tool when the liveliness token of its owner goes. A program may serve many guests
+//! over one link. It therefore gives the tool of each guest a separate owner and token.
 
 use scindo_proto::messages::ToolSample;
 use scindo_proto::{Chunk, Topic, WireMessage as _, encode, encoding};
@@ -15,7 +15,7 @@ use crate::error::LinkError;
 use crate::link::Link;
 use crate::tool::unix_ns;
 
-/// A tool that a guest brought; owner and tool have the same id. Dropping it releases the tool.
+/// A tool of a guest; owner and tool have the same id. Dropping it releases the tool.
 pub struct GuestTool {
     publisher: Publisher<'static>,
     id: String,
@@ -25,7 +25,7 @@ pub struct GuestTool {
 }
 
 impl Link {
-    /// A new tool `id` for a guest; its samples have to state a shape.
+    /// Creates tool `id` for a guest. Its samples must state a shape.
     pub async fn guest_tool(&self, id: &str) -> Result<GuestTool, LinkError> {
         let chunk = Chunk::new("tool id", id)?;
         let token = self

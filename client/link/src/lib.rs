@@ -13,16 +13,16 @@
 //! ```
 //!
 //! # Layout
-//! * [`config`]: whom to reach, who we are.
+//! * [`config`]: the server to reach, and our identity.
 //! * [`link`]: the two zenoh sessions, our liveliness token, presence of the server.
-//! * [`mirror`]: a body's surface, kept whole across cuts and lost messages.
+//! * [`mirror`]: a body's surface, kept complete across cuts and lost messages.
 //! * [`watch`]: tool states, statistics, events, the plan.
 //! * [`tool`]: poses up, contacts down, cuts acknowledged.
 //! * [`guest`]: tools held for others, such as browsers behind a viewer.
 //! * [`rpc`]: questions and orders with an answer.
 //!
-//! Nothing here blocks zenoh's receiving thread: newest state overwrites older state, and queues
-//! of things that must not be lost are bounded and count what they had to drop.
+//! Nothing here blocks zenoh's receiving thread. New state overwrites older state. Queues of messages that
+//! must not be lost are bounded and count what they drop.
 
 pub mod config;
 

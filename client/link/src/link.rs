@@ -1,4 +1,4 @@
-//! The two sessions of a client, its liveliness token, and whether a server is there.
+//! The two sessions of a client, its liveliness token, and the presence of a server.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,12 +16,12 @@ use zenoh::sample::{Sample, SampleKind};
 use crate::config::LinkConfig;
 use crate::error::{LinkError, words};
 
-/// Whether a server of our session is there.
+/// Presence of a server in our session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Presence {
-    /// Servers seen: 0 or 1, more only if somebody started two in one session.
+    /// Number of servers: 0 or 1, more only if somebody started two in one session.
     pub servers: usize,
-    /// Rises each time a server appears, so that one that restarted is told from the old one.
+    /// Rises each time a server appears, which distinguishes a restarted server from the old one.
     pub generation: u64,
 }
 
@@ -44,7 +44,7 @@ struct Shared {
 }
 
 impl Link {
-    /// Opens both sessions and announces us. Needs a multi-threaded tokio runtime.
+    /// Opens both sessions and declares our liveliness token. Needs a multi-threaded tokio runtime.
     pub async fn connect(config: LinkConfig) -> Result<Self, LinkError> {
         let keys = KeySpace::new(&config.realm, &config.session)?;
         let id = Chunk::new("client id", &config.id)?;
@@ -69,43 +69,43 @@ impl Link {
         Ok(Self { shared: Arc::new(shared) })
     }
 
-    /// The keys of the session.
+    /// Key space of the session.
     pub fn keys(&self) -> &KeySpace {
         &self.shared.keys
     }
 
-    /// Our id.
+    /// Id of this client.
     pub fn id(&self) -> &str {
         self.shared.id.as_str()
     }
 
-    /// Our role.
+    /// Role of this client.
     pub fn role(&self) -> Role {
         self.shared.role
     }
 
-    /// Whether a server is there; changes wake the receiver.
+    /// Presence of a server. Changes wake the receiver.
     pub fn presence(&self) -> watch::Receiver<Presence> {
         self.shared.presence.clone()
     }
 
-    /// Messages that arrived broken and were thrown away.
+    /// Number of invalid messages that were discarded.
     pub fn refused(&self) -> u64 {
         self.shared.refused.load(Ordering::Relaxed)
     }
 
-    /// The session of poses, contacts and cuts.
+    /// The session that carries poses, contacts and cuts.
     pub fn haptic(&self) -> &Session {
         &self.shared.haptic
     }
 
-    /// The session of surfaces, reports and rpc.
+    /// The session that carries surfaces, reports and rpc.
     pub fn bulk(&self) -> &Session {
         &self.shared.bulk
     }
 
-    /// Calls `on_message` for every valid message of `key`, on zenoh's receiving thread: it must
-    /// not block. Broken messages are counted in [`Self::refused`].
+    /// Calls `on_message` for every valid message of `key`. It runs on zenoh's receiving thread and must not
+    /// block. Invalid messages are counted in [`Self::refused`].
     pub(crate) async fn subscribe<M: WireMessage>(
         &self,
         session: &Session,
@@ -127,17 +127,17 @@ impl Link {
     }
 }
 
-/// The message of a sample, checked.
+/// Decodes and checks the message of a sample.
 pub(crate) fn decode_sample<M: WireMessage>(sample: &Sample) -> Result<M, LinkError> {
     let payload = Bytes::from(sample.payload().to_bytes().into_owned());
     Ok(decode_as(&sample.encoding().to_string(), payload)?)
 }
 
-/// How long the bulk port beside an endpoint that answers may take to answer too.
+/// Time that the bulk port may take to answer after the endpoint beside it has answered.
 const BULK_PATIENCE: Duration = Duration::from_secs(1);
 
-/// The session of poses at the first endpoint that answers; the session of surfaces at the bulk
-/// port beside it or, where that is closed (a router), at the same endpoint, which relays.
+/// Opens the session of poses at the first endpoint that answers. The session of surfaces uses the bulk port
+/// beside it. If that port is closed (a router), it uses the same endpoint, which relays.
 async fn open_both(config: &LinkConfig) -> Result<(Session, Session), LinkError> {
     let Some((last, others)) = config.connect.split_last() else {
         let haptic = open(config, None, config.timeout).await?;

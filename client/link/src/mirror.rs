@@ -1,10 +1,9 @@
-//! A body's surface as the server has it.
+//! A body's surface, as the server has it.
 //!
-//! A topology has an epoch; frames name the epoch they belong to. The mirror starts with a
-//! keyframe (one query), then applies frames of its epoch and topologies as they come. Whatever
-//! does not fit — a frame of another epoch or size, a new server — makes it ask for the keyframe
-//! again, at most every [`RETRY`]. What it hands out is always whole: triangles and positions of
-//! one epoch.
+//! A topology has an epoch, and every frame names its epoch. The mirror starts with a keyframe (one query).
+//! Then it applies frames of its epoch, and new topologies as they arrive. When something does not fit, it
+//! asks for the keyframe again, at most every [`RETRY`]. That happens with a frame of another epoch or size,
+//! or a new server. Every surface that it returns is complete: triangles and positions belong to one epoch.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -34,32 +33,32 @@ pub struct Surface {
     pub frame: SurfaceFrame,
 }
 
-/// What became of a message.
+/// The effect of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// A newer surface is there.
+    /// It gave a newer surface.
     Applied,
-    /// Older than what we have.
+    /// It is older than the present surface.
     Stale,
-    /// Does not fit; a keyframe is needed.
+    /// It does not fit; a keyframe is needed.
     Gap,
 }
 
-/// The rules of epochs, free of any transport.
+/// The rules of epochs, independent of any transport.
 #[derive(Debug, Default)]
 pub struct Assembly {
     surface: Option<Arc<Surface>>,
-    /// A topology whose first frame has not come yet.
+    /// A topology whose first frame has not arrived yet.
     pending: Option<Arc<SurfaceTopology>>,
 }
 
 impl Assembly {
-    /// The newest whole surface.
+    /// The newest complete surface.
     pub fn surface(&self) -> Option<&Arc<Surface>> {
         self.surface.as_ref()
     }
 
-    /// A keyframe is the server's present state and is always believed.
+    /// Applies a keyframe. It is the server's present state, so it always replaces the surface.
     pub fn keyframe(&mut self, keyframe: SurfaceKeyframe) -> Outcome {
         let (Some(topology), Some(frame)) = (keyframe.topology, keyframe.frame) else {
             return Outcome::Gap;
@@ -69,7 +68,7 @@ impl Assembly {
         Outcome::Applied
     }
 
-    /// A topology waits for the first frame of its epoch.
+    /// Takes a topology, which waits for the first frame of its epoch.
     pub fn topology(&mut self, topology: SurfaceTopology) -> Outcome {
         let held = self.surface.as_ref().map(|s| s.topology.epoch);
         if held.is_some_and(|epoch| topology.epoch <= epoch) {
@@ -79,7 +78,7 @@ impl Assembly {
         Outcome::Applied
     }
 
-    /// A frame moves the surface of its epoch.
+    /// Applies a frame, which moves the surface of its epoch.
     pub fn frame(&mut self, frame: SurfaceFrame) -> Outcome {
         let fits = |t: &SurfaceTopology| t.epoch == frame.epoch && t.vertex_count == frame.vertex_count;
         if let Some(topology) = self.pending.take_if(|t| fits(t)) {
@@ -100,20 +99,19 @@ impl Assembly {
     }
 }
 
-/// Follows one body until dropped.
+/// Follows the surface of one body until dropped.
 pub struct BodyMirror {
     surfaces: watch::Receiver<Option<Arc<Surface>>>,
     task: JoinHandle<()>,
 }
 
 impl BodyMirror {
-    /// The newest surface; `None` until the first keyframe has come.
+    /// The newest surface; `None` before the first keyframe.
     pub fn latest(&self) -> Option<Arc<Surface>> {
         self.surfaces.borrow().clone()
     }
 
-    /// Waits for a surface newer than the last one seen through this mirror; skips what the
-    /// caller was too slow for.
+    /// Waits for a surface newer than the last one returned. A slow caller misses the surfaces in between.
     pub async fn next(&mut self) -> Result<Arc<Surface>, LinkError> {
         loop {
             self.surfaces.changed().await.map_err(|_| LinkError::Closed)?;
@@ -133,7 +131,7 @@ impl Drop for BodyMirror {
 type Newest = Subscriber<RingChannelHandler<Sample>>;
 
 impl Link {
-    /// Starts to follow the surface of `body`. The keyframe is asked for until a server has it.
+    /// Starts to follow the surface of `body`. It repeats the query until a server has the keyframe.
     pub async fn mirror(&self, body: &str) -> Result<BodyMirror, LinkError> {
         let id = Chunk::new("body id", body)?;
         let keys = self.keys();
@@ -151,7 +149,7 @@ impl Link {
     }
 }
 
-/// Applies what arrives; whenever something does not fit, asks for the keyframe.
+/// Applies messages as they arrive, and asks for the keyframe when one does not fit.
 async fn follow(
     link: Link,
     keyframe_key: String,

@@ -13,14 +13,14 @@ use zenoh::query::ConsolidationMode;
 use crate::error::LinkError;
 use crate::link::{Link, decode_sample};
 
-/// How long an answer may take.
+/// Longest wait for an answer.
 pub const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// After this a question that reached nobody is asked again.
+/// Pause before a question that reached nobody is repeated.
 const PAUSE: Duration = Duration::from_millis(50);
 
 impl Link {
-    /// What is running.
+    /// Scene, bodies and tools of the running session.
     pub async fn info(&self) -> Result<SessionInfo, LinkError> {
         self.question(Verb::Info).await
     }
@@ -30,7 +30,7 @@ impl Link {
         self.question(Verb::Schema).await
     }
 
-    /// Stops (`true`) or continues the simulation.
+    /// Pauses (`true`) or continues the simulation.
     pub async fn pause(&self, paused: bool) -> Result<RpcReply, LinkError> {
         self.order(Verb::Pause, &PauseRequest { paused }).await
     }
@@ -40,7 +40,7 @@ impl Link {
         self.order(Verb::Step, &StepRequest { count }).await
     }
 
-    /// Back to the start of the scene.
+    /// Goes back to the start of the scene.
     pub async fn reset(&self) -> Result<RpcReply, LinkError> {
         self.order(Verb::Reset, &ResetRequest {}).await
     }
@@ -50,7 +50,7 @@ impl Link {
         self.order(Verb::Set, &SetRequest { key: key.to_owned(), value: value.to_owned() }).await
     }
 
-    /// What [`Self::set`] may change while the scene runs, with values and ranges.
+    /// Parameters that [`Self::set`] may change while the scene runs, with values and ranges.
     pub async fn params(&self) -> Result<ParamsReply, LinkError> {
         self.question(Verb::Params).await
     }
@@ -60,7 +60,7 @@ impl Link {
         self.order(Verb::Undo, &UndoRequest {}).await
     }
 
-    /// The scenes that [`Self::load`] may bring.
+    /// The scenes that [`Self::load`] accepts.
     pub async fn scenes(&self) -> Result<ScenesReply, LinkError> {
         self.question(Verb::Scenes).await
     }
@@ -70,9 +70,9 @@ impl Link {
         self.order(Verb::Load, &LoadRequest { name: name.to_owned() }).await
     }
 
-    /// Asks again while nobody is there to answer: a server that starts listens before it knows what it
-    /// is asked, and a link that was just made has not heard of it. Orders are not repeated: one whose
-    /// answer was lost may have been carried out.
+    /// Repeats a question while nobody answers. A starting server listens before it can answer, and a new
+    /// link does not know of it yet. Orders are not repeated: one whose answer was lost may have been carried
+    /// out.
     async fn question<R: WireMessage>(&self, verb: Verb) -> Result<R, LinkError> {
         let started = std::time::Instant::now();
         loop {
@@ -102,7 +102,7 @@ impl Link {
         self.ask(self.keys().key(&Topic::Rpc(verb)), payload, encoding).await
     }
 
-    /// One query on the bulk session, one answer.
+    /// Sends one query on the bulk session and waits for one answer.
     pub(crate) async fn ask<R: WireMessage>(
         &self,
         key: String,

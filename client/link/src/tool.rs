@@ -1,8 +1,8 @@
 //! A tool that this client holds: poses up, contacts down, cuts acknowledged.
 //!
-//! [`ToolLink::open`] gives three parts that live on different threads: a [`PoseSender`] for the
-//! thread that sends at up to 1 kHz, a [`ContactReader`] for the loop beside the device (reading
-//! never waits), and a [`Cutter`] for async code.
+//! [`ToolLink::open`] gives three parts for different threads: a [`PoseSender`] for the thread that sends at
+//! up to 1 kHz, a [`ContactReader`] for the loop beside the device (reading never waits), and a [`Cutter`]
+//! for async code.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,14 +22,14 @@ use zenoh::qos::{CongestionControl, Priority, Reliability};
 use crate::error::LinkError;
 use crate::link::Link;
 
-/// Pause between two sendings of an unanswered cut.
+/// Time after which an unanswered cut is sent again.
 pub const RESEND: Duration = Duration::from_millis(100);
 
 /// How long [`Cutter::cut`] waits for its acknowledgement.
 pub const CUT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A tool of the session, held by this client. The server grants it to the first who sends a
-/// pose; whoever loses the link loses the tool.
+/// A tool of the session, held by this client. The server grants it to the first client that sends a pose. A
+/// client that loses its link loses the tool.
 pub struct ToolLink {
     /// Sends poses.
     pub poses: PoseSender,
@@ -50,8 +50,8 @@ impl Link {
         })
     }
 
-    /// Calls `on_contact` for every contact message of tool `id`, on zenoh's receiving thread: it
-    /// must not block. For loops that count, order and time messages themselves.
+    /// Calls `on_contact` for every contact message of tool `id`, on zenoh's receiving thread: it must not
+    /// block. It serves loops that count, order and time messages themselves.
     pub async fn each_contact(
         &self,
         id: &str,
@@ -88,7 +88,7 @@ impl Link {
         let shared = counters.clone();
         let on_contact = move |message: HapticContact| {
             shared.received(message.seq);
-            // Only this callback locks it; the reader goes through the triple buffer.
+            // Only this callback locks it. The reader uses the triple buffer.
             let mut input = input.lock().unwrap_or_else(PoisonError::into_inner);
             input.write(ReceivedContact { message, at: Some(Instant::now()) });
         };
@@ -102,13 +102,13 @@ impl Link {
         let shared = waiting.clone();
         let client_id = self.id().to_owned();
         let on_ack = move |ack: CutAck| {
-            // A cut can overtake the token of its client; it is sent again.
+            // A cut can overtake the token of its client. It is then sent again.
             let too_early = ack.error.as_ref().is_some_and(|error| error.code == "no-token");
             if ack.client_id == client_id
                 && !too_early
                 && let Some(answer) = shared.take(ack.seq)
             {
-                // The caller may have given up; then nobody wants the answer.
+                // The caller may have stopped waiting.
                 let _ = answer.send(ack);
             }
         };
@@ -135,9 +135,9 @@ pub struct PoseSender {
 }
 
 impl PoseSender {
-    /// Sends `sample` after filling in ids, sequence number and client time; returns the
-    /// sequence number. Non-finite samples are refused here already. Takes about 15 µs; when
-    /// the network is jammed the sample is dropped after at most a millisecond.
+    /// Sends `sample` after filling in ids, sequence number and client time, and returns the sequence number.
+    /// Non-finite samples are refused before they are sent. A call takes about 15 µs. On a jammed network the
+    /// sample is dropped after at most a millisecond.
     pub fn send(&mut self, mut sample: ToolSample) -> Result<u64, LinkError> {
         self.seq += 1;
         sample.seq = self.seq;
@@ -150,7 +150,7 @@ impl PoseSender {
     }
 }
 
-/// A contact message and when it came.
+/// A contact message and its time of arrival.
 #[derive(Debug, Clone, Default)]
 pub struct ReceivedContact {
     /// The message; empty before the first one.
@@ -184,17 +184,17 @@ pub struct ContactReader {
 }
 
 impl ContactReader {
-    /// The newest message. Neither locks nor allocates.
+    /// The newest message. This neither locks nor allocates.
     pub fn latest(&mut self) -> &ReceivedContact {
         self.output.read()
     }
 
-    /// Messages received.
+    /// Number of messages received.
     pub fn received(&self) -> u64 {
         self.counters.received.load(Ordering::Relaxed)
     }
 
-    /// Messages that the sequence numbers say were lost.
+    /// Number of messages lost, by their sequence numbers.
     pub fn lost(&self) -> u64 {
         self.counters.lost.load(Ordering::Relaxed)
     }
@@ -224,7 +224,7 @@ impl Waiting {
     }
 }
 
-/// Sends cuts of one tool, each applied exactly once.
+/// Sends cuts of one tool. Each is applied exactly once.
 pub struct Cutter {
     link: Link,
     tool: Chunk,
@@ -234,8 +234,8 @@ pub struct Cutter {
 }
 
 impl Cutter {
-    /// Cuts along successive blade segments, body `body_id` or (if empty) every body that may
-    /// be cut. Repeats the command until it is answered; the server applies it once.
+    /// Cuts along successive blade segments. An empty `body_id` means every body that may be cut. The command
+    /// is repeated until it is answered, and the server applies it once.
     pub async fn cut(&self, body_id: &str, sweep: Vec<BladeSegment>) -> Result<CutAck, LinkError> {
         let command = CutCommand {
             client_id: self.link.id().to_owned(),
@@ -265,7 +265,7 @@ impl Cutter {
         Err(LinkError::Timeout { key, waited: CUT_TIMEOUT })
     }
 
-    /// Tells the server what the device can do.
+    /// Sends the capability of the device to the server.
     pub async fn announce(&self, mut capability: DeviceCapability) -> Result<(), LinkError> {
         capability.client_id = self.link.id().to_owned();
         capability.tool_id = self.tool.as_str().to_owned();

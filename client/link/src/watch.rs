@@ -12,7 +12,7 @@ use zenoh::pubsub::Subscriber;
 use crate::error::LinkError;
 use crate::link::Link;
 
-/// Events kept for a slow reader; the server sends a handful per second.
+/// Most events kept for a slow reader; the server sends a handful per second.
 const EVENT_QUEUE: usize = 256;
 
 /// The newest message of one topic. Dropping it unsubscribes.
@@ -70,7 +70,7 @@ impl EventStream {
         self.receiver.recv().await.ok_or(LinkError::Closed)
     }
 
-    /// Events lost because nobody read for a while.
+    /// Number of events lost because the reader was too slow.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
@@ -82,23 +82,23 @@ impl Link {
         self.latest(Topic::Stats).await
     }
 
-    /// Which effects are on, and why.
+    /// Active and inactive effects, with reasons.
     pub async fn plan(&self) -> Result<Latest<Plan>, LinkError> {
         self.latest(Topic::Plan).await
     }
 
-    /// Von Mises stress on the surface of `body`. The server computes it while somebody holds this.
+    /// Von Mises stress on the surface of `body`. The server computes it while this subscription exists.
     pub async fn stress(&self, body: &str) -> Result<Latest<SurfaceField>, LinkError> {
         let (body, name) = (Chunk::new("body id", body)?, Chunk::new("field name", "von-mises")?);
         self.latest(Topic::SurfaceField(body, name)).await
     }
 
-    /// Positions of the probes, and energies. The server computes them while somebody holds this.
+    /// Positions of the probes, and energies. The server computes them while this subscription exists.
     pub async fn measures(&self) -> Result<Latest<Measures>, LinkError> {
         self.latest(Topic::Measures).await
     }
 
-    /// What happens on the server.
+    /// Events of the server, from now on.
     pub async fn events(&self) -> Result<EventStream, LinkError> {
         let (sender, receiver) = mpsc::channel(EVENT_QUEUE);
         let dropped = Arc::new(AtomicU64::new(0));
@@ -113,7 +113,7 @@ impl Link {
         Ok(EventStream { receiver, dropped, _subscriber: subscriber })
     }
 
-    /// Where the tools are.
+    /// States of all tools of the session.
     pub async fn tool_states(&self) -> Result<ToolStates, LinkError> {
         let (sender, receiver) = watch::channel(Arc::default());
         let on_state = move |state: ToolState| {

@@ -16,7 +16,7 @@ use seldom::Seldom;
 /// The environment variable that chooses what is logged, such as `SCINDO_LOG=debug`.
 pub const LOG_VARIABLE: &str = "SCINDO_LOG";
 
-/// Logs to standard error what `SCINDO_LOG` asks for, or what `default` says where it is unset.
+/// Starts the log on standard error. `SCINDO_LOG` filters it; `default` is used if the variable is unset.
 ///
 /// A directive that cannot be read is reported, and `default` is used.
 pub fn start_log(default: &str) {
@@ -57,10 +57,10 @@ pub enum Manual {
 }
 
 impl Manual {
-    /// Writes what is asked for about the program `P`.
+    /// Writes completions or man pages of the program `P`.
     ///
     /// # Errors
-    /// What the disk or the pipe says.
+    /// A file or the pipe cannot be written.
     pub fn run<P: CommandFactory>(&self) -> io::Result<()> {
         match self {
             Self::Completions { shell } => {

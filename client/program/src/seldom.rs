@@ -1,4 +1,4 @@
-//! A log that cannot be flooded: one line per place in the code and second.
+//! A log that cannot be flooded: one line per place in the code and per second.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
@@ -7,16 +7,16 @@ use std::time::{Duration, Instant};
 use tracing::{Event, Metadata};
 use tracing_subscriber::layer::{Context, Filter};
 
-/// A place in the code writes this often.
+/// Shortest time between two lines of one place in the code.
 const EVERY: Duration = Duration::from_secs(1);
 
-/// The target of lines that are counted where they are written; they are let through.
+/// Target of lines that are already limited where they are written. They are let through.
 pub const COUNTED: &str = "scindo::exchange";
 
-/// Lets one line through per place in the code and second, whatever a peer or a library does.
+/// A filter that lets one line through per place in the code and per second.
 #[derive(Debug, Default)]
 pub struct Seldom {
-    /// When each place, by module and line, last wrote.
+    /// Time of the last line of each place, by module and line number.
     written: Mutex<BTreeMap<(&'static str, u32), Instant>>,
 }
 
@@ -25,7 +25,7 @@ impl Seldom {
         if metadata.target() == COUNTED {
             return true;
         }
-        // A place without a line is told by its name, which holds file and line.
+        // A place without a line number is identified by its name, which holds file and line.
         let place = metadata.line().map_or((metadata.name(), 0), |line| (metadata.target(), line));
         let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
         match written.get_mut(&place) {

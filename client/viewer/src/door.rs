@@ -1,7 +1,7 @@
-//! The door of the web server: who may hold a connection open, and for how long.
+//! Bounds the connections of the web server: how many may stay open, and for how long.
 //!
-//! A connection that says nothing is closed, and one address holds a bounded number of connections that are not
-//! browsers yet: a new one closes the oldest of them. So a thousand silent connections keep nobody out.
+//! A silent connection is closed. One address may hold a limited number of connections that are not browsers
+//! yet; a new one closes the oldest of them. A thousand silent connections therefore keep nobody out.
 
 use std::collections::BTreeMap;
 use std::future::Future;
@@ -20,45 +20,45 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::time::{Instant, Sleep};
 
-/// A request has to go on within this time.
+/// A request must continue within this time.
 const REQUEST_SILENCE: Duration = Duration::from_secs(10);
 
-/// A connection that asks for files ends after this time; a browser opens another one.
+/// A connection that asks for files ends after this time; a browser then opens another.
 const LONGEST_VISIT: Duration = Duration::from_secs(60);
 
-/// A browser answers pings, which come every [`PING`]; one that is silent for this long is gone.
+/// A browser answers pings, which are sent every [`PING`]. After this long a silence it counts as gone.
 const BROWSER_SILENCE: Duration = Duration::from_secs(30);
 
-/// How often a browser is asked for a sign of life.
+/// How often a browser is pinged.
 pub const PING: Duration = Duration::from_secs(10);
 
-/// Connections of one address that are no browsers yet. A page takes six at a time.
+/// Most connections of one address that are not browsers yet. A page opens six at a time.
 const PER_ADDRESS: usize = 64;
 
-/// Such connections of all addresses.
+/// Most such connections of all addresses together.
 const IN_ALL: usize = 512;
 
-/// Pause after the system refused a connection, as it does without file descriptors.
+/// Pause after the system refused a connection, for example for lack of file descriptors.
 const REFUSED: Duration = Duration::from_millis(100);
 
-/// A listener that keeps the connections bounded.
+/// A listener that bounds the number of connections.
 #[derive(Debug)]
 pub struct Door {
     listener: TcpListener,
     visits: Arc<Mutex<Visits>>,
 }
 
-/// Connections that are no browsers yet, oldest first.
+/// Connections that are not browsers yet, oldest first.
 #[derive(Debug, Default)]
 struct Visits {
     next: u64,
     open: BTreeMap<u64, Arc<Visitor>>,
 }
 
-/// The other end of a connection.
+/// The peer of a connection.
 #[derive(Debug)]
 pub struct Visitor {
-    /// Its address.
+    /// Address of the peer.
     pub address: SocketAddr,
     number: u64,
     visits: Arc<Mutex<Visits>>,
@@ -67,11 +67,11 @@ pub struct Visitor {
     waker: AtomicWaker,
 }
 
-/// How handlers know who asks.
+/// The peer of a request, as handlers receive it.
 #[derive(Debug, Clone)]
 pub struct From(pub Arc<Visitor>);
 
-/// A connection that ends when its other end is silent for too long.
+/// A connection that ends when its peer is silent for too long.
 #[derive(Debug)]
 pub struct Visit {
     stream: TcpStream,
@@ -82,7 +82,7 @@ pub struct Visit {
 }
 
 impl Door {
-    /// The door at a port that is taken already.
+    /// Wraps a listener whose port is already bound.
     pub fn new(listener: TcpListener) -> Self {
         Self { listener, visits: Arc::default() }
     }
@@ -117,7 +117,7 @@ impl Listener for Door {
         loop {
             match self.listener.accept().await {
                 Ok((stream, address)) => {
-                    // Small messages must not wait for company.
+                    // Small messages must not wait to be sent together.
                     let _ = stream.set_nodelay(true);
                     return (self.admit(stream, address), address);
                 }
@@ -141,7 +141,7 @@ impl Connected<IncomingStream<'_, Door>> for From {
 }
 
 impl Visits {
-    /// Sends the oldest visitors away until one more of `address` has a place.
+    /// Closes the oldest connections until `address` may open one more.
     fn make_room(&mut self, address: IpAddr) {
         let its = |visitor: &&Arc<Visitor>| visitor.address.ip() == address;
         while self.open.values().filter(its).count() >= PER_ADDRESS {
@@ -163,7 +163,7 @@ impl Visits {
 }
 
 impl Visitor {
-    /// It has a seat now, and does not count as a visit any more.
+    /// Marks the peer as a seated browser, which no longer counts as a visit.
     pub fn becomes_browser(&self) {
         self.is_browser.store(true, Ordering::Relaxed);
         lock(&self.visits).open.remove(&self.number);
@@ -171,7 +171,7 @@ impl Visitor {
 }
 
 impl Visit {
-    /// When it ends if nothing more is heard.
+    /// When the connection ends if nothing more is received.
     fn ends_at(&self) -> Instant {
         if self.visitor.is_browser.load(Ordering::Relaxed) {
             self.heard + BROWSER_SILENCE
@@ -180,7 +180,7 @@ impl Visit {
         }
     }
 
-    /// Ready when the connection has to end.
+    /// Ready when the connection must end.
     fn poll_end(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
         self.visitor.waker.register(context.waker());
         if self.visitor.sent_away.load(Ordering::Relaxed) {

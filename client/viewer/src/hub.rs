@@ -1,5 +1,5 @@
-//! Between one server and many browsers: keeps the newest state for late joiners, hands every
-//! message to every outbox, and collects what the browsers send.
+//! Connects one server with many browsers. It keeps the newest state for late joiners, hands every message to
+//! every outbox, and collects what the browsers send.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,19 +15,19 @@ use tokio::sync::{mpsc, watch};
 
 use crate::outbox::{Outbox, Slot};
 
-/// Messages from browsers that may wait for the link to the server.
+/// Most messages from browsers that wait for the link to the server.
 const MAX_WAITING: usize = 256;
 
-/// Events a late joiner still sees.
+/// Number of past events that late joiners receive.
 const MAX_EVENTS: usize = 7;
 
-/// State slots beside bodies and tools: link, info, plan, stats, measures.
+/// Most state slots: link, info, plan, stats and measures, and those of bodies and tools.
 const MAX_SLOTS: usize = 5 + 3 * MAX_BODIES + 2 * MAX_TOOLS;
 
-/// What browsers watch. Nothing else needs to be asked of the server.
+/// Topics that browsers watch. The viewer subscribes to nothing else.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Watched {
-    /// Surfaces and tools: some browser is there.
+    /// Surfaces and tools: at least one browser is present.
     pub scene: bool,
     /// Stress on surfaces.
     pub stress: bool,
@@ -35,29 +35,29 @@ pub struct Watched {
     pub measures: bool,
 }
 
-/// A browser that has been silent for this long gives its seat to another one, where all are taken.
+/// When all seats are taken, a browser that has been silent for this long loses its seat to a new one.
 const SILENT: Duration = Duration::from_secs(2);
 
-/// What a browser wants of the server, under the identity the viewer gave it.
+/// A message from a browser to the server, under the identity that the viewer assigned.
 #[derive(Debug)]
 pub enum Up {
     /// Newest pose of a mouse tool.
     Tool(Box<ToolSample>),
-    /// A call, to be answered through [`Hub::answer`].
+    /// A call, answered through [`Hub::answer`].
     Rpc {
-        /// The browser that called.
+        /// Number of the calling browser.
         browser: u64,
         /// The call.
         call: ViewerRpc,
     },
-    /// The mouse tool was put away, or its browser left.
+    /// The mouse tool was put away, or its browser has left.
     Release {
-        /// The tool.
+        /// Id of the tool.
         tool_id: String,
     },
 }
 
-/// The meeting point.
+/// State shared by the link to the server and all browsers.
 #[derive(Debug)]
 pub struct Hub {
     shared: Mutex<Shared>,
@@ -75,7 +75,7 @@ struct Shared {
     connected: bool,
 }
 
-/// A browser at the hub: what it has to be sent, and what it asked for beside surfaces.
+/// A browser at the hub: its outbox, and the topics it asked for beside surfaces.
 #[derive(Debug)]
 struct Browser {
     outbox: Arc<Outbox>,
@@ -83,7 +83,7 @@ struct Browser {
 }
 
 impl Shared {
-    /// Ends the browser that has been silent for longest; false if none is silent.
+    /// Ends the browser that has been silent for the longest time. False if none is silent.
     fn unseat_silent(&mut self) -> bool {
         let longest = self.browsers.iter().map(|(&number, browser)| (browser.outbox.silence(), number)).max();
         let Some((_, browser)) = longest.filter(|(silence, _)| *silence >= SILENT) else { return false };
@@ -94,21 +94,21 @@ impl Shared {
     }
 }
 
-/// A browser's place at the hub; leaving it drops the place.
+/// A browser's place at the hub. Dropping it removes the browser.
 #[derive(Debug)]
 pub struct Seat {
     hub: Arc<Hub>,
     /// Number of the browser, unique in this process.
     pub browser: u64,
-    /// What it has to be sent.
+    /// Messages to be sent to the browser.
     pub outbox: Arc<Outbox>,
-    /// Identity of its mouse tool.
+    /// Id of its mouse tool on the server.
     pub tool_id: String,
 }
 
 impl Hub {
-    /// A hub, and the end where the link to the server takes what browsers send. `client_id` is
-    /// the viewer's id on the server; the mouse tools are named after it.
+    /// Creates a hub, and the receiver from which the link to the server takes the messages of browsers.
+    /// `client_id` is the viewer's id on the server; mouse tools are named after it.
     pub fn new(client_id: &str) -> (Arc<Self>, mpsc::Receiver<Up>) {
         let (up, taken) = mpsc::channel(MAX_WAITING);
         let hub = Self {
@@ -126,12 +126,12 @@ impl Hub {
         &self.client_id
     }
 
-    /// What browsers watch.
+    /// Topics that browsers watch. Changes wake the receiver.
     pub fn watched(&self) -> watch::Receiver<Watched> {
         self.watched.subscribe()
     }
 
-    /// Forgets surfaces and tools: they will be told anew.
+    /// Drops the stored surfaces and tools. The server will send them again.
     pub fn forget_scene(&self) {
         let is_scene = |slot: &Slot| {
             matches!(
@@ -142,7 +142,7 @@ impl Hub {
         self.lock().slots.retain(|slot, _| !is_scene(slot));
     }
 
-    /// Gives a message to every browser and keeps it for those who come later.
+    /// Sends a message to every browser and stores it for late joiners.
     pub fn publish(&self, message: Down) {
         let bytes = encode(&message);
         let mut shared = self.lock();
@@ -159,7 +159,7 @@ impl Hub {
                 shared.browsers.values().for_each(|browser| browser.outbox.forget(&slot));
             }
             Down::Topology(topology) => {
-                // Positions of the epoch before have no triangles any more.
+                // Positions of the previous epoch have no triangles any more.
                 let slot = Slot::Frame(topology.body_id.clone());
                 shared.slots.remove(&slot);
                 shared.browsers.values().for_each(|browser| browser.outbox.forget(&slot));
@@ -179,20 +179,20 @@ impl Hub {
         asked.for_each(|browser| browser.outbox.put(slot.clone(), bytes.clone()));
     }
 
-    /// Tells every browser whether a server is heard; a server that left takes its state along.
+    /// Tells every browser whether the server is connected. If it has left, its stored state is dropped.
     pub fn set_link(&self, connected: bool, detail: &str) {
         {
             let mut shared = self.lock();
             shared.connected = connected;
             if !connected {
-                // What was last seen stays in the browsers, under a notice; newcomers wait.
+                // Browsers keep showing the last state under a notice. New browsers wait.
                 shared.slots.clear();
             }
         }
         self.publish(Down::Link(ViewerLink { connected, detail: detail.to_owned() }));
     }
 
-    /// Answers the call of one browser.
+    /// Sends the answer of a call to the browser that made it.
     pub fn answer(&self, browser: u64, answer: ViewerRpcReply) {
         let bytes = encode(&Down::Rpc(answer));
         if let Some(browser) = self.lock().browsers.get(&browser) {
@@ -200,18 +200,18 @@ impl Hub {
         }
     }
 
-    /// Whether a server is heard.
+    /// Whether a server is connected.
     pub fn connected(&self) -> bool {
         self.lock().connected
     }
 
-    /// Browsers that are connected.
+    /// Number of connected browsers.
     pub fn browsers(&self) -> usize {
         self.lock().browsers.len()
     }
 
-    /// Seats a browser; it is sent all present state. Where `most` already sit, it takes the seat of the one
-    /// that has been silent for longest, and gets none if all of them speak.
+    /// Seats a browser and sends it all present state. If `most` are seated already, it takes the seat of the
+    /// one that has been silent for the longest time. It gets none if no browser is silent.
     pub fn join(self: &Arc<Self>, most: usize) -> Option<Seat> {
         let mut shared = self.lock();
         if shared.browsers.len() >= most && !shared.unseat_silent() {
@@ -229,7 +229,7 @@ impl Hub {
         Some(Seat { hub: Arc::clone(self), browser, outbox, tool_id: format!("mouse-{name}-{browser}") })
     }
 
-    /// A browser says what it shows beside the surfaces.
+    /// Records which topics a browser shows beside the surfaces.
     pub fn ask(&self, browser: u64, asks: ViewerWatch) {
         let mut shared = self.lock();
         let Shared { slots, browsers, .. } = &mut *shared;
@@ -238,7 +238,7 @@ impl Hub {
         if asked_before == asks {
             return;
         }
-        // What others have already asked for is there.
+        // State that others already asked for is available at once.
         let on_demand = |slot: &Slot| matches!(slot, Slot::Field(_) | Slot::Measures);
         for (slot, bytes) in slots.iter().filter(|(slot, _)| on_demand(slot) && browser.takes(slot)) {
             browser.outbox.put(slot.clone(), bytes.clone());
@@ -256,7 +256,7 @@ impl Hub {
         self.watched.send_if_modified(|held| std::mem::replace(held, watched) != watched);
     }
 
-    /// Passes on what a browser sent. Poses are dropped when the link is behind: a newer one follows.
+    /// Forwards a message of a browser. Poses are dropped when the link is behind, because newer ones follow.
     pub async fn send_up(&self, message: Up) {
         if matches!(message, Up::Tool(_)) {
             let _ = self.up.try_send(message);
@@ -271,7 +271,7 @@ impl Hub {
 }
 
 impl Browser {
-    /// Whether it is sent this state: fields and measures only when it asked.
+    /// Whether the browser receives this state. Fields and measures are sent only on request.
     fn takes(&self, slot: &Slot) -> bool {
         match slot {
             Slot::Field(_) => self.asks.stress,
@@ -289,14 +289,14 @@ impl Drop for Seat {
             shared.browsers.remove(&self.browser);
             self.hub.tell_watched(&shared);
         }
-        // Should the channel be full, the server's watch on poses ends the tool.
+        // If the channel is full, the server's watch on poses ends the tool.
         if self.hub.up.try_send(Up::Release { tool_id: self.tool_id.clone() }).is_err() {
             tracing::warn!(tool = self.tool_id, "could not release the tool of a browser that left");
         }
     }
 }
 
-/// Bytes of one message to a browser.
+/// Encodes one message for a browser.
 pub fn encode(message: &Down) -> Bytes {
     ViewerDown { message: Some(message.clone()) }.encode_to_vec().into()
 }

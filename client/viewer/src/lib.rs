@@ -5,9 +5,9 @@
 //! page → [`socket`] → [`hub`] → `scindo-client` → server.
 //!
 //! # Invariants
-//! * A slow browser delays nobody: it gets the newest frame when it is ready, and misses the rest.
-//! * A browser never speaks for another: identity of client and tool is set here.
-//! * The page decides nothing about the mesh; it sends poses and calls, the server acts.
+//! * A slow browser delays nobody: it gets the newest frame when it is ready, and misses the others.
+//! * A browser never acts for another: the ids of client and tool are set here.
+//! * The page decides nothing about the mesh. It sends poses and calls; the server acts.
 
 pub mod outbox;
 
@@ -40,30 +40,30 @@ use crate::hub::{Hub, Up};
 pub use listen::listen_address;
 pub use server::{Operators, WebConfig, WebServer};
 
-/// Why the viewer cannot work.
+/// Reason why the viewer cannot start.
 #[derive(Debug, Error)]
 pub enum ViewError {
-    /// The address is taken or not ours.
+    /// The address is taken, or does not belong to this machine.
     #[error("cannot serve the page on {address}: {source}; choose another address")]
     Listen {
-        /// The address asked for.
+        /// The requested address.
         address: SocketAddr,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
 }
 
-/// What a viewer needs to know: where the server is, and where browsers come.
+/// Settings of a viewer: the server to reach, and the address for browsers.
 #[derive(Debug, Clone)]
 pub struct ViewConfig {
-    /// The link to the server.
+    /// Settings of the link to the server.
     pub link: LinkConfig,
-    /// The web server.
+    /// Settings of the web server.
     pub web: WebConfig,
 }
 
 impl ViewConfig {
-    /// A viewer of the default session on this machine, with an id of its own.
+    /// Settings for the default session on this machine, with a random id.
     pub fn new(listen: SocketAddr) -> Self {
         let random = RandomState::new().build_hasher().finish() & 0xff_ffff;
         Self {
@@ -73,7 +73,7 @@ impl ViewConfig {
     }
 }
 
-/// A viewer that has its port.
+/// A viewer whose port is bound.
 pub struct Viewer {
     web: WebServer,
     hub: Arc<Hub>,
@@ -82,14 +82,14 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// Takes the port for browsers; the server is looked for by [`Viewer::run`], and may come later.
+    /// Binds the port for browsers. [`Viewer::run`] looks for the server, which may come later.
     pub async fn bind(config: ViewConfig) -> Result<Self, ViewError> {
         let (hub, up) = Hub::new(&config.link.id);
         let web = WebServer::bind(config.web, Arc::clone(&hub), config.link.connect.join(", ")).await?;
         Ok(Self { web, hub, up, link: config.link })
     }
 
-    /// Where browsers find it.
+    /// Address at which browsers reach the page.
     pub fn address(&self) -> SocketAddr {
         self.web.address()
     }
@@ -103,12 +103,12 @@ impl Viewer {
     }
 }
 
-/// [`Viewer::bind`] and [`Viewer::run`] in one.
+/// Calls [`Viewer::bind`], then [`Viewer::run`].
 pub async fn serve(config: ViewConfig) -> Result<(), ViewError> {
     Viewer::bind(config).await?.run().await
 }
 
-/// Whether npm built the page that this program holds.
+/// Whether npm built the page embedded in this program.
 pub fn page_is_built() -> bool {
     page::is_built()
 }

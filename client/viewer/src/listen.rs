@@ -1,16 +1,17 @@
-//! Where browsers come: an address as people write it.
+//! Parses the address for browsers as people write it.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-/// The port of the page unless another is given.
+/// Default port of the page.
 pub const DEFAULT_PORT: u16 = 8080;
 
-/// Reads `PORT`, `HOST` or `HOST:PORT`; the host is an IP address or `localhost`.
+/// Reads `PORT`, `HOST` or `HOST:PORT`. The host is an IP address or `localhost`.
 ///
-/// Without a host, browsers of this machine only: `8080` and `:8080` are `127.0.0.1:8080`. Without a port: 8080.
+/// Without a host, only browsers on this machine can connect: `8080` and `:8080` are `127.0.0.1:8080`. The
+/// default port is 8080.
 ///
 /// # Errors
-/// What the form is, for a command line to print.
+/// A description of the expected form, for a command line to print.
 pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
     let local = IpAddr::V4(Ipv4Addr::LOCALHOST);
     let text = text.trim();

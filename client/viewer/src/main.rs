@@ -1,4 +1,4 @@
-//! `scindo-view`: the browser viewer as a program of its own, on any machine that reaches a server.
+//! `scindo-view`: the browser viewer as a separate program, for any machine that reaches a server.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;

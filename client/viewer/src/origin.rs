@@ -1,12 +1,12 @@
-//! Who may open a WebSocket. Without this, any web page in the user's browser could drive the tools.
+//! Checks who may open a WebSocket. Otherwise any web page in the user's browser could drive the tools.
 
 use axum::http::{HeaderMap, header};
 
-/// Accepts a request if its page came from this server (Origin names the host it was sent to) or
-/// from one of `allowed` (`http://lab:8080`). Programs that are no browser send no Origin.
+/// Accepts a request whose page came from this server (Origin names the host of the request) or from one of
+/// `allowed` (`http://lab:8080`). Programs other than browsers send no Origin.
 ///
-/// A server that listens on loopback also wants a loopback name in Host: otherwise a foreign name
-/// that resolves to 127.0.0.1 would pass as same origin.
+/// A server that listens on loopback also requires a loopback name in Host. Otherwise a foreign name that
+/// resolves to 127.0.0.1 would pass as same origin.
 pub fn is_allowed(headers: &HeaderMap, allowed: &[String], loopback_only: bool) -> bool {
     let host = text(headers, header::HOST);
     if loopback_only && !host.is_some_and(is_loopback_name) {

@@ -1,8 +1,8 @@
-//! What one browser has still to be sent: the newest of everything, never a backlog.
+//! Messages to be sent to one browser: the newest value of every state, never a backlog.
 //!
-//! Every state has one slot; a newer value replaces the older one that was not sent in time. Only
-//! events and answers queue, a bounded number of them. Frames wait while the browser has not
-//! acknowledged earlier ones, so that a slow link never fills with old pictures.
+//! Every state has one slot. A newer value replaces an older one that was not sent in time. Only events
+//! and answers queue, up to a limit. Frames wait until the browser has acknowledged earlier ones, so that a
+//! slow link never fills with outdated frames.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tokio::sync::Notify;
 
-/// A piece of session state. The order is the order of sending: small things first, and a
-/// topology before the frame that needs it.
+/// A part of the session state. Slots are sent in this order: small messages first, and a topology before the
+/// frame that needs it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Slot {
-    /// Whether a server is heard.
+    /// Whether a server is connected.
     Link,
-    /// What is running.
+    /// Scene, bodies and tools of the session.
     Info,
-    /// Effects that are on and off.
+    /// Active and inactive effects.
     Plan,
     /// Rates and costs.
     Stats,
@@ -35,14 +35,14 @@ pub enum Slot {
     Frame(String),
 }
 
-/// Frames on their way that the browser has not acknowledged. At 60 Hz this lets a round trip of
-/// 130 ms run at full rate.
+/// Most frames that were sent but not acknowledged. At 60 Hz this sustains the full rate over a round trip of
+/// 130 ms.
 const MAX_FRAMES_IN_FLIGHT: u64 = 8;
 
-/// Events and answers that may wait; the oldest give way.
+/// Most events and answers that wait. When there are more, the oldest are dropped.
 const MAX_QUEUED: usize = 64;
 
-/// The queue of one browser.
+/// The outgoing messages of one browser.
 #[derive(Debug, Default)]
 pub struct Outbox {
     queue: Mutex<Queue>,
@@ -57,7 +57,7 @@ struct Queue {
     frames_acked: u64,
     frames_dropped: u64,
     closed: bool,
-    /// When the browser last said something.
+    /// When the browser last sent something.
     heard: Instant,
 }
 
@@ -76,7 +76,7 @@ impl Default for Queue {
 }
 
 impl Outbox {
-    /// Sets a state; an older value that still waited is gone.
+    /// Sets a state. It replaces an older value that still waits.
     pub fn put(&self, slot: Slot, message: Bytes) {
         let mut queue = self.lock();
         let is_frame = matches!(slot, Slot::Frame(_));
@@ -87,7 +87,7 @@ impl Outbox {
         self.wake.notify_one();
     }
 
-    /// Adds a message that has to follow the ones before it.
+    /// Queues a message that must keep its order.
     pub fn push(&self, message: Bytes) {
         let mut queue = self.lock();
         if queue.ordered.len() == MAX_QUEUED {
@@ -98,12 +98,12 @@ impl Outbox {
         self.wake.notify_one();
     }
 
-    /// Forgets a state that no longer holds.
+    /// Drops a state that no longer holds.
     pub fn forget(&self, slot: &Slot) {
         self.lock().slots.remove(slot);
     }
 
-    /// The browser has taken this many frames since it connected.
+    /// Records that the browser has received this many frames since it connected.
     pub fn acknowledge(&self, frames: u64) {
         let mut queue = self.lock();
         queue.frames_acked = frames.min(queue.frames_sent).max(queue.frames_acked);
@@ -111,7 +111,7 @@ impl Outbox {
         self.wake.notify_one();
     }
 
-    /// The browser said something.
+    /// Records that the browser sent something.
     pub fn heard(&self) {
         self.lock().heard = Instant::now();
     }
@@ -121,12 +121,12 @@ impl Outbox {
         self.lock().heard.elapsed()
     }
 
-    /// Frames that were replaced before this browser could take them.
+    /// Number of frames that were replaced before this browser could receive them.
     pub fn frames_dropped(&self) -> u64 {
         self.lock().frames_dropped
     }
 
-    /// Ends [`Outbox::next`] for good.
+    /// Closes the outbox: [`Outbox::next`] returns `None` from now on.
     pub fn close(&self) {
         self.lock().closed = true;
         self.wake.notify_one();
@@ -149,7 +149,8 @@ impl Outbox {
     }
 
     fn lock(&self) -> MutexGuard<'_, Queue> {
-        // Nothing inside a lock can panic halfway through a change, so a poisoned queue is whole.
+        // No code holding this lock can panic halfway through a change, so a poisoned queue is still
+        // consistent.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -161,7 +162,7 @@ impl Queue {
         }
         let (slot, _) = self.slots.first_key_value()?;
         if matches!(slot, Slot::Frame(_)) {
-            // Frames come last in the order: when the first slot is a frame, only frames wait.
+            // Frames come last in the order. If the first slot is a frame, only frames wait.
             if self.frames_sent - self.frames_acked >= MAX_FRAMES_IN_FLIGHT {
                 return None;
             }

@@ -1,4 +1,4 @@
-//! The embedded page: what `build.rs` left in `OUT_DIR/page`.
+//! The embedded page, which `build.rs` wrote to `OUT_DIR/page`.
 
 use std::path::Path;
 
@@ -11,16 +11,16 @@ use rust_embed::RustEmbed;
 #[folder = "$OUT_DIR/page"]
 struct Page;
 
-/// Only this page's own scripts, styles and WebSocket; it loads nothing from elsewhere.
+/// Allows only this page's own scripts, styles and WebSocket. Nothing is loaded from elsewhere.
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; \
                       img-src 'self' data: blob:; frame-ancestors 'self'";
 
-/// Whether npm built the page; otherwise the one that is served says what to install.
+/// Whether npm built the page. Otherwise the served page explains what to install.
 pub fn is_built() -> bool {
     Page::get("viewer.js").is_some()
 }
 
-/// A file of the page: embedded, or from `folder` while somebody works on it.
+/// Serves a file of the page: the embedded one, or one from `folder` during work on the page.
 pub fn serve(name: &str, folder: Option<&Path>) -> Response {
     let name = if name.is_empty() { "index.html" } else { name };
     let Some(bytes) = read(name, folder) else {
@@ -36,7 +36,7 @@ pub fn serve(name: &str, folder: Option<&Path>) -> Response {
 }
 
 fn read(name: &str, folder: Option<&Path>) -> Option<Bytes> {
-    // The page is flat: a name with a separator or a leading dot is nobody's business.
+    // The page has no subfolders: a name with a separator or a leading dot is refused.
     if name.starts_with('.') || name.contains(['/', '\\']) {
         return None;
     }

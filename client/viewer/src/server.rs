@@ -1,4 +1,4 @@
-//! The web server: `/` the page, `/ws` the stream, `/healthz` how it is.
+//! The web server: `/` serves the page, `/ws` the stream, `/healthz` the status.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -18,15 +18,15 @@ use crate::hub::Hub;
 use crate::socket::Rights;
 use crate::{ViewError, origin, page, socket};
 
-/// What a socket reads at a time [bytes], allocated per browser: a page sends small messages.
+/// Read buffer of a socket [bytes], allocated per browser. Pages send only small messages.
 const READ_BUFFER: usize = 8 * 1024;
 
-/// How the web server behaves; part of [`crate::ViewConfig`].
+/// Settings of the web server; part of [`crate::ViewConfig`].
 #[derive(Debug, Clone)]
 pub struct WebConfig {
-    /// Address to listen on; port 0 takes a free one.
+    /// Address to listen on. Port 0 takes a free one.
     pub listen: SocketAddr,
-    /// Pages of other origins that may connect (`http://lab:8080`), beside this server's own.
+    /// Origins of other pages that may connect (`http://lab:8080`), beside this server's own.
     pub allow_origins: Vec<String>,
     /// Most browsers at a time.
     pub max_browsers: usize,
@@ -34,7 +34,7 @@ pub struct WebConfig {
     pub read_only: bool,
     /// Which pages may pause, step, reset and set.
     pub operators: Operators,
-    /// Serve the page from this folder instead of the embedded one, for work on the page.
+    /// Folder from which the page is served instead of the embedded one, for work on the page.
     pub page_folder: Option<PathBuf>,
 }
 
@@ -51,7 +51,7 @@ impl Default for WebConfig {
     }
 }
 
-/// Who among the browsers may give orders: pause, step, reset, set.
+/// Browsers that may give orders: pause, step, reset, set.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Operators {
     /// Every browser.
@@ -64,7 +64,7 @@ pub enum Operators {
 }
 
 impl Operators {
-    /// Whether a browser at this address is one of them.
+    /// Whether a browser at this address may give orders.
     pub fn admit(self, address: SocketAddr) -> bool {
         match self {
             Self::All => true,
@@ -74,7 +74,7 @@ impl Operators {
     }
 }
 
-/// A web server that has its port.
+/// A web server whose port is bound.
 #[derive(Debug)]
 pub struct WebServer {
     listener: TcpListener,
@@ -90,7 +90,7 @@ struct App {
 }
 
 impl WebServer {
-    /// Takes the port. `upstream` says in words where the server is looked for.
+    /// Binds the port. `upstream` describes where the server is looked for.
     pub async fn bind(config: WebConfig, hub: Arc<Hub>, upstream: String) -> Result<Self, ViewError> {
         let failed = |source| ViewError::Listen { address: config.listen, source };
         let listener = TcpListener::bind(config.listen).await.map_err(failed)?;
@@ -98,7 +98,7 @@ impl WebServer {
         Ok(Self { listener, address, app: Arc::new(App { hub, config, upstream }) })
     }
 
-    /// Where it listens.
+    /// Address that the server listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }

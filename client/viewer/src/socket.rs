@@ -1,4 +1,4 @@
-//! One browser: its WebSocket, from the hello to the good-bye.
+//! The WebSocket of one browser, from the hello to the end.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -18,22 +18,22 @@ use tokio::time::{Instant, interval_at};
 use crate::door::PING;
 use crate::hub::{Hub, Seat, Up, encode};
 
-/// Largest message a page may send [bytes]; a pose takes about 300.
+/// Largest message that a page may send [bytes]. A pose takes about 300.
 pub const MAX_UP_BYTES: usize = 64 * 1024;
 
-/// Messages in a row that may be malformed before the page is sent away.
+/// After this many malformed messages in a row the page is disconnected.
 const MAX_MALFORMED: u32 = 16;
 
-/// What a page may do.
+/// Permissions of a page.
 #[derive(Debug, Clone, Copy)]
 pub struct Rights {
-    /// It may only watch.
+    /// The page may only watch.
     pub read_only: bool,
-    /// It may pause, step, reset and set.
+    /// The page may pause, step, reset and set.
     pub operator: bool,
 }
 
-/// Serves one browser until it leaves.
+/// Serves one browser until it disconnects.
 pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: String, rights: Rights) {
     let (mut sink, mut stream) = socket.split();
     let hello = encode(&Down::Hello(ViewerHello {
@@ -56,7 +56,7 @@ pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: Strin
                     Some(message) => Message::Binary(message),
                     None => return,
                 },
-                // The answer keeps the connection open; without one it ends.
+                // The browser's answer keeps the connection open; without one it ends.
                 _ = ping.tick() => Message::Ping(Bytes::new()),
             };
             if sink.send(message).await.is_err() {
@@ -86,7 +86,7 @@ pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: Strin
     tokio::select! { () = send => {}, () = receive => {} }
 }
 
-/// Applies one message of the page. Identity is the seat's; what the page claims is overwritten.
+/// Handles one message of the page. The ids are those of the seat and replace what the page claims.
 async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, rights: Rights) -> Result<(), String> {
     let up = ViewerUp::decode(bytes).map_err(|error| error.to_string())?;
     let message = up.message.ok_or("empty message")?;

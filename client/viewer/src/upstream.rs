@@ -1,7 +1,7 @@
-//! The link to the server: what it says goes to the hub, what browsers want goes to it.
+//! The link to the server. Its messages go to the hub, and messages of browsers go to it.
 //!
-//! Surfaces and tool states are subscribed only while a browser watches, so that a server whose
-//! viewers are all closed builds no surface.
+//! Surfaces and tool states are subscribed only while a browser watches. A server whose viewers are all
+//! closed therefore builds no surface.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,13 +22,13 @@ use crate::hub::{Hub, Up};
 /// Pause between two attempts to reach a server.
 const RETRY: Duration = Duration::from_millis(700);
 
-/// A tool that said nothing for this long has left.
+/// A tool that has sent nothing for this long has left.
 const TOOL_SILENCE: Duration = Duration::from_millis(1500);
 
-/// How long a server that is seen may take to say what it runs.
+/// Longest time between the appearance of a server and its answer to `info`.
 const INFO_PATIENCE: Duration = Duration::from_secs(10);
 
-/// Keeps a link for as long as the viewer lives.
+/// Keeps a link to the server for as long as the viewer lives.
 pub async fn run(hub: Arc<Hub>, mut up: mpsc::Receiver<Up>, config: LinkConfig) {
     let place = config.connect.join(", ");
     loop {
@@ -54,7 +54,7 @@ pub async fn run(hub: Arc<Hub>, mut up: mpsc::Receiver<Up>, config: LinkConfig) 
     }
 }
 
-/// Answers browsers while there is nobody to ask. Ends when the hub is gone.
+/// Refuses calls of browsers while there is no server. Ends when the hub is gone.
 async fn refuse_calls(hub: &Hub, up: &mut mpsc::Receiver<Up>, words: &str) {
     while let Some(message) = up.recv().await {
         if let Up::Rpc { browser, call } = message {
@@ -63,7 +63,7 @@ async fn refuse_calls(hub: &Hub, up: &mut mpsc::Receiver<Up>, words: &str) {
     }
 }
 
-/// Relays over one link. `Ok` when the hub is gone.
+/// Relays messages over one link. Returns `Ok` when the hub is gone.
 async fn relay(
     hub: &Arc<Hub>,
     up: &mut mpsc::Receiver<Up>,
@@ -106,10 +106,10 @@ async fn relay(
     }
 }
 
-/// What is followed on the server, by tasks that end when they are dropped.
+/// Topics followed on the server. Their tasks end when they are dropped.
 #[derive(Default)]
 struct Followed {
-    /// The server that was there.
+    /// Generation of the server that they belong to.
     generation: u64,
     /// Ids of the bodies, while surfaces and tools are followed.
     bodies: Vec<String>,
@@ -118,7 +118,7 @@ struct Followed {
     measures: Option<JoinSet<()>>,
 }
 
-/// Brings what we follow in line with who is there: a server, and what browsers watch.
+/// Adjusts the followed topics to the present server and to what browsers watch.
 async fn refresh(hub: &Arc<Hub>, link: &Link, place: &str, followed: &mut Followed) -> Result<(), LinkError> {
     let presence = *link.presence().borrow();
     let watched = *hub.watched().borrow();
@@ -158,14 +158,14 @@ async fn refresh(hub: &Arc<Hub>, link: &Link, place: &str, followed: &mut Follow
     Ok(())
 }
 
-/// Every new message of a topic to the hub.
+/// Forwards every new message of a topic to the hub.
 async fn pass_on<M: Clone>(hub: Arc<Hub>, mut latest: Latest<M>, to_down: fn(M) -> Down) {
     while let Ok(message) = latest.next().await {
         hub.publish(to_down((*message).clone()));
     }
 }
 
-/// Starts to follow every body and the tools of the server that is there now; the ids of the bodies.
+/// Starts to follow every body and tool of the present server, and returns the ids of the bodies.
 async fn follow_scene(hub: &Arc<Hub>, link: &Link) -> Result<(Vec<String>, JoinSet<()>), LinkError> {
     let asked = Instant::now();
     let info = loop {
@@ -190,7 +190,7 @@ async fn follow_scene(hub: &Arc<Hub>, link: &Link) -> Result<(Vec<String>, JoinS
     Ok((bodies, tasks))
 }
 
-/// Surfaces of one body: the topology when it changed, then the frame.
+/// Forwards the surface of one body: the topology if it changed, then the frame.
 async fn follow_body(hub: Arc<Hub>, mut mirror: BodyMirror) {
     let mut shown = None;
     while let Ok(surface) = mirror.next().await {
@@ -202,7 +202,7 @@ async fn follow_body(hub: Arc<Hub>, mut mirror: BodyMirror) {
     }
 }
 
-/// States of all tools, and word of those that fell silent.
+/// Forwards the states of all tools, and reports tools that fall silent.
 async fn follow_tools(hub: Arc<Hub>, mut states: ToolStates) {
     let mut shown: BTreeMap<String, (Arc<ToolState>, Instant)> = BTreeMap::new();
     let mut clock = interval(TOOL_SILENCE / 3);
@@ -223,7 +223,7 @@ async fn follow_tools(hub: Arc<Hub>, mut states: ToolStates) {
                 for (id, (_, at)) in &mut shown {
                     if at.elapsed() > TOOL_SILENCE {
                         hub.publish(Down::ToolGone(ViewerToolGone { tool_id: id.clone() }));
-                        // Said once; a new state shows the tool again.
+                        // Reported once; a new state shows the tool again.
                         *at += Duration::from_secs(365 * 86_400);
                     }
                 }
@@ -232,8 +232,8 @@ async fn follow_tools(hub: Arc<Hub>, mut states: ToolStates) {
     }
 }
 
-/// The mouse tools of all browsers. Each has a liveliness token of its own, so that the server
-/// takes it back when its browser leaves, and all of them when the viewer does.
+/// The mouse tools of all browsers. Each has a liveliness token of its own. The server takes the tool back
+/// when its browser leaves, and all tools when the viewer leaves.
 struct Hands {
     link: Link,
     held: BTreeMap<String, GuestTool>,
@@ -267,7 +267,7 @@ impl Hands {
     }
 }
 
-/// One call of a page, answered.
+/// Makes one call of a page and returns the answer.
 async fn ask(link: &Link, call: ViewerRpc) -> ViewerRpcReply {
     let call_id = call.call_id;
     let mut answer = ViewerRpcReply { call_id, ..ViewerRpcReply::default() };

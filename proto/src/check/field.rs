@@ -5,7 +5,7 @@ use crate::key::is_chunk;
 use crate::limits::{MAX_COORDINATE_M, MAX_ID_BYTES, MAX_TEXT_BYTES, MAX_TOOL_M, QUATERNION_TOLERANCE};
 use crate::messages::{Error, Pose, ToolShape, Vec3, Vec3f, tool_shape::Kind};
 
-/// The message under check; every error names it.
+/// Name of the message under check, which every error states.
 #[derive(Clone, Copy)]
 pub(super) struct In(pub &'static str);
 

@@ -1,4 +1,4 @@
-//! Surfaces: array lengths agree with counts, positions are finite, triangles name vertices.
+//! Surfaces: array lengths agree with counts, positions are finite, triangles refer to existing vertices.
 
 use prost::Name as _;
 

@@ -26,7 +26,7 @@ mod study_progress;
 
 pub mod stress;
 
-/// Parses, runs, and turns the outcome into an exit code: the one place that does.
+/// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     scindo_program::start_log("error,scindo=info,scindo_world=info,scindo_view=info,scindo_client=warn");

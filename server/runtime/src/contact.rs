@@ -1,6 +1,6 @@
-//! The contact thread: a local contact model per tool at its own rate, on the newest snapshot and
-//! the newest pose, beside the simulation. It computes only for tools whose contact somebody
-//! subscribes to, and asks the simulation for surfaces only then.
+//! The contact thread computes a local contact model per tool, at its own rate beside the simulation. It uses
+//! the newest snapshot and the newest pose. It computes, and asks the simulation for surfaces, only while
+//! somebody subscribes to the contact of a held tool.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,31 +22,31 @@ use zenoh::{Session, Wait as _};
 use crate::exchange::Exchange;
 use crate::wire::convert::{to_pose, unix_ns};
 
-/// How often an idle thread looks for somebody who holds a tool.
+/// How often an idle thread checks whether somebody holds a tool.
 const IDLE: Duration = Duration::from_millis(5);
 
-/// What the thread is given.
+/// Fixed settings of the contact thread.
 pub struct ContactConfig {
-    /// Keys of the session.
+    /// Key space of the session.
     pub keys: KeySpace,
-    /// The haptic session.
+    /// The session on which contacts are published.
     pub haptic: Session,
-    /// Models per second and tool.
+    /// Contact models per second and tool [Hz].
     pub rate_hz: f64,
-    /// Tools of the scene.
+    /// Shapes of the scene's tools, by id.
     pub shapes: BTreeMap<String, ToolShape>,
-    /// Bodies of the scene, in its order.
+    /// Ids of the scene's bodies, in scene order.
     pub bodies: Vec<String>,
 }
 
-/// The way out for one held tool.
+/// Publisher of the contact of one held tool.
 struct Line {
     publisher: Publisher<'static>,
     wanted: Arc<AtomicBool>,
     seq: u64,
 }
 
-/// The thread's state.
+/// State of the contact thread.
 pub struct ContactThread {
     config: ContactConfig,
     exchange: Arc<Exchange>,
@@ -58,7 +58,7 @@ pub struct ContactThread {
 }
 
 impl ContactThread {
-    /// A thread that has nothing to do yet.
+    /// Creates an idle thread.
     pub fn new(config: ContactConfig, exchange: Arc<Exchange>, snapshots: Output<Snapshot>) -> Self {
         Self {
             config,
@@ -71,9 +71,9 @@ impl ContactThread {
         }
     }
 
-    /// Serves until the server ends.
+    /// Runs until the server ends.
     pub fn run(mut self) {
-        // The scene keeps the rate between 50 and 2000 Hz.
+        // Scenes allow 50 to 2000 Hz.
         let period = Duration::from_secs_f64(1.0 / self.config.rate_hz.max(1.0));
         let mut next = Instant::now();
         while !self.exchange.stopping() {
@@ -86,7 +86,7 @@ impl ContactThread {
         }
     }
 
-    /// Who holds which tool, and whether anybody wants its contact.
+    /// Updates which tools are held. True if somebody wants the contact of one of them.
     fn look(&mut self) -> bool {
         self.held.clear();
         self.held.extend(self.exchange.inbox().held().cloned());
@@ -104,7 +104,7 @@ impl ContactThread {
         wanted
     }
 
-    /// One model per tool.
+    /// Computes and publishes one model per tool.
     fn tick(&mut self) {
         let now_s = self.epoch.elapsed().as_secs_f64();
         if self.snapshots.update() {
@@ -180,7 +180,7 @@ fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> HapticContac
         body_id: String::new(),
         tool_pose_used: Some(to_pose(&model.pose_used)),
         mode: mode.into(),
-        // Planes come with the most pressing first; one datagram holds this many.
+        // Planes are sorted by urgency. One datagram holds this many.
         contacts: model.planes.iter().take(MAX_CONTACTS).map(to_contact).collect(),
         validity_ms: (1e3 * model.validity_s) as f32,
         max_force_n: model.max_force_n as f32,
@@ -207,7 +207,7 @@ fn to_vec3f(v: &Vector3<f64>) -> wire::Vec3f {
     wire::Vec3f { x: v.x as f32, y: v.y as f32, z: v.z as f32 }
 }
 
-/// Never advises more than the device said it can do.
+/// Limits the advice to what the device said it can do.
 fn heed_device(message: &mut HapticContact, exchange: &Exchange) {
     let inbox = exchange.inbox();
     let Some(device) = inbox.capability_of(&message.tool_id) else { return };

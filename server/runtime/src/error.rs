@@ -1,4 +1,4 @@
-//! What can go wrong in the server, and the exit code it means.
+//! Errors of the server, and their exit codes.
 
 use std::process::ExitCode;
 
@@ -13,37 +13,37 @@ use thiserror::Error;
 /// Failure of a command.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
-    /// The scene or a value in it.
+    /// The scene, or a value in it, is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A mesh file that cannot be read or written.
+    /// A mesh file cannot be read or written.
     #[error(transparent)]
     Mesh(#[from] MeshInError),
-    /// Results that cannot be written.
+    /// Results cannot be written.
     #[error(transparent)]
     Results(#[from] ResultsError),
-    /// A mesh that cannot be written where it was asked for.
+    /// A mesh cannot be written to the requested file.
     #[error("{0}; check that the directory exists and is writable")]
     Unwritten(MeshInError),
-    /// A study of accuracy.
+    /// A study of accuracy failed.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// A case that does not exist, or a page that cannot be written.
+    /// A stress case does not exist, or its page cannot be written.
     #[error(transparent)]
     Stress(#[from] StressError),
-    /// An option of the command line that cannot be used.
+    /// An option of the command line cannot be used.
     #[error("{option} '{value}': {reason}. {next}")]
     Option {
-        /// The option.
+        /// The option, as typed.
         option: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: String,
-        /// Why it cannot be used.
+        /// Why the value cannot be used.
         reason: String,
-        /// What to do instead.
+        /// What the user can do instead.
         next: String,
     },
-    /// Realm, session or id that cannot stand in a key.
+    /// Realm, session or id cannot stand in a key.
     #[error(transparent)]
     Key(#[from] KeyError),
     /// A port is taken or an address is not ours.
@@ -52,33 +52,33 @@ pub enum RuntimeError {
          choose another address with --listen tcp/HOST:PORT (PORT and the next one are used)"
     )]
     Listen {
-        /// The endpoints.
+        /// The endpoints that could not be opened.
         endpoints: String,
-        /// Zenoh's words.
+        /// Zenoh's message.
         reason: String,
     },
-    /// Zenoh does not accept something.
+    /// Zenoh rejected something.
     #[error("{what}: {reason}")]
     Zenoh {
-        /// What was tried.
+        /// The attempted action.
         what: String,
-        /// Zenoh's words.
+        /// Zenoh's message.
         reason: String,
     },
-    /// The browser viewer does not start.
+    /// The browser viewer cannot start.
     #[error("viewer at {address}: {reason}. Choose another address with --viewer HOST:PORT")]
     Viewer {
-        /// The address.
+        /// The address that was tried.
         address: String,
-        /// Why not.
+        /// The system's message.
         reason: String,
     },
-    /// The machine refuses a thread or a signal handler.
+    /// The system refused a thread or a signal handler.
     #[error("{what}: {reason}")]
     System {
-        /// What was tried.
+        /// The attempted action.
         what: String,
-        /// The system's words.
+        /// The system's message.
         reason: String,
     },
     /// A thread of the server panicked.
@@ -90,7 +90,7 @@ pub enum RuntimeError {
 }
 
 impl RuntimeError {
-    /// 2: what was asked for is not possible as written. 1: it was, but failed.
+    /// 2: the request is impossible as written. 1: it was possible but failed.
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Study(StudyError::Io { .. }) => ExitCode::from(1),
@@ -101,7 +101,7 @@ impl RuntimeError {
         }
     }
 
-    /// Stable name for `--json`.
+    /// Stable name of the error in `--json` output.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Scene(_) | Self::Study(StudyError::Scene(_)) => "scene",
@@ -121,7 +121,7 @@ impl RuntimeError {
     }
 }
 
-/// What zenoh says, without the place in its source.
+/// Zenoh's message without the location in its source.
 pub fn words(error: &zenoh::Error) -> String {
     let text = error.to_string();
     text.split(" at /").next().unwrap_or(&text).to_owned()

@@ -1,4 +1,4 @@
-//! What the threads share: newest inputs, who waits for what, and the way out.
+//! State shared by the threads: newest inputs, who waits for what, and queues to the publisher.
 
 pub mod meter;
 
@@ -16,20 +16,20 @@ use crate::inbox::Inbox;
 use crate::wire::convert::unix_ns;
 use meter::Meter;
 
-/// Messages that may wait for the publisher; beyond it events are dropped and counted.
+/// Capacity of the queue to the publisher. When it is full, events are dropped and counted.
 pub const OUTGOING: usize = 1024;
 
-/// Answers to cuts that may wait for the publisher. One that finds no place is counted; a client repeats its
-/// cut until it is answered, and the inbox knows the answer.
+/// Capacity of the queue of answers to cuts. An answer that finds it full is counted as lost. The client
+/// repeats its cut until it is answered, and the inbox remembers the answer.
 pub const ANSWERS: usize = 4096;
 
-/// What happens under one name is logged this often.
+/// Repeated events of one name are logged once in this time.
 const LOG_EVERY: Duration = Duration::from_secs(1);
 
 /// Events of one name that are published per [`LOG_EVERY`].
 const EVENTS_PER_NAME: u64 = 32;
 
-/// What the publisher sends besides surfaces and answers.
+/// Messages for the publisher other than surfaces and answers.
 #[derive(Debug)]
 pub enum Outgoing {
     /// Something happened.
@@ -38,63 +38,63 @@ pub enum Outgoing {
     Plan(Plan),
 }
 
-/// One per server.
+/// State shared by all threads of one server.
 pub struct Exchange {
     inbox: Mutex<Inbox>,
-    /// Rates and costs.
+    /// Rates and costs since the last report.
     pub meter: Meter,
-    /// Per body: somebody subscribes to its surface.
+    /// Per body: whether somebody subscribes to its surface.
     surface_wanted: Vec<AtomicBool>,
-    /// Per body: somebody subscribes to its stress.
+    /// Per body: whether somebody subscribes to its stress.
     stress_wanted: Vec<AtomicBool>,
-    /// Somebody subscribes to probes and energies.
+    /// Whether somebody subscribes to probes and energies.
     measures_wanted: AtomicBool,
-    /// Per body: epoch of the newest snapshot.
+    /// Per body: epoch of its newest snapshot.
     epochs: Vec<AtomicU32>,
-    /// Somebody asked for a keyframe.
+    /// Whether a keyframe query waits for an answer.
     keyframe_wanted: AtomicBool,
-    /// Somebody subscribes to the contact of a held tool.
+    /// Whether somebody subscribes to the contact of a held tool.
     contact_wanted: AtomicBool,
-    /// The server ends.
+    /// Set once, when all threads must end.
     stop: AtomicBool,
-    /// The simulation thread has ended: nothing more will be sent.
+    /// The simulation thread has ended: it sends nothing more.
     simulated: AtomicBool,
     /// Every thread has ended.
     closed: AtomicBool,
-    /// Raised to break off a step under way.
+    /// Raised to break off the current step.
     break_off: Arc<AtomicBool>,
-    /// When the order came that waits longest for the simulation thread.
+    /// When the oldest order arrived that the simulation thread has not looked at.
     order_since: Mutex<Option<Instant>>,
-    /// Simulation holds still.
+    /// Whether the simulation is paused.
     pub paused: AtomicBool,
-    /// Steps done.
+    /// Steps done, including those that panicked.
     pub sim_step: AtomicU64,
     /// Steps that panicked.
     panicked_steps: AtomicU64,
-    /// Events lost because the publisher was behind, or because there were too many of one name.
+    /// Events lost because the publisher was behind or one name had too many.
     events_dropped: AtomicU64,
-    /// Answers to cuts lost because the publisher was behind; their clients ask again.
+    /// Answers to cuts lost because the publisher was behind. Their clients ask again.
     answers_lost: AtomicU64,
     event_seq: AtomicU64,
-    /// What `rpc/set` may change, as of the last change.
+    /// Parameters that `rpc/set` may change, after the last change.
     params: Mutex<ParamsReply>,
-    /// Since when, and how often since then, something happened under a name.
+    /// By name of event: start of the current interval, and events since then.
     told: Mutex<BTreeMap<String, (Instant, u64)>>,
     outgoing: Sender<Outgoing>,
     answers: Sender<CutAck>,
 }
 
-/// What becomes of an event.
+/// Whether an event is logged and published.
 struct News {
-    /// It is the first of its name since [`LOG_EVERY`].
+    /// It is the first of its name in this [`LOG_EVERY`].
     logged: bool,
     published: bool,
-    /// Events of its name that were not logged before it.
+    /// Earlier events of this name that were not logged.
     untold: u64,
 }
 
 impl Exchange {
-    /// For `bodies` bodies; `outgoing` and `answers` lead to the publisher.
+    /// State for `bodies` bodies; `outgoing` and `answers` lead to the publisher.
     pub fn new(
         inbox: Inbox,
         bodies: usize,
@@ -127,22 +127,22 @@ impl Exchange {
         })
     }
 
-    /// The inbox; held for microseconds only.
+    /// Locks the inbox. Callers hold the lock for microseconds only.
     pub fn inbox(&self) -> MutexGuard<'_, Inbox> {
         self.inbox.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What `rpc/set` may change.
+    /// A copy of the parameters that `rpc/set` may change.
     pub fn params(&self) -> ParamsReply {
         self.params.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Notes what `rpc/set` may change.
+    /// Replaces the parameters that `rpc/set` may change.
     pub fn set_params(&self, params: ParamsReply) {
         *self.params.lock().unwrap_or_else(PoisonError::into_inner) = params;
     }
 
-    /// Notes whether somebody subscribes to the surface of body `index`.
+    /// Records whether somebody subscribes to the surface of body `index`.
     pub fn want_surface(&self, index: usize, wanted: bool) {
         if let Some(flag) = self.surface_wanted.get(index) {
             flag.store(wanted, Ordering::Relaxed);
@@ -154,19 +154,19 @@ impl Exchange {
         self.surface_wanted.get(index).is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Notes whether somebody subscribes to the stress of body `index`.
+    /// Records whether somebody subscribes to the stress of body `index`.
     pub fn want_stress(&self, index: usize, wanted: bool) {
         if let Some(flag) = self.stress_wanted.get(index) {
             flag.store(wanted, Ordering::Relaxed);
         }
     }
 
-    /// Notes whether somebody subscribes to probes and energies.
+    /// Records whether somebody subscribes to probes and energies.
     pub fn want_measures(&self, wanted: bool) {
         self.measures_wanted.store(wanted, Ordering::Relaxed);
     }
 
-    /// Notes the epoch of body `index`.
+    /// Records the epoch of body `index`.
     pub fn set_epoch(&self, index: usize, epoch: u32) {
         if let Some(held) = self.epochs.get(index) {
             held.store(epoch, Ordering::Relaxed);
@@ -178,22 +178,22 @@ impl Exchange {
         self.epochs.get(index).map_or(0, |epoch| epoch.load(Ordering::Relaxed))
     }
 
-    /// Notes whether keyframes are waited for.
+    /// Records whether a keyframe query waits for an answer.
     pub fn want_keyframe(&self, wanted: bool) {
         self.keyframe_wanted.store(wanted, Ordering::Relaxed);
     }
 
-    /// True while a keyframe is waited for.
+    /// True while a keyframe query waits for an answer.
     pub fn keyframe_wanted(&self) -> bool {
         self.keyframe_wanted.load(Ordering::Relaxed)
     }
 
-    /// Notes whether contact models are waited for.
+    /// Records whether somebody waits for contact models.
     pub fn want_contact(&self, wanted: bool) {
         self.contact_wanted.store(wanted, Ordering::Relaxed);
     }
 
-    /// What the next step and snapshot must provide.
+    /// Writes into `wants` what the next step and snapshot must provide.
     pub fn wants_into(&self, wants: &mut Wants) {
         let keyframe = self.keyframe_wanted();
         wants.surface.clear();
@@ -210,36 +210,36 @@ impl Exchange {
         self.stop.store(true, Ordering::Relaxed);
     }
 
-    /// True when threads should end.
+    /// True once every thread has been asked to end.
     pub fn stopping(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// The flag that breaks off a step under way, for those who look at it.
+    /// The flag that breaks off the current step, for code that checks it during a step.
     pub fn break_off_flag(&self) -> &Arc<AtomicBool> {
         &self.break_off
     }
 
-    /// An order was given to the simulation thread.
+    /// Records that the simulation thread was given an order.
     pub fn order_given(&self) {
         self.orders().get_or_insert_with(Instant::now);
     }
 
-    /// The simulation thread looks at its orders: none has waited longer than since now.
+    /// Called when the simulation thread looks at its orders: no order has waited longer than since now.
     pub fn orders_taken(&self) {
         let mut since = self.orders();
         *since = None;
         self.break_off.store(self.stopping() && self.break_off.load(Ordering::Relaxed), Ordering::Relaxed);
     }
 
-    /// Breaks off the step under way if an order has waited for `patience`.
+    /// Breaks off the current step if an order has waited for `patience`.
     pub fn break_off_after(&self, patience: Duration) {
         if self.orders().is_some_and(|since| since.elapsed() >= patience) {
             self.break_off.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Breaks off the step under way.
+    /// Breaks off the current step.
     pub fn break_off(&self) {
         self.break_off.store(true, Ordering::Relaxed);
     }
@@ -248,7 +248,7 @@ impl Exchange {
         self.order_since.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The simulation thread has ended.
+    /// Records that the simulation thread has ended.
     pub fn has_simulated(&self) {
         self.simulated.store(true, Ordering::Release);
     }
@@ -258,7 +258,7 @@ impl Exchange {
         self.simulated.load(Ordering::Acquire)
     }
 
-    /// Every thread has ended.
+    /// Records that every thread has ended.
     pub fn close(&self) {
         self.closed.store(true, Ordering::Release);
     }
@@ -268,17 +268,17 @@ impl Exchange {
         self.closed.load(Ordering::Acquire)
     }
 
-    /// A step panicked; its state is lost and the scene starts again.
+    /// Counts a step that panicked. Its state is lost and the scene starts again.
     pub fn step_panicked(&self) {
         self.panicked_steps.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Steps that panicked so far. A run with any has not succeeded.
+    /// Steps that panicked so far. A run with any of them has failed.
     pub fn panicked_steps(&self) -> u64 {
         self.panicked_steps.load(Ordering::Relaxed)
     }
 
-    /// What was lost or went wrong so far, by name; only what is not zero.
+    /// Counts of what was lost or went wrong so far, by name; zero counts are left out.
     pub fn losses(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let all = [
             ("events-dropped", &self.events_dropped),
@@ -288,14 +288,14 @@ impl Exchange {
         all.map(|(name, count)| (name, count.load(Ordering::Relaxed))).into_iter().filter(|(_, n)| *n > 0)
     }
 
-    /// Hands something to the publisher; never waits. Without a publisher it is gone.
+    /// Queues a message for the publisher without waiting. Without a publisher it is discarded.
     pub fn send(&self, outgoing: Outgoing) {
         if self.outgoing.try_send(outgoing).is_err_and(|error| error.is_full()) {
             self.events_dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// Hands the answer to a cut to the publisher; never waits.
+    /// Queues the answer to a cut for the publisher without waiting.
     pub fn answer(&self, answer: CutAck) {
         if self.answers.try_send(answer).is_err_and(|error| error.is_full()) {
             self.answers_lost.fetch_add(1, Ordering::Relaxed);
@@ -317,8 +317,8 @@ impl Exchange {
         News { logged: false, published: *count <= EVENTS_PER_NAME, untold: 0 }
     }
 
-    /// Publishes and logs an event. The log has one line per name and [`LOG_EVERY`] of what goes on and on,
-    /// as a cut does while the blade moves; the next line says how many there were.
+    /// Publishes and logs an event. Repeated events, such as those of a moving blade, are logged once per
+    /// name and [`LOG_EVERY`]. The next line tells how many there were.
     pub fn event(&self, level: Level, name: &str, message: String) {
         let News { logged, published, untold } = self.news(name);
         if logged {
@@ -377,7 +377,7 @@ mod tests {
             .collect();
         assert_eq!(names.last().map(String::as_str), Some("reset"));
         let refused = names.iter().filter(|name| *name == "step-refused").count() as u64;
-        // A machine that stalls for a second may let a second handful through.
+        // A machine that stalls for a second may let a second batch through.
         assert!(refused <= 4 * EVENTS_PER_NAME, "{refused}");
         let dropped: Vec<_> = exchange.losses().collect();
         assert_eq!(dropped, [("events-dropped", OUTGOING as u64 - refused)]);

@@ -1,14 +1,14 @@
 //! The scindo server.
 //!
 //! # Layout, along the way of the data
-//! * [`command`]: what the user asked for, and how it goes.
-//! * [`wire`]: the two zenoh sessions, haptic and bulk, and who may give orders through them; messages from the
-//!   types of the world and back.
+//! * [`command`]: the commands and their outcome.
+//! * [`wire`]: the two zenoh sessions (haptic and bulk), who may give orders through them, and conversion
+//!   between messages and the types of the world.
 //! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
-//! * [`exchange`]: what the threads share.
+//! * [`exchange`]: state shared by the threads.
 //! * [`sim`]: the simulation thread.
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
-//! * [`publish`]: the publication thread, and those that answer late joiners.
+//! * [`publish`]: the publication thread, and the threads that answer late joiners.
 //! * [`rpc`]: questions and orders.
 //! * [`server`]: starts and ends all of these.
 //!

@@ -1,5 +1,6 @@
-//! The publication thread: surfaces and tool states of the newest snapshot at each topic's rate,
-//! keyframes on query, answers, events, the plan, statistics. The simulation never waits for it.
+//! The publication thread sends surfaces and tool states of the newest snapshot at the rate of each topic. It
+//! also sends keyframes on query, answers, events, the plan and statistics. The simulation never waits for
+//! it.
 
 pub mod on_demand;
 
@@ -34,20 +35,20 @@ use keyframes::Keyframes;
 use on_demand::OnDemand;
 use stats::{Told, body_stats};
 
-/// The thread looks for keyframe queries and its end at least this often.
+/// The thread checks for keyframe queries and for its end at least this often.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// The longest time between two messages of a topic, however low its rate.
+/// Longest time between two messages of a topic, however low its rate.
 const LONGEST_PERIOD: Duration = Duration::from_secs(60);
 
-/// The plan is repeated this often for those who joined late.
+/// The plan is repeated this often for late joiners.
 const PLAN_PERIOD: Duration = Duration::from_secs(2);
 
-/// Tools are told this often when no new snapshot comes: who joins a paused simulation sees them too. Surfaces
-/// are told once more: the last frame before may have been dropped on its way.
+/// Without a new snapshot, tools are repeated this often: late joiners to a paused simulation see them as
+/// well. Surfaces are repeated only once, because the last frame may have been lost on its way.
 const STILL_PERIOD: Duration = Duration::from_millis(500);
 
-/// Publishers of one body.
+/// Publishers of the surface of one body.
 struct BodyChannel {
     frame: Publisher<'static>,
     topology: Publisher<'static>,
@@ -57,31 +58,31 @@ struct BodyChannel {
     _keyframe: Queryable<()>,
 }
 
-/// What the publisher reads.
+/// Inputs of the publisher.
 pub struct Sources {
-    /// Newest state.
+    /// Newest state of the simulation.
     pub snapshots: Output<Snapshot>,
     /// Events and plans.
     pub outgoing: Receiver<Outgoing>,
-    /// Answers to cuts.
+    /// Answers to cuts of clients.
     pub answers: Receiver<CutAck>,
 }
 
-/// What is published, and how often.
+/// Fixed settings: what is published, and how often.
 pub struct Published {
-    /// Ids of the bodies in the order of the scene.
+    /// Ids of the bodies, in scene order.
     pub bodies: Vec<String>,
-    /// Probes in the order of the scene.
+    /// Probes, in scene order.
     pub probes: Vec<ProbeName>,
     /// Simulated time per step [s].
     pub step_s: f64,
-    /// The plan at the start.
+    /// The first plan; later ones arrive through [`Sources::outgoing`].
     pub plan: Plan,
-    /// Surfaces and statistics per second.
+    /// Surfaces per second, and statistics per second [Hz].
     pub rates: (f64, f64),
 }
 
-/// The thread's state.
+/// State of the publication thread.
 pub struct PublishThread {
     keys: KeySpace,
     exchange: Arc<Exchange>,
@@ -98,9 +99,9 @@ pub struct PublishThread {
     events: Publisher<'static>,
     plan: Publisher<'static>,
     newest_plan: Plan,
-    /// A snapshot came that was not published yet.
+    /// A new snapshot arrived and is not published yet.
     fresh: bool,
-    /// The newest snapshot's surfaces were told only once.
+    /// Surfaces of the newest snapshot were sent only once.
     told_once: bool,
     keyframes: Keyframes,
     tool_states: u64,
@@ -112,7 +113,7 @@ pub struct PublishThread {
 }
 
 impl PublishThread {
-    /// Declares every topic.
+    /// Declares all topics.
     pub fn declare(
         keys: &KeySpace,
         sessions: &Sessions,
@@ -155,7 +156,7 @@ impl PublishThread {
         })
     }
 
-    /// Publishes until the server ends: what the simulation says last is sent, too.
+    /// Publishes until the server ends, including the simulation's last messages.
     pub fn run(mut self) {
         let mut next_frame = Instant::now();
         while !(self.exchange.stopping() && self.exchange.simulated()) {
@@ -172,7 +173,7 @@ impl PublishThread {
         self.send_until(Instant::now());
     }
 
-    /// Answers and events, as they come, until `deadline`.
+    /// Sends answers and events as they arrive, until `deadline`.
     fn send_until(&mut self, deadline: Instant) {
         for _ in 0..OUTGOING {
             let left = deadline.saturating_duration_since(Instant::now());
@@ -213,8 +214,8 @@ impl PublishThread {
         }
     }
 
-    /// To a client that does not read it is lost: nobody else waits for that. The client repeats its cut.
-    /// Answers to many cuts of one moment share a batch: as express messages most of them would be dropped.
+    /// Sends an answer. A client that does not read loses it and repeats its cut, so that nobody else waits.
+    /// Answers to many simultaneous cuts share a batch; most of them would be dropped as express messages.
     fn send_ack(&self, answer: &CutAck) {
         let Ok(tool) = Chunk::new("tool id", &answer.tool_id) else { return };
         let sent = self
@@ -246,7 +247,7 @@ impl PublishThread {
         self.on_demand.publish(snapshot);
     }
 
-    /// The snapshot may hold tools that a client has put away since: of those nothing is said.
+    /// Publishes the tools of the newest snapshot, except those that a client has put away since.
     fn publish_tools(&mut self) {
         self.tool_states += 1;
         let snapshot = self.sources.snapshots.output_buffer();
@@ -277,7 +278,7 @@ impl PublishThread {
         self.tools.retain(|id, _| snapshot.tools.iter().any(|tool| tool.id == *id));
     }
 
-    /// Answers those whose body is in the snapshot; the others wait for the next one.
+    /// Answers queries whose body is in the snapshot. The others wait for the next snapshot.
     fn answer_keyframe_queries(&mut self) {
         let Self { sources, bodies, keyframes, .. } = self;
         let snapshot = sources.snapshots.output_buffer();
@@ -335,7 +336,7 @@ impl PublishThread {
     }
 }
 
-/// The whole surface of a body, if the snapshot has it.
+/// The whole surface of a body. `None` if the snapshot does not hold it.
 fn keyframe(snapshot: &Snapshot, body: &BodySnapshot, channel: &BodyChannel) -> Option<Bytes> {
     if body.positions.len() != body.topology.vertex_count as usize || body.positions.is_empty() {
         return None;
@@ -369,8 +370,8 @@ fn body_channel(
         .map_err(failed)?;
     let topology_encoding = encoding::<SurfaceTopology>();
     let topology_key = key(Topic::SurfaceTopology);
-    // Never `Block`: this thread serves everybody. A client that misses a topology asks for the keyframe, whose
-    // answer has priority `Data`.
+    // Never `Block`: this thread serves all clients. A client that misses a topology asks for the keyframe,
+    // and that answer has priority `Data`.
     let topology =
         declare(bulk, topology_key, topology_encoding, Priority::DataHigh, CongestionControl::Drop)?;
     let watcher = exchange.clone();

@@ -1,4 +1,4 @@
-//! From zenoh into the inbox. Runs on zenoh's receiving threads: decode, check, store, return.
+//! From zenoh into the inbox. This code runs on zenoh's receiving threads: decode, check, store, return.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,7 +16,7 @@ use crate::error::{RuntimeError, words};
 use crate::exchange::Exchange;
 use crate::inbox::{Change, Cut};
 
-/// Subscriptions of the server; dropping them ends the input.
+/// Subscriptions of the server. Dropping them ends the input.
 pub struct Receivers {
     _subscribers: Vec<Subscriber<()>>,
     _token: LivelinessToken,
@@ -112,7 +112,7 @@ fn on_capability(_: &KeySpace, exchange: &Exchange, sample: &Sample) {
     }
 }
 
-/// The message of a sample; one that is too large is not even copied.
+/// Decodes the message of a sample. An oversized one is refused before it is copied.
 pub fn decode<M: WireMessage>(sample: &Sample) -> Result<M, DecodeError> {
     let found = sample.payload().len();
     if found > M::MAX_BYTES {
@@ -125,7 +125,7 @@ pub fn decode<M: WireMessage>(sample: &Sample) -> Result<M, DecodeError> {
 
 fn announce(exchange: &Exchange, change: Change) {
     match change {
-        // Guests, as the mouse of a page, come and go with a tool of their own name.
+        // Guests, such as the mouse of a page, come and go with a tool of their own name.
         Change::Taken { tool, owner } if tool == owner => {
             exchange.event(Level::Info, "tool-taken", format!("'{tool}' takes part"));
         }
@@ -147,7 +147,7 @@ fn refuse(exchange: &Exchange, code: &'static str, message: &str) {
     seldom(exchange, code, message);
 }
 
-/// An event for the 1st, 10th, 100th … refusal of a kind: a broken client sends thousands.
+/// Publishes an event for the 1st, 10th, 100th … refusal of a kind: a broken client sends thousands.
 fn seldom(exchange: &Exchange, code: &'static str, message: &str) {
     let count = exchange.inbox().refused().get(code).copied().unwrap_or(0);
     if count > 0 && 10_u64.pow(count.ilog10()) == count {

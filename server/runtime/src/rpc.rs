@@ -1,4 +1,4 @@
-//! Questions and orders under `rpc/`: one thread answers them in turn.
+//! Questions and orders under `rpc/`. One thread answers them in turn.
 
 pub mod catalogue;
 
@@ -22,30 +22,30 @@ use crate::exchange::Exchange;
 use crate::sim::{Command, Order};
 use catalogue::Catalogue;
 
-/// Questions that may wait; beyond it they are refused at once.
+/// Most questions that may wait. Further ones are refused at once.
 pub const WAITING: usize = 32;
 
-/// A client waits two seconds; an order that takes longer is answered "accepted" before.
+/// A client waits two seconds. An order that takes longer than this is answered "accepted" beforehand.
 const PATIENCE: Duration = Duration::from_millis(1700);
 
-/// How often the thread looks whether the server ends.
+/// How often the thread checks whether the server ends.
 const IDLE: Duration = Duration::from_millis(100);
 
-/// The thread's state.
+/// State of the rpc thread.
 pub struct RpcThread {
-    /// Keys of the session.
+    /// Key space of the session.
     pub keys: KeySpace,
-    /// Shared state.
+    /// State shared with the other threads.
     pub exchange: Arc<Exchange>,
-    /// Questions from zenoh.
+    /// Queue of questions that zenoh's threads fill.
     pub queries: Receiver<Query>,
-    /// Orders to the simulation.
+    /// Queue of orders to the simulation.
     pub commands: Sender<Command>,
-    /// What does not change of the answer to `info`.
+    /// The constant part of the answer to `info`.
     pub info: SessionInfo,
     /// Scenes that may be loaded.
     pub catalogue: Arc<Catalogue>,
-    /// Whether anybody may give orders.
+    /// Whether orders are taken at all.
     pub takes_orders: bool,
 }
 
@@ -93,7 +93,7 @@ impl RpcThread {
         }
     }
 
-    /// The scene is built while this one goes on; an event says why, should that fail.
+    /// Accepts the scene; it is built while the present one goes on. If that fails, an event says why.
     fn load(&self, name: &str) -> RpcReply {
         let reply = match self.catalogue.ask(name) {
             Ok(()) => RpcReply { ok: true, message: format!("building {name}"), ..RpcReply::default() },
@@ -102,7 +102,7 @@ impl RpcThread {
         RpcReply { sim_step: self.exchange.sim_step.load(Ordering::Relaxed), ..reply }
     }
 
-    /// Owners and epochs as they are now.
+    /// The answer to `info` with present owners and epochs.
     fn info_now(&self) -> SessionInfo {
         let mut info = self.info.clone();
         let held: Vec<ToolInput> = self.exchange.inbox().held().cloned().collect();
@@ -170,7 +170,7 @@ fn reply<M: WireMessage>(query: &Query, message: &M) {
     }
 }
 
-/// Answers with an error message.
+/// Answers a query with an error message.
 pub fn refuse(query: &Query, error: Error) {
     let encoding = "application/protobuf;scindo.v1.Error";
     if let Err(error) = query.reply_err(error.encode_to_vec()).encoding(encoding).wait() {

@@ -1,4 +1,4 @@
-//! A running server: what is started, in which order, and how it ends.
+//! A running server: which threads it starts, in which order, and how it ends.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -27,33 +27,33 @@ use crate::watchdog;
 use crate::wire::convert::ProbeName;
 use crate::wire::session::Sessions;
 
-/// Orders that may wait for the simulation thread.
+/// Most orders that may wait for the simulation thread.
 const WAITING_ORDERS: usize = 16;
 
-/// How a server runs.
+/// Fixed settings of a server.
 #[derive(Debug, Clone)]
 pub struct ServerConfig {
     /// First chunk of every key.
     pub realm: String,
-    /// Session within the realm.
+    /// Session within the realm; the second variable part of every key.
     pub session: String,
-    /// How fast and how long.
+    /// How fast and how long the simulation runs.
     pub pace: Pace,
-    /// Surfaces and tool states per second.
+    /// Surfaces and tool states per second [Hz].
     pub surface_hz: f64,
-    /// Contact models per second and held tool.
+    /// Contact models per second and held tool [Hz].
     pub contact_hz: f64,
-    /// Statistics per second.
+    /// Statistics per second [Hz].
     pub stats_hz: f64,
     /// Scenes that clients may change to.
     pub catalogue: Arc<Catalogue>,
-    /// The name under which the scene that runs is listed there; empty for one that is not.
+    /// Name of the present scene in the catalogue; empty if it is not listed.
     pub scene: String,
-    /// How many scenes ran before it.
+    /// Number of scenes that ran before this one.
     pub scene_seq: u32,
-    /// Whether orders are taken at all; who may send them is settled where the sessions are opened.
+    /// Whether orders are taken at all. Who may send them is settled where the sessions are opened.
     pub takes_orders: bool,
-    /// What to do, with the reason, when the threads do not end after they were told to: a program ends itself.
+    /// Called with the reason when threads do not end after they were told to. A program ends itself here.
     pub give_up: fn(&str),
 }
 
@@ -75,7 +75,7 @@ impl Default for ServerConfig {
     }
 }
 
-/// See the module.
+/// A running server and its threads.
 pub struct Server {
     exchange: Arc<Exchange>,
     sim: JoinHandle<Engine>,
@@ -91,8 +91,8 @@ struct Network {
 }
 
 impl Server {
-    /// Starts every thread: publication, orders, contact, input, simulation; without sessions
-    /// only the simulation.
+    /// Starts every thread: publication, orders, contact, input, simulation. Without sessions it starts only
+    /// the simulation.
     pub fn start(
         engine: Engine,
         sessions: Option<Sessions>,
@@ -148,17 +148,17 @@ impl Server {
         Ok(Self { exchange, sim, others, watchdog, network })
     }
 
-    /// Shared state, for progress and tests.
+    /// State shared by the threads, for progress and tests.
     pub fn exchange(&self) -> &Arc<Exchange> {
         &self.exchange
     }
 
-    /// Steps done.
+    /// Steps done since the start.
     pub fn steps(&self) -> u64 {
         self.exchange.sim_step.load(Ordering::Relaxed)
     }
 
-    /// True when the simulation thread has ended: all steps done, or told to stop.
+    /// True when the simulation thread has ended, because all steps are done or it was told to stop.
     pub fn finished(&self) -> bool {
         self.sim.is_finished()
     }
@@ -168,7 +168,7 @@ impl Server {
         self.exchange.stop();
     }
 
-    /// Waits for the simulation to end, then ends the rest; gives the engine back for its results.
+    /// Waits for the simulation to end, then ends the other threads. Returns the engine for its results.
     pub fn join(self) -> Result<Engine, RuntimeError> {
         let (engine, sessions) = self.release()?;
         for session in sessions.into_iter().flat_map(|sessions| [sessions.bulk, sessions.haptic]) {
@@ -179,7 +179,7 @@ impl Server {
         Ok(engine)
     }
 
-    /// The same, and gives back the sessions, for the next server: their clients stay connected.
+    /// Like [`join`](Self::join), but also returns the sessions for the next server: clients stay connected.
     pub fn release(self) -> Result<(Engine, Option<Sessions>), RuntimeError> {
         let engine = self.sim.join();
         self.exchange.stop();
@@ -195,7 +195,7 @@ impl Server {
             sessions
         });
         self.exchange.close();
-        // It has nothing to say any more.
+        // Its result no longer matters.
         let _ = self.watchdog.join();
         let engine = engine.map_err(|_| RuntimeError::Died { thread: "sim".to_owned() })?;
         Ok((engine, sessions))

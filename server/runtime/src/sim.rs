@@ -18,56 +18,56 @@ use crate::exchange::{Exchange, Outgoing};
 use crate::inbox::{Answering, Refusal};
 use engine::Engine;
 
-/// How often a simulation that holds still looks for new listeners.
+/// How often a paused simulation checks for new listeners.
 const STILL: Duration = Duration::from_millis(10);
 
-/// A simulation later than this gives up the lost time instead of racing after it.
+/// A simulation that is later than this gives up the lost time instead of catching up.
 const MOST_BEHIND: Duration = Duration::from_millis(250);
 
-/// The plan, with what it costs and who listens, is told this often.
+/// The plan, with its costs and listeners, is sent this often.
 const PLAN_PERIOD: Duration = Duration::from_secs(1);
 
-/// Steps in a row that may panic before the simulation is paused.
+/// After this many panics in a row the simulation is paused.
 const MOST_PANICS: u32 = 3;
 
-/// What an rpc asks of the simulation.
+/// An order that a client sends by rpc.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
-    /// Hold still or go on.
+    /// Pause (`true`) or go on (`false`).
     Pause(bool),
-    /// Advance a paused simulation.
+    /// Make this many steps while paused.
     Step(u32),
-    /// Back to the start.
+    /// Go back to the start of the scene.
     Reset,
     /// Take the last cut back.
     Undo,
-    /// Change a parameter.
+    /// Change a parameter of the scene.
     Set {
-        /// Key as in the scene.
+        /// Key, as in the scene file.
         key: String,
-        /// Value as in the scene.
+        /// Value, as in the scene file.
         value: String,
     },
 }
 
-/// An order and where its answer goes.
+/// An order and the channel of its answer.
 pub struct Command {
-    /// What to do.
+    /// The requested action.
     pub order: Order,
-    /// Holds one answer.
+    /// Channel that takes one answer.
     pub answer: Sender<RpcReply>,
 }
 
-/// How fast and how long.
+/// How fast and how long the simulation runs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Pace {
-    /// As fast as possible instead of real time.
+    /// Run as fast as possible instead of in real time.
     pub fast: bool,
-    /// End after this many steps.
+    /// End after this many steps; `None` runs until stopped.
     pub steps: Option<u64>,
 }
 
-/// The thread's state.
+/// State of the simulation thread.
 pub struct SimThread {
     engine: Engine,
     exchange: Arc<Exchange>,
@@ -79,7 +79,7 @@ pub struct SimThread {
     wanted: Wants,
     step: u64,
     next_step: Instant,
-    /// Steps a paused simulation still owes, and who waits for them.
+    /// Steps that a paused simulation still has to make, and the client that waits for them.
     owed: Option<(u32, Sender<RpcReply>)>,
     panics: u32,
     next_plan: Instant,
@@ -87,7 +87,7 @@ pub struct SimThread {
 }
 
 impl SimThread {
-    /// A simulation at its start.
+    /// Creates the thread's state before the first step.
     pub fn new(
         engine: Engine,
         exchange: Arc<Exchange>,
@@ -115,7 +115,7 @@ impl SimThread {
         }
     }
 
-    /// Steps until told to stop or done; gives the engine back for its results.
+    /// Steps until told to stop or done. Returns the engine for its results.
     pub fn run(mut self) -> Engine {
         let _ended = Ended(self.exchange.clone());
         self.engine.set_stop_flag(self.exchange.break_off_flag());
@@ -144,7 +144,7 @@ impl SimThread {
         self.exchange.paused.load(Ordering::Relaxed) && self.owed.is_none()
     }
 
-    /// Nothing moves, but somebody may begin to watch or give an order.
+    /// Waits while paused. Somebody may still begin to watch or give an order.
     fn wait_still(&mut self) {
         let mut wants = Wants::default();
         self.exchange.wants_into(&mut wants);
@@ -186,7 +186,7 @@ impl SimThread {
             Order::Undo => self.undo(),
             Order::Set { key, value } => self.set(&key, &value),
         };
-        // Who asked may have given up waiting.
+        // The client may have given up waiting.
         let _ = answer.try_send(self.reply(reply));
     }
 
@@ -203,7 +203,7 @@ impl SimThread {
         Ok("at the start".to_owned())
     }
 
-    /// Answers the cuts that wait, here and in the simulation: they will not be made.
+    /// Answers every waiting cut, here and in the simulation, with `reason`: none of them will be made.
     fn discard_cuts(&mut self, reason: &str) {
         let (step, epochs) = (self.step, self.epochs());
         let hint = "send it again with a new number";
@@ -221,7 +221,7 @@ impl SimThread {
         bodies.map(|(i, id)| BodyEpoch { body_id: id.clone(), epoch: self.exchange.epoch(i) }).collect()
     }
 
-    /// The log of cuts stays: one that was taken back is still a duplicate when it is sent again.
+    /// Takes the last cut back. The log of cuts stays, so a repetition of that cut is still a duplicate.
     fn undo(&mut self) -> Result<String, Refusal> {
         let message = self.engine.undo().map_err(|message| Refusal {
             code: "cannot-undo",
@@ -263,7 +263,7 @@ impl SimThread {
         self.exchange.inbox().take(&mut self.inputs);
     }
 
-    /// One step. A panic costs the state, not the server: the scene starts again.
+    /// Makes one step. A panic costs the state but not the server: the scene starts again.
     fn advance(&mut self) {
         let (engine, inputs) = (&mut self.engine, &self.inputs);
         if catch_unwind(AssertUnwindSafe(|| engine.step(inputs))).is_ok() {
@@ -271,7 +271,7 @@ impl SimThread {
         } else {
             self.recover();
         }
-        // Of a panicked step, too: a run that was asked for so many must end.
+        // Panicked steps count as well: a run of so many steps must end.
         self.step += 1;
         self.exchange.sim_step.store(self.step, Ordering::Relaxed);
         if let Some((count, answer)) = self.owed.take() {
@@ -298,7 +298,7 @@ impl SimThread {
         }
     }
 
-    /// Times to the meter, notes to the events, answers to those who cut.
+    /// Reports a step: times to the meter, notes as events, answers to the clients that cut.
     fn report(&mut self) {
         if Instant::now() >= self.next_plan {
             self.next_plan = Instant::now() + PLAN_PERIOD;
@@ -334,8 +334,8 @@ impl SimThread {
         }
     }
 
-    /// Fresh snapshots for the publisher and, while somebody holds a tool, for the contact
-    /// thread. Without pace, only those that the last one has reached.
+    /// Hands fresh snapshots to the publisher and, while somebody holds a tool, to the contact thread. A run
+    /// as fast as possible skips the publisher while the last snapshot is unread.
     fn hand_over(&mut self) {
         self.exchange.wants_into(&mut self.wanted);
         if !self.pace.fast || self.to_publish.consumed() || !self.inputs.cuts.is_empty() {
@@ -352,7 +352,7 @@ impl SimThread {
         }
     }
 
-    /// Waits for the next step's time; orders are carried out meanwhile.
+    /// Waits until the next step is due, and carries out orders meanwhile.
     fn keep_pace(&mut self) {
         if self.pace.fast || self.owed.is_some() {
             return;
@@ -375,7 +375,7 @@ impl SimThread {
     }
 }
 
-/// Says that the simulation has ended, however it did.
+/// Reports the end of the simulation thread when dropped, even after a panic.
 struct Ended(Arc<Exchange>);
 
 impl Drop for Ended {

@@ -1,22 +1,22 @@
-//! Looks after the simulation thread: a step that keeps an order waiting is broken off, and a process that was
-//! told to end does end.
+//! Watches the simulation thread. It breaks off a step that keeps an order waiting. It also makes sure that a
+//! process ends after it was told to.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::exchange::Exchange;
 
-/// A step may keep an order waiting for this long before it is broken off.
+/// A step is broken off when it keeps an order waiting for this long.
 pub const ORDER_PATIENCE: Duration = Duration::from_millis(400);
 
-/// How often the thread looks.
+/// How often the thread checks.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Threads that were told to end may take this long.
+/// Longest time that threads may take to end after they were told to.
 pub const END_PATIENCE: Duration = Duration::from_millis(4000);
 
-/// Looks after the threads until all have ended. If they do not in time after they were told to, `give_up` is
-/// called with the reason: a program ends the process there.
+/// Watches the threads until all have ended. If they take too long after they were told to end, it calls
+/// `give_up` with the reason. A program ends its process there.
 pub fn run(exchange: &Arc<Exchange>, give_up: fn(&str)) {
     let mut told: Option<Instant> = None;
     while !exchange.closed() {

@@ -1,4 +1,4 @@
-//! The network: its sessions, who may give orders through them, and what the messages mean.
+//! The network: sessions, permissions for orders, and conversion of messages.
 
 pub mod session;
 

@@ -1,17 +1,17 @@
-//! How far a run is from the reference, in three measures, all relative.
+//! Distance of a run from the reference, in three relative measures.
 
 use serde::{Deserialize, Serialize};
 
 use crate::trial::series::Series;
 
-/// What a case is asked for: one number.
+/// The one number that the user of a case wants to know.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Goal {
-    /// In words, such as `deflection of the tip`.
+    /// Description, such as `deflection of the tip`.
     pub words: String,
-    /// Index of the probe; none: whichever probe moves furthest.
+    /// Index of the probe; `None` for the probe that moves furthest.
     pub probe: Option<usize>,
-    /// Component of its displacement that counts; none: its amount.
+    /// Direction in which the displacement is measured; `None` for its magnitude.
     pub direction: Option<[f64; 3]>,
 }
 
@@ -35,30 +35,31 @@ impl Goal {
         }
     }
 
-    /// The goal [m]: its value in a static solution, its value of largest amount over a motion.
+    /// The goal [m]: its value in a static solution, or its value of largest magnitude over a motion.
     pub fn of(&self, series: &Series) -> f64 {
         (0..series.frames.len()).map(|i| self.at(series.at(i))).fold(0.0, larger)
     }
 }
 
-/// The one of larger amount.
+/// The number of larger magnitude.
 fn larger(a: f64, b: f64) -> f64 {
     if b.abs() > a.abs() { b } else { a }
 }
 
-/// Relative errors.
+/// Relative errors of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Errors {
     /// ‖u − u*‖ / ‖u*‖ over all probes and instants.
     pub l2: f64,
-    /// |Ψ − Ψ*| / Ψ*, of a motion √Σ(Ψ−Ψ*)² / √ΣΨ*²; Ψ is the elastic energy.
+    /// |Ψ − Ψ*| / Ψ*, or √Σ(Ψ−Ψ*)² / √ΣΨ*² for a motion; Ψ is the elastic energy.
     pub energy: f64,
-    /// |J − J*| / |J*|, J the goal.
+    /// |J − J*| / |J*|; J is the goal.
     pub goal: f64,
 }
 
 impl Errors {
-    /// Compares at the instants both have. `goal_reference` replaces the goal of `reference` where it is known better.
+    /// Compares two series at their common instants. `goal_reference` replaces the goal of `reference` where
+    /// it is known better.
     pub fn of(series: &Series, reference: &Series, goal: &Goal, goal_reference: Option<f64>) -> Self {
         let difference = series.minus(reference);
         let right = reference.at_instants_of(series);
@@ -70,13 +71,13 @@ impl Errors {
         }
     }
 
-    /// The relative error in the energy norm that the energy tells: √(|Ψ − Ψ*| / Ψ*). Equal to
-    /// ‖u − u*‖_E / ‖u*‖_E for linear statics under given loads, an indicator else.
+    /// Estimates the relative error in the energy norm from the energy: √(|Ψ − Ψ*| / Ψ*). For linear statics
+    /// under given loads it equals ‖u − u*‖_E / ‖u*‖_E; otherwise it is an indicator.
     pub fn energy_norm(&self) -> f64 {
         self.energy.sqrt()
     }
 
-    /// Whether all three are numbers.
+    /// Whether all three errors are finite.
     pub fn is_finite(&self) -> bool {
         self.l2.is_finite() && self.energy.is_finite() && self.goal.is_finite()
     }

@@ -1,4 +1,4 @@
-//! What came out of a study.
+//! The result of a study.
 
 use serde::Serialize;
 
@@ -11,75 +11,75 @@ use crate::distance::Errors;
 use crate::reference::Reference;
 use crate::trial::Trial;
 
-/// A configuration and what became of it.
+/// A configuration and the result of its run.
 #[derive(Debug, Clone)]
 pub struct Outcome {
-    /// What was run.
+    /// The configuration that was run.
     pub configuration: Configuration,
-    /// How it went.
+    /// The run: status, times and figures.
     pub trial: Trial,
-    /// How far from the reference; none without result or reference.
+    /// Distance from the reference; `None` without result or reference.
     pub errors: Option<Errors>,
-    /// Where its error comes from; known on the Pareto front.
+    /// Sources of its error, known on the Pareto front.
     pub sources: Option<Sources>,
 }
 
 impl Outcome {
-    /// Cost and error, not finite where there is no result.
+    /// Cost [ms] and error; not finite if there is no result.
     pub fn point(&self) -> (f64, f64) {
         (self.trial.cost.median_ms, self.errors.map_or(f64::INFINITY, |errors| errors.l2))
     }
 }
 
-/// What came out for a case.
+/// The result of one case.
 #[derive(Debug, Clone)]
 pub struct CaseResult {
-    /// The case.
+    /// The case that was studied.
     pub case: Case,
-    /// The right answer, or why there is none.
+    /// The reference, or the reason why there is none.
     pub reference: Result<Reference, String>,
     /// All points, the base first.
     pub points: Vec<Outcome>,
     /// Indices of the Pareto front, by rising cost.
     pub front: Vec<usize>,
-    /// The recommendation, where one was asked for.
+    /// The recommendation, if one was asked for.
     pub recommendation: Option<Recommendation>,
-    /// Points that were planned and not run, because they did not fit into the time or the budget.
+    /// Planned points that did not fit into the time or the budget.
     pub left_out: usize,
-    /// What the reader should know: what was left out, what regions select.
+    /// Remarks for the reader: what was left out, what regions select.
     pub notes: Vec<String>,
     /// Whether every point was run.
     pub complete: bool,
 }
 
-/// Cases, and how they were studied.
+/// All cases, and the circumstances of the study.
 #[derive(Debug, Clone)]
 pub struct StudyResult {
-    /// Case after case.
+    /// One result per case.
     pub cases: Vec<CaseResult>,
-    /// Build and machine.
+    /// Build and machine of the study.
     pub origin: Origin,
-    /// Points taken over from an earlier study.
+    /// Number of points taken over from an earlier study.
     pub resumed: usize,
     /// Wall time of this study [s].
     pub seconds: f64,
-    /// Load of the machine when it began and ended (one-minute average); none where unknown.
+    /// One-minute load average of the machine at the start and the end; `None` if unknown.
     pub load: [Option<f64>; 2],
     /// Whether it was ended early.
     pub interrupted: bool,
 }
 
-/// Figures of a study in short, for `--json`.
+/// Totals of a study, for `--json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Counts {
-    /// Points in all.
+    /// Number of points.
     pub points: usize,
-    /// Those without a result.
+    /// Number of points without a result.
     pub failures: usize,
 }
 
 impl CaseResult {
-    /// How many points there are, and how many gave no result.
+    /// Counts all points, and those without a result.
     pub fn counts(&self) -> Counts {
         let failures = self.points.iter().filter(|point| !point.trial.is_done()).count();
         Counts { points: self.points.len(), failures }

@@ -1,4 +1,4 @@
-//! What is asked of a study.
+//! The user's choices for a study.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -6,29 +6,29 @@ use std::sync::atomic::AtomicBool;
 
 use crate::design::axes::Factor;
 
-/// Which cases, in which time, and narrowed to what.
+/// Cases to study, time limits, and factors to narrow.
 #[derive(Debug, Clone)]
 pub struct Settings {
     /// Names of cases (see [`NAMES`](crate::case::NAMES)) and paths of scene files.
     pub cases: Vec<String>,
-    /// Where the results go; finished points there are taken over.
+    /// Directory of the results. Finished points in it are taken over.
     pub out: PathBuf,
-    /// Coarse meshes and short runs only.
+    /// Use only coarse meshes and short runs.
     pub quick: bool,
-    /// Time that the study may take [s]; none: as long as the cases of the program take, and
-    /// [`SCENE_S`] for a scene.
+    /// Time that the study may take [s]. `None`: as long as the cases of the program take, and [`SCENE_S`]
+    /// for a scene.
     pub within_s: Option<f64>,
-    /// Recommend a configuration that fits this time per solution or frame [ms].
+    /// Time per solution or frame that the recommended configuration must fit [ms].
     pub budget_ms: Option<f64>,
     /// Simulated time of scenes in motion [s].
     pub seconds: Option<f64>,
-    /// Factors and the labels that are kept of them; factors that are not named keep all.
+    /// Labels to keep, by factor. Factors that are not named keep all labels.
     pub only: Vec<(Factor, Vec<String>)>,
-    /// Replaces the meshes: cells along the longest side.
+    /// Cells along the longest side, which replace the default meshes; empty for the defaults.
     pub cells: Vec<usize>,
-    /// Raised from elsewhere to end the study; what is finished is kept and shown.
+    /// Raised from elsewhere to end the study. Finished runs are kept and shown.
     pub stop: Arc<AtomicBool>,
 }
 
-/// Time that a scene's study may take where nothing is said [s]; in a quick study.
+/// Default time for the study of a scene [s]: a full study, and a quick one.
 pub const SCENE_S: [f64; 2] = [300.0, 40.0];

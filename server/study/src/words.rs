@@ -1,4 +1,4 @@
-//! Numbers for people.
+//! Numbers formatted for people.
 
 /// A number with four significant digits and no trailing zeros.
 pub fn short(value: f64) -> String {

@@ -3,47 +3,47 @@
 use crate::device::path::PathError;
 use scindo_client::LinkError;
 
-/// Why the program ends early.
+/// Reason why the program ends early.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
     /// An argument that cannot be used.
     #[error("{what} = {found}: {next}")]
     Argument {
-        /// Which.
+        /// The argument, as typed.
         what: &'static str,
-        /// What stood there.
+        /// The value that was given.
         found: String,
-        /// What to do.
+        /// What the user can do instead.
         next: String,
     },
-    /// The path of the hand.
+    /// The path of the hand cannot be followed.
     #[error(transparent)]
     Path(#[from] PathError),
-    /// The network.
+    /// The network failed.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// A file or thread.
+    /// A file or thread could not be used.
     #[error("{what}: {source}")]
     Io {
-        /// What was tried.
+        /// The attempted action.
         what: String,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The whole run passed without one contact message.
     #[error("no contact message arrived for tool '{tool}' in {seconds:.1} s; {hint}")]
     NoContact {
-        /// The tool.
+        /// Id of the tool.
         tool: String,
-        /// How long.
+        /// Duration of the run [s].
         seconds: f64,
-        /// What to look at.
+        /// What the user should check.
         hint: &'static str,
     },
 }
 
 impl CommandError {
-    /// 2: bad input; 1: the thing asked for failed.
+    /// 2: bad input. 1: the run failed.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Argument { .. }

@@ -1,4 +1,4 @@
-//! What a run achieved, as the terminal and `--json` show it.
+//! Results of a run, as the terminal and `--json` show them.
 
 use serde::Serialize;
 
@@ -7,20 +7,20 @@ use crate::statistics::{LinkReport, LoopReport};
 /// All figures of a run.
 #[derive(Debug, Serialize)]
 pub struct Summary {
-    /// The tool that was held.
+    /// Id of the tool that was held.
     pub tool: String,
-    /// The device that held it.
+    /// Name of the device model.
     pub device: &'static str,
     /// Clamp in force [N].
     pub force_limit_n: f64,
     /// Slew limit in force [N/s].
     pub slew_limit_n_s: f64,
-    /// What the loop saw.
+    /// Figures of the loop.
     #[serde(rename = "loop")]
     pub loop_: LoopReport,
-    /// What the link saw.
+    /// Figures of the link.
     pub link: LinkReport,
-    /// Rows in the log file.
+    /// Number of rows in the log file; `None` without a log.
     pub log_rows: Option<u64>,
 }
 

@@ -1,12 +1,12 @@
-//! Force of the tissue at the current tip, from the newest contact model.
+//! Force of the tissue at the present tip, from the newest contact model.
 //!
 //! Each plane i of the message loads the tip with
 //!
 //! fᵢ(p) = nᵢ wᵢ max(0, f₀ᵢ·nᵢ − kᵢ (p − p_used − v_sᵢ·a)·nᵢ),
 //!
-//! p: tip, p_used: tip for which the message was computed, v_s: velocity of the surface,
-//! a = min(age, horizon): the surface moves on while the message ages, but not for ever;
-//! w: one within the trusted radius of the plane, falling to zero beyond.
+//! p: tip, p_used: tip for which the message was computed, v_s: velocity of the surface, a = min(age,
+//! horizon): the surface moves on while the message ages, but not without limit; w: one within the trusted
+//! radius of the plane, falling to zero beyond.
 //!
 //! # Source
 //! The message `scindo.v1.Contact` (`proto/scindo/v1/tool.proto`).
@@ -23,16 +23,16 @@ pub struct PlaneLoad {
     pub normal: Vector3<f64>,
     /// Load extrapolated to n·p = 0 [N].
     pub offset_n: f64,
-    /// Loss of load per metre along the normal [N/m].
+    /// Decrease of the load per metre along the normal [N/m].
     pub stiffness_n_m: f64,
-    /// Force against relative velocity along the normal [N·s/m].
+    /// Damping along the normal, against the relative velocity [N·s/m].
     pub damping_ns_m: f64,
     /// Velocity of the surface [m/s].
     pub surface_velocity_m_s: Vector3<f64>,
 }
 
 impl PlaneLoad {
-    /// Load with the tip at `p` [N], never pulling.
+    /// Load with the tip at `p` [N]; it never pulls.
     pub fn at(&self, p: &Vector3<f64>) -> f64 {
         (self.offset_n - self.stiffness_n_m * self.normal.dot(p)).max(0.0)
     }
@@ -46,7 +46,7 @@ pub struct PlaneLoads {
 }
 
 impl PlaneLoads {
-    /// The planes that load the tip or may.
+    /// The planes that load the tip or may load it.
     pub fn iter(&self) -> impl Iterator<Item = &PlaneLoad> {
         self.loads[..self.count].iter()
     }
@@ -62,7 +62,7 @@ impl PlaneLoads {
     }
 }
 
-/// Evaluates models and remembers how long a simulation step takes, for the horizon.
+/// Evaluates models. It remembers the length of a simulation step, which sets the horizon.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactLaw {
     horizon_s: f64,
@@ -102,7 +102,7 @@ impl ContactLaw {
         out
     }
 
-    /// Horizon = 1.5 simulation steps, as far as messages show how long one takes.
+    /// Updates the horizon to 1.5 simulation steps, once messages show the length of a step.
     fn observe_step(&mut self, model: &ContactModel) {
         let (step, time_s) = self.last_step;
         if model.sim_step == step {
@@ -118,7 +118,7 @@ impl ContactLaw {
     }
 }
 
-/// One within the trusted radius, falling linearly to zero over half a radius beyond.
+/// One within the trusted radius, falling linearly to zero over another half radius.
 fn patch_weight(plane: &ContactPlane, tip_m: &Vector3<f64>) -> f64 {
     let r = plane.patch_radius_m;
     if r <= 0.0 {

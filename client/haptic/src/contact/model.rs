@@ -1,7 +1,7 @@
 //! The newest contact message as the loop sees it: parsed, finite, in order.
 //!
-//! [`ContactInbox`] stands on the network side: it refuses what cannot be used, drops what arrives
-//! out of order, counts what was lost and puts the newest model into a lock-free slot.
+//! [`ContactInbox`] is the network side. It refuses unusable messages, drops those that arrive out of order
+//! and counts lost ones. It puts the newest model into a lock-free slot.
 
 use crate::constants::{DEFAULT_VALIDITY_NS, LOST_NS, MAX_VALIDITY_NS};
 use crate::statistics::{LinkReport, RoundTrips};
@@ -9,31 +9,31 @@ use nalgebra::Vector3;
 use scindo_proto::limits::MAX_CONTACTS;
 use scindo_proto::messages::{Contact, HapticContact, Vec3, Vec3f, haptic_contact};
 
-/// Largest force of one plane that is believed [N].
+/// Largest plausible force of one plane [N].
 const MAX_PLANE_FORCE_N: f64 = 1.0e3;
-/// Largest stiffness of one plane that is believed [N/m].
+/// Largest plausible stiffness of one plane [N/m].
 const MAX_PLANE_STIFFNESS_N_M: f64 = 1.0e6;
-/// Largest damping of one plane that is believed [N·s/m].
+/// Largest plausible damping of one plane [N·s/m].
 const MAX_PLANE_DAMPING_NS_M: f64 = 1.0e4;
-/// Largest coordinate that is believed [m], also the largest velocity [m/s].
+/// Largest plausible coordinate [m] and velocity [m/s].
 const MAX_COORDINATE: f64 = 1.0e4;
 
 /// One plane with a linearised force; see `scindo.v1.Contact`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPlane {
-    /// Point of the surface [m]; centre of the patch where the plane is trusted.
+    /// Point of the surface [m], at the centre of the patch where the plane is trusted.
     pub point_m: Vector3<f64>,
     /// Unit, from the tissue to the tool.
     pub normal: Vector3<f64>,
-    /// Force along the normal with the tip at the pose used [N].
+    /// Force along the normal with the tip at the pose used by the server [N].
     pub force_n: f64,
-    /// Loss of that force per metre along the normal [N/m].
+    /// Decrease of that force per metre along the normal [N/m].
     pub stiffness_n_m: f64,
-    /// Force against relative velocity along the normal [N·s/m].
+    /// Damping along the normal, against the relative velocity [N·s/m].
     pub damping_ns_m: f64,
     /// Velocity of the surface [m/s].
     pub surface_velocity_m_s: Vector3<f64>,
-    /// Radius around `point_m` where the plane is trusted [m]; zero: everywhere.
+    /// Radius around `point_m` where the plane is trusted [m]; zero for everywhere.
     pub patch_radius_m: f64,
 }
 
@@ -53,32 +53,32 @@ impl ContactPlane {
 /// A contact message, ready for the loop. Fixed size: it is copied, never allocated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactModel {
-    /// Number of the message; zero: none has arrived yet.
+    /// Number of the message; zero before the first one.
     pub seq: u64,
-    /// Topology it belongs to.
+    /// Epoch of the topology that it was computed on.
     pub epoch: u32,
-    /// Step of the simulation.
+    /// Step of the simulation that it was computed after.
     pub sim_step: u64,
-    /// Simulated time [s].
+    /// Simulated time of that step [s].
     pub sim_time_s: f64,
     /// Loop clock at arrival [ns].
     pub received_ns: u64,
-    /// Tip for which it was computed [m].
+    /// Tip for which the model was computed [m].
     pub tip_used_m: Vector3<f64>,
-    /// The planes; the first `plane_count` count.
+    /// The planes; only the first `plane_count` are valid.
     pub planes: [ContactPlane; MAX_CONTACTS],
-    /// How many planes count.
+    /// Number of valid planes.
     pub plane_count: usize,
     /// Age at which the force must start to ramp down [ns].
     pub validity_ns: u64,
-    /// The server's advice on force [N]; infinite if it gave none.
+    /// Largest force that the server advises [N]; infinite if it gave none.
     pub max_force_n: f64,
-    /// The server's advice on stiffness [N/m]; infinite if it gave none.
+    /// Largest stiffness that the server advises [N/m]; infinite if it gave none.
     pub max_stiffness_n_m: f64,
 }
 
 impl ContactModel {
-    /// What the loop holds before the first message.
+    /// Held by the loop before the first message.
     pub const NONE: Self = Self {
         seq: 0,
         epoch: 0,
@@ -93,7 +93,7 @@ impl ContactModel {
         max_stiffness_n_m: f64::INFINITY,
     };
 
-    /// The planes that count.
+    /// The valid planes.
     pub fn planes(&self) -> &[ContactPlane] {
         &self.planes[..self.plane_count]
     }
@@ -103,12 +103,12 @@ impl ContactModel {
         if self.seq == 0 { u64::MAX } else { now_ns.saturating_sub(self.received_ns) }
     }
 
-    /// Whether it may still be rendered at full gain.
+    /// Whether the model may still be rendered at full gain.
     pub fn is_fresh(&self, now_ns: u64) -> bool {
         self.age_ns(now_ns) <= self.validity_ns
     }
 
-    /// Parses a message. `None` if anything in it is missing, not finite or beyond belief.
+    /// Parses a message. `None` if a value is missing, not finite or implausible.
     pub fn parse(message: &HapticContact, received_ns: u64) -> Option<Self> {
         if message.seq == 0 || message.contacts.len() > MAX_CONTACTS || !message.sim_time_s.is_finite() {
             return None;
@@ -186,15 +186,16 @@ fn validity_ns(milliseconds: f32) -> Option<u64> {
     }
 }
 
-/// Reading end of the slot: belongs to the loop.
+/// Reading end of the slot, owned by the loop.
 pub type ContactSlot = triple_buffer::Output<ContactModel>;
 
-/// A lock-free slot that holds the newest model: writing end for the inbox, reading end for the loop.
+/// Creates a lock-free slot for the newest model: the writing end for the inbox, the reading end for the
+/// loop.
 pub fn contact_slot() -> (triple_buffer::Input<ContactModel>, ContactSlot) {
     triple_buffer::triple_buffer(&ContactModel::NONE)
 }
 
-/// Network side of the slot. One writer.
+/// Network side of the slot; its only writer.
 pub struct ContactInbox {
     slot: triple_buffer::Input<ContactModel>,
     last_seq: u64,
@@ -207,7 +208,7 @@ pub struct ContactInbox {
 }
 
 impl ContactInbox {
-    /// Writes into `slot`.
+    /// Creates an inbox that writes into `slot`.
     pub fn new(slot: triple_buffer::Input<ContactModel>) -> Self {
         Self {
             slot,
@@ -221,8 +222,8 @@ impl ContactInbox {
         }
     }
 
-    /// Takes one message that arrived at `now_ns` of the loop clock and at `client_ns` of the clock
-    /// that stamps poses (`tool_client_time_ns`).
+    /// Takes one message. It arrived at `now_ns` of the loop clock and at `client_ns` of the clock that
+    /// stamps poses (`tool_client_time_ns`).
     pub fn accept(&mut self, message: &HapticContact, now_ns: u64, client_ns: u64) {
         let Some(model) = ContactModel::parse(message, now_ns) else {
             self.counts.contacts_refused += 1;
@@ -236,8 +237,8 @@ impl ContactInbox {
         self.slot.write(model);
     }
 
-    /// Later than the last one. A lower number with a later send time is a server that started
-    /// anew; after a silence of half a second anything is a new beginning.
+    /// Whether the message is newer than the last one. A lower number with a later send time means that the
+    /// server restarted. After a silence of half a second any message starts a new stream.
     fn in_order(&mut self, message: &HapticContact, now_ns: u64) -> bool {
         let silent = now_ns.saturating_sub(self.last_received_ns) > LOST_NS;
         let restarted = message.seq <= self.last_seq && message.publish_unix_ns > self.last_publish_unix_ns;
@@ -271,7 +272,7 @@ impl ContactInbox {
         }
     }
 
-    /// Messages taken so far.
+    /// Number of messages taken so far.
     pub fn contacts(&self) -> u64 {
         self.counts.contacts
     }

@@ -1,7 +1,7 @@
 //! The path of the simulated hand: keyframes of a file, or the built-in `press` and `circle`.
 //!
 //! # Format
-//! TOML, the same entries as a scripted tool of a scene, times rising from zero:
+//! TOML with the same entries as a scripted tool of a scene. Times rise from zero:
 //! ```toml
 //! [[path]]
 //! at_s = 0.0
@@ -9,7 +9,7 @@
 //! toward = [0.0, 0.0, 1.0]   # from the tip along the shaft; upwards if left out
 //! mode = "touch"             # hover | touch | grab | cut, from this time on
 //! ```
-//! CSV with the header `at_s,x_m,y_m,z_m` and, if wanted, `mode`.
+//! CSV has the header `at_s,x_m,y_m,z_m` and an optional column `mode`.
 
 use super::ToolMode;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -22,7 +22,7 @@ const MAX_KEYFRAMES: usize = 72_000;
 /// Largest path file [bytes].
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
-/// Why a path cannot be followed.
+/// Reason why a path cannot be followed.
 #[derive(Debug, thiserror::Error)]
 pub enum PathError {
     /// The file cannot be read.
@@ -30,15 +30,15 @@ pub enum PathError {
     Read {
         /// Name of the file.
         file: String,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The file is not what its ending says.
+    /// The content does not match the extension of the file.
     #[error("{file} is not a path: {message}")]
     Parse {
         /// Name of the file.
         file: String,
-        /// What the parser said.
+        /// Message of the parser.
         message: String,
     },
     /// A keyframe cannot be used.
@@ -46,9 +46,9 @@ pub enum PathError {
     Keyframe {
         /// Index from zero.
         index: usize,
-        /// What is wrong, with the value found.
+        /// What is wrong, with the value.
         what: String,
-        /// What to do.
+        /// What the user can do.
         next: &'static str,
     },
 }
@@ -62,11 +62,11 @@ pub struct Keyframe {
     pub tip_m: Vector3<f64>,
     /// Unit direction from the tip along the shaft.
     pub toward: Vector3<f64>,
-    /// What the hand does from this time on.
+    /// Action of the hand from this time on.
     pub mode: ToolMode,
 }
 
-/// Where the hand wants to be at one time.
+/// The target pose of the hand at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandTarget {
     /// Tip of the tool [m].
@@ -75,11 +75,11 @@ pub struct HandTarget {
     pub velocity_m_s: Vector3<f64>,
     /// Unit quaternion x, y, z, w.
     pub orientation: [f64; 4],
-    /// What the hand does.
+    /// Action of the hand.
     pub mode: ToolMode,
 }
 
-/// A path of keyframes, linear in between; repeated or held at its end.
+/// Keyframes with linear motion in between. At the end the path repeats or stops.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     keyframes: Vec<Keyframe>,
@@ -87,7 +87,7 @@ pub struct Path {
 }
 
 impl Path {
-    /// Checks order, size and finiteness.
+    /// Builds a path after checking order, size and finiteness of the keyframes.
     pub fn new(keyframes: Vec<Keyframe>, repeat: bool) -> Result<Self, PathError> {
         let fail = |index, what: String, next| Err(PathError::Keyframe { index, what, next });
         if keyframes.is_empty() {
@@ -117,20 +117,20 @@ impl Path {
         Ok(Self { keyframes, repeat })
     }
 
-    /// Rests at one point.
+    /// A path that rests at one point.
     pub fn still(tip_m: Vector3<f64>) -> Self {
         let keyframe = Keyframe { at_s: 0.0, tip_m, toward: Vector3::z(), mode: ToolMode::Touch };
         Self { keyframes: vec![keyframe], repeat: false }
     }
 
-    /// Presses on a point of the surface and lifts off again, every four seconds.
+    /// A path of four seconds that presses on a point of the surface and lifts off again.
     pub fn press(touch: &Touch) -> Self {
         let (above, below) = (touch.above(), touch.point_m + touch.direction * touch.depth_m);
         let times = [0.0, 0.8, 1.6, 2.6, 3.2, 4.0];
         Self::built_in(touch, times.into_iter().zip([above, above, below, below, above, above]))
     }
 
-    /// Presses, draws a circle of a radius of one depth on the surface, and lifts off; six seconds.
+    /// A path of six seconds: press, draw a circle on the surface whose radius is the depth, lift off.
     pub fn circle(touch: &Touch) -> Self {
         let helper = if touch.direction.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
         let across = touch.direction.cross(&helper).normalize();
@@ -167,7 +167,7 @@ impl Path {
         Self::new(keyframes.map_err(|message| PathError::Parse { file: name, message })?, repeat)
     }
 
-    /// Where the hand wants to be at `time_s`.
+    /// The target at `time_s`.
     pub fn at(&self, time_s: f64) -> HandTarget {
         let last = self.keyframes.len() - 1;
         let end_s = self.keyframes[last].at_s;
@@ -189,7 +189,7 @@ impl Path {
     }
 }
 
-/// A point of a surface and how to touch it.
+/// A point of a surface, and the way to touch it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// Point of the undeformed surface [m].
@@ -198,7 +198,7 @@ pub struct Touch {
     pub direction: Vector3<f64>,
     /// How deep the hand presses [m].
     pub depth_m: f64,
-    /// How far above the surface it starts and rests [m].
+    /// Height above the surface at which the hand starts and rests [m].
     pub clearance_m: f64,
 }
 

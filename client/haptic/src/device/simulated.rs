@@ -2,8 +2,8 @@
 //!
 //! m a = k_h (p*(t) − x) + b_h (v*(t) − v) − b_d v + f
 //!
-//! p*, v*: path of the hand; k_h, b_h: the grip; b_d: damping of the device; f: force that the
-//! client commands. Symplectic Euler in steps of at most one millisecond.
+//! p*, v*: path of the hand; k_h, b_h: the grip; b_d: damping of the device; f: force that the client
+//! commands. It is integrated by symplectic Euler in steps of at most one millisecond.
 
 use super::path::Path;
 use super::{Capability, DeviceGone, DeviceState, HapticDevice};
@@ -38,7 +38,7 @@ pub const CAPABILITY: Capability = Capability {
     workspace_radius_m: 0.1,
 };
 
-/// Most milliseconds that one read catches up with after a stall.
+/// After a stall, one read catches up by at most this many milliseconds.
 const MAX_CATCH_UP: usize = 100;
 
 /// A hand on a path, with inertia.
@@ -53,17 +53,17 @@ pub struct SimulatedDevice {
 }
 
 impl SimulatedDevice {
-    /// At rest in the origin, until it follows a path.
+    /// Creates a device at rest at the origin, without a path.
     pub fn at_rest(hand: Hand) -> Self {
         Self::new(Path::still(Vector3::zeros()), hand)
     }
 
-    /// Begins `path` anew, at rest on its first point.
+    /// Starts `path` anew, at rest on its first point.
     pub fn follow(&mut self, path: Path) {
         *self = Self::new(path, self.hand);
     }
 
-    /// At rest on the first point of `path`.
+    /// Creates a device at rest on the first point of `path`.
     pub fn new(path: Path, hand: Hand) -> Self {
         let position_m = path.at(0.0).position_m;
         Self {

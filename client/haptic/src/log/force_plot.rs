@@ -1,4 +1,4 @@
-//! Force and age of the contact over the time of a run, as an SVG picture.
+//! Force and contact age over the time of a run, as an SVG plot.
 //!
 //! A run of any length fits a fixed memory: when the bins are full, neighbours are merged.
 
@@ -10,7 +10,7 @@ use plotters::style::FontTransform;
 use super::row::LogRow;
 use crate::safety::flag;
 
-/// Most bins of a trace: more than a picture has pixels in a row.
+/// Most bins of a trace: more than the picture has pixels in a row.
 const MAX_BINS: usize = 4096;
 
 /// Width of a bin until the first merge [s]: one tick.
@@ -19,24 +19,24 @@ const FIRST_WIDTH_S: f64 = 1e-3;
 /// Size of the picture [px].
 const SIZE: (u32, u32) = (1200, 640);
 
-/// An age above this one is drawn on the edge [ms]: the contact is lost.
+/// A larger age is drawn at the edge [ms]: the contact is lost.
 const MAX_AGE_MS: f64 = 500.0;
 
 const FORCE: RGBColor = RGBColor(178, 58, 48);
 const TISSUE: RGBColor = RGBColor(46, 97, 158);
 const AGE: RGBColor = RGBColor(92, 92, 92);
 
-/// What happened in a stretch of time.
+/// Summary of an interval of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bin {
     time_s: f64,
-    /// Least and largest force that left [N].
+    /// Smallest and largest force sent to the device [N].
     force_n: [f64; 2],
     /// Largest force of the tissue, before blend and safety [N].
     tissue_n: f64,
     /// Largest age of the contact in use [ms].
     age_ms: f64,
-    /// All flags.
+    /// All flags raised in the interval.
     flags: u32,
 }
 
@@ -75,7 +75,7 @@ impl Default for Trace {
 }
 
 impl Trace {
-    /// Takes one tick.
+    /// Adds one tick.
     pub fn push(&mut self, row: &LogRow) {
         self.rows += 1;
         let bin = Bin::of(row);
@@ -94,7 +94,7 @@ impl Trace {
         }
     }
 
-    /// Ticks taken.
+    /// Number of ticks added.
     pub fn rows(&self) -> u64 {
         self.rows
     }
@@ -110,7 +110,7 @@ impl Trace {
 /// Draws a trace. `limit_n` is the clamp of the force [N].
 ///
 /// # Errors
-/// What the disk says.
+/// The file cannot be written.
 pub fn draw(file: &Path, trace: &Trace, limit_n: f64) -> std::io::Result<()> {
     let mut text = String::new();
     {
@@ -143,7 +143,7 @@ fn draw_force<'a>(area: &Picture<'a>, trace: &Trace, limit_n: f64) -> Drawn<'a> 
         .y_label_area_size(64)
         .build_cartesian_2d(start..end, 0.0..top)?;
     chart.configure_mesh().light_line_style(TRANSPARENT).y_desc("force [N]").draw()?;
-    // The tissue may ask for far more than any device gives: it is drawn up to the edge.
+    // The tissue may ask for far more than any device gives. Its force is drawn up to the edge.
     let tissue = trace.bins.iter().map(|bin| (bin.time_s, bin.tissue_n.min(top)));
     chart
         .draw_series(LineSeries::new(tissue, TISSUE.stroke_width(1)))?

@@ -1,6 +1,7 @@
-//! Every tick as a line of CSV and as a point of the force plot, by a thread of its own through a bounded queue.
+//! Records every tick as a line of CSV and as a point of the force plot. A separate thread writes, fed by a
+//! bounded queue.
 //!
-//! The loop offers rows and never waits: where the queue is full the row is dropped and counted.
+//! The loop offers rows and never waits. When the queue is full, the row is dropped and counted.
 
 use super::force_plot::Trace;
 use super::row::LogRow;
@@ -11,30 +12,30 @@ use std::path::Path;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How often the writer looks for rows. It polls, so that the loop never has to wake it.
+/// How often the writer looks for rows. It polls so that the loop never has to wake it.
 const POLL: Duration = Duration::from_millis(5);
 
 /// First line of the file.
 pub const HEADER: &str = "time_s,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,tissue_x_n,tissue_y_n,tissue_z_n,\
                           force_x_n,force_y_n,force_z_n,contact_seq,contact_age_ms,epoch,energy_j,flags";
 
-/// Loop side of the log.
+/// The loop's end of the log.
 pub struct LogQueue(Sender<LogRow>);
 
 impl LogQueue {
-    /// Leaves a row; `false` if there was no room. Never waits: nobody ever blocks on the other end.
+    /// Queues a row. Returns `false` if the queue was full. Never waits: the writer polls its end.
     pub fn offer(&mut self, row: &LogRow) -> bool {
         self.0.try_send(*row).is_ok()
     }
 }
 
-/// The writer. It ends when the queue is dropped.
+/// The writing thread. It ends when the queue is dropped.
 pub struct Recorder {
     writer: JoinHandle<std::io::Result<(u64, Option<Trace>)>>,
 }
 
 impl Recorder {
-    /// Creates the file and starts the writer, which fills `trace` too.
+    /// Creates the file and starts the writer, which also fills `trace`.
     pub fn create(file: Option<&Path>, trace: Option<Trace>) -> std::io::Result<(LogQueue, Self)> {
         let out: Box<dyn Write + Send> = match file {
             Some(file) => Box::new(BufWriter::with_capacity(1 << 16, std::fs::File::create(file)?)),
@@ -47,7 +48,7 @@ impl Recorder {
         Ok((LogQueue(sender), Self { writer }))
     }
 
-    /// Waits for the last row; the number of rows, and the trace.
+    /// Waits for the last row and returns the number of rows and the trace.
     pub fn finish(self) -> std::io::Result<(u64, Option<Trace>)> {
         self.writer.join().unwrap_or_else(|_| Err(std::io::Error::other("the log writer panicked")))
     }

@@ -1,4 +1,4 @@
-//! One tick as the log keeps it.
+//! One tick, as a row of the log.
 
 use nalgebra::Vector3;
 
@@ -13,16 +13,16 @@ pub struct LogRow {
     pub velocity_m_s: Vector3<f64>,
     /// Force of the tissue before blend and safety [N].
     pub tissue_n: Vector3<f64>,
-    /// Force that left [N].
+    /// Force sent to the device [N].
     pub force_n: Vector3<f64>,
-    /// Contact message in use.
+    /// Number of the contact message in use.
     pub contact_seq: u64,
-    /// Its age [ms].
+    /// Age of that message [ms].
     pub contact_age_ms: f64,
-    /// Its topology.
+    /// Epoch of the topology of that message.
     pub epoch: u32,
     /// Energy of the passivity observer [J].
     pub energy_j: f64,
-    /// See [`crate::safety::flag`].
+    /// Flags of the tick, see [`crate::safety::flag`].
     pub flags: u32,
 }

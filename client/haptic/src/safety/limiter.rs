@@ -22,8 +22,8 @@ impl Limiter {
         Self { max_force_n, slew_n_s, output_n: Vector3::zeros(), touch_s: 0.0 }
     }
 
-    /// The force that may leave [N] and the flags of what held it back. `advice_n`: the server's
-    /// limit, approached within the slew limit; the own clamp is hard.
+    /// The force that may be sent [N], and the flags of the limits that held it back. `advice_n` is the
+    /// server's limit, approached within the slew limit. The limiter's own clamp is hard.
     pub fn limit(&mut self, wanted_n: Vector3<f64>, advice_n: f64) -> (Vector3<f64>, u32) {
         let (target, mut flags) = self.clamp(wanted_n, advice_n);
         let step = target - self.output_n;
@@ -39,21 +39,21 @@ impl Limiter {
         (self.output_n, flags)
     }
 
-    /// `wanted_n` within the clamp. The gain of a ramp goes on top of it: were it the other way round, a
-    /// force far above the clamp would fill it until the ramp is nearly over, and the slew limit would
-    /// hold force long after.
+    /// Clamps `wanted_n`. The gain of a ramp is applied after the clamp. In the opposite order, a force far
+    /// above the clamp would fill it until the ramp is nearly over. The slew limit would then hold force long
+    /// after.
     pub fn clamp(&self, wanted_n: Vector3<f64>, advice_n: f64) -> (Vector3<f64>, u32) {
         clamp(wanted_n, self.max_force_n.min(advice_n))
     }
 
-    /// Zero at once: for faults of the device, where the force itself is the danger.
+    /// Sets the force to zero at once: for device faults, where the force itself is the danger.
     pub fn cut(&mut self) -> Vector3<f64> {
         self.output_n = Vector3::zeros();
         self.touch_s = 0.0;
         self.output_n
     }
 
-    /// Slower while force rises at the start of a touch.
+    /// The slew limit for this tick. It is lower while force rises at the start of a touch.
     fn slew(&self, target_n: f64) -> f64 {
         let rises = target_n > self.output_n.norm();
         if rises && self.touch_s < FIRST_CONTACT_S {

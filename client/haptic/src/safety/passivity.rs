@@ -1,8 +1,8 @@
 //! Time-domain passivity: the output may not give the hand more energy than the hand has put in.
 //!
-//! Observer: E ← E − T f·v, f: force on the hand, v: its velocity. Controller: where E < 0, damping
-//! α = min(−E / (T v²), α_max) is added to the force, f ← f − α v; never more of it than there is
-//! or just was force (it may take some milliseconds after a bounce), so that free space stays free.
+//! Observer: E ← E − T f·v, f: force on the hand, v: its velocity. Controller: where E < 0, damping α =
+//! min(−E / (T v²), α_max) is added to the force, f ← f − α v. The damping force never exceeds the present or
+//! a recent force (it may act for some milliseconds after a bounce). Free space therefore stays free.
 //!
 //! # Source
 //! Hannaford and Ryu, "Time-domain passivity control of haptic interfaces", IEEE T-RA 18 (2002).
@@ -10,13 +10,13 @@
 use crate::constants::{FREE_FORCE_N, MAX_BANKED_ENERGY_J, PERIOD_S};
 use nalgebra::Vector3;
 
-/// Ticks without force after which the account is closed at zero.
+/// After this many ticks without force the energy is reset to zero.
 const FREE_TICKS: u32 = 100;
 
-/// How much of a force still counts as recent one tick later; half of it after 7 ms.
+/// Factor by which a recent force decays per tick; after 7 ms half of it is left.
 const RECENT_DECAY: f64 = 0.9;
 
-/// Observer and controller.
+/// Passivity observer and controller.
 #[derive(Debug, Clone, Copy)]
 pub struct Passivity {
     energy_j: f64,
@@ -26,22 +26,22 @@ pub struct Passivity {
 }
 
 impl Passivity {
-    /// `max_damping_ns_m`: α_max, what the device renders without buzzing.
+    /// `max_damping_ns_m`: α_max, the largest damping that the device renders without buzzing.
     pub fn new(max_damping_ns_m: f64) -> Self {
         Self { energy_j: 0.0, max_damping_ns_m, free_ticks: 0, recent_force_n: 0.0 }
     }
 
-    /// Energy that the hand has put in and not got back [J]; negative: the output is active.
+    /// Energy that the hand has put in and not received back [J]. Negative: the output is active.
     pub fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
-    /// No force is allowed: none is injected either.
+    /// Called while no force is allowed: no damping may be injected then.
     pub fn rest(&mut self) {
         self.recent_force_n = 0.0;
     }
 
-    /// The force with damping injected, and whether there was any.
+    /// The force with injected damping, and whether any was injected.
     pub fn correct(&mut self, force_n: Vector3<f64>, velocity_m_s: &Vector3<f64>) -> (Vector3<f64>, bool) {
         self.recent_force_n = force_n.norm().max(RECENT_DECAY * self.recent_force_n);
         let predicted_j = self.energy_j - PERIOD_S * force_n.dot(velocity_m_s);
@@ -54,7 +54,7 @@ impl Passivity {
         (force_n - alpha * velocity_m_s, alpha > 0.0)
     }
 
-    /// Books the force that really left.
+    /// Accounts for the force that was really sent.
     pub fn observe(&mut self, force_n: &Vector3<f64>, velocity_m_s: &Vector3<f64>) {
         self.energy_j = (self.energy_j - PERIOD_S * force_n.dot(velocity_m_s)).min(MAX_BANKED_ENERGY_J);
         self.free_ticks = if force_n.norm() > FREE_FORCE_N { 0 } else { self.free_ticks.saturating_add(1) };
@@ -68,7 +68,8 @@ impl Passivity {
 mod tests {
     use super::*;
 
-    /// A mass bounces on a wall that is rendered one tick late, an active wall; its speed afterwards.
+    /// Speed of a mass after it bounces on a wall that is rendered one tick late, which makes the wall
+    /// active.
     fn bounce(controlled: bool) -> f64 {
         let (mut passivity, mass, k) = (Passivity::new(20.0), 0.1, 3000.0);
         let (mut x, mut v, mut held) = (0.001, -0.1, 0.0);

@@ -1,4 +1,4 @@
-//! When force is allowed: the device must be plausible, the contact fresh, the start free.
+//! Decides when force is allowed: the device must be plausible, the contact fresh, the start free.
 //!
 //! ```text
 //!            200 ms of fresh contact without force
@@ -7,7 +7,7 @@
 //!     │ gain is zero                                    ▼ or the server's token is gone
 //!     └──────────────────────────────────────────── Ramping (damping held, spring to zero)
 //! ```
-//! A device fault leads from anywhere to Waiting, with zero force at once.
+//! A device fault leads from any state to Waiting, with zero force at once.
 
 use super::flag;
 use crate::constants::{
@@ -18,7 +18,7 @@ use crate::contact::model::ContactModel;
 use crate::device::{DeviceGone, DeviceState, ToolMode};
 use nalgebra::Vector3;
 
-/// Watches the device: what it reports must be finite, continuous and not too fast.
+/// Checks the device: its values must be finite, continuous and not too fast.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DeviceGuard {
     last: Option<DeviceState>,
@@ -27,8 +27,8 @@ pub struct DeviceGuard {
 }
 
 impl DeviceGuard {
-    /// The state to go on with (always finite) and the fault flags found. `elapsed_s` since the last
-    /// call: after a stall the hand may be further away.
+    /// The state to continue with (always finite), and the fault flags found. `elapsed_s` is the time since
+    /// the last call: after a stall the hand may have moved further.
     pub fn check(&mut self, read: Result<DeviceState, DeviceGone>, elapsed_s: f64) -> (DeviceState, u32) {
         let was_gone = std::mem::replace(&mut self.gone, read.is_err());
         let Ok(state) = read else { return (self.at_rest(ToolMode::Hover), flag::GONE) };
@@ -66,20 +66,20 @@ impl DeviceGuard {
 /// How much of the force is allowed in one tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Permit {
-    /// Factor on the force of the contact, zero to one.
+    /// Factor on the contact force, from zero to one.
     pub gain: f64,
-    /// Damping held against the hand [N·s/m].
+    /// Damping that holds the hand [N·s/m].
     pub hold_damping_ns_m: f64,
-    /// Largest magnitude of that damping force [N].
+    /// Largest magnitude of the holding force [N].
     pub hold_limit_n: f64,
-    /// Zero at once, whatever the slew limit says.
+    /// Set the force to zero at once, regardless of the slew limit.
     pub cut: bool,
-    /// See [`flag`].
+    /// Flags of the tick, see [`flag`].
     pub flags: u32,
 }
 
 impl Permit {
-    /// The part of `force_n` that is allowed, plus the damping that is held.
+    /// The allowed part of `force_n` plus the holding damping.
     pub fn apply(&self, force_n: Vector3<f64>, velocity_m_s: &Vector3<f64>) -> Vector3<f64> {
         let hold = -self.hold_damping_ns_m * velocity_m_s;
         let norm = hold.norm();
@@ -95,7 +95,7 @@ enum Engagement {
     Ramping { from_ns: u64, duration_ns: u64, from_gain: f64, from_force_n: f64 },
 }
 
-/// State of engagement.
+/// State machine of engagement.
 #[derive(Debug, Clone, Copy)]
 pub struct Watchdog {
     engagement: Engagement,
@@ -109,8 +109,8 @@ impl Default for Watchdog {
 }
 
 impl Watchdog {
-    /// Judges one tick. `force_n`: what the contact would give; `server_alive`: its liveliness token
-    /// stands; `device_faults`: from [`DeviceGuard`].
+    /// Evaluates one tick. `force_n`: force that the contact would give; `server_alive`: whether the server's
+    /// liveliness token is present; `device_faults`: from [`DeviceGuard`].
     pub fn judge(
         &mut self,
         model: &ContactModel,

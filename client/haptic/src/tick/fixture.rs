@@ -41,7 +41,7 @@ pub fn contact(seq: u64, force_n: f64, stiffness_n_m: f32) -> HapticContact {
     HapticContact { mode: haptic_contact::Mode::Contact.into(), contacts: vec![plane], ..free(seq) }
 }
 
-/// A device that reports what the test says and keeps what it was given.
+/// A device that reports what the test sets and keeps the force that it received.
 #[derive(Clone)]
 pub struct FakeDevice(Arc<Mutex<(DeviceState, Vector3<f64>)>>, Arc<AtomicBool>);
 
@@ -108,7 +108,7 @@ impl Rig {
         self.tick.tick(TickTime { now_ns: self.now_ns, elapsed_s: 1e-3 })
     }
 
-    /// Runs `ms` ticks with a fresh message every fifth; `None`: silence.
+    /// Runs `ms` ticks with a new message every fifth tick; without messages if `None`.
     pub fn run(&mut self, ms: usize, message: Option<&dyn Fn(u64) -> HapticContact>) -> Vec<TickOutput> {
         let one = |i: usize| {
             if let (Some(message), 0) = (message, i % 5) {
@@ -120,7 +120,7 @@ impl Rig {
         (0..ms).map(one).collect()
     }
 
-    /// Engaged at full gain, without force.
+    /// A rig that is engaged at full gain, without force.
     pub fn engaged(limits: Limits) -> Self {
         let mut rig = Self::new(limits);
         rig.run(600, Some(&free));

@@ -122,7 +122,7 @@ fn stiff_tissue_on_a_hand_does_not_chatter() {
     assert!(low > 0.8 && high < 1.2 && high - low < 0.05, "held force {low} to {high} N");
 }
 
-/// Any message a broken or hostile server may send.
+/// Any message that a broken or hostile server may send.
 fn garbage() -> impl Strategy<Value = HapticContact> {
     let number = prop_oneof![
         3 => -10.0..10.0f64,
@@ -174,7 +174,7 @@ fn arrival() -> impl Strategy<Value = Arrival> {
     ]
 }
 
-/// A force far above the clamp, then silence: zero when it was promised, although the slew is slow.
+/// A force far above the clamp, then silence: the force is zero in time, although the slew is slow.
 #[test]
 fn silence_is_followed_however_large_the_force_was() {
     let mut rig = Rig::engaged(Limits { max_force_n: 3.5, slew_n_s: 55.0 });
@@ -190,7 +190,7 @@ fn silence_is_followed_however_large_the_force_was() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Whatever arrives, lost, late or spoilt: the force stays finite, within the clamp, and never
+    /// Messages may be lost, late or corrupt. The force stays finite and within the clamp, and it never
     /// changes faster than the slew limit.
     #[test]
     fn clamp_and_slew_hold_for_any_stream(

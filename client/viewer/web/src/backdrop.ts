@@ -1,4 +1,4 @@
-// What stands behind the bodies and shines on them: background, lamps, reflections.
+// Background and lighting of the scene: backdrop, lamps, reflections.
 
 import {
   BackSide, Color, DirectionalLight, Group, HemisphereLight, Mesh, MeshBasicMaterial, PlaneGeometry, PMREMGenerator, Scene,
@@ -6,7 +6,7 @@ import {
 } from "three";
 import { isLight } from "./theme";
 
-/** Quiet gradients in screen space: bottom and top of the picture, display-referred. */
+/** Faint gradients in screen space: bottom and top of the picture, display-referred. */
 const SKIES = { dark: [[0.055, 0.067, 0.082], [0.165, 0.195, 0.235]], light: [[0.78, 0.81, 0.84], [0.95, 0.965, 0.975]] };
 
 export class Backdrop {
@@ -14,7 +14,7 @@ export class Backdrop {
   private readonly rig = new Group();
   private readonly sky = sky();
 
-  /** `software`: a processor draws, hence a lamp instead of reflections. */
+  /** `software`: the processor renders, so a lamp replaces the reflections. */
   constructor(scene: Scene, renderer: WebGLRenderer, private readonly software: boolean) {
     const lamp = (color: number, intensity: number, x: number, y: number, z: number) => {
       const light = new DirectionalLight(color, intensity);
@@ -22,7 +22,7 @@ export class Backdrop {
       this.rig.add(light, light.target);
     };
     lamp(0xa9c9ff, 0.9, -0.6, 0.8, 0.35);
-    // The underside of a body is seen too.
+    // The underside of a body is visible as well.
     lamp(0xd8dde6, 0.55, 0.3, -0.3, -1);
     if (software) lamp(0xfff6ee, 0.7, -0.8, -0.6, 0.7);
     else {
@@ -39,14 +39,14 @@ export class Backdrop {
     this.follow();
   }
 
-  /** Takes the colours of the present theme. */
+  /** Applies the colours of the present theme. */
   follow(): void {
     const [low, high] = isLight() ? SKIES.light : SKIES.dark;
     this.sky.low.value.fromArray(low);
     this.sky.high.value.fromArray(high);
   }
 
-  /** Lamps hang from above, wherever that is; shadows cover `radius` around `center`. */
+  /** Places the lamps above the scene, against gravity. Shadows cover `radius` around `center`. */
   aim(scene: Scene, turn: Group["quaternion"], center: Vector3, radius: number): void {
     this.rig.quaternion.copy(turn);
     if (!this.software) scene.environmentRotation.setFromQuaternion(turn);

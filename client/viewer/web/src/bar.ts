@@ -1,4 +1,4 @@
-// Buttons and keys.
+// Toolbar buttons and keyboard shortcuts.
 
 import { boundsOf, PRESETS, type Preset, type Stage } from "./stage";
 import type { Hand, HandMode } from "./hand";
@@ -16,9 +16,9 @@ const HINTS: Record<HandMode, string> = {
 };
 const KEYS: Record<string, HandMode> = { "1": "poke", "2": "grab", "3": "cut", c: "cut", o: "orbit", "0": "orbit", escape: "orbit" };
 const CAMERAS: Record<string, Preset> = { "5": "front", "6": "right", "7": "top", "8": "corner" };
-/** The second click on Reset has to come within this time. */
+/** A second click on Reset must follow within this time. */
 const SURE_MS = 5000;
-/** Below this width the numbers are hidden at first. */
+/** Below this window width [px] the numbers are hidden at first. */
 const NARROW = 1000;
 
 export class Bar {
@@ -90,7 +90,7 @@ export class Bar {
     return [...this.session.bodies.values()].some((body) => body.lipTriangles > 0 || body.marks.count > 0);
   }
 
-  /** Cuts cannot be had back: a second click has to confirm. */
+  /** A reset loses all cuts, so a second click must confirm it. */
   private askReset(): void {
     const cuts = this.hasCuts;
     const words = this.reset.querySelector("span")!;
@@ -137,7 +137,7 @@ export class Bar {
 
   private toggle(): void {
     const bare = document.body.classList.toggle("bare");
-    // On a phone there is room for one of them.
+    // A phone has room for only one of them.
     if (!bare && innerWidth <= 640) this.view.toggle(false);
     document.getElementById("toggle")!.setAttribute("aria-pressed", String(!bare));
     this.stage.relayout();

@@ -1,4 +1,4 @@
-// One body's surface on the GPU. Topology changes when a cut does; positions change every frame.
+// The surface of one body on the GPU. Its topology changes with a cut, its positions with every frame.
 
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, MeshLambertMaterial, Box3, type Plane } from "three";
 import { smoothTopology, type RenderTopology } from "./smoothing";
@@ -9,7 +9,7 @@ import { Tissue, type Look } from "./tissue";
 import { SkinLines } from "./lines";
 import type { SurfaceField, SurfaceFrame, SurfaceTopology } from "../gen/scindo/v1/surface_pb";
 
-/** Colours of render vertices: fills `colours` (r g b per vertex, linear), given what the body knows. */
+/** Fills `colours` (r g b per render vertex, linear) from the state of the body. */
 export type Painter = (body: BodySurface, colours: Float32Array) => void;
 
 export class BodySurface {
@@ -18,10 +18,10 @@ export class BodySurface {
   readonly tissue: Tissue;
   /** Lines along incisions that have not opened yet. */
   readonly marks = new SkinLines(2.2);
-  /** Where skin ends at a wound. */
+  /** Edges between skin and wound. */
   readonly rims = new SkinLines(1.4);
   readonly bounds = new Box3();
-  /** Bounds of what hangs on something held; of the largest part where nothing is held. */
+  /** Bounds of the parts that hang on something held, or of the largest part if nothing is held. */
   readonly core = new Box3();
   isHeld = false;
   coreArea = 0;
@@ -29,20 +29,20 @@ export class BodySurface {
   vertexCount = 0;
   triangleCount = 0;
   lipTriangles = 0;
-  /** Frames taken, frames that waited for their topology. */
+  /** Frames taken, and frames that waited for their topology. */
   frames = 0;
   unmatched = 0;
   simTimeS = 0;
   simStep = 0n;
-  /** Positions of the surface vertices as sent [m]. */
+  /** Positions of the surface vertices as received [m]. */
   positions: Float32Array = new Float32Array(0);
-  /** Where they rest [m]; empty when the server does not tell. */
+  /** Rest positions of the surface vertices [m]; empty if the server does not send them. */
   rest: Float32Array = new Float32Array(0);
-  /** Triangles as drawn; null before the first frame. */
+  /** Triangles ready for drawing; null before the first frame. */
   render: RenderTopology | null = null;
-  /** Von Mises stress of the surface vertices [Pa] and its epoch, while it is asked for. */
+  /** Von Mises stress of the surface vertices [Pa] and its epoch, while the page asks for it. */
   stress: { values: Float32Array; epoch: number } | null = null;
-  /** Called after a picture's positions went to the GPU. */
+  /** Called after new positions went to the GPU. */
   onUpload: (body: BodySurface) => void = () => {};
   private readonly plain = new MeshLambertMaterial({ vertexColors: true, toneMapped: false });
   private painter: Painter | null = null;
@@ -69,7 +69,7 @@ export class BodySurface {
     this.applyLook();
   }
 
-  /** Colours by a painter instead of tissue; `null` for tissue. */
+  /** Colours the body by a painter; `null` restores the look of tissue. */
   paint(painter: Painter | null): void {
     this.painter = painter;
     this.object.material = painter ? [this.plain, this.plain] : [this.tissue.skin, this.tissue.lip];
@@ -87,14 +87,14 @@ export class BodySurface {
     for (const lines of [this.marks, this.rims]) lines.clip(planes);
   }
 
-  /** Keeps the topology until the first frame of its epoch gives it positions. */
+  /** Keeps a topology until the first frame of its epoch brings positions. */
   setTopology(topology: SurfaceTopology): void {
     const triangles = topology.triangleCount;
     if (topology.triangles.length !== 12 * triangles || topology.tags.length !== 4 * triangles) return;
     this.topology = topology;
   }
 
-  /** Takes a frame; false when its topology is not here (yet). */
+  /** Takes a frame. Returns false if its topology has not arrived (yet). */
   setFrame(frame: SurfaceFrame): boolean {
     const vertices = frame.vertexCount;
     if (frame.positions.length !== 12 * vertices) return false;
@@ -123,7 +123,7 @@ export class BodySurface {
     this.stale = true;
   }
 
-  /** Brings positions and normals to the GPU if a new frame came since the last picture. */
+  /** Sends positions and normals to the GPU if a new frame arrived since the last picture. */
   upload(): void {
     if (!this.stale || !this.render) return;
     this.stale = false;
@@ -143,12 +143,12 @@ export class BodySurface {
     this.onUpload(this);
   }
 
-  /** The next picture is made anew, though no frame came. */
+  /** Forces a new picture even without a new frame. */
   touch(): void {
     this.stale = true;
   }
 
-  /** Loose parts of the present topology. */
+  /** Connected parts of the present topology. */
   get parts(): Parts {
     this.parted ??= partsOf(this.triangles, this.vertexCount, this.positions);
     return this.parted;
@@ -209,7 +209,7 @@ export class BodySurface {
     return true;
   }
 
-  /** What the camera keeps in view. */
+  /** Finds the vertices that the camera keeps in view. */
   private findCore(hangs: Uint8Array): void {
     const hanging = hangs.length > 0 ? Uint8Array.from({ length: this.vertexCount }, (_, v) => bit(hangs, v)) : null;
     this.isHeld = hanging !== null && hanging.includes(1);
@@ -222,7 +222,7 @@ export class BodySurface {
     this.inCore = area.length > 1 ? Uint8Array.from(of, (part) => (part === 0 ? 1 : 0)) : null;
   }
 
-  /** Depth below the skin of every vertex on a lip. */
+  /** Computes the depth below the skin of every vertex on a lip. */
   private findDepth(): void {
     const { index, source, skinTriangles } = this.render!;
     if (this.lipTriangles === 0) {
@@ -246,7 +246,7 @@ export class BodySurface {
     attribute.needsUpdate = true;
   }
 
-  /** Buffers grow by half, so that a long cut does not make a new buffer at every epoch. */
+  /** Grows the buffers by half, so that a long cut does not create new ones at every epoch. */
   private reserve(vertices: number, indices: number): void {
     const position = this.geometry.getAttribute("position") as BufferAttribute | undefined;
     const grows = !position || position.count < vertices;
@@ -268,7 +268,9 @@ function bit(bits: Uint8Array, v: number): number {
   return (bits[v >> 3] >> (v & 7)) & 1;
 }
 
-/** The message's own bytes as floats; copied into `room` only where they do not lie on four bytes. */
+/**
+ * The bytes of a message as floats. They are copied into `room` only if they are not aligned to four bytes.
+ */
 function floats(bytes: Uint8Array, room: Float32Array): Float32Array {
   if (bytes.byteOffset % 4 === 0) return new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
   const out = room.length === bytes.length / 4 && room.byteOffset === 0 ? room : new Float32Array(bytes.length / 4);

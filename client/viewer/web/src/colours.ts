@@ -1,4 +1,5 @@
-// Bodies coloured by a quantity, with its legend. Off, it costs nothing: no attribute, no message.
+// Colours bodies by a quantity and shows its legend. Switched off, it costs nothing: no attribute, no
+// message.
 
 import { Color } from "three";
 import { interpolateViridis, schemeTableau10 } from "d3-scale-chromatic";
@@ -10,18 +11,21 @@ import { engineering, length } from "./units";
 export type ColourMode = "tissue" | "displacement" | "stress" | "iterations" | "part";
 
 const STEPS = 256;
-/** Viridis rises evenly in lightness, so that equal steps look equal, in grey and to the colour-blind too. */
+/**
+ * Viridis rises evenly in lightness, so equal steps look equal, in greyscale and to colour-blind people as
+ * well.
+ */
 const MAP = lut(Array.from({ length: STEPS }, (_, i) => interpolateViridis(i / (STEPS - 1))));
 const KINDS = lut(schemeTableau10.slice());
 const NAMES: Record<ColourMode, string> = {
   tissue: "", displacement: "displacement", stress: "von Mises stress", iterations: "solver iterations", part: "loose parts",
 };
-/** The range follows a falling maximum this slowly, per picture. */
+/** Fraction per picture by which the range follows a falling maximum. */
 const FORGET = 0.02;
 
 export class Colours {
   mode: ColourMode = "tissue";
-  /** Upper end of the legend, in the unit of the quantity; the lower end is zero. */
+  /** Upper end of the legend, in the unit of the quantity. The lower end is zero. */
   high = 0;
   held = false;
   private seen = 0;
@@ -29,7 +33,7 @@ export class Colours {
   private stats: Stats | null = null;
   private readonly at = (id: string) => document.getElementById(id)!;
 
-  /** `onMode`: what the page asks of the server may have changed. */
+  /** `onMode`: called when the topics that the page needs may have changed. */
   constructor(private readonly session: Session, private readonly onMode: () => void) {
     const hold = this.at("legend-hold") as HTMLButtonElement;
     hold.onclick = () => {
@@ -51,7 +55,7 @@ export class Colours {
     this.onMode();
   }
 
-  /** A body that has come gets the present colours. */
+  /** Applies the present colours to a new body. */
   dress(body: BodySurface): void {
     if (this.mode !== "stress") body.stress = null;
     body.paint(this.mode === "tissue" ? null : (b, colours) => this.paint(b, colours));
@@ -63,7 +67,7 @@ export class Colours {
     for (const body of this.session.bodies.values()) body.touch();
   }
 
-  /** Once per picture, after all bodies were painted: the range follows what was seen. */
+  /** Called once per picture, after all bodies were painted: the range follows the values. */
   advance(): void {
     if (this.mode === "tissue" || this.mode === "part") return;
     if (!this.held) {
@@ -93,7 +97,7 @@ export class Colours {
     }
   }
 
-  /** The quantity at every surface vertex. */
+  /** The value of the quantity at every surface vertex. */
   private measure(body: BodySurface): Float32Array {
     if (this.values.length < body.vertexCount) this.values = new Float32Array(Math.ceil(1.5 * body.vertexCount));
     const out = this.values;
@@ -126,7 +130,7 @@ export class Colours {
   }
 }
 
-/** Colours as linear r g b. */
+/** Converts colour names to linear r g b. */
 function lut(words: string[]): Float32Array {
   const out = new Float32Array(3 * words.length);
   words.forEach((word, i) => new Color(word).toArray(out, 3 * i));

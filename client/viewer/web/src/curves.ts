@@ -1,5 +1,5 @@
 // Curves over simulated time: force per tool, energies, time per step, age of the contact that hands feel.
-// Nothing is kept while the curves are hidden.
+// Nothing is stored while the curves are hidden.
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
@@ -9,7 +9,7 @@ import { engineering } from "./units";
 import { ink, onTheme } from "./theme";
 
 const COLOURS = ["#e58a7b", "#4f9ae0", "#5fb878", "#c98bdb", "#d9a441", "#3fb5b0"];
-/** Points of a curve; older ones are forgotten. */
+/** Most points of a curve; older ones are dropped. */
 const POINTS = 1200;
 const HEIGHT = 92;
 const REFRESH_MS = 250;
@@ -43,7 +43,7 @@ export class Curves {
     this.timer = window.setInterval(() => Object.values(this.charts!).forEach((chart) => chart.draw()), REFRESH_MS);
   }
 
-  /** Another scene has other tools and energies. */
+  /** Clears the curves for a scene with other tools and energies. */
   restart(): void {
     if (!this.on) return;
     this.forces.clear();
@@ -76,7 +76,7 @@ export class Curves {
     this.charts.energy.add(measures.simTimeS, new Map([["elastic", sum("elasticJ")], ["kinetic", sum("kineticJ")]]));
   }
 
-  /** Points of each chart, for tests. */
+  /** Number of points of each chart, for tests. */
   get counts(): number[] {
     return this.charts ? Object.values(this.charts).map((chart) => chart.count) : [];
   }
@@ -104,7 +104,7 @@ class Chart {
   add(time: number, values: Map<string, number>): void {
     const times = this.data[0] as number[];
     const last = times.length > 0 ? times[times.length - 1] : -Infinity;
-    // The scene began again.
+    // The scene was restarted.
     if (time < last) this.data = this.data.map(() => []);
     for (const name of values.keys()) {
       if (this.names.includes(name) || this.names.length >= COLOURS.length) continue;

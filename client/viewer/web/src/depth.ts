@@ -1,11 +1,11 @@
-// How deep the faces of a wound lie below the skin, at rest.
+// Rest depth of wound faces below the skin.
 //
-// Cuts do not change where the outer skin rests, so its triangles are put into a grid once, and a point of a
-// wound is measured once, however often the topology changes.
+// Cuts do not change the rest position of the outer skin. Its triangles are therefore put into a grid once.
+// Each point of a wound is measured once, however often the topology changes.
 
 import { Vector3, Triangle, Box3 } from "three";
 
-/** Cells along the longest side. */
+/** Number of cells along the longest side. */
 const CELLS = 24;
 
 export class SkinDepth {
@@ -15,7 +15,7 @@ export class SkinDepth {
   private readonly triangles: Float32Array;
   private size = 1;
 
-  /** Of a skin: three corners per triangle, and where vertices rest [m]. */
+  /** Builds the grid of a skin: three corners per triangle, and rest positions of the vertices [m]. */
   constructor(corners: Uint32Array, rest: Float32Array) {
     this.triangles = new Float32Array(3 * corners.length);
     corners.forEach((v, c) => this.triangles.set(rest.subarray(3 * v, 3 * v + 3), 3 * c));
@@ -26,7 +26,7 @@ export class SkinDepth {
     for (let t = 0; t < this.triangles.length; t += 9) this.enter(t);
   }
 
-  /** Distance of a point at rest from the skin [m]. */
+  /** Distance of a rest position from the skin [m]. */
   at(x: number, y: number, z: number): number {
     const key = `${x},${y},${z}`;
     let depth = this.known.get(key);
@@ -55,7 +55,7 @@ export class SkinDepth {
         }
   }
 
-  /** Shells of cells around the point, until none further out can be nearer. */
+  /** Searches shells of cells around the point until no cell further out can be nearer. */
   private measure(p: Vector3): number {
     const at = [p.x - this.origin.x, p.y - this.origin.y, p.z - this.origin.z].map((c) => Math.floor(c / this.size));
     let best = Infinity;

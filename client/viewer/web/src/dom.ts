@@ -1,8 +1,8 @@
-// Small helpers to write into the page only what changed.
+// Helpers that write only changed text into the page.
 
 export type Row = [key: string, value: string, kind?: "title" | "bad" | "warn" | "words" | "bad words" | "", hint?: string];
 
-/** Fills a list of key and value, touching the page only where a text changed. */
+/** Fills a list of keys and values. It changes only the texts that differ. */
 export function setRows(box: Element, rows: Row[]): void {
   while (box.children.length > rows.length) box.lastElementChild!.remove();
   while (box.children.length < rows.length) {

@@ -1,4 +1,4 @@
-// Which way the axes point, and how long something is: a triad and a scale bar beside the picture, not in it.
+// The directions of the axes and a length scale: a triad and a scale bar beside the picture.
 
 import { Vector3 } from "three";
 import type { Stage } from "./stage";
@@ -23,7 +23,7 @@ export class Gizmo {
     this.shown = "";
   }
 
-  /** After each picture; touches the page only when something turned. */
+  /** Called after each picture. It changes the page only if the view turned. */
   place(): void {
     if (document.getElementById("axes")!.hidden) return;
     const { camera } = this.stage;
@@ -44,7 +44,7 @@ export class Gizmo {
   }
 }
 
-/** The largest of 1, 2, 5 times a power of ten that is not longer. */
+/** The largest number that is 1, 2 or 5 times a power of ten and not larger than `metres`. */
 function round(metres: number): number {
   const power = 10 ** Math.floor(Math.log10(metres));
   return (metres >= 5 * power ? 5 : metres >= 2 * power ? 2 : 1) * power;

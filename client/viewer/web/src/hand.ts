@@ -1,8 +1,8 @@
-// The mouse as a hand: hovers over the tissue, presses, holds and cuts it.
+// The mouse as a hand: it hovers over the tissue, presses, holds and cuts it.
 //
-// A press fixes a plane through the touched point, parallel to the picture. Poke and grab move in
-// that plane, so that the tissue that gives way does not pull the tool after it. A blade follows
-// the skin under the cursor and stands along the line of sight, so the cut runs where one draws it.
+// A press defines a plane through the touched point, parallel to the picture. Poke and grab move in that
+// plane, so that yielding tissue does not pull the tool along. A blade follows the skin under the cursor and
+// points along the line of sight, so the cut runs where the user draws it.
 
 import { create } from "@bufbuild/protobuf";
 import { Group, Matrix4, Mesh, MeshBasicMaterial, Plane, Quaternion, Raycaster, TorusGeometry, Vector2, Vector3 } from "three";
@@ -16,24 +16,24 @@ import type { Session } from "./session";
 
 export type HandMode = "orbit" | "poke" | "grab" | "cut";
 
-/** While moving, samples go out at this rate; at rest a tenth of it keeps the tool alive. */
+/** Period of samples while the tool moves [ms]. At rest, a tenth of that rate keeps the tool alive. */
 const SAMPLE_MS = 14;
 const REST_MS = 120;
-/** A press goes in over this time, as a hand does. */
+/** A press enters the tissue over this time [ms], as a hand does. */
 const PRESS_MS = 140;
-/** Probe radius and blade length as parts of the scene's radius. */
+/** Probe radius and blade length as fractions of the scene's radius. */
 const PROBE = 0.055;
 const BLADE = 0.9;
 const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.32, depthWrite: false });
 const RING = new MeshBasicMaterial({ color: 0xd7ecff, transparent: true, opacity: 0.9, depthTest: false, toneMapped: false });
 
 interface Press {
-  /** Where the tissue was touched, the picture plane through it, and the way in. */
+  /** The touched point, the picture plane through it, and the direction into the tissue. */
   anchor: Vector3;
   plane: Plane;
   inward: Vector3;
   since: number;
-  /** Line-of-sight distance of the skin last seen under a blade. */
+  /** Distance of the skin last seen under a blade, along the line of sight [m]. */
   reach: number;
 }
 
@@ -79,7 +79,7 @@ export class Hand {
     canvas.addEventListener("contextmenu", (e) => e.preventDefault());
   }
 
-  /** Chooses what the mouse does; another tool means putting the old one away. */
+  /** Selects what the mouse does. A change of tool puts the old one away. */
   choose(mode: HandMode): void {
     if (mode === this.mode) return;
     this.drop();
@@ -94,7 +94,7 @@ export class Hand {
     return this.depth[this.mode] * this.stage.radius;
   }
 
-  /** Depth range as parts of the scene's radius: a grab may also pull towards the eye. */
+  /** Depth range as fractions of the scene's radius. A grab may also pull towards the viewer. */
   get depthRange(): { value: number; min: number; max: number } {
     return { value: this.depth[this.mode], min: this.mode === "grab" ? -0.6 : 0, max: this.mode === "cut" ? 0.7 : 0.6 };
   }
@@ -106,7 +106,7 @@ export class Hand {
     this.onChange();
   }
 
-  /** Puts the tool away: the server forgets it. */
+  /** Puts the tool away, so that the server releases it. */
   drop(): void {
     this.press = null;
     this.held = false;
@@ -116,7 +116,7 @@ export class Hand {
     this.leave();
   }
 
-  /** Once per picture slot: where is the tool now, and does the server know? */
+  /** Called once per picture: updates the tool and sends its pose if one is due. */
   advance(now: number): void {
     if (this.mode === "orbit" || this.session.readOnly) return;
     if (this.press) this.follow(now);
@@ -125,7 +125,7 @@ export class Hand {
     if (this.held && now - this.lastSent >= due) this.sendSample(now);
   }
 
-  /** Puts the cursor where the tool is held. */
+  /** Moves the cursor to where the tool is held. */
   place(): void {
     this.cursor.visible = this.held;
     if (!this.held) return;
@@ -144,7 +144,7 @@ export class Hand {
     this.cursor.quaternion.copy(this.quaternion);
   }
 
-  /** What lies under a point of the page. */
+  /** The surface point under a point of the page. */
   surfaceAt(x: number, y: number): Hit | null {
     this.aim({ clientX: x, clientY: y });
     return this.hit();
@@ -229,7 +229,7 @@ export class Hand {
     return pick(this.caster.ray, this.session.bodies.values());
   }
 
-  /** Free tool just above the skin under the cursor; nowhere when the cursor is beside the bodies. */
+  /** Moves a free tool just above the skin under the cursor. Beside the bodies there is no tool. */
   private hover(): void {
     this.moved = false;
     const hit = this.hit();
@@ -246,7 +246,7 @@ export class Hand {
     this.stage.invalidate();
   }
 
-  /** Pressed tool: in the plane of the press, or along the skin for a blade. */
+  /** Moves a pressed tool in the plane of the press, or a blade along the skin. */
   private follow(now: number): void {
     const press = this.press!;
     this.caster.setFromCamera(this.pointer, this.stage.camera);
@@ -255,7 +255,7 @@ export class Hand {
     const depth = this.depthM * part * (2 - part);
     if (this.mode === "cut") {
       const hit = this.hit();
-      // Lips lie deeper than the skin beside them: the blade keeps its reach over an open slit.
+      // Lips lie deeper than the skin beside them. The blade therefore keeps its distance over an open slit.
       if (hit && hit.tag === 0) press.reach += 0.5 * (hit.distance - press.reach);
       this.moveTo(ray.at(press.reach + depth, new Vector3()), ray.direction.clone().negate());
     } else {

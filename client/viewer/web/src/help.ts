@@ -1,4 +1,4 @@
-// All keys and gestures in one place.
+// The list of all keys and gestures.
 
 const SECTIONS: [string, [string, string][]][] = [
   ["Look", [

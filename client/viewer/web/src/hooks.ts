@@ -1,4 +1,4 @@
-// window.scindo: what a headless test (or a curious console) may ask and do.
+// `window.scindo`: queries and actions for headless tests (or a curious console).
 
 import { Vector3 } from "three";
 import { boundsOf, type Stage } from "./stage";
@@ -63,18 +63,18 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     })),
     /** Force on this page's own tool [N]. */
     contactForceN: () => session.tools.get(session.toolId)?.force.length() ?? 0,
-    /** What lies under a point of the page, or null. */
+    /** The surface point under a point of the page, or null. */
     surfaceAt: (x: number, y: number) => {
       const hit = hand.surfaceAt(x, y);
       return hit && { body: hit.body.id, point: hit.point.toArray() as Triple, normal: hit.normal.toArray() as Triple, tag: hit.tag };
     },
     renderer: () => (stage.software ? "software" : "hardware"),
     stats: () => panel.stats,
-    /** Whether the server's plan has an effect on. */
+    /** Whether an effect is active in the server's plan. */
     effectIsOn: (name: string) => panel.plan?.effects.some((effect) => effect.name === name && effect.on) ?? false,
     connected: () => relay.isOpen,
     paused: () => session.paused,
-    /** A world point in page pixels. */
+    /** Projects a world point to page pixels. */
     project: (point: Triple) => stage.project(new Vector3(...point)),
     camera: (position: Triple, target: Triple) => {
       stage.release();
@@ -89,9 +89,9 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
       up: stage.camera.up.toArray() as Triple,
       radius: stage.radius,
     }),
-    /** Points of each curve while they are shown. */
+    /** Number of points of each curve while the curves are shown. */
     curves: () => curves.counts,
-    /** Changes a live parameter, with key and value as in a scene. */
+    /** Changes a live parameter; key and value are as in a scene. */
     set: (key: string, value: string) => relay.call({ case: "set", value: { key, value } }),
     hand: (mode: HandMode) => hand.choose(mode),
     depth: (part: number) => hand.setDepth(part),

@@ -1,17 +1,19 @@
-// Thin dark lines that lie on the skin: what a blade has drawn without opening it, and the rims of wounds,
-// which are seen where lips lie close to each other.
+// Thin dark lines on the skin. They show what a blade has drawn without opening it, and the rims of wounds,
+// which remain visible where lips lie close together.
 
 import { DynamicDrawUsage, InstancedInterleavedBuffer, InterleavedBufferAttribute, type Plane } from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
 
-/** Lines come this share of their distance nearer to the eye, so that the skin below does not hide them. */
+/**
+ * Lines are moved this fraction of their distance towards the viewer, so that the skin does not hide them.
+ */
 const LIFT = 1.5e-3;
 
 export class SkinLines {
   readonly object: LineSegments2;
-  /** Ends [m]: x y z of both ends, per line. */
+  /** End points [m]: x y z of both ends, per line. */
   positions: Float32Array = new Float32Array(0);
   private readonly geometry = new LineSegmentsGeometry();
   private readonly material: LineMaterial;
@@ -44,13 +46,13 @@ export class SkinLines {
     this.positions = positions ?? new Float32Array(0);
   }
 
-  /** Edges of a surface: two of its vertices each. */
+  /** Draws edges of a surface, given as pairs of its vertices. */
   follow(edges: Uint32Array, surface: Float32Array): void {
     if (this.positions.length !== 3 * edges.length) this.positions = new Float32Array(3 * edges.length);
     for (let k = 0; k < edges.length; k++) this.positions.set(surface.subarray(3 * edges[k], 3 * edges[k] + 3), 3 * k);
   }
 
-  /** Brings the lines to the GPU; the buffer grows by half. */
+  /** Sends the lines to the GPU. The buffer grows by half. */
   upload(): void {
     this.object.visible = this.count > 0;
     if (this.count === 0) return;

@@ -1,15 +1,18 @@
-// What happened, folded: one line per kind while it goes on.
+// The event log, folded: one line per kind of event while it repeats.
 
 import { Event_Level, type Event } from "../gen/scindo/v1/server_pb";
 
-/** Rows of the log, how long the last ones stay bright, and how long a line of the same kind counts with the last. */
+/**
+ * Rows of the log, time that the last rows stay bright, and time within which events of one kind share a
+ * line.
+ */
 const ROWS = 6;
 const BRIGHT_MS = 8000;
 const FOLD_MS = 20_000;
 
 export type Level = "info" | "warning" | "error";
 
-/** Kinds that another one tells already. */
+/** Kinds of events that another kind already covers. */
 const SILENT = ["cut-answered"];
 
 export class Log {
@@ -21,7 +24,7 @@ export class Log {
     this.line(plain(event) || event.name, level, event.name);
   }
 
-  /** Adds a line; one of a kind that was here a moment ago takes its place and counts it. */
+  /** Adds a line. It replaces and counts a recent line of the same kind. */
   line(text: string, level: Level, kind = ""): void {
     const now = performance.now();
     const rows = [...this.box.children] as HTMLElement[];
@@ -40,7 +43,7 @@ export class Log {
   }
 }
 
-/** An event in a user's words. */
+/** Describes an event in a user's words. */
 function plain(event: Event): string {
   const body = /^([a-z0-9_-]+): /.exec(event.message)?.[1];
   switch (event.name) {

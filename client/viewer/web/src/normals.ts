@@ -1,11 +1,11 @@
-// Positions and normals as the GPU takes them, from the surface as it was sent.
+// Positions and normals for the GPU, from the received surface.
 
 import { Box3, Vector3 } from "three";
 import type { RenderTopology } from "./smoothing";
 
 const low = new Vector3(), high = new Vector3();
 
-/** Copies positions to render vertices; `bounds` of all, `core` of those that `inCore` names. */
+/** Copies positions to render vertices. `bounds` covers all of them, `core` those marked by `inCore`. */
 export function gather(
   from: Float32Array, source: Uint32Array, to: Float32Array, bounds: Box3, inCore: Uint8Array | null, core: Box3,
 ): void {

@@ -1,4 +1,5 @@
-// What may be drawn over the bodies: their mesh, what is held, a plane that cuts them open. All off at first.
+// Optional drawings over the bodies: mesh, held places, and a plane that cuts bodies open. All are off at
+// first.
 
 import {
   AlwaysStencilFunc, BackSide, BufferAttribute, BufferGeometry, DecrementWrapStencilOp, DoubleSide, FrontSide, Group,
@@ -37,13 +38,13 @@ export class Overlays {
     this.dressAll();
   }
 
-  /** Normal of the plane: an axis, or towards the eye as it is now. */
+  /** Sets the normal of the plane: an axis, or the present direction to the viewer. */
   setAxis(axis: "eye" | "x" | "y" | "z"): void {
     this.axis = axis;
     this.turnPlane();
   }
 
-  /** Where the plane lies, −1 to 1 across what is in view. */
+  /** Sets the position of the plane, −1 to 1 across the visible region. */
   setPart(part: number): void {
     this.part = part;
     this.movePlane();
@@ -55,7 +56,7 @@ export class Overlays {
     this.movePlane();
   }
 
-  /** A body that has come gets what is on. */
+  /** Applies the active overlays to a new body. */
   dress(body: BodySurface): void {
     this.undress(body);
     body.clip(this.clipping ? [this.plane] : null);
@@ -72,7 +73,7 @@ export class Overlays {
     body.onUpload = () => {};
   }
 
-  /** Once per picture. */
+  /** Called once per picture. */
   place(): void {
     if (this.clipping) for (const extra of this.extras.values()) extra.place(this.stage.radius);
   }
@@ -97,7 +98,7 @@ export class Overlays {
   }
 }
 
-/** What is drawn with one body. */
+/** The overlays of one body. */
 class Extra {
   readonly object = new Group();
   private readonly held: Points | null = null;
@@ -121,7 +122,7 @@ class Extra {
     if (what.plane) this.addCap(what.plane);
   }
 
-  /** Held places move with the body (their displacement may be prescribed). */
+  /** Moves held places with the body (their displacement may be prescribed). */
   private follow(): void {
     const { body, held } = this;
     if (!held) return;
@@ -138,8 +139,8 @@ class Extra {
   }
 
   /**
-   * The face that the plane makes: back faces seen beyond the plane count up, front faces down; where the count is
-   * not zero the plane lies within the body. The count of each body is cleared before that of the next.
+   * Draws the face that the plane makes. Back faces seen beyond the plane count up, front faces count down.
+   * Where the count is not zero, the plane lies within the body. The count is cleared after each body.
    */
   private addCap(plane: Plane): void {
     const order = 10 + 3 * this.body.order;
@@ -159,7 +160,7 @@ class Extra {
     this.add(this.cap, order + 1);
   }
 
-  /** Keeps the face in the plane, large enough for the body. */
+  /** Keeps the face in the plane and large enough for the body. */
   place(radius: number): void {
     if (!this.cap) return;
     const plane = this.cap.userData["plane"] as Plane;

@@ -1,4 +1,4 @@
-// What the page is made of, and the way of a message.
+// The parts of the page, and the path of a message through them.
 
 import { Relay } from "./relay";
 import { Stage } from "./stage";
@@ -62,7 +62,7 @@ class Page {
     this.relay.open();
   }
 
-  /** Applies one message. Nothing is drawn here: a burst of messages costs one picture. */
+  /** Applies one message. Nothing is drawn here, so a burst of messages costs only one picture. */
   private receive(message: ViewerDown["message"], bytes: number): void {
     switch (message.case) {
       case "hello":
@@ -115,7 +115,7 @@ class Page {
     }
   }
 
-  /** One picture: surfaces to the GPU, tools in place, camera, render. */
+  /** Draws one picture: surfaces to the GPU, tools in place, camera, render. */
   private frame(now: number): void {
     requestAnimationFrame((next) => this.frame(next));
     this.hand.advance(now);
@@ -132,7 +132,7 @@ class Page {
     this.panel.countPicture(now);
   }
 
-  /** Another scene, or the same from a server that came back: bodies and tools it does not know leave the picture. */
+  /** Takes over a scene, new or restarted. Bodies and tools that it does not have are removed. */
   private takeInfo(info: SessionInfo): void {
     const tools = info.tools.map((tool) => tool.id);
     [...this.session.tools.keys()].filter((id) => !tools.includes(id)).forEach((id) => this.forgetTool(id));

@@ -80,13 +80,13 @@ export class Panel {
   }
 
   event(event: Event): void {
-    // That this page's own mouse comes and goes is no news.
+    // The page's own mouse tool comes and goes; that is not reported.
     const tool = this.status.hello?.toolId;
     if (tool && /^tool-(taken|released)$/.test(event.name) && event.message.includes(`'${tool}'`)) return;
     this.log.event(event);
   }
 
-  /** What the server did is told by an event; here only what it refused. */
+  /** Shows refusals only. Events report what the server did. */
   showRpc(answer: ViewerRpcReply): void {
     const { reply } = answer;
     if (!reply || reply.ok) return;
@@ -109,7 +109,7 @@ export class Panel {
     this.refreshTools(stats);
   }
 
-  /** The worst of all bodies stands in the head, also where the numbers are hidden. */
+  /** Shows the worst problem of all bodies in the header, even while the numbers are hidden. */
   private refreshAlarm(stats: Stats | null): void {
     const found = (stats?.bodies ?? []).flatMap((body) => troubles(body).filter((trouble) => trouble.short).map((trouble) => `${body.bodyId} ${trouble.short}`));
     const pill = this.at("alarm");

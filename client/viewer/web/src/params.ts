@@ -1,16 +1,17 @@
-// Live parameters as sliders, and the choice of scenes. Asked of the server only when the tray is opened.
+// Live parameters as sliders, and the choice of scenes. The page asks the server only when the tray is
+// opened.
 
 import { Param_Kind, type Param, type ParamsReply, type ScenesReply } from "../gen/scindo/v1/server_pb";
 import { element } from "./dom";
 import type { Relay } from "./relay";
 import { NO_OPERATOR, type Session } from "./session";
 
-/** Positions of a slider. */
+/** Number of positions of a slider. */
 const STEPS = 400;
-/** A slider that moves tells the server this often. */
+/** Period at which a moving slider sends its value [ms]. */
 const TELL_MS = 120;
 
-/** What users call the keys of a body, where these are called otherwise. */
+/** Names of keys for users, where they differ from the key. */
 const NAMES: Record<string, string> = {
   "rayleigh.mass": "drag", "rayleigh.stiffness": "viscosity",
   "solver.iterations": "iterations", "solver.tolerance": "tolerance", young: "stiffness", poisson: "Poisson’s ratio",
@@ -22,14 +23,14 @@ export class Params {
   private readonly list = element("div", "sliders");
   private scene = "";
   private timer = 0;
-  /** Values on their way, by key; only the newest of each is told. */
+  /** Values to send, by key. Only the newest value of each key is sent. */
   private readonly waiting = new Map<string, string>();
 
   constructor(private readonly relay: Relay, private readonly session: Session) {
     this.box.append(this.scenes, this.list);
   }
 
-  /** The tray was opened, or another scene runs. */
+  /** Called when the tray is opened or another scene runs. */
   ask(): void {
     if (!this.session.operator) {
       this.list.replaceChildren(element("p", "note", NO_OPERATOR));
@@ -65,7 +66,7 @@ export class Params {
 
   showParams({ params }: ParamsReply): void {
     const active = document.activeElement;
-    // A slider in the hand is not taken away.
+    // A slider in use is not replaced.
     if (active instanceof HTMLInputElement && this.list.contains(active)) return;
     const known = params.filter((param) => param.kind !== Param_Kind.UNSPECIFIED);
     this.list.replaceChildren();
@@ -121,19 +122,19 @@ function input(type: string): HTMLInputElement {
   return node;
 }
 
-/** `body.liver.young_pa` belongs to "liver". */
+/** The body of a key: `body.liver.young_pa` belongs to "liver". */
 function groupOf(key: string): string {
   const [table, id] = key.split(".");
   return table === "body" ? id : table;
 }
 
-/** `body.liver.solver.iterations` is "iterations". */
+/** The name of a key: `body.liver.solver.iterations` is "iterations". */
 function nameOf(key: string): string {
   const words = key.replace(/^body\.[^.]*\.|^(world|effects)\./, "").replace(/_(pa|m_s2|s|1_s)$/, "");
   return NAMES[words] ?? words.replaceAll(/[._]/g, " ");
 }
 
-/** Where a value lies between the ends of its slider, 0 to 1. */
+/** Position of a value between the ends of its slider, 0 to 1. */
 function partOf(param: Param, x: number): number {
   const { usualMin: low, usualMax: high } = param;
   const part = isLogarithmic(param) ? Math.log(x / low) / Math.log(high / low) : (x - low) / (high - low);
@@ -155,7 +156,7 @@ function numbers(text: string): number[] {
   return found.length === 3 && found.every(Number.isFinite) ? found : [0, 0, 0];
 }
 
-/** The vector at another length; one without a length points along −z. */
+/** The vector scaled to another length. A zero vector becomes one along −z. */
 function scaled(vector: number[], length: number): string {
   const now = Math.hypot(...vector);
   const at = now > 0 ? vector.map((c) => (c / now) * length) : [0, 0, -length];

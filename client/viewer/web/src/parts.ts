@@ -1,9 +1,9 @@
-// Loose parts of a surface: vertices that triangles hang together.
+// Connected parts of a surface: sets of vertices joined by triangles.
 
 export interface Parts {
-  /** Part of every vertex, numbered by falling area; vertices without a triangle have the last one. */
+  /** Part of every vertex, numbered by falling area. Vertices without a triangle belong to the last part. */
   of: Uint32Array;
-  /** Area of every part at the positions given, falling [m²]. */
+  /** Area of every part at the given positions [m²], descending. */
   area: number[];
 }
 

@@ -1,4 +1,4 @@
-// Where a ray meets the surfaces: plain Möller-Trumbore over the arrays that were drawn.
+// Intersection of a ray with the surfaces: plain Möller-Trumbore over the arrays that were drawn.
 
 import { Vector3, type Ray } from "three";
 import type { BodySurface } from "./body";
@@ -13,7 +13,7 @@ export interface Hit {
   tag: number;
 }
 
-/** Nearest front face along the ray, or null. */
+/** The nearest front face along the ray, or null. */
 export function pick(ray: Ray, bodies: Iterable<BodySurface>): Hit | null {
   let best: Hit | null = null;
   for (const body of bodies) {

@@ -1,4 +1,4 @@
-// Probes of the scene: where each material point is, its name, and the way it went.
+// Probes of the scene: their position, name and trace.
 
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Group, Line, LineBasicMaterial, Points, PointsMaterial, Vector3 } from "three";
 import { Color } from "three";
@@ -6,7 +6,7 @@ import type { Measures } from "../gen/scindo/v1/server_pb";
 import type { Stage } from "./stage";
 import { length } from "./units";
 
-/** Points kept of each way: half a minute at twenty per second. */
+/** Most points of a trace: half a minute at twenty per second. */
 const TRACE = 600;
 const COLOURS = [0xffd35c, 0x62c6f2, 0x8fe08a, 0xf29bd0, 0xd0a6ff, 0xffa35c];
 
@@ -28,7 +28,7 @@ export class Probes {
 
   take(measures: Measures): void {
     if (!this.on) return;
-    // The scene began again: so do the ways.
+    // The scene was restarted, so the traces start anew.
     if (measures.simTimeS < this.time) this.clear();
     this.time = measures.simTimeS;
     for (const { id, positionM: at, restM: rest } of measures.probes) {
@@ -44,7 +44,7 @@ export class Probes {
     this.stage.invalidate();
   }
 
-  /** Once per picture: names beside their points. */
+  /** Called once per picture: moves the names beside their points. */
   place(): void {
     for (const trace of this.shown.values()) trace.place(this.stage);
   }

@@ -1,4 +1,4 @@
-// Rates and smooth values for the panel.
+// Rates and smoothed values for the panel.
 
 /** Events per second over the last second or so. */
 export class Rate {

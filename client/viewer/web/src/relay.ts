@@ -1,4 +1,4 @@
-// The one WebSocket: decode, reconnect, clock offset, room for more frames.
+// The WebSocket of the page: decoding, reconnection, clock offset, acknowledgement of frames.
 
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { ViewerDownSchema, ViewerUpSchema, type ViewerDown } from "../gen/scindo/v1/viewer_pb";
@@ -9,14 +9,14 @@ type RpcCall = NonNullable<Extract<UpInit, { case: "rpc" }>["value"]>["call"];
 
 const RETRY_MS = 700;
 const PING_MS = 1000;
-/** Pings kept for the clock: the one with the shortest round trip tells the offset best. */
+/** Number of pings kept. The one with the shortest round trip gives the best clock offset. */
 const CLOCK_SAMPLES = 12;
 
 export class Relay {
-  /** Messages received, all kinds. */
+  /** Number of messages received, of all kinds. */
   messages = 0;
   bytes = 0;
-  /** Round trip page to relay [ms]. */
+  /** Round trip between page and relay [ms]. */
   roundTripMs = NaN;
   browsers = 0;
   framesDropped = 0;
@@ -63,12 +63,12 @@ export class Relay {
     return true;
   }
 
-  /** Calls the server; the answer comes back as an event line. */
+  /** Sends a call to the server. The answer appears as a line of the log. */
   call(call: NonNullable<RpcCall>): void {
     this.send({ case: "rpc", value: { callId: this.nextCall++, call } });
   }
 
-  /** Age of something the server stamped, by the relay's clock [ms]; NaN before the first ping. */
+  /** Age of a server time stamp by the relay's clock [ms]; NaN before the first ping. */
   ageMs(publishUnixNs: bigint): number {
     if (this.clock.length === 0) return NaN;
     const best = this.clock.reduce((a, b) => (b.roundTripMs < a.roundTripMs ? b : a));

@@ -1,12 +1,12 @@
-// What the page knows.
+// The state of the session as the page knows it.
 
 import type { BodySurface } from "./body";
 import type { ToolVisual } from "./tool";
 
-/** Why a page may not pause, reset, undo or change anything. */
+/** Explains why a page may not pause, reset, undo or change anything. */
 export const NO_OPERATOR = "Only operators change the simulation: pages on the server’s machine, or all with --operators all.";
 
-/** All the page knows of the session; what is drawn is drawn from here. */
+/** Everything that the page knows of the session. All drawing uses it. */
 export interface Session {
   bodies: Map<string, BodySurface>;
   tools: Map<string, ToolVisual>;

@@ -1,13 +1,13 @@
-// Which triangle corners share a normal: smooth over skin, sharp at the rim of a cut.
+// Decides which triangle corners share a normal: smooth over skin, sharp at the rim of a cut.
 
 import { find, unite } from "./parts";
 
-/** Neighbouring triangles of one kind share normals below this angle between them. */
+/** Neighbouring triangles of one kind share normals if the angle between them is below this. */
 const CREASE_COS = Math.cos((52 * Math.PI) / 180);
-/** Triangles below this part of the mean area have no reliable normal; they never make a crease. */
+/** Triangles below this fraction of the mean area have no reliable normal and never form a crease. */
 const SLIVER = 0.02;
 
-/** A surface ready for drawing: corners with one normal are one render vertex. */
+/** A surface ready for drawing. Corners that share a normal share a render vertex. */
 export interface RenderTopology {
   /** Three render vertices per triangle, skin triangles first. */
   index: Uint32Array;
@@ -22,9 +22,9 @@ export interface RenderTopology {
 }
 
 /**
- * Groups corners by union-find over edges whose two triangles have the same tag and meet below the
- * crease angle at the given positions (a slit just made is closed there: its lips fold by 180° at
- * the front and are kept apart).
+ * Groups corners by union-find over edges. The two triangles of an edge are joined if they have the same tag
+ * and meet below the crease angle at the given positions. A new slit is still closed there: its lips fold by
+ * 180° at the front and stay apart.
  */
 export function smoothTopology(
   given: Uint32Array, givenTags: Uint32Array, positions: Float32Array, vertexCount: number,
@@ -71,7 +71,7 @@ export function smoothTopology(
   return { index, source: source.slice(0, count), skinTriangles, tags, rims: Uint32Array.from(rims) };
 }
 
-/** Stable partition: skin, then lips, so that each kind is one draw range. */
+/** Stable partition into skin, then lips, so that each kind is one draw range. */
 function skinFirst(given: Uint32Array, givenTags: Uint32Array) {
   const n = givenTags.length;
   let skinTriangles = 0;
@@ -89,7 +89,7 @@ function skinFirst(given: Uint32Array, givenTags: Uint32Array) {
   return { triangles, tags, skinTriangles };
 }
 
-/** Corners around every vertex, compressed rows. */
+/** Corners around every vertex, as compressed rows. */
 function cornersOfVertices(triangles: Uint32Array, vertexCount: number) {
   const start = new Uint32Array(vertexCount + 1);
   for (const v of triangles) start[v + 1] += 1;

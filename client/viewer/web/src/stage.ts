@@ -1,4 +1,4 @@
-// Where the bodies stand: camera, light, and when to draw.
+// The stage of the bodies: camera, light, and when to draw.
 
 import { ACESFilmicToneMapping, Box3, MathUtils, PCFShadowMap, PerspectiveCamera, Quaternion, Scene, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
@@ -6,47 +6,47 @@ import { Backdrop } from "./backdrop";
 import { onTheme } from "./theme";
 import type { BodySurface } from "./body";
 
-/** Pictures slower than this, again and again, lower the resolution [ms]. */
+/** Repeated pictures slower than this lower the resolution [ms]. */
 const SLOW_PICTURE_MS = 55;
-/** What is in view may drift by this part of its radius before the camera goes after it. */
+/** The camera follows the bodies when they drift by more than this fraction of their radius. */
 const DRIFT = 0.6;
 
-/** Room around what is in view. */
+/** Margin around the bodies in view, as a factor. */
 const MARGIN = 1.18;
 
-/** Where the camera looks from, in axes with z up, x to the right and y away from the front. */
+/** Directions of the camera, in axes with z up, x to the right and y away from the front. */
 export const PRESETS = { corner: [0.42, -0.8, 0.55], front: [0, -1, 0], right: [1, 0, 0], top: [0, -0.001, 1] } as const;
 export type Preset = keyof typeof PRESETS;
 
-/** Page pixels at each side of the picture that other things cover. */
+/** Width that other elements cover at each side of the picture [page pixels]. */
 export interface Insets { left: number; right: number; top: number; bottom: number }
 
 export class Stage {
   readonly scene = new Scene();
   readonly camera = new PerspectiveCamera(32, 1, 0.001, 10);
   controls: OrbitControls;
-  /** Half the diagonal of what is in view [m]; everything that has a size is sized by it. */
+  /** Half the diagonal of the bodies in view [m]. All sizes in the scene follow it. */
   radius = 0.1;
   readonly center = new Vector3();
-  /** Turns axes with z up into those of the scene. */
+  /** Rotation from axes with z up to those of the scene. */
   readonly turn = new Quaternion();
   pictures = 0;
-  /** A processor draws: fewer lamps, coarser shadows, no reflections. */
+  /** The processor renders: fewer lamps, coarser shadows, no reflections. */
   readonly software: boolean;
   readonly renderer: WebGLRenderer;
-  /** Called after each picture, for what lies over it. */
+  /** Called after each picture, to update what lies over it. */
   onPicture: () => void = () => {};
-  /** What covers the picture; read at every change of layout. */
+  /** Covered margins of the picture, read at every change of layout. */
   insets: () => Insets = () => ({ left: 0, right: 0, top: 0, bottom: 0 });
-  /** `?up=` of the address holds against what the scene says. */
+  /** Whether the address gives `?up=`, which overrides the scene. */
   private readonly upGiven: boolean;
-  /** Whether resolution may give way to speed; `?quality=full` forbids it, for pictures. */
+  /** Whether resolution may be lowered for speed. `?quality=full` forbids it, for screenshots. */
   private readonly spares: boolean;
   private readonly backdrop: Backdrop;
   private dirty = true;
   private fitted = false;
   private preset: Preset = "corner";
-  /** What was fitted last, while nobody has turned the view since. */
+  /** The box fitted last; null once the user has turned the view. */
   private fittedBox: Box3 | null = null;
   private slow = 0;
   private lastPicture = 0;
@@ -98,7 +98,7 @@ export class Stage {
     this.spare(performance.now());
   }
 
-  /** The scene says where "up" is, against gravity. */
+  /** Sets the "up" of the scene, against gravity. */
   setUp(up: { x: number; y: number; z: number } | undefined): void {
     if (this.upGiven || !up) return;
     const wanted = new Vector3(up.x, up.y, up.z);
@@ -108,7 +108,7 @@ export class Stage {
     this.invalidate();
   }
 
-  /** Fits the camera when there is something to see; then goes after it when it moves away. */
+  /** Fits the camera when the first body appears, then follows the bodies when they move away. */
   frameBodies(bodies: Iterable<BodySurface>): void {
     const box = boundsOf(bodies);
     if (box.isEmpty()) return;
@@ -128,17 +128,17 @@ export class Stage {
     this.backdrop.aim(this.scene, this.turn, this.center, this.radius);
   }
 
-  /** From now on somebody else places the camera. */
+  /** Stops placing the camera: other code places it from now on. */
   release(): void {
     this.fittedBox = null;
   }
 
-  /** Forgets what was in view: the next body is fitted anew. */
+  /** Forgets the fitted box, so that the next body is fitted anew. */
   forget(): void {
     this.fitted = false;
   }
 
-  /** Puts the camera where the whole box is seen. */
+  /** Places the camera so that the whole box is visible. */
   fit(box: Box3, preset: Preset = this.preset): void {
     this.preset = preset;
     this.fittedBox = box.clone();
@@ -156,7 +156,7 @@ export class Stage {
     this.backdrop.aim(this.scene, this.turn, this.center, this.radius);
   }
 
-  /** How far along `from` the camera sees the whole box in what is left free of the picture [m]. */
+  /** Distance along `from` at which the whole box fits into the free part of the picture [m]. */
   private distanceFor(box: Box3, from: Vector3): number {
     const { clientWidth: w, clientHeight: h } = this.canvas;
     const { left, right, top, bottom } = this.insets();
@@ -171,20 +171,20 @@ export class Stage {
     return Math.max(distance, 0.2 * this.radius);
   }
 
-  /** A world point in page pixels and whether it is before the camera. */
+  /** Projects a world point to page pixels, and tells whether it lies before the camera. */
   project(point: Vector3): { x: number; y: number; visible: boolean } {
     const p = point.clone().project(this.camera);
     const { clientWidth: w, clientHeight: h } = this.canvas;
     return { x: ((p.x + 1) / 2) * w, y: ((1 - p.y) / 2) * h, visible: p.z > -1 && p.z < 1 };
   }
 
-  /** Page pixels per metre at the point that the camera turns about. */
+  /** Page pixels per metre at the centre of rotation. */
   get pixelsPerMetre(): number {
     const distance = this.camera.position.distanceTo(this.controls.target);
     return this.canvas.clientHeight / (2 * Math.tan(MathUtils.degToRad(this.camera.fov / 2)) * distance);
   }
 
-  /** To be called when what covers the picture changed: the bodies stay in the free part. */
+  /** Called when the covered margins have changed, to keep the bodies in the free part. */
   relayout(): void {
     if (this.fittedBox) this.fit(this.fittedBox);
     else this.resize();
@@ -195,7 +195,7 @@ export class Stage {
     this.renderer.setPixelRatio(this.pixelRatio);
     this.renderer.setSize(w, h, false);
     this.camera.aspect = w / Math.max(1, h);
-    // The bodies stand in the middle of what is left free.
+    // The bodies stand in the middle of the free part.
     const { left, right, top, bottom } = this.insets();
     this.camera.setViewOffset(w, h, (right - left) / 2, (bottom - top) / 2, w, h);
     this.camera.updateProjectionMatrix();
@@ -205,7 +205,7 @@ export class Stage {
   private turnTo(up: Vector3): void {
     this.camera.up.copy(up);
     this.turn.setFromUnitVectors(new Vector3(0, 0, 1), up);
-    // The controls know only the "up" they were made with.
+    // The controls keep the "up" with which they were created.
     this.controls.dispose();
     this.controls = this.newControls();
     this.backdrop.aim(this.scene, this.turn, this.center, this.radius);
@@ -221,7 +221,7 @@ export class Stage {
     return controls;
   }
 
-  /** A machine that cannot keep up gets fewer pixels, then no shadows, before it gets fewer pictures. */
+  /** Lowers the resolution on a slow machine, then drops shadows, before the picture rate suffers. */
   private spare(now: number): void {
     if (!this.spares) return;
     const took = now - this.lastPicture;
@@ -236,8 +236,8 @@ export class Stage {
 }
 
 /**
- * Bounds of what one wants to see: parts that hang on something held; where nothing is held, the largest part.
- * What a cut frees may fall for ever.
+ * Bounds of the parts of interest: those that hang on something held, or the largest part if nothing is held.
+ * Material that a cut frees may fall for ever, so it is left out.
  */
 export function boundsOf(bodies: Iterable<BodySurface>): Box3 {
   const shown = [...bodies].filter((body) => body.render !== null && !body.core.isEmpty());

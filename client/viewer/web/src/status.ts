@@ -1,10 +1,13 @@
-// Whether anything comes: the pill in the head, and the card over the picture when nothing can be shown.
+// Connection status: the label in the header, and the card over the picture when nothing can be shown.
 
 import type { ViewerHello, ViewerLink } from "../gen/scindo/v1/viewer_pb";
 import type { Stats } from "../gen/scindo/v1/server_pb";
 import { setText } from "./dom";
 
-/** No frame for this long, or for so many times what lay between the last ones, while not paused: stalled. */
+/**
+ * The stream counts as stalled without a frame for this long [ms] or for this many past frame intervals,
+ * unless paused.
+ */
 const SILENT_MS = 600;
 const SILENT_GAPS = 4;
 
@@ -25,7 +28,7 @@ export class Status {
     if (!open) this.link = null;
   }
 
-  /** Whether the server went or came back, or neither. */
+  /** Updates the link. Returns whether the server went, came back, or neither. */
   setLink(link: ViewerLink): "gone" | "back" | null {
     const before = this.link;
     this.link = link;
@@ -39,7 +42,7 @@ export class Status {
     this.lastFrame = now;
   }
 
-  /** Milliseconds without a frame, when that is too long; else 0. */
+  /** Time without a frame [ms] if it is too long, otherwise 0. */
   silentMs(now: number, stats: Stats | null): number {
     const silent = now - this.lastFrame;
     const patience = Math.max(SILENT_MS, SILENT_GAPS * this.gapMs);
@@ -79,7 +82,7 @@ export class Status {
   }
 }
 
-/** A browser that cannot draw is told so, once and for all. */
+/** Tells the user once that this browser cannot draw. */
 export function sayNoWebGl(): void {
   const card = document.getElementById("overlay")!;
   card.classList.remove("hidden");

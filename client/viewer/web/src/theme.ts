@@ -1,4 +1,4 @@
-// Light or dark, as the system says; colours that are not style sheet's business.
+// Light or dark theme, as the system prefers, and the colours of the style sheet for other code.
 
 const light = matchMedia("(prefers-color-scheme: light)");
 

@@ -1,16 +1,17 @@
-// How tissue looks: a moist dielectric over a scattering body. Light that enters comes out red, so the terminator
-// is warm and soft (wrapped diffuse), and the rim keeps a moist sheen (Fresnel). Inside a wound colour follows the
-// depth below the skin: a pale rim where the skin is cut, then layers, darker further in, where less light comes.
+// The look of tissue: a moist dielectric over a scattering body. Light that enters comes out red. The
+// terminator is therefore warm and soft (wrapped diffuse), and the rim keeps a moist sheen (Fresnel). Inside
+// a wound the colour follows the depth below the skin. It starts with a pale rim where the skin is cut. Then
+// come layers that darken inwards, where less light enters.
 
 import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, MeshStandardMaterial, RGBAFormat, SRGBColorSpace, type Plane } from "three";
 
-/** Skin tints of successive bodies: liver, muscle, kidney, fat, gut. */
+/** Skin colours of successive bodies: liver, muscle, kidney, fat, gut. */
 const SKIN = [0x8f4038, 0xb5713f, 0x6d4a86, 0xc9a064, 0x4f7f86];
-/** Without layers of its own, tissue is this from the rim inwards; depths in parts of the body's radius. */
+/** Default layers from the rim inwards, with depths as fractions of the body's radius. */
 const FLESH: [number, number][] = [[0.012, 0xd98a78], [0.05, 0xb3122f], [0.3, 0x8d0d26]];
 const TEXELS = 128;
 
-/** A body's look as the scene gives it. */
+/** The look of a body, as the scene sets it. */
 export interface Look {
   colour?: number | undefined;
   opacity: number;
@@ -19,7 +20,9 @@ export interface Look {
 
 export class Tissue {
   readonly skin: MeshStandardMaterial;
-  /** Cut faces: wetter, darker red, clearly apart from skin; a wound sees little of the room. */
+  /**
+   * Cut faces are wetter and darker red, clearly different from skin. A wound reflects little of the room.
+   */
   readonly lip: MeshStandardMaterial;
   private readonly uniforms = { layers: { value: null as DataTexture | null }, reach: { value: 1 }, dark: { value: 0.02 } };
   private layers: [number, number][] = [];
@@ -44,7 +47,7 @@ export class Tissue {
     this.setLayers(look.layers.map((layer) => [layer.depthM, layer.colour]), radius);
   }
 
-  /** Cut open by a plane, the inside of the skin is seen too. */
+  /** Clips by planes. The inside of the skin is then visible as well. */
   clip(planes: Plane[] | null): void {
     for (const material of [this.skin, this.lip]) {
       material.clippingPlanes = planes;
@@ -53,7 +56,7 @@ export class Tissue {
     }
   }
 
-  /** Colour at the middle of the body, for faces made by a clipping plane. */
+  /** Colour at the centre of the body, for faces made by a clipping plane. */
   get inside(): number {
     return this.layers[this.layers.length - 1][1];
   }
@@ -75,7 +78,7 @@ export class Tissue {
   }
 }
 
-/** Colours by depth, from the skin (0) to `reach`; borders are a little soft. */
+/** Colours by depth, from the skin (0) to `reach`, with slightly soft borders. */
 function ramp(layers: [number, number][], reach: number): DataTexture {
   const data = new Uint8Array(4 * TEXELS);
   for (let i = 0; i < TEXELS; i++) {
@@ -116,7 +119,7 @@ varying float vDepth; uniform sampler2D layers; uniform float reach; uniform flo
 #endif
 `;
 
-/** The colour of the layer; a cavity keeps light out the deeper it is. */
+/** The colour of the layer. A cavity gets darker with depth. */
 const WOUND_COLOR = /* glsl */ `
 #ifdef WOUND
   float cavity = mix(0.42, 1.0, exp(-vDepth / dark));

@@ -1,4 +1,4 @@
-// A rigid tool as the server sees it: solid where the tissue lets it be, a ghost where the hand holds it.
+// A rigid tool as the server sees it: solid where the tissue lets it be, and a ghost where the hand holds it.
 
 import {
   BufferAttribute, BufferGeometry, CapsuleGeometry, ConeGeometry, CylinderGeometry, Float32BufferAttribute, Group, Line,
@@ -8,19 +8,19 @@ import type { Stage } from "./stage";
 import { ToolSample_Mode, type ToolShape, type ToolState } from "../gen/scindo/v1/tool_pb";
 import type { Pose } from "../gen/scindo/v1/common_pb";
 
-/** Below this no arrow and no label [N]. */
+/** Below this force there is neither arrow nor label [N]. */
 const QUIET_N = 0.005;
 const UP = new Vector3(0, 0, 1);
 
 const STEEL = new MeshStandardMaterial({ color: 0xb9c2cc, roughness: 0.34, metalness: 0.35 });
 const HAND = new MeshStandardMaterial({ color: 0x5a9ae6, roughness: 0.4, metalness: 0.1 });
 const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.24, depthWrite: false });
-// A force is read, not seen: tissue before it does not hide it.
+// A force must be readable, so tissue in front does not hide it.
 const ARROW = new MeshBasicMaterial({ color: 0xffd35c, toneMapped: false, depthTest: false, transparent: true });
 
-/** From the hand to the tissue in its grip. */
+/** The line from the hand to the tissue in its grip. */
 const LEASH = new LineBasicMaterial({ color: 0x9fd0ff, toneMapped: false, depthTest: false, transparent: true, opacity: 0.95 });
-/** A force this near to its limit is at it. */
+/** A force above this fraction of its limit counts as limited. */
 const AT_LIMIT = 0.985;
 
 export class ToolVisual {
@@ -50,13 +50,13 @@ export class ToolVisual {
     this.shapeKey = key;
     this.solid.clear();
     this.ghost.clear();
-    // A blade of one's own points at the eye: its handle would hide the cut.
+    // The page's own blade points at the viewer, and its handle would hide the cut.
     const shaft = !(this.own && state.shape.kind.case === "blade");
     this.solid.add(...parts(state.shape, this.own ? HAND : STEEL, shaft));
     this.ghost.add(...parts(state.shape, GHOST, false));
   }
 
-  /** Puts solid, ghost, arrow and label where the newest state says. */
+  /** Moves solid, ghost, arrow and label to the newest state. */
   place(stage: Stage): void {
     const state = this.state;
     if (!state?.pose) return;
@@ -69,7 +69,7 @@ export class ToolVisual {
     this.arrow.visible = newtons > QUIET_N;
     this.label.hidden = newtons <= QUIET_N;
     if (!this.arrow.visible) return;
-    // Length grows with the force and never leaves the picture: half of the reach at 2 N.
+    // The length grows with the force but stays within the picture: half of the full length at 2 N.
     const length = (0.9 * stage.radius * newtons) / (newtons + 2) + 0.08 * stage.radius;
     this.arrow.position.copy(this.solid.position);
     this.arrow.quaternion.setFromUnitVectors(UP, this.force.clone().divideScalar(newtons));
@@ -84,13 +84,13 @@ export class ToolVisual {
     if (this.label.textContent !== text) this.label.textContent = text;
   }
 
-  /** Whether the force would be larger, were it not limited. */
+  /** Whether the limit holds the force back. */
   get isLimited(): boolean {
     const limit = this.state?.maxForceN ?? 0;
     return limit > 0 && this.force.length() >= AT_LIMIT * limit;
   }
 
-  /** Where the tissue is that the tool holds, or null. */
+  /** Position of the tissue that the tool holds, or null. */
   get heldPoint(): Vector3 | null {
     const at = this.state?.heldPointM;
     return at ? new Vector3(at.x, at.y, at.z) : null;
@@ -154,7 +154,10 @@ function rod(radius: number, from: number, to: number, material: Material): Mesh
   return mesh;
 }
 
-/** A thin double wedge along +z: the belly narrows to the tip; symmetric, as the edge may lead either way. */
+/**
+ * A thin double wedge along +z. The belly narrows to the tip. It is symmetric, because the edge may lead
+ * either way.
+ */
 function bladeGeometry(length: number): BufferGeometry {
   const w = 0.085 * length, t = 0.012 * length;
   const rings = [[0, 0.02], [0.12, 0.55], [0.3, 0.9], [0.55, 1], [1, 0.8], [1.03, 0.5]];
@@ -176,7 +179,7 @@ function bladeGeometry(length: number): BufferGeometry {
   return flat;
 }
 
-/** Unit arrow along +z; z is scaled to the length, x and y to the scene. */
+/** A unit arrow along +z. z is scaled to the length, x and y to the scene. */
 function arrow(): Group {
   const shaft = new Mesh(new CylinderGeometry(0.009, 0.009, 0.8, 12), ARROW);
   shaft.rotation.x = Math.PI / 2;

@@ -1,13 +1,13 @@
-// What went wrong in a body's steps, in words. Each kind is told apart, and only while there is something to tell.
+// Problems in the steps of a body, in words. Each kind is listed separately, and only while it occurs.
 
 import type { BodyStats } from "../gen/scindo/v1/server_pb";
 import { count, exponent } from "./units";
 
 export interface Trouble {
   kind: "error" | "refused" | "divided" | "rolled-back" | "inverted" | "missed";
-  /** For the head of the page, after the body's name; empty for what stands in the panel only. */
+  /** Text for the header of the page, after the body's name. Empty for problems that only the panel shows. */
   short: string;
-  /** For the panel. */
+  /** Text for the panel. */
   words: string;
 }
 

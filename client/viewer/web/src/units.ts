@@ -1,6 +1,6 @@
-// Numbers as people read them.
+// Numbers formatted for people.
 
-/** Length in the unit that gives one to three digits before the point. */
+/** A length in the unit that gives one to three digits before the point. */
 export function length(metres: number): string {
   const size = Math.abs(metres);
   if (size >= 1) return `${metres.toFixed(2)} m`;
@@ -17,7 +17,7 @@ export function count(n: number): string {
   return Math.round(n).toLocaleString("en").replaceAll(",", "\u202f");
 }
 
-/** Three significant digits, never in exponents for the range of a panel. */
+/** Three significant digits, without exponents within the range of the panel. */
 export function short(x: number): string {
   if (!Number.isFinite(x)) return "–";
   const size = Math.abs(x);
@@ -28,7 +28,7 @@ export function exponent(x: number): string {
   return x === 0 ? "0" : x.toExponential(1).replace("e-", "e−").replace("e+", "e");
 }
 
-/** With the prefix that gives one to three digits before the point. */
+/** A number with the prefix that gives one to three digits before the point. */
 export function engineering(x: number, unit: string): string {
   const size = Math.abs(x);
   const [factor, prefix] = size >= 1e9 ? [1e-9, "G"] : size >= 1e6 ? [1e-6, "M"] : size >= 1e3 ? [1e-3, "k"]

@@ -1,4 +1,4 @@
-// The tray of what is shown and how: colours, overlays, curves, camera, picture.
+// The tray that selects what is shown: colours, overlays, curves, camera, picture.
 
 import type { Colours, ColourMode } from "./colours";
 import type { Curves } from "./curves";
@@ -23,7 +23,7 @@ export class View {
     const select = this.at<HTMLSelectElement>("colour");
     select.onchange = () => {
       colours.choose(select.value as ColourMode);
-      // Keys go to the scene again.
+      // Returns the keyboard to the scene.
       select.blur();
       stage.invalidate();
     };
@@ -59,7 +59,7 @@ export class View {
     this.stage.relayout();
   }
 
-  /** Tells the server's relay what this page shows beside surfaces; only when that changed, or anew. */
+  /** Tells the relay which topics this page shows beside surfaces, if that changed or `anew` is set. */
   ask(anew = false): void {
     const { colours, probes, curves } = this.parts;
     const watch = { stress: colours.mode === "stress", measures: probes.on || curves.on };
@@ -70,7 +70,7 @@ export class View {
     this.relay.send({ case: "watch", value: watch });
   }
 
-  /** The canvas as a PNG; drawn at once, as its buffer is gone after a picture. */
+  /** Saves the canvas as a PNG. It is drawn at once, because its buffer is cleared after a picture. */
   savePicture(): void {
     this.stage.render();
     this.at<HTMLCanvasElement>("view").toBlob((blob) => {
@@ -94,7 +94,7 @@ export class View {
     };
   }
 
-  /** What covers the picture at its sides now. */
+  /** Present covered margins of the picture. */
   private insets(): Insets {
     const width = innerWidth, height = innerHeight;
     const over = (id: string) => {
@@ -109,7 +109,7 @@ export class View {
     }
     const left = Math.max(0, ...side.map((box) => box.right));
     const right = panel ? width - panel.left : 0;
-    // A window too narrow for both sides keeps the middle.
+    // A window too narrow for both sides keeps the whole width.
     const covers = left + right < 0.7 * width;
     return { left: covers ? left : 0, right: covers ? right : 0, top: 0, bottom: foot ? 0.6 * (height - foot.top) : 0 };
   }

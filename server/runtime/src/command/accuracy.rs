@@ -16,7 +16,7 @@ use super::say::say;
 use super::study_progress::StudyProgress;
 use crate::error::RuntimeError;
 
-/// Runs the study; Ctrl-C ends it after the step it is in, and what is finished is kept and shown.
+/// Runs the study. Ctrl-C ends it after the current step; finished runs are kept and shown.
 pub fn accuracy(args: &AccuracyArgs) -> Result<ExitCode, RuntimeError> {
     check(args)?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -73,7 +73,7 @@ fn narrowed(args: &AccuracyArgs) -> Vec<(Factor, Vec<String>)> {
         .collect()
 }
 
-/// Raises `stop` at the first Ctrl-C or request to terminate; a second Ctrl-C ends the program.
+/// Raises `stop` at the first Ctrl-C or request to terminate. A second Ctrl-C ends the program.
 pub(super) fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
     let failed = |e: std::io::Error| RuntimeError::System {
         what: "listening for signals".to_owned(),
@@ -99,7 +99,7 @@ pub(super) fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
     Ok(())
 }
 
-/// A bar on the standard error, nothing with `--json`.
+/// A progress bar on the standard error; with `--json`, a hidden one.
 pub(super) fn bar(json: bool) -> ProgressBar {
     let target = if json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {wide_msg}");

@@ -1,4 +1,4 @@
-//! `scindo check`: what is wrong, what is odd, which effects are on, and what the scene will do.
+//! `scindo check` reports errors, oddities, active effects and what the scene will do.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use super::progress::Share;
 use super::say::say;
 use crate::error::RuntimeError;
 
-/// A single step that takes this much longer than the whole forecast may is not waited for.
+/// The forecast is abandoned when it takes longer than this multiple of its whole budget: one step hangs.
 const PATIENCE: u32 = 8;
 
 /// Builds the scene and makes its first steps.
@@ -60,7 +60,7 @@ fn end_s(args: &CheckArgs, step_s: f64) -> Result<Option<f64>, RuntimeError> {
     }
 }
 
-/// What is known of a scene.
+/// What `scindo check` reports about a scene.
 struct Found {
     file: String,
     name: String,
@@ -68,7 +68,7 @@ struct Found {
     bodies: Vec<(String, Value)>,
     plan: Plan,
     forecast: Option<Forecast>,
-    /// Why there is no forecast, if one was asked for.
+    /// The reason when a forecast was asked for and none could be made.
     no_forecast: Option<String>,
     warnings: Vec<String>,
 }
@@ -87,7 +87,7 @@ impl Found {
         }
     }
 
-    /// Makes the first steps on a thread of their own: a step that does not end keeps nobody waiting.
+    /// Makes the first steps on a separate thread, so that a step that never ends cannot block the command.
     fn foretell(
         &mut self,
         mut simulation: Simulation,
@@ -99,7 +99,7 @@ impl Found {
         let told = Arc::clone(&progress);
         let work = move || {
             let made = forecast(&mut simulation, effort, &mut |share| told.at(share, "first steps"));
-            // Whoever asked may have gone.
+            // The receiver may have given up waiting.
             let _ = sender.send(made);
         };
         std::thread::Builder::new().name("forecast".into()).spawn(work).map_err(|e| {
@@ -136,7 +136,7 @@ impl Found {
         })
     }
 
-    /// Measured where steps were made, else from the table of costs.
+    /// Time per step [ms]: measured if steps were made, otherwise estimated from the table of costs.
     fn predicted_ms(&self) -> f64 {
         self.forecast.as_ref().map_or(self.plan.predicted_ms(), |forecast| forecast.cost.mean_ms)
     }

@@ -1,4 +1,4 @@
-//! `scindo mesh`: a surface or volume file becomes repaired tetrahedra.
+//! `scindo mesh` turns a surface or volume file into repaired tetrahedra.
 
 use std::process::ExitCode;
 
@@ -10,7 +10,7 @@ use super::progress::Share;
 use super::say::say;
 use crate::error::RuntimeError;
 
-/// Reads, repairs or fills, writes.
+/// Reads the file, repairs or fills the mesh, and writes it.
 pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
     if !(args.scale.is_finite() && args.scale > 0.0) {
         return Err(RuntimeError::Option {

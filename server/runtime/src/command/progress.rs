@@ -1,4 +1,4 @@
-//! How long work goes on: a bar on a terminal, a few lines elsewhere, nothing with `--json`.
+//! Progress of long work: a bar on a terminal, a few lines elsewhere, nothing with `--json`.
 
 use std::cell::Cell;
 use std::io::IsTerminal as _;
@@ -9,24 +9,24 @@ use indicatif::{ProgressBar, ProgressStyle};
 use scindo_world::mesh_in::Meshing;
 use scindo_world::quantity::{digits, duration, memory};
 
-/// Where there is no terminal a line is written this often.
+/// Without a terminal, a line is written this often.
 const EVERY: Duration = Duration::from_secs(3);
 
 /// Meshes that take less than this [s] are not announced.
 const WORTH_A_WORD_S: f64 = 2.0;
 
-/// See the module.
+/// Progress of work that is counted in units, such as steps.
 pub struct Progress {
     bar: Option<ProgressBar>,
     total: u64,
-    /// Tenths told so far, where there is no terminal.
+    /// Tenths of the total reported so far without a terminal.
     told: Cell<u64>,
     what: &'static str,
     quiet: bool,
 }
 
 impl Progress {
-    /// Work of `total` units; `None` if it has no end.
+    /// Starts to report work of `total` units; `None` if the work has no end.
     pub fn begin(what: &'static str, total: Option<u64>, json: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let bar = total.filter(|_| terminal && !json).map(|total| {
@@ -38,7 +38,7 @@ impl Progress {
         Self { bar, total: total.unwrap_or(0), told: Cell::new(0), what, quiet: json || terminal }
     }
 
-    /// `done` units are done.
+    /// Reports that `done` units are done.
     pub fn at(&self, done: u64) {
         if let Some(bar) = &self.bar {
             bar.set_position(done);
@@ -51,7 +51,7 @@ impl Progress {
         }
     }
 
-    /// The work ended.
+    /// Removes the bar.
     pub fn end(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -59,7 +59,7 @@ impl Progress {
     }
 }
 
-/// Work that tells the share of it that is done, from any thread: meshing, a forecast.
+/// Progress of work that reports the fraction done, from any thread: meshing, a forecast.
 pub struct Share {
     bar: Option<ProgressBar>,
     quiet: bool,
@@ -68,7 +68,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// Nothing is shown before the first word about it.
+    /// Shows nothing until the first report arrives.
     pub fn begin(json: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let bar = (terminal && !json).then(|| {
@@ -79,7 +79,7 @@ impl Share {
         Self { bar, quiet: json, told: Mutex::new((Instant::now(), false)) }
     }
 
-    /// A mesh has come so far.
+    /// Reports the progress of meshing. Long meshing is announced once, with its size and time.
     pub fn meshing(&self, at: Meshing) {
         let expected = &at.estimate;
         let worth_a_word = expected.seconds > WORTH_A_WORD_S && !self.quiet;
@@ -105,7 +105,7 @@ impl Share {
         self.at(at.done, at.stage);
     }
 
-    /// So much of the work `what` is done, 0 to 1.
+    /// Reports that the fraction `done` (0 to 1) of the work `what` is done.
     pub fn at(&self, done: f64, what: &str) {
         if let Some(bar) = &self.bar {
             bar.set_position((1e3 * done) as u64);
@@ -119,7 +119,7 @@ impl Share {
         }
     }
 
-    /// The work ended.
+    /// Removes the bar.
     pub fn end(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

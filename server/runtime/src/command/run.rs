@@ -1,4 +1,4 @@
-//! `scindo run`, and `scindo` alone: a scene, simulated and served until done or told to stop.
+//! `scindo run`, and `scindo` alone: simulates and serves a scene until it is done or told to stop.
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -28,18 +28,18 @@ use crate::sim::engine::Engine;
 use crate::wire::orders::Operators;
 use crate::wire::session::{NetworkConfig, Sessions, local};
 
-/// Where the demonstration's page is served.
+/// Default address of the demonstration's page.
 const DEMONSTRATION_VIEWER: &str = "127.0.0.1:8080";
 
-/// How often the foreground looks whether the simulation has ended.
+/// How often the foreground checks whether the simulation has ended.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// The built-in demonstration.
+/// Runs the built-in demonstration.
 pub fn demonstration(args: &ServeArgs) -> Result<ExitCode, RuntimeError> {
     shipped(SHIPPED[0], args)
 }
 
-/// A scene that ships with the program, or the list of them.
+/// Runs a scene that ships with the program, or lists them all.
 pub fn demo(args: &DemoArgs) -> Result<ExitCode, RuntimeError> {
     if args.list {
         if args.serve.json {
@@ -69,13 +69,14 @@ fn shipped(shipped: ShippedScene, args: &ServeArgs) -> Result<ExitCode, RuntimeE
     serve((shipped.name, &scene), args, viewer)
 }
 
-/// A scene file.
+/// Runs a scene file.
 pub fn scene(args: &RunArgs) -> Result<ExitCode, RuntimeError> {
     let scene = Scene::load_with(&args.scene, &args.serve.set)?;
     serve((scene.name(), &scene), &args.serve, args.serve.viewer)
 }
 
-/// Builds, starts, waits, writes results; again for every scene that a client asks for.
+/// Builds the scene, starts the server, waits and writes results. Repeats for every scene that a client
+/// loads.
 fn serve(
     (name, scene): (&str, &Scene),
     args: &ServeArgs,
@@ -108,7 +109,7 @@ fn serve(
         let started = Instant::now();
         let server = Server::start(engine, sessions, &config)?;
         if config.scene_seq == 0 {
-            // Whoever waits for these lines gets answers.
+            // Callers may wait for these lines, so they are written once the server answers.
             announce(scene, args, listen, viewer);
         }
         let ended = foreground.block_on(wait(&server, args, &config))?;
@@ -125,7 +126,7 @@ fn serve(
         }
         let interrupted = matches!(ended, Ended::Interrupted);
         let engine = server.join()?;
-        // Browsers may hold connections open; nobody waits for them.
+        // Browsers may keep connections open; do not wait for them.
         foreground.shutdown_timeout(Duration::from_millis(200));
         let unfinished = interrupted && pace.steps.is_some();
         let failures = conclude(engine, args, interrupted, (steps, started.elapsed()))?;
@@ -133,7 +134,7 @@ fn serve(
     }
 }
 
-/// What clients may change to: nothing where the run is one that is asked for as a whole.
+/// Scenes that clients may change to. It is empty for a run that is asked for as a whole.
 fn catalogue((name, scene): (&str, &Scene), args: &ServeArgs) -> Catalogue {
     let whole = args.out.is_some() || args.steps.is_some() || args.seconds.is_some() || args.fast;
     if whole { Catalogue::default() } else { Catalogue::beside(name, scene) }
@@ -188,7 +189,7 @@ fn network(args: &ServeArgs, keys: &KeySpace, engine: &Engine) -> Result<Network
     asked.settled()
 }
 
-/// A batch run that was not told where to listen goes on without network if the port is taken.
+/// Opens the sessions. A batch run without explicit endpoints goes on without network if the port is taken.
 fn open_sessions(network: &NetworkConfig, may_do_without: bool) -> Result<Option<Sessions>, RuntimeError> {
     match Sessions::open(network) {
         Ok(sessions) => Ok(Some(sessions)),
@@ -211,7 +212,7 @@ fn foreground() -> Result<Runtime, RuntimeError> {
         .map_err(|e| RuntimeError::System { what: "starting threads".to_owned(), reason: e.to_string() })
 }
 
-/// The viewer connects to us like any other client.
+/// Starts the viewer, which connects to the server like any other client.
 fn start_viewer(
     foreground: &Runtime,
     address: SocketAddr,
@@ -258,23 +259,23 @@ fn announce(scene: &Scene, args: &ServeArgs, listen: &[String], viewer: Option<S
     }
 }
 
-/// How a server comes to its end.
+/// How a server ends.
 enum Ended {
     /// All steps are done.
     Done,
-    /// Somebody ended it.
+    /// A user or the system interrupted the run.
     Interrupted,
     /// Another scene takes its place.
     Next(Box<Next>),
 }
 
-/// A scene that a client asked for, built.
+/// A scene that a client asked for, already built.
 struct Next {
     name: String,
     engine: Engine,
 }
 
-/// Until the simulation ends, somebody ends it or another scene is ready.
+/// Waits until the simulation ends, is interrupted, or another scene is ready.
 async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig) -> Result<Ended, RuntimeError> {
     let progress = Progress::begin("steps", config.pace.steps, args.json);
     let failed = |e: std::io::Error| RuntimeError::System {
@@ -318,13 +319,13 @@ async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig) -> Resul
     Ok(ended)
 }
 
-/// The end of a process whose threads do not end: what they hold is lost.
+/// Ends a process whose threads do not end. Whatever they hold is lost.
 fn give_up(reason: &str) {
     eprintln!("error: {reason}; the process ends here and writes no results");
     std::process::exit(1);
 }
 
-/// Results on disk and on the terminal; says why the run does not count as one that succeeded, if it does not.
+/// Writes results to disk and terminal. Reports why the run failed, if it did.
 fn conclude(
     mut engine: Engine,
     args: &ServeArgs,

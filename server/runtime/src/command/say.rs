@@ -1,10 +1,10 @@
-//! Lines for the user. A reader that has gone (`scindo check … | head`) is no reason to fail.
+//! Lines for the user. A reader that closes the pipe early (`scindo check … | head`) is no failure.
 
-/// Prints a line to standard output and goes on when nobody reads it.
+/// Prints a line to standard output and ignores a closed pipe.
 macro_rules! say {
     ($($line:tt)*) => {{
         use std::io::Write as _;
-        // The only failure is a closed pipe: whoever listened has heard enough.
+        // The only possible failure is a closed pipe: the reader has seen enough.
         let _ = writeln!(std::io::stdout().lock(), $($line)*);
     }};
 }

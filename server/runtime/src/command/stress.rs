@@ -1,4 +1,4 @@
-//! `scindo stress`: the hard cases, and whether they can fail.
+//! `scindo stress` runs the hard cases, and shows whether they can fail.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use super::cli::StressArgs;
 use super::say::say;
 use crate::error::RuntimeError;
 
-/// Runs the cases and writes the page; Ctrl-C ends it after the cases that are being run.
+/// Runs the cases and writes the page. Ctrl-C ends it after the cases that are under way.
 pub fn stress(args: &StressArgs) -> Result<ExitCode, RuntimeError> {
     if args.list {
         return list(args);

@@ -1,4 +1,4 @@
-//! Progress of a study: a bar on a terminal, a line every few seconds where there is none.
+//! Progress of a study: a bar on a terminal, otherwise a line every few seconds.
 
 use std::io::IsTerminal as _;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
@@ -8,23 +8,23 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use scindo_study::Progress;
 
-/// How often a line is written where there is no terminal, although nothing new began.
+/// Longest time between two lines without a terminal, even if nothing new began.
 const EVERY: Duration = Duration::from_secs(9);
 
-/// Least time between two lines.
+/// Shortest time between two lines.
 const SELDOM: Duration = Duration::from_secs(2);
 
-/// Parts of the bar, where it shows time.
+/// Resolution of the bar when it shows time.
 const PARTS: u64 = 1000;
 
-/// See the module.
+/// Shows the progress of a study on the standard error.
 pub struct StudyProgress {
     bar: ProgressBar,
     lines: Option<Lines>,
     started: Instant,
 }
 
-/// Lines from a thread of their own, so that a long run does not silence them.
+/// Writes lines from a thread of its own, so that a long run does not silence them.
 struct Lines {
     message: Arc<Mutex<String>>,
     last: Arc<Mutex<Instant>>,
@@ -33,7 +33,7 @@ struct Lines {
 }
 
 impl StudyProgress {
-    /// On the standard error, with `--json` too: the report goes to the standard output.
+    /// Writes to the standard error even with `--json`, because the report goes to the standard output.
     pub fn begin() -> Self {
         let terminal = std::io::stderr().is_terminal();
         let target = if terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
@@ -45,7 +45,7 @@ impl StudyProgress {
         Self { bar, lines, started: Instant::now() }
     }
 
-    /// The study is so far.
+    /// Shows the current progress.
     pub fn show(&self, progress: &Progress) {
         if let Some(note) = &progress.note {
             match &self.lines {
@@ -78,14 +78,14 @@ impl StudyProgress {
         }
     }
 
-    /// The study ended.
+    /// Removes the bar.
     pub fn end(&self) {
         self.bar.finish_and_clear();
     }
 }
 
 impl Lines {
-    /// None if the system gives no thread.
+    /// `None` if the system cannot start another thread.
     fn begin() -> Option<Self> {
         let message = Arc::new(Mutex::new("reading the scene".to_owned()));
         let last = Arc::new(Mutex::new(Instant::now()));

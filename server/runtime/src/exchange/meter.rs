@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Counts of one interval.
+/// Counts since the last report.
 #[derive(Debug, Default)]
 struct Interval {
     steps: u64,
@@ -12,8 +12,8 @@ struct Interval {
     contacts: BTreeMap<Arc<str>, u64>,
 }
 
-/// Written by the simulation and contact threads, read by the publisher. Each holds the lock
-/// for a few additions.
+/// Rates and costs. The simulation and contact threads write them and the publisher reads them. Each holds
+/// the lock for a few additions.
 #[derive(Debug)]
 pub struct Meter {
     interval: Mutex<(Instant, Interval)>,
@@ -39,7 +39,7 @@ impl Default for Meter {
 }
 
 impl Meter {
-    /// A step ended.
+    /// Counts a step and the duration of its stages [ms].
     pub fn step(&self, stages: impl Iterator<Item = (&'static str, f64)>) {
         let interval = &mut self.lock().1;
         interval.steps += 1;
@@ -51,7 +51,7 @@ impl Meter {
         }
     }
 
-    /// A contact message left.
+    /// Counts a contact message.
     pub fn contact(&self, tool: &Arc<str>) {
         let interval = &mut self.lock().1;
         match interval.contacts.get_mut(tool) {

@@ -1,4 +1,4 @@
-//! Cuts on their way, and the answers to those that were made: each is applied once.
+//! Cuts on their way, and the answers to finished ones. The log makes sure that each cut is applied once.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -10,46 +10,46 @@ use scindo_world::inputs::{CutOutcome, CutRequest};
 use super::refusal::{Refusal, refuse};
 use crate::wire::convert::from_vec3;
 
-/// Cuts that may be without an answer, in the queue here or in the simulation's.
+/// Most cuts without an answer, whether they wait here or in the simulation.
 pub const MAX_WAITING_CUTS: usize = 64;
 
-/// Clients times tools whose cuts are remembered.
+/// Most pairs of client and tool whose cuts are remembered.
 const MAX_LOGS: usize = 256;
 
-/// Answers remembered per client and tool. A client repeats a cut for seconds; it would have to
-/// send this many others meanwhile to be told "duplicate" without the details.
+/// Answers remembered per client and tool. A client repeats a cut for seconds. Only after this many others is
+/// it answered "duplicate" without details.
 pub(super) const MAX_ANSWERS: usize = 256;
 
-/// What becomes of a cut command.
+/// What happens to a cut command.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cut {
-    /// A step applies it; the answer comes afterwards.
+    /// It is new. A step will apply it, and the answer follows.
     Queued,
-    /// It waits already; the answer is on its way.
+    /// It is a repetition of one that still waits. The answer is on its way.
     Waiting,
-    /// The answer.
+    /// It is a repetition of one that has its answer.
     Answer(CutAck),
 }
 
-/// What an answer says besides the outcome.
+/// The part of an answer that does not depend on the cut.
 #[derive(Debug, Clone, Copy)]
 pub struct Answering<'a> {
     /// The step after the cut.
     pub step: u64,
-    /// Epochs of all bodies after it.
+    /// Epochs of all bodies after the cut.
     pub epochs: &'a [wire::BodyEpoch],
-    /// Reason of those that were not applied, such as `cut-failed`.
+    /// Reason given for cuts that were not applied, such as `cut-failed`.
     pub code: &'static str,
-    /// What their client can do.
+    /// Advice to the client of a cut that was not applied.
     pub hint: &'static str,
 }
 
-/// Cuts of one client with one tool.
+/// Cuts that one client made with one tool.
 #[derive(Debug, Default)]
 struct ToolLog {
     waiting: BTreeSet<u64>,
     answers: BTreeMap<u64, CutAck>,
-    /// Every number up to here was applied or refused, and its answer forgotten.
+    /// Every cut up to this number was applied or refused, and its answer is forgotten.
     forgotten_up_to: u64,
 }
 
@@ -60,12 +60,12 @@ struct Ticket {
     seq: u64,
 }
 
-/// See the module.
+/// The queue of cuts, and the log that recognises repetitions.
 #[derive(Debug, Default)]
 pub(super) struct CutLog {
     bodies: BTreeSet<Arc<str>>,
     queue: VecDeque<CutRequest>,
-    /// Every cut without an answer.
+    /// The origin of every cut without an answer, by request.
     tickets: BTreeMap<u64, Ticket>,
     logs: BTreeMap<(String, String), ToolLog>,
     next_request: u64,
@@ -77,7 +77,7 @@ impl CutLog {
         Self { bodies, ..Self::default() }
     }
 
-    /// What is known of a command that came before.
+    /// Looks up a repeated command. `None` if the command is new.
     pub fn known(&self, command: &CutCommand) -> Option<Cut> {
         let log = self.logs.get(&(command.client_id.clone(), command.tool_id.clone()))?;
         if log.waiting.contains(&command.seq) {
@@ -90,7 +90,7 @@ impl CutLog {
         forgotten.then(|| Cut::Answer(answer(command, cut_ack::Outcome::Duplicate)))
     }
 
-    /// Queues a new command; the logs of clients that are not here make room if need be.
+    /// Queues a new command. If the logs are full, it drops those of clients that have left.
     pub fn accept(&mut self, command: &CutCommand, is_here: impl Fn(&str) -> bool) -> Result<(), Refusal> {
         let body = match &*command.body_id {
             "" => None,
@@ -133,7 +133,7 @@ impl CutLog {
         )
     }
 
-    /// Makes room by forgetting the cuts of clients that are gone.
+    /// Drops the logs of clients that have left.
     fn forget_departed(&mut self, is_here: impl Fn(&str) -> bool) -> Result<(), Refusal> {
         self.logs.retain(|(client, _), log| !log.waiting.is_empty() || is_here(client));
         if self.logs.len() < MAX_LOGS {
@@ -152,13 +152,13 @@ impl CutLog {
         cuts.extend(self.queue.drain(..));
     }
 
-    /// Empties the queue; the outcome of what stood in it.
+    /// Empties the queue and returns a failed outcome for each cut in it.
     pub fn discard(&mut self, reason: &str) -> Vec<CutOutcome> {
         let failed = |cut: CutRequest| CutOutcome { request: cut.request, result: Err(reason.to_owned()) };
         self.queue.drain(..).map(failed).collect()
     }
 
-    /// The answers to cuts that have an outcome now.
+    /// Turns outcomes into answers and stores the answers for repetitions.
     pub fn finish(&mut self, outcomes: &[CutOutcome], with: &Answering<'_>) -> Vec<CutAck> {
         let mut answers = Vec::with_capacity(outcomes.len());
         for outcome in outcomes {
@@ -215,7 +215,7 @@ pub(super) fn answer(command: &CutCommand, outcome: cut_ack::Outcome) -> CutAck 
     }
 }
 
-/// The same answer again; one that was applied is now a duplicate.
+/// The stored answer for a repeated command: an applied cut becomes a duplicate.
 fn repeated(answer: &CutAck) -> CutAck {
     let mut again = answer.clone();
     if again.outcome() == cut_ack::Outcome::Applied {

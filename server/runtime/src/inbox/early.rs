@@ -1,9 +1,9 @@
-//! Poses that came before the liveliness token of their client.
+//! Poses that arrive before the liveliness token of their client.
 //!
-//! A pose is sent at once, a token waits up to a millisecond for company in its packet: on the way the pose
-//! overtakes the token that was declared before it, and the busier the machine, the more poses do. The
-//! newest of them waits here for the token; a client that never declares one is refused when it has been
-//! waited for long enough.
+//! A pose is sent at once. A token waits up to a millisecond to share a packet with other messages. A pose
+//! can therefore overtake a token that was declared before it, and more poses do so on a busy machine. The
+//! newest of these poses waits here for the token. If the token has not come after [`PATIENCE`], the client
+//! is refused.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -14,11 +14,11 @@ use scindo_proto::messages::ToolSample;
 /// How long a pose waits for the token of its client.
 pub const PATIENCE: Duration = Duration::from_secs(2);
 
-/// The newest pose of one client with one tool.
+/// The newest pose that one client sent with one tool.
 #[derive(Debug)]
 struct Early {
     newest: ToolSample,
-    /// When the first one came.
+    /// When the first pose arrived.
     since: Instant,
 }
 
@@ -28,15 +28,15 @@ impl Early {
     }
 }
 
-/// See the module.
+/// Poses that wait for the token of their client.
 #[derive(Debug, Default)]
 pub struct EarlyPoses {
     waiting: BTreeMap<(String, String), Early>,
 }
 
 impl EarlyPoses {
-    /// Keeps `sample` until the token of its client comes. False if that has been waited for long enough,
-    /// or if too many others wait.
+    /// Keeps `sample` until the token of its client arrives. Returns false if the client has had long enough
+    /// to send the token, or if too many others wait.
     pub fn keep(&mut self, sample: &ToolSample, now: Instant) -> bool {
         let whose = (sample.client_id.clone(), sample.tool_id.clone());
         if let Some(early) = self.waiting.get_mut(&whose) {
@@ -55,7 +55,7 @@ impl EarlyPoses {
         room
     }
 
-    /// The token of `client` came: its poses, one per tool, unless they are too old to mean anything.
+    /// Returns the poses of `client` when its token arrives: one per tool, unless it is too old to matter.
     pub fn take(&mut self, client: &str, now: Instant) -> Vec<ToolSample> {
         let its = self.waiting.extract_if(.., |(owner, _), _| owner == client);
         its.filter(|(_, early)| early.is_waited_for(now)).map(|(_, early)| early.newest).collect()

@@ -1,15 +1,15 @@
 //! Poses and cuts of clients: who holds which tool, what is newest, what was already applied.
 //!
 //! # Rules
-//! * A tool belongs to the first client with a liveliness token that sends a pose for it; it is
-//!   free again when that token goes ([`owners`]). A pose that overtook the token waits for it ([`early`]).
-//! * Of poses only the newest counts; one that is not newer than the last is refused.
-//! * A cut is applied once per (client, tool, sequence number); repetitions get the old answer
-//!   ([`cut_log`]). A cut of a client without a token is refused.
-//! * Whatever is refused is counted by reason and leaves everything as it was.
+//! * A tool belongs to the first client with a liveliness token that sends a pose for it. It is free again
+//!   when that token goes ([`owners`]). A pose that overtook the token waits for it ([`early`]).
+//! * Only the newest pose counts. A pose that is not newer than the last is refused.
+//! * A cut is applied once per (client, tool, sequence number). Repetitions get the old answer ([`cut_log`]).
+//!   A cut of a client without a token is refused.
+//! * Every refusal is counted by reason and changes nothing else.
 //!
-//! Free of zenoh and of clocks: the threads that receive call in here with the time, the simulation thread
-//! takes out.
+//! The inbox knows neither zenoh nor clocks. Receiving threads call it with the time; the simulation thread
+//! takes the inputs out.
 
 pub mod owners;
 
@@ -37,7 +37,7 @@ pub use owners::{Change, MAX_POSE_RATE};
 pub use refusal::Refusal;
 use refusal::refuse;
 
-/// See the module.
+/// Poses and cuts between the receiving threads and the simulation thread.
 #[derive(Debug, Default)]
 pub struct Inbox {
     owners: Owners,
@@ -58,22 +58,22 @@ impl Inbox {
         }
     }
 
-    /// A liveliness token of `client` appeared: what it sent before counts now.
+    /// Registers a liveliness token of `client`. Poses that waited for it count now.
     pub fn client_came(&mut self, client: &str, now: Instant) -> Vec<Change> {
         let early = self.owners.came(client, now);
         let taken = early.iter().filter_map(|sample| self.pose(&sample.tool_id, sample, now).ok());
         taken.flatten().collect()
     }
 
-    /// A liveliness token of `client` went; with the last one its tools are released.
+    /// Removes a liveliness token of `client`. With the last one its tools are released.
     pub fn client_went(&mut self, client: &str, now: Instant) -> Vec<Change> {
         self.owners.went(client, now)
     }
 
-    /// A checked sample that arrived under the key of tool `key_tool`.
+    /// Takes a checked sample that arrived under the key of tool `key_tool`.
     ///
     /// # Errors
-    /// Why it is refused.
+    /// The reason when the sample is refused.
     pub fn pose(
         &mut self,
         key_tool: &str,
@@ -88,7 +88,7 @@ impl Inbox {
         outcome
     }
 
-    /// A checked cut that arrived under the key of tool `key_tool`.
+    /// Takes a checked cut that arrived under the key of tool `key_tool`.
     pub fn cut(&mut self, key_tool: &str, command: &CutCommand) -> Cut {
         if let Some(known) = self.cuts.known(command) {
             return known;
@@ -107,26 +107,26 @@ impl Inbox {
         }
     }
 
-    /// What a device can do, told once per connection.
+    /// Stores what a device can do. Clients send it once per connection.
     pub fn capability(&mut self, capability: DeviceCapability) {
         self.owners.capability(capability);
     }
 
-    /// Counts a refused message; returns how many of its kind there were.
+    /// Counts a refused message and returns the count of its kind.
     pub fn count(&mut self, code: &'static str) -> u64 {
         let count = self.refused.entry(code).or_default();
         *count += 1;
         *count
     }
 
-    /// Moves what the next step reads into `inputs`: newest poses and all cuts that came since.
+    /// Moves the inputs of the next step into `inputs`: the newest poses, and all cuts since the last step.
     pub fn take(&mut self, inputs: &mut Inputs) {
         inputs.tools.clear();
         inputs.tools.extend(self.owners.held().cloned());
         self.cuts.take(&mut inputs.cuts);
     }
 
-    /// Answers the cuts that have an outcome; in no case twice.
+    /// Answers the cuts that have an outcome, each of them once.
     pub fn finish(&mut self, outcomes: &[CutOutcome], with: &Answering<'_>) -> Vec<CutAck> {
         let answers = self.cuts.finish(outcomes, with);
         let failed = answers.iter().filter(|answer| answer.error.is_some()).count() as u64;
@@ -147,7 +147,7 @@ impl Inbox {
         self.owners.held()
     }
 
-    /// What the device behind `tool` can do, if it told.
+    /// Capability of the device behind `tool`, if the device reported one.
     pub fn capability_of(&self, tool: &str) -> Option<&DeviceCapability> {
         self.owners.capability_of(tool)
     }
@@ -157,7 +157,7 @@ impl Inbox {
         self.owners.held().next().is_some()
     }
 
-    /// Age of the contact model that the device behind `tool` last used [ms]; 0: not told.
+    /// Age of the contact model that the device behind `tool` last used [ms]; 0 if not reported.
     pub fn contact_age_ms(&self, tool: &str) -> f32 {
         self.owners.contact_age_ms(tool)
     }
@@ -172,7 +172,7 @@ impl Inbox {
         &self.refused
     }
 
-    /// Cuts of clients applied so far.
+    /// Cuts from clients applied so far.
     pub fn cuts_applied(&self) -> u64 {
         self.cuts.applied()
     }

@@ -1,4 +1,4 @@
-//! Who is here, and who holds which tool.
+//! Which clients are present, and who holds which tool.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -11,48 +11,48 @@ use super::early::{EarlyPoses, PATIENCE};
 use super::refusal::{Refusal, refuse};
 use crate::wire::convert::to_tool_input;
 
-/// Poses per second and tool that are taken; twice what a 1 kHz device sends.
+/// Poses accepted per second and tool: twice what a 1 kHz device sends.
 pub const MAX_POSE_RATE: u32 = 2000;
 
-/// Most clients with a token at a time; the tokens themselves have no limit on their way here.
+/// Most clients with a token at a time. The tokens themselves are not limited before they arrive here.
 pub const MAX_CLIENTS: usize = 4096;
 
-// What the world takes must fit into the messages that tell of it.
+// All tools of the world must fit into the messages that report them.
 const _: () = assert!(MAX_TOOLS <= scindo_proto::limits::MAX_TOOLS);
 
-/// What changed hands.
+/// A change of ownership.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Change {
     /// A client took a tool.
     Taken {
-        /// The tool.
+        /// Id of the tool.
         tool: Arc<str>,
-        /// Its new owner.
+        /// Id of the new owner.
         owner: Arc<str>,
     },
     /// A client lost a tool because it went away.
     Released {
-        /// The tool.
+        /// Id of the tool.
         tool: Arc<str>,
-        /// Its former owner.
+        /// Id of the former owner.
         owner: Arc<str>,
     },
 }
 
-/// A tool in a client's hand.
+/// A tool that a client holds.
 #[derive(Debug, Clone)]
 struct Held {
     input: ToolInput,
     poses: u64,
     /// Age of the contact model that its device last used [ms].
     contact_age_ms: f32,
-    /// Poses since the second began.
+    /// Start of the current second, and poses since then.
     this_second: (Instant, u32),
     capability: Option<DeviceCapability>,
 }
 
 impl Held {
-    /// Counts a pose; false if the client sends too many.
+    /// Counts a pose. False if the client sends too many.
     fn admit(&mut self, now: Instant) -> bool {
         if now.duration_since(self.this_second.0) >= Duration::from_secs(1) {
             self.this_second = (now, 0);
@@ -61,29 +61,29 @@ impl Held {
         self.this_second.1 <= MAX_POSE_RATE
     }
 
-    /// Whether `sample` is newer than what is known. A hand that takes its tool anew counts from 1 again;
-    /// its clock goes on. A pose that is neither is old, or was there before.
+    /// Whether `sample` is newer than the newest known pose. A client that takes its tool again counts from
+    /// 1, but its clock goes on. A sample that is newer in neither is old or a duplicate.
     fn is_older_than(&self, sample: &ToolSample) -> bool {
         sample.seq > self.input.seq || sample.client_time_ns > self.input.client_time_ns
     }
 }
 
-/// The last pose of a client that let go of a tool.
+/// Last pose of a client before it lost a tool.
 #[derive(Debug)]
 struct LetGo {
     seq: u64,
     at: Instant,
 }
 
-/// See the module.
+/// Present clients and the tools that they hold.
 #[derive(Debug, Default)]
 pub(super) struct Owners {
     scene_tools: BTreeSet<Arc<str>>,
-    /// Tokens per client.
+    /// Number of tokens per client.
     here: BTreeMap<String, usize>,
     early: EarlyPoses,
     held: BTreeMap<Arc<str>, Held>,
-    /// By client and tool, for as long as a pose may be on its way.
+    /// By client and tool, kept while late poses may still arrive.
     let_go: BTreeMap<(String, String), LetGo>,
 }
 
@@ -92,7 +92,7 @@ impl Owners {
         Self { scene_tools, ..Self::default() }
     }
 
-    /// A token of `client` appeared; returns the poses that waited for it.
+    /// Registers a token of `client` and returns the poses that waited for it.
     pub fn came(&mut self, client: &str, now: Instant) -> Vec<ToolSample> {
         if self.here.len() < MAX_CLIENTS || self.here.contains_key(client) {
             *self.here.entry(client.to_owned()).or_default() += 1;
@@ -100,7 +100,7 @@ impl Owners {
         self.early.take(client, now)
     }
 
-    /// A token of `client` went.
+    /// Removes a token of `client`. The last one releases its tools.
     pub fn went(&mut self, client: &str, now: Instant) -> Vec<Change> {
         let Some(tokens) = self.here.get_mut(client) else { return Vec::new() };
         *tokens -= 1;
@@ -159,8 +159,8 @@ impl Owners {
         Ok(None)
     }
 
-    /// A pose of a client without a token: one that overtook it is kept, one that was sent before the
-    /// client let go is not.
+    /// Handles a pose of a client without a token. A pose that overtook the token is kept. A pose sent before
+    /// the client let go of the tool is refused.
     fn wait_for_token(&mut self, sample: &ToolSample, now: Instant) -> Result<(), Refusal> {
         let whose = (sample.client_id.clone(), sample.tool_id.clone());
         let comes_late = |last: &LetGo| sample.seq > last.seq && now.duration_since(last.at) < PATIENCE;
@@ -208,7 +208,7 @@ impl Owners {
         Ok(Change::Taken { tool: id, owner })
     }
 
-    /// Whether `client` may cut with a tool: it is here, and nobody else holds the tool.
+    /// Whether `client` may cut with a tool: the client is present, and nobody else holds the tool.
     pub fn may_cut(&self, tool: &str, client: &str) -> Result<(), Refusal> {
         if !self.is_here(client) {
             return Err(no_token(client));

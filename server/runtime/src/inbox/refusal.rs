@@ -1,15 +1,15 @@
-//! Why something is not taken, for the counts and for the sender.
+//! The reason of a refusal, for the counts and for the sender.
 
 use scindo_proto::messages::Error;
 
-/// Why a message is refused; the reason is counted and, for cuts, answered.
+/// A refused message. Its reason is counted and, for cuts, sent as the answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// Stable name, such as `not-owner`.
+    /// Stable name of the reason, such as `not-owner`.
     pub code: &'static str,
-    /// What is wrong.
+    /// What is wrong, with values.
     pub message: String,
-    /// What to do next.
+    /// What the sender can do next.
     pub hint: &'static str,
 }
 

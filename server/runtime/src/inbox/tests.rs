@@ -16,7 +16,7 @@ fn start() -> Instant {
     *START.get_or_init(Instant::now)
 }
 
-/// An inbox that `a` and `b` have come to.
+/// An inbox with clients `a` and `b` present.
 fn visited() -> Inbox {
     let mut inbox = inbox();
     inbox.client_came("a", start());
@@ -212,10 +212,10 @@ fn a_late_pose_of_the_old_hand_does_not_keep_the_new_one_from_the_tool() {
     inbox.client_came("a", start());
     inbox.pose("scalpel", &mouse(141, 1_000), start()).unwrap();
     inbox.client_went("a", start());
-    // The last pose of the old hand comes after its token went: it does not wait for the next token.
+    // The last pose of the old hand arrives after its token went. It does not wait for the next token.
     assert_eq!(inbox.pose("scalpel", &mouse(142, 1_001), start()).unwrap_err().code, "let-go");
     assert_eq!(inbox.client_came("a", start()), []);
-    // Were it later still, the first pose of the new hand is newer by its clock.
+    // Even if it came later still, the first pose of the new hand is newer by its clock.
     inbox.pose("scalpel", &mouse(143, 1_002), start()).unwrap();
     assert_eq!(inbox.pose("scalpel", &mouse(1, 2_000), start()), Ok(None));
     assert_eq!(inbox.pose("scalpel", &mouse(2, 2_001), start()), Ok(None));

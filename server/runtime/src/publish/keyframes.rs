@@ -1,8 +1,8 @@
-//! Keyframes on query: whole surfaces for those who join.
+//! Keyframes on query: whole surfaces for clients that join.
 //!
-//! An answer is as long as a surface, and its client may not read. A few threads send answers, so that neither
-//! the publisher nor the answers to others wait for one client; zenoh closes the link to a client that has
-//! taken nothing for a second ([`crate::wire::session`]).
+//! An answer is as long as a surface, and its client may not read. A few threads therefore send the answers.
+//! Neither the publisher nor the other clients wait for one client. zenoh closes the link to a client that
+//! has read nothing for a second ([`crate::wire::session`]).
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -17,26 +17,26 @@ use zenoh::query::Query;
 use crate::error::RuntimeError;
 use crate::exchange::Exchange;
 
-/// Keyframe queries that may wait for a snapshot, and answers that may wait for a thread.
+/// Most queries that wait for a snapshot, and most answers that wait for a thread.
 pub const WAITING_KEYFRAMES: usize = 64;
 
-/// A client waits two seconds for a keyframe; afterwards it asks again.
+/// A client waits two seconds for a keyframe, then it asks again. Later answers are pointless.
 const PATIENCE: Duration = Duration::from_millis(1900);
 
-/// Clients that read nothing for which others do not have to wait.
+/// Clients that read nothing may block this many threads before others wait.
 const THREADS: usize = 4;
 
-/// A query for the keyframe of body `body`.
+/// A client's query for the keyframe of one body.
 pub struct KeyframeQuery {
-    /// Index of the body.
+    /// Index of the body in the scene.
     pub body: usize,
-    /// Where the answer goes.
+    /// The zenoh query, which takes the answer.
     pub query: Query,
-    /// When it came.
+    /// When the query arrived.
     pub since: Instant,
 }
 
-/// An answer on its way: none where the query has waited for too long and only ends.
+/// An answer on its way. It is empty if the query has waited too long and only ends.
 struct Answer {
     query: Query,
     keyframe: Option<Bytes>,
@@ -51,10 +51,10 @@ pub struct Keyframes {
 }
 
 impl Keyframes {
-    /// Starts the threads; they end when this is dropped.
+    /// Starts the threads. They end when this is dropped.
     ///
     /// # Errors
-    /// The system has no thread left.
+    /// The system cannot start another thread.
     pub fn start() -> Result<Self, RuntimeError> {
         let (answers, receiver) = bounded::<Answer>(WAITING_KEYFRAMES);
         for number in 0..THREADS {
@@ -69,8 +69,8 @@ impl Keyframes {
         Ok(Self { from_zenoh, to_zenoh, waiting: Vec::new(), answers })
     }
 
-    /// What puts queries for body `body` here, on zenoh's threads. A full queue drops the query: its client
-    /// asks again.
+    /// The callback for queries of body `body`, which runs on zenoh's threads. A full queue drops the query,
+    /// and its client asks again.
     pub fn entrance(&self, exchange: &Arc<Exchange>, body: usize) -> impl Fn(Query) + Send + Sync + 'static {
         let (to_zenoh, exchange) = (self.to_zenoh.clone(), exchange.clone());
         move |query| {
@@ -79,8 +79,8 @@ impl Keyframes {
         }
     }
 
-    /// Answers those whose body `keyframe_of` has now, each body once; the others wait for the next snapshot.
-    /// False when nobody waits any more.
+    /// Answers every query whose body `keyframe_of` has now. It asks for each body once; the other queries
+    /// wait for the next snapshot. False when no query waits any more.
     pub fn answer(&mut self, mut keyframe_of: impl FnMut(usize) -> Option<Bytes>) -> bool {
         self.waiting.extend(self.from_zenoh.try_iter());
         if self.waiting.is_empty() {
@@ -108,7 +108,7 @@ impl Keyframes {
     }
 }
 
-/// Sends one answer; the query ends with it.
+/// Sends one answer and ends its query.
 fn send(answer: Answer) {
     let Answer { query, keyframe: Some(keyframe) } = answer else { return };
     let reply = query.reply(query.key_expr().clone(), keyframe);

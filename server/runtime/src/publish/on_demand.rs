@@ -1,5 +1,5 @@
-//! What is published only while somebody subscribes to it: stress on surfaces, probes and energies.
-//! A subscriber sets a flag; the simulation provides what is flagged with its next snapshot.
+//! Topics that are published only while somebody subscribes: stress on surfaces, probes and energies. A
+//! subscriber raises a flag, and the next snapshot of the simulation holds what is flagged.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -15,12 +15,12 @@ use crate::error::{RuntimeError, words};
 use crate::exchange::Exchange;
 use crate::wire::convert::{ProbeName, STRESS, to_measures, to_stress};
 
-/// Fields and measures come at most this often: colours and curves need less than motion.
+/// Shortest time between two messages of a topic: colours and curves need a lower rate than motion.
 const PERIOD: Duration = Duration::from_millis(50);
 
-/// The topics.
+/// Publishers of the topics.
 pub struct OnDemand {
-    /// Per body: publisher of its stress, and messages so far.
+    /// Per body: publisher of its stress, and number of messages so far.
     stress: Vec<(Publisher<'static>, u64)>,
     measures: (Publisher<'static>, u64),
     probes: Vec<ProbeName>,
@@ -28,7 +28,7 @@ pub struct OnDemand {
 }
 
 impl OnDemand {
-    /// Declares the topics of `bodies`.
+    /// Declares the topics of all `bodies`.
     pub fn declare(
         keys: &KeySpace,
         bulk: &Session,
@@ -49,7 +49,7 @@ impl OnDemand {
         Ok(Self { stress, measures: (measures, 0), probes, next: Instant::now() })
     }
 
-    /// Publishes what the snapshot holds of it: nothing, while nobody subscribes.
+    /// Publishes the flagged parts of the snapshot. There are none while nobody subscribes.
     pub fn publish(&mut self, snapshot: &Snapshot) {
         if Instant::now() < self.next {
             return;

@@ -1,4 +1,4 @@
-//! What a report tells of bodies, tools and refused messages.
+//! Statistics of bodies, tools and refused messages.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,21 +9,21 @@ use scindo_world::snapshot::{BodySnapshot, ToolSnapshot};
 use crate::exchange::Exchange;
 use crate::exchange::meter::Rates;
 
-/// What the inbox knows at the time of a report, copied so that nobody waits for the report.
+/// Figures of the inbox at the time of a report. They are copied so that nobody waits for the report.
 pub struct Told {
-    /// Poses per second and tool.
+    /// Poses per second, by tool.
     pose_hz: BTreeMap<Arc<str>, f64>,
-    /// Age of the contact model that the device of a tool last used [ms].
+    /// By tool: age of the contact model that its device last used [ms].
     contact_age_ms: BTreeMap<Arc<str>, f32>,
     refused: Vec<(&'static str, u64)>,
     /// Cuts of clients applied so far.
     pub cuts_applied: u64,
-    /// Tools in the hands of clients.
+    /// Number of tools that clients hold.
     pub held: u32,
 }
 
 impl Told {
-    /// Asks the inbox; `before` holds the counts of poses at the last report, `seconds` ago.
+    /// Reads the inbox. `before` holds the counts of poses at the last report, `seconds` ago, and is updated.
     pub fn by(exchange: &Exchange, before: &mut BTreeMap<Arc<str>, u64>, seconds: f64) -> Self {
         let (counts, contact_age_ms, refused, cuts_applied) = {
             let inbox = exchange.inbox();
@@ -47,13 +47,13 @@ impl Told {
         Self { pose_hz, contact_age_ms, refused, cuts_applied, held }
     }
 
-    /// Messages refused, and what was lost, by name.
+    /// Counts of refused messages and of losses, by name.
     pub fn refused(&self, exchange: &Exchange) -> Vec<Counter> {
         let all = self.refused.iter().copied().chain(exchange.losses());
         all.map(|(name, count)| Counter { name: name.to_owned(), count }).collect()
     }
 
-    /// Statistics of one tool.
+    /// Converts one tool for the report.
     pub fn tool_stats(&self, tool: &ToolSnapshot, rates: &Rates) -> ToolStats {
         let rate = |rates: &BTreeMap<Arc<str>, f64>| rates.get(&tool.id).copied().unwrap_or(0.0) as f32;
         ToolStats {
@@ -67,7 +67,7 @@ impl Told {
     }
 }
 
-/// Statistics of one body.
+/// Converts one body for the report.
 pub fn body_stats(body: &BodySnapshot) -> BodyStats {
     BodyStats {
         body_id: body.id.to_string(),

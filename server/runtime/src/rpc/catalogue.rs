@@ -1,7 +1,7 @@
-//! The scenes that a server can change to while it runs: `rpc/scenes` lists them, `rpc/load` asks for one.
+//! Scenes that a server can change to while it runs. `rpc/scenes` lists them, `rpc/load` asks for one.
 //!
-//! A scene that was asked for is built beside the one that runs, which goes on meanwhile; then the server starts
-//! anew with it, on the same sessions. Clients see the server go and come, as they do when it is restarted.
+//! A requested scene is built while the present one goes on. Then the server starts anew with it, on the same
+//! sessions. Clients see the server go and come, as they do at a restart.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -10,11 +10,11 @@ use scindo_world::scene::{SHIPPED, Scene, SceneError, ShippedScene};
 
 use crate::inbox::Refusal;
 
-/// What a scene of the list is made of.
+/// Origin of a scene in the list.
 #[derive(Debug, Clone)]
 enum Source {
     Shipped(ShippedScene),
-    /// The one that the server was started with.
+    /// The scene that the server was started with.
     Own(Box<Scene>),
 }
 
@@ -25,16 +25,17 @@ struct Listed {
     source: Source,
 }
 
-/// See the module.
+/// The list of scenes, and the one that was asked for.
 #[derive(Debug, Default)]
 pub struct Catalogue {
     scenes: Vec<Listed>,
-    /// Number of the scene that was asked for and does not run yet.
+    /// Index of the scene that was asked for and does not run yet.
     asked: Mutex<Option<usize>>,
 }
 
 impl Catalogue {
-    /// The scenes that ship, and `own`, the one that the server starts with, in place of any of its name.
+    /// A list of the scenes that ship and of `own`, the scene the server starts with. `own` replaces a
+    /// shipped scene of the same name.
     pub fn beside(name: &str, own: &Scene) -> Self {
         let listed = |scene: ShippedScene| Listed {
             name: scene.name.to_owned(),
@@ -53,14 +54,14 @@ impl Catalogue {
         Self { scenes, asked: Mutex::default() }
     }
 
-    /// The list for clients.
+    /// The list in the form that clients receive.
     pub fn entries(&self) -> ScenesReply {
         let entry =
             |scene: &Listed| SceneEntry { name: scene.name.clone(), description: scene.description.clone() };
         ScenesReply { scenes: self.scenes.iter().map(entry).collect() }
     }
 
-    /// Notes that somebody wants the scene `name`.
+    /// Asks for the scene `name`.
     ///
     /// # Errors
     /// Nothing can be loaded here, there is no such scene, or another one is on its way.
@@ -93,10 +94,10 @@ impl Catalogue {
         Ok(())
     }
 
-    /// The name of the scene that was asked for, and the scene; it stays asked for until [`settled`](Self::settled).
+    /// Name and scene that were asked for. The request stays until [`settled`](Self::settled).
     ///
     /// # Errors
-    /// What is wrong with the scene.
+    /// Problems of the scene.
     pub fn asked_for(&self) -> Option<(String, Result<Scene, SceneError>)> {
         let number = (*self.asked())?;
         let Listed { name, source, .. } = self.scenes.get(number)?;
@@ -107,7 +108,7 @@ impl Catalogue {
         Some((name.clone(), scene))
     }
 
-    /// The scene that was asked for runs, or cannot.
+    /// Ends the request: the scene runs, or it cannot.
     pub fn settled(&self) {
         *self.asked() = None;
     }

@@ -1,4 +1,4 @@
-//! The simulation as the runtime drives it: the world's [`Simulation`] and its results on disk.
+//! The simulation as the runtime drives it: [`Simulation`] and its results on disk.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -19,18 +19,18 @@ use scindo_world::tool::SCRIPT;
 use crate::error::RuntimeError;
 use crate::wire::convert::{to_param, to_shape, to_vec3};
 
-/// See the module.
+/// A simulation that records its results and counts its failures.
 pub struct Engine {
     sim: Simulation,
     results: Option<Results>,
-    /// Steps that panicked.
+    /// Steps that panicked so far.
     panics: u64,
-    /// The first failure to write results; later steps are not recorded.
+    /// First failure to write results. Later steps are not recorded.
     failure: Option<ResultsError>,
 }
 
 impl Engine {
-    /// Drives `sim` and records each step. Every id of the scene must be able to stand in a key.
+    /// Drives `sim` and records each step. Fails if an id of the scene cannot stand in a key.
     pub fn new(sim: Simulation, results: Option<Results>) -> Result<Self, RuntimeError> {
         for body in &sim.scene().bodies {
             Chunk::new("body id", &body.id)?;
@@ -41,7 +41,7 @@ impl Engine {
         Ok(Self { sim, results, panics: 0, failure: None })
     }
 
-    /// The simulation.
+    /// Read access to the simulation.
     pub fn simulation(&self) -> &Simulation {
         &self.sim
     }
@@ -51,7 +51,7 @@ impl Engine {
         self.sim.step_s()
     }
 
-    /// Scene, bodies and tools as they are now; tools in clients' hands are not told here.
+    /// Present scene, bodies and tools. Tools that clients hold are left out.
     pub fn info(&self) -> SessionInfo {
         let scene = self.sim.scene();
         let tools = scene.tools.iter().map(|tool| ToolInfo {
@@ -72,7 +72,7 @@ impl Engine {
         }
     }
 
-    /// Which effects are on, why, and what they cost.
+    /// All effects of the scene: whether each is on, why, and what it costs.
     pub fn plan(&self) -> Plan {
         let effects = self.sim.plan().effects.into_iter().map(|effect| Effect {
             name: effect.name,
@@ -84,13 +84,13 @@ impl Engine {
         Plan { effects: effects.collect() }
     }
 
-    /// What [`Self::set`] may change, with present values and ranges.
+    /// Parameters that [`Self::set`] may change, with present values and ranges.
     pub fn params(&self) -> ParamsReply {
         let params = self.sim.parameters().into_iter().take(MAX_PARAMS).map(to_param);
         ParamsReply { params: params.collect() }
     }
 
-    /// Bytes of the longest message that tells a whole surface of now.
+    /// Length of the longest message that holds a whole surface at present [bytes].
     pub fn longest_surface(&self) -> usize {
         let bytes = |body: &SimBody| {
             let surface = body.body.surface();
@@ -99,7 +99,7 @@ impl Engine {
         self.sim.bodies().iter().map(bytes).max().unwrap_or(0) + HEADER_BYTES
     }
 
-    /// One step, recorded.
+    /// Makes one step and records it.
     pub fn step(&mut self, inputs: &Inputs) {
         self.sim.step(inputs);
         if let Some(results) = self.results.as_mut().filter(|_| self.failure.is_none())
@@ -110,20 +110,20 @@ impl Engine {
         }
     }
 
-    /// A step under way ends as soon as `flag` is raised.
+    /// Installs `flag`: once it is raised, the current step ends early.
     pub fn set_stop_flag(&mut self, flag: &Arc<AtomicBool>) {
         self.sim.set_stop_flag(flag);
     }
 
-    /// Forgets the cuts that wait or are being made; their outcomes say `reason`.
+    /// Discards cuts that wait or are under way. Their outcomes give `reason`.
     pub fn discard_cuts(&mut self, reason: &str) -> Vec<CutOutcome> {
         self.sim.discard_cuts(reason)
     }
 
-    /// Completes the results. `status` is `done`, or why the run ended.
+    /// Completes the results. `status` is `done`, or the reason why the run ended.
     ///
     /// # Errors
-    /// What the disk said, now or in an earlier step.
+    /// The disk failed, now or in an earlier step.
     pub fn finish(&mut self, status: &str) -> Result<(), RuntimeError> {
         if let Some(error) = self.failure.take() {
             return Err(error.into());
@@ -134,7 +134,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Why the run so far does not count as one that succeeded; empty if it does.
+    /// Reasons why the run so far counts as failed; empty if it does not.
     pub fn failures(&self) -> Vec<String> {
         let mut failures = self.sim.failures();
         if self.panics > 0 {
@@ -143,33 +143,33 @@ impl Engine {
         failures
     }
 
-    /// A step panicked: a defect of the program, which a reset does not excuse.
+    /// Counts a panicked step. That is a defect of the program, and a reset does not excuse it.
     pub fn count_panic(&mut self) {
         self.panics += 1;
     }
 
-    /// What the last step told.
+    /// Report of the last step.
     pub fn report(&self) -> &StepReport {
         self.sim.report()
     }
 
-    /// Copies the present state; what nobody wants stays empty.
+    /// Copies the present state. Parts that nobody wants stay empty.
     pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
         self.sim.snapshot_into(wants, snapshot);
     }
 
-    /// Back to the start; epochs keep rising.
+    /// Goes back to the start. Epochs keep rising.
     ///
     /// # Errors
-    /// Why a body cannot be built again, in words.
+    /// The reason why a body cannot be built again, in words.
     pub fn reset(&mut self) -> Result<(), String> {
         self.sim.reset().map_err(|error| error.to_string())
     }
 
-    /// Takes the last cut back; says which.
+    /// Takes the last cut back and returns its description.
     ///
     /// # Errors
-    /// That there is none.
+    /// There is no cut to take back.
     pub fn undo(&mut self) -> Result<String, String> {
         let undone = self.sim.undo()?;
         let ids: Vec<&str> = undone.bodies.iter().map(|&body| &*self.sim.bodies()[body].id).collect();
@@ -185,7 +185,7 @@ impl Engine {
     }
 }
 
-/// Against gravity; z without it.
+/// Unit vector against gravity; z without gravity.
 fn up(gravity: &Vector3<f64>) -> Vector3<f64> {
     (-gravity).try_normalize(1e-9).unwrap_or_else(Vector3::z)
 }

@@ -1,4 +1,4 @@
-//! Between the types of the world and the messages of the wire.
+//! Conversion between the types of the world and the messages of the wire.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -11,26 +11,26 @@ use scindo_world::inputs::{ToolInput, ToolMode, ToolShape};
 use scindo_world::scene::{LiveParameter, LiveValue};
 use scindo_world::snapshot::{BodySnapshot, Snapshot, SurfaceTopology, ToolSnapshot};
 
-/// Name of the field of von Mises stress.
+/// Name of the field that holds von Mises stress.
 pub const STRESS: &str = "von-mises";
 
-/// Nanoseconds since 1970.
+/// Wall-clock time in nanoseconds since 1970 (UTC).
 pub fn unix_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Vector of the wire.
+/// Converts to a vector of the wire.
 pub fn to_vec3(v: &Vector3<f64>) -> wire::Vec3 {
     wire::Vec3 { x: v.x, y: v.y, z: v.z }
 }
 
-/// Vector of the world; an absent one is zero.
+/// Converts to a vector of the world; an absent one is zero.
 pub fn from_vec3(v: Option<wire::Vec3>) -> Vector3<f64> {
     v.map_or_else(Vector3::zeros, |v| Vector3::new(v.x, v.y, v.z))
 }
 
-/// What may change while a scene runs.
+/// Converts a parameter that may change while a scene runs.
 pub fn to_param(parameter: LiveParameter) -> wire::Param {
     let kind = match parameter.value {
         LiveValue::Switch(_) => param::Kind::Switch,
@@ -52,19 +52,19 @@ pub fn to_param(parameter: LiveParameter) -> wire::Param {
     }
 }
 
-/// Pose of the wire.
+/// Converts to a pose of the wire.
 pub fn to_pose(pose: &Isometry3<f64>) -> wire::Pose {
     let q = pose.rotation.coords;
     wire::Pose { position_m: Some(to_vec3(&pose.translation.vector)), qx: q.x, qy: q.y, qz: q.z, qw: q.w }
 }
 
-/// Pose of the world; the wire has checked that the quaternion is near unit length.
+/// Converts to a pose of the world. Codec checks have ensured that the quaternion is near unit length.
 pub fn from_pose(pose: &wire::Pose) -> Isometry3<f64> {
     let rotation = UnitQuaternion::from_quaternion(Quaternion::new(pose.qw, pose.qx, pose.qy, pose.qz));
     Isometry3::from_parts(Translation3::from(from_vec3(pose.position_m)), rotation)
 }
 
-/// Tool geometry of the wire.
+/// Converts to a tool shape of the wire.
 pub fn to_shape(shape: &ToolShape) -> wire::ToolShape {
     let kind = match *shape {
         ToolShape::Sphere { radius_m } => tool_shape::Kind::Sphere(tool_shape::Sphere { radius_m }),
@@ -78,7 +78,7 @@ pub fn to_shape(shape: &ToolShape) -> wire::ToolShape {
     wire::ToolShape { kind: Some(kind) }
 }
 
-/// Tool geometry of the world.
+/// Converts to a tool shape of the world; `None` if the message holds none.
 pub fn from_shape(shape: &wire::ToolShape) -> Option<ToolShape> {
     Some(match shape.kind? {
         tool_shape::Kind::Sphere(s) => ToolShape::Sphere { radius_m: s.radius_m },
@@ -87,7 +87,7 @@ pub fn from_shape(shape: &wire::ToolShape) -> Option<ToolShape> {
     })
 }
 
-/// Mode of the wire.
+/// Converts to a mode of the wire.
 pub fn to_mode(mode: ToolMode) -> tool_sample::Mode {
     match mode {
         ToolMode::Hover => tool_sample::Mode::Hover,
@@ -97,7 +97,7 @@ pub fn to_mode(mode: ToolMode) -> tool_sample::Mode {
     }
 }
 
-/// Mode of the world; an unspecified one hovers.
+/// Converts to a mode of the world. An unspecified one hovers.
 pub fn from_mode(mode: tool_sample::Mode) -> ToolMode {
     match mode {
         tool_sample::Mode::Touch => ToolMode::Touch,
@@ -107,7 +107,7 @@ pub fn from_mode(mode: tool_sample::Mode) -> ToolMode {
     }
 }
 
-/// What a step reads of a checked sample.
+/// Converts a checked sample to what a step reads of it.
 pub fn to_tool_input(sample: &wire::ToolSample, id: Arc<str>, owner: Arc<str>) -> ToolInput {
     ToolInput {
         id,
@@ -121,7 +121,7 @@ pub fn to_tool_input(sample: &wire::ToolSample, id: Arc<str>, owner: Arc<str>) -
     }
 }
 
-/// Positions of a body for the wire. `seq` counts the frames of the body.
+/// Positions of a body. `seq` counts the frames of the body.
 pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceFrame {
     let mut positions = Vec::with_capacity(POSITION_BYTES * body.positions.len());
     for coordinate in body.positions.iter().flatten() {
@@ -146,7 +146,7 @@ pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::Sur
     }
 }
 
-/// Triangles of a body for the wire. `seq` counts the topologies of the body.
+/// Triangles of a body. `seq` counts the topologies of the body.
 pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceTopology {
     let SurfaceTopology { epoch, vertex_count, triangles, tags, rest, held, hangs } = &*body.topology;
     let coordinates = rest.iter().flatten().flat_map(|c| c.to_le_bytes());
@@ -167,13 +167,13 @@ pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::
     }
 }
 
-/// Eight flags per byte, the lowest bit first.
+/// Packs eight flags into each byte, lowest bit first.
 fn bits(flags: &[bool]) -> Bytes {
     let byte = |flags: &[bool]| flags.iter().rev().fold(0, |byte: u8, &flag| (byte << 1) | u8::from(flag));
     flags.chunks(8).map(byte).collect::<Vec<u8>>().into()
 }
 
-/// Von Mises stress on the surface of a body for the wire. `seq` counts the fields of the body.
+/// Von Mises stress on the surface of a body. `seq` counts the fields of the body.
 pub fn to_stress(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceField {
     wire::SurfaceField {
         seq,
@@ -188,7 +188,7 @@ pub fn to_stress(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::Su
     }
 }
 
-/// Probes `(id, body, rest)` and energies for the wire. `seq` counts these messages.
+/// Probes and energies. `seq` counts these messages.
 pub fn to_measures(snapshot: &Snapshot, probes: &[ProbeName], seq: u64) -> wire::Measures {
     let point = |(name, position): (&ProbeName, &Vector3<f64>)| wire::ProbePoint {
         id: name.id.clone(),
@@ -215,14 +215,14 @@ pub fn to_measures(snapshot: &Snapshot, probes: &[ProbeName], seq: u64) -> wire:
     }
 }
 
-/// A probe of the scene.
+/// Identity and place of a probe, which stay constant during a scene.
 #[derive(Debug, Clone)]
 pub struct ProbeName {
-    /// Name.
+    /// Id of the probe in the scene.
     pub id: String,
-    /// Name of its body.
+    /// Id of the body that it lies in.
     pub body: String,
-    /// Where it rests [m].
+    /// Rest position [m].
     pub rest_m: Vector3<f64>,
 }
 
@@ -234,7 +234,7 @@ fn little_endian<'a>(words: impl Iterator<Item = &'a u32>, count: usize) -> Byte
     bytes.into()
 }
 
-/// What a viewer draws of a tool.
+/// State of a tool for viewers. `seq` counts these messages.
 pub fn to_tool_state(snapshot: &Snapshot, tool: &ToolSnapshot, seq: u64) -> wire::ToolState {
     wire::ToolState {
         seq,

@@ -1,14 +1,14 @@
-//! Who may give orders: pause, step, reset, set. Everybody may watch and touch.
+//! Permission to give orders (pause, step, reset, set). Everybody may watch and touch.
 //!
-//! There is no identity yet that a client could prove, but its address is known: orders are taken from this
-//! machine, unless `--operators` says otherwise. zenoh's access control keeps the queries of others out before
-//! anything is read of them; the page asks for the address of the browser.
+//! A client cannot prove an identity yet, but its address is known. Orders are taken from this machine only,
+//! unless `--operators` says otherwise. zenoh's access control rejects the queries of other clients before
+//! anything of them is read. The relay of the page checks the address of the browser.
 
 use clap::ValueEnum;
 use scindo_proto::{KeySpace, Topic, Verb};
 use serde_json::{Value, json};
 
-/// Who may give orders.
+/// Clients and browsers that may give orders.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum Operators {
     /// Every client and every browser.
@@ -16,15 +16,15 @@ pub enum Operators {
     /// Clients and browsers on this machine.
     #[default]
     Loopback,
-    /// Nobody.
+    /// Nobody, not even clients on this machine.
     None,
 }
 
-/// Names that systems give to the loopback interface.
+/// Names of the loopback interface on different systems.
 const LOOPBACK: [&str; 2] = ["lo", "lo0"];
 
 impl Operators {
-    /// Who among browsers may give orders.
+    /// The same permission in the viewer's terms, for browsers.
     pub fn of_pages(self) -> scindo_view::Operators {
         match self {
             Self::All => scindo_view::Operators::All,
@@ -33,12 +33,12 @@ impl Operators {
         }
     }
 
-    /// zenoh's access control for the sessions of a server; none where nothing has to be kept out by it.
+    /// zenoh's access control for the sessions of a server; `None` if nothing has to be kept out.
     pub fn access_control(self, keys: &KeySpace) -> Option<Value> {
         if self != Self::Loopback {
             return None;
         }
-        // `**` does not match the chunk that begins with @.
+        // `**` does not match a chunk that begins with @.
         let session = keys.every_key();
         let everything = ["**".to_owned(), session];
         let questions: Vec<String> =

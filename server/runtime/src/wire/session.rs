@@ -1,9 +1,9 @@
-//! The two zenoh sessions of a server: *haptic* for poses, contacts and cuts, *bulk* for surfaces,
-//! reports and rpc, so that a mesh never delays a force.
+//! The two zenoh sessions of a server. *Haptic* carries poses, contacts and cuts; *bulk* carries surfaces,
+//! reports and rpc. A mesh therefore never delays a force.
 //!
-//! The haptic session listens at the endpoints that were asked for and relays for clients that
-//! connect nowhere else; the bulk session listens one port above each of them
-//! ([`scindo_proto::endpoint::{DEFAULT_ENDPOINT, bulk_endpoint}`]), which spares those who know of it the relay.
+//! The haptic session listens at the requested endpoints and relays for clients that connect nowhere else.
+//! The bulk session listens one port above each of them ([`scindo_proto::endpoint::{DEFAULT_ENDPOINT,
+//! bulk_endpoint}`]). Clients that connect there as well need no relay.
 
 use std::path::{Path, PathBuf};
 
@@ -12,44 +12,45 @@ use zenoh::{Session, Wait as _};
 
 use crate::error::{RuntimeError, words};
 
-/// Where and how a server meets its clients.
+/// Network settings of a server.
 #[derive(Debug, Clone, Default)]
 pub struct NetworkConfig {
-    /// Endpoints at which clients connect.
+    /// Endpoints at which the haptic session listens.
     pub listen: Vec<String>,
     /// Routers to connect to.
     pub connect: Vec<String>,
     /// A zenoh configuration (JSON5) to start from: TLS, users, access control.
     pub zenoh_file: Option<PathBuf>,
-    /// zenoh's access control where the file has none of its own.
+    /// Access control of zenoh, used if the file has none of its own.
     pub access_control: Option<serde_json::Value>,
     /// Longest surface message that is relayed to clients of the haptic endpoint [bytes].
     pub longest_surface: usize,
 }
 
-/// Largest message that a session of the server puts together from fragments [bytes]: orders, poses and cuts
-/// take at most [`scindo_proto::limits::MAX_CUT_BYTES`]. zenoh's own limit is a gigabyte per client, priority and
-/// reliability.
+/// Largest message that a session of the server reassembles from fragments [bytes]. Orders, poses and cuts
+/// take at most [`scindo_proto::limits::MAX_CUT_BYTES`]. zenoh's own limit is a gigabyte per client, priority
+/// and reliability.
 const LONGEST_MESSAGE: usize = 256 * 1024;
 
-/// Surfaces grow where they are cut; what is longer than this many of the present ones is not relayed.
+/// Surfaces grow when they are cut. A message longer than this multiple of the longest present one is not
+/// relayed.
 const SURFACES_GROW: usize = 8;
 
 /// Limits that hold unless the zenoh file sets others.
 const LIMITS: [(&str, &str); 5] = [
-    // Silent connections hold the door for so long [ms], and so many of them.
+    // A connection that stays silent is closed after this time [ms]. At most so many may be pending.
     ("transport/unicast/accept_timeout", "1000"),
     ("transport/unicast/accept_pending", "256"),
     ("transport/unicast/max_sessions", "256"),
-    // A message that must not be lost waits for a client that reads nothing for so long before its link is
-    // closed, and a frame for one that is slow for so long before it is dropped [µs].
+    // The link to a client that reads nothing is closed when a message that must not be lost has waited this
+    // long [µs]. A frame for a slow client is dropped when it has waited this long [µs].
     ("transport/link/tx/queue/congestion_control/block/wait_before_close", "1000000"),
     ("transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments", "20000"),
 ];
 
 impl NetworkConfig {
-    /// Settles where to listen: where it was said, else where the zenoh file says, else, without
-    /// file or router, at the default endpoint.
+    /// Decides where to listen: at the given endpoints, otherwise where the zenoh file says. With neither
+    /// file nor router it is the default endpoint.
     pub fn settled(mut self) -> Result<Self, RuntimeError> {
         if self.listen.is_empty() {
             self.listen = match &self.zenoh_file {
@@ -62,7 +63,7 @@ impl NetworkConfig {
     }
 }
 
-/// The endpoints at which a configuration says to listen, if it lists them plainly.
+/// Endpoints at which a configuration says to listen. Only plain lists are recognised.
 fn endpoints_of(config: &zenoh::Config) -> Vec<String> {
     let endpoints = config.get_json("listen/endpoints").unwrap_or_default();
     serde_json::from_str(&endpoints).unwrap_or_default()
@@ -77,16 +78,16 @@ fn load(path: &Path) -> Result<zenoh::Config, RuntimeError> {
     })
 }
 
-/// The sessions, haptic and bulk.
+/// The open sessions of a server.
 pub struct Sessions {
-    /// Poses, contacts, cuts, liveliness.
+    /// Carries poses, contacts, cuts and liveliness.
     pub haptic: Session,
-    /// Surfaces, tool states, reports, rpc.
+    /// Carries surfaces, tool states, reports and rpc.
     pub bulk: Session,
 }
 
 impl Sessions {
-    /// Opens both. Fails if an endpoint is taken.
+    /// Opens both sessions. Fails if an endpoint is taken.
     pub fn open(network: &NetworkConfig) -> Result<Self, RuntimeError> {
         network.listen.iter().try_for_each(|endpoint| check("--listen", endpoint))?;
         network.connect.iter().try_for_each(|endpoint| check("--connect", endpoint))?;
@@ -101,7 +102,7 @@ impl Sessions {
     }
 }
 
-/// A typing mistake should not be reported as a network failure.
+/// Checks the form of an endpoint, so that a typing mistake is not reported as a network failure.
 fn check(option: &'static str, endpoint: &str) -> Result<(), RuntimeError> {
     let wrong = |reason: &str| RuntimeError::Option {
         option,
@@ -141,8 +142,8 @@ fn open(
         settings.push(("connect/endpoints", list(connect)));
     }
     if !from_file {
-        // Deterministic: only what was named, no discovery. No shared memory: each client on this machine would
-        // bring 16 MB that stay mapped when it is gone.
+        // Deterministic: only named endpoints, no discovery. No shared memory: each local client would map 16
+        // MB that stay mapped after it is gone.
         settings.extend(
             [
                 ("transport/shared_memory/enabled", "false"),
@@ -171,7 +172,7 @@ fn open(
     })
 }
 
-/// Those of our limits that a configuration leaves as zenoh has them.
+/// Those of our limits that the configuration does not set itself.
 fn limits(config: &zenoh::Config, longest_message: usize) -> Vec<(&'static str, String)> {
     let plain = zenoh::Config::default();
     let ours = LIMITS.map(|(key, value)| (key, value.to_owned()));
@@ -189,7 +190,7 @@ fn list(endpoints: &[String]) -> String {
     format!("[{}]", quoted.join(","))
 }
 
-/// How this process reaches its own endpoint; only plain TCP needs no certificate.
+/// The endpoint by which this process reaches its own `endpoint`. Only plain TCP works without a certificate.
 pub fn local(endpoint: &str) -> Option<String> {
     let address = endpoint.strip_prefix("tcp/")?;
     let (host, port) = address.rsplit_once(':')?;

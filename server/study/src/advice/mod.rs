@@ -1,5 +1,5 @@
-//! What the points of a case tell: which of them nothing beats, where their errors come from, and which one to
-//! take for a time budget.
+//! What the points of a case show: which of them form the Pareto front, where their errors come from, and
+//! which one to use within a time budget.
 
 pub mod pareto;
 

@@ -1,10 +1,10 @@
-//! The Pareto front: configurations than which nothing tried is both as fast and as accurate.
+//! The Pareto front: configurations such that no other one tried is both as fast and as accurate.
 
-/// An error counts as smaller only if it is smaller by this share: less is lost in the noise of times.
+/// An error counts as smaller only if it is smaller by this fraction. Less is lost in the noise of times.
 const WORTH: f64 = 0.01;
 
-/// Indices of the points (cost, error) on the front, by rising cost and falling error. Points that
-/// are not finite are never on it; of equal points the first is.
+/// Indices of the points (cost, error) on the front, by rising cost and falling error. Points that are not
+/// finite are never on it. Of equal points only the first is.
 pub fn front(points: &[(f64, f64)]) -> Vec<usize> {
     let usable = |i: &usize| points[*i].0.is_finite() && points[*i].1.is_finite();
     let mut order: Vec<usize> = (0..points.len()).filter(usable).collect();
@@ -40,7 +40,7 @@ mod tests {
         assert_eq!(front(&[(1.0, 0.2), (2.0, 0.1999), (3.0, 0.19)]), [0, 2], "too little to be worth it");
     }
 
-    /// Against the definition, on points of a fixed congruential sequence.
+    /// Compares with the definition on points of a fixed congruential sequence.
     #[test]
     fn agrees_with_the_definition() {
         let mut state = 1_u32;
@@ -48,7 +48,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             f64::from(1 + (state >> 26))
         };
-        // Integers up to 64 differ by more than what counts as smaller.
+        // Integers up to 64 differ by more than the threshold.
         let points: Vec<(f64, f64)> = (0..300).map(|_| (next(), next())).collect();
         let front = front(&points);
         for (i, p) in points.iter().enumerate() {

@@ -1,8 +1,8 @@
-//! A configuration for a time budget, as far as the reference can tell configurations apart.
+//! Recommends a configuration for a time budget, as far as the reference can tell configurations apart.
 //!
-//! Errors are distances from a reference that is itself known only to its error bar b: the true error
-//! of a point lies within e ± b. An error below b is nothing but the reference's own, so points there
-//! cannot be told apart; the cheapest of them is named, as what it is.
+//! Errors are distances from a reference that is itself known only to its error bar b. The true error of a
+//! point therefore lies within e ± b. An error below b may be the reference's own, so points there cannot be
+//! told apart. The cheapest of them is then recommended, as indistinguishable.
 
 use serde::Serialize;
 
@@ -10,15 +10,15 @@ use super::pareto::front;
 use super::sources::{Source, Sources};
 use crate::words::{percent, short};
 
-/// What is recommended, in indices of the points.
+/// The recommendation; points are given by their indices.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Recommendation {
-    /// The budget [ms].
+    /// Time budget per solution or frame [ms].
     pub budget_ms: f64,
-    /// The most accurate point within it, or the cheapest of those that cannot be told from the
-    /// reference; none if nothing is fast enough or nothing is known.
+    /// The most accurate point within the budget, or the cheapest one below the error bar. `None` if nothing
+    /// is fast enough or nothing is known.
     pub choice: Option<usize>,
-    /// Whether the choice cannot be told from others: its error is below the error bar.
+    /// Whether the error of the choice is below the error bar, so that it cannot be told from others.
     pub indistinguishable: bool,
     /// Relative error of the choice.
     pub error: Option<f64>,
@@ -26,37 +26,37 @@ pub struct Recommendation {
     pub error_bar: f64,
     /// The 99th percentile of its time [ms].
     pub p99_ms: Option<f64>,
-    /// What it changes in the scene, as `key=value`.
+    /// Overrides of the scene that the choice needs, as `key=value`.
     pub set: Vec<String>,
-    /// The next point on the front that is better by more than the bar: what more time would buy, or
-    /// the fastest where nothing fits.
+    /// The next point on the front that is better by more than the bar: it shows what more time would buy.
+    /// Where nothing fits the budget, the fastest point.
     pub next: Option<usize>,
-    /// Which error dominates the choice.
+    /// Source of error that dominates the choice.
     pub dominant: Option<Source>,
-    /// In words.
+    /// The recommendation as a sentence.
     pub words: String,
 }
 
-/// A point as the recommendation sees it.
+/// What the recommendation needs to know of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Candidate<'a> {
-    /// Time that must fit [ms]: the 99th percentile.
+    /// Time that must fit the budget [ms]: the 99th percentile.
     pub p99_ms: f64,
     /// Relative error; not finite for a run without result.
     pub error: f64,
     /// The configuration in words.
     pub words: &'a str,
-    /// Its sources of error, where they are known.
+    /// Sources of its error, where they are known.
     pub sources: Option<&'a Sources>,
 }
 
-/// Picks the most accurate candidate whose slow steps, too, fit the budget; where errors fall below
-/// the reference's own error bar, the cheapest of those.
+/// Picks the most accurate candidate whose slow steps fit the budget as well. Where errors fall below the
+/// reference's own error bar, it picks the cheapest of those.
 pub fn recommend(budget_ms: f64, error_bar: f64, candidates: &[Candidate<'_>]) -> Recommendation {
     let points: Vec<(f64, f64)> = candidates.iter().map(|c| (c.p99_ms, c.error)).collect();
     let front = front(&points);
     let fitting = front.iter().take_while(|&&i| points[i].0 <= budget_ms).count();
-    // Along the front costs rise and errors fall: the first below the bar is the cheapest there.
+    // Costs rise and errors fall along the front: the first point below the bar is the cheapest there.
     let hidden = front[..fitting].iter().position(|&i| points[i].1 <= error_bar);
     let choice = hidden.or(fitting.checked_sub(1)).map(|at| front[at]);
     let next = match choice {
@@ -81,7 +81,7 @@ pub fn recommend(budget_ms: f64, error_bar: f64, candidates: &[Candidate<'_>]) -
     advice
 }
 
-/// Number of points, by rank of cost, among those that cannot be told apart.
+/// The sentence. `alike` counts the points that cannot be told apart.
 fn words(advice: &Recommendation, candidates: &[Candidate<'_>], alike: usize) -> String {
     let (budget, bar) = (short(advice.budget_ms), percent(advice.error_bar));
     let told = |i: usize| {

@@ -1,12 +1,12 @@
-//! Which source of error dominates: one source after another is peeled off by a twin run.
+//! Finds the dominant source of error: twin runs remove one source after another.
 //!
-//! The error of a run telescopes into what each twin changes,
+//! The error of a run telescopes into the changes from twin to twin,
 //!
 //! u − u* = (u − u_d) + (u_d − u_t) + (u_t − u_h) + (u_h − u_m) + (u_m − u*)
 //!
-//! where u_d is the same run in double precision, u_t it solved to 1e-10, u_h that extrapolated to
-//! Δt → 0, u_m that with the law of the reference. The five terms are rounding, algebraic, time,
-//! model and, what is left, discretisation. All relative to ‖u*‖ over the probes.
+//! where u_d is the same run in double precision, and u_t is u_d solved to 1e-10. u_h is u_t extrapolated to
+//! Δt → 0, and u_m is u_h with the law of the reference. The five terms are rounding, algebraic, time, model
+//! and the rest, which is discretisation. All are relative to ‖u*‖ over the probes.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,20 +21,20 @@ use crate::trial::series::Series;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// Elements too large or too poor.
+    /// Elements are too large or too poor.
     Discretisation,
-    /// Steps too long.
+    /// Steps are too long.
     Time,
-    /// Solver stopped too early.
+    /// The solver stopped too early.
     Algebraic,
-    /// Another law than that of the reference.
+    /// The law differs from that of the reference.
     Model,
-    /// Too few digits.
+    /// The arithmetic has too few digits.
     Rounding,
 }
 
 impl Source {
-    /// All of them, in the order of tables.
+    /// All sources, in the order of tables.
     pub const ALL: [Source; 5] =
         [Source::Discretisation, Source::Time, Source::Algebraic, Source::Model, Source::Rounding];
 
@@ -49,7 +49,7 @@ impl Source {
         }
     }
 
-    /// What makes it smaller.
+    /// Advice that reduces this error.
     pub fn remedy(self) -> &'static str {
         match self {
             Source::Discretisation => "a finer mesh or a better element",
@@ -61,30 +61,30 @@ impl Source {
     }
 }
 
-/// The share of every source: relative size of its term; none where it could not be told apart.
+/// Relative size of each term. Sources that could not be told apart are absent.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sources(pub Vec<(Source, f64)>);
 
 impl Sources {
-    /// The size of a source.
+    /// Relative size of one source, if known.
     pub fn of(&self, source: Source) -> Option<f64> {
         self.0.iter().find(|(s, _)| *s == source).map(|(_, size)| *size)
     }
 
-    /// The largest.
+    /// The source with the largest term.
     pub fn dominant(&self) -> Option<Source> {
         let usable = self.0.iter().filter(|(_, size)| size.is_finite());
         usable.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(source, _)| *source)
     }
 }
 
-/// Tolerance of a twin whose algebraic error is nothing.
+/// Tolerance of a twin whose algebraic error is negligible.
 const TIGHT: f64 = 1e-10;
 
-/// The same where double precision is not to be had.
+/// The same for twins without double precision.
 const TIGHT_MIXED: f64 = 1e-8;
 
-/// Peels the error of `configuration`, whose run left `series`; `run` makes the twins.
+/// Splits the error of `configuration`, whose run gave `series`. The twins are made by `run`.
 pub fn peel(
     case: &Case,
     configuration: &Configuration,
@@ -121,7 +121,7 @@ pub fn peel(
     peeling.found
 }
 
-/// Keys for double precision, as the case itself names them.
+/// Overrides for double precision, as the case itself defines them.
 fn double_precision(case: &Case) -> Vec<String> {
     let axis = case.axes.iter().find(|axis| axis.factor == Factor::Precision);
     axis.and_then(|axis| axis.find("double")).map(|setting| setting.set.clone()).unwrap_or_default()
@@ -138,18 +138,18 @@ fn order(integrator: &str) -> i32 {
 
 struct Peeling<'a> {
     run: &'a mut dyn FnMut(&Configuration) -> Option<Trial>,
-    /// The configuration with all that was peeled off so far.
+    /// The configuration without the sources removed so far.
     twin: Configuration,
-    /// Its result.
+    /// Result of the twin.
     left: Series,
-    /// What extrapolation to Δt → 0 adds to it.
+    /// Correction of `left` by extrapolation to Δt → 0.
     ahead: Option<Series>,
     scale: f64,
     found: Sources,
 }
 
 impl Peeling<'_> {
-    /// Removes one source by changing one factor; false if that could not be run.
+    /// Removes one source by changing one factor. False if that twin could not be run.
     fn take(&mut self, source: Source, factor: Factor, setting: &Setting) -> bool {
         if self.twin.label(factor) == setting.label {
             self.found.0.push((source, 0.0));
@@ -163,7 +163,7 @@ impl Peeling<'_> {
         true
     }
 
-    /// Removes the error of the step h by a run with h/2 and extrapolation from the two.
+    /// Removes the error of the step h by a run with h/2 and an extrapolation from both.
     fn take_time(&mut self, step_s: f64, order: i32) {
         let twin = self.twin.with(Factor::Step, &step(0.5 * step_s));
         let Some(trial) = (self.run)(&twin).filter(Trial::is_done) else { return };
@@ -175,7 +175,7 @@ impl Peeling<'_> {
         self.twin = twin;
     }
 
-    /// What is left when all is peeled off, against the reference.
+    /// The error that remains against the reference after all sources were removed.
     fn rest(&self, reference: &Series) -> f64 {
         let rest = self.left.minus(reference);
         let rest = self.ahead.as_ref().map_or_else(|| rest.clone(), |ahead| rest.combine(1.0, ahead, 1.0));

@@ -1,4 +1,4 @@
-//! Runs configurations, keeps what ended, watches the time and tells how far it is.
+//! The bench runs configurations, stores finished runs, watches the time and reports progress.
 
 pub mod runner;
 
@@ -24,23 +24,23 @@ use progress::Progress;
 use runner::{Ask, Runner};
 use store::{Store, fingerprint};
 
-/// Where runs are made.
+/// Makes the runs of all cases.
 pub struct Bench<'a> {
     settings: &'a Settings,
-    /// Runs that ended, on disk.
+    /// Finished runs, on disk.
     pub store: Store,
     tell: &'a mut dyn FnMut(&Progress),
     progress: Progress,
     forecast: Forecast,
     started: Instant,
-    /// When the present case is to end [s since the start]; infinite without a budget.
+    /// When the present case must end [s since the start]; infinite without a budget.
     until_s: f64,
-    /// What could not be written.
+    /// First file that could not be written. It ends the study.
     pub broken: Option<(PathBuf, io::Error)>,
 }
 
 impl<'a> Bench<'a> {
-    /// A bench with the runs of an earlier study.
+    /// A bench that continues with the runs in `store`.
     pub fn new(settings: &'a Settings, store: Store, tell: &'a mut dyn FnMut(&Progress)) -> Self {
         Self {
             settings,
@@ -54,12 +54,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// What is asked for.
+    /// Settings of the study.
     pub fn settings(&self) -> &'a Settings {
         self.settings
     }
 
-    /// Begins a case that may take `seconds`.
+    /// Begins a case that may take `seconds` from now.
     pub fn begin(&mut self, case: &str, seconds: f64) {
         self.until_s = self.elapsed_s() + seconds;
         self.progress = Progress { case: case.to_owned(), ..Progress::default() };
@@ -71,29 +71,29 @@ impl<'a> Bench<'a> {
         self.started.elapsed().as_secs_f64()
     }
 
-    /// Whether the study is to end.
+    /// Whether the study must end: it was stopped, or a file could not be written.
     pub fn is_over(&self) -> bool {
         self.settings.stop.load(Ordering::Relaxed) || self.broken.is_some()
     }
 
-    /// A sentence for the user.
+    /// Shows a sentence to the user.
     pub fn note(&mut self, note: String) {
         self.progress.note = Some(note);
         (self.tell)(&self.progress);
         self.progress.note = None;
     }
 
-    /// Points done and planned.
+    /// Reports how many points are done and planned.
     pub fn count(&mut self, done: usize, total: usize) {
         (self.progress.done, self.progress.total) = (done, total);
     }
 
-    /// Runs on `case`.
+    /// A runner for `case`.
     pub fn on<'b>(&'b mut self, case: &'b Case) -> On<'b, 'a> {
         On { bench: self, case }
     }
 
-    /// A run whatever is known from before; it is not kept.
+    /// Repeats a run even if its result is stored. The new result is not stored.
     pub fn again(&mut self, case: &Case, configuration: &Configuration, ask: Ask) -> Option<Trial> {
         if self.is_over() {
             return None;
@@ -134,7 +134,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// A bench at work on a case.
+/// The bench at work on one case.
 pub struct On<'b, 'a> {
     bench: &'b mut Bench<'a>,
     case: &'b Case,
@@ -157,7 +157,7 @@ impl Runner for On<'_, '_> {
         if trial.is_done() {
             bench.forecast.learn(case, configuration, seconds);
         }
-        // A run that was stopped may end where there is more time.
+        // A run that was stopped for its time may end when there is more time, so it is not stored.
         if trial.status != Status::Late
             && let Err(error) = bench.store.put(&key(case, configuration), &trial)
         {
@@ -178,7 +178,7 @@ impl Runner for On<'_, '_> {
     }
 }
 
-/// What a run is known by: scene, settings and protocol.
+/// Key of a run in the store: scene, settings and protocol.
 fn key(case: &Case, configuration: &Configuration) -> String {
     let mut set = configuration.overrides();
     set.push(format!("{:?}", case.protocol));
@@ -188,7 +188,7 @@ fn key(case: &Case, configuration: &Configuration) -> String {
     format!("{} {scene} {words}", case.name)
 }
 
-/// Whether the point differs only in the method of cutting from the base of the case.
+/// Whether the point differs from the base of the case only in the method of cutting.
 fn compares_methods(case: &Case, configuration: &Configuration) -> bool {
     let base = Configuration::base(&case.axes);
     configuration
@@ -196,12 +196,12 @@ fn compares_methods(case: &Case, configuration: &Configuration) -> bool {
         .is_some_and(|method| base.with(Factor::Cutting, method).key() == configuration.key())
 }
 
-/// The mesh after many cuts; nothing where the scene is refused, none where the study is to end.
+/// Quality of the mesh after many cuts. Empty if the scene is refused; `None` if the study must end.
 fn worn(case: &Case, configuration: &Configuration, stop: &AtomicBool) -> Option<Vec<Wear>> {
     let mut set = configuration.overrides();
     set.extend(wear::at_rest(&case.bodies));
     let Ok(scene) = case.scene.apply_sets(&set) else { return Some(Vec::new()) };
-    // The others have the mesh of one of these, or can take no further cut.
+    // The other methods have the mesh of one of these, or can take no further cut.
     let once = !["xfem", "snap"].contains(&configuration.label(Factor::Cutting));
     match wear::measure(&scene, case.scene.base_dir(), once, stop) {
         None if stop.load(Ordering::Relaxed) => None,

@@ -1,18 +1,18 @@
-//! What a study tells while it runs.
+//! What a study reports while it runs.
 
-/// How far it is.
+/// Present state of a study.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Progress {
-    /// Case that is worked on.
+    /// Name of the present case.
     pub case: String,
-    /// What is run now.
+    /// The present run in words.
     pub what: String,
-    /// Points of this case done; 0 while its reference is computed.
+    /// Finished points of this case; 0 while its reference is computed.
     pub done: usize,
-    /// Points of this case in all; 0 before they are known.
+    /// All points of this case; 0 before they are known.
     pub total: usize,
-    /// When this case began and must end [s since the study began]; infinite without a budget.
+    /// When this case began and must end [s since the start of the study]; infinite without a budget.
     pub case_s: [f64; 2],
-    /// Something to be said once, such as the estimate.
+    /// A message to show once, such as the estimate of the duration.
     pub note: Option<String>,
 }

@@ -1,8 +1,8 @@
-//! What is finished stays on disk: every run is appended as it ends, and a study that is started
-//! again with the same directory takes it from there.
+//! Finished runs stay on disk. Every run is appended as it ends, and a study that is started again with the
+//! same directory reads it back.
 //!
-//! `runs.jsonl` holds a line on the machine and the build, then one line per run. Times of another
-//! machine or build mean nothing here, so a file that begins differently is put aside.
+//! `runs.jsonl` holds a line on the machine and the build, then one line per run. Times of another machine or
+//! build mean nothing here, so a file with a different first line is renamed.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -14,14 +14,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::trial::Trial;
 
-/// What the times depend on.
+/// Build and machine; times depend on both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Origin {
     /// Version of the program.
     pub version: String,
-    /// Commit it was built from.
+    /// Commit that the program was built from.
     pub commit: String,
-    /// The machine.
+    /// Processor and system.
     pub machine: Machine,
 }
 
@@ -47,15 +47,15 @@ struct Line {
 pub struct Store {
     runs: BTreeMap<String, Trial>,
     file: File,
-    /// How many were there from an earlier study.
+    /// Number of runs read from an earlier study.
     pub resumed: usize,
 }
 
 impl Store {
-    /// Opens the runs of `directory`, which is made if it is missing.
+    /// Opens the runs in `directory`, which is created if missing.
     ///
     /// # Errors
-    /// What the system says about a file or directory.
+    /// A file or directory that the system cannot read or write.
     pub fn open(directory: &Path, origin: &Origin) -> Result<Self, (PathBuf, io::Error)> {
         fs::create_dir_all(directory).map_err(|e| (directory.to_owned(), e))?;
         let path = directory.join("runs.jsonl");
@@ -70,22 +70,22 @@ impl Store {
         if fresh {
             writeln!(file, "{header}").map_err(at)?;
         } else {
-            // Ends a line that a kill cut short; empty lines are nothing.
+            // Ends a line that a kill cut short. Empty lines are ignored.
             writeln!(file).map_err(at)?;
         }
         let runs = runs.unwrap_or_default();
         Ok(Self { resumed: runs.len(), runs, file })
     }
 
-    /// A finished run.
+    /// Looks up a finished run.
     pub fn get(&self, key: &str) -> Option<&Trial> {
         self.runs.get(key)
     }
 
-    /// Keeps a run.
+    /// Stores a finished run.
     ///
     /// # Errors
-    /// What the system says.
+    /// The file cannot be written.
     pub fn put(&mut self, key: &str, trial: &Trial) -> io::Result<()> {
         let line = Line { key: key.to_owned(), trial: trial.clone() };
         writeln!(self.file, "{}", serde_json::to_string(&line)?)?;
@@ -94,7 +94,7 @@ impl Store {
     }
 }
 
-/// The runs of a file that begins with `header`; none if there is no such file. A last line that a
+/// Reads the runs of a file that begins with `header`; `None` if there is no such file. A last line that a
 /// kill cut short is dropped.
 fn read(path: &Path, header: &str) -> io::Result<Option<BTreeMap<String, Trial>>> {
     let file = match File::open(path) {
@@ -115,7 +115,7 @@ fn read(path: &Path, header: &str) -> io::Result<Option<BTreeMap<String, Trial>>
     Ok(Some(runs))
 }
 
-/// A short name for a text: FNV-1a, 64 bits, as hexadecimal.
+/// A short name for a text: its 64-bit FNV-1a hash in hexadecimal.
 pub fn fingerprint(text: &str) -> String {
     let hash = text
         .bytes()
@@ -137,7 +137,7 @@ mod tests {
         trial.cost.median_ms = 0.1 + 0.2;
         store.put("a", &trial).unwrap();
         drop(store);
-        // A kill in the middle of a line.
+        // Simulates a kill in the middle of a line.
         let path = directory.path().join("runs.jsonl");
         let mut file = OpenOptions::new().append(true).open(&path).unwrap();
         write!(file, "{{\"key\":\"b\",\"tri").unwrap();

@@ -14,7 +14,7 @@ fn gold() -> Gold {
     Gold::read(include_str!("../../cases/bar.gold.json"))
 }
 
-/// At rest.
+/// The bar at rest, against stored solutions.
 pub fn at_rest(quick: bool) -> Case {
     let body = ["bar".to_owned()];
     let gold = gold();
@@ -60,7 +60,7 @@ pub fn at_rest(quick: bool) -> Case {
     }
 }
 
-/// Let go from straight: five seconds of motion.
+/// The bar released from its straight shape: five seconds of motion.
 pub fn in_motion(quick: bool) -> Case {
     let body = ["bar".to_owned()];
     let gold = gold();
@@ -68,7 +68,7 @@ pub fn in_motion(quick: bool) -> Case {
     let (meshes, base) = if quick { (&all[..2], all[0]) } else { (&all[..], all[1]) };
     let frame_s = 0.04;
     let hs = if quick { vec![0.04, 0.02] } else { vec![0.08, 0.04, 0.02, 0.01] };
-    // Explicit integrators divide it further, into what is stable.
+    // Explicit integrators divide the step further until it is stable.
     let explicit = if quick { 0.02 } else { 0.01 };
     let integrators = ["implicit-euler", "bdf2", "newmark", "symplectic-euler", "midpoint", "rk4"];
     let mesh = cells("bar", meshes, base);
@@ -129,7 +129,7 @@ fn frames(quick: bool) -> u32 {
     if quick { 15 } else { 125 }
 }
 
-/// The limit of the motion: the best element and integrator first.
+/// Plans for the limit of the motion, best element and integrator first.
 fn plans(bodies: &[String], axes: &[Axis], quick: bool) -> Vec<Plan> {
     let base = Configuration::base(axes).with(Factor::Tolerance, &tolerance(bodies, 1e-6));
     let tens = [[10, 2, 2], [15, 3, 3], [20, 4, 4]];

@@ -7,7 +7,7 @@ use super::{bar, cantilever, cut_beam, cutting};
 pub const NAMES: [&str; 7] =
     ["r1", "r2-tc1", "bar-rest", "bar-motion", "cut-tc1", "cut-tc2force", "cut-tc2strip"];
 
-/// A case that comes with the program; `quick` leaves out what takes long.
+/// Builds the case `name`. `quick` leaves out slow configurations.
 pub fn builtin(name: &str, quick: bool) -> Option<Case> {
     match name {
         "r1" => Some(cantilever::case(quick)),

@@ -12,7 +12,7 @@ use crate::trial::series::Series;
 /// Length, height, depth [m]; Young's modulus [Pa]; load [N].
 const BEAM: Beam = Beam { l: 1.2, h: 0.2, d: 0.3, young: 1e6, force: 3.0 };
 
-/// The case.
+/// Builds the case.
 pub fn case(quick: bool) -> Case {
     let body = ["beam".to_owned()];
     let mut probes = Vec::new();

@@ -8,11 +8,11 @@ use crate::design::axes::{Factor, cells, elements};
 use crate::distance::Goal;
 use crate::trial::Protocol;
 
-/// The case.
+/// Builds the case.
 pub fn case(quick: bool) -> Case {
     let body = ["beam".to_owned()];
     let gold = Gold::read(include_str!("../../cases/r2-tc1.gold.json"));
-    // 5×10×33 has its faces beside the cut, the others have a layer of faces in it.
+    // The mesh 5×10×33 has faces beside the cut. The others have a layer of faces in the cut.
     let all = [[2, 4, 14], [4, 8, 26], [5, 10, 33], [6, 12, 40]];
     let (meshes, base) = if quick { (&all[..2], all[0]) } else { (&all[..], all[1]) };
     let mesh = cells("beam", meshes, base);

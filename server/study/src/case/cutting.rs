@@ -1,5 +1,5 @@
-//! Schoch's beam, half cut in three ways: inside the elements, along their faces, and by a mesh that
-//! was made with the cut. Each under gravity, under a dead force and under a prescribed strip.
+//! Schoch's beam, half cut in three ways: inside the elements, along their faces, and by a mesh made with the
+//! cut. Each is loaded by gravity, by a dead force and by a prescribed strip.
 
 use super::definition::Case;
 use super::gold::Gold;
@@ -12,26 +12,26 @@ use crate::trial::Protocol;
 /// Names of the ways to cut, labels of [`Factor::Cutting`].
 pub const METHODS: [&str; 3] = ["xfem", "snap", "precut"];
 
-/// The same ways where only the plane of the cut lies inside elements and its front does not: they tell how much
-/// of an error the front makes.
+/// The same methods on meshes where the plane of the cut lies inside elements but its front does not. They
+/// show how much of an error the front causes.
 pub const FRONTS: [&str; 2] = ["xfem-front", "snap-front"];
 
-/// What pulls at the beam.
+/// How the beam is loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pull {
     /// Gravity across the beam.
     Gravity,
-    /// 5 N along it, on a strip of its free end.
+    /// 5 N along the beam, on a strip of its free end.
     Force,
-    /// The same strip moved by 20 mm along it.
+    /// The same strip, displaced by 20 mm along the beam.
     Strip,
 }
 
-/// Cells of 6×12×40 in the beam, of 3×6×20 for a quick look; the strip ends on a line of cells.
+/// Cells of 6×12×40 in the beam, of 3×6×20 for a quick study. The strip ends on a line of cells.
 const FINE: (&[f64], usize, usize) = (&[0.0, 0.005, 0.01, 0.015, 0.02, 0.025, 0.03], 12, 20);
 const COARSE: (&[f64], usize, usize) = (&[0.0, 0.005, 0.015, 0.03], 6, 10);
 
-/// The case.
+/// Builds the case.
 pub fn case(pull: Pull, quick: bool) -> Case {
     let body = ["beam".to_owned()];
     let gold = Gold::read(match pull {
@@ -84,7 +84,7 @@ pub fn case(pull: Pull, quick: bool) -> Case {
     }
 }
 
-/// Loads and constraints instead of gravity.
+/// Overrides that set loads and constraints instead of gravity.
 fn pulled(pull: Pull) -> Vec<String> {
     let base = "{ where = { box = { min_m = [-1, -1, -1], max_m = [1, 1, 1e-6] } } }";
     let strip = "where = { box = { min_m = [-1, -1, 0.199999], max_m = [0.005001, 1, 1] } }";
@@ -101,17 +101,17 @@ fn pulled(pull: Pull) -> Vec<String> {
     }
 }
 
-/// The ways, each with its mesh.
+/// The axis of cutting methods, each with its mesh.
 fn methods(body: &[String], x_m: &[f64], y: usize, half_z: usize) -> Axis {
     let y_m: Vec<f64> = (0..=y).map(|j| 0.06 * j as f64 / y as f64).collect();
     let n = half_z as f64;
     let aligned: Vec<f64> = (0..=2 * half_z).map(|k| 0.1 * k as f64 / n).collect();
-    // The cut at z = 0.1 is a third of a cell above line half_z.
+    // The cut at z = 0.1 lies a third of a cell above line half_z.
     let dz = 0.1 / (n + 1.0 / 3.0);
     let below = (0..=half_z).map(|k| dz * k as f64);
     let above = (1..=half_z).map(|k| dz * n + (0.2 - dz * n) * k as f64 / n);
     let beside: Vec<f64> = below.chain(above).collect();
-    // The front at x = 0.015 is a third of a cell before a line.
+    // The front at x = 0.015 lies a third of a cell before a line.
     let front = x_m.iter().position(|x| *x == 0.015).unwrap_or(1);
     let mut x_beside = x_m.to_vec();
     x_beside[front] += (x_m[front] - x_m[front - 1]) / 3.0;

@@ -1,4 +1,4 @@
-//! What a case is, and where its right answer comes from.
+//! The definition of a case, and the origin of its right answer.
 
 use scindo_world::scene::Scene;
 
@@ -14,9 +14,9 @@ use crate::trial::series::Series;
 pub struct Case {
     /// Short name, for files and the command line.
     pub name: String,
-    /// Title for people.
+    /// Title on the page.
     pub title: String,
-    /// What it is, in a few sentences.
+    /// Description in a few sentences.
     pub about: String,
     /// The scene, with its probes.
     pub scene: Scene,
@@ -24,71 +24,71 @@ pub struct Case {
     pub bodies: Vec<String>,
     /// What a run computes.
     pub protocol: Protocol,
-    /// How few frames still show what happens in a motion.
+    /// Fewest frames that still show what happens in a motion.
     pub fewest_frames: u32,
-    /// What the user should know about it.
+    /// Remarks that the user should read.
     pub notes: Vec<String>,
-    /// What is varied.
+    /// Factors that are varied, with their settings.
     pub axes: Vec<Axis>,
-    /// Combinations that are tried besides one factor at a time.
+    /// Combinations that are tried in addition to one factor at a time.
     pub blocks: Vec<Block>,
-    /// What it is asked for.
+    /// The number that the user wants to know.
     pub goal: Goal,
-    /// Where the right answer comes from.
+    /// Origin of the right answer.
     pub truth: Truth,
-    /// The factor that colours the points, and the one that shapes them.
+    /// Factor that decides the colour of the points.
     pub colour: Factor,
-    /// See `colour`.
+    /// Factor that decides the shape of the points.
     pub shape: Factor,
 }
 
-/// Where the right answer comes from.
+/// Origin of the right answer.
 #[derive(Debug, Clone)]
 pub enum Truth {
     /// A formula or stored data.
     Known {
-        /// The field and the energy.
+        /// Displacements and energy.
         series: Series,
         /// The goal, where it is known better than the field.
         goal: Option<f64>,
         /// Relative half-width of the error bar.
         error_bar: f64,
-        /// The law it was computed with, as the label of a setting.
+        /// Law of the reference, as the label of a setting.
         law: String,
-        /// Where it comes from.
+        /// Origin of the reference, in words.
         source: String,
     },
-    /// Extrapolation of the case's own finest runs.
+    /// Extrapolated from the case's own finest runs.
     Extrapolated {
-        /// The law it is computed with, as the label of a setting.
+        /// Law of the reference, as the label of a setting.
         law: String,
-        /// Ways to compute it, the best first; the first whose runs all succeed is taken.
+        /// Ways to compute the reference, best first. The first one whose runs all succeed is used.
         plans: Vec<Plan>,
     },
-    /// Levels of refinement, as many as the time allows.
+    /// Refined level by level, as far as the time allows.
     Refined {
-        /// The law it is computed with, as the label of a setting.
+        /// Law of the reference, as the label of a setting.
         law: String,
-        /// Ways to compute it, the best first.
+        /// Ways to compute the reference, best first.
         ladders: Vec<Ladder>,
     },
 }
 
-/// A way to a reference: which runs it is extrapolated from.
+/// The runs from which a reference is extrapolated.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// Element, integrator, … of its runs; mesh and step are replaced.
+    /// Element, integrator, … of the runs; mesh and step are replaced.
     pub configuration: Configuration,
-    /// Meshes, coarse to fine; none where the mesh cannot be refined.
+    /// Meshes, coarse to fine; `None` if the mesh cannot be refined.
     pub meshes: Option<[Setting; 3]>,
-    /// Steps, coarse to fine; none for statics. Meshes are compared at the first.
+    /// Steps, coarse to fine; `None` for statics. Meshes are compared at the first step.
     pub steps: Option<[Setting; 3]>,
-    /// Order of the integrator, for the words of the source.
+    /// Integrator and element in words, for the description of the source.
     pub words: String,
 }
 
 impl Truth {
-    /// The law of the reference: other laws have an error of the model.
+    /// Law of the reference. Every other law has a model error.
     pub fn law(&self) -> &str {
         match self {
             Truth::Known { law, .. } | Truth::Extrapolated { law, .. } | Truth::Refined { law, .. } => law,

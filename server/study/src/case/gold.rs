@@ -5,34 +5,34 @@ use serde::Deserialize;
 use super::definition::Truth;
 use crate::trial::series::Series;
 
-/// A file of reference solutions.
+/// Contents of a file of reference solutions.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Gold {
-    /// Where the displacements are known.
+    /// Material points at which displacements are stored.
     pub probes: Vec<Point>,
-    /// The solutions.
+    /// One solution per law.
     pub fields: Vec<GoldField>,
 }
 
-/// A material point.
+/// A material point of a solution.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Point {
-    /// Name.
+    /// Id of the probe.
     pub id: String,
-    /// At rest [m].
+    /// Rest position [m].
     pub point_m: [f64; 3],
-    /// Side of a cut.
+    /// Vector towards the side of a cut on which the point lies.
     pub side: Option<[f64; 3]>,
 }
 
-/// A solution.
+/// The solution of one law.
 #[derive(Debug, Clone, Deserialize)]
 pub struct GoldField {
-    /// Its law.
+    /// Name of the law.
     pub law: String,
     /// Relative half-width of its error bar.
     pub error_bar: f64,
-    /// How it was computed.
+    /// How the solution was computed.
     pub source: String,
     /// Elastic energy [J].
     pub energy_j: f64,
@@ -41,12 +41,12 @@ pub struct GoldField {
 }
 
 impl Gold {
-    /// Reads one of the files beside this crate.
+    /// Parses one of the files stored with this crate.
     pub fn read(text: &str) -> Self {
         serde_json::from_str(text).expect("the file is part of the program and a test reads it")
     }
 
-    /// The override that puts the probes into the scene.
+    /// Override that adds the probes to the scene.
     pub fn probes(&self, body: &str) -> String {
         probes_override(body, &self.probes)
     }
@@ -56,7 +56,7 @@ impl Gold {
         self.probes.iter().position(|probe| probe.id == id).unwrap_or(0)
     }
 
-    /// The solution of a law.
+    /// The solution of `law` as the truth of a case.
     pub fn truth(&self, law: &str, goal: Option<f64>, from: &str) -> Truth {
         let field = self.fields.iter().find(|field| field.law == law);
         let field = field.expect("the file is part of the program and a test reads it");
@@ -74,12 +74,12 @@ impl Gold {
     }
 }
 
-/// `probe=[…]` for points of a body.
+/// The override `probe=[…]` for points of a body.
 pub fn probes_override(body: &str, points: &[Point]) -> String {
     format!("probe=[{}]", probe_tables(body, points))
 }
 
-/// The tables of these probes, separated by commas.
+/// The inline tables of these probes, separated by commas.
 pub fn probe_tables(body: &str, points: &[Point]) -> String {
     let table = |Point { id, point_m, side }: &Point| {
         let side = side.map_or(String::new(), |side| format!(", side = {side:?}"));

@@ -1,26 +1,26 @@
-//! The runs that a reference can be climbed along: mesh and step are refined together, level by level.
+//! Levels of refinement that lead to a reference: mesh and step are refined together.
 
 use crate::design::Configuration;
 use crate::design::axes::{Factor, Setting, step};
 
-/// A way to a reference.
+/// A sequence of levels.
 #[derive(Debug, Clone)]
 pub struct Ladder {
-    /// Element, integrator, … of its runs; mesh and step are replaced.
+    /// Element, integrator, … of the runs; mesh and step are replaced.
     pub configuration: Configuration,
-    /// Meshes, coarse to fine; their size is the factor f. Empty where the mesh cannot be refined.
+    /// Meshes, coarse to fine, whose size is the factor f. Empty if the mesh cannot be refined.
     pub meshes: Vec<Setting>,
-    /// Frame [s] that the steps divide; none for statics.
+    /// Frame [s] that is divided into steps; `None` for statics.
     pub step_s: Option<f64>,
     /// Element and integrator in words.
     pub words: String,
 }
 
-/// Levels of a ladder of steps alone.
+/// Most levels of a ladder that refines only the step.
 const MOST_LEVELS: usize = 8;
 
 impl Ladder {
-    /// Its run on mesh `mesh` with `n` steps per frame.
+    /// The run on mesh `mesh` with `n` steps per frame.
     pub fn at(&self, mesh: usize, n: u32) -> Configuration {
         let mut configuration = self.configuration.clone();
         if let Some(mesh) = self.meshes.get(mesh) {
@@ -32,7 +32,7 @@ impl Ladder {
         configuration
     }
 
-    /// How many levels there are.
+    /// Number of levels.
     pub fn levels(&self) -> usize {
         match (self.meshes.len(), self.step_s) {
             (0 | 1, None) => 1,
@@ -50,7 +50,7 @@ impl Ladder {
         (i, ((f64::from(n0) * ratio).round() as u32).max(1))
     }
 
-    /// Size h of a level: that of its elements, or of its step where the mesh stays.
+    /// Size h of a level: that of its elements, or of its step if the mesh stays the same.
     pub fn size(&self, i: usize, n0: u32) -> f64 {
         let (mesh, n) = self.level(i, n0);
         if self.meshes.len() < 2 { 1.0 / f64::from(n) } else { 1.0 / self.meshes[mesh].size }

@@ -1,4 +1,4 @@
-//! Cases: a scene, what is varied in it, what it is asked for, and where the right answer comes from.
+//! Cases: a scene, the factors to vary, the number wanted, and the origin of the right answer.
 
 mod definition;
 

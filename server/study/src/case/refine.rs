@@ -1,25 +1,25 @@
 //! Meshes of a scene, refined and coarsened by a factor.
 //!
-//! What a user can write is a number of cells ([`cells`]). The reference wants more: regions that hold
-//! or load a body, and fronts of cuts, must be the same on every mesh. A block is therefore made from
-//! given coordinates for it, the nearest of which lie on the faces of those regions ([`aligned`]).
+//! A user sets a number of cells ([`cells`]). The reference needs more: regions that hold or load a body, and
+//! fronts of cuts, must be the same on every mesh. A block is therefore made from explicit coordinates. The
+//! nearest of them are moved onto the faces of those regions ([`aligned`]).
 
 use scindo_world::scene::{BodySpec, CellSplit, CheckedScene, CutPath, MeshSource, Region};
 
 use super::subdivide::Subdivisions;
 use crate::design::axes::Setting;
 
-/// Factors that are tried for levels, about √2 apart.
+/// Factors tried for levels, about √2 apart.
 pub const FACTORS: [f64; 10] = [0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
 
-/// How far a level may lie from its factor, and how uneven its cells may be along the axes.
+/// Largest ratio of a level to its factor, and largest logarithmic unevenness of its cells along the axes.
 const ROOM: f64 = 1.15;
 const UNEVEN: f64 = 0.07;
 
-/// Coordinates nearer to a face of a block than this share of a cell lie on it.
+/// Coordinates closer to a face of a block than this fraction of a cell lie on it.
 const ON_FACE: f64 = 0.05;
 
-/// Levels that refine the scene evenly, coarse to fine; `make` builds the setting of a factor.
+/// Levels that refine the scene evenly, coarse to fine. `make` builds the setting for a factor.
 pub fn levels(scene: &CheckedScene, make: &dyn Fn(f64) -> Option<Setting>) -> Vec<Setting> {
     let mut found: Vec<Setting> = Vec::new();
     for setting in FACTORS.iter().filter_map(|target| make(even(scene, *target)?)) {
@@ -30,7 +30,7 @@ pub fn levels(scene: &CheckedScene, make: &dyn Fn(f64) -> Option<Setting>) -> Ve
     found
 }
 
-/// The factor near `target` that rounds the cells along every axis most evenly; none if none does.
+/// The factor near `target` that rounds the cells along every axis most evenly; `None` if none does.
 fn even(scene: &CheckedScene, target: f64) -> Option<f64> {
     let counts: Vec<f64> = scene.bodies.iter().flat_map(|body| counts(&body.mesh)).collect();
     let unevenness = |factor: f64| {
@@ -40,14 +40,14 @@ fn even(scene: &CheckedScene, target: f64) -> Option<f64> {
     let exact = std::iter::once(target);
     let near = (-20..=20).map(|i| target * ROOM.powf(f64::from(i) / 20.0));
     let best = exact.chain(near).min_by(|a, b| {
-        // Of equally even ones the nearest to the target.
+        // Of equally even factors the nearest to the target wins.
         let rank = |f: f64| unevenness(f) + 0.02 * (f / target).ln().abs();
         rank(*a).total_cmp(&rank(*b))
     })?;
     (unevenness(best) <= UNEVEN).then_some(best)
 }
 
-/// Cells of a mesh along its axes; nothing for a file.
+/// Cells of a mesh along its axes; empty for a file.
 fn counts(mesh: &MeshSource) -> Vec<f64> {
     match mesh {
         MeshSource::Box { cells, .. } => cells.map(|n| n as f64).to_vec(),
@@ -66,9 +66,9 @@ fn range(mesh: &MeshSource) -> [usize; 2] {
     }
 }
 
-/// All meshes with their cells times `factor`, as a user would write them. The size of the setting is
-/// the factor as rounded, the cube root of the number of cells. None where nothing changes or a body
-/// does not allow it.
+/// All meshes with their cells times `factor`, as a user would write them. The size of the setting is the
+/// factor after rounding, from the cube root of the number of cells. `None` if nothing changes or a body does
+/// not allow it.
 pub fn cells(scene: &CheckedScene, files: &Subdivisions, factor: f64) -> Option<Setting> {
     refined(scene, files, factor, &|body, counts| match &body.mesh {
         MeshSource::Box { .. } => Some(format!("body.{}.mesh.box.cells={counts:?}", body.id)),
@@ -87,8 +87,8 @@ pub fn cells(scene: &CheckedScene, files: &Subdivisions, factor: f64) -> Option<
     })
 }
 
-/// As [`cells`], with blocks whose coordinates lie on the faces of all regions of the scene and are
-/// split as `split` says. None where the cells are too few for the faces.
+/// Like [`cells`], with blocks whose coordinates lie on the faces of all regions of the scene. `split`
+/// decides how their cells are split. `None` if there are too few cells for the faces.
 pub fn aligned(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Split) -> Option<Setting> {
     refined(scene, files, factor, &|body, counts| match &body.mesh {
         MeshSource::Box { min_m, max_m, split: own, .. } => {
@@ -108,7 +108,7 @@ pub fn aligned(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: S
     })
 }
 
-/// As [`aligned`], with coordinates that stay where they are wherever regions end.
+/// Like [`aligned`], but coordinates stay where they are, wherever regions end.
 pub fn uneven(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Split) -> Option<Setting> {
     let mut setting = cells(scene, files, factor)?;
     for body in &scene.bodies {
@@ -122,12 +122,12 @@ pub fn uneven(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Sp
     Some(setting)
 }
 
-/// Into what the cells of a block are to be split.
+/// How the cells of a block are split.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
     /// As the scene says.
     Own,
-    /// Into tetrahedra: as the scene says, else six.
+    /// Into tetrahedra: as the scene says, otherwise six per cell.
     Tets,
 }
 
@@ -142,7 +142,7 @@ impl Split {
     }
 }
 
-/// A setting made body by body; `key` gives the override for a body and its cells.
+/// Builds a setting body by body. `key` gives the override for a body and its cells.
 fn refined(
     scene: &CheckedScene,
     files: &Subdivisions,
@@ -179,7 +179,7 @@ fn refined(
     (!set.is_empty() || factor == 1.0).then(|| Setting::new(labels.join(" and "), size, set))
 }
 
-/// `n` intervals between the ends of `lines`, graded as they are.
+/// Divides the range of `lines` into `n` intervals with the same grading.
 fn resampled(lines: &[f64], n: usize) -> Vec<f64> {
     let last = lines.len() - 1;
     let at = |k: usize| {
@@ -190,8 +190,8 @@ fn resampled(lines: &[f64], n: usize) -> Vec<f64> {
     (0..n).map(at).chain(lines.last().copied()).collect()
 }
 
-/// The override that makes a body's mesh from coordinates, moved onto the faces of its regions; none
-/// where they do not reach.
+/// The override that makes a body's mesh from coordinates, moved onto the faces of its regions. `None` if
+/// there are too few coordinates.
 fn grid(scene: &CheckedScene, body: &BodySpec, mut lines: [Vec<f64>; 3], pattern: &str) -> Option<String> {
     for (axis, lines) in lines.iter_mut().enumerate() {
         let ends = [lines[0], lines[lines.len() - 1]];
@@ -206,7 +206,7 @@ fn grid(scene: &CheckedScene, body: &BodySpec, mut lines: [Vec<f64>; 3], pattern
     ))
 }
 
-/// Where regions of a body and cuts through it end along an axis.
+/// Where regions of a body and cuts through it end along an axis [m].
 fn faces(scene: &CheckedScene, body: &BodySpec, axis: usize, [low, high]: [f64; 2]) -> Vec<f64> {
     let regions = body.fixes.iter().map(|f| &f.region).chain(body.loads.iter().map(|l| &l.region));
     let mut faces: Vec<f64> = regions
@@ -223,7 +223,7 @@ fn faces(scene: &CheckedScene, body: &BodySpec, axis: usize, [low, high]: [f64; 
         let CutPath::Sweep(segments) = &cut.blade else { continue };
         let along = || segments.iter().flatten().map(|point| point[axis]);
         let ends = [along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max)];
-        // A flat sweep may lie anywhere; an end inside the body is a front.
+        // A flat sweep may lie anywhere, but an end inside the body is a front.
         if ends[1] - ends[0] > 1e-6 * (high - low) {
             faces.extend(ends);
         }
@@ -234,7 +234,7 @@ fn faces(scene: &CheckedScene, body: &BodySpec, axis: usize, [low, high]: [f64; 
     faces
 }
 
-/// Moves the nearest inner coordinate onto each face; ends stay, order stays. False if a face is left.
+/// Moves the nearest inner coordinate onto each face. Ends and order stay. False if a face remains.
 fn snap(lines: &mut [f64], faces: &[f64]) -> bool {
     let n = lines.len() - 1;
     let mut taken = vec![false; n + 1];
@@ -304,7 +304,7 @@ mod tests {
         let files = Subdivisions::default();
         for (split, pattern) in [(Split::Own, "hex"), (Split::Tets, "tet6")] {
             let setting = aligned(scene.checked(), &files, 2.0, split).unwrap();
-            // Eight cells: the coordinate next to the face of the region has moved onto it.
+            // Eight cells: the coordinate nearest to the face of the region has moved onto it.
             assert!(setting.set[0].contains("0.125, 0.3, 0.375"), "{}", setting.set[0]);
             assert!(setting.set[0].contains(pattern), "{}", setting.set[0]);
         }

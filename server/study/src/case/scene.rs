@@ -1,4 +1,4 @@
-//! Any scene as a case: what can be varied in it, points to compare, a reference by refinement.
+//! Turns any scene into a case: factors to vary, points to compare, a reference by refinement.
 
 use std::path::Path;
 
@@ -16,31 +16,31 @@ use crate::design::axes::{Axis, Factor, Setting, on_bodies, tolerance};
 use crate::distance::Goal;
 use crate::trial::Protocol;
 
-/// Points that are compared where the scene has no probe, per body.
+/// Compared points per body if the scene has no probes.
 const POINTS: usize = 8;
 
-/// Longest motion without a word from the user [frames]; in a quick study.
+/// Longest motion if the user sets none [frames]: in a full study, and in a quick one.
 const MOST_FRAMES: [u32; 2] = [400, 50];
 
-/// Choices about a scene's study.
+/// The user's choices for the study of a scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Wishes<'a> {
-    /// Simulated time of a motion [s]; none: as long as its events last and the time allows.
+    /// Simulated time of a motion [s]. `None`: as long as its events last and the time allows.
     pub seconds: Option<f64>,
-    /// Coarse meshes and few frames only.
+    /// Use only coarse meshes and few frames.
     pub quick: bool,
-    /// Cells along the longest side, in place of the usual meshes.
+    /// Cells along the longest side, instead of the default meshes; empty for the defaults.
     pub cells: &'a [usize],
-    /// Threads to compare; none: one, as `scindo run` has it.
+    /// Threads to compare. Empty: one thread, as `scindo run` uses.
     pub threads: &'a [usize],
-    /// Where refined copies of mesh files go.
+    /// Directory for refined copies of mesh files.
     pub directory: &'a Path,
 }
 
-/// A case from a scene.
+/// Builds a case from a scene.
 ///
 /// # Errors
-/// What is wrong with the scene.
+/// Problems of the scene.
 pub fn from_scene(scene: &Scene, wishes: Wishes<'_>) -> Result<Case, SceneError> {
     let scene = with_probes(scene)?;
     let checked = scene.checked();
@@ -79,7 +79,7 @@ pub fn from_scene(scene: &Scene, wishes: Wishes<'_>) -> Result<Case, SceneError>
     })
 }
 
-/// What a run computes, and how few frames still show what happens.
+/// The protocol of the runs, and the fewest frames that still show what happens.
 fn protocol(scene: &CheckedScene, of: Subject<'_>, wishes: Wishes<'_>) -> (Protocol, u32) {
     let cuts = scene.cuts.iter().map(|cut| cut.at_s).reduce(f64::max);
     let paths = scene.tools.iter().filter_map(|tool| Some(tool.path.last()?.at_s));
@@ -102,9 +102,9 @@ fn protocol(scene: &CheckedScene, of: Subject<'_>, wishes: Wishes<'_>) -> (Proto
     (Protocol::Motion { frame_s, frames: most }, fewest)
 }
 
-/// Ways to the reference, the best first: quadratic tetrahedra, which converge faster, then the
-/// scene's own element; second order in time, then the scene's own integrator. What the scene's check
-/// refuses is left out here.
+/// Ways to the reference, best first. Quadratic tetrahedra converge faster, so they precede the scene's own
+/// element. Second order in time precedes the scene's own integrator. Ways that the scene's check refuses
+/// drop out when they are tried.
 fn ladders(of: Subject<'_>, axes: &[Axis]) -> Vec<Ladder> {
     let own = Configuration::base(axes);
     let explicit = of.scene.bodies.iter().any(|body| body.mechanics.integrator.is_explicit());
@@ -130,7 +130,7 @@ fn ladders(of: Subject<'_>, axes: &[Axis]) -> Vec<Ladder> {
             }
             let mut meshes = levels(of.scene, &|factor| aligned(of.scene, of.files, factor, split));
             if meshes.len() < 3 {
-                // No mesh has faces where the regions end; the study says what they select instead.
+                // No mesh has faces where the regions end. The study reports what they select instead.
                 meshes = levels(of.scene, &|factor| uneven(of.scene, of.files, factor, split));
             }
             let element = element.map_or_else(|| own.label(Factor::Element).to_owned(), |e| e.label.clone());
@@ -145,7 +145,7 @@ fn ladders(of: Subject<'_>, axes: &[Axis]) -> Vec<Ladder> {
     ladders
 }
 
-/// The scene's own settings, solved to the last digits that count.
+/// The scene's own settings, solved to the last significant digits.
 fn tight(of: Subject<'_>, own: &Configuration) -> Configuration {
     let mut exact = tolerance(of.bodies, 1e-8);
     exact.set.extend(on_bodies(of.bodies, "solver.precision", "\"double\""));
@@ -169,11 +169,11 @@ fn goal(scene: &CheckedScene) -> Goal {
     }
 }
 
-/// How the names of chosen probes begin.
+/// Prefix of the names of chosen probes.
 const CHOSEN: &str = "chosen-";
 
-/// The scene itself if it has probes; else with material points spread through its bodies, as deep
-/// inside as can be had, so that coarser meshes hold them, too.
+/// Returns the scene itself if it has probes. Otherwise it adds material points throughout the bodies, as
+/// deep inside as possible so that coarser meshes hold them as well.
 fn with_probes(scene: &Scene) -> Result<Scene, SceneError> {
     if !scene.checked().probes.is_empty() {
         return Ok(scene.clone());
@@ -191,8 +191,8 @@ fn with_probes(scene: &Scene) -> Result<Scene, SceneError> {
     scene.apply_sets(&[format!("probe=[{}]", tables.join(", "))])
 }
 
-/// Centroids of elements, one out of each of [`POINTS`] slices along the longest side of a body: the
-/// one deepest below the surface.
+/// Centroids of elements. A body is cut into [`POINTS`] slices along its longest side, and the element
+/// deepest below the surface is taken from each.
 fn points(body: &scindo_world::simulation::SimBody) -> Vec<[f64; 3]> {
     let mesh = body.body.mesh();
     let [low, high] = mesh.bounds();
@@ -214,7 +214,7 @@ fn points(body: &scindo_world::simulation::SimBody) -> Vec<[f64; 3]> {
     best.into_iter().flatten().map(|(_, point)| point).collect()
 }
 
-/// Letters, digits and dashes only.
+/// Reduces a name to letters, digits and dashes.
 fn slug(name: &str) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();

@@ -1,13 +1,13 @@
-//! What the cases that come with the program have in common.
+//! Helpers of the cases that come with the program.
 
 use scindo_world::scene::Scene;
 
 use crate::design::axes::{Axis, Factor, precisions, threads, tolerances, words};
 
-/// All laws.
+/// All laws, as they are called in scenes.
 pub const LAWS: [&str; 4] = ["linear", "corotational", "stvk", "neo-hookean"];
 
-/// Law, element, mesh, solver, tolerance, precision, threads.
+/// The axes law, element, mesh, solver, tolerance, precision and threads.
 pub fn axes(bodies: &[String], law: &str, element: Axis, mesh: Axis, tolerance: f64) -> Vec<Axis> {
     vec![
         words(Factor::Law, bodies, "law", &LAWS, law),
@@ -26,12 +26,12 @@ pub fn labels(axes: &[Axis], factor: Factor) -> Vec<String> {
     axis.map(|axis| axis.settings.iter().map(|s| s.label.clone()).collect()).unwrap_or_default()
 }
 
-/// Labels from literals.
+/// Converts literals to labels.
 pub fn names(labels: &[&str]) -> Vec<String> {
     labels.iter().map(|label| (*label).to_owned()).collect()
 }
 
-/// A scene that is part of the program.
+/// Parses a scene that is part of the program. Panics if it is invalid.
 pub fn load(text: &str, overrides: &[String]) -> Scene {
     let scene = Scene::from_toml(text).and_then(|scene| scene.apply_sets(overrides));
     scene.expect("the file is part of the program and a test reads it")

@@ -1,8 +1,8 @@
-//! Volumetric mesh files, refined: every tetrahedron is split into eight at the middles of its edges.
+//! Refines volumetric mesh files. Every tetrahedron is split into eight at the midpoints of its edges.
 //!
-//! The boundary stays the polyhedron of the file, so that all levels fill the same body. The four
-//! corners are similar to the whole; the octahedron between them is split at its shortest diagonal,
-//! which keeps the worst angle bounded over any number of levels (Bey, Computing 55 (1995), 355–378).
+//! The boundary stays the polyhedron of the file, so that all levels fill the same body. The four corner
+//! tetrahedra are similar to the whole. The octahedron between them is split at its shortest diagonal. This
+//! keeps the worst angle bounded over any number of levels (Bey, Computing 55 (1995), 355–378).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,27 +12,27 @@ use scindo_physics::mesh::TetMesh;
 use scindo_world::mesh_in::{load_volume, write_mesh};
 use scindo_world::scene::{CheckedScene, MeshSource};
 
-/// Elements up to which a level is made.
+/// A level is made up to this number of elements.
 const MOST_TETS: usize = 400_000;
 
 /// A refined copy of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
-    /// How many times finer its edges are.
+    /// Ratio of the file's edge length to the edge length of this copy.
     pub factor: f64,
-    /// Its elements.
+    /// Number of elements.
     pub tets: usize,
-    /// Where it was written; none: the scene's own file.
+    /// Path of the copy; `None` for the scene's own file.
     path: Option<PathBuf>,
 }
 
 impl Level {
-    /// Keys that put it into the scene.
+    /// Overrides that use the copy in the scene.
     pub fn overrides(&self, body: &str) -> Vec<String> {
         let Some(path) = &self.path else { return Vec::new() };
         let path = path.display();
         let mesh = |key: &str, value: &str| format!("body.{body}.mesh.{key}={value}");
-        // Nodes at one place are two lips of a cut, unless the scene's own file was welded already.
+        // Coincident nodes are the two lips of a cut, unless the scene's own file was already welded.
         vec![mesh("file", &format!("\"{path}\"")), mesh("scale", "1.0"), mesh("weld", "false")]
     }
 }
@@ -44,11 +44,11 @@ pub struct Subdivisions {
 }
 
 impl Subdivisions {
-    /// Writes refined copies of the files of a scene into `directory`, which is made if it is missing.
-    /// A file that cannot be read is left to the run that reads it.
+    /// Writes refined copies of the files of a scene into `directory`, which is created if missing. An
+    /// unreadable file is skipped here; the run that needs it reports the error.
     ///
     /// # Errors
-    /// What the system says about the directory or a file in it.
+    /// The directory or a file in it cannot be written.
     pub fn write(scene: &CheckedScene, base_dir: &Path, directory: &Path) -> Result<Self, String> {
         let mut bodies = BTreeMap::new();
         for (i, body) in scene.bodies.iter().enumerate() {
@@ -70,13 +70,13 @@ impl Subdivisions {
         Ok(Self { bodies })
     }
 
-    /// The copy that is `factor` times finer, to a quarter; none where there is no such copy.
+    /// The copy whose edges are `factor` times finer, to within a quarter; `None` if there is none.
     pub fn level(&self, body: usize, factor: f64) -> Option<&Level> {
         self.bodies.get(&body)?.iter().find(|level| (level.factor / factor).ln().abs() < 0.22)
     }
 }
 
-/// Every tetrahedron into eight.
+/// Splits every tetrahedron into eight.
 pub fn split(mesh: &TetMesh) -> TetMesh {
     let mut nodes = mesh.nodes.clone();
     let mut middles = BTreeMap::new();
@@ -92,7 +92,7 @@ pub fn split(mesh: &TetMesh) -> TetMesh {
         let (ab, ac, ad) = (middle(a, b), middle(a, c), middle(a, d));
         let (bc, bd, cd) = (middle(b, c), middle(b, d), middle(c, d));
         tets.extend([[a, ab, ac, ad], [ab, b, bc, bd], [ac, bc, c, cd], [ad, bd, cd, d]]);
-        // The octahedron as four tets around a diagonal, whose ring runs around it.
+        // Four tets share a diagonal of the octahedron, and the other four corners form a ring around it.
         let diagonals =
             [([ab, cd], [ac, bc, bd, ad]), ([ac, bd], [ab, ad, cd, bc]), ([ad, bc], [ab, bd, cd, ac])];
         let length = |ends: &[u32; 2]| (nodes[ends[0] as usize] - nodes[ends[1] as usize]).norm_squared();
@@ -106,7 +106,7 @@ pub fn split(mesh: &TetMesh) -> TetMesh {
     TetMesh { nodes, tets }
 }
 
-/// The tetrahedron with positive volume on these nodes.
+/// The tetrahedron on these nodes, ordered to have positive volume.
 fn upright(nodes: &[Vector3<f64>], [a, b, c, d]: [u32; 4]) -> [u32; 4] {
     let [w, x, y, z] = [a, b, c, d].map(|n| nodes[n as usize]);
     if (x - w).cross(&(y - w)).dot(&(z - w)) > 0.0 { [a, b, c, d] } else { [a, b, d, c] }
@@ -126,7 +126,7 @@ mod tests {
         fine.check().unwrap();
         let volume: f64 = (0..fine.tets.len()).map(|e| fine.volume(e)).sum();
         assert!((volume - 6.0).abs() < 1e-12, "{volume}");
-        // As many nodes as a block of four times the cells: middles are shared.
+        // As many nodes as in a block with four times the cells: midpoints are shared.
         let same = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [8, 8, 8], BoxPattern::Tet6);
         assert_eq!(fine.nodes.len(), same.nodes.len());
     }

@@ -1,4 +1,4 @@
-//! What is varied in a scene. The base of every axis is what the scene itself says, untouched.
+//! The factors to vary in a scene. The base of every axis is the scene's own setting, untouched.
 
 use scindo_world::scene::{CellSplit, CheckedScene, MeshSource};
 use serde_json::Value;
@@ -9,15 +9,15 @@ use super::subdivide::Subdivisions;
 use crate::design::Block;
 use crate::design::axes::{Axis, Factor, Setting, on_bodies, step, threads, tolerance};
 
-/// Label of a base that has no word of its own.
+/// Label of a base that has no name of its own.
 pub const OWN: &str = "as in the scene";
 
-/// A scene to be varied.
+/// A scene whose settings are varied.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
-    /// With its names resolved.
+    /// The scene with its names resolved.
     pub scene: &'a CheckedScene,
-    /// As it was written.
+    /// The scene as it was written.
     pub tree: &'a Value,
     /// Names of its bodies.
     pub bodies: &'a [String],
@@ -26,7 +26,7 @@ pub struct Subject<'a> {
 }
 
 impl Subject<'_> {
-    /// What all bodies say for a key; none where they differ.
+    /// The value of a key if all bodies agree on it; `None` if they differ.
     pub fn word(&self, key: &str, default: &str) -> Option<String> {
         let bodies = self.tree["body"].as_array()?;
         let of = |body: &Value| {
@@ -46,7 +46,7 @@ impl Subject<'_> {
     }
 }
 
-/// The axes of a scene. `cells_wanted`: cells along the longest side that replace the usual meshes.
+/// The axes of a scene. `cells_wanted`: cells along the longest side, which replace the default meshes.
 pub fn axes(of: Subject<'_>, quick: bool, cells_wanted: &[usize], threads_wanted: &[usize]) -> Vec<Axis> {
     let integrator = of.word("integrator", "implicit-euler");
     let explicit = of.scene.bodies.iter().any(|body| body.mechanics.integrator.is_explicit());
@@ -78,7 +78,7 @@ pub fn axes(of: Subject<'_>, quick: bool, cells_wanted: &[usize], threads_wanted
     axes
 }
 
-/// An axis whose base is the scene as it stands, called `own`.
+/// An axis whose base is the unchanged scene, labelled `own`.
 fn with_own(factor: Factor, own: &str, others: Vec<Setting>) -> Axis {
     let mut settings = vec![Setting::new(own, 0.0, Vec::new())];
     settings.extend(others.into_iter().filter(|setting| setting.label != own));
@@ -93,7 +93,7 @@ fn words(of: Subject<'_>, factor: Factor, key: &str, default: &str, all: &[&str]
     with_own(factor, own.as_deref().unwrap_or(OWN), all.iter().enumerate().map(setting).collect())
 }
 
-/// Elements with their remedies against locking, where every body's mesh has them.
+/// Elements with their remedies against locking, if the mesh of every body supports them.
 fn elements(of: Subject<'_>) -> Axis {
     let own = match (of.word("element", "tet4"), of.word("locking", "none")) {
         (Some(element), Some(locking)) if locking == "none" => element,
@@ -108,7 +108,7 @@ fn elements(of: Subject<'_>) -> Axis {
     with_own(Factor::Element, &own, labels.iter().enumerate().map(setting).collect())
 }
 
-/// Keys for an element, with the split of cells that goes with it.
+/// Overrides for an element, with the split of cells that it needs.
 pub fn element(of: Subject<'_>, label: &str) -> Vec<String> {
     let (element, locking) = label.split_once(' ').unwrap_or((label, "none"));
     let mut set = on_bodies(of.bodies, "element", &format!("\"{element}\""));
@@ -130,7 +130,7 @@ pub fn element(of: Subject<'_>, label: &str) -> Vec<String> {
     set
 }
 
-/// Meshes as a user would write them; none where no mesh can be changed.
+/// Meshes as a user would write them; `None` if no mesh can be changed.
 fn meshes(of: Subject<'_>, quick: bool, wanted: &[usize]) -> Option<Axis> {
     let make = |factor: f64| cells(of.scene, of.files, factor);
     let own = make(1.0)?;
@@ -163,7 +163,7 @@ fn steps(own_s: f64, factors: &[f64]) -> Axis {
     axis
 }
 
-/// What matters together: mesh and step first, then mesh with element, tolerance and law.
+/// Factors that interact: mesh and step first, then mesh with element, tolerance and law.
 pub fn blocks(axes: &[Axis], of: Subject<'_>) -> Vec<Block> {
     let labels = |factor: Factor| {
         let axis = axes.iter().find(|axis| axis.factor == factor);

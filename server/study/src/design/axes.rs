@@ -1,10 +1,10 @@
-//! What a study varies: axes, their settings, and the keys of the scene that a setting changes.
+//! The factors of a study: axes, their settings, and the keys of the scene that a setting changes.
 
 use serde::{Deserialize, Serialize};
 
 use crate::words::short;
 
-/// What is varied.
+/// A property of a scene that a study varies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Factor {
@@ -12,9 +12,9 @@ pub enum Factor {
     Law,
     /// Finite element, with its remedy against locking.
     Element,
-    /// How the mesh is cut.
+    /// Method of cutting.
     Cutting,
-    /// Cells of the mesh.
+    /// Number of cells of the mesh.
     Mesh,
     /// Time integration.
     Integrator,
@@ -22,11 +22,11 @@ pub enum Factor {
     Step,
     /// Linear solver.
     Solver,
-    /// Where the solver stops.
+    /// Tolerance at which the solver stops.
     Tolerance,
     /// Floating-point precision.
     Precision,
-    /// Threads that work on a step.
+    /// Number of threads that work on a step.
     Threads,
 }
 
@@ -65,14 +65,14 @@ impl Factor {
 /// One value of a factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Setting {
-    /// How it is written for people, unique within its axis.
+    /// Name for people, unique within its axis.
     pub label: String,
-    /// Keys of the scene and their values, as `key=value`.
+    /// Overrides of the scene, as `key=value`.
     pub set: Vec<String>,
-    /// Threads, where this is a setting of [`Factor::Threads`].
+    /// Number of threads, if this is a setting of [`Factor::Threads`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub threads: Option<usize>,
-    /// Size of it: cells along the longest side, step [s], tolerance. For sorting and refinement.
+    /// Cells along the longest side, step [s] or tolerance; used to sort and refine.
     #[serde(default)]
     pub size: f64,
 }
@@ -87,11 +87,11 @@ impl Setting {
 /// The settings of a factor that a case tries.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What is varied.
+    /// The factor that is varied.
     pub factor: Factor,
-    /// Its values.
+    /// The values to try.
     pub settings: Vec<Setting>,
-    /// Which of them is the base, around which the others are varied one at a time.
+    /// Index of the base, around which the others are varied one at a time.
     pub base: usize,
 }
 
@@ -107,7 +107,7 @@ impl Axis {
         self.settings.iter().find(|s| s.label == label)
     }
 
-    /// The base setting; none for an axis that was narrowed to nothing.
+    /// The base setting; `None` if no setting is left after narrowing.
     pub fn base(&self) -> Option<&Setting> {
         self.settings.get(self.base)
     }
@@ -118,7 +118,7 @@ pub fn on_bodies(bodies: &[String], key: &str, value: &str) -> Vec<String> {
     bodies.iter().map(|id| format!("body.{id}.{key}={value}")).collect()
 }
 
-/// An axis over words of one key, such as `law`.
+/// An axis over values of one key, such as `law`.
 pub fn words(factor: Factor, bodies: &[String], key: &str, words: &[&str], base: &str) -> Axis {
     let setting = |(i, word): (usize, &&str)| {
         Setting::new(*word, i as f64, on_bodies(bodies, key, &format!("\"{word}\"")))
@@ -126,7 +126,7 @@ pub fn words(factor: Factor, bodies: &[String], key: &str, words: &[&str], base:
     Axis::new(factor, words.iter().enumerate().map(setting).collect(), base)
 }
 
-/// Arithmetic; left to the program (single where that is allowed, else mixed) it needs no key.
+/// Precision of the arithmetic. The program's own choice (single where allowed, otherwise mixed) sets no key.
 pub fn precisions(bodies: &[String]) -> Axis {
     let words = ["single", "mixed", "double"].into_iter().enumerate();
     let word = |(i, word): (usize, &str)| {
@@ -136,8 +136,8 @@ pub fn precisions(bodies: &[String]) -> Axis {
     Axis::new(Factor::Precision, [automatic].into_iter().chain(words.map(word)).collect(), "auto")
 }
 
-/// Elements and their remedies against locking. `pattern` splits the cells of a block into
-/// tetrahedra; without it there is no block, hence no hexahedra.
+/// Elements and their remedies against locking. `pattern` splits the cells of a block into tetrahedra.
+/// Without it the mesh is no block, hence there are no hexahedra.
 pub fn elements(bodies: &[String], pattern: Option<&str>, base: &str) -> Axis {
     let setting = |(i, label): (usize, &&str)| {
         let (element, locking) = label.split_once(' ').unwrap_or((label, "none"));
@@ -154,20 +154,20 @@ pub fn elements(bodies: &[String], pattern: Option<&str>, base: &str) -> Axis {
     Axis::new(Factor::Element, some.iter().enumerate().map(setting).collect(), base)
 }
 
-/// Where the linear solver stops: relative preconditioned residuals, with iterations to reach them.
+/// Tolerances of the linear solver: relative preconditioned residuals, with enough iterations to reach them.
 pub fn tolerances(bodies: &[String], tolerances: &[f64], base: f64) -> Axis {
     let settings = tolerances.iter().map(|t| tolerance(bodies, *t)).collect();
     Axis::new(Factor::Tolerance, settings, &tolerance_label(base))
 }
 
-/// One tolerance.
+/// A setting with one tolerance.
 pub fn tolerance(bodies: &[String], tolerance: f64) -> Setting {
     let mut set = on_bodies(bodies, "solver.tolerance", &format!("{tolerance:e}"));
     set.extend(on_bodies(bodies, "solver.iterations", "20000"));
     Setting::new(tolerance_label(tolerance), tolerance, set)
 }
 
-/// A fixed number of iterations, whatever is left then: a speed setting, not a solution.
+/// A fixed number of iterations, whatever residual they leave: a setting for speed, not a solution.
 pub fn iterations(bodies: &[String], iterations: u32) -> Setting {
     let mut set = on_bodies(bodies, "solver.tolerance", "1e-12");
     set.extend(on_bodies(bodies, "solver.iterations", &iterations.to_string()));
@@ -178,30 +178,30 @@ fn tolerance_label(tolerance: f64) -> String {
     format!("{tolerance:.0e}")
 }
 
-/// Time steps [s]; `frame_s` is the base.
+/// Time steps [s]; `base_s` is the base.
 pub fn steps(steps_s: &[f64], base_s: f64) -> Axis {
     Axis::new(Factor::Step, steps_s.iter().map(|h| step(*h)).collect(), &step(base_s).label)
 }
 
-/// One time step [s].
+/// A setting with one time step [s].
 pub fn step(step_s: f64) -> Setting {
     Setting::new(format!("{} ms", short(1e3 * step_s)), step_s, vec![format!("world.step_s={step_s:?}")])
 }
 
-/// Threads.
+/// Numbers of threads to compare.
 pub fn threads(threads: &[usize]) -> Axis {
     let setting =
         |n: &usize| Setting { threads: Some(*n), ..Setting::new(n.to_string(), *n as f64, Vec::new()) };
     Axis::new(Factor::Threads, threads.iter().map(setting).collect(), "1")
 }
 
-/// Meshes of a block; the size of a mesh is its number of cells along the longest side.
+/// Meshes of a block. The size of a setting is its number of cells along the longest side.
 pub fn cells(body: &str, cells: &[[usize; 3]], base: [usize; 3]) -> Axis {
     let settings = cells.iter().map(|c| block(body, *c)).collect();
     Axis::new(Factor::Mesh, settings, &cells_label(base))
 }
 
-/// One mesh of a block.
+/// A setting with one mesh of a block.
 pub fn block(body: &str, cells: [usize; 3]) -> Setting {
     let [x, y, z] = cells;
     let set = vec![format!("body.{body}.mesh.box.cells=[{x},{y},{z}]")];

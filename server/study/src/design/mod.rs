@@ -1,4 +1,4 @@
-//! Which configurations are tried: one factor at a time around a base, and factorial blocks.
+//! Selects the configurations to try: one factor at a time around a base, and factorial blocks.
 
 pub mod axes;
 
@@ -16,18 +16,18 @@ pub struct Configuration {
 }
 
 impl Configuration {
-    /// Every axis at its base.
+    /// The configuration with every axis at its base.
     pub fn base(axes: &[Axis]) -> Self {
         let choice = |axis: &Axis| Some((axis.factor, axis.base()?.clone()));
         Self { choices: axes.iter().filter_map(choice).collect() }
     }
 
-    /// The setting of a factor, where the case varies it.
+    /// The setting of a factor, if the case varies it.
     pub fn setting(&self, factor: Factor) -> Option<&Setting> {
         self.choices.iter().find(|(f, _)| *f == factor).map(|(_, setting)| setting)
     }
 
-    /// The label of a factor's setting; empty where the case does not vary it.
+    /// The label of a factor's setting; empty if the case does not vary it.
     pub fn label(&self, factor: Factor) -> &str {
         self.setting(factor).map_or("", |setting| &setting.label)
     }
@@ -42,12 +42,12 @@ impl Configuration {
         changed
     }
 
-    /// Overrides of the scene, later ones win.
+    /// Overrides of the scene; later ones win.
     pub fn overrides(&self) -> Vec<String> {
         self.choices.iter().flat_map(|(_, setting)| setting.set.iter().cloned()).collect()
     }
 
-    /// Threads that work on a step.
+    /// Number of threads that work on a step.
     pub fn threads(&self) -> usize {
         self.setting(Factor::Threads).and_then(|setting| setting.threads).unwrap_or(1)
     }
@@ -70,7 +70,7 @@ impl Configuration {
         words.join(", ")
     }
 
-    /// What tells it from all others of its case.
+    /// Key that identifies the configuration within its case.
     pub fn key(&self) -> String {
         let parts: Vec<String> =
             self.choices.iter().map(|(f, setting)| format!("{}={}", f.name(), setting.label)).collect();
@@ -90,8 +90,8 @@ impl Block {
     }
 }
 
-/// The configurations of a case, the base first, each once. Labels that an axis does not have
-/// (because it was narrowed) are left out.
+/// The configurations of a case, each of them once, base first. Labels that narrowing has removed from an
+/// axis are left out.
 pub fn design(axes: &[Axis], blocks: &[Block]) -> Vec<Configuration> {
     let base = Configuration::base(axes);
     let mut all = vec![base.clone()];
@@ -116,8 +116,8 @@ pub fn design(axes: &[Axis], blocks: &[Block]) -> Vec<Configuration> {
     all
 }
 
-/// Keeps of an axis only the settings with these labels; the base moves to the first one kept if
-/// it is not among them.
+/// Narrows an axis to the settings with these labels. If the base is removed, the first remaining setting
+/// becomes the base.
 pub fn narrow(axes: &mut [Axis], factor: Factor, labels: &[String]) {
     for axis in axes.iter_mut().filter(|axis| axis.factor == factor) {
         let base = axis.base().map(|setting| setting.label.clone()).unwrap_or_default();

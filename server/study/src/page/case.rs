@@ -1,4 +1,4 @@
-//! The section of a case: pictures, front, all points, reference.
+//! The section of a case: plots, Pareto front, all points, reference.
 
 use std::fmt::Write as _;
 
@@ -13,7 +13,7 @@ use crate::result::{CaseResult, Outcome};
 use crate::trial::Protocol;
 use crate::words::{percent, short};
 
-/// A picture that stands alone, with its own style.
+/// A plot that stands alone, with its own style.
 pub fn picture(result: &CaseResult) -> String {
     let mut plot = plot(result, [1000.0, 600.0], |errors| errors.l2, "displacement error");
     plot.title = Some(result.case.title.clone());
@@ -21,7 +21,7 @@ pub fn picture(result: &CaseResult) -> String {
     plot.svg().replacen("<rect class=\"ground\"", &format!("{style}<rect class=\"ground\""), 1)
 }
 
-/// The section.
+/// The whole section as HTML.
 pub fn section(result: &CaseResult) -> String {
     let case = &result.case;
     let mut out = format!(
@@ -58,7 +58,7 @@ pub fn section(result: &CaseResult) -> String {
     out
 }
 
-/// What is recommended, with the keys to set, and what the reader should know.
+/// The recommendation, with the overrides it needs and remarks for the reader.
 fn advice(result: &CaseResult) -> String {
     let mut out = String::new();
     if let Some(advice) = &result.recommendation {
@@ -133,7 +133,7 @@ fn plot(result: &CaseResult, size: [f64; 2], measure: fn(&Errors) -> f64, what: 
     }
 }
 
-/// What the time is the time of.
+/// Explains what the measured time covers.
 fn cost_words(case: &Case) -> String {
     match case.protocol {
         Protocol::Static => "time to equilibrium, median".to_owned(),
@@ -174,7 +174,7 @@ fn title(case: &Case, point: &Outcome, errors: &Errors) -> String {
     text
 }
 
-/// Factors that these points vary; what all of them share stands once above the table.
+/// Factors that these points vary. Settings that all of them share are stated once above the table.
 fn factors<'p>(case: &Case, points: impl Iterator<Item = &'p Outcome> + Clone) -> (Vec<Factor>, String) {
     let known = |factor: &Factor| case.axes.iter().any(|axis| axis.factor == *factor);
     let varies = |factor: &Factor| {
@@ -228,7 +228,7 @@ fn front_table(result: &CaseResult) -> String {
     out
 }
 
-/// Median, p99 and the three errors.
+/// Cells of the table: median, p99 and the three errors.
 fn figures(point: &Outcome) -> String {
     let cost = &point.trial.cost;
     let mut cells = vec![time(cost.median_ms), time(cost.p99_ms)];
@@ -237,7 +237,7 @@ fn figures(point: &Outcome) -> String {
     cells.iter().map(|cell| format!("<td class=\"number\">{cell}</td>")).collect()
 }
 
-/// The shares of the sources as a bar.
+/// A bar that shows the shares of the sources.
 fn bar(sources: &Sources) -> String {
     let total: f64 = sources.0.iter().map(|(_, size)| *size).filter(|size| size.is_finite()).sum();
     let mut told = Vec::new();

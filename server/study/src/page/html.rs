@@ -1,18 +1,18 @@
-//! Texts and times as HTML and SVG show them.
+//! Text and times for HTML and SVG.
 
-/// Text for HTML and SVG.
+/// Escapes text for HTML and SVG.
 pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Prose for HTML: what stands in backticks is code.
+/// Converts prose to HTML; text in backticks becomes code.
 pub(crate) fn prose(text: &str) -> String {
     let part =
         |(i, part): (usize, &str)| if i % 2 == 1 { format!("<code>{part}</code>") } else { part.to_owned() };
     escape(text).split('`').enumerate().map(part).collect()
 }
 
-/// Milliseconds for people: three digits, seconds from a thousand on.
+/// A time for people: three digits, in seconds from 1000 ms on.
 pub(crate) fn time(milliseconds: f64) -> String {
     if !milliseconds.is_finite() || milliseconds <= 0.0 {
         return "–".to_owned();

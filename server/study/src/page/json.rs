@@ -1,11 +1,11 @@
-//! The study for programs.
+//! The study as JSON, for programs.
 
 use serde_json::{Value, json};
 
 use crate::design::axes::Factor;
 use crate::result::{CaseResult, Outcome, StudyResult};
 
-/// `study.json`.
+/// Contents of `study.json`.
 pub fn study(study: &StudyResult) -> Value {
     json!({
         "origin": study.origin,

@@ -1,4 +1,5 @@
-//! What people read: one self-contained page, a picture per case, and the same as JSON and as a table.
+//! Output for people: a self-contained page and a plot per case. The same data is written as JSON and as a
+//! table.
 
 pub(crate) mod html;
 
@@ -24,10 +25,10 @@ use std::path::{Path, PathBuf};
 
 use crate::result::StudyResult;
 
-/// Writes `index.html`, `study.json` and `pareto-<case>.svg`, each whole or not at all.
+/// Writes `index.html`, `study.json` and `pareto-<case>.svg`. Each file is written completely or not at all.
 ///
 /// # Errors
-/// File and what the system says.
+/// The file and the message of the system.
 pub fn write(directory: &Path, study: &StudyResult) -> Result<(), (PathBuf, io::Error)> {
     let put = |name: &str, text: &str| {
         let (path, draft) = (directory.join(name), directory.join(format!("{name}.part")));
@@ -41,7 +42,7 @@ pub fn write(directory: &Path, study: &StudyResult) -> Result<(), (PathBuf, io::
     Ok(())
 }
 
-/// The page.
+/// The complete page.
 fn html(study: &StudyResult) -> String {
     let mut out = String::with_capacity(1 << 18);
     out += "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";

@@ -1,5 +1,5 @@
-//! A log–log picture of error over time: points, Pareto front, failures, and how well the
-//! reference is known. Colours are CSS classes, so that the page's light or dark ground decides.
+//! A log–log plot of error over time: points, Pareto front, failures, and the error bar of the reference.
+//! Colours are CSS classes, so that they follow the light or dark theme of the page.
 
 use std::fmt::Write as _;
 
@@ -7,54 +7,54 @@ use super::html::{escape, time};
 use super::scale::Scale;
 use crate::words::{percent, short};
 
-/// A point with a result.
+/// A run with a result.
 #[derive(Debug, Clone)]
 pub struct Mark {
-    /// Time [ms].
+    /// Time per solution or frame [ms].
     pub x: f64,
     /// Relative error.
     pub y: f64,
-    /// Index of its colour.
+    /// Index into the colours.
     pub colour: usize,
-    /// Index of its shape.
+    /// Index into the shapes.
     pub shape: usize,
-    /// Its number on the front, from 1.
+    /// Number on the Pareto front, counted from 1; `None` off the front.
     pub rank: Option<usize>,
-    /// What hovering tells.
+    /// Text shown on hovering.
     pub title: String,
 }
 
 /// A run without a result.
 #[derive(Debug, Clone)]
 pub struct Failure {
-    /// Time until it failed [ms]; none if it never ran.
+    /// Time until the run failed [ms]; `None` if it never ran.
     pub x: Option<f64>,
-    /// What hovering tells.
+    /// Text shown on hovering.
     pub title: String,
 }
 
-/// A picture.
+/// Everything that one plot shows.
 #[derive(Debug, Clone)]
 pub struct Plot {
     /// Width and height [px].
     pub size: [f64; 2],
-    /// What the horizontal axis shows.
+    /// Label of the horizontal axis.
     pub x_label: String,
-    /// What the vertical axis shows.
+    /// Label of the vertical axis.
     pub y_label: String,
-    /// Points.
+    /// Runs with a result.
     pub marks: Vec<Mark>,
-    /// Runs without result.
+    /// Runs without a result.
     pub failures: Vec<Failure>,
-    /// The reference is not known better than this.
+    /// Relative error bar of the reference.
     pub error_bar: f64,
-    /// A time budget [ms].
+    /// Time budget [ms], drawn as a line.
     pub budget_ms: Option<f64>,
     /// Names of the colours in use, by index.
     pub colours: Vec<(usize, String)>,
     /// Names of the shapes in use, by index.
     pub shapes: Vec<(usize, String)>,
-    /// A title within the picture, for a picture that stands alone.
+    /// Title within the picture, for a plot that stands alone.
     pub title: Option<String>,
 }
 
@@ -63,10 +63,10 @@ const RIGHT: f64 = 22.0;
 const BOTTOM: f64 = 58.0;
 const LANE: f64 = 34.0;
 const ROW: f64 = 24.0;
-/// Width of a character of a tick's label, at most.
+/// Upper bound on the width of a character in a tick label [px].
 const CHARACTER: f64 = 8.5;
 
-/// An error bar that many times smaller than every error is not drawn.
+/// An error bar smaller than every error by this factor is not drawn.
 const FAR_BELOW: f64 = 20.0;
 
 impl Plot {
@@ -134,7 +134,7 @@ impl Plot {
         }
         for tick in x.ticks().iter().filter(|tick| tick.labelled) {
             let label = tick_time(tick.value);
-            // A label at the end of the axis stays in the picture.
+            // Keeps a label at the end of the axis inside the picture.
             let half = 0.5 * CHARACTER * label.chars().count() as f64;
             let at = x.at(tick.value).min(self.size[0] - half);
             let _ = writeln!(
@@ -172,14 +172,14 @@ impl Plot {
         );
     }
 
-    /// Whether the error bar of the reference comes near any mark; far below all of them it would only
-    /// press them into a corner.
+    /// Whether the error bar of the reference comes near any mark. Far below all marks, it would press them
+    /// into a corner.
     fn shows_error_bar(&self) -> bool {
         let least = self.marks.iter().map(|mark| mark.y).filter(|y| *y > 0.0).fold(f64::INFINITY, f64::min);
         self.error_bar > 0.0 && !(self.error_bar * FAR_BELOW < least && least.is_finite())
     }
 
-    /// What the reference cannot tell, and the budget.
+    /// Draws the range below the error bar, and the budget.
     fn bands(&self, out: &mut String, x: &Scale, y: &Scale, (y0, y1): (f64, f64)) {
         if self.shows_error_bar() {
             let at = y.at(self.error_bar);
@@ -241,7 +241,7 @@ impl Plot {
         }
     }
 
-    /// Runs without result, above the frame: at the time they took, or at the left if they never ran.
+    /// Draws runs without a result above the frame: at the time they took, or at the left if they never ran.
     fn lane(&self, out: &mut String, x: &Scale, top: f64) {
         let middle = top + 0.5 * LANE;
         let width = self.size[0] - RIGHT - LEFT;
@@ -331,7 +331,7 @@ impl Plot {
     }
 }
 
-/// A shape around the origin.
+/// Draws a shape around the origin.
 fn shape(index: usize, r: f64, class: &str) -> String {
     match index % 6 {
         0 => format!("<circle class=\"{class}\" r=\"{r}\"/>"),
@@ -357,7 +357,7 @@ fn shape(index: usize, r: f64, class: &str) -> String {
     }
 }
 
-/// A place beside `at` that is away from what is taken and within the frame.
+/// A position beside `at` within the frame, away from the positions in `taken`.
 fn free_place(at: [f64; 2], taken: &[[f64; 2]], [right, bottom]: [f64; 2]) -> [f64; 2] {
     let around = [
         [-12.0, 12.0],
@@ -382,7 +382,7 @@ fn free_place(at: [f64; 2], taken: &[[f64; 2]], [right, bottom]: [f64; 2]) -> [f
     best.map_or(places[0], |(place, _)| place)
 }
 
-/// A time at an axis: 1, 2, 5 times a power of ten.
+/// Label for a time on an axis, which is 1, 2 or 5 times a power of ten.
 fn tick_time(milliseconds: f64) -> String {
     let (value, unit) = if milliseconds >= 999.0 {
         (milliseconds / 1e3, "s")

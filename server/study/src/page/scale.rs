@@ -9,29 +9,29 @@ pub struct Scale {
     to: f64,
 }
 
-/// A line of the grid.
+/// A grid line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tick {
-    /// Its value.
+    /// Value at the line.
     pub value: f64,
     /// Whether it has a label.
     pub labelled: bool,
 }
 
 impl Scale {
-    /// An axis that holds all positive finite `values` with some air around them.
+    /// An axis that holds all positive finite `values`, with some margin.
     pub fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let usable = values.filter(|value| value.is_finite() && *value > 0.0);
         let (low, high) = usable.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
         let (low, high) = if low <= high { (low, high) } else { (0.1, 10.0) };
-        // At least a decade, so that a scatter of a per cent does not look like one of ten.
+        // At least a decade, so that a scatter of one per cent does not look like ten.
         let middle = (low * high).sqrt();
         let (low, high) = (low.min(middle / 3.2), high.max(middle * 3.2));
         let air = (high / low).powf(0.06);
         Self { low: low / air, high: high * air, from, to }
     }
 
-    /// Pixels of a value; values beyond the axis lie on its end.
+    /// Position of a value [px]. Values beyond the axis lie at its end.
     pub fn at(&self, value: f64) -> f64 {
         let share = (value / self.low).ln() / (self.high / self.low).ln();
         self.from + (self.to - self.from) * if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
@@ -42,7 +42,7 @@ impl Scale {
         (self.low..=self.high).contains(&value)
     }
 
-    /// Grid lines: 1 to 9 of every decade; labels at decades, and at 2 and 5 where decades are few.
+    /// Grid lines at 1 to 9 of every decade. Decades are labelled; with few decades, 2 and 5 as well.
     pub fn ticks(&self) -> Vec<Tick> {
         let decades = (self.high / self.low).log10();
         let labelled = |digit: i32| digit == 1 || (decades < 2.2 && (digit == 2 || digit == 5));

@@ -1,10 +1,10 @@
 //! Typography and colours, light and dark.
 
-/// Colours of marks, in the order of the settings of a factor; distinguishable by colour-blind
-/// readers and on light and dark ground (after Okabe and Ito).
+/// Number of colours for marks, used in the order of a factor's settings. Colour-blind readers can tell them
+/// apart, on light and on dark backgrounds (after Okabe and Ito).
 pub const MARKS: usize = 6;
 
-/// Colours as variables.
+/// Colours as CSS variables.
 pub const COLOURS: &str = "
 :root, svg.plot {
   --ground: #ffffff; --ink: #1c2430; --soft: #5b6675; --rule: #d9dee5; --faint: #edf0f3; --panel: #f6f7f9;
@@ -22,7 +22,7 @@ pub const COLOURS: &str = "
 }
 ";
 
-/// The pictures.
+/// Style of the plots.
 pub const PLOT: &str = "
 svg.plot { display: block; width: 100%; height: auto; font: 14px/1.2 system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif; }
 svg.plot .ground { fill: var(--ground); }
@@ -46,7 +46,7 @@ svg.plot .c3 { fill: var(--c3); } svg.plot .c4 { fill: var(--c4); } svg.plot .c5
 svg.plot .key { fill: var(--soft); }
 ";
 
-/// The page around them.
+/// Style of the page around the plots.
 pub const PAGE: &str = "
 :root { color-scheme: light dark; }
 * { box-sizing: border-box; }

@@ -1,4 +1,4 @@
-//! `points.csv`: one line per point, written when a case is finished.
+//! `points.csv`: one line per point, written as soon as a case is finished.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -9,7 +9,7 @@ use crate::design::axes::Factor;
 use crate::result::{Outcome, StudyResult};
 use crate::trial::wear::CUTS;
 
-/// The file.
+/// An open `points.csv`.
 #[derive(Debug)]
 pub struct Table {
     path: PathBuf,
@@ -43,10 +43,10 @@ const FIGURES: [&str; 20] = [
 type Broken = (PathBuf, io::Error);
 
 impl Table {
-    /// Begins the file anew; points that are taken over are written again.
+    /// Creates the file. Points taken over from an earlier study are written again.
     ///
     /// # Errors
-    /// What the system says.
+    /// The file and the message of the system.
     pub fn begin(directory: &Path) -> Result<Self, Broken> {
         let path = directory.join("points.csv");
         let file = OpenOptions::new().create(true).write(true).truncate(true).open(&path);
@@ -65,10 +65,10 @@ impl Table {
         Ok(table)
     }
 
-    /// Writes the whole table, with what is known only at the end: front and dominant error.
+    /// Writes the whole table, including columns known only at the end: front and dominant error.
     ///
     /// # Errors
-    /// What the system says.
+    /// The file and the message of the system.
     pub fn whole(directory: &Path, study: &StudyResult) -> Result<(), Broken> {
         let mut table = Self::begin(directory)?;
         for result in &study.cases {

@@ -1,4 +1,4 @@
-//! The words of the page: what is seen, how it was measured, on what.
+//! The prose of the page: what is shown, how it was measured, and on which machine.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use super::html::{escape, time};
 use crate::result::{CaseResult, StudyResult};
 use crate::words::percent;
 
-/// Heading, how to read it, and the cases at a glance.
+/// Heading, reading guide, and an overview of the cases.
 pub fn opening(study: &StudyResult) -> String {
     let machine = &study.origin.machine;
     let mut out = "<header>\n<h1>What accuracy costs</h1>\n".to_owned();
@@ -44,7 +44,7 @@ pub fn opening(study: &StudyResult) -> String {
     out
 }
 
-/// The answer of a case in a sentence.
+/// The result of a case in a sentence.
 fn answer(result: &CaseResult, named: bool) -> String {
     let words = match (&result.recommendation, &result.reference) {
         (_, Err(why)) => format!("No answer: {why}."),
@@ -55,7 +55,7 @@ fn answer(result: &CaseResult, named: bool) -> String {
     format!("<p class=\"advice answer\"><strong>{}</strong>{}</p>\n", escape(&title), escape(&words))
 }
 
-/// The scene as it stands, the first point, and what beats it.
+/// A summary without a budget: the scene as it stands, the first point, and what beats it.
 fn without_budget(result: &CaseResult, bar: f64) -> String {
     let Some(own) = result.points.first() else { return "Nothing was run.".to_owned() };
     let (ms, error) = own.point();
@@ -100,7 +100,7 @@ fn glance(study: &StudyResult) -> String {
     out
 }
 
-/// Definitions, method, machine.
+/// Definitions, method and machine.
 pub fn method(study: &StudyResult) -> String {
     let mut out = "<section id=\"method\">\n<h2>How it was measured</h2>\n<dl>\n".to_owned();
     for (term, meaning) in DEFINITIONS {

@@ -8,7 +8,7 @@ use crate::result::{CaseResult, Outcome};
 use crate::trial::wear::{CUTS, Wear};
 use crate::words::percent;
 
-/// The table; empty where a case compares no methods of cutting.
+/// The table; empty if the case does not compare methods of cutting.
 pub fn table(result: &CaseResult) -> String {
     let rows: Vec<&Outcome> = result.points.iter().filter(|point| !point.trial.wear.is_empty()).collect();
     if rows.is_empty() {
@@ -68,7 +68,7 @@ pub fn table(result: &CaseResult) -> String {
     out
 }
 
-/// What the rows have in common, and what follows from them.
+/// A text on what the rows have in common, and what follows from them.
 fn compared(rows: &[&Outcome]) -> String {
     let label = |factor| rows[0].configuration.label(factor);
     let mut words = format!("With law {} and tolerance {}", label(Factor::Law), label(Factor::Tolerance));
@@ -93,7 +93,7 @@ fn compared(rows: &[&Outcome]) -> String {
                 percent(xfem_front),
                 percent(snap_front)
             );
-            // What is left of the distance to a mesh that was made with its cut.
+            // The remaining distance to a mesh that was made with its cut.
             let left = [(xfem, xfem_front), (snap, snap_front)]
                 .map(|(all, front)| (front - precut) / (all - precut));
             if xfem > precut && snap > precut && left.iter().all(|left| *left < 0.5) {

@@ -1,11 +1,11 @@
-//! A reference that takes the time it is given: mesh and step are refined together, level by level.
+//! A reference that uses the time it is given: mesh and step are refined together, level by level.
 //!
-//! On level i the mesh is f_i times finer than the scene's and the frame is divided into n_i steps with
-//! n_i ∝ f_i, so that all errors vanish along the ladder, the mixed ones too. n_0 is chosen by pilot
-//! runs on the coarsest mesh, so that mesh and step leave errors of like size. They go on to steps far
-//! shorter than those that are chosen: steps that damp a vibration away agree with each other, and not
-//! with what the scene does. What the step leaves at the finest level is added to the error bar. Levels
-//! that ended are never thrown away: the reference is the [`limit`](super::limit) of those there are.
+//! On level i the mesh is f_i times finer than the scene's. The frame is divided into n_i steps with n_i ∝
+//! f_i, so that all errors vanish along the ladder, including the mixed ones. Pilot runs on the coarsest mesh
+//! choose n_0 so that mesh and step leave errors of similar size. The pilots continue to much shorter steps
+//! than those chosen. The reason is that steps which damp a vibration away agree with each other, but not
+//! with the scene. The error that the step leaves at the finest level is added to the error bar. Finished
+//! levels are never thrown away: the reference is the [`limit`](super::limit) of all of them.
 
 use super::limit::{Limit, UNKNOWN, limit};
 use super::value::Reference;
@@ -21,10 +21,10 @@ use crate::words::percent;
 /// Most steps per frame on the coarsest mesh.
 const MOST_STEPS: u32 = 16;
 
-/// Error bar at which a reference is good enough.
+/// A reference with this relative error bar is good enough.
 const ENOUGH: f64 = 2e-3;
 
-/// A level that ended.
+/// A finished level.
 #[derive(Debug, Clone)]
 struct Rung {
     size: f64,
@@ -33,26 +33,26 @@ struct Rung {
     seen: Vec<Sight>,
 }
 
-/// A ladder under way.
+/// A ladder that is being climbed.
 #[derive(Debug)]
 pub struct Climb<'a> {
     ladder: &'a Ladder,
     law: &'a str,
     /// Steps per frame on the coarsest mesh.
     n0: u32,
-    /// What n_0 steps per frame leave on the coarsest mesh: a norm as that of [`Series`].
+    /// Error that n_0 steps per frame leave on the coarsest mesh, in the norm of [`Series`].
     by_step: f64,
     rungs: Vec<Rung>,
-    /// Why it does not go on, where that is final.
+    /// Reason why no further level can follow.
     over: Option<String>,
 }
 
 impl<'a> Climb<'a> {
-    /// Makes the pilot runs and the first level, keeping `keep_s` of the study's time for later. None
-    /// if the study is to end before there is a level.
+    /// Makes the pilot runs and the first level, and reserves `keep_s` of the study's time. `None` if the
+    /// study must end before there is a level.
     ///
     /// # Errors
-    /// Why the first run gave no result.
+    /// The reason why the first run gave no result.
     pub fn start(
         ladder: &'a Ladder,
         law: &'a str,
@@ -68,15 +68,15 @@ impl<'a> Climb<'a> {
         climb.choose_steps(&first.series, runner, keep_s);
         climb.push(0, first);
         if climb.n0 > 1 {
-            // The first level has been run with its n0 steps by the pilots; this finds it again.
+            // The pilots have already run the first level with its n0 steps. This finds that run again.
             climb.rungs.clear();
             climb.up(runner, keep_s);
         }
         Ok(Some(climb))
     }
 
-    /// The fewest steps per frame whose error is no larger than that of the mesh, by the shortest steps there
-    /// is time for.
+    /// Chooses the fewest steps per frame whose error is no larger than that of the mesh. The error is
+    /// measured against the shortest steps that the time allows.
     fn choose_steps(&mut self, first: &Series, runner: &mut dyn Runner, keep_s: f64) {
         if self.ladder.step_s.is_none() || self.ladder.meshes.len() < 2 {
             return;
@@ -92,7 +92,7 @@ impl<'a> Climb<'a> {
         (self.n0, self.by_step) = fewest_steps(&pilots, by_mesh);
     }
 
-    /// A pilot run, where it takes no more than a tenth of the time there is.
+    /// A pilot run, if it takes no more than a tenth of the available time.
     fn pilot(&self, mesh: usize, n: u32, runner: &mut dyn Runner, keep_s: f64) -> Option<Series> {
         let configuration = self.ladder.at(mesh, n);
         let allowed_s = 0.1 * (runner.left_s() - keep_s);
@@ -103,7 +103,7 @@ impl<'a> Climb<'a> {
         usable(&trial).then_some(trial.series)
     }
 
-    /// Goes on as long as levels fit into the time, less `keep_s`, and the error bar is not small enough.
+    /// Adds levels while they fit into the time less `keep_s` and the error bar is too large.
     pub fn climb(&mut self, runner: &mut dyn Runner, keep_s: f64) {
         while self.over.is_none() && self.bar() > ENOUGH {
             let Some(next) = self.next() else { break };
@@ -113,7 +113,7 @@ impl<'a> Climb<'a> {
         }
     }
 
-    /// The next level.
+    /// The configuration of the next level, if there is one.
     pub fn next(&self) -> Option<Configuration> {
         let i = self.rungs.len();
         (i < self.ladder.levels()).then(|| {
@@ -122,7 +122,7 @@ impl<'a> Climb<'a> {
         })
     }
 
-    /// One level more; false if there is none.
+    /// Adds one level; false if there is none.
     fn up(&mut self, runner: &mut dyn Runner, keep_s: f64) -> bool {
         let Some(next) = self.next() else { return false };
         let room_s = (runner.left_s() - 0.5 * keep_s).max(0.1);
@@ -158,7 +158,7 @@ impl<'a> Climb<'a> {
         self.rungs.last().map_or(&[], |rung| &rung.seen)
     }
 
-    /// How much regions change over the last levels, at most.
+    /// Largest change of the regions over the last levels.
     fn wander(&self) -> f64 {
         let last = &self.rungs[self.rungs.len().saturating_sub(3)..];
         let pairs = last.windows(2).filter_map(|pair| Some(largest_change(&pair[0].seen, &pair[1].seen)?.2));
@@ -170,21 +170,22 @@ impl<'a> Climb<'a> {
         limit(&levels, self.wander() <= SAME)
     }
 
-    /// Present error bar.
+    /// Present relative error bar.
     pub fn bar(&self) -> f64 {
         self.limit().map_or(UNKNOWN, |limit| self.with_step(&limit))
     }
 
-    /// The error bar of a limit with what the step leaves at the finest level, which is of first order at worst.
+    /// The error bar of a limit plus the error that the step leaves at the finest level. That error is
+    /// assumed to be of first order, the worst case.
     fn with_step(&self, limit: &Limit) -> f64 {
         let finest = self.ladder.level(self.rungs.len().saturating_sub(1), self.n0).1;
         limit.error_bar + self.by_step * f64::from(self.n0) / f64::from(finest) / limit.value.norm()
     }
 
-    /// The reference from the levels that ended.
+    /// The reference from the finished levels.
     ///
     /// # Errors
-    /// That nothing moves.
+    /// Nothing moves.
     pub fn reference(&self) -> Result<Reference, String> {
         let Some(limit) = self.limit() else {
             return Err("no probe moves in this scene, so there is no error to measure; give it a load, a \
@@ -222,8 +223,9 @@ impl<'a> Climb<'a> {
     }
 }
 
-/// Of runs with 1, 2, 4, … steps per frame, the fewest whose error is at most half of `by_mesh`, and that error:
-/// the distance to the last run, whose own is taken for that to the one before it.
+/// Among runs with 1, 2, 4, … steps per frame, the fewest whose error is at most half of `by_mesh`, and that
+/// error. The error is the distance to the last run. The last run's own error is taken as its distance to the
+/// run before it.
 fn fewest_steps(pilots: &[Series], by_mesh: f64) -> (u32, f64) {
     let [.., before, last] = pilots else { return (1, 0.0) };
     let own = last.minus(before).norm();
@@ -232,7 +234,7 @@ fn fewest_steps(pilots: &[Series], by_mesh: f64) -> (u32, f64) {
     (1 << enough, error(&pilots[enough]))
 }
 
-/// Whether a run may be part of a reference: it ended, and the solver with it.
+/// Whether a run may be part of a reference: it ended, and its solver converged.
 fn usable(trial: &Trial) -> bool {
     trial.is_done() && trial.reason.is_empty()
 }
@@ -241,7 +243,7 @@ fn usable(trial: &Trial) -> bool {
 mod tests {
     use super::*;
 
-    /// Amplitude that implicit Euler leaves of a vibration with n steps per frame, 1 without damping.
+    /// Amplitude that implicit Euler leaves of a vibration with n steps per frame; 1 without damping.
     fn damped(n: u32) -> Series {
         let u = 0.2 + 0.8 * (-12.0 / f64::from(n)).exp();
         Series { frames: vec![0], displacement_m: vec![u, 0.0, 0.0], energy_j: vec![u] }

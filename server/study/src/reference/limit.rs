@@ -1,8 +1,8 @@
 //! The limit of a sequence of refinements by least squares, with an honest error bar.
 //!
-//! To solutions u_i on levels of size h_i the model u_i = u* + c h_iᵖ is fitted: u* and c component by
-//! component, one order p for all of them, by scanning p. With σ the standard deviation of the fit and
-//! u_n the finest solution, the error bar is
+//! The model u_i = u* + c h_iᵖ is fitted to solutions u_i on levels of size h_i. u* and c are fitted
+//! component by component; one order p for all of them is found by scanning. Let σ be the standard deviation
+//! of the fit and u_n the finest solution. Then the error bar is
 //!
 //! - 1.25 ‖u* − u_n‖ + σ, and at least the distance to the limit without the finest level, where the
 //!   observed order is plausible; at least 1.25 ‖u_n − u_{n−1}‖ where that is more than the change before it;
@@ -15,34 +15,34 @@
 
 use crate::trial::series::Series;
 
-/// Orders that are looked for. A higher one, seen on few levels, is chance: 2 is assumed then.
+/// Range of orders that are searched. A higher order, seen on few levels, is chance: 2 is then assumed.
 const ORDERS: [f64; 2] = [0.5, 2.0];
 
-/// Levels that are fitted: the finest ones.
+/// Number of levels that are fitted, counted from the finest.
 const LEVELS: usize = 4;
 
 /// Factor between the estimated error and the bar.
 const SAFETY: f64 = 1.25;
 
-/// Largest σ of a fit that is believed, relative to the change by the last refinement.
+/// Largest credible σ of a fit, relative to the change by the last refinement.
 const SCATTER: f64 = 0.5;
 
-/// Bar of a single run, whose own error nobody knows.
+/// Error bar of a single run, whose own error is unknown.
 pub const UNKNOWN: f64 = 1.0;
 
 /// The limit of a sequence of refinements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Limit {
-    /// Best value: extrapolated, or the finest solution.
+    /// Best value: the extrapolated solution, or the finest one.
     pub value: Series,
-    /// Observed order; none where no plausible one shows.
+    /// Observed order; `None` if no plausible order shows.
     pub order: Option<f64>,
     /// Half-width of the error bar, relative to the norm of the value.
     pub error_bar: f64,
 }
 
-/// The limit of `levels`: size h and solution, coarse to fine. `smooth`: the levels solve the same
-/// problem, so that an order can be expected. `None` if they share no instant or nothing moves.
+/// The limit of `levels` (size h and solution, coarse to fine). `smooth`: the levels solve the same problem,
+/// so that an order can be expected. `None` if they share no instant or nothing moves.
 pub fn limit(levels: &[(f64, &Series)], smooth: bool) -> Option<Limit> {
     let levels = &levels[levels.len().saturating_sub(LEVELS)..];
     let shared = at_common_instants(levels);
@@ -55,14 +55,14 @@ pub fn limit(levels: &[(f64, &Series)], smooth: bool) -> Option<Limit> {
     Some(fitted.unwrap_or_else(|| spread(&sizes, &shared)))
 }
 
-/// All series at the instants that all of them have.
+/// All series, restricted to their common instants.
 fn at_common_instants(levels: &[(f64, &Series)]) -> Vec<Series> {
     let Some(((_, first), rest)) = levels.split_first() else { return Vec::new() };
     let common = rest.iter().fold((*first).clone(), |common, (_, next)| common.at_instants_of(next));
     levels.iter().map(|(_, series)| series.at_instants_of(&common)).collect()
 }
 
-/// The fit, where its order is plausible.
+/// The fitted limit; `None` if its order is not plausible.
 fn extrapolated(sizes: &[f64], levels: &[Series]) -> Option<Limit> {
     let n = levels.len();
     if n < 3 || !sizes.windows(2).all(|pair| pair[0] > pair[1] && pair[1] > 0.0) {
@@ -88,13 +88,13 @@ fn extrapolated(sizes: &[f64], levels: &[Series]) -> Option<Limit> {
     Some(Limit { error_bar: bar / value.norm(), value, order: Some(order) })
 }
 
-/// The order of the smallest residual; none at the lower end of the range.
+/// The order with the smallest residual; `None` at the lower end of the range.
 fn best_order(sizes: &[f64], levels: &[Series]) -> Option<f64> {
     let steps = 60;
     let order = |i: usize| ORDERS[0] + (ORDERS[1] - ORDERS[0]) * i as f64 / steps as f64;
     let residuals = (0..=steps).map(|i| fit(sizes, levels, order(i)).1);
     let (best, _) = residuals.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    // Differences that do not fall at all fit worst everywhere; they end at the lower bound.
+    // Differences that do not fall at all give a best fit at the lower bound.
     (best > 0).then(|| order(best))
 }
 
@@ -117,7 +117,7 @@ fn fit(sizes: &[f64], levels: &[Series], order: f64) -> (Series, f64) {
     (value, (sum_squared / (n - 2.0).max(1.0)).sqrt())
 }
 
-/// The finest solution with the spread of the levels.
+/// The finest solution, with the spread of the levels as its error bar.
 fn spread(sizes: &[f64], levels: &[Series]) -> Limit {
     let n = levels.len();
     let value = levels[n - 1].clone();
@@ -175,7 +175,7 @@ mod tests {
         assert!(limit(&levels, false).unwrap().order.is_none());
     }
 
-    /// A region that the levels select a little differently: they come nearer, and not evenly.
+    /// A region is selected a little differently on every level: the levels approach the limit unevenly.
     #[test]
     fn changes_that_grow_again_are_within_the_bar() {
         let sizes = [1.0, 0.66, 0.5, 0.33];

@@ -1,4 +1,4 @@
-//! What the right answer is, and how well it is known.
+//! The reference of a case: the right answer, and how well it is known.
 
 pub mod value;
 

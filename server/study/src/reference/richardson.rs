@@ -7,7 +7,7 @@
 
 use crate::trial::series::Series;
 
-/// Orders that are believed.
+/// Credible orders.
 const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.5..=4.5;
 
 /// The limit of a sequence of refinements.
@@ -15,16 +15,16 @@ const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.5..=4.5;
 pub struct Limit {
     /// Extrapolated values.
     pub value: Series,
-    /// Order in h that was observed, or 1 where none could be.
+    /// Observed order in h; 1 if none could be observed.
     pub order: f64,
-    /// Whether the order was observed in a plausible range.
+    /// Whether the observed order lies in the plausible range.
     pub plausible: bool,
     /// Half-width of the error bar, relative to the norm of the limit.
     pub error_bar: f64,
 }
 
-/// Extrapolates three solutions on meshes (or with steps) of size `sizes`, coarse to fine.
-/// `None` if they have no instant in common or the sizes do not descend.
+/// Extrapolates three solutions on meshes (or with steps) of size `sizes`, coarse to fine. `None` if they
+/// have no common instant or the sizes do not descend.
 pub fn extrapolate(sizes: [f64; 3], [u1, u2, u3]: [&Series; 3]) -> Option<Limit> {
     let [h1, h2, h3] = sizes;
     if !(h1 > h2 && h2 > h3 && h3 > 0.0) {
@@ -46,7 +46,7 @@ pub fn extrapolate(sizes: [f64; 3], [u1, u2, u3]: [&Series; 3]) -> Option<Limit>
     Some(Limit { error_bar: safety * correction.norm() / norm, value, order, plausible })
 }
 
-/// The p for which the differences fall as they do, by bisection; none if not plausible.
+/// The order p that explains how the differences fall, found by bisection; `None` if not plausible.
 pub fn observed_order([h1, h2, h3]: [f64; 3], coarse: f64, fine: f64) -> Option<f64> {
     if !(coarse > 0.0 && fine > 0.0) {
         return None;

@@ -8,11 +8,11 @@ use crate::design::axes::{Factor, Setting};
 use crate::trial::Trial;
 use crate::trial::series::Series;
 
-/// Takes a stored reference, or computes one with `run`. That of a scene takes as long as it is given:
-/// see [`Climb`](super::climb::Climb).
+/// Takes a stored reference, or computes one with `run`. The reference of a scene uses all the time it is
+/// given: see [`Climb`](super::climb::Climb).
 ///
 /// # Errors
-/// Why none could be computed.
+/// The reason why none could be computed.
 pub fn settle(
     case: &Case,
     run: &mut dyn FnMut(&Configuration) -> Option<Trial>,
@@ -39,8 +39,8 @@ pub fn settle(
     }
 }
 
-/// Mesh limit at the coarsest step, plus what finer steps change on the coarsest mesh:
-/// u(0,0) ≈ u(h→0, Δt₁) + u(h₁, Δt→0) − u(h₁, Δt₁).
+/// The limit of the mesh at the coarsest step, plus the change by finer steps on the coarsest mesh: u(0,0) ≈
+/// u(h→0, Δt₁) + u(h₁, Δt→0) − u(h₁, Δt₁).
 fn follow(
     plan: &Plan,
     law: &str,
@@ -66,7 +66,8 @@ fn follow(
         None => None,
         Some([_, b, c]) => {
             let (u2, u3) = (solve(Some(b), first)?, solve(Some(c), first)?);
-            // Sizes of a mesh are cells along an edge: the element size is their inverse.
+            // The size of a mesh setting is its number of cells along an edge. The element size is the
+            // inverse.
             let sizes = plan.meshes.as_ref().map(|m| [1.0 / m[0].size, 1.0 / m[1].size, 1.0 / m[2].size]);
             sizes.and_then(|sizes| extrapolate(sizes, [&start, &u2, &u3]))
         }

@@ -7,15 +7,15 @@ use crate::trial::series::Series;
 /// The reference of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reference {
-    /// The field.
+    /// Displacements and energy.
     #[serde(skip)]
     pub series: Series,
-    /// The goal, where it is known better than the field.
+    /// Value of the goal, if it is known better than the field.
     pub goal: Option<f64>,
-    /// Relative half-width of its error bar: below it no error can be told.
+    /// Relative half-width of the error bar. Smaller errors cannot be told apart.
     pub error_bar: f64,
-    /// The law it was computed with.
+    /// Law with which the reference was computed.
     pub law: String,
-    /// Where it comes from, in words.
+    /// Origin of the reference, in words.
     pub source: String,
 }

@@ -1,4 +1,4 @@
-//! A hard case, what it is run with, and what came of it.
+//! A hard case, its setting and its outcome.
 
 use scindo_physics::body::{Ablation, Body, BodyError, BodySettings, PcgSettings};
 use scindo_physics::cut::CutMesh;
@@ -7,30 +7,30 @@ use scindo_physics::mesh::{MeshError, TetMesh};
 
 use super::evidence::Evidence;
 
-/// What keeps a case from being run to its end.
+/// An error that stops a case before its end.
 pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 
-/// The body of a case: sets up, runs, measures.
+/// The body of a case: it sets up, runs and measures.
 pub type Run = fn(&Setting) -> Result<Evidence, Trouble>;
 
 /// A hard case.
 #[derive(Debug, Clone, Copy)]
 pub struct Case {
-    /// Its number in the list of hard cases; none for what is shown beside them.
+    /// Number in the list of hard cases; `None` for cases outside that list.
     pub number: Option<u8>,
-    /// Name for the command line.
+    /// Name on the command line.
     pub name: &'static str,
     /// Heading.
     pub title: &'static str,
-    /// What is done.
+    /// Description of the set-up and the run.
     pub set_up: &'static str,
-    /// When it passes.
+    /// Condition under which the case passes.
     pub rule: &'static str,
-    /// Where the case comes from.
+    /// Origin of the case, such as a paper.
     pub source: &'static str,
-    /// Takes a second or less in a development build.
+    /// Whether the case takes a second or less in a development build.
     pub quick: bool,
-    /// How; none if it belongs to a part that is still to come.
+    /// Runs the case; `None` if it needs a part that is not built yet.
     pub run: Option<Run>,
 }
 
@@ -39,14 +39,14 @@ pub struct Case {
 pub enum Status {
     /// Every figure is within its bound.
     Passed,
-    /// At least one is not, or it did not come to its end.
+    /// At least one figure is out of bounds, or the case did not finish.
     Failed,
-    /// Belongs to a part that is still to come.
+    /// The case needs a part that is not built yet.
     NotYet,
 }
 
 impl Status {
-    /// For people and programs.
+    /// Stable name for people and programs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Passed => "passed",
@@ -56,39 +56,39 @@ impl Status {
     }
 }
 
-/// A case and what came of it.
+/// A case and its outcome.
 #[derive(Debug, Clone)]
 pub struct CaseReport {
-    /// The case.
+    /// The case that was run.
     pub case: &'static Case,
     /// How it ended.
     pub status: Status,
-    /// Why it did not come to its end.
+    /// Reason why the case did not finish.
     pub reason: Option<String>,
-    /// What was measured.
+    /// Figures, charts and pictures of the run.
     pub evidence: Evidence,
 }
 
 impl CaseReport {
-    /// Figures out of their bounds, in words; or why there are none.
+    /// Figures out of bounds, in words; or the reason why there are none.
     pub fn failures(&self) -> Vec<String> {
         let figures = self.evidence.figures.iter().filter(|figure| !figure.holds());
         self.reason.iter().cloned().chain(figures.map(|figure| figure.words())).collect()
     }
 }
 
-/// What a case is run with.
+/// The conditions of a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Setting {
-    /// What is taken out of the method: nothing, except in a mutation check.
+    /// Parts taken out of the method: none, except in a mutation check.
     pub ablation: Ablation,
 }
 
 impl Setting {
-    /// A body on the fast path with this tolerance and at most so many iterations.
+    /// Builds a body on the fast path with this tolerance and at most this many iterations.
     ///
     /// # Errors
-    /// What the body says.
+    /// The body refuses the mesh or a setting.
     pub fn body(
         &self,
         mesh: TetMesh,
@@ -100,18 +100,18 @@ impl Setting {
         self.with(mesh, material, BodySettings { solver, ..BodySettings::default() })
     }
 
-    /// A body with these settings.
+    /// Builds a body with these settings.
     ///
     /// # Errors
-    /// What the body says.
+    /// The body refuses the mesh or a setting.
     pub fn with(&self, mesh: TetMesh, material: Material, settings: BodySettings) -> Result<Body, BodyError> {
         Body::new(mesh, material, BodySettings { ablation: self.ablation, ..settings })
     }
 
-    /// A mesh to be cut without mechanics.
+    /// Builds a mesh that is cut without mechanics.
     ///
     /// # Errors
-    /// What the mesh says.
+    /// The mesh is invalid.
     pub fn cut_mesh(&self, mesh: TetMesh) -> Result<CutMesh, MeshError> {
         let mut cut = CutMesh::new(mesh)?;
         cut.set_exact(!self.ablation.exact_predicates);

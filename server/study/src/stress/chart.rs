@@ -1,30 +1,30 @@
-//! Lines over time as SVG, with the colours of the page.
+//! Line charts over time as SVG, in the colours of the page.
 
 use std::fmt::Write as _;
 
 use crate::page::html::escape;
 
-/// A line.
+/// One line of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Its name.
+    /// Name in the legend.
     pub name: String,
-    /// Points (x, y).
+    /// Points (x, y), in the units of the axes.
     pub points: Vec<[f64; 2]>,
 }
 
-/// Lines over a common axis.
+/// Several lines over one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// What it shows.
+    /// Title of the chart.
     pub title: String,
-    /// What the horizontal axis shows, with its unit.
+    /// Label of the horizontal axis, with its unit.
     pub x_label: String,
-    /// What the vertical axis shows, with its unit.
+    /// Label of the vertical axis, with its unit.
     pub y_label: String,
     /// The lines.
     pub lines: Vec<Line>,
-    /// The vertical axis is logarithmic.
+    /// Whether the vertical axis is logarithmic.
     pub logarithmic: bool,
 }
 
@@ -34,11 +34,11 @@ const RIGHT: f64 = 14.0;
 const HEIGHT: f64 = 230.0;
 const BOTTOM: f64 = 46.0;
 const ROW: f64 = 19.0;
-/// Most points of a drawn line.
+/// Longer lines are thinned to this many points.
 const POINTS: usize = 240;
-/// Colours there are.
+/// Number of colours.
 const COLOURS: usize = 6;
-/// Ends of the names of the two energies of a run.
+/// Suffixes of the names of the two energies of a run.
 const KINETIC: &str = ", kinetic";
 const ELASTIC: &str = ", elastic";
 
@@ -54,7 +54,7 @@ impl Chart {
         }
     }
 
-    /// As SVG; nothing if there is nothing to draw.
+    /// The chart as SVG; empty if there is nothing to draw.
     pub fn svg(&self) -> String {
         let usable =
             |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite() && (!self.logarithmic || p[1] > 0.0);
@@ -126,13 +126,13 @@ impl Chart {
         out
     }
 
-    /// Whether line `i` is the elastic energy of the run whose kinetic energy is the line before it.
+    /// Whether line `i` is the elastic energy of the run whose kinetic energy is the previous line.
     fn is_elastic_of_last(&self, i: usize) -> bool {
         let run = |i: usize, kind| self.lines[i].name.strip_suffix(kind);
         i > 0 && run(i, ELASTIC).is_some_and(|name| run(i - 1, KINETIC) == Some(name))
     }
 
-    /// Colour and dash of every line; both energies of a run have one colour.
+    /// Colour and dash of every line. Both energies of a run share one colour.
     fn classes(&self) -> Vec<String> {
         let mut runs = 0;
         let mut of_line = |i: usize| {
@@ -177,7 +177,7 @@ impl Chart {
     }
 }
 
-/// Colour, and a dash for every further round of colours.
+/// A colour, with another dash for every further round of colours.
 fn class(i: usize) -> String {
     format!("l{} d{}", i % COLOURS, (i / COLOURS) % 3)
 }

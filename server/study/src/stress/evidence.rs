@@ -1,36 +1,36 @@
-//! What a case leaves behind: figures with bounds, charts, pictures.
+//! Results of a case: figures with bounds, charts, pictures.
 
 use super::chart::Chart;
 use super::view::Picture;
 
-/// Where a figure must lie.
+/// The range that a figure must lie in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bound {
-    /// ≤.
+    /// At most this value.
     AtMost(f64),
-    /// ≥.
+    /// At least this value.
     AtLeast(f64),
-    /// =, bit for bit.
+    /// Exactly this value, bit for bit.
     Exactly(f64),
-    /// Anywhere: it is only told.
+    /// No bound: the figure is only reported.
     Told,
 }
 
-/// A number that a case is judged by.
+/// A number by which a case is judged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// What it is.
+    /// Name of the quantity.
     pub name: String,
-    /// Value.
+    /// Measured value.
     pub value: f64,
     /// Unit; empty for a plain number.
     pub unit: &'static str,
-    /// Where it must lie.
+    /// Range that the value must lie in.
     pub bound: Bound,
 }
 
 impl Figure {
-    /// Whether it is where it must be; NaN is nowhere.
+    /// Whether the value is within its bound. NaN never is.
     pub fn holds(&self) -> bool {
         match self.bound {
             Bound::AtMost(bound) => self.value <= bound,
@@ -58,7 +58,7 @@ impl Figure {
     }
 }
 
-/// A number for people: four digits, without zeros at their end.
+/// A number for people: four digits without trailing zeros.
 pub fn short(value: f64) -> String {
     let size = value.abs();
     if value == value.round() && size < 1e7 {
@@ -75,41 +75,41 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// A decimal number without zeros at the end of its fraction.
+/// A decimal number without trailing zeros in its fraction.
 fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
-/// What a case leaves behind.
+/// All results of a case.
 #[derive(Debug, Clone, Default)]
 pub struct Evidence {
-    /// What it is judged by.
+    /// Figures by which the case is judged.
     pub figures: Vec<Figure>,
-    /// Energies, iterations and others over time.
+    /// Charts over time: energies, iterations and others.
     pub charts: Vec<Chart>,
-    /// What it looks like.
+    /// Pictures of bodies.
     pub pictures: Vec<Picture>,
-    /// What else there is to say.
+    /// Further remarks.
     pub notes: Vec<String>,
 }
 
 impl Evidence {
-    /// A figure that must not exceed `bound`.
+    /// Adds a figure that must not exceed `bound`.
     pub fn at_most(&mut self, name: impl Into<String>, value: f64, bound: f64, unit: &'static str) {
         self.figure(name, value, Bound::AtMost(bound), unit);
     }
 
-    /// A figure that must reach `bound`.
+    /// Adds a figure that must reach `bound`.
     pub fn at_least(&mut self, name: impl Into<String>, value: f64, bound: f64, unit: &'static str) {
         self.figure(name, value, Bound::AtLeast(bound), unit);
     }
 
-    /// A count that must be what is expected.
+    /// Adds a count that must equal `expected`.
     pub fn exactly(&mut self, name: impl Into<String>, found: usize, expected: usize) {
         self.figure(name, found as f64, Bound::Exactly(expected as f64), "");
     }
 
-    /// A figure without bound.
+    /// Adds a figure without a bound.
     pub fn tell(&mut self, name: impl Into<String>, value: f64, unit: &'static str) {
         self.figure(name, value, Bound::Told, unit);
     }

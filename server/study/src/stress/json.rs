@@ -1,4 +1,4 @@
-//! The suite for programs. What depends on machine and time stands under `run` alone.
+//! The suite as JSON, for programs. Values that depend on machine and time are all under `run`.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use super::evidence::{Bound, Figure};
 use super::mutation::Row;
 use super::suite::SuiteReport;
 
-/// `stress.json`.
+/// Contents of `stress.json`.
 pub fn suite(report: &SuiteReport, table: Option<&[Row]>) -> Value {
     json!({
         "run": {
@@ -26,7 +26,7 @@ pub fn suite(report: &SuiteReport, table: Option<&[Row]>) -> Value {
     })
 }
 
-/// A case; the same on every run.
+/// One case; the same on every run.
 pub fn case(report: &CaseReport) -> Value {
     let case = report.case;
     let charts = report.evidence.charts.iter().map(|chart| {

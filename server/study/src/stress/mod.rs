@@ -1,12 +1,12 @@
-//! The hard cases: what breaks codes that deform and cut, run and shown by `scindo stress`.
+//! The hard cases, which break codes that deform and cut. `scindo stress` runs and shows them.
 //!
-//! A [`case`] is a set-up of a few lines with a rule that it passes or fails; [`cases`] lists all of
-//! them. A [`watch`] steps a body and holds it to what every case must keep: finite numbers, mass,
-//! momentum, energy, whole steps. What a case leaves is [`evidence`]: figures with their bounds,
-//! [`chart`]s over time, pictures ([`view`]). [`suite`] runs them. [`mutation`] takes parts of the method
-//! away and tells which cases notice; [`page`] and [`json`] write it down.
+//! A [`case`] is a set-up of a few lines with a rule that it passes or fails; [`cases`] lists all of them. A
+//! [`watch`] steps a body and checks what every case must keep: finite numbers, mass, momentum, energy, whole
+//! steps. The results of a case are [`evidence`]: figures with bounds, [`chart`]s over time, pictures
+//! ([`view`]). [`suite`] runs the cases. [`mutation`] takes parts of the method out and reports which cases
+//! notice. [`page`] and [`json`] write the results.
 //!
-//! A case knows no clock and no chance: it gives the same figures on every run. Times stand apart.
+//! A case uses neither clock nor chance: it gives the same figures on every run. Times are kept apart.
 
 pub mod case;
 
@@ -36,10 +36,10 @@ pub use evidence::{Bound, Evidence, Figure};
 pub use mutation::{Mutation, Row};
 pub use suite::{Progress, Settings, StressError, SuiteReport, run, run_case, select};
 
-/// Writes `index.html` and `stress.json` into `directory`, each whole or not at all.
+/// Writes `index.html` and `stress.json` into `directory`. Each file is written completely or not at all.
 ///
 /// # Errors
-/// File and what the system says.
+/// The file and the message of the system.
 pub fn write(directory: &Path, report: &SuiteReport, table: Option<&[Row]>) -> Result<(), StressError> {
     let io = |path: &Path| {
         let path = path.to_owned();

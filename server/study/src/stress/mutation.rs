@@ -1,11 +1,11 @@
-//! Whether the cases can fail: parts of the method are taken out, and some case must notice.
+//! Checks that the cases can fail: parts of the method are taken out, and some case must notice.
 
 use scindo_physics::body::Ablation;
 
 use super::case::{CaseReport, Setting, Status};
 use super::suite::{Progress, Settings, StressError, run_cases, select};
 
-/// A part of the method that is taken out.
+/// A part of the method that can be taken out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mutation {
     /// The masses of pieces.
@@ -19,10 +19,10 @@ pub enum Mutation {
 }
 
 impl Mutation {
-    /// All of them.
+    /// All mutations, in the order of the table.
     pub const ALL: [Self; 4] = [Self::PieceMasses, Self::ExactPredicates, Self::Predictor, Self::LineSearch];
 
-    /// Name for programs.
+    /// Stable name for programs.
     pub fn name(self) -> &'static str {
         match self {
             Self::PieceMasses => "piece-masses",
@@ -32,7 +32,7 @@ impl Mutation {
         }
     }
 
-    /// What is done instead.
+    /// Describes what is done instead.
     pub fn words(self) -> &'static str {
         match self {
             Self::PieceMasses => "the copies of a node share its mass evenly, whatever their pieces weigh",
@@ -42,7 +42,7 @@ impl Mutation {
         }
     }
 
-    /// Cases that must notice.
+    /// Names of the cases that must notice.
     pub fn named(self) -> &'static [&'static str] {
         match self {
             Self::PieceMasses => &["freed-node", "free-fall"],
@@ -52,7 +52,7 @@ impl Mutation {
         }
     }
 
-    /// What a case is run with.
+    /// The setting with which the cases are run.
     pub fn setting(self) -> Setting {
         let none = Ablation::default();
         let ablation = match self {
@@ -65,23 +65,23 @@ impl Mutation {
     }
 }
 
-/// A case that failed without a part of the method.
+/// A case that failed under a mutation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failed {
-    /// Its name.
+    /// Name of the case.
     pub name: &'static str,
-    /// The first figure out of its bound.
+    /// The first figure out of its bound, in words.
     pub why: String,
 }
 
-/// What the cases made of a mutation.
+/// Outcome of all cases under one mutation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// The mutation.
+    /// The part that was taken out.
     pub mutation: Mutation,
-    /// Cases that failed, in their order.
+    /// Cases that failed, in the order of the list.
     pub failed: Vec<Failed>,
-    /// Cases that were run.
+    /// Number of cases that were run.
     pub run: usize,
 }
 

@@ -1,4 +1,4 @@
-//! The page: a row per case at a glance, then a section per case with figures, charts and pictures.
+//! The page: an overview with a row per case, then a section per case with figures, charts and pictures.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,7 @@ use super::view;
 use crate::page::html::escape;
 use crate::page::style;
 
-/// Marks of states, lines of charts, cards of cases.
+/// Style of status marks, chart lines and case cards.
 const STYLE: &str = "
 .state { display: inline-block; min-width: 66px; padding: 1px 9px; border-radius: 10px; font-size: 13px; font-weight: 600; text-align: center; color: #fff; }
 .state.passed { background: #1f7a4d; } .state.failed { background: #b3261e; } .state.not-yet { background: #7a8491; }
@@ -31,7 +31,7 @@ svg.plot .line.key { stroke: var(--soft); }
 svg.plot .line.d1 { stroke-dasharray: 7 4; } svg.plot .line.d2 { stroke-dasharray: 2 3; }
 ";
 
-/// The page, which needs nothing beside it.
+/// The page as one self-contained file.
 pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
     let mut out = String::with_capacity(1 << 20);
     out += "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
@@ -108,7 +108,7 @@ fn glance(report: &SuiteReport) -> String {
     out
 }
 
-/// Text whose powers of ten are not broken at their sign.
+/// Text whose powers of ten do not break at their sign.
 fn whole(text: &str) -> String {
     let word = |word: &str| {
         let escaped = escape(word);
@@ -117,12 +117,12 @@ fn whole(text: &str) -> String {
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// The last sentence of a set-up that cannot be run yet.
+/// The last sentence of a set-up that cannot be run yet: it names the missing part.
 fn waits_for(set_up: &str) -> &str {
     set_up.rfind(". ").map_or(set_up, |end| &set_up[end + 2..])
 }
 
-/// The figure that uses most of what its bound allows; one of the case's own rule where there is one.
+/// The figure that uses most of what its bound allows, preferably one of the case's own rule.
 fn closest(figures: &[Figure]) -> Option<&Figure> {
     let used = |figure: &&Figure| match figure.bound {
         Bound::AtMost(bound) if bound > 0.0 => figure.value / bound,
@@ -181,7 +181,7 @@ fn section(report: &CaseReport) -> String {
     out
 }
 
-/// All figures, folded away unless one of them is what is looked for.
+/// All figures, folded away unless one of them is out of bounds.
 fn figures(figures: &[Figure], open: bool) -> String {
     if figures.is_empty() {
         return String::new();

@@ -1,4 +1,4 @@
-//! Picks cases and runs them, several at the same time.
+//! Selects cases and runs several of them in parallel.
 
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,27 +14,27 @@ use super::cases;
 use super::evidence::{Bound, Evidence, Figure};
 use crate::bench::store::Origin;
 
-/// What is run.
+/// The user's choices for a run.
 #[derive(Debug, Clone, Default)]
 pub struct Settings {
-    /// Names or numbers of cases; empty: all.
+    /// Names or numbers of cases; empty for all.
     pub cases: Vec<String>,
-    /// Cases run at the same time; 0: one per hardware thread.
+    /// Number of cases run in parallel; 0 for one per hardware thread.
     pub threads: usize,
-    /// Set to end after the cases that are being run.
+    /// Raised from elsewhere to end after the cases that are under way.
     pub stop: Arc<AtomicBool>,
 }
 
-/// The suite as it was run.
+/// The result of a run.
 #[derive(Debug, Clone)]
 pub struct SuiteReport {
-    /// Build and machine.
+    /// Build and machine of the run.
     pub origin: Origin,
     /// Wall time [s].
     pub seconds: f64,
-    /// Whether it was ended before all cases were run.
+    /// Whether the run ended before all cases were done.
     pub interrupted: bool,
-    /// One report per case that was run, in the order of the list.
+    /// One report per finished case, in the order of the list.
     pub cases: Vec<CaseReport>,
     /// Wall time of every case [s], in the same order.
     pub case_seconds: Vec<f64>,
@@ -47,13 +47,13 @@ impl SuiteReport {
     }
 }
 
-/// Why nothing was run.
+/// Reason why a run failed.
 #[derive(Debug, Error)]
 pub enum StressError {
     /// There is no such case.
     #[error("there is no case '{name}'; the cases are {known}")]
     NoSuchCase {
-        /// What was asked for.
+        /// The name that was given.
         name: String,
         /// Names of all cases.
         known: String,
@@ -61,27 +61,27 @@ pub enum StressError {
     /// A file or directory cannot be written.
     #[error("{path}: {error}")]
     Io {
-        /// Which.
+        /// The file or directory.
         path: PathBuf,
-        /// What the system says.
+        /// The message of the system.
         error: io::Error,
     },
 }
 
-/// A case ended.
+/// Progress, reported whenever a case ends.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
-    /// Cases that are done.
+    /// Number of finished cases.
     pub done: usize,
-    /// Cases to be run.
+    /// Number of cases to run.
     pub total: usize,
-    /// The one that ended last.
+    /// The case that ended last.
     pub case: &'a Case,
-    /// How.
+    /// Outcome of that case.
     pub status: Status,
 }
 
-/// The cases that go by these names or numbers; all of them if there is none.
+/// The cases with these names or numbers; all cases if none is given.
 ///
 /// # Errors
 /// A name that no case has.
@@ -101,7 +101,7 @@ pub fn select(names: &[String]) -> Result<Vec<&'static Case>, StressError> {
     names.iter().map(find).collect()
 }
 
-/// Runs the cases and tells of every one that ends.
+/// Runs the cases and reports each one that ends.
 ///
 /// # Errors
 /// A name that no case has.
@@ -120,7 +120,7 @@ pub fn run(settings: &Settings, progress: &mut dyn FnMut(Progress<'_>)) -> Resul
     })
 }
 
-/// Runs `cases` on a few threads; reports come in the order of `cases`, with their wall times [s].
+/// Runs `cases` on a few threads. Reports are in the order of `cases`, with their wall times [s].
 pub(super) fn run_cases(
     cases: &[&'static Case],
     setting: &Setting,
@@ -156,7 +156,7 @@ pub(super) fn run_cases(
     reports.into_iter().flatten().collect()
 }
 
-/// Runs one case; a panic is a failure like any other.
+/// Runs one case. A panic counts as a failure.
 pub fn run_case(case: &'static Case, setting: &Setting) -> CaseReport {
     let Some(run) = case.run else {
         return CaseReport { case, status: Status::NotYet, reason: None, evidence: Evidence::default() };

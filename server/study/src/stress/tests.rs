@@ -1,4 +1,4 @@
-//! The quick cases, their list, and what is written.
+//! Tests of the quick cases, of their list, and of the written files.
 #![allow(clippy::unwrap_used)]
 
 use super::*;
@@ -51,7 +51,7 @@ fn cases_pass_and_are_the_same_on_every_run() {
     assert!(page.contains("free-fall") && !page.contains("MNaN") && !page.contains("LNaN"));
 }
 
-/// Each mutation is noticed by the cases that are named for it.
+/// Every mutation is noticed by the cases named for it.
 #[test]
 fn every_mutation_is_caught_by_its_named_cases() {
     let mut missed = Vec::new();
@@ -67,7 +67,7 @@ fn every_mutation_is_caught_by_its_named_cases() {
     assert!(missed.is_empty(), "{missed:?}");
 }
 
-/// No scene leads to a mutation.
+/// No scene can select a mutation.
 #[test]
 fn bodies_of_scenes_are_whole() {
     let settings = scindo_physics::body::BodySettings::default();

@@ -1,4 +1,4 @@
-//! A picture of a body: its surface, shaded, lips of cuts in their own colour.
+//! A shaded picture of a body's surface. Lips of cuts have their own colour.
 
 use std::fmt::Write as _;
 
@@ -6,24 +6,24 @@ use nalgebra::Vector3;
 use scindo_physics::body::Body;
 use scindo_physics::cut::Surface;
 
-/// A picture.
+/// A picture of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// What is seen.
+    /// Describes what the picture shows.
     pub caption: String,
-    /// SVG.
+    /// The picture as SVG.
     pub svg: String,
 }
 
-/// Shades of a colour.
+/// Number of shades per colour.
 pub const SHADES: usize = 8;
 const WIDTH: f64 = 320.0;
 const HEIGHT: f64 = 220.0;
 const AIR: f64 = 8.0;
-/// Where the eye is: to the right, in front, above.
+/// Direction to the viewer: from the right, in front and above.
 const EYE: Vector3<f64> = Vector3::new(0.55, -0.75, 0.42);
 
-/// A body as it is now.
+/// Draws a body in its present shape.
 pub fn body(body: &Body, caption: impl Into<String>) -> Picture {
     surface(body.surface(), body.positions(), Vector3::y(), caption)
 }
@@ -41,7 +41,7 @@ pub fn surface(
 }
 
 fn draw(points: &[Vector3<f64>], triangles: &[[u32; 3]], tags: &[u32], up: Vector3<f64>) -> String {
-    // The eye stands in front, to the right and above of what `up` says is upright.
+    // The viewer stands in front, to the right and above with respect to `up`.
     let side = if up.y.abs() > 0.5 { Vector3::z() } else { -Vector3::y() };
     let right = side.cross(&up) * -1.0;
     let eye = (EYE.x * right + EYE.z * up - EYE.y * side).normalize();

@@ -1,10 +1,10 @@
-//! What every case must keep, held at every step: the common rule **C**.
+//! The common rule **C**: what every case must keep, checked at every step.
 //!
-//! Everything stays finite; Σm is constant to 1e-12; the momentum of every part that hangs on nothing
-//! changes by the impulse of gravity and drag, to 1e-6 of the motion there has been; energy never exceeds that
-//! of the start and the work done on the body by more than one percent; no step is left out, divided
-//! or held without being counted. The momentum that a clamp takes up cannot be told from an error, so
-//! clamped parts are left out of the balance.
+//! Everything stays finite. Σm is constant to 1e-12. The momentum of every free part changes by the impulse
+//! of gravity and drag, to 1e-6 of the motion so far. Energy never exceeds the energy of the start and the
+//! work done on the body by more than one percent. No step is left out, divided or held without being
+//! counted. The momentum that a clamp takes up cannot be told from an error, so clamped parts are left out of
+//! the balance.
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodyError, Outcome, SolveReport};
@@ -13,20 +13,20 @@ use scindo_physics::cut::{BladeSweep, CutReport};
 use super::chart::{Chart, Line};
 use super::evidence::Evidence;
 
-/// The worst that was seen of what must be kept.
+/// The worst values seen so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Common {
     /// Largest |Σm/Σm₀ − 1|.
     pub mass: f64,
-    /// Largest missing momentum of a free part, over its mass times the largest mean speed so far.
+    /// Largest missing momentum of a free part, relative to its mass times the largest mean speed so far.
     pub momentum: f64,
-    /// Largest (E − E₀ − W), over the larger of E₀ and W.
+    /// Largest (E − E₀ − W), relative to the larger of E₀ and W.
     pub energy: f64,
-    /// Positions and velocities that were not finite.
+    /// Count of positions and velocities that were not finite.
     pub not_finite: usize,
-    /// Steps that were held, refused, or divided without a notice.
+    /// Count of steps that were held, refused, or divided without a notice.
     pub not_whole: usize,
-    /// Steps.
+    /// Number of steps.
     pub steps: usize,
 }
 
@@ -37,9 +37,9 @@ impl Default for Common {
 }
 
 impl Common {
-    /// Takes over what is worse in `other`.
+    /// Takes over every value of `other` that is worse.
     pub fn merge(&mut self, other: &Common) {
-        // NaN must not get lost.
+        // NaN must win; a plain comparison would lose it.
         let worse = |a: f64, b: f64| if b.is_nan() || b > a { b } else { a };
         self.mass = worse(self.mass, other.mass);
         self.momentum = worse(self.momentum, other.momentum);
@@ -49,7 +49,7 @@ impl Common {
         self.steps += other.steps;
     }
 
-    /// The figures of rule C.
+    /// Adds the figures of rule C.
     pub fn tell(&self, evidence: &mut Evidence) {
         evidence.exactly("C: positions and velocities that are not finite", self.not_finite, 0);
         evidence.at_most("C: largest change of mass", self.mass, 1e-12, "");
@@ -60,20 +60,20 @@ impl Common {
     }
 }
 
-/// A body that is stepped, with everything that is held and drawn.
+/// A body that is stepped, checked and drawn.
 #[derive(Debug)]
 pub struct Watch {
-    /// The body.
+    /// The watched body.
     pub body: Body,
     name: String,
     h: f64,
     gravity: Vector3<f64>,
     mass: f64,
-    /// Kinetic and elastic energy at the start [J], and Σ m g·x.
+    /// Kinetic and elastic energy at the start [J], and Σ m g·x [J].
     start: (f64, f64),
     excess: f64,
     scale: f64,
-    /// Largest Σ m |v| so far, over the mass [m/s].
+    /// Largest Σ m |v| so far, divided by the mass [m/s].
     speed: f64,
     common: Common,
     time: f64,
@@ -116,7 +116,7 @@ impl Watch {
         last(&self.kinetic) + last(&self.elastic)
     }
 
-    /// One step.
+    /// Makes one step and checks it.
     pub fn step(&mut self) -> SolveReport {
         let before = parts(&self.body);
         let report = self.body.step(self.h, self.gravity, &[]);
@@ -144,17 +144,17 @@ impl Watch {
         report
     }
 
-    /// So many steps.
+    /// Makes `n` steps.
     pub fn steps(&mut self, n: usize) {
         for _ in 0..n {
             self.step();
         }
     }
 
-    /// A cut; mass and momentum stay what they are.
+    /// Makes a cut and checks that mass and momentum stay the same.
     ///
     /// # Errors
-    /// What the body says.
+    /// The body refuses the cut.
     pub fn cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
         let (before, scale) = (self.body.momentum(), flow(&self.body));
         let report = self.body.cut(blade, incision)?;
@@ -189,7 +189,7 @@ impl Watch {
         }
     }
 
-    /// What was seen so far, and the charts over time.
+    /// Adds the worst values to `common` and the lines of this body to the charts.
     pub fn finish(self, common: &mut Common, energies: &mut Chart, iterations: &mut Chart) -> Body {
         common.merge(&self.common());
         let name = &self.name;
@@ -201,14 +201,14 @@ impl Watch {
         self.body
     }
 
-    /// What was seen so far.
+    /// The worst values seen so far.
     pub fn common(&self) -> Common {
         let energy = if self.scale > 0.0 { self.excess / self.scale } else { self.excess };
         Common { energy, ..self.common }
     }
 }
 
-/// The two charts most cases have.
+/// The energy chart and the iteration chart that most cases have.
 pub fn charts() -> (Chart, Chart) {
     (
         Chart::new("energy", "time [s]", "energy [J]"),
@@ -245,7 +245,7 @@ fn fall(body: &Body, gravity: Vector3<f64>) -> f64 {
     body.masses().iter().zip(body.positions()).map(|(m, x)| m * gravity.dot(x)).sum()
 }
 
-/// The larger one; NaN wins.
+/// The larger number; NaN wins.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }

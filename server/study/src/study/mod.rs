@@ -1,4 +1,4 @@
-//! The study: every case, configuration after configuration, then the pages.
+//! The study: runs every case and writes the pages.
 
 mod survey;
 
@@ -19,44 +19,44 @@ use crate::page::table::Table;
 use crate::result::StudyResult;
 use crate::settings::{SCENE_S, Settings};
 
-/// Why there is no study.
+/// Reason why a study cannot be made.
 #[derive(Debug, Error)]
 pub enum StudyError {
-    /// A scene.
+    /// A scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A name that is neither case nor file.
+    /// A name is neither a case nor a file.
     #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting", case::NAMES.join(", "))]
     UnknownCase {
-        /// The name.
+        /// The name that was given.
         name: String,
     },
-    /// Narrowing to nothing.
+    /// Narrowing leaves no setting.
     #[error("`{label}` is no setting of {factor} in case {case}; settings: {known}")]
     UnknownSetting {
-        /// The factor.
+        /// The factor that was narrowed.
         factor: &'static str,
-        /// What was asked for.
+        /// The label that was given.
         label: String,
-        /// The case.
+        /// Name of the case.
         case: String,
-        /// What there is.
+        /// Labels that the case has.
         known: String,
     },
-    /// The disk said no.
+    /// A file or directory cannot be written.
     #[error("cannot write {}: {source}; check that the directory is writable and has room", path.display())]
     Io {
-        /// File or directory.
+        /// The file or directory.
         path: PathBuf,
-        /// What the system says.
+        /// The message of the system.
         source: io::Error,
     },
 }
 
-/// Runs a study and writes `points.csv`, `study.json`, a picture per case and `index.html`.
+/// Runs a study and writes `points.csv`, `study.json`, a plot per case and `index.html`.
 ///
 /// # Errors
-/// Bad names or scenes, and a disk that cannot be written. Runs that fail are results.
+/// Bad names, bad scenes, or files that cannot be written. Failed runs are results.
 pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<StudyResult, StudyError> {
     let cases = open(settings)?;
     let origin = Origin::here();
@@ -93,7 +93,7 @@ pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<Study
     Ok(result)
 }
 
-/// Seconds for the next of `waiting` cases: an even share of what is left of the budget.
+/// Time for the next of `waiting` cases [s]: an equal share of the remaining budget.
 fn share(settings: &Settings, case: &Case, waiting: usize, elapsed_s: f64) -> f64 {
     match (settings.within_s, &case.truth) {
         (Some(within_s), _) => (within_s - elapsed_s).max(0.0) / waiting as f64,
@@ -102,7 +102,7 @@ fn share(settings: &Settings, case: &Case, waiting: usize, elapsed_s: f64) -> f6
     }
 }
 
-/// The cases asked for, narrowed.
+/// Opens the requested cases and narrows them.
 fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     let mut cases = Vec::new();
     let threads = threads(settings);
@@ -133,7 +133,7 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     Ok(cases)
 }
 
-/// What is asked for of scenes.
+/// The user's choices that concern scenes.
 fn wishes<'a>(settings: &'a Settings, threads: &'a [usize]) -> Wishes<'a> {
     Wishes {
         seconds: settings.seconds,
@@ -144,13 +144,13 @@ fn wishes<'a>(settings: &'a Settings, threads: &'a [usize]) -> Wishes<'a> {
     }
 }
 
-/// Threads that are asked for.
+/// Numbers of threads that the user asked for.
 fn threads(settings: &Settings) -> Vec<usize> {
     let asked = settings.only.iter().filter(|(factor, _)| *factor == Factor::Threads);
     asked.flat_map(|(_, labels)| labels.iter().filter_map(|label| label.parse().ok())).collect()
 }
 
-/// Meshes of the wished fineness for a case of the program: the shape of the base mesh, scaled.
+/// Replaces the meshes of a built-in case by scaled copies of the base mesh with the wished fineness.
 fn replace_meshes(case: &mut Case, cells: &[usize]) {
     if matches!(case.truth, case::Truth::Refined { .. }) {
         return;
@@ -198,7 +198,7 @@ fn check(case: &Case, factor: Factor, labels: &[String]) -> Result<(), StudyErro
     }
 }
 
-/// One-minute load average, where the system tells.
+/// One-minute load average, if the system reports it.
 fn load() -> Option<f64> {
     std::fs::read_to_string("/proc/loadavg").ok()?.split_whitespace().next()?.parse().ok()
 }

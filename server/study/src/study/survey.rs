@@ -1,9 +1,9 @@
-//! The study of one case: the reference, the points, what is recommended, within a time.
+//! The study of one case within a time: the reference, the points, the recommendation.
 //!
-//! A scene is measured first, which fixes how long a motion is studied and how far the reference may
-//! climb. Half of the time goes to the reference, the other half to configurations: those of the design,
-//! cheap ones first, then neighbours of the best that fits the budget. What is recommended is run once
-//! more before it is.
+//! A scene is measured first. That fixes the length of the motion to study and the levels that the reference
+//! may reach. Half of the time goes to the reference, the other half to configurations. Those of the design
+//! come first, cheapest first, then neighbours of the best one that fits the budget. A recommended
+//! configuration is run once more before it is named.
 
 use crate::advice::pareto::front;
 use crate::advice::recommend::{Candidate, Recommendation, recommend};
@@ -20,25 +20,24 @@ use crate::trial::sight::{SAME, largest_change};
 use crate::trial::{Protocol, Trial};
 use crate::words::{percent, short};
 
-/// Share of a scene's time that is kept for configurations while the reference climbs, and for what
-/// comes after them.
+/// Share of a scene's time that the reference leaves for the configurations and for what follows them.
 const FOR_POINTS: f64 = 0.5;
 const FOR_REST: f64 = 0.15;
 
-/// Error bar above which another way to the reference is tried.
+/// With an error bar above this, another way to the reference is tried.
 const WIDE: f64 = 0.1;
 
-/// Frames that a first look takes.
+/// Number of frames of the first look.
 const LOOK: u32 = 5;
 
-/// Longest time of a run of a case that has no budget [s]; in a quick study. References and twins may
-/// take ten times as long.
+/// Longest time of a run of a case without a budget [s], in a full study and in a quick one. References and
+/// twins may take ten times as long.
 const RUN_S: [f64; 2] = [12.0, 3.0];
 
-/// Configurations that take longer per solution than this many budgets are not run.
+/// Configurations that need more than this many budgets per solution are not run.
 const TOO_SLOW: f64 = 6.0;
 
-/// Studies `case` for at most `seconds`.
+/// Studies `case` within `seconds`.
 pub fn study(bench: &mut Bench<'_>, mut case: Case, seconds: f64) -> CaseResult {
     bench.begin(&case.name, seconds);
     let mut notes = std::mem::take(&mut case.notes);
@@ -65,7 +64,7 @@ pub fn study(bench: &mut Bench<'_>, mut case: Case, seconds: f64) -> CaseResult 
     survey.sources(recommendation.as_ref().and_then(|advice| advice.choice));
     let Survey { points, left_out, .. } = survey;
     let coordinates: Vec<(f64, f64)> = points.iter().map(Outcome::point).collect();
-    // The sources of error are known now, which the words tell.
+    // The sources of error are known by now, so that the text can name them.
     let recommendation = recommendation.map(|advice| words_again(&advice, &points, &reference));
     CaseResult {
         front: front(&coordinates),
@@ -79,7 +78,7 @@ pub fn study(bench: &mut Bench<'_>, mut case: Case, seconds: f64) -> CaseResult 
     }
 }
 
-/// A case of which nothing could be run.
+/// The result of a case in which nothing could be run.
 fn nothing(case: Case, why: String, notes: Vec<String>) -> CaseResult {
     CaseResult {
         case,
@@ -93,8 +92,8 @@ fn nothing(case: Case, why: String, notes: Vec<String>) -> CaseResult {
     }
 }
 
-/// A few frames of the scene as it stands and of the reference's coarsest run: how long the motion can
-/// be, and the estimate that the user hears first.
+/// Runs a few frames of the scene as it stands and of the reference's coarsest run. They show how long the
+/// motion can be, and give the estimate that the user sees first.
 fn look(
     bench: &mut Bench<'_>,
     case: &mut Case,
@@ -122,7 +121,7 @@ fn look(
         let cap_s = 0.1 * total_s;
         let Some(trial) = bench.on(case).run(&ladder.at(0, 1), Ask { timed: false, cap_s }) else { break };
         if trial.is_done() {
-            // The finest of the levels costs about as much as all others with the pilots.
+            // The finest level costs about as much as all others and the pilots together.
             reference_s = 2.0 * bench.on(case).forecast_s(&ladder.at(finest(ladder), 4), false);
             break;
         }
@@ -147,7 +146,7 @@ fn look(
     Ok(())
 }
 
-/// What the study will take.
+/// Tells the user how long the study will take.
 fn estimate(bench: &mut Bench<'_>, case: &Case, first: &Trial, reference_s: f64, total_s: f64) -> String {
     let scale = match case.protocol {
         Protocol::Motion { frames, .. } => f64::from(frames) / f64::from(frames.min(LOOK)),
@@ -182,7 +181,7 @@ fn estimate(bench: &mut Bench<'_>, case: &Case, first: &Trial, reference_s: f64,
     )
 }
 
-/// The reference of a scene: the best way to it that works, as far up as half of the time allows.
+/// The reference of a scene: the best working way to it, refined as far as half of the time allows.
 fn refine(
     bench: &mut Bench<'_>,
     case: &Case,
@@ -230,7 +229,7 @@ fn refine(
     best.reference()
 }
 
-/// Configurations of a case: all of a case of the program, those that its check allows of a scene.
+/// Configurations to try: all of a built-in case, or those of a scene that its check accepts.
 fn candidates(case: &Case) -> Vec<Configuration> {
     let mut all = design(&case.axes, &case.blocks);
     if let Truth::Refined { .. } = case.truth {
@@ -239,14 +238,14 @@ fn candidates(case: &Case) -> Vec<Configuration> {
     all
 }
 
-/// Points of a case under way.
+/// The points of a case while they are run.
 struct Survey<'s, 'a> {
     bench: &'s mut Bench<'a>,
     case: &'s Case,
     reference: &'s Result<Reference, String>,
     points: Vec<Outcome>,
     left_out: usize,
-    /// Time that is kept for what comes after the points [s].
+    /// Time reserved for what follows the points [s].
     keep_s: f64,
 }
 
@@ -255,7 +254,7 @@ impl Survey<'_, '_> {
         matches!(self.case.truth, Truth::Refined { .. })
     }
 
-    /// The design, the base first, then by expected cost where time is short.
+    /// Runs the design: the base first, the others by rising expected cost if time is short.
     fn design(&mut self) {
         let mut all = candidates(self.case);
         if self.is_scene() {
@@ -281,7 +280,7 @@ impl Survey<'_, '_> {
         }
     }
 
-    /// Runs a configuration, where it fits into the time and anywhere near the budget.
+    /// Runs a configuration if it fits into the time and is anywhere near the budget.
     fn point(&mut self, configuration: Configuration) -> bool {
         let keep_s = self.keep_s;
         let is_scene = self.is_scene();
@@ -308,7 +307,7 @@ impl Survey<'_, '_> {
         true
     }
 
-    /// Solutions or frames of a run.
+    /// Number of solutions or frames of a run.
     fn solutions(&self) -> f64 {
         match self.case.protocol {
             Protocol::Static => 4.0,
@@ -316,7 +315,7 @@ impl Survey<'_, '_> {
         }
     }
 
-    /// Neighbours of the best point that fits, as long as they are better.
+    /// Runs neighbours of the best point that fits the budget, as long as they are better.
     fn search(&mut self) {
         if !self.is_scene() || self.reference.is_err() {
             return;
@@ -337,7 +336,7 @@ impl Survey<'_, '_> {
         }
     }
 
-    /// The most accurate point that fits the budget.
+    /// Index of the most accurate point that fits the budget.
     fn best(&self) -> Option<usize> {
         let budget_ms = self.bench.settings().budget_ms.unwrap_or(f64::INFINITY);
         let fitting = self.points.iter().enumerate().filter(|(_, p)| p.trial.cost.p99_ms <= budget_ms);
@@ -345,7 +344,7 @@ impl Survey<'_, '_> {
         known.min_by(|a, b| a.1.point().1.total_cmp(&b.1.point().1)).map(|(i, _)| i)
     }
 
-    /// Configurations that differ in one factor and are new.
+    /// Configurations that differ in one factor and were not run yet.
     fn neighbours(&self, from: &Configuration) -> Vec<Configuration> {
         let keys: Vec<String> = self.points.iter().map(|point| point.configuration.key()).collect();
         let axes = self.case.axes.iter().filter(|axis| {
@@ -359,8 +358,8 @@ impl Survey<'_, '_> {
         new.filter(|c| self.case.scene.apply_sets(&c.overrides()).is_ok()).collect()
     }
 
-    /// What is recommended, after it was run once more: a choice that is slower then is taken with the
-    /// slower time, and may give way to another.
+    /// The recommendation, after its choice was run once more. If the choice is then slower, the slower time
+    /// counts, and another choice may win.
     fn advise(&mut self) -> Option<Recommendation> {
         let budget_ms = self.bench.settings().budget_ms?;
         let mut advice = advise(budget_ms, &self.points, self.reference);
@@ -386,7 +385,7 @@ impl Survey<'_, '_> {
         Some(advice)
     }
 
-    /// Where errors come from: of the choice first, then along the front, as far as the time goes.
+    /// Finds the sources of error: of the choice first, then along the front, as far as time allows.
     fn sources(&mut self, choice: Option<usize>) {
         let Ok(reference) = self.reference else { return };
         let coordinates: Vec<(f64, f64)> = self.points.iter().map(Outcome::point).collect();
@@ -407,7 +406,7 @@ impl Survey<'_, '_> {
     }
 }
 
-/// A point with its errors.
+/// A point with its errors against the reference.
 fn outcome(
     case: &Case,
     reference: &Result<Reference, String>,
@@ -432,7 +431,7 @@ fn advise(budget_ms: f64, points: &[Outcome], reference: &Result<Reference, Stri
     advice
 }
 
-/// The same advice in words that know the sources of error.
+/// The same recommendation with a text that names the sources of error.
 fn words_again(
     advice: &Recommendation,
     points: &[Outcome],

@@ -1,4 +1,4 @@
-//! One run of one configuration: set up, solve or step, time it, and say how it ended.
+//! One run of one configuration: set up, solve or step, measure the time, and classify the outcome.
 
 pub mod series;
 
@@ -22,47 +22,47 @@ use series::Series;
 use sight::Sight;
 use wear::Wear;
 
-/// What a run computes.
+/// The quantity that a run computes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Protocol {
-    /// One equilibrium from rest; its time is the cost, over all steps that relaxation takes.
+    /// One equilibrium from rest. The cost is its time over all steps that relaxation takes.
     Static,
-    /// A motion; the cost is the time to compute one frame.
+    /// A motion. The cost is the time to compute one frame.
     Motion {
         /// Simulated time between the instants that are compared [s].
         frame_s: f64,
-        /// How many of them.
+        /// Number of frames.
         frames: u32,
     },
 }
 
-/// Frames up to which the first counts like any other.
+/// Up to this many frames, the first frame counts like any other.
 const FEW: usize = 11;
 
-/// How much a run may take.
+/// Limits on the time of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Longest time of one run [s]; what takes longer is stopped and counts as failed.
+    /// Longest time of one run [s]. A longer run is stopped and counts as failed.
     pub run_s: f64,
-    /// Time for repetitions of a static solution [s].
+    /// Time for repetitions of a static solution, all together [s].
     pub repeat_s: f64,
-    /// Most repetitions.
+    /// Most repetitions of a static solution.
     pub repeats: usize,
 }
 
-/// How a run ended.
+/// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// It gave a result.
+    /// The run gave a result.
     Done,
-    /// The scene was refused at its check.
+    /// The scene was refused by its check.
     Refused,
-    /// A step was rolled back, or a displacement left every measure.
+    /// A step was rolled back, or a displacement grew beyond all bounds.
     Exploded,
-    /// It ended without a solution.
+    /// The run ended without a solution.
     Failed,
-    /// It took longer than allowed.
+    /// The run took longer than allowed.
     Late,
 }
 
@@ -79,47 +79,47 @@ impl Status {
     }
 }
 
-/// Measured times [ms]. A cost is that of one static solution, or of one frame of a motion. It is the
-/// processor time of the thread that steps, which is the wall time of a machine that does nothing else;
-/// wall time where several threads work on a step.
+/// Measured times [ms]. A cost is the time of one static solution or of one frame of a motion. It is the
+/// processor time of the stepping thread, which equals the wall time on an otherwise idle machine. If several
+/// threads work on a step, it is the wall time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Reading, meshing, cutting and preparing.
+    /// Time to read, mesh, cut and prepare.
     pub setup_ms: f64,
-    /// The first, cold one.
+    /// The first, cold measurement.
     pub first_ms: f64,
-    /// Median.
+    /// Median of the measurements.
     pub median_ms: f64,
-    /// 99th percentile; the slowest where there are fewer than 100. The first frame of a motion stands
-    /// apart, in `first_ms`.
+    /// 99th percentile; the slowest if there are fewer than 100. The first frame of a motion is kept apart,
+    /// in `first_ms`.
     pub p99_ms: f64,
-    /// How many were measured.
+    /// Number of measurements.
     pub count: usize,
 }
 
-/// A run.
+/// The outcome and the result of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// How it ended.
+    /// The outcome.
     pub status: Status,
-    /// Why, where it did not end well; else what is worth knowing, or nothing.
+    /// The reason of a bad outcome; otherwise a remark, or empty.
     pub reason: String,
-    /// What it took.
+    /// The measured times.
     pub cost: Cost,
-    /// Elements of all bodies.
+    /// Number of elements of all bodies.
     pub elements: usize,
-    /// Unknowns of all bodies: three per copy of a node.
+    /// Number of unknowns of all bodies: three per copy of a node.
     pub unknowns: usize,
-    /// Solver iterations per step.
+    /// Mean number of solver iterations per step.
     pub iterations: f64,
-    /// Largest preconditioned residual that a step ended with.
+    /// Largest preconditioned residual at the end of a step.
     pub residual: f64,
-    /// The result; empty where there is none.
+    /// Displacements and energy; empty without a result.
     pub series: Series,
-    /// The mesh after many cuts, where methods of cutting are compared.
+    /// Quality of the mesh after many cuts, if methods of cutting are compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wear: Vec<Wear>,
-    /// What the regions of the scene select on its meshes.
+    /// Extent of the scene's regions on its meshes.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub seen: Vec<Sight>,
 }
@@ -145,13 +145,13 @@ impl Trial {
         }
     }
 
-    /// Whether it gave a result.
+    /// Whether the run gave a result.
     pub fn is_done(&self) -> bool {
         self.status == Status::Done
     }
 }
 
-/// Runs a scene. `None` if `stop` was raised meanwhile. A run that panics has failed; the others go on.
+/// Runs a scene. `None` if `stop` was raised meanwhile. A panic makes this run fail but not the others.
 pub fn run(
     scene: &Scene,
     base_dir: &Path,
@@ -161,7 +161,7 @@ pub fn run(
     stop: &AtomicBool,
 ) -> Option<Trial> {
     let attempt = || attempt(scene, base_dir, threads, protocol, limits, stop);
-    // Nothing that the attempt touches is used again after a panic.
+    // Nothing that the attempt touches is used after a panic.
     catch_unwind(AssertUnwindSafe(attempt)).unwrap_or_else(|_| {
         Some(Trial::without(Status::Failed, "the program panicked in this run".to_owned()))
     })
@@ -200,9 +200,9 @@ fn attempt(
     Some(running.finish(&mut costs))
 }
 
-/// A run under way.
+/// A run in progress.
 struct Running {
-    /// Whether one thread does all the work.
+    /// Whether one thread does all the work, so that its processor time counts.
     alone: bool,
     /// Whether an equilibrium takes many steps.
     relaxes: bool,
@@ -230,7 +230,7 @@ impl Running {
         Some(costs)
     }
 
-    /// Solves from where the body is; milliseconds.
+    /// Solves from the present state and returns the time [ms].
     fn solve(&mut self, stop: &AtomicBool) -> Option<f64> {
         let mut milliseconds = self.step(stop)?;
         while self.relaxes && self.trial.is_done() && !self.has_converged() {
@@ -249,7 +249,7 @@ impl Running {
         self.simulation.report().bodies.iter().all(|body| body.solve.stop == Default::default())
     }
 
-    /// Steps through the frames; milliseconds per frame.
+    /// Steps through the frames and returns the time per frame [ms].
     fn motion(&mut self, frame_s: f64, frames: u32, stop: &AtomicBool) -> Option<Vec<f64>> {
         let step_s = self.simulation.step_s();
         let steps = (f64::from(frames) * frame_s / step_s).round() as u32;
@@ -274,7 +274,7 @@ impl Running {
         Some(costs)
     }
 
-    /// One step; milliseconds without cuts, which belong to the set-up.
+    /// Makes one step and returns its time [ms] without cuts, which belong to the set-up.
     fn step(&mut self, stop: &AtomicBool) -> Option<f64> {
         if stop.load(Ordering::Relaxed) {
             return None;
@@ -351,7 +351,7 @@ impl Running {
     }
 }
 
-/// What the step said, if it was bad.
+/// The outcome that the report of a bad step implies.
 fn verdict(report: &StepReport) -> Option<(Status, String)> {
     if let Some(bad) = report.events.iter().find(|event| event.level == Level::Error) {
         let status = if bad.name == "step-rolled-back" { Status::Exploded } else { Status::Failed };
@@ -375,7 +375,7 @@ impl Cost {
     }
 }
 
-/// An error message on one line, for tables.
+/// An error message reduced to one line, for tables.
 pub fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

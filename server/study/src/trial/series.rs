@@ -1,20 +1,20 @@
-//! What a run leaves for comparison: displacements of the probes and energy, at one or more instants.
+//! Data of a run for comparison: displacements of the probes and energy, at one or more instants.
 
 use serde::{Deserialize, Serialize};
 
 /// Displacements and energy at some instants. A static solution has one instant.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Series {
-    /// Instants, in frames of the case.
+    /// Instants, as frame numbers of the case.
     pub frames: Vec<u32>,
-    /// Displacement [m] of every probe, x y z after each other, instant after instant.
+    /// Displacement of every probe [m]: x, y, z of each probe, instant after instant.
     pub displacement_m: Vec<f64>,
     /// Elastic energy [J] at every instant.
     pub energy_j: Vec<f64>,
 }
 
 impl Series {
-    /// Numbers per instant.
+    /// Number of displacement components per instant.
     pub fn width(&self) -> usize {
         self.displacement_m.len().checked_div(self.frames.len()).unwrap_or(0)
     }
@@ -25,7 +25,7 @@ impl Series {
         &self.displacement_m[i * width..(i + 1) * width]
     }
 
-    /// a·self + b·other at the instants both have.
+    /// a·self + b·other at the common instants.
     pub fn combine(&self, a: f64, other: &Series, b: f64) -> Series {
         let mut out = Series::default();
         for (i, j) in common(self, other) {
@@ -37,7 +37,7 @@ impl Series {
         out
     }
 
-    /// self − other at the instants both have.
+    /// self − other at the common instants.
     pub fn minus(&self, other: &Series) -> Series {
         self.combine(1.0, other, -1.0)
     }
@@ -63,7 +63,7 @@ impl Series {
     }
 }
 
-/// Indices of the instants that both have; both ascend.
+/// Indices of the common instants. Both lists ascend.
 fn common(a: &Series, b: &Series) -> Vec<(usize, usize)> {
     let find = |(i, frame): (usize, &u32)| Some((i, b.frames.binary_search(frame).ok()?));
     a.frames.iter().enumerate().filter_map(find).collect()

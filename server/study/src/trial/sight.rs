@@ -1,4 +1,4 @@
-//! What the regions of a scene hold and load on a mesh: the nodes that lie in them, as area and volume.
+//! What the regions of a scene hold and load on a mesh: number of nodes, area and volume.
 
 use std::collections::BTreeMap;
 
@@ -8,27 +8,27 @@ use scindo_world::scene::Region;
 use scindo_world::simulation::Simulation;
 use serde::{Deserialize, Serialize};
 
-/// A region as a mesh sees it: only whole elements and faces count.
+/// The extent of a region on a mesh. Only whole elements and faces count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sight {
-    /// Which region, as a key such as `body.liver.fix.0`.
+    /// Key of the region, such as `body.liver.fix.0`.
     pub region: String,
-    /// Nodes in it.
+    /// Number of nodes in the region.
     pub nodes: usize,
-    /// Area of boundary faces all of whose nodes lie in it [m²].
+    /// Area of the boundary faces whose nodes all lie in the region [m²].
     pub area_m2: f64,
-    /// Volume of the elements all of whose nodes lie in it [m³].
+    /// Volume of the elements whose nodes all lie in the region [m³].
     pub volume_m3: f64,
 }
 
-/// Change of a region from mesh to mesh that is not worth a word.
+/// A relative change of a region from mesh to mesh below this is not reported.
 pub const SAME: f64 = 0.02;
 
 impl Sight {
     /// Largest relative change of area or volume between two meshes.
     fn change(&self, other: &Sight) -> f64 {
         let relative = |a: f64, b: f64| if a.max(b) > 0.0 { (a - b).abs() / a.max(b) } else { 0.0 };
-        // A volume that is a thin skin of whole elements says little; the area then says it all.
+        // The volume of a thin layer of whole elements says little. The area is then sufficient.
         if self.area_m2.min(other.area_m2) > 0.0 {
             relative(self.area_m2, other.area_m2)
         } else {
@@ -37,13 +37,13 @@ impl Sight {
     }
 }
 
-/// The region that changes most between two meshes, and by how much; both lists are of one scene.
+/// The region that changes most between two meshes, and its change. Both lists belong to one scene.
 pub fn largest_change<'a>(a: &'a [Sight], b: &'a [Sight]) -> Option<(&'a Sight, &'a Sight, f64)> {
     let changes = a.iter().zip(b).map(|(x, y)| (x, y, x.change(y)));
     changes.max_by(|x, y| x.2.total_cmp(&y.2))
 }
 
-/// All regions of a scene on its meshes.
+/// The extent of all regions of a scene on its meshes.
 pub fn look(simulation: &Simulation) -> Vec<Sight> {
     let mut seen = Vec::new();
     for (spec, body) in simulation.scene().bodies.iter().zip(simulation.bodies()) {
@@ -62,7 +62,7 @@ pub fn look(simulation: &Simulation) -> Vec<Sight> {
     seen
 }
 
-/// Faces of one element only.
+/// Faces that belong to one element only.
 fn boundary(mesh: &TetMesh) -> Vec<[u32; 3]> {
     let mut faces = BTreeMap::new();
     for [a, b, c, d] in &mesh.tets {

@@ -1,6 +1,6 @@
-//! What many cuts do to a mesh: quality and size after 1, 10 and 100 of them.
+//! The effect of many cuts on a mesh: quality and size after 1, 10 and 100 cuts.
 //!
-//! The body lies still, weightless and without loads; the first cut is that of the case, the others are
+//! The body lies still, weightless and without loads. The first cut is that of the case. The others are
 //! planes across the beam to seeded random depths, the same for every method.
 
 use std::path::Path;
@@ -16,31 +16,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::random::Random;
 
-/// After how many cuts the mesh is looked at.
+/// Numbers of cuts after which the mesh is measured.
 pub const CUTS: [usize; 3] = [1, 10, 100];
 
 /// The mesh after a number of cuts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Wear {
-    /// Cuts so far.
+    /// Number of cuts so far.
     pub cuts: usize,
     /// Mean ratio of the worst element: 1 regular, 0 flat (Liu, Joe 1994).
     pub quality: f64,
-    /// Elements.
+    /// Number of elements.
     pub elements: usize,
-    /// Pieces that material is divided into inside them; as many as elements where none is.
+    /// Number of pieces inside the elements; equal to the number of elements if none is cut.
     pub pieces: usize,
-    /// Nodes, copies included.
+    /// Number of nodes, copies included.
     pub nodes: usize,
-    /// Least volume fraction of a piece of its element.
+    /// Smallest volume fraction of a piece in its element.
     pub least_fraction: f64,
-    /// Parts that hang together.
+    /// Number of connected parts.
     pub parts: usize,
     /// Time of all cuts so far [ms].
     pub cut_ms: f64,
 }
 
-/// Keys of the scene that leave the body alone.
+/// Overrides that leave the bodies at rest: no gravity, no loads, no held places.
 pub fn at_rest(bodies: &[String]) -> Vec<String> {
     let mut set = vec!["world.gravity_m_s2=[0.0, 0.0, 0.0]".to_owned(), "world.step_s=0.001".to_owned()];
     for id in bodies {
@@ -53,8 +53,7 @@ pub fn at_rest(bodies: &[String]) -> Vec<String> {
     set
 }
 
-/// Cuts the first body of a scene; no more than one cut where `once`. None where the scene is refused
-/// or `stop` was raised.
+/// Cuts the first body of a scene, only once if `once`. `None` if the scene is refused or `stop` was raised.
 pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) -> Option<Vec<Wear>> {
     let mut simulation = Simulation::with_options(scene, base_dir, BuildOptions::default()).ok()?;
     let [low, high] = simulation.bodies().first()?.body.mesh().bounds();
@@ -87,7 +86,7 @@ pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) ->
     Some(found)
 }
 
-/// A sweep across the box from outside to a random depth, tilted at random.
+/// A randomly tilted sweep across the box, from outside to a random depth.
 fn plane(random: &mut Random, cut: usize, low: Vector3<f64>, high: Vector3<f64>) -> CutRequest {
     let size = high - low;
     let across = (0.15 + 0.7 * random.next()) * size.z + low.z;
@@ -100,7 +99,7 @@ fn plane(random: &mut Random, cut: usize, low: Vector3<f64>, high: Vector3<f64>)
     let outside = low.x - 0.1 * size.x;
     CutRequest {
         request: cut as u64,
-        // Every cut is an incision of its own.
+        // Every cut is a separate incision.
         tool: Arc::from(format!("wear-{cut}")),
         body: None,
         segments: vec![

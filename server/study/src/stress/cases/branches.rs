@@ -1,4 +1,4 @@
-//! 5, 6, 9, 12 and 13: halved edges, random cuts, branches, moving tissue, clamps.
+//! Cases 5, 6, 9, 12 and 13: halved edges, random cuts, branches, moving tissue, clamps.
 
 use super::flaws::{mass_of_parts, tell};
 use super::support::{DOWN, L, SOFT, Shaped, V, clamp_left, cube, damped, nodes, plane, slice};
@@ -127,11 +127,11 @@ fn halved(setting: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-/// Positions with the parts moved away from each other, for a picture.
+/// Positions with the parts moved apart, for a picture.
 fn apart(mesh: &TetMesh, pieces: &[Piece], x: &[V]) -> Vec<V> {
     let middle = x.iter().sum::<V>() / x.len() as f64;
     let mut root: Vec<usize> = (0..x.len()).collect();
-    // Few copies: passing labels on until nothing changes is short and clear.
+    // There are few copies, so it is simplest to propagate labels until none changes.
     loop {
         let mut changed = false;
         for piece in pieces {
@@ -170,7 +170,7 @@ fn random(setting: &Setting) -> Result<Evidence, Trouble> {
         clamp_left(&mut body)?;
         let mut watch = Watch::new(format!("seed {seed}"), body, 0.01, DOWN);
         let middle = |watch: &Watch| -> V {
-            // The middle of the clamped part, where it is now.
+            // The present centre of the clamped part.
             let part = watch.body.parts().free.iter().position(|free| !free).unwrap_or(0);
             let of = |c: &usize| watch.body.parts().of_copy[*c] as usize == part;
             let copies: Vec<usize> = (0..watch.body.positions().len()).filter(of).collect();
@@ -271,7 +271,7 @@ fn moving(setting: &Setting) -> Result<Evidence, Trouble> {
     for k in 0..=150 {
         let time = watch.time();
         let at = watch.body.centre_of_mass();
-        // The blade goes along with nothing but the flight, and passes from one side to the other.
+        // The blade moves with the flight and also crosses the body from one side to the other.
         let s = at.x - 0.75 * L + 1.5 * L * f64::from(k) / 150.0;
         let blade = [V::new(s, time - 0.5 * L, at.z), V::new(s, time + 1.5 * L, at.z)];
         watch.cut(&BladeSweep { segments: vec![blade] }, 1)?;

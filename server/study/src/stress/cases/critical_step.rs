@@ -5,7 +5,7 @@ use crate::stress::chart::{Chart, Line};
 use crate::stress::evidence::Evidence;
 use scindo_physics::enrichment::{CutElement, Enrichment, Lumping};
 
-/// Not one of the numbered cases.
+/// Shown beside the numbered cases.
 pub const CASE: Case = Case {
     number: None,
     name: "critical-step",
@@ -38,7 +38,7 @@ const LUMPINGS: [(Lumping, &str); 4] = [
     (Lumping::Menouillard, "Menouillard"),
 ];
 
-/// Cut positions: dense at the ends.
+/// Positions of the cut, dense at both ends.
 fn positions() -> Vec<f64> {
     let end = [1e-4, 3e-4, 1e-3, 3e-3];
     let inner = (1..100).map(|k| f64::from(k) / 100.0);
@@ -56,7 +56,7 @@ fn run(_: &Setting) -> Result<Evidence, Trouble> {
         for (lumping, words) in LUMPINGS {
             let mut points = Vec::new();
             for c in positions() {
-                // Bases whose consistent mass degenerates at the ends have no answer there.
+                // Bases whose consistent mass degenerates at the ends have no result there.
                 let Ok(value) = ratio(c, enrichment, lumping) else { continue };
                 points.push([c, value]);
                 let error = |exact: f64| (value / exact - 1.0).abs();

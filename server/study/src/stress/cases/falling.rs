@@ -1,4 +1,4 @@
-//! 7 and 8: what is cut loose falls.
+//! Cases 7 and 8: what is cut loose falls.
 
 use super::flaws::{mass_of_parts, tell};
 use super::support::{DOWN, L, SOFT, V, clamp_left, cube, slice};
@@ -39,12 +39,12 @@ pub const FRAGMENTS: Case = Case {
     run: Some(fragments),
 };
 
-/// A part of a body, as its copies move it.
+/// A part of a body and the copies that move it.
 struct Fragment {
     mass: f64,
     centre: V,
     momentum: V,
-    /// Density × volume of its pieces at rest.
+    /// Density times rest volume of its pieces [kg].
     weighed: f64,
 }
 
@@ -67,7 +67,7 @@ fn fragments_of(body: &Body) -> Vec<Fragment> {
     all
 }
 
-/// How far the fall of the free fragments is from that of a point mass: by momentum and by way.
+/// Deviation of the free fragments from a falling point mass, in momentum and in distance.
 struct Fall {
     momentum: f64,
     way: f64,

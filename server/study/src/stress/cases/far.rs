@@ -1,4 +1,4 @@
-//! 32: a kilometre away.
+//! Case 32: a kilometre away from the origin.
 
 use super::support::{DOWN, SOFT, V};
 use crate::stress::case::{Case, Setting, Trouble};

@@ -1,11 +1,11 @@
-//! What is true of every cut state, whatever was cut: as figures, with what they may be at most.
+//! Properties that every cut state must have, whatever was cut. They become figures with bounds.
 
 use scindo_physics::body::Body;
 use scindo_physics::cut::Flaws;
 
 use crate::stress::evidence::Evidence;
 
-/// Tells the flaws of cut states as figures.
+/// Records the flaws of a cut state as figures.
 pub fn tell(flaws: &Flaws, evidence: &mut Evidence) {
     evidence.exactly(
         "edges and vertices at which the surface is not closed and 2-manifold",

@@ -1,4 +1,4 @@
-//! 10 and 11: a cut that grows tick by tick, and one that is made again and again.
+//! Cases 10 and 11: a cut that grows tick by tick, and a cut that is repeated.
 
 use super::flaws::tell;
 use super::support::{L, SOFT, V, block, cube, nodes, plane};
@@ -41,7 +41,7 @@ pub const AGAIN: Case = Case {
 /// Edge of a cell [m].
 const CELL: f64 = 0.01;
 
-/// Area [m²] of the lips at rest, and how far along x they reach [m].
+/// Rest area of the lips [m²] and their reach along x [m].
 fn wound(body: &Body) -> (f64, f64) {
     let surface = body.surface();
     let place = |v: u32| surface.vertices[v as usize].position(body.rest_positions());
@@ -54,7 +54,7 @@ fn wound(body: &Body) -> (f64, f64) {
     (area, reach)
 }
 
-/// Mass, momentum and angular momentum, energies.
+/// Mass, momentum, angular momentum and both energies.
 fn measure(body: &Body) -> (f64, V, V, [f64; 2]) {
     let energies = [body.kinetic_energy(), body.elastic_energy()];
     (body.total_mass(), body.momentum(), body.angular_momentum(), energies)

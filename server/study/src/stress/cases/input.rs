@@ -1,4 +1,4 @@
-//! 26: input without meaning.
+//! Case 26: input without meaning.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -43,7 +43,7 @@ fn is_finite(body: &Body) -> bool {
     body.positions().iter().chain(body.velocities()).all(|v| v.iter().all(|c| c.is_finite()))
 }
 
-/// What was asked, refused, carried out, and changed although it was refused.
+/// Requests that were refused, that were carried out, or that changed the body or made it non-finite.
 #[derive(Default)]
 struct Tally {
     refused: usize,
@@ -53,7 +53,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// A request that must be refused and leave the body as it is.
+    /// Makes a request that must be refused and must leave the body as it is.
     fn refuse(&mut self, what: &str, body: &mut Body, ask: impl FnOnce(&mut Body) -> bool) {
         let before = bits(body);
         if ask(body) {
@@ -69,7 +69,7 @@ impl Tally {
         }
     }
 
-    /// A request without a body that must be refused.
+    /// Makes a request without a body that must be refused.
     fn expect(&mut self, what: &str, refused: bool) {
         if refused {
             self.refused += 1;
@@ -92,7 +92,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
     of_materials_and_meshes(setting, &mut tally);
     of_files_and_scenes(&mut tally);
     of_clients(&mut tally)?;
-    // Tiny numbers have a meaning: nearly nothing happens.
+    // Tiny numbers are valid: almost nothing happens.
     let before = body.positions().to_vec();
     body.add_nodal_force(5, V::repeat(TINY))?;
     let step = body.step(TINY, V::repeat(TINY), &[]);
@@ -117,7 +117,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
             evidence.notes.push(format!("{what}: {}.", list.join("; ")));
         }
     }
-    // And life goes on.
+    // The body still works afterwards.
     let end = body.step(0.01, DOWN, &[]);
     evidence.exactly("steps that fail afterwards", usize::from(end.outcome != Outcome::Advanced), 0);
     Ok(evidence)
@@ -126,7 +126,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
 fn of_the_body(tally: &mut Tally, body: &mut Body) {
     for bad in BAD {
         let advances = |outcome: Outcome| outcome == Outcome::Advanced;
-        // 1e300 s is a number, but nothing can be done with it: held, at rest, where it was.
+        // 1e300 s is a finite number but an impossible step: the body is held, at rest, where it was.
         if !bad.is_finite() {
             tally.refuse(&format!("a step of {bad} s"), body, |b| advances(b.step(bad, DOWN, &[]).outcome));
         }
@@ -160,7 +160,7 @@ fn of_the_body(tally: &mut Tally, body: &mut Body) {
                 b.cut(&BladeSweep { segments: blade.to_vec() }, 9).is_ok()
             });
         }
-        // A spring that is no spring is left out of the step and counted.
+        // An invalid spring is left out of the step and counted.
         let target_m = V::new(0.0, bad, 0.0);
         let spring = PointSpring {
             copies: [0, 1, 2, 3],
@@ -241,7 +241,7 @@ fn of_files_and_scenes(tally: &mut Tally) {
         );
         let obj = format!("v 0 0 0\nv {bad} 0 0\nv 0 1 0\nf 1 2 3\n");
         for (name, text) in [("tet.vtk", vtk), ("face.obj", obj)] {
-            // 1e300 is a number; what it makes of a mesh is refused when a body is made of it.
+            // 1e300 is a finite number. A mesh scaled by it is refused later, when a body is made of it.
             if bad != "1e300" {
                 let read = read_mesh_bytes(name, text.as_bytes());
                 tally.expect(&format!("{name} with a node at {bad}"), read.is_err());
@@ -250,7 +250,7 @@ fn of_files_and_scenes(tally: &mut Tally) {
     }
 }
 
-/// Poses and cuts of clients: the simulation goes on as if they had not come.
+/// Poses and cuts of clients: the simulation goes on as if they had not arrived.
 fn of_clients(tally: &mut Tally) -> Result<(), Trouble> {
     let scene = Scene::from_toml(SCENE)?;
     let mut plain = Simulation::new(&scene, Path::new("."))?;

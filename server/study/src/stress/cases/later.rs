@@ -1,11 +1,11 @@
-//! Cases of parts that are still to come: listed, never passed.
+//! Cases that need parts which are not built yet. They are listed and never passed.
 
 use crate::stress::case::Case;
 
 const NOT_YET: Case =
     Case { number: None, name: "", title: "", set_up: "", rule: "", source: "", quick: true, run: None };
 
-/// 24.
+/// Case 24.
 pub const JAB: Case = Case {
     number: Some(24),
     name: "tool-jab",
@@ -16,7 +16,7 @@ pub const JAB: Case = Case {
     ..NOT_YET
 };
 
-/// 25.
+/// Case 25.
 pub const PACKETS: Case = Case {
     number: Some(25),
     name: "packet-loss",
@@ -27,7 +27,7 @@ pub const PACKETS: Case = Case {
     ..NOT_YET
 };
 
-/// 27.
+/// Case 27.
 pub const WALL: Case = Case {
     number: Some(27),
     name: "haptic-wall",
@@ -38,7 +38,7 @@ pub const WALL: Case = Case {
     ..NOT_YET
 };
 
-/// 28.
+/// Case 28.
 pub const LIPS: Case = Case {
     number: Some(28),
     name: "lips-in-contact",
@@ -49,7 +49,7 @@ pub const LIPS: Case = Case {
     ..NOT_YET
 };
 
-/// 29.
+/// Case 29.
 pub const BLADES: Case = Case {
     number: Some(29),
     name: "blade-grid",
@@ -60,7 +60,7 @@ pub const BLADES: Case = Case {
     ..NOT_YET
 };
 
-/// 30.
+/// Case 30.
 pub const SOAK: Case = Case {
     number: Some(30),
     name: "soak",
@@ -71,7 +71,7 @@ pub const SOAK: Case = Case {
     ..NOT_YET
 };
 
-/// 31.
+/// Case 31.
 pub const OVERLOAD: Case = Case {
     number: Some(31),
     name: "overload",

@@ -1,4 +1,4 @@
-//! The list of hard cases, in their order.
+//! The list of hard cases, in order.
 
 mod flaws;
 mod branches;
@@ -17,7 +17,7 @@ mod support;
 
 use super::case::Case;
 
-/// All cases: the numbered ones, then what is shown beside them.
+/// All cases: first the numbered ones, then those shown beside them.
 pub const ALL: &[Case] = &[
     sliver::CASE,
     on_mesh::NODE,

@@ -1,4 +1,4 @@
-//! 2, 3 and 4: cuts through nodes, along edges and along faces of the mesh.
+//! Cases 2, 3 and 4: cuts through nodes, along edges and along faces of the mesh.
 
 use super::flaws::tell;
 use super::support::{DOWN, SOFT, Shaped, V, block, nodes, plane};
@@ -63,7 +63,7 @@ pub const FACE: Case = Case {
     run: Some(face),
 };
 
-/// Edge of the cube [m]: nodes lie at dyadic numbers, so that "exactly" means exactly.
+/// Edge of the cube [m]. Nodes lie at dyadic numbers, so that "exactly" means exactly.
 const EDGE_M: f64 = 0.125;
 
 fn mesh() -> TetMesh {
@@ -87,7 +87,7 @@ fn far_side(X: &V) -> bool {
     X.y == EDGE_M
 }
 
-/// Where the middle of every element is that is one piece; none for the others.
+/// Centre of every element that is still one piece; `None` for the others.
 fn middles(body: &Body) -> Vec<Option<V>> {
     let mut middle = vec![None; body.mesh().tets.len()];
     for piece in body.pieces().iter().filter(|piece| piece.fraction == 1.0) {
@@ -151,7 +151,7 @@ fn on_mesh(setting: &Setting, normals: &[V]) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-/// Cubes in general position, with every blade position of the sweep exactly across edges of the mesh.
+/// Cubes in general position. Every blade position of the sweep lies exactly across edges of the mesh.
 fn seams(setting: &Setting, evidence: &mut Evidence) -> Result<(), Trouble> {
     let mut wrong = 0;
     for seed in 0..60 {
@@ -173,7 +173,7 @@ fn seams(setting: &Setting, evidence: &mut Evidence) -> Result<(), Trouble> {
     Ok(())
 }
 
-/// The mesh whose nodes at z = ½ and y < `to` (in edges) exist twice: once below, once above.
+/// A mesh whose nodes at z = ½ and y < `to` (in edges) exist twice, once below and once above.
 fn duplicated(to: f64) -> TetMesh {
     let mut mesh = mesh();
     let on = |X: &V| X.z == 0.5 * EDGE_M && X.y < to * EDGE_M;

@@ -1,4 +1,4 @@
-//! 14 to 17: bodies that start inverted, collapsed, flat, stretched, scrambled.
+//! Cases 14 to 17: bodies that start inverted, collapsed, flat, stretched or scrambled.
 
 use super::support::{L, V, cube};
 use crate::stress::case::{Case, Setting, Trouble};
@@ -90,14 +90,14 @@ pub const SCRAMBLED: Case = Case {
     run: Some(scrambled),
 };
 
-/// Start positions from the number and the rest position of a node; the cube is centred at 0.
+/// Maps index and rest position of a node to its start position. The cube is centred at the origin.
 type Ruin = fn(usize, &V) -> V;
 
 const H: f64 = 0.02;
 const STEPS: usize = 250;
 
 fn material(law: Law) -> Material {
-    // Drag takes away the spin that a body gets from its recovery: a spin of ω alone strains it by
+    // Drag removes the spin that a body acquires while it recovers. A spin of ω alone strains the body by
     // ρω²L²/E, up to 1e-4.
     let rayleigh = Rayleigh { mass_1_s: 0.5, stiffness_s: 0.0 };
     Material { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1e3, rayleigh, law }
@@ -111,7 +111,7 @@ fn noise(i: usize) -> V {
     })
 }
 
-/// Fast path and Newton's method for the corotational law, Newton's method for the others.
+/// The corotational law on the fast path and with Newton's method; the other laws with Newton's method.
 fn bodies(setting: &Setting, cells: usize) -> Result<[(&'static str, Body); 4], Trouble> {
     let mut mesh = cube(cells);
     mesh.nodes.iter_mut().for_each(|X| *X -= V::repeat(0.5 * L));
@@ -130,7 +130,7 @@ fn bodies(setting: &Setting, cells: usize) -> Result<[(&'static str, Body); 4], 
     ])
 }
 
-/// Largest error of a distance between two nodes, over the edge.
+/// Largest error of a distance between two nodes, relative to the edge.
 fn shape_error(body: &Body) -> f64 {
     let (x, X) = (body.positions(), body.rest_positions());
     let pairs = (0..x.len()).flat_map(|i| (0..i).map(move |j| (i, j)));

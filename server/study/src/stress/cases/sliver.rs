@@ -1,4 +1,4 @@
-//! 1: a cut that leaves next to nothing on one side of an element.
+//! Case 1: a cut that leaves almost nothing on one side of an element.
 
 use super::support::{DOWN, L, SOFT, V, clamp_left, cube, slice};
 use crate::stress::case::{Case, Setting, Trouble};
@@ -35,7 +35,8 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
         let name = fraction.map_or("uncut".to_owned(), short);
         let mut watch = Watch::new(name.clone(), body, 0.02, DOWN);
         if let Some(fraction) = fraction {
-            // A tetrahedron with one node beyond the plane keeps t³ there, t of each edge.
+            // A tetrahedron with one node beyond the plane keeps the volume fraction t³ there, and t of each
+            // edge.
             let at = 0.5 + fraction.cbrt() / 6.0;
             watch.cut(&slice(at, -5.0, 0.5), 1)?;
             let least = watch.body.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min);

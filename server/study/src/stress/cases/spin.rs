@@ -1,4 +1,4 @@
-//! 18, 19 and 20: free spin with implicit integrators, over four decades of step length.
+//! Cases 18, 19 and 20: free spin with implicit integrators, over four decades of step length.
 
 use super::support::{L, V, cube};
 use crate::stress::case::{Case, Setting, Trouble};
@@ -73,7 +73,7 @@ fn newton(scheme: Scheme, steps: u32) -> BodySettings {
     }
 }
 
-/// Fast path, or with settings.
+/// A spinning body, on the fast path or with the given settings.
 fn spinning(
     setting: &Setting,
     young: f64,
@@ -93,15 +93,15 @@ fn spinning(
     Ok(body)
 }
 
-/// What a spin looked like, relative to its start.
+/// Measurements of a spin, relative to its start.
 struct Spin {
     most_energy: f64,
     momentum: f64,
-    /// Largest growth of the angular momentum in a step.
+    /// Largest growth of the angular momentum in one step.
     growth: f64,
-    /// Largest diagonal.
+    /// Largest length of the diagonal.
     size: f64,
-    /// Steps with something to tell.
+    /// Steps that reported something.
     notices: usize,
     /// Angular momentum over time.
     path: Vec<[f64; 2]>,
@@ -157,10 +157,10 @@ fn step_sweep(setting: &Setting) -> Result<Evidence, Trouble> {
                     let spin = spin(&mut watch, (seconds / h).round() as usize);
                     let excess = spin.most_energy - 1.0;
                     worst = if excess.is_nan() || excess > worst { excess } else { worst };
-                    // The first step of a spin that is too fast for the fast path.
+                    // On the fast path this spin turns too far in its first step.
                     fast_turns += u32::from(with.is_none() && omega * h > 4.5);
                     told += u32::from(with.is_none() && spin.notices > 0);
-                    // The first step of BDF2 is Euler's: there is always something to tell.
+                    // BDF2 starts with a step of implicit Euler, so it always has something to report.
                     silent += usize::from(name == "BDF2" && spin.notices == 0);
                     if young == 1e5 && omega == 10.0 && (h == 2e-2 || h == 0.2) {
                         watch.finish(&mut common, &mut energies, &mut iterations);
@@ -201,8 +201,8 @@ fn free_spin(setting: &Setting) -> Result<Evidence, Trouble> {
     let (mut energies, mut iterations) = charts();
     let mut momenta = Chart::new("angular momentum over that of the start", "time [s]", "L / L₀");
     for omega in [10.0, 40.0] {
-        // Stiff enough that the centrifugal load itself stretches it by little: 1.2 % at 40 rad/s for
-        // 1e5 Pa.
+        // Stiff enough that the centrifugal load itself stretches the body only a little: 1.2 % at 40 rad/s
+        // for 1e5 Pa.
         let young = if omega > 20.0 { 1e6 } else { 1e5 };
         for h in [5e-3, 2e-2] {
             let paths =

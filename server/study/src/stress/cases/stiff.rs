@@ -1,4 +1,4 @@
-//! 21, 22 and 23: stiffness a million times larger next door, near incompressibility, ruined meshes.
+//! Cases 21, 22 and 23: a stiffness ratio of a million, near incompressibility, ruined meshes.
 
 use super::support::{DOWN, L, SOFT, V, block, clamp_left, cube, nodes};
 use crate::stress::case::{Case, Setting, Trouble};
@@ -60,7 +60,7 @@ pub const NEEDLES: Case = Case {
     run: Some(needles),
 };
 
-/// Elements of one stiffness as a mesh of their own, with the number of every node in the whole.
+/// The elements of one stiffness as a separate mesh, with the index of every node in the whole mesh.
 fn part_of(mesh: &TetMesh, chosen: impl Fn(&V) -> bool) -> (TetMesh, Vec<u32>) {
     let middle = |e: usize| mesh.corners(e).iter().sum::<V>() / 4.0;
     let tets: Vec<[u32; 4]> =
@@ -77,7 +77,7 @@ fn linear(young_pa: f64) -> Material {
     Material { young_pa, poisson: 0.33, density_kg_m3: 1e3, rayleigh: Rayleigh::default(), law: Law::Linear }
 }
 
-/// K [N/m] of a mesh whose elements are stiff where `stiff` says so.
+/// Stiffness K [N/m] of a mesh whose elements are stiff where `stiff` holds.
 fn stiffness(mesh: &TetMesh, stiff: &dyn Fn(&V) -> bool) -> Result<BlockCsr<f64>, Trouble> {
     let whole = Model::tet4(mesh, &linear(1e3), Volumetric::Full)?;
     let mut K = whole.pattern();
@@ -169,7 +169,7 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-/// How far corner, centre and mean of the top came down, in edges; and V/V₀ − 1.
+/// Downward motion of corner, centre and mean of the top, in edges, and the volume change V/V₀ − 1.
 struct Compressed {
     top: [f64; 3],
     volume: f64,
@@ -257,7 +257,7 @@ fn incompressible(setting: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-/// Splits tet `e` at the point with these barycentric coordinates, all positive.
+/// Splits tet `e` at the point with these barycentric coordinates, all of them positive.
 fn split(mesh: &mut TetMesh, e: usize, weights: [f64; 4]) {
     let corners = mesh.corners(e);
     let sum: f64 = weights.iter().sum();
@@ -265,7 +265,7 @@ fn split(mesh: &mut TetMesh, e: usize, weights: [f64; 4]) {
     let (nodes, apex) = (mesh.tets[e], mesh.nodes.len() as u32);
     mesh.nodes.push(point);
     for k in 0..4 {
-        // The point takes the place of corner k, on the inner side of the face opposite to it.
+        // The point replaces corner k, on the inner side of the opposite face.
         let mut tet = nodes;
         tet[k] = apex;
         if k == 0 { mesh.tets[e] = tet } else { mesh.tets.push(tet) }

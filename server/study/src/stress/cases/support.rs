@@ -53,8 +53,7 @@ pub fn clamp_left(body: &mut Body) -> Result<Vec<u32>, Trouble> {
     Ok(clamp)
 }
 
-/// A blade that spans z and sweeps the plane x = `at` from y = `from` to `to`, all in edges of the
-/// cube.
+/// A blade that spans z and sweeps the plane x = `at` from y = `from` to `to`, all in edges of the cube.
 pub fn slice(at: f64, from: f64, to: f64) -> BladeSweep {
     let segment = |y: f64| [V::new(at, y, -5.0) * L, V::new(at, y, 5.0) * L];
     BladeSweep { segments: vec![segment(from), segment(to)] }
@@ -85,7 +84,7 @@ impl Shaped {
         Self { mesh, x }
     }
 
-    /// Sweeps; new copies are where the copies are that they were split from.
+    /// Sweeps a blade. New copies start at the positions of the copies that they were split from.
     pub fn sweep(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, Trouble> {
         let report = self.mesh.sweep(&self.x, blade, incision)?;
         for new in &report.new_copies {
@@ -99,7 +98,7 @@ impl Shaped {
         [self.mesh.components().len(), self.mesh.pieces().len(), self.mesh.n_copies()]
     }
 
-    /// Rest volumes of the parts [m³], the smallest first.
+    /// Rest volumes of the parts [m³], ascending.
     pub fn volumes(&self) -> Vec<f64> {
         let mut volumes = self.mesh.components().volume;
         volumes.sort_by(f64::total_cmp);
