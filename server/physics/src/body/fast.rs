@@ -185,20 +185,25 @@ impl Fast {
         let mut made_with = if report.substeps == 1 { scheme } else { Scheme::ImplicitEuler };
         if self.multistep.is_newmark() {
             let driven = is_driven(&self.before, inputs.fixed);
+            let may_repeat = made_with != Scheme::ImplicitEuler;
             let excess = match report.outcome {
-                Outcome::Advanced => self.excess(team, mesh, state, inputs, (rest, driven)),
+                Outcome::Advanced => self
+                    .excess(team, (mesh, state), inputs, rest, (driven, may_repeat))
+                    .filter(|_| may_repeat),
                 _ => None,
             };
-            if let (Some(excess_j), true) = (excess, made_with != Scheme::ImplicitEuler) {
+            if let Some(excess_j) = excess {
                 state.copy_from(&self.before);
                 made_with = Scheme::ImplicitEuler;
                 let iterations = report.iterations;
                 report = self.attempts(team, mesh, state, (made_with, inputs), spring_forces);
                 report.iterations += iterations;
                 report.notice = report.notice.or(Some(Notice::EnergyGained { excess_j }));
+                if report.outcome == Outcome::Advanced {
+                    self.excess(team, (mesh, state), inputs, rest, (driven, false));
+                }
             }
-            if excess.is_some() || report.outcome != Outcome::Advanced {
-                // The energy that is there now is what there is.
+            if report.outcome != Outcome::Advanced {
                 self.multistep.forget_energy();
             }
         }
@@ -221,18 +226,18 @@ impl Fast {
         why_no_equilibrium(held, inputs.material.law, rest, &f_ext, !inputs.springs.is_empty())
     }
 
-    /// Energy [J] that a step of Newmark's method gained without work; `None` within its allowance.
+    /// [`Multistep::end_energy`].
     fn excess(
         &mut self,
         team: &mut Team,
-        mesh: &CutMesh,
-        state: &State,
+        (mesh, state): (&CutMesh, &State),
         inputs: &StepInputs<'_>,
-        (rest, driven): (&[Vector3<f64>], bool),
+        rest: &[Vector3<f64>],
+        how: (bool, bool),
     ) -> Option<f64> {
         let Self { multistep, elastic, places, partial, before, .. } = self;
         let stored = held_energy(team, mesh, (elastic, places), &state.x, (inputs.material, partial));
-        multistep.end_energy((before, state), inputs, (rest, stored), driven)
+        multistep.end_energy((before, state), inputs, (rest, stored), how)
     }
 
     /// Makes the step with one scheme. If the result is not finite or a free part gained energy, the step

@@ -192,13 +192,13 @@ impl Multistep {
 
     /// Ends the energy balance at `state` after a step from `before`. Returns the energy [J] gained
     /// without work, if it is more than a conserving scheme may gain. `driven` tells that prescribed
-    /// copies moved and put energy in.
+    /// copies moved and put energy in. A step that may be made again is booked only if it gained none.
     pub fn end_energy(
         &mut self,
         (before, state): (&State, &State),
         inputs: &StepInputs<'_>,
         (rest, stored_j): (&[Vector3<f64>], f64),
-        driven: bool,
+        (driven, may_repeat): (bool, bool),
     ) -> Option<f64> {
         let kinetic_before = kinetic(before, inputs);
         let moved = state.x.iter().zip(&before.x).enumerate();
@@ -206,7 +206,7 @@ impl Multistep {
         let allowed = GAIN_CONSERVING * (kinetic_before + self.stored_j.unwrap_or(0.0) + exchanged.abs());
         let H = kinetic(state, inputs) + stored_j + load_energy(&state.x, inputs, rest);
         let excess = if driven { None } else { self.ledger.excess(H, allowed) };
-        if excess.is_none() {
+        if excess.is_none() || !may_repeat {
             self.stored_j = Some(stored_j);
             self.ledger.end(H, driven);
         }
