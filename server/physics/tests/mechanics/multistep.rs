@@ -108,7 +108,8 @@ fn a_spinning_body_gains_no_energy() {
             let spin = Vector3::new(0.3, 0.2, 1.0).normalize() * omega;
             let v: Vec<_> =
                 body.rest_positions().iter().map(|X| spin.cross(&(X - Vector3::repeat(0.05)))).collect();
-            body.set_state(&body.rest_positions().to_vec(), &v).unwrap();
+            let rest = body.rest_positions().to_vec();
+            body.set_state(&rest, &v).unwrap();
             let start = body.kinetic_energy() + body.elastic_energy();
             for _ in 0..200 {
                 let report = body.step(0.01, Vector3::zeros(), &[]);
