@@ -158,6 +158,7 @@ impl StepInputs<'_> {
     /// Whether both steps have the same loads and prescribed positions, and none has springs.
     pub(super) fn is_loaded_as(&self, known: &KnownLoads) -> bool {
         self.springs.is_empty()
+            && known.material == Some(*self.material)
             && known.gravity == self.gravity
             && known.load == self.load
             && known.fixed == self.fixed
@@ -167,6 +168,7 @@ impl StepInputs<'_> {
 /// The loads of a step, to be compared with those of the next.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KnownLoads {
+    material: Option<Material>,
     gravity: Vector3<f64>,
     load: Vec<Vector3<f64>>,
     fixed: Vec<FixedCopy>,
@@ -175,6 +177,7 @@ pub(super) struct KnownLoads {
 impl KnownLoads {
     /// Records the loads of `inputs`.
     pub(super) fn note(&mut self, inputs: &StepInputs<'_>) {
+        self.material = Some(*inputs.material);
         self.gravity = inputs.gravity;
         self.load.clear();
         self.load.extend_from_slice(inputs.load);

@@ -4,7 +4,8 @@
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::body::{
-    Arithmetic, Body, BodySettings, Notice, Outcome, PcgSettings, PointSpring, Scheme, SpringKind, StopReason,
+    Arithmetic, Body, BodySettings, Constants, Notice, Outcome, PcgSettings, PointSpring, Scheme, SpringKind,
+    StopReason,
 };
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material};
@@ -104,6 +105,20 @@ fn relaxation_goes_on_where_it_ended() {
         body.step(0.02, Vector3::zeros(), &[]);
     }
     assert!(sag(&body) < 1e-3 * sag(&exact));
+    // Half as stiff, twice the sag.
+    let Material { young_pa, poisson, rayleigh, .. } = *body.material();
+    body.set_constants(Constants { young_pa: 0.5 * young_pa, poisson, rayleigh }).unwrap();
+    for _ in 0..100 {
+        body.step(0.02, DOWN, &[]);
+    }
+    let ratio = sag(&body) / sag(&exact);
+    assert!((1.998..2.002).contains(&ratio), "{ratio}");
+    body.set_constants(Constants { young_pa, poisson, rayleigh }).unwrap();
+    for _ in 0..100 {
+        body.step(0.02, DOWN, &[]);
+    }
+    let ratio = sag(&body) / sag(&exact);
+    assert!((0.999..1.001).contains(&ratio), "{ratio}");
 }
 
 #[test]
