@@ -3,6 +3,7 @@
 
 use nalgebra::Vector3;
 
+use super::held_energy::HeldEnergy;
 use super::{Outcome, SolveReport};
 use crate::cut::{CutMesh, NewCopy};
 use crate::element::{Simd, deformation_gradient, piece_energy};
@@ -10,10 +11,9 @@ use crate::integrator::{
     FreeMotion, Inertia, LinearStep, LooseParts, Multistep, Notice, Scheme, SpinGuard, State, StepInputs,
     StepOutcome, WEIGHTLESS, free_motions, why_no_equilibrium,
 };
-use crate::material::Material;
-use crate::operator::{BLOCK, Elastic, FixedCopy, Place, StiffModes, degenerate_elements};
+use crate::operator::{Elastic, FixedCopy, StiffModes, degenerate_elements};
 use crate::reserve::{refill, resize_reserving};
-use crate::team::{Team, blocks};
+use crate::team::Team;
 
 /// A step that fails is tried again in 2 and then in 4 parts.
 const MOST_HALVINGS: u32 = 2;
@@ -45,9 +45,8 @@ pub(super) struct Fast {
     multistep: Multistep,
     /// Rigid motions of held parts that the constraints leave free; found for equilibria only.
     free_motions: Vec<FreeMotion>,
-    /// Where the operator keeps the rotation of every piece; for the energy of Newmark's method.
-    places: Vec<Place>,
-    partial: Vec<f64>,
+    /// For the energy balance of Newmark's method.
+    held: HeldEnergy,
     /// Degenerate elements of the mesh, ascending.
     degenerate: Vec<u32>,
     weightless: Vec<Weightless>,
@@ -73,8 +72,7 @@ impl Fast {
             scheme,
             multistep: Multistep::new(scheme),
             free_motions: Vec::new(),
-            places: Vec::new(),
-            partial: Vec::new(),
+            held: HeldEnergy::default(),
             degenerate: degenerate_elements(mesh.mesh()),
             weightless: Vec::new(),
             before: State::default(),
@@ -115,8 +113,7 @@ impl Fast {
         self.integrator.resize(mesh.n_copies());
         self.multistep.resize(mesh.n_copies());
         if self.multistep.is_newmark() {
-            self.places = self.elastic.places();
-            self.partial.resize(mesh.pieces().len().div_ceil(BLOCK), 0.0);
+            self.held.follow(mesh, &self.elastic);
         }
         self.integrator.set_stiff_modes(self.stiff_modes(mesh));
         // A step fills these and must not allocate.
@@ -177,8 +174,8 @@ impl Fast {
             integrator.accelerate(team, elastic, state, &inputs, multistep.acceleration_mut());
         }
         if self.multistep.is_newmark() {
-            let Self { multistep, elastic, places, partial, .. } = self;
-            let stored = || held_energy(team, mesh, (elastic, places), &state.x, (inputs.material, partial));
+            let Self { multistep, elastic, held, .. } = self;
+            let stored = || held.at(team, elastic, &state.x, inputs.material);
             multistep.begin_energy(state, inputs, rest, stored);
         }
         let mut report = self.attempts(team, mesh, state, (scheme, inputs), spring_forces);
@@ -187,9 +184,9 @@ impl Fast {
             let driven = is_driven(&self.before, inputs.fixed);
             let may_repeat = made_with != Scheme::ImplicitEuler;
             let excess = match report.outcome {
-                Outcome::Advanced => self
-                    .excess(team, (mesh, state), inputs, rest, (driven, may_repeat))
-                    .filter(|_| may_repeat),
+                Outcome::Advanced => {
+                    self.excess(team, state, inputs, rest, (driven, may_repeat)).filter(|_| may_repeat)
+                }
                 _ => None,
             };
             if let Some(excess_j) = excess {
@@ -200,7 +197,7 @@ impl Fast {
                 report.iterations += iterations;
                 report.notice = report.notice.or(Some(Notice::EnergyGained { excess_j }));
                 if report.outcome == Outcome::Advanced {
-                    self.excess(team, (mesh, state), inputs, rest, (driven, false));
+                    self.excess(team, state, inputs, rest, (driven, false));
                 }
             }
             if report.outcome != Outcome::Advanced {
@@ -230,13 +227,13 @@ impl Fast {
     fn excess(
         &mut self,
         team: &mut Team,
-        (mesh, state): (&CutMesh, &State),
+        state: &State,
         inputs: &StepInputs<'_>,
         rest: &[Vector3<f64>],
         how: (bool, bool),
     ) -> Option<f64> {
-        let Self { multistep, elastic, places, partial, before, .. } = self;
-        let stored = held_energy(team, mesh, (elastic, places), &state.x, (inputs.material, partial));
+        let Self { multistep, elastic, held, before, .. } = self;
+        let stored = held.at(team, elastic, &state.x, inputs.material);
         multistep.end_energy((before, state), inputs, (rest, stored), how)
     }
 
@@ -359,41 +356,6 @@ impl Fast {
 fn is_driven(before: &State, fixed: &[FixedCopy]) -> bool {
     let moves = |f: &FixedCopy| (0..3).any(|k| f.axes[k] && f.position_m[k] != before.x[f.copy as usize][k]);
     fixed.iter().any(moves)
-}
-
-/// Elastic energy [J] at `x` [m] with the rotations of the last update. Each block of pieces sums into
-/// one entry of `partial`. Where these rotations are not those of `x`, the result is slightly too large.
-fn held_energy(
-    team: &mut Team,
-    mesh: &CutMesh,
-    (elastic, places): (&Elastic, &[Place]),
-    x: &[Vector3<f64>],
-    (material, partial): (&Material, &mut [f64]),
-) -> f64 {
-    let lame = material.lame();
-    team.for_blocks(blocks(partial, 1), |block, partial| {
-        let first = block * BLOCK;
-        let pieces = &mesh.pieces()[first..mesh.pieces().len().min(first + BLOCK)];
-        partial[0] = pieces
-            .iter()
-            .zip(&places[first..])
-            .map(|(piece, place)| {
-                let e = piece.element as usize;
-                let F = deformation_gradient(
-                    &piece.copies.map(|copy| x[copy as usize]),
-                    &mesh.mesh().gradients(e),
-                );
-                let volume = piece.fraction * mesh.mesh().volume(e);
-                if !material.law.rotates() {
-                    return piece_energy(material.law, lame, &F, volume);
-                }
-                let R = elastic.rotation(*place).map(f64::from);
-                let stretch = R.tr_mul(&F).trace() - 3.0;
-                volume * (lame.mu * (F - R).norm_squared() + 0.5 * lame.lambda * stretch * stretch)
-            })
-            .sum();
-    });
-    partial.iter().sum()
 }
 
 /// Kinetic and elastic energy of the free parts, and Σ f·x of gravity and loads on them [J].

@@ -7,6 +7,7 @@ mod cutting;
 mod error;
 mod fast;
 mod general;
+mod held_energy;
 mod measures;
 mod precision;
 mod range;
