@@ -3,6 +3,8 @@
 use nalgebra::Vector3;
 
 use super::State;
+use super::guard::LARGEST_TURN;
+use super::notice::Notice;
 use crate::cut::NewCopy;
 
 /// The last two states.
@@ -42,6 +44,24 @@ impl History {
                 kept.v[c as usize] = Vector3::zeros();
             }
         }
+    }
+
+    /// Why BDF2 cannot make a step of `h` [s]: no history of steps as long, a turn by an angle [rad] that it does
+    /// not bear, or more springs in contact at the end of the step than there were.
+    pub fn why_no_bdf2(
+        &self,
+        h: f64,
+        angle_rad: impl FnOnce() -> f64,
+        contacts: impl FnOnce() -> usize,
+    ) -> Option<Notice> {
+        if !self.known || (self.h - h).abs() > 1e-9 * h {
+            return Some(Notice::Started);
+        }
+        let angle_rad = angle_rad();
+        if angle_rad > LARGEST_TURN {
+            return Some(Notice::Spinning { angle_rad });
+        }
+        (contacts() > self.contacts).then_some(Notice::ContactOnset)
     }
 
     /// Records a step of length `h` [s] from `before` to `after`.

@@ -5,6 +5,7 @@ mod free_motion;
 mod guard;
 mod history;
 mod multistep;
+mod notice;
 pub(crate) mod increment;
 mod linear_step;
 mod parts;
@@ -17,7 +18,7 @@ mod relaxation;
 
 pub use dynamics::{
     Dynamics, DynamicsError, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings,
-    LEAST_NEWTON_STEPS, MassKind, Notice, Scheme, stable_step, why_no_equilibrium,
+    LEAST_NEWTON_STEPS, MassKind, Scheme, stable_step, why_no_equilibrium,
 };
 pub use free_motion::{FreeMotion, free_motions};
 pub use history::History;
@@ -25,6 +26,7 @@ pub use increment::Increment;
 pub use linear_step::LinearStep;
 pub use local_connectivity::LocalConnectivity;
 pub use multistep::Multistep;
+pub use notice::Notice;
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};
 pub use spin::SpinGuard;

@@ -4,10 +4,11 @@
 use nalgebra::Vector3;
 
 use super::State;
-use super::dynamics::{Notice, Scheme};
+use super::dynamics::Scheme;
 use super::guard::{GAIN_CONSERVING, LARGEST_TURN, Ledger};
 use super::history::History;
 use super::increment::{Increment, bdf2_history, newmark_history};
+use super::notice::Notice;
 use super::spin::SpinGuard;
 use super::springs::ActiveSpring;
 use super::step_inputs::{StepHistory, StepInputs};
@@ -107,23 +108,21 @@ impl Multistep {
         if !self.history.continues(state) {
             self.forget();
         }
-        let euler = |notice| (Scheme::ImplicitEuler, Some(notice));
-        let same_step = (self.history.h - inputs.h).abs() <= 1e-9 * inputs.h;
-        if self.scheme == Scheme::Bdf2 && !(self.history.known && same_step) {
-            return euler(Notice::Started);
-        }
-        if inputs.material.law.rotates() {
-            let angle_rad = inputs.h * spin.fastest(state, inputs.mass, inputs.parts);
-            if angle_rad > LARGEST_TURN {
-                return euler(Notice::Spinning { angle_rad });
-            }
-        }
         let h = inputs.h;
-        let onset = || contacts(inputs, |c| state.x[c] + h * state.v[c]) > self.history.contacts;
-        if self.scheme == Scheme::Bdf2 && onset() {
-            return euler(Notice::ContactOnset);
+        let mut turn = || match inputs.material.law.rotates() {
+            true => h * spin.fastest(state, inputs.mass, inputs.parts),
+            false => 0.0,
+        };
+        let touching = || contacts(inputs, |c| state.x[c] + h * state.v[c]);
+        let why = if self.is_newmark() {
+            Some(turn()).filter(|angle| *angle > LARGEST_TURN).map(|angle_rad| Notice::Spinning { angle_rad })
+        } else {
+            self.history.why_no_bdf2(h, turn, touching)
+        };
+        match why {
+            Some(notice) => (Scheme::ImplicitEuler, Some(notice)),
+            None => (self.scheme, None),
         }
-        (self.scheme, None)
     }
 
     /// Whether Newmark's method needs the acceleration at the state it starts from.

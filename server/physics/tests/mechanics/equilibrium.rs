@@ -11,7 +11,7 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, left_face};
+use crate::{DOWN, SOFT, apart, left_face};
 
 fn statics(arithmetic: Arithmetic, iterations: u32, tolerance: f64) -> BodySettings {
     let solver = PcgSettings { iterations, tolerance };
@@ -29,10 +29,6 @@ fn beam(settings: BodySettings) -> Body {
 fn sag(body: &Body) -> f64 {
     let down = body.positions().iter().zip(body.rest_positions()).map(|(x, X)| X.y - x.y);
     down.fold(0.0, f64::max)
-}
-
-fn apart(a: &Body, b: &Body) -> f64 {
-    a.positions().iter().zip(b.positions()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
 
 /// A spring that pushes the free end up.

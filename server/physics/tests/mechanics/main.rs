@@ -56,3 +56,8 @@ pub fn left_face(body: &Body) -> Vec<u32> {
     let nodes = &body.mesh().nodes;
     (0..nodes.len() as u32).filter(|&n| nodes[n as usize].x == 0.0).collect()
 }
+
+/// Largest distance between the nodes of two bodies [m].
+pub fn apart(a: &Body, b: &Body) -> f64 {
+    a.positions().iter().zip(b.positions()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}

@@ -9,7 +9,7 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, cube, left_face, settings};
+use crate::{DOWN, SOFT, apart, cube, left_face, settings};
 
 const NEWMARK: Scheme = Scheme::AVERAGE_ACCELERATION;
 
@@ -24,11 +24,6 @@ fn beam(law: Law, rayleigh: Rayleigh, settings: BodySettings) -> Body {
 
 fn with(scheme: Scheme, arithmetic: Arithmetic, tolerance: f64) -> BodySettings {
     BodySettings { scheme, arithmetic: Some(arithmetic), ..settings(500, tolerance) }
-}
-
-/// Largest distance between the nodes of two bodies [m].
-fn apart(a: &Body, b: &Body) -> f64 {
-    a.positions().iter().zip(b.positions()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::{
     Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, LEAST_NEWTON_STEPS, Notice, Scheme, finite,
 };
 use crate::assembly::Tangent;
-use crate::integrator::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN};
+use crate::integrator::guard::{GAIN_CONSERVING, GAIN_DISSIPATING};
 use crate::integrator::increment::{Increment, bdf2_history, newmark_history};
 use crate::integrator::{FreeMotion, LooseParts, State};
 use crate::material::Law;
@@ -112,21 +112,16 @@ impl Dynamics {
         if scheme != Scheme::Bdf2 {
             return (scheme, None);
         }
-        let euler = |notice| (Scheme::ImplicitEuler, Some(notice));
-        if !self.history.known || (self.history.h - inputs.h).abs() > 1e-9 * inputs.h {
-            return euler(Notice::Started);
-        }
-        let angle_rad = inputs.h * self.spin.fastest(state, &self.mass.lumped, &self.parts);
-        if angle_rad > LARGEST_TURN {
-            return euler(Notice::Spinning { angle_rad });
-        }
         for ((next, x), v) in self.next.x.iter_mut().zip(&state.x).zip(&state.v) {
             *next = x + inputs.h * v;
         }
-        if self.contacts() > self.history.contacts {
-            return euler(Notice::ContactOnset);
+        let touching = self.contacts();
+        let Self { spin, mass, parts, history, .. } = self;
+        let turn = || inputs.h * spin.fastest(state, &mass.lumped, parts);
+        match history.why_no_bdf2(inputs.h, turn, || touching) {
+            Some(notice) => (Scheme::ImplicitEuler, Some(notice)),
+            None => (scheme, None),
         }
-        (scheme, None)
     }
 
     /// Number of springs that push or pull at the positions in `self.next`.

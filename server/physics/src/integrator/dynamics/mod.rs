@@ -15,7 +15,7 @@ mod settings;
 
 pub use critical_step::stable_step;
 pub use implicit::why_no_equilibrium;
-pub use report::{DynamicsOutcome, DynamicsReport, Notice};
+pub use report::{DynamicsOutcome, DynamicsReport};
 pub use settings::{DynamicsSettings, LEAST_NEWTON_STEPS, MassKind, Scheme};
 
 use std::sync::Arc;
@@ -26,6 +26,7 @@ use thiserror::Error;
 use super::State;
 use super::free_motion::{FreeMotion, free_motions};
 use super::history::History;
+use super::notice::Notice;
 use super::parts::{LooseParts, Translations};
 use super::relaxation::Relaxation;
 use super::spin::SpinGuard;
