@@ -27,6 +27,7 @@ pub mod team;
 pub mod assembly;
 pub mod operator;
 pub mod solver;
+pub mod space;
 pub mod integrator;
 pub mod estimate;
 pub mod body;

@@ -21,7 +21,7 @@ use scindo_physics::element::Simd;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 use scindo_physics::operator::{
-    BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, OperatorChoice, SystemOperator,
+    BlockJacobi, Elastic, ElasticUpdate, FixedCopy, LinearOperator, OperatorChoice, Stiffness, SystemOperator,
 };
 use scindo_physics::solver::Pcg;
 use scindo_physics::team::Team;
@@ -226,7 +226,7 @@ fn updated(body: &Body, choice: OperatorChoice, team: &mut Team) -> Elastic {
     elastic.set_choice(choice);
     let with = ElasticUpdate { lame: material.lame(), law: material.law, scale: 1.0 };
     let (mut f, mut blocks) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
-    elastic.update(team, &with, body.positions(), &mut f, &mut blocks);
+    elastic.update_all(team, &with, body.positions(), &mut f, &mut blocks);
     elastic
 }
 
@@ -245,7 +245,7 @@ fn static_cube(threads: usize) -> Line {
         .collect();
     let with = ElasticUpdate { lame: LINEAR.lame(), law: LINEAR.law, scale: 1.0 };
     let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
-    elastic.update(&mut team, &with, body.positions(), &mut f, &mut diagonal);
+    elastic.update_all(&mut team, &with, body.positions(), &mut f, &mut diagonal);
     let mut M = BlockJacobi::default();
     M.resize(n);
     M.update(&mut team, &diagonal, &fixed);
@@ -324,7 +324,7 @@ fn updates(mesh: TetMesh, choice: OperatorChoice) -> Line {
         body.positions().iter().map(|x| x + 0.02 * Vector3::new(x.y, x.z, x.x)).collect();
     let run = move || {
         let start = Instant::now();
-        elastic.update(&mut team, &with, &x, &mut f, &mut blocks);
+        elastic.update_all(&mut team, &with, &x, &mut f, &mut blocks);
         (1.0, start.elapsed().as_secs_f64())
     };
     let work = ((pieces * 156) as f64, pieces * 120, pieces as f64 * 700.0);

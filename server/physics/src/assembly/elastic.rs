@@ -2,10 +2,11 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::kernel::{add_forces, add_upper_blocks, deformation_gradient, mirror};
+use super::kernel::{add_forces, add_upper_blocks, mirror};
 use super::point::projected;
 use super::scratch::Buffers;
 use super::{BlockCsr, ElementKind, Model, Volumetric};
+use crate::element::deformation_gradient;
 use crate::material::{Law, Split, Tangent};
 
 impl Model {

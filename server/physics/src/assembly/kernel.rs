@@ -4,19 +4,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::material::Matrix9;
 
-/// F = Σ_a x_a ⊗ g_a, from differences to the first node so that rigid shifts cancel exactly.
-#[inline]
-pub(super) fn deformation_gradient<const N: usize>(
-    x: &[Vector3<f64>; N],
-    g: &[Vector3<f64>],
-) -> Matrix3<f64> {
-    let mut F = Matrix3::zeros();
-    for a in 1..N {
-        F += (x[a] - x[0]) * g[a].transpose();
-    }
-    F
-}
-
 /// f_a += w P g_a.
 #[inline]
 pub(super) fn add_forces(P: &Matrix3<f64>, g: &[Vector3<f64>], w: f64, f: &mut [Vector3<f64>]) {

@@ -6,8 +6,8 @@ use super::averaging::NodeAverage;
 use super::mass::Products;
 use super::point::PointLaw;
 use super::scratch::Scratch;
-use super::{BlockCsr, ModelError, kernel};
-use crate::element::Spring;
+use super::{BlockCsr, ModelError};
+use crate::element::{Point, Points, Spring, deformation_gradient};
 use crate::material::{Lame, Law};
 
 /// Finite element of a model, and the points at which its energy is integrated.
@@ -170,7 +170,7 @@ impl Model {
     }
 
     fn gradient_at<const N: usize>(&self, e: usize, q: usize, x: &[Vector3<f64>]) -> Matrix3<f64> {
-        kernel::deformation_gradient::<N>(&self.positions(e, x), self.gradients(e, q))
+        deformation_gradient::<N>(&self.positions(e, x), self.gradients(e, q))
     }
 
     /// Positions of the nodes of element `e`.
@@ -178,6 +178,12 @@ impl Model {
     pub(super) fn positions<const N: usize>(&self, e: usize, x: &[Vector3<f64>]) -> [Vector3<f64>; N] {
         let nodes = &self.connectivity[e * N..][..N];
         std::array::from_fn(|a| x[nodes[a] as usize])
+    }
+
+    /// Calls `visit` with the nodes of every group that hangs together: elements and springs.
+    pub fn for_groups(&self, visit: &mut dyn FnMut(&[u32])) {
+        (0..self.n_elements()).for_each(|e| visit(self.element(e)));
+        self.springs.iter().for_each(|spring| visit(&[spring.a, spring.b]));
     }
 
     /// One-dimensional springs between nodes, as given to [`with_springs`](Self::with_springs).
@@ -248,5 +254,17 @@ impl Model {
         }
         self.pattern = pattern;
         self.find_incidence();
+    }
+}
+
+impl Points for Model {
+    fn for_points(&self, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
+        for element in 0..self.n_elements() {
+            for (q, &weight) in self.weights(element).iter().enumerate() {
+                let (nodes, gradients) = (self.element(element), self.gradients(element, q));
+                let F = self.deformation_gradient(element, q, x);
+                visit(Point { element, nodes, gradients, weight, F });
+            }
+        }
     }
 }

@@ -2,13 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::shape::Shape;
-use super::{Body, BodyError, Path};
-use crate::cut::CutMesh;
+use super::{Body, BodyError};
 use crate::operator::FixedCopy;
 use crate::reserve::resize_reserving;
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;
+use crate::space::Space;
 
 /// A node whose displacement is prescribed in some directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,14 +106,15 @@ impl Boundary {
     /// fraction of the prescribed displacements.
     pub fn fixed_copies(
         &self,
-        mesh: &CutMesh,
+        space: &dyn Space,
         rest: &[Vector3<f64>],
         share: f64,
         fixed: &mut Vec<FixedCopy>,
     ) {
-        let n_nodes = mesh.mesh().nodes.len();
-        let mut divided = vec![false; n_nodes];
-        mesh.copy_node().iter().skip(n_nodes).for_each(|&node| divided[node as usize] = true);
+        // The first copy of a node has its number.
+        let copies = (0u32..).zip(space.node_of_copy());
+        let mut divided = vec![false; space.n_nodes()];
+        copies.filter(|(copy, node)| copy != *node).for_each(|(_, &node)| divided[node as usize] = true);
         fixed.clear();
         if self.fixed.len() > fixed.capacity() {
             fixed.reserve_exact(self.fixed.len() + self.fixed.len() / 2);
@@ -123,9 +123,8 @@ impl Boundary {
             let target = rest[f.node as usize] + share * f.displacement_m;
             let held = |copy: u32| FixedCopy { copy, axes: f.axes, position_m: target.into() };
             fixed.push(held(f.node));
-            // Nodes that an element adds are never cut.
-            if divided.get(f.node as usize) == Some(&true) {
-                let copies = mesh.copies_with_node(f.node).into_iter();
+            if divided[f.node as usize] {
+                let copies = space.copies_with_node(f.node).into_iter();
                 fixed.extend(copies.filter(|&copy| copy != f.node).map(held));
             }
         }
@@ -135,37 +134,37 @@ impl Boundary {
     /// Writes the force [N] on every one of `n` copies and added nodes to `load`. A point force goes to
     /// the copy with the node's material. A spread force goes to all copies of the node, by the volume
     /// they carry. Totals are kept.
-    pub fn node_loads(&self, mesh: &CutMesh, n: usize, load: &mut Vec<Vector3<f64>>) {
+    pub fn node_loads(&self, space: &dyn Space, n: usize, load: &mut Vec<Vector3<f64>>) {
         load.clear();
         resize_reserving(load, n, Vector3::zeros());
-        self.add_loads(mesh, load);
+        self.add_loads(space, load);
     }
 
     /// The same after a cut, with `load` from before it. Point forces stay on their copies, so only
     /// spread forces are shared anew.
-    pub fn loads_of_new_copies(&self, mesh: &CutMesh, load: &mut Vec<Vector3<f64>>) {
+    pub fn loads_of_new_copies(&self, space: &dyn Space, load: &mut Vec<Vector3<f64>>) {
         if self.spread_force.is_empty() {
-            resize_reserving(load, mesh.n_copies(), Vector3::zeros());
+            resize_reserving(load, space.n_copies(), Vector3::zeros());
         } else {
-            self.node_loads(mesh, mesh.n_copies(), load);
+            self.node_loads(space, space.n_copies(), load);
         }
     }
 
-    fn add_loads(&self, mesh: &CutMesh, load: &mut [Vector3<f64>]) {
+    fn add_loads(&self, space: &dyn Space, load: &mut [Vector3<f64>]) {
         for (load, f) in load.iter_mut().zip(&self.point_force) {
             *load += f;
         }
         if !self.spread_force.is_empty() {
             // Nodes that an element adds have no copies, because such elements are not cut.
-            for (load, f) in load.iter_mut().zip(&self.spread_force).skip(mesh.n_copies()) {
+            for (load, f) in load.iter_mut().zip(&self.spread_force).skip(space.n_copies()) {
                 *load += f;
             }
-            let mut node_volume = vec![0.0; mesh.mesh().nodes.len()];
-            for (&node, &volume) in mesh.copy_node().iter().zip(mesh.copy_volume()) {
+            let mut node_volume = vec![0.0; space.n_nodes()];
+            for (&node, &volume) in space.node_of_copy().iter().zip(space.copy_volumes()) {
                 node_volume[node as usize] += volume;
             }
-            for (c, &node) in mesh.copy_node().iter().enumerate() {
-                let share = mesh.copy_volume()[c] / node_volume[node as usize];
+            for (c, &node) in space.node_of_copy().iter().enumerate() {
+                let share = space.copy_volumes()[c] / node_volume[node as usize];
                 load[c] += share * self.spread_force[node as usize];
             }
         }
@@ -210,7 +209,7 @@ impl Body {
         }
         self.prescribed_share = share;
         for held in &mut self.fixed {
-            let node = self.cut_mesh.copy_node().get(held.copy as usize).copied().unwrap_or(held.copy);
+            let node = self.space.node_of_copy().get(held.copy as usize).copied().unwrap_or(held.copy);
             let asleep = self.asleep.binary_search_by_key(&held.copy, |held| held.copy).is_ok();
             if let (Some(asked), false) = (self.boundary.fixed_at(node), asleep) {
                 held.position_m = (self.rest[node as usize] + share * asked.displacement_m).into();
@@ -234,7 +233,7 @@ impl Body {
     pub fn add_nodal_force(&mut self, node: u32, force_n: Vector3<f64>) -> Result<(), BodyError> {
         self.check_nodes(&[node])?;
         check_vector("force_n", &force_n)?;
-        self.boundary.point_force.resize(self.n_fixable(), Vector3::zeros());
+        self.boundary.point_force.resize(self.space.n_nodes(), Vector3::zeros());
         self.boundary.point_force[node as usize] += force_n;
         self.follow_boundary();
         Ok(())
@@ -243,44 +242,15 @@ impl Body {
     /// Adds a total force [N] shared by area over the skin faces all of whose nodes are in `nodes`.
     pub fn add_surface_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
         let selected = self.selection(nodes, &force_n)?;
-        let area = self.shape.areas(self.cut_mesh.mesh(), &selected);
+        let area = self.space.areas(&selected);
         self.spread("surface", &area, force_n)
     }
 
     /// Adds a total force [N] shared by volume over the tets around `nodes`.
     pub fn add_volume_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
         let selected = self.selection(nodes, &force_n)?;
-        let volume = self.volumes(&selected);
+        let volume = self.space.volumes(&selected);
         self.spread("volume", &volume, force_n)
-    }
-
-    /// ∫ N_a dV [m³] of the selected nodes in the uncut mesh; zero for the others.
-    fn volumes(&self, selected: &[bool]) -> Vec<f64> {
-        let mut volume = vec![0.0; selected.len()];
-        if let (Path::General(general), false) = (&self.path, matches!(self.shape, Shape::Tet4)) {
-            let integrals = general.model().shape_integrals();
-            for (volume, integral) in
-                volume.iter_mut().zip(integrals).zip(selected).filter(|(_, s)| **s).map(|(pair, _)| pair)
-            {
-                *volume = *integral;
-            }
-            return volume;
-        }
-        let mesh = self.cut_mesh.mesh();
-        for (e, tet) in mesh.tets.iter().enumerate() {
-            for &n in tet.iter().filter(|&&n| selected[n as usize]) {
-                volume[n as usize] += mesh.volume(e) / 4.0;
-            }
-        }
-        volume
-    }
-
-    /// Number of nodes that can be held or loaded: those of the mesh and those the element adds.
-    fn n_fixable(&self) -> usize {
-        match &self.shape {
-            Shape::Tet10(mesh) => mesh.nodes.len(),
-            Shape::Tet4 | Shape::Hex8(_) => self.cut_mesh.mesh().nodes.len(),
-        }
     }
 
     /// Load on every node [N], gravity not included.
@@ -298,7 +268,7 @@ impl Body {
     fn selection(&self, nodes: &[u32], force_n: &Vector3<f64>) -> Result<Vec<bool>, BodyError> {
         self.check_nodes(nodes)?;
         check_vector("force_n", force_n)?;
-        let mut selected = vec![false; self.n_fixable()];
+        let mut selected = vec![false; self.space.n_nodes()];
         nodes.iter().for_each(|&n| selected[n as usize] = true);
         Ok(selected)
     }
@@ -322,7 +292,7 @@ impl Body {
     }
 
     fn check_nodes(&self, nodes: &[u32]) -> Result<(), BodyError> {
-        let n_nodes = self.n_fixable();
+        let n_nodes = self.space.n_nodes();
         match nodes.iter().find(|&&n| n as usize >= n_nodes) {
             Some(&node) => Err(BodyError::NoSuchNode { node, n_nodes }),
             None => Ok(()),

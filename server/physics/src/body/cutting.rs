@@ -2,11 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::{Body, BodyError, General, Path};
+use super::snapping::SnapCut;
+use super::{Body, BodyError, element_name};
 use crate::assembly::ElementKind;
-use crate::cut::{
-    BladeSweep, CutError, CutLimits, CutReport, NewCopy, Piece, SweepUnderWay, Work, swept_area,
-};
+use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Piece, Work, swept_area};
 use crate::integrator::LooseParts;
 use crate::reserve::{refill, resize_reserving};
 
@@ -16,15 +15,6 @@ const SNAP_PAIRS_PER_FRAGMENT: usize = 4;
 /// Largest number of pairs of blade segment and element in a cut along faces that was begun. Such a cut is
 /// made at once.
 const MAX_SNAP_PAIRS: usize = 4_000_000;
-
-/// A cut that was begun and is not complete.
-#[derive(Debug)]
-pub(super) enum CutUnderWay {
-    /// Pieces and copies: the sweep, and the positions it began with [m].
-    Pieces(SweepUnderWay, Vec<Vector3<f64>>),
-    /// Along faces: the sweep and its incision.
-    Faces(BladeSweep, u32),
-}
 
 impl Body {
     /// Begins a cut at the present positions; [`go_on_cutting`](Self::go_on_cutting) makes it in parts.
@@ -36,21 +26,17 @@ impl Body {
     /// is being cut.
     pub fn begin_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<(), BodyError> {
         self.may_be_cut()?;
-        let mesh = self.cut_mesh.mesh();
-        let n_elements = mesh.tets.len();
-        self.under_way = Some(if self.snap.is_some() {
-            blade.check()?;
-            let (found, limit) = (blade.segments.len() * n_elements, MAX_SNAP_PAIRS);
-            if found > limit {
-                let segments = (limit / n_elements.max(1)).max(2);
-                return Err(CutError::TooManySegments { found: blade.segments.len(), limit: segments }.into());
-            }
-            CutUnderWay::Faces(blade.clone(), incision)
-        } else {
-            let limits = CutLimits::of_mesh(n_elements, mesh.nodes.len());
-            let sweep = self.cut_mesh.begin_sweep(&self.state.x, blade, incision, limits)?;
-            CutUnderWay::Pieces(sweep, self.state.x.clone())
-        });
+        if self.snap.is_none() {
+            return Ok(self.space.begin_cut(&self.state.x, blade, incision)?);
+        }
+        blade.check()?;
+        let n_elements = self.space.mesh().tets.len();
+        let (found, limit) = (blade.segments.len() * n_elements, MAX_SNAP_PAIRS);
+        if found > limit {
+            let segments = (limit / n_elements.max(1)).max(2);
+            return Err(CutError::TooManySegments { found: blade.segments.len(), limit: segments }.into());
+        }
+        self.under_way = Some(SnapCut { blade: blade.clone(), incision });
         Ok(())
     }
 
@@ -60,35 +46,28 @@ impl Body {
     /// # Errors
     /// As [`cut`](Self::cut).
     pub fn go_on_cutting(&mut self, work: &mut Work) -> Result<Option<CutReport>, BodyError> {
-        match self.under_way.take() {
-            None => Ok(None),
-            Some(CutUnderWay::Faces(blade, incision)) => {
-                work.book(blade.segments.len() * self.cut_mesh.mesh().tets.len() / SNAP_PAIRS_PER_FRAGMENT);
-                self.snap_cut(&blade, incision).map(Some)
-            }
-            Some(CutUnderWay::Pieces(mut sweep, x)) => {
-                if !self.cut_mesh.detect(&x, &mut sweep, work) {
-                    self.under_way = Some(CutUnderWay::Pieces(sweep, x));
-                    return Ok(None);
-                }
-                let report = self.cut_mesh.complete(sweep, work);
-                self.follow_cut(&report)?;
-                Ok(Some(report))
-            }
+        if let Some(SnapCut { blade, incision }) = self.under_way.take() {
+            work.book(blade.segments.len() * self.space.mesh().tets.len() / SNAP_PAIRS_PER_FRAGMENT);
+            return self.snap_cut(&blade, incision).map(Some);
         }
+        let report = self.space.go_on_cutting(work);
+        if let Some(report) = &report {
+            self.follow_cut(report)?;
+        }
+        Ok(report)
     }
 
     /// Whether a cut was begun and is not complete.
     pub fn is_being_cut(&self) -> bool {
-        self.under_way.is_some()
+        self.under_way.is_some() || self.space.is_being_cut()
     }
 
     fn may_be_cut(&self) -> Result<(), BodyError> {
-        if self.shape.kind() != ElementKind::Tet4 {
-            let with = if self.shape.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" };
+        if self.space.kind() != ElementKind::Tet4 {
+            let with = element_name(&*self.space);
             return Err(BodyError::Combination { what: "a cut", with, instead: "tet4" });
         }
-        if self.under_way.is_some() {
+        if self.is_being_cut() {
             return Err(CutError::UnderWay.into());
         }
         Ok(())
@@ -101,45 +80,34 @@ impl Body {
         if self.snap.is_some() {
             return self.snap_cut(blade, incision);
         }
-        let report = self.cut_mesh.sweep(&self.state.x, blade, incision)?;
+        let report = self.space.cut(&self.state.x, blade, incision)?;
         self.follow_cut(&report)?;
         Ok(report)
     }
 
     /// Brings the body up to date after a cut of pieces and copies.
     fn follow_cut(&mut self, report: &CutReport) -> Result<(), BodyError> {
-        if let Some(skin) = &mut self.skin {
-            skin.follow(&self.cut_mesh);
-        }
         // While a cut is still on its way through an element, only the surface changes.
-        if !self.cut_mesh.changed_pieces().is_empty() {
+        if !self.space.changed_pieces().is_empty() {
             self.inherit(report);
-            match &mut self.path {
-                Path::Fast(fast) => {
-                    fast.follow_cut(&self.cut_mesh, &report.new_copies);
-                    self.follow_new_copies(&report.new_copies);
-                }
-                Path::General(_) => {
-                    self.follow_general(&report.new_copies)?;
-                    self.follow_topology();
-                }
-            }
+            self.dynamics.follow_cut(&*self.space, &report.new_copies)?;
+            self.follow_new_copies(&report.new_copies);
         }
         Ok(())
     }
 
     /// Area [m²] of the sweep inside the body at its present positions; parts that are already cut count too.
     pub fn swept_area(&self, blade: &BladeSweep) -> f64 {
-        let mut seen = vec![false; self.cut_mesh.mesh().tets.len()];
+        let mut seen = vec![false; self.space.mesh().tets.len()];
         let first_of_element = |p: &&Piece| !std::mem::replace(&mut seen[p.element as usize], true);
-        let pieces = self.cut_mesh.pieces().iter().filter(first_of_element);
+        let pieces = self.space.pieces().iter().filter(first_of_element);
         let tets: Vec<[u32; 4]> = pieces.map(|piece| piece.copies).collect();
         swept_area(&tets, &self.state.x, blade)
     }
 
     /// Area [m²] at rest of the cut that an incision has opened, counting one of its two lips.
     pub fn opened_area(&self, incision: u32) -> f64 {
-        let surface = self.cut_mesh.surface();
+        let surface = self.space.element_surface();
         let lips = surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag == incision);
         let area = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|v| surface.vertices[v as usize].position(&self.rest));
@@ -149,7 +117,7 @@ impl Body {
     }
 
     fn inherit(&mut self, report: &CutReport) {
-        let n = self.cut_mesh.n_copies();
+        let n = self.space.n_copies();
         resize_reserving(&mut self.state.x, n, Vector3::zeros());
         resize_reserving(&mut self.state.v, n, Vector3::zeros());
         for new in &report.new_copies {
@@ -164,70 +132,46 @@ impl Body {
         }
     }
 
-    /// Rebuilds the model after a cut that made the copies `new`; integrators continue.
-    fn follow_general(&mut self, new: &[NewCopy]) -> Result<(), BodyError> {
-        let general = General::new(&self.shape, &self.cut_mesh, &self.material, &self.settings)?;
-        if let Path::General(before) = std::mem::replace(&mut self.path, Path::General(Box::new(general)))
-            && let Path::General(general) = &mut self.path
-        {
-            general.dynamics.continue_from(before.dynamics, new);
-        }
-        Ok(())
-    }
-
-    /// Rebuilds the model from the present pieces and copies; integrators start afresh from the present
-    /// state.
-    pub(super) fn rebuild_general(&mut self) -> Result<(), BodyError> {
-        let general = General::new(&self.shape, &self.cut_mesh, &self.material, &self.settings)?;
-        self.path = Path::General(Box::new(general));
-        Ok(())
-    }
-
     /// Updates everything derived from pieces and copies.
     pub(super) fn follow_topology(&mut self) {
-        refill(&mut self.rest, self.shape.rest_positions(&self.cut_mesh).into_iter());
+        refill(&mut self.rest, self.space.rest_positions().into_iter());
         self.follow_masses();
         self.follow_boundary();
     }
 
-    /// The same on the fast path, after a cut that made the copies `new`, for elements without added
-    /// nodes. The data of earlier copies stays in place.
+    /// The same after a cut that made the copies `new`, for elements without added nodes. The data of earlier
+    /// copies stays in place.
     fn follow_new_copies(&mut self, new: &[NewCopy]) {
         let known = self.rest.len();
-        resize_reserving(&mut self.rest, self.cut_mesh.n_copies(), Vector3::zeros());
+        resize_reserving(&mut self.rest, self.space.n_copies(), Vector3::zeros());
         for (rest, new) in self.rest[known..].iter_mut().zip(new) {
-            *rest = self.cut_mesh.mesh().nodes[self.cut_mesh.copy_node()[new.copy as usize] as usize];
+            *rest = self.space.mesh().nodes[self.space.node_of_copy()[new.copy as usize] as usize];
         }
         self.follow_masses();
         self.find_fixed();
-        self.boundary.loads_of_new_copies(&self.cut_mesh, &mut self.load);
-        self.connectivity.follow(&mut self.parts, &self.cut_mesh, new, &self.mass, &self.fixed);
+        self.boundary.loads_of_new_copies(&*self.space, &mut self.load);
+        self.connectivity.follow(&mut self.parts, &*self.space, new, &self.mass, &self.fixed);
         self.follow_parts();
     }
 
-    /// Updates the masses, and what the fast path derives from them.
+    /// Updates the masses, and what the integrator derives from them.
     fn follow_masses(&mut self) {
-        let density = self.material.density_kg_m3;
-        match &self.path {
-            Path::Fast(_) => refill(&mut self.mass, self.cut_mesh.copy_volume().iter().map(|v| density * v)),
-            Path::General(general) => self.mass = general.model().lumped_mass(density),
-        }
+        let Self { dynamics, space, mass, .. } = self;
+        dynamics.solver().lumped_masses(&**space, self.material.density_kg_m3, mass);
         if self.settings.ablation.piece_masses && self.is_fast() {
             self.share_masses_evenly();
         }
-        if let Path::Fast(fast) = &mut self.path {
-            fast.follow_topology(&self.cut_mesh, &self.mass);
-        }
+        self.dynamics.follow_masses(&*self.space, &self.mass);
     }
 
     /// Applies [`Ablation::piece_masses`](super::Ablation): the copies of a node get equal masses.
     fn share_masses_evenly(&mut self) {
-        let mut sum = vec![(0.0, 0.0); self.cut_mesh.mesh().nodes.len()];
-        for (&node, m) in self.cut_mesh.copy_node().iter().zip(&self.mass) {
+        let mut sum = vec![(0.0, 0.0); self.space.mesh().nodes.len()];
+        for (&node, m) in self.space.node_of_copy().iter().zip(&self.mass) {
             let (mass, copies) = &mut sum[node as usize];
             (*mass, *copies) = (*mass + m, *copies + 1.0);
         }
-        for (&node, m) in self.cut_mesh.copy_node().iter().zip(&mut self.mass) {
+        for (&node, m) in self.space.node_of_copy().iter().zip(&mut self.mass) {
             let (mass, copies) = sum[node as usize];
             *m = mass / copies;
         }
@@ -236,22 +180,13 @@ impl Body {
     /// Updates everything derived from constraints and loads.
     pub(super) fn follow_boundary(&mut self) {
         self.find_fixed();
-        self.boundary.node_loads(&self.cut_mesh, self.rest.len(), &mut self.load);
-        self.parts = match &self.path {
-            Path::Fast(_) => LooseParts::new(self.cut_mesh.pieces(), &self.mass, &self.fixed),
-            Path::General(general) => {
-                let model = general.model();
-                let elements = (0..model.n_elements()).map(|e| model.element(e));
-                LooseParts::connected(elements, &self.mass, &self.fixed)
-            }
-        };
+        self.boundary.node_loads(&*self.space, self.rest.len(), &mut self.load);
+        self.parts = LooseParts::connected(|visit| self.space.for_groups(visit), &self.mass, &self.fixed);
         self.follow_parts();
     }
 
     fn follow_parts(&mut self) {
-        if let Path::Fast(fast) = &mut self.path {
-            fast.follow_parts((&self.rest, &self.mass), &self.parts, &self.fixed);
-        }
+        self.dynamics.follow_parts();
         self.range.follow(&self.rest, &self.parts, &self.fixed);
     }
 }

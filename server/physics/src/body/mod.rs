@@ -5,14 +5,10 @@ mod boundary;
 mod cost;
 mod cutting;
 mod error;
-mod fast;
-mod general;
-mod held_energy;
 mod measures;
 mod precision;
 mod range;
 mod settings;
-mod shape;
 mod sleep;
 mod snapping;
 mod statics;
@@ -36,87 +32,24 @@ use nalgebra::Vector3;
 
 pub use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::{CutMesh, IncisionMark, Surface};
-use crate::element::Simd;
-use crate::integrator::{DynamicsInputs, Inertia, LocalConnectivity, LooseParts, State, StepInputs};
-pub use crate::integrator::{MassKind, Notice, PointSpring, Scheme, SpringKind};
+use crate::integrator::{
+    Dynamics, LinearlyImplicit, LocalConnectivity, LooseParts, ModelSolver, State, StepInputs, StepSolver,
+};
+pub use crate::integrator::{MassKind, Notice, Outcome, PointSpring, Scheme, SolveReport, SpringKind};
 use crate::material::{Material, Rayleigh};
-use crate::mesh::{HexMesh, Tet10Mesh, TetMesh};
+use crate::mesh::{HexMesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
 use crate::reserve::{refill, resize_reserving};
 use crate::skin::{Skin, SkinSettings, SkinShape};
 use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};
+use crate::space::{Space, Tets};
 use crate::team::Team;
 use boundary::Boundary;
-use cutting::CutUnderWay;
-use fast::Fast;
-use general::General;
 use precision::too_flat_for_single;
 use range::{Beyond, Range};
-use shape::Shape;
-use snapping::SnapState;
-
-/// Result of one step of a body.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SolveReport {
-    /// Solver iterations, summed over all parts of the step.
-    pub iterations: u32,
-    /// √(rᵀM⁻¹r) relative to the right-hand side, in the worst part of the step; that of Newton's method
-    /// if the step is nonlinear.
-    pub residual: f64,
-    /// Value that `residual` has to reach; 0 if nothing is solved, as in explicit integrators.
-    pub tolerance: f64,
-    /// Why the last linear or Newton solve stopped.
-    pub stop: StopReason,
-    /// Whether the body advanced, and if not, why.
-    pub outcome: Outcome,
-    /// Number of equal parts into which the step was divided.
-    pub substeps: u32,
-    /// Pieces with det F ≤ 0; on the general path, quadrature points.
-    pub inverted_pieces: usize,
-    /// Springs left out because one of their numbers is unusable.
-    pub refused_springs: usize,
-    /// Newton steps; 1 if the step is one linear solve, 0 for explicit integrators.
-    pub newton_steps: u32,
-    /// Halvings of the step length in all line searches.
-    pub backtracks: u32,
-    /// Estimated algebraic error of the last linear solve in the energy norm [√J]; 0 without an estimate.
-    pub algebraic_error: f64,
-    /// What the step did differently from what was requested.
-    pub notice: Option<Notice>,
-}
-
-impl SolveReport {
-    /// Whether the body advanced by a step whose residual is above its tolerance. The residual is
-    /// √(rᵀM⁻¹r) over that of the loads on every path: after the linear solve if a step is one by design,
-    /// after Newton's method otherwise.
-    pub fn is_unconverged(&self) -> bool {
-        self.outcome == Outcome::Advanced && self.tolerance > 0.0 && self.residual > self.tolerance
-    }
-
-    /// Whether the step failed as a whole and was made in parts. Sub-steps that an explicit integrator
-    /// plans do not count.
-    pub fn is_divided(&self) -> bool {
-        let planned = matches!(self.notice, Some(Notice::Divided { .. }));
-        self.outcome == Outcome::Advanced && self.substeps > 1 && !planned
-    }
-}
-
-/// How a step ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Outcome {
-    /// The body advanced by the whole step.
-    #[default]
-    Advanced,
-    /// The body is where it was, and at rest. No subdivision stayed finite, or a part was drawn out far
-    /// beyond its size; the notice says which.
-    Held,
-    /// The stop flag was raised; the body is as it was before the step.
-    Interrupted,
-    /// The step length or the gravity is unusable, or there is no equilibrium; nothing was changed.
-    Refused,
-}
+use snapping::{SnapCut, SnapState};
 
 /// Material constants that may change while a body moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,9 +65,7 @@ pub struct Constants {
 /// A deformable, cuttable body.
 #[derive(Debug)]
 pub struct Body {
-    cut_mesh: CutMesh,
-    skin: Option<Skin>,
-    shape: Shape,
+    space: Box<dyn Space>,
     /// Rest position of every node [m]: copies first, then the nodes that the element adds.
     rest: Vec<Vector3<f64>>,
     material: Material,
@@ -153,84 +84,63 @@ pub struct Body {
     parts: LooseParts,
     connectivity: LocalConnectivity,
     range: Range,
-    path: Path,
+    dynamics: Dynamics,
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
     /// State of cutting along faces; `None` for other bodies.
     snap: Option<Box<SnapState>>,
-    under_way: Option<CutUnderWay>,
-}
-
-/// The two ways to compute a step.
-#[derive(Debug)]
-enum Path {
-    Fast(Box<Fast>),
-    General(Box<General>),
+    /// A cut along faces that was begun and is not complete.
+    under_way: Option<SnapCut>,
 }
 
 impl Body {
     /// A body at rest in the configuration of `mesh`, made of linear or quadratic tetrahedra as
     /// `settings` request.
     pub fn new(mesh: TetMesh, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
-        let shape = match settings.element {
-            ElementKind::Tet4 => Shape::Tet4,
-            ElementKind::Tet10 => {
+        let mut tets = match (settings.element, settings.cutting) {
+            (ElementKind::Tet4, CuttingMethod::Xfem) => Tets::linear(CutMesh::new(mesh)?),
+            (ElementKind::Tet4, CuttingMethod::Snap) => {
                 mesh.check()?;
-                Shape::Tet10(Tet10Mesh::new(&mesh))
+                Tets::linear(CutMesh::new(Snapper::prepared(&mesh))?)
             }
-            ElementKind::Hex8 => {
+            (ElementKind::Tet10, _) => Tets::quadratic(mesh)?,
+            (ElementKind::Hex8, _) => {
                 let (what, with) = ("element hex8", "a mesh of tetrahedra");
                 return Err(BodyError::Combination { what, with, instead: "tet4 or tet10" });
             }
         };
-        let mesh = match settings.cutting {
-            CuttingMethod::Xfem => mesh,
-            CuttingMethod::Snap => {
-                mesh.check()?;
-                Snapper::prepared(&mesh)
-            }
-        };
-        Self::with_shape(CutMesh::new(mesh)?, shape, material, settings)
+        tets.set_exact(!settings.ablation.exact_predicates);
+        Self::of_space(Box::new(tets), material, settings)
     }
 
     /// A body of trilinear hexahedra at rest in the configuration of `mesh`. Its surface is that of the
     /// tetrahedra each hexahedron is split into, on the same nodes.
     pub fn hex8(mesh: HexMesh, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
-        mesh.check()?;
         let settings = BodySettings { element: ElementKind::Hex8, ..settings };
-        Self::with_shape(CutMesh::new(mesh.to_tets())?, Shape::Hex8(mesh), material, settings)
+        Self::of_space(Box::new(Tets::hexahedra(mesh)?), material, settings)
     }
 
-    fn with_shape(
-        cut_mesh: CutMesh,
-        shape: Shape,
+    /// A body at rest that is discretised by `space`.
+    fn of_space(
+        space: Box<dyn Space>,
         material: Material,
         settings: BodySettings,
     ) -> Result<Self, BodyError> {
         material.check()?;
         settings.check(material.law)?;
-        settings.scheme.check()?;
         let mut settings = settings;
         // Single precision is a default, so it yields where flat elements would turn forces into noise.
         if settings.arithmetic.is_none()
             && settings.arithmetic(material.law) == Arithmetic::Single
-            && too_flat_for_single(cut_mesh.mesh())
+            && too_flat_for_single(space.mesh())
         {
             settings.arithmetic = Some(Arithmetic::Mixed);
         }
-        let mut cut_mesh = cut_mesh;
-        cut_mesh.set_exact(!settings.ablation.exact_predicates);
-        let path = if settings.arithmetic(material.law) == Arithmetic::Single {
-            let simd = if settings.portable { Simd::Baseline } else { Simd::detect() };
-            let mut fast = Fast::new(simd, &cut_mesh, settings.scheme, settings.ablation.predictor);
-            fast.elastic.set_choice(settings.operator(material.law, cut_mesh.pieces().len()));
-            Path::Fast(Box::new(fast))
-        } else {
-            Path::General(Box::new(General::new(&shape, &cut_mesh, &material, &settings)?))
-        };
+        let solver = step_solver(&*space, &material, &settings)?;
+        let dynamics = Dynamics::new(settings.scheme, material.law, solver)?;
         let snap = settings.cutting == CuttingMethod::Snap;
         let mut body = Self {
-            snap: snap.then(|| Box::new(SnapState::new(cut_mesh.mesh()))),
+            snap: snap.then(|| Box::new(SnapState::new(space.mesh()))),
             rest: Vec::new(),
             state: State::default(),
             boundary: Boundary::default(),
@@ -241,17 +151,15 @@ impl Body {
             mass: Vec::new(),
             split_from: Vec::new(),
             parts: LooseParts::default(),
-            connectivity: LocalConnectivity::with_capacity(cut_mesh.n_copies()),
+            connectivity: LocalConnectivity::with_capacity(space.n_copies()),
             range: Range::default(),
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
             under_way: None,
-            skin: None,
-            cut_mesh,
-            shape,
+            space,
             material,
             settings,
-            path,
+            dynamics,
         };
         body.return_to_rest();
         body.follow_topology();
@@ -273,7 +181,7 @@ impl Body {
         let mut report = self.advance(dt_s, gravity, springs);
         if let Some(Notice::Pivot { displacement }) = &mut report.notice {
             let (copy, axis) = (*displacement / 3, *displacement % 3);
-            let node = self.cut_mesh.copy_node().get(copy as usize).copied().unwrap_or(copy);
+            let node = self.space.node_of_copy().get(copy as usize).copied().unwrap_or(copy);
             *displacement = 3 * node + axis;
         }
         if report.outcome == Outcome::Advanced {
@@ -282,35 +190,11 @@ impl Body {
         report
     }
 
-    /// Makes the step on the path of this body.
     fn advance(&mut self, dt_s: f64, gravity: Vector3<f64>, springs: &[PointSpring]) -> SolveReport {
-        let Self { cut_mesh, team, state, spring_forces, load, fixed, mass, parts, rest, .. } = self;
-        let report = match &mut self.path {
-            Path::Fast(fast) => {
-                let inputs = StepInputs {
-                    h: dt_s,
-                    gravity,
-                    mass,
-                    mass_f32: &[],
-                    load,
-                    fixed,
-                    parts,
-                    springs,
-                    material: &self.material,
-                    solver: self.settings.solver(self.material.law),
-                    inertia: match self.settings.scheme {
-                        Scheme::Static => Inertia::None { mesh: cut_mesh, relax: self.settings.relaxation },
-                        _ => Inertia::Euler,
-                    },
-                    solves: self.settings.solves(self.material.law),
-                };
-                fast.step(team, cut_mesh, state, &inputs, (rest, spring_forces))
-            }
-            Path::General(general) => {
-                let inputs = DynamicsInputs { h: dt_s, gravity, load, fixed, springs };
-                general.step(team, state, &inputs, spring_forces)
-            }
-        };
+        let Self { space, dynamics, team, state, spring_forces, load, fixed, mass, parts, rest, .. } = self;
+        let points = &**space;
+        let inputs = StepInputs { h: dt_s, gravity, mass, load, fixed, parts, springs, rest, points };
+        let report = dynamics.step(team, state, &inputs, spring_forces);
         let solves = !self.settings.scheme.is_explicit();
         let tolerance = if solves { self.settings.solver.tolerance } else { 0.0 };
         SolveReport { tolerance, ..report }
@@ -318,10 +202,7 @@ impl Body {
 
     /// Takes a step back that drew a part of the body out of any sensible range.
     fn hold_within_range(&mut self, report: &mut SolveReport) {
-        let before = match &self.path {
-            Path::Fast(fast) => fast.before(),
-            Path::General(general) => general.before(),
-        };
+        let before = self.dynamics.before();
         let Some(Beyond { stretch, size_m }) = self.range.beyond(&before.x, &self.state.x, &self.parts)
         else {
             return;
@@ -329,9 +210,7 @@ impl Body {
         self.state.x.copy_from_slice(&before.x);
         self.state.v.fill(Vector3::zeros());
         self.spring_forces.fill(Vector3::zeros());
-        if let Path::General(general) = &mut self.path {
-            general.dynamics.restart();
-        }
+        self.dynamics.restart();
         report.outcome = Outcome::Held;
         report.notice = Some(Notice::OutOfRange { stretch, size_m });
     }
@@ -347,9 +226,9 @@ impl Body {
         &self.spring_forces
     }
 
-    /// Whether the body takes the fast path: single precision, matrix-free.
+    /// Whether steps are linear solves, matrix-free in single precision.
     pub fn is_fast(&self) -> bool {
-        matches!(self.path, Path::Fast(_))
+        self.dynamics.model().is_none()
     }
 
     /// Rest position of every node [m]: copies, then the nodes that quadratic elements add.
@@ -360,7 +239,7 @@ impl Body {
     /// Nodes and shape functions (Σ = 1) of the point with barycentric coordinates `weights` in tet `tet`
     /// of the mesh, whose piece is on `copies`.
     pub fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
-        self.shape.carriers(tet, copies, weights)
+        self.space.carriers(tet, copies, weights)
     }
 
     /// Position of every node [m], in the order of [`rest_positions`](Self::rest_positions).
@@ -388,39 +267,34 @@ impl Body {
             let with = "cutting along element faces";
             return Err(BodyError::Combination { what: "a skin", with, instead: "cutting method xfem" });
         }
-        if self.shape.kind() == ElementKind::Tet4 {
-            self.skin = Some(Skin::new(&self.cut_mesh, settings, shape)?);
-            return Ok(());
+        if self.space.kind() == ElementKind::Tet4 {
+            return Ok(self.space.put_on_skin(settings, shape)?);
         }
-        let with = if self.shape.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" };
-        Err(BodyError::Combination { what: "a skin", with, instead: "tet4" })
+        Err(BodyError::Combination { what: "a skin", with: element_name(&*self.space), instead: "tet4" })
     }
 
     /// The skin, if the body has one.
     pub fn skin(&self) -> Option<&Skin> {
-        self.skin.as_ref()
+        self.space.skin()
     }
 
     /// See [`Skin::spoil`].
     #[doc(hidden)]
     pub fn spoil_skin(&mut self) {
-        self.skin.iter_mut().for_each(Skin::spoil);
+        self.space.spoil_skin();
     }
 
     /// The surface that is shown and touched, closed and 2-manifold. It consists of the skin, or without
     /// one the boundary of the elements, and of the lips of cuts. It changes only when the
     /// [`epoch`](Self::epoch) does.
     pub fn surface(&self) -> &Surface {
-        self.skin.as_ref().map_or(self.cut_mesh.surface(), Skin::surface)
+        self.space.surface()
     }
 
     /// Lines that incisions have drawn on the [`surface`](Self::surface) without opening it yet. They may
     /// change with every cut, even one that leaves the topology alone.
     pub fn incision_marks(&self) -> Vec<IncisionMark> {
-        match &self.skin {
-            Some(skin) => skin.incision_marks(&self.cut_mesh),
-            None => self.cut_mesh.incision_marks(),
-        }
+        self.space.incision_marks()
     }
 
     /// Material with its present constants; see [`set_constants`](Self::set_constants).
@@ -440,10 +314,8 @@ impl Body {
         let settings = BodySettings { solver, ..self.settings };
         BodySettings { arithmetic, ..settings }.check(self.material.law)?;
         self.settings = settings;
-        if let Path::General(general) = &mut self.path {
-            let newton = BodySettings { arithmetic, ..settings }.newton(self.material.law);
-            general.dynamics.set_solver(newton, settings.relaxation_iterations());
-        }
+        let solver = BodySettings { arithmetic, ..settings }.step_solver(self.material.law);
+        self.dynamics.set_solver(solver);
         Ok(())
     }
 
@@ -460,11 +332,7 @@ impl Body {
             return Ok(());
         }
         self.material = material;
-        match &mut self.path {
-            // The fast path receives its constants with every step.
-            Path::Fast(fast) => fast.forget_energy(),
-            Path::General(general) => general.dynamics.set_material(material),
-        }
+        self.dynamics.set_material(material);
         Ok(())
     }
 
@@ -472,15 +340,10 @@ impl Body {
     /// [`OperatorChoice::Auto`] takes the cheaper way. Returns `false`, and changes nothing, if the body
     /// takes the general path, which always assembles.
     pub fn set_operator(&mut self, choice: OperatorChoice) -> bool {
-        match &mut self.path {
-            Path::Fast(fast) => {
-                self.settings.operator = choice;
-                let pieces = self.cut_mesh.pieces().len();
-                fast.elastic.set_choice(self.settings.operator(self.material.law, pieces));
-                true
-            }
-            Path::General(_) => false,
-        }
+        let Some(stiffness) = self.dynamics.stiffness_mut() else { return false };
+        self.settings.operator = choice;
+        stiffness.set_choice(self.settings.operator(self.material.law, self.space.pieces().len()));
+        true
     }
 
     /// Connected parts of the body, by copy.
@@ -512,25 +375,45 @@ impl Body {
         if self.snap.is_some() {
             return self.snap_reset();
         }
-        self.cut_mesh.reset()?;
-        if let Some(skin) = &mut self.skin {
-            skin.follow(&self.cut_mesh);
-        }
+        self.space.reset()?;
         self.return_to_rest();
-        match &mut self.path {
-            Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
-            Path::General(_) => self.rebuild_general()?,
-        }
+        self.dynamics.rebuild(&*self.space)?;
         self.follow_topology();
         Ok(())
     }
 
     fn return_to_rest(&mut self) {
-        refill(&mut self.rest, self.shape.rest_positions(&self.cut_mesh).into_iter());
-        refill(&mut self.split_from, 0..self.cut_mesh.n_copies() as u32);
+        refill(&mut self.rest, self.space.rest_positions().into_iter());
+        refill(&mut self.split_from, 0..self.space.n_copies() as u32);
         refill(&mut self.state.x, self.rest.iter().copied());
         self.state.v.fill(Vector3::zeros());
         resize_reserving(&mut self.state.v, self.rest.len(), Vector3::zeros());
         self.spring_forces.clear();
     }
+}
+
+/// The way to solve the equations of a step that the settings choose.
+fn step_solver(
+    space: &dyn Space,
+    material: &Material,
+    settings: &BodySettings,
+) -> Result<Box<dyn StepSolver>, BodyError> {
+    let (law, scheme) = (material.law, settings.scheme);
+    let stiffness = match settings.arithmetic(law) {
+        Arithmetic::Single => space.stiffness(settings.portable),
+        Arithmetic::Mixed | Arithmetic::Double => None,
+    };
+    let Some(mut stiffness) = stiffness else {
+        let dynamics = settings.dynamics(law);
+        return Ok(Box::new(ModelSolver::of_space(space, *material, settings.volumetric, dynamics)?));
+    };
+    stiffness.set_choice(settings.operator(law, space.pieces().len()));
+    let (solver, at_start) = (settings.step_solver(law), settings.ablation.predictor);
+    let stiffness = (stiffness, settings.portable);
+    Ok(Box::new(LinearlyImplicit::new((scheme, *material), solver, stiffness, at_start)))
+}
+
+/// The element of a body that can be neither cut nor given a skin.
+fn element_name(space: &dyn Space) -> &'static str {
+    if space.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" }
 }

@@ -2,7 +2,7 @@
 
 use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
 use crate::assembly::{ElementKind, Volumetric};
-use crate::integrator::{MassKind, Multistep, Scheme};
+use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::Law;
 use crate::operator::OperatorChoice;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
@@ -142,16 +142,6 @@ impl BodySettings {
         })
     }
 
-    /// When a linear solve of the fast path stops. An equilibrium may use all the iterations that
-    /// Newton's method would get.
-    pub(super) fn solver(&self, law: Law) -> PcgSettings {
-        let steps = match self.scheme {
-            Scheme::Static if !self.relaxation => self.newton_steps(law),
-            _ => 1,
-        };
-        PcgSettings { iterations: self.solver.iterations.saturating_mul(steps), ..self.solver }
-    }
-
     /// Largest number of linear solves in a step of the fast path.
     pub(super) fn solves(&self, law: Law) -> u32 {
         match self.scheme {
@@ -204,9 +194,26 @@ impl BodySettings {
         solves * cost::step_seconds(law, pieces, self.solver, assembled)
     }
 
-    /// Iterations of relaxation per step, if that is how the body is solved.
-    pub(super) fn relaxation_iterations(&self) -> Option<u32> {
-        self.relaxation.then_some(self.solver.iterations)
+    /// When the solvers of a step stop. An equilibrium by linear solves may use all the iterations that
+    /// Newton's method would get.
+    pub(super) fn step_solver(&self, law: Law) -> SolverSettings {
+        let steps = match self.scheme {
+            Scheme::Static if !self.relaxation => self.newton_steps(law),
+            _ => 1,
+        };
+        let iterations = self.solver.iterations.saturating_mul(steps);
+        SolverSettings {
+            newton: self.newton(law),
+            linear: (self.solves(law), PcgSettings { iterations, ..self.solver }),
+            relaxation: self.relaxation.then_some(self.solver.iterations),
+        }
+    }
+
+    /// Settings of steps with a discrete model.
+    pub(super) fn dynamics(&self, law: Law) -> DynamicsSettings {
+        let SolverSettings { newton, relaxation, .. } = self.step_solver(law);
+        let (scheme, mass, linearised) = (self.scheme, self.mass, self.is_linearised(law));
+        DynamicsSettings { scheme, mass, linearised, newton, relaxation, ..DynamicsSettings::default() }
     }
 
     /// Checks that every setting is in its range and compatible with the others and with `law`.

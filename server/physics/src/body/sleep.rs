@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Body, Path};
+use super::Body;
 use crate::operator::FixedCopy;
 
 impl Body {
@@ -24,12 +24,9 @@ impl Body {
             self.asleep.push(FixedCopy { copy, axes: [true; 3], position_m });
             self.state.v[copy as usize] = Vector3::zeros();
         }
-        match &mut self.path {
-            Path::Fast(fast) => fast.still(&copies, &self.state),
-            Path::General(general) => general.dynamics.still(&copies, &self.state),
-        }
+        self.dynamics.still(&copies, &self.state);
         self.asleep.sort_unstable_by_key(|held| held.copy);
-        self.cut_mesh.raise_epoch();
+        self.space.set_epoch(self.space.epoch() + 1);
         self.follow_boundary();
         true
     }
@@ -58,7 +55,7 @@ impl Body {
 
     /// Collects the copies held by constraints or by sleep, ascending.
     pub(super) fn find_fixed(&mut self) {
-        self.boundary.fixed_copies(&self.cut_mesh, &self.rest, self.prescribed_share, &mut self.fixed);
+        self.boundary.fixed_copies(&*self.space, &self.rest, self.prescribed_share, &mut self.fixed);
         if !self.asleep.is_empty() {
             self.fixed.extend_from_slice(&self.asleep);
             self.fixed.sort_by_key(|held| held.copy);

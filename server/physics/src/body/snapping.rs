@@ -3,10 +3,11 @@
 use nalgebra::Vector3;
 
 use super::boundary::Boundary;
-use super::{Body, BodyError, Path};
+use super::{Body, BodyError};
 use crate::cut::{BladeSweep, CutMesh, CutReport, NewCopy};
 use crate::mesh::TetMesh;
 use crate::snap::{SnapNode, SnapReport, Snapper};
+use crate::space::Tets;
 
 /// How cuts are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,6 +39,13 @@ pub(super) struct SnapState {
     report: SnapReport,
     /// For every node, the node of the uncut mesh that it was, or [`crate::snap::node::NEW`].
     origins: Vec<u32>,
+}
+
+/// A cut along faces that was begun.
+#[derive(Clone, Debug)]
+pub(super) struct SnapCut {
+    pub blade: BladeSweep,
+    pub incision: u32,
 }
 
 /// The body before its first cut.
@@ -86,12 +94,12 @@ impl Body {
         // On a clone of the state, so that a refused cut leaves the body as it was.
         let Some(mut snap) = self.snap.clone() else { return Ok(CutReport::default()) };
         let nodes = self.snap_nodes();
-        let (report, cut) = snap.snapper.cut(&self.cut_mesh.mesh().tets, nodes, blade, incision)?;
+        let (report, cut) = snap.snapper.cut(&self.space.mesh().tets, nodes, blade, incision)?;
         let mut told = CutReport {
             elements_cut: report.elements,
             faces_opened: report.faces,
             pending_edges: report.pending,
-            epoch: self.cut_mesh.epoch(),
+            epoch: self.space.epoch(),
             ..CutReport::default()
         };
         snap.report = report;
@@ -101,7 +109,8 @@ impl Body {
             return Ok(told);
         };
         told.epoch += 1;
-        self.cut_mesh = CutMesh::with_lips(cut.mesh, snap.snapper.tags(), told.epoch)?;
+        let cut_mesh = CutMesh::with_lips(cut.mesh, snap.snapper.tags(), told.epoch)?;
+        self.space = Box::new(Tets::linear(cut_mesh));
         told.new_copies = cut.duplicates.iter().map(|d| NewCopy { copy: d.node, parent: d.parent }).collect();
         // A reset must restore requests made since the last cut, but not the pins.
         snap.take_changes(&self.boundary);
@@ -129,30 +138,28 @@ impl Body {
     /// loose parts are removed, and so are requests on nodes that cuts made.
     pub(super) fn snap_reset(&mut self) -> Result<(), BodyError> {
         let Some(snap) = &mut self.snap else { return Ok(()) };
-        let epoch = self.cut_mesh.epoch() + 1;
+        let epoch = self.space.epoch() + 1;
         let mesh = snap.start.mesh.clone();
         snap.take_changes(&self.boundary);
         if let Some(boundary) = snap.start.boundary.take() {
             self.boundary = boundary;
         }
         **snap = SnapState::new(&mesh);
-        self.cut_mesh = CutMesh::with_lips(mesh, snap.snapper.tags(), epoch)?;
+        let cut_mesh = CutMesh::with_lips(mesh, snap.snapper.tags(), epoch)?;
+        self.space = Box::new(Tets::linear(cut_mesh));
         self.return_to_rest();
         self.follow_mesh()
     }
 
     /// Updates everything derived from the mesh after it was replaced.
     fn follow_mesh(&mut self) -> Result<(), BodyError> {
-        match &mut self.path {
-            Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
-            Path::General(_) => self.rebuild_general()?,
-        }
+        self.dynamics.rebuild(&*self.space)?;
         self.follow_topology();
         Ok(())
     }
 
     fn snap_nodes(&self) -> Vec<SnapNode> {
-        let rest = &self.cut_mesh.mesh().nodes;
+        let rest = &self.space.mesh().nodes;
         let mut nodes: Vec<SnapNode> =
             (0u32..).zip(rest).map(|(n, &rest)| SnapNode::at_rest(rest, n)).collect();
         for ((node, x), v) in nodes.iter_mut().zip(&self.state.x).zip(&self.state.v) {
@@ -164,7 +171,7 @@ impl Body {
 
     /// Holds every part that is held nowhere at its largest skin face, in its present position.
     fn pin_loose_parts(&mut self) -> Result<(), BodyError> {
-        let mesh = self.cut_mesh.mesh();
+        let mesh = self.space.mesh();
         let mut largest: Vec<Option<(f64, [u32; 3])>> = vec![None; self.parts.len()];
         for face in mesh.boundary_faces() {
             let area = mesh.face_area(&face);

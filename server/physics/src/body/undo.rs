@@ -12,16 +12,14 @@ use nalgebra::Vector3;
 
 use super::boundary::Boundary;
 use super::snapping::SnapState;
-use super::{Body, BodyError, Path};
-use crate::cut::CutMesh;
+use super::{Body, BodyError};
 use crate::mesh::TetMesh;
-use crate::skin::Skin;
+use crate::space::Space;
 
 /// The topology of a body at some time: mesh, pieces, copies and skin, without positions.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct BodyTopology {
-    cut_mesh: CutMesh,
-    skin: Option<Skin>,
+    space: Box<dyn Space>,
     boundary: Boundary,
     snap: Option<Box<SnapState>>,
     x: Vec<Vector3<f64>>,
@@ -37,9 +35,9 @@ const TRIANGLE_BYTES: usize = 400;
 impl BodyTopology {
     /// Estimated memory [byte], within a factor of about two.
     pub fn bytes(&self) -> usize {
-        let skin = self.skin.as_ref().map_or(0, |skin| skin.surface().triangles.len());
-        ELEMENT_BYTES * self.cut_mesh.pieces().len()
-            + TRIANGLE_BYTES * (skin + self.cut_mesh.surface().triangles.len())
+        let skin = self.space.skin().map_or(0, |skin| skin.surface().triangles.len());
+        ELEMENT_BYTES * self.space.pieces().len()
+            + TRIANGLE_BYTES * (skin + self.space.element_surface().triangles.len())
     }
 }
 
@@ -47,8 +45,7 @@ impl Body {
     /// Takes a copy of the present topology, for [`restore`](Self::restore).
     pub fn topology(&self) -> BodyTopology {
         BodyTopology {
-            cut_mesh: self.cut_mesh.clone(),
-            skin: self.skin.clone(),
+            space: self.space.boxed_clone(),
             boundary: self.boundary.clone(),
             snap: self.snap.clone(),
             x: self.state.x.clone(),
@@ -62,27 +59,21 @@ impl Body {
     /// # Errors
     /// If the model cannot be built again.
     pub fn restore(&mut self, topology: BodyTopology) -> Result<(), BodyError> {
-        let epoch = self.cut_mesh.epoch() + 1;
+        let epoch = self.space.epoch() + 1;
         let before = Moving::of(self, topology.held);
-        let BodyTopology { cut_mesh, skin, boundary, snap, x, .. } = topology;
+        let BodyTopology { space, boundary, snap, x, .. } = topology;
         let state = match &snap {
-            Some(_) => before.on_mesh(cut_mesh.mesh(), &x),
+            Some(_) => before.on_mesh(space.mesh(), &x),
             None => before.joined(&x, &self.split_from),
         };
-        (self.cut_mesh, self.skin, self.snap) = (cut_mesh, skin, snap);
-        self.cut_mesh.set_epoch(epoch);
-        if let Some(skin) = &mut self.skin {
-            skin.set_epoch(epoch);
-        }
+        (self.space, self.snap) = (space, snap);
+        self.space.set_epoch(epoch);
         self.boundary = boundary;
         self.asleep.clear();
-        self.split_from.truncate(self.cut_mesh.n_copies());
+        self.split_from.truncate(self.space.n_copies());
         (self.state.x, self.state.v) = state;
         // Rotations and history of the cut state no longer apply: the integrator starts afresh.
-        match &mut self.path {
-            Path::Fast(fast) => fast.rebuild(&self.cut_mesh),
-            Path::General(_) => self.rebuild_general()?,
-        }
+        self.dynamics.rebuild(&*self.space)?;
         self.spring_forces.clear();
         self.follow_topology();
         if !before.lost.contains(&true) {
@@ -119,7 +110,7 @@ impl Moving {
     fn of(body: &Body, held: bool) -> Self {
         let free = |&part: &u32| held && body.parts.free[part as usize];
         // The mesh is needed only if cuts have changed it.
-        let mesh = if body.snap.is_some() { body.cut_mesh.mesh().clone() } else { TetMesh::default() };
+        let mesh = if body.snap.is_some() { body.space.mesh().clone() } else { TetMesh::default() };
         Self {
             mesh,
             x: body.state.x.clone(),

@@ -187,12 +187,7 @@ impl CutMesh {
         self.epoch
     }
 
-    /// Raises the epoch because the displayed mesh changed without a cut.
-    pub(crate) fn raise_epoch(&mut self) {
-        self.epoch += 1;
-    }
-
-    /// Sets the epoch of an earlier state that becomes the present one again.
+    /// Sets the epoch, because the displayed mesh changed without a cut or is an earlier one again.
     pub(crate) fn set_epoch(&mut self, epoch: u32) {
         self.epoch = epoch;
     }

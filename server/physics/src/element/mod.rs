@@ -11,8 +11,10 @@ pub mod quadrature;
 pub mod tet10;
 pub mod hex8;
 mod spring;
+mod points;
 
 pub use lanes::{Ids, LANES, Lanes, Simd, Vector8};
+pub use points::{Point, Points};
 pub use polar::polar_rotation;
 pub use polar_lanes::{Mat3, polar_newton};
 pub use spring::Spring;

@@ -8,9 +8,15 @@ use crate::material::{Lame, Law};
 /// The six edges of a tetrahedron as pairs of local node numbers.
 pub const TET_EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
-/// F = Σ_a x_a ⊗ g_a [1], with current corners `x` [m] and rest gradients `g` [1/m].
-pub fn deformation_gradient(x: &[Vector3<f64>; 4], g: &[Vector3<f64>; 4]) -> Matrix3<f64> {
-    (1..4).fold(Matrix3::zeros(), |F, a| F + (x[a] - x[0]) * g[a].transpose())
+/// F = Σ_a x_a ⊗ g_a [1] of an element with its nodes at `x` [m] and rest gradients `g` [1/m], from differences
+/// to the first node so that rigid shifts cancel exactly.
+#[inline]
+pub fn deformation_gradient<const N: usize>(x: &[Vector3<f64>; N], g: &[Vector3<f64>]) -> Matrix3<f64> {
+    let mut F = Matrix3::zeros();
+    for a in 1..N {
+        F += (x[a] - x[0]) * g[a].transpose();
+    }
+    F
 }
 
 /// Elastic energy w V ψ(F) [J] of a piece of volume `volume_m3` = w V.

@@ -15,13 +15,13 @@ use nalgebra::Vector3;
 
 use super::parts::Translations;
 use super::springs::ActiveSpring;
-use super::step_inputs::{Inertia, KnownLoads, StepInputs, StepOutcome};
+use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
+use super::step_solver::ActiveSprings;
 use super::{State, WEIGHTLESS, hold};
 use crate::material::Rayleigh;
-use crate::operator::exact;
 use crate::operator::{
-    BLOCK, Block6, BlockJacobi, CompositeDiagonal, Elastic, FixedCopy, LinearOperator, Padded, Spring,
-    StiffModes, Substitution, Sum, SystemOperator, block_of, filter, invert, padded,
+    BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
+    Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
 };
 use crate::reserve::resize_reserving;
 use crate::solver::{LEAST_REFERENCE, Pcg, PcgReport, StopReason};
@@ -59,8 +59,7 @@ pub struct LinearStep {
     pcg: Pcg,
     /// One entry per block of the vector loops.
     partial: Vec<f64>,
-    active: Vec<ActiveSpring>,
-    accepted: Vec<bool>,
+    springs: ActiveSprings,
     terms: Vec<Spring>,
     translations: Translations,
     reference: f64,
@@ -139,16 +138,16 @@ impl LinearStep {
     pub fn step(
         &mut self,
         team: &mut Team,
-        elastic: &mut Elastic,
+        elastic: &mut dyn Stiffness,
         state: &mut State,
-        inputs: &StepInputs<'_>,
-        spring_forces: &mut Vec<Vector3<f64>>,
+        inputs: &LinearInputs<'_>,
+        spring_forces: &mut [Vector3<f64>],
     ) -> StepOutcome {
         if inputs.relaxes() && self.goes_on(elastic, state, inputs) {
             return self.relax(team, elastic, state, inputs, spring_forces);
         }
         self.predict(team, state, inputs);
-        self.start_springs(inputs);
+        self.springs.begin(&inputs.step, &self.predicted);
         let mut solve = PcgReport::default();
         let (mut inverted_pieces, mut finite, mut solves) = (0, true, 0);
         let mut began = f64::INFINITY;
@@ -179,16 +178,16 @@ impl LinearStep {
         }
         // Relaxation may continue this search in the next step if nothing changes until then.
         self.searched = None;
-        if finite && inputs.relaxes() && inputs.springs.is_empty() {
+        if finite && inputs.relaxes() && inputs.step.springs.is_empty() {
             self.searched.get_or_insert_default().note(inputs);
             self.ended.clone_from(&state.x);
         }
-        let refused_springs = inputs.springs.len() - self.active.len();
+        let refused_springs = self.springs.refused();
         StepOutcome { solve, solves, inverted_pieces, refused_springs, finite }
     }
 
     /// Whether nothing has changed from outside since the last step.
-    fn goes_on(&self, elastic: &Elastic, state: &State, inputs: &StepInputs<'_>) -> bool {
+    fn goes_on(&self, elastic: &dyn Stiffness, state: &State, inputs: &LinearInputs<'_>) -> bool {
         let made_for = Some((elastic.version(), inputs.mass_factor()));
         let same = |known| inputs.is_loaded_as(known) && self.made_for == made_for && self.ended == state.x;
         self.searched.as_ref().is_some_and(same)
@@ -198,14 +197,14 @@ impl LinearStep {
     fn relax(
         &mut self,
         team: &mut Team,
-        elastic: &mut Elastic,
+        elastic: &mut dyn Stiffness,
         state: &mut State,
-        inputs: &StepInputs<'_>,
-        spring_forces: &mut Vec<Vector3<f64>>,
+        inputs: &LinearInputs<'_>,
+        spring_forces: &mut [Vector3<f64>],
     ) -> StepOutcome {
         self.predicted.copy_from_slice(&state.x);
         self.delta.fill([0.0; 4]);
-        self.translations.restart(inputs.parts);
+        self.translations.restart(inputs.step.parts);
         let Self { pcg, preconditioner, delta, reference, .. } = self;
         let mut A = system(elastic, &[], inputs);
         let solve = pcg.go_on(team, &mut A, preconditioner, delta, (*reference, inputs.solver));
@@ -225,13 +224,13 @@ impl LinearStep {
     fn improve(
         &mut self,
         team: &mut Team,
-        (elastic, inputs): (&mut Elastic, &StepInputs<'_>),
+        (elastic, inputs): (&mut dyn Stiffness, &LinearInputs<'_>),
         state: &State,
         first: bool,
         solve: &mut PcgReport,
     ) {
         self.delta.fill([0.0; 4]);
-        self.translations.restart(inputs.parts);
+        self.translations.restart(inputs.step.parts);
         for pass in 0..SPRING_PASSES {
             self.complete_operator(elastic, inputs);
             self.balance_parts(state, inputs);
@@ -253,38 +252,39 @@ impl LinearStep {
     pub fn accelerate(
         &mut self,
         team: &mut Team,
-        elastic: &mut Elastic,
+        elastic: &mut dyn Stiffness,
         state: &State,
-        inputs: &StepInputs<'_>,
+        inputs: &LinearInputs<'_>,
         acceleration: &mut [Vector3<f64>],
     ) {
         self.predicted.copy_from_slice(&state.x);
-        elastic.update_chunks(team, &inputs.elastic_update(), &state.x);
+        elastic.update(team, &inputs.elastic_update(), &state.x);
         team.for_blocks(blocks(&mut self.f_int, BLOCK), |block, f| elastic.forces(block, f));
         self.made_for = None;
         let Rayleigh { stiffness_s: beta, mass_1_s: alpha } = inputs.material.rayleigh;
         self.damping.fill([0.0; 4]);
         if beta > 0.0 {
             self.scratch.iter_mut().zip(&state.v).for_each(|(out, v)| *out = padded(v));
-            elastic.apply(team, &self.scratch, &mut self.damping); // scale · K̂ v
+            apply(elastic, team, &self.scratch, &mut self.damping); // scale · K̂ v
         }
         let beta = beta / inputs.elastic_update().scale;
         for (c, a) in acceleration.iter_mut().enumerate() {
-            let applied = inputs.mass[c] * (inputs.gravity - alpha * state.v[c]) + inputs.load[c];
+            let applied =
+                inputs.step.mass[c] * (inputs.step.gravity - alpha * state.v[c]) + inputs.step.load[c];
             *a = applied - unpadded(&self.f_int[c]) - beta * unpadded(&self.damping[c]);
         }
-        self.start_springs(inputs);
-        for spring in &self.active {
+        self.springs.begin(&inputs.step, &self.predicted);
+        for spring in &self.springs.springs {
             let force = spring.potential(spring.point(&state.x)).force;
             spring.carriers().for_each(|(c, w)| acceleration[c] += w * force);
         }
-        for (a, &m) in acceleration.iter_mut().zip(inputs.mass) {
+        for (a, &m) in acceleration.iter_mut().zip(inputs.step.mass) {
             *a = if m > WEIGHTLESS { *a / m } else { Vector3::zeros() };
         }
-        hold(inputs.fixed, acceleration);
+        hold(inputs.step.fixed, acceleration);
     }
 
-    fn predict(&mut self, team: &mut Team, state: &State, inputs: &StepInputs<'_>) {
+    fn predict(&mut self, team: &mut Team, state: &State, inputs: &LinearInputs<'_>) {
         team.for_blocks(blocks(&mut self.predicted, BLOCK), |block, predicted| {
             match inputs.inertia {
                 Inertia::Euler => {}
@@ -295,10 +295,10 @@ impl LinearStep {
             }
             let known = block_of(&state.x, block).iter().zip(block_of(&state.v, block));
             for (predicted, (x, v)) in predicted.iter_mut().zip(known) {
-                *predicted = x + inputs.h * v;
+                *predicted = x + inputs.step.h * v;
             }
         });
-        for fixed in inputs.fixed {
+        for fixed in inputs.step.fixed {
             for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
                 self.predicted[fixed.copy as usize][axis] = fixed.position_m[axis];
             }
@@ -310,21 +310,21 @@ impl LinearStep {
     fn update_operator(
         &mut self,
         team: &mut Team,
-        elastic: &mut Elastic,
+        elastic: &mut dyn Stiffness,
         state: &State,
-        inputs: &StepInputs<'_>,
+        inputs: &LinearInputs<'_>,
     ) -> usize {
-        let (h, beta) = (inputs.h, inputs.material.rayleigh.stiffness_s);
+        let (h, beta) = (inputs.step.h, inputs.material.rayleigh.stiffness_s);
         let with = inputs.elastic_update();
         let scale = with.scale;
         let at = if self.at_start { &state.x } else { &self.predicted };
-        let inverted = elastic.update_chunks(team, &with, at);
+        let inverted = elastic.update(team, &with, at);
         self.sum_chunks(team, elastic, inputs);
         // Without inertia, single-precision forces would be too coarse for the residual.
-        if let Inertia::None { mesh, .. } = inputs.inertia {
+        if !inputs.moves() {
             self.exact.resize(self.predicted.len(), Vector3::zeros());
-            let material = (inputs.material.law, inputs.material.lame());
-            self.stored = exact::internal_forces(mesh, material, &self.predicted, &mut self.exact);
+            let points = inputs.step.points;
+            self.stored = points.elastic_forces(inputs.material, &self.predicted, &mut self.exact);
         }
         if self.damps(inputs) {
             // Prescribed copies count with the velocity that they have in the step.
@@ -335,7 +335,7 @@ impl LinearStep {
                 }),
                 _ => scratch.zip(&state.x).for_each(|((v, to), x)| *v = padded(&((to - x) / h))),
             }
-            elastic.apply(team, &self.scratch, &mut self.damping); // s K̂ v
+            apply(elastic, team, &self.scratch, &mut self.damping); // s K̂ v
             // Linearised at x_n, the predictor is h v away: f_int(x̂) ≈ f_int(x_n) + h K̂ v.
             let beta = if self.at_start { beta + h } else { beta };
             let factor = (beta / scale) as f32;
@@ -345,25 +345,26 @@ impl LinearStep {
     }
 
     /// Whether the step has a damping term K̂ v.
-    fn damps(&self, inputs: &StepInputs<'_>) -> bool {
+    fn damps(&self, inputs: &LinearInputs<'_>) -> bool {
         inputs.moves() && (self.at_start || inputs.material.rayleigh.stiffness_s > 0.0)
     }
 
     /// Sums internal forces and, if it changed, the diagonal of A and its inverse, without springs.
-    fn sum_chunks(&mut self, team: &mut Team, elastic: &Elastic, inputs: &StepInputs<'_>) {
+    fn sum_chunks(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
         let factor = inputs.mass_factor();
         let made_for = Some((elastic.version(), factor));
         let axes = |f: &FixedCopy| (f.copy, f.axes);
         let f_int = blocks(&mut self.f_int, BLOCK);
-        if self.made_for == made_for && inputs.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied())
+        if self.made_for == made_for
+            && inputs.step.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied())
         {
             team.for_blocks(f_int, |block, f| elastic.forces(block, f));
             return;
         }
         self.made_for = made_for;
-        if !inputs.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied()) {
+        if !inputs.step.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied()) {
             self.made_for_fixed.clear();
-            self.made_for_fixed.extend(inputs.fixed.iter().map(axes));
+            self.made_for_fixed.extend(inputs.step.fixed.iter().map(axes));
             self.stiff.iter_mut().for_each(|stiff| stiff.stale = true);
         }
         self.sprung.clear();
@@ -381,7 +382,7 @@ impl LinearStep {
             }
         });
         self.substitute(team, elastic, inputs);
-        for copy in inputs.fixed {
+        for copy in inputs.step.fixed {
             let c = copy.copy as usize;
             self.preconditioner.set(c, &self.diagonal[c], copy.axes);
         }
@@ -389,10 +390,10 @@ impl LinearStep {
 
     /// Replaces blocks of the preconditioner by those in variables in which degenerate elements are not
     /// stiff.
-    fn substitute(&mut self, team: &mut Team, elastic: &Elastic, inputs: &StepInputs<'_>) {
+    fn substitute(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
         let Some(stiff) = &mut self.stiff else { return };
         if stiff.stale {
-            let held = |copy: u32| inputs.fixed.binary_search_by_key(&copy, |f| f.copy).is_ok();
+            let held = |copy: u32| inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy).is_ok();
             let (T, left) = stiff.modes.substitution(held);
             stiff.composite = CompositeDiagonal::new(&stiff.modes, &T, elastic);
             (stiff.left, stiff.stale) = (left, false);
@@ -406,23 +407,13 @@ impl LinearStep {
         }
     }
 
-    fn start_springs(&mut self, inputs: &StepInputs<'_>) {
-        self.active.clear();
-        self.accepted.clear();
-        for spring in inputs.springs {
-            let active = ActiveSpring::new(spring, &self.predicted);
-            self.accepted.push(active.is_some());
-            self.active.extend(active);
-        }
-    }
-
     /// Adds the springs to the operator and to the preconditioner.
-    fn complete_operator(&mut self, elastic: &mut Elastic, inputs: &StepInputs<'_>) {
+    fn complete_operator(&mut self, elastic: &mut dyn Stiffness, inputs: &LinearInputs<'_>) {
         self.terms.clear();
-        self.terms.extend(self.active.iter().filter_map(|s| s.term(inputs.s())));
+        self.terms.extend(self.springs.springs.iter().filter_map(|s| s.term(inputs.s())));
         let axes_of = |copy: u32| {
-            let found = inputs.fixed.binary_search_by_key(&copy, |f| f.copy);
-            found.map_or([false; 3], |f| inputs.fixed[f].axes)
+            let found = inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy);
+            found.map_or([false; 3], |f| inputs.step.fixed[f].axes)
         };
         // Springs of the last pass leave the preconditioner.
         for &copy in &self.sprung {
@@ -462,36 +453,36 @@ impl LinearStep {
     }
 
     /// Solves the translation equations of every free part for the imbalance that δ leaves.
-    fn balance_parts(&mut self, state: &State, inputs: &StepInputs<'_>) {
-        if !inputs.parts.any_free() {
+    fn balance_parts(&mut self, state: &State, inputs: &LinearInputs<'_>) {
+        if !inputs.step.parts.any_free() {
             return;
         }
         let factor = inputs.mass_factor();
         let s = inputs.s();
-        self.translations.begin(inputs.parts, factor);
+        self.translations.begin(inputs.step.parts, factor);
         for (c, delta) in self.delta.iter().enumerate() {
-            let moved = self.translations.shift[inputs.parts.of_copy[c] as usize] + unpadded(delta);
+            let moved = self.translations.shift[inputs.step.parts.of_copy[c] as usize] + unpadded(delta);
             let external =
                 inputs.external(c, state, &self.predicted) - inputs.inertia(c, &self.predicted) / s;
-            let missing = s * external - factor * inputs.mass[c] * moved;
-            self.translations.add(inputs.parts, c, missing);
+            let missing = s * external - factor * inputs.step.mass[c] * moved;
+            self.translations.add(inputs.step.parts, c, missing);
         }
-        for spring in &self.active {
+        for spring in &self.springs.springs {
             let point = self.point_of(spring, inputs);
             let (S, f) = (s * spring.stiffness(), s * spring.force(point));
-            self.translations.add_spring(inputs.parts, spring.main_copy(), S, f);
+            self.translations.add_spring(inputs.step.parts, spring.main_copy(), S, f);
         }
-        self.translations.solve(inputs.parts);
+        self.translations.solve(inputs.step.parts);
     }
 
     /// Position [m] of the point of a spring with the present δ.
-    fn point_of(&self, spring: &ActiveSpring, inputs: &StepInputs<'_>) -> Vector3<f64> {
+    fn point_of(&self, spring: &ActiveSpring, inputs: &LinearInputs<'_>) -> Vector3<f64> {
         spring.carriers().map(|(c, w)| w * self.position(c, inputs)).sum()
     }
 
     /// x̂ + δ of copy `c` [m].
-    fn position(&self, c: usize, inputs: &StepInputs<'_>) -> Vector3<f64> {
-        let part = inputs.parts.of_copy[c] as usize;
+    fn position(&self, c: usize, inputs: &LinearInputs<'_>) -> Vector3<f64> {
+        let part = inputs.step.parts.of_copy[c] as usize;
         self.predicted[c] + self.translations.shift[part] + unpadded(&self.delta[c])
     }
 
@@ -500,9 +491,9 @@ impl LinearStep {
     fn residual(
         &mut self,
         team: &mut Team,
-        elastic: &mut Elastic,
+        elastic: &mut dyn Stiffness,
         state: &State,
-        inputs: &StepInputs<'_>,
+        inputs: &LinearInputs<'_>,
         (pass, first): (usize, bool),
     ) {
         let (s, factor) = (inputs.s(), inputs.mass_factor());
@@ -525,14 +516,15 @@ impl LinearStep {
                 if damped {
                     f -= unpadded(&damping[c]);
                 }
-                let moved = shift[inputs.parts.of_copy[c] as usize];
-                *r = padded(&(s * f - factor * inputs.mass[c] * moved - inputs.inertia(c, predicted)));
+                let moved = shift[inputs.step.parts.of_copy[c] as usize];
+                *r = padded(&(s * f - factor * inputs.step.mass[c] * moved - inputs.inertia(c, predicted)));
                 if pass > 0 {
                     for k in 0..4 {
                         r[k] -= solved[c][k];
                     }
                 } else {
-                    let weight = padded(&(s * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
+                    let weight =
+                        padded(&(s * (inputs.step.mass[c] * inputs.step.gravity + inputs.step.load[c])));
                     load.add(&weight, &M.times(&weight)); // M⁻¹ is 0 where a copy is fixed
                 }
             }
@@ -544,27 +536,27 @@ impl LinearStep {
                 self.partial.iter().sum::<f64>().max(0.0).sqrt()
             } else {
                 for (c, load) in self.scratch.iter_mut().enumerate() {
-                    *load = padded(&(s * (inputs.mass[c] * inputs.gravity + inputs.load[c])));
+                    *load = padded(&(s * (inputs.step.mass[c] * inputs.step.gravity + inputs.step.load[c])));
                 }
-                filter(inputs.fixed, &mut self.scratch);
+                filter(inputs.step.fixed, &mut self.scratch);
                 self.pcg.norm(team, &mut self.preconditioner, &self.scratch)
             };
             self.reference = self.least_reference(loads, inputs);
         }
         // Springs reach few copies: they are added one by one.
-        for spring in &self.active {
+        for spring in &self.springs.springs {
             let f = s * spring.force(self.point_of(spring, inputs));
             for (c, w) in spring.carriers() {
                 let r = &mut self.pcg.r[c];
                 (0..3).for_each(|k| r[k] += (w * f[k]) as f32);
             }
         }
-        filter(inputs.fixed, &mut self.pcg.r);
+        filter(inputs.step.fixed, &mut self.pcg.r);
     }
 
     /// Least reference of the residual, given the norm √(fᵀM⁻¹f) of the `loads`. For an equilibrium it is
     /// that norm, or a fraction of √(2Ψ) if displacements alone load the body.
-    fn least_reference(&self, loads: f64, inputs: &StepInputs<'_>) -> f64 {
+    fn least_reference(&self, loads: f64, inputs: &LinearInputs<'_>) -> f64 {
         if inputs.moves() {
             return LOAD_FLOOR * loads;
         }
@@ -576,8 +568,8 @@ impl LinearStep {
     fn solve(
         &mut self,
         team: &mut Team,
-        elastic: &mut Elastic,
-        inputs: &StepInputs<'_>,
+        elastic: &mut dyn Stiffness,
+        inputs: &LinearInputs<'_>,
         (pass, first): (usize, bool),
     ) -> PcgReport {
         let Self { pcg, preconditioner, terms, delta, reference, began, .. } = self;
@@ -592,22 +584,22 @@ impl LinearStep {
         pcg.run(team, &mut A, preconditioner, delta, (rz, *reference, inputs.solver))
     }
 
-    fn springs_changed(&mut self, inputs: &StepInputs<'_>, pass: usize) -> bool {
+    fn springs_changed(&mut self, inputs: &LinearInputs<'_>, pass: usize) -> bool {
         if pass + 1 == SPRING_PASSES {
             return false;
         }
         let mut changed = false;
-        for s in 0..self.active.len() {
-            let point = self.point_of(&self.active[s], inputs);
-            changed |= self.active[s].choose_mode(point);
+        for s in 0..self.springs.springs.len() {
+            let point = self.point_of(&self.springs.springs[s], inputs);
+            changed |= self.springs.springs[s].choose_mode(point);
         }
         changed
     }
 
     /// Moves the predictor to x⁺ = x̂ + δ. Returns whether all of it is finite.
-    fn move_predictor(&mut self, team: &mut Team, inputs: &StepInputs<'_>) -> bool {
+    fn move_predictor(&mut self, team: &mut Team, inputs: &LinearInputs<'_>) -> bool {
         let bound = 1e15; // m: far outside any scene, far inside the range of single precision
-        let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.parts.of_copy);
+        let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.step.parts.of_copy);
         let results = (blocks(&mut self.predicted, BLOCK), blocks(&mut self.partial, 1));
         team.for_blocks(results, |block, (next, partial)| {
             let known = block_of(delta, block).iter().zip(block_of(of_part, block));
@@ -626,16 +618,10 @@ impl LinearStep {
         &mut self,
         team: &mut Team,
         state: &mut State,
-        inputs: &StepInputs<'_>,
-        spring_forces: &mut Vec<Vector3<f64>>,
+        inputs: &LinearInputs<'_>,
+        spring_forces: &mut [Vector3<f64>],
     ) {
-        spring_forces.clear();
-        let mut active = self.active.iter();
-        for &accepted in &self.accepted {
-            let spring = if accepted { active.next() } else { None };
-            let force = spring.map(|s| s.force(s.point(&self.predicted)));
-            spring_forces.push(force.unwrap_or_else(Vector3::zeros));
-        }
+        self.springs.write(spring_forces, |s| s.force(s.point(&self.predicted)));
         let (predicted, rate) = (&self.predicted, inputs.rate());
         let x_v = match inputs.inertia {
             Inertia::Remembered(history) => Some(history.x_v),
@@ -662,16 +648,16 @@ impl LinearStep {
 }
 
 fn system<'a>(
-    elastic: &'a mut Elastic,
+    elastic: &'a mut dyn Stiffness,
     springs: &'a [Spring],
-    inputs: &StepInputs<'a>,
+    inputs: &LinearInputs<'a>,
 ) -> SystemOperator<'a> {
     SystemOperator {
         elastic,
         mass: inputs.mass_f32,
         mass_factor: inputs.mass_factor() as f32,
         springs,
-        fixed: inputs.fixed,
+        fixed: inputs.step.fixed,
     }
 }
 

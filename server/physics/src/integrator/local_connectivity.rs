@@ -5,11 +5,12 @@
 //! whole body searched.
 
 use super::parts::LooseParts;
-use crate::cut::{CutMesh, NewCopy};
+use crate::cut::NewCopy;
 use crate::disjoint::{find, join};
 use crate::numbering::Numbering;
 use crate::operator::FixedCopy;
 use crate::reserve::resize_reserving;
+use crate::space::Space;
 
 /// Buffers of the local search.
 #[derive(Clone, Debug, Default)]
@@ -27,12 +28,12 @@ impl LocalConnectivity {
         Self { numbering: Numbering::with_capacity(n_copies), ..Self::default() }
     }
 
-    /// Brings `parts` up to date after a cut, the last one of `mesh`, that made the copies `new`.
-    /// `mass` [kg] and `fixed` are those after it. The result is that of [`LooseParts::new`].
+    /// Brings `parts` up to date after a cut, the last one of `space`, that made the copies `new`.
+    /// `mass` [kg] and `fixed` are those after it. The result is that of [`LooseParts::connected`].
     pub fn follow(
         &mut self,
         parts: &mut LooseParts,
-        mesh: &CutMesh,
+        space: &dyn Space,
         new: &[NewCopy],
         mass: &[f64],
         fixed: &[FixedCopy],
@@ -41,10 +42,10 @@ impl LocalConnectivity {
         for new in new {
             parts.of_copy[new.copy as usize] = parts.of_copy[new.parent as usize];
         }
-        if self.holds(parts, mesh, new) {
+        if self.holds(parts, space, new) {
             parts.measure(mass, fixed);
         } else {
-            *parts = LooseParts::new(mesh.pieces(), mass, fixed);
+            *parts = LooseParts::connected(|visit| space.for_groups(visit), mass, fixed);
         }
     }
 
@@ -52,16 +53,16 @@ impl LocalConnectivity {
     /// then come apart. A lost connection ran through a changed piece, so each side of it has a copy of
     /// that piece, or the copy that one was split from. These copies are still connected, and so are both
     /// sides.
-    fn holds(&mut self, parts: &LooseParts, mesh: &CutMesh, new: &[NewCopy]) -> bool {
+    fn holds(&mut self, parts: &LooseParts, space: &dyn Space, new: &[NewCopy]) -> bool {
         self.copies.clear();
         self.root.clear();
-        for &p in mesh.changed_pieces() {
-            self.join(mesh.pieces()[p as usize].copies);
+        for &p in space.changed_pieces() {
+            self.join(space.pieces()[p as usize].copies);
         }
         let known = |parent: &u32| self.numbering.find(&self.copies, *parent).is_some();
         let lone: Vec<u32> = new.iter().map(|new| new.parent).filter(|parent| !known(parent)).collect();
         for copy in lone {
-            mesh.tets_around(copy).into_iter().for_each(|copies| self.join(copies));
+            space.pieces_around(copy).into_iter().for_each(|copies| self.join(copies));
         }
         let mut root_of_part = vec![u32::MAX; parts.len()];
         (0..self.copies.len()).all(|i| {
@@ -95,17 +96,18 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::cut::BladeSweep;
+    use crate::cut::{BladeSweep, CutMesh};
     use crate::mesh::{BoxPattern, box_mesh};
+    use crate::space::Tets;
 
     #[test]
     fn parts_that_follow_cuts_are_those_of_the_whole_body() {
         let mesh = box_mesh(Vector3::zeros(), Vector3::new(6.0, 4.0, 4.0), [6, 4, 4], BoxPattern::Tet6);
-        let mut cut = CutMesh::new(mesh).unwrap();
+        let mut cut = Tets::linear(CutMesh::new(mesh).unwrap());
         let held: Vec<u32> = (0..cut.n_copies() as u32).filter(|c| c % 35 == 3).collect();
         let hold = |&copy: &u32| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] };
         let fixed: Vec<FixedCopy> = held.iter().map(hold).collect();
-        let mut parts = LooseParts::new(cut.pieces(), cut.copy_volume(), &fixed);
+        let mut parts = LooseParts::connected(|visit| cut.for_groups(visit), cut.copy_volumes(), &fixed);
         let mut connectivity = LocalConnectivity::default();
         // Incisions and cuts right through, across elements and (the whole numbers) along their faces.
         let places = [(2.3, 3.1), (1.0, 2.5), (2.3, 4.5), (1.0, 4.5), (3.0, 4.5), (3.0, 1.5), (0.4, 4.5)];
@@ -113,10 +115,11 @@ mod tests {
         for ((x, depth), incision) in places.into_iter().zip(1..) {
             let at = |y: f64| [Vector3::new(x, y, -0.5), Vector3::new(x, y, 4.5)];
             let sweep = BladeSweep { segments: vec![at(-0.5), at(depth)] };
-            let report = cut.sweep(&cut.rest_positions(), &sweep, incision).unwrap();
-            let mass = cut.copy_volume();
+            let report = cut.cut(&cut.rest_positions(), &sweep, incision).unwrap();
+            let mass = cut.copy_volumes();
             connectivity.follow(&mut parts, &cut, &report.new_copies, mass, &fixed);
-            assert_eq!(parts, LooseParts::new(cut.pieces(), mass, &fixed), "incision {incision}");
+            let whole = LooseParts::connected(|visit| cut.for_groups(visit), mass, &fixed);
+            assert_eq!(parts, whole, "incision {incision}");
             sizes.push(parts.len());
             // A body that stays connected is recognised near the cut.
             assert!(parts.len() > 1 || connectivity.holds(&parts, &cut, &report.new_copies));

@@ -1,38 +1,52 @@
 //! Time integration: one step in time, or the way to an equilibrium.
 
+mod scheme;
+mod settings;
+mod report;
+mod step_inputs;
+mod step_solver;
 mod dynamics;
-mod free_motion;
-mod guard;
-mod history;
+mod course;
 mod multistep;
+mod history;
+mod guard;
 mod notice;
 pub(crate) mod increment;
-mod linear_step;
 mod parts;
 mod local_connectivity;
+mod free_motion;
 mod spin;
 mod springs;
-mod step_inputs;
+mod linearly_implicit;
+mod linear_step;
+mod held_energy;
+mod model_solver;
+mod fully_implicit;
+mod potential;
 mod statics;
 mod relaxation;
+mod explicit;
+mod critical_step;
+mod mass;
 
-pub use dynamics::{
-    Dynamics, DynamicsError, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings,
-    LEAST_NEWTON_STEPS, MassKind, Scheme, stable_step, why_no_equilibrium,
-};
+pub use critical_step::{omega_max, stable_step};
+pub use dynamics::{Dynamics, DynamicsError};
 pub use free_motion::{FreeMotion, free_motions};
-pub use history::History;
 pub use increment::Increment;
-pub use linear_step::LinearStep;
+pub use linearly_implicit::LinearlyImplicit;
 pub use local_connectivity::LocalConnectivity;
+pub use model_solver::ModelSolver;
 pub use multistep::Multistep;
 pub use notice::Notice;
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};
-pub use spin::SpinGuard;
+pub use report::{Outcome, SolveReport};
+pub use scheme::{MassKind, Scheme};
+pub use settings::{DynamicsSettings, LEAST_NEWTON_STEPS};
 pub use springs::{PointSpring, SpringKind};
 pub use statics::{StaticProblem, find_equilibrium, prescribe};
-pub use step_inputs::{Inertia, StepHistory, StepInputs, StepOutcome};
+pub use step_inputs::StepInputs;
+pub use step_solver::{SolverSettings, StepSolver};
 
 use nalgebra::Vector3;
 

@@ -1,16 +1,15 @@
-//! What BDF2 and Newmark's method add to a step by linear solves: the history of earlier steps, and
-//! guards that replace a step by one of implicit Euler where the scheme would fail.
+//! The history of earlier steps that BDF2 and Newmark's method need, and guards that replace a step by one of
+//! implicit Euler where the scheme would fail.
 
 use nalgebra::Vector3;
 
 use super::State;
-use super::dynamics::Scheme;
-use super::guard::{GAIN_CONSERVING, LARGEST_TURN, Ledger};
+use super::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN, Ledger};
 use super::history::History;
 use super::increment::{Increment, bdf2_history, newmark_history};
 use super::notice::Notice;
+use super::scheme::Scheme;
 use super::spin::SpinGuard;
-use super::springs::ActiveSpring;
 use super::step_inputs::{StepHistory, StepInputs};
 use crate::cut::NewCopy;
 use crate::material::Law;
@@ -18,7 +17,7 @@ use crate::operator::BLOCK;
 use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
-/// History of a scheme; empty for implicit Euler, which needs none.
+/// History of a scheme; empty for implicit Euler by one linear solve, which needs none.
 #[derive(Debug, Default)]
 pub struct Multistep {
     scheme: Scheme,
@@ -30,29 +29,41 @@ pub struct Multistep {
     ledger: Ledger,
     /// Elastic energy at the end of the last step [J].
     stored_j: Option<f64>,
+    /// Whether the energy of every scheme is judged, not only that of Newmark's method.
+    judges_all: bool,
 }
 
 impl Multistep {
-    /// An empty history of `scheme`.
-    pub fn new(scheme: Scheme) -> Self {
-        Self { scheme, ..Self::default() }
+    /// An empty history of `scheme`. With `judges_all` the energy of every scheme is judged; otherwise only
+    /// that of Newmark's method, which alone may gain it.
+    pub fn new(scheme: Scheme, judges_all: bool) -> Self {
+        Self { scheme, judges_all, ..Self::default() }
     }
 
+    /// Whether states are kept from step to step.
     fn remembers(&self) -> bool {
-        matches!(self.scheme, Scheme::Bdf2 | Scheme::Newmark { .. })
+        self.judges_all || self.scheme.remembers()
     }
 
-    /// Whether acceleration and energy are followed from step to step.
-    pub fn is_newmark(&self) -> bool {
-        matches!(self.scheme, Scheme::Newmark { .. })
+    /// Whether energy is followed from step to step.
+    pub fn judges_energy(&self) -> bool {
+        (self.judges_all && self.scheme.is_implicit_motion()) || self.scheme.is_newmark()
+    }
+
+    /// Whether `state` is what the last step left, where that matters.
+    pub fn continues(&self, state: &State) -> bool {
+        !self.remembers() || self.history.continues(state)
     }
 
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
         if self.remembers() {
-            for v in [&mut self.x_a, &mut self.x_v, &mut self.acceleration] {
+            for v in [&mut self.x_a, &mut self.x_v] {
                 resize_reserving(v, n, Vector3::zeros());
             }
+        }
+        if self.scheme.remembers() {
+            resize_reserving(&mut self.acceleration, n, Vector3::zeros());
         }
     }
 
@@ -75,13 +86,15 @@ impl Multistep {
         if !self.remembers() {
             return;
         }
-        if self.is_newmark() {
+        if self.scheme.is_newmark() {
             self.history.forget();
         }
         self.history.inherit(new);
-        for copy in new {
-            let parent = self.acceleration[copy.parent as usize];
-            self.acceleration.push(parent);
+        if self.scheme.remembers() {
+            for copy in new {
+                let parent = self.acceleration[copy.parent as usize];
+                self.acceleration.push(parent);
+            }
         }
         self.stored_j = None;
     }
@@ -90,7 +103,9 @@ impl Multistep {
     pub fn still(&mut self, copies: &[u32], state: &State) {
         if self.remembers() {
             self.history.still(copies, state);
-            copies.iter().for_each(|&c| self.acceleration[c as usize] = Vector3::zeros());
+            if self.scheme.remembers() {
+                copies.iter().for_each(|&c| self.acceleration[c as usize] = Vector3::zeros());
+            }
             self.forget_energy();
         }
     }
@@ -99,25 +114,25 @@ impl Multistep {
     pub fn choose(
         &mut self,
         state: &State,
-        inputs: &StepInputs<'_>,
+        (inputs, law): (&StepInputs<'_>, Law),
         spin: &mut SpinGuard,
     ) -> (Scheme, Option<Notice>) {
-        if !self.remembers() {
-            return (self.scheme, None);
-        }
-        if !self.history.continues(state) {
-            self.forget();
-        }
         let h = inputs.h;
-        let mut turn = || match inputs.material.law.rotates() {
+        let mut turn = || match law.rotates() || self.judges_all {
             true => h * spin.fastest(state, inputs.mass, inputs.parts),
             false => 0.0,
         };
-        let touching = || contacts(inputs, |c| state.x[c] + h * state.v[c]);
-        let why = if self.is_newmark() {
-            Some(turn()).filter(|angle| *angle > LARGEST_TURN).map(|angle_rad| Notice::Spinning { angle_rad })
-        } else {
-            self.history.why_no_bdf2(h, turn, touching)
+        let why = match self.scheme {
+            Scheme::Bdf2 => {
+                let touching = || inputs.contacts(|c| state.x[c] + h * state.v[c]);
+                self.history.why_no_bdf2(h, turn, touching)
+            }
+            // Where several solves are made per step, the energy balance alone decides.
+            Scheme::Newmark { .. } if !self.judges_all => {
+                let angle = Some(turn()).filter(|angle| *angle > LARGEST_TURN);
+                angle.map(|angle_rad| Notice::Spinning { angle_rad })
+            }
+            _ => None,
         };
         match why {
             Some(notice) => (Scheme::ImplicitEuler, Some(notice)),
@@ -127,7 +142,7 @@ impl Multistep {
 
     /// Whether Newmark's method needs the acceleration at the state it starts from.
     pub fn starts_newmark(&self, scheme: Scheme) -> bool {
-        matches!(scheme, Scheme::Newmark { .. }) && !self.history.known
+        scheme.is_newmark() && !self.history.known
     }
 
     /// Buffer for that acceleration [m/s²].
@@ -135,7 +150,8 @@ impl Multistep {
         &mut self.acceleration
     }
 
-    /// x_a and x_v of a step of `h` [s] with `scheme`; `None` for implicit Euler.
+    /// x_a and x_v of a step of `h` [s] with `scheme`; `None` for schemes without history, whose steps by one
+    /// linear solve compute them on the fly.
     pub fn extrapolate(
         &mut self,
         team: &mut Team,
@@ -166,7 +182,19 @@ impl Multistep {
                 });
                 Increment::newmark(h, beta, gamma)
             }
-            _ => return None,
+            _ if !self.judges_all => return None,
+            Scheme::Static => {
+                self.x_v.copy_from_slice(&state.x);
+                self.x_a.copy_from_slice(&state.x);
+                Increment::NONE
+            }
+            _ => {
+                self.x_v.copy_from_slice(&state.x);
+                for (x_a, (x, v)) in self.x_a.iter_mut().zip(state.x.iter().zip(&state.v)) {
+                    *x_a = x + h * v;
+                }
+                Increment::euler(h)
+            }
         };
         Some(StepHistory { increment, x_a: &self.x_a, x_v: &self.x_v })
     }
@@ -176,35 +204,26 @@ impl Multistep {
         if matches!(scheme, Scheme::Newmark { .. }) && law.rotates() { 2 } else { 1 }
     }
 
-    /// Begins the energy balance of a step from `state`. At `rest` [m] the loads have done no work;
-    /// `stored` computes the elastic energy [J].
-    pub fn begin_energy(
-        &mut self,
-        state: &State,
-        inputs: &StepInputs<'_>,
-        rest: &[Vector3<f64>],
-        stored: impl FnOnce() -> f64,
-    ) {
+    /// Begins the energy balance of a step, with the kinetic energy and that of loads and springs [J]; `stored`
+    /// computes the elastic energy [J] if it is not known. Returns kinetic and elastic energy.
+    pub fn begin_energy(&mut self, kinetic_j: f64, loads_j: f64, stored: impl FnOnce() -> f64) -> f64 {
         let stored_j = *self.stored_j.get_or_insert_with(stored);
-        self.ledger.begin(kinetic(state, inputs) + stored_j + load_energy(&state.x, inputs, rest));
+        self.ledger.begin(kinetic_j + stored_j + loads_j);
+        kinetic_j + stored_j
     }
 
-    /// Ends the energy balance at `state` after a step from `before`. Returns the energy [J] gained
-    /// without work, if it is more than a conserving scheme may gain. `driven` tells that prescribed
-    /// copies moved and put energy in. A step that may be made again is booked only if it gained none.
+    /// Ends the energy balance of a step with energy `H` and elastic energy `stored_j` [J]. Returns the energy
+    /// [J] gained without work, if it is more than `scheme` may gain of the `size_j` [J] that take part.
+    /// `driven` tells that prescribed nodes moved and put energy in. A step that may be made again is booked
+    /// only if it gained none.
     pub fn end_energy(
         &mut self,
-        (before, state): (&State, &State),
-        inputs: &StepInputs<'_>,
-        (rest, stored_j): (&[Vector3<f64>], f64),
+        (H, stored_j, size_j): (f64, f64, f64),
+        scheme: Scheme,
         (driven, may_repeat): (bool, bool),
     ) -> Option<f64> {
-        let kinetic_before = kinetic(before, inputs);
-        let moved = state.x.iter().zip(&before.x).enumerate();
-        let exchanged: f64 = moved.map(|(c, (x, from))| force(c, inputs).dot(&(x - from))).sum();
-        let allowed = GAIN_CONSERVING * (kinetic_before + self.stored_j.unwrap_or(0.0) + exchanged.abs());
-        let H = kinetic(state, inputs) + stored_j + load_energy(&state.x, inputs, rest);
-        let excess = if driven { None } else { self.ledger.excess(H, allowed) };
+        let gain = if scheme == Scheme::ImplicitEuler { GAIN_DISSIPATING } else { GAIN_CONSERVING };
+        let excess = if driven { None } else { self.ledger.excess(H, gain * size_j) };
         if excess.is_none() || !may_repeat {
             self.stored_j = Some(stored_j);
             self.ledger.end(H, driven);
@@ -217,7 +236,7 @@ impl Multistep {
         if !self.remembers() {
             return;
         }
-        if self.is_newmark() {
+        if self.scheme.is_newmark() {
             let increment = match scheme {
                 Scheme::Newmark { beta, gamma } => Increment::newmark(inputs.h, beta, gamma),
                 _ => Increment::euler(inputs.h),
@@ -231,30 +250,8 @@ impl Multistep {
             }
         }
         self.history.push(before, state, inputs.h);
-        self.history.contacts = contacts(inputs, |c| state.x[c]);
+        if self.scheme == Scheme::Bdf2 {
+            self.history.contacts = inputs.contacts(|c| state.x[c]);
+        }
     }
-}
-
-/// Number of springs that push or pull when their copies are at `x`.
-fn contacts(inputs: &StepInputs<'_>, x: impl Fn(usize) -> Vector3<f64>) -> usize {
-    let usable = inputs.springs.iter().filter_map(|spring| ActiveSpring::usable(spring, inputs.mass.len()));
-    let point = |spring: &ActiveSpring| spring.carriers().map(|(c, w)| w * x(c)).sum();
-    usable.filter(|spring| spring.potential(point(spring)).energy > 0.0).count()
-}
-
-/// Gravity and load on copy `c` [N].
-fn force(c: usize, inputs: &StepInputs<'_>) -> Vector3<f64> {
-    inputs.mass[c] * inputs.gravity + inputs.load[c]
-}
-
-/// ½ vᵀ M v [J].
-fn kinetic(state: &State, inputs: &StepInputs<'_>) -> f64 {
-    state.v.iter().zip(inputs.mass).map(|(v, m)| 0.5 * m * v.norm_squared()).sum()
-}
-
-/// Energy of springs and loads at `x` [J].
-fn load_energy(x: &[Vector3<f64>], inputs: &StepInputs<'_>, rest: &[Vector3<f64>]) -> f64 {
-    let loads: f64 = x.iter().zip(rest).enumerate().map(|(c, (x, X))| force(c, inputs).dot(&(x - X))).sum();
-    let springs = inputs.springs.iter().filter_map(|spring| ActiveSpring::usable(spring, x.len()));
-    springs.map(|spring| spring.potential(spring.point(x)).energy).sum::<f64>() - loads
 }

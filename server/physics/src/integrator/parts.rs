@@ -7,7 +7,6 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::cut::Piece;
 use crate::disjoint::{find, join};
 use crate::operator::FixedCopy;
 use crate::reserve::resize_reserving;
@@ -24,25 +23,24 @@ pub struct LooseParts {
 }
 
 impl LooseParts {
-    /// Finds the parts that `pieces` hold together.
-    pub fn new(pieces: &[Piece], mass: &[f64], fixed: &[FixedCopy]) -> Self {
-        Self::connected(pieces.iter().map(|piece| &piece.copies[..]), mass, fixed)
-    }
-
-    /// Finds the parts that `groups` of copies hold together: pieces, elements, springs.
-    pub fn connected<'a>(groups: impl Iterator<Item = &'a [u32]>, mass: &[f64], fixed: &[FixedCopy]) -> Self {
+    /// Finds the parts that groups of copies hold together: pieces, elements, springs. `for_groups` hands
+    /// them over one by one.
+    pub fn connected(
+        for_groups: impl FnOnce(&mut dyn FnMut(&[u32])),
+        mass: &[f64],
+        fixed: &[FixedCopy],
+    ) -> Self {
         let n = mass.len();
         let mut root: Vec<u32> = (0..n as u32).collect();
-        for group in groups {
+        for_groups(&mut |group| {
             // Most groups are connected already, with short paths to the root.
             let first = root[group[0] as usize];
-            if group.iter().all(|&copy| root[copy as usize] == first) {
-                continue;
+            if !group.iter().all(|&copy| root[copy as usize] == first) {
+                for &copy in &group[1..] {
+                    join(&mut root, group[0], copy);
+                }
             }
-            for &copy in &group[1..] {
-                join(&mut root, group[0], copy);
-            }
-        }
+        });
         let mut parts = Self::default();
         resize_reserving(&mut parts.of_copy, n, 0);
         let mut n_parts = 0;

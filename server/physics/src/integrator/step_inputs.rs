@@ -1,12 +1,12 @@
-//! Inputs and result of a step by linear solves.
+//! Inputs of a step, and what a step by linear solves adds to them.
 
 use nalgebra::Vector3;
 
 use super::State;
 use super::increment::Increment;
 use super::parts::LooseParts;
-use super::springs::PointSpring;
-use crate::cut::CutMesh;
+use super::springs::{ActiveSpring, PointSpring};
+use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{ElasticUpdate, FixedCopy};
 use crate::solver::{PcgReport, PcgSettings};
@@ -18,18 +18,54 @@ pub struct StepInputs<'a> {
     pub h: f64,
     /// Acceleration of gravity [m/s²].
     pub gravity: Vector3<f64>,
-    /// Mass of every copy [kg].
+    /// Lumped mass of every node [kg].
     pub mass: &'a [f64],
-    /// The same in single precision.
-    pub mass_f32: &'a [f32],
-    /// Load on every copy [N], gravity not included.
+    /// Load on every node [N], gravity not included.
     pub load: &'a [Vector3<f64>],
-    /// Prescribed copies.
+    /// Prescribed nodes, with their positions at the end of the step.
     pub fixed: &'a [FixedCopy],
     /// Connected parts of the body, and which of them are free.
     pub parts: &'a LooseParts,
-    /// Springs of this step.
+    /// Contact and tool springs of this step, whose forces are reported in the same order.
     pub springs: &'a [PointSpring],
+    /// Rest position of every node [m].
+    pub rest: &'a [Vector3<f64>],
+    /// Quadrature points of the body, for what is computed in double precision.
+    pub points: &'a dyn Points,
+}
+
+impl StepInputs<'_> {
+    /// Whether prescribed nodes move in a step from `before`, which puts energy in.
+    pub fn is_driven(&self, before: &State) -> bool {
+        let x = |f: &FixedCopy| before.x[f.copy as usize];
+        self.fixed.iter().any(|f| (0..3).any(|k| f.axes[k] && f.position_m[k] != x(f)[k]))
+    }
+
+    /// Number of springs that push or pull with the nodes at `x` [m].
+    pub fn contacts(&self, x: impl Fn(usize) -> Vector3<f64>) -> usize {
+        let point = |s: &ActiveSpring| s.carriers().map(|(c, w)| w * x(c)).sum();
+        self.usable_springs().filter(|s| s.potential(point(s)).energy > 0.0).count()
+    }
+
+    /// Potential energy of springs and loads at `x` [J]; `weight` is the force of gravity on a node [N].
+    pub fn load_energy(&self, x: &[Vector3<f64>], weight: impl Fn(usize) -> Vector3<f64>) -> f64 {
+        let moved = x.iter().zip(self.rest).enumerate();
+        let loads: f64 = moved.map(|(c, (x, X))| (weight(c) + self.load[c]).dot(&(x - X))).sum();
+        self.usable_springs().map(|s| s.potential(s.point(x)).energy).sum::<f64>() - loads
+    }
+
+    fn usable_springs(&self) -> impl Iterator<Item = ActiveSpring> {
+        self.springs.iter().filter_map(|spring| ActiveSpring::usable(spring, self.mass.len()))
+    }
+}
+
+/// Inputs of a step by linear solves.
+#[derive(Clone, Copy, Debug)]
+pub struct LinearInputs<'a> {
+    /// The step.
+    pub step: StepInputs<'a>,
+    /// Mass of every copy [kg] in single precision.
+    pub mass_f32: &'a [f32],
     /// Material constants.
     pub material: &'a Material,
     /// When to stop the solver.
@@ -50,9 +86,6 @@ pub enum Inertia<'a> {
     Remembered(StepHistory<'a>),
     /// None: the step ends in equilibrium with the loads, at rest (A = B = 0, and s = 1).
     None {
-        /// The pieces, for a residual in double precision. Without inertia the rounding of single
-        /// precision would exceed most tolerances.
-        mesh: &'a CutMesh,
         /// Continue the search of the last step if nothing was changed from outside (Nienhuys 2003, §3.3).
         relax: bool,
     },
@@ -69,11 +102,11 @@ pub struct StepHistory<'a> {
     pub x_v: &'a [Vector3<f64>],
 }
 
-impl StepInputs<'_> {
+impl LinearInputs<'_> {
     /// s = 1/A [s²], the factor of forces in the system of a step.
     pub(super) fn s(&self) -> f64 {
         match self.inertia {
-            Inertia::Euler => self.h * self.h,
+            Inertia::Euler => self.step.h * self.step.h,
             Inertia::Remembered(history) => 1.0 / history.increment.A,
             Inertia::None { .. } => 1.0,
         }
@@ -82,7 +115,7 @@ impl StepInputs<'_> {
     /// r = B/A [s].
     pub(super) fn r(&self) -> f64 {
         match self.inertia {
-            Inertia::Euler => self.h,
+            Inertia::Euler => self.step.h,
             Inertia::Remembered(history) => history.increment.B / history.increment.A,
             Inertia::None { .. } => 0.0,
         }
@@ -91,7 +124,7 @@ impl StepInputs<'_> {
     /// √s [s]: δ minimises s times an energy.
     pub fn root_s(&self) -> f64 {
         match self.inertia {
-            Inertia::Euler => self.h,
+            Inertia::Euler => self.step.h,
             Inertia::Remembered(history) => history.increment.A.sqrt().recip(),
             Inertia::None { .. } => 1.0,
         }
@@ -100,7 +133,7 @@ impl StepInputs<'_> {
     /// B [1/s]. The shortest steps have no finite inverse; nothing moves in them.
     pub(super) fn rate(&self) -> f64 {
         match self.inertia {
-            Inertia::Euler => (1.0 / self.h).min(f64::MAX),
+            Inertia::Euler => (1.0 / self.step.h).min(f64::MAX),
             Inertia::Remembered(history) => history.increment.B,
             Inertia::None { .. } => 0.0,
         }
@@ -130,7 +163,7 @@ impl StepInputs<'_> {
     #[inline(always)]
     pub(super) fn inertia(&self, c: usize, predicted: &[Vector3<f64>]) -> Vector3<f64> {
         match &self.inertia {
-            Inertia::Remembered(h) => self.mass[c] * (predicted[c] - h.x_a[c]),
+            Inertia::Remembered(h) => self.step.mass[c] * (predicted[c] - h.x_a[c]),
             Inertia::Euler | Inertia::None { .. } => Vector3::zeros(),
         }
     }
@@ -140,7 +173,7 @@ impl StepInputs<'_> {
     pub(super) fn external(&self, c: usize, state: &State, predicted: &[Vector3<f64>]) -> Vector3<f64> {
         let drag = self.material.rayleigh.mass_1_s;
         let velocity = self.predicted_velocity(c, state, predicted);
-        self.mass[c] * (self.gravity - drag * velocity) + self.load[c]
+        self.step.mass[c] * (self.step.gravity - drag * velocity) + self.step.load[c]
     }
 
     /// K̂ and its factor s + rβ.
@@ -157,11 +190,11 @@ impl StepInputs<'_> {
 
     /// Whether both steps have the same loads and prescribed positions, and none has springs.
     pub(super) fn is_loaded_as(&self, known: &KnownLoads) -> bool {
-        self.springs.is_empty()
+        self.step.springs.is_empty()
             && known.material == Some(*self.material)
-            && known.gravity == self.gravity
-            && known.load == self.load
-            && known.fixed == self.fixed
+            && known.gravity == self.step.gravity
+            && known.load == self.step.load
+            && known.fixed == self.step.fixed
     }
 }
 
@@ -176,13 +209,13 @@ pub(super) struct KnownLoads {
 
 impl KnownLoads {
     /// Records the loads of `inputs`.
-    pub(super) fn note(&mut self, inputs: &StepInputs<'_>) {
+    pub(super) fn note(&mut self, inputs: &LinearInputs<'_>) {
         self.material = Some(*inputs.material);
-        self.gravity = inputs.gravity;
+        self.gravity = inputs.step.gravity;
         self.load.clear();
-        self.load.extend_from_slice(inputs.load);
+        self.load.extend_from_slice(inputs.step.load);
         self.fixed.clear();
-        self.fixed.extend_from_slice(inputs.fixed);
+        self.fixed.extend_from_slice(inputs.step.fixed);
     }
 }
 

@@ -3,9 +3,9 @@
 //! They are computed from the pieces' gradients in the new variables. The blocks of A would cancel: the
 //! stiff parts of A are 1/ε times as large as what remains of them.
 
-use super::elastic::Place;
 use super::kernel::Block6;
-use super::{Elastic, ElasticUpdate, StiffModes, Substitution};
+use super::stiffness::{ElasticUpdate, Place, Stiffness};
+use super::{StiffModes, Substitution};
 use crate::team::{Team, blocks};
 
 /// Copies per unit of work.
@@ -38,7 +38,7 @@ struct Term {
 
 impl CompositeDiagonal {
     /// The blocks of the substitution `T` of `modes`, with the pieces arranged as in `elastic`.
-    pub fn new(modes: &StiffModes, T: &Substitution, elastic: &Elastic) -> Self {
+    pub fn new(modes: &StiffModes, T: &Substitution, elastic: &dyn Stiffness) -> Self {
         let places = elastic.places();
         let copies = T.columns().map(|(copy, column)| {
             let moved = column.iter().map(|&(a, w)| (a, w * w)).collect();
@@ -71,7 +71,7 @@ impl CompositeDiagonal {
     pub fn update(
         &mut self,
         team: &mut Team,
-        (elastic, with): (&Elastic, &ElasticUpdate),
+        (elastic, with): (&dyn Stiffness, &ElasticUpdate),
         (mass, factor): (&[f32], f64),
         diagonal: &mut [Block6],
     ) {

@@ -5,12 +5,12 @@ use nalgebra::{Matrix3, Vector3};
 use super::chunk::{Chunk, NewLane};
 use super::chunks::{Gather, NO_PIECE, region_of_elements};
 use super::kernel::{Block6, Coefficients};
-use super::rows::{Sum, gather_direction};
+use super::rows::{self, Sum, gather_direction};
 use super::shared_lanes::{LaneChanges, SharedLanes};
-use super::{BLOCK, LinearOperator, Padded};
+use super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
+use super::{BLOCK, LinearOperator, Padded, block_of};
 use crate::cut::Piece;
 use crate::element::Simd;
-use crate::material::{Lame, Law};
 use crate::mesh::TetMesh;
 use crate::numbering::Numbering;
 use crate::reserve::resize_reserving;
@@ -56,25 +56,6 @@ pub struct Elastic {
     /// Scratch of [`Self::follow`].
     numbering: Numbering,
     marks: Marks,
-}
-
-/// Chunk, batch and lane of a piece; valid until the next cut.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Place {
-    chunk: u32,
-    batch: u32,
-    lane: u32,
-}
-
-/// Parameters of an update.
-#[derive(Clone, Copy, Debug)]
-pub struct ElasticUpdate {
-    /// Lamé parameters [Pa].
-    pub lame: Lame,
-    /// The law, which decides whether pieces rotate.
-    pub law: Law,
-    /// s, the factor of K̂ [s²].
-    pub scale: f64,
 }
 
 impl Elastic {
@@ -205,21 +186,6 @@ impl Elastic {
         lanes.map(|(chunk, (p, batch, lane))| (p, chunk.rotation(batch, lane))).unzip()
     }
 
-    /// Chooses how K̂ is applied from the next update on. The choices differ in the last bits.
-    pub fn set_choice(&mut self, choice: OperatorChoice) {
-        self.choice = choice;
-    }
-
-    /// How K̂ is to be applied.
-    pub fn choice(&self) -> OperatorChoice {
-        self.choice
-    }
-
-    /// Rises with every change of the stiffness. Updates with the same version have the same diagonal blocks.
-    pub fn version(&self) -> u64 {
-        self.version
-    }
-
     /// Whether K̂ was assembled at the last update.
     pub fn assembled(&self) -> bool {
         self.made_with.is_some_and(|(_, assembled)| assembled)
@@ -232,7 +198,7 @@ impl Elastic {
 
     /// Recomputes rotations, rotated gradients, forces and diagonal blocks at `positions` [m] (one
     /// per copy), and writes f_int [N] and the blocks of s K̂. Returns the number of inverted pieces.
-    pub fn update(
+    pub fn update_all(
         &mut self,
         team: &mut Team,
         with: &ElasticUpdate,
@@ -240,7 +206,7 @@ impl Elastic {
         f_int: &mut [Padded],
         diagonal: &mut [Block6],
     ) -> usize {
-        let inverted = self.update_chunks(team, with, positions);
+        let inverted = Stiffness::update(self, team, with, positions);
         let elastic = &*self;
         team.for_blocks((blocks(f_int, BLOCK), blocks(diagonal, BLOCK)), |block, (f, diagonal)| {
             elastic.forces(block, f);
@@ -249,14 +215,46 @@ impl Elastic {
         inverted
     }
 
-    /// First half of an update: every chunk's own sums. Without rotations the stiffness changes only if
+    /// The chunks' sums and where those of the copies of block number `block` lie in them, two per
+    /// copy; the rest comes with [`Self::add_further`].
+    #[inline(always)]
+    pub(super) fn sums(&self, block: usize) -> (&[[u32; 2]], &[Padded]) {
+        (self.gather.pairs(block), &self.sums)
+    }
+
+    /// Adds the rows that [`Self::sums`] leaves out to `y`. Returns the change of x·y.
+    #[inline(always)]
+    pub(super) fn add_further(&self, block: usize, x: &[Padded], y: &mut [Padded]) -> f64 {
+        let mut product = Sum::default();
+        for (copy, row) in self.gather.further(block) {
+            product.add(&x[copy], &self.sums[row]);
+            for (y, part) in y[copy].iter_mut().zip(&self.sums[row]) {
+                *y += part;
+            }
+        }
+        product.total()
+    }
+
+    /// Rotation of every piece at the last update.
+    pub fn rotations(&self) -> Vec<Matrix3<f32>> {
+        self.places().into_iter().map(|place| self.rotation(place)).collect()
+    }
+
+    /// Number of pieces.
+    pub fn n_pieces(&self) -> usize {
+        self.shared_lanes.of_piece().len()
+    }
+
+    /// Number of lanes that are computed with: pieces of one element with the same copies share one.
+    pub fn n_lanes(&self) -> usize {
+        self.chunks.iter().map(Chunk::n_lanes).sum()
+    }
+}
+
+impl Stiffness for Elastic {
+    /// Every chunk's own sums. Without rotations the stiffness changes only if
     /// `with` or the pieces do; otherwise one application is enough.
-    pub(crate) fn update_chunks(
-        &mut self,
-        team: &mut Team,
-        with: &ElasticUpdate,
-        positions: &[Vector3<f64>],
-    ) -> usize {
+    fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize {
         let (simd, c) = (self.simd, coefficients(with));
         let assembled = match self.choice {
             OperatorChoice::Auto => !c.rotates,
@@ -285,22 +283,19 @@ impl Elastic {
         self.chunks.iter().map(|chunk| chunk.inverted).sum()
     }
 
-    /// Second half: internal forces [N] on the copies of block number `block`.
     #[inline(always)]
-    pub(crate) fn forces(&self, block: usize, f: &mut [Padded]) {
+    fn forces(&self, block: usize, f: &mut [Padded]) {
         f.fill([0.0; 4]);
         self.gather.add(block, &self.sums, f);
     }
 
-    /// Second half: diagonal blocks of s K̂ of the copies of block number `block`.
     #[inline(always)]
-    pub(crate) fn diagonals(&self, block: usize, diagonal: &mut [Block6]) {
+    fn diagonals(&self, block: usize, diagonal: &mut [Block6]) {
         diagonal.fill([0.0; 8]);
         self.gather.add(block, &self.diagonals, diagonal);
     }
 
-    /// First half of an application: every chunk's own sums of s K̂ x.
-    pub(super) fn apply_chunks(&mut self, team: &mut Team, x: &[Padded]) {
+    fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
         let simd = self.simd;
         let sums = ranges(&mut self.sums, &self.gather.first_row);
         team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
@@ -312,8 +307,7 @@ impl Elastic {
         });
     }
 
-    /// The same with x ← z + β x, where x is that of the last application (nothing if β = 0).
-    pub(super) fn apply_chunks_to_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
+    fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
         let simd = self.simd;
         let sums = ranges(&mut self.sums, &self.gather.first_row);
         team.for_blocks((blocks(&mut self.chunks, 1), sums), |_, (chunk, y)| {
@@ -323,51 +317,32 @@ impl Elastic {
         });
     }
 
-    /// Second half: s K̂ x of the copies of block number `block`, added to `y`.
     #[inline(always)]
-    pub(super) fn add_sums(&self, block: usize, y: &mut [Padded]) {
+    fn add_products(&self, block: usize, y: &mut [Padded]) {
         self.gather.add(block, &self.sums, y);
     }
 
-    /// The chunks' sums and where those of the copies of block number `block` lie in them, two per
-    /// copy; the rest comes with [`Self::add_further`].
     #[inline(always)]
-    pub(super) fn sums(&self, block: usize) -> (&[[u32; 2]], &[Padded]) {
-        (self.gather.pairs(block), &self.sums)
+    fn advance(&self, block: usize, with: &Direction<'_>, p: &mut [Padded], q: &mut [Padded]) -> f64 {
+        let (z, mass) = (block_of(with.z, block), block_of(with.mass, block));
+        let inertia = (mass, with.factor);
+        let product = rows::advance_direction(z, with.beta, inertia, self.sums(block), [&mut *p, &mut *q]);
+        product + self.add_further(block, p, q)
     }
 
-    /// Adds the rows that [`Self::sums`] leaves out to `y`. Returns the change of x·y.
-    #[inline(always)]
-    pub(super) fn add_further(&self, block: usize, x: &[Padded], y: &mut [Padded]) -> f64 {
-        let mut product = Sum::default();
-        for (copy, row) in self.gather.further(block) {
-            product.add(&x[copy], &self.sums[row]);
-            for (y, part) in y[copy].iter_mut().zip(&self.sums[row]) {
-                *y += part;
-            }
-        }
-        product.total()
+    fn version(&self) -> u64 {
+        self.version
     }
 
-    /// Rotation of every piece at the last update.
-    pub fn rotations(&self) -> Vec<Matrix3<f32>> {
-        let of_lane = self.lane_rotations();
-        self.shared_lanes.of_piece().iter().map(|&carrier| of_lane[carrier as usize]).collect()
+    fn set_choice(&mut self, choice: OperatorChoice) {
+        self.choice = choice;
     }
 
-    /// Rotation of every piece that has a lane.
-    fn lane_rotations(&self) -> Vec<Matrix3<f32>> {
-        let mut rotations = vec![Matrix3::identity(); self.n_pieces()];
-        for chunk in &self.chunks {
-            for (p, batch, lane) in chunk.lanes() {
-                rotations[p as usize] = chunk.rotation(batch, lane);
-            }
-        }
-        rotations
+    fn choice(&self) -> OperatorChoice {
+        self.choice
     }
 
-    /// Where every piece is kept, until the next cut.
-    pub fn places(&self) -> Vec<Place> {
+    fn places(&self) -> Vec<Place> {
         let mut places = vec![Place::default(); self.n_pieces()];
         for (chunk, c) in (0u32..).zip(&self.chunks) {
             for (p, batch, lane) in c.lanes() {
@@ -381,20 +356,9 @@ impl Elastic {
         places
     }
 
-    /// Rotation of one piece at the last update.
-    #[inline]
-    pub fn rotation(&self, place: Place) -> Matrix3<f32> {
+    #[inline(always)]
+    fn rotation(&self, place: Place) -> Matrix3<f32> {
         self.chunks[place.chunk as usize].rotation(place.batch as usize, place.lane as usize)
-    }
-
-    /// Number of pieces.
-    pub fn n_pieces(&self) -> usize {
-        self.shared_lanes.of_piece().len()
-    }
-
-    /// Number of lanes that are computed with: pieces of one element with the same copies share one.
-    pub fn n_lanes(&self) -> usize {
-        self.chunks.iter().map(Chunk::n_lanes).sum()
     }
 }
 
@@ -427,12 +391,7 @@ impl Marks {
 
 impl LinearOperator for Elastic {
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
-        self.apply_chunks(team, x);
-        let elastic = &*self;
-        team.for_blocks(blocks(y, BLOCK), |block, y| {
-            y.fill([0.0; 4]);
-            elastic.add_sums(block, y);
-        });
+        apply(self, team, x, y);
     }
 }
 

@@ -5,23 +5,24 @@ mod chunk;
 mod chunks;
 mod composite_diagonal;
 mod elastic;
-pub mod exact;
 mod kernel;
 mod edges;
 mod precondition;
 mod preconditioner;
 mod stiff_modes;
+mod stiffness;
 mod substitution;
 pub mod rows;
 mod system;
 
 pub use composite_diagonal::CompositeDiagonal;
-pub use elastic::{Elastic, ElasticUpdate, OperatorChoice, Place};
+pub use elastic::{Elastic, OperatorChoice};
 pub use kernel::Block6;
 pub use precondition::{Iterate, Preconditioner};
 pub use preconditioner::{BlockJacobi, Inverse3, invert};
 pub use rows::Sum;
 pub use stiff_modes::{NearPiece, StiffModes, degenerate_elements};
+pub use stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
 pub use substitution::{Substitutable, Substitution};
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 

@@ -1,7 +1,8 @@
 //! The matrix of one implicit step: A = (1 + hα) M + (h² + hβ) K̂ + h² Σ k J Jᵀ, with fixed copies
 //! filtered out.
 
-use super::{Advance, BLOCK, Block6, Elastic, LinearOperator, Padded, Substitution, block_of, rows};
+use super::stiffness::{Direction, Stiffness};
+use super::{Advance, BLOCK, Block6, LinearOperator, Padded, Substitution, block_of};
 use crate::team::{Team, blocks};
 
 /// A copy whose displacement is prescribed in some directions.
@@ -32,7 +33,7 @@ pub struct Spring {
 #[derive(Debug)]
 pub struct SystemOperator<'a> {
     /// (h² + hβ) K̂.
-    pub elastic: &'a mut Elastic,
+    pub elastic: &'a mut dyn Stiffness,
     /// Mass of every copy [kg].
     pub mass: &'a [f32],
     /// 1 + hα.
@@ -45,13 +46,13 @@ pub struct SystemOperator<'a> {
 
 impl LinearOperator for SystemOperator<'_> {
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
-        self.elastic.apply_chunks(team, x);
+        self.elastic.multiply(team, x);
         let (elastic, mass, factor) = (&*self.elastic, self.mass, self.mass_factor);
         team.for_blocks(blocks(y, BLOCK), |block, y| {
             for (y, (x, &mass)) in y.iter_mut().zip(block_of(x, block).iter().zip(block_of(mass, block))) {
                 *y = x.map(|v| factor * mass * v);
             }
-            elastic.add_sums(block, y);
+            elastic.add_products(block, y);
         });
         self.springs.iter().for_each(|spring| spring.add_to(x, y));
         filter(self.fixed, y);
@@ -59,13 +60,12 @@ impl LinearOperator for SystemOperator<'_> {
 
     fn advance(&mut self, team: &mut Team, beta: f32, z: &[Padded], out: Advance<'_>) -> f64 {
         let Advance { p, q, partial } = out;
-        self.elastic.apply_chunks_to_direction(team, z, beta);
-        let (elastic, mass, factor) = (&*self.elastic, self.mass, self.mass_factor);
+        self.elastic.multiply_direction(team, z, beta);
+        let elastic = &*self.elastic;
+        let with = Direction { z, beta, mass: self.mass, factor: self.mass_factor };
         let state = (blocks(p, BLOCK), blocks(q, BLOCK), blocks(partial, 1));
         team.for_blocks(state, |block, (p, q, partial)| {
-            let (z, mass) = (block_of(z, block), block_of(mass, block));
-            let product = rows::advance_direction(z, beta, (mass, factor), elastic.sums(block), [p, q]);
-            partial[0] = product + elastic.add_further(block, p, q);
+            partial[0] = elastic.advance(block, &with, p, q);
         });
         let springs: f64 = self.springs.iter().map(|spring| spring.curvature(p)).sum();
         self.springs.iter().for_each(|spring| spring.add_to(p, q));

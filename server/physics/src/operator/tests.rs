@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Block6, Elastic, ElasticUpdate, LinearOperator, OperatorChoice, Padded};
+use super::{Block6, Elastic, ElasticUpdate, LinearOperator, OperatorChoice, Padded, Stiffness};
 use crate::cut::{BladeSweep, CutMesh, Piece};
 use crate::element::{Simd, deformation_gradient, piece_forces};
 use crate::material::{Lame, Law};
@@ -44,7 +44,7 @@ fn updated(simd: Simd, choice: OperatorChoice, law: Law, x: &[Vector3<f64>], sca
     elastic.set_choice(choice);
     let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
     let with = ElasticUpdate { lame: LAME, law, scale };
-    let inverted = elastic.update(&mut Team::new(1).unwrap(), &with, x, &mut f, &mut diagonal);
+    let inverted = elastic.update_all(&mut Team::new(1).unwrap(), &with, x, &mut f, &mut diagonal);
     Updated { elastic, f, diagonal, inverted }
 }
 
@@ -144,28 +144,28 @@ fn the_linear_stiffness_is_made_once_and_forces_do_not_feel_how_far_the_body_is(
         let version = elastic.version();
         let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
         let mut with = ElasticUpdate { lame: LAME, law: Law::Linear, scale: 1e-4 };
-        elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
+        elastic.update_all(&mut team, &with, &near, &mut f, &mut diagonal);
         assert_eq!((&f, &diagonal, elastic.version()), (&first.f, &first.diagonal, version));
-        elastic.update(&mut team, &with, &far, &mut f, &mut diagonal);
+        elastic.update_all(&mut team, &with, &far, &mut f, &mut diagonal);
         let size = largest(first.f.iter().map(wide));
         let error = largest(f.iter().zip(&first.f).map(|(a, b)| wide(a) - wide(b)));
         assert!(error < 1e-5 * size, "{choice:?}: {error:e} of {size:e}");
         assert_eq!(elastic.version(), version);
         // Another step length, a cut: the stiffness is made anew.
         with.scale = 4e-4;
-        elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
+        elastic.update_all(&mut team, &with, &near, &mut f, &mut diagonal);
         assert!(elastic.version() > version && diagonal[5][0] > 3.9 * first.diagonal[5][0]);
         let version = elastic.version();
         let mut cut = pieces.clone();
         cut[70].fraction = 0.5;
         elastic.follow(&mesh, &cut, &[70], n);
-        elastic.update(&mut team, &with, &near, &mut f, &mut diagonal);
+        elastic.update_all(&mut team, &with, &near, &mut f, &mut diagonal);
         assert!(elastic.version() > version);
         // The update covers all that the cut changed: a fresh operator gives the same.
         let mut fresh = Elastic::new(Simd::detect(), &mesh, &cut, n);
         fresh.set_choice(choice);
         let (mut fresh_f, mut fresh_diagonal) = (f.clone(), diagonal.clone());
-        fresh.update(&mut team, &with, &near, &mut fresh_f, &mut fresh_diagonal);
+        fresh.update_all(&mut team, &with, &near, &mut fresh_f, &mut fresh_diagonal);
         assert_eq!((&f, &diagonal), (&fresh_f, &fresh_diagonal));
     }
 }
@@ -179,7 +179,7 @@ fn a_rotation_is_remembered_where_the_gradient_defines_none() {
     let collapsed = vec![Vector3::zeros(); x.len()];
     let with = ElasticUpdate { lame: LAME, law: Law::Corotational, scale: 1e-4 };
     let mut team = Team::new(1).unwrap();
-    let inverted = found.elastic.update(&mut team, &with, &collapsed, &mut found.f, &mut found.diagonal);
+    let inverted = found.elastic.update_all(&mut team, &with, &collapsed, &mut found.f, &mut found.diagonal);
     assert_eq!(inverted, before.len());
     assert!(found.f.iter().flatten().all(|f| f.is_finite()));
     let drift =
@@ -223,7 +223,7 @@ fn amended_chunks_act_like_new(law: Law, choice: OperatorChoice) {
             (0..n).map(|c| [(0.3 * c as f32).sin(), (1.7 * c as f32).cos(), 0.4, 0.0]).collect();
         let mut found = [&mut fresh, &mut amended].map(|elastic| {
             let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
-            let inverted = elastic.update(&mut team, &with, &x, &mut f, &mut diagonal);
+            let inverted = elastic.update_all(&mut team, &with, &x, &mut f, &mut diagonal);
             let mut y = vec![[0.0; 4]; n];
             elastic.apply(&mut team, &direction, &mut y);
             assert_eq!(elastic.n_pieces(), pieces.len());
@@ -289,7 +289,7 @@ fn pieces_with_the_same_copies_share_a_lane_until_a_cut_separates_them() {
             (0..n).map(|c| [(0.3 * c as f32).sin(), (1.7 * c as f32).cos(), 0.4, 0.0]).collect();
         let found = [&mut elastic, &mut unmerged].map(|elastic| {
             let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
-            let inverted = elastic.update(&mut team, &with, &x, &mut f, &mut diagonal);
+            let inverted = elastic.update_all(&mut team, &with, &x, &mut f, &mut diagonal);
             let mut y = vec![[0.0; 4]; n];
             elastic.apply(&mut team, &direction, &mut y);
             (inverted, f, y)

@@ -6,8 +6,7 @@ use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::{BladeSweep, CutMesh};
 use scindo_physics::integrator::{
-    Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings, MassKind, Notice, Scheme,
-    State,
+    Dynamics, DynamicsSettings, LooseParts, MassKind, Notice, Outcome, Scheme, SolveReport, State, StepInputs,
 };
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
@@ -31,6 +30,11 @@ const DYNAMIC: [Scheme; 6] = [
 /// A body with its loads.
 struct Rig {
     dynamics: Dynamics,
+    model: Model,
+    masses: Vec<f64>,
+    parts: LooseParts,
+    /// Prescribed nodes for which the parts were found.
+    known: Option<Vec<FixedCopy>>,
     state: State,
     team: Team,
     load: Vec<V>,
@@ -45,7 +49,11 @@ impl Rig {
         let n = model.n_nodes();
         Self {
             state: State { x: model.rest().to_vec(), v: vec![V::zeros(); n] },
-            dynamics: Dynamics::new(model, material, settings).unwrap(),
+            masses: model.lumped_mass(material.density_kg_m3),
+            dynamics: Dynamics::of_model(model.clone(), material, settings).unwrap(),
+            model,
+            parts: LooseParts::default(),
+            known: None,
             team: Team::new(1).unwrap(),
             load: vec![V::zeros(); n],
             fixed: Vec::new(),
@@ -60,28 +68,37 @@ impl Rig {
         Self::new(Model::tet4(&mesh, &material, Volumetric::Full).unwrap(), material, settings)
     }
 
-    fn step(&mut self, h: f64) -> DynamicsReport {
-        let inputs = DynamicsInputs {
+    fn step(&mut self, h: f64) -> SolveReport {
+        if self.known.as_ref() != Some(&self.fixed) {
+            self.parts =
+                LooseParts::connected(|visit| self.model.for_groups(visit), &self.masses, &self.fixed);
+            self.known = Some(self.fixed.clone());
+        }
+        let inputs = StepInputs {
             h,
             gravity: self.gravity,
+            mass: &self.masses,
             load: &self.load,
             fixed: &self.fixed,
+            parts: &self.parts,
             springs: &self.springs,
+            rest: self.model.rest(),
+            points: &self.model,
         };
         self.dynamics.step(&mut self.team, &mut self.state, &inputs, &mut self.forces)
     }
 
     fn momentum(&self) -> V {
-        self.state.v.iter().zip(self.dynamics.masses()).map(|(v, m)| *m * v).sum()
+        self.state.v.iter().zip(&self.masses).map(|(v, m)| *m * v).sum()
     }
 
     fn mass(&self) -> f64 {
-        self.dynamics.masses().iter().sum()
+        self.masses.iter().sum()
     }
 
     /// One-sided springs under the lowest nodes.
     fn floor(&mut self, height: f64, stiffness_n_m: f64) {
-        let rest = self.dynamics.model().rest();
+        let rest = self.model.rest();
         self.springs = (0..rest.len())
             .filter(|&n| rest[n].y == 0.0)
             .map(|n| PointSpring {
@@ -98,7 +115,7 @@ impl Rig {
         let at_zero = |(n, x): (usize, &V)| {
             (x.x == 0.0).then(|| FixedCopy { copy: n as u32, axes: [true; 3], position_m: (*x).into() })
         };
-        self.fixed = self.dynamics.model().rest().iter().enumerate().filter_map(at_zero).collect();
+        self.fixed = self.model.rest().iter().enumerate().filter_map(at_zero).collect();
     }
 }
 
@@ -120,7 +137,7 @@ fn a_body_comes_to_rest_on_a_floor_with_every_scheme_and_mass() {
             rig.floor(-0.01, 200.0);
             for _ in 0..200 {
                 let report = rig.step(0.005);
-                assert_eq!(report.outcome, DynamicsOutcome::Advanced, "{report:?}");
+                assert_eq!(report.outcome, Outcome::Advanced, "{report:?}");
                 assert!(rig.forces.iter().all(|f| f.y >= 0.0), "a floor does not pull");
             }
             let push: V = rig.forces.iter().sum();
@@ -162,11 +179,11 @@ fn prescribed_nodes_arrive_where_they_should() {
         rig.clamp();
         let h = 0.002;
         for k in 1..=20 {
-            let rest = rig.dynamics.model().rest().to_vec();
+            let rest = rig.model.rest().to_vec();
             for f in &mut rig.fixed {
                 f.position_m[1] = rest[f.copy as usize].y + 0.5 * h * f64::from(k);
             }
-            assert_eq!(rig.step(h).outcome, DynamicsOutcome::Advanced);
+            assert_eq!(rig.step(h).outcome, Outcome::Advanced);
             for f in &rig.fixed {
                 let c = f.copy as usize;
                 assert!((rig.state.x[c] - V::from(f.position_m)).norm() < 1e-15, "{scheme:?}");
@@ -198,11 +215,11 @@ fn fragments_fall_freely_with_every_scheme() {
             for _ in 0..20 {
                 rig.step(h);
             }
-            let parts = rig.dynamics.parts();
+            let parts = &rig.parts;
             assert_eq!((parts.len(), parts.any_free()), (2, true));
             let free = (0..2).find(|&p| parts.free[p]).unwrap();
             let copies = || (0..rig.state.x.len()).filter(|&c| parts.of_copy[c] as usize == free);
-            let mass = rig.dynamics.masses();
+            let mass = &rig.masses;
             let v: V = copies().map(|c| mass[c] * rig.state.v[c]).sum::<V>() / parts.mass[free];
             let error = (v - 20.0 * h * DOWN).norm() / (20.0 * h * DOWN.norm());
             assert!(error < 1e-9, "{scheme:?} {law:?}: {error:e}");
@@ -214,13 +231,13 @@ fn fragments_fall_freely_with_every_scheme() {
 fn static_steps_end_in_equilibrium_and_loose_bodies_are_refused() {
     let mut rig = Rig::cube(SOFT, with(Scheme::Static));
     let report = rig.step(0.01);
-    assert_eq!((report.outcome, report.notice), (DynamicsOutcome::Refused, Some(Notice::LooseBody)));
+    assert_eq!((report.outcome, report.notice), (Outcome::Refused, Some(Notice::LooseBody)));
     rig.clamp();
     rig.step(0.01);
     let mut f = vec![V::zeros(); rig.state.x.len()];
-    rig.dynamics.model().internal_forces(&rig.state.x, &mut f);
+    rig.model.internal_forces(&rig.state.x, &mut f);
     let loose = |c: usize| rig.fixed.iter().all(|f| f.copy as usize != c);
-    let masses = rig.dynamics.masses();
+    let masses = &rig.masses;
     let out = (0..f.len()).filter(|&c| loose(c)).map(|c| (f[c] - masses[c] * DOWN).norm());
     assert!(out.fold(0.0, f64::max) < 1e-5 * rig.mass() * DOWN.norm());
     assert!(rig.state.v.iter().all(|v| *v == V::zeros()));
@@ -240,8 +257,7 @@ fn the_fast_path_agrees() {
         rig.step(0.01);
         body.step(0.01, DOWN, &[]);
     }
-    let moved =
-        rig.state.x.iter().zip(rig.dynamics.model().rest()).map(|(x, r)| (x - r).norm()).fold(0.0, f64::max);
+    let moved = rig.state.x.iter().zip(rig.model.rest()).map(|(x, r)| (x - r).norm()).fold(0.0, f64::max);
     let apart = rig.state.x.iter().zip(body.positions()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(apart < 1e-4 * moved, "{apart:e} of {moved:e}");
 }
@@ -253,10 +269,10 @@ fn nonsense_is_refused_and_nothing_becomes_infinite() {
         let before = rig.state.clone();
         rig.load[5].x = f64::NAN;
         let report = rig.step(0.01);
-        assert_eq!((report.outcome, report.notice), (DynamicsOutcome::Refused, Some(Notice::BadInput)));
+        assert_eq!((report.outcome, report.notice), (Outcome::Refused, Some(Notice::BadInput)));
         rig.load[5].x = 0.0;
         for h in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(rig.step(h).outcome, DynamicsOutcome::Refused);
+            assert_eq!(rig.step(h).outcome, Outcome::Refused);
         }
         assert_eq!(rig.state, before);
         // A velocity that no scheme can follow.
@@ -273,7 +289,7 @@ fn unusable_newmark_parameters_are_an_error() {
     let mesh = box_mesh(V::zeros(), V::repeat(0.1), [1; 3], BoxPattern::Tet6);
     let model = Model::tet4(&mesh, &SOFT, Volumetric::Full).unwrap();
     for (beta, gamma) in [(0.0, 0.5), (0.25, 0.4), (f64::NAN, 0.5), (0.25, f64::NAN)] {
-        assert!(Dynamics::new(model.clone(), SOFT, with(Scheme::Newmark { beta, gamma })).is_err());
+        assert!(Dynamics::of_model(model.clone(), SOFT, with(Scheme::Newmark { beta, gamma })).is_err());
     }
 }
 

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::integrator::{
-    Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, DynamicsSettings, MassKind, Scheme, State,
+    Dynamics, DynamicsSettings, LooseParts, MassKind, Outcome, Scheme, SolveReport, State, StepInputs,
+    omega_max,
 };
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
@@ -50,12 +51,16 @@ pub fn accurate(scheme: Scheme, mass: MassKind) -> DynamicsSettings {
 /// A body on its way, alone in the world.
 pub struct Run {
     pub dynamics: Dynamics,
+    pub model: Model,
+    pub settings: DynamicsSettings,
+    pub masses: Vec<f64>,
+    density_kg_m3: f64,
     pub state: State,
     pub fixed: Vec<FixedCopy>,
     pub load: Vec<V>,
     pub gravity: V,
     pub team: Team,
-    pub reports: Vec<DynamicsReport>,
+    pub reports: Vec<SolveReport>,
 }
 
 impl Run {
@@ -63,7 +68,11 @@ impl Run {
         let n = model.n_nodes();
         let state = State { x: model.rest().to_vec(), v: vec![V::zeros(); n] };
         Self {
-            dynamics: Dynamics::new(model, material, settings).unwrap(),
+            masses: model.lumped_mass(material.density_kg_m3),
+            density_kg_m3: material.density_kg_m3,
+            dynamics: Dynamics::of_model(model.clone(), material, settings).unwrap(),
+            model,
+            settings,
             state,
             fixed: Vec::new(),
             load: vec![V::zeros(); n],
@@ -81,9 +90,11 @@ impl Run {
         }
     }
 
-    pub fn step(&mut self, h: f64) -> DynamicsReport {
-        let Self { dynamics, state, fixed, load, gravity, team, .. } = self;
-        let inputs = DynamicsInputs { h, gravity: *gravity, load, fixed, springs: &[] };
+    pub fn step(&mut self, h: f64) -> SolveReport {
+        let Self { dynamics, model, masses: mass, state, fixed, load, gravity, team, .. } = self;
+        let parts = &LooseParts::connected(|visit| model.for_groups(visit), mass, fixed);
+        let (gravity, rest) = (*gravity, model.rest());
+        let inputs = StepInputs { h, gravity, mass, load, fixed, parts, springs: &[], rest, points: &*model };
         let report = dynamics.step(team, state, &inputs, &mut Vec::new());
         assert!(state.x.iter().chain(&state.v).all(|c| c.iter().all(|c| c.is_finite())));
         self.reports.push(report);
@@ -94,27 +105,37 @@ impl Run {
     pub fn steps(&mut self, h: f64, steps: usize) {
         for _ in 0..steps {
             let report = self.step(h);
-            assert_eq!(report.outcome, DynamicsOutcome::Advanced, "{report:?}");
+            assert_eq!(report.outcome, Outcome::Advanced, "{report:?}");
         }
     }
 
     pub fn energy(&self) -> f64 {
-        self.dynamics.kinetic_energy(&self.state.v) + self.dynamics.model().energy(&self.state.x)
+        self.kinetic_energy(&self.state.v) + self.model.energy(&self.state.x)
+    }
+
+    /// ½ vᵀ M v.
+    pub fn kinetic_energy(&self, v: &[V]) -> f64 {
+        self.dynamics.solver().kinetic_energy(&self.masses, v)
+    }
+
+    /// ω_max at `x`.
+    pub fn omega_max(&mut self, x: &[V], fixed: &[FixedCopy]) -> f64 {
+        omega_max(&mut self.team, &self.model, (self.density_kg_m3, self.settings.mass), x, fixed)
     }
 
     pub fn centre_of_mass(&self) -> V {
-        let mass = self.dynamics.masses();
+        let mass = &self.masses;
         let moment: V = self.state.x.iter().zip(mass).map(|(x, m)| *m * x).sum();
         moment / mass.iter().sum::<f64>()
     }
 
     pub fn momentum(&self) -> V {
-        self.state.v.iter().zip(self.dynamics.masses()).map(|(v, m)| *m * v).sum()
+        self.state.v.iter().zip(&self.masses).map(|(v, m)| *m * v).sum()
     }
 
     /// About the origin, with lumped masses.
     pub fn angular_momentum(&self) -> V {
         let State { x, v } = &self.state;
-        self.dynamics.masses().iter().zip(x).zip(v).map(|((m, x), v)| *m * x.cross(v)).sum()
+        self.masses.iter().zip(x).zip(v).map(|((m, x), v)| *m * x.cross(v)).sum()
     }
 }

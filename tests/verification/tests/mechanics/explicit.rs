@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use scindo_physics::enrichment::{largest_frequency, tet_stiffness};
-use scindo_physics::integrator::{DynamicsOutcome, DynamicsSettings, MassKind, Notice, Scheme};
+use scindo_physics::integrator::{DynamicsSettings, MassKind, Notice, Outcome, Scheme};
 use scindo_physics::material::Law;
 use scindo_physics::mesh::tet_volume;
 use serde_json::Value;
@@ -72,7 +72,7 @@ fn box_meshes_have_the_published_critical_steps() {
         let fixed = held_at_zero(&model, axis);
         let x = model.rest().to_vec();
         let mut run = Run::new(model, material, explicit(Scheme::SymplecticEuler));
-        let omega = run.dynamics.omega_max(&mut run.team, &x, &fixed);
+        let omega = run.omega_max(&x, &fixed);
         let expected = table[name]["omega_max_global"].as_f64().unwrap();
         println!(
             "R4 (b) {name}: ω_max = {omega:.5}, reference {expected:.5}, {:.1e}",
@@ -95,7 +95,7 @@ fn a_step_that_is_too_long_is_refused_in_words() {
     let mut run = Run::new(tet_box([0.1; 3], [2; 3], &material), material, settings);
     let before = run.state.clone();
     let report = run.step(0.02);
-    assert_eq!((report.outcome, &run.state), (DynamicsOutcome::Refused, &before));
+    assert_eq!((report.outcome, &run.state), (Outcome::Refused, &before));
     let words = report.notice.unwrap().to_string();
     assert!(words.contains("longer than the longest stable one"), "{words}");
 }
@@ -135,21 +135,21 @@ fn spinning_cube(law: Law, h: f64, steps: usize, omega_max: f64, reference: &Val
     let mut run = Run::new(model, material, explicit(Scheme::SymplecticEuler));
     run.spin(V::new(0.0, 0.0, 20.0));
     let x = run.state.x.clone();
-    let omega = run.dynamics.omega_max(&mut run.team, &x, &[]);
+    let omega = run.omega_max(&x, &[]);
     assert!((omega / omega_max - 1.0).abs() < 1e-8, "{omega} {omega_max}");
-    let mass = run.dynamics.masses().to_vec();
+    let mass = run.masses.clone();
     let centre = run.centre_of_mass();
     let mut f = vec![V::zeros(); mass.len()];
     // Energy and angular momentum with the velocities at the time of the positions, which those of
     // the scheme are half a step behind.
     let mut measure = |run: &Run| {
-        let elastic = run.dynamics.model().internal_forces(&run.state.x, &mut f);
+        let elastic = run.model.internal_forces(&run.state.x, &mut f);
         let v: Vec<V> =
             run.state.v.iter().zip(&f).zip(&mass).map(|((v, f), m)| v - 0.5 * h / m * f).collect();
         let about_centre = |((x, v), m): ((&V, &V), &f64)| *m * (x - centre).cross(v);
         let angular: V = run.state.x.iter().zip(&v).zip(&mass).map(about_centre).sum();
         assert!(run.momentum().norm() < 1e-13);
-        (elastic + run.dynamics.kinetic_energy(&v), angular)
+        (elastic + run.kinetic_energy(&v), angular)
     };
     // At rest in shape there is no force, so the first velocities are those half a step earlier too.
     let (energy_0, angular_0) = measure(&run);
@@ -162,7 +162,7 @@ fn spinning_cube(law: Law, h: f64, steps: usize, omega_max: f64, reference: &Val
         spin = spin.max((angular - angular_0).norm() / angular_0.norm());
     }
     let first = &reference["final_u_node0"];
-    let u = run.state.x[0] - run.dynamics.model().rest()[0];
+    let u = run.state.x[0] - run.model.rest()[0];
     for k in 0..3 {
         assert!((u[k] - first[k].as_f64().unwrap()).abs() < 1e-9, "{u} {first}");
     }
@@ -180,7 +180,7 @@ fn a_consistent_mass_shortens_the_critical_step() {
         let settings = DynamicsSettings { mass, ..explicit(Scheme::SymplecticEuler) };
         let mut run = Run::new(tet_box([0.1; 3], [3; 3], &material), material, settings);
         let x = run.state.x.clone();
-        run.dynamics.omega_max(&mut run.team, &x, &[])
+        run.omega_max(&x, &[])
     };
     let ratio = omega(MassKind::Consistent) / omega(MassKind::Lumped);
     assert!((1.5..2.3).contains(&ratio), "{ratio}");

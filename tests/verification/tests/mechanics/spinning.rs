@@ -40,7 +40,7 @@ fn spin(mut run: Run, omega: f64, h: f64, seconds: f64) -> Summary {
     let (energy, momentum) = (run.energy(), run.angular_momentum().norm());
     let diagonal = |run: &Run| (run.state.x[26] - run.state.x[0]).norm();
     let length = diagonal(&run);
-    let scheme = run.dynamics.settings().scheme;
+    let scheme = run.settings.scheme;
     let steps = (seconds / h).round() as usize;
     let mut summary = Summary {
         most_energy: 1.0,
@@ -217,7 +217,7 @@ fn stiffness_damping_leaves_rigid_motion_alone() {
             assert!(lost.abs() < 2e-3, "{scheme:?} {law:?}: spin, {lost:e}");
 
             let mut ringing = cube(law, 1e5, with(scheme, 20), rayleigh);
-            for (v, x) in ringing.state.v.iter_mut().zip(ringing.dynamics.model().rest()) {
+            for (v, x) in ringing.state.v.iter_mut().zip(ringing.model.rest()) {
                 *v = V::new(x.x - 0.05, 0.0, 0.0) * 4.0;
             }
             let before = ringing.energy();

@@ -7,11 +7,12 @@
 
 use nalgebra::Vector3;
 
-use super::Scheme;
+use super::hold;
 use super::mass::Mass;
-use crate::assembly::BlockCsr;
-use crate::integrator::hold;
-use crate::integrator::springs::ActiveSpring;
+use super::scheme::{MassKind, Scheme};
+use super::springs::ActiveSpring;
+use crate::assembly::{BlockCsr, Model, Tangent};
+
 use crate::material::Rayleigh;
 use crate::operator::FixedCopy;
 use crate::team::Team;
@@ -120,6 +121,23 @@ impl PowerIteration {
         }
         self.row.iter().fold(0.0, |most, row| most.max(*row))
     }
+}
+
+/// ω_max [rad/s] of the tangent of `model` at `x` [m] and of its mass matrix for a density [kg/m³], in the
+/// directions that `fixed` leaves free; Δt_c = 2/ω_max.
+pub fn omega_max(
+    team: &mut Team,
+    model: &Model,
+    (density_kg_m3, kind): (f64, MassKind),
+    x: &[Vector3<f64>],
+    fixed: &[FixedCopy],
+) -> f64 {
+    let (mut power, mut K) = (PowerIteration::default(), model.pattern());
+    let mut mass = Mass::new(model, density_kg_m3, kind);
+    power.resize(model.n_nodes());
+    mass.hold(fixed);
+    model.tangent(x, Tangent::Projected, &mut K);
+    power.omega_max(team, &K, &mut mass, fixed)
 }
 
 /// A deterministic start with a component in every direction: a Weyl sequence per axis.

@@ -1,17 +1,17 @@
-//! The elastic energy of a body on the fast path with the rotations that its operator holds, for the energy
+//! The elastic energy of a body with the rotations that its stiffness holds, for the energy
 //! balance of Newmark's method: cheap enough for every step, since no rotation has to be found.
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::cut::CutMesh;
 use crate::element::piece_energy;
 use crate::material::Material;
-use crate::operator::{BLOCK, Elastic, Place};
+use crate::operator::{BLOCK, Place, Stiffness};
+use crate::space::Space;
 use crate::team::{Team, blocks};
 
 /// What the energy of the pieces of a body is computed from; empty until it is needed.
 #[derive(Debug, Default)]
-pub(super) struct HeldEnergy {
+pub struct HeldEnergy {
     pieces: Vec<HeldPiece>,
     /// Sum of each block of pieces [J].
     partial: Vec<f64>,
@@ -29,17 +29,17 @@ struct HeldPiece {
 
 impl HeldEnergy {
     /// Takes over the present pieces, which `elastic` has arranged.
-    pub fn follow(&mut self, mesh: &CutMesh, elastic: &Elastic) {
+    pub fn follow(&mut self, space: &dyn Space, elastic: &dyn Stiffness) {
         let places = elastic.places();
         self.pieces.clear();
-        self.pieces.extend(mesh.pieces().iter().zip(places).map(|(piece, place)| {
+        self.pieces.extend(space.pieces().iter().zip(places).map(|(piece, place)| {
             let e = piece.element as usize;
-            let [_, gradients @ ..] = mesh.mesh().gradients(e);
+            let [_, gradients @ ..] = space.mesh().gradients(e);
             HeldPiece {
                 copies: piece.copies,
                 place,
                 gradients,
-                volume: piece.fraction * mesh.mesh().volume(e),
+                volume: piece.fraction * space.mesh().volume(e),
             }
         }));
         self.partial.resize(self.pieces.len().div_ceil(BLOCK), 0.0);
@@ -47,7 +47,13 @@ impl HeldEnergy {
 
     /// The energy [J] at `x` [m]. Where the rotations of the last update are not those of `x`, it is slightly
     /// too large.
-    pub fn at(&mut self, team: &mut Team, elastic: &Elastic, x: &[Vector3<f64>], material: &Material) -> f64 {
+    pub fn at(
+        &mut self,
+        team: &mut Team,
+        elastic: &dyn Stiffness,
+        x: &[Vector3<f64>],
+        material: &Material,
+    ) -> f64 {
         let (pieces, lame) = (&self.pieces, material.lame());
         let energy = |piece: &HeldPiece| {
             let [origin, others @ ..] = piece.copies.map(|copy| x[copy as usize]);

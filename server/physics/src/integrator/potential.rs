@@ -12,10 +12,10 @@
 
 use nalgebra::Vector3;
 
+use super::increment::Increment;
 use super::mass::Mass;
+use super::springs::ActiveSpring;
 use crate::assembly::{BlockCsr, Model, Tangent};
-use crate::integrator::increment::Increment;
-use crate::integrator::springs::ActiveSpring;
 use crate::solver::{Curvature, Potential};
 use crate::team::Team;
 

@@ -2,10 +2,15 @@
 
 use nalgebra::Vector3;
 
+use super::course::Course;
 use super::critical_step::stable_step;
-use super::{Dynamics, DynamicsInputs, DynamicsOutcome, DynamicsReport, Notice, Scheme, finite};
+use super::model_solver::{ModelSolver, finite};
+use super::notice::Notice;
+use super::report::{Outcome, SolveReport};
+use super::scheme::Scheme;
+use super::step_inputs::StepInputs;
+use super::{State, hold};
 use crate::assembly::Tangent;
-use crate::integrator::{State, hold};
 use crate::material::Law;
 use crate::operator::FixedCopy;
 use crate::team::Team;
@@ -17,22 +22,23 @@ const RECHECK: u32 = 128;
 /// A step that did not stay finite is tried again with sub-steps half, then a quarter as long.
 const RETRIES: u32 = 2;
 
-impl Dynamics {
-    /// Makes the step; the new state is in `self.next`.
+impl ModelSolver {
+    /// Makes the step. If it would take too many parts, it is refused.
     pub(super) fn explicit_step(
         &mut self,
         team: &mut Team,
-        state: &State,
-        inputs: &DynamicsInputs<'_>,
-        report: &mut DynamicsReport,
+        (course, state): (&Course, &mut State),
+        inputs: &StepInputs<'_>,
+        report: &mut SolveReport,
     ) {
-        let stable_s = self.stable_step(team, state, inputs.fixed);
+        let before = &course.before;
+        let stable_s = self.stable_step(team, before, inputs.fixed);
         report.stable_step_s = Some(stable_s);
         let parts = (inputs.h / (MARGIN * stable_s) * (1.0 - 1e-9)).ceil().max(1.0);
         // The cast saturates: a stable step of length zero needs more parts than anyone allows.
         let needed = if parts.is_nan() { u32::MAX } else { parts as u32 };
         if needed > self.settings.most_substeps.max(1) {
-            report.outcome = DynamicsOutcome::Refused;
+            report.outcome = Outcome::Refused;
             report.notice = Some(Notice::TooLong { h_s: inputs.h, stable_s, needed });
             return;
         }
@@ -44,26 +50,26 @@ impl Dynamics {
                 (_, substeps) => Some(Notice::DividedAgain { substeps }),
             };
             let h = inputs.h / f64::from(report.substeps);
-            self.next.copy_from(state);
+            state.copy_from(before);
             // Prescribed nodes move at the constant velocity that reaches their target.
             for f in inputs.fixed {
                 let c = f.copy as usize;
                 for k in (0..3).filter(|&k| f.axes[k]) {
-                    self.next.v[c][k] = (f.position_m[k] - state.x[c][k]) / inputs.h;
+                    state.v[c][k] = (f.position_m[k] - before.x[c][k]) / inputs.h;
                 }
             }
             for k in 1..=report.substeps {
                 if team.told_to_stop() {
                     return;
                 }
-                self.substep(team, state, inputs, h, f64::from(k) / f64::from(report.substeps));
+                let part = (h, f64::from(k) / f64::from(report.substeps));
+                self.substep(team, (before, state), inputs, part);
             }
-            if finite(&self.next) {
-                report.kinetic_j = self.mass.kinetic(&self.next.v);
+            if finite(state) {
                 return;
             }
         }
-        report.outcome = DynamicsOutcome::Held;
+        report.outcome = Outcome::Held;
     }
 
     /// Longest stable step [s], including the springs of this step.
@@ -82,20 +88,25 @@ impl Dynamics {
                 omega_squared
             }
         };
-        let springs = self.power.spring_bound(&self.active, &self.mass.lumped);
+        let springs = self.power.spring_bound(&self.active.springs, &self.mass.lumped);
         stable_step(self.settings.scheme, (body + springs).sqrt(), self.material.rayleigh)
     }
 
-    /// Makes one part of length `h` [s], which ends at the fraction `s` of the step.
-    fn substep(&mut self, team: &mut Team, state: &State, inputs: &DynamicsInputs<'_>, h: f64, s: f64) {
-        let mut next = std::mem::take(&mut self.next);
+    /// Makes one part of length `h` [s], which ends at the fraction `s` of the step from `before`.
+    fn substep(
+        &mut self,
+        team: &mut Team,
+        (before, next): (&State, &mut State),
+        inputs: &StepInputs<'_>,
+        (h, s): (f64, f64),
+    ) {
         let [mut x, mut v, mut a, mut dx, mut dv] = std::mem::take(&mut self.stages);
         match self.settings.scheme {
             Scheme::Midpoint => {
-                self.accelerate(team, &next.x, &next.v, inputs.fixed, &mut a);
+                self.acceleration_at(team, [&next.x, &next.v], inputs.fixed, &mut a);
                 shifted(&next.x, h / 2.0, &next.v, &mut x);
                 shifted(&next.v, h / 2.0, &a, &mut v);
-                self.accelerate(team, &x, &v, inputs.fixed, &mut a);
+                self.acceleration_at(team, [&x, &v], inputs.fixed, &mut a);
                 add(&mut next.x, h, &v);
                 add(&mut next.v, h, &a);
             }
@@ -106,7 +117,7 @@ impl Dynamics {
                 x.copy_from_slice(&next.x);
                 v.copy_from_slice(&next.v);
                 for (weight, forward) in [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)] {
-                    self.accelerate(team, &x, &v, inputs.fixed, &mut a);
+                    self.acceleration_at(team, [&x, &v], inputs.fixed, &mut a);
                     add(&mut dx, weight, &v);
                     add(&mut dv, weight, &a);
                     shifted(&next.x, h * forward, &v, &mut x);
@@ -116,7 +127,7 @@ impl Dynamics {
                 add(&mut next.v, h / 6.0, &dv);
             }
             _ => {
-                self.accelerate(team, &next.x, &next.v, inputs.fixed, &mut a);
+                self.acceleration_at(team, [&next.x, &next.v], inputs.fixed, &mut a);
                 add(&mut next.v, h, &a);
                 add(&mut next.x, h, &next.v);
             }
@@ -125,20 +136,18 @@ impl Dynamics {
         for f in inputs.fixed {
             let c = f.copy as usize;
             for k in (0..3).filter(|&k| f.axes[k]) {
-                let way = f.position_m[k] - state.x[c][k];
-                next.x[c][k] = state.x[c][k] + s * way;
+                let way = f.position_m[k] - before.x[c][k];
+                next.x[c][k] = before.x[c][k] + s * way;
             }
         }
         self.stages = [x, v, a, dx, dv];
-        self.next = next;
     }
 
     /// a = M⁻¹ (f_ext + f_springs(x) − f_int(x) − α M v − β K̂(x) v) [m/s²], 0 where prescribed.
-    pub(super) fn accelerate(
+    pub(super) fn acceleration_at(
         &mut self,
         team: &mut Team,
-        x: &[Vector3<f64>],
-        v: &[Vector3<f64>],
+        [x, v]: [&[Vector3<f64>]; 2],
         fixed: &[FixedCopy],
         a: &mut [Vector3<f64>],
     ) {
@@ -153,7 +162,7 @@ impl Dynamics {
         for (f, f_ext) in self.force.iter_mut().zip(&self.f_ext) {
             *f = f_ext - *f;
         }
-        for spring in &self.active {
+        for spring in &self.active.springs {
             let force = spring.potential(spring.point(x)).force;
             spring.carriers().for_each(|(c, w)| self.force[c] += w * force);
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::MassKind;
+use super::scheme::MassKind;
 use crate::assembly::{BlockCsr, Model};
 use crate::solver::{LinearSettings, LinearSolver, Method, Precision};
 use crate::team::Team;

@@ -1,0 +1,325 @@
+//! A step of a body: any scheme, with history, guards and report.
+//!
+//! The equations themselves are solved by a [`StepSolver`]. A step that gains energy, or does not stay finite,
+//! is made again with implicit Euler. If that fails too, the body is held. Whatever happens, the state stays
+//! finite, and every departure from what was requested is reported.
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::course::Course;
+use super::free_motion::{FreeMotion, free_motions};
+use super::multistep::Multistep;
+use super::notice::Notice;
+use super::parts::LooseParts;
+use super::report::{Outcome, SolveReport};
+use super::scheme::Scheme;
+use super::step_inputs::StepInputs;
+use super::step_solver::{SolverSettings, StepSolver};
+use super::{DynamicsSettings, ModelSolver, State};
+use crate::assembly::{Model, ModelError};
+use crate::cut::NewCopy;
+use crate::material::{Law, Material};
+use crate::operator::{FixedCopy, Stiffness};
+use crate::reserve::resize_reserving;
+use crate::space::Space;
+use crate::team::Team;
+
+/// Settings with which no step can be made.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum DynamicsError {
+    /// Newmark's parameters are out of range.
+    #[error("Newmark parameters beta = {beta}, gamma = {gamma}: beta must be in (0, 1], gamma in [0.5, 2]")]
+    Newmark {
+        /// β.
+        beta: f64,
+        /// γ.
+        gamma: f64,
+    },
+}
+
+/// Integrates the motion of one body; owns all memory that a step needs.
+#[derive(Debug)]
+pub struct Dynamics {
+    scheme: Scheme,
+    law: Law,
+    course: Course,
+    solver: Box<dyn StepSolver>,
+    /// Rigid motions of held parts that the constraints leave free; found for equilibria only.
+    free_motions: Vec<FreeMotion>,
+    /// Prescribed directions for which these were found; `None` after a change of the topology.
+    known_fixed: Option<Vec<FixedCopy>>,
+    f_ext: Vec<Vector3<f64>>,
+}
+
+impl Dynamics {
+    /// Steps of `scheme` whose equations `solver` solves.
+    pub fn new(scheme: Scheme, law: Law, solver: Box<dyn StepSolver>) -> Result<Self, DynamicsError> {
+        scheme.check()?;
+        let multistep = Multistep::new(scheme, solver.model().is_some());
+        let course = Course { multistep, ..Course::default() };
+        let (free_motions, f_ext) = (Vec::new(), Vec::new());
+        Ok(Self { scheme, law, course, solver, free_motions, known_fixed: None, f_ext })
+    }
+
+    /// Steps of a discrete model in double precision.
+    pub fn of_model(
+        model: Model,
+        material: Material,
+        settings: DynamicsSettings,
+    ) -> Result<Self, DynamicsError> {
+        let (scheme, law, n) = (settings.scheme, material.law, model.n_nodes());
+        let solver = Box::new(ModelSolver::new(model, material, settings));
+        let mut dynamics = Self::new(scheme, law, solver)?;
+        dynamics.resize(n);
+        Ok(dynamics)
+    }
+
+    /// The way in which the equations are solved.
+    pub fn solver(&self) -> &dyn StepSolver {
+        &*self.solver
+    }
+
+    /// The discrete model in double precision; `None` on a body that is computed in single precision.
+    pub fn model(&self) -> Option<&Model> {
+        self.solver.model()
+    }
+
+    /// The stiffness in single precision; `None` on a body that is computed with a model.
+    pub fn stiffness_mut(&mut self) -> Option<&mut dyn Stiffness> {
+        self.solver.stiffness_mut()
+    }
+
+    /// The state before the last step.
+    pub fn before(&self) -> &State {
+        &self.course.before
+    }
+
+    /// Takes new stopping criteria from the next step on.
+    pub fn set_solver(&mut self, settings: SolverSettings) {
+        self.solver.set_solver(settings);
+    }
+
+    /// Changes elastic constants and damping from the next step on; law and density stay. The energy
+    /// balance starts anew, because the elastic energy jumps with the constants.
+    pub fn set_material(&mut self, material: Material) {
+        self.solver.set_material(material);
+        self.course.multistep.forget_energy();
+    }
+
+    /// Forgets earlier steps. The integrator calls it itself if a state is not the one it left.
+    pub fn restart(&mut self) {
+        self.course.multistep.forget();
+        self.solver.restart();
+    }
+
+    /// Tells that `copies` were stopped in `state` and are held from now on. The history of the others
+    /// stays. The energy balance starts anew without that of the stopped copies.
+    pub fn still(&mut self, copies: &[u32], state: &State) {
+        self.course.multistep.still(copies, state);
+    }
+
+    /// Follows the last cut of `space`, which made the copies `new`. All material keeps its history.
+    pub fn follow_cut(&mut self, space: &dyn Space, new: &[NewCopy]) -> Result<(), ModelError> {
+        self.course.multistep.inherit(new);
+        self.solver.follow_cut(space)
+    }
+
+    /// Starts anew from `space` as it is now.
+    pub fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
+        self.course.multistep.forget();
+        self.solver.rebuild(space)
+    }
+
+    /// Updates everything else that follows from the topology of `space` and from the masses [kg].
+    pub fn follow_masses(&mut self, space: &dyn Space, mass: &[f64]) {
+        self.solver.follow_masses(space, mass);
+        self.resize(mass.len());
+    }
+
+    /// Tells that the connected parts have changed.
+    pub fn follow_parts(&mut self) {
+        self.known_fixed = None;
+    }
+
+    /// Makes room for `n` nodes, so that a step allocates nothing.
+    fn resize(&mut self, n: usize) {
+        let Self { course, f_ext, .. } = self;
+        course.multistep.resize(n);
+        for v in [&mut course.before.x, &mut course.before.v] {
+            resize_reserving(v, n, Vector3::zeros());
+        }
+        if self.scheme == Scheme::Static {
+            resize_reserving(f_ext, n, Vector3::zeros());
+        }
+        self.known_fixed = None;
+    }
+
+    /// Advances `state` by h. The force of every spring at the end of the step goes to `spring_forces`, in
+    /// the order of the inputs.
+    pub fn step(
+        &mut self,
+        team: &mut Team,
+        state: &mut State,
+        inputs: &StepInputs<'_>,
+        spring_forces: &mut Vec<Vector3<f64>>,
+    ) -> SolveReport {
+        let mut report = SolveReport { scheme: self.scheme, substeps: 1, ..SolveReport::default() };
+        spring_forces.clear();
+        spring_forces.resize(inputs.springs.len(), Vector3::zeros());
+        let bad_input = self.solver.why_refused(state, inputs);
+        if bad_input.is_none() {
+            self.follow_fixed(inputs);
+        }
+        if let Some(why) = bad_input.or_else(|| self.why_no_equilibrium(inputs)) {
+            return SolveReport { outcome: Outcome::Refused, notice: Some(why), ..report };
+        }
+        self.course.before.copy_from(state);
+        if !self.course.multistep.continues(state) {
+            self.restart();
+        }
+        if self.scheme.is_explicit() {
+            self.attempt(team, state, (self.scheme, inputs), &mut report, spring_forces);
+        } else {
+            self.implicit_step(team, state, inputs, &mut report, spring_forces);
+        }
+        if team.told_to_stop() {
+            report.outcome = Outcome::Interrupted;
+        }
+        if report.outcome == Outcome::Advanced {
+            self.course.multistep.push((&self.course.before, state), inputs, report.scheme);
+            return report;
+        }
+        state.copy_from(&self.course.before);
+        spring_forces.fill(Vector3::zeros());
+        self.course.multistep.forget_energy();
+        if report.outcome == Outcome::Held {
+            state.v.fill(Vector3::zeros());
+            report.notice = Some(Notice::NotFinite);
+        }
+        report
+    }
+
+    /// Makes the step with the scheme of the body, or with implicit Euler where a guard demands it.
+    fn implicit_step(
+        &mut self,
+        team: &mut Team,
+        state: &mut State,
+        inputs: &StepInputs<'_>,
+        report: &mut SolveReport,
+        spring_forces: &mut [Vector3<f64>],
+    ) {
+        let Course { multistep, spin, .. } = &mut self.course;
+        let (scheme, notice) = multistep.choose(state, (inputs, self.law), spin);
+        let underheld = self.free_motions.first().map(|&motion| Notice::Underheld { motion, driven: false });
+        (report.scheme, report.notice) = (scheme, notice.or(underheld));
+        if multistep.starts_newmark(scheme) {
+            self.solver.accelerate(team, state, inputs, multistep.acceleration_mut());
+        }
+        let before_j = self.begin_energy(team, state, inputs);
+        self.attempt(team, state, (scheme, inputs), report, spring_forces);
+        // A step that was made in parts was made with implicit Euler.
+        let (made_with, iterations) = (report.scheme, report.iterations);
+        let repeats = self.solver.may_repeat(made_with) && self.scheme != Scheme::Static;
+        let excess = self.end_energy(team, state, (inputs, before_j), report, repeats);
+        if !repeats || team.told_to_stop() || (report.outcome == Outcome::Advanced && excess.is_none()) {
+            return;
+        }
+        if let Some(excess_j) = excess {
+            report.notice = Some(Notice::EnergyGained { excess_j });
+        }
+        state.copy_from(&self.course.before);
+        (report.scheme, report.outcome) = (Scheme::ImplicitEuler, Outcome::Advanced);
+        self.solver.be_careful(true);
+        self.attempt(team, state, (Scheme::ImplicitEuler, inputs), report, spring_forces);
+        self.solver.be_careful(false);
+        report.iterations += iterations;
+        self.end_energy(team, state, (inputs, before_j), report, false);
+    }
+
+    fn attempt(
+        &mut self,
+        team: &mut Team,
+        state: &mut State,
+        (scheme, inputs): (Scheme, &StepInputs<'_>),
+        report: &mut SolveReport,
+        spring_forces: &mut [Vector3<f64>],
+    ) {
+        let Self { course, solver, .. } = self;
+        solver.attempt(team, course, state, (scheme, inputs), (report, spring_forces));
+    }
+
+    /// Begins the energy balance of a step from `state`. Returns kinetic and elastic energy [J] there.
+    fn begin_energy(&mut self, team: &mut Team, state: &State, inputs: &StepInputs<'_>) -> f64 {
+        let Self { course: Course { multistep, .. }, solver, .. } = self;
+        if !multistep.judges_energy() {
+            return 0.0;
+        }
+        let kinetic_j = solver.kinetic_energy(inputs.mass, &state.v);
+        let weight = |c: usize| solver.weight(c, inputs.mass[c], inputs.gravity);
+        let loads_j = inputs.load_energy(&state.x, weight);
+        multistep.begin_energy(kinetic_j, loads_j, || solver.elastic_energy(team, inputs, &state.x))
+    }
+
+    /// Ends the energy balance of an attempt that began with `before_j`. Returns the energy [J] that it gained
+    /// without work, if it is more than its scheme may gain. An attempt that may be repeated is booked only
+    /// if it gained none.
+    fn end_energy(
+        &mut self,
+        team: &mut Team,
+        state: &State,
+        (inputs, before_j): (&StepInputs<'_>, f64),
+        report: &SolveReport,
+        may_repeat: bool,
+    ) -> Option<f64> {
+        let Self { course: Course { multistep, before, .. }, solver, .. } = self;
+        if !multistep.judges_energy() || report.outcome != Outcome::Advanced {
+            return None;
+        }
+        let elastic_j = report.elastic_j.unwrap_or_else(|| solver.elastic_energy(team, inputs, &state.x));
+        let weight = |c: usize| solver.weight(c, inputs.mass[c], inputs.gravity);
+        let force = |c: usize| weight(c) + inputs.load[c];
+        let exchanged: f64 = (0..state.x.len()).map(|c| force(c).dot(&(state.x[c] - before.x[c]))).sum();
+        let H =
+            solver.kinetic_energy(inputs.mass, &state.v) + elastic_j + inputs.load_energy(&state.x, weight);
+        let driven = inputs.is_driven(before);
+        let end = (H, elastic_j, before_j + exchanged.abs());
+        multistep.end_energy(end, report.scheme, (driven, may_repeat))
+    }
+
+    /// Follows a change of the prescribed directions.
+    fn follow_fixed(&mut self, inputs: &StepInputs<'_>) {
+        let axes = |f: &FixedCopy| (f.copy, f.axes);
+        let same = |known: &Vec<FixedCopy>| known.iter().map(axes).eq(inputs.fixed.iter().map(axes));
+        if self.known_fixed.as_ref().is_some_and(same) {
+            return;
+        }
+        self.course.spin.follow(inputs.rest, inputs.mass, inputs.parts);
+        if self.scheme == Scheme::Static {
+            self.free_motions = free_motions(inputs.parts, inputs.rest, inputs.fixed);
+        }
+        self.solver.hold(inputs.fixed);
+        self.known_fixed = Some(inputs.fixed.to_vec());
+    }
+
+    /// The reason why the body has no equilibrium: a part that is held nowhere, or a free rigid motion that
+    /// the loads drive. A finite rotation comes to an end, but the linear law knows no finite rotations.
+    /// Springs may hold what the boundary conditions do not.
+    fn why_no_equilibrium(&mut self, inputs: &StepInputs<'_>) -> Option<Notice> {
+        let parts: &LooseParts = inputs.parts;
+        if self.scheme != Scheme::Static || (self.free_motions.is_empty() && !parts.any_free()) {
+            return None;
+        }
+        if parts.any_free() {
+            return Some(Notice::LooseBody);
+        }
+        for (c, f_ext) in self.f_ext.iter_mut().enumerate() {
+            *f_ext = self.solver.weight(c, inputs.mass[c], inputs.gravity) + inputs.load[c];
+        }
+        let endless = |m: &&FreeMotion| m.is_translation() || self.law == Law::Linear;
+        let driven = |m: &&FreeMotion| m.is_driven(parts, inputs.rest, &self.f_ext);
+        let motion = self.free_motions.iter().filter(endless).find(driven);
+        let motion = motion.filter(|_| inputs.springs.is_empty())?;
+        Some(Notice::Underheld { motion: *motion, driven: true })
+    }
+}

@@ -1,0 +1,298 @@
+//! Steps by linear solves from the predictor: linear tetrahedra, matrix-free in single precision. One solve per
+//! step, two with Newmark's method.
+
+use nalgebra::Vector3;
+
+use super::course::Course;
+use super::held_energy::HeldEnergy;
+use super::linear_step::LinearStep;
+use super::notice::Notice;
+use super::report::{Outcome, SolveReport};
+use super::scheme::Scheme;
+use super::step_inputs::{Inertia, LinearInputs, StepInputs, StepOutcome};
+use super::step_solver::{SolverSettings, StepSolver};
+use super::{State, WEIGHTLESS};
+use crate::assembly::ModelError;
+use crate::material::Material;
+use crate::operator::Stiffness;
+use crate::reserve::refill;
+use crate::solver::PcgSettings;
+use crate::space::Space;
+use crate::team::Team;
+
+/// A step that fails is tried again in 2 and then in 4 parts.
+const MOST_HALVINGS: u32 = 2;
+
+/// Largest turn [rad] of a free part in a step, or in a part of a divided step; a faster spin is slowed
+/// to it. Little is lost: implicit Euler leaves less than a sixteenth of such a spin.
+const LARGEST_TURN: f64 = 4.0;
+
+/// If a free part turns by more than this in a step [rad], the energy of the free parts is checked after it.
+///
+/// A rigid part that spins far from a principal axis precesses. One linear solve mistakes that finite
+/// rotation for strain and gains energy.
+const NOTABLE_TURN: f64 = 0.5;
+
+/// A step that gained energy is divided into 2, 4, … parts at most this often.
+const MOST_SPIN_HALVINGS: u32 = 4;
+
+/// Relative gain of energy that counts as rounding.
+const GAIN: f64 = 1e-6;
+
+/// Stiffness and buffers of steps by linear solves.
+#[derive(Debug)]
+pub struct LinearlyImplicit {
+    scheme: Scheme,
+    material: Material,
+    solves: u32,
+    pcg: PcgSettings,
+    relaxes: bool,
+    stiffness: Box<dyn Stiffness>,
+    /// Whether the stiffness uses only instructions that every machine has.
+    portable: bool,
+    mass_f32: Vec<f32>,
+    step: LinearStep,
+    /// For the energy balance of Newmark's method.
+    held: HeldEnergy,
+    weightless: Vec<Weightless>,
+}
+
+/// A copy without mass, and the copies of its piece that carry it along.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Weightless {
+    copy: u32,
+    /// Copies of the same piece; those with mass count.
+    piece: [u32; 4],
+}
+
+impl LinearlyImplicit {
+    /// Steps with `stiffness`, which was made for `portable` instructions or not. `at_start` linearises at
+    /// the positions of the last step; only a mutation test sets it.
+    pub fn new(
+        (scheme, material): (Scheme, Material),
+        settings: SolverSettings,
+        (stiffness, portable): (Box<dyn Stiffness>, bool),
+        at_start: bool,
+    ) -> Self {
+        let (solves, pcg) = settings.linear;
+        Self {
+            scheme,
+            material,
+            solves,
+            pcg,
+            relaxes: settings.relaxation.is_some(),
+            stiffness,
+            portable,
+            mass_f32: Vec::new(),
+            step: LinearStep::new(at_start),
+            held: HeldEnergy::default(),
+            weightless: Vec::new(),
+        }
+    }
+
+    /// Makes all parts of a step; returns `false` as soon as one is not finite.
+    fn try_step(
+        &mut self,
+        team: &mut Team,
+        (course, state): (&mut Course, &mut State),
+        (scheme, inputs): (Scheme, &StepInputs<'_>),
+        (report, spring_forces): (&mut SolveReport, &mut [Vector3<f64>]),
+    ) -> bool {
+        (report.residual, report.algebraic_error) = (0.0, 0.0);
+        for _ in 0..report.substeps {
+            let inertia = match course.multistep.extrapolate(team, state, (scheme, inputs.h)) {
+                Some(history) => Inertia::Remembered(history),
+                None if scheme == Scheme::Static => Inertia::None { relax: self.relaxes },
+                None => Inertia::Euler,
+            };
+            let solves = if scheme == Scheme::ImplicitEuler { 1 } else { self.solves };
+            let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
+            let inputs = LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves };
+            let StepOutcome { solve, solves, inverted_pieces, refused_springs, finite } =
+                step.step(team, &mut **stiffness, state, &inputs, spring_forces);
+            report.newton_steps += solves;
+            report.iterations += solve.iterations;
+            report.residual = report.residual.max(solve.residual);
+            report.stop = solve.stop;
+            // δ minimises s times an energy, so its norm is in √J times √s.
+            report.algebraic_error = report.algebraic_error.max(solve.algebraic_error / inputs.root_s());
+            report.inverted_pieces = inverted_pieces;
+            report.refused_springs = refused_springs;
+            if !finite {
+                return false;
+            }
+            if team.told_to_stop() {
+                break;
+            }
+        }
+        true
+    }
+
+    /// Moves copies without mass along with the rest of their piece: no force would move them.
+    fn carry_weightless(&self, state: &mut State, inputs: &StepInputs<'_>) {
+        let rest = |c: u32| inputs.rest[c as usize];
+        for Weightless { copy, piece } in &self.weightless {
+            let (mut moved, mut v, mut hosts) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+            for &host in piece.iter().filter(|&&c| inputs.mass[c as usize] > WEIGHTLESS) {
+                moved += state.x[host as usize] - rest(host);
+                v += state.v[host as usize];
+                hosts += 1.0;
+            }
+            let fixed = inputs.fixed.binary_search_by_key(copy, |f| f.copy).is_ok();
+            if hosts > 0.0 && !fixed {
+                state.x[*copy as usize] = rest(*copy) + moved / hosts;
+                state.v[*copy as usize] = v / hosts;
+            }
+        }
+    }
+
+    /// Kinetic and elastic energy of the free parts, and Σ f·x of gravity and loads on them [J].
+    fn free_energy(&self, state: &State, inputs: &StepInputs<'_>) -> (f64, f64) {
+        let free = |copy: usize| inputs.parts.free[inputs.parts.of_copy[copy] as usize];
+        let (mut energy, mut loads) = (0.0, 0.0);
+        for c in (0..inputs.mass.len()).filter(|&c| free(c)) {
+            energy += 0.5 * inputs.mass[c] * state.v[c].norm_squared();
+            loads += (inputs.mass[c] * inputs.gravity + inputs.load[c]).dot(&state.x[c]);
+        }
+        let (law, lame) = (self.material.law, self.material.lame());
+        inputs.points.for_points(&state.x, &mut |point| {
+            if free(point.nodes[0] as usize) {
+                energy += point.weight * law.energy(&point.F, lame);
+            }
+        });
+        (energy, loads)
+    }
+}
+
+impl StepSolver for LinearlyImplicit {
+    /// Makes the step with `scheme`. If the result is not finite or a free part gained energy, the step is
+    /// tried again in smaller parts with implicit Euler.
+    fn attempt(
+        &mut self,
+        team: &mut Team,
+        course: &mut Course,
+        state: &mut State,
+        (scheme, inputs): (Scheme, &StepInputs<'_>),
+        (report, spring_forces): (&mut SolveReport, &mut [Vector3<f64>]),
+    ) {
+        let (h, notice) = (inputs.h, report.notice);
+        // Springs do work that is not known here, so the energy cannot be checked.
+        let turns = inputs.springs.is_empty()
+            && course.spin.exceeds(state, inputs.mass, inputs.parts, (h, NOTABLE_TURN));
+        let start = if turns { self.free_energy(state, inputs) } else { (0.0, 0.0) };
+        let (mut failed, mut gained) = (0, false);
+        for halvings in 0..=MOST_SPIN_HALVINGS {
+            report.substeps = 1 << halvings;
+            // Parts of a step are made with implicit Euler.
+            report.scheme =
+                if halvings == 0 || scheme == Scheme::Static { scheme } else { Scheme::ImplicitEuler };
+            let inputs = StepInputs { h: h / f64::from(report.substeps), ..*inputs };
+            let limit = (inputs.h, LARGEST_TURN);
+            let slowed = course.spin.limit(state, inputs.mass, inputs.parts, limit);
+            report.notice = match slowed {
+                Some(angle_rad) => Some(Notice::SpinLimited { angle_rad, largest_rad: LARGEST_TURN }),
+                None if gained => Some(Notice::SpinDivided { substeps: report.substeps }),
+                None => notice,
+            };
+            let scheme = report.scheme;
+            let finite = self.try_step(team, (course, state), (scheme, &inputs), (report, spring_forces));
+            if team.told_to_stop() {
+                return;
+            }
+            if finite {
+                let (now, put_in) = if turns { self.free_energy(state, &inputs) } else { (0.0, 0.0) };
+                // Gravity and loads may do work; any further gain comes from the linearisation.
+                let (gain, work) = (now - start.0, put_in - start.1);
+                if gain - work <= GAIN * (start.0 + work.abs()) || halvings == MOST_SPIN_HALVINGS {
+                    return self.carry_weightless(state, &inputs);
+                }
+                gained = true;
+            } else {
+                failed += 1;
+            }
+            state.copy_from(&course.before);
+            if failed > MOST_HALVINGS {
+                break;
+            }
+        }
+        report.outcome = Outcome::Held;
+    }
+
+    fn accelerate(
+        &mut self,
+        team: &mut Team,
+        state: &State,
+        inputs: &StepInputs<'_>,
+        acceleration: &mut [Vector3<f64>],
+    ) {
+        let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
+        let inertia = Inertia::Euler;
+        let inputs = LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves: 1 };
+        step.accelerate(team, &mut **stiffness, state, &inputs, acceleration);
+    }
+
+    fn elastic_energy(&mut self, team: &mut Team, _: &StepInputs<'_>, x: &[Vector3<f64>]) -> f64 {
+        self.held.at(team, &*self.stiffness, x, &self.material)
+    }
+
+    fn set_material(&mut self, material: Material) {
+        self.material = material;
+    }
+
+    fn set_solver(&mut self, settings: SolverSettings) {
+        (self.solves, self.pcg) = settings.linear;
+        self.relaxes = settings.relaxation.is_some();
+    }
+
+    fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
+        space.follow_cut(&mut *self.stiffness);
+        Ok(())
+    }
+
+    /// The pieces are arranged anew, without rotations.
+    fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
+        let choice = self.stiffness.choice();
+        if let Some(stiffness) = space.stiffness(self.portable) {
+            self.stiffness = stiffness;
+        }
+        self.stiffness.set_choice(choice);
+        Ok(())
+    }
+
+    fn follow_masses(&mut self, space: &dyn Space, mass: &[f64]) {
+        refill(&mut self.mass_f32, mass.iter().map(|&m| m as f32));
+        self.weightless = find_weightless(space, mass);
+        self.step.resize(mass.len());
+        if self.scheme.is_newmark() {
+            self.held.follow(space, &*self.stiffness);
+        }
+        self.step.set_stiff_modes(space.stiff_modes());
+    }
+
+    fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) {
+        refill(mass, space.copy_volumes().iter().map(|v| density_kg_m3 * v));
+    }
+
+    fn stiff_motions(&self) -> [usize; 3] {
+        self.step.stiff_motions()
+    }
+
+    fn stiffness_mut(&mut self) -> Option<&mut dyn Stiffness> {
+        Some(&mut *self.stiffness)
+    }
+}
+
+fn find_weightless(space: &dyn Space, mass: &[f64]) -> Vec<Weightless> {
+    if mass.iter().all(|&m| m > WEIGHTLESS) {
+        return Vec::new();
+    }
+    let mut found: Vec<Weightless> = Vec::new();
+    for piece in space.pieces() {
+        for copy in piece.copies {
+            if mass[copy as usize] <= WEIGHTLESS && found.iter().all(|w| w.copy != copy) {
+                found.push(Weightless { copy, piece: piece.copies });
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,235 @@
+//! Steps of a discrete model in double precision: any element, any law, every scheme, either mass.
+//!
+//! Explicit schemes check the critical time step; they divide a step that is too long, or refuse it.
+//! Implicit schemes minimise the incremental potential of the step by Newton's method with backtracking,
+//! so that contacts, inverted elements and any law are treated alike.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::State;
+use super::course::Course;
+use super::critical_step::PowerIteration;
+use super::mass::Mass;
+use super::notice::Notice;
+use super::parts::Translations;
+use super::relaxation::Relaxation;
+use super::report::SolveReport;
+use super::scheme::Scheme;
+use super::settings::DynamicsSettings;
+use super::step_inputs::StepInputs;
+use super::step_solver::{ActiveSprings, SolverSettings, StepSolver};
+use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
+use crate::material::Material;
+use crate::operator::FixedCopy;
+use crate::solver::Newton;
+use crate::space::Space;
+use crate::team::Team;
+
+/// Positions beyond this [m] count as not finite.
+const FARTHEST: f64 = 1e15;
+
+/// A discrete model with all memory that its steps need.
+#[derive(Debug)]
+pub struct ModelSolver {
+    pub(super) model: Model,
+    pub(super) material: Material,
+    pub(super) settings: DynamicsSettings,
+    /// Whether an attempt replaces one that failed.
+    pub(super) careful: bool,
+    pub(super) mass: Mass,
+    pub(super) newton: Newton,
+    pub(super) relaxation: Relaxation,
+    pub(super) translations: Translations,
+    pub(super) active: ActiveSprings,
+    pub(super) f_ext: Vec<Vector3<f64>>,
+    pub(super) scratch: Vec<Vector3<f64>>,
+    pub(super) force: Vec<Vector3<f64>>,
+    /// Buffers for the stages of explicit schemes.
+    pub(super) stages: [Vec<Vector3<f64>>; 5],
+    pub(super) damping: Option<BlockCsr<f64>>,
+    pub(super) tangent: Option<BlockCsr<f64>>,
+    pub(super) power: PowerIteration,
+    /// ω_max² [1/s²] without springs, and the number of explicit steps until it is computed again.
+    pub(super) omega_squared: Option<(f64, u32)>,
+}
+
+impl ModelSolver {
+    /// Prepares the motion of `model`, which has to be made of `material`.
+    pub fn new(model: Model, material: Material, settings: DynamicsSettings) -> Self {
+        let n = model.n_nodes();
+        let zeros = || vec![Vector3::zeros(); n];
+        let explicit = settings.scheme.is_explicit();
+        let mut power = PowerIteration::default();
+        if explicit {
+            power.resize(n);
+        }
+        Self {
+            careful: false,
+            mass: Mass::new(&model, material.density_kg_m3, settings.mass),
+            newton: Newton::new(settings.newton),
+            relaxation: Relaxation::default(),
+            translations: Translations::default(),
+            active: ActiveSprings::default(),
+            f_ext: zeros(),
+            scratch: zeros(),
+            force: zeros(),
+            stages: std::array::from_fn(|_| vec![Vector3::zeros(); if explicit { n } else { 0 }]),
+            damping: (material.rayleigh.stiffness_s > 0.0).then(|| model.pattern()),
+            tangent: explicit.then(|| model.pattern()),
+            power,
+            omega_squared: None,
+            model,
+            material,
+            settings,
+        }
+    }
+
+    /// The model of `space` as it is cut now.
+    pub fn of_space(
+        space: &dyn Space,
+        material: Material,
+        volumetric: Volumetric,
+        settings: DynamicsSettings,
+    ) -> Result<Self, ModelError> {
+        let mut model = space.model(&material, volumetric)?;
+        if settings.scheme.is_explicit() {
+            model.share_mass_evenly();
+        }
+        let mut solver = Self::new(model, material, settings);
+        solver.newton.set_stiff_modes(space.stiff_modes().map(Arc::new));
+        Ok(solver)
+    }
+
+    /// Sets loads and usable springs of a step from `state`.
+    pub(super) fn begin(&mut self, state: &State, inputs: &StepInputs<'_>, report: &mut SolveReport) {
+        for c in 0..self.f_ext.len() {
+            self.f_ext[c] = self.weight(c, inputs.mass[c], inputs.gravity) + inputs.load[c];
+        }
+        self.active.begin(inputs, &state.x);
+        report.refused_springs = self.active.refused();
+    }
+}
+
+impl StepSolver for ModelSolver {
+    fn attempt(
+        &mut self,
+        team: &mut Team,
+        course: &mut Course,
+        state: &mut State,
+        (scheme, inputs): (Scheme, &StepInputs<'_>),
+        (report, spring_forces): (&mut SolveReport, &mut [Vector3<f64>]),
+    ) {
+        self.begin(state, inputs, report);
+        if scheme.is_explicit() {
+            self.explicit_step(team, (course, state), inputs, report);
+        } else {
+            self.implicit_step(team, (course, state), (scheme, inputs), report);
+        }
+        self.active.write(spring_forces, |spring| spring.potential(spring.point(&state.x)).force);
+    }
+
+    fn be_careful(&mut self, careful: bool) {
+        self.careful = careful;
+    }
+
+    fn may_repeat(&self, scheme: Scheme) -> bool {
+        scheme != Scheme::ImplicitEuler || self.is_coarse()
+    }
+
+    fn why_refused(&self, state: &State, inputs: &StepInputs<'_>) -> Option<Notice> {
+        let n = self.model.n_nodes();
+        let finite = |v: &Vector3<f64>| v.iter().all(|c| c.abs() < FARTHEST);
+        let lengths = [state.x.len(), state.v.len(), inputs.load.len()];
+        let usable = lengths == [n; 3]
+            && inputs.h > 0.0
+            && inputs.h.is_finite()
+            && finite(&inputs.gravity)
+            && inputs.load.iter().chain(&state.x).chain(&state.v).all(finite)
+            && inputs.fixed.iter().all(|f| {
+                (f.copy as usize) < n && (0..3).all(|k| !f.axes[k] || f.position_m[k].abs() < FARTHEST)
+            });
+        (!usable).then_some(Notice::BadInput)
+    }
+
+    fn accelerate(
+        &mut self,
+        team: &mut Team,
+        state: &State,
+        inputs: &StepInputs<'_>,
+        acceleration: &mut [Vector3<f64>],
+    ) {
+        self.begin(state, inputs, &mut SolveReport::default());
+        self.acceleration_at(team, [&state.x, &state.v], inputs.fixed, acceleration);
+    }
+
+    fn elastic_energy(&mut self, team: &mut Team, _: &StepInputs<'_>, x: &[Vector3<f64>]) -> f64 {
+        self.model.energy_by(team, x)
+    }
+
+    fn kinetic_energy(&self, _: &[f64], v: &[Vector3<f64>]) -> f64 {
+        self.mass.kinetic(v)
+    }
+
+    /// M g in motion, the consistent load ρ ∫ N dV g in an equilibrium, where no mass matrix has to agree
+    /// with it.
+    fn weight(&self, c: usize, _: f64, g: Vector3<f64>) -> Vector3<f64> {
+        match self.settings.scheme {
+            Scheme::Static => self.material.density_kg_m3 * self.model.shape_integrals()[c] * g,
+            _ => self.mass.weight(c, g),
+        }
+    }
+
+    fn restart(&mut self) {
+        self.omega_squared = None;
+    }
+
+    fn hold(&mut self, fixed: &[FixedCopy]) {
+        self.mass.hold(fixed);
+        self.omega_squared = None;
+    }
+
+    fn set_material(&mut self, material: Material) {
+        self.model.set_lame(material.lame());
+        let (damped, model) = (material.rayleigh.stiffness_s > 0.0, &self.model);
+        self.damping = damped.then(|| self.damping.take().unwrap_or_else(|| model.pattern()));
+        let Material { law, density_kg_m3, .. } = self.material;
+        self.material = Material { law, density_kg_m3, ..material };
+        self.relaxation.forget();
+        self.omega_squared = None;
+    }
+
+    fn set_solver(&mut self, settings: SolverSettings) {
+        (self.settings.newton, self.settings.relaxation) = (settings.newton, settings.relaxation);
+    }
+
+    fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
+        self.rebuild(space)
+    }
+
+    fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
+        *self = Self::of_space(space, self.material, self.model.volumetric(), self.settings)?;
+        Ok(())
+    }
+
+    fn follow_masses(&mut self, _: &dyn Space, _: &[f64]) {}
+
+    fn lumped_masses(&self, _: &dyn Space, _: f64, mass: &mut Vec<f64>) {
+        mass.clone_from(&self.mass.lumped);
+    }
+
+    fn stiff_motions(&self) -> [usize; 3] {
+        self.newton.stiff_motions()
+    }
+
+    fn model(&self) -> Option<&Model> {
+        Some(&self.model)
+    }
+}
+
+/// Whether all numbers are finite and below [`FARTHEST`].
+pub(super) fn finite(state: &State) -> bool {
+    let fine = |v: &Vector3<f64>| v.iter().all(|c| c.abs() < FARTHEST);
+    state.x.iter().all(fine) && state.v.iter().all(fine)
+}

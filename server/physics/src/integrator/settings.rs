@@ -1,0 +1,48 @@
+//! Settings of the integration of a discrete model: scheme, mass, Newton's method, limits of explicit steps.
+
+use super::scheme::{MassKind, Scheme};
+use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
+
+/// Settings of [`Dynamics`](super::Dynamics).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DynamicsSettings {
+    /// Time integration scheme.
+    pub scheme: Scheme,
+    /// Lumped or consistent mass.
+    pub mass: MassKind,
+    /// A step is a fixed number of linear solves by design. It is judged by how well the last of them was
+    /// solved and not by the residual of Newton's method.
+    pub linearised: bool,
+    /// Newton's method of implicit schemes. `steps` = 1 (2 for Newmark) is the fast path, one linear
+    /// solve from the predictor. Linear and corotational bodies in order take it. Other laws, inverted or
+    /// collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
+    pub newton: NewtonSettings,
+    /// [`Scheme::Static`] only: number of iterations of matrix-free relaxation per step, in place of
+    /// Newton's method. They continue from step to step.
+    pub relaxation: Option<u32>,
+    /// Explicit schemes: largest number of parts into which a step longer than the stable one is divided;
+    /// 1 refuses such a step.
+    pub most_substeps: u32,
+}
+
+/// Least number of Newton steps where one linear solve cannot be trusted.
+pub const LEAST_NEWTON_STEPS: u32 = 3;
+
+impl Default for DynamicsSettings {
+    fn default() -> Self {
+        let linear = LinearSettings {
+            method: Method::Pcg,
+            precision: Precision::Mixed,
+            iterations: 500,
+            tolerance: 0.1,
+        };
+        Self {
+            scheme: Scheme::ImplicitEuler,
+            mass: MassKind::Lumped,
+            linearised: false,
+            newton: NewtonSettings { steps: 20, tolerance: 1e-6, linear, ..NewtonSettings::default() },
+            relaxation: None,
+            most_substeps: 256,
+        }
+    }
+}
