@@ -42,6 +42,7 @@ impl Model {
         if self.kind != ElementKind::Tet4 {
             return;
         }
+        self.even_mass = true;
         self.lumped.fill(0.0);
         for (nodes, volume) in self.connectivity.chunks_exact(4).zip(&self.volumes) {
             nodes.iter().for_each(|&node| self.lumped[node as usize] += volume / 4.0);

@@ -17,6 +17,7 @@ mod point;
 mod error;
 mod model;
 mod build;
+mod follow;
 mod kernel;
 mod averaging;
 mod scratch;

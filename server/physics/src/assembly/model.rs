@@ -84,6 +84,8 @@ pub struct Model {
     /// ∫ N_a dV of every node [m³].
     pub(super) integrals: Vec<f64>,
     pub(super) products: Products,
+    /// Whether mass is shared evenly instead of by the integrals of the shape functions.
+    pub(super) even_mass: bool,
     /// The tangent's pattern, without blocks.
     pub(super) pattern: BlockCsr<f64>,
     /// Position in the tangent of every block (a, b) of every element.
@@ -254,6 +256,7 @@ impl Model {
         }
         self.pattern = pattern;
         self.find_incidence();
+        self.find_row_bounds();
     }
 }
 

@@ -154,7 +154,7 @@ impl Model {
         self.add_spring_tangent(x, kind, K);
     }
 
-    fn incidence(&self, n: usize) -> std::ops::Range<usize> {
+    pub(super) fn incidence(&self, n: usize) -> std::ops::Range<usize> {
         self.incident_first[n] as usize..self.incident_first[n + 1] as usize
     }
 
@@ -173,6 +173,11 @@ impl Model {
             fill[node as usize] += 1;
         }
         self.incident_first = first;
+    }
+
+    /// Divides the rows of the tangent among tasks.
+    pub(super) fn find_row_bounds(&mut self) {
+        let n = self.n_nodes();
         let starts = self.pattern.first[..n].iter().step_by(ROWS);
         self.row_bounds = starts.chain(self.pattern.first.last()).copied().collect();
     }

@@ -8,6 +8,7 @@ use crate::cut::{BladeSweep, CutMesh};
 use crate::element::Spring;
 use crate::material::{Law, Material, Rayleigh};
 use crate::mesh::{BoxPattern, box_hexes, box_mesh};
+use crate::team::Team;
 
 fn material(law: Law) -> Material {
     Material { young_pa: 3.0, poisson: 0.3, density_kg_m3: 2.0, rayleigh: Rayleigh::default(), law }
@@ -200,12 +201,56 @@ fn a_team_gives_the_bits_of_one_thread() {
         let energy = model.internal_forces(&x, &mut f);
         model.tangent(&x, Tangent::Projected, &mut K);
         for threads in [1, 2, 3] {
-            let mut team = crate::team::Team::new(threads).unwrap();
+            let mut team = Team::new(threads).unwrap();
             let (mut f_by, mut K_by) = (vec![Vector3::repeat(7.0); x.len()], model.pattern());
             assert_eq!(model.internal_forces_by(&mut team, &x, &mut f_by), energy, "{}", name(&model));
             assert_eq!(model.energy_by(&mut team, &x), model.energy(&x), "{}", name(&model));
             model.tangent_by(&mut team, &x, Tangent::Projected, &mut K_by);
             assert!(f_by == f && K_by == K, "{} on {threads} threads", name(&model));
         }
+    }
+}
+
+/// Incisions that end inside, go on and cut parts off.
+#[test]
+fn a_model_that_follows_cuts_is_the_one_built_anew() {
+    let mesh = box_mesh(Vector3::zeros(), size(), [4; 3], BoxPattern::Tet6);
+    for (volumetric, even) in [(Volumetric::Full, false), (Volumetric::Full, true), (AVERAGED, false)] {
+        let material = material(Law::Corotational);
+        let mut cut = CutMesh::new(mesh.clone()).unwrap();
+        let fresh = |cut: &CutMesh| {
+            let mut model = Model::tet4_cut(cut, &material, volumetric).unwrap();
+            if even {
+                model.share_mass_evenly();
+            }
+            model
+        };
+        let mut followed = fresh(&cut);
+        for (incision, x, reach) in [(1, 0.31, 0.5), (2, 0.62, 1.3), (1, 0.31, 1.3), (3, 0.9, 0.7)] {
+            let segment = |y: f64| [Vector3::new(x, y, -0.3), Vector3::new(x + 0.05, y, 1.4)];
+            let sweep = BladeSweep { segments: vec![segment(-0.3), segment(reach)] };
+            let at_rest = cut.rest_positions();
+            assert!(cut.sweep(&at_rest, &sweep, incision).unwrap().elements_cut > 0);
+            followed.follow_cut(&cut);
+            let anew = fresh(&cut);
+            assert_eq!(followed.lumped_mass(2.0), anew.lumped_mass(2.0));
+            assert_eq!(followed.shape_integrals(), anew.shape_integrals());
+            let at = deformed(&anew);
+            let mut team = Team::new(2).unwrap();
+            let results = [&followed, &anew].map(|model| {
+                let (mut K, mut M) = (model.pattern(), model.pattern());
+                let mut f = vec![Vector3::zeros(); model.n_nodes()];
+                model.tangent_by(&mut team, &at, Tangent::Exact, &mut K);
+                model.consistent_mass(2.0, &mut M);
+                let energy = model.internal_forces_by(&mut team, &at, &mut f);
+                (M, (K, energy, f, model.energy(&at)))
+            });
+            let [(M, of_followed), (expected, of_anew)] = &results;
+            assert!(of_followed == of_anew, "{volumetric:?} {even} incision {incision}");
+            // A piece that is bisected, but not divided, sums its products over other fragments.
+            let equal = |(a, b): (&[f64; 9], &[f64; 9])| (a[0] - b[0]).abs() <= 1e-14 * b[0].abs();
+            assert!(M.blocks.iter().zip(&expected.blocks).all(equal), "{volumetric:?} incision {incision}");
+        }
+        assert!(followed.n_nodes() > mesh.nodes.len() + 50);
     }
 }

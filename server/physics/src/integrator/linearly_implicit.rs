@@ -245,7 +245,7 @@ impl StepSolver for LinearlyImplicit {
     }
 
     fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
-        space.follow_cut(&mut *self.stiffness);
+        space.follow_stiffness(&mut *self.stiffness);
         Ok(())
     }
 

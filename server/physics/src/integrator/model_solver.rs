@@ -23,6 +23,7 @@ use super::step_solver::{ActiveSprings, SolverSettings, StepSolver};
 use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
 use crate::material::Material;
 use crate::operator::FixedCopy;
+use crate::reserve::resize_reserving;
 use crate::solver::Newton;
 use crate::space::Space;
 use crate::team::Team;
@@ -58,32 +59,43 @@ pub struct ModelSolver {
 impl ModelSolver {
     /// Prepares the motion of `model`, which has to be made of `material`.
     pub fn new(model: Model, material: Material, settings: DynamicsSettings) -> Self {
-        let n = model.n_nodes();
-        let zeros = || vec![Vector3::zeros(); n];
-        let explicit = settings.scheme.is_explicit();
-        let mut power = PowerIteration::default();
-        if explicit {
-            power.resize(n);
-        }
-        Self {
+        let mut solver = Self {
             careful: false,
             mass: Mass::new(&model, material.density_kg_m3, settings.mass),
             newton: Newton::new(settings.newton),
             relaxation: Relaxation::default(),
             translations: Translations::default(),
             active: ActiveSprings::default(),
-            f_ext: zeros(),
-            scratch: zeros(),
-            force: zeros(),
-            stages: std::array::from_fn(|_| vec![Vector3::zeros(); if explicit { n } else { 0 }]),
-            damping: (material.rayleigh.stiffness_s > 0.0).then(|| model.pattern()),
-            tangent: explicit.then(|| model.pattern()),
-            power,
+            f_ext: Vec::new(),
+            scratch: Vec::new(),
+            force: Vec::new(),
+            stages: Default::default(),
+            damping: None,
+            tangent: None,
+            power: PowerIteration::default(),
             omega_squared: None,
             model,
             material,
             settings,
+        };
+        solver.resize();
+        solver
+    }
+
+    /// Makes room for the nodes of the model, so that a step allocates nothing.
+    fn resize(&mut self) {
+        let Self { model, settings, material, f_ext, scratch, force, stages, power, .. } = self;
+        let n = model.n_nodes();
+        for v in [f_ext, scratch, force] {
+            resize_reserving(v, n, Vector3::zeros());
         }
+        self.damping = (material.rayleigh.stiffness_s > 0.0).then(|| model.pattern());
+        if settings.scheme.is_explicit() {
+            stages.iter_mut().for_each(|v| resize_reserving(v, n, Vector3::zeros()));
+            power.resize(n);
+            self.tangent = Some(model.pattern());
+        }
+        self.omega_squared = None;
     }
 
     /// The model of `space` as it is cut now.
@@ -205,7 +217,13 @@ impl StepSolver for ModelSolver {
     }
 
     fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
-        self.rebuild(space)
+        space.follow_model(&mut self.model);
+        self.mass = Mass::new(&self.model, self.material.density_kg_m3, self.settings.mass);
+        self.newton.forget_pattern();
+        self.newton.set_stiff_modes(space.stiff_modes().map(Arc::new));
+        self.relaxation.forget();
+        self.resize();
+        Ok(())
     }
 
     fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {

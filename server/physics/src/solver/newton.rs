@@ -169,6 +169,11 @@ impl Newton {
         }
     }
 
+    /// Forgets the pattern of the Hessian, because it has changed.
+    pub fn forget_pattern(&mut self) {
+        self.hessian = BlockCsr::default();
+    }
+
     /// Moves `x` to a minimum of the potential; prescribed directions stay where they are.
     ///
     /// `x` only ever moves to states of lower potential, so it stays finite if it was.

@@ -155,11 +155,14 @@ pub trait Space: Points + Send {
 
     /// Brings the stiffness that this space made up to date after the last cut. Earlier pieces keep their
     /// rotations.
-    fn follow_cut(&self, stiffness: &mut dyn Stiffness);
+    fn follow_stiffness(&self, stiffness: &mut dyn Stiffness);
 
     /// Stiff motions of degenerate elements, as these are cut now; `None` if there are none.
     fn stiff_modes(&self) -> Option<StiffModes>;
 
     /// The discrete model in double precision, for any law.
     fn model(&self, material: &Material, volumetric: Volumetric) -> Result<Model, ModelError>;
+
+    /// Brings the model of this space up to date after the last cut.
+    fn follow_model(&self, model: &mut Model);
 }

@@ -243,7 +243,7 @@ impl Space for Tets {
         (self.kind() == ElementKind::Tet4).then(|| Box::new(elastic()) as Box<dyn Stiffness>)
     }
 
-    fn follow_cut(&self, stiffness: &mut dyn Stiffness) {
+    fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {
         if let Some(elastic) = (stiffness as &mut dyn Any).downcast_mut::<Elastic>() {
             let Self { cut, .. } = self;
             elastic.follow(cut.mesh(), cut.pieces(), cut.changed_pieces(), cut.n_copies());
@@ -257,6 +257,10 @@ impl Space for Tets {
 
     fn model(&self, material: &Material, volumetric: Volumetric) -> Result<Model, ModelError> {
         self.element.model(&self.cut, material, volumetric)
+    }
+
+    fn follow_model(&self, model: &mut Model) {
+        model.follow_cut(&self.cut);
     }
 }
 
