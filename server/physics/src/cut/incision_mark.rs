@@ -7,13 +7,14 @@ use nalgebra::Vector3;
 
 use super::cut_mesh::CutMesh;
 use super::drawn::traces::TraceLine;
-use super::shell::surface::{SurfaceVertex, bind};
+use super::shell::surface::bind;
+use crate::element::MaterialPoint;
 
 /// A point on the surface: Σ weights · vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkPoint {
     /// Surface vertices around the point, or three times the point itself.
-    pub vertices: [SurfaceVertex; 3],
+    pub vertices: [MaterialPoint; 3],
     /// Weight of each, Σ = 1.
     pub weights: [f64; 3],
 }
@@ -29,7 +30,7 @@ pub struct IncisionMark {
 
 impl MarkPoint {
     /// A mark point at a surface vertex.
-    pub fn at(vertex: SurfaceVertex) -> Self {
+    pub fn at(vertex: MaterialPoint) -> Self {
         Self { vertices: [vertex; 3], weights: [1.0, 0.0, 0.0] }
     }
 

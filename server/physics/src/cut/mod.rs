@@ -37,7 +37,7 @@ pub use cut_mesh::{CutMesh, SweepUnderWay};
 pub use drawn::pending::PendingFace;
 pub use flaws::Flaws;
 pub use incision_mark::{IncisionMark, MarkPoint};
-pub use shell::surface::{Surface, SurfaceVertex};
+pub use shell::surface::Surface;
 pub use solid::Solid;
 pub use sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, MAX_SEGMENTS, Work};
 pub(crate) use sweep::front::{Front, Surroundings, sweep_triangles};

@@ -7,13 +7,14 @@
 use std::collections::BTreeMap;
 
 use super::cut_mesh::CutMesh;
-use super::shell::surface::{SurfaceVertex, bind};
+use super::shell::surface::bind;
+use crate::element::MaterialPoint;
 
 /// Tetrahedra without overlap; their volumes add up to that of the body, in every configuration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Solid {
     /// Points of the material. The two sides of a cut have separate points.
-    pub vertices: Vec<SurfaceVertex>,
+    pub vertices: Vec<MaterialPoint>,
     /// Vertex ids, positively oriented at rest.
     pub tets: Vec<[u32; 4]>,
     /// Piece each tetrahedron belongs to.
@@ -25,7 +26,7 @@ impl CutMesh {
     pub fn solid(&self) -> Solid {
         let mut solid = Solid::default();
         // Two pieces share a point exactly where they share the copies that move it.
-        let mut ids: BTreeMap<(u32, [u32; 4]), u32> = BTreeMap::new();
+        let mut ids: BTreeMap<(u32, Vec<u32>), u32> = BTreeMap::new();
         let fragments = &self.fragments;
         for (t, tet) in fragments.tets.iter().enumerate() {
             if fragments.fraction[t] == 0.0 {
@@ -35,7 +36,7 @@ impl CutMesh {
             solid.piece.push(piece);
             solid.tets.push(tet.map(|v| {
                 let vertex = bind(self.mesh(), &self.pieces, piece, &fragments.vertices[v as usize]);
-                *ids.entry((v, vertex.copies)).or_insert_with(|| {
+                *ids.entry((v, vertex.copies().to_vec())).or_insert_with(|| {
                     solid.vertices.push(vertex);
                     solid.vertices.len() as u32 - 1
                 })

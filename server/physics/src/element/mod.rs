@@ -12,8 +12,10 @@ pub mod tet10;
 pub mod hex8;
 mod spring;
 mod points;
+mod material_point;
 
 pub use lanes::{Ids, LANES, Lanes, Simd, Vector8};
+pub use material_point::{MOST_CARRIERS, MaterialPoint};
 pub use points::{Point, Points};
 pub use polar::polar_rotation;
 pub use polar_lanes::{Mat3, polar_newton};

@@ -421,7 +421,7 @@ impl LinearStep {
         }
         self.sprung.clear();
         match &mut self.stiff {
-            None => self.sprung.extend(self.terms.iter().flat_map(|term| term.copies)),
+            None => self.sprung.extend(self.terms.iter().flat_map(|term| term.point.copies())),
             // A spring also acts on the copies relative to which its own are moved.
             Some(stiff) => {
                 for term in &self.terms {

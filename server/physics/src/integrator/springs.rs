@@ -2,15 +2,14 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::element::MaterialPoint;
 use crate::operator::Spring;
 
-/// A spring on the material point x_p = Σ weights · x\[copies\].
+/// A spring on a material point x_p.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointSpring {
-    /// Copies that carry the point; all of one piece.
-    pub copies: [u32; 4],
-    /// Their weights, Σ = 1.
-    pub weights: [f64; 4],
+    /// The point; its carriers are all of one piece.
+    pub point: MaterialPoint,
     /// Direction and rest position.
     pub kind: SpringKind,
     /// Stiffness k [N/m], ≥ 0.
@@ -87,17 +86,16 @@ impl ActiveSpring {
             SpringKind::Hold { target_m } => target_m.iter().all(|t| t.is_finite()),
         };
         let usable = direction_ok
-            && spring.copies.iter().all(|&c| (c as usize) < n_copies)
-            && spring.weights.iter().all(|w| w.is_finite())
+            && spring.point.copies().iter().all(|&c| (c as usize) < n_copies)
+            && spring.point.weights().iter().all(|w| w.is_finite())
             && (0.0..=1e15).contains(&spring.stiffness_n_m)
             && spring.max_force_n >= 0.0;
         usable.then_some(Self { spring, mode: Mode::Linear })
     }
 
-    /// x_p = Σ w x of the four copies.
+    /// x_p [m].
     pub fn point(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        let PointSpring { copies, weights, .. } = &self.spring;
-        copies.iter().zip(weights).map(|(&c, &w)| w * x[c as usize]).sum()
+        self.spring.point.position(x)
     }
 
     /// Extension vector [m] at `point`, which k multiplies; `None` if a one-sided spring has no contact.
@@ -186,8 +184,7 @@ impl ActiveSpring {
             SpringKind::Hold { .. } => None,
         };
         (self.mode == Mode::Linear).then(|| Spring {
-            copies: self.spring.copies,
-            weights: self.spring.weights.map(|w| w as f32),
+            point: self.spring.point.map(|w| w as f32),
             direction,
             stiffness: (h_squared * self.spring.stiffness_n_m) as f32,
         })
@@ -195,14 +192,11 @@ impl ActiveSpring {
 
     /// The copy with the largest weight, which tells the part of the point.
     pub fn main_copy(&self) -> usize {
-        let heaviest = (0..4).fold(0, |best, a| {
-            if self.spring.weights[a].abs() > self.spring.weights[best].abs() { a } else { best }
-        });
-        self.spring.copies[heaviest] as usize
+        self.spring.point.main_copy() as usize
     }
 
     /// Copies and weights.
     pub fn carriers(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.spring.copies.iter().map(|&c| c as usize).zip(self.spring.weights)
+        self.spring.point.carriers()
     }
 }

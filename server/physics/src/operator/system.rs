@@ -3,6 +3,7 @@
 
 use super::stiffness::{Direction, Stiffness};
 use super::{Advance, BLOCK, Block6, LinearOperator, Padded, Substitution, block_of};
+use crate::element::MaterialPoint;
 use crate::team::{Team, blocks};
 
 /// A copy whose displacement is prescribed in some directions.
@@ -19,10 +20,8 @@ pub struct FixedCopy {
 /// Stiffness along `direction` between a material point and the world, or in all directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spring {
-    /// Copies that carry the point.
-    pub copies: [u32; 4],
-    /// Their weights, Σ = 1.
-    pub weights: [f32; 4],
+    /// The point.
+    pub point: MaterialPoint<f32>,
     /// Unit vector of the stiff direction, or `None` if all three are stiff.
     pub direction: Option<[f32; 3]>,
     /// Factor of J Jᵀ in the operator: h² k.
@@ -78,19 +77,19 @@ impl SystemOperator<'_> {
     /// Adds the springs to the diagonal blocks of (1 + hα) M + (h² + hβ) K̂, which gives those of A.
     pub fn add_springs(&self, diagonal: &mut [Block6]) {
         for spring in self.springs {
-            for (&copy, &w) in spring.copies.iter().zip(&spring.weights) {
-                spring.add_to_block(w, &mut diagonal[copy as usize]);
+            for (copy, w) in spring.point.carriers() {
+                spring.add_to_block(w, &mut diagonal[copy]);
             }
         }
     }
 }
 
 impl Spring {
-    /// Σ w x of the four copies.
-    pub fn point(&self, x: &[Padded]) -> [f32; 3] {
+    /// Σ w x of the carriers.
+    pub fn moved(&self, x: &[Padded]) -> [f32; 3] {
         let mut p = [0.0; 3];
-        for (&copy, &w) in self.copies.iter().zip(&self.weights) {
-            for (p, x) in p.iter_mut().zip(&x[copy as usize]) {
+        for (copy, w) in self.point.carriers() {
+            for (p, x) in p.iter_mut().zip(&x[copy]) {
                 *p += w * x;
             }
         }
@@ -111,10 +110,10 @@ impl Spring {
     /// The copies and their weights in the variables of a substitution, each once.
     pub fn expand(&self, T: &Substitution, row: &mut Vec<(u32, f64)>) {
         row.clear();
-        for (&copy, &w) in self.copies.iter().zip(&self.weights) {
-            match row.iter_mut().find(|r| r.0 == copy) {
+        for (copy, w) in self.point.carriers() {
+            match row.iter_mut().find(|r| r.0 as usize == copy) {
                 Some(found) => found.1 += f64::from(w),
-                None => row.push((copy, f64::from(w))),
+                None => row.push((copy as u32, f64::from(w))),
             }
         }
         T.gather(row);
@@ -122,7 +121,7 @@ impl Spring {
 
     /// k (n·p)² or k |p|² of the point's displacement p.
     fn curvature(&self, x: &[Padded]) -> f64 {
-        let p = self.point(x).map(f64::from);
+        let p = self.moved(x).map(f64::from);
         let squared = match self.direction {
             Some(n) => (0..3).map(|i| f64::from(n[i]) * p[i]).sum::<f64>().powi(2),
             None => p.iter().map(|p| p * p).sum(),
@@ -131,7 +130,7 @@ impl Spring {
     }
 
     fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
-        let p = self.point(x);
+        let p = self.moved(x);
         let f = match self.direction {
             Some(n) => {
                 let along = self.stiffness * (n[0] * p[0] + n[1] * p[1] + n[2] * p[2]);
@@ -139,8 +138,8 @@ impl Spring {
             }
             None => p.map(|p| self.stiffness * p),
         };
-        for (&copy, &w) in self.copies.iter().zip(&self.weights) {
-            for (y, f) in y[copy as usize].iter_mut().zip(&f) {
+        for (copy, w) in self.point.carriers() {
+            for (y, f) in y[copy].iter_mut().zip(&f) {
                 *y += w * f;
             }
         }

@@ -15,7 +15,8 @@ use super::misfit::Misfit;
 use super::sheet::Sheet;
 use crate::cut::shell::joined::{Joined, Place};
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
-use crate::cut::{CutMesh, Surface, SurfaceVertex};
+use crate::cut::{CutMesh, Surface};
+use crate::element::MaterialPoint;
 
 /// The state from which the surface is built.
 pub struct SkinSource<'a> {
@@ -407,8 +408,8 @@ impl Placed<'_> {
 
 impl Place for Placed<'_> {
     /// On the skin if one of the corners is, and in the element that has to extrapolate least.
-    fn vertex(&mut self, cycle: &[u32]) -> SurfaceVertex {
-        let mut best: Option<(f64, SurfaceVertex)> = None;
+    fn vertex(&mut self, cycle: &[u32]) -> MaterialPoint {
+        let mut best: Option<(f64, MaterialPoint)> = None;
         let mut seen = NONE;
         for &c in cycle {
             let (Owner::Skin(_), Corner::Skin(p)) = (self.parts.owner[c as usize / 3], self.corner(c)) else {
@@ -418,7 +419,7 @@ impl Place for Placed<'_> {
             if piece != seen {
                 seen = piece;
                 let vertex = in_element(self.cut, piece, &self.sheet.points[p as usize].place);
-                let reach = vertex.weights.iter().fold(0.0f64, |m, w| m.max(w.abs()));
+                let reach = vertex.weights().iter().fold(0.0f64, |m, w| m.max(w.abs()));
                 if best.is_none_or(|b| reach < b.0) {
                     best = Some((reach, vertex));
                 }
@@ -431,11 +432,11 @@ impl Place for Placed<'_> {
                 on_fragment(self.cut, piece, &self.cut.fragments.vertices[v as usize])
             }
             // The middle of a lip is placed after its neighbours.
-            _ => SurfaceVertex { copies: [0; 4], weights: [0.0; 4] },
+            _ => MaterialPoint::default(),
         }
     }
 
-    fn middle(&self, corners: &[u32], of: &[SurfaceVertex]) -> SurfaceVertex {
+    fn middle(&self, corners: &[u32], of: &[MaterialPoint]) -> MaterialPoint {
         let sum: Vector3<f64> = of.iter().map(|vertex| rest_place(self.cut, vertex)).sum();
         in_element(self.cut, self.parts.piece[corners[0] as usize / 3], &(sum / of.len() as f64))
     }
@@ -457,13 +458,13 @@ fn piece_under(cut: &CutMesh, base: &Base, f: u32) -> Option<u32> {
 }
 
 /// Rest position of a surface vertex [m].
-fn rest_place(cut: &CutMesh, vertex: &SurfaceVertex) -> Vector3<f64> {
-    let node = |c: u32| cut.mesh().nodes[cut.copy_node()[c as usize] as usize];
-    vertex.copies.iter().zip(&vertex.weights).map(|(&c, &w)| node(c) * w).sum()
+fn rest_place(cut: &CutMesh, vertex: &MaterialPoint) -> Vector3<f64> {
+    let node = |c: usize| cut.mesh().nodes[cut.copy_node()[c] as usize];
+    vertex.carriers().map(|(c, w)| node(c) * w).sum()
 }
 
 /// A rest position in the barycentric coordinates of a piece's element.
-fn in_element(cut: &CutMesh, piece: u32, place: &Vector3<f64>) -> SurfaceVertex {
+fn in_element(cut: &CutMesh, piece: u32, place: &Vector3<f64>) -> MaterialPoint {
     let piece = &cut.pieces()[piece as usize];
     let e = piece.element as usize;
     let [origin, ..] = cut.mesh().corners(e);
@@ -472,12 +473,12 @@ fn in_element(cut: &CutMesh, piece: u32, place: &Vector3<f64>) -> SurfaceVertex 
     for (w, g) in weights.iter_mut().zip(&g) {
         *w += g.dot(&(place - origin));
     }
-    SurfaceVertex { copies: piece.copies, weights }
+    MaterialPoint::in_tet(piece.copies, weights)
 }
 
 /// A fragment vertex, expressed by the copies of a piece.
-fn on_fragment(cut: &CutMesh, piece: u32, v: &FragmentVertex) -> SurfaceVertex {
+fn on_fragment(cut: &CutMesh, piece: u32, v: &FragmentVertex) -> MaterialPoint {
     let piece = &cut.pieces()[piece as usize];
     let nodes = cut.mesh().tets[piece.element as usize];
-    SurfaceVertex { copies: piece.copies, weights: nodes.map(|n| v.weight_of(n)) }
+    MaterialPoint::in_tet(piece.copies, nodes.map(|n| v.weight_of(n)))
 }

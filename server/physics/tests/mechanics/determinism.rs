@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use scindo_allocations::{Counting, allocations};
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::body::{Body, BodySettings, PointSpring, SpringKind};
+use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material, Rayleigh, Tangent};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
 use scindo_physics::team::Team;
@@ -25,8 +26,7 @@ fn bar(threads: usize, portable: bool) -> Body {
 fn push(body: &Body, height: f64) -> PointSpring {
     let copies = body.pieces()[6_000].copies;
     PointSpring {
-        copies,
-        weights: [0.25; 4],
+        point: MaterialPoint::in_tet(copies, [0.25; 4]),
         kind: SpringKind::OneSided { normal: Vector3::y(), offset_m: height },
         stiffness_n_m: 500.0,
         max_force_n: 10.0,
@@ -98,8 +98,7 @@ fn degenerate_elements_change_none_of_that() {
         let mut body = ruined_cube(threads);
         let last = *body.pieces().last().unwrap();
         let grab = PointSpring {
-            copies: last.copies,
-            weights: [0.1, 0.2, 0.3, 0.4],
+            point: MaterialPoint::in_tet(last.copies, [0.1, 0.2, 0.3, 0.4]),
             kind: SpringKind::Hold { target_m: Vector3::new(0.1, 0.12, 0.1) },
             stiffness_n_m: 2_000.0,
             max_force_n: 50.0,

@@ -5,6 +5,7 @@ use scindo_allocations::allocations;
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::{BladeSweep, CutMesh};
+use scindo_physics::element::MaterialPoint;
 use scindo_physics::integrator::{
     Dynamics, DynamicsSettings, LooseParts, MassKind, Notice, Outcome, Scheme, SolveReport, State, StepInputs,
 };
@@ -102,8 +103,7 @@ impl Rig {
         self.springs = (0..rest.len())
             .filter(|&n| rest[n].y == 0.0)
             .map(|n| PointSpring {
-                copies: [n as u32; 4],
-                weights: [1.0, 0.0, 0.0, 0.0],
+                point: MaterialPoint::new([(n as u32, 1.0)]),
                 kind: SpringKind::OneSided { normal: V::y(), offset_m: height },
                 stiffness_n_m,
                 max_force_n: 100.0,

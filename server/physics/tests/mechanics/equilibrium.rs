@@ -8,6 +8,7 @@ use scindo_physics::body::{
     StopReason,
 };
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
@@ -36,8 +37,7 @@ fn prop(body: &Body) -> PointSpring {
     let last = *body.pieces().last().unwrap();
     let kind = SpringKind::OneSided { normal: Vector3::y(), offset_m: 0.06 };
     PointSpring {
-        copies: last.copies,
-        weights: [0.25; 4],
+        point: MaterialPoint::in_tet(last.copies, [0.25; 4]),
         kind,
         stiffness_n_m: 20.0,
         max_force_n: f64::INFINITY,

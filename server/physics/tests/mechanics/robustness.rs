@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, Outcome, PointSpring, SpringKind};
+use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Material, Rayleigh};
 
 use crate::{DOWN, SOFT, cube, settings};
@@ -76,13 +77,12 @@ fn input_without_meaning_changes_nothing() {
     assert_eq!(body.step(0.01, Vector3::repeat(f64::NAN), &[]).outcome, Outcome::Refused);
     assert_eq!(body.positions(), x);
     let broken = PointSpring {
-        copies: [0, 1, 2, 3],
-        weights: [f64::NAN, 0.0, 0.0, 1.0],
+        point: MaterialPoint::in_tet([0, 1, 2, 3], [f64::NAN, 0.0, 0.0, 1.0]),
         kind: SpringKind::Hold { target_m: Vector3::zeros() },
         stiffness_n_m: 10.0,
         max_force_n: 1.0,
     };
-    let missing = PointSpring { copies: [0, 1, 2, 9999], weights: [0.25; 4], ..broken };
+    let missing = PointSpring { point: MaterialPoint::in_tet([0, 1, 2, 9999], [0.25; 4]), ..broken };
     let report = body.step(0.01, Vector3::zeros(), &[broken, missing]);
     assert_eq!((report.outcome, report.refused_springs), (Outcome::Advanced, 2));
     assert_eq!(body.spring_forces(), [Vector3::zeros(); 2]);

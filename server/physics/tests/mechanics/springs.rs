@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, PointSpring, SpringKind};
+use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::{Material, Rayleigh};
 
 use crate::{DOWN, SOFT, cube, settings};
@@ -12,8 +13,7 @@ fn floor(body: &Body, height: f64, stiffness_n_m: f64, max_force_n: f64) -> Vec<
     (0..nodes.len())
         .filter(|&n| nodes[n].y == 0.0)
         .map(|n| PointSpring {
-            copies: [n as u32; 4],
-            weights: [1.0, 0.0, 0.0, 0.0],
+            point: MaterialPoint::new([(n as u32, 1.0)]),
             kind: SpringKind::OneSided { normal: Vector3::y(), offset_m: height },
             stiffness_n_m,
             max_force_n,
@@ -46,8 +46,7 @@ fn a_body_comes_to_rest_on_a_floor_that_carries_its_weight() {
 fn a_grab_pulls_no_harder_than_it_may() {
     let mut body = cube(3, SOFT, settings(100, 1e-6));
     let grab = PointSpring {
-        copies: body.pieces()[40].copies,
-        weights: [0.25; 4],
+        point: MaterialPoint::in_tet(body.pieces()[40].copies, [0.25; 4]),
         kind: SpringKind::Hold { target_m: Vector3::new(0.05, 0.5, 0.05) },
         stiffness_n_m: 1000.0,
         max_force_n: 0.05,
@@ -70,7 +69,12 @@ fn a_soft_grab_moves_the_body_to_its_target() {
     let target = Vector3::new(0.2, 0.1, 0.0);
     let copies = body.pieces()[40].copies;
     let kind = SpringKind::Hold { target_m: target };
-    let grab = PointSpring { copies, weights: [0.25; 4], kind, stiffness_n_m: 50.0, max_force_n: 100.0 };
+    let grab = PointSpring {
+        point: MaterialPoint::in_tet(copies, [0.25; 4]),
+        kind,
+        stiffness_n_m: 50.0,
+        max_force_n: 100.0,
+    };
     for _ in 0..600 {
         body.step(0.01, Vector3::zeros(), &[grab]);
     }

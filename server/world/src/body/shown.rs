@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_physics::body::Body;
-use scindo_physics::cut::SurfaceVertex;
+use scindo_physics::element::MaterialPoint;
 
 /// Share of a vertex's weight on held nodes above which the vertex counts as held.
 const MOSTLY: f64 = 0.5;
@@ -31,17 +31,17 @@ pub fn topology(body: &Body) -> SurfaceTopology {
     let surface = body.surface();
     let rest = body.rest_positions();
     let held = held_copies(body);
-    let awake = |triangle: &[u32; 3]| !body.is_asleep(surface.vertices[triangle[0] as usize].copies[0]);
+    let awake = |triangle: &[u32; 3]| !body.is_asleep(surface.vertices[triangle[0] as usize].copies()[0]);
     let shown = surface.triangles.iter().zip(&surface.tags).filter(|(triangle, _)| awake(triangle));
     let (triangles, tags) = shown.unzip();
     let parts = body.parts();
-    let hangs = |vertex: &SurfaceVertex| {
-        let copy = vertex.copies[heaviest(vertex)] as usize;
+    let hangs = |vertex: &MaterialPoint| {
+        let copy = vertex.main_copy() as usize;
         parts.of_copy.get(copy).is_some_and(|&part| !parts.free[part as usize])
     };
-    let moves_with_held = |vertex: &SurfaceVertex| {
-        let slots = vertex.copies.iter().zip(&vertex.weights);
-        slots.filter(|&(&copy, _)| held[copy as usize]).map(|(_, weight)| weight).sum::<f64>() > MOSTLY
+    let moves_with_held = |vertex: &MaterialPoint| {
+        let held = vertex.carriers().filter(|(copy, _)| held[*copy]);
+        held.map(|(_, weight)| weight).sum::<f64>() > MOSTLY
     };
     SurfaceTopology {
         epoch: body.epoch(),
@@ -67,9 +67,9 @@ pub fn surface_stress(body: &Body, out: &mut Vec<f32>) {
     }
     out.clear();
     out.extend(body.surface().vertices.iter().map(|vertex| {
-        let slots = vertex.copies.iter().zip(&vertex.weights).filter(|(_, weight)| **weight > 0.0);
-        let (sum, weights) = slots.fold((0.0, 0.0), |(sum, weights), (&copy, &weight)| {
-            let (stress, volume) = mean[copy as usize];
+        let carriers = vertex.carriers().filter(|(_, weight)| *weight > 0.0);
+        let (sum, weights) = carriers.fold((0.0, 0.0), |(sum, weights), (copy, weight)| {
+            let (stress, volume) = mean[copy];
             if volume > 0.0 { (sum + weight * stress / volume, weights + weight) } else { (sum, weights) }
         });
         let stress = if weights > 0.0 { (sum / weights) as f32 } else { 0.0 };
@@ -88,11 +88,6 @@ fn held_copies(body: &Body) -> Vec<bool> {
     let fixed = body.fixed_nodes();
     let is_held = |node: &u32| fixed.binary_search_by_key(node, |f| f.node).is_ok();
     body.node_of_copy().iter().map(is_held).collect()
-}
-
-/// The slot with the largest weight.
-fn heaviest(vertex: &SurfaceVertex) -> usize {
-    (0..4).max_by(|&a, &b| vertex.weights[a].total_cmp(&vertex.weights[b])).unwrap_or(0)
 }
 
 fn single(x: Vector3<f64>) -> [f32; 3] {

@@ -22,7 +22,8 @@ pub mod hand;
 use nalgebra::Vector3;
 use scindo_collision::SurfaceError;
 use scindo_physics::body::{PointSpring, SpringKind};
-use scindo_physics::cut::{Surface, SurfaceVertex};
+use scindo_physics::cut::Surface;
+use scindo_physics::element::MaterialPoint;
 
 use crate::inputs::MAX_TOOLS;
 use crate::tool::geometry::core_radius;
@@ -39,7 +40,7 @@ const SPRING_CAPACITY: usize = MAX_TOOLS * MAX_POINTS * 3;
 #[derive(Debug, Clone)]
 struct BodyContacts {
     young_pa: f64,
-    vertices: Vec<SurfaceVertex>,
+    vertices: Vec<MaterialPoint>,
     springs: Vec<PointSpring>,
     /// Per spring its tool, and its depth before the solve [m].
     behind: Vec<(u32, f64)>,
@@ -233,8 +234,7 @@ fn pull(index: u32, tool: &Tool, hand: &Hand, surfaces: &[ContactSurface], bodie
                 places[corner_of(&vertex, corners.map(|v| &body.vertices[v]))]
             };
             springs.push(PointSpring {
-                copies: vertex.copies,
-                weights: vertex.weights,
+                point: vertex,
                 kind: SpringKind::Hold { target_m: at + pulled },
                 stiffness_n_m: tool.stiffness_n_m * each * share,
                 max_force_n: tool.max_force_n * each * share,
@@ -259,8 +259,7 @@ impl BodyContacts {
             let at = if share == 1.0 { bearing.point } else { triangle[corner_of(&vertex, corners)] };
             let share = share * bearing.share;
             springs.push(PointSpring {
-                copies: vertex.copies,
-                weights: vertex.weights,
+                point: vertex,
                 kind: SpringKind::OneSided { normal, offset_m: bearing.depth + normal.dot(&at) },
                 stiffness_n_m: stiffness * share,
                 max_force_n: max_force * share,
@@ -271,7 +270,7 @@ impl BodyContacts {
 }
 
 /// Index of the corner that a material point is.
-fn corner_of(vertex: &SurfaceVertex, corners: [&SurfaceVertex; 3]) -> usize {
+fn corner_of(vertex: &MaterialPoint, corners: [&MaterialPoint; 3]) -> usize {
     corners.iter().position(|corner| *corner == vertex).unwrap_or(0)
 }
 

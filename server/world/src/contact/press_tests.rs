@@ -176,7 +176,7 @@ fn opened_by(body: &Body, gap: f64) -> Vec<V> {
         let normal = (q - p).cross(&(r - p));
         for v in triangle {
             let vertex = surface.vertices[*v as usize];
-            for (&copy, &w) in vertex.copies.iter().zip(&vertex.weights) {
+            for (copy, w) in vertex.carriers() {
                 if w > 0.0 {
                     side[copy as usize] = -normal.x.signum();
                 }

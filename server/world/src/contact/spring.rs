@@ -1,24 +1,29 @@
 //! Converts a point of a surface triangle to springs on the node copies that carry it.
 
-use scindo_physics::cut::SurfaceVertex;
+use scindo_physics::element::{MOST_CARRIERS, MaterialPoint};
 
 /// Share of a point's stiffness below which a copy is omitted.
 const LEAST_WEIGHT: f64 = 1e-9;
+/// Carriers of a point that is not divided among the corners of its triangle: those of one tetrahedron.
+const MOST_OF_ONE: usize = 4;
+/// Carriers of the three corners together.
+const MOST: usize = 3 * MOST_CARRIERS;
 
-/// Calls `emit` with material points that together represent one point of a triangle. If at most four copies
+/// Calls `emit` with material points that together represent one point of a triangle. If few copies
 /// carry the point, it is a single one with share 1. Otherwise there is one per corner with the barycentric
 /// coordinate of the corner as its share. Force and moment on the tissue are the same.
 pub fn material_points(
-    corners: [&SurfaceVertex; 3],
+    corners: [&MaterialPoint; 3],
     barycentric: [f64; 3],
-    mut emit: impl FnMut(SurfaceVertex, f64),
+    mut emit: impl FnMut(MaterialPoint, f64),
 ) {
-    let mut copies = [corners[0].copies[0]; 12];
-    let mut weights = [0.0; 12];
+    let mut copies = [0; MOST];
+    let mut weights = [0.0; MOST];
     let mut count = 0;
     // Corners often share copies, so their weights are merged.
     for (vertex, w) in corners.iter().zip(barycentric) {
-        for (&copy, &weight) in vertex.copies.iter().zip(&vertex.weights) {
+        for (copy, weight) in vertex.carriers() {
+            let copy = copy as u32;
             if (w * weight).abs() < LEAST_WEIGHT {
                 continue;
             }
@@ -28,10 +33,8 @@ pub fn material_points(
             count = count.max(slot + 1);
         }
     }
-    if count <= 4 {
-        let first = |a: [u32; 12]| [a[0], a[1], a[2], a[3]];
-        let weights = [weights[0], weights[1], weights[2], weights[3]];
-        emit(SurfaceVertex { copies: first(copies), weights }, 1.0);
+    if count <= MOST_OF_ONE {
+        emit(MaterialPoint::new(copies.into_iter().zip(weights).take(count)), 1.0);
         return;
     }
     for (vertex, w) in corners.into_iter().zip(barycentric) {
@@ -46,11 +49,11 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    fn vertex(copies: [u32; 4], weights: [f64; 4]) -> SurfaceVertex {
-        SurfaceVertex { copies, weights }
+    fn vertex(copies: [u32; 4], weights: [f64; 4]) -> MaterialPoint {
+        MaterialPoint::in_tet(copies, weights)
     }
 
-    fn position(points: &[(SurfaceVertex, f64)], x: &[Vector3<f64>]) -> Vector3<f64> {
+    fn position(points: &[(MaterialPoint, f64)], x: &[Vector3<f64>]) -> Vector3<f64> {
         points.iter().map(|(vertex, share)| vertex.position(x) * *share).sum()
     }
 
@@ -76,7 +79,7 @@ mod tests {
             let whole: Vector3<f64> = corners.iter().zip(w).map(|(corner, w)| corner.position(&x) * w).sum();
             assert!((position(&points, &x) - whole).norm() < 1e-15);
             for (point, _) in &points {
-                assert!((point.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                assert!((point.weights().iter().sum::<f64>() - 1.0).abs() < 1e-12);
             }
         }
     }

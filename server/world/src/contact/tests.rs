@@ -83,7 +83,7 @@ impl Bench {
     /// Forces of all springs at the present node positions.
     fn forces(&self) -> Vec<V> {
         let force = |spring: &PointSpring| {
-            let x: V = spring.copies.iter().zip(spring.weights).map(|(&c, w)| self.x[c as usize] * w).sum();
+            let x: V = spring.point.position(&self.x);
             let force = match spring.kind {
                 SpringKind::OneSided { normal, offset_m } => {
                     normal * spring.stiffness_n_m * (offset_m - normal.dot(&x)).max(0.0)

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3, Vector3};
 
 use scindo_physics::body::Body;
-use scindo_physics::cut::SurfaceVertex;
+use scindo_physics::element::MaterialPoint;
 
 use crate::body::{SimBody, von_mises};
 use crate::format::vtu::{Cells, Field, FieldValues, Grid, VtuError, save_grid, save_vtm};
@@ -92,7 +92,7 @@ pub fn write_blocks(
 
 impl Points {
     /// Points bound to copies; the number of the first.
-    fn add(&mut self, body: &Body, vertices: &[SurfaceVertex]) -> u32 {
+    fn add(&mut self, body: &Body, vertices: &[MaterialPoint]) -> u32 {
         let first = self.current.len() as u32;
         for vertex in vertices {
             let (x, rest) = (vertex.position(body.positions()), vertex.position(body.rest_positions()));
@@ -100,8 +100,8 @@ impl Points {
             self.rest.push(rest);
             self.displacement.push(x - rest);
             self.velocity.push(vertex.position(body.velocities()));
-            let whole = vertex.weights.iter().position(|&weight| weight == 1.0);
-            self.copy.push(whole.map_or(NONE, |slot| vertex.copies[slot] as i32));
+            let whole = vertex.carriers().find(|(_, weight)| *weight == 1.0);
+            self.copy.push(whole.map_or(NONE, |(copy, _)| copy as i32));
         }
         first
     }

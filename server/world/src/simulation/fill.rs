@@ -90,7 +90,7 @@ fn hide_sleepers(body: &Body, positions: &mut [[f32; 3]]) {
     }
     let place = body.rest_positions().first().map_or([0.0; 3], |x| [x.x as f32, x.y as f32, x.z as f32]);
     for (position, vertex) in positions.iter_mut().zip(&body.surface().vertices) {
-        if body.is_asleep(vertex.copies[0]) {
+        if body.is_asleep(vertex.copies()[0]) {
             *position = place;
         }
     }

@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
+use crate::element::MaterialPoint;
 use crate::mesh::{TET_EDGES, TetMesh};
 
-use crate::cut::shell::surface::{SurfaceVertex, bind};
+use crate::cut::shell::surface::bind;
 use crate::cut::topology::crossings::Crossings;
 use crate::cut::topology::fragments::{FragmentVertex, Fragments};
 use crate::cut::topology::incision_sets::IncisionSets;
@@ -20,7 +21,7 @@ pub struct PendingFace {
     pub incision: u32,
     /// Points where it crosses the fragment's edges and corners, in order around the section: two (a line),
     /// three or four points of the material.
-    pub corners: Vec<SurfaceVertex>,
+    pub corners: Vec<MaterialPoint>,
 }
 
 /// Pairs of incision and fragment where the incision may be pending.

@@ -4,7 +4,8 @@
 
 use std::collections::BTreeSet;
 
-use super::surface::{Surface, SurfaceVertex};
+use super::surface::Surface;
+use crate::element::MaterialPoint;
 
 /// The edges to divide, each identified by the smaller of its two half-edges.
 #[derive(Clone, Debug, Default)]
@@ -51,7 +52,7 @@ impl DoubledEdges {
         &self,
         surface: &mut Surface,
         twin: impl Fn(u32) -> u32,
-        middle: impl Fn(&[u32], &[SurfaceVertex]) -> SurfaceVertex,
+        middle: impl Fn(&[u32], &[MaterialPoint]) -> MaterialPoint,
     ) {
         let mut halved: Vec<(u32, u32)> = Vec::with_capacity(2 * self.edges.len());
         let mut on_edges = Vec::with_capacity(self.edges.len());

@@ -7,8 +7,9 @@
 //! last triangle that of a removed triangle.
 
 use super::doubled_edges::{DoubledEdges, next};
-use super::surface::{Surface, SurfaceVertex};
+use super::surface::Surface;
 use crate::cut::topology::fragments::NONE;
+use crate::element::MaterialPoint;
 
 /// Where the vertices of the surface lie. Corners are numbered 3·triangle + k.
 pub trait Place {
@@ -17,9 +18,9 @@ pub trait Place {
         true
     }
     /// The vertex in which the corners of a cycle meet.
-    fn vertex(&mut self, cycle: &[u32]) -> SurfaceVertex;
+    fn vertex(&mut self, cycle: &[u32]) -> MaterialPoint;
     /// The vertex at the centroid of two or three corners of one triangle, whose vertices are `of`.
-    fn middle(&self, corners: &[u32], of: &[SurfaceVertex]) -> SurfaceVertex;
+    fn middle(&self, corners: &[u32], of: &[MaterialPoint]) -> MaterialPoint;
 }
 
 /// Triangles by number. Half-edge 3·triangle + k runs from corner k to the next.

@@ -5,20 +5,12 @@
 
 use nalgebra::Vector3;
 
+use crate::element::MaterialPoint;
 use crate::mesh::TetMesh;
 
 use crate::cut::topology::fragments::{FragmentVertex, NONE};
 use crate::cut::topology::pieces::PieceTable;
 use crate::cut::topology::slot::slot_of;
-
-/// A surface point bound to the material: x = Σ weights · x\[copies\].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfaceVertex {
-    /// Copies of the piece the vertex belongs to; a valid id in unused slots too.
-    pub copies: [u32; 4],
-    /// Weights, Σ = 1; 0 in unused slots.
-    pub weights: [f64; 4],
-}
 
 /// Closed triangle surface of a body, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,14 +20,7 @@ pub struct Surface {
     /// Per triangle 0 for skin, n > 0 for a lip of incision n.
     pub tags: Vec<u32>,
     /// The vertices, each bound to the copies of one piece.
-    pub vertices: Vec<SurfaceVertex>,
-}
-
-impl SurfaceVertex {
-    /// Position [m] at the positions `x` of the copies.
-    pub fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        self.copies.iter().zip(&self.weights).map(|(&c, &w)| x[c as usize] * w).sum()
-    }
+    pub vertices: Vec<MaterialPoint>,
 }
 
 impl Surface {
@@ -56,18 +41,12 @@ impl Surface {
 }
 
 /// Expresses a fragment vertex by weights on the copies of piece `p`.
-pub fn bind(mesh: &TetMesh, pieces: &PieceTable, p: u32, v: &FragmentVertex) -> SurfaceVertex {
+pub fn bind(mesh: &TetMesh, pieces: &PieceTable, p: u32, v: &FragmentVertex) -> MaterialPoint {
     let piece = &pieces.pieces[p as usize];
     let nodes = &mesh.tets[piece.element as usize];
-    let mut bound = SurfaceVertex { copies: [NONE; 4], weights: v.weights };
-    for (copy, &node) in bound.copies.iter_mut().zip(&v.nodes) {
-        if let Some(a) = slot_of(nodes, node) {
-            *copy = piece.copies[a];
-        }
-    }
-    let [first, ..] = bound.copies;
-    for copy in bound.copies.iter_mut().filter(|c| **c == NONE) {
-        *copy = first;
-    }
-    bound
+    let mut copies = v.nodes.map(|node| slot_of(nodes, node).map_or(NONE, |a| piece.copies[a]));
+    // Unused slots have weight 0, and need a valid copy.
+    let [first, ..] = copies;
+    copies.iter_mut().filter(|copy| **copy == NONE).for_each(|copy| *copy = first);
+    MaterialPoint::in_tet(copies, v.weights)
 }

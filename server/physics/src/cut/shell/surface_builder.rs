@@ -9,11 +9,12 @@
 //! half-edge then lies on such a fragment too. It is therefore enough to pair the half-edges of changed
 //! fragments anew, and to walk the cycles through their corners.
 
+use crate::element::MaterialPoint;
 use crate::mesh::{TET_FACES, TetMesh};
 use crate::reserve::reserve_half_again;
 
 use super::joined::{Joined, Place};
-use super::surface::{Surface, SurfaceVertex, bind};
+use super::surface::{Surface, bind};
 use crate::cut::topology::fragments::{FragmentVertex, Fragments, NONE};
 use crate::cut::topology::pieces::PieceTable;
 
@@ -189,7 +190,7 @@ struct Placed<'a> {
 }
 
 impl Placed<'_> {
-    fn bound(&self, t: u32, v: &FragmentVertex) -> SurfaceVertex {
+    fn bound(&self, t: u32, v: &FragmentVertex) -> MaterialPoint {
         let Material { mesh, fragments, pieces } = self.material;
         bind(mesh, pieces, fragments.piece[t as usize], v)
     }
@@ -203,14 +204,14 @@ impl Place for Placed<'_> {
         source == v || fragments.vertices[source as usize] == fragments.vertices[v as usize]
     }
 
-    fn vertex(&mut self, cycle: &[u32]) -> SurfaceVertex {
+    fn vertex(&mut self, cycle: &[u32]) -> MaterialPoint {
         let fragments = self.material.fragments;
         let (t, v) = corner_of(self.faces, fragments, cycle[0]);
         cycle.iter().for_each(|&c| self.source[c as usize] = v);
         self.bound(t, &fragments.vertices[v as usize])
     }
 
-    fn middle(&self, corners: &[u32], _of: &[SurfaceVertex]) -> SurfaceVertex {
+    fn middle(&self, corners: &[u32], _of: &[MaterialPoint]) -> MaterialPoint {
         let fragments = self.material.fragments;
         let at = |c: u32| fragments.vertices[corner_of(self.faces, fragments, c).1 as usize];
         let mut middle = at(corners[0]);

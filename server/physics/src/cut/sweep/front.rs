@@ -6,6 +6,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::element::MaterialPoint;
+
 use super::blade::BladeSweep;
 use super::sweep_triangle::SweepTriangle;
 
@@ -31,24 +33,19 @@ struct FrontPoint {
     anchor: Anchor,
 }
 
-/// A material point: Σ weights · x\[copies\].
+/// A material point, and where it was.
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
-    copies: [u32; 4],
-    weights: [f64; 4],
+    point: MaterialPoint,
     /// Its position when it was remembered [m].
     at: Vector3<f64>,
 }
 
 impl Anchor {
     fn new(copies: [u32; 4], weights: [f64; 4], x: &[Vector3<f64>]) -> Option<Self> {
-        let mut anchor = Self { copies, weights, at: Vector3::zeros() };
-        anchor.at = anchor.position(x);
-        anchor.at.iter().all(|c| c.is_finite()).then_some(anchor)
-    }
-
-    fn position(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        self.copies.iter().zip(&self.weights).map(|(&c, &w)| x[c as usize] * w).sum()
+        let point = MaterialPoint::in_tet(copies, weights);
+        let at = point.position(x);
+        at.iter().all(|c| c.is_finite()).then_some(Self { point, at })
     }
 }
 
@@ -109,7 +106,7 @@ impl Front {
     /// The front at the present positions of the copies: only its two ends if nothing has moved.
     fn now(&self, x: &[Vector3<f64>]) -> Row {
         let shifts: Vec<Vector3<f64>> =
-            self.points.iter().map(|p| p.anchor.position(x) - p.anchor.at).collect();
+            self.points.iter().map(|p| p.anchor.point.position(x) - p.anchor.at).collect();
         if shifts.iter().all(|shift| *shift == Vector3::zeros()) {
             return Row::straight(&self.segment);
         }

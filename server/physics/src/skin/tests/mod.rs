@@ -80,18 +80,18 @@ fn bound_to_pieces(cut: &CutMesh, surface: &Surface) {
     }
     let mut sets = BTreeSet::new();
     for piece in cut.pieces() {
-        sets.insert(piece.copies);
+        sets.insert(piece.copies.to_vec());
         for c in piece.copies {
             let (i, j) = (root(&mut part, piece.copies[0] as usize), root(&mut part, c as usize));
             part[i.max(j)] = i.min(j);
         }
     }
     for vertex in &surface.vertices {
-        assert!(sets.contains(&vertex.copies), "a vertex is not on the copies of a piece");
-        assert!((vertex.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        assert!(sets.contains(vertex.copies()), "a vertex is not on the copies of a piece");
+        assert!((vertex.weights().iter().sum::<f64>() - 1.0).abs() < 1e-9);
     }
     for triangle in &surface.triangles {
-        let [p, q, r] = triangle.map(|v| root(&mut part, surface.vertices[v as usize].copies[0] as usize));
+        let [p, q, r] = triangle.map(|v| root(&mut part, surface.vertices[v as usize].copies()[0] as usize));
         assert!(p == q && q == r, "a triangle reaches across a cut");
     }
 }

@@ -9,6 +9,7 @@ use crate::stress::evidence::Evidence;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use scindo_physics::body::{Body, Outcome, PointSpring, SpringKind};
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::element::MaterialPoint;
 use scindo_physics::material::Material;
 use scindo_physics::mesh::TetMesh;
 use scindo_world::format::read_mesh_bytes;
@@ -163,8 +164,7 @@ fn of_the_body(tally: &mut Tally, body: &mut Body) {
         // An invalid spring is left out of the step and counted.
         let target_m = V::new(0.0, bad, 0.0);
         let spring = PointSpring {
-            copies: [0, 1, 2, 3],
-            weights: [0.25; 4],
+            point: MaterialPoint::in_tet([0, 1, 2, 3], [0.25; 4]),
             kind: SpringKind::Hold { target_m },
             stiffness_n_m: 100.0,
             max_force_n: 1.0,

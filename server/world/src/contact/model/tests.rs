@@ -1,7 +1,8 @@
 //! A 1 kHz client on models at 200 Hz of tissue stepped at 50 Hz.
 
 use nalgebra::Translation3;
-use scindo_physics::cut::{CutMesh, SurfaceVertex};
+use scindo_physics::cut::CutMesh;
+use scindo_physics::element::MaterialPoint;
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
 use super::*;
@@ -16,7 +17,7 @@ const TISSUE: f64 = 500.0;
 
 /// A slab whose top yields like a spring to a tool pressed on it.
 struct Tissue {
-    vertices: Vec<SurfaceVertex>,
+    vertices: Vec<MaterialPoint>,
     rest: Vec<V>,
     snapshot: Snapshot,
     tip: V,
