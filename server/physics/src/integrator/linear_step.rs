@@ -24,7 +24,7 @@ use crate::operator::{
     Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
 };
 use crate::reserve::resize_reserving;
-use crate::solver::{LEAST_REFERENCE, Pcg, PcgReport, StopReason};
+use crate::solver::{LEAST_REFERENCE, LinearReport, Pcg, StopReason};
 use crate::team::{Team, blocks};
 
 /// Largest number of passes of a linear solve, repeated while springs open, close or reach their cap.
@@ -148,7 +148,7 @@ impl LinearStep {
         }
         self.predict(team, state, inputs);
         self.springs.begin(&inputs.step, &self.predicted);
-        let mut solve = PcgReport::default();
+        let mut solve = LinearReport::default();
         let (mut inverted_pieces, mut finite, mut solves) = (0, true, 0);
         let mut began = f64::INFINITY;
         for number in 0..inputs.solves.max(1) {
@@ -227,7 +227,7 @@ impl LinearStep {
         (elastic, inputs): (&mut dyn Stiffness, &LinearInputs<'_>),
         state: &State,
         first: bool,
-        solve: &mut PcgReport,
+        solve: &mut LinearReport,
     ) {
         self.delta.fill([0.0; 4]);
         self.translations.restart(inputs.step.parts);
@@ -239,7 +239,7 @@ impl LinearStep {
             // A pass with nothing left to do estimates no error.
             let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
             *solve =
-                PcgReport { iterations: solve.iterations + report.iterations, algebraic_error, ..report };
+                LinearReport { iterations: solve.iterations + report.iterations, algebraic_error, ..report };
             self.balance_parts(state, inputs);
             if report.stop == StopReason::NonFinite || !self.springs_changed(inputs, pass) {
                 break;
@@ -571,7 +571,7 @@ impl LinearStep {
         elastic: &mut dyn Stiffness,
         inputs: &LinearInputs<'_>,
         (pass, first): (usize, bool),
-    ) -> PcgReport {
+    ) -> LinearReport {
         let Self { pcg, preconditioner, terms, delta, reference, began, .. } = self;
         let rz = pcg.precondition(team, preconditioner);
         if first && pass == 0 {

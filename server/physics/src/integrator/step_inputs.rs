@@ -9,7 +9,7 @@ use super::springs::{ActiveSpring, PointSpring};
 use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{ElasticUpdate, FixedCopy};
-use crate::solver::{PcgReport, PcgSettings};
+use crate::solver::{LinearReport, PcgSettings};
 
 /// Inputs of one step.
 #[derive(Clone, Copy, Debug)]
@@ -223,7 +223,7 @@ impl KnownLoads {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepOutcome {
     /// Report of the last linear solve; iterations are those of all passes.
-    pub solve: PcgReport,
+    pub solve: LinearReport,
     /// Linear solves made.
     pub solves: u32,
     /// Pieces with det F ≤ 0 at the predictor.

@@ -25,7 +25,7 @@ pub use eigen::{EigenError, EigenSettings, Modes, natural_frequencies};
 pub use linear::{LinearSettings, LinearSolver, Method, Precision};
 pub(crate) use newton::LEAST_REFERENCE;
 pub use newton::{Curvature, Newton, NewtonReport, NewtonSettings, Potential};
-pub use pcg::{Pcg, PcgReport, PcgSettings};
+pub use pcg::{Pcg, PcgSettings};
 pub use report::{LinearReport, StopReason};
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! residual √(rᵀM⁻¹r): the plain norm is blind to slivers, whose forces are 1e-9 of the others.
 
 use super::algebraic_error::AlgebraicError;
-use super::report::StopReason;
+use super::report::{LinearReport, StopReason};
 use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Preconditioner};
 use crate::reserve::resize_reserving;
 use crate::team::Team;
@@ -16,19 +16,6 @@ pub struct PcgSettings {
     pub iterations: u32,
     /// Stop at √(rᵀM⁻¹r) ≤ tolerance · reference.
     pub tolerance: f64,
-}
-
-/// Result of a solve.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PcgReport {
-    /// Iterations made.
-    pub iterations: u32,
-    /// √(rᵀM⁻¹r) over the reference.
-    pub residual: f64,
-    /// Why it stopped.
-    pub stop: StopReason,
-    /// Estimate of the algebraic error ‖x* − x‖_A, in the unit of √(xᵀA x).
-    pub algebraic_error: f64,
 }
 
 /// Scratch vectors of the solver, one entry per copy; reused from solve to solve.
@@ -68,7 +55,7 @@ impl Pcg {
         M: &mut impl Preconditioner,
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
-    ) -> PcgReport {
+    ) -> LinearReport {
         let start = self.precondition(team, M);
         self.run(team, A, M, x, (start, reference, settings))
     }
@@ -81,7 +68,7 @@ impl Pcg {
         M: &mut impl Preconditioner,
         x: &mut [Padded],
         (rz, reference, settings): (f64, f64, PcgSettings),
-    ) -> PcgReport {
+    ) -> LinearReport {
         (self.rz, self.beta) = (rz, 0.0);
         self.go_on(team, A, M, x, (reference, settings))
     }
@@ -95,10 +82,10 @@ impl Pcg {
         M: &mut impl Preconditioner,
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
-    ) -> PcgReport {
+    ) -> LinearReport {
         let (mut rz, mut beta) = (self.rz, self.beta);
         let target = settings.tolerance * reference;
-        let mut report = PcgReport::default();
+        let mut report = LinearReport::default();
         let mut error = AlgebraicError::default();
         loop {
             // rᵀM⁻¹r is not negative: M⁻¹ is positive semidefinite.
@@ -179,7 +166,7 @@ mod tests {
         }
     }
 
-    fn solve(shift: f32, iterations: u32, n: usize) -> (PcgReport, Vec<Padded>) {
+    fn solve(shift: f32, iterations: u32, n: usize) -> (LinearReport, Vec<Padded>) {
         let mut team = Team::new(1).unwrap();
         let mut M = BlockJacobi::default();
         M.resize(n);
