@@ -221,6 +221,15 @@ impl Body {
         self.team.set_stop_flag(flag);
     }
 
+    /// Works with `team` from now on, in place of threads of its own. A stop flag stays.
+    pub fn set_team(&mut self, mut team: Team) {
+        if let Some(flag) = self.team.stop_flag() {
+            team.set_stop_flag(Arc::clone(flag));
+        }
+        self.settings.threads = team.threads();
+        self.team = team;
+    }
+
     /// Force on the body [N] of every spring of the last step, in the order given, from the same solve.
     pub fn spring_forces(&self) -> &[Vector3<f64>] {
         &self.spring_forces
