@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use scindo_allocations::{Counting, allocations};
+use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::{Inputs, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
@@ -55,4 +56,32 @@ fn a_steady_step_with_contact_and_snapshot_allocates_nothing() {
     let before = allocations();
     (0..50).for_each(|_| step(&mut sim));
     assert_eq!(allocations() - before, 0);
+}
+
+#[test]
+fn a_steady_step_of_bodies_side_by_side_allocates_nothing() {
+    let second = r#"
+[[body]]
+id = "beside"
+mesh = { box = { min_m = [0.2, 0, 0], max_m = [0.3, 0.1, 0.1], cells = [6, 6, 6] } }
+young_pa = 2e4
+poisson = 0.4
+density_kg_m3 = 1000
+fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
+"#;
+    let scene = Scene::from_toml(&format!("{PRESSED}{second}")).unwrap();
+    // Only this thread is counted: alone it steps both bodies, beside another one of them.
+    for threads in [1, 2] {
+        let options = BuildOptions { threads, portable: false };
+        let mut sim = Simulation::with_options(&scene, Path::new(""), options).unwrap();
+        let inputs = Inputs::default();
+        for _ in 0..60 {
+            sim.step(&inputs);
+        }
+        let before = allocations();
+        for _ in 0..50 {
+            sim.step(&inputs);
+        }
+        assert_eq!(allocations() - before, 0, "{threads} threads");
+    }
 }

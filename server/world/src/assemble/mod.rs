@@ -8,11 +8,14 @@ mod mesh;
 
 mod skin;
 
+mod threads;
+
 use std::path::Path;
 
 use scindo_physics::assembly::ModelError;
 use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants};
 use scindo_physics::material::{Material, MaterialError, Rayleigh};
+use scindo_physics::team::Lead;
 
 use crate::body::{Probe, SimBody};
 use crate::mesh_in::{MeshHealth, Observer};
@@ -21,7 +24,7 @@ use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, Scen
 /// How bodies are computed; belongs to the machine, not to the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BuildOptions {
-    /// Threads that work on a step.
+    /// Threads that work on a step, all bodies together.
     pub threads: usize,
     /// Use only instructions that every machine has, for the same bits everywhere.
     pub portable: bool,
@@ -38,6 +41,8 @@ impl Default for BuildOptions {
 pub struct Built {
     /// Bodies in the order of the scene.
     pub bodies: Vec<SimBody>,
+    /// Steps the bodies side by side; `None` for one body or one thread.
+    pub lead: Option<Lead>,
     /// Probes in the order of the scene.
     pub probes: Vec<Probe>,
     /// What is odd but allowed.
@@ -57,6 +62,7 @@ pub fn build(
     let mut builder = Builder {
         base_dir,
         options,
+        bodies: checked.bodies.len(),
         observer,
         findings: Vec::new(),
         doubts: Vec::new(),
@@ -64,12 +70,20 @@ pub fn build(
     };
     let bodies: Vec<Option<SimBody>> = checked.bodies.iter().map(|spec| builder.body(spec)).collect();
     let probes = builder.probes(checked, &bodies);
+    let mut lead = None;
+    let mut bodies: Vec<SimBody> = bodies.into_iter().flatten().collect();
+    match threads::share(&mut bodies, options.threads) {
+        Ok(shared) => lead = shared,
+        Err(error) => {
+            let (key, fault) = blame(&error);
+            builder.findings.push((format!("body{key}"), fault));
+        }
+    }
     if builder.findings.is_empty() {
         let mut warnings = builder.warnings;
         warnings.extend(builder.doubts.into_iter().map(|(at, doubt)| format!("{at}: {doubt}")));
-        let mut bodies: Vec<SimBody> = bodies.into_iter().flatten().collect();
         warnings.extend(doubts::of(checked, &mut bodies));
-        Ok(Built { bodies, probes, warnings })
+        Ok(Built { bodies, lead, probes, warnings })
     } else {
         // A body of the wrong size is why regions and probes miss it.
         let doubts = builder.doubts.into_iter();
@@ -81,6 +95,8 @@ pub fn build(
 struct Builder<'a> {
     base_dir: &'a Path,
     options: BuildOptions,
+    /// Number of bodies in the scene.
+    bodies: usize,
     observer: &'a Observer<'a>,
     findings: Vec<Finding>,
     /// Where, and what is odd about the size there.
@@ -111,7 +127,7 @@ impl Builder<'_> {
         let along = mesh.nodes_along();
         let settings = BodySettings {
             solver: spec.mechanics.linear_solver(along, spec.poisson),
-            threads: self.options.threads,
+            threads: threads::of_one_body(self.bodies, self.options.threads),
             portable: self.options.portable,
             ..spec.mechanics.body_settings()
         };

@@ -82,7 +82,7 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
         body.displacement_over_s = fine.displacement_over_s;
         bodies.push(body);
     }
-    let built = Built { bodies, probes: Vec::new(), warnings: Vec::new() };
+    let built = Built { bodies, lead: None, probes: Vec::new(), warnings: Vec::new() };
     Some(Simulation::assemble(simulation.source().clone(), scene, built))
 }
 

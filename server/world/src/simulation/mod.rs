@@ -22,6 +22,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 use scindo_physics::body::{BodyError, PcgSettings};
+use scindo_physics::team::{Lead, blocks};
 
 pub(crate) use stopwatch::processor_seconds;
 pub use undo::{MAX_UNDO, Undone};
@@ -48,6 +49,7 @@ pub struct Simulation {
     source: Scene,
     scene: CheckedScene,
     bodies: Vec<SimBody>,
+    lead: Option<Lead>,
     tools: Tools,
     cuts: Cuts,
     contacts: Contacts,
@@ -112,6 +114,7 @@ impl Simulation {
             contacts,
             sleep: Sleep::new(&built.bodies),
             bodies: built.bodies,
+            lead: built.lead,
             probes: built.probes,
             warnings: built.warnings,
             steps: 0,
@@ -180,10 +183,21 @@ impl Simulation {
 
     fn deform(&mut self) {
         let (when, gravity) = ((self.time_s(), self.scene.step_s), self.scene.gravity_m_s2);
-        for (i, body) in self.bodies.iter_mut().enumerate() {
-            let solve = body.step(when, gravity, self.contacts.springs(i));
-            self.report.bodies[i].solve = solve;
-            body.has_stepped(&solve, &mut self.report);
+        let Self { bodies, lead, contacts, report, .. } = self;
+        let step = |i: usize, body: &mut SimBody, report: &mut BodyReport| {
+            report.solve = body.step(when, gravity, contacts.springs(i));
+        };
+        // Bodies act on each other through nothing but the springs, which this step finds as they are.
+        if let Some(lead) = lead {
+            let each = (blocks(bodies, 1), blocks(&mut report.bodies, 1));
+            lead.side_by_side(each, |i, (body, report)| step(i, &mut body[0], &mut report[0]));
+        } else {
+            let each = bodies.iter_mut().zip(&mut report.bodies).enumerate();
+            each.for_each(|(i, (body, report))| step(i, body, report));
+        }
+        for (i, body) in bodies.iter_mut().enumerate() {
+            let solve = report.bodies[i].solve;
+            body.has_stepped(&solve, report);
         }
         self.sleep.look(self.steps, &mut self.bodies, &mut self.report);
     }
