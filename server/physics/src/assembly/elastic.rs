@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-use super::kernel::{add_forces, add_upper_blocks, mirror};
+use super::kernel::{add_forces, add_green_blocks, add_upper_blocks, mirror};
 use super::point::projected;
 use super::scratch::Buffers;
 use super::{BlockCsr, ElementKind, Model, Volumetric};
@@ -256,6 +256,12 @@ impl Model {
         for q in 0..self.kind.points() {
             let g = self.gradients(e, q);
             let F = deformation_gradient::<N>(&x, g);
+            if kind == Tangent::Exact
+                && let Some([_, S]) = self.point.green(&F)
+            {
+                add_green_blocks::<N>((&F, &S), self.point.lame, g, weights[q], K);
+                continue;
+            }
             let A = match &split {
                 None => self.point.tangent(&F, kind),
                 Some(split) if selective => split.shear_tangent(&F, point_kind),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::material::Matrix9;
+use crate::material::{Lame, Matrix9};
 
 /// f_a += w P g_a.
 #[inline]
@@ -37,6 +37,34 @@ pub(super) fn add_upper_blocks<const N: usize>(A: &Matrix9, g: &[Vector3<f64>], 
                         block[3 * i + k] += g_aj * T[i + 3 * j][k];
                     }
                 }
+            }
+        }
+    }
+}
+
+/// The same for St. Venant–Kirchhoff's law at F under the stress S, without ∂P/∂F: with h = F g
+/// K_ab += w ((g_a·S g_b) I + λ h_a h_bᵀ + μ h_b h_aᵀ + μ (g_a·g_b) F Fᵀ).
+#[inline]
+pub(super) fn add_green_blocks<const N: usize>(
+    (F, S): (&Matrix3<f64>, &Matrix3<f64>),
+    lame: Lame,
+    g: &[Vector3<f64>],
+    w: f64,
+    K: &mut [[f64; 9]],
+) {
+    let h: [Vector3<f64>; N] = std::array::from_fn(|a| F * g[a]);
+    let B = F * F.transpose();
+    let (lambda, mu) = (w * lame.lambda, w * lame.mu);
+    for b in 0..N {
+        let s = w * (S * g[b]);
+        for a in 0..=b {
+            let (block, stress, along) = (&mut K[a * N + b], g[a].dot(&s), mu * g[a].dot(&g[b]));
+            for i in 0..3 {
+                for k in 0..3 {
+                    block[3 * i + k] +=
+                        lambda * h[a][i] * h[b][k] + mu * h[b][i] * h[a][k] + along * B[(i, k)];
+                }
+                block[4 * i] += stress;
             }
         }
     }

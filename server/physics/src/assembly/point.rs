@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix};
 
-use crate::material::{Lame, Law, Matrix9, Split, Tangent};
+use crate::material::{Lame, Law, Matrix9, Split, StVenantKirchhoff, Tangent};
 
 /// A law with its constants.
 #[derive(Clone, Copy, Debug)]
@@ -13,16 +13,41 @@ pub(super) struct PointLaw {
 
 impl PointLaw {
     pub fn energy(&self, F: &Matrix3<f64>) -> f64 {
-        self.law.energy(F, self.lame)
+        match self.green(F) {
+            Some([E, S]) => 0.5 * S.dot(&E),
+            None => self.law.energy(F, self.lame),
+        }
     }
 
     /// ψ [J/m³] and P [Pa].
     pub fn energy_and_stress(&self, F: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
-        self.law.energy_and_stress(F, self.lame)
+        match self.green(F) {
+            Some([E, S]) => (0.5 * S.dot(&E), F * S),
+            None => self.law.energy_and_stress(F, self.lame),
+        }
     }
 
     pub fn tangent(&self, F: &Matrix3<f64>, kind: Tangent) -> Matrix9 {
         self.law.tangent(F, self.lame, kind)
+    }
+
+    /// Green strain E = ½ (FᵀF − I) and second Piola–Kirchhoff stress S = 2μ E + λ tr(E) I [Pa] of St.
+    /// Venant–Kirchhoff's law. `None` for other laws, and where a stretch is so small that the law departs
+    /// from its textbook form.
+    pub fn green(&self, F: &Matrix3<f64>) -> Option<[Matrix3<f64>; 2]> {
+        if self.law != Law::StVenantKirchhoff || F.determinant() <= 0.0 {
+            return None;
+        }
+        let Lame { mu, lambda } = self.lame;
+        let least = StVenantKirchhoff::invertible(self.lame).continued_below.powi(2);
+        let C: Matrix3<f64> = F.transpose() * F;
+        let above = C - Matrix3::from_diagonal_element(least);
+        let minor = above[(0, 0)] * above[(1, 1)] - above[(0, 1)] * above[(1, 0)];
+        if !(above[(0, 0)] > 0.0 && minor > 0.0 && above.determinant() > 0.0) {
+            return None;
+        }
+        let E = 0.5 * (C - Matrix3::identity());
+        Some([E, 2.0 * mu * E + Matrix3::from_diagonal_element(lambda * E.trace())])
     }
 
     /// The law split into shear and volume, if it has a volumetric part λ/2 θ².
