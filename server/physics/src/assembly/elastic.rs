@@ -9,6 +9,15 @@ use super::{BlockCsr, ElementKind, Model, Volumetric};
 use crate::element::deformation_gradient;
 use crate::material::{Law, Split, Tangent};
 
+/// Where and how a tangent is taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Linearisation<'a> {
+    pub x: &'a [Vector3<f64>],
+    pub kind: Tangent,
+    /// Positions from which the stress is extrapolated, in place of its value at `x`.
+    pub from: Option<&'a [Vector3<f64>]>,
+}
+
 impl Model {
     /// Elastic energy Ψ(x) = Σ w ψ(F) \[J\], springs included.
     pub fn energy(&self, x: &[Vector3<f64>]) -> f64 {
@@ -38,13 +47,18 @@ impl Model {
     /// Tangent ∂²Ψ/∂x² [N/m]; overwrites the blocks of `K`, which has the model's pattern.
     /// [`Tangent::Projected`] and [`Tangent::Held`] are positive semidefinite.
     pub fn tangent(&self, x: &[Vector3<f64>], kind: Tangent, K: &mut BlockCsr<f64>) {
+        self.linearised(&Linearisation { x, kind, from: None }, K);
+    }
+
+    pub(super) fn linearised(&self, at: &Linearisation<'_>, K: &mut BlockCsr<f64>) {
+        let Linearisation { x, kind, .. } = *at;
         let mut buffers = self.scratch.take();
         self.average_volume(x, &mut buffers, true);
         K.clear();
         match self.kind {
-            ElementKind::Tet4 => self.scatter_tangent::<4>(x, kind, &buffers, K),
-            ElementKind::Tet10 => self.scatter_tangent::<10>(x, kind, &buffers, K),
-            ElementKind::Hex8 => self.scatter_tangent::<8>(x, kind, &buffers, K),
+            ElementKind::Tet4 => self.scatter_tangent::<4>(at, &buffers, K),
+            ElementKind::Tet10 => self.scatter_tangent::<10>(at, &buffers, K),
+            ElementKind::Hex8 => self.scatter_tangent::<8>(at, &buffers, K),
         }
         if let (Some(averaging), Some(split)) = (&self.averaging, self.point.split()) {
             for i in 0..self.n_nodes() {
@@ -219,15 +233,14 @@ impl Model {
 
     fn scatter_tangent<const N: usize>(
         &self,
-        x: &[Vector3<f64>],
-        kind: Tangent,
+        at: &Linearisation<'_>,
         buffers: &Buffers,
         K: &mut BlockCsr<f64>,
     ) {
         let mut blocks = [[0.0; 9]; 100];
         let blocks = &mut blocks[..N * N];
         for e in 0..self.n_elements() {
-            self.element_tangent::<N>(e, x, kind, buffers, blocks);
+            self.element_tangent::<N>(e, at, buffers, blocks);
             for (block, &slot) in blocks.iter().zip(&self.slots[e * N * N..][..N * N]) {
                 for (k, b) in K.blocks[slot as usize].iter_mut().zip(block) {
                     *k += b;
@@ -239,13 +252,14 @@ impl Model {
     pub(super) fn element_tangent<const N: usize>(
         &self,
         e: usize,
-        x: &[Vector3<f64>],
-        kind: Tangent,
+        at: &Linearisation<'_>,
         buffers: &Buffers,
         K: &mut [[f64; 9]],
     ) {
         K.fill([0.0; 9]);
-        let x = self.positions::<N>(e, x);
+        let kind = at.kind;
+        let x = self.positions::<N>(e, at.x);
+        let from = at.from.map(|from| self.positions::<N>(e, from));
         let weights = self.weights(e);
         let split = self.remedy();
         // With selective integration only the sum of shear and volume is (nearly) semidefinite, so the
@@ -256,11 +270,12 @@ impl Model {
         for q in 0..self.kind.points() {
             let g = self.gradients(e, q);
             let F = deformation_gradient::<N>(&x, g);
-            if kind == Tangent::Exact
-                && let Some([_, S]) = self.point.green(&F)
-            {
-                add_green_blocks::<N>((&F, &S), self.point.lame, g, weights[q], K);
-                continue;
+            if kind == Tangent::Exact {
+                let D = from.map_or(Matrix3::zeros(), |from| F - deformation_gradient::<N>(&from, g));
+                if let Some([_, S]) = self.point.green(&F, &D) {
+                    add_green_blocks::<N>((&F, &S), self.point.lame, g, weights[q], K);
+                    continue;
+                }
             }
             let A = match &split {
                 None => self.point.tangent(&F, kind),

@@ -4,9 +4,10 @@
 
 use nalgebra::Vector3;
 
+use super::elastic::Linearisation;
 use super::scratch::{Buffers, Work};
 use super::{BlockCsr, ElementKind, Model};
-use crate::material::Tangent;
+use crate::material::{Law, Tangent};
 use crate::team::{Team, blocks, ranges};
 
 /// Elements per task.
@@ -43,13 +44,38 @@ impl Model {
 
     /// [`tangent`](Self::tangent) on all threads of a team.
     pub fn tangent_by(&self, team: &mut Team, x: &[Vector3<f64>], kind: Tangent, K: &mut BlockCsr<f64>) {
+        self.linearised_by(team, &Linearisation { x, kind, from: None }, K);
+    }
+
+    /// The exact tangent at `x` [m], except that the stress in it is that of `from` [m] extrapolated linearly
+    /// to `x`. Only St. Venant–Kirchhoff's law has one; for the others `K` stays as it is. Returns whether
+    /// it was computed.
+    ///
+    /// # Source
+    /// Magisano, Leonetti, Garcea 2017, "How to improve efficiency and robustness of the Newton method in
+    /// geometrically non-linear structural problem discretized via displacement-based finite elements".
+    pub fn extrapolated_tangent_by(
+        &self,
+        team: &mut Team,
+        from: &[Vector3<f64>],
+        x: &[Vector3<f64>],
+        K: &mut BlockCsr<f64>,
+    ) -> bool {
+        let known = self.point.law == Law::StVenantKirchhoff;
+        if known {
+            self.linearised_by(team, &Linearisation { x, kind: Tangent::Exact, from: Some(from) }, K);
+        }
+        known
+    }
+
+    fn linearised_by(&self, team: &mut Team, at: &Linearisation<'_>, K: &mut BlockCsr<f64>) {
         if team.threads() == 1 {
-            return self.tangent(x, kind, K);
+            return self.linearised(at, K);
         }
         match self.kind {
-            ElementKind::Tet4 => self.blocks_by::<4>(team, x, kind, K),
-            ElementKind::Tet10 => self.blocks_by::<10>(team, x, kind, K),
-            ElementKind::Hex8 => self.blocks_by::<8>(team, x, kind, K),
+            ElementKind::Tet4 => self.blocks_by::<4>(team, at, K),
+            ElementKind::Tet10 => self.blocks_by::<10>(team, at, K),
+            ElementKind::Hex8 => self.blocks_by::<8>(team, at, K),
         }
     }
 
@@ -94,15 +120,9 @@ impl Model {
         energy + averaged + self.add_spring_forces(x, f)
     }
 
-    fn blocks_by<const N: usize>(
-        &self,
-        team: &mut Team,
-        x: &[Vector3<f64>],
-        kind: Tangent,
-        K: &mut BlockCsr<f64>,
-    ) {
+    fn blocks_by<const N: usize>(&self, team: &mut Team, at: &Linearisation<'_>, K: &mut BlockCsr<f64>) {
         let mut buffers = self.scratch.take();
-        self.average_volume(x, &mut buffers, true);
+        self.average_volume(at.x, &mut buffers, true);
         K.clear();
         let mut work = std::mem::take(&mut buffers.work);
         let Work { blocks: handed, next, .. } = &mut work;
@@ -117,7 +137,7 @@ impl Model {
             let batch = &mut handed[..(end - first) * N * N];
             team.for_blocks(blocks(batch, CHUNK * N * N), |chunk, parts| {
                 for (i, part) in parts.chunks_exact_mut(N * N).enumerate() {
-                    self.element_tangent::<N>(first + chunk * CHUNK + i, x, kind, shared, part);
+                    self.element_tangent::<N>(first + chunk * CHUNK + i, at, shared, part);
                 }
             });
             // A task owns its rows. Every node goes on in its list where the last batch ended.
@@ -151,7 +171,7 @@ impl Model {
             });
         }
         buffers.work = work;
-        self.add_spring_tangent(x, kind, K);
+        self.add_spring_tangent(at.x, at.kind, K);
     }
 
     pub(super) fn incidence(&self, n: usize) -> std::ops::Range<usize> {

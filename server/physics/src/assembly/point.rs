@@ -13,7 +13,7 @@ pub(super) struct PointLaw {
 
 impl PointLaw {
     pub fn energy(&self, F: &Matrix3<f64>) -> f64 {
-        match self.green(F) {
+        match self.green(F, &Matrix3::zeros()) {
             Some([E, S]) => 0.5 * S.dot(&E),
             None => self.law.energy(F, self.lame),
         }
@@ -21,7 +21,7 @@ impl PointLaw {
 
     /// ψ [J/m³] and P [Pa].
     pub fn energy_and_stress(&self, F: &Matrix3<f64>) -> (f64, Matrix3<f64>) {
-        match self.green(F) {
+        match self.green(F, &Matrix3::zeros()) {
             Some([E, S]) => (0.5 * S.dot(&E), F * S),
             None => self.law.energy_and_stress(F, self.lame),
         }
@@ -31,16 +31,16 @@ impl PointLaw {
         self.law.tangent(F, self.lame, kind)
     }
 
-    /// Green strain E = ½ (FᵀF − I) and second Piola–Kirchhoff stress S = 2μ E + λ tr(E) I [Pa] of St.
-    /// Venant–Kirchhoff's law. `None` for other laws, and where a stretch is so small that the law departs
-    /// from its textbook form.
-    pub fn green(&self, F: &Matrix3<f64>) -> Option<[Matrix3<f64>; 2]> {
+    /// Green strain E = ½ (FᵀF − DᵀD − I) and second Piola–Kirchhoff stress S = 2μ E + λ tr(E) I [Pa] of
+    /// St. Venant–Kirchhoff's law: at F for D = 0, else those of F − D extrapolated linearly to F. `None` for
+    /// other laws, and where a stretch is so small that the law departs from its textbook form.
+    pub fn green(&self, F: &Matrix3<f64>, D: &Matrix3<f64>) -> Option<[Matrix3<f64>; 2]> {
         if self.law != Law::StVenantKirchhoff || F.determinant() <= 0.0 {
             return None;
         }
         let Lame { mu, lambda } = self.lame;
         let least = StVenantKirchhoff::invertible(self.lame).continued_below.powi(2);
-        let C: Matrix3<f64> = F.transpose() * F;
+        let C: Matrix3<f64> = F.transpose() * F - D.transpose() * D;
         let above = C - Matrix3::from_diagonal_element(least);
         let minor = above[(0, 0)] * above[(1, 1)] - above[(0, 1)] * above[(1, 0)];
         if !(above[(0, 0)] > 0.0 && minor > 0.0 && above.determinant() > 0.0) {

@@ -121,6 +121,51 @@ fn the_exact_tangent_is_the_gradient_of_the_forces() {
     }
 }
 
+/// With the stress of E(F) − ½ DᵀD, D the step, the forces change by that of ½ DᵀD less as F does.
+#[test]
+fn the_extrapolated_tangent_has_the_stress_of_a_straight_step() {
+    for model in models() {
+        // Part of the way, where no stretch is below that of the continuation.
+        let part = |t: f64| model.rest().iter().zip(deformed(&model)).map(|(X, x)| X + t * (x - X)).collect();
+        let (from, x): (Vec<_>, Vec<_>) = (part(0.1), part(0.25));
+        let (mut K, mut exact) = (model.pattern(), model.pattern());
+        let mut team = crate::team::Team::new(1).unwrap();
+        let known = model.extrapolated_tangent_by(&mut team, &x, &x, &mut K);
+        assert_eq!(known, model.law() == Law::StVenantKirchhoff, "{}", name(&model));
+        if !known {
+            assert_eq!(K, model.pattern());
+            continue;
+        }
+        model.tangent(&x, Tangent::Exact, &mut exact);
+        assert_eq!(K, exact, "a step of length zero extrapolates nothing");
+        model.extrapolated_tangent_by(&mut team, &from, &x, &mut K);
+        let v: Vec<_> = model.rest().iter().map(|X| Vector3::new(X.y * X.z, X.x, X.x * X.x - X.y)).collect();
+        let (mut f, mut expected) = (vec![Vector3::zeros(); x.len()], vec![Vector3::zeros(); x.len()]);
+        K.multiply(&v, &mut f);
+        exact.multiply(&v, &mut expected);
+        for e in 0..model.n_elements() {
+            for q in 0..model.kind().points() {
+                let [F, F_from, F_v] = [&x, &from, &v].map(|x| model.deformation_gradient(e, q, x));
+                let half = 0.5 * (F - F_from).transpose() * (F - F_from);
+                let S = 2.0 * model.lame().mu * half
+                    + Matrix3::from_diagonal_element(model.lame().lambda * half.trace());
+                for (&n, g) in model.element(e).iter().zip(model.gradients(e, q)) {
+                    expected[n as usize] -= model.weights(e)[q] * F_v * S * g;
+                }
+            }
+        }
+        let apart = f.iter().zip(&expected).map(|(f, e)| (f - e).norm()).fold(0.0, f64::max);
+        assert!(apart < 1e-13, "{}: {apart:e}", name(&model));
+        assert!(exact != K);
+        for threads in [2, 3] {
+            let mut K_by = model.pattern();
+            let mut team = crate::team::Team::new(threads).unwrap();
+            model.extrapolated_tangent_by(&mut team, &from, &x, &mut K_by);
+            assert_eq!(K_by, K, "{} on {threads} threads", name(&model));
+        }
+    }
+}
+
 #[test]
 fn projected_and_held_tangents_are_symmetric_and_not_negative() {
     for model in models() {

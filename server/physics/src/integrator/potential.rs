@@ -87,6 +87,16 @@ impl StepPotential<'_> {
         }
         phi
     }
+
+    /// Adds ∇²Φ without ∇²Ψ.
+    fn add_rest_of_hessian(&self, x: &[Vector3<f64>], H: &mut BlockCsr<f64>) {
+        let Increment { A, B } = self.increment;
+        self.mass.add_to(A + self.alpha * B, H);
+        if let Some((beta, K)) = self.damping {
+            H.add_scaled(beta * B, K);
+        }
+        self.springs.iter().for_each(|spring| add_spring(spring, x, H));
+    }
 }
 
 impl Potential for StepPotential<'_> {
@@ -109,12 +119,21 @@ impl Potential for StepPotential<'_> {
             Curvature::Definite => self.definite,
         };
         self.model.tangent_by(team, x, kind, H);
-        let Increment { A, B } = self.increment;
-        self.mass.add_to(A + self.alpha * B, H);
-        if let Some((beta, K)) = self.damping {
-            H.add_scaled(beta * B, K);
+        self.add_rest_of_hessian(x, H);
+    }
+
+    fn extrapolated_hessian(
+        &mut self,
+        team: &mut Team,
+        from: &[Vector3<f64>],
+        x: &[Vector3<f64>],
+        H: &mut BlockCsr<f64>,
+    ) -> bool {
+        let known = self.model.extrapolated_tangent_by(team, from, x, H);
+        if known {
+            self.add_rest_of_hessian(x, H);
         }
-        self.springs.iter().for_each(|spring| add_spring(spring, x, H));
+        known
     }
 
     fn loads(&mut self, loads: &mut [Vector3<f64>]) {

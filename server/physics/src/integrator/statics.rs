@@ -56,6 +56,16 @@ impl Potential for StaticProblem<'_> {
         self.model.tangent_by(team, x, kind, H);
     }
 
+    fn extrapolated_hessian(
+        &mut self,
+        team: &mut Team,
+        from: &[Vector3<f64>],
+        x: &[Vector3<f64>],
+        H: &mut BlockCsr<f64>,
+    ) -> bool {
+        self.model.extrapolated_tangent_by(team, from, x, H)
+    }
+
     fn loads(&mut self, loads: &mut [Vector3<f64>]) {
         loads.copy_from_slice(self.load);
     }

@@ -15,6 +15,7 @@ mod cholesky;
 mod substituted;
 mod linear;
 mod newton;
+mod mixed;
 mod eigen;
 mod pcg;
 

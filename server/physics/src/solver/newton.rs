@@ -31,6 +31,18 @@ pub trait Potential {
     /// Writes the forces [N] against which the residual is measured: loads, inertia.
     fn loads(&mut self, loads: &mut [Vector3<f64>]);
 
+    /// The exact H at `x` with the stress extrapolated from the positions `from`. Returns whether there is
+    /// one; if not, `H` may stay as it is.
+    fn extrapolated_hessian(
+        &mut self,
+        _team: &mut Team,
+        _from: &[Vector3<f64>],
+        _x: &[Vector3<f64>],
+        _H: &mut BlockCsr<f64>,
+    ) -> bool {
+        false
+    }
+
     /// Elastic energy [J] at the last gradient; 0 if there is none. A body under prescribed displacements
     /// alone has no loads to measure the residual against, so this stands in.
     fn stored(&self) -> f64 {
@@ -118,20 +130,22 @@ pub struct NewtonReport {
 pub struct Newton {
     /// Settings; may be changed between solves.
     pub settings: NewtonSettings,
-    solver: LinearSolver,
-    hessian: BlockCsr<f64>,
-    g: Vec<Vector3<f64>>,
+    pub(super) solver: LinearSolver,
+    pub(super) hessian: BlockCsr<f64>,
+    pub(super) g: Vec<Vector3<f64>>,
     minus_g: Vec<Vector3<f64>>,
-    p: Vec<Vector3<f64>>,
-    trial: Vec<Vector3<f64>>,
-    trial_g: Vec<Vector3<f64>>,
+    pub(super) p: Vec<Vector3<f64>>,
+    pub(super) trial: Vec<Vector3<f64>>,
+    pub(super) trial_g: Vec<Vector3<f64>>,
+    /// Positions before the last of the mixed steps.
+    pub(super) from: Vec<Vector3<f64>>,
     loads: Vec<Vector3<f64>>,
 }
 
 /// Armijo's factor: the part of the promised decrease that a step must keep.
 const ARMIJO: f64 = 1e-4;
 /// Differences of Φ below this part of the largest |Φ| met are rounding.
-const ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-12;
 /// Least reference, relative to the norm √(2Ψ) of the elastic forces. Without loads, and with held nodes
 /// where they were, a residual could otherwise be measured only against rounding.
 pub const LEAST_REFERENCE: f64 = 1e-3;
@@ -162,8 +176,8 @@ impl Newton {
     pub fn prepare(&mut self, potential: &mut dyn Potential) {
         self.hessian = potential.pattern();
         let n = self.hessian.n_rows();
-        let Self { g, minus_g, p, trial, trial_g, loads, .. } = self;
-        for v in [g, minus_g, p, trial, trial_g, loads] {
+        let Self { g, minus_g, p, trial, trial_g, from, loads, .. } = self;
+        for v in [g, minus_g, p, trial, trial_g, from, loads] {
             v.clear();
             v.resize(n, Vector3::zeros());
         }
@@ -187,12 +201,17 @@ impl Newton {
         if self.hessian.n_rows() != x.len() {
             self.prepare(potential);
         }
-        let mut report = NewtonReport::default();
-        let mut phi = potential.gradient(team, x, &mut self.g);
-        let mut largest = phi.abs();
+        let potential_there = potential.gradient(team, x, &mut self.g);
+        let mut report = NewtonReport { potential: potential_there, ..NewtonReport::default() };
         let mut first = None;
         let mut curvature = self.settings.curvature;
+        if self.mixed_steps(team, potential, (x, fixed), (&mut report, &mut first)) {
+            return report;
+        }
+        let mut phi = report.potential;
+        let mut largest = phi.abs();
         let mut floor = Floor::default();
+        let mut moved = false;
         loop {
             report.potential = phi;
             if !phi.is_finite() || !self.g.iter().all(|g| g.norm_squared().is_finite()) {
@@ -204,7 +223,7 @@ impl Newton {
                 return report;
             }
             // After the first step, the previous preconditioner tells whether a new Hessian is needed at all.
-            if first.is_some() && self.measure(potential, &mut report, &mut first) {
+            if moved && self.measure(potential, &mut report, &mut first) {
                 return report;
             }
             potential.hessian(team, x, curvature, &mut self.hessian);
@@ -218,7 +237,8 @@ impl Newton {
                 return report;
             }
             let (before, backtracks) = (report.residual, report.backtracks);
-            let definite = self.direction(team, curvature, &mut report);
+            let most = self.settings.linear.tolerance.min(report.residual.sqrt());
+            let definite = self.direction(team, (curvature, most), &mut report);
             // An indefinite Hessian may point uphill: make this step with its projection.
             if !definite && curvature == Curvature::Exact {
                 curvature = Curvature::Definite;
@@ -257,11 +277,12 @@ impl Newton {
             std::mem::swap(&mut self.g, &mut self.trial_g);
             report.steps += 1;
             curvature = self.settings.curvature;
+            moved = true;
         }
     }
 
     /// Writes the residual into the report. Returns whether the tolerance is reached.
-    fn measure(
+    pub(super) fn measure(
         &mut self,
         potential: &mut dyn Potential,
         report: &mut NewtonReport,
@@ -278,8 +299,14 @@ impl Newton {
         norm <= self.settings.tolerance * report.reference
     }
 
-    /// Computes p with H p ≈ −g. Returns whether H showed no direction of non-positive curvature.
-    fn direction(&mut self, team: &mut Team, curvature: Curvature, report: &mut NewtonReport) -> bool {
+    /// Computes p with H p ≈ −g, with a forcing term of at most `most`. Returns whether H showed no direction
+    /// of non-positive curvature.
+    pub(super) fn direction(
+        &mut self,
+        team: &mut Team,
+        (curvature, most): (Curvature, f64),
+        report: &mut NewtonReport,
+    ) -> bool {
         for (minus_g, g) in self.minus_g.iter_mut().zip(&self.g) {
             *minus_g = -g;
         }
@@ -287,7 +314,7 @@ impl Newton {
         // Eisenstat, Walker 1996: solve the more accurately, the closer the end; never beyond it.
         let linear = self.settings.linear;
         let needed = 0.1 * self.settings.tolerance / report.residual.max(f64::MIN_POSITIVE);
-        let tolerance = linear.tolerance.min(report.residual.sqrt()).max(needed.min(0.1));
+        let tolerance = most.max(needed.min(0.1));
         self.solver.settings = LinearSettings { tolerance, ..linear };
         let mut solved = self.solver.solve(team, &self.hessian, &self.minus_g, &mut self.p, None);
         // A matrix that must be definite was not factorised: conjugate gradients take over.
