@@ -1,8 +1,8 @@
 //! What is kept of a motion from step to step, whichever way its equations are solved.
 
-use super::State;
 use super::multistep::Multistep;
 use super::spin::SpinGuard;
+use super::state::State;
 
 /// History and guards of a motion.
 #[derive(Debug, Default)]

@@ -7,10 +7,10 @@
 
 use nalgebra::Vector3;
 
-use super::hold;
 use super::mass::Mass;
 use super::scheme::{MassKind, Scheme};
 use super::springs::ActiveSpring;
+use super::state::hold;
 use crate::assembly::{BlockCsr, Model, Tangent};
 
 use crate::material::Rayleigh;

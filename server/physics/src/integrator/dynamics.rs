@@ -9,14 +9,16 @@ use thiserror::Error;
 
 use super::course::Course;
 use super::free_motion::{FreeMotion, free_motions};
+use super::model_solver::ModelSolver;
 use super::multistep::Multistep;
 use super::notice::Notice;
 use super::parts::LooseParts;
 use super::report::{Outcome, SolveReport};
 use super::scheme::Scheme;
+use super::settings::DynamicsSettings;
+use super::state::State;
 use super::step_inputs::StepInputs;
 use super::step_solver::{SolverSettings, StepSolver};
-use super::{DynamicsSettings, ModelSolver, State};
 use crate::assembly::{Model, ModelError};
 use crate::cut::NewCopy;
 use crate::material::{Law, Material};

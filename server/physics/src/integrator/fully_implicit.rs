@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::State;
 use super::course::Course;
 use super::model_solver::{ModelSolver, finite};
 use super::notice::Notice;
@@ -10,6 +9,7 @@ use super::potential::StepPotential;
 use super::report::{Outcome, SolveReport};
 use super::scheme::Scheme;
 use super::settings::LEAST_NEWTON_STEPS;
+use super::state::State;
 use super::statics::prescribe;
 use super::step_inputs::{StepHistory, StepInputs};
 use crate::assembly::Tangent;

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::State;
 use super::guard::LARGEST_TURN;
 use super::notice::Notice;
+use super::state::State;
 use crate::cut::NewCopy;
 
 /// The last two states.

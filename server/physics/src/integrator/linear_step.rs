@@ -15,9 +15,9 @@ use nalgebra::Vector3;
 
 use super::parts::Translations;
 use super::springs::ActiveSpring;
+use super::state::{State, WEIGHTLESS, hold};
 use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
 use super::step_solver::ActiveSprings;
-use super::{State, WEIGHTLESS, hold};
 use crate::material::Rayleigh;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,

@@ -1,5 +1,6 @@
 //! Time integration: one step in time, or the way to an equilibrium.
 
+mod state;
 mod scheme;
 mod settings;
 mod report;
@@ -44,39 +45,7 @@ pub use report::{Outcome, SolveReport};
 pub use scheme::{MassKind, Scheme};
 pub use settings::{DynamicsSettings, LEAST_NEWTON_STEPS};
 pub use springs::{PointSpring, SpringKind};
+pub use state::{State, WEIGHTLESS};
 pub use statics::{StaticProblem, find_equilibrium, prescribe};
 pub use step_inputs::StepInputs;
 pub use step_solver::{SolverSettings, StepSolver};
-
-use nalgebra::Vector3;
-
-use crate::operator::FixedCopy;
-
-/// Positions and velocities that a body keeps from step to step, one entry per copy.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Positions [m].
-    pub x: Vec<Vector3<f64>>,
-    /// Velocities [m/s].
-    pub v: Vec<Vector3<f64>>,
-}
-
-/// A copy lighter than this [kg] has no inertia that single precision could represent.
-pub const WEIGHTLESS: f64 = 1e-30;
-
-/// Sets the prescribed directions of `v` to 0.
-fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
-    for f in fixed {
-        for axis in (0..3).filter(|&axis| f.axes[axis]) {
-            v[f.copy as usize][axis] = 0.0;
-        }
-    }
-}
-
-impl State {
-    /// Copies `other` into this state, without allocating if the lengths agree.
-    pub fn copy_from(&mut self, other: &State) {
-        self.x.clone_from(&other.x);
-        self.v.clone_from(&other.v);
-    }
-}

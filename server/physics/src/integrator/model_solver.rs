@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::State;
 use super::course::Course;
 use super::critical_step::PowerIteration;
 use super::mass::Mass;
@@ -18,6 +17,7 @@ use super::relaxation::Relaxation;
 use super::report::SolveReport;
 use super::scheme::Scheme;
 use super::settings::DynamicsSettings;
+use super::state::State;
 use super::step_inputs::StepInputs;
 use super::step_solver::{ActiveSprings, SolverSettings, StepSolver};
 use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};

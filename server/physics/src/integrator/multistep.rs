@@ -3,13 +3,13 @@
 
 use nalgebra::Vector3;
 
-use super::State;
 use super::guard::{GAIN_CONSERVING, GAIN_DISSIPATING, LARGEST_TURN, Ledger};
 use super::history::History;
 use super::increment::{Increment, bdf2_history, newmark_history};
 use super::notice::Notice;
 use super::scheme::Scheme;
 use super::spin::SpinGuard;
+use super::state::State;
 use super::step_inputs::{StepHistory, StepInputs};
 use crate::cut::NewCopy;
 use crate::material::Law;

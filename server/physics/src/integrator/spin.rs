@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::State;
 use super::parts::LooseParts;
+use super::state::State;
 
 /// Measures how fast connected parts turn, and slows free ones.
 #[derive(Clone, Debug, Default)]

@@ -2,10 +2,10 @@
 
 use nalgebra::Vector3;
 
-use super::State;
 use super::increment::Increment;
 use super::parts::LooseParts;
 use super::springs::{ActiveSpring, PointSpring};
+use super::state::State;
 use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{ElasticUpdate, FixedCopy};

@@ -5,11 +5,12 @@ use std::fmt::Debug;
 use nalgebra::Vector3;
 
 use super::course::Course;
+use super::notice::Notice;
 use super::report::SolveReport;
 use super::scheme::Scheme;
 use super::springs::ActiveSpring;
+use super::state::State;
 use super::step_inputs::StepInputs;
-use super::{Notice, State};
 use crate::assembly::{Model, ModelError};
 use crate::material::Material;
 use crate::operator::{FixedCopy, Stiffness};
