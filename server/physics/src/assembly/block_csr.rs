@@ -90,8 +90,9 @@ impl BlockCsr<f64> {
         });
     }
 
-    #[inline]
-    fn row_times(&self, i: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
+    /// Row `i` of A x.
+    #[inline(always)]
+    pub(crate) fn row_times(&self, i: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
         let mut y = [0.0; 3];
         let row = self.row(i);
         for (A, &j) in self.blocks[row.clone()].iter().zip(&self.columns[row]) {

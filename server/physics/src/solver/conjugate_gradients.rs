@@ -272,14 +272,6 @@ fn verdict(norm: f64, target: f64) -> StopReason {
 impl Rows<f64> for BlockCsr<f64> {
     #[inline(always)]
     fn times(&self, i: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
-        let row = self.row(i);
-        let mut y = [0.0; 3];
-        for (A, &j) in self.blocks[row.clone()].iter().zip(&self.columns[row]) {
-            let x = &x[j as usize];
-            for k in 0..3 {
-                y[k] += A[3 * k] * x.x + A[3 * k + 1] * x.y + A[3 * k + 2] * x.z;
-            }
-        }
-        y.into()
+        self.row_times(i, x)
     }
 }
