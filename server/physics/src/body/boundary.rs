@@ -49,13 +49,12 @@ impl Boundary {
         }
     }
 
-    /// Stores constraints and loads with the nodes they act on.
-    pub fn onto_nodes(&self, nodes: &mut [SnapNode]) {
-        for fixed in &self.fixed {
-            nodes[fixed.node as usize].fixed = Some((fixed.axes, fixed.displacement_m));
-        }
-        nodes.iter_mut().zip(&self.point_force).for_each(|(node, force)| node.point_force = *force);
-        nodes.iter_mut().zip(&self.spread_force).for_each(|(node, force)| node.spread_force = *force);
+    /// Stores constraint and loads of a node with it.
+    pub fn onto_node(&self, number: u32, node: &mut SnapNode) {
+        node.fixed = self.fixed_at(number).map(|fixed| (fixed.axes, fixed.displacement_m));
+        let force = |forces: &[Vector3<f64>]| forces.get(number as usize).copied().unwrap_or_default();
+        node.point_force = force(&self.point_force);
+        node.spread_force = force(&self.spread_force);
     }
 
     /// Applies the requests made between `then` and `now`. `origins` maps their nodes to the `n` nodes of

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::snapping::SnapCut;
+use super::snapping::FaceCut;
 use super::{Body, BodyError, element_name};
 use crate::assembly::ElementKind;
 use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Piece, Work, swept_area};
@@ -36,7 +36,7 @@ impl Body {
             let segments = (limit / n_elements.max(1)).max(2);
             return Err(CutError::TooManySegments { found: blade.segments.len(), limit: segments }.into());
         }
-        self.under_way = Some(SnapCut { blade: blade.clone(), incision });
+        self.under_way = Some(FaceCut { blade: blade.clone(), incision });
         Ok(())
     }
 
@@ -46,7 +46,7 @@ impl Body {
     /// # Errors
     /// As [`cut`](Self::cut).
     pub fn go_on_cutting(&mut self, work: &mut Work) -> Result<Option<CutReport>, BodyError> {
-        if let Some(SnapCut { blade, incision }) = self.under_way.take() {
+        if let Some(FaceCut { blade, incision }) = self.under_way.take() {
             work.book(blade.segments.len() * self.space.mesh().tets.len() / SNAP_PAIRS_PER_FRAGMENT);
             return self.snap_cut(&blade, incision).map(Some);
         }

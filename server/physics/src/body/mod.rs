@@ -49,7 +49,7 @@ use crate::team::Team;
 use boundary::Boundary;
 use precision::too_flat_for_single;
 use range::{Beyond, Range};
-use snapping::{SnapCut, SnapState};
+use snapping::{FaceCut, SnapState};
 
 /// Material constants that may change while a body moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,7 +90,7 @@ pub struct Body {
     /// State of cutting along faces; `None` for other bodies.
     snap: Option<Box<SnapState>>,
     /// A cut along faces that was begun and is not complete.
-    under_way: Option<SnapCut>,
+    under_way: Option<FaceCut>,
 }
 
 impl Body {

@@ -6,7 +6,7 @@ use super::boundary::Boundary;
 use super::{Body, BodyError};
 use crate::cut::{BladeSweep, CutMesh, CutReport, NewCopy};
 use crate::mesh::TetMesh;
-use crate::snap::{SnapNode, SnapReport, Snapper};
+use crate::snap::{Nodes, SnapCut, SnapNode, SnapReport, Snapper};
 use crate::space::Tets;
 
 /// How cuts are made.
@@ -43,7 +43,7 @@ pub(super) struct SnapState {
 
 /// A cut along faces that was begun.
 #[derive(Clone, Debug)]
-pub(super) struct SnapCut {
+pub(super) struct FaceCut {
     pub blade: BladeSweep,
     pub incision: u32,
 }
@@ -91,10 +91,18 @@ impl Body {
     /// Cuts along faces. Held nodes stay in place, and all their duplicates are held. Loads of a
     /// duplicated node are shared by volume.
     pub(super) fn snap_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
-        // On a clone of the state, so that a refused cut leaves the body as it was.
-        let Some(mut snap) = self.snap.clone() else { return Ok(CutReport::default()) };
-        let nodes = self.snap_nodes();
-        let (report, cut) = snap.snapper.cut(&self.space.mesh().tets, nodes, blade, incision)?;
+        let Some(mut snap) = self.snap.take() else { return Ok(CutReport::default()) };
+        let before = snap.snapper.clone();
+        let result = self.snap_with(&mut snap.snapper, blade, incision);
+        // A refused cut leaves the body as it was.
+        let (report, cut) = match result {
+            Ok(done) => done,
+            Err(error) => {
+                snap.snapper = before;
+                self.snap = Some(snap);
+                return Err(error);
+            }
+        };
         let mut told = CutReport {
             elements_cut: report.elements,
             faces_opened: report.faces,
@@ -108,9 +116,6 @@ impl Body {
             self.snap = Some(snap);
             return Ok(told);
         };
-        told.epoch += 1;
-        let cut_mesh = CutMesh::with_lips(cut.mesh, snap.snapper.tags(), told.epoch)?;
-        self.space = Box::new(Tets::linear(cut_mesh));
         told.new_copies = cut.duplicates.iter().map(|d| NewCopy { copy: d.node, parent: d.parent }).collect();
         // A reset must restore requests made since the last cut, but not the pins.
         snap.take_changes(&self.boundary);
@@ -158,15 +163,24 @@ impl Body {
         Ok(())
     }
 
-    fn snap_nodes(&self) -> Vec<SnapNode> {
-        let rest = &self.space.mesh().nodes;
-        let mut nodes: Vec<SnapNode> =
-            (0u32..).zip(rest).map(|(n, &rest)| SnapNode::at_rest(rest, n)).collect();
-        for ((node, x), v) in nodes.iter_mut().zip(&self.state.x).zip(&self.state.v) {
-            (node.x, node.v) = (*x, *v);
+    /// Runs `snapper` on the mesh of this body, and replaces the mesh by the new one if there is one.
+    fn snap_with(
+        &mut self,
+        snapper: &mut Snapper,
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(SnapReport, Option<SnapCut>), BodyError> {
+        let (epoch, boundary) = (self.space.epoch() + 1, &self.boundary);
+        let data = |n: u32, node: &mut SnapNode| boundary.onto_node(n, node);
+        let nodes = Nodes { rest: &self.rest, x: &self.state.x, v: &self.state.v, data: &data };
+        let (report, mut cut) = self.space.cut_along_faces(snapper, nodes, blade, incision)?;
+        if let Some(cut) = &mut cut {
+            let mut cut_mesh = CutMesh::with_lips(std::mem::take(&mut cut.mesh), snapper.tags(), epoch)?;
+            let x: Vec<Vector3<f64>> = cut.nodes.iter().map(|node| node.x).collect();
+            snapper.follow(&mut cut_mesh, &x, cut);
+            self.space = Box::new(Tets::linear(cut_mesh));
         }
-        self.boundary.onto_nodes(&mut nodes);
-        nodes
+        Ok((report, cut))
     }
 
     /// Holds every part that is held nowhere at its largest skin face, in its present position.

@@ -20,6 +20,7 @@ use super::sweep::sweep_triangle::SweepTriangle;
 use super::topology::components::Components;
 use super::topology::copies::CopyTable;
 use super::topology::crossings::Crossings;
+use super::topology::elements_around::ElementsAround;
 use super::topology::fragments::Fragments;
 use super::topology::incision_sets::IncisionSets;
 use super::topology::locate::piece_at;
@@ -167,6 +168,32 @@ impl CutMesh {
         self.copies.tets_around(copy, &self.pieces)
     }
 
+    /// The elements around every node.
+    pub(crate) fn elements_around(&self) -> &ElementsAround {
+        self.copies.elements_around()
+    }
+
+    /// Pieces whose tet may meet the box between two corners [m], ascending, and how many elements were looked
+    /// at to find them. `x` is the position [m] of every copy.
+    pub(crate) fn pieces_near(&mut self, x: &[Vector3<f64>], corners: &[Vector3<f64>; 2]) -> (&[u32], usize) {
+        let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
+        self.detector.find_candidates(&body, (&self.runs, &self.copies.node), corners);
+        (&self.detector.near, self.detector.examined)
+    }
+
+    /// Remembers a blade position by the material around it at the positions `x` [m] of the copies.
+    pub(crate) fn front(&mut self, segment: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> Front {
+        self.pieces_near(x, &[segment[0].inf(&segment[1]), segment[0].sup(&segment[1])]);
+        self.front_among_candidates(segment, x)
+    }
+
+    /// The same if the last search for pieces was at these positions, in a box that holds the segment.
+    pub(crate) fn front_among_candidates(&self, segment: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> Front {
+        let near = self.detector.tets_near(segment, &self.pieces);
+        let around = |copy| self.copies.tets_around(copy, &self.pieces);
+        Front::remember(segment, &Surroundings { near: &near, around: &around, x })
+    }
+
     /// Σ over pieces of ∫ N_a dV [m³] per copy. The mass of a copy is the density times this.
     pub fn copy_volume(&self) -> &[f64] {
         &self.copies.volume
@@ -285,13 +312,11 @@ impl CutMesh {
         // The sweep starts where the material has carried the last blade position of this incision.
         let mut triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
         triangles.iter_mut().for_each(|triangle| triangle.exact = !self.inexact);
-        let bounds = bounds(&triangles, blade);
+        let bounds = sweep_bounds(&triangles, blade);
         let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
         self.detector.find_candidates(&body, (&self.runs, &self.copies.node), &bounds);
         if let Some(last) = blade.segments.last() {
-            let near = self.detector.tets_near(last, &self.pieces);
-            let around = |copy| self.copies.tets_around(copy, &self.pieces);
-            let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
+            let front = self.front_among_candidates(last, x);
             self.fronts.insert(incision, front);
         }
         let place = self.detector.begin(&self.fragments);
@@ -358,7 +383,7 @@ impl CutMesh {
 }
 
 /// Box around the sweep and the last blade segment [m].
-fn bounds(triangles: &[SweepTriangle], blade: &BladeSweep) -> [Vector3<f64>; 2] {
+pub(crate) fn sweep_bounds(triangles: &[SweepTriangle], blade: &BladeSweep) -> [Vector3<f64>; 2] {
     let mut low = Vector3::repeat(f64::INFINITY);
     let mut high = Vector3::repeat(f64::NEG_INFINITY);
     for triangle in triangles {

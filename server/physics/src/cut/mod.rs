@@ -33,6 +33,7 @@ mod incision_mark;
 mod solid;
 mod flaws;
 
+pub(crate) use cut_mesh::sweep_bounds;
 pub use cut_mesh::{CutMesh, SweepUnderWay};
 pub use drawn::pending::PendingFace;
 pub use flaws::Flaws;
@@ -40,11 +41,12 @@ pub use incision_mark::{IncisionMark, MarkPoint};
 pub use shell::surface::Surface;
 pub use solid::Solid;
 pub use sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, MAX_SEGMENTS, Work};
-pub(crate) use sweep::front::{Front, Surroundings, sweep_triangles};
+pub(crate) use sweep::front::{Front, sweep_triangles};
 pub(crate) use sweep::sweep_triangle::SweepTriangle;
 pub use sweep::swept_area::swept_area;
 pub use topology::components::Components;
 pub use topology::copies::NewCopy;
+pub(crate) use topology::elements_around::ElementsAround;
 pub use topology::pieces::Piece;
 
 #[cfg(test)]

@@ -36,7 +36,7 @@ pub fn collapse(complex: &mut Complex, a: u32, b: u32, floor: f64) -> Option<Col
     if !link_condition(complex, a, b) {
         return None;
     }
-    let [node_a, node_b] = [a, b].map(|n| complex.nodes[n as usize]);
+    let [node_a, node_b] = [a, b].map(|n| complex.node(n));
     let middle = SnapNode::between(&[&node_a, &node_b], &[0.5, 0.5]);
     let places = match (node_a.fixed.is_some(), node_b.fixed.is_some()) {
         (true, true) => return None,
@@ -46,7 +46,7 @@ pub fn collapse(complex: &mut Complex, a: u32, b: u32, floor: f64) -> Option<Col
     };
     let (kept, gone, place) =
         places.into_iter().find(|(kept, gone, place)| improves(complex, *kept, *gone, place, floor))?;
-    let (mut node, other) = (complex.nodes[kept as usize].placed_at(&place), complex.nodes[gone as usize]);
+    let (mut node, other) = (complex.node(kept).placed_at(&place), complex.node(gone));
     node.point_force += other.point_force;
     node.spread_force += other.spread_force;
     if node.origin == NEW {
@@ -147,7 +147,7 @@ fn without(&[p, q, r]: &FaceKey, n: u32) -> Option<[u32; 2]> {
 
 /// Adds a node on the edge from `a` to `b`, at parameter `s` from `a`, and splits the elements around it.
 pub fn split_edge(complex: &mut Complex, a: u32, b: u32, s: f64) -> u32 {
-    let place = SnapNode::between(&[&complex.nodes[a as usize], &complex.nodes[b as usize]], &[1.0 - s, s]);
+    let place = SnapNode::between(&[&complex.node(a), &complex.node(b)], &[1.0 - s, s]);
     split(complex, place, &[a, b])
 }
 
@@ -155,7 +155,7 @@ pub fn split_edge(complex: &mut Complex, a: u32, b: u32, s: f64) -> u32 {
 /// the elements next to it.
 pub fn split_face(complex: &mut Complex, t: u32, k: usize, weights: [f64; 3]) -> u32 {
     let face = complex.face(t, k);
-    let place = SnapNode::between(&face.map(|n| &complex.nodes[n as usize]), &weights);
+    let place = SnapNode::between(&face.map(|n| complex.node(n)).each_ref(), &weights);
     split(complex, place, &face)
 }
 

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::node::SnapNode;
+use super::node::{Nodes, SnapNode};
+use super::paged::Paged;
+use crate::cut::ElementsAround;
 use crate::mesh::TET_FACES;
 
 /// Nodes of a face in ascending order: a key that is the same from both of its elements.
@@ -16,20 +18,39 @@ pub fn face_key(mut nodes: [u32; 3]) -> FaceKey {
     nodes
 }
 
-/// Elements, their nodes, and the faces that incisions have marked.
-#[derive(Clone, Debug, Default)]
-pub struct Complex {
-    /// All nodes. Those that no element uses any more are dropped at the end of the cut.
-    pub nodes: Vec<SnapNode>,
+/// The mesh before a cut.
+#[derive(Clone, Copy)]
+pub struct Before<'a> {
     /// Node ids per element, positively oriented.
-    tets: Vec<[u32; 4]>,
-    alive: Vec<bool>,
+    pub tets: &'a [[u32; 4]],
     /// Elements around every node.
-    around: Vec<Vec<u32>>,
+    pub around: &'a ElementsAround,
+    /// Nodes in both configurations.
+    pub nodes: Nodes<'a>,
+}
+
+/// Elements, their nodes, and the faces that incisions have marked: the mesh before the cut and what was
+/// changed of it since. A cut costs what it changes, whatever the size of the mesh.
+#[derive(Clone)]
+pub struct Complex<'a> {
+    before: Before<'a>,
+    /// All nodes. Those that no element uses any more are dropped at the end of the cut.
+    nodes: Paged<SnapNode>,
+    elements: Paged<Element>,
+    /// Elements around every node.
+    around: Paged<Vec<u32>>,
     /// Incision per face: of a lip if the face is on the surface, else of a face that is selected but still
     /// closed.
     tags: BTreeMap<FaceKey, u32>,
     journal: Vec<Edit>,
+}
+
+/// An element.
+#[derive(Clone, Copy, Debug)]
+struct Element {
+    /// Node ids, positively oriented.
+    tet: [u32; 4],
+    alive: bool,
 }
 
 /// One reversible change.
@@ -46,35 +67,68 @@ enum Edit {
 #[derive(Clone, Copy, Debug)]
 pub struct Mark(usize);
 
-impl Complex {
+impl<'a> Complex<'a> {
     /// The complex of a checked mesh.
-    pub fn new(nodes: Vec<SnapNode>, tets: &[[u32; 4]], tags: BTreeMap<FaceKey, u32>) -> Self {
-        let mut around = vec![Vec::new(); nodes.len()];
-        for (t, tet) in (0u32..).zip(tets) {
-            tet.iter().for_each(|&n| around[n as usize].push(t));
+    pub fn new(before: Before<'a>, tags: BTreeMap<FaceKey, u32>) -> Self {
+        let (n_nodes, n_elements) = (before.nodes.rest.len(), before.tets.len());
+        Self {
+            before,
+            nodes: Paged::new(n_nodes),
+            elements: Paged::new(n_elements),
+            around: Paged::new(n_nodes),
+            tags,
+            journal: Vec::new(),
         }
-        let alive = vec![true; tets.len()];
-        Self { nodes, tets: tets.to_vec(), alive, around, tags, journal: Vec::new() }
     }
 
     /// Number of element slots, including removed elements.
     pub fn n_slots(&self) -> usize {
-        self.tets.len()
+        self.elements.len()
+    }
+
+    /// Number of nodes, including those that no element uses.
+    pub fn n_nodes(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Number of elements and nodes copied in order to change them.
+    pub fn copied(&self) -> usize {
+        self.elements.copied() + self.nodes.copied().max(self.around.copied())
     }
 
     /// Whether element `t` has not been removed.
     pub fn is_alive(&self, t: u32) -> bool {
-        self.alive[t as usize]
+        self.elements.get(t).is_none_or(|element| element.alive)
     }
 
     /// Nodes of element `t`.
     pub fn tet(&self, t: u32) -> [u32; 4] {
-        self.tets[t as usize]
+        self.elements.get(t).map_or_else(|| self.before.tets[t as usize], |element| element.tet)
+    }
+
+    /// A node with all its data.
+    pub fn node(&self, n: u32) -> SnapNode {
+        self.nodes.get(n).copied().unwrap_or_else(|| self.before.nodes.node(n))
+    }
+
+    /// Rest position [m] of a node.
+    pub fn rest_of(&self, n: u32) -> Vector3<f64> {
+        self.nodes.get(n).map_or_else(|| self.before.nodes.rest[n as usize], |node| node.rest)
+    }
+
+    /// Present position [m] of a node.
+    pub fn x_of(&self, n: u32) -> Vector3<f64> {
+        self.nodes.get(n).map_or_else(|| self.before.nodes.x[n as usize], |node| node.x)
+    }
+
+    /// Positions [m] of all nodes before the cut.
+    pub fn x_before(&self) -> &'a [Vector3<f64>] {
+        self.before.nodes.x
     }
 
     /// Elements around a node.
     pub fn around(&self, node: u32) -> &[u32] {
-        &self.around[node as usize]
+        self.around.get(node).map_or_else(|| self.before.around.of(node), |elements| &elements[..])
     }
 
     /// Elements around an edge.
@@ -99,6 +153,11 @@ impl Complex {
         self.tags.get(key).copied()
     }
 
+    /// The marked faces, at the end of a cut.
+    pub fn into_tags(self) -> BTreeMap<FaceKey, u32> {
+        self.tags
+    }
+
     /// All marked faces.
     pub fn tags(&self) -> &BTreeMap<FaceKey, u32> {
         &self.tags
@@ -106,45 +165,60 @@ impl Complex {
 
     /// Rest positions [m] of the corners of `t`.
     pub fn rest(&self, t: u32) -> [Vector3<f64>; 4] {
-        self.tet(t).map(|n| self.nodes[n as usize].rest)
+        self.tet(t).map(|n| self.rest_of(n))
     }
 
     /// Present positions [m] of the corners of `t`.
     pub fn now(&self, t: u32) -> [Vector3<f64>; 4] {
-        self.tet(t).map(|n| self.nodes[n as usize].x)
+        self.tet(t).map(|n| self.x_of(n))
     }
 
     /// Adds an element.
     pub fn add_tet(&mut self, tet: [u32; 4]) -> u32 {
-        let t = self.tets.len() as u32;
-        self.tets.push(tet);
-        self.alive.push(true);
-        tet.iter().for_each(|&n| self.around[n as usize].push(t));
+        let (t, before) = (self.elements.len() as u32, self.before);
+        self.elements.push(Element { tet, alive: true }, |t| before.element(t));
+        tet.iter().for_each(|&n| self.around_mut(n).push(t));
         self.journal.push(Edit::Added);
         t
     }
 
     /// Removes an element.
     pub fn remove_tet(&mut self, t: u32) {
-        self.alive[t as usize] = false;
+        self.element_mut(t).alive = false;
         for n in self.tet(t) {
-            self.around[n as usize].retain(|&s| s != t);
+            self.around_mut(n).retain(|&s| s != t);
         }
         self.journal.push(Edit::Removed(t));
     }
 
     /// Adds a node without elements.
     pub fn add_node(&mut self, node: SnapNode) -> u32 {
-        self.nodes.push(node);
-        self.around.push(Vec::new());
+        let before = self.before;
+        self.nodes.push(node, |n| before.nodes.node(n));
+        self.around.push(Vec::new(), |n| before.around.of(n).to_vec());
         self.journal.push(Edit::NodeAdded);
         self.nodes.len() as u32 - 1
     }
 
     /// Changes a node.
     pub fn set_node(&mut self, n: u32, node: SnapNode) {
-        self.journal.push(Edit::Moved(n, self.nodes[n as usize]));
-        self.nodes[n as usize] = node;
+        self.journal.push(Edit::Moved(n, self.node(n)));
+        *self.node_mut(n) = node;
+    }
+
+    fn node_mut(&mut self, n: u32) -> &mut SnapNode {
+        let before = self.before;
+        self.nodes.change(n, |n| before.nodes.node(n))
+    }
+
+    fn element_mut(&mut self, t: u32) -> &mut Element {
+        let before = self.before;
+        self.elements.change(t, |t| before.element(t))
+    }
+
+    fn around_mut(&mut self, n: u32) -> &mut Vec<u32> {
+        let before = self.before;
+        self.around.change(n, |n| before.around.of(n).to_vec())
     }
 
     /// Marks or unmarks a face.
@@ -158,13 +232,13 @@ impl Complex {
 
     /// Puts other nodes under an element and keeps its number. Not to be undone.
     pub fn rename(&mut self, t: u32, from: u32, to: u32) {
-        for n in &mut self.tets[t as usize] {
+        for n in &mut self.element_mut(t).tet {
             if *n == from {
                 *n = to;
             }
         }
-        self.around[from as usize].retain(|&s| s != t);
-        self.around[to as usize].push(t);
+        self.around_mut(from).retain(|&s| s != t);
+        self.around_mut(to).push(t);
     }
 
     /// Replaces all marks of faces. Not to be undone.
@@ -182,22 +256,21 @@ impl Complex {
         while self.journal.len() > mark.0 {
             match self.journal.pop() {
                 Some(Edit::Added) => {
-                    let t = self.tets.len() as u32 - 1;
+                    let t = self.elements.len() as u32 - 1;
                     for n in self.tet(t) {
-                        self.around[n as usize].retain(|&s| s != t);
+                        self.around_mut(n).retain(|&s| s != t);
                     }
-                    self.tets.pop();
-                    self.alive.pop();
+                    self.elements.pop();
                 }
                 Some(Edit::Removed(t)) => {
-                    self.alive[t as usize] = true;
+                    self.element_mut(t).alive = true;
                     for n in self.tet(t) {
-                        let around = &mut self.around[n as usize];
+                        let around = self.around_mut(n);
                         let at = around.partition_point(|&s| s < t);
                         around.insert(at, t);
                     }
                 }
-                Some(Edit::Moved(n, node)) => self.nodes[n as usize] = node,
+                Some(Edit::Moved(n, node)) => *self.node_mut(n) = node,
                 Some(Edit::NodeAdded) => {
                     self.nodes.pop();
                     self.around.pop();
@@ -211,6 +284,12 @@ impl Complex {
                 None => break,
             }
         }
+    }
+}
+
+impl Before<'_> {
+    fn element(&self, t: u32) -> Element {
+        Element { tet: self.tets[t as usize], alive: true }
     }
 }
 

@@ -42,7 +42,7 @@ pub fn dissect(complex: &mut Complex, nodes: &BTreeSet<u32>, memories: &mut [&mu
         }
         let volumes: Vec<f64> = components.iter().map(|c| star_volume(complex, c)).collect();
         let total: f64 = volumes.iter().sum();
-        let whole = complex.nodes[n as usize];
+        let whole = complex.node(n);
         for (component, volume) in components.iter().zip(&volumes) {
             let share = if total > 0.0 { volume / total } else { 1.0 / components.len() as f64 };
             let mut part = whole;

@@ -49,7 +49,7 @@ impl Crossing {
 
     /// Where it is now [m].
     pub fn point(&self, edge: &EdgeKey, complex: &Complex) -> Vector3<f64> {
-        let [a, b] = edge.map(|n| complex.nodes[n as usize].x);
+        let [a, b] = edge.map(|n| complex.x_of(n));
         a + (b - a) * self.t
     }
 }

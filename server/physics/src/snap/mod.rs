@@ -10,7 +10,8 @@
 //! 3. [`dissect`]: nodes are duplicated by the connected components of the elements around them.
 //! 4. [`clean`]: degenerate elements are removed by splitting and collapsing edges.
 //!
-//! [`Snapper`] runs them. Per incision it remembers what a sweep has crossed but not cut yet.
+//! [`Snapper`] runs them. Per incision it remembers what a sweep has crossed but not cut yet. It searches where
+//! a cut inside the elements does too, and copies only what it changes of the mesh.
 //!
 //! # Invariants
 //! A cut keeps the volume, hence the mass, and inverts no element. An element may become flat, but a moved
@@ -24,6 +25,7 @@
 //! Elements that cannot be collapsed are kept instead of removed.
 
 pub mod node;
+mod paged;
 pub mod complex;
 pub mod memory;
 pub mod select;
@@ -34,7 +36,7 @@ pub mod collapse;
 pub mod clean;
 mod snapper;
 
-pub use node::SnapNode;
+pub use node::{Nodes, SnapNode};
 pub use snapper::{SnapCut, SnapReport, Snapper};
 
 #[cfg(test)]

@@ -25,6 +25,29 @@ pub struct SnapNode {
     pub origin: u32,
 }
 
+/// All nodes of a body before a cut, as the body keeps them; lengths n_nodes.
+#[derive(Clone, Copy)]
+pub struct Nodes<'a> {
+    /// Rest positions [m].
+    pub rest: &'a [Vector3<f64>],
+    /// Present positions [m].
+    pub x: &'a [Vector3<f64>],
+    /// Velocities [m/s].
+    pub v: &'a [Vector3<f64>],
+    /// Adds constraint and loads to the node with this number.
+    pub data: &'a dyn Fn(u32, &mut SnapNode),
+}
+
+impl Nodes<'_> {
+    /// One node with all its data.
+    pub fn node(&self, n: u32) -> SnapNode {
+        let at_rest = SnapNode::at_rest(self.rest[n as usize], n);
+        let mut node = SnapNode { x: self.x[n as usize], v: self.v[n as usize], ..at_rest };
+        (self.data)(n, &mut node);
+        node
+    }
+}
+
 impl SnapNode {
     /// A free node at rest.
     pub fn at_rest(rest: Vector3<f64>, origin: u32) -> Self {

@@ -69,7 +69,7 @@ pub fn relocate_all(complex: &mut Complex, nodes: Vec<u32>, marks: &BTreeMap<u32
 
 /// Moves node `n` onto the sweep near `mark`. Returns `false` if it has to stay.
 fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
-    let node = complex.nodes[n as usize];
+    let node = complex.node(n);
     if node.fixed.is_some() {
         return false;
     }
@@ -84,7 +84,7 @@ fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
 
 /// The material point in the star of `n` that lies on the sweep.
 fn target(complex: &Complex, n: u32, mark: &NodeMark, freedom: Freedom) -> Option<SnapNode> {
-    let node = &complex.nodes[n as usize];
+    let node = complex.node(n);
     // Distance from the sweep [m], positive along its normal.
     let s = mark.normal.dot(&(node.x - mark.point));
     let least = if freedom == Freedom::Space { -OUTSIDE } else { -OUTSIDE_ON_SKIN };
@@ -105,8 +105,8 @@ fn target(complex: &Complex, n: u32, mark: &NodeMark, freedom: Freedom) -> Optio
         let Some(weights) = weights else { continue };
         let depth = weights.into_iter().fold(f64::INFINITY, f64::min);
         if depth >= least && best.as_ref().is_none_or(|b| depth > b.0) {
-            let nodes = complex.tet(t).map(|n| &complex.nodes[n as usize]);
-            best = Some((depth, SnapNode::between(&nodes, &weights)));
+            let nodes = complex.tet(t).map(|n| complex.node(n));
+            best = Some((depth, SnapNode::between(&nodes.each_ref(), &weights)));
         }
     }
     best.map(|b| b.1)
@@ -124,7 +124,7 @@ fn along(
     let edges = |x: [Vector3<f64>; 4]| Matrix3::from_columns(&[x[1] - x[0], x[2] - x[0], x[3] - x[0]]);
     let rest = complex.rest(t);
     let F = edges(complex.now(t)) * edges(rest).try_inverse()?;
-    let moved = complex.nodes[n as usize].rest + way(F.transpose() * mark.normal)?;
+    let moved = complex.rest_of(n) + way(F.transpose() * mark.normal)?;
     barycentric(&rest, &moved)
 }
 
@@ -135,7 +135,7 @@ fn freedom(complex: &Complex, n: u32) -> Freedom {
         for k in (0..4).filter(|&k| complex.tet(t)[k] != n) {
             if complex.neighbour(t, k).is_none() {
                 let face = complex.face(t, k);
-                let [p, q, r] = face.map(|n| complex.nodes[n as usize].rest);
+                let [p, q, r] = face.map(|n| complex.rest_of(n));
                 skin.push((face, (q - p).cross(&(r - p)), complex.tag(&face_key(face))));
             }
         }
@@ -160,7 +160,7 @@ fn freedom(complex: &Complex, n: u32) -> Freedom {
     let size: f64 = skin.iter().map(|face| face.1.norm()).sum();
     // At the tip of an incision the normals of the two lips cancel.
     let up = if up.norm() > 1e-9 * size { up.normalize() } else { Vector3::zeros() };
-    let rest = |m: u32| complex.nodes[m as usize].rest;
+    let rest = |m: u32| complex.rest_of(m);
     match creases[..] {
         [] => Freedom::Plane(up),
         [a, b] => {

@@ -42,10 +42,11 @@ pub struct Selection {
 }
 
 /// Intersects the sweep with the edges of the mesh. If an incision crosses an edge several times, its first
-/// crossing counts.
-pub fn cross(complex: &Complex, triangles: &[SweepTriangle], memory: &mut Memory) {
-    let boxes: Vec<(u32, [Vector3<f64>; 2])> = (0..complex.n_slots() as u32)
-        .map(|t| {
+/// crossing counts. The elements `near` the sweep, ascending, must be all that it may meet.
+pub fn cross(complex: &Complex, near: &[u32], triangles: &[SweepTriangle], memory: &mut Memory) {
+    let boxes: Vec<(u32, [Vector3<f64>; 2])> = near
+        .iter()
+        .map(|&t| {
             let [a, b, c, d] = complex.now(t);
             (t, [a.inf(&b).inf(&c.inf(&d)), a.sup(&b).sup(&c.sup(&d))])
         })
@@ -109,7 +110,7 @@ fn marks(complex: &Complex, memory: &Memory) -> BTreeMap<u32, NodeMark> {
     for (edge, crossing) in &memory.crossings {
         let node = crossing.near(edge);
         let point = crossing.point(edge, complex);
-        let distance = (point - complex.nodes[node as usize].x).norm();
+        let distance = (point - complex.x_of(node)).norm();
         if marks.get(&node).is_none_or(|mark| distance < mark.distance) {
             marks.insert(node, NodeMark { point, normal: crossing.normal, distance });
         }
@@ -131,7 +132,7 @@ fn separates(complex: &Complex, memory: &Memory, marks: &BTreeMap<u32, NodeMark>
         let apex = complex.tet(t).into_iter().find(|n| !face.contains(n)).filter(|n| !marked(n));
         // An element with four marked nodes is on the side of its centroid.
         let at = match apex {
-            Some(apex) => complex.nodes[apex as usize].x,
+            Some(apex) => complex.x_of(apex),
             None => complex.now(t).iter().sum::<Vector3<f64>>() / 4.0,
         };
         (at - plane.point).dot(&plane.normal) >= 0.0
@@ -168,11 +169,11 @@ fn close_notches(complex: &Complex, memory: &Memory, selection: &mut Selection) 
             if is_cut || decided(*t) || decided(other) {
                 continue;
             }
-            let middle = face.map(|n| complex.nodes[n as usize].x).iter().sum::<Vector3<f64>>() / 3.0;
+            let middle = face.map(|n| complex.x_of(n)).iter().sum::<Vector3<f64>>() / 3.0;
             let above = |t: u32| {
                 let apex = complex.tet(t).into_iter().find(|n| !face.contains(n) && normal(n).is_none());
                 // An element with four nodes on the surface counts as above it.
-                apex.is_none_or(|n| (complex.nodes[n as usize].x - middle).dot(&(p + q + r)) >= 0.0)
+                apex.is_none_or(|n| (complex.x_of(n) - middle).dot(&(p + q + r)) >= 0.0)
             };
             if above(*t) != above(other) {
                 faces.push(key);

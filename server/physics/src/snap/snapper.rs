@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::clean::clean;
-use super::complex::{Complex, FaceKey};
+use super::complex::{Before, Complex, FaceKey};
 use super::dissect::{Duplicate, dissect};
 use super::memory::Memory;
-use super::node::{NEW, SnapNode};
+use super::node::{NEW, Nodes, SnapNode};
 use super::relocate::relocate_all;
 use super::select::{Selection, cross, select};
-use crate::cut::{BladeSweep, CutError, Front, Surroundings, sweep_triangles};
+use crate::cut::{BladeSweep, CutError, CutMesh, ElementsAround, Front, sweep_bounds, sweep_triangles};
 use crate::mesh::TetMesh;
 
 /// Counts of what one cut did.
@@ -35,6 +35,10 @@ pub struct SnapReport {
     pub degenerate: usize,
     /// Crossed edges that no selected face represents yet. The cut lags there.
     pub pending: usize,
+    /// Work: elements looked at in search of those near the sweep.
+    pub examined: usize,
+    /// Work: elements and nodes copied in order to change some of them.
+    pub copied: usize,
 }
 
 /// The mesh after a cut.
@@ -46,6 +50,8 @@ pub struct SnapCut {
     pub nodes: Vec<SnapNode>,
     /// Nodes that were split off others by this cut.
     pub duplicates: Vec<Duplicate>,
+    /// Last blade position [m] of every incision, for [`Snapper::follow`].
+    pub fronts: Vec<(u32, [Vector3<f64>; 2])>,
 }
 
 /// Cuts one body along its faces, and remembers unfinished incisions.
@@ -59,11 +65,14 @@ pub struct Snapper {
 impl Snapper {
     /// A copy of the mesh in which only elements that share a face share nodes, as after a cut.
     pub fn prepared(mesh: &TetMesh) -> TetMesh {
-        let nodes = (0u32..).zip(&mesh.nodes).map(|(n, &rest)| SnapNode::at_rest(rest, n)).collect();
-        let mut complex = Complex::new(nodes, &mesh.tets, BTreeMap::new());
+        let (rest, v) = (&mesh.nodes[..], vec![Vector3::zeros(); mesh.nodes.len()]);
+        let around = ElementsAround::new(rest.len(), &mesh.tets);
+        let nodes = Nodes { rest, x: rest, v: &v, data: &|_, _| () };
+        let before = Before { tets: &mesh.tets, around: &around, nodes };
+        let mut complex = Complex::new(before, BTreeMap::new());
         dissect(&mut complex, &(0..mesh.nodes.len() as u32).collect(), &mut []);
         let tets = (0..mesh.tets.len() as u32).map(|t| complex.tet(t)).collect();
-        TetMesh { nodes: complex.nodes.iter().map(|n| n.rest).collect(), tets }
+        TetMesh { nodes: (0..complex.n_nodes() as u32).map(|n| complex.rest_of(n)).collect(), tets }
     }
 
     /// Incision of every surface face that is a lip, and of selected faces that are still closed.
@@ -71,15 +80,15 @@ impl Snapper {
         &self.tags
     }
 
-    /// Cuts along the surface that the blade swept, in the present configuration of `nodes`. Returns no mesh
-    /// as long as nothing can be cut.
+    /// Cuts `mesh` along the surface that the blade swept, in the present configuration of `nodes`. Returns no
+    /// mesh as long as nothing can be cut. A mesh that is returned must come back in [`follow`](Self::follow).
     ///
     /// # Errors
     /// Those of [`crate::cut::CutMesh::sweep`]. Nothing is changed then.
     pub fn cut(
         &mut self,
-        tets: &[[u32; 4]],
-        nodes: Vec<SnapNode>,
+        mesh: &mut CutMesh,
+        nodes: Nodes<'_>,
         blade: &BladeSweep,
         incision: u32,
     ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
@@ -87,36 +96,45 @@ impl Snapper {
         if incision == 0 {
             return Err(CutError::ReservedIncision);
         }
-        if let Some(copy) = nodes.iter().position(|n| !n.x.iter().all(|c| c.is_finite())) {
+        if let Some(copy) = nodes.x.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
             return Err(CutError::NonFinitePosition { copy });
         }
-        let x: Vec<Vector3<f64>> = nodes.iter().map(|n| n.x).collect();
-        let triangles = sweep_triangles(self.fronts.get(&incision), blade, &x);
-        let complex = Complex::new(nodes, tets, std::mem::take(&mut self.tags));
+        let triangles = sweep_triangles(self.fronts.get(&incision), blade, nodes.x);
+        let (near, examined) = mesh.pieces_near(nodes.x, &sweep_bounds(&triangles, blade));
+        // Nothing is cut inside the elements of this mesh, so its pieces are its elements.
+        let near = near.to_vec();
+        let before = Before { tets: &mesh.mesh().tets, around: mesh.elements_around(), nodes };
+        let complex = Complex::new(before, std::mem::take(&mut self.tags));
         let memory = self.memories.entry(incision).or_default();
-        cross(&complex, &triangles, memory);
+        cross(&complex, &near, &triangles, memory);
         let selection = select(&complex, memory);
         if selection.faces.is_empty() {
-            self.tags = complex.tags().clone();
-            let report = SnapReport { pending: memory.crossings.len(), ..SnapReport::default() };
-            self.remember(blade, incision, &complex, &x);
+            self.tags = complex.into_tags();
+            let report = SnapReport { pending: memory.crossings.len(), examined, ..SnapReport::default() };
+            if let Some(last) = blade.segments.last() {
+                self.fronts.insert(incision, mesh.front_among_candidates(last, nodes.x));
+            }
             return Ok((report, None));
         }
-        let (report, cut) = self.open(complex, &selection, blade, incision, &x);
-        Ok((report, Some(cut)))
+        let (report, cut) = self.open(complex, &selection, blade, incision);
+        Ok((SnapReport { examined, ..report }, Some(cut)))
+    }
+
+    /// Remembers the last blade positions by the material of the mesh after a cut, at the positions `x` [m] of
+    /// its nodes.
+    pub fn follow(&mut self, mesh: &mut CutMesh, x: &[Vector3<f64>], cut: &SnapCut) {
+        self.fronts = cut.fronts.iter().map(|(incision, ends)| (*incision, mesh.front(ends, x))).collect();
     }
 
     /// Moves nodes, opens the selected faces and removes degenerate elements.
     fn open(
         &mut self,
-        mut complex: Complex,
+        mut complex: Complex<'_>,
         selection: &Selection,
         blade: &BladeSweep,
         incision: u32,
-        x: &[Vector3<f64>],
     ) -> (SnapReport, SnapCut) {
-        let ends: Vec<(u32, [Vector3<f64>; 2])> =
-            self.fronts.iter().filter(|(id, _)| **id != incision).map(|(id, f)| (*id, f.ends(x))).collect();
+        let fronts = self.last_blades(&complex, blade, incision);
         let mut report = SnapReport { faces: selection.faces.len(), ..SnapReport::default() };
         let surface: BTreeSet<u32> = selection.faces.iter().flatten().copied().collect();
         // Nodes move before the faces open: a node still has all of its elements then, and moves for both
@@ -165,34 +183,24 @@ impl Snapper {
         }
         self.memories
             .retain(|id, memory| *id == incision || !memory.crossings.is_empty() || !memory.on.is_empty());
-        let cut = compact(&complex, &number, &duplicates);
-        // The fronts are bound to elements, which have new numbers as well.
+        report.copied = complex.copied();
+        let cut = SnapCut { fronts, ..compact(&complex, &number, &duplicates) };
         self.tags = tags_of(&complex, &number);
         report.pending = self.memories.get(&incision).map_or(0, |memory| memory.crossings.len());
-        let complex = Complex::new(cut.nodes.clone(), &cut.mesh.tets, BTreeMap::new());
-        let x: Vec<Vector3<f64>> = cut.nodes.iter().map(|n| n.x).collect();
-        self.fronts.clear();
-        for (id, ends) in ends {
-            self.remember(&BladeSweep { segments: vec![ends] }, id, &complex, &x);
-        }
-        self.remember(blade, incision, &complex, &x);
         (report, cut)
     }
 
-    /// Remembers the last blade position by the material it passed through.
-    fn remember(&mut self, blade: &BladeSweep, incision: u32, complex: &Complex, x: &[Vector3<f64>]) {
-        let Some(last) = blade.segments.last() else { return };
-        let (from, to) = (last[0].inf(&last[1]), last[0].sup(&last[1]));
-        let overlaps = |&t: &u32| {
-            let [a, b, c, d] = complex.now(t);
-            let (low, high) = (a.inf(&b).inf(&c.inf(&d)), a.sup(&b).sup(&c.sup(&d)));
-            (0..3).all(|k| from[k] <= high[k] && low[k] <= to[k])
-        };
-        let all = 0..complex.n_slots() as u32;
-        let near: Vec<[u32; 4]> = all.filter(overlaps).map(|t| complex.tet(t)).collect();
-        let around = |n: u32| complex.around(n).iter().map(|&t| complex.tet(t)).collect();
-        self.fronts
-            .insert(incision, Front::remember(last, &Surroundings { near: &near, around: &around, x }));
+    /// The last blade position [m] of every incision, at present. The fronts are bound to elements, which have
+    /// other numbers after a cut.
+    fn last_blades(
+        &self,
+        complex: &Complex<'_>,
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Vec<(u32, [Vector3<f64>; 2])> {
+        let others = self.fronts.iter().filter(|(id, _)| **id != incision);
+        let others = others.map(|(id, front)| (*id, front.ends(complex.x_before())));
+        others.chain(blade.segments.last().map(|last| (incision, *last))).collect()
     }
 }
 
@@ -209,18 +217,19 @@ fn numbers(complex: &Complex) -> Vec<Option<u32>> {
         next += u32::from(used);
         used.then(|| next - 1)
     };
-    (0..complex.nodes.len()).map(&mut number).collect()
+    (0..complex.n_nodes()).map(&mut number).collect()
 }
 
 fn compact(complex: &Complex, number: &[Option<u32>], duplicates: &[Duplicate]) -> SnapCut {
     let of = |n: u32| number[n as usize].unwrap_or(NEW);
-    let nodes: Vec<SnapNode> =
-        complex.nodes.iter().zip(number).filter(|(_, used)| used.is_some()).map(|(node, _)| *node).collect();
+    let used = (0u32..).zip(number).filter(|(_, number)| number.is_some());
+    let nodes: Vec<SnapNode> = used.map(|(n, _)| complex.node(n)).collect();
     let alive = (0..complex.n_slots() as u32).filter(|&t| complex.is_alive(t));
     let tets = alive.map(|t| complex.tet(t).map(of)).collect();
     let there = duplicates.iter().map(|d| Duplicate { node: of(d.node), parent: of(d.parent) });
     let duplicates = there.filter(|d| d.node != NEW && d.parent != NEW).collect();
-    SnapCut { mesh: TetMesh { nodes: nodes.iter().map(|n| n.rest).collect(), tets }, nodes, duplicates }
+    let mesh = TetMesh { nodes: nodes.iter().map(|n| n.rest).collect(), tets };
+    SnapCut { mesh, nodes, duplicates, fronts: Vec::new() }
 }
 
 fn tags_of(complex: &Complex, number: &[Option<u32>]) -> BTreeMap<FaceKey, u32> {

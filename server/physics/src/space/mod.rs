@@ -26,6 +26,7 @@ use crate::material::Material;
 use crate::mesh::{MeshError, TetMesh};
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
 
 /// What a discretisation offers a body. Its functions are called once per phase of a step or per cut, never
 /// per element.
@@ -142,6 +143,16 @@ pub trait Space: Points + Send {
 
     /// Whether a cut was begun and is not complete.
     fn is_being_cut(&self) -> bool;
+
+    /// Finds the mesh that a cut along its faces makes of this one, for `snapper` and the state of its nodes;
+    /// `None` if nothing comes apart yet. The mesh itself stays.
+    fn cut_along_faces(
+        &mut self,
+        snapper: &mut Snapper,
+        nodes: Nodes<'_>,
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(SnapReport, Option<SnapCut>), CutError>;
 
     /// Undoes all cuts and drops one under way. The epoch keeps rising.
     fn reset(&mut self) -> Result<(), MeshError>;

@@ -16,6 +16,7 @@ use crate::material::Material;
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
 use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
 
 /// Linear or quadratic tetrahedra, or hexahedra that are divided into tetrahedra. Only linear ones are cut.
 #[derive(Clone, Debug)]
@@ -224,6 +225,16 @@ impl Space for Tets {
 
     fn is_being_cut(&self) -> bool {
         self.under_way.is_some()
+    }
+
+    fn cut_along_faces(
+        &mut self,
+        snapper: &mut Snapper,
+        nodes: Nodes<'_>,
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
+        snapper.cut(&mut self.cut, nodes, blade, incision)
     }
 
     fn reset(&mut self) -> Result<(), MeshError> {

@@ -67,8 +67,10 @@ pub struct Detector {
     beyond: Vec<u8>,
     /// The same per node; a bit is set where it is set for all copies of the node.
     node_beyond: Vec<u8>,
-    /// Scratch: ids of the candidate pieces.
-    near: Vec<u32>,
+    /// Ids of the candidate pieces, ascending.
+    pub near: Vec<u32>,
+    /// Number of elements whose nodes the last search for candidates looked at.
+    pub examined: usize,
     marks: BitMarks,
     order: Ascending,
     position: Vec<Vector3<f64>>,
@@ -173,7 +175,8 @@ impl Detector {
             self.node_beyond[node as usize] &= beyond;
         }
         self.near.clear();
-        let elements = runs.within_reach(&self.node_beyond);
+        self.examined = 0;
+        let elements = runs.within_reach(&self.node_beyond).inspect(|_| self.examined += 1);
         self.near.extend(elements.flat_map(|e| pieces.of_element(e)).filter(|&p| {
             let [a, b, c, d] = pieces.pieces[p as usize].copies.map(|c| self.beyond[c as usize]);
             a & b & c & d == 0

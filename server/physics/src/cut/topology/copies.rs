@@ -8,6 +8,7 @@
 use crate::mesh::TetMesh;
 use crate::reserve::{reserve_half_again, reserved};
 
+use super::elements_around::ElementsAround;
 use super::fragments::{Fragments, NONE};
 use super::pieces::PieceTable;
 use super::slot::slot_of;
@@ -28,8 +29,7 @@ pub struct CopyTable {
     pub node: Vec<u32>,
     /// Σ over pieces of ∫ N_a dV [m³] per copy.
     pub volume: Vec<f64>,
-    around_start: Vec<u32>,
-    around: Vec<u32>,
+    around: ElementsAround,
     /// Pieces whose copies changed since the caller last cleared this list. A piece may appear more than
     /// once.
     pub changed: Vec<u32>,
@@ -53,28 +53,18 @@ impl CopyTable {
     /// One copy per node, before [`update`](Self::update) examines the connectivity.
     pub fn new(mesh: &TetMesh, pieces: &PieceTable) -> Self {
         let n = mesh.nodes.len();
-        let mut around_start = vec![0u32; n + 1];
-        for &node in mesh.tets.iter().flatten() {
-            around_start[node as usize + 1] += 1;
-        }
-        for i in 0..n {
-            around_start[i + 1] += around_start[i];
-        }
-        let mut fill = around_start.clone();
-        let mut around = vec![0u32; 4 * mesh.tets.len()];
-        for (e, tet) in (0u32..).zip(&mesh.tets) {
-            for &node in tet {
-                around[fill[node as usize] as usize] = e;
-                fill[node as usize] += 1;
-            }
-        }
         let mut volume = vec![0.0; n];
         for (tet, node_volume) in mesh.tets.iter().zip(&pieces.node_volume) {
             for (&node, v) in tet.iter().zip(node_volume) {
                 volume[node as usize] += v;
             }
         }
-        Self { node: (0..n as u32).collect(), volume, around_start, around, ..Self::default() }
+        Self {
+            node: (0..n as u32).collect(),
+            volume,
+            around: ElementsAround::new(n, &mesh.tets),
+            ..Self::default()
+        }
     }
 
     /// Reserves memory for cuts through a body of `n_elements` elements.
@@ -89,9 +79,8 @@ impl CopyTable {
     /// The copies of node `i` whose material contains the node itself, ascending. There is one, or more where
     /// a cut passes exactly through the node and each lip has it.
     pub fn with_node(&self, mesh: &TetMesh, i: u32, fragments: &Fragments, pieces: &PieceTable) -> Vec<u32> {
-        let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
         let mut found = Vec::new();
-        for &e in &self.around[range] {
+        for &e in self.around.of(i) {
             let Some(a) = slot_of(&mesh.tets[e as usize], i) else { continue };
             for t in fragments.of_element(e) {
                 let at_node = |&v: &u32| fragments.vertices[v as usize].nodes == [i, NONE, NONE, NONE];
@@ -105,10 +94,14 @@ impl CopyTable {
         found
     }
 
+    /// The elements around every node.
+    pub fn elements_around(&self) -> &ElementsAround {
+        &self.around
+    }
+
     /// Copies of all pieces that use this copy.
     pub fn tets_around(&self, copy: u32, pieces: &PieceTable) -> Vec<[u32; 4]> {
-        let i = self.node[copy as usize] as usize;
-        let elements = &self.around[self.around_start[i] as usize..self.around_start[i + 1] as usize];
+        let elements = self.around.of(self.node[copy as usize]);
         let all =
             elements.iter().flat_map(|&e| pieces.of_element(e)).map(|p| pieces.pieces[p as usize].copies);
         all.filter(|copies| copies.contains(&copy)).collect()
@@ -168,11 +161,10 @@ impl CopyTable {
     fn find_components_around(&mut self, mesh: &TetMesh, i: u32, fragments: &Fragments, pieces: &PieceTable) {
         self.stamp += 1;
         self.visited.resize(pieces.pieces.len(), 0);
-        let range = self.around_start[i as usize] as usize..self.around_start[i as usize + 1] as usize;
         self.components.clear();
         self.members.clear();
-        for k in range {
-            for seed in pieces.of_element(self.around[k]) {
+        for k in self.around.range(i) {
+            for seed in pieces.of_element(self.around.at(k)) {
                 if self.visited[seed as usize] != self.stamp {
                     let component = self.flood(mesh, i, seed, fragments, pieces);
                     self.components.push(component);

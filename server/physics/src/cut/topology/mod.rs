@@ -3,6 +3,7 @@
 //! Each is a pure function of the one before. A cut only opens faces between fragments.
 
 pub(crate) mod slot;
+pub(crate) mod elements_around;
 pub(crate) mod incision_sets;
 pub(crate) mod crossings;
 pub(crate) mod runs;

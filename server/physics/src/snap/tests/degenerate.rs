@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
+use crate::cut::ElementsAround;
 use crate::snap::clean::clean;
 use crate::snap::collapse::collapse;
-use crate::snap::complex::Complex;
+use crate::snap::complex::{Before, Complex};
 use crate::snap::shape::{FLAT, Kind, aspect, kind};
 
 fn corners(height: f64, apex: [f64; 2]) -> [Vector3<f64>; 4] {
@@ -27,8 +28,13 @@ fn kinds_are_told_by_their_large_angles() {
     assert!(aspect(&corners(1.0, [0.0, 0.0])) > 0.4);
 }
 
-fn complex_of(sample: &Sample) -> Complex {
-    Complex::new(sample.nodes.clone(), &sample.mesh.tets, BTreeMap::new())
+/// What `edit` makes of the complex of a body.
+fn edited<R>(sample: &Sample, edit: impl FnOnce(&mut Complex<'_>) -> R) -> R {
+    let (tets, rest) = (&sample.mesh.tets[..], &sample.mesh.nodes[..]);
+    let (around, [x, v]) = (ElementsAround::new(rest.len(), tets), sample.state());
+    let data = |n: u32, node: &mut SnapNode| *node = sample.nodes[n as usize];
+    let nodes = Nodes { rest, x: &x, v: &v, data: &data };
+    edit(&mut Complex::new(Before { tets, around: &around, nodes }, BTreeMap::new()))
 }
 
 fn volume(complex: &Complex) -> f64 {
@@ -44,18 +50,19 @@ fn flat_elements_go_and_the_volume_stays() {
     let places = [v(0.2505, 0.5, 0.5), v(0.2505, 0.2505, 0.2505), v(0.5, 0.5, 0.2503), v(0.375, 0.3752, 0.5)];
     for place in places {
         let mut sample = Sample::unit(4);
-        (sample.nodes[inner].rest, sample.nodes[inner].x) = (place, place);
-        let mut complex = complex_of(&sample);
-        let all: BTreeSet<u32> = (0..complex.n_slots() as u32).collect();
-        let flat = |complex: &Complex| {
-            let alive = (0..complex.n_slots() as u32).filter(|&t| complex.is_alive(t));
-            alive.filter(|&t| aspect(&complex.rest(t)) < FLAT).count()
-        };
-        let before = (flat(&complex), volume(&complex));
-        let cleaned = clean(&mut complex, all);
-        assert_eq!(flat(&complex), cleaned.left);
-        assert!(before.0 == 0 || cleaned.left < before.0, "{place:?}: {} flat, {cleaned:?}", before.0);
-        assert!((volume(&complex) / before.1 - 1.0).abs() < 1e-12);
+        (sample.nodes[inner].rest, sample.nodes[inner].x, sample.mesh.nodes[inner]) = (place, place, place);
+        edited(&sample, |complex| {
+            let all: BTreeSet<u32> = (0..complex.n_slots() as u32).collect();
+            let flat = |complex: &Complex| {
+                let alive = (0..complex.n_slots() as u32).filter(|&t| complex.is_alive(t));
+                alive.filter(|&t| aspect(&complex.rest(t)) < FLAT).count()
+            };
+            let before = (flat(complex), volume(complex));
+            let cleaned = clean(complex, all);
+            assert_eq!(flat(complex), cleaned.left);
+            assert!(before.0 == 0 || cleaned.left < before.0, "{place:?}: {} flat, {cleaned:?}", before.0);
+            assert!((volume(complex) / before.1 - 1.0).abs() < 1e-12);
+        });
     }
 }
 
@@ -63,24 +70,30 @@ fn flat_elements_go_and_the_volume_stays() {
 fn a_collapse_that_would_pinch_the_body_is_refused() {
     // An edge through the body between two nodes of its skin.
     let sample = Sample::unit(1);
-    let mut complex = complex_of(&sample);
-    assert_eq!(collapse(&mut complex, 0, 7, 0.0), None);
-    assert!((volume(&complex) - 1.0).abs() < 1e-14);
+    edited(&sample, |complex| {
+        assert_eq!(collapse(complex, 0, 7, 0.0), None);
+        assert!((volume(complex) - 1.0).abs() < 1e-14);
+    });
 }
 
 #[test]
 fn what_is_undone_leaves_no_trace() {
     let sample = Sample::unit(2);
-    let mut complex = complex_of(&sample);
-    let mark = complex.mark();
-    let before: Vec<_> = (0..complex.n_slots() as u32).map(|t| complex.tet(t)).collect();
-    let m = crate::snap::collapse::split_edge(&mut complex, 0, 13, 0.3);
-    crate::snap::collapse::split_face(&mut complex, 0, 1, [0.2, 0.3, 0.5]);
-    assert!(complex.around(m).len() >= 6 && (volume(&complex) - 1.0).abs() < 1e-12);
-    complex.undo(mark);
-    let after: Vec<_> = (0..complex.n_slots() as u32).map(|t| complex.tet(t)).collect();
-    assert!(before == after && complex.nodes == sample.nodes);
-    for (n, _) in (0u32..).zip(&sample.nodes) {
-        assert_eq!(complex.around(n), complex_of(&sample).around(n));
-    }
+    let elements = |complex: &Complex| -> Vec<[u32; 4]> {
+        (0..complex.n_slots() as u32).map(|t| complex.tet(t)).collect()
+    };
+    edited(&sample, |complex| {
+        let mark = complex.mark();
+        let before = elements(complex);
+        let m = crate::snap::collapse::split_edge(complex, 0, 13, 0.3);
+        crate::snap::collapse::split_face(complex, 0, 1, [0.2, 0.3, 0.5]);
+        assert!(complex.around(m).len() >= 6 && (volume(complex) - 1.0).abs() < 1e-12);
+        complex.undo(mark);
+        assert!(before == elements(complex) && complex.n_nodes() == sample.nodes.len());
+        for (n, node) in (0u32..).zip(&sample.nodes) {
+            assert_eq!(complex.node(n), *node);
+            let uncut = edited(&sample, |uncut| uncut.around(n).to_vec());
+            assert_eq!(complex.around(n), uncut);
+        }
+    });
 }

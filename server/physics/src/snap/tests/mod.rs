@@ -2,12 +2,13 @@
 
 mod cuts;
 mod degenerate;
+mod local;
 mod random;
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::complex::det;
-use super::{SnapNode, SnapReport, Snapper};
+use super::{Nodes, SnapNode, SnapReport, Snapper};
 use crate::cut::{BladeSweep, CutMesh};
 use crate::mesh::{BoxPattern, TetMesh, box_mesh};
 use crate::testing::{Random, surface_is_closed_and_manifold, v};
@@ -34,11 +35,23 @@ impl Sample {
 
     fn sweep(&mut self, segments: &[[Vector3<f64>; 2]], incision: u32) -> SnapReport {
         let blade = BladeSweep { segments: segments.to_vec() };
-        let (report, cut) = self.snapper.cut(&self.mesh.tets, self.nodes.clone(), &blade, incision).unwrap();
-        if let Some(cut) = cut {
-            (self.mesh, self.nodes) = (cut.mesh, cut.nodes);
+        let mut mesh = self.cut_mesh();
+        let [x, v] = self.state();
+        let data = |n: u32, node: &mut SnapNode| *node = self.nodes[n as usize];
+        let nodes = Nodes { rest: &self.mesh.nodes, x: &x, v: &v, data: &data };
+        let (report, cut) = self.snapper.cut(&mut mesh, nodes, &blade, incision).unwrap();
+        if let Some(mut cut) = cut {
+            (self.mesh, self.nodes) = (std::mem::take(&mut cut.mesh), std::mem::take(&mut cut.nodes));
+            let (mut mesh, [x, _]) = (self.cut_mesh(), self.state());
+            self.snapper.follow(&mut mesh, &x, &cut);
         }
         report
+    }
+
+    /// Positions [m] and velocities [m/s] of the nodes.
+    fn state(&self) -> [Vec<Vector3<f64>>; 2] {
+        let of = |value: fn(&SnapNode) -> Vector3<f64>| self.nodes.iter().map(value).collect();
+        [of(|node| node.x), of(|node| node.v)]
     }
 
     /// Sweeps a square of half width `reach` [m] in the plane through `point` with the normal.
