@@ -8,12 +8,14 @@
 //!   a step after 100 cuts against the growth of the copies. Every solve makes the same number of
 //!   iterations. The bodies compared are stepped in turns, so that a busy moment of the machine hits all
 //!   of them.
+//! - Snapping: a small cut along faces, and an advance that opens nothing yet, in a body and in one eight
+//!   times as long.
 //! - Skin: the time a skin takes to follow a cut, early and late in a hundred of them.
 
 use std::time::Instant;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, BodySettings, PcgSettings, Scheme};
+use scindo_physics::body::{Body, BodySettings, CuttingMethod, PcgSettings, Scheme};
 use scindo_physics::cut::{BladeSweep, CutMesh};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
@@ -45,6 +47,9 @@ fn main() {
     if wanted("insertion") {
         insertion(&mesh, elements, if quick { 1 } else { 21 });
         longer_body(cells, elements, if quick { 1 } else { 9 });
+    }
+    if wanted("snapping") {
+        snapping(cells, if quick { 1 } else { 9 });
     }
     if wanted("growth") {
         growth(&mesh, if quick { 1 } else { 5 });
@@ -176,6 +181,47 @@ fn longer_body(cells: usize, elements: usize, repeats: usize) {
         }
         let [best, median] = [0, 1].map(|i| times[1][k][i] / times[0][k][i]);
         println!("  {best:.2} × the time (median {median:.2}) in a body of four times the size");
+    }
+}
+
+/// A cut along faces should search only where the sweep is: a slit of four cells in a body and in one eight
+/// times as long, in turns. The first advance goes through less than an element and opens nothing. The last
+/// cut goes through the whole body.
+fn snapping(cells: usize, repeats: usize) {
+    let block = |length: usize| {
+        let size = Vector3::new(length as f64 * SIZE_M, SIZE_M, SIZE_M);
+        box_mesh(Vector3::zeros(), size, [length * cells, cells, cells], BoxPattern::Tet6)
+    };
+    let meshes = [block(1), block(8)];
+    let cell = SIZE_M / cells as f64;
+    let at = |x: f64| [Vector3::new(x, 0.031, 0.0521), Vector3::new(x, 0.031 + 4.0 * cell, 0.0532)];
+    let across = |x: f64| [Vector3::new(x, -0.01, 0.0721), Vector3::new(x, 0.11, 0.0732)];
+    let sweep = |ends: &[[Vector3<f64>; 2]]| BladeSweep { segments: ends.to_vec() };
+    let sweeps = [
+        ("advance that opens nothing", 1, sweep(&[at(-0.01), at(0.1 * cell)])),
+        ("slit", 1, sweep(&[at(0.1 * cell), at(4.0 * cell)])),
+        ("cut through the body", 2, sweep(&[across(-0.01), across(1.0)])),
+    ];
+    let mut times = [const { [const { Vec::new() }; 3] }; 2];
+    for _ in 0..repeats {
+        for (mesh, times) in meshes.iter().zip(&mut times) {
+            let settings = BodySettings { cutting: CuttingMethod::Snap, ..BodySettings::default() };
+            let mut body = Body::new(mesh.clone(), material(Law::Corotational), settings).expect("usual");
+            for ((which, incision, sweep), times) in sweeps.iter().zip(times) {
+                let (report, seconds) = timed(|| body.cut(sweep, *incision));
+                let opened = report.expect("the sweep is well formed").faces_opened;
+                assert_eq!(opened == 0, which.contains("nothing"), "{which}: {opened} faces");
+                times.push(seconds);
+            }
+        }
+    }
+    let times = times.map(|times| times.map(sorted));
+    for (k, (which, ..)) in sweeps.iter().enumerate() {
+        for (mesh, times) in meshes.iter().zip(&times) {
+            say(&format!("{which} along faces, in {} elements", mesh.tets.len()), times[k], "");
+        }
+        let [best, median] = [0, 1].map(|i| times[1][k][i] / times[0][k][i]);
+        println!("  {best:.2} × the time (median {median:.2}) in a body of eight times the size");
     }
 }
 
