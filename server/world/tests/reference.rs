@@ -25,8 +25,8 @@ fn the_published_schema_is_the_enforced_one() {
 
 #[test]
 fn the_table_of_keys_is_complete() {
-    let intro = "# Keys of a scene\n\nGenerated from the types that read scenes; `[]` marks a list. All \
-                 numbers are SI and must be finite. Unknown keys are refused, and so are, for now, words in (brackets). The same as JSON Schema: \
-                 [schema.json](schema.json).\n\n";
+    let intro = "# Keys of a scene\n\nGenerated from the types that read scenes; `[]` marks a list. All numbers \
+                 are SI and must be finite. Unknown keys are refused. Words in (brackets) are not supported yet. \
+                 The same reference as JSON Schema: [schema.json](schema.json).\n\n";
     same_as_published("KEYS.md", &format!("{intro}{}", key_reference()));
 }

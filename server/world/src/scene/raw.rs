@@ -26,37 +26,38 @@ pub type Vec3 = [f64; 3];
 #[serde(deny_unknown_fields)]
 #[schemars(title = "scindo scene")]
 pub struct RawScene {
-    /// Version of this format.
+    /// Version of the scene format.
     #[schemars(range(min = 1, max = 1), extend("x-next" = "write schema = 1"))]
     pub schema: u32,
-    /// What the scene is called in results and clients.
+    /// Name of the scene in results and clients.
     #[serde(default = "unnamed")]
     pub name: String,
-    /// Seed of everything random; recorded in the results.
+    /// Seed of random numbers. The results record it.
     #[serde(default)]
     pub seed: u64,
-    /// What acts on all bodies.
+    /// Gravity and time step, common to all bodies.
     #[serde(default)]
     pub world: RawWorld,
     /// Soft bodies.
     #[serde(default)]
     pub body: Vec<RawBody>,
-    /// Cuts that happen by themselves at a given time.
+    /// Scheduled cuts.
     #[serde(default)]
     pub cut: Vec<RawCut>,
-    /// Material points whose path is recorded.
+    /// Material points whose motion is recorded.
     #[serde(default)]
     pub probe: Vec<RawProbe>,
-    /// Rigid tools, moved by a path or by a client.
+    /// Rigid tools, moved along a given path or by a client.
     #[serde(default)]
     pub tool: Vec<RawTool>,
-    /// Effects switched by hand; what is absent follows from the rest of the scene.
+    /// Effects switched on or off explicitly. An effect without an entry is on if the rest of the scene needs
+    /// it.
     #[serde(default)]
     pub effects: RawEffects,
-    /// How often clients hear of what.
+    /// Rates at which the server publishes to clients.
     #[serde(default)]
     pub publish: RawPublish,
-    /// What is written to disk.
+    /// Files written beside the summary.
     #[serde(default)]
     pub results: RawResults,
 }
@@ -65,11 +66,11 @@ fn unnamed() -> String {
     "unnamed".into()
 }
 
-/// What acts on all bodies.
+/// Gravity and time step, common to all bodies.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawWorld {
-    /// Acceleration of free fall [m/s²]; zero switches gravity off.
+    /// Gravitational acceleration [m/s²]. Zero switches gravity off.
     pub gravity_m_s2: Vec3,
     /// Simulated time per step [s].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0, "x-next" = "0.005 to 0.04 suits real time"))]
@@ -89,16 +90,17 @@ pub struct RawBody {
     /// Name, unique among bodies; becomes part of network keys.
     #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
     pub id: String,
-    /// Where its elements come from.
+    /// Source of the elements: exactly one of `box`, `grid`, `file`, `surface`, `organ`.
     pub mesh: RawMesh,
-    /// A skin finer than the elements, shown and touched in place of their boundary and cut with them.
+    /// A surface finer than the elements. It is drawn and touched in place of their boundary, and every cut
+    /// splits it too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub skin: Option<RawSkin>,
     /// Finite element.
     #[serde(default)]
     pub element: RawElement,
-    /// Constitutive law; `neo-hookean` is the stable one of Smith et al. 2018, and `stvk` is continued below a
-    /// stretch of 0.65.
+    /// Constitutive law. `neo-hookean` is the stable law of Smith et al. 2018. `stvk` is modified below a
+    /// stretch of 0.65, so that it resists inversion.
     #[serde(default)]
     pub law: RawLaw,
     /// Young's modulus [Pa].
@@ -113,10 +115,10 @@ pub struct RawBody {
     #[schemars(extend("minimum" = *Material::DENSITY_KG_M3.start(), "maximum" = *Material::DENSITY_KG_M3.end(),
         "x-next" = "soft tissue has about 1000 kg/m3"))]
     pub density_kg_m3: f64,
-    /// Rayleigh damping.
+    /// Rayleigh damping: a mass term and a stiffness term.
     #[serde(default)]
     pub rayleigh: RawRayleigh,
-    /// Time integration.
+    /// Time integration scheme.
     #[serde(default)]
     pub integrator: RawIntegrator,
     /// Parameters of `integrator = "newmark"`.
@@ -125,32 +127,33 @@ pub struct RawBody {
     /// Mass matrix.
     #[serde(default)]
     pub mass: RawMass,
-    /// Remedy against locking of nearly incompressible material; the last percent takes `tet10`, or `hex8` with
-    /// `selective`.
+    /// Remedy for volumetric locking of nearly incompressible material. For the last percent of accuracy,
+    /// take `tet10`, or `hex8` with `selective`.
     #[serde(default)]
     pub locking: RawLocking,
-    /// Solver of a step.
+    /// Settings of the solver.
     #[serde(default)]
     pub solver: RawSolver,
-    /// What a cut does to it, whoever makes the cut.
+    /// How cuts act on the body: those of the scene, of tools and of clients.
     #[serde(default)]
     pub cutting: RawCutting,
-    /// Held or displaced parts.
+    /// Regions that are held or displaced.
     #[serde(default)]
     pub fix: Vec<RawFix>,
-    /// Time over which every `displacement_m` of its fixes grows from zero [s]; 0: at once.
+    /// Time over which every `displacement_m` of the body grows from zero [s]. 0 applies it at once.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "1 lets a body follow what would turn its elements inside out at once"))]
+    #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "1 often avoids inverted elements where a sudden \
+        displacement would cause them"))]
     pub displacement_over_s: f64,
     /// Constant loads.
     #[serde(default)]
     pub load: Vec<RawLoad>,
-    /// How it is drawn.
+    /// Appearance of the body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub look: Option<RawLook>,
 }
 
-/// Where the elements of a body come from: exactly one of `box`, `grid`, `file`, `surface`, `organ`.
+/// Source of a body's elements: exactly one of `box`, `grid`, `file`, `surface`, `organ`.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{"required": ["box"]}, {"required": ["grid"]},
@@ -159,18 +162,19 @@ pub struct RawMesh {
     /// An axis-aligned block.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub r#box: Option<RawBox>,
-    /// A block whose cells end at given coordinates.
+    /// An axis-aligned block with cell boundaries at given coordinates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<RawGrid>,
-    /// A volumetric mesh: Gmsh .msh, .vtk or .vtu; relative to the scene file.
+    /// File of a volume mesh: Gmsh .msh, .vtk or .vtu. The path is relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub file: Option<String>,
-    /// A closed or dirty surface: .obj, .stl or .ply; relative to the scene file.
+    /// File of a surface to be filled with tetrahedra: .obj, .stl, .ply, .vtk or .vtp. It need not be closed.
+    /// The path is relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub surface: Option<String>,
-    /// A shape that the program makes itself.
+    /// A shape that the program generates.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub organ: Option<RawOrgan>,
     /// Lattice cells along the longest side of a `surface`.
@@ -181,11 +185,11 @@ pub struct RawMesh {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "0.001 for a file in millimetres"))]
     pub scale: Option<f64>,
-    /// Whether nodes of a `file` that lie at the same place become one, which is told; absent: true. False
-    /// keeps a mesh as it was made with its cut.
+    /// Whether coincident nodes of a `file` are merged, with a warning (default: true). Write false for a
+    /// mesh that already contains a cut.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weld: Option<bool>,
-    /// Which parts of a `file` or `surface` are kept, where no element joins them.
+    /// Which connected parts of a `file` or `surface` are kept (default: all).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parts: Option<RawParts>,
 }
@@ -212,25 +216,25 @@ pub struct RawBox {
     /// Cells along x, y, z.
     #[schemars(inner(range(min = 1, max = 1024)), extend("x-next" = "give at least one cell per axis"))]
     pub cells: [u32; 3],
-    /// How a cell is split.
+    /// How each cell is split into elements.
     #[serde(default)]
     pub pattern: RawPattern,
 }
 
-/// An axis-aligned block whose cells end at given coordinates, finer where they lie closer.
+/// An axis-aligned block with cell boundaries at given coordinates, finer where they lie closer.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawGrid {
-    /// Rising coordinates along x [m].
+    /// Cell boundaries along x in ascending order [m].
     #[schemars(length(min = 2, max = 1025))]
     pub x_m: Vec<f64>,
-    /// Rising coordinates along y [m].
+    /// Cell boundaries along y in ascending order [m].
     #[schemars(length(min = 2, max = 1025))]
     pub y_m: Vec<f64>,
-    /// Rising coordinates along z [m].
+    /// Cell boundaries along z in ascending order [m].
     #[schemars(length(min = 2, max = 1025))]
     pub z_m: Vec<f64>,
-    /// How a cell is split.
+    /// How each cell is split into elements.
     #[serde(default)]
     pub pattern: RawPattern,
 }
@@ -244,34 +248,36 @@ pub enum RawPattern {
     Tet5,
     /// Six tetrahedra around the cell's diagonal (Kuhn).
     Tet6,
-    /// Six tetrahedra without a preferred diagonal, as Nienhuys cut his cube.
+    /// Six tetrahedra without a preferred diagonal, as in Nienhuys 2003.
     Oct6,
-    /// Not split: one hexahedron, for `element = "hex8"`.
+    /// One hexahedron, for `element = "hex8"`.
     Hex,
 }
 
-/// A shape that the program makes itself.
+/// A shape that the program generates.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawOrgan {
-    /// Which.
+    /// Name of the shape.
     #[serde(default)]
     pub shape: Organ,
-    /// Lattice cells along its longest side.
+    /// Lattice cells along the longest side of the shape.
     #[schemars(range(min = 4, max = 128), extend("x-next" = "20 to 24 cells run in real time"))]
     pub cells: u32,
 }
 
-/// A skin finer than the elements.
+/// A surface finer than the elements.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSkin {
-    /// Parts of each edge of the elements' boundary: n² skin triangles per face.
+    /// Number n of parts into which each edge of the elements' boundary is divided. Each face then has n²
+    /// skin triangles.
     #[serde(default = "four")]
-    #[schemars(range(min = 1, max = 32), extend("x-next" = "2 to 6 is smooth; triangles rise with the square"))]
+    #[schemars(range(min = 1, max = 32), extend("x-next" = "2 to 6 looks smooth; the number of triangles grows \
+        with the square"))]
     pub divisions: u32,
-    /// The surface that the skin rests on: .obj, .stl or .ply, relative to the scene file. Absent: the one
-    /// that the mesh was made from, or the elements' own boundary where there is none.
+    /// File of the surface that the skin follows: .obj, .stl or .ply, relative to the scene file. Default:
+    /// the surface that the mesh was made from; without one, the boundary of the elements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub surface: Option<String>,
@@ -279,8 +285,8 @@ pub struct RawSkin {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "0.001 for a file in millimetres"))]
     pub scale: Option<f64>,
-    /// Share of an edge from which a corner is moved onto a cut instead of the triangle split; 0 splits
-    /// always.
+    /// Snapping distance as a fraction of an edge. A skin vertex closer to a cut is moved onto it, and its
+    /// triangles are not split. 0 always splits.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 0.5), extend("x-next" = "0.3 leaves few thin triangles along a cut"))]
     pub snapping: f64,
@@ -290,16 +296,16 @@ fn four() -> u32 {
     4
 }
 
-/// A held or displaced part of a body.
+/// A region of a body that is held or displaced.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawFix {
-    /// Which nodes.
+    /// Selection of nodes: exactly one of `box`, `sphere`, `half_space`, `slab`.
     pub r#where: RawWhere,
-    /// Which axes are held.
+    /// Axes along which the nodes are held.
     #[serde(default)]
     pub axes: RawAxes,
-    /// Displacement from rest that is held [m].
+    /// Prescribed displacement from the rest position [m].
     #[serde(default)]
     pub displacement_m: Vec3,
 }
@@ -329,16 +335,17 @@ pub enum RawAxes {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLoad {
-    /// Which nodes.
+    /// Selection of nodes: exactly one of `box`, `sphere`, `half_space`, `slab`.
     pub r#where: RawWhere,
-    /// Total force [N], shared over the selected nodes.
+    /// Total force [N], distributed over the selected nodes.
     pub force_n: Vec3,
-    /// How it is shared; absent: by area where the selection holds boundary faces, else by volume.
+    /// Whether the force is distributed by area or by volume. Default: by area if the selection contains
+    /// boundary faces, otherwise by volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub share: Option<RawShare>,
 }
 
-/// How a total force is shared over nodes.
+/// How a total force is distributed over nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawShare {
@@ -354,16 +361,16 @@ pub enum RawShare {
 #[schemars(extend("oneOf" = [{"required": ["box"]}, {"required": ["sphere"]},
     {"required": ["half_space"]}, {"required": ["slab"]}]))]
 pub struct RawWhere {
-    /// Inside an axis-aligned box, its faces included.
+    /// Nodes inside an axis-aligned box or on its faces.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub r#box: Option<RawRegionBox>,
-    /// Inside a ball.
+    /// Nodes inside a sphere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sphere: Option<RawBall>,
-    /// On the side of a plane that the normal points to, the plane included.
+    /// Nodes on a plane or on the side that its normal points to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_space: Option<RawHalfSpace>,
-    /// Between two fractions of the body's own extent along an axis.
+    /// Nodes between two fractions of the body's extent along an axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slab: Option<RawSlab>,
 }
@@ -378,7 +385,7 @@ pub struct RawRegionBox {
     pub max_m: Vec3,
 }
 
-/// A ball.
+/// A sphere.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBall {
@@ -393,9 +400,9 @@ pub struct RawBall {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawHalfSpace {
-    /// A point of the plane [m].
+    /// A point on the plane [m].
     pub point_m: Vec3,
-    /// Towards the selected side; any length but zero.
+    /// Vector towards the selected side. It may have any length except zero.
     pub normal: Vec3,
 }
 
@@ -403,12 +410,12 @@ pub struct RawHalfSpace {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSlab {
-    /// Axis of the slice.
+    /// Axis of the slab.
     pub axis: RawAxis,
-    /// Start as a fraction of the extent, 0 = lowest node.
+    /// Start as a fraction of the extent. 0 is the lowest node.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-next" = "0 is the lowest node, 1 the highest"))]
     pub from: f64,
-    /// End as a fraction of the extent, 1 = highest node.
+    /// End as a fraction of the extent. 1 is the highest node.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-next" = "0 is the lowest node, 1 the highest"))]
     pub to: f64,
 }
@@ -425,80 +432,82 @@ pub enum RawAxis {
     Z,
 }
 
-/// A cut that happens by itself: along a blade's sweep, or along a path on the skin to a depth.
+/// A scheduled cut: the sweep of a blade, or a path on the skin with a depth.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{"required": ["sweep_m"]}, {"required": ["path_m", "depth_m"]}]))]
 pub struct RawCut {
-    /// The body that is cut.
+    /// Body that is cut.
     pub body: String,
     /// Simulated time of the cut [s].
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-next" = "0 cuts before the first step"))]
     pub at_s: f64,
-    /// How the mesh is cut; absent: as `cutting.method` of the body says, with which it has to agree.
+    /// Cutting method. It must agree with `cutting.method` of the body, which is also its default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<RawCutMethod>,
-    /// Successive blade segments [tip, heel] in the deformed body [m]; they span the cut surface.
+    /// Successive positions [tip, heel] of the blade in the deformed body [m]. Together they span the cut
+    /// surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 2, max = 1024))]
     pub sweep_m: Option<Vec<[Vec3; 2]>>,
-    /// Points near the skin of the deformed body [m]; the incision follows the skin between them.
+    /// Points near the skin of the deformed body [m]. The incision follows the skin between them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 2, max = 64))]
     pub path_m: Option<Vec<Vec3>>,
-    /// How deep the tool goes into the skin along `path_m` [m].
+    /// Depth of the incision below the skin along `path_m` [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "elements are opened that the blade cuts through"))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "only elements that the blade crosses completely open"))]
     pub depth_m: Option<f64>,
 }
 
-/// How a mesh is cut.
+/// A cutting method.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawCutMethod {
-    /// Pieces and copies inside the elements; the mesh stays.
+    /// Elements are split into pieces, and nodes get copies. The mesh itself does not change.
     #[default]
     Xfem,
-    /// Along element faces, nodes moved onto the sweep; the mesh changes. For `tet4`.
+    /// Nodes are moved onto the sweep, and the mesh is separated along element faces. For `tet4`.
     Snap,
-    /// Unlinked cells of a hexahedral body; not supported yet.
+    /// Hexahedral cells are unlinked from each other. Not supported yet.
     Links,
 }
 
-/// What a cut does to a body.
+/// How cuts act on a body.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawCutting {
-    /// How the mesh is cut.
+    /// Cutting method: inside elements (`xfem`) or along element faces (`snap`).
     pub method: RawCutMethod,
-    /// What becomes of a part that a cut leaves without a held node; `pinned` goes with `snap`.
+    /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs
+    /// the method `snap`.
     pub loose: RawLoose,
 }
 
-/// What becomes of a part that hangs on nothing.
+/// What happens to a part without held nodes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawLoose {
-    /// It is a free body.
+    /// It moves freely.
     #[default]
     Free,
-    /// It is held where it is, at the corners of its largest skin face.
+    /// It is held in place at the corners of its largest skin face.
     Pinned,
 }
 
-/// A material point whose path is recorded.
+/// A material point whose motion is recorded.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawProbe {
     /// Name, unique among probes.
     #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
     pub id: String,
-    /// The body it is bound to.
+    /// Body that the probe is attached to.
     pub body: String,
-    /// Where it lies in the body at rest [m].
+    /// Position in the body at rest [m].
     pub point_m: Vec3,
-    /// Towards the side it belongs to, where the point lies on a cut.
+    /// Vector towards the material that the probe belongs to. Only needed if the point lies on a cut.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub side: Option<Vec3>,
 }
@@ -510,9 +519,9 @@ pub struct RawTool {
     /// Name, unique among tools; becomes part of network keys.
     #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
     pub id: String,
-    /// Its geometry.
+    /// Shape of the tool: exactly one of `blade`, `sphere`, `capsule`.
     pub shape: RawShape,
-    /// Stiffness of the spring between hand and tissue [N/m].
+    /// Stiffness of the virtual coupling between hand and tissue [N/m].
     #[serde(default = "tool_stiffness")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "200 to 2000 N/m suits haptic devices"))]
     pub stiffness_n_m: f64,
@@ -520,12 +529,12 @@ pub struct RawTool {
     #[serde(default = "tool_force")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e4, "x-next" = "desktop devices give 3 to 20 N"))]
     pub max_force_n: f64,
-    /// Poses over time; the tool moves evenly between them. Absent: a client moves it.
+    /// Poses over time, interpolated linearly. Without a path, a client moves the tool.
     #[serde(default)]
     pub path: Vec<RawPathPoint>,
-    /// Start the path again after this time [s]; absent: stay at its end.
+    /// Period after which the path starts again [s]. Without it, the tool stays at the end of the path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "give the time of one round"))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "give the duration of one cycle"))]
     pub repeat_s: Option<f64>,
 }
 
@@ -537,18 +546,18 @@ fn tool_force() -> f64 {
     8.0
 }
 
-/// Geometry of a tool, its tip in the origin and its shaft along +z: exactly one key.
+/// Geometry of a tool, with its tip at the origin and its shaft along +z: exactly one key.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = [{"required": ["blade"]}, {"required": ["sphere"]}, {"required": ["capsule"]}]))]
 pub struct RawShape {
-    /// A cutting edge from tip to heel.
+    /// A blade with a straight cutting edge from tip to heel.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blade: Option<RawBlade>,
-    /// A ball.
+    /// A sphere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sphere: Option<RawSphere>,
-    /// A rod with round ends.
+    /// A cylinder with hemispherical ends.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub capsule: Option<RawCapsule>,
 }
@@ -565,7 +574,7 @@ pub struct RawBlade {
     pub thickness_m: f64,
 }
 
-/// A ball.
+/// A sphere.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSphere {
@@ -574,14 +583,14 @@ pub struct RawSphere {
     pub radius_m: f64,
 }
 
-/// A rod with round ends.
+/// A cylinder with hemispherical ends.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawCapsule {
     /// Radius [m].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a probe has about 0.002 m"))]
     pub radius_m: f64,
-    /// Length of its axis [m].
+    /// Length of the axis between the centres of the two hemispheres [m].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a probe has about 0.1 m"))]
     pub length_m: f64,
 }
@@ -591,14 +600,14 @@ pub struct RawCapsule {
 #[serde(deny_unknown_fields)]
 pub struct RawPathPoint {
     /// Simulated time [s].
-    #[schemars(range(min = 0.0), extend("x-next" = "times start at 0 and rise"))]
+    #[schemars(range(min = 0.0), extend("x-next" = "times start at 0 and increase"))]
     pub at_s: f64,
-    /// Where the tip is [m].
+    /// Position of the tip [m].
     pub tip_m: Vec3,
-    /// Direction from the tip along the shaft; any length but zero.
+    /// Direction from the tip along the shaft. It may have any length except zero.
     #[serde(default = "upwards")]
     pub toward: Vec3,
-    /// What the tool does from here on.
+    /// What the tool does from this time on.
     #[serde(default)]
     pub mode: RawMode,
 }
@@ -611,7 +620,7 @@ fn upwards() -> Vec3 {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawMode {
-    /// Exists, touches nothing.
+    /// Passes through everything.
     Hover,
     /// Pushes what it meets.
     #[default]
@@ -622,38 +631,38 @@ pub enum RawMode {
     Cut,
 }
 
-/// Effects switched by hand. Absent: on when the rest of the scene calls for it.
+/// Effects switched on or off explicitly. An effect without an entry is on if the rest of the scene needs it.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawEffects {
-    /// `false`: cuts by tools and clients are refused.
+    /// `false` refuses cuts by tools and clients.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cutting: Option<bool>,
-    /// `false`: tools pass through bodies.
+    /// `false` lets tools pass through bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<bool>,
-    /// Contact of a body with itself; `true` is not supported yet.
+    /// Contact of a body with itself. `true` is not supported yet.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub self_collision: Option<bool>,
-    /// `true`: kinetic and elastic energy in every step report.
+    /// `true` adds kinetic and elastic energy to every step report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<bool>,
-    /// `true`: estimate of the discretisation error in every step report.
+    /// `true` adds an estimate of the discretisation error to every step report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_estimate: Option<bool>,
 }
 
-/// How often clients hear of what.
+/// Rates at which the server publishes to clients.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawPublish {
     /// Surface frames per second [Hz].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 240.0, "x-next" = "20 to 60 Hz suits eyes"))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 240.0, "x-next" = "20 to 60 Hz looks smooth"))]
     pub surface_hz: f64,
     /// Contact models per second [Hz].
-    #[schemars(range(min = 50.0, max = 2000.0), extend("x-next" = "200 to 1000 Hz suits hands"))]
+    #[schemars(range(min = 50.0, max = 2000.0), extend("x-next" = "200 to 1000 Hz feels smooth"))]
     pub contact_hz: f64,
-    /// Rates and costs per second [Hz].
+    /// Statistics reports (rates and costs) per second [Hz].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 60.0, "x-next" = "1 to 10 Hz is plenty"))]
     pub stats_hz: f64,
 }
@@ -664,11 +673,12 @@ impl Default for RawPublish {
     }
 }
 
-/// What is written to disk beside the summary.
+/// Files written beside the summary.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawResults {
-    /// Write the fields every so many steps and a .pvd series over them; 0: only the final state.
-    #[schemars(range(min = 0, max = 1000000), extend("x-next" = "0 writes the final state only"))]
+    /// Number of steps between two field files. A .pvd file lists them in time. 0 writes only the final
+    /// state.
+    #[schemars(range(min = 0, max = 1000000), extend("x-next" = "0 writes only the final state"))]
     pub series_steps: u32,
 }

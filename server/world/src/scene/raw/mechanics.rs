@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawElement {
-    /// Linear tetrahedron; the only one that can be cut.
+    /// Linear tetrahedron. It is the only element that can be cut.
     #[default]
     Tet4,
     /// Quadratic tetrahedron, for accuracy.
     Tet10,
-    /// Trilinear hexahedron; needs the box pattern `hex`.
+    /// Trilinear hexahedron. It needs the pattern `hex`.
     Hex8,
 }
 
@@ -26,11 +26,11 @@ pub enum RawLaw {
     /// Small strain, large rotation.
     #[default]
     Corotational,
-    /// St. Venant-Kirchhoff as in the textbooks while every principal stretch is above 0.65; below, where that
-    /// law would give way, it is continued so that it resists inversion.
+    /// St. Venant–Kirchhoff while every principal stretch is above 0.65. Below, where that law loses its
+    /// resistance, it is modified so that it resists inversion.
     Stvk,
-    /// The stable Neo-Hookean law (Smith, de Goes, Kim 2018), not that of the textbooks: the same for small
-    /// strains, finite when an element inverts; with a guard against collapse.
+    /// The stable Neo-Hookean law of Smith, de Goes and Kim (2018). It equals the classical law for small
+    /// strains and stays finite when an element inverts. A guard prevents collapse.
     NeoHookean,
 }
 
@@ -38,17 +38,17 @@ pub enum RawLaw {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawRayleigh {
-    /// Factor of the mass matrix [1/s]: drags against the room.
+    /// Coefficient of the mass matrix [1/s]. It damps all motion, rigid motion included.
     #[schemars(extend("minimum" = *Material::MASS_1_S.start(), "maximum" = *Material::MASS_1_S.end(),
         "x-next" = "0 switches it off"))]
     pub mass_1_s: f64,
-    /// Factor of the stiffness matrix [s]: damps deformation, not rigid motion.
+    /// Coefficient of the stiffness matrix [s]. It damps deformation, but not rigid motion.
     #[schemars(extend("minimum" = *Material::STIFFNESS_S.start(), "maximum" = *Material::STIFFNESS_S.end(),
         "x-next" = "0 switches it off"))]
     pub stiffness_s: f64,
 }
 
-/// Time integration.
+/// A time integration scheme.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawIntegrator {
@@ -80,13 +80,13 @@ impl RawIntegrator {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawNewmark {
-    /// Weight of the new acceleration in the positions.
+    /// β, the weight of the new acceleration in the displacements.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0,
-        "x-next" = "0.25 is the average acceleration; beta = gamma/2 or more is stable for every step"))]
+        "x-next" = "0.25 is the average acceleration method; beta = gamma/2 or more is stable for every step"))]
     pub beta: f64,
-    /// Weight of the new acceleration in the velocities.
+    /// γ, the weight of the new acceleration in the velocities.
     #[schemars(range(min = 0.5, max = 1.0),
-        extend("x-next" = "0.5 does not damp, more damps, less would gain energy"))]
+        extend("x-next" = "0.5 adds no damping, larger values damp, smaller ones would gain energy"))]
     pub gamma: f64,
 }
 
@@ -103,50 +103,54 @@ pub enum RawMass {
     /// Diagonal.
     #[default]
     Lumped,
-    /// As the shape functions give it.
+    /// Integrated from the shape functions.
     Consistent,
 }
 
-/// Remedy against locking of nearly incompressible material.
+/// Remedy for volumetric locking of nearly incompressible material.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawLocking {
     /// Full integration of everything.
     #[default]
     None,
-    /// The volume change averaged around each node, per copy; for `tet4`. Next to `tet10` it is a remedy for
-    /// speed: for the last percent near incompressibility take `tet10`, or `hex8` with `selective`.
+    /// The volume change is averaged around each node copy. For `tet4`. It is the fast remedy; for the last
+    /// percent of accuracy, take `tet10`, or `hex8` with `selective`.
     NodeAveraged,
-    /// The volume change of each element's centre; for `hex8`.
+    /// The volume change is evaluated at the centre of each element. For `hex8`.
     Selective,
 }
 
-/// Solver of a step.
+/// Settings of the solver.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSolver {
-    /// Linear solver. For solutions to round-off take `cholesky` with precision `double` and tolerance 1e-12; in
-    /// equilibrium it also costs least where thin layers would take `pcg` hundreds of iterations.
+    /// Linear solver. For a solution to round-off, take `cholesky` with precision `double` and tolerance
+    /// 1e-12. It is also the fastest for equilibria with thin layers, where `pcg` needs hundreds of
+    /// iterations.
     pub method: RawMethod,
-    /// Most iterations of a linear solve; absent: several times what the size of the mesh and `poisson` call for.
+    /// Maximum number of iterations of a linear solve. Default: several times an estimate from the size of
+    /// the mesh and `poisson`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100000), extend("x-next" = "leave it out; 10 to 100 with fixed_iterations = true suits real time"))]
     pub iterations: Option<u32>,
-    /// The iterations are a fixed number that is meant, as in real time: steps that end above the tolerance are
-    /// counted, but neither warned of nor a failure of the run.
+    /// Whether the limit of iterations is deliberate, as in real time. Steps that end above the tolerance are
+    /// then counted, but they cause no warning and no failed run.
     pub fixed_iterations: bool,
-    /// Stop when the preconditioned residual is below this part of that of the loads: after the linear solve where
-    /// a step is one, after Newton's method otherwise. With 1e-4 positions are off by less than 0.1 % of the motion.
+    /// Relative tolerance: the solver stops when the preconditioned residual is below this fraction of that
+    /// of the loads. It is measured after the linear solve if a step is a single one, otherwise after
+    /// Newton's method. With 1e-4, positions deviate by less than 0.1 % of the motion.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0, "x-next" = "1e-3 for speed, 1e-6 for accuracy, 1e-10 with method cholesky and precision double"))]
     pub tolerance: f64,
-    /// Arithmetic; absent: `single` where it can be and the tolerance allows, else `mixed`.
+    /// Floating-point precision. Default: `single` if the other settings and the tolerance allow it,
+    /// otherwise `mixed`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub precision: Option<RawPrecision>,
-    /// How single precision applies the stiffness; absent: what costs less, from measured costs.
+    /// How the stiffness is applied in single precision. Default: the faster of the two by measured costs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub operator: Option<RawOperator>,
-    /// Most Newton steps per step of time; absent: 1 for linear and corotational bodies in motion (2 with
-    /// newmark), 100 for static ones, else 20.
+    /// Maximum number of Newton iterations per time step. Default: 1 for linear and corotational bodies in
+    /// motion (2 with `newmark`), 100 for static bodies, otherwise 20.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 1000), extend("x-next" = "1 for speed, 20 for accuracy"))]
     pub newton_steps: Option<u32>,
@@ -187,7 +191,8 @@ pub enum RawMethod {
     Pcg,
     /// Sparse factorisation.
     Cholesky,
-    /// Matrix-free, with integrator static: so many iterations per step, going on where the last ended.
+    /// Matrix-free static relaxation, for the integrator `static`. Each step makes a fixed number of
+    /// iterations and continues where the last one ended.
     Relaxation,
     /// Not supported yet.
     Multigrid,
@@ -195,11 +200,11 @@ pub enum RawMethod {
     MgPcg,
 }
 
-/// Arithmetic of a step. State and sums are in double precision always.
+/// Floating-point precision of a step. State and sums are always in double precision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawPrecision {
-    /// Forces and solver in single precision: the fast path.
+    /// Forces and solver in single precision (the fast path).
     Single,
     /// Residuals in double precision, solver in single precision with iterative refinement.
     Mixed,
