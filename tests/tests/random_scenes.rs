@@ -135,7 +135,7 @@ fn judge((code, reach_m): (i32, f64), out: &Path, said: &str) -> Result<End, Str
             for (count, what) in [
                 ("unconverged_steps", "did not converge"),
                 ("refused_steps", "were refused"),
-                ("rolled_back_steps", "were taken back"),
+                ("rolled_back_steps", "were rolled back"),
             ] {
                 let steps = solver[count].as_u64().unwrap_or(0);
                 // Some steps may miss their tolerance in a run that counts as one that succeeded: it says so.

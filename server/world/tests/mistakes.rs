@@ -99,7 +99,7 @@ const AT_ONCE: &[Mistake] = &[
     (
         BOX,
         "surface = \"two.obj\", cells = 16",
-        &["its mesh falls into 2 parts", "hangs on nothing", "mesh.parts = \"largest\""],
+        &["its mesh consists of 2 separate parts", "nothing holds one of them", "mesh.parts = \"largest\""],
     ),
     (BOX, "surface = \"comb.obj\", cells = 8", &["of the volume at 8 cells", "use cells ="]),
     (
@@ -119,8 +119,12 @@ const AT_ONCE: &[Mistake] = &[
         "body = \"blok\"\nat_s",
         &["no body is called `blok`", "did you mean `block`?"],
     ),
-    ("[[body.fix]]", "[[body.fix]]\naxes = \"xy\"", &["nothing holds it along z, where gravity pulls it"]),
-    (FIX, "", &["body.block: nothing holds the body, it has no `fix`", "falls for ever", "axis = \"z\""]),
+    (
+        "[[body.fix]]",
+        "[[body.fix]]\naxes = \"xy\"",
+        &["nothing holds it along z, although gravity pulls it that way"],
+    ),
+    (FIX, "", &["body.block: nothing holds the body: it has no `fix`", "falls without end", "axis = \"z\""]),
     (
         "point_m = [0.02, 0.05, 0.1]",
         "point_m = [0.02, 0.05, 0.3]",
@@ -150,7 +154,7 @@ const AT_ONCE: &[Mistake] = &[
     (
         "radius_m = 0.01",
         "radius_m = 10",
-        &["tool.finger.shape.sphere.radius_m: 10 m is more than the longest body has"],
+        &["tool.finger.shape.sphere.radius_m: 10 m is more than the length of the longest body"],
     ),
     (
         "tip_m = [0.02, 0.05, 0.15] }, { at_s = 0.3, tip_m = [0.02, 0.05, 0.105] }",
@@ -160,7 +164,7 @@ const AT_ONCE: &[Mistake] = &[
     (
         "{ at_s = 0.0, tip_m",
         "{ at_s = 0.9, tip_m",
-        &["tool.finger.path.1.at_s", "let the times of a path rise"],
+        &["tool.finger.path.1.at_s", "give the times of a path in ascending order"],
     ),
     // what does not exist
     (BODY_END, "solver = { method = \"multigrid\" }", &["`multigrid` is not supported yet"]),

@@ -91,7 +91,7 @@ fn a_cut_that_is_taken_back_leaves_the_surface_the_mass_and_the_momentum() {
             assert!((body.centre_of_mass() - c).norm() < 1e-12, "{how}");
         }
         assert!(sim.bodies()[0].epoch() > epoch + 2, "{how}");
-        assert!(sim.undo().unwrap_err().contains("no cut to take back"));
+        assert!(sim.undo().unwrap_err().contains("no cut to undo"));
         steps(&mut sim, 40);
         let body = &sim.bodies()[0].body;
         assert!(body.least_volume_ratio() > 0.5, "{how}: {}", body.least_volume_ratio());
@@ -103,7 +103,7 @@ fn a_cut_that_is_taken_back_leaves_the_surface_the_mass_and_the_momentum() {
 #[test]
 fn the_last_cuts_are_kept_and_no_more() {
     let mut sim = block("");
-    assert_eq!(sim.undo().unwrap_err(), "there is no cut to take back");
+    assert_eq!(sim.undo().unwrap_err(), "there is no cut to undo");
     for number in 1..=MAX_UNDO as u64 + 2 {
         cut(&mut sim, number, 0.005 + 0.0067 * number as f64);
     }
@@ -113,7 +113,7 @@ fn the_last_cuts_are_kept_and_no_more() {
     assert!(sim.undo().unwrap_err().contains("the last 8 are kept"));
     cut(&mut sim, 20, 0.0337);
     sim.reset().unwrap();
-    assert_eq!(sim.undo().unwrap_err(), "there is no cut to take back");
+    assert_eq!(sim.undo().unwrap_err(), "there is no cut to undo");
 }
 
 #[test]

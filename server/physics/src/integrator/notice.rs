@@ -89,14 +89,17 @@ pub enum Notice {
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::BadInput => write!(f, "step length, gravity, loads or parameters are not usable"),
+            Self::BadInput => write!(f, "the step length, gravity, loads or parameters are not valid"),
             Self::TooLong { h_s, stable_s, needed } => write!(
                 f,
-                "step {h_s:.3e} s is longer than the longest stable one, {stable_s:.3e} s; \
-                 it would take {needed} sub-steps: shorten it or choose an implicit scheme"
+                "the step of {h_s:.3e} s exceeds the stability limit of {stable_s:.3e} s and would need {needed} \
+                 sub-steps; shorten it or choose an implicit scheme"
             ),
             Self::Divided { substeps, stable_s } => {
-                write!(f, "divided into {substeps} sub-steps, the longest stable one is {stable_s:.3e} s")
+                write!(
+                    f,
+                    "divided into {substeps} sub-steps, because the stability limit is {stable_s:.3e} s"
+                )
             }
             Self::DividedAgain { substeps } => {
                 write!(f, "did not stay finite: divided into {substeps} sub-steps")
@@ -109,17 +112,17 @@ impl fmt::Display for Notice {
             Self::SpinLimited { angle_rad, largest_rad } => {
                 write!(
                     f,
-                    "a loose part turned by {angle_rad:.2} rad per step: slowed to {largest_rad:.2} rad"
+                    "a loose part turned by {angle_rad:.2} rad per step: slowed to {largest_rad:.2} rad per step"
                 )
             }
             Self::SpinDivided { substeps } => {
-                write!(f, "loose parts turned far and gained energy: divided into {substeps} parts")
+                write!(f, "loose parts turned far and gained energy: divided into {substeps} sub-steps")
             }
             Self::EnergyGained { excess_j } => {
-                write!(f, "gained {excess_j:.3e} J: made again with implicit Euler")
+                write!(f, "gained {excess_j:.3e} J of energy: repeated with implicit Euler")
             }
             Self::Recovery => write!(f, "inverted or collapsed elements: more Newton steps allowed"),
-            Self::LooseBody => write!(f, "a part hangs on nothing: no static equilibrium"),
+            Self::LooseBody => write!(f, "nothing holds a part of the body: no static equilibrium"),
             Self::Underheld { motion, driven } => {
                 let (mass_kg, FreeMotion { slide, turn, about, .. }) = (motion.mass_kg, motion);
                 write!(f, "nothing keeps a part of {mass_kg:.3e} kg from ")?;
@@ -130,23 +133,24 @@ impl fmt::Display for Notice {
                 match driven {
                     true => write!(
                         f,
-                        ", and the loads do: no static equilibrium; fix more of it, or use dynamics"
+                        ", and the loads drive this motion: no static equilibrium; fix more of it, or use dynamics"
                     ),
-                    false => write!(f, ": its equilibrium is one of many; fix more of it"),
+                    false => write!(f, ": its equilibrium is not unique; fix more of it"),
                 }
             }
             Self::Pivot { displacement } => write!(
                 f,
-                "Cholesky met a pivot that is not positive at node {} along {}: hardly anything holds it, or the \
-                 stiffness spans more than double precision; conjugate gradients solved instead",
+                "Cholesky found a pivot that is not positive at node {} along {}, so conjugate gradients solved \
+                 instead; hardly anything holds the node, or the stiffness ratio exceeds double precision",
                 displacement / 3,
                 ['x', 'y', 'z'][*displacement as usize % 3]
             ),
-            Self::NotFinite => write!(f, "did not stay finite: taken back"),
+            Self::NotFinite => write!(f, "did not stay finite: rolled back"),
             Self::OutOfRange { stretch, size_m } => write!(
                 f,
-                "a part of {size_m:.3e} m would reach {stretch:.1e} times as far: taken back, the body is at rest; \
-                 it is too soft for its loads, or the step too long or the solver's limits too low for it"
+                "a part of {size_m:.3e} m would extend over {stretch:.1e} times its size: rolled back, and the \
+                 body was put to rest; it is too soft for its loads, the step is too long, or the limits of the \
+                 solver are too low"
             ),
         }
     }

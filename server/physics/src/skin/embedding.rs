@@ -34,7 +34,7 @@ impl Default for SkinSettings {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SkinError {
     /// The number of divisions is out of range.
-    #[error("a skin divides the edges of the elements in 1 to {MAX_DIVISIONS} parts, not in {found}")]
+    #[error("a skin cannot divide edges of elements into {found} parts; allowed are 1 to {MAX_DIVISIONS}")]
     Divisions {
         /// Number requested.
         found: usize,
@@ -48,16 +48,16 @@ pub enum SkinError {
         found: usize,
     },
     /// The snapping distance is out of range.
-    #[error("the snapping distance of a skin is a share from 0 to 0.5, not {found}")]
+    #[error("the snapping distance of a skin is {found}; allowed are fractions of an edge from 0 to 0.5")]
     Snapping {
         /// Distance requested.
         found: f64,
     },
     /// The body has already been cut.
-    #[error("a skin is put on an uncut body; reset the body first")]
+    #[error("only an uncut body can be given a skin; reset the body first")]
     AlreadyCut,
     /// The shape function returned a position that is not finite.
-    #[error("skin point {point} has a place that is not finite")]
+    #[error("skin point {point} has a coordinate that is not finite")]
     NonFinitePlace {
         /// Index of the point.
         point: usize,

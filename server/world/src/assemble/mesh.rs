@@ -167,8 +167,8 @@ pub fn doubts_about_repair(health: Option<&MeshHealth>) -> Option<String> {
     let Some(MeshHealth::Volume(VolumeHealth { welded_nodes: joined, .. })) = health else { return None };
     (*joined > 0).then(|| {
         format!(
-            "{joined} nodes of the file lie at the same place as another one and were joined with it: a cut or gap \
-             that was meant there is closed; weld = false keeps them apart"
+            "{joined} nodes of the file coincide with another node and were merged with it; this closes a cut or \
+             gap there. Write weld = false to keep them apart"
         )
     })
 }

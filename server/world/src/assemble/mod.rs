@@ -145,9 +145,8 @@ impl Builder<'_> {
         };
         let law = spec.mechanics.constitutive_law();
         if settings.arithmetic(law) == Arithmetic::Single && !body.is_fast() {
-            let doubt =
-                "most elements are too flat for single precision: mixed precision is taken, which costs more";
-            self.warnings.push(format!("{at}.mesh: {doubt}; elements of more equal edges would not need it"));
+            let doubt = "most elements are too flat for single precision, so mixed precision is used, which is slower";
+            self.warnings.push(format!("{at}.mesh: {doubt}; better-shaped elements would not need it"));
         }
         if let Some(skin) = &spec.skin
             && let Err(fault) = skin::put_on(&mut body, skin, &spec.mesh, self.base_dir)

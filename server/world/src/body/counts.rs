@@ -90,15 +90,15 @@ impl Trouble {
                 )
             }
             Self::Refused => refusal(solve.notice),
-            Self::Divided => format!("done in {} parts to stay finite", solve.substeps),
+            Self::Divided => format!("divided into {} sub-steps to stay finite", solve.substeps),
             Self::RolledBack => match solve.notice {
                 Some(why @ Notice::OutOfRange { .. }) => why.to_string(),
                 _ => format!(
-                    "not finite even in {} parts; the body is back where it was, at rest",
+                    "not finite even in {} sub-steps; the body was put back where it was, at rest",
                     solve.substeps
                 ),
             },
-            Self::Inverted => format!("{} elements are turned inside out", solve.inverted_pieces),
+            Self::Inverted => format!("{} elements are inverted", solve.inverted_pieces),
         }
     }
 
@@ -108,14 +108,14 @@ impl Trouble {
             Self::Unconverged => "ended above the tolerance",
             Self::Refused => "were refused",
             Self::Divided => "were divided",
-            Self::RolledBack => "were taken back",
-            Self::Inverted => "held elements turned inside out",
+            Self::RolledBack => "were rolled back",
+            Self::Inverted => "contained inverted elements",
         }
     }
 }
 
 fn refusal(notice: Option<Notice>) -> String {
-    notice.map_or_else(|| "step or gravity is not usable".into(), |why| why.to_string())
+    notice.map_or_else(|| "the step or gravity is not valid".into(), |why| why.to_string())
 }
 
 /// A trouble from its first step until it is over.
@@ -165,7 +165,7 @@ impl Watch {
             }
             if spell.calm == CALM {
                 let (steps, of) = (spell.steps, spell.of - CALM);
-                let message = format!("over: {steps} of {of} steps {}", trouble.past());
+                let message = format!("resolved: {steps} of {of} steps {}", trouble.past());
                 report.tell(Level::Info, trouble.name(), body, message);
                 *spell = Spell::default();
             }
@@ -213,11 +213,11 @@ impl Watch {
             add(format!("{refused} of {steps} steps were refused, and the body stood still: {why}"));
         }
         if let Some(why) = self.out_of_range {
-            add(format!("{rolled_back} of {steps} steps were taken back, the first because {why}"));
+            add(format!("{rolled_back} of {steps} steps were rolled back, the first because {why}"));
         } else if rolled_back > 0 {
             add(format!(
-                "{rolled_back} of {steps} steps did not stay finite, and the body was put back at rest; take a \
-                 shorter world.step_s or weaker loads"
+                "{rolled_back} of {steps} steps did not stay finite and were rolled back to rest; take a shorter \
+                 world.step_s or smaller loads"
             ));
         }
         if divided > 0 {
@@ -231,11 +231,11 @@ impl Watch {
         if inverted > 0 || least <= 0.0 {
             let displaced = body.fixed_nodes().iter().any(|held| held.displacement_m.norm() > 0.0);
             let slower =
-                if displaced { ", and displacement_over_s lets what is held arrive slowly" } else { "" };
+                if displaced { ", and displacement_over_s applies displacements gradually" } else { "" };
             add(format!(
-                "{inverted} of {steps} steps held inverted elements, up to {} of them, and the least det F is now \
-                 {least:.3}: the loads are too much for the stiffness or for the region that holds it; law = \
-                 \"neo-hookean\" resists inversion{slower}",
+                "{inverted} of {steps} steps contained inverted elements, up to {} at a time, and the smallest \
+                 det F is now {least:.3}: the loads are too large for the stiffness or for the held region; law \
+                 = \"neo-hookean\" resists inversion{slower}",
                 self.counts.most_inverted
             ));
         }
@@ -246,7 +246,8 @@ impl Watch {
         let StepCounts { steps, unconverged, worst_residual, .. } = self.counts;
         let tolerance = body.settings().solver.tolerance;
         let mut text = format!(
-            "{unconverged} of {steps} steps ended above the tolerance {tolerance:e}, worst residual {worst_residual:.1e}; "
+            "{unconverged} of {steps} steps ended above the tolerance {tolerance:e} (largest residual \
+            {worst_residual:.1e}); "
         );
         let _ = write!(text, "{}", advice(body, self.stop, worst_residual));
         text
@@ -276,8 +277,8 @@ fn advice(body: &Body, stop: StopReason, residual: f64) -> String {
     let (settings, law) = (body.settings(), body.material().law);
     let solver = settings.solver;
     if stop != StopReason::IterationLimit {
-        return "the solver could not lower it further: raise solver.tolerance, or take solver.precision = \
-                \"double\" or smaller loads"
+        return "the solver could not reduce it further: raise solver.tolerance, take solver.precision = \
+                \"double\", or reduce the loads"
             .into();
     }
     let by_newton = !settings.is_linearised(law) && !settings.relaxation && !body.is_fast();
@@ -289,7 +290,7 @@ fn advice(body: &Body, stop: StopReason, residual: f64) -> String {
         return "raise solver.tolerance, or take a shorter world.step_s".into();
     }
     let about = needed_iterations(solver.iterations, residual, solver.tolerance);
-    format!("raise solver.iterations to about {about}, or say solver.fixed_iterations = true")
+    format!("raise solver.iterations to about {about}, or write solver.fixed_iterations = true")
 }
 
 /// Iterations that reach `tolerance`, estimated from `made` iterations that left `residual`. Conjugate
@@ -329,7 +330,7 @@ mod tests {
         assert_eq!((told[0].0, told[0].1), (Level::Warning, "step-unconverged"));
         assert_eq!(
             told[1],
-            (Level::Info, "step-unconverged", "over: 30 of 88 steps ended above the tolerance")
+            (Level::Info, "step-unconverged", "resolved: 30 of 88 steps ended above the tolerance")
         );
         assert_eq!((watch.counts.steps, watch.counts.unconverged), (200, 30));
     }

@@ -17,7 +17,7 @@ pub fn warnings(scene: &CheckedScene, forecast: &mut Forecast) {
         let at = format!("body.{}", body.id);
         if body.refused_steps > 0 {
             found.push(format!(
-                "{at}: {} of {} steps are refused or rolled back, the body stands still: {}",
+                "{at}: {} of {} steps are refused or rolled back, and the body stands still in them; {}",
                 body.refused_steps,
                 forecast.steps,
                 refusal(spec)
@@ -30,25 +30,22 @@ pub fn warnings(scene: &CheckedScene, forecast: &mut Forecast) {
             let at_once = spec.displacement_over_s == 0.0;
             let displaced = at_once && spec.fixes.iter().any(|fix| fix.displacement_m.norm() > 0.0);
             let slower = if displaced {
-                "; write displacement_over_s = 1 to let what is held arrive slowly"
+                "; write displacement_over_s = 1 to apply displacements gradually"
             } else {
                 ""
             };
             found.push(format!(
-                "{at}: elements turn inside out (up to {}, least volume ratio {}): the body is too soft for its \
-                 loads, or its mesh too coarse; raise young_pa, take law = \"neo-hookean\", or hold more of it{slower}",
+                "{at}: elements turn inside out (up to {}, smallest volume ratio {}): the body is too soft for \
+                 its loads, or its mesh is too coarse; raise young_pa, take law = \"neo-hookean\", or hold more \
+                 of it{slower}",
                 body.inverted_elements.max(1),
                 digits(body.least_volume_ratio)
             ));
         }
         if body.free_parts > 0 && !scene.cuts.is_empty() {
             found.push(format!(
-                "{at}: after the scheduled cuts {} on nothing ({})",
-                if body.free_parts == 1 {
-                    "a part hangs".into()
-                } else {
-                    format!("{} parts hang", body.free_parts)
-                },
+                "{at}: nothing holds {} after the scheduled cuts ({})",
+                if body.free_parts == 1 { "a part".into() } else { format!("{} parts", body.free_parts) },
                 mass(body.free_mass_kg)
             ));
         }
@@ -97,13 +94,13 @@ fn two_digits(value: f64) -> u64 {
 impl fmt::Display for Forecast {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ending = match self.ending {
-            Ending::Rest => "comes to rest",
-            Ending::End => "the end of the run",
-            Ending::Budget => "the time for the forecast is used up",
+            Ending::Rest => "it came to rest",
+            Ending::End => "this is the whole run",
+            Ending::Budget => "the time for the forecast was used up",
         };
         write!(
             f,
-            "forecast from {} steps of the scene, up to {} of {}: {ending}",
+            "forecast from {} steps of the scene, up to {} of {}; {ending}",
             self.steps,
             duration(self.time_s),
             duration(self.end_s)
@@ -129,8 +126,8 @@ fn motion(body: &BodyForecast, is_static: bool) -> String {
     let when = if is_static { String::new() } else { format!(", after {}", duration(body.largest_at_s)) };
     match body.displacement {
         Source::Steps => format!("moves by {moves} at most{when}"),
-        Source::CoarseCopies => format!("moves by about {moves} at most{when}, as coarse copies of it do"),
-        Source::AtLeast => format!("moves by more than {moves}, it was still moving"),
+        Source::CoarseCopies => format!("moves by about {moves} at most{when}, estimated from coarse copies"),
+        Source::AtLeast => format!("moves by more than {moves}; it was still moving"),
     }
 }
 

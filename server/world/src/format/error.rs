@@ -117,7 +117,7 @@ pub enum MeshInError {
         limit_percent: f64,
     },
     /// A surface was given where a volume mesh was asked for, or the other way round.
-    #[error("'{file}' holds {found}, but {wanted} was asked for; {instead}")]
+    #[error("'{file}' contains {found}, but the scene needs {wanted}; {instead}")]
     WrongKind {
         /// File name.
         file: String,

@@ -74,7 +74,7 @@ impl Storage<'_> {
                 let offset = array.offset.ok_or("appended without an offset")?;
                 let data = data
                     .get(offset..)
-                    .ok_or_else(|| format!("offset {offset} behind the end of the file"))?;
+                    .ok_or_else(|| format!("offset {offset} beyond the end of the file"))?;
                 if is_base64 { self.block(&mut Base64::new(data))? } else { self.block(&mut Raw(data))? }
             }
             ("appended", None) => return Err("appended, but the file has no <AppendedData>".into()),

@@ -138,7 +138,7 @@ impl fmt::Display for VolumeHealth {
             f,
             "repaired",
             &[
-                (self.flipped_tets, "inverted tetrahedra turned round"),
+                (self.flipped_tets, "inverted tetrahedra reoriented"),
                 (self.degenerate_tets, "degenerate tetrahedra removed"),
                 (self.duplicate_tets, "duplicate tetrahedra removed"),
                 (self.welded_nodes, "duplicate nodes merged"),
@@ -151,7 +151,7 @@ impl fmt::Display for VolumeHealth {
             &[
                 (self.overfull_faces, "faces with more than two tetrahedra"),
                 (self.non_manifold_edges, "non-manifold boundary edges"),
-                (self.components.saturating_sub(1), "loose parts beside the first"),
+                (self.components.saturating_sub(1), "separate parts beside the first"),
             ],
         )?;
         for note in &self.notes {
@@ -184,8 +184,8 @@ impl fmt::Display for LatticeReport {
                 (s.welded_vertices, "duplicate vertices merged"),
                 (s.degenerate_triangles, "degenerate triangles removed"),
                 (s.duplicate_triangles, "duplicate triangles removed"),
-                (s.flipped_triangles, "triangles turned round"),
-                (usize::from(s.was_inside_out), "surface that faced inwards turned outwards"),
+                (s.flipped_triangles, "triangles reoriented"),
+                (usize::from(s.was_inside_out), "surface that faced inwards flipped"),
             ],
         )?;
         counts(
@@ -196,7 +196,7 @@ impl fmt::Display for LatticeReport {
                 (s.boundary_edges, "edges with one triangle"),
                 (s.non_manifold_edges, "edges with more than two triangles"),
                 (s.one_sided_edges, "one-sided edges"),
-                (s.self_intersections, "edges through other triangles"),
+                (s.self_intersections, "edges that pierce other triangles"),
             ],
         )?;
         writeln!(
@@ -208,11 +208,11 @@ impl fmt::Display for LatticeReport {
             f,
             "changed",
             &[
-                (self.hole_crossings, "boundary points over holes"),
-                (self.split_nodes, "touching nodes doubled"),
+                (self.hole_crossings, "boundary points across holes"),
+                (self.split_nodes, "touching nodes duplicated"),
                 (self.removed_tets, "pinching tetrahedra removed"),
-                (self.dropped_components, "crumbs dropped"),
-                (self.components.saturating_sub(1), "loose parts beside the first"),
+                (self.dropped_components, "tiny parts dropped"),
+                (self.components.saturating_sub(1), "separate parts beside the first"),
             ],
         )?;
         write!(

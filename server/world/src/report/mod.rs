@@ -94,7 +94,7 @@ impl StepReport {
         let begins = notice != *known;
         *known = notice;
         if solve.outcome == Outcome::Interrupted {
-            let message = "the step was broken off for an order; the body is as it was before it".into();
+            let message = "the step was interrupted by a command; the body is as before the step".into();
             self.tell(Level::Warning, "step-interrupted", body, message);
         }
         if let (Outcome::Advanced, Some(notice), true) = (solve.outcome, solve.notice, begins) {

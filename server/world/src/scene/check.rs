@@ -121,10 +121,10 @@ impl Check<'_> {
         }
         if body.element != RawElement::Tet4 {
             let next = "write element = \"tet4\", or remove the skin";
-            self.conflict(format!("{at}.skin"), "a skin goes with linear tetrahedra", next);
+            self.conflict(format!("{at}.skin"), "a skin needs linear tetrahedra", next);
         }
         if skin.scale.is_some() && skin.surface.is_none() {
-            let next = "the mesh has its own `scale`, which holds for its skin too";
+            let next = "remove it; `scale` of the mesh applies to its skin too";
             self.conflict(format!("{at}.skin.scale"), "`scale` only goes with `surface`", next);
         }
         SkinSpec {
@@ -144,7 +144,7 @@ impl Check<'_> {
             self.conflict(format!("{at}.scale"), "`scale` only goes with `file` or `surface`", next);
         }
         if mesh.weld.is_some() && mesh.file.is_none() {
-            let next = "a surface is filled with a lattice, which has each node once";
+            let next = "a surface is filled with a lattice, which has no coincident nodes";
             self.conflict(format!("{at}.weld"), "`weld` only goes with `file`", next);
         }
         if mesh.parts.is_some() && mesh.surface.is_none() && mesh.file.is_none() {
@@ -194,7 +194,7 @@ impl Check<'_> {
         for (name, lines) in ["x_m", "y_m", "z_m"].into_iter().zip(lines_m) {
             if let Some(i) = (1..lines.len()).find(|&i| lines[i] <= lines[i - 1]) {
                 let what = format!("{} does not lie above {}", lines[i], lines[i - 1]);
-                self.conflict(format!("{at}.{name}.{i}"), what, "let the coordinates rise");
+                self.conflict(format!("{at}.{name}.{i}"), what, "give the coordinates in ascending order");
             }
         }
         self.cell_count(at, lines_m.map(|lines| lines.len() as u64 - 1));
@@ -262,7 +262,11 @@ impl Check<'_> {
     /// A direction of any length but zero.
     fn direction(&mut self, at: &str, raw: Vec3) -> Unit<Vector3<f64>> {
         Unit::try_new(Vector3::from(raw), 1e-300).unwrap_or_else(|| {
-            self.conflict(at.to_owned(), "the direction has no length", "give a direction such as [0, 0, 1]");
+            self.conflict(
+                at.to_owned(),
+                "the direction has zero length",
+                "give a direction such as [0, 0, 1]",
+            );
             Vector3::z_axis()
         })
     }
@@ -284,7 +288,7 @@ impl Check<'_> {
         if let (Some(path), Some(depth_m)) = (&cut.path_m, cut.depth_m) {
             let points: Vec<Vector3<f64>> = path.iter().map(|p| Vector3::from(*p)).collect();
             if points.windows(2).any(|pair| pair[0] == pair[1]) {
-                let next = "give each point of the path once";
+                let next = "remove one of them";
                 self.conflict(format!("{at}.path_m"), "two points in a row are the same", next);
             }
             self.cutting_is_on(&at);
@@ -309,8 +313,8 @@ impl Check<'_> {
             .map(|[tip, heel]| [Vector3::from(*tip), Vector3::from(*heel)])
             .collect();
         if segments.iter().all(|[tip, heel]| tip == heel) {
-            let next = "a blade segment reaches from its tip to its heel";
-            self.conflict(format!("{at}.sweep_m"), "all blade segments have no length", next);
+            let next = "give each blade segment a tip and a heel that differ";
+            self.conflict(format!("{at}.sweep_m"), "all blade segments have zero length", next);
         } else if segments.windows(2).all(|pair| pair[0] == pair[1]) {
             let next = "give successive positions of the blade";
             self.conflict(format!("{at}.sweep_m"), "the blade does not move", next);
@@ -343,7 +347,11 @@ impl Check<'_> {
         for (i, pair) in path.windows(2).enumerate() {
             if pair[1].at_s <= pair[0].at_s {
                 let what = format!("{} s does not come after {} s", pair[1].at_s, pair[0].at_s);
-                self.conflict(format!("{at}.path.{}.at_s", i + 1), what, "let the times of a path rise");
+                self.conflict(
+                    format!("{at}.path.{}.at_s", i + 1),
+                    what,
+                    "give the times of a path in ascending order",
+                );
             }
         }
         if let (Some(repeat), Some(last)) = (tool.repeat_s, path.last())
@@ -369,7 +377,7 @@ impl Check<'_> {
     fn path_point(&mut self, at: &str, index: usize, tool: &RawTool, point: &RawPathPoint) -> PathPoint {
         let at = format!("{at}.path.{index}");
         if point.mode == RawMode::Cut && tool.shape.blade.is_none() {
-            self.conflict(format!("{at}.mode"), "only a blade cuts", "give the tool the shape of a blade");
+            self.conflict(format!("{at}.mode"), "only a blade can cut", "give the tool the shape of a blade");
         }
         if point.mode == RawMode::Cut && self.raw.effects.cutting == Some(false) {
             let next = "remove the mode or effects.cutting";
@@ -396,13 +404,13 @@ impl Check<'_> {
         let other = self.raw.body.iter().find(|body| body.element != RawElement::Tet4);
         if let (Some(true), Some(body)) = (raw.error_estimate, other) {
             let what = format!(
-                "found true, but body `{}` is not of tet4, the only element with an estimate",
+                "found true, but only tet4 has an error estimate, and body `{}` has other elements",
                 body.id
             );
             self.conflict(
                 "effects.error_estimate".into(),
                 what,
-                "make the body of tet4 or remove the effect",
+                "write element = \"tet4\" or remove the effect",
             );
         }
         EffectSwitches {

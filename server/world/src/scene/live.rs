@@ -172,10 +172,10 @@ impl BodyKey {
         match self {
             Self::YoungPa => "Stiffness: Young's modulus",
             Self::Poisson => "Resistance to a change of volume: Poisson's ratio",
-            Self::DampingMass => "Drag of the surroundings",
-            Self::DampingStiffness => "Viscosity of the material",
-            Self::Iterations => "Most iterations of the solver",
-            Self::Tolerance => "Residual at which the solver stops",
+            Self::DampingMass => "Damping of all motion: mass term of Rayleigh damping",
+            Self::DampingStiffness => "Damping of deformation: stiffness term of Rayleigh damping",
+            Self::Iterations => "Maximum number of solver iterations",
+            Self::Tolerance => "Relative residual at which the solver stops",
         }
     }
 }
@@ -203,9 +203,11 @@ impl LiveKey {
     pub fn parameter(self, scene: &CheckedScene) -> LiveParameter {
         let switch = |on: Option<bool>, meaning| (LiveValue::Switch(on == Some(true)), meaning, "");
         let (value, meaning, unit) = match self {
-            Self::Gravity => (LiveValue::Vector(scene.gravity_m_s2), "Acceleration of free fall", "m/s²"),
-            Self::Energy => switch(scene.effects.energy, "Energies in every report"),
-            Self::ErrorEstimate => switch(scene.effects.error_estimate, "Estimated error of the mesh"),
+            Self::Gravity => (LiveValue::Vector(scene.gravity_m_s2), "Gravitational acceleration", "m/s²"),
+            Self::Energy => switch(scene.effects.energy, "Energies in every step report"),
+            Self::ErrorEstimate => {
+                switch(scene.effects.error_estimate, "Discretisation error in every step report")
+            }
             Self::Body(i, key) => (key.value(&scene.bodies[i]), key.meaning(), key.unit()),
         };
         let (range, usual) = match self {

@@ -112,9 +112,9 @@ impl Node {
         let (last, parents) = segments.split_last().ok_or_else(|| fail("empty key".into()))?;
         let mut node = self;
         for segment in parents {
-            node = node.enter(segment).ok_or_else(|| {
-                fail(format!("`{path}` leads nowhere: nothing is called `{segment}` there"))
-            })?;
+            node = node
+                .enter(segment)
+                .ok_or_else(|| fail(format!("`{path}` does not exist: there is no `{segment}`")))?;
         }
         match &mut node.kind {
             Kind::Table(entries) => match entries.iter_mut().find(|(k, _)| k == last) {
@@ -123,10 +123,14 @@ impl Node {
             },
             Kind::Array(items) => {
                 let index = position(items, last)
-                    .ok_or_else(|| fail(format!("`{path}` leads nowhere: `{last}` is not in the list")))?;
+                    .ok_or_else(|| fail(format!("`{path}` does not exist: the list has no item `{last}`")))?;
                 items[index] = value;
             }
-            _ => return Err(fail(format!("`{path}` leads into a value that is not a table"))),
+            _ => {
+                return Err(fail(format!(
+                    "`{path}` does not exist: it leads into a value that is not a table"
+                )));
+            }
         }
         Ok(())
     }

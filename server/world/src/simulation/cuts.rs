@@ -140,7 +140,7 @@ impl Cuts {
     /// That there is none, that cuts still wait, or that a body cannot be built again.
     pub fn undo(&mut self, bodies: &mut [SimBody]) -> Result<Undone, String> {
         if !self.waiting.is_empty() {
-            return Err("cuts are under way; take the last one back once they are made".into());
+            return Err("cuts are still being made; undo the last one when they are complete".into());
         }
         let undone = self.history.undo(bodies)?;
         self.ends.retain(|end| end.incision != undone.incision);
@@ -210,7 +210,7 @@ impl Cuts {
                 let job = Job { blade, incision, bodies, begun: false, elements: 0, request: None };
                 self.waiting.push_back(job);
             } else if let Some(body) = at.bodies.first() {
-                let reason = format!("{MAX_WAITING} cuts wait already; move the blade more slowly");
+                let reason = format!("{MAX_WAITING} cuts are waiting already; move the blade more slowly");
                 at.report.tell(Level::Error, "cut-refused", &body.id, reason);
             }
         }
@@ -361,14 +361,15 @@ impl Cuts {
         if done.refused_edges > 0 {
             let edges = done.refused_edges;
             let message = format!(
-                "incision {incision}: {edges} edges stay whole, their elements or the body hold too many fragments"
+                "incision {incision}: {edges} edges were not cut, because their elements or the body have too \
+                many fragments"
             );
             report.tell(Level::Warning, "cut-incomplete", &body.id, message);
         }
         if let (true, Some(why)) = (before.fitted, body.body.skin().and_then(Skin::misfit)) {
             let message = format!(
-                "incision {incision}: skin and wound do not fit, {why}; the boundary of the elements is shown \
-                 from here to the next reset; other skin.divisions or skin.snapping = 0 may fit"
+                "incision {incision}: skin and wound do not fit, because {why}; the boundary of the elements is \
+                 shown until the next reset. Another value of skin.divisions, or skin.snapping = 0, may help"
             );
             report.tell(Level::Warning, "skin-left", &body.id, message);
         }
@@ -408,11 +409,11 @@ fn tell_of_nothing_opened(done: &CutReport, incision: u32, body: &SimBody, repor
     let message = if done.pending_edges > 0 {
         let size_mm = 1e3 * body.cell_m();
         format!(
-            "incision {incision} is drawn on the surface and opens nothing: it ends inside the elements it \
-             enters, whose cells are {size_mm:.1} mm wide; cut deeper or make the elements smaller"
+            "incision {incision} is drawn on the surface and opens nothing, because it ends inside the elements \
+             it enters; cut deeper than a cell of {size_mm:.1} mm, or make the elements smaller"
         )
     } else {
-        format!("incision {incision} opens nothing: its sweep crosses no edge of an element of the body")
+        format!("incision {incision} opens nothing: its sweep crosses no edge of an element")
     };
     report.tell(Level::Warning, "cut-opens-nothing", &body.id, message);
 }
@@ -427,9 +428,10 @@ pub(crate) fn rounded_fronts(swept: &[Swept], bodies: &[SimBody]) -> Vec<String>
         if opened_m2 < LEAST_OPENED * area_m2 {
             let share = 100.0 * opened_m2 / area_m2;
             doubts.push(format!(
-                "body.{}: incision {incision} acts on {opened_m2:.3e} of the {area_m2:.3e} m² that its blade swept \
-                 ({share:.0} %): its front is rounded down to whole elements, whose cells are {:.1} mm wide; the \
-                 error estimate does not see that; make the elements smaller, or let faces lie on the front",
+                "body.{}: incision {incision} acts on {opened_m2:.3e} of the {area_m2:.3e} m² that its blade \
+                 swept ({share:.0} %), because its front is rounded down to whole elements with cells of {:.1} \
+                 mm; the error estimate does not include this. Make the elements smaller, or let element faces \
+                 lie on the front",
                 body.id,
                 1e3 * body.cell_m()
             ));

@@ -78,7 +78,7 @@ impl Plan {
         }
     }
 
-    /// Switches on what somebody listens to now.
+    /// Switches on what clients subscribe to now.
     pub fn listening(&mut self, wants: &Wants) {
         let surface = wants.contact || wants.surface.contains(&true);
         let now_on = |name: &str| match name {
@@ -90,7 +90,7 @@ impl Plan {
         };
         for effect in self.effects.iter_mut().filter(|effect| !effect.on && now_on(&effect.name)) {
             effect.on = true;
-            effect.why = "somebody listens".into();
+            effect.why = "a client subscribes".into();
         }
     }
 
@@ -123,10 +123,10 @@ impl Plan {
         let why = match (allowed, cuts, blades) {
             (false, ..) => "effects.cutting = false".into(),
             (true, 0, 0) => {
-                "no cut and no blade in the scene; clients may still cut, it costs when they do".into()
+                "no cut and no blade in the scene; cuts by clients cost time only when they are made".into()
             }
             (true, cuts, blades) => format!(
-                "{} and {}; costs only while a blade moves",
+                "{} and {}; costs time only while a blade moves",
                 count(cuts, "scheduled cut"),
                 count(blades, "blade")
             ),
@@ -139,7 +139,7 @@ impl Plan {
             .collect();
         let why = match (allowed, snapped.is_empty()) {
             (true, false) => {
-                format!("{why}; along element faces, the model is built anew per cut: {}", snapped.join(", "))
+                format!("{why}; cuts along element faces rebuild the model: {}", snapped.join(", "))
             }
             _ => why,
         };
@@ -170,16 +170,16 @@ impl Plan {
         let vertices: usize = sizes.iter().map(|size| size.vertices).sum();
         self.push("probes", !scene.probes.is_empty(), count(scene.probes.len(), "probe"), 0.0);
         let energy = scene.effects.energy == Some(true);
-        let why = if energy { "effects.energy = true" } else { "nobody asked" };
+        let why = if energy { "effects.energy = true" } else { "not requested" };
         let elements: f64 = sizes.iter().map(|size| size.elements as f64).sum();
         self.push("energies", energy, why, elements * SECONDS_PER_ELEMENT);
         let rate = scene.publish.surface_hz;
-        let why = format!("on demand: {vertices} vertices, at most {rate} Hz, while somebody subscribes");
+        let why = format!("on demand: {vertices} vertices, at most {rate} Hz, while a client subscribes");
         self.push("surface publication", false, why, vertices as f64 * SECONDS_PER_VERTEX);
-        let why = "on demand: von Mises stress on the surface, while somebody subscribes";
+        let why = "on demand: von Mises stress on the surface, while a client subscribes";
         self.push("surface stress", false, why, elements * SECONDS_PER_ELEMENT);
         let rate = scene.publish.contact_hz;
-        let why = format!("on demand: {rate} Hz beside the step, while a haptic client lives");
+        let why = format!("on demand: {rate} Hz beside the step, while a haptic client is connected");
         self.push("haptic contact", false, why, 0.0);
     }
 }

@@ -49,7 +49,7 @@ impl Sleep {
                 let parts = if slept == 1 { "1 part".into() } else { format!("{slept} parts") };
                 let message = format!(
                     "{parts} that nothing holds fell more than {far_m:.2} m away from the scene and stay there, \
-                     out of the view, until a reset"
+                     out of view, until a reset"
                 );
                 report.tell(Level::Warning, "part-asleep", &body.id, message);
             }

@@ -86,10 +86,10 @@ impl History {
         }
         let Some(incision) = self.kept.back().map(|kept| kept.incision) else {
             return Err(match self.forgotten {
-                true => format!(
-                    "there is no cut left to take back: the last {MAX_UNDO} are kept, memory permitting"
-                ),
-                false => "there is no cut to take back".to_owned(),
+                true => {
+                    format!("there is no cut left to undo: the last {MAX_UNDO} are kept, memory permitting")
+                }
+                false => "there is no cut to undo".to_owned(),
             });
         };
         let mut undone = Undone { incision, bodies: Vec::new(), left: 0 };

@@ -97,7 +97,7 @@ fn a_step_that_is_too_long_is_refused_in_words() {
     let report = run.step(0.02);
     assert_eq!((report.outcome, &run.state), (Outcome::Refused, &before));
     let words = report.notice.unwrap().to_string();
-    assert!(words.contains("longer than the longest stable one"), "{words}");
+    assert!(words.contains("exceeds the stability limit"), "{words}");
 }
 
 /// Symplectic Euler with the velocities half a step behind is velocity Verlet.

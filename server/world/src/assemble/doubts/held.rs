@@ -18,13 +18,13 @@ pub fn doubts(scene: &CheckedScene, spec: &BodySpec, body: &SimBody, doubts: &mu
     let (at, parts) = (format!("body.{}", spec.id), body.body.parts());
     if parts.free.iter().all(|&free| free) {
         let (consequence, fix) = (consequence(scene, spec), suggestion(scene));
-        let what = if spec.fixes.is_empty() { "it has no `fix`" } else { "its `fix` holds no part" };
-        doubts.push(format!("{at}: nothing holds the body, {what}; {consequence}. {fix}"));
+        let what = if spec.fixes.is_empty() { "it has no `fix`" } else { "its `fix` holds no part of it" };
+        doubts.push(format!("{at}: nothing holds the body: {what}, and {consequence}. {fix}"));
     } else if parts.any_free() {
         doubts.push(format!("{at}: {}", loose_parts(scene, spec, body)));
     } else if parts.len() > 1 {
         doubts.push(format!(
-            "{at}: its mesh falls into {} parts that no element joins ({}); each is held{}",
+            "{at}: its mesh consists of {} separate parts ({}); each is held{}",
             parts.len(),
             sizes(&parts.mass),
             remedy(spec)
@@ -35,13 +35,13 @@ pub fn doubts(scene: &CheckedScene, spec: &BodySpec, body: &SimBody, doubts: &mu
 
 fn consequence(scene: &CheckedScene, spec: &BodySpec) -> &'static str {
     if spec.mechanics.integrator == RawIntegrator::Static {
-        "a static body that nothing holds has no equilibrium, its steps are refused"
+        "a static body without support has no equilibrium, so its steps are refused"
     } else if scene.gravity_m_s2.norm() > 0.0 {
-        "it falls for ever"
+        "it falls without end"
     } else if spec.loads.is_empty() {
-        "the first touch sends it away"
+        "the first touch pushes it away"
     } else {
-        "its loads send it away"
+        "its loads push it away"
     }
 }
 
@@ -60,9 +60,9 @@ fn suggestion(scene: &CheckedScene) -> String {
 fn loose_parts(scene: &CheckedScene, spec: &BodySpec, body: &SimBody) -> String {
     let parts = body.body.parts();
     let free: Vec<f64> = (0..parts.len()).filter(|&p| parts.free[p]).map(|p| parts.mass[p]).collect();
-    let hang = if free.len() == 1 { "one of them hangs" } else { "some of them hang" };
+    let which = if free.len() == 1 { "one of them" } else { "some of them" };
     format!(
-        "its mesh falls into {} parts and {hang} on nothing ({} of {}); {}{}",
+        "its mesh consists of {} separate parts, and nothing holds {which} ({} of {}); {}{}",
         parts.len(),
         sizes(&free),
         mass(body.body.total_mass()),
@@ -109,7 +109,8 @@ fn pulled_along(scene: &CheckedScene, body: &SimBody, at: &str, doubts: &mut Vec
     if let Some(axis) = held.iter().find_map(pulled) {
         let axis = AXES[axis];
         doubts.push(format!(
-            "{at}: nothing holds it along {axis}, where gravity pulls it; it slides away. Add {axis} to the `axes` of a fix"
+            "{at}: nothing holds it along {axis}, although gravity pulls it that way; it slides away. Add {axis} \
+            to the `axes` of a fix"
         ));
     }
 }

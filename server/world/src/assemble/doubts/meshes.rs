@@ -30,8 +30,8 @@ pub fn doubts(spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
         && spec.mechanics.locking == RawLocking::None
     {
         doubts.push(format!(
-            "{at}.poisson: linear tetrahedra lock at {}, the body will be far too stiff; \
-             take 0.45, element = \"tet10\", or law = \"neo-hookean\" with locking = \"node-averaged\"",
+            "{at}.poisson: linear tetrahedra lock at {}, and the body will be far too stiff; take 0.45, element \
+             = \"tet10\", or law = \"neo-hookean\" with locking = \"node-averaged\"",
             spec.poisson
         ));
     }
@@ -45,7 +45,7 @@ fn lattice(at: &str, report: &LatticeReport, doubts: &mut Vec<String>) {
         let wanted = report.cells as f64 * (error.abs() / VOLUME).powf(1.0 / ORDER);
         let cells = ((wanted / 2.0).ceil() as usize * 2).min(most_cells());
         let holes = report.surface.holes;
-        let open = if holes > 0 { " (the surface has holes, its volume is a guess)" } else { "" };
+        let open = if holes > 0 { " (the surface has holes, so its volume is an estimate)" } else { "" };
         doubts.push(format!(
             "{at}.mesh: meshing {verb} {} of the volume at {} cells{open}; use cells = {cells}",
             percent(error.abs()),
@@ -66,8 +66,8 @@ fn lattice(at: &str, report: &LatticeReport, doubts: &mut Vec<String>) {
 fn volume(at: &str, health: &VolumeHealth, doubts: &mut Vec<String>) {
     if health.overfull_faces > 0 {
         doubts.push(format!(
-            "{at}.mesh: {} faces belong to more than two tetrahedra, elements overlap; repair the file, or mesh its \
-             surface anew with mesh = {{ surface = …, cells = … }}",
+            "{at}.mesh: {} faces belong to more than two tetrahedra, so elements overlap; repair the file, or \
+             remesh its surface with mesh = {{ surface = …, cells = … }}",
             health.overfull_faces
         ));
     }
@@ -91,7 +91,8 @@ fn forces(at: &str, spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
     for (i, fix) in spec.fixes.iter().enumerate() {
         if fix.displacement_m.norm() > size_m {
             doubts.push(format!(
-                "{at}.fix.{i}.displacement_m: moves a held part by {}, more than the body is long ({}); is it in metres?",
+                "{at}.fix.{i}.displacement_m: moves a held region by {}, more than the length of the body ({}); \
+                is it in metres?",
                 length(fix.displacement_m.norm()),
                 length(size_m)
             ));

@@ -34,7 +34,7 @@ fn size(at: &str, tool: &ToolSpec, longest_m: f64, doubts: &mut Vec<String>) {
     };
     if size_m > allowed_m {
         doubts.push(format!(
-            "{at}.shape.{key}: {} is more than the longest body has ({}); is it in metres?",
+            "{at}.shape.{key}: {} is more than the length of the longest body ({}); is it in metres?",
             length(size_m),
             length(longest_m)
         ));
@@ -72,7 +72,8 @@ fn reach(at: &str, tool: &ToolSpec, bodies: &[SimBody], doubts: &mut Vec<String>
     }
     if nearest_m > radius_m {
         doubts.push(format!(
-            "{at}.path: the tool never comes nearer than {} to a body as it lies at the start; check the path, in metres",
+            "{at}.path: the tool never comes nearer than {} to the initial position of a body; check the path, \
+            which is in metres",
             length(nearest_m - radius_m)
         ));
     }

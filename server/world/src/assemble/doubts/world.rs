@@ -75,7 +75,7 @@ fn step(scene: &CheckedScene, bodies: &[SimBody], doubts: &mut Vec<String>) {
         ));
     } else if h > LONG_STEP_S {
         doubts.push(format!(
-            "world.step_s: a step of {} shows the motion as single pictures and damps it away; write 0.005 to 0.04",
+            "world.step_s: a step of {} makes the motion jump between pictures and damps it away; write 0.005 to 0.04",
             duration(h)
         ));
     }

@@ -49,7 +49,7 @@ impl Check<'_> {
         }
         if m.loose == RawLoose::Pinned && m.cutting != RawCutMethod::Snap {
             let what = format!("found `pinned` with {}, allowed: snap", word(&m.cutting));
-            let next = "write cutting.method = \"snap\", or let loose parts be free";
+            let next = "write cutting.method = \"snap\" or cutting.loose = \"free\"";
             self.conflict(format!("{at}.cutting.loose"), what, next);
         }
     }
@@ -194,12 +194,12 @@ impl Check<'_> {
 
     fn operator(&mut self, at: &str, m: &Mechanics) {
         let Some(found) = m.operator.filter(|_| m.arithmetic() != Arithmetic::Single) else { return };
-        let why = m.why_general().unwrap_or("the precision asked for");
+        let why = m.why_general().unwrap_or("the chosen precision");
         let what = format!("found `{}`, but the general path is taken, for {why}", word(&found));
         self.conflict(
             format!("{at}.solver.operator"),
             what,
-            "remove it; only single precision has the choice",
+            "remove it; only single precision offers this choice",
         );
     }
 
@@ -214,7 +214,7 @@ impl Check<'_> {
                     body.id,
                     word(&body.element)
                 );
-                self.conflict(format!("cut.{i}.body"), what, "make the body of tet4 or remove the cut");
+                self.conflict(format!("cut.{i}.body"), what, "write element = \"tet4\" or remove the cut");
             }
         }
         let Some(body) = raw.body.iter().find(whole) else { return };
@@ -228,7 +228,7 @@ impl Check<'_> {
                 self.conflict(
                     format!("tool.{}.path.{i}.mode", tool.id),
                     what,
-                    "make the body of tet4 or let the tool touch",
+                    "write element = \"tet4\", or give the tool another mode",
                 );
             }
         }

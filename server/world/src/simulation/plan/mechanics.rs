@@ -45,13 +45,13 @@ impl Plan {
         self.push("damping", damped > 0, why, 0.0);
         let remedies = of(&|body| body.mechanics.locking != RawLocking::None);
         let why = if remedies > 0 {
-            format!("{} with a remedy", count(remedies, "body"))
+            format!("{} with a locking remedy", count(remedies, "body"))
         } else {
             "no body has locking".into()
         };
         self.push("locking remedy", remedies > 0, why, 0.0);
         let estimate = scene.effects.error_estimate == Some(true);
-        let why = if estimate { "effects.error_estimate = true" } else { "nobody asked" };
+        let why = if estimate { "effects.error_estimate = true" } else { "not requested" };
         let cost = sizes.iter().map(|size| size.elements as f64 * POINT_FORCES).sum();
         self.push("error estimate", estimate, why, cost);
     }
@@ -102,12 +102,12 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
             OperatorChoice::Assembled => "assembled",
             _ => "matrix-free",
         };
-        let why = if m.operator.is_some() { "the scene asks for it" } else { "it costs less" };
+        let why = if m.operator.is_some() { "set by the scene" } else { "it costs less" };
         format!("fast path, {operator}: {why}")
     } else if m.integrator.is_explicit() || m.method == RawMethod::Relaxation {
         "general path, forces only".into()
     } else {
-        let why = m.why_general().unwrap_or("the precision asked for");
+        let why = m.why_general().unwrap_or("the chosen precision");
         format!("general path for {why}, assembled")
     };
     let elements = size.elements;
