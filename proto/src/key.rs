@@ -45,7 +45,7 @@ pub enum KeyError {
         found: String,
     },
     /// No topic has this form.
-    #[error("'{found}' is no topic of scindo.v1; the topics stand in the documentation of scindo_proto::key")]
+    #[error("'{found}' is no topic of scindo.v1; the documentation of scindo_proto::key lists the topics")]
     Unknown {
         /// The part of the key after the session.
         found: String,

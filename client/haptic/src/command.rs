@@ -129,9 +129,9 @@ fn at(file: &std::path::Path) -> impl Fn(std::io::Error) -> CommandError + use<>
 fn no_contact(arguments: &Arguments, seconds: f64, refused: u64) -> CommandError {
     let hint = match refused {
         0 => {
-            "is the tool id right, does another client or a script hold it, does the scene switch contact off?"
+            "check the tool id, whether another client holds the tool, and whether the scene switches contact off"
         }
-        _ => "messages came but could not be used: are both programs of the same version?",
+        _ => "messages arrived but could not be read; check that both programs have the same version",
     };
     CommandError::NoContact { tool: arguments.tool.clone(), seconds, hint }
 }

@@ -251,8 +251,8 @@ fn position(bytes: &[u8]) -> Vector3<f64> {
 pub async fn tell_of_script(link: &Link, tool: &str) -> Result<(), LinkError> {
     if is_scripted(&link.info().await?, tool) {
         tracing::warn!(
-            "tool '{tool}' is moved by a script of the scene: it follows this device from now on, and its script \
-             again when the device lets go; a tool of the scene without `path`, or a new id, leaves the script alone"
+            "tool '{tool}' has a path in the scene. It now follows this device, and its path again when the \
+             device releases it. To keep the path, name a tool without `path`, or a new id"
         );
     }
     Ok(())

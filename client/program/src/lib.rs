@@ -43,7 +43,7 @@ pub fn start_log(default: &str) {
 /// The commands that describe a program to a shell and to `man`.
 #[derive(Debug, Subcommand)]
 pub enum Manual {
-    /// Print completions for a shell, to be put where it looks for them.
+    /// Print completions for a shell; save them where the shell looks for them.
     Completions {
         /// The shell.
         #[arg(value_enum)]
@@ -51,7 +51,7 @@ pub enum Manual {
     },
     /// Write man pages, one per command.
     Man {
-        /// Where they go; made if missing.
+        /// Directory for the man pages; it is created if missing.
         directory: PathBuf,
     },
 }

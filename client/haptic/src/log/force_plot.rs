@@ -147,7 +147,7 @@ fn draw_force<'a>(area: &Picture<'a>, trace: &Trace, limit_n: f64) -> Drawn<'a> 
     let tissue = trace.bins.iter().map(|bin| (bin.time_s, bin.tissue_n.min(top)));
     chart
         .draw_series(LineSeries::new(tissue, TISSUE.stroke_width(1)))?
-        .label("asked for by the tissue")
+        .label("from the contact model")
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], TISSUE.stroke_width(2)));
     let upper = trace.bins.iter().map(|bin| (bin.time_s, bin.force_n[1]));
     let lower = trace.bins.iter().rev().map(|bin| (bin.time_s, bin.force_n[0]));
@@ -155,7 +155,7 @@ fn draw_force<'a>(area: &Picture<'a>, trace: &Trace, limit_n: f64) -> Drawn<'a> 
     chart.draw_series([Polygon::new(band, FORCE.mix(0.35))])?;
     chart
         .draw_series(LineSeries::new(upper, FORCE.stroke_width(2)))?
-        .label("given to the hand")
+        .label("on the hand")
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], FORCE.stroke_width(2)));
     if limit_n < top {
         chart
@@ -197,7 +197,7 @@ fn draw_age<'a>(area: &Picture<'a>, trace: &Trace) -> Drawn<'a> {
     let line = trace.bins.iter().map(|bin| (bin.time_s, age(bin)));
     chart.draw_series(LineSeries::new(line, AGE.stroke_width(1)))?;
     let note = TextStyle::from(("sans-serif", 13)).color(&FORCE).transform(FontTransform::None);
-    area.draw_text("red: too old, force ramps down or is zero", &note, (80, 14))
+    area.draw_text("red: contact is too old, and the force ramps down to zero", &note, (80, 14))
 }
 
 #[cfg(test)]
@@ -244,7 +244,7 @@ mod tests {
         draw(&file, &trace, 1.6).unwrap();
         let text = std::fs::read_to_string(&file).unwrap();
         for part in
-            ["<svg", "force [N]", "time [s]", "age of contact [ms]", "given to the hand", "limit", "<polygon"]
+            ["<svg", "force [N]", "time [s]", "age of contact [ms]", "on the hand", "limit", "<polygon"]
         {
             assert!(text.contains(part), "{part}");
         }
