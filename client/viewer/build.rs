@@ -195,12 +195,12 @@ fn cause(words: &str) -> (&'static str, &'static str) {
         ),
         (
             &["EACCES", "EPERM", "EROFS"],
-            "npm may not write where it must.",
-            "Give yourself the right to write to the path named below.",
+            "npm has no permission to write its files.",
+            "Make the path named below writable.",
         ),
         (
             &["EINTEGRITY"],
-            "A package that npm fetched is not the one that package-lock.json pins.",
+            "A package that npm fetched differs from the one that package-lock.json pins.",
             "Run <code>npm cache clean --force</code>.",
         ),
         (
@@ -224,12 +224,12 @@ fn cause(words: &str) -> (&'static str, &'static str) {
         (
             &["EBADENGINE", "EUSAGE"],
             "npm refused the packages or the way it was called.",
-            "Read its words below.",
+            "See its message below.",
         ),
     ];
     let known = causes.iter().find(|(codes, ..)| codes.iter().any(|code| words.contains(code)));
     known.map_or(
-        ("npm could not build it, for a reason that this program does not know.", "Read npm's words below."),
+        ("npm could not build the page, for an unknown reason.", "See the message of npm below."),
         |(_, what, next)| (what, next),
     )
 }
@@ -247,7 +247,8 @@ fn advice(reason: &NoPage) -> String {
          <style>body{{font:16px/1.5 system-ui,sans-serif;max-width:46em;margin:12vh auto;padding:0 1em;background:#171c23;color:#e8edf3}}\
          code,pre{{background:#0006;padding:.1em .4em;border-radius:4px}}pre{{padding:1em;overflow:auto;font-size:13px}}</style>\
          <h1>The simulation runs, but its page was not built</h1><p>{what}</p><p>{next}</p>\
-         <p>Meanwhile the streams are on zenoh as always; <code>/healthz</code> tells whether the viewer hears a server.</p>\
+         <p>The data of the simulation are still available over zenoh. \
+         <code>/healthz</code> reports whether the viewer is connected to a server.</p>\
          {}</html>",
         if said.is_empty() { String::new() } else { format!("<pre>{said}</pre>") }
     )

@@ -186,13 +186,13 @@ impl Visit {
         if self.visitor.sent_away.load(Ordering::Relaxed) {
             return Poll::Ready(io::Error::new(
                 io::ErrorKind::ConnectionAborted,
-                "others wait for the place",
+                "closed in favour of waiting connections",
             ));
         }
         while self.deadline.as_mut().poll(context).is_ready() {
             let ends_at = self.ends_at();
             if ends_at <= Instant::now() {
-                return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, "nothing heard for too long"));
+                return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, "no message for too long"));
             }
             self.deadline.as_mut().reset(ends_at);
         }

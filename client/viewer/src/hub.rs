@@ -171,7 +171,7 @@ impl Hub {
             return;
         };
         if shared.slots.len() >= MAX_SLOTS && !shared.slots.contains_key(&slot) {
-            tracing::warn!(?slot, "more bodies and tools than a session may have; not shown");
+            tracing::warn!(?slot, "the session has too many bodies and tools; some are not shown");
             return;
         }
         shared.slots.insert(slot.clone(), bytes.clone());
@@ -261,7 +261,7 @@ impl Hub {
         if matches!(message, Up::Tool(_)) {
             let _ = self.up.try_send(message);
         } else if self.up.send(message).await.is_err() {
-            tracing::debug!("the link has ended; a command of a browser is lost");
+            tracing::debug!("the link was closed; a command from a browser was lost");
         }
     }
 

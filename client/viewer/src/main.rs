@@ -17,10 +17,10 @@ struct Args {
     /// Zenoh endpoint of the server, for example tcp/192.168.1.10:7447; may be given several times
     #[arg(long, value_name = "ENDPOINT")]
     connect: Vec<String>,
-    /// Address for browsers: PORT, HOST or HOST:PORT; 8080 is 127.0.0.1:8080, and port 0 takes a free one
+    /// Address for browsers: PORT, HOST or HOST:PORT; 8080 is 127.0.0.1:8080, and port 0 chooses a free one
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8080", value_parser = scindo_view::listen_address)]
     listen: SocketAddr,
-    /// First part of every key; one per laboratory
+    /// First chunk of every network key; one per laboratory
     #[arg(long, default_value = "scindo")]
     realm: String,
     /// Session within the realm
@@ -32,19 +32,19 @@ struct Args {
     /// Pages of another origin that may connect, for example http://lab:8080; may be given several times
     #[arg(long, value_name = "ORIGIN")]
     allow_origin: Vec<String>,
-    /// Most browsers at a time
+    /// Maximum number of connected browsers
     #[arg(long, default_value_t = 32)]
     max_browsers: usize,
-    /// Pages may watch, but not touch, cut or pause
+    /// Let pages watch, but not touch, cut or pause
     #[arg(long)]
     read_only: bool,
-    /// Which pages may pause, step, reset and set; the server has an option of the same name
+    /// Which pages may pause, step, reset and change parameters; the server has an option of the same name
     #[arg(long, value_enum, default_value = "loopback")]
     operators: Operators,
     /// Serve the page from this folder, for work on the page itself
     #[arg(long, value_name = "DIR", hide = true)]
     page: Option<PathBuf>,
-    /// Print one JSON line with the address instead of words
+    /// Print the address as one JSON line instead of text
     #[arg(long)]
     json: bool,
 }
@@ -82,7 +82,7 @@ async fn run(args: Args) -> anyhow::Result<()> {
     } else {
         println!("{url}  (server: {upstream})");
         if !page_is_built() {
-            println!("The page was not built; what is served there says what to install.");
+            println!("The page was not built; open the address to see what to install.");
         }
     }
     tokio::select! {

@@ -150,7 +150,11 @@ async fn open_socket(
         return (StatusCode::FORBIDDEN, words).into_response();
     }
     let Some(seat) = app.hub.join(app.config.max_browsers) else {
-        return (StatusCode::SERVICE_UNAVAILABLE, "as many browsers as allowed are connected")
+        return (
+            StatusCode::SERVICE_UNAVAILABLE,
+            "the maximum number of browsers is connected; raise it with \
+            --max-browsers",
+        )
             .into_response();
     };
     visitor.becomes_browser();

@@ -115,7 +115,7 @@ async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, rights: Rights) -> Result<()
 fn not_an_operator() -> RpcReply {
     let error = Error {
         code: "not-an-operator".to_owned(),
-        message: "this page may not pause, step, reset or set".to_owned(),
+        message: "this page may not pause, step, reset or change parameters".to_owned(),
         hint: "open it on the viewer's own machine, or start the viewer with --operators all".to_owned(),
     };
     RpcReply { ok: false, error: Some(error), ..RpcReply::default() }

@@ -286,7 +286,7 @@ async fn ask(link: &Link, call: ViewerRpc) -> ViewerRpcReply {
             answer.scenes = Some(scenes);
             RpcReply { ok: true, ..RpcReply::default() }
         }),
-        None => return failed(call_id, refused("empty", "the page asked for nothing")),
+        None => return failed(call_id, refused("empty", "the request of the page is empty")),
     };
     answer.reply = Some(outcome.unwrap_or_else(|error| match error {
         LinkError::Refused { code, message, hint } => {

@@ -9,10 +9,10 @@ import type { View } from "./view";
 import { length } from "./units";
 
 const HINTS: Record<HandMode, string> = {
-  orbit: "drag turns the view, the wheel zooms · Poke, Grab and Cut touch the tissue · ? shows all keys",
-  poke: "drag on the tissue to press · wheel: depth · beside it, with Shift or right button: turn the view",
-  grab: "drag the tissue to pull it · wheel: push and pull · beside it, with Shift or right button: turn the view",
-  cut: "draw the cut on the tissue · wheel: depth · beside it, with Shift or right button: turn the view",
+  orbit: "drag to turn the view · wheel: zoom · Poke, Grab and Cut touch the tissue · ? shows all keys",
+  poke: "drag on the tissue to press it · wheel: depth · to turn the view: Shift, right button, or drag beside it",
+  grab: "drag the tissue to pull it · wheel: push and pull · to turn the view: Shift, right button, or drag beside it",
+  cut: "draw the cut on the tissue · wheel: depth · to turn the view: Shift, right button, or drag beside it",
 };
 const KEYS: Record<string, HandMode> = { "1": "poke", "2": "grab", "3": "cut", c: "cut", o: "orbit", "0": "orbit", escape: "orbit" };
 const CAMERAS: Record<string, Preset> = { "5": "front", "6": "right", "7": "top", "8": "corner" };
@@ -72,7 +72,7 @@ export class Bar {
     this.range.value = String(value);
     document.getElementById("depth-value")!.textContent = length(this.hand.depthM);
     document.getElementById("hint")!.textContent = HINTS[this.hand.mode];
-    this.pause.querySelector("span")!.textContent = this.session.paused ? "Go on" : "Pause";
+    this.pause.querySelector("span")!.textContent = this.session.paused ? "Resume" : "Pause";
     this.pause.querySelector("path")!.setAttribute("d", this.session.paused ? "M7 5l12 7-12 7z" : "M8 5v14M16 5v14");
     const { operator, paused } = this.session;
     this.pause.disabled = this.reset.disabled = !operator;

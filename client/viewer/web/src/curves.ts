@@ -37,8 +37,8 @@ export class Curves {
     }
     const chart = (name: string, unit: string, none: string) => new Chart(this.box, name, unit, none);
     this.charts = {
-      force: chart("force on tools", "N", "no tool yet"), energy: chart("energies", "J", "not told yet"),
-      step: chart("time per step", "s", "not told yet"), age: chart("age of contact", "s", "no haptic device"),
+      force: chart("force on tools", "N", "no tool yet"), energy: chart("energies", "J", "no data yet"),
+      step: chart("time per step", "s", "no data yet"), age: chart("age of contact", "s", "no haptic device"),
     };
     this.timer = window.setInterval(() => Object.values(this.charts!).forEach((chart) => chart.draw()), REFRESH_MS);
   }

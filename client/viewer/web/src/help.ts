@@ -2,24 +2,24 @@
 
 const SECTIONS: [string, [string, string][]][] = [
   ["Look", [
-    ["drag", "turns the view; the right button moves it"], ["wheel", "zooms; over tissue with a tool it sets the depth"],
-    ["F", "brings what is held into view"], ["5 6 7 8", "from the front, the right, above, the corner"],
-    ["V", "colours, mesh, probes, curves"], ["H", "numbers"], ["P", "saves the picture"],
+    ["drag", "turn the view; with the right button, move it"], ["wheel", "zoom; over tissue with a tool, set the depth"],
+    ["F", "bring held bodies into view"], ["5 6 7 8", "view from the front, the right, above, the corner"],
+    ["V", "show colours, mesh, probes, curves"], ["H", "show or hide the numbers"], ["P", "save the picture"],
   ]],
   ["Touch", [
     ["O or Esc", "turn the view, put the tool away"], ["1", "poke: press the tissue"], ["2", "grab: hold and pull it"],
-    ["3 or C", "cut along the drag"], ["Shift", "held: the drag turns the view, whatever the tool"],
+    ["3 or C", "cut along the drag"], ["Shift", "hold it to turn the view with any tool"],
   ]],
-  ["Time", [["Space", "pause or go on"], [".", "one step, when paused"], ["R", "back to the start; asks first when there are cuts"]]],
+  ["Time", [["Space", "pause or resume"], [".", "make one step while paused"], ["R", "return to the start; asks first if there are cuts"]]],
   ["Colours", [
-    ["displacement", "how far each point is from where it rests"], ["von Mises stress", "how much the material is strained in shape, in pascal"],
-    ["solver iterations", "work of the last step"], ["loose parts", "what hangs together"],
+    ["displacement", "distance of each point from its rest position"], ["von Mises stress", "equivalent stress, a measure of distortion, in pascals"],
+    ["solver iterations", "iterations of the last step"], ["loose parts", "one colour for each connected part"],
   ]],
   ["Numbers", [
-    ["real time", "simulated seconds per second; 1 keeps pace"], ["latency", "age of the picture when it is drawn"],
-    ["error left", "what the solver left of a step's imbalance; red above its goal"],
+    ["real time", "simulated seconds per second; 1 is real time"], ["latency", "age of the picture when it is drawn"],
+    ["residual", "relative residual of the solver after a step; red above the tolerance"],
   ]],
-  ["Address", [["?up=y", "this axis is up (x, y, z); otherwise gravity says"], ["?quality=full", "never lower the resolution"]]],
+  ["Address", [["?up=y", "axis that points up (x, y, z); the default follows gravity"], ["?quality=full", "never lower the resolution"]]],
 ];
 
 export class Help {

@@ -39,7 +39,7 @@ export class Panel {
 
   showLink(link: ViewerLink): void {
     const change = this.status.setLink(link);
-    if (change) this.log.line(`server is ${change}`, change === "back" ? "info" : "error");
+    if (change) this.log.line(`server is ${change === "back" ? "back" : "unreachable"}`, change === "back" ? "info" : "error");
     this.refresh();
   }
 
@@ -173,7 +173,7 @@ export class Panel {
       const rate = tool.contactRateHz > 0 ? ` · ${short(tool.contactRateHz)} Hz` : "";
       const age = tool.contactAgeMs > 0 ? ` · ${short(tool.contactAgeMs)} ms old` : "";
       const name = tool.owner && tool.owner !== tool.toolId ? `${tool.toolId} · ${tool.owner}` : tool.toolId;
-      return [name, `${short(tool.forceN)} N${rate}${age}`, "", "force, contacts per second and their age in the hand's device"];
+      return [name, `${short(tool.forceN)} N${rate}${age}`, "", "force, contact models per second, and their age in the haptic device"];
     });
     setRows(this.at("tools"), rows.length > 0 ? rows : [["none", ""]]);
   }
@@ -203,9 +203,9 @@ function bodyRows(body: BodyStats): Row[] {
   const goal = body.tolerance > 0 ? ` of ${exponent(body.tolerance)}` : "";
   const rows: Row[] = [
     [body.bodyId, body.volumeM3 > 0 ? volume(body.volumeM3) : "", "title", "name and volume at rest"],
-    ["elements", count(body.pieces || body.elements), "", "pieces of elements, where cuts took elements apart"],
+    ["elements", count(body.pieces || body.elements), "", "pieces of elements, where cuts divide them"],
     ["solver", `${body.iterations} iterations${body.fixedIterations ? " (fixed)" : ""}`],
-    ["error left", `${exponent(body.residual)}${goal}`, missed ? "bad" : "", "relative residual after the step, and the goal of the scene"],
+    ["residual", `${exponent(body.residual)}${goal}`, missed ? "bad" : "", "relative residual after the step, and the tolerance of the scene"],
   ];
   for (const trouble of found) rows.push(["", trouble.words, "bad words"]);
   return rows;

@@ -13,7 +13,7 @@ const TELL_MS = 120;
 
 /** Names of keys for users, where they differ from the key. */
 const NAMES: Record<string, string> = {
-  "rayleigh.mass": "drag", "rayleigh.stiffness": "viscosity",
+  "rayleigh.mass": "mass damping", "rayleigh.stiffness": "stiffness damping",
   "solver.iterations": "iterations", "solver.tolerance": "tolerance", young: "stiffness", poisson: "Poisson’s ratio",
 };
 

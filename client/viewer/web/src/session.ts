@@ -4,7 +4,7 @@ import type { BodySurface } from "./body";
 import type { ToolVisual } from "./tool";
 
 /** Explains why a page may not pause, reset, undo or change anything. */
-export const NO_OPERATOR = "Only operators change the simulation: pages on the server’s machine, or all with --operators all.";
+export const NO_OPERATOR = "Only operators may change the simulation: pages on the server’s machine, or all pages with --operators all.";
 
 /** Everything that the page knows of the session. All drawing uses it. */
 export interface Session {

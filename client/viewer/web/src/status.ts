@@ -53,14 +53,14 @@ export class Status {
     const connected = this.open && this.link?.connected === true;
     const silent = this.silentMs(now, stats);
     const [state, text] = !this.open
-      ? ["gone", this.everOpen ? "viewer is gone" : "connecting"]
+      ? ["gone", this.everOpen ? "viewer unreachable" : "connecting"]
       : !connected ? ["wait", "waiting for the server"]
       : stats?.paused ? ["paused", "paused"]
       : silent > 0 ? ["stalled", `stalled for ${(silent / 1000).toFixed(0)} s`]
       : ["live", "live"];
     if (this.pill.dataset["state"] !== state) this.pill.dataset["state"] = state;
     setText(this.pill, text);
-    this.pill.title = state === "stalled" ? "No new picture comes: the server is busy with a long step, or stopped answering." : this.link?.detail ?? "";
+    this.pill.title = state === "stalled" ? "No new picture arrives. The server is busy with a long step, or it stopped answering." : this.link?.detail ?? "";
     const up = connected && this.frames > 0;
     this.card.classList.toggle("hidden", up);
     if (!up) this.say(...this.words(connected));
@@ -69,11 +69,11 @@ export class Status {
   private words(connected: boolean): [string, string] {
     if (!this.open) {
       return this.everOpen
-        ? ["The viewer is gone", "The program that serves this page stopped. The page goes on by itself when it is back."]
+        ? ["The viewer is unreachable", "The program that serves this page does not answer. The page reconnects when it is back."]
         : ["Connecting", location.host];
     }
     if (connected) return ["Waiting for the first surface", this.link?.detail ?? ""];
-    return [this.frames > 0 ? "The simulation server is gone" : "Looking for a simulation server", this.link?.detail || this.hello?.upstream || ""];
+    return [this.frames > 0 ? "The simulation server is unreachable" : "Looking for a simulation server", this.link?.detail || this.hello?.upstream || ""];
   }
 
   private say(title: string, words: string): void {
@@ -89,7 +89,7 @@ export function sayNoWebGl(): void {
   card.firstElementChild!.classList.add("final");
   card.querySelector("h1")!.textContent = "This browser cannot draw the scene";
   card.querySelector("p")!.textContent =
-    "The page needs WebGL 2, which is switched off or missing here.\nSwitch on hardware acceleration in the browser's settings, or open this address in a current Chrome, Firefox, Edge or Safari.\nThe simulation itself goes on.";
+    "The page needs WebGL 2, which is switched off or missing here.\nSwitch on hardware acceleration in the browser's settings, or open this address in a current Chrome, Firefox, Edge or Safari.\nThe simulation itself continues.";
   const pill = document.getElementById("link")!;
   pill.dataset["state"] = "gone";
   pill.textContent = "no WebGL";

@@ -15,16 +15,16 @@ export function troubles(body: BodyStats): Trouble[] {
   const found: Trouble[] = [];
   const say = (kind: Trouble["kind"], short: string, words: string) => found.push({ kind, short, words });
   if (body.refusedSteps > 0n) {
-    say("refused", "refuses steps", `${many(body.refusedSteps, "step")} refused: the body stands still in them`);
+    say("refused", "refuses steps", `${many(body.refusedSteps, "step")} refused; the body stood still in them`);
   }
-  if (body.inverted > 0) say("inverted", "is inverted", `${many(body.inverted, "element")} turned inside out: the result is wrong there`);
+  if (body.inverted > 0) say("inverted", "is inverted", `${many(body.inverted, "element")} inverted: the result is wrong there`);
   if (body.unconverged && !body.fixedIterations) {
-    say("error", "does not converge", `the solver stopped above its goal: ${exponent(body.residual)}, goal ${exponent(body.tolerance)}`);
+    say("error", "does not converge", `the solver stopped above its tolerance: residual ${exponent(body.residual)}, tolerance ${exponent(body.tolerance)}`);
   }
   if (body.unconvergedSteps > 0n && !body.fixedIterations && !body.unconverged) {
-    say("missed", "", `${many(body.unconvergedSteps, "step")} ended above the goal so far`);
+    say("missed", "", `${many(body.unconvergedSteps, "step")} ended above the tolerance so far`);
   }
-  if (body.rolledBackSteps > 0n) say("rolled-back", "was rolled back", `${many(body.rolledBackSteps, "step")} rolled back and tried again`);
+  if (body.rolledBackSteps > 0n) say("rolled-back", "was rolled back", `${many(body.rolledBackSteps, "step")} rolled back`);
   if (body.dividedSteps > 0n) say("divided", "", `${many(body.dividedSteps, "step")} divided into shorter ones`);
   return found;
 }
