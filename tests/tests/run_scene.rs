@@ -102,7 +102,7 @@ fn a_run_that_did_not_converge_fails_unless_its_iterations_are_meant() {
     for word in ["10 of 10 steps ended above the tolerance 1e-6", "raise solver.iterations to about"] {
         assert!(warning.contains(word), "{word:?} in {warning}");
     }
-    assert!(text.contains("not to be trusted: body `beam`: 10 of 10 steps did not converge"), "{text}");
+    assert!(text.contains("unreliable: body `beam`: 10 of 10 steps did not converge"), "{text}");
 
     let (code, text, summary) = ended(&[few, "body.beam.solver.fixed_iterations=true"]);
     assert_eq!((code, &summary["warnings"]), (0, &serde_json::json!([])), "{text}");

@@ -48,8 +48,8 @@ pub enum RuntimeError {
     Key(#[from] KeyError),
     /// A port is taken or an address is not ours.
     #[error(
-        "cannot listen at {endpoints}: {reason}. Another server may run there; \
-         choose another address with --listen tcp/HOST:PORT (PORT and the next one are used)"
+        "cannot listen at {endpoints}: {reason}. Another server may be running there; choose another address \
+         with --listen tcp/HOST:PORT (PORT and the next one are used)"
     )]
     Listen {
         /// The endpoints that could not be opened.
@@ -82,7 +82,9 @@ pub enum RuntimeError {
         reason: String,
     },
     /// A thread of the server panicked.
-    #[error("thread '{thread}' died; this is a defect of scindo, its message stands above")]
+    #[error(
+        "thread '{thread}' panicked. This is a defect of scindo; the message of the panic is printed above"
+    )]
     Died {
         /// Name of the thread.
         thread: String,

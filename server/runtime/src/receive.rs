@@ -127,16 +127,16 @@ fn announce(exchange: &Exchange, change: Change) {
     match change {
         // Guests, such as the mouse of a page, come and go with a tool of their own name.
         Change::Taken { tool, owner } if tool == owner => {
-            exchange.event(Level::Info, "tool-taken", format!("'{tool}' takes part"));
+            exchange.event(Level::Info, "tool-taken", format!("'{tool}' joined"));
         }
         Change::Released { tool, owner } if tool == owner => {
-            exchange.event(Level::Info, "tool-released", format!("'{tool}' is put away"));
+            exchange.event(Level::Info, "tool-released", format!("'{tool}' left"));
         }
         Change::Taken { tool, owner } => {
             exchange.event(Level::Info, "tool-taken", format!("'{owner}' holds tool '{tool}'"));
         }
         Change::Released { tool, owner } => {
-            let message = format!("'{owner}' is gone; tool '{tool}' is free");
+            let message = format!("'{owner}' left; tool '{tool}' is free");
             exchange.event(Level::Info, "tool-released", message);
         }
     }

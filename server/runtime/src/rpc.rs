@@ -67,7 +67,7 @@ impl RpcThread {
         };
         let payload = query.payload().map(|p| Bytes::from(p.to_bytes().into_owned())).unwrap_or_default();
         if verb.is_order() && !self.takes_orders {
-            let message = format!("rpc/{} is an order, and nobody may give orders here", verb.as_str());
+            let message = format!("rpc/{} needs an operator, and this server admits none", verb.as_str());
             return refuse(query, error("not-an-operator", message, "start the server with --operators"));
         }
         match verb {
@@ -127,7 +127,11 @@ impl RpcThread {
         let (answer, answers) = bounded(1);
         self.exchange.order_given();
         if self.commands.try_send(Command { order, answer }).is_err() {
-            let error = error("busy", "the simulation has too many orders waiting".into(), "ask again later");
+            let error = error(
+                "busy",
+                "too many commands are waiting for the simulation".into(),
+                "send it again later",
+            );
             return RpcReply { error: Some(error), ..RpcReply::default() };
         }
         answers.recv_timeout(PATIENCE).unwrap_or_else(|_| RpcReply {

@@ -248,8 +248,8 @@ fn declare_rpc(
             if let Err(full) = queries.try_send(query) {
                 let error = scindo_proto::messages::Error {
                     code: "busy".to_owned(),
-                    message: "too many questions are waiting".to_owned(),
-                    hint: "ask again later".to_owned(),
+                    message: "too many requests are waiting".to_owned(),
+                    hint: "send it again later".to_owned(),
                 };
                 rpc::refuse(&full.into_inner(), error);
             }

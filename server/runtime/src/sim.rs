@@ -132,7 +132,7 @@ impl SimThread {
             self.report();
             self.keep_pace();
         }
-        self.discard_cuts("the server ends");
+        self.discard_cuts("the server is shutting down");
         self.engine
     }
 
@@ -226,7 +226,7 @@ impl SimThread {
         let message = self.engine.undo().map_err(|message| Refusal {
             code: "cannot-undo",
             message,
-            hint: "rpc/reset takes back every cut",
+            hint: "rpc/reset undoes every cut",
         })?;
         self.announce_plan();
         self.exchange.event(Level::Info, "cut-undone", message.clone());
@@ -287,13 +287,15 @@ impl SimThread {
         self.panics += 1;
         self.engine.count_panic();
         self.exchange.step_panicked();
-        self.discard_cuts("a step panicked and the scene starts again");
+        self.discard_cuts("a step panicked, and the scene restarts");
         let reset = matches!(catch_unwind(AssertUnwindSafe(|| self.engine.reset())), Ok(Ok(())));
-        let message = format!("step {} panicked; the scene starts again", self.step);
+        let message = format!("step {} panicked; the scene restarts", self.step);
         self.exchange.event(Level::Error, "step-panicked", message);
         if !reset || self.panics >= MOST_PANICS {
             self.exchange.paused.store(true, Ordering::Relaxed);
-            let message = "paused after repeated panics; rpc/reset and rpc/pause bring it back".to_owned();
+            let message =
+                "paused after repeated panics; send rpc/reset, then rpc/pause with paused = false, to resume"
+                    .to_owned();
             self.exchange.event(Level::Error, "paused", message);
         }
     }
@@ -314,7 +316,7 @@ impl SimThread {
             return;
         }
         let epochs = self.epochs();
-        let hint = "change the sweep, or reset, and send it with a new number";
+        let hint = "change the sweep or reset the scene, and send it with a new number";
         let with = Answering { step: self.step, epochs: &epochs, code: "cut-failed", hint };
         let answers = self.exchange.inbox().finish(&report.cuts, &with);
         for answer in answers {

@@ -81,7 +81,7 @@ pub enum BodyError {
     },
     /// A load on a selection that has no surface or volume to carry it.
     #[error(
-        "the selected nodes hold no {carrier}, so {force_n:?} N cannot be shared over it; select more nodes"
+        "the selected nodes contain no {carrier}, so {force_n:?} N cannot be distributed over it; select more nodes"
     )]
     NothingSelected {
         /// "surface" or "volume".

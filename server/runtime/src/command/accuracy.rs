@@ -49,7 +49,7 @@ fn check(args: &AccuracyArgs) -> Result<(), RuntimeError> {
         Some(x) if !(x.is_finite() && x > 0.0) => Err(RuntimeError::Option {
             option,
             value: x.to_string(),
-            reason: "must be a positive number".to_owned(),
+            reason: "it must be a positive number".to_owned(),
             next: "Leave it out for the default".to_owned(),
         }),
         _ => Ok(()),
@@ -114,8 +114,8 @@ fn print(args: &AccuracyArgs, study: &StudyResult) {
         print_case(result);
     }
     let directory = args.out.display();
-    let how = if study.interrupted { "interrupted; the same command goes on from here" } else { "done" };
-    say!("{how}: {:.0} s, {} runs taken over", study.seconds, study.resumed);
+    let how = if study.interrupted { "interrupted; the same command resumes from here" } else { "done" };
+    say!("{how}: {:.0} s, {} runs reused", study.seconds, study.resumed);
     say!("  page     {directory}/index.html");
     say!("  figures  {directory}/points.csv, study.json, pareto-*.svg");
 }
@@ -124,7 +124,7 @@ fn print_case(result: &CaseResult) {
     let counts = result.counts();
     let left_out = match result.left_out {
         0 => String::new(),
-        n => format!(", {n} left out (too slow for the budget, or no time left)"),
+        n => format!(", {n} skipped (too slow for the budget, or no time left)"),
     };
     say!("{}: {} points, {} without a result{left_out}", result.case.title, counts.points, counts.failures);
     match &result.reference {

@@ -54,7 +54,7 @@ fn end_s(args: &CheckArgs, step_s: f64) -> Result<Option<f64>, RuntimeError> {
             option: "--seconds",
             value: seconds.to_string(),
             reason: "a simulated time must be positive".to_owned(),
-            next: "Leave it out to look until the scene comes to rest".to_owned(),
+            next: "Leave it out to step until the scene comes to rest".to_owned(),
         }),
         (None, seconds) => Ok(seconds),
     }
@@ -114,7 +114,8 @@ impl Found {
             Ok(Err(error)) => self.no_forecast = Some(error.to_string()),
             Err(_) => {
                 self.no_forecast = Some(format!(
-                    "the first steps take longer than {}; make the mesh coarser, or look at one step with scindo run --steps 1",
+                    "the first steps take longer than {}; make the mesh coarser, or try a single step with \
+                    scindo run --steps 1",
                     duration(patience.as_secs_f64())
                 ));
             }
@@ -164,7 +165,7 @@ impl Found {
         if let Some(why) = &self.no_forecast {
             say!("no forecast: {why}");
         }
-        let how = if self.forecast.is_some() { "measured" } else { "by the table of costs" };
+        let how = if self.forecast.is_some() { "measured" } else { "from a table of costs" };
         let (price, step) = (self.predicted_ms(), 1e3 * self.step_s);
         let pace = if price <= step {
             "keeps up with real time".to_owned()

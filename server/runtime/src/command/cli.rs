@@ -11,12 +11,12 @@ use crate::wire::orders::Operators;
 
 /// Deforms and cuts soft bodies in real time and serves them over the network.
 ///
-/// Without a command: the built-in demonstration, at http://127.0.0.1:8080.
-/// Exit codes: 0 done, 1 what was asked for failed, 2 bad input.
+/// Without a command, it runs the built-in demonstration at http://127.0.0.1:8080. Exit codes: 0 success, 1
+/// failure, 2 bad input.
 #[derive(Debug, Parser)]
 #[command(name = "scindo", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
-    /// What to do; nothing: the demonstration.
+    /// Command to run. Without one, the demonstration runs.
     #[command(subcommand)]
     pub command: Option<Command>,
     /// How the demonstration is served.
@@ -29,16 +29,16 @@ pub struct Cli {
 pub enum Command {
     /// Simulate a scene and serve it to viewers and haptic clients.
     Run(Box<RunArgs>),
-    /// Run one of the scenes that come with the program, with its page at http://127.0.0.1:8080.
+    /// Run a scene that comes with the program and serve the page at http://127.0.0.1:8080.
     Demo(Box<DemoArgs>),
-    /// Check a scene: what is wrong, what is odd, which effects are on; foretell whether it converges, how far it
-    /// moves, what a step costs.
+    /// Check a scene for errors and doubtful values, and forecast convergence, motion and time per step.
     Check(CheckArgs),
-    /// Turn a surface or volume file into tetrahedra.
+    /// Make a tetrahedral mesh from a surface or volume file.
     Mesh(MeshArgs),
-    /// Measure what accuracy costs in time: laws, elements, meshes, steps, solvers on reference cases or a scene.
+    /// Measure accuracy against time over laws, elements, meshes, steps and solvers, for reference cases or a
+    /// scene.
     Accuracy(AccuracyArgs),
-    /// Run the hard cases that break codes which deform and cut, and write a page about them.
+    /// Run hard cases for deformation and cutting, and write a page of their results.
     Stress(StressArgs),
     /// Completions and man pages.
     #[command(flatten)]
@@ -58,7 +58,7 @@ pub struct RunArgs {
 /// `scindo demo`.
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Which.
+    /// Name of the scene.
     #[arg(default_value = scindo_world::scene::DEMONSTRATION)]
     pub name: String,
     /// Print the scenes instead of running one.
@@ -72,7 +72,7 @@ pub struct DemoArgs {
 /// How a scene is run and served.
 #[derive(Debug, Clone, Args)]
 pub struct ServeArgs {
-    /// As fast as possible instead of real time.
+    /// Run as fast as possible instead of in real time.
     #[arg(long)]
     pub fast: bool,
     /// End after this many steps.
@@ -93,26 +93,27 @@ pub struct ServeArgs {
     /// Session within the realm.
     #[arg(long, default_value = "main")]
     pub session: String,
-    /// Where clients connect, such as tcp/0.0.0.0:7447; surfaces go out one port above
-    /// [default: that of --zenoh, nothing with --connect, else tcp/127.0.0.1:7447].
+    /// Address for clients, such as tcp/0.0.0.0:7447; surfaces use the next port [default: that of --zenoh,
+    /// nothing with --connect, else tcp/127.0.0.1:7447].
     #[arg(long, value_name = "ENDPOINT")]
     pub listen: Vec<String>,
-    /// A zenoh router to connect to.
+    /// Zenoh router to connect to.
     #[arg(long, value_name = "ENDPOINT")]
     pub connect: Vec<String>,
-    /// A zenoh configuration to start from: TLS, users, access control.
+    /// Zenoh configuration file to start from, for TLS, users and access control.
     #[arg(long, value_name = "FILE.json5")]
     pub zenoh: Option<PathBuf>,
-    /// Threads that work on a step; the result does not depend on it.
+    /// Threads per step; results do not depend on their number.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub threads: u16,
     /// Serve the browser page at this address: PORT, HOST or HOST:PORT. 8080 is 127.0.0.1:8080.
     #[arg(long, value_name = "ADDRESS", value_parser = scindo_view::listen_address)]
     pub viewer: Option<SocketAddr>,
-    /// Who may pause, step, reset and set, over the network and in pages; everybody may watch and touch.
+    /// Who may pause, step, reset and change parameters, over the network and in pages. All clients may watch
+    /// and touch.
     #[arg(long, value_enum, value_name = "WHO", default_value = "loopback")]
     pub operators: Operators,
-    /// Override a key of the scene, such as body.liver.young_pa=5e3.
+    /// Override a key of the scene, such as body.liver.young_pa=5e3. May be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Report as JSON, one object per line.
@@ -129,16 +130,16 @@ pub struct CheckArgs {
     /// Print the JSON Schema of scene files instead.
     #[arg(long, conflicts_with = "scene")]
     pub schema: bool,
-    /// Look only at the scene: make no steps, foretell nothing.
+    /// Check only the scene file and its meshes; make no steps and no forecast.
     #[arg(long)]
     pub no_solve: bool,
-    /// Foretell a run of this many steps; without it, until the scene comes to rest.
+    /// Forecast a run of this many steps. By default, the forecast ends when the scene comes to rest.
     #[arg(long, value_name = "N", conflicts_with = "seconds")]
     pub steps: Option<u64>,
-    /// Foretell a run of this much simulated time [s].
+    /// Forecast a run of this much simulated time [s].
     #[arg(long, value_name = "T")]
     pub seconds: Option<f64>,
-    /// Override a key of the scene.
+    /// Override a key of the scene, such as body.liver.young_pa=5e3. May be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
     /// Report as JSON.
@@ -149,9 +150,9 @@ pub struct CheckArgs {
 /// `scindo mesh`.
 #[derive(Debug, Args)]
 pub struct MeshArgs {
-    /// A surface (.obj, .stl, .ply) or a volume (.msh, .vtk, .vtu).
+    /// Input file: a surface (.obj, .stl, .ply) or a volume mesh (.msh, .vtk, .vtu).
     pub input: PathBuf,
-    /// The tetrahedra: .vtu, .vtk or .msh.
+    /// Output file for the tetrahedra: .vtu, .vtk or .msh.
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Lattice cells along the longest side of a surface.
@@ -172,20 +173,20 @@ pub struct AccuracyArgs {
     /// methods of cutting; cutting is all three) and scene files.
     #[arg(value_name = "CASE|SCENE", default_values = ["r1", "r2-tc1", "bar"])]
     pub cases: Vec<String>,
-    /// Recommend a configuration that fits this time: of a static solution, or of a frame of a motion.
+    /// Recommend a configuration that fits into this time, per static solution or per frame of a motion.
     #[arg(long, value_name = "X")]
     pub budget_ms: Option<f64>,
-    /// Where index.html, points.csv and study.json go; a study that was interrupted goes on there.
+    /// Directory for index.html, points.csv and study.json. An interrupted study resumes there.
     #[arg(long, value_name = "DIR", default_value = "accuracy")]
     pub out: PathBuf,
-    /// Coarse meshes and short motions only: less than a minute.
+    /// Use only coarse meshes and short motions; takes less than a minute.
     #[arg(long)]
     pub quick: bool,
-    /// Time that the study itself may take, such as 90s, 2m or 1h30m, its reference included
-    /// [default: 5m for a scene, 40s with --quick; as long as it takes for the cases of the program].
+    /// Time limit of the whole study, its reference included, such as 90s, 2m or 1h30m [default: 5m for a
+    /// scene, 40s with --quick, none for built-in cases].
     #[arg(long, value_name = "DURATION", value_parser = duration)]
     pub within: Option<Duration>,
-    /// Simulated time of scenes in motion [s].
+    /// Simulated time for scenes in motion [s].
     #[arg(long, value_name = "T")]
     pub seconds: Option<f64>,
     /// Only these laws, such as linear,corotational.
@@ -203,7 +204,7 @@ pub struct AccuracyArgs {
     /// Only these numbers of threads.
     #[arg(long, value_name = "N", value_delimiter = ',')]
     pub threads: Vec<String>,
-    /// Other meshes of a block: cells along its longest side.
+    /// Meshes of a block, given as cells along its longest side.
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub cells: Vec<u32>,
     /// Report as JSON.
@@ -224,19 +225,19 @@ fn duration(text: &str) -> Result<Duration, String> {
 /// `scindo stress`.
 #[derive(Debug, Args)]
 pub struct StressArgs {
-    /// Only this case, by name or number; may be given again.
+    /// Run only this case, given by name or number. May be repeated.
     #[arg(long = "case", value_name = "NAME")]
     pub cases: Vec<String>,
     /// Print the cases instead of running them.
     #[arg(long)]
     pub list: bool,
-    /// Take parts of the method away and see that the cases fail: about five times as long.
+    /// Disable parts of the method in turn and check that the cases fail. Takes about five times as long.
     #[arg(long)]
     pub mutations: bool,
-    /// Where index.html and stress.json go.
+    /// Directory for index.html and stress.json.
     #[arg(long, value_name = "DIR", default_value = "stress")]
     pub out: PathBuf,
-    /// Cases run at the same time; 0: one per hardware thread. Results do not depend on it.
+    /// Number of cases that run in parallel; 0 is one per hardware thread. Results do not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub threads: u16,
     /// Report as JSON.

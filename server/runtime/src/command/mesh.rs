@@ -25,7 +25,7 @@ pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
         return Err(RuntimeError::Option {
             option: "--output",
             value: args.output.display().to_string(),
-            reason: "the format is told by the ending".to_owned(),
+            reason: "the extension of the file determines its format".to_owned(),
             next: "Use .vtu, .vtk or .msh".to_owned(),
         });
     }

@@ -195,7 +195,7 @@ fn open_sessions(network: &NetworkConfig, may_do_without: bool) -> Result<Option
         Ok(sessions) => Ok(Some(sessions)),
         Err(RuntimeError::Listen { endpoints, .. }) if may_do_without => {
             tracing::warn!(
-                "{endpoints} is taken; nobody can watch this run (--listen chooses another address)"
+                "{endpoints} is in use, so no client can watch this run; choose another address with --listen"
             );
             Ok(None)
         }
@@ -321,7 +321,7 @@ async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig) -> Resul
 
 /// Ends a process whose threads do not end. Whatever they hold is lost.
 fn give_up(reason: &str) {
-    eprintln!("error: {reason}; the process ends here and writes no results");
+    eprintln!("error: {reason}; the process exits without writing results");
     std::process::exit(1);
 }
 
@@ -361,7 +361,7 @@ fn conclude(
         say!("  results  {directory}/summary.json, probes.csv, final.vtm");
     }
     for failure in &failures {
-        say!("  not to be trusted: {failure}");
+        say!("  unreliable: {failure}");
     }
     Ok(failures)
 }

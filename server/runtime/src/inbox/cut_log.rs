@@ -99,8 +99,8 @@ impl CutLog {
         if self.tickets.len() >= MAX_WAITING_CUTS {
             return Err(refuse(
                 "queue-full",
-                format!("{MAX_WAITING_CUTS} cuts wait already"),
-                "send it again after some of them were answered",
+                format!("{MAX_WAITING_CUTS} cuts are waiting already"),
+                "send it again when some of them have been answered",
             ));
         }
         let whose = (command.client_id.clone(), command.tool_id.clone());
@@ -128,7 +128,7 @@ impl CutLog {
         let names: Vec<&str> = self.bodies.iter().map(|b| &**b).collect();
         refuse(
             "unknown-body",
-            format!("the scene has no body '{id}', it has {}", names.join(", ")),
+            format!("the scene has no body '{id}'; its bodies are {}", names.join(", ")),
             "name one of these bodies, or none for all",
         )
     }
@@ -141,7 +141,9 @@ impl CutLog {
         }
         Err(refuse(
             "too-many-clients",
-            format!("cuts of {MAX_LOGS} clients and tools are remembered already"),
+            format!(
+                "the server tracks the cuts of at most {MAX_LOGS} clients and tools, and all places are taken"
+            ),
             "use fewer client and tool ids",
         ))
     }

@@ -142,7 +142,7 @@ impl Owners {
             return Err(refuse(
                 "stale-sequence",
                 format!("pose {} of tool '{key_tool}' is not newer than {}", sample.seq, held.input.seq),
-                "number poses upwards",
+                "number poses in ascending order",
             ));
         }
         if !held.admit(now) {
@@ -167,7 +167,7 @@ impl Owners {
         if self.let_go.get(&whose).is_some_and(comes_late) {
             return Err(refuse(
                 "let-go",
-                format!("a pose of '{}' came after it let go of tool '{}'", whose.0, whose.1),
+                format!("a pose of '{}' arrived after it released tool '{}'", whose.0, whose.1),
                 "declare the token again before the next pose",
             ));
         }
@@ -183,8 +183,8 @@ impl Owners {
             if sample.shape.is_none() {
                 return Err(refuse(
                     "unknown-tool",
-                    format!("the scene has no tool '{tool}' and the sample states no shape"),
-                    "use a tool of rpc/info or state a shape",
+                    format!("the scene has no tool '{tool}', and the sample gives no shape"),
+                    "use a tool of rpc/info or give a shape",
                 ));
             }
             let brought = self.held.keys().filter(|id| !self.scene_tools.contains(*id)).count();
@@ -193,7 +193,7 @@ impl Owners {
                 return Err(refuse(
                     "too-many-tools",
                     format!(
-                        "the scene has {of_scene} tools and clients brought {brought}, at most {MAX_TOOLS}"
+                        "the scene has {of_scene} tools and clients added {brought}; at most {MAX_TOOLS} are allowed"
                     ),
                     "wait until another client leaves",
                 ));

@@ -101,7 +101,7 @@ impl Keyframes {
             if let Err(TrySendError::Full(_)) =
                 self.answers.try_send(Answer { query: waiting.query, keyframe })
             {
-                tracing::debug!("keyframe not sent: {WAITING_KEYFRAMES} wait already");
+                tracing::debug!("keyframe not sent: {WAITING_KEYFRAMES} are waiting already");
             }
         }
         !self.waiting.is_empty() || !self.from_zenoh.is_empty()

@@ -69,8 +69,10 @@ impl Catalogue {
         if self.scenes.is_empty() {
             return Err(Refusal {
                 code: "not-supported",
-                message: "this server runs one scene: it counts steps, writes results or does not keep pace"
-                    .into(),
+                message:
+                    "this server keeps its scene, because it makes a fixed number of steps, writes results \
+                    or does not keep pace with real time"
+                        .into(),
                 hint: "start a server with the scene instead",
             });
         }
@@ -78,8 +80,8 @@ impl Catalogue {
             let names: Vec<&str> = self.scenes.iter().map(|scene| &*scene.name).collect();
             return Err(Refusal {
                 code: "unknown-scene",
-                message: format!("there is no scene '{name}', there are {}", names.join(", ")),
-                hint: "name one of rpc/scenes",
+                message: format!("there is no scene '{name}'; the scenes are {}", names.join(", ")),
+                hint: "choose one of rpc/scenes",
             });
         };
         let mut asked = self.asked();
@@ -87,7 +89,7 @@ impl Catalogue {
             return Err(Refusal {
                 code: "busy",
                 message: "another scene is being built".into(),
-                hint: "ask again when it runs",
+                hint: "send it again when that scene runs",
             });
         }
         *asked = Some(number);

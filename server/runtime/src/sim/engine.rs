@@ -105,7 +105,7 @@ impl Engine {
         if let Some(results) = self.results.as_mut().filter(|_| self.failure.is_none())
             && let Err(error) = results.record(&self.sim)
         {
-            tracing::error!(%error, "results end here");
+            tracing::error!(%error, "results cannot be written; they end at this step");
             self.failure = Some(error);
         }
     }
@@ -138,7 +138,7 @@ impl Engine {
     pub fn failures(&self) -> Vec<String> {
         let mut failures = self.sim.failures();
         if self.panics > 0 {
-            failures.push(format!("{} steps panicked, after which the scene started again", self.panics));
+            failures.push(format!("{} steps panicked, and the scene restarted after each", self.panics));
         }
         failures
     }
@@ -173,7 +173,7 @@ impl Engine {
     pub fn undo(&mut self) -> Result<String, String> {
         let undone = self.sim.undo()?;
         let ids: Vec<&str> = undone.bodies.iter().map(|&body| &*self.sim.bodies()[body].id).collect();
-        Ok(format!("{}: incision {} is taken back", ids.join(", "), undone.incision))
+        Ok(format!("{}: incision {} was undone", ids.join(", "), undone.incision))
     }
 
     /// Changes one parameter of the scene.

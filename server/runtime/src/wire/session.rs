@@ -74,7 +74,7 @@ fn load(path: &Path) -> Result<zenoh::Config, RuntimeError> {
         option: "--zenoh",
         value: path.display().to_string(),
         reason: words(&e),
-        next: "An example stands in deploy/open-lab.json5".to_owned(),
+        next: "See the example deploy/open-lab.json5".to_owned(),
     })
 }
 
@@ -108,7 +108,8 @@ fn check(option: &'static str, endpoint: &str) -> Result<(), RuntimeError> {
         option,
         value: endpoint.to_owned(),
         reason: reason.to_owned(),
-        next: "Write it like tcp/0.0.0.0:7447, with two free ports from 1 to 65535".to_owned(),
+        next: "Write it like tcp/0.0.0.0:7447, with a port from 1 to 65534 that is free, as is the next one"
+            .to_owned(),
     };
     let (protocol, address) = endpoint.split_once('/').ok_or_else(|| wrong("no protocol"))?;
     if !matches!(protocol, "tcp" | "tls") {
@@ -118,7 +119,7 @@ fn check(option: &'static str, endpoint: &str) -> Result<(), RuntimeError> {
     let port = address.rsplit_once(':').ok_or_else(|| wrong("no port"))?.1;
     match port.parse::<u16>() {
         Ok(1..=65534) => Ok(()),
-        _ => Err(wrong("no such port, or no port above it for surfaces")),
+        _ => Err(wrong("there is no such port, or no port above it for surfaces")),
     }
 }
 
