@@ -23,6 +23,7 @@ pub mod cut;
 pub mod skin;
 pub mod snap;
 pub mod enrichment;
+pub mod phase;
 pub mod team;
 pub mod assembly;
 pub mod operator;

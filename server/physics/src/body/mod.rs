@@ -6,6 +6,7 @@ mod cost;
 mod cutting;
 mod error;
 mod measures;
+mod phases;
 mod precision;
 mod range;
 mod settings;
@@ -40,6 +41,7 @@ use crate::material::{Material, Rayleigh};
 use crate::mesh::{HexMesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
+use crate::phase::Phase;
 use crate::reserve::{refill, resize_reserving};
 use crate::skin::{Skin, SkinSettings, SkinShape};
 use crate::snap::Snapper;
@@ -178,7 +180,9 @@ impl Body {
             self.spring_forces.resize(springs.len(), Vector3::zeros());
             return SolveReport { outcome: Outcome::Refused, ..SolveReport::default() };
         }
+        self.team.begin(Phase::Guards);
         let mut report = self.advance(dt_s, gravity, springs);
+        self.team.begin(Phase::Guards);
         if let Some(Notice::Pivot { displacement }) = &mut report.notice {
             let (copy, axis) = (*displacement / 3, *displacement % 3);
             let node = self.space.node_of_copy().get(copy as usize).copied().unwrap_or(copy);

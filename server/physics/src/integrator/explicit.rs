@@ -13,6 +13,7 @@ use super::step_inputs::StepInputs;
 use crate::assembly::Tangent;
 use crate::material::Law;
 use crate::operator::FixedCopy;
+use crate::phase::Phase;
 use crate::team::Team;
 
 /// Fraction of the longest stable step that is used.
@@ -151,6 +152,7 @@ impl ModelSolver {
         fixed: &[FixedCopy],
         a: &mut [Vector3<f64>],
     ) {
+        team.begin(Phase::Residual);
         let rayleigh = self.material.rayleigh;
         self.model.internal_forces_by(team, x, &mut self.force);
         if rayleigh.stiffness_s > 0.0 {
@@ -167,9 +169,11 @@ impl ModelSolver {
             spring.carriers().for_each(|(c, w)| self.force[c] += w * force);
         }
         hold(fixed, &mut self.force);
+        team.begin(Phase::Solve);
         a.fill(Vector3::zeros());
         self.mass.solve(team, &self.force, a);
         hold(fixed, a);
+        team.begin(Phase::Commit);
     }
 }
 

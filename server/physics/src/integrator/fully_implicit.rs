@@ -14,6 +14,7 @@ use super::statics::prescribe;
 use super::step_inputs::{StepHistory, StepInputs};
 use crate::assembly::Tangent;
 use crate::material::Law;
+use crate::phase::Phase;
 use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
 use crate::team::Team;
 
@@ -40,6 +41,7 @@ impl ModelSolver {
         (scheme, inputs): (Scheme, &StepInputs<'_>),
         report: &mut SolveReport,
     ) {
+        team.begin(Phase::Predict);
         let Course { multistep, before, .. } = course;
         let Some(history) = multistep.extrapolate(team, before, (scheme, inputs.h)) else { return };
         match scheme {
@@ -50,12 +52,14 @@ impl ModelSolver {
             _ => state.x.copy_from_slice(history.x_a),
         }
         prescribe(inputs.fixed, &mut state.x);
+        team.begin(Phase::Operator);
         let increment = history.increment;
         let beta = if increment.B > 0.0 { self.material.rayleigh.stiffness_s } else { 0.0 };
         if let (true, Some(K)) = (beta > 0.0, &mut self.damping) {
             self.model.rotated_stiffness(&state.x, K);
         }
         let newton = self.minimise(team, (before, &mut state.x), (inputs, &history), report);
+        team.begin(Phase::Commit);
         if newton.stop == StopReason::NonFinite {
             report.outcome = Outcome::Held;
             return;
@@ -66,6 +70,7 @@ impl ModelSolver {
         for ((v, x), from) in state.v.iter_mut().zip(&state.x).zip(history.x_v) {
             *v = increment.B * (x - from);
         }
+        team.begin(Phase::Guards);
         let elastic_j = self.model.energy_by(team, &state.x);
         report.elastic_j = Some(elastic_j);
         if !finite(state) || !(self.mass.kinetic(&state.v) + elastic_j).is_finite() {
@@ -94,6 +99,7 @@ impl ModelSolver {
         (inputs, history): (&StepInputs<'_>, &StepHistory<'_>),
         report: &mut SolveReport,
     ) -> NewtonReport {
+        team.begin(Phase::Guards);
         let ruined = self.count_ruined(x, report);
         let (settings, linearised) = self.newton_settings();
         let StepHistory { increment, x_a, x_v } = *history;
@@ -136,6 +142,7 @@ impl ModelSolver {
             scratch: &mut self.scratch,
             force: &mut self.force,
         };
+        team.begin(Phase::Residual);
         if !phi.value(team, x).is_finite() {
             // The velocity is so high that the predictor overflows: start from the present positions.
             x.copy_from_slice(&before.x);
@@ -146,6 +153,7 @@ impl ModelSolver {
             if !self.active.springs.is_empty() {
                 self.relaxation.restart_next(); // springs move without being loads
             }
+            team.begin(Phase::Solve);
             let done = self.relaxation.relax(team, &mut phi, inputs.fixed, x, iterations);
             report.iterations += done.iterations;
             (report.residual, report.stop) = (done.residual, done.stop);

@@ -23,6 +23,7 @@ use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
     Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
 };
+use crate::phase::Phase;
 use crate::reserve::resize_reserving;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Pcg, StopReason};
 use crate::team::{Team, blocks};
@@ -176,6 +177,7 @@ impl LinearStep {
         if finite {
             self.commit(team, state, inputs, spring_forces);
         }
+        team.begin(Phase::Guards);
         // Relaxation may continue this search in the next step if nothing changes until then.
         self.searched = None;
         if finite && inputs.relaxes() && inputs.step.springs.is_empty() {
@@ -202,9 +204,11 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         spring_forces: &mut [Vector3<f64>],
     ) -> StepOutcome {
+        team.begin(Phase::Predict);
         self.predicted.copy_from_slice(&state.x);
         self.delta.fill([0.0; 4]);
         self.translations.restart(inputs.step.parts);
+        team.begin(Phase::Solve);
         let Self { pcg, preconditioner, delta, reference, .. } = self;
         let mut A = system(elastic, &[], inputs);
         let solve = pcg.go_on(team, &mut A, preconditioner, delta, (*reference, inputs.solver));
@@ -213,6 +217,7 @@ impl LinearStep {
             self.commit(team, state, inputs, spring_forces);
             self.ended.copy_from_slice(&state.x);
         }
+        team.begin(Phase::Guards);
         // Convergence by the recurrence is checked in the next step, from forces.
         if !finite || solve.stop == StopReason::Converged {
             self.searched = None;
@@ -232,9 +237,12 @@ impl LinearStep {
         self.delta.fill([0.0; 4]);
         self.translations.restart(inputs.step.parts);
         for pass in 0..SPRING_PASSES {
+            team.begin(Phase::Operator);
             self.complete_operator(elastic, inputs);
+            team.begin(Phase::Residual);
             self.balance_parts(state, inputs);
             self.residual(team, elastic, state, inputs, (pass, first));
+            team.begin(Phase::Solve);
             let report = self.solve(team, elastic, inputs, (pass, first));
             // A pass with nothing left to do estimates no error.
             let algebraic_error = solve.algebraic_error.max(report.algebraic_error);
@@ -257,6 +265,7 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         acceleration: &mut [Vector3<f64>],
     ) {
+        team.begin(Phase::Residual);
         self.predicted.copy_from_slice(&state.x);
         elastic.update(team, &inputs.elastic_update(), &state.x);
         team.for_blocks(blocks(&mut self.f_int, BLOCK), |block, f| elastic.forces(block, f));
@@ -282,9 +291,11 @@ impl LinearStep {
             *a = if m > WEIGHTLESS { *a / m } else { Vector3::zeros() };
         }
         hold(inputs.step.fixed, acceleration);
+        team.begin(Phase::Guards);
     }
 
     fn predict(&mut self, team: &mut Team, state: &State, inputs: &LinearInputs<'_>) {
+        team.begin(Phase::Predict);
         team.for_blocks(blocks(&mut self.predicted, BLOCK), |block, predicted| {
             match inputs.inertia {
                 Inertia::Euler => {}
@@ -314,6 +325,7 @@ impl LinearStep {
         state: &State,
         inputs: &LinearInputs<'_>,
     ) -> usize {
+        team.begin(Phase::Operator);
         let (h, beta) = (inputs.step.h, inputs.material.rayleigh.stiffness_s);
         let with = inputs.elastic_update();
         let scale = with.scale;
@@ -598,6 +610,7 @@ impl LinearStep {
 
     /// Moves the predictor to x⁺ = x̂ + δ. Returns whether all of it is finite.
     fn move_predictor(&mut self, team: &mut Team, inputs: &LinearInputs<'_>) -> bool {
+        team.begin(Phase::Commit);
         let bound = 1e15; // m: far outside any scene, far inside the range of single precision
         let (delta, shift, of_part) = (&self.delta, &self.translations.shift, &inputs.step.parts.of_copy);
         let results = (blocks(&mut self.predicted, BLOCK), blocks(&mut self.partial, 1));

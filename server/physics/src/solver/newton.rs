@@ -12,6 +12,7 @@ use super::linear::{LinearSettings, LinearSolver, Method};
 use super::report::StopReason;
 use crate::assembly::BlockCsr;
 use crate::operator::{FixedCopy, StiffModes};
+use crate::phase::Phase;
 use crate::team::Team;
 
 /// A function to minimise: potential energy, or that plus the inertia of a time step.
@@ -201,6 +202,7 @@ impl Newton {
         if self.hessian.n_rows() != x.len() {
             self.prepare(potential);
         }
+        team.begin(Phase::Residual);
         let potential_there = potential.gradient(team, x, &mut self.g);
         let mut report = NewtonReport { potential: potential_there, ..NewtonReport::default() };
         let mut first = None;
@@ -226,8 +228,10 @@ impl Newton {
             if moved && self.measure(potential, &mut report, &mut first) {
                 return report;
             }
+            team.begin(Phase::Operator);
             potential.hessian(team, x, curvature, &mut self.hessian);
             self.solver.set_matrix(&self.hessian, fixed);
+            team.begin(Phase::Residual);
             if self.measure(potential, &mut report, &mut first) {
                 return report;
             }
@@ -237,6 +241,7 @@ impl Newton {
                 return report;
             }
             let (before, backtracks) = (report.residual, report.backtracks);
+            team.begin(Phase::Solve);
             let most = self.settings.linear.tolerance.min(report.residual.sqrt());
             let definite = self.direction(team, (curvature, most), &mut report);
             // An indefinite Hessian may point uphill: make this step with its projection.
@@ -244,6 +249,7 @@ impl Newton {
                 curvature = Curvature::Definite;
                 continue;
             }
+            team.begin(Phase::Search);
             let slope = dot(&self.g, &self.p);
             let halvings = self.settings.halvings;
             let mut next = self.search(team, potential, (x, phi), (slope, largest, halvings), &mut report);
@@ -271,6 +277,7 @@ impl Newton {
                 return report;
             };
             floor.below_rounding = slope.abs() <= 1e3 * ROUNDING * next.abs();
+            team.begin(Phase::Residual);
             phi = next;
             largest = largest.max(phi.abs());
             x.copy_from_slice(&self.trial);

@@ -23,6 +23,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::phase::{Marks, Phase, PhaseMark};
+
 use gate::Gate;
 use threads::{Lookout, Threads};
 
@@ -35,6 +37,7 @@ pub struct Team {
     threads: Arc<Threads>,
     gate: usize,
     stop: Option<Arc<AtomicBool>>,
+    marks: Marks,
 }
 
 /// Steps several teams side by side; see [`Team::sharing`].
@@ -45,16 +48,31 @@ pub struct Lead {
 }
 
 impl Team {
+    /// Calls `mark` from now on with each phase of the work when it begins; `None` ends that.
+    pub fn set_phase_mark(&mut self, mark: Option<PhaseMark>) {
+        self.marks.set(mark);
+    }
+
+    /// Announces that `phase` of the work begins.
+    pub fn begin(&mut self, phase: Phase) {
+        self.marks.begin(phase);
+    }
+
     /// A team of `threads` members, at least one: the caller itself.
     pub fn new(threads: usize) -> std::io::Result<Self> {
-        Ok(Self { threads: Arc::new(Threads::new(threads, &[])?), gate: 0, stop: None })
+        Ok(Self {
+            threads: Arc::new(Threads::new(threads, &[])?),
+            gate: 0,
+            stop: None,
+            marks: Marks::default(),
+        })
     }
 
     /// A team for each of the `sizes`, all on the same `threads` threads (the caller's included), and the lead
     /// under which they work side by side. A size is the work of a team relative to the others.
     pub fn sharing(threads: usize, sizes: &[usize]) -> std::io::Result<(Lead, Vec<Self>)> {
         let threads = Arc::new(Threads::new(threads, sizes)?);
-        let team = |gate| Self { threads: Arc::clone(&threads), gate, stop: None };
+        let team = |gate| Self { threads: Arc::clone(&threads), gate, stop: None, marks: Marks::default() };
         let lead = Lead { team: team(0), lookout: threads.lookout() };
         Ok((lead, (1..=sizes.len()).map(team).collect()))
     }

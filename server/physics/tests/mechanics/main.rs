@@ -11,6 +11,7 @@ mod dynamics;
 mod equilibrium;
 mod half_cut_beam;
 mod multistep;
+mod phases;
 mod reference;
 mod repeated_solves;
 mod robustness;
