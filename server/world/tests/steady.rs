@@ -42,7 +42,18 @@ point_m = [0.07, 0.05, 0.1]
 
 #[test]
 fn a_steady_step_with_contact_and_snapshot_allocates_nothing() {
+    steady(false);
+}
+
+#[test]
+fn measuring_the_phases_of_a_steady_step_allocates_nothing() {
+    steady(true);
+}
+
+/// Steps with contact and snapshot until all is steady, then counts.
+fn steady(phases: bool) {
     let mut sim = Simulation::new(&Scene::from_toml(PRESSED).unwrap(), Path::new("")).unwrap();
+    sim.measure_phases(phases);
     let wants = Wants { surface: vec![true], contact: true, energy: false, ..Wants::default() };
     let inputs = Inputs { wants: wants.clone(), ..Inputs::default() };
     let mut snapshot = Snapshot::default();

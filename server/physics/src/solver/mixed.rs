@@ -15,6 +15,7 @@ use nalgebra::Vector3;
 
 use super::newton::{Curvature, Newton, NewtonReport, Potential, ROUNDING};
 use crate::operator::FixedCopy;
+use crate::phase::Phase;
 use crate::team::Team;
 
 /// Largest number of steps. Five are usual.
@@ -45,6 +46,7 @@ impl Newton {
         self.trial_g.copy_from_slice(&self.g);
         let (mut before, mut converged) = (f64::INFINITY, false);
         while report.potential.is_finite() && !team.told_to_stop() {
+            team.begin(Phase::Operator);
             self.solver.set_matrix(&self.hessian, fixed);
             converged = self.measure(potential, report, first);
             let risen = report.steps > FREE_STEPS && report.residual >= before;
@@ -52,14 +54,17 @@ impl Newton {
                 break;
             }
             let most = FORCING * report.residual.min(1.0 / report.residual);
+            team.begin(Phase::Solve);
             if !self.direction(team, (Curvature::Exact, most), report) {
                 break;
             }
             before = report.residual;
             self.from.copy_from_slice(x);
+            team.begin(Phase::Residual);
             x.iter_mut().zip(&self.p).for_each(|(x, p)| *x += p);
             report.potential = potential.gradient(team, x, &mut self.g);
             report.steps += 1;
+            team.begin(Phase::Operator);
             potential.extrapolated_hessian(team, &self.from, x, &mut self.hessian);
         }
         let finite = self.g.iter().all(|g| g.norm_squared().is_finite());

@@ -1,5 +1,7 @@
 //! What a step says about itself.
 
+mod phases;
+
 mod stages;
 
 use std::mem::{Discriminant, discriminant};
@@ -9,6 +11,7 @@ use scindo_physics::body::{Notice, Outcome, SolveReport};
 use scindo_physics::estimate::MeshError;
 
 use crate::inputs::CutOutcome;
+pub use phases::PhaseSeconds;
 pub use stages::{Stage, StageSeconds};
 
 /// How a step went. The buffers are reused from step to step.
@@ -20,6 +23,8 @@ pub struct StepReport {
     pub time_s: f64,
     /// Measured seconds per stage.
     pub seconds: StageSeconds,
+    /// Measured seconds per phase of the stage that deforms; zeros unless they are asked for.
+    pub phases: PhaseSeconds,
     /// Processor time of the thread that steps [s]; what other threads of `--threads` do is not in it.
     pub processor_s: f64,
     /// Per body, in the order of the scene.

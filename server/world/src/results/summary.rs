@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::machine::Machine;
 use crate::body::{Probe, SimBody};
-use crate::report::{Event, Level, Stage, StepReport};
+use crate::report::{Event, Level, StepReport};
 use crate::simulation::{Plan, Simulation};
 
 /// Most events that a summary lists; the rest is counted.
@@ -72,9 +72,11 @@ pub struct Timing {
     pub real_time_factor: f64,
     /// Mean per stage.
     pub stages: Vec<StageSummary>,
+    /// Mean per phase of the stage `deform`, over all bodies; empty if they were not measured.
+    pub phases: Vec<StageSummary>,
 }
 
-/// Mean time of a stage.
+/// Mean time of a stage or phase.
 #[derive(Debug, Clone, Serialize)]
 pub struct StageSummary {
     /// Name.
@@ -304,8 +306,9 @@ impl Running {
         let at = |share: f64| f64::from(sorted[((sorted.len() - 1) as f64 * share).round() as usize]);
         let n = sorted.len() as f64;
         let mean_ms = sorted.iter().map(|ms| f64::from(*ms)).sum::<f64>() / n;
-        let total = simulation.total_seconds();
+        let (total, phases) = (simulation.total_seconds(), simulation.total_phases());
         let per_step = 1e3 / simulation.steps().max(1) as f64;
+        let mean = |(name, seconds)| StageSummary { name, mean_ms: seconds * per_step };
         Timing {
             mean_ms,
             median_ms: at(0.5),
@@ -313,10 +316,8 @@ impl Running {
             max_ms: f64::from(max),
             processor_mean_ms: 1e3 * self.processor_s / n,
             real_time_factor: simulation.step_s() * 1e3 / mean_ms.max(1e-9),
-            stages: Stage::ALL
-                .iter()
-                .map(|stage| StageSummary { name: stage.name(), mean_ms: total.of(*stage) * per_step })
-                .collect(),
+            stages: total.iter().map(mean).collect(),
+            phases: if phases.total() > 0.0 { phases.iter().map(mean).collect() } else { Vec::new() },
         }
     }
 }

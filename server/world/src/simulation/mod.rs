@@ -6,6 +6,8 @@ mod plan;
 
 mod stopwatch;
 
+mod phase_clock;
+
 mod cuts;
 
 mod incision;
@@ -33,12 +35,13 @@ pub use crate::body::{Probe, SimBody, StepCounts};
 use crate::contact::Contacts;
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
 use crate::mesh_in::Observer;
-pub use crate::report::{BodyReport, Energy, Event, Level, Stage, StageSeconds, StepReport};
+pub use crate::report::{BodyReport, Energy, Event, Level, PhaseSeconds, Stage, StageSeconds, StepReport};
 use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
 use crate::snapshot::Snapshot;
 use crate::tool::Tools;
 use cuts::{CutContext, Cuts};
 use fill::Sources;
+use phase_clock::PhaseClock;
 pub use plan::Plan;
 use sleep::Sleep;
 use stopwatch::Stopwatch;
@@ -60,6 +63,8 @@ pub struct Simulation {
     steps: u64,
     wants: Wants,
     total: StageSeconds,
+    phase_clock: PhaseClock,
+    total_phases: PhaseSeconds,
     report: StepReport,
 }
 
@@ -107,7 +112,7 @@ impl Simulation {
         }
         let report =
             StepReport { bodies: vec![BodyReport::default(); built.bodies.len()], ..StepReport::default() };
-        Self {
+        let mut simulation = Self {
             plan,
             tools: Tools::new(&scene.tools),
             cuts: Cuts::new(&scene.cuts, &built.bodies),
@@ -120,16 +125,21 @@ impl Simulation {
             steps: 0,
             wants: Wants::default(),
             total: StageSeconds::default(),
+            phase_clock: PhaseClock::default(),
+            total_phases: PhaseSeconds::default(),
             report,
             source,
             scene,
-        }
+        };
+        simulation.measure_phases(PhaseClock::is_traced());
+        simulation
     }
 
     /// One step of simulated time. The order of the lines is the order of the data.
     pub fn step(&mut self, inputs: &Inputs) -> &StepReport {
         let mut watch = Stopwatch::start();
         self.begin(inputs);
+        let _span = tracing::trace_span!("step", number = self.steps).entered();
         self.tools.advance(self.time_s(), &inputs.tools);
         watch.book(Stage::Tools);
         self.cut(&inputs.cuts);
@@ -183,9 +193,12 @@ impl Simulation {
 
     fn deform(&mut self) {
         let (when, gravity) = ((self.time_s(), self.scene.step_s), self.scene.gravity_m_s2);
-        let Self { bodies, lead, contacts, report, .. } = self;
+        let Self { bodies, lead, contacts, report, phase_clock, .. } = self;
         let step = |i: usize, body: &mut SimBody, report: &mut BodyReport| {
+            let _span = tracing::trace_span!("deform", body = %body.id).entered();
+            phase_clock.start(i);
             report.solve = body.step(when, gravity, contacts.springs(i));
+            phase_clock.end(i);
         };
         // Bodies act on each other through nothing but the springs, which this step finds as they are.
         if let Some(lead) = lead {
@@ -220,8 +233,10 @@ impl Simulation {
 
     fn finish(&mut self, watch: Stopwatch) -> &StepReport {
         self.report.seconds = watch.seconds();
+        self.report.phases = self.phase_clock.take();
         self.report.processor_s = watch.processor_s();
         self.total.add(&self.report.seconds);
+        self.total_phases.add(&self.report.phases);
         &self.report
     }
 
@@ -245,6 +260,7 @@ impl Simulation {
         self.cuts.reset();
         self.steps = 0;
         self.total = StageSeconds::default();
+        self.total_phases = PhaseSeconds::default();
         Ok(())
     }
 
@@ -292,6 +308,12 @@ impl Simulation {
     /// before a [`reset`](Self::reset), or at the end.
     pub fn discard_cuts(&mut self, reason: &str) -> Vec<CutOutcome> {
         self.cuts.discard(reason)
+    }
+
+    /// Begins (`on`) or ends to measure the phases of deforming. They are not measured at first, unless the
+    /// log asks for their spans.
+    pub fn measure_phases(&mut self, on: bool) {
+        self.phase_clock.set(on, self.bodies.iter_mut().map(|body| &mut body.body));
     }
 
     /// A step under way ends as soon as `flag` is raised: bodies that have not moved yet stay as they were.
@@ -449,5 +471,10 @@ impl Simulation {
     /// Seconds per stage since the start or the last reset.
     pub fn total_seconds(&self) -> StageSeconds {
         self.total
+    }
+
+    /// Seconds per phase of deforming since the start or the last reset, as far as they were measured.
+    pub fn total_phases(&self) -> PhaseSeconds {
+        self.total_phases
     }
 }

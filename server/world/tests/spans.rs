@@ -1,0 +1,69 @@
+//! Spans of a step in the log. One test alone: a place in the code that another thread reaches first counts as
+//! not logged, as long as that thread has no log.
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use scindo_world::inputs::Inputs;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+use tracing::{Subscriber, span};
+use tracing_subscriber::layer::{Context, SubscriberExt as _};
+use tracing_subscriber::registry::LookupSpan;
+use tracing_subscriber::{EnvFilter, Layer};
+
+const SCENE: &str = r#"
+schema = 1
+world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
+[[body]]
+id = "fast"
+mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [6, 6, 6] } }
+young_pa = 2e4
+poisson = 0.4
+density_kg_m3 = 1000
+fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
+[[body]]
+id = "nonlinear"
+mesh = { box = { min_m = [1, 0, 0], max_m = [1.1, 0.1, 0.1], cells = [3, 3, 3] } }
+law = "neo-hookean"
+young_pa = 2e4
+poisson = 0.4
+density_kg_m3 = 1000
+fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
+"#;
+
+/// Writes down the name of every span that is entered, after those around it.
+#[derive(Clone, Default)]
+struct Entered(Arc<Mutex<Vec<String>>>);
+
+impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Entered {
+    fn on_enter(&self, id: &span::Id, log: Context<'_, S>) {
+        let path: Vec<&str> = log.span_scope(id).unwrap().from_root().map(|span| span.name()).collect();
+        self.0.lock().unwrap().push(path.join(" "));
+    }
+}
+
+/// Spans entered in one step, where the log takes what `filter` lets through.
+fn spans(filter: &str) -> Vec<String> {
+    let entered = Entered::default();
+    let log = tracing_subscriber::registry().with(EnvFilter::new(filter)).with(entered.clone());
+    tracing::subscriber::with_default(log, || {
+        let scene = Scene::from_toml(SCENE).unwrap();
+        Simulation::new(&scene, Path::new("")).unwrap().step(&Inputs::default());
+    });
+    entered.0.lock().unwrap().clone()
+}
+
+#[test]
+fn a_log_at_trace_level_has_a_span_for_each_phase_of_each_body() {
+    let entered = spans("scindo_world=trace");
+    let fast = ["guards", "predict", "operator", "residual", "solve", "commit", "guards"];
+    assert_eq!(entered[..2], ["step", "step deform"]);
+    let of_fast: Vec<String> = fast.iter().map(|name| format!("step deform {name}")).collect();
+    assert_eq!(entered[2..9], of_fast);
+    assert_eq!(entered[9], "step deform");
+    assert!(entered[10..].contains(&"step deform search".to_owned()), "{entered:?}");
+    assert_eq!(spans("scindo_world=debug"), Vec::<String>::new());
+}
