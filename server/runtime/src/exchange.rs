@@ -73,7 +73,7 @@ pub struct Exchange {
     panicked_steps: AtomicU64,
     /// Events lost because the publisher was behind or one name had too many.
     events_dropped: AtomicU64,
-    /// Answers to cuts lost because the publisher was behind. Their clients ask again.
+    /// Answers to cuts lost because the publisher was behind or could not send. Their clients ask again.
     answers_lost: AtomicU64,
     event_seq: AtomicU64,
     /// Parameters that `rpc/set` may change, after the last change.
@@ -298,8 +298,14 @@ impl Exchange {
     /// Queues the answer to a cut for the publisher without waiting.
     pub fn answer(&self, answer: CutAck) {
         if self.answers.try_send(answer).is_err_and(|error| error.is_full()) {
-            self.answers_lost.fetch_add(1, Ordering::Relaxed);
+            tracing::warn!("more answers to cuts wait than can be sent; their clients have to ask again");
+            self.answer_lost();
         }
+    }
+
+    /// Counts an answer to a cut that does not reach the network.
+    pub fn answer_lost(&self) {
+        self.answers_lost.fetch_add(1, Ordering::Relaxed);
     }
 
     fn news(&self, name: &str) -> News {
@@ -381,6 +387,16 @@ mod tests {
         assert!(refused <= 4 * EVENTS_PER_NAME, "{refused}");
         let dropped: Vec<_> = exchange.losses().collect();
         assert_eq!(dropped, [("events-dropped", OUTGOING as u64 - refused)]);
+    }
+
+    #[test]
+    fn answers_that_find_the_queue_full_are_counted() {
+        let (answers, waiting) = bounded(2);
+        let exchange = Exchange::new(Inbox::default(), 0, (bounded(1).0, answers));
+        assert_eq!(exchange.losses().count(), 0);
+        (1..=5).for_each(|seq| exchange.answer(CutAck { seq, ..CutAck::default() }));
+        assert_eq!(waiting.try_iter().map(|answer| answer.seq).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(exchange.losses().collect::<Vec<_>>(), [("answers-lost", 3)]);
     }
 
     #[test]

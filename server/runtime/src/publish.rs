@@ -106,7 +106,7 @@ pub struct PublishThread {
     keyframes: Keyframes,
     tool_states: u64,
     reports: u64,
-    pose_counts: BTreeMap<Arc<str>, u64>,
+    told: Told,
     next_stats: Instant,
     next_plan: Instant,
     next_still: Instant,
@@ -148,7 +148,7 @@ impl PublishThread {
             keyframes,
             tool_states: 0,
             reports: 0,
-            pose_counts: BTreeMap::new(),
+            told: Told::default(),
             next_stats: Instant::now(),
             next_plan: Instant::now(),
             next_still: Instant::now(),
@@ -217,7 +217,7 @@ impl PublishThread {
     /// Sends an answer. A client that does not read loses it and repeats its cut, so that nobody else waits.
     /// Answers to many simultaneous cuts share a batch; most of them would be dropped as express messages.
     fn send_ack(&self, answer: &CutAck) {
-        let Ok(tool) = Chunk::new("tool id", &answer.tool_id) else { return };
+        let Ok(tool) = Chunk::new("tool id", &answer.tool_id) else { return self.exchange.answer_lost() };
         let sent = self
             .haptic
             .put(self.keys.key(&Topic::ToolCutAck(tool)), encode(answer))
@@ -227,6 +227,7 @@ impl PublishThread {
             .wait();
         if let Err(error) = sent {
             tracing::warn!(%error, "answer to a cut not sent");
+            self.exchange.answer_lost();
         }
     }
 
@@ -303,8 +304,8 @@ impl PublishThread {
     fn gather_stats(&mut self) -> Stats {
         self.reports += 1;
         let rates = self.exchange.meter.read();
-        let told = Told::by(&self.exchange, &mut self.pose_counts, rates.seconds);
-        let snapshot = self.sources.snapshots.output_buffer();
+        self.told.read(&self.exchange, rates.seconds);
+        let (told, snapshot) = (&self.told, self.sources.snapshots.output_buffer());
         Stats {
             seq: self.reports,
             sim_step: snapshot.step,
@@ -320,10 +321,10 @@ impl PublishThread {
             bodies: snapshot.bodies.iter().map(body_stats).collect(),
             tools: snapshot.tools.iter().map(|tool| told.tool_stats(tool, &rates)).collect(),
             refused: told.refused(&self.exchange),
-            cuts_applied: told.cuts_applied,
+            cuts_applied: told.cuts_applied(),
             surface_subscribers: (0..self.bodies.len()).filter(|&i| self.exchange.surface_wanted(i)).count()
                 as u32,
-            haptic_clients: told.held,
+            haptic_clients: told.held(),
             paused: self.exchange.paused.load(Ordering::Relaxed),
         }
     }

@@ -66,9 +66,10 @@ fn with(
 
 fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     let Ok(Topic::Live(_, client)) = keys.parse(sample.key_expr().as_str()) else { return };
+    let now = Instant::now();
     let changes = match sample.kind() {
-        SampleKind::Put => exchange.inbox().client_came(client.as_str(), Instant::now()),
-        SampleKind::Delete => exchange.inbox().client_went(client.as_str(), Instant::now()),
+        SampleKind::Put => exchange.inbox().client_came(client.as_str(), now),
+        SampleKind::Delete => exchange.inbox().client_went(client.as_str(), now),
     };
     changes.into_iter().for_each(|change| announce(exchange, change));
 }
@@ -79,7 +80,8 @@ fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     };
     match decode::<ToolSample>(sample) {
         Ok(pose) => {
-            let outcome = exchange.inbox().pose(tool.as_str(), &pose, Instant::now());
+            let now = Instant::now();
+            let outcome = exchange.inbox().pose(tool.as_str(), &pose, now);
             match outcome {
                 Ok(None) => {}
                 Ok(Some(change)) => announce(exchange, change),

@@ -6,16 +6,18 @@
 //! * Only the newest pose counts. A pose that is not newer than the last is refused.
 //! * A cut is applied once per (client, tool, sequence number). Repetitions get the old answer ([`cut_log`]).
 //!   A cut of a client without a token is refused.
-//! * Every refusal is counted by reason and changes nothing else.
+//! * Every refusal is counted by reason and changes nothing else ([`counters`]).
 //!
 //! The inbox knows neither zenoh nor clocks. Receiving threads call it with the time; the simulation thread
-//! takes the inputs out.
+//! takes the inputs out. Whoever reports copies the figures and goes on without the lock.
 
 pub mod owners;
 
 pub mod early;
 
 pub mod cut_log;
+
+pub mod counters;
 
 mod refusal;
 
@@ -30,6 +32,7 @@ use std::time::Instant;
 use scindo_proto::messages::{CutAck, CutCommand, DeviceCapability, ToolSample, cut_ack};
 use scindo_world::inputs::{CutOutcome, Inputs, ToolInput};
 
+use counters::{Counters, Figures};
 pub use cut_log::{Answering, Cut};
 use cut_log::{CutLog, answer};
 use owners::Owners;
@@ -42,7 +45,7 @@ use refusal::refuse;
 pub struct Inbox {
     owners: Owners,
     cuts: CutLog,
-    refused: BTreeMap<&'static str, u64>,
+    counters: Counters,
 }
 
 impl Inbox {
@@ -54,7 +57,7 @@ impl Inbox {
         Self {
             owners: Owners::new(scene_tools.into_iter().collect()),
             cuts: CutLog::new(bodies.into_iter().collect()),
-            refused: BTreeMap::new(),
+            counters: Counters::default(),
         }
     }
 
@@ -114,9 +117,7 @@ impl Inbox {
 
     /// Counts a refused message and returns the count of its kind.
     pub fn count(&mut self, code: &'static str) -> u64 {
-        let count = self.refused.entry(code).or_default();
-        *count += 1;
-        *count
+        self.counters.count(code, 1)
     }
 
     /// Moves the inputs of the next step into `inputs`: the newest poses, and all cuts since the last step.
@@ -131,7 +132,7 @@ impl Inbox {
         let answers = self.cuts.finish(outcomes, with);
         let failed = answers.iter().filter(|answer| answer.error.is_some()).count() as u64;
         if failed > 0 {
-            *self.refused.entry(with.code).or_default() += failed;
+            self.counters.count(with.code, failed);
         }
         answers
     }
@@ -157,24 +158,18 @@ impl Inbox {
         self.owners.held().next().is_some()
     }
 
-    /// Age of the contact model that the device behind `tool` last used [ms]; 0 if not reported.
-    pub fn contact_age_ms(&self, tool: &str) -> f32 {
-        self.owners.contact_age_ms(tool)
-    }
-
-    /// Poses accepted per held tool since it was taken.
-    pub fn pose_counts(&self) -> impl Iterator<Item = (&Arc<str>, u64)> {
-        self.owners.pose_counts()
+    /// Copies all figures into `figures`, whose buffers are reused.
+    pub fn figures_into(&self, figures: &mut Figures) {
+        figures.tools.clear();
+        figures.tools.extend(self.owners.figures());
+        figures.refused.clear();
+        figures.refused.extend(self.refused().iter().map(|(&code, &count)| (code, count)));
+        figures.cuts_applied = self.cuts.applied();
     }
 
     /// Messages refused so far, by reason.
     pub fn refused(&self) -> &BTreeMap<&'static str, u64> {
-        &self.refused
-    }
-
-    /// Cuts from clients applied so far.
-    pub fn cuts_applied(&self) -> u64 {
-        self.cuts.applied()
+        self.counters.refused()
     }
 }
 

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use scindo_proto::messages::{DeviceCapability, ToolSample};
 use scindo_world::inputs::{MAX_TOOLS, ToolInput};
 
+use super::counters::ToolFigures;
 use super::early::{EarlyPoses, PATIENCE};
 use super::refusal::{Refusal, refuse};
 use crate::wire::convert::to_tool_input;
@@ -235,12 +236,12 @@ impl Owners {
         self.held.get(tool)?.capability.as_ref()
     }
 
-    pub fn contact_age_ms(&self, tool: &str) -> f32 {
-        self.held.get(tool).map_or(0.0, |held| held.contact_age_ms)
-    }
-
-    pub fn pose_counts(&self) -> impl Iterator<Item = (&Arc<str>, u64)> {
-        self.held.iter().map(|(tool, held)| (tool, held.poses))
+    pub fn figures(&self) -> impl Iterator<Item = ToolFigures> {
+        self.held.iter().map(|(tool, &Held { poses, contact_age_ms, .. })| ToolFigures {
+            tool: tool.clone(),
+            poses,
+            contact_age_ms,
+        })
     }
 }
 

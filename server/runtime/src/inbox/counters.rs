@@ -1,0 +1,46 @@
+//! What the inbox counts: refused messages by reason, and a copy of its figures for reports.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Messages refused so far, by reason.
+#[derive(Debug, Default)]
+pub(super) struct Counters {
+    refused: BTreeMap<&'static str, u64>,
+}
+
+impl Counters {
+    /// Counts `more` refusals and returns the count of their kind.
+    pub fn count(&mut self, code: &'static str, more: u64) -> u64 {
+        let count = self.refused.entry(code).or_default();
+        *count += more;
+        *count
+    }
+
+    /// Refusals by reason.
+    pub fn refused(&self) -> &BTreeMap<&'static str, u64> {
+        &self.refused
+    }
+}
+
+/// Figures of a tool that a client holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolFigures {
+    /// Id of the tool.
+    pub tool: Arc<str>,
+    /// Poses accepted since it was taken.
+    pub poses: u64,
+    /// Age of the contact model that its device last used [ms].
+    pub contact_age_ms: f32,
+}
+
+/// A copy of all figures. It is filled under the lock of the inbox and read after the lock is released.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Figures {
+    /// Held tools.
+    pub tools: Vec<ToolFigures>,
+    /// Refused messages by reason.
+    pub refused: Vec<(&'static str, u64)>,
+    /// Cuts from clients applied so far.
+    pub cuts_applied: u64,
+}
