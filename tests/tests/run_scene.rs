@@ -1,8 +1,9 @@
 //! `scindo run --fast --out`: a cut beam from scene file to results.
 
 use std::fs;
+use std::process::Command;
 
-use scindo_tests::run;
+use scindo_tests::{program, run};
 
 const SCENE: &str = r#"
 schema = 1
@@ -117,4 +118,26 @@ fn a_run_whose_steps_are_refused_fails() {
     let events = summary["events"].as_array().expect("events");
     let refused = events.iter().filter(|event| event["name"] == "step-refused").count();
     assert_eq!(refused, 1, "one event for all of them: {events:?}");
+}
+
+#[test]
+fn a_run_prints_its_phases_and_a_log_at_trace_level_shows_each_of_them() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let scene = directory.path().join("beam.toml");
+    fs::write(&scene, SCENE).expect("written");
+    let logged = |level: &str| {
+        let mut scindo = Command::new(program("scindo"));
+        scindo.env("SCINDO_LOG", level).arg("run").arg(&scene).args(["--fast", "--steps", "3", "--json"]);
+        let output = scindo.output().expect("scindo starts");
+        let text = String::from_utf8(output.stdout).expect("text");
+        (text, String::from_utf8(output.stderr).expect("text"))
+    };
+    let (text, log) = logged("warn,scindo_world=trace");
+    let solves = log.lines().filter(|line| line.contains("solve: close time.busy=")).count();
+    assert_eq!(solves, 3, "{log}");
+    let ended: serde_json::Value = serde_json::from_str(text.lines().last().expect("lines")).expect("JSON");
+    for (parts, name) in [("stages_ms", "deform"), ("phases_ms", "solve"), ("phases_ms", "operator")] {
+        assert!(ended["ended"][parts][name].as_f64().is_some_and(|ms| ms > 0.0), "{name}: {text}");
+    }
+    assert!(!logged("warn").1.contains("time.busy"));
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Command, CommandFactory, Subcommand};
 use clap_complete::Shell;
+use tracing_subscriber::fmt::format::FmtSpan;
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{EnvFilter, Layer as _};
@@ -17,6 +18,7 @@ use seldom::Seldom;
 pub const LOG_VARIABLE: &str = "SCINDO_LOG";
 
 /// Starts the log on standard error. `SCINDO_LOG` filters it; `default` is used if the variable is unset.
+/// Spans, such as those of a step at the level `trace`, are a line with their duration when they end.
 ///
 /// A directive that cannot be read is reported, and `default` is used.
 pub fn start_log(default: &str) {
@@ -36,6 +38,7 @@ pub fn start_log(default: &str) {
         .with_writer(io::stderr)
         .with_ansi(io::stderr().is_terminal())
         .with_target(false)
+        .with_span_events(FmtSpan::CLOSE)
         .with_filter(Seldom::default());
     tracing_subscriber::registry().with(filter).with(lines).init();
 }

@@ -13,7 +13,7 @@ use scindo_world::assemble::{BuildOptions, doubts};
 use scindo_world::results::Results;
 use scindo_world::scene::{SHIPPED, Scene, ShippedScene};
 use scindo_world::simulation::{Level, Simulation};
-use serde_json::json;
+use serde_json::{Map, Value, json};
 use tokio::runtime::Runtime;
 use tokio::task::JoinHandle;
 
@@ -167,8 +167,11 @@ fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
 fn build(scene: &Scene, args: &ServeArgs) -> Result<Engine, RuntimeError> {
     let options = BuildOptions { threads: usize::from(args.threads), ..BuildOptions::default() };
     let progress = Share::begin(args.json);
-    let simulation = Simulation::observed(scene, scene.base_dir(), options, &|at| progress.meshing(at))?;
+    let mut simulation = Simulation::observed(scene, scene.base_dir(), options, &|at| progress.meshing(at))?;
     progress.end();
+    if args.json || args.out.is_some() {
+        simulation.measure_phases(true);
+    }
     let late = pace(args, scene.checked().step_s)?.steps.map(|steps| steps as f64 * simulation.step_s());
     let late = late.map_or(Vec::new(), |end_s| doubts::after_the_end(scene.checked(), end_s));
     for warning in simulation.warnings().iter().chain(&late) {
@@ -351,6 +354,8 @@ fn conclude(
         let report = json!({ "ended": {
             "status": status, "steps": steps, "simulated_s": simulated, "wall_s": seconds,
             "real_time_factor": simulated / seconds, "cuts_applied": simulation.cuts_applied(),
+            "stages_ms": means_ms(simulation.total_seconds().iter(), simulation.steps()),
+            "phases_ms": means_ms(simulation.total_phases().iter(), simulation.steps()),
             "warnings": warnings, "failures": failures, "out": args.out,
         }});
         say!("{report}");
@@ -364,4 +369,10 @@ fn conclude(
         say!("  unreliable: {failure}");
     }
     Ok(failures)
+}
+
+/// Mean duration of each part of a step [ms], by name.
+fn means_ms(parts: impl Iterator<Item = (&'static str, f64)>, steps: u64) -> Map<String, Value> {
+    let mean = |seconds: f64| Value::from(1e3 * seconds / steps.max(1) as f64);
+    parts.map(|(name, seconds)| (name.to_owned(), mean(seconds))).collect()
 }
