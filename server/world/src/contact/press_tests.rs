@@ -178,7 +178,7 @@ fn opened_by(body: &Body, gap: f64) -> Vec<V> {
             let vertex = surface.vertices[*v as usize];
             for (copy, w) in vertex.carriers() {
                 if w > 0.0 {
-                    side[copy as usize] = -normal.x.signum();
+                    side[copy] = -normal.x.signum();
                 }
             }
         }
