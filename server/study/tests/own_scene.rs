@@ -95,7 +95,7 @@ fn a_scene_that_cannot_be_run_has_no_results_and_says_why() {
     let result = study(directory.path(), &outside);
     assert!(!result.has_results());
     let why = result.cases[0].reference.as_ref().unwrap_err();
-    assert!(why.contains("as it stands gives no result"), "{why}");
+    assert!(why.contains("with its own settings gives no result"), "{why}");
 }
 
 /// Runs of u = 1 + h that take h⁻³ of simulated time; from `broken` cells on they fail.

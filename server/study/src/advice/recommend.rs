@@ -93,11 +93,11 @@ fn words(advice: &Recommendation, candidates: &[Candidate<'_>], alike: usize) ->
             let c = candidates[i];
             let others = match alike {
                 0 | 1 => String::new(),
-                n => format!(", the cheapest of {n} that cannot be told apart"),
+                n => format!(", the cheapest of {n} that are indistinguishable"),
             };
             format!(
-                "Within {budget} ms: {} (p99 {} ms){others}. Its error cannot be told from that of the reference, \
-                 whose bar is {bar}: it is at most {}. Give the study more time to tell: --within 20m.",
+                "Within {budget} ms: {} (p99 {} ms){others}. Its error cannot be resolved: the error bar is \
+                 {bar}, so the error is at most {}. Give the study more time: --within 20m.",
                 c.words,
                 short(c.p99_ms),
                 percent(c.error + advice.error_bar)
@@ -113,7 +113,7 @@ fn words(advice: &Recommendation, candidates: &[Candidate<'_>], alike: usize) ->
     match advice.next {
         Some(i) => text += &format!(" With more time per step: {}.", told(i)),
         None if advice.indistinguishable => {}
-        None => text += " Nothing that was tried is more accurate by more than the bar.",
+        None => text += " No configuration is more accurate by more than the error bar.",
     }
     text
 }

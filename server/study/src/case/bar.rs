@@ -89,9 +89,9 @@ pub fn in_motion(quick: bool) -> Case {
         name: "bar-motion".into(),
         title: "R3 · Bar, in motion".into(),
         about: format!(
-            "The same bar, let go from straight: it falls, swings and comes to rest (Rayleigh damping \
-             α = 1/s, β = 2 ms). {} frames of 40 ms are compared; the cost is that of one frame, however many steps \
-             it takes.",
+            "The same bar, released from its straight shape: it falls, swings and comes to rest (Rayleigh \
+             damping α = 1/s, β = 2 ms). {} frames of 40 ms are compared. The cost is that of one frame, \
+             whatever its number of steps.",
             frames(quick)
         ),
         scene: load(SCENE, &moving),

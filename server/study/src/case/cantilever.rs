@@ -36,7 +36,7 @@ pub fn case(quick: bool) -> Case {
         title: "R1 · Nienhuys’ cantilever".into(),
         about: "A block of 1.2 × 0.2 × 0.3 m (E = 1 MPa, ν = 0), held at one end, carries 3 N at the other. \
                 Strains are small. The meshes and the split into tetrahedra are those of Nienhuys’ Table 3.1, \
-                where they leave 3 % to 29 %, and a coarser one."
+                where their errors are 3 % to 29 %, and a coarser one."
             .into(),
         scene: load(include_str!("../../cases/r1.toml"), &[probes_override("beam", &probes)]),
         bodies: body.to_vec(),

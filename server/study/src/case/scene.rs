@@ -63,7 +63,7 @@ pub fn from_scene(scene: &Scene, wishes: Wishes<'_>) -> Result<Case, SceneError>
     let truth = Truth::Refined { law, ladders: ladders(of, &axes) };
     Ok(Case {
         title: scene.name().to_owned(),
-        about: format!("The scene {}. Every setting that is not named is the scene’s own.", scene.file()),
+        about: format!("The scene {}. Settings that are not listed are those of the scene.", scene.file()),
         name: slug(scene.name()),
         goal: goal(checked),
         blocks: vary::blocks(&axes, of),

@@ -34,8 +34,9 @@ pub fn section(result: &CaseResult) -> String {
     let main = plot(result, [1064.0, 580.0], |errors| errors.l2, "displacement error");
     let _ = writeln!(
         out,
-        "<figure>\n{}<figcaption>Each mark is one configuration; hover for its settings. Left is faster, down is more accurate. \
-         The numbered marks on the line are the Pareto front: nothing that was tried is both faster and more accurate.</figcaption>\n</figure>",
+        "<figure>\n{}<figcaption>Each mark is one configuration; hover over it for its settings. Left is faster, \
+         down is more accurate. The numbered marks on the line are the Pareto front: no other configuration is \
+         both faster and more accurate.</figcaption>\n</figure>",
         main.svg()
     );
     let goal = format!("error of the goal: {}", case.goal.words);
@@ -45,7 +46,9 @@ pub fn section(result: &CaseResult) -> String {
     );
     let _ = writeln!(
         out,
-        "<div class=\"pair\">\n<figure>{}<figcaption>The same points by the {}; the line goes through the front above.</figcaption></figure>\n<figure>{}<figcaption>The same points by their elastic energy; the line likewise.</figcaption></figure>\n</div>",
+        "<div class=\"pair\">\n<figure>{}<figcaption>The same points by the error of the {}. The line connects \
+        the points of the front above.</figcaption></figure>\n<figure>{}<figcaption>The same points by the error \
+        of their elastic energy, with the same line.</figcaption></figure>\n</div>",
         a.svg(),
         escape(&goal),
         b.svg()
@@ -62,7 +65,7 @@ pub fn section(result: &CaseResult) -> String {
 fn advice(result: &CaseResult) -> String {
     let mut out = String::new();
     if let Some(advice) = &result.recommendation {
-        let head = if advice.indistinguishable { "Cannot be told apart." } else { "Recommended." };
+        let head = if advice.indistinguishable { "Indistinguishable." } else { "Recommended." };
         let _ = writeln!(out, "<p class=\"advice\"><strong>{head}</strong> {}</p>", escape(&advice.words));
         if !advice.set.is_empty() {
             let set: Vec<String> = advice.set.iter().map(|set| format!("--set '{set}'")).collect();
@@ -77,7 +80,8 @@ fn advice(result: &CaseResult) -> String {
     if result.left_out > 0 {
         let _ = writeln!(
             out,
-            "<p class=\"note\">{} configurations were left out: too slow for the budget, or no time was left.</p>",
+            "<p class=\"note\">{} configurations were skipped, because they were too slow for the budget or no \
+            time was left.</p>",
             result.left_out
         );
     }
@@ -189,7 +193,7 @@ fn factors<'p>(case: &Case, points: impl Iterator<Item = &'p Outcome> + Clone) -
     });
     let shared = labels.filter(|labels| !labels.is_empty());
     let shared = shared.map_or(String::new(), |labels| {
-        format!("<p class=\"soft\">The same in all: {}.</p>\n", escape(&labels))
+        format!("<p class=\"soft\">Settings shared by all: {}.</p>\n", escape(&labels))
     });
     (varied, shared)
 }
@@ -199,8 +203,7 @@ fn front_table(result: &CaseResult) -> String {
         return "<h3>The Pareto front</h3>\n<p>No configuration gave a result.</p>\n".to_owned();
     }
     let case = &result.case;
-    let mut out =
-        "<h3>The Pareto front, and what dominates the error there</h3>\n<ul class=\"keys\">".to_owned();
+    let mut out = "<h3>The Pareto front and its dominant errors</h3>\n<ul class=\"keys\">".to_owned();
     for (i, source) in Source::ALL.iter().enumerate() {
         let _ = write!(out, "<li><i class=\"s{i}\"></i>{}</li>", source.name());
     }
@@ -249,7 +252,7 @@ fn bar(sources: &Sources) -> String {
                 let share = if total > 0.0 { 100.0 * size / total } else { 0.0 };
                 let _ = write!(parts, "<i class=\"s{i}\" style=\"width:{share:.1}%\"></i>");
             }
-            _ => told.push(format!("{} not told apart", source.name())),
+            _ => told.push(format!("{} not separated", source.name())),
         }
     }
     format!("<span class=\"bar\" title=\"{}\">{parts}</span>", escape(&told.join("\n")))
@@ -258,11 +261,11 @@ fn bar(sources: &Sources) -> String {
 fn reference(result: &CaseResult) -> String {
     let told = match &result.reference {
         Ok(reference) => format!(
-            "{}. Error bar ± {}: differences below it say nothing.",
+            "{}. Error bar ± {}: smaller differences are not significant.",
             escape(&reference.source),
             percent(reference.error_bar)
         ),
-        Err(why) => format!("None: {}. Times are shown, errors are not.", escape(why)),
+        Err(why) => format!("None: {}. Only times are shown.", escape(why)),
     };
     format!("<h3>The reference</h3>\n<p>{told}</p>\n")
 }

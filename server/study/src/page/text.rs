@@ -19,17 +19,19 @@ pub fn opening(study: &StudyResult) -> String {
         machine.threads
     );
     if !machine.optimised {
-        out += "<p class=\"advice\"><strong>Not optimised.</strong> This is a development build: its times say nothing about a release.</p>\n";
+        out += "<p class=\"advice\"><strong>Not optimised.</strong> This is a development build. Its times do \
+            not predict those of a release.</p>\n";
     }
     if let Some(load) = study.load[0].filter(|load| *load > machine.threads as f64) {
         let _ = writeln!(
             out,
-            "<p class=\"advice\"><strong>Busy machine.</strong> Other programs kept its threads at work (load average \
-             {load:.1}): times are longer than they need be, and runs may have been stopped as too slow.</p>"
+            "<p class=\"advice\"><strong>Busy machine.</strong> Other programs used its processors (load average \
+             {load:.1}). Times are therefore too long, and runs may have been stopped as too slow.</p>"
         );
     }
     if study.interrupted {
-        out += "<p class=\"advice\"><strong>Interrupted.</strong> The same command with the same directory goes on from here.</p>\n";
+        out += "<p class=\"advice\"><strong>Interrupted.</strong> The same command with the same directory \
+            resumes from here.</p>\n";
     }
     study.cases.iter().for_each(|result| out += &answer(result, study.cases.len() > 1));
     out += "<p class=\"soft\">Files: <a href=\"points.csv\">points.csv</a> · <a href=\"study.json\">study.json</a>";
@@ -37,9 +39,9 @@ pub fn opening(study: &StudyResult) -> String {
         let name = escape(&result.case.name);
         let _ = write!(out, " · <a href=\"pareto-{name}.svg\">pareto-{name}.svg</a>");
     }
-    out += "</p>\n<p>Every case below is one scene, solved with many settings. What a setting costs is measured on this \
-            machine; what it is worth is its distance from a reference that is known better than any of them. \
-            Runs that failed stay in the picture.</p>\n</header>\n";
+    out += "</p>\n<p>Every case below is one scene, solved with many settings. The cost of a setting is its time \
+            on this machine. Its error is the distance from a reference that is known more accurately than any \
+            of them. Failed runs are shown as well.</p>\n</header>\n";
     out += &glance(study);
     out
 }
@@ -57,17 +59,21 @@ fn answer(result: &CaseResult, named: bool) -> String {
 
 /// A summary without a budget: the scene as it stands, the first point, and what beats it.
 fn without_budget(result: &CaseResult, bar: f64) -> String {
-    let Some(own) = result.points.first() else { return "Nothing was run.".to_owned() };
+    let Some(own) = result.points.first() else { return "No configuration was run.".to_owned() };
     let (ms, error) = own.point();
-    let mut words =
-        format!("As it stands: {} per solution, error {} ± {}.", time(ms), percent(error), percent(bar));
+    let mut words = format!(
+        "With its own settings: {} per solution, error {} ± {}.",
+        time(ms),
+        percent(error),
+        percent(bar)
+    );
     let better = result.front.iter().map(|&i| &result.points[i]);
     let mut better = better.filter(|point| point.point().0 <= ms && point.point().1 + bar < error);
     if let Some(point) = better.next_back() {
         let (ms, error) = point.point();
         let _ = write!(
             words,
-            " For no more time: {} ({}, error {}).",
+            " More accurate in no more time: {} ({}, error {}).",
             point.configuration.words(),
             time(ms),
             percent(error)
@@ -77,7 +83,8 @@ fn without_budget(result: &CaseResult, bar: f64) -> String {
 }
 
 fn glance(study: &StudyResult) -> String {
-    let mut out = "<div class=\"scroll\"><table class=\"glance\">\n<thead><tr><th>case</th><th class=\"number\">points</th><th class=\"number\">no result</th><th class=\"number\">fastest on the front</th><th class=\"number\">most accurate</th><th class=\"number\">reference known to</th></tr></thead>\n<tbody>\n".to_owned();
+    let mut out = "<div class=\"scroll\"><table class=\"glance\">\n<thead><tr><th>case</th><th class=\"number\">points</th><th class=\"number\">no result</th><th class=\"number\">fastest on the front</th><th class=\"number\">most accurate</th><th class=\"number\">error bar of the reference</th></tr></thead>\n<tbody>\n"
+        .to_owned();
     for result in &study.cases {
         let counts = result.counts();
         let end = |i: Option<&usize>| {
@@ -121,8 +128,9 @@ pub fn method(study: &StudyResult) -> String {
     let points: usize = study.cases.iter().map(|case: &CaseResult| case.counts().points).sum();
     let _ = writeln!(
         out,
-        "<dt>This study</dt><dd>{points} points in {:.0} s; {} runs were taken over from an earlier study. Version {}, commit {}. \
-         The same figures for programs: <a href=\"points.csv\">points.csv</a>, <a href=\"study.json\">study.json</a>.</dd>",
+        "<dt>This study</dt><dd>{points} points in {:.0} s; {} runs were reused from an earlier study. Version \
+         {}, commit {}. The figures in machine-readable form: <a href=\"points.csv\">points.csv</a>, <a \
+         href=\"study.json\">study.json</a>.</dd>",
         study.seconds,
         study.resumed,
         escape(&study.origin.version),
@@ -139,34 +147,56 @@ const DEFINITIONS: [(&str, &str); 9] = [
     ),
     (
         "Goal error",
-        "The relative error of the one number that the case is asked for. It can be small by accident where two errors cancel.",
+        "The relative error of the one quantity of interest of the case. It can be small by accident, where two \
+        errors cancel.",
     ),
     (
         "Energy error",
-        "|Ψ − Ψ*| / Ψ* of the elastic energy, in a motion root mean square over the frames. Its square root is the error in the energy norm for linear statics under given loads.",
+        "|Ψ − Ψ*| / Ψ* of the elastic energy; in a motion, its root mean square over the frames. For linear \
+        statics under given loads, its square root is the error in the energy norm.",
     ),
     (
         "Time",
-        "Processor time of the thread that steps, which a busy machine does not stretch (wall time where several threads work on a step), without set-up (reading, meshing, cutting), which is listed apart. A static solution is found anew from rest up to 11 times, as far as 1.5 s allow; a motion is timed frame by frame, and its first frame stands apart. Median and 99th percentile (the slowest of fewer than 100).",
+        "Processor time of the stepping thread, which does not depend on the load of the machine. With several \
+        threads per step, it is wall time. Set-up (reading, meshing, cutting) is listed separately. A static \
+        solution is repeated from rest up to 11 times within 1.5 s. A motion is timed frame by frame, and its \
+        first frame is listed separately. The figures are the median and the 99th percentile (the slowest of \
+        fewer than 100).",
     ),
     (
         "Design",
-        "One factor at a time around a base, and factorial blocks of those that matter together. No setting is tuned to a case. Runs of the program’s own cases are stopped after 12 s (3 s in a quick study) and then count as too slow. A scene has a time (--within): half of it goes to the reference; configurations whose forecast does not fit, or is six times over the budget, are left out; then neighbours of the best one that fits are tried, and the one that is recommended is run once more.",
+        "Factors are varied one at a time around a base configuration; factors that interact are combined in \
+        factorial blocks. No setting is tuned to a case. Runs of built-in cases are stopped after 12 s (3 s in a \
+        quick study) and then count as too slow. The study of a scene has a time limit (--within), and half of \
+        it goes to the reference. Configurations are skipped if their forecast does not fit or is more than six \
+        times the budget. Then the neighbours of the best configuration within the budget are tried, and the \
+        recommended one is run once more.",
     ),
     (
         "No result",
-        "Refused: the scene does not allow the combination. Exploded: a step was rolled back, or a displacement left every measure. Failed: no solution. Too slow: stopped. Hovering tells the reason; the table of all points has it, too.",
+        "Refused: the scene does not allow the combination. Exploded: a step was rolled back, or a displacement \
+        grew beyond all bounds. Failed: no solution was found. Too slow: the run was stopped. The reason is \
+        shown on hovering and in the table of all points.",
     ),
     (
         "Sources of error",
-        "At every point of the front, one source after another is removed by a twin run: double precision (rounding), tolerance 10⁻¹⁰ (algebraic), half the step with extrapolation (time), the law of the reference (model). What is left is discretisation. The terms add up to the error as vectors, so their sizes can exceed it.",
+        "At every point of the front, a twin run removes one source after another: double precision (rounding), \
+        tolerance 10⁻¹⁰ (algebraic), half the step with extrapolation (time), the law of the reference (model). \
+        The rest is discretisation. The terms add up to the error as vectors, so the sum of their sizes can \
+        exceed it.",
     ),
     (
         "Model error",
-        "The distance between the point’s law and the law of the reference, which is a choice: no law is the truth about a tissue.",
+        "The difference between the law of the point and the law of the reference. The latter is a choice: no \
+        law describes a tissue exactly.",
     ),
     (
         "Reference",
-        "A formula, a stored solution of higher order on finer meshes, or Richardson extrapolation over three meshes and three steps with the observed order; its error bar is 1.25 times the extrapolated change, 3 times where no order shows. Of a scene: levels on which mesh and step are refined together, as many as the time allows, fitted by least squares; where no plausible order shows, the finest level with the spread of the levels as its bar (Eça and Hoekstra 2014). Blocks have their elements end where regions and cuts end there.",
+        "For a case: a formula, a stored solution of higher order on finer meshes, or Richardson extrapolation \
+        over three meshes and three steps with the observed order. Its error bar is 1.25 times the extrapolated \
+        change, or 3 times without an observed order. For a scene: mesh and step are refined together on as many \
+        levels as the time allows, and the levels are fitted by least squares. Without a plausible order, the \
+        reference is the finest level, and its error bar is the spread of the levels (Eça and Hoekstra 2014). In \
+        blocks, element boundaries coincide with those of regions and cuts.",
     ),
 ];

@@ -59,10 +59,11 @@ pub fn table(result: &CaseResult) -> String {
         out,
         "<p class=\"soft\">{}</p>",
         prose(
-            "The worst element is told by its mean ratio: 1 regular, 0 flat. The cuts after the first are planes \
-             across the beam to random depths, the same for all; a mesh that was made with its cut takes no further \
-             one, and with its front on faces a mesh wears as the other of its method. `xfem` leaves the mesh as it \
-             was and makes copies of nodes, which its unknowns count; `snap` moves nodes and removes elements that become flat."
+            "The worst element is the one with the smallest mean ratio, which is 1 for a regular element and 0 \
+             for a flat one. The cuts after the first are planes across the beam to random depths, the same for \
+             all methods. A mesh made with its cut takes no further cuts. Meshes with their front on faces \
+             degrade like the others of their method and are not repeated. `xfem` keeps the mesh and makes \
+             copies of nodes, which count as unknowns. `snap` moves nodes and removes elements that become flat."
         )
     );
     out
@@ -79,8 +80,8 @@ fn compared(rows: &[&Outcome]) -> String {
     if let (Some(precut), Some(xfem), Some(snap)) = (error("precut"), error("xfem"), error("snap")) {
         let _ = write!(
             words,
-            ", a mesh that was made with its cut errs by {}; on the mesh that does not know of the cut `xfem` errs \
-             by {} and `snap` by {}",
+            ", the error is {} on a mesh made with its cut; on a mesh made without it, the error is {} with \
+             `xfem` and {} with `snap`",
             percent(precut),
             percent(xfem),
             percent(snap)
@@ -88,7 +89,7 @@ fn compared(rows: &[&Outcome]) -> String {
         if let (Some(xfem_front), Some(snap_front)) = (error("xfem-front"), error("snap-front")) {
             let _ = write!(
                 words,
-                ". Where the front of the cut meets faces and only its plane lies inside elements, they err by {} \
+                ". If the front of the cut lies on faces and only its plane inside elements, the errors are {} \
                  and {}",
                 percent(xfem_front),
                 percent(snap_front)
@@ -97,8 +98,8 @@ fn compared(rows: &[&Outcome]) -> String {
             let left = [(xfem, xfem_front), (snap, snap_front)]
                 .map(|(all, front)| (front - precut) / (all - precut));
             if xfem > precut && snap > precut && left.iter().all(|left| *left < 0.5) {
-                words +=
-                    ": most of the difference comes from the front, which neither ends inside an element";
+                words += ": most of the difference comes from the front, because neither method can end a cut \
+                    inside an element";
             }
         }
     }

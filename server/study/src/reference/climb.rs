@@ -195,10 +195,11 @@ impl<'a> Climb<'a> {
         let levels: Vec<&str> = self.rungs.iter().map(|rung| rung.words.as_str()).collect();
         let mut words = format!("{}; levels {}", self.ladder.words, levels.join(", "));
         words += &match (self.rungs.len(), limit.order) {
-            (1, _) => ". Only this run ended: its own error is not known".to_owned(),
+            (1, _) => ". Only this run ended, so its own error is not known".to_owned(),
             (_, Some(order)) => format!(". Extrapolated with the observed order {order:.1}"),
             (_, None) => {
-                ". No plausible order shows: the finest level, with the spread of the levels".to_owned()
+                ". There is no plausible order, so this is the finest level with the spread of the levels as its \
+                error bar".to_owned()
             }
         };
         if self.wander() > SAME {
@@ -208,7 +209,7 @@ impl<'a> Climb<'a> {
             );
         }
         if self.ladder.meshes.len() < 2 {
-            words += ". The mesh cannot be refined: its error is not part of this study";
+            words += ". The mesh cannot be refined, so its error is not part of this study";
         }
         if let Some(why) = self.over.as_ref().filter(|why| *why != "interrupted") {
             words += &format!(". The next level gave no result ({why})");

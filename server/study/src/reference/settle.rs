@@ -94,14 +94,14 @@ fn together(plan: &Plan, law: &str, start: &Series, space: Option<Limit>, time: 
         let order = if limit.plausible {
             format!("observed order {:.2}", limit.order)
         } else {
-            "no order observed, first assumed".to_owned()
+            "no order observed, first order assumed".to_owned()
         };
         let labels = sizes.iter().map(|s| s.label.as_str()).collect::<Vec<_>>().join(", ");
         words.push(format!("{what} {labels}: {order}, ± {:.2} %", 100.0 * limit.error_bar));
     }
     if words.len() == 1 {
         words = vec![
-            "The scene’s own mesh, solved tightly: the error of the mesh is not part of this study"
+            "The scene’s own mesh, solved to a tight tolerance; the error of the mesh is not part of this study"
                 .to_owned(),
         ];
     }

@@ -35,9 +35,11 @@ impl Mutation {
     /// Describes what is done instead.
     pub fn words(self) -> &'static str {
         match self {
-            Self::PieceMasses => "the copies of a node share its mass evenly, whatever their pieces weigh",
+            Self::PieceMasses => {
+                "the copies of a node share its mass evenly, whatever the mass of their pieces"
+            }
             Self::ExactPredicates => "signs by plain floating-point determinants",
-            Self::Predictor => "the fast path linearises at the positions of the last step",
+            Self::Predictor => "the fast path linearises at the positions of the previous step",
             Self::LineSearch => "Newton's method takes every full step",
         }
     }

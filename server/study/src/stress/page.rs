@@ -66,15 +66,15 @@ fn opening(report: &SuiteReport) -> String {
         escape(&machine.processor)
     );
     if report.interrupted {
-        out +=
-            "<p class=\"advice\"><strong>Interrupted.</strong> Only the cases that had ended are here.</p>\n";
+        out += "<p class=\"advice\"><strong>Interrupted.</strong> Only completed cases are listed.</p>\n";
     }
-    out += "<p>What breaks codes that deform and cut: slivers, cuts exactly through nodes, fragments in free fall, \
-            inverted and collapsed bodies, steps far too large, input without meaning. Each case has a rule that it \
-            passes or fails. All of them keep rule <strong>C</strong>: everything finite, mass constant to 1e-12, \
-            the momentum of free parts balanced to 1e-6, energy never more than one percent above that of the start \
-            and the work done, no step held, refused, or divided without saying so. A case of a part that is still \
-            to come is listed as <em>not yet</em>.</p>\n</header>\n";
+    out += "<p>These cases break codes for deformation and cutting: slivers, cuts exactly through nodes, \
+            fragments in free fall, inverted and collapsed bodies, steps far too large, meaningless input. Each \
+            case has a rule that it passes or fails. Cases marked <strong>C</strong> also keep the common rule: \
+            everything is finite; mass is constant to 1e-12; the momentum of free parts is balanced to 1e-6; \
+            energy never exceeds that of the start plus the work done by more than one percent; and every step \
+            that is held, refused or divided is reported. Cases of features that are not implemented are listed \
+            as <em>not yet</em>.</p>\n</header>\n";
     out
 }
 
@@ -150,7 +150,7 @@ fn section(report: &CaseReport) -> String {
         case.name
     );
     if let Some(reason) = &report.reason {
-        let _ = writeln!(out, "<p class=\"advice\">It did not come to its end: {}</p>", escape(reason));
+        let _ = writeln!(out, "<p class=\"advice\">The case did not complete: {}</p>", escape(reason));
     }
     let evidence = &report.evidence;
     evidence.notes.iter().for_each(|note| {
@@ -212,7 +212,8 @@ fn figures(figures: &[Figure], open: bool) -> String {
 }
 
 fn mutations(rows: &[Row]) -> String {
-    let mut out = "<section id=\"mutations\">\n<h2>Can the cases fail?</h2>\n<p>A part of the method is taken out and all cases are run again. The named cases must notice.</p>\n<div class=\"scroll\"><table>\n<thead><tr><th>without</th><th>instead</th><th>named cases</th><th></th><th>cases that fail</th></tr></thead>\n<tbody>\n".to_owned();
+    let mut out = "<section id=\"mutations\">\n<h2>Can the cases fail?</h2>\n<p>One part of the method is disabled at a time, and all cases are run again. The named cases must fail.</p>\n<div class=\"scroll\"><table>\n<thead><tr><th>without</th><th>instead</th><th>named cases</th><th></th><th>cases that fail</th></tr></thead>\n<tbody>\n"
+        .to_owned();
     for row in rows {
         let failed: Vec<String> =
             row.failed.iter().map(|f| format!("<strong>{}</strong>: {}", f.name, escape(&f.why))).collect();
@@ -236,7 +237,9 @@ fn closing(report: &SuiteReport) -> String {
     let slow = slow
         .map_or(String::new(), |(case, s)| format!("; the longest case, {}, took {s:.0} s", case.case.name));
     format!(
-        "<section id=\"run\">\n<h2>This run</h2>\n<p>{:.0} s on {}, {}, {} hardware threads, {}{slow}. Figures, charts and pictures do not depend on it: they are the same on every run. The same for programs: <code>stress.json</code>.</p>\n</section>\n",
+        "<section id=\"run\">\n<h2>This run</h2>\n<p>{:.0} s on {}, {}, {} hardware threads, {}{slow}. Figures, \
+        charts and pictures are the same on every run. The results in machine-readable form: \
+        <code>stress.json</code>.</p>\n</section>\n",
         report.seconds,
         escape(&machine.processor),
         escape(&machine.system),

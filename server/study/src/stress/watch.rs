@@ -53,9 +53,9 @@ impl Common {
     pub fn tell(&self, evidence: &mut Evidence) {
         evidence.exactly("C: positions and velocities that are not finite", self.not_finite, 0);
         evidence.at_most("C: largest change of mass", self.mass, 1e-12, "");
-        evidence.at_most("C: momentum from nowhere, over that of the part", self.momentum, 1e-6, "");
+        evidence.at_most("C: unbalanced momentum, over that of the part", self.momentum, 1e-6, "");
         evidence.at_most("C: energy beyond that of the start and work", self.energy, 0.01, "");
-        evidence.exactly("C: steps held, refused, or divided without a word", self.not_whole, 0);
+        evidence.exactly("C: steps held, refused, or divided without a notice", self.not_whole, 0);
         evidence.tell("steps", self.steps as f64, "");
     }
 }

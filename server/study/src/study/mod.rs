@@ -32,7 +32,7 @@ pub enum StudyError {
         name: String,
     },
     /// Narrowing leaves no setting.
-    #[error("`{label}` is no setting of {factor} in case {case}; settings: {known}")]
+    #[error("`{label}` is not a setting of {factor} in case {case}; settings: {known}")]
     UnknownSetting {
         /// The factor that was narrowed.
         factor: &'static str,

@@ -110,7 +110,7 @@ fn look(
     let first = bench.on(case).run(&base, Ask { timed: true, cap_s }).ok_or("interrupted")?;
     if !first.is_done() {
         return Err(format!(
-            "the scene as it stands gives no result ({}): {}",
+            "the scene with its own settings gives no result ({}): {}",
             first.status.name(),
             first.reason
         ));
@@ -134,7 +134,7 @@ fn look(
         case.protocol = Protocol::Motion { frame_s, frames };
         if frames < most {
             notes.push(format!(
-                "the first {} s of {} s are studied; --seconds {} with a longer --within studies all",
+                "only the first {} s of {} s are studied; --seconds {} with a longer --within studies all of them",
                 short(f64::from(frames) * frame_s),
                 short(f64::from(most) * frame_s),
                 short(f64::from(most) * frame_s),
@@ -169,8 +169,8 @@ fn estimate(bench: &mut Bench<'_>, case: &Case, first: &Trial, reference_s: f64,
     };
     let sum_s = (reference_s + points_s + 0.05 * total_s).min(total_s);
     format!(
-        "{}: as it stands {what}, {} elements. Estimate: reference {}, up to {} configurations {}; about {} in \
-         all, at most {} (--within)",
+        "{}: with its own settings {what}, {} elements. Estimate: reference {}, up to {} configurations {}; \
+         about {} in total, at most {} (--within)",
         case.title,
         first.elements,
         seconds(reference_s),
@@ -217,7 +217,7 @@ fn refine(
     {
         notes.push(format!(
             "`{}` selects {:.3e} m² and {:.3e} m³ on the scene’s mesh, {:.3e} m² and {:.3e} m³ in the reference \
-             ({} apart): only whole faces and elements count; part of the error comes from there",
+             (a difference of {}), because only whole faces and elements count; this is part of the error",
             on_own.region,
             on_own.area_m2,
             on_own.volume_m3,

@@ -294,11 +294,11 @@ impl Running {
         if let Some((status, reason)) = ended {
             self.end(status, reason);
         } else if Instant::now() > self.deadline {
-            self.end(Status::Late, "longer than one run may take".to_owned());
+            self.end(Status::Late, "the run exceeded its time limit".to_owned());
         } else if self.has_exploded() {
             self.end(
                 Status::Exploded,
-                "a probe moved further than ten times the size of the body".to_owned(),
+                "a probe moved farther than ten times the size of the body".to_owned(),
             );
         }
         Some(milliseconds)

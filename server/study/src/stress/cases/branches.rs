@@ -32,8 +32,8 @@ pub const RANDOM: Case = Case {
     title: "Twenty random cuts through one ring of elements",
     set_up: "A clamped cube of 162 tetrahedra; twenty random planes through its middle, all within a tenth of \
              its edge, with four steps of 10 ms under gravity after each. Four seeds.",
-    rule: "C. Fractions of every element add up to 1; the surface is closed and 2-manifold; the parts by \
-           material that hangs together are those by shared copies.",
+    rule: "C. Fractions of every element add up to 1; the surface is closed and 2-manifold; the parts of \
+           connected material are those connected by shared copies.",
     source: "Sifakis 2007; Ton-That 2024",
     quick: false,
     run: Some(random),
@@ -43,7 +43,7 @@ pub const RANDOM: Case = Case {
 pub const BRANCHES: Case = Case {
     number: Some(9),
     name: "branches",
-    title: "T, X and Y, and a cut inside a piece",
+    title: "T, X and Y junctions, and a cut inside a piece",
     set_up: "A cube of 750 tetrahedra: a cut that ends on another (T); two that cross (X); a bent one with a \
              third arm that begins half a cell behind its bend (Y); after T, a cut of one piece only.",
     rule: "3, 4, 3 and 4 parts; the surface is closed and 2-manifold; no volume is lost.",
@@ -74,8 +74,8 @@ pub const CLAMPED: Case = Case {
              still have clamped nodes, but hold no clamped material. Then a cut through the clamped nodes \
              themselves, so that both halves are clamped; once between layers of nodes and once exactly along \
              one, so that both lips have its clamped nodes.",
-    rule: "C. The loose part falls with g to 1e-6: it is not glued to air; clamped material stays where it is, \
-           bit for bit, on both lips.",
+    rule: "C. The loose part falls with g to 1e-6, so nothing holds it in the air. Clamped material stays in \
+           place, bit for bit, on both lips.",
     source: "Schoch et al. 2013, §5.2",
     quick: true,
     run: Some(clamped),
@@ -246,8 +246,8 @@ fn branches(setting: &Setting) -> Result<Evidence, Trouble> {
     }
     tell(&flaws, &mut evidence);
     evidence.notes.push(
-        "The third arm of the Y has to reach over the bend: a bent sheet is flat within an element, so that an \
-         arm that begins exactly on the bend can leave a bridge of less than one element."
+        "The third arm of the Y must extend past the bend. A bent cut is flat within each element, so an arm \
+         that begins exactly at the bend can leave a bridge of less than one element."
             .to_owned(),
     );
     Ok(evidence)
@@ -325,7 +325,7 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     watch.steps(20);
     let way = 1e-4 * 20.0 * 21.0 / 2.0 * DOWN;
     let off = (fallen(&watch).0 - start - way).norm() / way.norm();
-    evidence.at_most("its way against free fall", off, 1e-6, "off");
+    evidence.at_most("deviation of its fall from free fall", off, 1e-6, "off");
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
     let rest = body.rest_positions();
     let moved = |body: &scindo_physics::body::Body, clamp: &[u32]| {

@@ -86,19 +86,19 @@ fn run(_: &Setting) -> Result<Evidence, Trouble> {
     let small = ratio(0.01, Enrichment::ShiftedHeaviside, Lumping::Hrz)?;
     evidence.at_most("shifted Heaviside, scaled diagonal, at c = 0.01", small, 0.05, "");
     evidence.notes.push(
-        "Where the thesis' claim does not hold: it says that with the shifted Heaviside function every lumping \
-         keeps the critical step above 0.75 of the uncut one. Its printed curves follow from functions supported \
-         on the node's own side, |H + H_i|/2, not from (H − H_i)/2. With the function as its formula says, the \
-         sliver beside the cut keeps a mass of about c²/2 (row sums) or c³ (scaled diagonal) but a stiffness of \
-         about c, and the step goes to zero with c. Only Menouillard's lumping stays bounded."
+        "One claim of the thesis does not hold. It says that with the shifted Heaviside function every lumping \
+         keeps the critical step above 0.75 of the uncut one. The printed curves follow from functions supported \
+         on the node's own side, |H + H_i|/2, not from (H − H_i)/2. With the formula, the sliver beside the cut \
+         keeps a mass of about c²/2 (row sums) or c³ (scaled diagonal) but a stiffness of about c, and the step \
+         goes to zero with c. Only Menouillard's lumping stays bounded."
             .to_owned(),
     );
     evidence.notes.push(
-        "Equation (3.44) of the thesis divides by the row sum and so does not keep the mass (4/3 of it in one \
-         dimension, 1.6 in three); scaled diagonals are taken here as Hinton, Rock and Zienkiewicz have them. \
-         Diagonal masses of standard and enriched degrees of freedom, (3.46) and (3.47), give fragments the \
-         wrong inertia: they fall with 0.40 to 0.997 g. The solver works with copies of the nodes and the \
-         masses of their pieces, where every fragment falls with g (see the case free-fall)."
+        "Equation (3.44) of the thesis divides by the row sum and therefore does not conserve mass (factor 4/3 \
+         in one dimension, 1.6 in three). Scaled diagonals here follow Hinton, Rock and Zienkiewicz. Diagonal \
+         masses of standard and enriched degrees of freedom, (3.46) and (3.47), give fragments the wrong \
+         inertia: they fall with 0.40 to 0.997 g. The solver uses copies of the nodes with the masses of their \
+         pieces, so every fragment falls with g (see the case free-fall)."
             .to_owned(),
     );
     Ok(evidence)

@@ -14,8 +14,8 @@ pub const FREED_NODE: Case = Case {
     number: Some(7),
     name: "freed-node",
     title: "A single node is cut free",
-    set_up: "A blade whose tip stays inside the body turns once around a node of the skin: a cone that holds \
-             that node and tiny pieces of the tetrahedra around it. The rest is clamped; gravity \
+    set_up: "A blade whose tip stays inside the body turns once around a node of the skin. It cuts out a cone \
+             that contains this node and tiny pieces of the tetrahedra around it. The rest is clamped; gravity \
              pulls the cone out.",
     rule: "C. One fragment besides the rest; its centre of mass falls with g to 1e-3 although no element has \
            more than a thousandth of its volume in it.",
@@ -31,8 +31,8 @@ pub const FRAGMENTS: Case = Case {
     title: "Every fragment falls with g",
     set_up: "A cube of 384 tetrahedra sliced into four by three cuts, one slice a twentieth of the whole; all \
              free, then with one side clamped. 0.4 s under gravity in steps of 10 ms.",
-    rule: "C. Momentum gained by every free fragment over density × volume × g × time, measured on its rest \
-           geometry, is 1 to 1e-6; so is the way its centre of mass has fallen. (Lumping of the enriched \
+    rule: "C. The momentum of every free fragment is density × volume × g × time to 1e-6, with the volume of its \
+           rest geometry. So is the distance that its centre of mass has fallen. (Lumping of the enriched \
            degrees of freedom as in Jeřábková 2007, (3.47): 0.40 to 0.997.)",
     source: "errata of Jeřábková 2007, (3.46) and (3.47)",
     quick: true,
@@ -121,9 +121,14 @@ fn freed_node(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.at_most("largest fraction of an element in it", largest, 1e-3, "");
     tell(&watch.body.flaws(), &mut evidence);
     let fall = fall(&mut watch, 0.01, 40, -DOWN);
-    evidence.exactly("fragments that hang on nothing", fall.free, 1);
-    evidence.at_most("its momentum against density × volume × g × time", fall.momentum, 1e-3, "off");
-    evidence.at_most("its way against free fall", fall.way, 1e-3, "off");
+    evidence.exactly("fragments that nothing holds", fall.free, 1);
+    evidence.at_most(
+        "deviation of its momentum from density × volume × g × time",
+        fall.momentum,
+        1e-3,
+        "off",
+    );
+    evidence.at_most("deviation of its fall from free fall", fall.way, 1e-3, "off");
     evidence.at_most("mass of the parts against density × volume", mass_of_parts(&watch.body), 1e-10, "off");
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
     evidence.pictures.push(view::surface(body.surface(), body.rest_positions(), V::y(), "The cut, at rest"));
@@ -149,7 +154,12 @@ fn fragments(setting: &Setting) -> Result<Evidence, Trouble> {
         let fall = fall(&mut watch, 0.01, 40, DOWN);
         evidence.exactly(format!("free fragments, {name}"), fall.free, if clamped { 3 } else { 4 });
         evidence.at_most(format!("momentum of a fragment, {name}"), fall.momentum, 1e-6, "off");
-        evidence.at_most(format!("way of a fragment, {name}"), fall.way, 1e-6, "off");
+        evidence.at_most(
+            format!("deviation of the fall of a fragment from free fall, {name}"),
+            fall.way,
+            1e-6,
+            "off",
+        );
         evidence.at_most(
             format!("mass of a fragment against density × volume, {name}"),
             mass_of_parts(&watch.body),

@@ -18,8 +18,8 @@ pub const GROWTH: Case = Case {
     set_up: "A block of 10 × 3 × 4 cells, its lower face clamped, gravity pulling its upper half sideways \
              and up. A blade advances by a tenth of a cell per step of 10 ms, from one end to the other.",
     rule: "C. One part until the blade has passed; the wound only grows and is never more than one element \
-           behind the blade; at every tick mass, momentum, angular momentum and both energies are what they \
-           were, to 1e-12.",
+           behind the blade. Cutting changes mass, momentum, angular momentum and both energies by at most 1e-12 \
+           at every tick.",
     source: "Jeřábková 2007, §4.1.3",
     quick: true,
     run: Some(growing),
@@ -30,8 +30,8 @@ pub const AGAIN: Case = Case {
     number: Some(11),
     name: "same-cut-again",
     title: "The same cut fifty times",
-    set_up: "A cube of 162 tetrahedra is cut by an oblique plane; then 50 times more by the same sweep, as the \
-             same and as six other incisions.",
+    set_up: "A cube of 162 tetrahedra is cut by an oblique plane, then 50 times more by the same sweep under the \
+             same and six other incision numbers.",
     rule: "No copy, piece, fragment or surface triangle is added after the first sweep.",
     source: "own",
     quick: true,

@@ -25,8 +25,8 @@ pub const CASE: Case = Case {
     set_up: "NaN, ±∞, 1e300 and the smallest denormal number, in: steps, gravity, springs, forces, \
              displacements, states, blades, materials, meshes, mesh files, scene files, tool poses and cuts of \
              clients.",
-    rule: "What has no meaning is refused with an error, and body or simulation are bit for bit what they were; \
-           what has one is carried out; every number stays finite.",
+    rule: "Invalid requests are refused with an error, and the body or simulation stays as it was, bit for bit. \
+           Valid requests are carried out. Every number stays finite.",
     source: "own",
     quick: true,
     run: Some(run),
@@ -108,7 +108,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
     );
     evidence.at_most("way of a step of 5e-324 s", moved, 1e-9, "m");
     evidence.at_least("requests refused", tally.refused as f64, 60.0, "");
-    evidence.exactly("requests without meaning that were carried out", tally.accepted.len(), 0);
+    evidence.exactly("invalid requests that were carried out", tally.accepted.len(), 0);
     evidence.exactly("requests that were refused and changed something", tally.changed.len(), 0);
     evidence.exactly("requests after which a number was not finite", tally.not_finite.len(), 0);
     for (what, list) in

@@ -10,7 +10,8 @@ pub const JAB: Case = Case {
     number: Some(24),
     name: "tool-jab",
     title: "A tool jabs at 10 m/s",
-    set_up: "A rigid tip, its pose known every 5 ms, is driven into the body. Waits for continuous contact of haptic tools.",
+    set_up: "A rigid tip, its pose known every 5 ms, is driven into the body. Needs continuous contact of haptic \
+        tools.",
     rule: "Nothing tunnels, the force stays below its cap, the tissue recovers within 1 s.",
     source: "Jeřábková 2007, §4.1",
     ..NOT_YET
@@ -21,7 +22,7 @@ pub const PACKETS: Case = Case {
     number: Some(25),
     name: "packet-loss",
     title: "A tool's packets get lost",
-    set_up: "30 % of the poses are lost, gaps last 200 ms, others come late or twice. Waits for the haptic suite.",
+    set_up: "30 % of the poses are lost, gaps last 200 ms, others come late or twice. Needs the haptic suite.",
     rule: "No force step above the slew limit; the passivity observer never falls below zero.",
     source: "contract of the haptic client",
     ..NOT_YET
@@ -32,7 +33,7 @@ pub const WALL: Case = Case {
     number: Some(27),
     name: "haptic-wall",
     title: "A wall at the limit of passivity",
-    set_up: "Stiffness 0.9 and 1.5 times the passivity limit, 1 ms ticks, 10 ms latency. Waits for the haptic suite.",
+    set_up: "Stiffness 0.9 and 1.5 times the passivity limit, 1 ms ticks, 10 ms latency. Needs the haptic suite.",
     rule: "The first is passive; the second is damped by the controller and stays bounded.",
     source: "Colgate, Schenkel 1994",
     ..NOT_YET
@@ -43,7 +44,7 @@ pub const LIPS: Case = Case {
     number: Some(28),
     name: "lips-in-contact",
     title: "The lips of a cut are pressed together",
-    set_up: "Cut, then press the cut shut 1000 times. Waits for self-contact.",
+    set_up: "A cut is made and then pressed shut 1000 times. Needs self-contact.",
     rule: "Energy does not grow from jitter; penetration stays below 0.05 h.",
     source: "Teschner 2004, Heidelberger 2004",
     ..NOT_YET
@@ -54,7 +55,8 @@ pub const BLADES: Case = Case {
     number: Some(29),
     name: "blade-grid",
     title: "A grid of blades in hexahedra, multigrid",
-    set_up: "Aligned and rotated grids of cuts to half depth, 83 000 to 230 000 cells. Waits for linked hexahedra and multigrid.",
+    set_up: "Aligned and rotated grids of cuts to half depth, 83 000 to 230 000 cells. Needs linked hexahedra \
+        and multigrid.",
     rule: "Convergence factor at most 0.80, at most 25 iterations to 1e-6; worse without duplicated coarse cells.",
     source: "Dick 2011, Figs. 10 and 11",
     ..NOT_YET
@@ -65,7 +67,8 @@ pub const SOAK: Case = Case {
     number: Some(30),
     name: "soak",
     title: "An hour of random tools and cuts",
-    set_up: "One hour of simulated time with random tools, cuts, sleep and wake-up under a memory cap. Waits for sleep and replay.",
+    set_up: "One hour of simulated time with random tools, cuts, sleep and wake-up under a memory cap. Needs \
+        sleep and replay.",
     rule: "Rule C; memory bounded; the 99th percentile of steps in budget; a replay has the same bits.",
     source: "own",
     ..NOT_YET
@@ -75,9 +78,9 @@ pub const SOAK: Case = Case {
 pub const OVERLOAD: Case = Case {
     number: Some(31),
     name: "overload",
-    title: "Five times more scene than time",
-    set_up: "A scene that costs five times its budget. Waits for the budget governor.",
-    rule: "Simulated time slows down and this is said; the residual stays below 1e-2.",
+    title: "A scene five times too slow",
+    set_up: "A scene whose steps cost five times their budget. Needs the budget governor.",
+    rule: "Simulated time slows down, and the slowdown is reported; the residual stays below 1e-2.",
     source: "own",
     ..NOT_YET
 };

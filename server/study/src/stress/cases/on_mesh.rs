@@ -19,8 +19,8 @@ pub const NODE: Case = Case {
     set_up: "A clamped cube of 384 tetrahedra with nodes at multiples of 1/32 m. A plane through its middle \
              node in general position, then one through a whole layer of nodes; both also shifted by ± 1e-9 m. \
              A quarter of a second under gravity in double precision.",
-    rule: "C. Two parts; volumes add up to 1e-12; surface closed; shifted planes move all material that was \
-           not cut to the same places, to 1e-6 of the edge.",
+    rule: "C. Two parts; volumes add up to 1e-12; the surface is closed; with shifted planes, all material that \
+           was not cut moves to the same positions, to 1e-6 of the edge.",
     source: "Wang 2014; Schoch et al. 2013, the cases \"0\"",
     quick: true,
     run: Some(|setting| {
@@ -33,10 +33,10 @@ pub const EDGE: Case = Case {
     number: Some(3),
     name: "edge-on-cut",
     title: "Edges exactly in the cut",
-    set_up: "As the case before, with planes through the middle node that hold whole edges and diagonals of \
-             the cells: x = y, x + y = 1, x + y = z + ½, 2x = y + z. Then 60 cubes, turned at random and metres \
-             away, cut by sweeps of seven blade positions each of which passes through five edges: what \
-             crosses a seam of the sweep must not slip through.",
+    set_up: "As the case before, with planes through the middle node that hold whole edges and diagonals of the \
+             cells: x = y, x + y = 1, x + y = z + ½, 2x = y + z. Then 60 cubes, turned at random and metres \
+             away, cut by sweeps of seven blade positions each of which passes through five edges: edges that \
+             cross a seam of the sweep must not stay uncut.",
     rule: "As the case before; all of the 60 cubes fall into two parts of the right volume.",
     source: "Schoch et al. 2013, Fig. 6",
     quick: true,
@@ -56,8 +56,8 @@ pub const FACE: Case = Case {
     set_up: "The same cube, cut along a layer of faces: through, and half through from the side that is not \
              clamped. The half cut is compared \
              with a mesh whose nodes on the cut were duplicated by hand, as cutting along faces does.",
-    rule: "C. No element has two pieces, none a piece next to nothing; each node of the layer has one copy \
-           more; the motion is that of the duplicated mesh, to 1e-9 of the edge.",
+    rule: "C. No element has two pieces or a vanishing piece; each node of the layer has one more copy; the \
+           motion is that of the duplicated mesh, to 1e-9 of the edge.",
     source: "Nienhuys 2003, ch. 3",
     quick: true,
     run: Some(face),
@@ -205,7 +205,7 @@ fn face(setting: &Setting) -> Result<Evidence, Trouble> {
     let [parts, pieces, copies] = whole.topology();
     evidence.exactly("parts, cut through", parts, 2);
     evidence.exactly("pieces, cut through", pieces, before[1]);
-    evidence.exactly("copies more, cut through", copies - before[2], 25);
+    evidence.exactly("additional copies, cut through", copies - before[2], 25);
     tell(&Flaws::of(&whole.mesh), &mut evidence);
     let least = |body: &Body| {
         let volume = |p: &scindo_physics::cut::Piece| {

@@ -17,8 +17,8 @@ pub const INVERTED: Case = Case {
     title: "Every element starts inverted",
     set_up: "A cube of 48 tetrahedra is turned inside out: x → −x for all coordinates, then for one. Five \
              seconds in steps of 20 ms without gravity, slight drag.",
-    rule: "C. Corotational (fast path and Newton's method) and stable Neo-Hookean find their shape to 1e-4 of \
-           the edge within 5 s and no element is left inverted; St. Venant–Kirchhoff with its continuation to \
+    rule: "C. Corotational (fast path and Newton's method) and stable Neo-Hookean recover their shape to 1e-4 of \
+           the edge within 5 s, and no element stays inverted; modified St. Venant–Kirchhoff recovers it to \
            1e-2. The law as published has no stress in a mirror image: all 48 elements stay inverted.",
     source: "Irving 2004; Smith 2018",
     quick: true,
@@ -81,10 +81,10 @@ pub const SCRAMBLED: Case = Case {
     number: Some(17),
     name: "scrambled",
     title: "Every node at a random place",
-    set_up: "The same cube with every node anywhere in its box, then cubes of 6 × 6 × 6 cells for 15 steps.",
+    set_up: "The same cube with every node at a random place in its box, then cubes of 6 × 6 × 6 cells for 15 steps.",
     rule: "C. The small cube: the same bounds as for the inverted one. The large one: finite, and the energy \
-           never grows by more than 1e-9 of that at the start in a step with Newton's method, by more than 1 % on \
-           the fast path, which makes one linear solve per step and searches for nothing.",
+           never grows by more than 1e-9 of that at the start in a step with Newton's method, by more than 1 % \
+           on the fast path, which makes one linear solve per step without a line search.",
     source: "Chen 2024",
     quick: false,
     run: Some(scrambled),

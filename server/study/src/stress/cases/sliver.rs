@@ -58,7 +58,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
         match fraction {
             None => {
                 uncut = most;
-                evidence.tell("iterations uncut, most of a step", f64::from(most), "");
+                evidence.tell("largest number of iterations of a step, uncut", f64::from(most), "");
             }
             Some(_) => {
                 let ratio = f64::from(most) / f64::from(uncut);

@@ -18,10 +18,10 @@ pub const STEPS: Case = Case {
              1e5, 1e6 and 1e7 Pa; steps of 1e-4, 1e-3, 5e-3, 0.02, 0.04, 0.1 and 0.2 s, up to 100 of them; implicit \
              Euler on the fast path and by Newton's method, and BDF2.",
     rule: "C. Implicit Euler: the energy is never above that of the start (1e-5 in single precision, 1e-9 in \
-           double), whatever the turn per step; the guard of the fast path divides steps that would gain \
-           energy, slows what turns by more than 4 rad in a step, and says so. BDF2: never more than 1 % above; its guard takes over where the cube turns too \
-           far in a step, and says so.",
-    source: "no paper; bounds as measured",
+           double), whatever the rotation per step; the guard of the fast path divides steps that would gain \
+           energy, slows parts that turn by more than 4 rad in a step, and reports both. BDF2: never more than 1 \
+           % above; its guard takes over if the cube turns too far in a step, and reports this.",
+    source: "no publication; bounds as measured",
     quick: false,
     run: Some(step_sweep),
 };
@@ -34,7 +34,7 @@ pub const SPIN: Case = Case {
     set_up: "The same cube at rest shape spins freely at 10 and 40 rad/s, in steps of 5 and 20 ms.",
     rule: "C. Implicit Euler: angular momentum never grows; size grows by less than 1 %. BDF2 at 10 rad/s and \
            20 ms keeps 90 % of the angular momentum.",
-    source: "no paper; bounds as measured",
+    source: "no publication; bounds as measured",
     quick: true,
     run: Some(free_spin),
 };
@@ -179,14 +179,14 @@ fn step_sweep(setting: &Setting) -> Result<Evidence, Trouble> {
         }
         if with.is_none() {
             evidence.at_least(
-                "runs of the fast path with a word of its guard",
+                "runs of the fast path with a notice of its guard",
                 f64::from(told),
                 f64::from(fast_turns),
                 "",
             );
         }
         if name == "BDF2" {
-            evidence.exactly("runs of BDF2 without a word of its guard", silent, 0);
+            evidence.exactly("runs of BDF2 without a notice of its guard", silent, 0);
         }
         most.lines.push(Line { name: name.to_owned(), points });
     }
@@ -269,7 +269,7 @@ fn newmark(setting: &Setting) -> Result<Evidence, Trouble> {
                     0.01,
                     "",
                 );
-                evidence.tell(format!("steps with a word of the guard, {name}"), spin.notices as f64, "");
+                evidence.tell(format!("steps with a notice of the guard, {name}"), spin.notices as f64, "");
                 if steps == 2 {
                     watch.finish(&mut common, &mut energies, &mut iterations);
                 } else {

@@ -23,8 +23,8 @@ pub const LAYERS: Case = Case {
     set_up: "A clamped block of 8 × 8 × 8 cells of E = 1e3 Pa with an inclusion of 1e9 Pa in its middle; then \
              four glued layers of 1e3 and 1e9 Pa in turn. Implicit Euler, small strains, 25 steps of 20 ms under \
              gravity; every step solved by block-Jacobi PCG to 1e-6.",
-    rule: "C. Every solve reaches 1e-6; its iterations are told. (At most 60 iterations of multigrid are asked \
-           of hexahedra, which are still to come.)",
+    rule: "C. Every solve reaches 1e-6; its iterations are listed. (Multigrid on hexahedra, which is not \
+           implemented yet, must need at most 60 iterations.)",
     source: "Dick 2011, Fig. 14",
     quick: false,
     run: Some(layers),
@@ -39,7 +39,7 @@ pub const INCOMPRESSIBLE: Case = Case {
              tetrahedra and selectively integrated hexahedra of 10 cells per edge against quadratic tetrahedra \
              of 6.",
     rule: "The volume changes by at most 0.5 %; the top comes down as far as with quadratic tetrahedra, to 10 %. \
-           What the same elements do without remedy is told.",
+           The results of the same elements without the remedy are listed.",
     source: "Smith 2018; Zhu 2010",
     quick: false,
     run: Some(incompressible),
@@ -151,7 +151,7 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
             counts.push([f64::from(step) * h, f64::from(report.iterations)]);
         }
         evidence.exactly(format!("solves that did not reach 1e-6, {name}"), missed, 0);
-        evidence.tell(format!("iterations of a step, most, {name}"), f64::from(most), "");
+        evidence.tell(format!("largest number of iterations of a step, {name}"), f64::from(most), "");
         evidence.exactly(format!("C: numbers that are not finite, {name}"), not_finite, 0);
         evidence.at_most(format!("C: energy beyond work, {name}"), excess / scale, 0.01, "");
         energies.lines.push(Line { name: name.to_owned(), points: path });
@@ -309,7 +309,7 @@ fn needles(setting: &Setting) -> Result<Evidence, Trouble> {
         let body = watch.finish(&mut common, &mut energies, &mut iterations);
         evidence.pictures.push(view::body(&body, format!("{name}, after one second")));
     }
-    evidence.tell("iterations of a step, most, clean", f64::from(most[0]), "");
+    evidence.tell("largest number of iterations of a step, clean", f64::from(most[0]), "");
     for ((name, ..), found) in kinds.iter().zip(&most).skip(1) {
         let ratio = f64::from(*found) / f64::from(most[0]);
         evidence.at_most(format!("iterations with {name}, over clean"), ratio, 3.0, "");
