@@ -96,10 +96,7 @@ impl fmt::Display for Notice {
                  sub-steps; shorten it or choose an implicit scheme"
             ),
             Self::Divided { substeps, stable_s } => {
-                write!(
-                    f,
-                    "divided into {substeps} sub-steps, because the stability limit is {stable_s:.3e} s"
-                )
+                write!(f, "divided into {substeps} sub-steps; the stability limit is {stable_s:.3e} s")
             }
             Self::DividedAgain { substeps } => {
                 write!(f, "did not stay finite: divided into {substeps} sub-steps")
@@ -148,9 +145,8 @@ impl fmt::Display for Notice {
             Self::NotFinite => write!(f, "did not stay finite: rolled back"),
             Self::OutOfRange { stretch, size_m } => write!(
                 f,
-                "a part of {size_m:.3e} m would extend over {stretch:.1e} times its size: rolled back, and the \
-                 body was put to rest; it is too soft for its loads, the step is too long, or the limits of the \
-                 solver are too low"
+                "a part of {size_m:.3e} m would extend over {stretch:.1e} times its size: rolled back to rest; \
+                 it is too soft for its loads, the step too long, or the solver's limits too low"
             ),
         }
     }

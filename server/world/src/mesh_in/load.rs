@@ -171,7 +171,7 @@ impl fmt::Display for LatticeReport {
         let state = if s.is_clean() { "clean" } else { "dirty" };
         writeln!(
             f,
-            "surface: {} triangles in {} sheets, {state}, {}",
+            "surface: {} triangles in {} components, {state}, {}",
             s.triangles,
             s.components,
             size(&s.min_m, &s.max_m)

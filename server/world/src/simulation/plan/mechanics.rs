@@ -38,16 +38,16 @@ impl Plan {
         self.push("large rotation", turning > 0, why, 0.0);
         let damped = of(&|b| b.damping_mass_1_s > 0.0 || b.damping_stiffness_s > 0.0);
         let why = if damped > 0 {
-            format!("{} with rayleigh", count(damped, "body"))
+            format!("{} with Rayleigh damping", count(damped, "body"))
         } else {
-            "no body has rayleigh".into()
+            "no body has Rayleigh damping".into()
         };
         self.push("damping", damped > 0, why, 0.0);
         let remedies = of(&|body| body.mechanics.locking != RawLocking::None);
         let why = if remedies > 0 {
             format!("{} with a locking remedy", count(remedies, "body"))
         } else {
-            "no body has locking".into()
+            "no body has a locking remedy".into()
         };
         self.push("locking remedy", remedies > 0, why, 0.0);
         let estimate = scene.effects.error_estimate == Some(true);
@@ -93,9 +93,13 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
     let solver = match m.method {
         _ if m.integrator.is_explicit() => "no solver".into(),
         RawMethod::Cholesky => format!("cholesky, {precision}"),
-        RawMethod::Relaxation => format!("relaxation, {} x {:e}, {precision}", size.iterations, m.tolerance),
-        RawMethod::Cg => format!("cg, {} x {:e}, {precision}", size.iterations, m.tolerance),
-        _ => format!("pcg, {} x {:e}, {precision}", size.iterations, m.tolerance),
+        RawMethod::Relaxation => {
+            format!("relaxation, {} iterations to {:e}, {precision}", size.iterations, m.tolerance)
+        }
+        RawMethod::Cg => {
+            format!("cg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance)
+        }
+        _ => format!("pcg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance),
     };
     let path = if m.arithmetic() == Arithmetic::Single {
         let operator = match m.body_settings().operator(m.constitutive_law(), size.elements) {
