@@ -32,8 +32,6 @@ pub mod space;
 pub mod integrator;
 pub mod estimate;
 pub mod body;
-mod disjoint;
-mod numbering;
-mod reserve;
+mod lists;
 #[cfg(test)]
 mod testing;

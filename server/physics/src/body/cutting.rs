@@ -7,7 +7,7 @@ use super::{Body, BodyError, element_name};
 use crate::assembly::ElementKind;
 use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Piece, Work, swept_area};
 use crate::integrator::LooseParts;
-use crate::reserve::{refill, resize_reserving};
+use crate::lists::reserve::{refill, resize_reserving};
 
 /// Pairs of sweep triangle and element that cost as much as one fragment, in a cut along faces.
 const SNAP_PAIRS_PER_FRAGMENT: usize = 4;

@@ -37,12 +37,12 @@ use crate::integrator::{
     Dynamics, LinearlyImplicit, LocalConnectivity, LooseParts, ModelSolver, State, StepInputs, StepSolver,
 };
 pub use crate::integrator::{MassKind, Notice, Outcome, PointSpring, Scheme, SolveReport, SpringKind};
+use crate::lists::reserve::{refill, resize_reserving};
 use crate::material::{Material, Rayleigh};
 use crate::mesh::{HexMesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
 use crate::phase::Phase;
-use crate::reserve::{refill, resize_reserving};
 use crate::skin::{Skin, SkinSettings, SkinShape};
 use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};

@@ -21,9 +21,9 @@ use super::step_inputs::StepInputs;
 use super::step_solver::{SolverSettings, StepSolver};
 use crate::assembly::{Model, ModelError};
 use crate::cut::NewCopy;
+use crate::lists::reserve::resize_reserving;
 use crate::material::{Law, Material};
 use crate::operator::{FixedCopy, Stiffness};
-use crate::reserve::resize_reserving;
 use crate::space::Space;
 use crate::team::Team;
 

@@ -18,13 +18,13 @@ use super::springs::ActiveSpring;
 use super::state::{State, WEIGHTLESS, hold};
 use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
 use super::step_solver::ActiveSprings;
+use crate::lists::reserve::resize_reserving;
 use crate::material::Rayleigh;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
     Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
 };
 use crate::phase::Phase;
-use crate::reserve::resize_reserving;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Pcg, StopReason};
 use crate::team::{Team, blocks};
 

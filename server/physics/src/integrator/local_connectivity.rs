@@ -6,10 +6,10 @@
 
 use super::parts::LooseParts;
 use crate::cut::NewCopy;
-use crate::disjoint::{find, join};
-use crate::numbering::Numbering;
+use crate::lists::disjoint::{find, join};
+use crate::lists::numbering::Numbering;
+use crate::lists::reserve::resize_reserving;
 use crate::operator::FixedCopy;
-use crate::reserve::resize_reserving;
 use crate::space::Space;
 
 /// Buffers of the local search.

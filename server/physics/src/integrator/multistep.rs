@@ -12,9 +12,9 @@ use super::spin::SpinGuard;
 use super::state::State;
 use super::step_inputs::{StepHistory, StepInputs};
 use crate::cut::NewCopy;
+use crate::lists::reserve::resize_reserving;
 use crate::material::Law;
 use crate::operator::BLOCK;
-use crate::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// History of a scheme; empty for implicit Euler by one linear solve, which needs none.

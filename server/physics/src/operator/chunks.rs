@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 use super::BLOCK;
 use crate::element::{Ids, LANES};
-use crate::reserve::resize_reserving;
+use crate::lists::reserve::resize_reserving;
 
 /// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
 /// body of a few thousand pieces still has work for several threads.

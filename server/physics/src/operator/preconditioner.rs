@@ -2,7 +2,7 @@
 //! they are not stiff.
 
 use super::{BLOCK, Block6, FixedCopy, Iterate, Padded, Preconditioner, Substitution, Sum, block_of, rows};
-use crate::reserve::resize_reserving;
+use crate::lists::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// Block-Jacobi preconditioner M⁻¹: one symmetric positive definite 3×3 matrix per copy.

@@ -5,8 +5,8 @@
 
 use super::algebraic_error::AlgebraicError;
 use super::report::{LinearReport, StopReason};
+use crate::lists::reserve::resize_reserving;
 use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Preconditioner};
-use crate::reserve::resize_reserving;
 use crate::team::Team;
 
 /// Stopping criteria of a solve.

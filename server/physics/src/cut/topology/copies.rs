@@ -5,8 +5,8 @@
 //! with the node's own material keeps the copy with the node's number, the *real* copy; the others are
 //! virtual.
 
+use crate::lists::reserve::{reserve_half_again, reserved};
 use crate::mesh::TetMesh;
-use crate::reserve::{reserve_half_again, reserved};
 
 use super::elements_around::ElementsAround;
 use super::fragments::{Fragments, NONE};
