@@ -65,6 +65,29 @@ pub struct Constants {
 }
 
 /// A deformable, cuttable body.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use scindo_physics::body::{Body, BodySettings, Outcome};
+/// use scindo_physics::material::{Law, Material, Rayleigh};
+/// use scindo_physics::mesh::{BoxPattern, box_mesh};
+///
+/// let size = Vector3::new(0.2, 0.05, 0.05); // m
+/// let mesh = box_mesh(Vector3::zeros(), size, [8, 2, 2], BoxPattern::Tet6);
+/// let (law, rayleigh) = (Law::Corotational, Rayleigh::default());
+/// let material = Material { young_pa: 1e5, poisson: 0.4, density_kg_m3: 1e3, rayleigh, law };
+/// let mut body = Body::new(mesh, material, BodySettings::default())?;
+///
+/// // Held at its left end, it sags.
+/// let left = (0..).zip(body.rest_positions()).filter(|(_, rest)| rest.x == 0.0);
+/// let held: Vec<u32> = left.map(|(node, _)| node).collect();
+/// body.fix(&held, [true; 3], Vector3::zeros())?;
+/// let before = body.centre_of_mass();
+/// let report = body.step(0.01, Vector3::new(0.0, 0.0, -9.81), &[]); // s, m/s²
+/// assert_eq!(report.outcome, Outcome::Advanced);
+/// assert!(body.centre_of_mass().z < before.z);
+/// # Ok::<(), scindo_physics::body::BodyError>(())
+/// ```
 #[derive(Debug)]
 pub struct Body {
     space: Box<dyn Space>,

@@ -8,6 +8,17 @@ use crate::operator::OperatorChoice;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// Settings that are chosen when a body is made.
+///
+/// ```
+/// use scindo_physics::body::{Arithmetic, BodySettings, ElementKind, Scheme};
+/// use scindo_physics::material::Law;
+///
+/// let fast = BodySettings { scheme: Scheme::Bdf2, threads: 2, ..BodySettings::default() };
+/// assert_eq!(fast.arithmetic(Law::Corotational), Arithmetic::Single);
+///
+/// let quadratic = BodySettings { element: ElementKind::Tet10, ..fast };
+/// assert_eq!(quadratic.why_general(Law::Corotational), Some("element tet10"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodySettings {
     /// When the solver of a step stops. On the fast path this is the linear solve; on the general path it

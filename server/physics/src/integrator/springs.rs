@@ -6,6 +6,33 @@ use crate::element::MaterialPoint;
 use crate::operator::Spring;
 
 /// A spring on a material point x_p.
+///
+/// ```
+/// # use nalgebra::Vector3;
+/// # use scindo_physics::body::{Body, BodySettings};
+/// # use scindo_physics::material::{Law, Material, Rayleigh};
+/// # use scindo_physics::mesh::{BoxPattern, box_mesh};
+/// use scindo_physics::body::{PointSpring, SpringKind};
+/// use scindo_physics::element::MaterialPoint;
+///
+/// # let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(0.1), [2; 3], BoxPattern::Tet6);
+/// # let (law, rayleigh) = (Law::Corotational, Rayleigh::default());
+/// # let material = Material { young_pa: 1e4, poisson: 0.4, density_kg_m3: 1e3, rayleigh, law };
+/// # let mut body = Body::new(mesh, material, BodySettings::default())?;
+/// // Pulls the centre of one tetrahedron 1 cm upwards.
+/// let point = MaterialPoint::in_tet(body.pieces()[0].copies, [0.25; 4]);
+/// let above = point.position(body.positions()) + Vector3::new(0.0, 0.0, 0.01);
+/// let pull = PointSpring {
+///     point,
+///     kind: SpringKind::Hold { target_m: above },
+///     stiffness_n_m: 100.0,
+///     max_force_n: 2.0,
+/// };
+/// body.step(0.01, Vector3::zeros(), &[pull]);
+/// let force = body.spring_forces()[0]; // N, on the body
+/// assert!(force.z > 0.0 && force.norm() <= 2.0);
+/// # Ok::<(), scindo_physics::body::BodyError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointSpring {
     /// The point; its carriers are all of one piece.

@@ -34,6 +34,24 @@ use thiserror::Error;
 pub type Matrix9 = nalgebra::SMatrix<f64, 9, 9>;
 
 /// Isotropic elastic material of one body.
+///
+/// ```
+/// use scindo_physics::material::{Law, Material, Rayleigh};
+///
+/// let liver = Material {
+///     young_pa: 1e4,
+///     poisson: 0.4,
+///     density_kg_m3: 1060.0,
+///     rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.02 },
+///     law: Law::Corotational,
+/// };
+/// liver.check()?;
+/// assert!((liver.lame().mu - 1e4 / 2.8).abs() < 1e-9); // μ = E / (2 (1 + ν)) [Pa]
+///
+/// let incompressible = Material { poisson: 0.5, ..liver };
+/// assert!(incompressible.check().is_err());
+/// # Ok::<(), scindo_physics::material::MaterialError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Young's modulus E [Pa], within [`Material::YOUNG_PA`].

@@ -32,6 +32,16 @@ const OCTAHEDRAL6: [[usize; 4]; 6] =
 ///
 /// Node id = i + (nx+1)·(j + (ny+1)·k); tets in cell order, x fastest. An empty or flat box gives
 /// a mesh that [`TetMesh::check`] refuses.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use scindo_physics::mesh::{BoxPattern, box_mesh};
+///
+/// let size = Vector3::new(0.3, 0.1, 0.1); // m
+/// let mesh = box_mesh(Vector3::zeros(), size, [6, 2, 2], BoxPattern::Tet6);
+/// assert_eq!((mesh.nodes.len(), mesh.tets.len()), (7 * 3 * 3, 6 * 6 * 2 * 2));
+/// assert!((mesh.volumes().iter().sum::<f64>() - 0.003).abs() < 1e-15); // m³
+/// ```
 pub fn box_mesh(min: Vector3<f64>, max: Vector3<f64>, cells: [usize; 3], pattern: BoxPattern) -> TetMesh {
     let [nx, ny, nz] = cells;
     let node = |i: usize, j: usize, k: usize| i + (nx + 1) * (j + (ny + 1) * k);

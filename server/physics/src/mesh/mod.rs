@@ -31,6 +31,20 @@ pub use crate::element::TET_EDGES;
 pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// Linear tetrahedra in their rest configuration.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use scindo_physics::mesh::TetMesh;
+///
+/// let corners = [Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()];
+/// let mesh = TetMesh { nodes: corners.to_vec(), tets: vec![[0, 1, 2, 3]] };
+/// mesh.check()?;
+/// assert!((mesh.volume(0) - 1.0 / 6.0).abs() < 1e-15); // m³
+///
+/// let turned_inside_out = TetMesh { tets: vec![[1, 0, 2, 3]], ..mesh };
+/// assert!(turned_inside_out.check().is_err());
+/// # Ok::<(), scindo_physics::mesh::MeshError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
     /// Rest positions [m], length n_nodes.
