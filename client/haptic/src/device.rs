@@ -57,6 +57,36 @@ pub struct Capability {
 pub struct DeviceGone;
 
 /// A kinesthetic device with three degrees of freedom in force.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use scindo_haptic::device::{Capability, DeviceGone, DeviceState, HapticDevice, ToolMode, simulated};
+///
+/// /// A hand that nothing moves, and that remembers the force on it.
+/// #[derive(Default)]
+/// struct Clamped {
+///     force_n: Vector3<f64>,
+/// }
+///
+/// impl HapticDevice for Clamped {
+///     fn capability(&self) -> Capability {
+///         Capability { model: "clamped", max_force_n: 3.0, ..simulated::CAPABILITY }
+///     }
+///     fn read(&mut self, _elapsed_s: f64) -> Result<DeviceState, DeviceGone> {
+///         let (position_m, velocity_m_s) = (Vector3::zeros(), Vector3::zeros());
+///         let (orientation, mode) = ([0.0, 0.0, 0.0, 1.0], ToolMode::Touch);
+///         Ok(DeviceState { position_m, velocity_m_s, orientation, mode })
+///     }
+///     fn write(&mut self, force_n: Vector3<f64>) {
+///         self.force_n = force_n;
+///     }
+/// }
+///
+/// let mut device = Clamped::default();
+/// device.write(Vector3::new(0.0, 0.0, 1.0));
+/// assert_eq!(device.force_n.z, 1.0);
+/// assert_eq!(device.read(1e-3).map(|state| state.mode), Ok(ToolMode::Touch));
+/// ```
 pub trait HapticDevice: Send {
     /// Limits of the device.
     fn capability(&self) -> Capability;

@@ -99,6 +99,28 @@ impl HapticTick {
 
     /// One tick: device → contact → force of the tissue → safety → device, pose, log. It takes no lock,
     /// allocates nothing and waits for nothing.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    /// use std::sync::atomic::AtomicBool;
+    ///
+    /// use nalgebra::Vector3;
+    /// use scindo_haptic::contact::model::contact_slot;
+    /// use scindo_haptic::device::simulated::{Hand, SimulatedDevice};
+    /// use scindo_haptic::tick::{HapticTick, Limits, Ports, TickTime};
+    ///
+    /// let (_newest, contacts) = contact_slot();
+    /// let server_alive = Arc::new(AtomicBool::new(false));
+    /// let ports = Ports { contacts, server_alive, poses: None, log: None, meter: None };
+    /// let limits = Limits { max_force_n: 3.0, slew_n_s: 300.0 };
+    /// let device = Box::new(SimulatedDevice::at_rest(Hand::default()));
+    /// let mut tick = HapticTick::new(device, limits, ports);
+    /// for ms in 1..=10 {
+    ///     let output = tick.tick(TickTime { now_ns: 1_000_000 * ms, elapsed_s: 1e-3 });
+    ///     assert_eq!(output.force_n, Vector3::zeros()); // without a server there is no force
+    /// }
+    /// assert_eq!(tick.report().ticks, 10);
+    /// ```
     pub fn tick(&mut self, time: TickTime) -> TickOutput {
         let (state, faults) = self.guard.check(self.device.read(time.elapsed_s), time.elapsed_s);
         let model = *self.ports.contacts.read();

@@ -38,6 +38,28 @@ pub enum SurfaceError {
 /// It holds the surface twice: before the last [`refit`](Self::refit) and at present. Every leaf box covers
 /// both, so the same tree serves swept queries on the motion in between. Triangles are counter-clockwise seen
 /// from outside.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use scindo_collision::SurfaceBvh;
+///
+/// // A tetrahedron: the origin and the three unit points.
+/// let mut positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// let triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+/// let mut surface = SurfaceBvh::new(&positions, &triangles)?;
+///
+/// let below = Vector3::new(0.2, 0.2, -0.5); // m
+/// let nearest = surface.closest_point(below, 1.0).expect("within 1 m");
+/// assert!((nearest.point - Vector3::new(0.2, 0.2, 0.0)).norm() < 1e-6);
+/// assert_eq!(nearest.normal, -Vector3::z());
+/// assert!((nearest.signed_distance - 0.5).abs() < 1e-6);
+///
+/// // The surface moves up by 1 m: the same point is out of reach now.
+/// positions.iter_mut().for_each(|x| x[2] += 1.0);
+/// surface.refit(&positions)?;
+/// assert_eq!(surface.closest_point(below, 1.0), None);
+/// # Ok::<(), scindo_collision::SurfaceError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SurfaceBvh {
     triangles: Vec<[u32; 3]>,

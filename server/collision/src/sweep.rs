@@ -71,6 +71,22 @@ impl SurfaceBvh {
     /// A capsule that already touches a triangle hits it at time 0 if it moves into it, and not at all if it
     /// moves away. Triangles seen from behind never stop anything, so a capsule that started inside can
     /// leave.
+    ///
+    /// ```
+    /// use nalgebra::Vector3;
+    /// use scindo_collision::{CapsuleMotion, SurfaceBvh};
+    ///
+    /// let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    /// let surface = SurfaceBvh::new(&positions, &[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])?;
+    ///
+    /// // A sphere of 10 cm rises by 1 m from 60 cm below.
+    /// let (from, to) = (Vector3::new(0.2, 0.2, -0.6), Vector3::new(0.2, 0.2, 0.4));
+    /// let motion = CapsuleMotion { start: [from; 2], end: [to; 2], radius: 0.1 };
+    /// let impact = surface.sweep(&motion).expect("it hits");
+    /// assert!((impact.time - 0.5).abs() < 1e-5);
+    /// assert!((impact.normal + Vector3::z()).norm() < 1e-9);
+    /// # Ok::<(), scindo_collision::SurfaceError>(())
+    /// ```
     pub fn sweep(&self, motion: &CapsuleMotion) -> Option<Impact> {
         self.sweep_triangles(motion, |t| (self.triangle(t), [V::zeros(); 3]))
     }

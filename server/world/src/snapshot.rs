@@ -14,6 +14,36 @@ use crate::inputs::{ToolMode, ToolShape};
 use crate::report::Energy;
 
 /// The state after one step.
+///
+/// ```
+/// # use std::path::Path;
+/// # use scindo_world::scene::Scene;
+/// # use scindo_world::simulation::Simulation;
+/// use scindo_world::inputs::{Inputs, Wants};
+/// use scindo_world::snapshot::Snapshot;
+///
+/// # const TEXT: &str = r#"
+/// # schema = 1
+/// # world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
+/// # [[body]]
+/// # id = "block"
+/// # mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }
+/// # young_pa = 1e4
+/// # poisson = 0.4
+/// # density_kg_m3 = 1000
+/// # "#;
+/// # let mut simulation = Simulation::new(&Scene::from_toml(TEXT)?, Path::new(""))?;
+/// simulation.step(&Inputs::default());
+/// let mut snapshot = Snapshot::default();
+/// simulation.snapshot_into(&Wants::default(), &mut snapshot);
+/// assert_eq!((snapshot.step, snapshot.bodies.len()), (1, 1));
+/// assert!(snapshot.bodies[0].positions.is_empty(), "nobody wants the surface");
+///
+/// simulation.snapshot_into(&Wants { surface: vec![true], ..Wants::default() }, &mut snapshot);
+/// let body = &snapshot.bodies[0];
+/// assert_eq!(body.positions.len(), body.topology.vertex_count as usize);
+/// # Ok::<(), scindo_world::scene::SceneError>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Snapshot {
     /// Steps done.

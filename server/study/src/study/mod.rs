@@ -57,6 +57,47 @@ pub enum StudyError {
 ///
 /// # Errors
 /// Bad names, bad scenes, or files that cannot be written. Failed runs are results.
+///
+/// ```
+/// use std::sync::Arc;
+/// use std::sync::atomic::AtomicBool;
+///
+/// use scindo_study::{Settings, run};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let directory = tempfile::tempdir()?;
+/// let scene = directory.path().join("block.toml");
+/// # let text = r#"
+/// # schema = 1
+/// # world = { gravity_m_s2 = [0, 0, -9.81] }
+/// # [[body]]
+/// # id = "block"
+/// # mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }
+/// # law = "linear"
+/// # integrator = "static"
+/// # young_pa = 1e4
+/// # poisson = 0.3
+/// # density_kg_m3 = 1000
+/// # fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
+/// # "#;
+/// # std::fs::write(&scene, text)?;
+/// let settings = Settings {
+///     cases: vec![scene.display().to_string()],
+///     out: directory.path().join("accuracy"),
+///     quick: true,
+///     within_s: Some(1.0),
+///     budget_ms: Some(10.0),
+///     seconds: None,
+///     only: Vec::new(),
+///     cells: Vec::new(),
+///     stop: Arc::new(AtomicBool::new(false)),
+/// };
+/// let result = run(&settings, &mut |progress| println!("{}", progress.what))?;
+/// assert_eq!(result.cases.len(), 1);
+/// assert!(settings.out.join("index.html").exists() && !result.interrupted);
+/// # Ok(())
+/// # }
+/// ```
 pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<StudyResult, StudyError> {
     let cases = open(settings)?;
     let origin = Origin::here();

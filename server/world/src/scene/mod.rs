@@ -38,6 +38,30 @@ pub use shipped::{DEMONSTRATION, SHIPPED, ShippedScene};
 use source::{Node, Unreadable};
 
 /// A scene that has been read and checked.
+///
+/// ```
+/// use scindo_world::scene::Scene;
+///
+/// let text = r#"
+/// schema = 1
+/// name = "a block"
+/// [[body]]
+/// id = "block"
+/// mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }
+/// young_pa = 1e4
+/// poisson = 0.4
+/// density_kg_m3 = 1000
+/// "#;
+/// let scene = Scene::from_toml(text)?;
+/// assert_eq!(scene.name(), "a block");
+/// let stiffer = scene.apply_set("body.block.young_pa=3e4")?;
+/// assert_eq!(stiffer.checked().bodies[0].young_pa, 3e4);
+///
+/// // A mistake says what, where, and what is allowed.
+/// let mistake = Scene::from_toml(&text.replace("0.4", "0.6")).unwrap_err();
+/// assert!(mistake.to_string().contains("poisson"), "{mistake}");
+/// # Ok::<(), scindo_world::scene::SceneError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Scene {
     file: String,

@@ -47,6 +47,36 @@ use sleep::Sleep;
 use stopwatch::Stopwatch;
 
 /// A running scene.
+///
+/// ```
+/// use std::path::Path;
+///
+/// use scindo_world::inputs::Inputs;
+/// use scindo_world::scene::Scene;
+/// use scindo_world::simulation::{Simulation, Stage};
+///
+/// # const TEXT: &str = r#"
+/// # schema = 1
+/// # world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
+/// # [[body]]
+/// # id = "block"
+/// # mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [2, 2, 2] } }
+/// # young_pa = 1e4
+/// # poisson = 0.4
+/// # density_kg_m3 = 1000
+/// # "#;
+/// // One block that nothing holds.
+/// let mut simulation = Simulation::new(&Scene::from_toml(TEXT)?, Path::new(""))?;
+/// for _ in 0..10 {
+///     let report = simulation.step(&Inputs::default());
+///     assert!(report.events.is_empty());
+/// }
+/// assert!((simulation.time_s() - 0.1).abs() < 1e-12);
+/// assert!(simulation.total_seconds().of(Stage::Deform) > 0.0);
+/// let body = &simulation.bodies()[0].body;
+/// assert!(body.velocities().iter().all(|v| (v.z + 9.81 * 0.1).abs() < 1e-6)); // it falls
+/// # Ok::<(), scindo_world::scene::SceneError>(())
+/// ```
 #[derive(Debug)]
 pub struct Simulation {
     source: Scene,
