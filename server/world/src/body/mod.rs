@@ -247,7 +247,7 @@ impl SimBody {
     }
 
     /// Must be called whenever the body moved.
-    pub(crate) fn has_moved(&mut self) {
+    fn has_moved(&mut self) {
         self.surface_is_old = true;
     }
 

@@ -294,16 +294,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// Gives the nodes of body number `index` other positions [m] and velocities [m/s].
-    ///
-    /// # Errors
-    /// As [`scindo_physics::body::Body::set_state`].
-    #[doc(hidden)]
-    pub fn throw(&mut self, index: usize, x: &[Vector3<f64>], v: &[Vector3<f64>]) -> Result<(), BodyError> {
-        self.bodies[index].has_moved();
-        self.bodies[index].body.set_state(x, v)
-    }
-
     /// Takes the last incision back, whoever made it, with everything that was cut in the same bodies since
     /// it began. The tissue closes where it is now and moves on; epochs rise.
     ///
