@@ -135,22 +135,38 @@ impl Body {
             }
         };
         tets.set_exact(!settings.ablation.exact_predicates);
-        Self::of_space(Box::new(tets), material, settings)
+        Self::at_rest(Box::new(tets), material, settings)
     }
 
     /// A body of trilinear hexahedra at rest in the configuration of `mesh`. Its surface is that of the
     /// tetrahedra each hexahedron is split into, on the same nodes.
     pub fn hex8(mesh: HexMesh, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
-        let settings = BodySettings { element: ElementKind::Hex8, ..settings };
         Self::of_space(Box::new(Tets::hexahedra(mesh)?), material, settings)
     }
 
-    /// A body at rest that is discretised by `space`.
-    fn of_space(
+    /// A body at rest that is discretised by `space`, whose element takes the place of `settings.element`.
+    ///
+    /// # Errors
+    /// Material or settings out of range or incompatible. Cutting along faces needs [`Body::new`], because it
+    /// replaces the mesh.
+    pub fn of_space(
         space: Box<dyn Space>,
         material: Material,
         settings: BodySettings,
     ) -> Result<Self, BodyError> {
+        let settings = BodySettings { element: space.kind(), ..settings };
+        if settings.cutting == CuttingMethod::Snap && settings.element == ElementKind::Tet4 {
+            let (what, with) = ("cutting along faces", "a discretisation that was made beforehand");
+            return Err(BodyError::Combination {
+                what,
+                with,
+                instead: "a mesh of tetrahedra, or cutting method xfem",
+            });
+        }
+        Self::at_rest(space, material, settings)
+    }
+
+    fn at_rest(space: Box<dyn Space>, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
         material.check()?;
         settings.check(material.law)?;
         let mut settings = settings;

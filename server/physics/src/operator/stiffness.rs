@@ -21,12 +21,16 @@ pub struct ElasticUpdate {
     pub scale: f64,
 }
 
-/// Chunk, batch and lane of a piece; valid until the next cut.
+/// Where a stiffness keeps a piece; valid until the next cut. Only the stiffness that gave a place interprets
+/// its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    pub(super) chunk: u32,
-    pub(super) batch: u32,
-    pub(super) lane: u32,
+    /// Chunk: the unit of work of one thread.
+    pub chunk: u32,
+    /// Batch within the chunk: the pieces computed at once.
+    pub batch: u32,
+    /// Lane within the batch.
+    pub lane: u32,
 }
 
 /// Vectors and factors of a product with A = `factor` M + s K̂.

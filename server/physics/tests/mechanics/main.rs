@@ -9,6 +9,7 @@ mod cutting;
 mod determinism;
 mod dynamics;
 mod equilibrium;
+mod foreign_space;
 mod half_cut_beam;
 mod multistep;
 mod phases;
