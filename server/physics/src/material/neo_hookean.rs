@@ -1,7 +1,6 @@
 //! Stable Neo-Hookean elasticity: ψ = μ/2 (I − 3) + λ/2 (J − α)² − μ/2 log((I + 1)/4) − λ/2 (1 − α)²
 //! with I = ‖F‖², J = det F, α = 1 + μ/λ − μ/(4λ). Finite for every F, also inverted.
 //!
-//! μ = 4/3 μ_L and λ = λ_L + 5/6 μ_L of the Lamé constants μ_L, λ_L make it Hooke's law at small
 //! μ = 4/3 μ_L and λ = λ_L + 5/6 μ_L of the Lamé constants μ_L, λ_L make it Hooke's law at small strain. A
 //! [collapse guard](super::collapse_guard) near F = 0 lets an element recover that has collapsed to a point.
 //!
