@@ -154,7 +154,8 @@ impl EnrichedTet {
                 let FS = F * self.second_piola_kirchhoff(&F);
                 self.beta.map(|beta| self.volume * FS * beta)
             }
-            Law::NeoHookean => {
+            // The papers have no formulas of their own for any other law.
+            _ => {
                 let P = law.stress(&self.deformation_gradient(p), self.lame);
                 self.beta.map(|beta| self.volume * P * beta)
             }
@@ -185,7 +186,7 @@ impl EnrichedTet {
                     self.volume * (material + Matrix3::from_diagonal_element(g_i.dot(&(S * g_j))))
                 })
             }
-            Law::NeoHookean => {
+            _ => {
                 let A = law.tangent(&F, self.lame, Tangent::Exact);
                 each(&|i, j| {
                     Matrix3::from_fn(|r, c| {
