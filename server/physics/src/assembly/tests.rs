@@ -14,7 +14,6 @@ fn material(law: Law) -> Material {
     Material { young_pa: 3.0, poisson: 0.3, density_kg_m3: 2.0, rayleigh: Rayleigh::default(), law }
 }
 
-const LAWS: [Law; 4] = Law::ALL;
 const AVERAGED: Volumetric = Volumetric::NodeAveraged { kept: 0.05 };
 
 fn size() -> Vector3<f64> {
@@ -42,7 +41,7 @@ fn models() -> Vec<Model> {
     let cut = cut_box();
     let spring = Spring { a: 0, b: 13, stiffness_n_m: 2.0, rest_length_m: 0.4 };
     let mut models = Vec::new();
-    for law in LAWS {
+    for law in Law::ALL {
         let material = material(law);
         models.push(Model::tet4(&tets, &material, Volumetric::Full).unwrap());
         models.push(
@@ -50,7 +49,7 @@ fn models() -> Vec<Model> {
         );
         models.push(Model::tet10(&tets, &material).unwrap());
         models.push(Model::hex8(&hexes, &material, Volumetric::Full).unwrap());
-        if law != Law::StVenantKirchhoff {
+        if law.split(material.lame()).is_some() {
             models.push(Model::tet4(&tets, &material, AVERAGED).unwrap());
             models.push(Model::tet4_cut(&cut, &material, AVERAGED).unwrap());
             models.push(Model::hex8(&hexes, &material, Volumetric::Selective).unwrap());

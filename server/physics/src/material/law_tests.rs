@@ -107,7 +107,7 @@ proptest! {
     fn objective_and_isotropic(f in prop::array::uniform9(-1.5..1.5f64), q in prop::array::uniform3(-3.0..3.0f64), size in -3..1i32) {
         let F = Matrix3::from_row_slice(&f) * 10f64.powi(size);
         let Q = Rotation3::new(Vector3::from(q)).into_inner();
-        for law in [Law::Corotational, Law::StVenantKirchhoff, Law::NeoHookean] {
+        for law in Law::ALL.into_iter().filter(|law| *law != Law::Linear) {
             let (energy, P) = (law.energy(&F, LAME), law.stress(&F, LAME));
             prop_assert!((law.energy(&(Q * F), LAME) - energy).abs() < 1e-10 * (1.0 + energy));
             prop_assert!((law.energy(&(F * Q), LAME) - energy).abs() < 1e-10 * (1.0 + energy));
@@ -124,7 +124,7 @@ proptest! {
     #[test]
     fn stress_gives_no_torque(f in prop::array::uniform9(-1.5..1.5f64)) {
         let F = Matrix3::from_row_slice(&f);
-        for law in [Law::Corotational, Law::StVenantKirchhoff, Law::NeoHookean] {
+        for law in Law::ALL.into_iter().filter(|law| *law != Law::Linear) {
             let tau = law.stress(&F, LAME) * F.transpose();
             prop_assert!((tau - tau.transpose()).norm() < 1e-11 * (1.0 + tau.norm()));
         }

@@ -17,7 +17,6 @@ const SIZE: Vector3<f64> = Vector3::new(0.2, 0.1, 0.1);
 const CELLS: [usize; 3] = [4, 2, 2];
 
 const ELEMENTS: [ElementKind; 3] = [ElementKind::Tet4, ElementKind::Tet10, ElementKind::Hex8];
-const LAWS: [Law; 4] = [Law::Linear, Law::Corotational, Law::StVenantKirchhoff, Law::NeoHookean];
 const SCHEMES: [Scheme; 7] = [
     Scheme::Static,
     Scheme::SymplecticEuler,
@@ -74,7 +73,7 @@ fn run(body: &mut Body, what: &str) {
 #[test]
 fn every_element_law_integrator_and_solver_steps() {
     for element in ELEMENTS {
-        for law in LAWS {
+        for law in Law::ALL {
             for scheme in SCHEMES {
                 let methods = if scheme.is_explicit() { &METHODS[1..2] } else { &METHODS[..] };
                 for &method in methods {
@@ -117,7 +116,7 @@ fn remedies_masses_and_precisions_step() {
 /// Relaxation continues from step to step: many short steps end where one of Newton's method does.
 #[test]
 fn relaxation_keeps_its_iterate() {
-    for law in LAWS {
+    for law in Law::ALL {
         let statics = BodySettings { scheme: Scheme::Static, ..settings() };
         let solver = PcgSettings { iterations: 20, tolerance: 1e-8 };
         let mut relaxed = beam(law, BodySettings { relaxation: true, solver, ..statics }).unwrap();
@@ -156,7 +155,7 @@ fn both_paths_agree() {
 #[test]
 fn every_law_is_cut_on_the_general_path() {
     let averaged = Volumetric::NodeAveraged { kept: 0.05 };
-    for (law, volumetric) in LAWS
+    for (law, volumetric) in Law::ALL
         .into_iter()
         .map(|law| (law, Volumetric::Full))
         .chain([(Law::Corotational, averaged), (Law::NeoHookean, averaged)])
