@@ -49,7 +49,7 @@ fn models() -> Vec<Model> {
         );
         models.push(Model::tet10(&tets, &material).unwrap());
         models.push(Model::hex8(&hexes, &material, Volumetric::Full).unwrap());
-        if law.split(material.lame()).is_some() {
+        if law.splits() {
             models.push(Model::tet4(&tets, &material, AVERAGED).unwrap());
             models.push(Model::tet4_cut(&cut, &material, AVERAGED).unwrap());
             models.push(Model::hex8(&hexes, &material, Volumetric::Selective).unwrap());

@@ -100,10 +100,11 @@ impl Check<'_> {
             let what = format!("found `{found}` with {}, allowed: only {}", word(&m.element), word(&needs));
             self.conflict(key.clone(), what, &format!("take {others}"));
         }
-        if m.law == RawLaw::Stvk {
+        if !m.constitutive_law().splits() {
             let what = format!(
-                "found `{found}` with `stvk`, whose energy does not split into shape and volume; allowed: \
-                 none"
+                "found `{found}` with `{}`, whose energy does not split into shape and volume; allowed: \
+                 none",
+                word(&m.law)
             );
             self.conflict(key, what, "choose linear, corotational or neo-hookean, or no remedy");
         }
