@@ -13,6 +13,7 @@ use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
 use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
 use scindo_physics::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use scindo_physics::snap::{Nodes, SnapCut, SnapReport, Snapper};
 use scindo_physics::space::{Space, Tets};
 use scindo_physics::team::Team;
 
@@ -278,6 +279,16 @@ impl Space for Lattice {
 
     fn is_being_cut(&self) -> bool {
         self.tets.is_being_cut()
+    }
+
+    fn cut_along_faces(
+        &mut self,
+        snapper: &mut Snapper,
+        nodes: Nodes<'_>,
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
+        self.tets.cut_along_faces(snapper, nodes, blade, incision)
     }
 
     fn reset(&mut self) -> Result<(), MeshError> {
