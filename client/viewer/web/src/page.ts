@@ -80,7 +80,10 @@ class Page {
         break;
       case "info": this.takeInfo(message.value); break;
       case "plan": this.panel.showPlan(message.value); break;
-      case "topology": this.bodyOf(message.value.bodyId).setTopology(message.value); break;
+      case "topology":
+        this.bodyOf(message.value.bodyId).setTopology(message.value);
+        this.bar.refresh();
+        break;
       case "frame":
         if (this.bodyOf(message.value.bodyId).setFrame(message.value)) this.stage.invalidate();
         this.panel.countFrame(message.value, bytes);
