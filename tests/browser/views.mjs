@@ -217,7 +217,7 @@ async function takesACutBack(page) {
     await page.keyboard.press("u");
     await until(page, `a cut with ${left} wound triangles is taken back`, MINUTE, (left) => window.scindo.bodies()[0].lipTriangles < left, left);
   }
-  hold(await page.isDisabled("#undo"), "nothing is left to be undone");
+  await until(page, "nothing is left to be undone", MINUTE, () => document.getElementById("undo").disabled);
   await picture(page, "views-9-undone.png");
 }
 
