@@ -13,7 +13,8 @@ use super::state::State;
 use super::statics::prescribe;
 use super::step_inputs::{StepHistory, StepInputs};
 use crate::assembly::Tangent;
-use crate::material::Law;
+use crate::element::Points;
+use crate::material::{Law, Rayleigh};
 use crate::phase::Phase;
 use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
 use crate::team::Team;
@@ -54,8 +55,7 @@ impl ModelSolver {
         prescribe(inputs.fixed, &mut state.x);
         team.begin(Phase::Operator);
         let increment = history.increment;
-        let beta = if increment.B > 0.0 { self.material.rayleigh.stiffness_s } else { 0.0 };
-        if let (true, Some(K)) = (beta > 0.0, &mut self.damping) {
+        if let (true, Some(K)) = (increment.B > 0.0, &mut self.damping) {
             self.model.rotated_stiffness(&state.x, K);
         }
         let newton = self.minimise(team, (before, &mut state.x), (inputs, &history), report);
@@ -126,15 +126,15 @@ impl ModelSolver {
         if loose && self.active.springs.is_empty() {
             self.balance_parts(x, (inputs, history));
         }
-        let beta = if increment.B > 0.0 { self.material.rayleigh.stiffness_s } else { 0.0 };
+        let Rayleigh { mass_1_s: alpha, stiffness_s: beta } = self.material.rayleigh;
         let mut phi = StepPotential {
             model: &self.model,
             mass: &self.mass,
             increment,
             x_a,
             x_v,
-            alpha: self.material.rayleigh.mass_1_s,
-            damping: self.damping.as_ref().filter(|_| beta > 0.0).map(|K| (beta, K)),
+            alpha,
+            damping: self.damping.as_ref().filter(|_| increment.B > 0.0).map(|K| (beta, K)),
             f_ext: &self.f_ext,
             springs: &self.active.springs,
             definite: if single { Tangent::Held } else { Tangent::Projected },
@@ -215,14 +215,11 @@ impl ModelSolver {
     fn count_ruined(&self, x: &[Vector3<f64>], report: &mut SolveReport) -> bool {
         let mut ruined = false;
         report.inverted_pieces = 0;
-        for e in 0..self.model.n_elements() {
-            for q in 0..self.model.kind().points() {
-                let F = self.model.deformation_gradient(e, q, x);
-                let inverted = F.determinant() <= 0.0;
-                report.inverted_pieces += usize::from(inverted);
-                ruined |= inverted || F.norm() < COLLAPSED;
-            }
-        }
+        self.model.for_points(x, &mut |point| {
+            let inverted = point.F.determinant() <= 0.0;
+            report.inverted_pieces += usize::from(inverted);
+            ruined |= inverted || point.F.norm() < COLLAPSED;
+        });
         ruined
     }
 }

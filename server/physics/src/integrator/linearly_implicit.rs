@@ -231,7 +231,7 @@ impl StepSolver for LinearlyImplicit {
         step.accelerate(team, &mut **stiffness, state, &inputs, acceleration);
     }
 
-    fn elastic_energy(&mut self, team: &mut Team, _: &StepInputs<'_>, x: &[Vector3<f64>]) -> f64 {
+    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
         self.held.at(team, &*self.stiffness, x, &self.material)
     }
 

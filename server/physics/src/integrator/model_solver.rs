@@ -176,7 +176,7 @@ impl StepSolver for ModelSolver {
         self.acceleration_at(team, [&state.x, &state.v], inputs.fixed, acceleration);
     }
 
-    fn elastic_energy(&mut self, team: &mut Team, _: &StepInputs<'_>, x: &[Vector3<f64>]) -> f64 {
+    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
         self.model.energy_by(team, x)
     }
 

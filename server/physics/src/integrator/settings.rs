@@ -3,7 +3,7 @@
 use super::scheme::{MassKind, Scheme};
 use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
 
-/// Settings of [`Dynamics`](super::Dynamics).
+/// Settings of a [`ModelSolver`](super::ModelSolver).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DynamicsSettings {
     /// Time integration scheme.
@@ -13,8 +13,8 @@ pub struct DynamicsSettings {
     /// A step is a fixed number of linear solves by design. It is judged by how well the last of them was
     /// solved and not by the residual of Newton's method.
     pub linearised: bool,
-    /// Newton's method of implicit schemes. `steps` = 1 (2 for Newmark) is the fast path, one linear
-    /// solve from the predictor. Linear and corotational bodies in order take it. Other laws, inverted or
+    /// Newton's method of implicit schemes. With `steps` = 1 a step is one linear solve from the predictor;
+    /// Newmark's method makes two. Linear and corotational bodies need no more. Other laws, inverted or
     /// collapsed elements and contacts get at least [`LEAST_NEWTON_STEPS`].
     pub newton: NewtonSettings,
     /// [`Scheme::Static`] only: number of iterations of matrix-free relaxation per step, in place of

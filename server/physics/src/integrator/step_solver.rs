@@ -59,7 +59,7 @@ pub trait StepSolver: Debug + Send {
     );
 
     /// Elastic energy [J] at `x` [m].
-    fn elastic_energy(&mut self, team: &mut Team, inputs: &StepInputs<'_>, x: &[Vector3<f64>]) -> f64;
+    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64;
 
     /// ½ vᵀ M v [J].
     fn kinetic_energy(&self, mass: &[f64], v: &[Vector3<f64>]) -> f64 {
