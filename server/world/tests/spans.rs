@@ -14,25 +14,7 @@ use tracing_subscriber::layer::{Context, SubscriberExt as _};
 use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::{EnvFilter, Layer};
 
-const SCENE: &str = r#"
-schema = 1
-world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
-[[body]]
-id = "fast"
-mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [6, 6, 6] } }
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
-[[body]]
-id = "nonlinear"
-mesh = { box = { min_m = [1, 0, 0], max_m = [1.1, 0.1, 0.1], cells = [3, 3, 3] } }
-law = "neo-hookean"
-young_pa = 2e4
-poisson = 0.4
-density_kg_m3 = 1000
-fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
-"#;
+const SCENE: &str = include_str!("fast_and_nonlinear.toml");
 
 /// Writes down the name of every span that is entered, after those around it.
 #[derive(Clone, Default)]
