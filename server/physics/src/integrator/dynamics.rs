@@ -106,6 +106,7 @@ impl Dynamics {
     /// balance starts anew, because the elastic energy jumps with the constants.
     pub fn set_material(&mut self, material: Material) {
         self.solver.set_material(material);
+        self.course.multistep.forces_jump();
         self.course.multistep.forget_energy();
     }
 

@@ -57,7 +57,7 @@ impl Multistep {
 
     /// Makes room for `n` copies.
     pub fn resize(&mut self, n: usize) {
-        if self.remembers() {
+        if self.remembers() && !self.scheme.is_explicit() {
             for v in [&mut self.x_a, &mut self.x_v] {
                 resize_reserving(v, n, Vector3::zeros());
             }
@@ -79,16 +79,22 @@ impl Multistep {
         self.stored_j = None;
     }
 
-    /// Gives the copies `new`, which a cut made, the history of their parents. Positions and velocities
-    /// continue, but forces jump where lips come apart. Newmark's method therefore needs a new
+    /// Tells that forces jump while positions and velocities continue. Newmark's method then needs a new
     /// acceleration: with the old one it would be of first order.
+    pub fn forces_jump(&mut self) {
+        if self.scheme.is_newmark() {
+            self.history.forget();
+        }
+        self.stored_j = None;
+    }
+
+    /// Gives the copies `new`, which a cut made, the history of their parents. Forces jump where lips come
+    /// apart.
     pub fn inherit(&mut self, new: &[NewCopy]) {
         if !self.remembers() {
             return;
         }
-        if self.scheme.is_newmark() {
-            self.history.forget();
-        }
+        self.forces_jump();
         self.history.inherit(new);
         if self.scheme.remembers() {
             for copy in new {
@@ -96,7 +102,6 @@ impl Multistep {
                 self.acceleration.push(parent);
             }
         }
-        self.stored_j = None;
     }
 
     /// See [`History::still`].
