@@ -54,7 +54,7 @@ impl Body {
     }
 
     /// Takes back every cut since `topology` was taken from this body; the epoch rises. Mass stays.
-    /// Momentum and centre of mass stay too, unless a part was cut off.
+    /// Momentum and centre of mass stay too, unless a part was cut off. A cut under way is dropped.
     ///
     /// # Errors
     /// If the model cannot be built again.
