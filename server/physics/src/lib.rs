@@ -22,6 +22,7 @@ pub mod element;
 pub mod cut;
 pub mod skin;
 pub mod snap;
+pub mod octree;
 pub mod enrichment;
 pub mod phase;
 pub mod team;

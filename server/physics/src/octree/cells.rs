@@ -1,0 +1,238 @@
+//! Cubical cells on an adaptive octree, the links between them, and their vertices.
+//!
+//! # Source
+//! Dick, Georgii, Westermann 2011, §4. Every finest cell has six links to its neighbours. A cut disconnects
+//! links; both ends of a cut link are leaves of the finest level, so leaves of different size are always linked
+//! where they touch.
+
+use std::collections::HashMap;
+use std::fmt;
+
+use nalgebra::Vector3;
+
+use super::build::OctreeSettings;
+use super::lattice::{At, Lattice, LeafMap, OUTSIDE};
+
+/// The six directions of links: −x, +x, −y, +y, −z, +z.
+pub const DIRECTIONS: [At; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
+
+/// A leaf of the octree: one finite element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cell {
+    /// Low corner, in sides of finest cells.
+    pub at: At,
+    /// Its side is 2^level finest cells.
+    pub level: u8,
+    /// Bit d is set if no link leads on in direction d of [`DIRECTIONS`]. 0 unless the level is 0.
+    pub cut: u8,
+    /// Number of its material.
+    pub material: u16,
+}
+
+impl Cell {
+    /// A cell with all links.
+    pub fn new(at: At, level: u8, material: u16) -> Self {
+        Self { at, level, cut: 0, material }
+    }
+
+    /// Side in finest cells.
+    #[inline]
+    pub fn side(&self) -> i32 {
+        1 << self.level
+    }
+
+    /// Lattice point of corner `c`; bit k of `c` is its end along axis k.
+    #[inline]
+    pub fn corner(&self, c: usize) -> At {
+        [0, 1, 2].map(|k| self.at[k] + if c >> k & 1 == 1 { self.side() } else { 0 })
+    }
+
+    /// Which child of its parent it is; bit k is the half along axis k.
+    #[inline]
+    pub fn octant(&self) -> usize {
+        (0..3).fold(0, |octant, k| octant | ((self.at[k] >> self.level & 1) as usize) << k)
+    }
+}
+
+/// Where a link is cut. Fractions count from the lower end, which is the centre of the lower cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CutLink {
+    /// Fraction of the way from the lower to the upper centre of the cut nearest to the lower one, and of
+    /// that nearest to the upper one.
+    pub at: [f64; 2],
+    /// Unit normals of the blade, or of the boundary, there, at rest.
+    pub normal: [Vector3<f64>; 2],
+    /// The incision; 0 is the boundary of the body.
+    pub incision: u32,
+}
+
+/// A link: its lower cell and its axis.
+pub type LinkKey = (At, u8);
+
+/// Cells, links and vertices of a body.
+///
+/// Vertices are numbered; they are the copies of [`Space`](crate::space::Space). Those of the uncut body come
+/// first.
+#[derive(Clone, Debug)]
+pub struct Octree {
+    pub(super) lattice: Lattice,
+    pub(super) map: LeafMap,
+    pub(super) cells: Vec<Cell>,
+    /// Vertices of every cell: those of its corners, except that a hanging corner is replaced by the vertex of
+    /// the parent's corner in that direction.
+    pub(super) vertices: Vec<[u32; 8]>,
+    /// Bit c is set if corner c hangs.
+    pub(super) hanging: Vec<u8>,
+    /// Lattice point of every vertex.
+    pub(super) points: Vec<At>,
+    /// Links that are cut by an incision.
+    pub(super) links: HashMap<LinkKey, CutLink>,
+}
+
+impl Octree {
+    /// The octree with these leaves; `map` knows them.
+    pub(super) fn of_leaves(lattice: Lattice, map: LeafMap, cells: Vec<Cell>) -> Self {
+        let n = cells.len();
+        let (vertices, hanging) = (vec![[OUTSIDE; 8]; n], vec![0; n]);
+        let mut octree =
+            Self { lattice, map, cells, vertices, hanging, points: Vec::new(), links: HashMap::new() };
+        octree.mark_boundary();
+        octree.number_vertices();
+        octree
+    }
+
+    /// Cuts the links of finest leaves that lead out of the body.
+    fn mark_boundary(&mut self) {
+        for i in 0..self.cells.len() {
+            if self.cells[i].level == 0 {
+                let near = super::build::neighbours(self.cells[i].at);
+                let out = |d: &usize| self.map.leaf(near[*d]) == OUTSIDE;
+                self.cells[i].cut = (0..6).filter(out).fold(0, |cut, d| cut | 1 << d);
+            }
+        }
+    }
+
+    /// Place and size of the finest cells.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// The leaves, each a finite element.
+    pub fn cells(&self) -> &[Cell] {
+        &self.cells
+    }
+
+    /// Number of vertices, each with three degrees of freedom.
+    pub fn n_vertices(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Lattice point of every vertex.
+    pub fn points(&self) -> &[At] {
+        &self.points
+    }
+
+    /// The eight vertices that carry each cell: those of its corners, or, for a corner that hangs, of the
+    /// parent's corner in that direction.
+    pub fn vertices(&self) -> &[[u32; 8]] {
+        &self.vertices
+    }
+
+    /// Which corners of each cell hang, one bit per corner.
+    pub fn hanging(&self) -> &[u8] {
+        &self.hanging
+    }
+
+    /// The leaf that covers the finest cell `at`, or [`OUTSIDE`].
+    #[inline]
+    pub fn leaf(&self, at: At) -> u32 {
+        self.map.leaf(at)
+    }
+
+    /// Whether the link from the finest cell `at`, which is inside, in direction `d` is whole.
+    #[inline]
+    pub fn is_linked(&self, at: At, d: usize) -> bool {
+        let cell = &self.cells[self.map.leaf(at) as usize];
+        cell.level > 0 || cell.cut >> d & 1 == 0
+    }
+
+    /// The links that incisions cut.
+    pub fn cut_links(&self) -> &HashMap<LinkKey, CutLink> {
+        &self.links
+    }
+
+    /// Calls `visit` with two linked leaves and the axis from the lower to the upper one, once for each pair,
+    /// in the order of the cells.
+    pub fn for_links(&self, mut visit: impl FnMut(u32, u32, usize)) {
+        for (id, cell) in (0u32..).zip(&self.cells) {
+            for d in 0..6 {
+                let (axis, up) = (d / 2, d % 2 == 1);
+                // The first finest cell beyond the face; if that leaf is smaller, it tells of this link itself.
+                let mut beyond = cell.at;
+                beyond[axis] += if up { cell.side() } else { -1 };
+                if cell.cut >> d & 1 == 1 {
+                    continue;
+                }
+                let near = self.map.leaf(beyond);
+                if near == OUTSIDE {
+                    continue;
+                }
+                let level = self.cells[near as usize].level;
+                if level > cell.level || (level == cell.level && up) {
+                    let (low, high) = if up { (id, near) } else { (near, id) };
+                    visit(low, high, axis);
+                }
+            }
+        }
+    }
+
+    /// Bytes in use.
+    pub fn bytes(&self) -> usize {
+        self.map.bytes()
+            + self.cells.len() * (size_of::<Cell>() + 33)
+            + self.points.len() * size_of::<At>()
+            + self.links.len() * (size_of::<LinkKey>() + size_of::<CutLink>())
+    }
+}
+
+/// Why a solid cannot be filled with cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OctreeError {
+    /// The solid has no finite extent.
+    Empty,
+    /// The number of cells or levels is out of range.
+    Settings(OctreeSettings),
+    /// The lattice would have too many finest cells.
+    TooMany {
+        /// Finest cells of the lattice.
+        finest: u64,
+        /// Largest number.
+        limit: u64,
+    },
+    /// No centre of a finest cell is inside the solid.
+    NoCell {
+        /// Side of a finest cell [m].
+        h: f64,
+    },
+}
+
+impl fmt::Display for OctreeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => write!(f, "the solid has no finite extent; check the surface and its unit"),
+            Self::Settings(OctreeSettings { cells, levels }) => write!(
+                f,
+                "octree with {cells} cells across and {levels} levels: allowed are 1 … 4096 cells and 0 … 8 levels"
+            ),
+            Self::TooMany { finest, limit } => {
+                write!(f, "octree of {finest} finest cells: at most {limit} are allowed; take fewer cells")
+            }
+            Self::NoCell { h } => write!(
+                f,
+                "no cell has its centre inside the solid, which is thinner than a cell of {h} m; take more cells"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for OctreeError {}

@@ -1,0 +1,20 @@
+//! Cubical cells on an adaptive octree, cut along the links between them.
+//!
+//! # Source
+//! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
+
+mod build;
+mod cells;
+mod lattice;
+mod shape;
+mod vertices;
+
+pub use build::{Bits, OctreeSettings};
+pub use cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree, OctreeError};
+pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
+pub use shape::{BoxShape, Shape};
+pub use vertices::{Octants, corner_weights};
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
