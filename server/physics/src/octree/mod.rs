@@ -3,14 +3,17 @@
 //! # Source
 //! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
 
+mod blade;
 mod build;
 mod cells;
+mod change;
 mod lattice;
 mod shape;
 mod vertices;
 
 pub use build::{Bits, OctreeSettings};
 pub use cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree, OctreeError};
+pub use change::OctreeChange;
 pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
 pub use shape::{BoxShape, Shape};
 pub use vertices::{Octants, corner_weights};

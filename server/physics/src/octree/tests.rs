@@ -137,3 +137,146 @@ fn a_solid_that_no_cell_can_fill_is_refused() {
     let cube = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
     assert!(matches!(Octree::fill(&cube, settings, &|_| 0), Err(OctreeError::TooMany { .. })));
 }
+
+/// Random numbers in 0 … 1, the same on every run.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f64 / f64::from(1 << 24)
+    }
+
+    fn below(&mut self, n: i32) -> i32 {
+        (self.next() * f64::from(n)) as i32
+    }
+}
+
+fn link(incision: u32) -> CutLink {
+    CutLink { at: [0.5; 2], normal: [Vector3::x(); 2], incision }
+}
+
+/// Mass per vertex, for unit density and h = 1: an eighth of each cell to each corner.
+fn masses(octree: &Octree) -> Vec<f64> {
+    let mut mass = vec![0.0; octree.n_vertices()];
+    for (id, cell) in octree.cells().iter().enumerate() {
+        let W = corner_weights(cell, octree.hanging()[id]);
+        for row in W {
+            for (v, w) in octree.vertices()[id].iter().zip(row) {
+                mass[*v as usize] += w * f64::from(cell.side().pow(3)) / 8.0;
+            }
+        }
+    }
+    mass
+}
+
+#[test]
+fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
+    let mut random = Random(3);
+    for round in 0..40 {
+        let levels = (round % 4) as u8;
+        let mut octree = if round % 2 == 0 {
+            cube(16, levels)
+        } else {
+            Octree::fill(&Odd, OctreeSettings { cells: 24, levels }, &|_| 0).unwrap()
+        };
+        let mut value: Vec<f64> = (0..octree.n_vertices()).map(|_| random.next()).collect();
+        for incision in 1..4 {
+            let before = octree.clone();
+            let moment = |octree: &Octree, value: &[f64]| masses(octree).iter().zip(value).map(|(m, v)| m * v).sum::<f64>();
+            let earlier = (moment(&octree, &value), masses(&octree).iter().sum::<f64>());
+            // A patch of links across one plane, and some links at random.
+            let axis = random.below(3) as u8;
+            let size = octree.lattice().size.map(|n| n as i32);
+            let plane = random.below(size[usize::from(axis)]);
+            let corner = [0, 1, 2].map(|k| random.below(size[k]));
+            let mut cuts = Vec::new();
+            for s in 0..size.into_iter().max().unwrap() / 2 {
+                for t in 0..7 {
+                    let mut at = corner;
+                    at[usize::from(axis)] = plane;
+                    at[usize::from(axis + 1) % 3] += s;
+                    at[usize::from(axis + 2) % 3] += t;
+                    cuts.push(((at, axis), link(incision)));
+                }
+            }
+            for _ in 0..3 {
+                let at = [0, 1, 2].map(|k| random.below(size[k]));
+                cuts.push(((at, random.below(3) as u8), link(incision)));
+            }
+            let change = octree.cut(&cuts);
+            check_vertices(&octree);
+            value.extend(change.new_vertices.iter().map(|p| p.carriers().map(|(v, w)| w * value[v]).sum::<f64>()).collect::<Vec<_>>());
+            assert_eq!(value.len(), octree.n_vertices());
+            // The field is the same at every corner of every finest cell.
+            let at = |octree: &Octree, value: &[f64], at: At, c: usize| {
+                let id = octree.leaf(at);
+                let cell = octree.cells()[id as usize];
+                let xi = [0, 1, 2].map(|k| f64::from(at[k] + (c >> k & 1) as i32 - cell.at[k]) / f64::from(cell.side()));
+                octree.point_in(id, xi).carriers().map(|(v, w)| w * value[v]).sum::<f64>()
+            };
+            for cell in octree.cells() {
+                for c in 0..8 {
+                    let (new, old) = (at(&octree, &value, cell.at, c), at(&before, &value, cell.at, c));
+                    assert!((new - old).abs() < 1e-12, "{:?} corner {c}: {new} {old}", cell.at);
+                }
+            }
+            let later = (moment(&octree, &value), masses(&octree).iter().sum::<f64>());
+            assert!((later.0 / earlier.0 - 1.0).abs() < 1e-12 && (later.1 / earlier.1 - 1.0).abs() < 1e-12);
+            assert!(masses(&octree).iter().all(|&m| m > 0.0), "every vertex has mass");
+            // What was not told of has not changed.
+            for id in (0..before.cells().len()).filter(|&id| change.cells.binary_search(&(id as u32)).is_err()) {
+                assert_eq!(octree.cells()[id], before.cells()[id]);
+                assert_eq!(octree.vertices()[id], before.vertices()[id]);
+                assert_eq!(octree.hanging()[id], before.hanging()[id]);
+            }
+            check_numbering(&octree);
+        }
+    }
+}
+
+/// The vertices are those that numbering from scratch finds, up to their numbers.
+fn check_numbering(octree: &Octree) {
+    let mut anew = octree.clone();
+    anew.points.clear();
+    anew.vertices.iter_mut().for_each(|v| *v = [OUTSIDE; 8]);
+    anew.hanging.iter_mut().for_each(|h| *h = 0);
+    anew.number_vertices();
+    assert_eq!((anew.hanging(), anew.n_vertices()), (octree.hanging(), octree.n_vertices()));
+    let mut other = BTreeMap::new();
+    for (a, b) in octree.vertices().as_flattened().iter().zip(anew.vertices().as_flattened()) {
+        assert_eq!(other.entry(*a).or_insert(*b), b);
+    }
+}
+
+#[test]
+fn a_stroke_in_parts_equals_the_stroke_whole() {
+    let cuts: Vec<(LinkKey, CutLink)> =
+        (0..12).flat_map(|y| (0..9).map(move |z| (([7, y, z], 0), link(1)))).collect();
+    let mut whole = cube(16, 3);
+    whole.cut(&cuts);
+    let mut parts = cube(16, 3);
+    for part in cuts.chunks(5) {
+        parts.cut(part);
+    }
+    let leaves = |octree: &Octree| octree.cells().iter().map(|c| (c.at, c.level, c.cut)).collect::<BTreeSet<_>>();
+    assert_eq!(leaves(&whole), leaves(&parts));
+    assert_eq!(whole.n_vertices(), parts.n_vertices());
+    check_numbering(&parts);
+}
+
+#[test]
+fn the_cube_of_the_paper_cut_by_aligned_blades_has_its_number_of_cells() {
+    let mut octree = cube(80, 4);
+    let mut cuts = Vec::new();
+    for p in [7, 13, 21, 27, 33, 41, 47, 53, 61, 67, 73] {
+        for s in 0..80 {
+            for z in 0..40 {
+                cuts.push((([p - 1, s, z], 0), link(1)));
+                cuts.push((([s, p - 1, z], 1), link(1)));
+            }
+        }
+    }
+    octree.cut(&cuts);
+    assert_eq!(octree.cells().len(), 203_503);
+}

@@ -1,0 +1,189 @@
+//! The links that a blade crosses in the deformed body.
+//!
+//! A link runs from the centre of its lower cell to the centre of the face, and on to the centre of the upper
+//! cell. Each half bends with its own leaf. Along it the trilinear map of the leaf is linear, so a half is a
+//! straight segment in the deformed body too.
+//!
+//! # Source
+//! Dick, Georgii, Westermann 2011, §4.3.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::cells::{CutLink, LinkKey, Octree};
+use super::lattice::{At, OUTSIDE};
+use super::vertices::corner_weights;
+use crate::cut::SweepTriangle;
+
+/// Leaves whose triangles are selected together.
+const RUN: usize = 64;
+
+/// Corner positions of a leaf [m].
+type Corners = [Vector3<f64>; 8];
+
+/// A search for crossed links.
+struct Search<'a> {
+    octree: &'a Octree,
+    x: &'a [Vector3<f64>],
+    incision: u32,
+    found: BTreeMap<LinkKey, CutLink>,
+}
+
+impl Octree {
+    /// The links that the triangles of a sweep cross with the vertices at `x` [m], in order.
+    pub fn crossed_links(
+        &self,
+        x: &[Vector3<f64>],
+        triangles: &[SweepTriangle],
+        incision: u32,
+    ) -> Vec<(LinkKey, CutLink)> {
+        let mut search = Search { octree: self, x, incision, found: BTreeMap::new() };
+        let all: Vec<&SweepTriangle> = triangles.iter().collect();
+        let leaves = self.leaves_near(x, &bounds(triangles.iter().flat_map(|t| [t.low, t.high])));
+        for run in leaves.chunks(RUN) {
+            let near = among(&all, &bounds(run.iter().flat_map(|&id| self.vertices[id as usize].map(|v| x[v as usize]))));
+            if near.is_empty() {
+                continue;
+            }
+            for &id in run {
+                search.leaf(id, &near);
+            }
+        }
+        search.found.into_iter().collect()
+    }
+
+    /// Leaves that may meet the box between two corners [m] with the vertices at `x` [m], ascending.
+    pub fn leaves_near(&self, x: &[Vector3<f64>], [low, high]: &[Vector3<f64>; 2]) -> Vec<u32> {
+        // One bit for each face of the box that a vertex is beyond.
+        let beyond = |p: &Vector3<f64>| {
+            (0..3).fold(0u8, |code, k| code | u8::from(p[k] < low[k]) << k | u8::from(p[k] > high[k]) << (3 + k))
+        };
+        let codes: Vec<u8> = x.iter().map(beyond).collect();
+        let may_meet = |vertices: &[u32; 8]| vertices.iter().fold(!0, |all, &v| all & codes[v as usize]) == 0;
+        (0u32..).zip(&self.vertices).filter(|(_, vertices)| may_meet(vertices)).map(|(id, _)| id).collect()
+    }
+
+    /// Positions of the corners of leaf `id` [m].
+    pub fn corners(&self, id: u32, x: &[Vector3<f64>]) -> [Vector3<f64>; 8] {
+        let id = id as usize;
+        let carriers = self.vertices[id].map(|v| x[v as usize]);
+        if self.hanging[id] == 0 {
+            return carriers;
+        }
+        corner_weights(&self.cells[id], self.hanging[id])
+            .map(|row| row.iter().zip(&carriers).filter(|(w, _)| **w != 0.0).map(|(w, x)| *w * x).sum())
+    }
+}
+
+impl Search<'_> {
+    /// Searches all links in leaf `id`.
+    fn leaf(&mut self, id: u32, triangles: &[&SweepTriangle]) {
+        let corners = self.octree.corners(id, self.x);
+        let cell = self.octree.cells[id as usize];
+        self.part(&corners, cell.at, cell.level, triangles);
+    }
+
+    /// Searches the links in a part of a leaf: a cube of 2^level finest cells with these corners.
+    fn part(&mut self, corners: &Corners, at: At, level: u8, triangles: &[&SweepTriangle]) {
+        let near = among(triangles, &bounds(corners.iter().copied()));
+        if near.is_empty() {
+            return;
+        }
+        if level == 0 {
+            return self.finest(at, &near);
+        }
+        let half = 1 << (level - 1);
+        for child in 0..8 {
+            let part: Corners = std::array::from_fn(|c| {
+                let xi = [0, 1, 2].map(|k| 0.5 * f64::from((child >> k & 1) as u8 + (c >> k & 1) as u8));
+                interpolate(corners, xi)
+            });
+            let at = [0, 1, 2].map(|k| at[k] + half * (child >> k & 1) as i32);
+            self.part(&part, at, level - 1, &near);
+        }
+    }
+
+    /// Searches the six halves of links in a finest cell.
+    fn finest(&mut self, at: At, triangles: &[&SweepTriangle]) {
+        let centre = self.position(at, [0.5; 3]);
+        for d in 0..6 {
+            let (axis, up) = (d / 2, d % 2 == 1);
+            let beyond = Octree::across(at, d);
+            if self.octree.leaf(beyond) == OUTSIDE {
+                continue;
+            }
+            // The lower cell decides where the middle of the face is, so that both halves end in one point.
+            let lower = if up { at } else { beyond };
+            let mut xi = [0.5; 3];
+            xi[axis] = 1.0;
+            let face = self.position(lower, xi);
+            for triangle in triangles {
+                let Some(fraction) = crossing(triangle, &centre, &face) else { continue };
+                let along = if up { 0.5 * fraction } else { 1.0 - 0.5 * fraction };
+                let normal = self.rest_normal(at, triangle);
+                let cut = CutLink { at: [along; 2], normal: [normal; 2], incision: self.incision };
+                self.found.entry((lower, axis as u8)).and_modify(|known| known.join(&cut)).or_insert(cut);
+            }
+        }
+    }
+
+    /// Position [m] of the point with local coordinates `xi` in the finest cell `at`.
+    fn position(&self, at: At, xi: [f64; 3]) -> Vector3<f64> {
+        let id = self.octree.leaf(at);
+        let cell = &self.octree.cells[id as usize];
+        let side = f64::from(cell.side());
+        let in_leaf = [0, 1, 2].map(|k| (f64::from(at[k] - cell.at[k]) + xi[k]) / side);
+        interpolate(&self.octree.corners(id, self.x), in_leaf)
+    }
+
+    /// Unit normal at rest of the plane of a triangle in the leaf around the finest cell `at`: ∝ Fᵀ n.
+    fn rest_normal(&self, at: At, triangle: &SweepTriangle) -> Vector3<f64> {
+        let corners = self.octree.corners(self.octree.leaf(at), self.x);
+        let [p, q, r] = triangle.corners;
+        let normal = (q - p).cross(&(r - p));
+        // Columns of F up to a factor: mean edges along the axes.
+        let edge = |k: usize| -> Vector3<f64> {
+            (0..8).map(|c| if c >> k & 1 == 1 { corners[c] } else { -corners[c] }).sum()
+        };
+        let F = Matrix3::from_columns(&[edge(0), edge(1), edge(2)]);
+        (F.transpose() * normal).try_normalize(0.0).unwrap_or_else(|| normal.normalize())
+    }
+}
+
+/// Fraction of the way from `a` to `b` where it crosses the triangle. A point in the plane counts as above it.
+fn crossing(triangle: &SweepTriangle, a: &Vector3<f64>, b: &Vector3<f64>) -> Option<f64> {
+    if !triangle.overlaps(&a.inf(b), &a.sup(b)) {
+        return None;
+    }
+    let (s, t) = (triangle.side(a), triangle.side(b));
+    ((s >= 0.0) != (t >= 0.0) && triangle.holds_line(a, b)).then(|| s / (s - t))
+}
+
+/// The triangles that may pass through a box.
+fn among<'a>(triangles: &[&'a SweepTriangle], [low, high]: &[Vector3<f64>; 2]) -> Vec<&'a SweepTriangle> {
+    triangles.iter().filter(|t| t.overlaps(low, high) && t.may_cross(low, high)).copied().collect()
+}
+
+fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
+    let empty = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+    points.fold(empty, |[low, high], p| [low.inf(&p), high.sup(&p)])
+}
+
+fn interpolate(corners: &Corners, xi: [f64; 3]) -> Vector3<f64> {
+    let mut x = *corners;
+    // Along one axis after the other; at the ends the corners come out to the bit.
+    for k in 0..3 {
+        for c in 0..4 >> k {
+            let (a, b) = (x[2 * c], x[2 * c + 1]);
+            x[c] = if xi[k] == 0.0 {
+                a
+            } else if xi[k] == 1.0 {
+                b
+            } else {
+                a * (1.0 - xi[k]) + b * xi[k]
+            };
+        }
+    }
+    x[0]
+}
