@@ -32,7 +32,7 @@ struct Search<'a> {
 
 impl Octree {
     /// The links that the triangles of a sweep cross with the vertices at `x` [m], in order.
-    pub fn crossed_links(
+    pub(crate) fn crossed_links(
         &self,
         x: &[Vector3<f64>],
         triangles: &[SweepTriangle],
@@ -42,7 +42,10 @@ impl Octree {
         let all: Vec<&SweepTriangle> = triangles.iter().collect();
         let leaves = self.leaves_near(x, &bounds(triangles.iter().flat_map(|t| [t.low, t.high])));
         for run in leaves.chunks(RUN) {
-            let near = among(&all, &bounds(run.iter().flat_map(|&id| self.vertices[id as usize].map(|v| x[v as usize]))));
+            let near = among(
+                &all,
+                &bounds(run.iter().flat_map(|&id| self.vertices[id as usize].map(|v| x[v as usize]))),
+            );
             if near.is_empty() {
                 continue;
             }
@@ -57,7 +60,9 @@ impl Octree {
     pub fn leaves_near(&self, x: &[Vector3<f64>], [low, high]: &[Vector3<f64>; 2]) -> Vec<u32> {
         // One bit for each face of the box that a vertex is beyond.
         let beyond = |p: &Vector3<f64>| {
-            (0..3).fold(0u8, |code, k| code | u8::from(p[k] < low[k]) << k | u8::from(p[k] > high[k]) << (3 + k))
+            (0..3).fold(0u8, |code, k| {
+                code | u8::from(p[k] < low[k]) << k | u8::from(p[k] > high[k]) << (3 + k)
+            })
         };
         let codes: Vec<u8> = x.iter().map(beyond).collect();
         let may_meet = |vertices: &[u32; 8]| vertices.iter().fold(!0, |all, &v| all & codes[v as usize]) == 0;

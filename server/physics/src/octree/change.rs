@@ -129,8 +129,11 @@ impl Octree {
     /// Finds the vertices anew around the leaves that were divided and those in `changed`.
     fn follow(&mut self, mut division: Division, mut changed: BTreeSet<u32>, links: usize) -> OctreeChange {
         changed.extend(division.part_of.keys());
-        let points: BTreeSet<At> =
-            changed.iter().flat_map(|&id| (0..8).map(move |c| (id, c))).map(|(id, c)| self.cells[id as usize].corner(c)).collect();
+        let points: BTreeSet<At> = changed
+            .iter()
+            .flat_map(|&id| (0..8).map(move |c| (id, c)))
+            .map(|(id, c)| self.cells[id as usize].corner(c))
+            .collect();
         let mut new_vertices = Vec::new();
         let mut to_resolve = changed.clone();
         for &p in &points {
@@ -193,7 +196,13 @@ impl Octree {
     }
 
     /// Point `p` in the material of a class as it was before.
-    fn earlier_point(&self, p: At, octants: &Octants, class: u8, division: &Division) -> Option<MaterialPoint> {
+    fn earlier_point(
+        &self,
+        p: At,
+        octants: &Octants,
+        class: u8,
+        division: &Division,
+    ) -> Option<MaterialPoint> {
         let mut found: Option<MaterialPoint> = None;
         for o in (0..8).filter(|&o| octants.class[o] == class && octants.leaf[o] != OUTSIDE) {
             let id = octants.leaf[o];

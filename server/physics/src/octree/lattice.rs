@@ -139,7 +139,10 @@ mod tests {
         let mut map = LeafMap::new([32, 16, 16]);
         map.set([16, 0, 0], 4, 7);
         assert_eq!((map.leaf([15, 0, 0]), map.leaf([16, 0, 0]), map.leaf([31, 15, 15])), (OUTSIDE, 7, 7));
-        assert_eq!((map.leaf([-1, 0, 0]), map.leaf([32, 0, 0]), map.leaf([0, 16, 0])), (OUTSIDE, OUTSIDE, OUTSIDE));
+        assert_eq!(
+            (map.leaf([-1, 0, 0]), map.leaf([32, 0, 0]), map.leaf([0, 16, 0])),
+            (OUTSIDE, OUTSIDE, OUTSIDE)
+        );
         map.set([16, 0, 0], 1, 8);
         map.set([19, 2, 5], 0, 9);
         assert_eq!([[16, 0, 0], [17, 1, 1], [18, 0, 0], [19, 2, 5]].map(|at| map.leaf(at)), [8, 8, 7, 9]);

@@ -8,6 +8,7 @@ mod build;
 mod cells;
 mod change;
 mod lattice;
+mod measures;
 mod shape;
 mod vertices;
 

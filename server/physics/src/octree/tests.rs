@@ -67,7 +67,9 @@ fn check_vertices(octree: &Octree) {
     let at = |id: u32, p: [f64; 3]| {
         let (cell, u) = (&cells[id as usize], field(id));
         let x = [0, 1, 2].map(|k| (p[k] - f64::from(cell.at[k])) / f64::from(cell.side()));
-        (0..8).map(|c| u[c] * (0..3).map(|k| if c >> k & 1 == 1 { x[k] } else { 1.0 - x[k] }).product::<f64>()).sum::<f64>()
+        (0..8)
+            .map(|c| u[c] * (0..3).map(|k| if c >> k & 1 == 1 { x[k] } else { 1.0 - x[k] }).product::<f64>())
+            .sum::<f64>()
     };
     octree.for_links(|a, b, axis| {
         let small = if cells[a as usize].level <= cells[b as usize].level { a } else { b };
@@ -115,7 +117,8 @@ fn a_uniform_grid_has_the_vertices_of_its_lattice() {
 #[test]
 fn two_materials_are_separated_by_finest_cells() {
     let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
-    let octree = Octree::fill(&shape, OctreeSettings { cells: 32, levels: 3 }, &|p| u16::from(p.z > 0.5)).unwrap();
+    let octree =
+        Octree::fill(&shape, OctreeSettings { cells: 32, levels: 3 }, &|p| u16::from(p.z > 0.5)).unwrap();
     check_vertices(&octree);
     for cell in octree.cells() {
         for d in [15, 16] {
@@ -183,7 +186,9 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
         let mut value: Vec<f64> = (0..octree.n_vertices()).map(|_| random.next()).collect();
         for incision in 1..4 {
             let before = octree.clone();
-            let moment = |octree: &Octree, value: &[f64]| masses(octree).iter().zip(value).map(|(m, v)| m * v).sum::<f64>();
+            let moment = |octree: &Octree, value: &[f64]| {
+                masses(octree).iter().zip(value).map(|(m, v)| m * v).sum::<f64>()
+            };
             let earlier = (moment(&octree, &value), masses(&octree).iter().sum::<f64>());
             // A patch of links across one plane, and some links at random.
             let axis = random.below(3) as u8;
@@ -206,13 +211,20 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
             }
             let change = octree.cut(&cuts);
             check_vertices(&octree);
-            value.extend(change.new_vertices.iter().map(|p| p.carriers().map(|(v, w)| w * value[v]).sum::<f64>()).collect::<Vec<_>>());
+            value.extend(
+                change
+                    .new_vertices
+                    .iter()
+                    .map(|p| p.carriers().map(|(v, w)| w * value[v]).sum::<f64>())
+                    .collect::<Vec<_>>(),
+            );
             assert_eq!(value.len(), octree.n_vertices());
             // The field is the same at every corner of every finest cell.
             let at = |octree: &Octree, value: &[f64], at: At, c: usize| {
                 let id = octree.leaf(at);
                 let cell = octree.cells()[id as usize];
-                let xi = [0, 1, 2].map(|k| f64::from(at[k] + (c >> k & 1) as i32 - cell.at[k]) / f64::from(cell.side()));
+                let xi = [0, 1, 2]
+                    .map(|k| f64::from(at[k] + (c >> k & 1) as i32 - cell.at[k]) / f64::from(cell.side()));
                 octree.point_in(id, xi).carriers().map(|(v, w)| w * value[v]).sum::<f64>()
             };
             for cell in octree.cells() {
@@ -225,7 +237,9 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
             assert!((later.0 / earlier.0 - 1.0).abs() < 1e-12 && (later.1 / earlier.1 - 1.0).abs() < 1e-12);
             assert!(masses(&octree).iter().all(|&m| m > 0.0), "every vertex has mass");
             // What was not told of has not changed.
-            for id in (0..before.cells().len()).filter(|&id| change.cells.binary_search(&(id as u32)).is_err()) {
+            for id in
+                (0..before.cells().len()).filter(|&id| change.cells.binary_search(&(id as u32)).is_err())
+            {
                 assert_eq!(octree.cells()[id], before.cells()[id]);
                 assert_eq!(octree.vertices()[id], before.vertices()[id]);
                 assert_eq!(octree.hanging()[id], before.hanging()[id]);
@@ -259,7 +273,8 @@ fn a_stroke_in_parts_equals_the_stroke_whole() {
     for part in cuts.chunks(5) {
         parts.cut(part);
     }
-    let leaves = |octree: &Octree| octree.cells().iter().map(|c| (c.at, c.level, c.cut)).collect::<BTreeSet<_>>();
+    let leaves =
+        |octree: &Octree| octree.cells().iter().map(|c| (c.at, c.level, c.cut)).collect::<BTreeSet<_>>();
     assert_eq!(leaves(&whole), leaves(&parts));
     assert_eq!(whole.n_vertices(), parts.n_vertices());
     check_numbering(&parts);
@@ -279,4 +294,136 @@ fn the_cube_of_the_paper_cut_by_aligned_blades_has_its_number_of_cells() {
     }
     octree.cut(&cuts);
     assert_eq!(octree.cells().len(), 203_503);
+}
+
+/// Triangles of a sweep of a straight blade between two positions.
+fn swept(from: [Vector3<f64>; 2], to: [Vector3<f64>; 2]) -> Vec<crate::cut::SweepTriangle> {
+    let blade = crate::cut::BladeSweep { segments: vec![from, to] };
+    crate::cut::sweep_triangles(None, &blade, &[])
+}
+
+/// A plane through `p` across `normal`, far larger than the unit cube.
+fn plane(p: Vector3<f64>, normal: Vector3<f64>) -> Vec<crate::cut::SweepTriangle> {
+    let normal = normal.normalize();
+    let u = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize() * 5.0;
+    let v = normal.cross(&u);
+    swept([p - u - v, p - u + v], [p + u - v, p + u + v])
+}
+
+#[test]
+fn a_plane_divides_a_deformed_body_into_two() {
+    let mut random = Random(11);
+    for round in 0..30 {
+        let mut octree = if round % 3 == 0 {
+            Octree::fill(&Odd, OctreeSettings { cells: 30, levels: 2 }, &|_| 0).unwrap()
+        } else {
+            cube(16, 1 + round as u8 % 3)
+        };
+        let loose = octree.components().len();
+        // Bent, sheared and moved.
+        let bend = 0.4 * random.next();
+        let place = |X: Vector3<f64>| {
+            Vector3::new(X.x + bend * X.z * X.z + 0.1, X.y - 0.2 * X.x, X.z + 0.1 * (3.0 * X.y).sin())
+        };
+        let x: Vec<Vector3<f64>> = octree.rest_positions().into_iter().map(place).collect();
+        let normal = Vector3::new(random.next() - 0.5, random.next() - 0.5, random.next() - 0.5);
+        let middle = place(
+            Vector3::repeat(if round % 3 == 0 { 0.0 } else { 0.5 })
+                + 0.2 * Vector3::new(random.next(), random.next(), random.next()),
+        );
+        let triangles = plane(middle, normal);
+        let cuts = octree.crossed_links(&x, &triangles, 1);
+        assert!(!cuts.is_empty());
+        octree.cut(&cuts);
+        check_vertices(&octree);
+        let parts = octree.components();
+        assert!(parts.len() > loose, "round {round}: {} parts", parts.len());
+        // All of a part is on one side: the centre of every finest cell, and the sides differ over cut links.
+        let side = |at: At| {
+            let id = octree.leaf(at);
+            let cell = octree.cells()[id as usize];
+            let xi = [0, 1, 2].map(|k| (f64::from(at[k] - cell.at[k]) + 0.5) / f64::from(cell.side()));
+            let X = octree.point_in(id, xi).position(&octree.rest_positions());
+            (place(X) - middle).dot(&normal)
+        };
+        for ((at, axis), cut) in octree.cut_links() {
+            let mut upper = *at;
+            upper[usize::from(*axis)] += 1;
+            // The trilinear cell and the smooth map differ by a little.
+            assert!(side(*at) * side(upper) < 1e-4, "{at:?} {axis}");
+            assert!((0.0..=1.0).contains(&cut.at[0]) && cut.at[0] <= cut.at[1]);
+            assert!((cut.normal[0].norm() - 1.0).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn a_blade_through_the_middles_of_cells_opens_one_layer_of_links() {
+    let mut octree = cube(8, 2);
+    let x = octree.rest_positions();
+    let triangles = plane(Vector3::repeat(0.5 + 0.5 / 8.0), Vector3::z());
+    let cuts = octree.crossed_links(&x, &triangles, 1);
+    assert_eq!(cuts.len(), 64);
+    octree.cut(&cuts);
+    let parts = octree.components();
+    assert_eq!(parts.len(), 2);
+    let mut volume = parts.volume.clone();
+    volume.sort_by(f64::total_cmp);
+    assert!((volume[0] - 3.0 / 8.0).abs() < 1e-12 || (volume[0] - 0.5).abs() < 1e-12, "{volume:?}");
+    // Between cells the two halves of a link end in one point.
+    let mut octree = cube(8, 2);
+    let cuts = octree.crossed_links(&x, &plane(Vector3::repeat(0.5), Vector3::x()), 1);
+    assert_eq!(cuts.len(), 64);
+    assert!(
+        cuts.iter()
+            .all(|(_, cut)| (cut.at[0] - 0.5).abs() < 1e-12 && (cut.normal[0].x.abs() - 1.0).abs() < 1e-12)
+    );
+    octree.cut(&cuts);
+    assert_eq!(octree.components().len(), 2);
+}
+
+#[test]
+fn a_moving_blade_opens_the_same_links_in_many_parts() {
+    let edge = |s: f64| [Vector3::new(s, 0.31 + 0.2 * s, -0.1), Vector3::new(s, 0.42 + 0.2 * s, 0.63)];
+    let mut whole = cube(16, 3);
+    let x = whole.rest_positions();
+    let cuts = whole.crossed_links(&x, &swept(edge(-0.1), edge(0.87)), 1);
+    whole.cut(&cuts);
+    let mut parts = cube(16, 3);
+    let mut x = parts.rest_positions();
+    for k in 0..200 {
+        let at = |k: i32| -0.1 + 0.97 * f64::from(k) / 200.0;
+        let cuts = parts.crossed_links(&x, &swept(edge(at(k)), edge(at(k + 1))), 1);
+        parts.cut(&cuts);
+        x = parts.rest_positions();
+    }
+    let links = |octree: &Octree| octree.cut_links().keys().copied().collect::<BTreeSet<_>>();
+    assert_eq!(links(&whole), links(&parts));
+    let leaves =
+        |octree: &Octree| octree.cells().iter().map(|c| (c.at, c.level, c.cut)).collect::<BTreeSet<_>>();
+    assert_eq!(leaves(&whole), leaves(&parts));
+}
+
+#[test]
+fn volumes_areas_and_quadrature_points_fill_the_body() {
+    for levels in 0..4 {
+        let octree = cube(16, levels);
+        let rest = octree.rest_positions();
+        assert!((octree.vertex_volumes().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        let top: Vec<bool> = rest.iter().map(|X| X.z > 1.0 - 1e-9).collect();
+        let area = octree.areas(&top);
+        assert!((area.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        let (mut volume, mut points) = (0.0, 0);
+        crate::element::Points::for_points(&octree, &rest, &mut |point| {
+            volume += point.weight;
+            points += 1;
+            assert!((point.F - nalgebra::Matrix3::identity()).norm() < 1e-12);
+        });
+        assert!((volume - 1.0).abs() < 1e-12 && points == 8 * octree.cells().len());
+        for p in [Vector3::new(0.3, 0.71, 0.2), Vector3::new(1.0, 1.0, 1.0), Vector3::zeros()] {
+            let (leaf, xi) = octree.locate(&p).unwrap();
+            assert!((octree.point_in(leaf, xi).position(&rest) - p).norm() < 1e-12);
+        }
+        assert!(octree.locate(&Vector3::repeat(1.3)).is_none());
+    }
 }

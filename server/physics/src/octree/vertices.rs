@@ -39,7 +39,8 @@ impl Octree {
                 let (a, b) = (leaf[o], leaf[o | 1 << axis]);
                 let inside = a != OUTSIDE && b != OUTSIDE;
                 if inside && (a == b || self.cells[a as usize].cut >> (2 * axis + 1) & 1 == 0) {
-                    let (low, high) = (class[o].min(class[o | 1 << axis]), class[o].max(class[o | 1 << axis]));
+                    let (low, high) =
+                        (class[o].min(class[o | 1 << axis]), class[o].max(class[o | 1 << axis]));
                     class.iter_mut().filter(|c| **c == high).for_each(|c| *c = low);
                 }
             }

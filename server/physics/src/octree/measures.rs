@@ -1,0 +1,154 @@
+//! Integrals over the cells: volumes and areas of vertices, quadrature points, loose parts.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::cells::Octree;
+use super::lattice::{At, OUTSIDE};
+use super::vertices::corner_weights;
+use crate::cut::Components;
+use crate::element::{Point, Points, deformation_gradient, hex8, quadrature};
+use crate::lists::disjoint::{find, join};
+
+/// Corners of the faces in the directions −x, +x, −y, +y, −z, +z.
+pub const FACES: [[usize; 4]; 6] =
+    [[0, 2, 4, 6], [1, 3, 5, 7], [0, 1, 4, 5], [2, 3, 6, 7], [0, 1, 2, 3], [4, 5, 6, 7]];
+
+impl Octree {
+    /// Rest position of every vertex [m].
+    pub fn rest_positions(&self) -> Vec<Vector3<f64>> {
+        self.points.iter().map(|&p| self.lattice.point(p)).collect()
+    }
+
+    /// Volume of a leaf at rest [m³].
+    pub fn cell_volume(&self, id: usize) -> f64 {
+        (f64::from(self.cells[id].side()) * self.lattice.h).powi(3)
+    }
+
+    /// Adds an eighth of the volume [m³] of every leaf in `cells` to each of its corners.
+    fn add_volumes(&self, cells: impl Iterator<Item = usize>, out: &mut [f64], factor: f64) {
+        for id in cells {
+            let share = factor * self.cell_volume(id) / 8.0;
+            if self.hanging[id] == 0 {
+                self.vertices[id].iter().for_each(|&v| out[v as usize] += share);
+                continue;
+            }
+            for row in corner_weights(&self.cells[id], self.hanging[id]) {
+                for (&v, w) in self.vertices[id].iter().zip(row) {
+                    out[v as usize] += w * share;
+                }
+            }
+        }
+    }
+
+    /// ∫ N_a dV of every vertex [m³].
+    pub fn vertex_volumes(&self) -> Vec<f64> {
+        let mut volume = vec![0.0; self.n_vertices()];
+        self.add_volumes(0..self.cells.len(), &mut volume, 1.0);
+        volume
+    }
+
+    /// ∫ N_a dA [m²] over the boundary faces all of whose vertices are `selected`, by vertex.
+    pub fn areas(&self, selected: &[bool]) -> Vec<f64> {
+        let mut area = vec![0.0; self.n_vertices()];
+        let share = self.lattice.h * self.lattice.h / 4.0;
+        for (id, cell) in self.cells.iter().enumerate().filter(|(_, cell)| cell.cut != 0) {
+            let W = corner_weights(cell, self.hanging[id]);
+            for (d, face) in FACES.iter().enumerate() {
+                let outside = cell.cut >> d & 1 == 1 && self.leaf(Self::across(cell.at, d)) == OUTSIDE;
+                let carriers = |c: usize| self.vertices[id].into_iter().zip(W[c]).filter(|(_, w)| *w != 0.0);
+                let chosen = || face.iter().all(|&c| carriers(c).all(|(v, _)| selected[v as usize]));
+                if outside && chosen() {
+                    for &c in face {
+                        carriers(c).for_each(|(v, w)| area[v as usize] += w * share);
+                    }
+                }
+            }
+        }
+        area
+    }
+
+    /// Whether the vertex with this number is at the same lattice point as `vertex`.
+    pub fn vertices_at(&self, vertex: u32) -> Vec<u32> {
+        let p = self.points[vertex as usize];
+        let octants = self.octants(p);
+        let mut found: Vec<u32> = (0..8)
+            .filter(|&o| octants.leaf[o] != OUTSIDE)
+            .map(|o| (octants.leaf[o] as usize, 7 - o))
+            .filter(|&(id, c)| self.cells[id].corner(c) == p && self.hanging[id] >> c & 1 == 0)
+            .map(|(id, c)| self.vertices[id][c])
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// Loose parts, by leaf, and their volumes [m³].
+    pub fn components(&self) -> Components {
+        let mut root: Vec<u32> = (0..self.cells.len() as u32).collect();
+        self.for_links(|a, b, _| {
+            join(&mut root, a, b);
+        });
+        let mut part_of_root = BTreeMap::new();
+        let mut parts = Components { of_piece: Vec::with_capacity(root.len()), volume: Vec::new() };
+        for id in 0..root.len() {
+            let part = *part_of_root.entry(find(&mut root, id as u32)).or_insert_with(|| {
+                parts.volume.push(0.0);
+                parts.volume.len() as u32 - 1
+            });
+            parts.volume[part as usize] += self.cell_volume(id);
+            parts.of_piece.push(part);
+        }
+        parts
+    }
+
+    /// The leaf that holds the point `p` [m] at rest, and the point's local coordinates in it, 0 … 1 along each
+    /// axis. Outside the body, the nearest leaf within a finest cell's reach, if there is one.
+    pub fn locate(&self, p: &Vector3<f64>) -> Option<(u32, [f64; 3])> {
+        let at = self.lattice.coordinates(p);
+        let own: At = [0, 1, 2].map(|k| at[k].floor() as i32);
+        let mut best: Option<(f64, u32)> = None;
+        super::build::for_around(own, |near| {
+            let leaf = self.leaf(near);
+            if leaf != OUTSIDE {
+                let beyond =
+                    |k: usize| (f64::from(near[k]) - at[k]).max(at[k] - f64::from(near[k] + 1)).max(0.0);
+                let distance = (0..3).map(|k| beyond(k).powi(2)).sum::<f64>();
+                if best.is_none_or(|(least, _)| distance < least) {
+                    best = Some((distance, leaf));
+                }
+            }
+        });
+        let (_, leaf) = best?;
+        let cell = &self.cells[leaf as usize];
+        Some((leaf, [0, 1, 2].map(|k| (at[k] - f64::from(cell.at[k])) / f64::from(cell.side()))))
+    }
+}
+
+impl Points for Octree {
+    fn for_points(&self, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
+        let rule = quadrature::cube_gauss(2);
+        // On [−1, 1]³; a side of s gives 2/s.
+        let reference: Vec<[Vector3<f64>; 8]> =
+            rule.iter().map(|(xi, _)| hex8::reference_gradients(xi)).collect();
+        for (element, nodes) in self.vertices.iter().enumerate() {
+            let cell = &self.cells[element];
+            let per_metre = 2.0 / (f64::from(cell.side()) * self.lattice.h);
+            let weight = self.cell_volume(element) / 8.0;
+            let W = (self.hanging[element] != 0).then(|| corner_weights(cell, self.hanging[element]));
+            let at = nodes.map(|v| x[v as usize]);
+            for of_corners in &reference {
+                let mut gradients = of_corners.map(|g| g * per_metre);
+                if let Some(W) = &W {
+                    let corners = std::mem::replace(&mut gradients, [Vector3::zeros(); 8]);
+                    for (row, g) in W.iter().zip(corners) {
+                        gradients.iter_mut().zip(row).for_each(|(out, w)| *out += *w * g);
+                    }
+                }
+                let F: Matrix3<f64> = deformation_gradient(&at, &gradients);
+                visit(Point { element, nodes, gradients: &gradients, weight, F });
+            }
+        }
+    }
+}
