@@ -88,7 +88,7 @@ impl Body {
     /// Brings the body up to date after a cut of pieces and copies.
     fn follow_cut(&mut self, report: &CutReport) -> Result<(), BodyError> {
         // While a cut is still on its way through an element, only the surface changes.
-        if !self.space.changed_pieces().is_empty() {
+        if self.space.has_changed() {
             self.inherit(report);
             self.dynamics.follow_cut(&*self.space, &report.new_copies)?;
             self.follow_new_copies(&report.new_copies);
@@ -121,9 +121,9 @@ impl Body {
         resize_reserving(&mut self.state.x, n, Vector3::zeros());
         resize_reserving(&mut self.state.v, n, Vector3::zeros());
         for new in &report.new_copies {
-            let (copy, parent) = (new.copy as usize, new.parent as usize);
-            self.state.x[copy] = self.state.x[parent];
-            self.state.v[copy] = self.state.v[parent];
+            let copy = new.copy as usize;
+            self.state.x[copy] = new.inherited(&self.state.x);
+            self.state.v[copy] = new.inherited(&self.state.v);
         }
         let known = self.split_from.len();
         resize_reserving(&mut self.split_from, n, 0);

@@ -116,7 +116,7 @@ impl Body {
             self.snap = Some(snap);
             return Ok(told);
         };
-        told.new_copies = cut.duplicates.iter().map(|d| NewCopy { copy: d.node, parent: d.parent }).collect();
+        told.new_copies = cut.duplicates.iter().map(|d| NewCopy::split(d.node, d.parent)).collect();
         // A reset must restore requests made since the last cut, but not the pins.
         snap.take_changes(&self.boundary);
         if snap.start.boundary.is_none() {

@@ -81,7 +81,7 @@ impl History {
             for values in [&mut kept.x, &mut kept.v] {
                 for copy in new {
                     debug_assert_eq!(values.len(), copy.copy as usize);
-                    values.push(values[copy.parent as usize]);
+                    values.push(copy.inherited(values));
                 }
             }
         }

@@ -56,13 +56,11 @@ impl LocalConnectivity {
     fn holds(&mut self, parts: &LooseParts, space: &dyn Space, new: &[NewCopy]) -> bool {
         self.copies.clear();
         self.root.clear();
-        for &p in space.changed_pieces() {
-            self.join(space.pieces()[p as usize].copies);
-        }
+        space.for_changed_groups(&mut |group| self.join(group));
         let known = |parent: &u32| self.numbering.find(&self.copies, *parent).is_some();
         let lone: Vec<u32> = new.iter().map(|new| new.parent).filter(|parent| !known(parent)).collect();
         for copy in lone {
-            space.pieces_around(copy).into_iter().for_each(|copies| self.join(copies));
+            space.for_groups_around(copy, &mut |group| self.join(group));
         }
         let mut root_of_part = vec![u32::MAX; parts.len()];
         (0..self.copies.len()).all(|i| {
@@ -75,17 +73,16 @@ impl LocalConnectivity {
         })
     }
 
-    fn join(&mut self, copies: [u32; 4]) {
-        let [first, others @ ..] = copies.map(|copy| {
-            if self.numbering.insert(&mut self.copies, copy) {
+    fn join(&mut self, copies: &[u32]) {
+        let mut first = None;
+        for &copy in copies {
+            let at = if self.numbering.insert(&mut self.copies, copy) {
                 self.root.push(self.root.len() as u32);
                 self.root.len() as u32 - 1
             } else {
                 self.numbering.find(&self.copies, copy).map_or(0, |at| at as u32)
-            }
-        });
-        for other in others {
-            join(&mut self.root, first, other);
+            };
+            join(&mut self.root, *first.get_or_insert(at), at);
         }
     }
 }

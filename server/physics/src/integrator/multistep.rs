@@ -98,8 +98,8 @@ impl Multistep {
         self.history.inherit(new);
         if self.scheme.remembers() {
             for copy in new {
-                let parent = self.acceleration[copy.parent as usize];
-                self.acceleration.push(parent);
+                let inherited = copy.inherited(&self.acceleration);
+                self.acceleration.push(inherited);
             }
         }
     }

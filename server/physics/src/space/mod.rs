@@ -75,14 +75,17 @@ pub trait Space: Points + Send {
     /// stable; cuts append.
     fn pieces(&self) -> &[Piece];
 
-    /// Pieces that the last cut split, created or gave other copies, ascending.
-    fn changed_pieces(&self) -> &[u32];
-
     /// Calls `visit` with the nodes of every group that hangs together: a piece, or an element.
     fn for_groups(&self, visit: &mut dyn FnMut(&[u32]));
 
-    /// Copies of all pieces that use this copy.
-    fn pieces_around(&self, copy: u32) -> Vec<[u32; 4]>;
+    /// Whether the last cut split, created or renumbered anything that hangs together.
+    fn has_changed(&self) -> bool;
+
+    /// Calls `visit` with the copies of every group that the last cut split, created or gave other copies.
+    fn for_changed_groups(&self, visit: &mut dyn FnMut(&[u32]));
+
+    /// Calls `visit` with the copies of every group that contains `copy`, and maybe of others at its node.
+    fn for_groups_around(&self, copy: u32, visit: &mut dyn FnMut(&[u32]));
 
     /// ∫ N_a dV [m³] over piece `p`, for its four copies.
     fn piece_volumes(&self, p: usize) -> [f64; 4];

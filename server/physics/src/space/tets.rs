@@ -119,12 +119,16 @@ impl Space for Tets {
         self.cut.pieces()
     }
 
-    fn changed_pieces(&self) -> &[u32] {
-        self.cut.changed_pieces()
+    fn has_changed(&self) -> bool {
+        !self.cut.changed_pieces().is_empty()
     }
 
-    fn pieces_around(&self, copy: u32) -> Vec<[u32; 4]> {
-        self.cut.tets_around(copy)
+    fn for_changed_groups(&self, visit: &mut dyn FnMut(&[u32])) {
+        self.cut.changed_pieces().iter().for_each(|&p| visit(&self.cut.pieces()[p as usize].copies));
+    }
+
+    fn for_groups_around(&self, copy: u32, visit: &mut dyn FnMut(&[u32])) {
+        self.cut.tets_around(copy).iter().for_each(|copies| visit(copies));
     }
 
     fn piece_volumes(&self, p: usize) -> [f64; 4] {

@@ -193,16 +193,20 @@ impl Space for Lattice {
         self.tets.pieces()
     }
 
-    fn changed_pieces(&self) -> &[u32] {
-        self.tets.changed_pieces()
-    }
-
     fn for_groups(&self, visit: &mut dyn FnMut(&[u32])) {
         self.tets.for_groups(visit);
     }
 
-    fn pieces_around(&self, copy: u32) -> Vec<[u32; 4]> {
-        self.tets.pieces_around(copy)
+    fn has_changed(&self) -> bool {
+        self.tets.has_changed()
+    }
+
+    fn for_changed_groups(&self, visit: &mut dyn FnMut(&[u32])) {
+        self.tets.for_changed_groups(visit);
+    }
+
+    fn for_groups_around(&self, copy: u32, visit: &mut dyn FnMut(&[u32])) {
+        self.tets.for_groups_around(copy, visit);
     }
 
     fn piece_volumes(&self, p: usize) -> [f64; 4] {

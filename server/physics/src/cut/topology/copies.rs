@@ -5,6 +5,9 @@
 //! with the node's own material keeps the copy with the node's number, the *real* copy; the others are
 //! virtual.
 
+use nalgebra::Vector3;
+
+use crate::element::MaterialPoint;
 use crate::lists::reserve::{reserve_half_again, reserved};
 use crate::mesh::TetMesh;
 
@@ -14,12 +17,26 @@ use super::pieces::PieceTable;
 use super::slot::slot_of;
 
 /// A node copy made by a cut.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewCopy {
     /// Id of the new copy.
     pub copy: u32,
-    /// The copy it was split from; position, velocity and warm start are inherited from it.
+    /// The copy it was split from, or the nearest of those that it lies between.
     pub parent: u32,
+    /// The earlier copies that it lies between, where refinement placed it inside an element.
+    pub between: Option<MaterialPoint>,
+}
+
+impl NewCopy {
+    /// Copy `copy`, split from `parent`.
+    pub fn split(copy: u32, parent: u32) -> Self {
+        Self { copy, parent, between: None }
+    }
+
+    /// The value that it inherits, of any quantity with one value per copy: position, velocity, warm start.
+    pub fn inherited(&self, values: &[Vector3<f64>]) -> Vector3<f64> {
+        self.between.map_or_else(|| values[self.parent as usize], |between| between.position(values))
+    }
 }
 
 /// The copies of all nodes, and the elements around every node.
@@ -132,7 +149,7 @@ impl CopyTable {
                 let copy = self.node.len() as u32;
                 self.node.push(i);
                 self.volume.push(0.0);
-                new_copies.push(NewCopy { copy, parent });
+                new_copies.push(NewCopy::split(copy, parent));
                 copy
             };
             // Pieces of a new component change their copy; the volume of a copy is summed anew.
