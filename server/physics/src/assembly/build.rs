@@ -8,9 +8,10 @@ use super::point::PointLaw;
 use super::scratch::Scratch;
 use super::{BlockCsr, ElementKind, Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
-use crate::element::{hex8, quadrature, tet10};
+use crate::element::{Points, hex8, quadrature, tet10};
 use crate::material::Material;
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
+use crate::octree::{Octree, corner_weights};
 
 impl Model {
     /// Linear tetrahedra of an uncut mesh.
@@ -107,6 +108,59 @@ impl Model {
         model.finish()
     }
 
+    /// The cells of an octree, on the vertices that carry them: N_a = Σ_c W_ca N_c, with the weights W of the
+    /// hanging corners.
+    pub fn octree(
+        octree: &Octree,
+        material: &Material,
+        volumetric: Volumetric,
+    ) -> Result<Self, ModelError> {
+        let mut model = Self::begin(ElementKind::Octree, Vec::new(), material, volumetric)?;
+        model.fill_octree(octree);
+        Ok(model)
+    }
+
+    /// Takes the cells of `octree` in place of those there are.
+    pub fn fill_octree(&mut self, octree: &Octree) {
+        let rest = octree.rest_positions();
+        for list in [&mut self.gradients, &mut self.mean_gradients] {
+            list.clear();
+        }
+        for list in [&mut self.weights, &mut self.volumes] {
+            list.clear();
+        }
+        self.connectivity.clear();
+        octree.for_points(&rest, &mut |point| {
+            self.gradients.extend_from_slice(point.gradients);
+            self.weights.push(point.weight);
+        });
+        self.rest = rest;
+        // ∫ N_a N_b over the unit cube.
+        let unit = hex8::shape_products(&std::array::from_fn(|c| 0.5 * hex8::corner(c)));
+        let mut products = Vec::with_capacity(36 * octree.cells().len());
+        for (e, (cell, nodes)) in octree.cells().iter().zip(octree.vertices()).enumerate() {
+            let (volume, W) = (octree.cell_volume(e), corner_weights(cell, octree.hanging()[e]));
+            self.connectivity.extend_from_slice(nodes);
+            self.volumes.push(volume);
+            if self.volumetric == Volumetric::Selective {
+                let points = &self.gradients[64 * e..];
+                let mean = |a: usize| (0..8).map(|q| points[8 * q + a]).sum::<Vector3<f64>>() / 8.0;
+                let mean: [Vector3<f64>; 8] = std::array::from_fn(mean);
+                self.mean_gradients.extend(mean);
+            }
+            let product = |a: usize, b: usize| -> f64 {
+                let row = |c: usize| (0..8).map(|d| unit[c][d] * W[d][b]).sum::<f64>();
+                volume * (0..8).map(|c| W[c][a] * row(c)).sum::<f64>()
+            };
+            let M: [[f64; 8]; 8] = std::array::from_fn(|a| std::array::from_fn(|b| product(a, b)));
+            products.extend(pack(&M));
+        }
+        self.lumped = octree.vertex_volumes();
+        self.integrals.clone_from(&self.lumped);
+        self.products = Products::PerElement(products);
+        self.find_pattern();
+    }
+
     fn begin(
         kind: ElementKind,
         rest: Vec<Vector3<f64>>,
@@ -119,7 +173,7 @@ impl Model {
         match (volumetric, kind) {
             (Volumetric::Full, _)
             | (Volumetric::NodeAveraged { .. }, ElementKind::Tet4)
-            | (Volumetric::Selective, ElementKind::Hex8) => {}
+            | (Volumetric::Selective, ElementKind::Hex8 | ElementKind::Octree) => {}
             (remedy, element) => return Err(ModelError::Remedy { element, remedy }),
         }
         if volumetric != Volumetric::Full && point.split().is_none() {

@@ -26,7 +26,7 @@ impl Model {
         let elements: f64 = match self.kind {
             ElementKind::Tet4 => (0..self.n_elements()).map(|e| self.element_energy::<4>(e, x)).sum(),
             ElementKind::Tet10 => (0..self.n_elements()).map(|e| self.element_energy::<10>(e, x)).sum(),
-            ElementKind::Hex8 => (0..self.n_elements()).map(|e| self.element_energy::<8>(e, x)).sum(),
+            ElementKind::Hex8 | ElementKind::Octree => (0..self.n_elements()).map(|e| self.element_energy::<8>(e, x)).sum(),
         };
         elements + averaged + self.spring_energy(x)
     }
@@ -39,7 +39,7 @@ impl Model {
         let energy = match self.kind {
             ElementKind::Tet4 => self.scatter_forces::<4>(x, &buffers, f),
             ElementKind::Tet10 => self.scatter_forces::<10>(x, &buffers, f),
-            ElementKind::Hex8 => self.scatter_forces::<8>(x, &buffers, f),
+            ElementKind::Hex8 | ElementKind::Octree => self.scatter_forces::<8>(x, &buffers, f),
         };
         energy + averaged + self.add_spring_forces(x, f)
     }
@@ -58,7 +58,7 @@ impl Model {
         match self.kind {
             ElementKind::Tet4 => self.scatter_tangent::<4>(at, &buffers, K),
             ElementKind::Tet10 => self.scatter_tangent::<10>(at, &buffers, K),
-            ElementKind::Hex8 => self.scatter_tangent::<8>(at, &buffers, K),
+            ElementKind::Hex8 | ElementKind::Octree => self.scatter_tangent::<8>(at, &buffers, K),
         }
         if let (Some(averaging), Some(split)) = (&self.averaging, self.point.split()) {
             for i in 0..self.n_nodes() {

@@ -20,6 +20,8 @@ pub enum ElementKind {
     Tet10,
     /// Trilinear hexahedron, 2×2×2 points.
     Hex8,
+    /// Cubes on an adaptive octree, which are cut along the links between them; 2×2×2 points.
+    Octree,
 }
 
 impl ElementKind {
@@ -28,7 +30,7 @@ impl ElementKind {
         match self {
             ElementKind::Tet4 => 4,
             ElementKind::Tet10 => 10,
-            ElementKind::Hex8 => 8,
+            ElementKind::Hex8 | ElementKind::Octree => 8,
         }
     }
 
@@ -37,7 +39,7 @@ impl ElementKind {
         match self {
             ElementKind::Tet4 => 1,
             ElementKind::Tet10 => 4,
-            ElementKind::Hex8 => 8,
+            ElementKind::Hex8 | ElementKind::Octree => 8,
         }
     }
 }
@@ -167,7 +169,7 @@ impl Model {
         match self.kind {
             ElementKind::Tet4 => self.gradient_at::<4>(e, q, x),
             ElementKind::Tet10 => self.gradient_at::<10>(e, q, x),
-            ElementKind::Hex8 => self.gradient_at::<8>(e, q, x),
+            ElementKind::Hex8 | ElementKind::Octree => self.gradient_at::<8>(e, q, x),
         }
     }
 

@@ -26,7 +26,7 @@ impl Model {
         match self.kind {
             ElementKind::Tet4 => self.energies_by::<4>(team, x),
             ElementKind::Tet10 => self.energies_by::<10>(team, x),
-            ElementKind::Hex8 => self.energies_by::<8>(team, x),
+            ElementKind::Hex8 | ElementKind::Octree => self.energies_by::<8>(team, x),
         }
     }
 
@@ -38,7 +38,7 @@ impl Model {
         match self.kind {
             ElementKind::Tet4 => self.forces_by::<4>(team, x, f),
             ElementKind::Tet10 => self.forces_by::<10>(team, x, f),
-            ElementKind::Hex8 => self.forces_by::<8>(team, x, f),
+            ElementKind::Hex8 | ElementKind::Octree => self.forces_by::<8>(team, x, f),
         }
     }
 
@@ -75,7 +75,7 @@ impl Model {
         match self.kind {
             ElementKind::Tet4 => self.blocks_by::<4>(team, at, K),
             ElementKind::Tet10 => self.blocks_by::<10>(team, at, K),
-            ElementKind::Hex8 => self.blocks_by::<8>(team, at, K),
+            ElementKind::Hex8 | ElementKind::Octree => self.blocks_by::<8>(team, at, K),
         }
     }
 

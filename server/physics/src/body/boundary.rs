@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::{Body, BodyError};
 use crate::lists::reserve::resize_reserving;
+use crate::cut::NewCopy;
 use crate::operator::FixedCopy;
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;
@@ -130,6 +131,33 @@ impl Boundary {
         fixed.sort_unstable_by_key(|f| f.copy);
     }
 
+    /// Holds nodes that refinement put between held ones: along the axes that all of these are held, at the mean
+    /// of their displacements.
+    pub fn hold_between(&mut self, new: &[NewCopy], node_of_copy: &[u32]) {
+        for new in new {
+            let Some(between) = &new.between else { continue };
+            let (mut axes, mut displacement_m) = ([true; 3], Vector3::zeros());
+            for (copy, weight) in between.carriers() {
+                match self.fixed_at(node_of_copy[copy]) {
+                    Some(held) => {
+                        (0..3).for_each(|k| axes[k] &= held.axes[k]);
+                        displacement_m += weight * held.displacement_m;
+                    }
+                    None => axes = [false; 3],
+                }
+            }
+            if axes.contains(&true) {
+                // New nodes have the highest numbers.
+                self.fixed.push(FixedNode { node: new.copy, axes, displacement_m });
+            }
+        }
+    }
+
+    /// Forgets the nodes that refinement had added to a body of `n_nodes` nodes.
+    pub fn forget_refinement(&mut self, n_nodes: usize) {
+        self.fixed.retain(|held| (held.node as usize) < n_nodes);
+    }
+
     /// Writes the force [N] on every one of `n` copies and added nodes to `load`. A point force goes to
     /// the copy with the node's material. A spread force goes to all copies of the node, by the volume
     /// they carry. Totals are kept.
@@ -163,8 +191,10 @@ impl Boundary {
                 node_volume[node as usize] += volume;
             }
             for (c, &node) in space.node_of_copy().iter().enumerate() {
+                // Nodes that refinement added carry nothing: the load stays where it was put.
+                let Some(force) = self.spread_force.get(node as usize) else { continue };
                 let share = space.copy_volumes()[c] / node_volume[node as usize];
-                load[c] += share * self.spread_force[node as usize];
+                load[c] += share * force;
             }
         }
     }

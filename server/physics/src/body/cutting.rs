@@ -63,7 +63,7 @@ impl Body {
     }
 
     fn may_be_cut(&self) -> Result<(), BodyError> {
-        if self.space.kind() != ElementKind::Tet4 {
+        if !matches!(self.space.kind(), ElementKind::Tet4 | ElementKind::Octree) {
             let with = element_name(&*self.space);
             return Err(BodyError::Combination { what: "a cut", with, instead: "tet4" });
         }
@@ -142,12 +142,12 @@ impl Body {
     /// The same after a cut that made the copies `new`, for elements without added nodes. The data of earlier
     /// copies stays in place.
     fn follow_new_copies(&mut self, new: &[NewCopy]) {
-        let known = self.rest.len();
         resize_reserving(&mut self.rest, self.space.n_copies(), Vector3::zeros());
-        for (rest, new) in self.rest[known..].iter_mut().zip(new) {
-            *rest = self.space.mesh().nodes[self.space.node_of_copy()[new.copy as usize] as usize];
+        for new in new {
+            self.rest[new.copy as usize] = new.inherited(&self.rest);
         }
         self.follow_masses();
+        self.boundary.hold_between(new, self.space.node_of_copy());
         self.find_fixed();
         self.boundary.loads_of_new_copies(&*self.space, &mut self.load);
         self.connectivity.follow(&mut self.parts, &*self.space, new, &self.mass, &self.fixed);

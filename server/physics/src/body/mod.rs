@@ -129,8 +129,8 @@ impl Body {
                 Tets::linear(CutMesh::new(Snapper::prepared(&mesh))?)
             }
             (ElementKind::Tet10, _) => Tets::quadratic(mesh)?,
-            (ElementKind::Hex8, _) => {
-                let (what, with) = ("element hex8", "a mesh of tetrahedra");
+            (ElementKind::Hex8 | ElementKind::Octree, _) => {
+                let (what, with) = ("an element that is no tetrahedron", "a mesh of tetrahedra");
                 return Err(BodyError::Combination { what, with, instead: "tet4 or tet10" });
             }
         };
@@ -428,6 +428,7 @@ impl Body {
             return self.snap_reset();
         }
         self.space.reset()?;
+        self.boundary.forget_refinement(self.space.n_nodes());
         self.return_to_rest();
         self.dynamics.rebuild(&*self.space)?;
         self.follow_topology();

@@ -114,6 +114,7 @@ impl BodySettings {
         let reasons = [
             (self.element == ElementKind::Tet10, "element tet10"),
             (self.element == ElementKind::Hex8, "element hex8"),
+            (self.element == ElementKind::Octree, "element octree"),
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
             (self.scheme.is_explicit(), "an explicit integrator"),
             (self.scheme == Scheme::Static && law.rotates(), "the static integrator with a law that rotates"),
@@ -249,6 +250,9 @@ impl BodySettings {
             }
             (CuttingMethod::Snap, ElementKind::Hex8, _) => {
                 return refused("cutting along faces", "element hex8", "tet4");
+            }
+            (CuttingMethod::Snap, ElementKind::Octree, _) => {
+                return refused("cutting along faces", "element octree", "cutting method links");
             }
             (CuttingMethod::Xfem, _, LooseRule::Pinned) => {
                 return refused("pinning loose parts", "cutting method xfem", "cutting method snap");

@@ -10,6 +10,7 @@ mod change;
 mod lattice;
 mod measures;
 mod shape;
+mod space;
 mod vertices;
 
 pub use build::{Bits, OctreeSettings};
@@ -17,6 +18,7 @@ pub use cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree, OctreeError};
 pub use change::OctreeChange;
 pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
 pub use shape::{BoxShape, Shape};
+pub use space::OctreeSpace;
 pub use vertices::{Octants, corner_weights};
 
 #[cfg(test)]

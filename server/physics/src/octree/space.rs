@@ -1,0 +1,362 @@
+//! The octree as a discretisation of a body.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::cells::{CutLink, LinkKey, Octree};
+use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
+use crate::cut::{
+    BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Piece, Solid, Surface,
+    Surroundings, Work, sweep_triangles,
+};
+use crate::element::{Point, Points};
+use crate::material::Material;
+use crate::mesh::{MeshError, TetMesh};
+use crate::operator::{StiffModes, Stiffness};
+use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
+use crate::space::Space;
+
+/// Most leaves that cuts by clients may make of one.
+const MOST_GROWTH: usize = 8;
+/// Links that cost as much work as one fragment of a tetrahedron.
+const LINKS_PER_FRAGMENT: usize = 4;
+
+/// An octree that is cut, with everything that a body asks of it.
+#[derive(Clone, Debug)]
+pub struct OctreeSpace {
+    octree: Octree,
+    /// The uncut state.
+    initial: Arc<Octree>,
+    /// The first vertex at the lattice point of each vertex.
+    node_of_copy: Vec<u32>,
+    volumes: Vec<f64>,
+    /// Leaves that the last cut changed.
+    changed: Vec<u32>,
+    fronts: BTreeMap<u32, Front>,
+    surface: Surface,
+    epoch: u32,
+    under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
+    /// An octree has no tetrahedra.
+    no_tets: TetMesh,
+}
+
+impl OctreeSpace {
+    /// The uncut state of `octree`.
+    pub fn new(octree: Octree) -> Self {
+        let n = octree.n_vertices() as u32;
+        let mut space = Self {
+            initial: Arc::new(octree.clone()),
+            octree,
+            node_of_copy: (0..n).collect(),
+            volumes: Vec::new(),
+            changed: Vec::new(),
+            fronts: BTreeMap::new(),
+            surface: Surface::default(),
+            epoch: 0,
+            under_way: None,
+            no_tets: TetMesh::default(),
+        };
+        space.renew();
+        space
+    }
+
+    /// The cells, links and vertices.
+    pub fn octree(&self) -> &Octree {
+        &self.octree
+    }
+
+    fn renew(&mut self) {
+        self.volumes = self.octree.vertex_volumes();
+        self.surface = Surface::default();
+    }
+
+    /// Remembers the last position of the blade by the material around it.
+    fn remember(&mut self, blade: &BladeSweep, incision: u32, x: &[Vector3<f64>]) {
+        let Some(last) = blade.segments.last() else { return };
+        let near = self.octree.leaves_near(x, &[last[0].inf(&last[1]), last[0].sup(&last[1])]);
+        let near: Vec<[u32; 4]> = near.into_iter().flat_map(|id| self.tets_of(id)).collect();
+        let around = |vertex: u32| {
+            let mut tets = Vec::new();
+            self.for_leaves_around(vertex, |id| tets.extend(self.tets_of(id)));
+            tets
+        };
+        let front = Front::remember(last, &Surroundings { near: &near, around: &around, x });
+        self.fronts.insert(incision, front);
+    }
+
+    /// Six tetrahedra on the vertices of a leaf, which fill it where no corner hangs.
+    fn tets_of(&self, id: u32) -> [[u32; 4]; 6] {
+        let v = self.octree.vertices()[id as usize];
+        let ways = [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]];
+        ways.map(|[a, b]| [v[0], v[a], v[b], v[7]])
+    }
+
+    /// Calls `visit` for the leaves around the lattice point of `vertex`.
+    fn for_leaves_around(&self, vertex: u32, mut visit: impl FnMut(u32)) {
+        let octants = self.octree.octants(self.octree.points()[vertex as usize]);
+        let mut leaves = octants.leaf;
+        leaves.sort_unstable();
+        let mut last = super::OUTSIDE;
+        for leaf in leaves {
+            if leaf != super::OUTSIDE && leaf != last {
+                visit(leaf);
+            }
+            last = leaf;
+        }
+    }
+
+    /// The links that a blade crosses, after the checks of a cut.
+    fn search(
+        &mut self,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<Vec<(LinkKey, CutLink)>, CutError> {
+        blade.check()?;
+        if incision == 0 {
+            return Err(CutError::ReservedIncision);
+        }
+        let expected = self.octree.n_vertices();
+        if x.len() != expected {
+            return Err(CutError::PositionCount { found: x.len(), expected });
+        }
+        if let Some(copy) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            return Err(CutError::NonFinitePosition { copy });
+        }
+        let limit = MOST_GROWTH * self.initial.cells().len() + 100_000;
+        let found = self.octree.cells().len();
+        if found >= limit {
+            return Err(CutError::Full { what: "cells", found, limit });
+        }
+        let triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
+        let cuts = self.octree.crossed_links(x, &triangles, incision);
+        self.remember(blade, incision, x);
+        Ok(cuts)
+    }
+
+    /// Cuts these links and brings everything up to date.
+    fn open(&mut self, cuts: &[(LinkKey, CutLink)]) -> CutReport {
+        let known = self.octree.n_vertices() as u32;
+        let change = self.octree.cut(cuts);
+        let mut new_copies = Vec::with_capacity(change.new_vertices.len());
+        for (copy, between) in (known..).zip(&change.new_vertices) {
+            let parent = between.main_copy();
+            let split = between.copies().len() == 1;
+            let between = (!split).then_some(*between);
+            // Vertices that refinement made are nodes of their own.
+            self.node_of_copy.push(if split { self.node_of_copy[parent as usize] } else { copy });
+            new_copies.push(NewCopy { copy, parent, between });
+        }
+        self.changed = change.cells;
+        if change.links > 0 || change.divided > 0 {
+            self.epoch += 1;
+            self.renew();
+        }
+        CutReport {
+            new_copies,
+            elements_cut: self.changed.len(),
+            faces_opened: change.links,
+            epoch: self.epoch,
+            ..CutReport::default()
+        }
+    }
+}
+
+impl Points for OctreeSpace {
+    fn for_points(&self, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
+        self.octree.for_points(x, visit);
+    }
+}
+
+impl Space for OctreeSpace {
+    fn kind(&self) -> ElementKind {
+        ElementKind::Octree
+    }
+
+    fn n_elements(&self) -> usize {
+        self.octree.cells().len()
+    }
+
+    fn n_nodes(&self) -> usize {
+        self.octree.n_vertices()
+    }
+
+    fn node_of_copy(&self) -> &[u32] {
+        &self.node_of_copy
+    }
+
+    fn copies_with_node(&self, node: u32) -> Vec<u32> {
+        self.octree.vertices_at(node)
+    }
+
+    fn rest_positions(&self) -> Vec<Vector3<f64>> {
+        self.octree.rest_positions()
+    }
+
+    fn copy_volumes(&self) -> &[f64] {
+        &self.volumes
+    }
+
+    fn areas(&self, selected: &[bool]) -> Vec<f64> {
+        self.octree.areas(selected)
+    }
+
+    fn volumes(&self, selected: &[bool]) -> Vec<f64> {
+        self.volumes.iter().zip(selected).map(|(v, &chosen)| if chosen { *v } else { 0.0 }).collect()
+    }
+
+    fn mesh(&self) -> &TetMesh {
+        &self.no_tets
+    }
+
+    fn pieces(&self) -> &[Piece] {
+        &[]
+    }
+
+    fn for_groups(&self, visit: &mut dyn FnMut(&[u32])) {
+        self.octree.vertices().iter().for_each(|vertices| visit(vertices));
+    }
+
+    fn has_changed(&self) -> bool {
+        !self.changed.is_empty()
+    }
+
+    fn for_changed_groups(&self, visit: &mut dyn FnMut(&[u32])) {
+        self.changed.iter().for_each(|&id| visit(&self.octree.vertices()[id as usize]));
+    }
+
+    fn for_groups_around(&self, copy: u32, visit: &mut dyn FnMut(&[u32])) {
+        self.for_leaves_around(copy, |id| visit(&self.octree.vertices()[id as usize]));
+    }
+
+    fn piece_volumes(&self, _: usize) -> [f64; 4] {
+        [0.0; 4]
+    }
+
+    fn element_of(&self, p: usize) -> usize {
+        p
+    }
+
+    fn piece_at(&self, tet: u32, _: [f64; 4]) -> u32 {
+        tet
+    }
+
+    fn carriers(&self, _: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
+        copies.into_iter().zip(weights).collect()
+    }
+
+    fn components(&self) -> Components {
+        self.octree.components()
+    }
+
+    fn solid(&self) -> Solid {
+        Solid::default()
+    }
+
+    fn flaws(&self) -> Flaws {
+        let total: f64 = (0..self.octree.cells().len()).map(|id| self.octree.cell_volume(id)).sum();
+        let copies: f64 = self.volumes.iter().sum();
+        Flaws {
+            surface: self.surface.n_defects(),
+            volume: (copies / total - 1.0).abs(),
+            ..Flaws::default()
+        }
+    }
+
+    fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    fn set_epoch(&mut self, epoch: u32) {
+        self.epoch = epoch;
+    }
+
+    fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    fn element_surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    fn incision_marks(&self) -> Vec<IncisionMark> {
+        Vec::new()
+    }
+
+    fn skin(&self) -> Option<&Skin> {
+        None
+    }
+
+    fn put_on_skin(&mut self, _: SkinSettings, _: &mut SkinShape<'_>) -> Result<(), SkinError> {
+        Ok(())
+    }
+
+    fn spoil_skin(&mut self) {}
+
+    fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
+        let cuts = self.search(x, blade, incision)?;
+        Ok(self.open(&cuts))
+    }
+
+    fn begin_cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<(), CutError> {
+        let cuts = self.search(x, blade, incision)?;
+        self.under_way = Some((cuts, CutReport::default()));
+        Ok(())
+    }
+
+    fn go_on_cutting(&mut self, work: &mut Work) -> Option<CutReport> {
+        let (cuts, _) = self.under_way.take()?;
+        work.book(cuts.len() / LINKS_PER_FRAGMENT);
+        Some(self.open(&cuts))
+    }
+
+    fn is_being_cut(&self) -> bool {
+        self.under_way.is_some()
+    }
+
+    fn cut_along_faces(
+        &mut self,
+        _: &mut Snapper,
+        _: Nodes<'_>,
+        _: &BladeSweep,
+        _: u32,
+    ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
+        Ok((SnapReport::default(), None))
+    }
+
+    fn reset(&mut self) -> Result<(), MeshError> {
+        self.under_way = None;
+        self.fronts.clear();
+        self.changed.clear();
+        self.octree = (*self.initial).clone();
+        self.node_of_copy.truncate(self.octree.n_vertices());
+        self.epoch += 1;
+        self.renew();
+        Ok(())
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Space> {
+        Box::new(Self { under_way: None, ..self.clone() })
+    }
+
+    fn stiffness(&self, _: bool) -> Option<Box<dyn Stiffness>> {
+        None
+    }
+
+    fn follow_stiffness(&self, _: &mut dyn Stiffness) {}
+
+    fn stiff_modes(&self) -> Option<StiffModes> {
+        None
+    }
+
+    fn model(&self, material: &Material, volumetric: Volumetric) -> Result<Model, ModelError> {
+        Model::octree(&self.octree, material, volumetric)
+    }
+
+    fn follow_model(&self, model: &mut Model) {
+        model.fill_octree(&self.octree);
+    }
+}
