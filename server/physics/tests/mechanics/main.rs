@@ -12,6 +12,7 @@ mod equilibrium;
 mod foreign_space;
 mod half_cut_beam;
 mod multistep;
+mod octree;
 mod phases;
 mod reference;
 mod repeated_solves;

@@ -1,0 +1,150 @@
+//! Bodies of octree cells on the general path, in double precision: the reference for everything faster.
+
+use nalgebra::{Matrix3, Vector3};
+use scindo_physics::body::{Body, BodySettings, ElementKind, Method, Outcome, PcgSettings, Scheme};
+use scindo_physics::cut::BladeSweep;
+use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::mesh::box_hexes;
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+
+const LINEAR: Material = Material {
+    young_pa: 1e6,
+    poisson: 0.3,
+    density_kg_m3: 1000.0,
+    rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.0 },
+    law: Law::Linear,
+};
+const FALL: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+
+fn unit_cube(cells: u32, levels: u8) -> Octree {
+    let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
+    Octree::fill(&shape, OctreeSettings { cells, levels }, &|_| 0).unwrap()
+}
+
+fn body(octree: Octree, material: Material, settings: BodySettings) -> Body {
+    Body::of_space(Box::new(OctreeSpace::new(octree)), material, settings).unwrap()
+}
+
+fn direct(scheme: Scheme) -> BodySettings {
+    let solver = PcgSettings { iterations: 2000, tolerance: 1e-11 };
+    BodySettings { scheme, method: Method::Cholesky, solver, ..BodySettings::default() }
+}
+
+fn at(body: &Body, inside: impl Fn(&Vector3<f64>) -> bool) -> Vec<u32> {
+    (0..).zip(body.rest_positions()).filter(|(_, X)| inside(X)).map(|(n, _)| n).collect()
+}
+
+/// Displacement [m] of the vertex at `X` [m] under gravity, with the face x = 0 held.
+fn sag(mut body: Body, X: Vector3<f64>) -> Vector3<f64> {
+    let held = at(&body, |X| X.x < 1e-9);
+    body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+    let report = body.step(1.0, FALL, &[]);
+    assert_eq!(report.outcome, Outcome::Advanced, "{report:?}");
+    let found = at(&body, |p| (p - X).norm() < 1e-9);
+    body.positions()[found[0] as usize] - X
+}
+
+/// Strain energies and corner displacements of reference R7 on coarse grids.
+#[test]
+fn coarse_grids_have_the_reference_solution() {
+    let references = [
+        (4, Vector3::new(0.009212639891299992, 4.089492789281112e-05, -0.026829049421700515)),
+        (8, Vector3::new(0.009417049205520648, 3.6250991714351976e-05, -0.0280378711310351)),
+    ];
+    for (n, expected) in references {
+        let u = sag(body(unit_cube(n, 0), LINEAR, direct(Scheme::Static)), Vector3::repeat(1.0));
+        assert!((u - expected).norm() < 1e-8 * expected.norm(), "{n}: {u} {expected}");
+        let hexes = box_hexes(Vector3::zeros(), Vector3::repeat(1.0), [n as usize; 3]);
+        let hex8 = sag(Body::hex8(hexes, LINEAR, direct(Scheme::Static)).unwrap(), Vector3::repeat(1.0));
+        assert!((u - hex8).norm() < 1e-10 * u.norm());
+    }
+}
+
+#[test]
+fn adaptive_grids_converge_to_the_uniform_answer() {
+    let tip = |cells, levels| sag(body(unit_cube(cells, levels), LINEAR, direct(Scheme::Static)), Vector3::repeat(1.0)).z;
+    let uniform = tip(16, 0);
+    for levels in 1..4 {
+        let adaptive = tip(16, levels);
+        assert!((adaptive / uniform - 1.0).abs() < 0.01, "{levels}: {adaptive} {uniform}");
+    }
+}
+
+/// A linear field of positions, cut or not, across level changes: no force on any vertex inside the body.
+#[test]
+fn constant_stress_is_in_balance_across_level_changes_and_along_cuts() {
+    let F = Matrix3::new(1.1, 0.1, 0.0, -0.05, 0.9, 0.2, 0.02, 0.0, 1.05);
+    for law in [Law::Linear, Law::Corotational, Law::NeoHookean] {
+        let turn = *nalgebra::Rotation3::from_euler_angles(0.4, -0.3, 1.0).matrix();
+        let F = if law == Law::Linear { F } else { turn * F };
+        let mut body = body(unit_cube(12, 2), Material { law, ..LINEAR }, direct(Scheme::ImplicitEuler));
+        let edge = |z: f64| [Vector3::new(-0.1, 0.45, z), Vector3::new(0.55, 0.45, z)];
+        let report = body.cut(&BladeSweep { segments: vec![edge(1.1), edge(0.4)] }, 1).unwrap();
+        assert!(report.faces_opened > 10 && report.new_copies.iter().any(|new| new.between.is_none()));
+        let x: Vec<Vector3<f64>> = body.rest_positions().iter().map(|X| F * X).collect();
+        let v = vec![Vector3::zeros(); x.len()];
+        body.set_state(&x, &v).unwrap();
+        // The blade lies in a plane of cell faces: on its lips there is the traction of the stress, elsewhere
+        // inside there is nothing.
+        let f = body.internal_forces();
+        let scale = f.iter().map(Vector3::norm).fold(0.0, f64::max);
+        for (f, X) in f.iter().zip(body.rest_positions()) {
+            let inside = X.iter().all(|c| *c > 1e-9 && *c < 1.0 - 1e-9);
+            let at_cut = (X.y - 0.45).abs() < 0.1;
+            assert!(!inside || at_cut || f.norm() < 1e-10 * scale, "{law:?} {X} {f}");
+        }
+        let total: Vector3<f64> = f.iter().sum();
+        assert!(total.norm() < 1e-10 * scale);
+    }
+}
+
+#[test]
+fn a_cut_keeps_mass_momentum_and_the_moving_field_and_the_parts_fall_freely() {
+    let material = Material { law: Law::Corotational, young_pa: 1e4, ..LINEAR };
+    let solver = PcgSettings { iterations: 400, tolerance: 1e-9 };
+    let settings = BodySettings { solver, ..BodySettings::default() };
+    let mut body = body(unit_cube(8, 2), material, settings);
+    let spin = |X: &Vector3<f64>| Vector3::new(0.3, -0.2, 0.1).cross(X) + Vector3::new(0.1, 0.0, 0.2) * X.z * X.z;
+    let v: Vec<Vector3<f64>> = body.rest_positions().iter().map(spin).collect();
+    let x = body.positions().to_vec();
+    body.set_state(&x, &v).unwrap();
+    for _ in 0..3 {
+        assert_eq!(body.step(0.01, FALL, &[]).outcome, Outcome::Advanced);
+    }
+    let before = (body.total_mass(), body.momentum(), body.centre_of_mass(), body.elastic_energy());
+    let middle = body.centre_of_mass();
+    let edge = |z: f64| [middle + Vector3::new(-2.0, 0.1, z), middle + Vector3::new(2.0, -0.2, z)];
+    let report = body.cut(&BladeSweep { segments: vec![edge(2.0), edge(-2.0)] }, 1).unwrap();
+    assert!(report.new_copies.iter().any(|new| new.between.is_some()), "leaves are divided");
+    assert_eq!(body.components().len(), 2);
+    assert!((body.total_mass() / before.0 - 1.0).abs() < 1e-12);
+    assert!((body.momentum() - before.1).norm() < 1e-12 * before.1.norm());
+    assert!((body.centre_of_mass() - before.2).norm() < 1e-12);
+    assert!((body.elastic_energy() / before.3 - 1.0).abs() < 1e-2);
+    let (c, p) = (body.centre_of_mass(), body.momentum());
+    for _ in 0..10 {
+        assert_eq!(body.step(0.01, FALL, &[]).outcome, Outcome::Advanced);
+    }
+    let gained = (body.momentum() - p) / body.total_mass();
+    assert!((gained - FALL * 0.1).norm() < 1e-6, "{gained}");
+    assert!(body.centre_of_mass().z < c.z);
+    body.reset().unwrap();
+    assert_eq!((body.components().len(), body.n_copies()), (1, unit_cube(8, 2).n_vertices()));
+    assert_eq!(body.step(0.01, FALL, &[]).outcome, Outcome::Advanced);
+}
+
+#[test]
+fn held_faces_stay_held_where_leaves_are_divided() {
+    let mut body = body(unit_cube(8, 2), LINEAR, direct(Scheme::Static));
+    // A slab: its inner vertices belong to coarse leaves.
+    let held = at(&body, |X| X.x < 0.51);
+    body.fix(&held, [true, true, false], Vector3::new(0.01, 0.0, 0.0)).unwrap();
+    body.fix(&at(&body, |X| X.x < 1e-9), [true; 3], Vector3::new(0.01, 0.0, 0.0)).unwrap();
+    let edge = |z: f64| [Vector3::new(-0.1, 0.4, z), Vector3::new(1.1, 0.47, z)];
+    body.cut(&BladeSweep { segments: vec![edge(1.1), edge(0.2)] }, 1).unwrap();
+    body.step(1.0, FALL, &[]);
+    for (x, X) in body.positions().iter().zip(body.rest_positions()) {
+        assert!(X.x > 0.51 || (x - X - Vector3::x() * 0.01).xy().norm() < 1e-12, "{X} {x}");
+    }
+    assert_eq!(body.settings().element, ElementKind::Octree);
+}
