@@ -26,7 +26,9 @@ impl Model {
         let elements: f64 = match self.kind {
             ElementKind::Tet4 => (0..self.n_elements()).map(|e| self.element_energy::<4>(e, x)).sum(),
             ElementKind::Tet10 => (0..self.n_elements()).map(|e| self.element_energy::<10>(e, x)).sum(),
-            ElementKind::Hex8 | ElementKind::Octree => (0..self.n_elements()).map(|e| self.element_energy::<8>(e, x)).sum(),
+            ElementKind::Hex8 | ElementKind::Octree => {
+                (0..self.n_elements()).map(|e| self.element_energy::<8>(e, x)).sum()
+            }
         };
         elements + averaged + self.spring_energy(x)
     }
@@ -144,8 +146,9 @@ impl Model {
             self.weights(e)[q] * psi(&deformation_gradient::<N>(&x, self.gradients(e, q)))
         };
         let Q = self.kind.points();
-        let Some(split) = self.remedy() else {
-            return (0..Q).map(|q| point(q, &|F| self.point.energy(F))).sum();
+        let law = self.point_of(e);
+        let Some(split) = self.remedy(e) else {
+            return (0..Q).map(|q| point(q, &|F| law.energy(F))).sum();
         };
         let shear: f64 = (0..Q).map(|q| point(q, &|F| split.shear_energy(F))).sum();
         let (F, share) = match &self.averaging {
@@ -159,9 +162,9 @@ impl Model {
         kind == Tangent::Held && self.point.law == Law::Corotational
     }
 
-    /// The split law if the volumetric energy is integrated by itself.
-    fn remedy(&self) -> Option<Split> {
-        if self.volumetric == Volumetric::Full { None } else { self.point.split() }
+    /// The split law of element `e` if the volumetric energy is integrated by itself.
+    fn remedy(&self, e: usize) -> Option<Split> {
+        if self.volumetric == Volumetric::Full { None } else { self.point_of(e).split() }
     }
 
     fn mean_gradient<const N: usize>(&self, e: usize, x: &[Vector3<f64>; N]) -> Matrix3<f64> {
@@ -194,14 +197,14 @@ impl Model {
     ) -> f64 {
         let x = self.positions::<N>(e, x);
         let weights = self.weights(e);
-        let split = self.remedy();
+        let (law, split) = (self.point_of(e), self.remedy(e));
         let mut energy = 0.0;
         for q in 0..self.kind.points() {
             let (g, w) = (self.gradients(e, q), weights[q]);
             let F = deformation_gradient::<N>(&x, g);
             let P = match &split {
                 None => {
-                    let (psi, P) = self.point.energy_and_stress(&F);
+                    let (psi, P) = law.energy_and_stress(&F);
                     energy += w * psi;
                     P
                 }
@@ -261,7 +264,7 @@ impl Model {
         let x = self.positions::<N>(e, at.x);
         let from = at.from.map(|from| self.positions::<N>(e, from));
         let weights = self.weights(e);
-        let split = self.remedy();
+        let (law, split) = (self.point_of(e), self.remedy(e));
         // With selective integration only the sum of shear and volume is (nearly) semidefinite, so the
         // sum is projected at the end.
         let selective = self.volumetric == Volumetric::Selective;
@@ -272,13 +275,13 @@ impl Model {
             let F = deformation_gradient::<N>(&x, g);
             if kind == Tangent::Exact {
                 let D = from.map_or(Matrix3::zeros(), |from| F - deformation_gradient::<N>(&from, g));
-                if let Some([_, S]) = self.point.green(&F, &D) {
-                    add_green_blocks::<N>((&F, &S), self.point.lame, g, weights[q], K);
+                if let Some([_, S]) = law.green(&F, &D) {
+                    add_green_blocks::<N>((&F, &S), law.lame, g, weights[q], K);
                     continue;
                 }
             }
             let A = match &split {
-                None => self.point.tangent(&F, kind),
+                None => law.tangent(&F, kind),
                 Some(split) if selective => split.shear_tangent(&F, point_kind),
                 Some(split) => self.averaged_tangent(e, split, &F, kind, buffers),
             };

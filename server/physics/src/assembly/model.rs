@@ -8,7 +8,7 @@ use super::point::PointLaw;
 use super::scratch::Scratch;
 use super::{BlockCsr, ModelError};
 use crate::element::{Point, Points, Spring, deformation_gradient};
-use crate::material::{Lame, Law};
+use crate::material::{Lame, Law, Region};
 
 /// Finite element of a model, and the points at which its energy is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -67,7 +67,11 @@ pub enum Volumetric {
 pub struct Model {
     pub(super) kind: ElementKind,
     pub(super) volumetric: Volumetric,
+    /// The law with the body's own constants.
     pub(super) point: PointLaw,
+    /// Regions with other constants, and the number of the region of every element; empty if there are none.
+    pub(super) regions: Vec<Region>,
+    pub(super) region_of: Vec<u16>,
     pub(super) rest: Vec<Vector3<f64>>,
     /// Nodes of every element, `kind.nodes()` each.
     pub(super) connectivity: Vec<u32>,
@@ -124,6 +128,14 @@ impl Model {
     /// Changes the elastic constants and recomputes nothing else.
     pub fn set_lame(&mut self, lame: Lame) {
         self.point.lame = lame;
+    }
+
+    /// The law with the constants of element `e`.
+    #[inline]
+    pub(super) fn point_of(&self, e: usize) -> PointLaw {
+        let region = self.region_of.get(e).copied().unwrap_or(0);
+        let other = usize::from(region).checked_sub(1).and_then(|r| self.regions.get(r));
+        other.map_or(self.point, |other| PointLaw { law: self.point.law, lame: other.lame() })
     }
 
     /// Number of nodes (copies, where the mesh is cut).
@@ -268,8 +280,13 @@ impl Points for Model {
             for (q, &weight) in self.weights(element).iter().enumerate() {
                 let (nodes, gradients) = (self.element(element), self.gradients(element, q));
                 let F = self.deformation_gradient(element, q, x);
-                visit(Point { element, nodes, gradients, weight, F });
+                let region = self.region_of.get(element).copied().unwrap_or(0);
+                visit(Point { element, nodes, gradients, weight, F, region });
             }
         }
+    }
+
+    fn regions(&self) -> &[Region] {
+        &self.regions
     }
 }

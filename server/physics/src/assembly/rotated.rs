@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{BlockCsr, Model};
 use crate::element::polar_rotation;
-use crate::material::Law;
+use crate::material::{Lame, Law};
 
 /// Largest number of nodes per element, that of Tet10.
 const MOST_NODES: usize = 10;
@@ -20,8 +20,7 @@ impl Model {
     /// K̂ [N/m] at the positions `x` [m]; overwrites the blocks of `K`, which has the model's pattern.
     pub fn rotated_stiffness(&self, x: &[Vector3<f64>], K: &mut BlockCsr<f64>) {
         K.clear();
-        let lame = self.lame();
-        self.for_rotated_gradients(x, |nodes, w, g| {
+        self.for_rotated_gradients(x, |nodes, (w, lame), g| {
             for (&i, g_a) in nodes.iter().zip(g) {
                 for (&j, g_b) in nodes.iter().zip(g) {
                     let Some(at) = K.position(i as usize, j) else { continue };
@@ -47,8 +46,7 @@ impl Model {
         v: &[Vector3<f64>],
         f: &mut [Vector3<f64>],
     ) {
-        let lame = self.lame();
-        self.for_rotated_gradients(x, |nodes, w, g| {
+        self.for_rotated_gradients(x, |nodes, (w, lame), g| {
             let mut H = Matrix3::zeros();
             for (&i, g_a) in nodes.iter().zip(g) {
                 H += v[i as usize] * g_a.transpose();
@@ -62,11 +60,15 @@ impl Model {
         });
     }
 
-    /// Calls `visit(nodes, weight, R ∇N)` at every quadrature point, in order.
-    fn for_rotated_gradients(&self, x: &[Vector3<f64>], mut visit: impl FnMut(&[u32], f64, &[Vector3<f64>])) {
+    /// Calls `visit(nodes, (weight, Lamé constants), R ∇N)` at every quadrature point, in order.
+    fn for_rotated_gradients(
+        &self,
+        x: &[Vector3<f64>],
+        mut visit: impl FnMut(&[u32], (f64, Lame), &[Vector3<f64>]),
+    ) {
         let mut rotated = [Vector3::zeros(); MOST_NODES];
         for e in 0..self.n_elements() {
-            let nodes = self.element(e);
+            let (nodes, lame) = (self.element(e), self.point_of(e).lame);
             for (q, &w) in self.weights(e).iter().enumerate() {
                 let g = self.gradients(e, q);
                 if self.law() != Law::Linear {
@@ -76,7 +78,7 @@ impl Model {
                 } else {
                     rotated.iter_mut().zip(g).for_each(|(r, g)| *r = *g);
                 }
-                visit(nodes, w, &rotated[..g.len()]);
+                visit(nodes, (w, lame), &rotated[..g.len()]);
             }
         }
     }

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::{Body, BodyError};
-use crate::lists::reserve::resize_reserving;
 use crate::cut::NewCopy;
+use crate::lists::reserve::resize_reserving;
 use crate::operator::FixedCopy;
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;

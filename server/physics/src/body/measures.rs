@@ -57,10 +57,7 @@ impl Body {
         if let Some(model) = self.dynamics.model() {
             return model.energy(&self.state.x);
         }
-        let (law, lame, mut energy) = (self.material.law, self.material.lame(), 0.0);
-        self.space
-            .for_points(&self.state.x, &mut |point| energy += point.weight * law.energy(&point.F, lame));
-        energy
+        self.space.energy(&self.material, &self.state.x)
     }
 
     /// Σ w det F, the present volume [m³].
@@ -80,12 +77,13 @@ impl Body {
     /// Cauchy stress P Fᵀ / det F of every piece [Pa], averaged over the quadrature points of its
     /// element; 0 where it is flat or inverted.
     pub fn cauchy_stresses(&self) -> Vec<Matrix3<f64>> {
-        let (law, lame) = (self.material.law, self.material.lame());
+        let law = self.material.law;
         let mut of_element: Vec<(Matrix3<f64>, f64)> = Vec::new();
         self.space.for_points(&self.state.x, &mut |point| {
             of_element.resize(point.element + 1, (Matrix3::zeros(), 0.0));
             let J = point.F.determinant();
             if J > 1e-9 {
+                let lame = self.space.lame(point.region, &self.material);
                 let stress = law.stress(&point.F, lame) * point.F.transpose() / J;
                 of_element[point.element].0 += point.weight * stress;
             }

@@ -154,10 +154,10 @@ impl LinearlyImplicit {
             energy += 0.5 * inputs.mass[c] * state.v[c].norm_squared();
             loads += (inputs.mass[c] * inputs.gravity + inputs.load[c]).dot(&state.x[c]);
         }
-        let (law, lame) = (self.material.law, self.material.lame());
         inputs.points.for_points(&state.x, &mut |point| {
             if free(point.nodes[0] as usize) {
-                energy += point.weight * law.energy(&point.F, lame);
+                let lame = inputs.points.lame(point.region, &self.material);
+                energy += point.weight * self.material.law.energy(&point.F, lame);
             }
         });
         (energy, loads)
@@ -270,7 +270,7 @@ impl StepSolver for LinearlyImplicit {
     }
 
     fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) {
-        refill(mass, space.copy_volumes().iter().map(|v| density_kg_m3 * v));
+        refill(mass, space.copy_masses(density_kg_m3).into_iter());
     }
 
     fn stiff_motions(&self) -> [usize; 3] {

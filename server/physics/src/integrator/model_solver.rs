@@ -217,7 +217,7 @@ impl StepSolver for ModelSolver {
     }
 
     fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
-        space.follow_model(&mut self.model);
+        space.follow_model(&mut self.model, &self.material);
         self.mass = Mass::new(&self.model, self.material.density_kg_m3, self.settings.mass);
         self.newton.forget_pattern();
         self.newton.set_stiff_modes(space.stiff_modes().map(Arc::new));

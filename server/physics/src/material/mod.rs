@@ -66,6 +66,26 @@ pub struct Material {
     pub law: Law,
 }
 
+/// Elastic constants and density of a region that differs from the rest of its body. Law and damping are those of
+/// the body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Region {
+    /// Young's modulus E [Pa], within [`Material::YOUNG_PA`].
+    pub young_pa: f64,
+    /// Poisson's ratio ν [1], within [`Material::POISSON`].
+    pub poisson: f64,
+    /// Density ρ at rest [kg/m³], within [`Material::DENSITY_KG_M3`].
+    pub density_kg_m3: f64,
+}
+
+impl Region {
+    /// Lamé constants; see [`Material::lame`].
+    pub fn lame(&self) -> Lame {
+        let (E, nu) = (self.young_pa, self.poisson);
+        Lame { mu: E / (2.0 * (1.0 + nu)), lambda: E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
+    }
+}
+
 /// Coefficients of Rayleigh damping D = α M + β K̂. K̂ rotates with the material, so β does not damp rigid
 /// motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -111,8 +131,14 @@ impl Material {
 
     /// Lamé constants: μ = E / (2 (1+ν)), λ = E ν / ((1+ν)(1−2ν)).
     pub fn lame(&self) -> Lame {
-        let (E, nu) = (self.young_pa, self.poisson);
-        Lame { mu: E / (2.0 * (1.0 + nu)), lambda: E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
+        let Self { young_pa, poisson, density_kg_m3, .. } = *self;
+        Region { young_pa, poisson, density_kg_m3 }.lame()
+    }
+
+    /// The material of a region of a body of this material.
+    pub fn of_region(&self, region: &Region) -> Self {
+        let Region { young_pa, poisson, density_kg_m3 } = *region;
+        Self { young_pa, poisson, density_kg_m3, ..*self }
     }
 
     /// Checks that every constant is finite and in its range.

@@ -12,6 +12,7 @@ use nalgebra::Vector3;
 
 use super::build::OctreeSettings;
 use super::lattice::{At, Lattice, LeafMap, OUTSIDE};
+use crate::material::Region;
 
 /// The six directions of links: −x, +x, −y, +y, −z, +z.
 pub const DIRECTIONS: [At; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
@@ -85,6 +86,8 @@ pub struct Octree {
     pub(super) hanging: Vec<u8>,
     /// Lattice point of every vertex.
     pub(super) points: Vec<At>,
+    /// Constants of the materials 1, 2, …; material 0 is the body's own.
+    pub(super) regions: Vec<Region>,
     /// Links that are cut by an incision.
     pub(super) links: HashMap<LinkKey, CutLink>,
 }
@@ -94,8 +97,8 @@ impl Octree {
     pub(super) fn of_leaves(lattice: Lattice, map: LeafMap, cells: Vec<Cell>) -> Self {
         let n = cells.len();
         let (vertices, hanging) = (vec![[OUTSIDE; 8]; n], vec![0; n]);
-        let mut octree =
-            Self { lattice, map, cells, vertices, hanging, points: Vec::new(), links: HashMap::new() };
+        let (points, regions, links) = (Vec::new(), Vec::new(), HashMap::new());
+        let mut octree = Self { lattice, map, cells, vertices, hanging, points, regions, links };
         octree.mark_boundary();
         octree.number_vertices();
         octree
@@ -110,6 +113,16 @@ impl Octree {
                 self.cells[i].cut = (0..6).filter(out).fold(0, |cut, d| cut | 1 << d);
             }
         }
+    }
+
+    /// Gives the cells of material n the constants `regions[n − 1]`.
+    pub fn set_regions(&mut self, regions: Vec<Region>) {
+        self.regions = regions;
+    }
+
+    /// Constants of the materials 1, 2, …; cells of material 0 have those of the body.
+    pub fn regions(&self) -> &[Region] {
+        &self.regions
     }
 
     /// Place and size of the finest cells.

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::cells::Octree;
+use super::cells::{Cell, Octree};
 use super::lattice::{At, OUTSIDE};
 use super::vertices::corner_weights;
 use crate::cut::Components;
 use crate::element::{Point, Points, deformation_gradient, hex8, quadrature};
 use crate::lists::disjoint::{find, join};
+use crate::material::Region;
 
 /// Corners of the faces in the directions −x, +x, −y, +y, −z, +z.
 pub const FACES: [[usize; 4]; 6] =
@@ -26,10 +27,11 @@ impl Octree {
         (f64::from(self.cells[id].side()) * self.lattice.h).powi(3)
     }
 
-    /// Adds an eighth of the volume [m³] of every leaf in `cells` to each of its corners.
-    fn add_volumes(&self, cells: impl Iterator<Item = usize>, out: &mut [f64], factor: f64) {
-        for id in cells {
-            let share = factor * self.cell_volume(id) / 8.0;
+    /// Sum over the leaves of an eighth of their volume [m³] times `factor`, at each of their corners.
+    fn sum_volumes(&self, factor: impl Fn(&Cell) -> f64) -> Vec<f64> {
+        let mut out = vec![0.0; self.n_vertices()];
+        for id in 0..self.cells.len() {
+            let share = factor(&self.cells[id]) * self.cell_volume(id) / 8.0;
             if self.hanging[id] == 0 {
                 self.vertices[id].iter().for_each(|&v| out[v as usize] += share);
                 continue;
@@ -40,13 +42,20 @@ impl Octree {
                 }
             }
         }
+        out
     }
 
     /// ∫ N_a dV of every vertex [m³].
     pub fn vertex_volumes(&self) -> Vec<f64> {
-        let mut volume = vec![0.0; self.n_vertices()];
-        self.add_volumes(0..self.cells.len(), &mut volume, 1.0);
-        volume
+        self.sum_volumes(|_| 1.0)
+    }
+
+    /// Mass of every vertex [kg] in a body of this density.
+    pub fn vertex_masses(&self, density_kg_m3: f64) -> Vec<f64> {
+        self.sum_volumes(|cell| {
+            let region = usize::from(cell.material).checked_sub(1).and_then(|r| self.regions.get(r));
+            region.map_or(density_kg_m3, |region| region.density_kg_m3)
+        })
     }
 
     /// ∫ N_a dA [m²] over the boundary faces all of whose vertices are `selected`, by vertex.
@@ -147,8 +156,12 @@ impl Points for Octree {
                     }
                 }
                 let F: Matrix3<f64> = deformation_gradient(&at, &gradients);
-                visit(Point { element, nodes, gradients: &gradients, weight, F });
+                visit(Point { element, nodes, gradients: &gradients, weight, F, region: cell.material });
             }
         }
+    }
+
+    fn regions(&self) -> &[Region] {
+        &self.regions
     }
 }

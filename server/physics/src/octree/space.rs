@@ -12,7 +12,7 @@ use crate::cut::{
     Surroundings, Work, sweep_triangles,
 };
 use crate::element::{Point, Points};
-use crate::material::Material;
+use crate::material::{Material, Region};
 use crate::mesh::{MeshError, TetMesh};
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
@@ -169,6 +169,10 @@ impl Points for OctreeSpace {
     fn for_points(&self, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
         self.octree.for_points(x, visit);
     }
+
+    fn regions(&self) -> &[Region] {
+        self.octree.regions()
+    }
 }
 
 impl Space for OctreeSpace {
@@ -198,6 +202,10 @@ impl Space for OctreeSpace {
 
     fn copy_volumes(&self) -> &[f64] {
         &self.volumes
+    }
+
+    fn copy_masses(&self, density_kg_m3: f64) -> Vec<f64> {
+        self.octree.vertex_masses(density_kg_m3)
     }
 
     fn areas(&self, selected: &[bool]) -> Vec<f64> {
@@ -259,11 +267,7 @@ impl Space for OctreeSpace {
     fn flaws(&self) -> Flaws {
         let total: f64 = (0..self.octree.cells().len()).map(|id| self.octree.cell_volume(id)).sum();
         let copies: f64 = self.volumes.iter().sum();
-        Flaws {
-            surface: self.surface.n_defects(),
-            volume: (copies / total - 1.0).abs(),
-            ..Flaws::default()
-        }
+        Flaws { surface: self.surface.n_defects(), volume: (copies / total - 1.0).abs(), ..Flaws::default() }
     }
 
     fn epoch(&self) -> u32 {
@@ -356,7 +360,7 @@ impl Space for OctreeSpace {
         Model::octree(&self.octree, material, volumetric)
     }
 
-    fn follow_model(&self, model: &mut Model) {
-        model.fill_octree(&self.octree);
+    fn follow_model(&self, model: &mut Model, material: &Material) {
+        model.fill_octree(&self.octree, material.density_kg_m3);
     }
 }

@@ -78,6 +78,7 @@ impl Element for Hexahedra {
                         gradients: &gradients,
                         weight: w * det,
                         F: deformation_gradient(&hex.map(|n| x[n as usize]), &gradients),
+                        region: 0,
                     });
                 }
             }

@@ -57,6 +57,7 @@ impl Element for LinearTets {
                 gradients: &gradients,
                 weight: piece.fraction * cut.mesh().volume(tet),
                 F: deformation_gradient(&piece.copies.map(|c| x[c as usize]), &gradients),
+                region: 0,
             });
         }
     }

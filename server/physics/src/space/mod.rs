@@ -59,8 +59,13 @@ pub trait Space: Points + Send {
     /// Rest position of every copy and added node [m].
     fn rest_positions(&self) -> Vec<Vector3<f64>>;
 
-    /// ∫ N_a dV of every copy [m³]: times the density, its mass.
+    /// ∫ N_a dV of every copy [m³].
     fn copy_volumes(&self) -> &[f64];
+
+    /// ∫ ρ N_a dV of every copy [kg] in a body of this density; regions may have others.
+    fn copy_masses(&self, density_kg_m3: f64) -> Vec<f64> {
+        self.copy_volumes().iter().map(|v| density_kg_m3 * v).collect()
+    }
 
     /// ∫ N_a dA [m²] over the skin faces all of whose nodes are `selected`, by node of the uncut body.
     fn areas(&self, selected: &[bool]) -> Vec<f64>;
@@ -178,5 +183,5 @@ pub trait Space: Points + Send {
     fn model(&self, material: &Material, volumetric: Volumetric) -> Result<Model, ModelError>;
 
     /// Brings the model of this space up to date after the last cut.
-    fn follow_model(&self, model: &mut Model);
+    fn follow_model(&self, model: &mut Model, material: &Material);
 }

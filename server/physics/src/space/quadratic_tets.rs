@@ -79,6 +79,7 @@ impl Element for QuadraticTets {
                     gradients: &gradients,
                     weight: w * volume,
                     F: deformation_gradient(&tet.map(|n| x[n as usize]), &gradients),
+                    region: 0,
                 });
             }
         }

@@ -274,7 +274,7 @@ impl Space for Tets {
         self.element.model(&self.cut, material, volumetric)
     }
 
-    fn follow_model(&self, model: &mut Model) {
+    fn follow_model(&self, model: &mut Model, _: &Material) {
         model.follow_cut(&self.cut);
     }
 }

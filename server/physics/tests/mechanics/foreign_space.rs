@@ -322,7 +322,7 @@ impl Space for Lattice {
         self.tets.model(material, volumetric)
     }
 
-    fn follow_model(&self, model: &mut Model) {
-        self.tets.follow_model(model);
+    fn follow_model(&self, model: &mut Model, material: &Material) {
+        self.tets.follow_model(model, material);
     }
 }
