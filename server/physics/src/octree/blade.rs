@@ -7,8 +7,6 @@
 //! # Source
 //! Dick, Georgii, Westermann 2011, §4.3.
 
-use std::collections::BTreeMap;
-
 use nalgebra::{Matrix3, Vector3};
 
 use super::cells::{CutLink, LinkKey, Octree};
@@ -27,7 +25,7 @@ struct Search<'a> {
     octree: &'a Octree,
     x: &'a [Vector3<f64>],
     incision: u32,
-    found: BTreeMap<LinkKey, CutLink>,
+    found: Vec<(LinkKey, CutLink)>,
 }
 
 impl Octree {
@@ -38,7 +36,7 @@ impl Octree {
         triangles: &[SweepTriangle],
         incision: u32,
     ) -> Vec<(LinkKey, CutLink)> {
-        let mut search = Search { octree: self, x, incision, found: BTreeMap::new() };
+        let mut search = Search { octree: self, x, incision, found: Vec::new() };
         let all: Vec<&SweepTriangle> = triangles.iter().collect();
         let leaves = self.leaves_near(x, &bounds(triangles.iter().flat_map(|t| [t.low, t.high])));
         for run in leaves.chunks(RUN) {
@@ -53,7 +51,16 @@ impl Octree {
                 search.leaf(id, &near);
             }
         }
-        search.found.into_iter().collect()
+        let mut found = search.found;
+        found.sort_by_key(|(key, _)| *key);
+        found.dedup_by(|next, first| {
+            let same = next.0 == first.0;
+            if same {
+                first.1.join(&next.1);
+            }
+            same
+        });
+        found
     }
 
     /// Leaves that may meet the box between two corners [m] with the vertices at `x` [m], ascending.
@@ -96,7 +103,7 @@ impl Search<'_> {
             return;
         }
         if level == 0 {
-            return self.finest(at, &near);
+            return self.finest(corners, at, &near);
         }
         let half = 1 << (level - 1);
         for child in 0..8 {
@@ -110,25 +117,36 @@ impl Search<'_> {
     }
 
     /// Searches the six halves of links in a finest cell.
-    fn finest(&mut self, at: At, triangles: &[&SweepTriangle]) {
-        let centre = self.position(at, [0.5; 3]);
+    fn finest(&mut self, corners: &Corners, at: At, triangles: &[&SweepTriangle]) {
+        let leaf = self.octree.leaf(at) as usize;
+        let plain = self.octree.cells[leaf].level == 0 && self.octree.hanging[leaf] == 0;
+        let centre = interpolate(corners, [0.5; 3]);
         for d in 0..6 {
             let (axis, up) = (d / 2, d % 2 == 1);
             let beyond = Octree::across(at, d);
-            if self.octree.leaf(beyond) == OUTSIDE {
+            let near = self.octree.leaf(beyond);
+            if near == OUTSIDE {
                 continue;
             }
-            // The lower cell decides where the middle of the face is, so that both halves end in one point.
-            let lower = if up { at } else { beyond };
+            // The lower cell decides where the middle of the face is, so that both halves end in one point. Two
+            // finest cells without hanging corners have the same one, to the bit.
+            let near = near as usize;
+            let same = plain && self.octree.cells[near].level == 0 && self.octree.hanging[near] == 0;
             let mut xi = [0.5; 3];
-            xi[axis] = 1.0;
-            let face = self.position(lower, xi);
+            let lower = if up { at } else { beyond };
+            let face = if same {
+                xi[axis] = f64::from(u8::from(up));
+                interpolate(corners, xi)
+            } else {
+                xi[axis] = 1.0;
+                self.position(lower, xi)
+            };
             for triangle in triangles {
                 let Some(fraction) = crossing(triangle, &centre, &face) else { continue };
                 let along = if up { 0.5 * fraction } else { 1.0 - 0.5 * fraction };
-                let normal = self.rest_normal(at, triangle);
+                let normal = rest_normal(corners, triangle);
                 let cut = CutLink { at: [along; 2], normal: [normal; 2], incision: self.incision };
-                self.found.entry((lower, axis as u8)).and_modify(|known| known.join(&cut)).or_insert(cut);
+                self.found.push(((lower, axis as u8), cut));
             }
         }
     }
@@ -141,19 +159,18 @@ impl Search<'_> {
         let in_leaf = [0, 1, 2].map(|k| (f64::from(at[k] - cell.at[k]) + xi[k]) / side);
         interpolate(&self.octree.corners(id, self.x), in_leaf)
     }
+}
 
-    /// Unit normal at rest of the plane of a triangle in the leaf around the finest cell `at`: ∝ Fᵀ n.
-    fn rest_normal(&self, at: At, triangle: &SweepTriangle) -> Vector3<f64> {
-        let corners = self.octree.corners(self.octree.leaf(at), self.x);
-        let [p, q, r] = triangle.corners;
-        let normal = (q - p).cross(&(r - p));
-        // Columns of F up to a factor: mean edges along the axes.
-        let edge = |k: usize| -> Vector3<f64> {
-            (0..8).map(|c| if c >> k & 1 == 1 { corners[c] } else { -corners[c] }).sum()
-        };
-        let F = Matrix3::from_columns(&[edge(0), edge(1), edge(2)]);
-        (F.transpose() * normal).try_normalize(0.0).unwrap_or_else(|| normal.normalize())
-    }
+/// Unit normal at rest of the plane of a triangle in a cube with these corners: ∝ Fᵀ n.
+fn rest_normal(corners: &Corners, triangle: &SweepTriangle) -> Vector3<f64> {
+    let [p, q, r] = triangle.corners;
+    let normal = (q - p).cross(&(r - p));
+    // Columns of F up to a factor: mean edges along the axes.
+    let edge = |k: usize| -> Vector3<f64> {
+        (0..8).map(|c| if c >> k & 1 == 1 { corners[c] } else { -corners[c] }).sum()
+    };
+    let F = Matrix3::from_columns(&[edge(0), edge(1), edge(2)]);
+    (F.transpose() * normal).try_normalize(0.0).unwrap_or_else(|| normal.normalize())
 }
 
 /// Fraction of the way from `a` to `b` where it crosses the triangle. A point in the plane counts as above it.

@@ -4,8 +4,6 @@
 //! interpolate the leaf they are in, so that displacement and velocity stay the same field, and mass and momentum
 //! stay too. A vertex whose leaves come apart is copied.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use super::build::{child_corner, for_around};
 use super::cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree};
 use super::lattice::{At, OUTSIDE};
@@ -33,22 +31,48 @@ struct Earlier {
     hanging: u8,
 }
 
-/// Leaves as they were before, and what became of those that were divided.
-#[derive(Debug, Default)]
-struct Division {
+/// Leaves as they were before, and what became of them.
+#[derive(Debug)]
+struct History {
     earlier: Vec<Earlier>,
-    /// For every leaf that came of one of them, which one it was part of.
-    part_of: BTreeMap<u32, usize>,
-    /// Leaves that were not divided but may have other vertices now.
-    whole: BTreeMap<u32, Earlier>,
+    /// Per leaf one more than the entry of `earlier` that it was part of; 0 if it is as it was.
+    part_of: Vec<u32>,
+    /// Leaves that have to be told of, in any order.
+    changed: Vec<u32>,
+    /// Per leaf whether it is among `changed`, and which of its corners are done, one bit each.
+    told: Vec<bool>,
+    done: Vec<u8>,
+    divided: usize,
+}
+
+impl History {
+    fn new(n: usize) -> Self {
+        let (part_of, told, done) = (vec![0; n], vec![false; n], vec![0; n]);
+        Self { earlier: Vec::new(), part_of, changed: Vec::new(), told, done, divided: 0 }
+    }
+
+    fn tell(&mut self, id: u32) {
+        if !std::mem::replace(&mut self.told[id as usize], true) {
+            self.changed.push(id);
+        }
+    }
+
+    /// Number of the entry of `earlier` for leaf `id`; `now` is the leaf, should it be as it was.
+    fn keep(&mut self, id: u32, now: Earlier) -> u32 {
+        let part_of = &mut self.part_of[id as usize];
+        if *part_of == 0 {
+            self.earlier.push(now);
+            *part_of = self.earlier.len() as u32;
+        }
+        *part_of
+    }
 }
 
 impl Octree {
     /// Cuts these links; those that lead out of the body stay as they are. A link that was cut before keeps its
     /// incision, and the two cuts nearest to its ends.
     pub fn cut(&mut self, cuts: &[(LinkKey, CutLink)]) -> OctreeChange {
-        let mut division = Division::default();
-        let mut changed = BTreeSet::new();
+        let mut history = History::new(self.cells.len());
         let mut links = 0;
         for &((at, axis), cut) in cuts {
             let mut upper = at;
@@ -56,58 +80,62 @@ impl Octree {
             if self.map.leaf(at) == OUTSIDE || self.map.leaf(upper) == OUTSIDE {
                 continue;
             }
-            for end in [at, upper] {
-                self.divide_down_to(end, &mut division);
-            }
-            let (low, high) = (self.map.leaf(at), self.map.leaf(upper));
+            self.divide_to(at, 0, &mut history);
+            let high = self.divide_to(upper, 0, &mut history);
+            let low = self.map.leaf(at);
             let bit = 2 * axis + 1;
             if self.cells[low as usize].cut >> bit & 1 == 0 {
                 links += 1;
                 self.cells[low as usize].cut |= 1 << bit;
                 self.cells[high as usize].cut |= 1 << (bit - 1);
-                changed.extend([low, high]);
+                history.tell(low);
+                history.tell(high);
             }
             self.links.entry((at, axis)).and_modify(|known| known.join(&cut)).or_insert(cut);
         }
-        self.follow(division, changed, links)
+        self.follow(history, links)
     }
 
     /// Divides leaves until those at `at` have sides of 2^level finest cells at most.
     pub fn refine(&mut self, at: &[At], level: u8) -> OctreeChange {
-        let mut division = Division::default();
+        let mut history = History::new(self.cells.len());
         for &at in at {
-            while self.map.leaf(at) != OUTSIDE && self.cells[self.map.leaf(at) as usize].level > level {
-                self.divide(self.map.leaf(at), &mut division);
+            if self.map.leaf(at) != OUTSIDE {
+                self.divide_to(at, level, &mut history);
             }
         }
-        self.follow(division, BTreeSet::new(), 0)
+        self.follow(history, 0)
     }
 
-    fn divide_down_to(&mut self, at: At, division: &mut Division) {
-        while self.cells[self.map.leaf(at) as usize].level > 0 {
-            self.divide(self.map.leaf(at), division);
+    /// Divides leaves until that at `at` has sides of 2^level at most; returns it.
+    fn divide_to(&mut self, at: At, level: u8, history: &mut History) -> u32 {
+        loop {
+            let leaf = self.map.leaf(at);
+            if self.cells[leaf as usize].level <= level {
+                return leaf;
+            }
+            self.divide(leaf, history);
         }
     }
 
     /// Divides a leaf into eight; its number becomes that of the first. Coarser leaves around it are divided
     /// before, so that 2:1 balance stays.
-    fn divide(&mut self, id: u32, division: &mut Division) {
+    fn divide(&mut self, id: u32, history: &mut History) {
         let cell = self.cells[id as usize];
         let unit = cell.at.map(|x| x >> cell.level);
-        let mut coarser = Vec::new();
-        for_around(unit, |near| coarser.push(near.map(|x| x << cell.level)));
-        for at in coarser {
+        let mut around = [[0; 3]; 27];
+        let mut n = 0;
+        for_around(unit, |near| {
+            around[n] = near.map(|x| x << cell.level);
+            n += 1;
+        });
+        for at in around {
             while self.map.leaf(at) != OUTSIDE && self.cells[self.map.leaf(at) as usize].level > cell.level {
-                self.divide(self.map.leaf(at), division);
+                self.divide(self.map.leaf(at), history);
             }
         }
-        let earlier = match division.part_of.get(&id) {
-            Some(&earlier) => earlier,
-            None => {
-                division.earlier.push(self.now(id));
-                division.earlier.len() - 1
-            }
-        };
+        let earlier = history.keep(id, self.now(id));
+        history.divided += 1;
         for child in 0..8 {
             let at = child_corner(cell.at, cell.level, child);
             let part = Cell { at, level: cell.level - 1, cut: 0, material: cell.material };
@@ -119,102 +147,96 @@ impl Octree {
                 self.cells.push(part);
                 self.vertices.push([OUTSIDE; 8]);
                 self.hanging.push(0);
+                history.part_of.push(earlier);
+                history.told.push(false);
+                history.done.push(0);
                 self.cells.len() as u32 - 1
             };
             self.map.set(part.at, part.level, number);
-            division.part_of.insert(number, earlier);
+            history.tell(number);
         }
     }
 
-    /// Finds the vertices anew around the leaves that were divided and those in `changed`.
-    fn follow(&mut self, mut division: Division, mut changed: BTreeSet<u32>, links: usize) -> OctreeChange {
-        changed.extend(division.part_of.keys());
-        let points: BTreeSet<At> = changed
-            .iter()
-            .flat_map(|&id| (0..8).map(move |c| (id, c)))
-            .map(|(id, c)| self.cells[id as usize].corner(c))
-            .collect();
+    /// Finds the vertices anew around the leaves that were told of.
+    fn follow(&mut self, mut history: History, links: usize) -> OctreeChange {
         let mut new_vertices = Vec::new();
-        let mut to_resolve = changed.clone();
-        for &p in &points {
-            self.follow_point(p, &mut division, &mut new_vertices, &mut to_resolve);
+        // The list grows by leaves around; only the corners of those at first are examined.
+        for k in 0..history.changed.len() {
+            let id = history.changed[k] as usize;
+            for c in 0..8 {
+                if history.done[id] >> c & 1 == 0 {
+                    self.follow_point(self.cells[id].corner(c), &mut history, &mut new_vertices);
+                }
+            }
         }
         // Corners that hang on a coarse leaf follow the vertices of that leaf.
-        let coarse: Vec<Cell> =
-            to_resolve.iter().map(|&id| self.cells[id as usize]).filter(|cell| cell.level > 0).collect();
-        for cell in coarse {
-            self.for_smaller_around(&cell, |id| {
-                to_resolve.insert(id);
-            });
+        for k in 0..history.changed.len() {
+            let cell = self.cells[history.changed[k] as usize];
+            if cell.level > 0 {
+                self.for_smaller_around(&cell, |id| history.tell(id));
+            }
         }
-        for &id in &to_resolve {
-            self.resolve(id as usize);
+        for &id in &history.changed {
+            if self.hanging[id as usize] != 0 {
+                self.resolve(id as usize);
+            }
         }
-        let divided = division.earlier.len();
-        OctreeChange { cells: to_resolve.into_iter().collect(), new_vertices, links, divided }
+        let History { mut changed, divided, .. } = history;
+        changed.sort_unstable();
+        OctreeChange { cells: changed, new_vertices, links, divided }
     }
 
     /// Gives the classes of leaves around lattice point `p` their vertices. The first class keeps a vertex that
     /// several had in common.
-    fn follow_point(
-        &mut self,
-        p: At,
-        division: &mut Division,
-        new_vertices: &mut Vec<MaterialPoint>,
-        touched: &mut BTreeSet<u32>,
-    ) {
+    fn follow_point(&mut self, p: At, history: &mut History, new_vertices: &mut Vec<MaterialPoint>) {
         let octants = self.octants(p);
-        for &id in octants.leaf.iter().filter(|&&leaf| leaf != OUTSIDE) {
-            if !division.part_of.contains_key(&id) {
-                division.whole.entry(id).or_insert_with(|| self.now(id));
+        for (o, &id) in octants.leaf.iter().enumerate().filter(|(_, leaf)| **leaf != OUTSIDE) {
+            history.keep(id, self.now(id));
+            history.tell(id);
+            if self.cells[id as usize].corner(7 - o) == p {
+                history.done[id as usize] |= 1 << (7 - o);
             }
         }
         // What every class was carried by before, found before anything is entered.
-        let mut classes: Vec<(u8, MaterialPoint)> = Vec::with_capacity(8);
+        let mut classes = [(0u8, Carrier::New(MaterialPoint::default())); 8];
+        let mut n = 0;
         for o in (0..8).filter(|&o| octants.class[o] == o as u8 && octants.leaf[o] != OUTSIDE) {
-            if let Some(point) = self.earlier_point(p, &octants, o as u8, division) {
-                classes.push((o as u8, point));
-            }
+            classes[n] = (o as u8, self.earlier_carrier(p, &octants, o as u8, history));
+            n += 1;
         }
-        let mut kept: Vec<u32> = Vec::with_capacity(8);
-        for (class, point) in classes {
-            let known = point.copies().first().copied().filter(|_| point.weights() == [1.0]);
-            let vertex = match known {
-                Some(known) if !kept.contains(&known) => known,
-                _ => self.points.len() as u32,
+        let mut kept = [OUTSIDE; 8];
+        for k in 0..n {
+            let (class, carrier) = classes[k];
+            let next = self.points.len() as u32;
+            let (vertex, point) = match carrier {
+                Carrier::Vertex(known) if !kept.contains(&known) => (known, None),
+                Carrier::Vertex(known) => (next, Some(MaterialPoint::new([(known, 1.0)]))),
+                Carrier::New(point) => (next, Some(point)),
             };
             if self.enter(p, &octants, class, vertex) {
-                if vertex as usize == self.points.len() {
-                    self.points.push(p);
-                    new_vertices.push(point);
-                } else {
-                    kept.push(vertex);
+                match point {
+                    Some(point) => {
+                        self.points.push(p);
+                        new_vertices.push(point);
+                    }
+                    None => kept[k] = vertex,
                 }
             }
         }
-        touched.extend(octants.leaf.iter().filter(|&&leaf| leaf != OUTSIDE));
     }
 
-    /// Point `p` in the material of a class as it was before.
-    fn earlier_point(
-        &self,
-        p: At,
-        octants: &Octants,
-        class: u8,
-        division: &Division,
-    ) -> Option<MaterialPoint> {
-        let mut found: Option<MaterialPoint> = None;
+    /// What carried point `p` in the material of a class before.
+    fn earlier_carrier(&self, p: At, octants: &Octants, class: u8, history: &History) -> Carrier {
+        let mut within = None;
         for o in (0..8).filter(|&o| octants.class[o] == class && octants.leaf[o] != OUTSIDE) {
-            let id = octants.leaf[o];
-            let part = division.part_of.get(&id).map(|&part| division.earlier[part]);
-            let earlier = part.or_else(|| division.whole.get(&id).copied()).unwrap_or_else(|| self.now(id));
-            let point = earlier.carriers(p);
-            if point.copies().len() == 1 {
-                return Some(point);
+            let earlier = &history.earlier[history.part_of[octants.leaf[o] as usize] as usize - 1];
+            let corner = (0..8).find(|&c| earlier.hanging >> c & 1 == 0 && earlier.cell.corner(c) == p);
+            match corner {
+                Some(c) => return Carrier::Vertex(earlier.vertices[c]),
+                None => within = within.or(Some(earlier)),
             }
-            found = found.or(Some(point));
         }
-        found
+        Carrier::New(within.map_or_else(MaterialPoint::default, |earlier| earlier.carriers(p)))
     }
 
     fn now(&self, id: u32) -> Earlier {
@@ -250,12 +272,18 @@ impl Octree {
     }
 }
 
+/// What carries a lattice point.
+#[derive(Clone, Copy, Debug)]
+enum Carrier {
+    /// A vertex of its own.
+    Vertex(u32),
+    /// The vertices of a leaf that it lies within.
+    New(MaterialPoint),
+}
+
 impl Earlier {
     /// The carriers of lattice point `p`, which is in the cell or on its border.
     fn carriers(&self, p: At) -> MaterialPoint {
-        if let Some(c) = (0..8).find(|&c| self.hanging >> c & 1 == 0 && self.cell.corner(c) == p) {
-            return MaterialPoint::new([(self.vertices[c], 1.0)]);
-        }
         let side = f64::from(self.cell.side());
         self.at([0, 1, 2].map(|k| f64::from(p[k] - self.cell.at[k]) / side))
     }

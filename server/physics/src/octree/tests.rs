@@ -427,3 +427,53 @@ fn volumes_areas_and_quadrature_points_fill_the_body() {
         assert!(octree.locate(&Vector3::repeat(1.3)).is_none());
     }
 }
+
+#[test]
+#[ignore]
+fn timing() {
+    use std::time::Instant;
+    let t = Instant::now();
+    let mut octree = cube(80, 4);
+    eprintln!("fill {:?}", t.elapsed());
+    let x = octree.rest_positions();
+    let mut tri = Vec::new();
+    for p in [7, 13, 21, 27, 33, 41, 47, 53, 61, 67, 73] {
+        let s = f64::from(p) / 80.0;
+        for a in 0..2 {
+            let q = |z: f64, o: f64| if a == 0 { Vector3::new(s, o, z) } else { Vector3::new(o, s, z) };
+            tri.extend(swept([q(-0.1, -0.1), q(-0.1, 1.1)], [q(0.5, -0.1), q(0.5, 1.1)]));
+        }
+    }
+    let t = Instant::now();
+    let cuts = octree.crossed_links(&x, &tri, 1);
+    eprintln!("search {:?} {}", t.elapsed(), cuts.len());
+    let t = Instant::now();
+    let change = octree.cut(&cuts);
+    eprintln!(
+        "cut {:?} cells {} vertices {} changed {}",
+        t.elapsed(),
+        octree.cells().len(),
+        octree.n_vertices(),
+        change.cells.len()
+    );
+    let t = Instant::now();
+    let v = octree.vertex_volumes();
+    eprintln!("volumes {:?} {}", t.elapsed(), v.len());
+    let x = octree.rest_positions();
+    let t = Instant::now();
+    let small = octree.crossed_links(
+        &x,
+        &swept(
+            [Vector3::new(0.31, 0.31, 0.8), Vector3::new(0.31, 0.35, 0.8)],
+            [Vector3::new(0.33, 0.31, 0.8), Vector3::new(0.33, 0.35, 0.8)],
+        ),
+        2,
+    );
+    eprintln!("small search {:?} {}", t.elapsed(), small.len());
+    let t = Instant::now();
+    let change = octree.cut(&small);
+    eprintln!("small cut {:?} changed {}", t.elapsed(), change.cells.len());
+    let t = Instant::now();
+    let parts = octree.components();
+    eprintln!("components {:?} {}", t.elapsed(), parts.len());
+}
