@@ -5,8 +5,8 @@
 
 use nalgebra::Vector3;
 
-use super::cells::{Cell, Octree, OctreeError};
-use super::lattice::{At, Lattice, LeafMap};
+use super::cells::{Cell, CutLink, Octree, OctreeError};
+use super::lattice::{At, Lattice, LeafMap, OUTSIDE};
 use super::shape::Shape;
 
 /// Largest number of finest cells of the lattice.
@@ -125,7 +125,26 @@ impl Octree {
                 }
             }
         }
-        Self::of_cells(lattice, &inside, &|at| material(&lattice.centre(at)))
+        let mut octree = Self::of_cells(lattice, &inside, &|at| material(&lattice.centre(at)))?;
+        octree.cross_boundary(shape);
+        Ok(octree)
+    }
+
+    /// Finds where the links that lead out of the body meet the boundary of `shape`.
+    fn cross_boundary(&mut self, shape: &dyn Shape) {
+        for cell in self.cells.iter().filter(|cell| cell.cut != 0) {
+            for (d, outer) in neighbours(cell.at).into_iter().enumerate() {
+                if cell.cut >> d & 1 == 0 || self.map.leaf(outer) != OUTSIDE {
+                    continue;
+                }
+                let [a, b] = [cell.at, outer].map(|at| self.lattice.centre(at));
+                let Some((fraction, normal)) = shape.crossing(&a, &b) else { continue };
+                let up = d % 2 == 1;
+                let (lower, along) = if up { (cell.at, fraction) } else { (outer, 1.0 - fraction) };
+                let cut = CutLink { at: [along; 2], normal: [normal; 2], incision: 0 };
+                self.boundary.insert((lower, (d / 2) as u8), cut);
+            }
+        }
     }
 
     /// The octree whose finest cells are those `inside`; `material` gives the number of their material.

@@ -90,6 +90,8 @@ pub struct Octree {
     pub(super) regions: Vec<Region>,
     /// Links that are cut by an incision.
     pub(super) links: HashMap<LinkKey, CutLink>,
+    /// Where links that lead out of the body meet its boundary; halfway if nothing is known.
+    pub(super) boundary: HashMap<LinkKey, CutLink>,
 }
 
 impl Octree {
@@ -97,8 +99,9 @@ impl Octree {
     pub(super) fn of_leaves(lattice: Lattice, map: LeafMap, cells: Vec<Cell>) -> Self {
         let n = cells.len();
         let (vertices, hanging) = (vec![[OUTSIDE; 8]; n], vec![0; n]);
-        let (points, regions, links) = (Vec::new(), Vec::new(), HashMap::new());
-        let mut octree = Self { lattice, map, cells, vertices, hanging, points, regions, links };
+        let (points, regions) = (Vec::new(), Vec::new());
+        let (links, boundary) = (HashMap::new(), HashMap::new());
+        let mut octree = Self { lattice, map, cells, vertices, hanging, points, regions, links, boundary };
         octree.mark_boundary();
         octree.number_vertices();
         octree
@@ -204,7 +207,7 @@ impl Octree {
         self.map.bytes()
             + self.cells.len() * (size_of::<Cell>() + 33)
             + self.points.len() * size_of::<At>()
-            + self.links.len() * (size_of::<LinkKey>() + size_of::<CutLink>())
+            + (self.links.len() + self.boundary.len()) * (size_of::<LinkKey>() + size_of::<CutLink>())
     }
 }
 

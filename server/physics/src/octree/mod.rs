@@ -11,6 +11,7 @@ mod lattice;
 mod measures;
 mod shape;
 mod space;
+mod surface;
 mod vertices;
 
 pub use build::{Bits, OctreeSettings};
@@ -19,6 +20,7 @@ pub use change::OctreeChange;
 pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
 pub use shape::{BoxShape, Shape};
 pub use space::OctreeSpace;
+pub use surface::OctreeSurface;
 pub use vertices::{Octants, corner_weights};
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::cells::{CutLink, LinkKey, Octree};
+use super::surface::OctreeSurface;
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Piece, Solid, Surface,
@@ -36,7 +37,7 @@ pub struct OctreeSpace {
     /// Leaves that the last cut changed.
     changed: Vec<u32>,
     fronts: BTreeMap<u32, Front>,
-    surface: Surface,
+    surface: OctreeSurface,
     epoch: u32,
     under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
     /// An octree has no tetrahedra.
@@ -54,7 +55,7 @@ impl OctreeSpace {
             volumes: Vec::new(),
             changed: Vec::new(),
             fronts: BTreeMap::new(),
-            surface: Surface::default(),
+            surface: OctreeSurface::default(),
             epoch: 0,
             under_way: None,
             no_tets: TetMesh::default(),
@@ -70,7 +71,7 @@ impl OctreeSpace {
 
     fn renew(&mut self) {
         self.volumes = self.octree.vertex_volumes();
-        self.surface = Surface::default();
+        self.surface = OctreeSurface::build(&self.octree);
     }
 
     /// Remembers the last position of the blade by the material around it.
@@ -153,7 +154,9 @@ impl OctreeSpace {
         self.changed = change.cells;
         if change.links > 0 || change.divided > 0 {
             self.epoch += 1;
-            self.renew();
+            self.volumes = self.octree.vertex_volumes();
+            let links: Vec<LinkKey> = cuts.iter().map(|(link, _)| *link).collect();
+            self.surface.follow(&self.octree, &self.changed, &links);
         }
         CutReport {
             new_copies,
@@ -267,7 +270,11 @@ impl Space for OctreeSpace {
     fn flaws(&self) -> Flaws {
         let total: f64 = (0..self.octree.cells().len()).map(|id| self.octree.cell_volume(id)).sum();
         let copies: f64 = self.volumes.iter().sum();
-        Flaws { surface: self.surface.n_defects(), volume: (copies / total - 1.0).abs(), ..Flaws::default() }
+        Flaws {
+            surface: self.surface.surface().n_defects(),
+            volume: (copies / total - 1.0).abs(),
+            ..Flaws::default()
+        }
     }
 
     fn epoch(&self) -> u32 {
@@ -279,11 +286,11 @@ impl Space for OctreeSpace {
     }
 
     fn surface(&self) -> &Surface {
-        &self.surface
+        self.surface.surface()
     }
 
     fn element_surface(&self) -> &Surface {
-        &self.surface
+        self.surface.surface()
     }
 
     fn incision_marks(&self) -> Vec<IncisionMark> {
