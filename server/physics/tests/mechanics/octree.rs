@@ -175,3 +175,24 @@ fn materials_in_series_share_the_stress() {
         assert!((body.elastic_energy() / energy - 1.0).abs() < 1e-9);
     }
 }
+
+#[test]
+fn the_surface_follows_cuts_and_a_reset_and_encloses_the_volume() {
+    let mut body = body(unit_cube(8, 2), Material { law: Law::Corotational, ..LINEAR }, BodySettings::default());
+    let whole = body.surface().clone();
+    assert!((whole.volume(body.positions()) - 1.0).abs() < 1e-9);
+    let epoch = body.epoch();
+    for (incision, z) in [(1, 0.31), (2, 0.72)] {
+        let edge = |x: f64| [Vector3::new(x, -0.2, z), Vector3::new(x, 0.8, z + 0.1)];
+        body.cut(&BladeSweep { segments: vec![edge(-0.1), edge(0.6)] }, incision).unwrap();
+        assert_eq!(body.surface().n_defects(), 0);
+        assert!(body.surface().tags.contains(&incision));
+        assert!(body.opened_area(incision) > 0.3);
+    }
+    assert!(body.epoch() > epoch);
+    assert!((body.surface().volume(body.positions()) - 1.0).abs() < 1e-2);
+    body.step(0.01, FALL, &[]);
+    assert_eq!(body.flaws().surface, 0);
+    body.reset().unwrap();
+    assert_eq!(*body.surface(), whole);
+}
