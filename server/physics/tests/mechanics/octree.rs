@@ -178,7 +178,8 @@ fn materials_in_series_share_the_stress() {
 
 #[test]
 fn the_surface_follows_cuts_and_a_reset_and_encloses_the_volume() {
-    let mut body = body(unit_cube(8, 2), Material { law: Law::Corotational, ..LINEAR }, BodySettings::default());
+    let mut body =
+        body(unit_cube(8, 2), Material { law: Law::Corotational, ..LINEAR }, BodySettings::default());
     let whole = body.surface().clone();
     assert!((whole.volume(body.positions()) - 1.0).abs() < 1e-9);
     let epoch = body.epoch();

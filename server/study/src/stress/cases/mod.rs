@@ -2,6 +2,7 @@
 
 mod flaws;
 mod branches;
+mod cells;
 mod critical_step;
 mod falling;
 mod far;
@@ -52,4 +53,8 @@ pub const ALL: &[Case] = &[
     later::OVERLOAD,
     far::CASE,
     critical_step::CASE,
+    cells::ALIGNED,
+    cells::BRANCHES,
+    cells::FALLING,
+    cells::GROWTH,
 ];
