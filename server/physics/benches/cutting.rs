@@ -282,7 +282,7 @@ fn enriched_elements(mesh: &TetMesh, repeats: usize) {
         let mut same = body_of_pieces(&cut, law);
         assert!([&mut plain, &mut cut, &mut same].into_iter().all(|b| b.set_operator(choice)));
         let mut pieces = vec![0u32; mesh.tets.len()];
-        cut.pieces().iter().for_each(|piece| pieces[piece.element as usize] += 1);
+        cut.tets().unwrap().pieces().iter().for_each(|piece| pieces[piece.element as usize] += 1);
         let enriched = pieces.iter().filter(|&&n| n > 1).count();
         let share = enriched as f64 / mesh.tets.len() as f64;
         // Two bodies at a time: a third would push the others out of the cache.
@@ -331,7 +331,7 @@ fn hundred_cuts(mesh: &TetMesh, repeats: usize) {
             }
             let growth = |n: fn(&Body) -> usize| n(&cut) as f64 / n(&plain) as f64;
             let copies = growth(|b| b.n_copies());
-            let pieces = growth(|b| b.pieces().len());
+            let pieces = growth(|b| b.n_pieces());
             let lanes = growth(lanes);
             let times = steps(&mut [&mut plain, &mut cut], repeats);
             let slower = [0, 1].map(|i| times[1][i] / times[0][i]);
@@ -349,7 +349,7 @@ fn hundred_cuts(mesh: &TetMesh, repeats: usize) {
 /// group.
 fn lanes(body: &Body) -> usize {
     let mut groups: Vec<(u32, [u32; 4])> =
-        body.pieces().iter().map(|piece| (piece.element, piece.copies)).collect();
+        body.tets().unwrap().pieces().iter().map(|piece| (piece.element, piece.copies)).collect();
     groups.sort_unstable();
     groups.dedup();
     groups.len()
@@ -365,7 +365,7 @@ fn body_of_pieces(cut: &Body, law: Law) -> Body {
     let mut number = vec![0; x.len()];
     (0u32..).zip(&order).for_each(|(n, &c)| number[c as usize] = n);
     let nodes = order.iter().map(|&c| x[c as usize]).collect();
-    let mut pieces: Vec<_> = cut.pieces().to_vec();
+    let mut pieces: Vec<_> = cut.tets().unwrap().pieces().to_vec();
     pieces.sort_by_key(|piece| piece.element);
     let tets = pieces.iter().map(|piece| piece.copies.map(|c| number[c as usize])).collect();
     body(&TetMesh { nodes, tets }, law)

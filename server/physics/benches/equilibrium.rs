@@ -56,7 +56,7 @@ fn ratio(cells: [usize; 3], settings: BodySettings, rounds: usize) {
             work[k] = body.step(1.0, ACROSS, &[]);
             best[k] = best[k].min(start.elapsed().as_secs_f64());
             assert_eq!(work[k].stop, StopReason::Converged, "{law:?}: {:?}", work[k]);
-            tets = body.pieces().len();
+            tets = body.n_pieces();
         }
     }
     let arithmetic = settings.arithmetic(Law::StVenantKirchhoff);

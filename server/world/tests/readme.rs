@@ -27,7 +27,7 @@ fn the_scene_of_the_readme_converges_and_its_cut_opens() {
         let body = &sim.bodies()[0].body;
         assert!(body.surface().tags.contains(&1), "the cut opens");
         assert!(body.parts().free.iter().all(|free| !free), "nothing falls off");
-        let [low, high] = body.mesh().bounds();
+        let [low, high] = body.bounds();
         let moved = body.positions().iter().zip(body.rest_positions()).map(|(x, rest)| (x - rest).norm());
         let most = moved.fold(0.0, f64::max) / (high - low).max();
         assert!((0.005..0.2).contains(&most), "it moves by {most} of its length");

@@ -69,7 +69,7 @@ fn the_skin_lies_on_the_organ_and_is_cut_with_it() {
     let elements = sim.bodies()[0].rest_volume_m3;
     // Twice as close to the organ as the elements are, at least.
     assert!((skin - exact).abs() < 0.5 * (elements - exact).abs(), "{skin} {elements} {exact}");
-    let faces = sim.bodies()[0].body.mesh().boundary_faces().len();
+    let faces = sim.bodies()[0].body.tets().unwrap().mesh().boundary_faces().len();
     assert_eq!(uncut.bodies[0].topology.triangles.len(), 16 * faces);
     for _ in 0..4 {
         sim.step(&Inputs::default());

@@ -194,7 +194,7 @@ fn iteration_work(elastic: &Elastic, n: usize) -> (f64, usize, f64) {
 
 /// Times whole steps.
 fn steps(name: &str, mut body: Body, threads: usize, target: &'static str) -> Line {
-    let (tets, n) = (body.pieces().len(), body.positions().len());
+    let (tets, n) = (body.n_pieces(), body.positions().len());
     let mut elastic = updated(&body, OperatorChoice::Auto, &mut Team::new(1).unwrap());
     elastic.set_choice(OperatorChoice::Auto);
     let (bytes, working_set, flops) = iteration_work(&elastic, n);
@@ -220,9 +220,9 @@ fn steps(name: &str, mut body: Body, threads: usize, target: &'static str) -> Li
 }
 
 fn updated(body: &Body, choice: OperatorChoice, team: &mut Team) -> Elastic {
-    let (mesh, material) = (body.mesh(), body.material());
+    let (mesh, material) = (body.tets().unwrap().mesh(), body.material());
     let n = body.n_copies();
-    let mut elastic = Elastic::new(Simd::detect(), mesh, body.pieces(), n);
+    let mut elastic = Elastic::new(Simd::detect(), mesh, body.tets().unwrap().pieces(), n);
     elastic.set_choice(choice);
     let with = ElasticUpdate { lame: material.lame(), law: material.law, scale: 1.0 };
     let (mut f, mut blocks) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);
@@ -254,7 +254,7 @@ fn static_cube(threads: usize) -> Line {
     pcg.resize(n);
     let mass: Vec<f32> = body.masses().iter().map(|&m| m as f32).collect();
     let settings = PcgSettings { iterations: ITERATIONS, tolerance: 0.0 };
-    let name = format!("iteration of CG, cube ({} tets)", body.pieces().len());
+    let name = format!("iteration of CG, cube ({} tets)", body.n_pieces());
     let run = move || {
         let mut x = vec![[0.0; 4]; n];
         for (r, m) in pcg.r.iter_mut().zip(&mass) {
@@ -294,7 +294,7 @@ fn applications(
     target: &'static str,
 ) -> Line {
     let body = Body::new(mesh, SOFT, BodySettings::default()).unwrap();
-    let (pieces, n) = (body.pieces().len(), body.positions().len());
+    let (pieces, n) = (body.n_pieces(), body.positions().len());
     let mut team = Team::new(threads).unwrap();
     let mut elastic = updated(&body, choice, &mut team);
     let (bytes, _, flops) = iteration_work(&elastic, n);
@@ -315,7 +315,7 @@ fn applications(
 /// Times an update: rotations, forces, gradients and diagonal blocks.
 fn updates(mesh: TetMesh, choice: OperatorChoice) -> Line {
     let body = Body::new(mesh, SOFT, BodySettings::default()).unwrap();
-    let (pieces, n) = (body.pieces().len(), body.positions().len());
+    let (pieces, n) = (body.n_pieces(), body.positions().len());
     let mut team = Team::new(1).unwrap();
     let mut elastic = updated(&body, choice, &mut team);
     let with = ElasticUpdate { lame: SOFT.lame(), law: SOFT.law, scale: 1.0 };

@@ -25,6 +25,16 @@ pub enum ElementKind {
 }
 
 impl ElementKind {
+    /// Its name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            ElementKind::Tet4 => "element tet4",
+            ElementKind::Tet10 => "element tet10",
+            ElementKind::Hex8 => "element hex8",
+            ElementKind::Octree => "element octree",
+        }
+    }
+
     /// Nodes per element.
     pub fn nodes(self) -> usize {
         match self {

@@ -3,9 +3,8 @@
 use nalgebra::Vector3;
 
 use super::snapping::FaceCut;
-use super::{Body, BodyError, element_name};
-use crate::assembly::ElementKind;
-use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Piece, Work, swept_area};
+use super::{Body, BodyError};
+use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Work};
 use crate::integrator::LooseParts;
 use crate::lists::reserve::{refill, resize_reserving};
 
@@ -30,7 +29,7 @@ impl Body {
             return Ok(self.space.begin_cut(&self.state.x, blade, incision)?);
         }
         blade.check()?;
-        let n_elements = self.space.mesh().tets.len();
+        let n_elements = self.space.n_elements();
         let (found, limit) = (blade.segments.len() * n_elements, MAX_SNAP_PAIRS);
         if found > limit {
             let segments = (limit / n_elements.max(1)).max(2);
@@ -47,7 +46,7 @@ impl Body {
     /// As [`cut`](Self::cut).
     pub fn go_on_cutting(&mut self, work: &mut Work) -> Result<Option<CutReport>, BodyError> {
         if let Some(FaceCut { blade, incision }) = self.under_way.take() {
-            work.book(blade.segments.len() * self.space.mesh().tets.len() / SNAP_PAIRS_PER_FRAGMENT);
+            work.book(blade.segments.len() * self.space.n_elements() / SNAP_PAIRS_PER_FRAGMENT);
             return self.snap_cut(&blade, incision).map(Some);
         }
         let report = self.space.go_on_cutting(work);
@@ -63,9 +62,9 @@ impl Body {
     }
 
     fn may_be_cut(&self) -> Result<(), BodyError> {
-        if !matches!(self.space.kind(), ElementKind::Tet4 | ElementKind::Octree) {
-            let with = element_name(&*self.space);
-            return Err(BodyError::Combination { what: "a cut", with, instead: "tet4" });
+        if !self.space.can_be_cut() {
+            let with = self.space.name();
+            return Err(BodyError::Combination { what: "a cut", with, instead: "tet4 or octree" });
         }
         if self.is_being_cut() {
             return Err(CutError::UnderWay.into());
@@ -98,11 +97,7 @@ impl Body {
 
     /// Area [m²] of the sweep inside the body at its present positions; parts that are already cut count too.
     pub fn swept_area(&self, blade: &BladeSweep) -> f64 {
-        let mut seen = vec![false; self.space.mesh().tets.len()];
-        let first_of_element = |p: &&Piece| !std::mem::replace(&mut seen[p.element as usize], true);
-        let pieces = self.space.pieces().iter().filter(first_of_element);
-        let tets: Vec<[u32; 4]> = pieces.map(|piece| piece.copies).collect();
-        swept_area(&tets, &self.state.x, blade)
+        self.space.swept_area(&self.state.x, blade)
     }
 
     /// Area [m²] at rest of the cut that an incision has opened, counting one of its two lips.
@@ -166,7 +161,7 @@ impl Body {
 
     /// Applies [`Ablation::piece_masses`](super::Ablation): the copies of a node get equal masses.
     fn share_masses_evenly(&mut self) {
-        let mut sum = vec![(0.0, 0.0); self.space.mesh().nodes.len()];
+        let mut sum = vec![(0.0, 0.0); self.space.n_nodes()];
         for (&node, m) in self.space.node_of_copy().iter().zip(&self.mass) {
             let (mass, copies) = &mut sum[node as usize];
             (*mass, *copies) = (*mass + m, *copies + 1.0);

@@ -3,7 +3,6 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Body;
-use crate::assembly::ElementKind;
 use crate::estimate::{CutTets, MeshError, StressRecovery};
 
 /// Counts of elements so flat that one of their motions is far stiffer than the others.
@@ -74,8 +73,9 @@ impl Body {
         least
     }
 
-    /// Cauchy stress P Fᵀ / det F of every piece [Pa], averaged over the quadrature points of its
-    /// element; 0 where it is flat or inverted.
+    /// Cauchy stress P Fᵀ / det F of every element [Pa], averaged over its quadrature points; 0 where it is
+    /// flat or inverted. Pieces of linear tetrahedra are elements of their own;
+    /// [`solid`](Self::solid) and [`for_pieces`](Self::for_pieces) tell the element of every part.
     pub fn cauchy_stresses(&self) -> Vec<Matrix3<f64>> {
         let law = self.material.law;
         let mut of_element: Vec<(Matrix3<f64>, f64)> = Vec::new();
@@ -89,18 +89,14 @@ impl Body {
             }
             of_element[point.element].1 += point.weight;
         });
-        let mean = |p: usize| {
-            let (sum, weight) = of_element[self.space.element_of(p)];
-            sum / weight
-        };
-        (0..self.space.pieces().len()).map(mean).collect()
+        of_element.into_iter().map(|(sum, weight)| sum / weight).collect()
     }
 
     /// Estimates the discretisation error of linear tetrahedra, cut or not; `None` for other elements.
     pub fn mesh_error(&self, recovery: &mut StressRecovery) -> Option<MeshError> {
-        let tets = CutTets::new(self.mesh(), self.pieces(), self.n_copies());
-        let (law, lame) = (self.material.law, self.material.lame());
-        (self.space.kind() == ElementKind::Tet4).then(|| recovery.estimate(&tets, &self.state.x, law, lame))
+        let tets = self.space.tets().filter(|tets| tets.is_linear())?;
+        let tets = CutTets::new(tets.mesh(), tets.pieces(), self.n_copies());
+        Some(recovery.estimate(&tets, &self.state.x, self.material.law, self.material.lame()))
     }
 
     /// Internal force on every node [N]; it pulls the body back, so it is subtracted from the loads.

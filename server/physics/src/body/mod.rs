@@ -173,15 +173,15 @@ impl Body {
         // Single precision is a default, so it yields where flat elements would turn forces into noise.
         if settings.arithmetic.is_none()
             && settings.arithmetic(material.law) == Arithmetic::Single
-            && too_flat_for_single(space.mesh())
+            && space.tets().is_some_and(|tets| too_flat_for_single(tets.mesh()))
         {
             settings.arithmetic = Some(Arithmetic::Mixed);
         }
         let solver = step_solver(&*space, &material, &settings)?;
         let dynamics = Dynamics::new(settings.scheme, material.law, solver)?;
-        let snap = settings.cutting == CuttingMethod::Snap;
+        let snap = space.tets().filter(|_| settings.cutting == CuttingMethod::Snap);
         let mut body = Self {
-            snap: snap.then(|| Box::new(SnapState::new(space.mesh()))),
+            snap: snap.map(|tets| Box::new(SnapState::new(tets.mesh()))),
             rest: Vec::new(),
             state: State::default(),
             boundary: Boundary::default(),
@@ -288,12 +288,6 @@ impl Body {
         &self.rest
     }
 
-    /// Nodes and shape functions (Σ = 1) of the point with barycentric coordinates `weights` in tet `tet`
-    /// of the mesh, whose piece is on `copies`.
-    pub fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
-        self.space.carriers(tet, copies, weights)
-    }
-
     /// Position of every node [m], in the order of [`rest_positions`](Self::rest_positions).
     pub fn positions(&self) -> &[Vector3<f64>] {
         &self.state.x
@@ -319,10 +313,10 @@ impl Body {
             let with = "cutting along element faces";
             return Err(BodyError::Combination { what: "a skin", with, instead: "cutting method xfem" });
         }
-        if self.space.kind() == ElementKind::Tet4 {
+        if self.space.can_carry_skin() {
             return Ok(self.space.put_on_skin(settings, shape)?);
         }
-        Err(BodyError::Combination { what: "a skin", with: element_name(&*self.space), instead: "tet4" })
+        Err(BodyError::Combination { what: "a skin", with: self.space.name(), instead: "tet4" })
     }
 
     /// The skin, if the body has one.
@@ -394,7 +388,7 @@ impl Body {
     pub fn set_operator(&mut self, choice: OperatorChoice) -> bool {
         let Some(stiffness) = self.dynamics.stiffness_mut() else { return false };
         self.settings.operator = choice;
-        stiffness.set_choice(self.settings.operator(self.material.law, self.space.pieces().len()));
+        stiffness.set_choice(self.settings.operator(self.material.law, self.space.n_pieces()));
         true
     }
 
@@ -460,13 +454,8 @@ fn step_solver(
         let dynamics = settings.dynamics(law);
         return Ok(Box::new(ModelSolver::of_space(space, *material, settings.volumetric, dynamics)?));
     };
-    stiffness.set_choice(settings.operator(law, space.pieces().len()));
+    stiffness.set_choice(settings.operator(law, space.n_pieces()));
     let (solver, at_start) = (settings.step_solver(law), settings.ablation.predictor);
     let stiffness = (stiffness, settings.portable);
     Ok(Box::new(LinearlyImplicit::new((scheme, *material), solver, stiffness, at_start)))
-}
-
-/// The element of a body that can be neither cut nor given a skin.
-fn element_name(space: &dyn Space) -> &'static str {
-    if space.kind() == ElementKind::Tet10 { "element tet10" } else { "element hex8" }
 }

@@ -173,7 +173,8 @@ impl Body {
         let (epoch, boundary) = (self.space.epoch() + 1, &self.boundary);
         let data = |n: u32, node: &mut SnapNode| boundary.onto_node(n, node);
         let nodes = Nodes { rest: &self.rest, x: &self.state.x, v: &self.state.v, data: &data };
-        let (report, mut cut) = self.space.cut_along_faces(snapper, nodes, blade, incision)?;
+        let Some(tets) = self.space.tets_mut() else { return Ok((SnapReport::default(), None)) };
+        let (report, mut cut) = tets.cut_along_faces(snapper, nodes, blade, incision)?;
         if let Some(cut) = &mut cut {
             let mut cut_mesh = CutMesh::with_lips(std::mem::take(&mut cut.mesh), snapper.tags(), epoch)?;
             let x: Vec<Vector3<f64>> = cut.nodes.iter().map(|node| node.x).collect();
@@ -185,7 +186,7 @@ impl Body {
 
     /// Holds every part that is held nowhere at its largest skin face, in its present position.
     fn pin_loose_parts(&mut self) -> Result<(), BodyError> {
-        let mesh = self.space.mesh();
+        let Some(mesh) = self.space.tets().map(Tets::mesh) else { return Ok(()) };
         let mut largest: Vec<Option<(f64, [u32; 3])>> = vec![None; self.parts.len()];
         for face in mesh.boundary_faces() {
             let area = mesh.face_area(&face);

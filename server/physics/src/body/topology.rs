@@ -1,4 +1,4 @@
-//! Queries of a body's discretisation: elements, pieces, copies, parts, rest positions.
+//! Queries of a body's discretisation: elements, material points, copies, parts, rest positions.
 //!
 //! Nothing outside this crate reads the state of the cuts itself, so that any [`Space`](crate::space::Space)
 //! can answer the same queries.
@@ -6,9 +6,8 @@
 use nalgebra::Vector3;
 
 use super::Body;
-use crate::assembly::ElementKind;
-use crate::cut::{Components, Flaws, Piece, Solid};
-use crate::mesh::TetMesh;
+use crate::cut::{Components, Flaws, Solid, Surface};
+use crate::space::{RestPoint, Tets};
 
 impl Body {
     /// Topology epoch; rises with every cut that changes the surface and with every reset.
@@ -16,15 +15,20 @@ impl Body {
         self.space.epoch()
     }
 
-    /// The tetrahedra at rest that are cut and drawn: the elements, or six tets for every hexahedron.
-    /// Only cuts along faces change them.
-    pub fn mesh(&self) -> &TetMesh {
-        self.space.mesh()
+    /// The tetrahedra with their mesh and pieces, if the body consists of them.
+    pub fn tets(&self) -> Option<&Tets> {
+        self.space.tets()
     }
 
     /// Box around the body at rest, lower and upper corner [m].
     pub fn bounds(&self) -> [Vector3<f64>; 2] {
-        self.space.mesh().bounds()
+        self.space.bounds()
+    }
+
+    /// Side of a typical element at rest [m]: of the finest cells, or of a cube that consists of six
+    /// tetrahedra of mean volume.
+    pub fn element_size(&self) -> f64 {
+        self.space.element_size()
     }
 
     /// Volume at rest [m³].
@@ -39,10 +43,7 @@ impl Body {
 
     /// Number of pieces that cuts made of the elements; that of the elements in a body that cannot be cut.
     pub fn n_pieces(&self) -> usize {
-        match self.space.kind() {
-            ElementKind::Tet4 => self.space.pieces().len(),
-            _ => self.n_elements(),
-        }
+        self.space.n_pieces()
     }
 
     /// Number of nodes of the uncut body, including those that quadratic elements add.
@@ -61,19 +62,36 @@ impl Body {
         self.space.node_of_copy()
     }
 
-    /// Material pieces of the tetrahedra of [`mesh`](Self::mesh). Ids are stable; cuts append.
-    pub fn pieces(&self) -> &[Piece] {
-        self.space.pieces()
+    /// Calls `visit` for every part that fills the volume without overlap and moves with its own copies: its
+    /// entry in [`cauchy_stresses`](Self::cauchy_stresses), its copies, and ∫ N_a dV [m³] over it for each of
+    /// them.
+    pub fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+        self.space.for_pieces(visit);
     }
 
-    /// ∫ N_a dV [m³] over piece `p`, for its four copies.
-    pub fn piece_volumes(&self, p: usize) -> [f64; 4] {
-        self.space.piece_volumes(p)
+    /// Finds a material point by its rest position [m]. If it lies on a cut or between elements, `side` points
+    /// to the side that it belongs to. `None` outside the body.
+    pub fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint> {
+        self.space.locate(point, side)
     }
 
-    /// The piece of tetrahedron `tet` that holds the point with these barycentric coordinates.
-    pub fn piece_at(&self, tet: u32, barycentric: [f64; 4]) -> u32 {
-        self.space.piece_at(tet, barycentric)
+    /// Nodes and shape functions (Σ = 1) that carry a material point now. If cuts have replaced the mesh since
+    /// it was located, its element is found again.
+    pub fn carriers(&self, point: &mut RestPoint) -> Vec<(u32, f64)> {
+        if let (Some(_), Some(tets)) = (&self.snap, self.space.tets()) {
+            *point = tets.locate_again(point);
+        }
+        self.space.carriers(point)
+    }
+
+    /// The boundary of the elements and the lips of cuts, whatever skin is shown.
+    pub fn element_surface(&self) -> &Surface {
+        self.space.element_surface()
+    }
+
+    /// Whether [`cut`](Self::cut) and [`begin_cut`](Self::begin_cut) open the body.
+    pub fn can_be_cut(&self) -> bool {
+        self.space.can_be_cut()
     }
 
     /// Parts of the material that are connected through faces, and their rest volumes.
@@ -81,7 +99,7 @@ impl Body {
         self.space.components()
     }
 
-    /// The material as tetrahedra that fill it without overlap, for export.
+    /// The material as tetrahedra or hexahedra that fill it without overlap, for export.
     pub fn solid(&self) -> Solid {
         self.space.solid()
     }

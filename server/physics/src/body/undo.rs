@@ -27,17 +27,10 @@ pub struct BodyTopology {
     held: bool,
 }
 
-/// Bytes per element, surface triangle and skin triangle, measured on the demonstration's organ and
-/// rounded up.
-const ELEMENT_BYTES: usize = 2000;
-const TRIANGLE_BYTES: usize = 400;
-
 impl BodyTopology {
     /// Estimated memory [byte], within a factor of about two.
     pub fn bytes(&self) -> usize {
-        let skin = self.space.skin().map_or(0, |skin| skin.surface().triangles.len());
-        ELEMENT_BYTES * self.space.pieces().len()
-            + TRIANGLE_BYTES * (skin + self.space.element_surface().triangles.len())
+        self.space.bytes()
     }
 }
 
@@ -62,9 +55,9 @@ impl Body {
         let epoch = self.space.epoch() + 1;
         let before = Moving::of(self, topology.held);
         let BodyTopology { space, boundary, snap, x, .. } = topology;
-        let state = match &snap {
-            Some(_) => before.on_mesh(space.mesh(), &x),
-            None => before.joined(&x, &self.split_from),
+        let state = match (&snap, space.tets()) {
+            (Some(_), Some(tets)) => before.on_mesh(tets.mesh(), &x),
+            _ => before.joined(&x, &self.split_from),
         };
         (self.space, self.snap) = (space, snap);
         self.space.set_epoch(epoch);
@@ -110,7 +103,8 @@ impl Moving {
     fn of(body: &Body, held: bool) -> Self {
         let free = |&part: &u32| held && body.parts.free[part as usize];
         // The mesh is needed only if cuts have changed it.
-        let mesh = if body.snap.is_some() { body.space.mesh().clone() } else { TetMesh::default() };
+        let tets = body.space.tets().filter(|_| body.snap.is_some());
+        let mesh = tets.map_or_else(TetMesh::default, |tets| tets.mesh().clone());
         Self {
             mesh,
             x: body.state.x.clone(),

@@ -39,7 +39,7 @@ pub use drawn::pending::PendingFace;
 pub use flaws::Flaws;
 pub use incision_mark::{IncisionMark, MarkPoint};
 pub use shell::surface::Surface;
-pub use solid::Solid;
+pub use solid::{Solid, SolidCells, SolidOrigin};
 pub use sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, MAX_SEGMENTS, Work};
 pub(crate) use sweep::front::{Front, Surroundings, sweep_triangles};
 pub(crate) use sweep::sweep_triangle::SweepTriangle;

@@ -261,7 +261,7 @@ impl Dynamics {
         let kinetic_j = solver.kinetic_energy(inputs.mass, &state.v);
         let weight = |c: usize| solver.weight(c, inputs.mass[c], inputs.gravity);
         let loads_j = inputs.load_energy(&state.x, weight);
-        multistep.begin_energy(kinetic_j, loads_j, || solver.elastic_energy(team, &state.x))
+        multistep.begin_energy(kinetic_j, loads_j, || solver.elastic_energy(team, &state.x, inputs.points))
     }
 
     /// Ends the energy balance of an attempt that began with `before_j`. Returns the energy [J] that it gained
@@ -279,7 +279,8 @@ impl Dynamics {
         if !multistep.judges_energy() || report.outcome != Outcome::Advanced {
             return None;
         }
-        let elastic_j = report.elastic_j.unwrap_or_else(|| solver.elastic_energy(team, &state.x));
+        let elastic_j =
+            report.elastic_j.unwrap_or_else(|| solver.elastic_energy(team, &state.x, inputs.points));
         let weight = |c: usize| solver.weight(c, inputs.mass[c], inputs.gravity);
         let force = |c: usize| weight(c) + inputs.load[c];
         let exchanged: f64 = (0..state.x.len()).map(|c| force(c).dot(&(state.x[c] - before.x[c]))).sum();

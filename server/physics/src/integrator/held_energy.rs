@@ -30,19 +30,24 @@ struct HeldPiece {
 impl HeldEnergy {
     /// Takes over the present pieces, which `elastic` has arranged.
     pub fn follow(&mut self, space: &dyn Space, elastic: &dyn Stiffness) {
-        let places = elastic.places();
         self.pieces.clear();
-        self.pieces.extend(space.pieces().iter().zip(places).map(|(piece, place)| {
+        let Some(tets) = space.tets() else { return };
+        self.pieces.extend(tets.pieces().iter().zip(elastic.places()).map(|(piece, place)| {
             let e = piece.element as usize;
-            let [_, gradients @ ..] = space.mesh().gradients(e);
+            let [_, gradients @ ..] = tets.mesh().gradients(e);
             HeldPiece {
                 copies: piece.copies,
                 place,
                 gradients,
-                volume: piece.fraction * space.mesh().volume(e),
+                volume: piece.fraction * tets.mesh().volume(e),
             }
         }));
         self.partial.resize(self.pieces.len().div_ceil(BLOCK), 0.0);
+    }
+
+    /// Whether the elements are other than tetrahedra: their energy is then not known here.
+    pub fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
     }
 
     /// The energy [J] at `x` [m]. Where the rotations of the last update are not those of `x`, it is slightly

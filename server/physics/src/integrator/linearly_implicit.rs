@@ -13,6 +13,7 @@ use super::state::{State, WEIGHTLESS};
 use super::step_inputs::{Inertia, LinearInputs, StepInputs, StepOutcome};
 use super::step_solver::{SolverSettings, StepSolver};
 use crate::assembly::ModelError;
+use crate::element::Points;
 use crate::lists::reserve::refill;
 use crate::material::Material;
 use crate::operator::Stiffness;
@@ -58,11 +59,11 @@ pub struct LinearlyImplicit {
 }
 
 /// A copy without mass, and the copies of its piece that carry it along.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Weightless {
     copy: u32,
     /// Copies of the same piece; those with mass count.
-    piece: [u32; 4],
+    piece: Box<[u32]>,
 }
 
 impl LinearlyImplicit {
@@ -231,7 +232,10 @@ impl StepSolver for LinearlyImplicit {
         step.accelerate(team, &mut **stiffness, state, &inputs, acceleration);
     }
 
-    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
+    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], points: &dyn Points) -> f64 {
+        if self.held.is_empty() {
+            return points.energy(&self.material, x);
+        }
         self.held.at(team, &*self.stiffness, x, &self.material)
     }
 
@@ -287,12 +291,12 @@ fn find_weightless(space: &dyn Space, mass: &[f64]) -> Vec<Weightless> {
         return Vec::new();
     }
     let mut found: Vec<Weightless> = Vec::new();
-    for piece in space.pieces() {
-        for copy in piece.copies {
+    space.for_groups(&mut |piece| {
+        for &copy in piece {
             if mass[copy as usize] <= WEIGHTLESS && found.iter().all(|w| w.copy != copy) {
-                found.push(Weightless { copy, piece: piece.copies });
+                found.push(Weightless { copy, piece: piece.into() });
             }
         }
-    }
+    });
     found
 }

@@ -21,6 +21,7 @@ use super::state::State;
 use super::step_inputs::StepInputs;
 use super::step_solver::{ActiveSprings, SolverSettings, StepSolver};
 use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
+use crate::element::Points;
 use crate::lists::reserve::resize_reserving;
 use crate::material::Material;
 use crate::operator::FixedCopy;
@@ -176,7 +177,7 @@ impl StepSolver for ModelSolver {
         self.acceleration_at(team, [&state.x, &state.v], inputs.fixed, acceleration);
     }
 
-    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64 {
+    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], _: &dyn Points) -> f64 {
         self.model.energy_by(team, x)
     }
 

@@ -20,7 +20,7 @@ use crate::operator::Spring;
 /// # let material = Material { young_pa: 1e4, poisson: 0.4, density_kg_m3: 1e3, rayleigh, law };
 /// # let mut body = Body::new(mesh, material, BodySettings::default())?;
 /// // Pulls the centre of one tetrahedron 1 cm upwards.
-/// let point = MaterialPoint::in_tet(body.pieces()[0].copies, [0.25; 4]);
+/// let point = MaterialPoint::in_tet(body.tets().unwrap().pieces()[0].copies, [0.25; 4]);
 /// let above = point.position(body.positions()) + Vector3::new(0.0, 0.0, 0.01);
 /// let pull = PointSpring {
 ///     point,

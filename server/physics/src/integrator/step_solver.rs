@@ -12,6 +12,7 @@ use super::springs::ActiveSpring;
 use super::state::State;
 use super::step_inputs::StepInputs;
 use crate::assembly::{Model, ModelError};
+use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{FixedCopy, Stiffness};
 use crate::solver::{NewtonSettings, PcgSettings};
@@ -58,8 +59,8 @@ pub trait StepSolver: Debug + Send {
         acceleration: &mut [Vector3<f64>],
     );
 
-    /// Elastic energy [J] at `x` [m].
-    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>]) -> f64;
+    /// Elastic energy [J] at `x` [m] of the body with these quadrature points.
+    fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], points: &dyn Points) -> f64;
 
     /// ½ vᵀ M v [J].
     fn kinetic_energy(&self, mass: &[f64], v: &[Vector3<f64>]) -> f64 {

@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::cells::{Cell, Octree};
 use super::lattice::{At, OUTSIDE};
 use super::vertices::corner_weights;
-use crate::cut::Components;
-use crate::element::{Point, Points, deformation_gradient, hex8, quadrature};
+use crate::cut::{Components, Solid, SolidCells, SolidOrigin};
+use crate::element::{MaterialPoint, Point, Points, deformation_gradient, hex8, quadrature};
 use crate::lists::disjoint::{find, join};
 use crate::material::Region;
 
@@ -132,6 +132,88 @@ impl Octree {
         let (_, leaf) = best?;
         let cell = &self.cells[leaf as usize];
         Some((leaf, [0, 1, 2].map(|k| (at[k] - f64::from(cell.at[k])) / f64::from(cell.side()))))
+    }
+
+    /// Box around the leaves at rest, lower and upper corner [m].
+    pub fn bounds(&self) -> [Vector3<f64>; 2] {
+        let none = [[i32::MAX; 3], [i32::MIN; 3]];
+        let [low, high] = self.cells.iter().fold(none, |[low, high], cell| {
+            let (a, b) = (cell.corner(0), cell.corner(7));
+            [[0, 1, 2].map(|k| low[k].min(a[k])), [0, 1, 2].map(|k| high[k].max(b[k]))]
+        });
+        [self.lattice.point(low), self.lattice.point(high)]
+    }
+
+    /// ∫ N_a dV [m³] over a leaf, for each of its eight vertices.
+    pub fn shape_integrals(&self, id: usize) -> [f64; 8] {
+        let share = self.cell_volume(id) / 8.0;
+        let mut integrals = [share; 8];
+        if self.hanging[id] != 0 {
+            integrals = [0.0; 8];
+            for row in corner_weights(&self.cells[id], self.hanging[id]) {
+                integrals.iter_mut().zip(row).for_each(|(integral, w)| *integral += w * share);
+            }
+        }
+        integrals
+    }
+
+    /// Vertices and weights (Σ = 1) of the point that rests at `p` [m], as part of the leaf `id`; beyond its
+    /// faces the displacement of the leaf is continued.
+    pub fn carriers(&self, id: u32, p: &Vector3<f64>) -> Vec<(u32, f64)> {
+        let (id, at) = (id as usize, self.lattice.coordinates(p));
+        let cell = &self.cells[id];
+        let local = [0, 1, 2].map(|k| (at[k] - f64::from(cell.at[k])) / f64::from(cell.side()));
+        let W = corner_weights(cell, self.hanging[id]);
+        let mut weights = [0.0; 8];
+        for (c, row) in W.iter().enumerate() {
+            let N: f64 = (0..3).map(|k| if c >> k & 1 == 1 { local[k] } else { 1.0 - local[k] }).product();
+            weights.iter_mut().zip(row).for_each(|(weight, w)| *weight += N * w);
+        }
+        self.vertices[id].into_iter().zip(weights).collect()
+    }
+
+    /// The leaf that the material at `p` [m] belongs to, of `id`, which covers it, and the neighbours from which
+    /// cuts separate that one: a cut may pass between `p` and the centre of `id`.
+    pub fn on_side_of_cuts(&self, id: u32, p: &Vector3<f64>) -> u32 {
+        let cell = &self.cells[id as usize];
+        let centre = self.lattice.centre(cell.at);
+        for d in (0..6).filter(|d| cell.cut >> d & 1 == 1) {
+            let (axis, up) = (d / 2, d % 2 == 1);
+            let across = Self::across(cell.at, d);
+            let lower = if up { cell.at } else { across };
+            let Some(link) = self.links.get(&(lower, axis as u8)) else { continue };
+            let end = usize::from(!up);
+            let mut on_cut = self.lattice.centre(lower);
+            on_cut[axis] += link.at[end] * self.lattice.h;
+            let height = |q: &Vector3<f64>| link.normal[end].dot(&(q - on_cut));
+            if height(p) * height(&centre) < 0.0 && self.leaf(across) != OUTSIDE {
+                return self.leaf(across);
+            }
+        }
+        id
+    }
+
+    /// The leaves as hexahedra. Leaves share a point where the same vertices carry it.
+    pub fn solid(&self) -> Solid {
+        let mut solid = Solid::default();
+        let mut hexes = Vec::with_capacity(self.cells.len());
+        let mut ids: BTreeMap<Vec<(u32, u64)>, u32> = BTreeMap::new();
+        for (id, (cell, vertices)) in (0u32..).zip(self.cells.iter().zip(&self.vertices)) {
+            let W = corner_weights(cell, self.hanging[id as usize]);
+            hexes.push(W.map(|row| {
+                let mut carriers: Vec<(u32, f64)> =
+                    vertices.iter().copied().zip(row).filter(|(_, w)| *w != 0.0).collect();
+                carriers.sort_unstable_by_key(|(vertex, _)| *vertex);
+                let key = carriers.iter().map(|(vertex, w)| (*vertex, w.to_bits())).collect();
+                *ids.entry(key).or_insert_with(|| {
+                    solid.vertices.push(MaterialPoint::new(carriers));
+                    solid.vertices.len() as u32 - 1
+                })
+            }));
+            solid.origins.push(SolidOrigin { element: id, piece: id, stress: id, fraction: 1.0 });
+        }
+        solid.cells = SolidCells::Hexes(hexes);
+        solid
     }
 }
 

@@ -9,21 +9,28 @@ use super::cells::{CutLink, LinkKey, Octree};
 use super::surface::OctreeSurface;
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
-    BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Piece, Solid, Surface,
-    Surroundings, Work, sweep_triangles,
+    BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
+    Surroundings, Work, sweep_triangles, swept_area,
 };
 use crate::element::{Point, Points};
 use crate::material::{Material, Region};
-use crate::mesh::{MeshError, TetMesh};
+use crate::mesh::MeshError;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
-use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
-use crate::space::Space;
+use crate::space::{RestPoint, Space};
 
 /// Most leaves that cuts by clients may make of one.
 const MOST_GROWTH: usize = 8;
 /// Links that cost as much work as one fragment of a tetrahedron.
 const LINKS_PER_FRAGMENT: usize = 4;
+
+/// Corners of six tetrahedra that fill a cube.
+const TETS_OF_CUBE: [[u32; 4]; 6] =
+    [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
+/// Bytes per triangle of the surface.
+const TRIANGLE_BYTES: usize = 100;
+/// Distance, in finest cells, by which a point is moved towards its side before its cell is looked up.
+const SIDE_STEP: f64 = 1e-6;
 
 /// An octree that is cut, with everything that a body asks of it.
 #[derive(Clone, Debug)]
@@ -40,8 +47,6 @@ pub struct OctreeSpace {
     surface: OctreeSurface,
     epoch: u32,
     under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
-    /// An octree has no tetrahedra.
-    no_tets: TetMesh,
 }
 
 impl OctreeSpace {
@@ -58,7 +63,6 @@ impl OctreeSpace {
             surface: OctreeSurface::default(),
             epoch: 0,
             under_way: None,
-            no_tets: TetMesh::default(),
         };
         space.renew();
         space
@@ -91,8 +95,7 @@ impl OctreeSpace {
     /// Six tetrahedra on the vertices of a leaf, which fill it where no corner hangs.
     fn tets_of(&self, id: u32) -> [[u32; 4]; 6] {
         let v = self.octree.vertices()[id as usize];
-        let ways = [[1, 3], [1, 5], [2, 3], [2, 6], [4, 5], [4, 6]];
-        ways.map(|[a, b]| [v[0], v[a], v[b], v[7]])
+        TETS_OF_CUBE.map(|tet| tet.map(|c| v[c as usize]))
     }
 
     /// Calls `visit` for the leaves around the lattice point of `vertex`.
@@ -183,6 +186,22 @@ impl Space for OctreeSpace {
         ElementKind::Octree
     }
 
+    fn can_be_cut(&self) -> bool {
+        true
+    }
+
+    fn can_carry_skin(&self) -> bool {
+        false
+    }
+
+    fn bounds(&self) -> [Vector3<f64>; 2] {
+        self.octree.bounds()
+    }
+
+    fn element_size(&self) -> f64 {
+        self.octree.lattice().h
+    }
+
     fn n_elements(&self) -> usize {
         self.octree.cells().len()
     }
@@ -219,12 +238,10 @@ impl Space for OctreeSpace {
         self.volumes.iter().zip(selected).map(|(v, &chosen)| if chosen { *v } else { 0.0 }).collect()
     }
 
-    fn mesh(&self) -> &TetMesh {
-        &self.no_tets
-    }
-
-    fn pieces(&self) -> &[Piece] {
-        &[]
+    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+        for (id, vertices) in self.octree.vertices().iter().enumerate() {
+            visit(id, vertices, &self.octree.shape_integrals(id));
+        }
     }
 
     fn for_groups(&self, visit: &mut dyn FnMut(&[u32])) {
@@ -243,20 +260,19 @@ impl Space for OctreeSpace {
         self.for_leaves_around(copy, |id| visit(&self.octree.vertices()[id as usize]));
     }
 
-    fn piece_volumes(&self, _: usize) -> [f64; 4] {
-        [0.0; 4]
+    fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint> {
+        let step = |side: Vector3<f64>| side.normalize() * (SIDE_STEP * self.octree.lattice().h);
+        let towards_m = side.map_or(Vector3::zeros(), step);
+        let (element, _) = self.octree.locate(&(point + towards_m)).or_else(|| self.octree.locate(&point))?;
+        Some(RestPoint { rest_m: point, towards_m, element })
     }
 
-    fn element_of(&self, p: usize) -> usize {
-        p
-    }
-
-    fn piece_at(&self, tet: u32, _: [f64; 4]) -> u32 {
-        tet
-    }
-
-    fn carriers(&self, _: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
-        copies.into_iter().zip(weights).collect()
+    fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)> {
+        let aim = point.rest_m + point.towards_m;
+        let found = self.octree.locate(&aim).or_else(|| self.octree.locate(&point.rest_m));
+        found.map_or_else(Vec::new, |(leaf, _)| {
+            self.octree.carriers(self.octree.on_side_of_cuts(leaf, &aim), &point.rest_m)
+        })
     }
 
     fn components(&self) -> Components {
@@ -264,7 +280,7 @@ impl Space for OctreeSpace {
     }
 
     fn solid(&self) -> Solid {
-        Solid::default()
+        self.octree.solid()
     }
 
     fn flaws(&self) -> Flaws {
@@ -307,6 +323,19 @@ impl Space for OctreeSpace {
 
     fn spoil_skin(&mut self) {}
 
+    fn swept_area(&self, x: &[Vector3<f64>], blade: &BladeSweep) -> f64 {
+        let ends = blade.segments.iter().flatten();
+        let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+        let bounds = ends.fold(none, |[low, high], end| [low.inf(end), high.sup(end)]);
+        let (mut corners, mut tets) = (Vec::new(), Vec::new());
+        for id in self.octree.leaves_near(x, &bounds) {
+            let first = corners.len() as u32;
+            corners.extend(self.octree.corners(id, x));
+            tets.extend(TETS_OF_CUBE.map(|tet| tet.map(|c| first + c)));
+        }
+        swept_area(&tets, &corners, blade)
+    }
+
     fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
         let cuts = self.search(x, blade, incision)?;
         Ok(self.open(&cuts))
@@ -328,16 +357,6 @@ impl Space for OctreeSpace {
         self.under_way.is_some()
     }
 
-    fn cut_along_faces(
-        &mut self,
-        _: &mut Snapper,
-        _: Nodes<'_>,
-        _: &BladeSweep,
-        _: u32,
-    ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
-        Ok((SnapReport::default(), None))
-    }
-
     fn reset(&mut self) -> Result<(), MeshError> {
         self.under_way = None;
         self.fronts.clear();
@@ -351,6 +370,11 @@ impl Space for OctreeSpace {
 
     fn boxed_clone(&self) -> Box<dyn Space> {
         Box::new(Self { under_way: None, ..self.clone() })
+    }
+
+    fn bytes(&self) -> usize {
+        // The uncut state is shared.
+        self.octree.bytes() + 16 * self.node_of_copy.len() + TRIANGLE_BYTES * self.surface.triangles.len()
     }
 
     fn stiffness(&self, _: bool) -> Option<Box<dyn Stiffness>> {

@@ -7,26 +7,25 @@ mod element;
 mod hexahedra;
 mod linear_tets;
 mod quadratic_tets;
+mod rest_point;
 mod tets;
 
 pub use element::Element;
 pub use hexahedra::Hexahedra;
 pub use linear_tets::LinearTets;
 pub use quadratic_tets::QuadraticTets;
+pub use rest_point::RestPoint;
 pub use tets::Tets;
 
 use nalgebra::Vector3;
 
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
-use crate::cut::{
-    BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Piece, Solid, Surface, Work,
-};
+use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work};
 use crate::element::Points;
 use crate::material::Material;
-use crate::mesh::{MeshError, TetMesh};
+use crate::mesh::MeshError;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
-use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
 
 /// What a discretisation offers a body. Its functions are called once per phase of a step or per cut, never
 /// per element.
@@ -37,6 +36,34 @@ use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
 pub trait Space: Points + Send {
     /// The finite element.
     fn kind(&self) -> ElementKind;
+
+    /// The finite element in the words of messages, e.g. "element tet10".
+    fn name(&self) -> &'static str {
+        self.kind().name()
+    }
+
+    /// Whether [`cut`](Self::cut) and [`begin_cut`](Self::begin_cut) open it.
+    fn can_be_cut(&self) -> bool;
+
+    /// Whether [`put_on_skin`](Self::put_on_skin) can give it a skin.
+    fn can_carry_skin(&self) -> bool;
+
+    /// The tetrahedra with their mesh and pieces, if it consists of them.
+    fn tets(&self) -> Option<&Tets> {
+        None
+    }
+
+    /// The same, for cuts along faces, which replace the mesh.
+    fn tets_mut(&mut self) -> Option<&mut Tets> {
+        None
+    }
+
+    /// Box around it at rest, lower and upper corner [m].
+    fn bounds(&self) -> [Vector3<f64>; 2];
+
+    /// Side of a typical element at rest [m]: of the finest cells, or of a cube that consists of six
+    /// tetrahedra of mean volume.
+    fn element_size(&self) -> f64;
 
     /// Number of finite elements of the uncut body.
     fn n_elements(&self) -> usize;
@@ -73,12 +100,15 @@ pub trait Space: Points + Send {
     /// ∫ N_a dV [m³] of the `selected` nodes of the uncut body; 0 for the others.
     fn volumes(&self, selected: &[bool]) -> Vec<f64>;
 
-    /// The tetrahedra at rest that are cut and drawn.
-    fn mesh(&self) -> &TetMesh;
+    /// Number of pieces that cuts made of the elements; that of the elements if these are not cut themselves.
+    fn n_pieces(&self) -> usize {
+        self.n_elements()
+    }
 
-    /// Material pieces of the tetrahedra of [`mesh`](Self::mesh). The copies of a piece hang together. Ids are
-    /// stable; cuts append.
-    fn pieces(&self) -> &[Piece];
+    /// Calls `visit` for every part that fills the volume without overlap and moves with its own copies: the
+    /// [element](crate::element::Point::element) of its quadrature points, its copies, and ∫ N_a dV [m³]
+    /// over it for each of them.
+    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64]));
 
     /// Calls `visit` with the nodes of every group that hangs together: a piece, or an element.
     fn for_groups(&self, visit: &mut dyn FnMut(&[u32]));
@@ -92,23 +122,17 @@ pub trait Space: Points + Send {
     /// Calls `visit` with the copies of every group that contains `copy`, and maybe of others at its node.
     fn for_groups_around(&self, copy: u32, visit: &mut dyn FnMut(&[u32]));
 
-    /// ∫ N_a dV [m³] over piece `p`, for its four copies.
-    fn piece_volumes(&self, p: usize) -> [f64; 4];
+    /// Finds a material point by its rest position [m]. If it lies on a cut or between elements, `side` points
+    /// to the side that it belongs to. `None` outside the body.
+    fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint>;
 
-    /// The finite element that contains piece `p`.
-    fn element_of(&self, p: usize) -> usize;
-
-    /// The piece of tetrahedron `tet` that holds the point with these barycentric coordinates.
-    fn piece_at(&self, tet: u32, barycentric: [f64; 4]) -> u32;
-
-    /// Nodes and shape functions (Σ = 1) of the point with barycentric coordinates `weights` in tetrahedron
-    /// `tet`, whose piece is on `copies`.
-    fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)>;
+    /// Nodes and shape functions (Σ = 1) that carry a material point in the present cut state.
+    fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)>;
 
     /// Parts of the material that are connected through faces, and their rest volumes.
     fn components(&self) -> Components;
 
-    /// The material as tetrahedra that fill it without overlap, for export.
+    /// The material as tetrahedra or hexahedra that fill it without overlap, for export.
     fn solid(&self) -> Solid;
 
     /// Violations of the invariants of the cut state; beyond rounding there must be none.
@@ -139,6 +163,9 @@ pub trait Space: Points + Send {
     #[doc(hidden)]
     fn spoil_skin(&mut self);
 
+    /// Area [m²] of the sweep inside the material with the copies at `x` [m]. Parts that are already cut count too.
+    fn swept_area(&self, x: &[Vector3<f64>], blade: &BladeSweep) -> f64;
+
     /// Cuts along the surface that the blade swept, with the copies at `x` [m].
     fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError>;
 
@@ -152,21 +179,14 @@ pub trait Space: Points + Send {
     /// Whether a cut was begun and is not complete.
     fn is_being_cut(&self) -> bool;
 
-    /// Finds the mesh that a cut along its faces makes of this one, for `snapper` and the state of its nodes;
-    /// `None` if nothing comes apart yet. The mesh itself stays.
-    fn cut_along_faces(
-        &mut self,
-        snapper: &mut Snapper,
-        nodes: Nodes<'_>,
-        blade: &BladeSweep,
-        incision: u32,
-    ) -> Result<(SnapReport, Option<SnapCut>), CutError>;
-
     /// Undoes all cuts and drops one under way. The epoch keeps rising.
     fn reset(&mut self) -> Result<(), MeshError>;
 
     /// A copy without a cut under way.
     fn boxed_clone(&self) -> Box<dyn Space>;
+
+    /// Estimated memory of such a copy [byte], within a factor of about two.
+    fn bytes(&self) -> usize;
 
     /// The stiffness of the elements for solvers in single precision; `None` if there is no such kernel for
     /// these elements. `portable` uses only instructions that every machine has.

@@ -3,13 +3,13 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::{Element, Hexahedra, LinearTets, QuadraticTets, Space};
+use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space};
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutLimits, CutMesh, CutReport, Flaws, IncisionMark, Piece, Solid,
-    Surface, SweepUnderWay, Work,
+    Surface, SweepUnderWay, Work, swept_area,
 };
 use crate::element::{Point, Points, Simd};
 use crate::material::Material;
@@ -17,6 +17,18 @@ use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
 use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
+
+/// Distance, relative to the element, by which a point is moved towards its side before its piece is looked
+/// up. Far above rounding, far below any piece that can be seen.
+const SIDE_STEP: f64 = 1e-6;
+
+/// Distance outside an element at which a point still counts as inside, in barycentric units.
+const INSIDE: f64 = 1e-9;
+
+/// Bytes per piece, surface triangle and skin triangle, measured on the demonstration's organ and rounded
+/// up.
+const PIECE_BYTES: usize = 2000;
+const TRIANGLE_BYTES: usize = 400;
 
 /// Linear or quadratic tetrahedra, or hexahedra that are divided into tetrahedra. Only linear ones are cut.
 #[derive(Clone, Debug)]
@@ -61,6 +73,50 @@ impl Tets {
         self.cut.set_exact(exact);
     }
 
+    /// Whether these are linear tetrahedra, which can be cut.
+    pub fn is_linear(&self) -> bool {
+        self.kind() == ElementKind::Tet4
+    }
+
+    /// The tetrahedra at rest that are cut and drawn: the elements, or six for every hexahedron. Only cuts
+    /// along faces change them.
+    pub fn mesh(&self) -> &TetMesh {
+        self.cut.mesh()
+    }
+
+    /// Material pieces of the tetrahedra of [`mesh`](Self::mesh). Ids are stable; cuts append.
+    pub fn pieces(&self) -> &[Piece] {
+        self.cut.pieces()
+    }
+
+    /// ∫ N_a dV [m³] over piece `p`, for its four copies.
+    pub fn piece_volumes(&self, p: usize) -> [f64; 4] {
+        self.cut.piece_node_volume(p)
+    }
+
+    /// The piece of tetrahedron `tet` that holds the point with these barycentric coordinates.
+    pub fn piece_at(&self, tet: u32, barycentric: [f64; 4]) -> u32 {
+        self.cut.piece_at(tet, barycentric)
+    }
+
+    /// Finds a material point again after the mesh was replaced: in the tetrahedron in which it lies deepest.
+    pub fn locate_again(&self, point: &RestPoint) -> RestPoint {
+        let element = deepest(self.cut.mesh(), point.rest_m + point.towards_m) as u32;
+        RestPoint { element, ..*point }
+    }
+
+    /// Finds the mesh that a cut along its faces makes of this one, for `snapper` and the state of its nodes;
+    /// `None` if nothing comes apart yet. The mesh itself stays.
+    pub fn cut_along_faces(
+        &mut self,
+        snapper: &mut Snapper,
+        nodes: Nodes<'_>,
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
+        snapper.cut(&mut self.cut, nodes, blade, incision)
+    }
+
     fn renew_skin(&mut self) {
         if let Some(skin) = &mut self.skin {
             skin.follow(&self.cut);
@@ -77,6 +133,32 @@ impl Points for Tets {
 impl Space for Tets {
     fn kind(&self) -> ElementKind {
         self.element.kind()
+    }
+
+    fn can_be_cut(&self) -> bool {
+        self.is_linear()
+    }
+
+    fn can_carry_skin(&self) -> bool {
+        self.is_linear()
+    }
+
+    fn tets(&self) -> Option<&Tets> {
+        Some(self)
+    }
+
+    fn tets_mut(&mut self) -> Option<&mut Tets> {
+        Some(self)
+    }
+
+    fn bounds(&self) -> [Vector3<f64>; 2] {
+        self.cut.mesh().bounds()
+    }
+
+    fn element_size(&self) -> f64 {
+        let per_cell = if self.kind() == ElementKind::Hex8 { 1.0 } else { 6.0 };
+        let volume: f64 = self.cut.copy_volume().iter().sum();
+        (per_cell * volume / self.n_elements() as f64).cbrt()
     }
 
     fn n_elements(&self) -> usize {
@@ -111,12 +193,18 @@ impl Space for Tets {
         self.element.volumes(self.cut.mesh(), selected)
     }
 
-    fn mesh(&self) -> &TetMesh {
-        self.cut.mesh()
+    fn n_pieces(&self) -> usize {
+        if self.is_linear() { self.cut.pieces().len() } else { self.n_elements() }
     }
 
-    fn pieces(&self) -> &[Piece] {
-        self.cut.pieces()
+    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+        for (p, piece) in self.cut.pieces().iter().enumerate() {
+            visit(self.element.element_of(p), &piece.copies, &self.cut.piece_node_volume(p));
+        }
+    }
+
+    fn for_groups(&self, visit: &mut dyn FnMut(&[u32])) {
+        self.element.for_groups(&self.cut, visit);
     }
 
     fn has_changed(&self) -> bool {
@@ -131,24 +219,20 @@ impl Space for Tets {
         self.cut.tets_around(copy).iter().for_each(|copies| visit(copies));
     }
 
-    fn piece_volumes(&self, p: usize) -> [f64; 4] {
-        self.cut.piece_node_volume(p)
+    fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint> {
+        let mesh = self.cut.mesh();
+        let step = |side: Vector3<f64>| side.normalize() * (SIDE_STEP * mean_edge(mesh));
+        let towards_m = side.map_or(Vector3::zeros(), step);
+        let element = element_at(mesh, point + towards_m).or_else(|| element_at(mesh, point))?;
+        Some(RestPoint { rest_m: point, towards_m, element: element as u32 })
     }
 
-    fn element_of(&self, p: usize) -> usize {
-        self.element.element_of(p)
-    }
-
-    fn piece_at(&self, tet: u32, barycentric: [f64; 4]) -> u32 {
-        self.cut.piece_at(tet, barycentric)
-    }
-
-    fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
-        self.element.carriers(tet, copies, weights)
-    }
-
-    fn for_groups(&self, visit: &mut dyn FnMut(&[u32])) {
-        self.element.for_groups(&self.cut, visit);
+    fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)> {
+        let corners = self.cut.mesh().corners(point.element as usize);
+        let lookup = barycentric(&corners, point.rest_m + point.towards_m);
+        let piece = self.cut.piece_at(point.element, lookup);
+        let copies = self.cut.pieces()[piece as usize].copies;
+        self.element.carriers(point.element, copies, barycentric(&corners, point.rest_m))
     }
 
     fn components(&self) -> Components {
@@ -156,7 +240,11 @@ impl Space for Tets {
     }
 
     fn solid(&self) -> Solid {
-        self.cut.solid()
+        let mut solid = self.cut.solid();
+        for cell in &mut solid.origins {
+            cell.stress = self.element.element_of(cell.piece as usize) as u32;
+        }
+        solid
     }
 
     fn flaws(&self) -> Flaws {
@@ -202,6 +290,14 @@ impl Space for Tets {
         self.skin.iter_mut().for_each(Skin::spoil);
     }
 
+    fn swept_area(&self, x: &[Vector3<f64>], blade: &BladeSweep) -> f64 {
+        let mut seen = vec![false; self.cut.mesh().tets.len()];
+        let first_of_element = |p: &&Piece| !std::mem::replace(&mut seen[p.element as usize], true);
+        let pieces = self.cut.pieces().iter().filter(first_of_element);
+        let tets: Vec<[u32; 4]> = pieces.map(|piece| piece.copies).collect();
+        swept_area(&tets, x, blade)
+    }
+
     fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
         let report = self.cut.sweep(x, blade, incision)?;
         self.renew_skin();
@@ -231,16 +327,6 @@ impl Space for Tets {
         self.under_way.is_some()
     }
 
-    fn cut_along_faces(
-        &mut self,
-        snapper: &mut Snapper,
-        nodes: Nodes<'_>,
-        blade: &BladeSweep,
-        incision: u32,
-    ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
-        snapper.cut(&mut self.cut, nodes, blade, incision)
-    }
-
     fn reset(&mut self) -> Result<(), MeshError> {
         self.under_way = None;
         self.cut.reset()?;
@@ -252,10 +338,15 @@ impl Space for Tets {
         Box::new(Self { under_way: None, ..self.clone() })
     }
 
+    fn bytes(&self) -> usize {
+        let skin = self.skin.as_ref().map_or(0, |skin| skin.surface().triangles.len());
+        PIECE_BYTES * self.cut.pieces().len() + TRIANGLE_BYTES * (skin + self.cut.surface().triangles.len())
+    }
+
     fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
         let simd = if portable { Simd::Baseline } else { Simd::detect() };
         let elastic = || Elastic::new(simd, self.cut.mesh(), self.cut.pieces(), self.cut.n_copies());
-        (self.kind() == ElementKind::Tet4).then(|| Box::new(elastic()) as Box<dyn Stiffness>)
+        self.is_linear().then(|| Box::new(elastic()) as Box<dyn Stiffness>)
     }
 
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {
@@ -277,6 +368,36 @@ impl Space for Tets {
     fn follow_model(&self, model: &mut Model, _: &Material) {
         model.follow_cut(&self.cut);
     }
+}
+
+/// Mean edge length [m] of an element, from the mean volume.
+fn mean_edge(mesh: &TetMesh) -> f64 {
+    let volume: f64 = mesh.volumes().iter().sum();
+    (6.0 * volume / mesh.tets.len().max(1) as f64).cbrt()
+}
+
+/// The tetrahedron that contains a point, if any.
+fn element_at(mesh: &TetMesh, point: Vector3<f64>) -> Option<usize> {
+    let element = deepest(mesh, point);
+    (depth(mesh, point, element) >= -INSIDE).then_some(element)
+}
+
+/// The tetrahedron in which a point lies deepest; of equals the first.
+fn deepest(mesh: &TetMesh, point: Vector3<f64>) -> usize {
+    let all = (0..mesh.tets.len()).map(|e| (depth(mesh, point, e), e));
+    all.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).map_or(0, |(_, e)| e)
+}
+
+/// Smallest barycentric coordinate of a point in tetrahedron `e`.
+fn depth(mesh: &TetMesh, point: Vector3<f64>, e: usize) -> f64 {
+    barycentric(&mesh.corners(e), point).into_iter().fold(f64::INFINITY, f64::min)
+}
+
+fn barycentric(x: &[Vector3<f64>; 4], point: Vector3<f64>) -> [f64; 4] {
+    let edges = Matrix3::from_columns(&[x[1] - x[0], x[2] - x[0], x[3] - x[0]]);
+    let inner =
+        edges.try_inverse().map_or(Vector3::repeat(f64::NEG_INFINITY), |inverse| inverse * (point - x[0]));
+    [1.0 - inner.sum(), inner.x, inner.y, inner.z]
 }
 
 #[cfg(test)]
@@ -323,13 +444,30 @@ mod tests {
     }
 
     #[test]
+    fn pieces_fill_the_volume_and_the_solid_tells_their_elements() {
+        for space in spaces() {
+            let (mut volume, mut elements) = (0.0, 0);
+            space.for_pieces(&mut |element, copies, volumes| {
+                assert_eq!(copies.len(), volumes.len());
+                volume += volumes.iter().sum::<f64>();
+                elements = elements.max(element + 1);
+            });
+            assert!((volume - 6.0).abs() < 1e-12 && elements == space.n_elements(), "{:?}", space.kind());
+            let origins = space.solid().origins;
+            assert_eq!(origins.iter().map(|cell| cell.stress).max(), Some(elements as u32 - 1));
+        }
+    }
+
+    #[test]
     fn carriers_reproduce_the_point_they_carry() {
         for space in spaces() {
             let (rest, mesh) = (space.rest_positions(), space.mesh());
-            for (e, tet) in mesh.tets.iter().enumerate().step_by(7) {
+            for e in (0..mesh.tets.len()).step_by(7) {
                 let weights = [0.1, 0.2, 0.3, 0.4];
                 let X: Vector3<f64> = mesh.corners(e).iter().zip(weights).map(|(X, w)| w * X).sum();
-                let carriers = space.carriers(e as u32, *tet, weights);
+                let point = space.locate(X, None).unwrap();
+                assert_eq!(point.element, e as u32);
+                let carriers = space.carriers(&point);
                 let found: Vector3<f64> = carriers.iter().map(|(n, N)| *N * rest[*n as usize]).sum();
                 assert!((found - X).norm() < 1e-12, "{:?} {e}", space.kind());
             }

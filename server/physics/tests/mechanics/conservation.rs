@@ -138,7 +138,7 @@ fn weight_rests_on_the_clamp() {
     assert!((reaction + weight).norm() < 1e-4 * weight.norm(), "{reaction} {weight}");
     assert!(body.velocities().iter().all(|v| v.norm() < 1e-5));
     for &n in &clamp {
-        assert_eq!(body.positions()[n as usize], body.mesh().nodes[n as usize]);
+        assert_eq!(body.positions()[n as usize], body.tets().unwrap().mesh().nodes[n as usize]);
     }
 }
 
@@ -149,7 +149,7 @@ fn prescribed_surfaces_carry_a_homogeneous_strain_inside() {
         Material { rayleigh: Rayleigh { mass_1_s: 50.0, stiffness_s: 0.05 }, ..SOFT },
         settings(300, 1e-7),
     );
-    let nodes = body.mesh().nodes.clone();
+    let nodes = body.tets().unwrap().mesh().nodes.clone();
     let strain = |x: &Vector3<f64>| Vector3::new(0.1 * x.x + 0.05 * x.y, -0.02 * x.y, 0.03 * x.z);
     for (n, x) in nodes.iter().enumerate() {
         if x.iter().any(|&c| c == 0.0 || c == 0.1) {

@@ -116,7 +116,7 @@ fn a_cut_exactly_through_clamped_nodes_leaves_both_lips_clamped() {
         let arithmetic = general.then_some(Arithmetic::Double);
         let settings = BodySettings { arithmetic, ..settings(200, 1e-5) };
         let mut body = cube(4, SOFT, settings);
-        let rest = body.mesh().nodes.clone();
+        let rest = body.tets().unwrap().mesh().nodes.clone();
         let clamp: Vec<u32> = (0..rest.len() as u32).filter(|&n| rest[n as usize].y == 0.0).collect();
         body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
         body.cut(&slice(0.05, -0.5, 0.5), 1).unwrap();

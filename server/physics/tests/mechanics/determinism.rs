@@ -24,7 +24,7 @@ fn bar(threads: usize, portable: bool) -> Body {
 }
 
 fn push(body: &Body, height: f64) -> PointSpring {
-    let copies = body.pieces()[6_000].copies;
+    let copies = body.tets().unwrap().pieces()[6_000].copies;
     PointSpring {
         point: MaterialPoint::in_tet(copies, [0.25; 4]),
         kind: SpringKind::OneSided { normal: Vector3::y(), offset_m: height },
@@ -96,7 +96,7 @@ fn degenerate_elements_change_none_of_that() {
     let mut hashes = Vec::new();
     for threads in [1, 2, 3] {
         let mut body = ruined_cube(threads);
-        let last = *body.pieces().last().unwrap();
+        let last = *body.tets().unwrap().pieces().last().unwrap();
         let grab = PointSpring {
             point: MaterialPoint::in_tet(last.copies, [0.1, 0.2, 0.3, 0.4]),
             kind: SpringKind::Hold { target_m: Vector3::new(0.1, 0.12, 0.1) },

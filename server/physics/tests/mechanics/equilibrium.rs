@@ -34,7 +34,7 @@ fn sag(body: &Body) -> f64 {
 
 /// A spring that pushes the free end up.
 fn prop(body: &Body) -> PointSpring {
-    let last = *body.pieces().last().unwrap();
+    let last = *body.tets().unwrap().pieces().last().unwrap();
     let kind = SpringKind::OneSided { normal: Vector3::y(), offset_m: 0.06 };
     PointSpring {
         point: MaterialPoint::in_tet(last.copies, [0.25; 4]),

@@ -6,15 +6,14 @@ use nalgebra::{Matrix3, Vector3};
 use scindo_physics::assembly::{ElementKind, Model, ModelError, Volumetric};
 use scindo_physics::body::{Body, BodySettings, CuttingMethod, OperatorChoice, Scheme};
 use scindo_physics::cut::{
-    BladeSweep, Components, CutError, CutMesh, CutReport, Flaws, IncisionMark, Piece, Solid, Surface, Work,
+    BladeSweep, Components, CutError, CutMesh, CutReport, Flaws, IncisionMark, Solid, Surface, Work,
 };
 use scindo_physics::element::{Point, Points};
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
 use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
 use scindo_physics::skin::{Skin, SkinError, SkinSettings, SkinShape};
-use scindo_physics::snap::{Nodes, SnapCut, SnapReport, Snapper};
-use scindo_physics::space::{Space, Tets};
+use scindo_physics::space::{RestPoint, Space, Tets};
 use scindo_physics::team::Team;
 
 use super::{DOWN, SOFT, left_face, settings};
@@ -31,11 +30,11 @@ fn blade() -> BladeSweep {
 }
 
 /// Whether every position of a hanging block is the same to the bit, before and after a cut.
-fn assert_same_motion(law: Law, scheme: Scheme, fast: bool) {
+fn assert_same_motion(law: Law, scheme: Scheme, fast: bool, says: bool) {
     let material = Material { young_pa: 2e3, law, ..SOFT };
     let settings = BodySettings { scheme, ..settings(200, 1e-6) };
     let own = Body::new(block(), material, settings).unwrap();
-    let foreign = Lattice { tets: Tets::linear(CutMesh::new(block()).unwrap()) };
+    let foreign = Lattice { tets: Tets::linear(CutMesh::new(block()).unwrap()), says };
     let foreign = Body::of_space(Box::new(foreign), material, settings).unwrap();
     let mut bodies = [own, foreign];
     for body in &mut bodies {
@@ -60,20 +59,53 @@ fn assert_same_motion(law: Law, scheme: Scheme, fast: bool) {
 
 #[test]
 fn a_foreign_space_moves_like_the_one_it_hands_on_to() {
-    assert_same_motion(Law::Corotational, Scheme::ImplicitEuler, true);
-    assert_same_motion(Law::NeoHookean, Scheme::ImplicitEuler, false);
+    for says in [true, false] {
+        assert_same_motion(Law::Corotational, Scheme::ImplicitEuler, true, says);
+        assert_same_motion(Law::NeoHookean, Scheme::ImplicitEuler, false, says);
+    }
+}
+
+/// Whoever asks about any body gets the same answers from one whose tetrahedra are hidden.
+#[test]
+fn a_space_without_tetrahedra_answers_what_any_body_is_asked() {
+    let foreign = |says| {
+        let space = Lattice { tets: Tets::linear(CutMesh::new(block()).unwrap()), says };
+        let mut body = Body::of_space(Box::new(space), SOFT, settings(200, 1e-6)).unwrap();
+        let held = left_face(&body);
+        body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+        body.cut(&blade(), 1).unwrap();
+        for _ in 0..3 {
+            body.step(0.01, DOWN, &[]);
+        }
+        body
+    };
+    let [own, hidden] = [true, false].map(foreign);
+    assert!(own.tets().is_some() && hidden.tets().is_none());
+    assert_eq!(own.bounds(), hidden.bounds());
+    assert_eq!(own.element_size(), hidden.element_size());
+    assert_eq!((own.n_elements(), own.n_pieces()), (hidden.n_elements(), hidden.n_pieces()));
+    assert!(own.n_pieces() > own.n_elements() && hidden.can_be_cut());
+    assert_eq!(own.cauchy_stresses(), hidden.cauchy_stresses());
+    assert_eq!((own.solid(), own.swept_area(&blade())), (hidden.solid(), hidden.swept_area(&blade())));
+    let lip = |side: Vector3<f64>, body: &Body| {
+        let mut point = body.locate(Vector3::new(0.02, 0.16, 0.05), Some(side)).unwrap();
+        body.carriers(&mut point)
+    };
+    assert_eq!(lip(Vector3::y(), &own), lip(Vector3::y(), &hidden));
+    assert_ne!(lip(Vector3::y(), &own), lip(-Vector3::y(), &own), "the lips move apart");
+    assert!(own.locate(Vector3::new(0.02, 0.31, 0.05), None).is_none());
 }
 
 /// The energy balance of Newmark's method asks the stiffness for the rotation of every piece.
 #[test]
 fn a_foreign_stiffness_gives_the_rotations_of_its_own_places() {
-    assert_same_motion(Law::Corotational, Scheme::Newmark { beta: 0.25, gamma: 0.5 }, true);
+    assert_same_motion(Law::Corotational, Scheme::Newmark { beta: 0.25, gamma: 0.5 }, true, true);
 }
 
 /// Cutting along faces makes new tetrahedra, which no other space could take over.
 #[test]
 fn a_foreign_space_is_not_cut_along_faces() {
-    let space = Box::new(Lattice { tets: Tets::linear(CutMesh::new(block()).unwrap()) });
+    let space = Box::new(Lattice { tets: Tets::linear(CutMesh::new(block()).unwrap()), says: true });
     let settings = BodySettings { cutting: CuttingMethod::Snap, ..settings(200, 1e-6) };
     let error = Body::of_space(space, SOFT, settings).unwrap_err().to_string();
     assert!(error.contains("cutting along faces"), "{error}");
@@ -83,6 +115,8 @@ fn a_foreign_space_is_not_cut_along_faces() {
 #[derive(Clone, Debug)]
 struct Lattice {
     tets: Tets,
+    /// Whether it says that it consists of tetrahedra.
+    says: bool,
 }
 
 /// Hands everything on to the stiffness of tetrahedra, but numbers the places of pieces itself.
@@ -153,6 +187,26 @@ impl Space for Lattice {
         self.tets.kind()
     }
 
+    fn can_be_cut(&self) -> bool {
+        self.tets.can_be_cut()
+    }
+
+    fn can_carry_skin(&self) -> bool {
+        self.tets.can_carry_skin()
+    }
+
+    fn tets(&self) -> Option<&Tets> {
+        self.says.then_some(&self.tets)
+    }
+
+    fn bounds(&self) -> [Vector3<f64>; 2] {
+        self.tets.bounds()
+    }
+
+    fn element_size(&self) -> f64 {
+        self.tets.element_size()
+    }
+
     fn n_elements(&self) -> usize {
         self.tets.n_elements()
     }
@@ -185,12 +239,12 @@ impl Space for Lattice {
         self.tets.volumes(selected)
     }
 
-    fn mesh(&self) -> &TetMesh {
-        self.tets.mesh()
+    fn n_pieces(&self) -> usize {
+        self.tets.n_pieces()
     }
 
-    fn pieces(&self) -> &[Piece] {
-        self.tets.pieces()
+    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+        self.tets.for_pieces(visit);
     }
 
     fn for_groups(&self, visit: &mut dyn FnMut(&[u32])) {
@@ -209,20 +263,12 @@ impl Space for Lattice {
         self.tets.for_groups_around(copy, visit);
     }
 
-    fn piece_volumes(&self, p: usize) -> [f64; 4] {
-        self.tets.piece_volumes(p)
+    fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint> {
+        self.tets.locate(point, side)
     }
 
-    fn element_of(&self, p: usize) -> usize {
-        self.tets.element_of(p)
-    }
-
-    fn piece_at(&self, tet: u32, barycentric: [f64; 4]) -> u32 {
-        self.tets.piece_at(tet, barycentric)
-    }
-
-    fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
-        self.tets.carriers(tet, copies, weights)
+    fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)> {
+        self.tets.carriers(point)
     }
 
     fn components(&self) -> Components {
@@ -269,6 +315,10 @@ impl Space for Lattice {
         self.tets.spoil_skin();
     }
 
+    fn swept_area(&self, x: &[Vector3<f64>], blade: &BladeSweep) -> f64 {
+        self.tets.swept_area(x, blade)
+    }
+
     fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
         self.tets.cut(x, blade, incision)
     }
@@ -285,22 +335,16 @@ impl Space for Lattice {
         self.tets.is_being_cut()
     }
 
-    fn cut_along_faces(
-        &mut self,
-        snapper: &mut Snapper,
-        nodes: Nodes<'_>,
-        blade: &BladeSweep,
-        incision: u32,
-    ) -> Result<(SnapReport, Option<SnapCut>), CutError> {
-        self.tets.cut_along_faces(snapper, nodes, blade, incision)
-    }
-
     fn reset(&mut self) -> Result<(), MeshError> {
         self.tets.reset()
     }
 
     fn boxed_clone(&self) -> Box<dyn Space> {
         Box::new(self.clone())
+    }
+
+    fn bytes(&self) -> usize {
+        self.tets.bytes()
     }
 
     fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {

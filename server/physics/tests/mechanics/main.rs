@@ -57,7 +57,7 @@ pub fn cube(cells: usize, material: Material, settings: BodySettings) -> Body {
 
 /// The nodes at x = 0 of a bar.
 pub fn left_face(body: &Body) -> Vec<u32> {
-    let nodes = &body.mesh().nodes;
+    let nodes = &body.rest_positions()[..body.n_copies()];
     (0..nodes.len() as u32).filter(|&n| nodes[n as usize].x == 0.0).collect()
 }
 

@@ -169,7 +169,7 @@ fn threads_do_not_change_a_bit_and_nothing_is_allocated() {
                 let settings = BodySettings { threads, ..with(scheme, Arithmetic::Single, 1e-4) };
                 let mut body = beam(law, Rayleigh { mass_1_s: 0.1, stiffness_s: 0.001 }, settings);
                 let kind = SpringKind::OneSided { normal: Vector3::y(), offset_m: 0.0 };
-                let point = MaterialPoint::in_tet(body.pieces()[70].copies, [0.25; 4]);
+                let point = MaterialPoint::in_tet(body.tets().unwrap().pieces()[70].copies, [0.25; 4]);
                 let spring = PointSpring { point, kind, stiffness_n_m: 50.0, max_force_n: 1.0 };
                 (0..8).for_each(|_| {
                     body.step(0.004, DOWN, &[spring]);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_physics::body::{Body, BodySettings, ElementKind, Method, Outcome, PcgSettings, Scheme};
-use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::{BladeSweep, SolidCells};
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::mesh::box_hexes;
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
@@ -196,4 +196,53 @@ fn the_surface_follows_cuts_and_a_reset_and_encloses_the_volume() {
     assert_eq!(body.flaws().surface, 0);
     body.reset().unwrap();
     assert_eq!(*body.surface(), whole);
+}
+
+/// What world, runtime and studies ask of any body.
+#[test]
+fn an_octree_answers_what_any_body_is_asked() {
+    let mut body = body(unit_cube(10, 2), LINEAR, BodySettings::default());
+    assert!(body.tets().is_none() && body.can_be_cut() && body.mesh_error(&mut Default::default()).is_none());
+    assert_eq!(body.bounds(), [Vector3::zeros(), Vector3::repeat(1.0)]);
+    assert!((body.element_size() - 0.1).abs() < 1e-12);
+    // The cut lies between the centres at 0.45 and 0.55, above the faces there.
+    let edge = |z: f64| [Vector3::new(-0.1, 0.53, z), Vector3::new(1.1, 0.53, z)];
+    let area = body.swept_area(&BladeSweep { segments: vec![edge(1.1), edge(0.2)] });
+    assert!((area - 0.8).abs() < 1e-6, "{area}");
+    let points = [(Vector3::new(0.33, 0.53, 0.7), true), (Vector3::new(0.33, 0.53, 0.05), false)];
+    let mut probes: Vec<_> = points
+        .iter()
+        .flat_map(|(X, _)| [Vector3::y(), -Vector3::y()].map(|side| body.locate(*X, Some(side)).unwrap()))
+        .collect();
+    assert!(body.locate(Vector3::new(0.5, 0.5, 1.3), None).is_none());
+    body.cut(&BladeSweep { segments: vec![edge(1.1), edge(0.2)] }, 1).unwrap();
+    for (pair, (X, apart)) in probes.chunks_mut(2).zip(points) {
+        let [above, below] = [0, 1].map(|k| body.carriers(&mut pair[k]));
+        for carriers in [&above, &below] {
+            let at: Vector3<f64> =
+                carriers.iter().map(|(v, w)| *w * body.rest_positions()[*v as usize]).sum();
+            assert!((at - X).norm() < 1e-12);
+        }
+        assert_eq!(above != below, apart, "{X}");
+    }
+    // The parts that fill the body, and the stress of each.
+    let (mut volume, mut parts) = (0.0, 0);
+    body.for_pieces(&mut |element, copies, volumes| {
+        assert_eq!((element, copies.len()), (parts, 8));
+        volume += volumes.iter().sum::<f64>();
+        parts += 1;
+    });
+    assert!((volume - 1.0).abs() < 1e-12);
+    assert_eq!((parts, body.cauchy_stresses().len()), (body.n_pieces(), body.n_pieces()));
+    let solid = body.solid();
+    let SolidCells::Hexes(hexes) = &solid.cells else { panic!("cells are hexahedra") };
+    assert_eq!((hexes.len(), solid.origins.len()), (parts, parts));
+    let filled: f64 = hexes
+        .iter()
+        .map(|hex| {
+            let at = |c: usize| solid.vertices[hex[c] as usize].position(body.rest_positions());
+            (at(1) - at(0)).cross(&(at(2) - at(0))).dot(&(at(4) - at(0)))
+        })
+        .sum();
+    assert!((filled - 1.0).abs() < 1e-12, "{filled}");
 }

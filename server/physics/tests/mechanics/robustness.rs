@@ -13,7 +13,7 @@ fn is_finite(body: &Body) -> bool {
 
 /// Largest difference between present and rest edge lengths, relative to the size of the body.
 fn shape_error(body: &Body) -> f64 {
-    let (x, mesh) = (body.positions(), body.mesh());
+    let (x, mesh) = (body.positions(), body.tets().unwrap().mesh());
     let length = |x: &[Vector3<f64>], a: u32, b: u32| (x[a as usize] - x[b as usize]).norm();
     mesh.tets
         .iter()

@@ -9,7 +9,7 @@ use crate::{DOWN, SOFT, cube, settings};
 
 /// One-sided springs under every node of the lowest layer.
 fn floor(body: &Body, height: f64, stiffness_n_m: f64, max_force_n: f64) -> Vec<PointSpring> {
-    let nodes = &body.mesh().nodes;
+    let nodes = &body.tets().unwrap().mesh().nodes;
     (0..nodes.len())
         .filter(|&n| nodes[n].y == 0.0)
         .map(|n| PointSpring {
@@ -46,7 +46,7 @@ fn a_body_comes_to_rest_on_a_floor_that_carries_its_weight() {
 fn a_grab_pulls_no_harder_than_it_may() {
     let mut body = cube(3, SOFT, settings(100, 1e-6));
     let grab = PointSpring {
-        point: MaterialPoint::in_tet(body.pieces()[40].copies, [0.25; 4]),
+        point: MaterialPoint::in_tet(body.tets().unwrap().pieces()[40].copies, [0.25; 4]),
         kind: SpringKind::Hold { target_m: Vector3::new(0.05, 0.5, 0.05) },
         stiffness_n_m: 1000.0,
         max_force_n: 0.05,
@@ -67,7 +67,7 @@ fn a_soft_grab_moves_the_body_to_its_target() {
     let damped = Material { rayleigh: Rayleigh { mass_1_s: 5.0, stiffness_s: 0.01 }, ..SOFT };
     let mut body = cube(3, damped, settings(100, 1e-6));
     let target = Vector3::new(0.2, 0.1, 0.0);
-    let copies = body.pieces()[40].copies;
+    let copies = body.tets().unwrap().pieces()[40].copies;
     let kind = SpringKind::Hold { target_m: target };
     let grab = PointSpring {
         point: MaterialPoint::in_tet(copies, [0.25; 4]),

@@ -180,7 +180,7 @@ impl Found {
 }
 
 fn in_words(body: &SimBody) -> String {
-    let (size, nodes) = (body.size(), body.body.mesh().nodes.len());
+    let (size, nodes) = (body.size(), body.body.n_copies());
     let [low, high] = body.corners_m().map(|corner| coordinates(&corner));
     let mut words = format!(
         "  body {}: {} elements, {nodes} nodes, {} surface triangles, {:.4e} m3\n    from {low} to {high} m",
@@ -202,7 +202,7 @@ fn body_as_json(body: &SimBody) -> Value {
     json!({
         "id": &*body.id,
         "elements": size.elements,
-        "nodes": body.body.mesh().nodes.len(),
+        "nodes": body.body.n_copies(),
         "surface_vertices": size.vertices,
         "surface_triangles": size.triangles,
         "min_m": min_m,

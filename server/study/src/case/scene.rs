@@ -194,16 +194,20 @@ fn with_probes(scene: &Scene) -> Result<Scene, SceneError> {
 /// Centroids of elements. A body is cut into [`POINTS`] slices along its longest side, and the element
 /// deepest below the surface is taken from each.
 fn points(body: &scindo_world::simulation::SimBody) -> Vec<[f64; 3]> {
-    let mesh = body.body.mesh();
-    let [low, high] = mesh.bounds();
+    let mut centres: Vec<nalgebra::Vector3<f64>> = Vec::new();
+    let rest = body.body.rest_positions();
+    body.body.for_pieces(&mut |_, copies, volumes| {
+        let parts = copies.iter().zip(volumes).map(|(&copy, volume)| *volume * rest[copy as usize]);
+        centres.push(parts.sum::<nalgebra::Vector3<f64>>() / volumes.iter().sum::<f64>());
+    });
+    let [low, high] = body.body.bounds();
     let axis = (high - low).imax();
     let x = body.body.rest_positions();
     let skin: Vec<_> = body.body.surface().vertices.iter().map(|v| v.position(x)).collect();
     let skin: Vec<_> = skin.iter().step_by(skin.len().div_ceil(500).max(1)).collect();
-    let every = mesh.tets.len().div_ceil(2_000).max(1);
+    let every = centres.len().div_ceil(2_000).max(1);
     let mut best = [const { None::<(f64, [f64; 3])> }; POINTS];
-    for e in (0..mesh.tets.len()).step_by(every) {
-        let centre = mesh.corners(e).iter().sum::<nalgebra::Vector3<f64>>() / 4.0;
+    for centre in centres.into_iter().step_by(every) {
         let share = (centre[axis] - low[axis]) / (high[axis] - low[axis]);
         let slice = ((share * POINTS as f64) as usize).min(POINTS - 1);
         let depth = skin.iter().map(|s| (*s - centre).norm_squared()).fold(f64::INFINITY, f64::min);

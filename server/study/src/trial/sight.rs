@@ -1,8 +1,6 @@
 //! What the regions of a scene hold and load on a mesh: number of nodes, area and volume.
 
-use std::collections::BTreeMap;
-
-use scindo_physics::mesh::TetMesh;
+use scindo_physics::body::Body;
 use scindo_world::assemble::region::select;
 use scindo_world::scene::Region;
 use scindo_world::simulation::Simulation;
@@ -47,47 +45,35 @@ pub fn largest_change<'a>(a: &'a [Sight], b: &'a [Sight]) -> Option<(&'a Sight, 
 pub fn look(simulation: &Simulation) -> Vec<Sight> {
     let mut seen = Vec::new();
     for (spec, body) in simulation.scene().bodies.iter().zip(simulation.bodies()) {
-        let mesh = body.body.mesh();
         let fixes = spec.fixes.iter().enumerate().map(|(i, fix)| (format!("fix.{i}"), &fix.region));
         let loads = spec.loads.iter().enumerate().map(|(i, load)| (format!("load.{i}"), &load.region));
-        let regions: Vec<(String, &Region)> = fixes.chain(loads).collect();
-        if regions.is_empty() {
-            continue;
-        }
-        let boundary = boundary(mesh);
-        for (key, region) in regions {
-            seen.push(measure(mesh, &boundary, format!("body.{}.{key}", spec.id), region));
+        for (key, region) in fixes.chain(loads) {
+            seen.push(measure(&body.body, format!("body.{}.{key}", spec.id), region));
         }
     }
     seen
 }
 
-/// Faces that belong to one element only.
-fn boundary(mesh: &TetMesh) -> Vec<[u32; 3]> {
-    let mut faces = BTreeMap::new();
-    for [a, b, c, d] in &mesh.tets {
-        for mut face in [[*a, *b, *c], [*a, *b, *d], [*a, *c, *d], [*b, *c, *d]] {
-            face.sort_unstable();
-            *faces.entry(face).or_insert(0_u32) += 1;
-        }
-    }
-    faces.into_iter().filter(|(_, count)| *count == 1).map(|(face, _)| face).collect()
-}
-
-fn measure(mesh: &TetMesh, boundary: &[[u32; 3]], key: String, region: &Region) -> Sight {
-    let nodes = select(&mesh.nodes, mesh.bounds(), region);
-    let mut inside = vec![false; mesh.nodes.len()];
+fn measure(body: &Body, key: String, region: &Region) -> Sight {
+    let rest = &body.rest_positions()[..body.n_copies()];
+    let nodes = select(rest, body.bounds(), region);
+    let mut inside = vec![false; rest.len()];
     nodes.iter().for_each(|n| inside[*n as usize] = true);
-    let at = |n: u32| mesh.nodes[n as usize];
-    let whole = |face: &&[u32; 3]| face.iter().all(|n| inside[*n as usize]);
-    let area = |[a, b, c]: &[u32; 3]| 0.5 * (at(*b) - at(*a)).cross(&(at(*c) - at(*a))).norm();
-    let filled = (0..mesh.tets.len()).filter(|e| mesh.tets[*e].iter().all(|n| inside[*n as usize]));
-    Sight {
-        region: key,
-        nodes: nodes.len(),
-        area_m2: boundary.iter().filter(whole).map(area).sum(),
-        volume_m3: filled.map(|e| mesh.volume(e)).sum(),
-    }
+    let mut volume_m3 = 0.0;
+    body.for_pieces(&mut |_, copies, volumes| {
+        if copies.iter().all(|&copy| inside[copy as usize]) {
+            volume_m3 += volumes.iter().sum::<f64>();
+        }
+    });
+    let boundary = body.element_surface();
+    let vertex = |v: u32| &boundary.vertices[v as usize];
+    let whole = |face: &&[u32; 3]| face.iter().all(|&v| vertex(v).carriers().all(|(copy, _)| inside[copy]));
+    let area = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| vertex(v).position(rest));
+        0.5 * (b - a).cross(&(c - a)).norm()
+    };
+    let area_m2 = boundary.triangles.iter().filter(whole).map(area).sum();
+    Sight { region: key, nodes: nodes.len(), area_m2, volume_m3 }
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::Vector3;
+use scindo_physics::space::Tets;
 use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::{CutRequest, Inputs};
 use scindo_world::scene::Scene;
@@ -56,7 +57,7 @@ pub fn at_rest(bodies: &[String]) -> Vec<String> {
 /// Cuts the first body of a scene, only once if `once`. `None` if the scene is refused or `stop` was raised.
 pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) -> Option<Vec<Wear>> {
     let mut simulation = Simulation::with_options(scene, base_dir, BuildOptions::default()).ok()?;
-    let [low, high] = simulation.bodies().first()?.body.mesh().bounds();
+    let [low, high] = simulation.bodies().first()?.body.bounds();
     let mut random = Random(4);
     let (mut cut_ms, mut found) = (0.0, Vec::new());
     for cut in 1..=CUTS[2] {
@@ -68,13 +69,15 @@ pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) ->
         cut_ms += 1e3 * report.seconds.of(Stage::Cuts);
         if CUTS.contains(&cut) {
             let body = &simulation.bodies().first()?.body;
+            let tets = body.tets();
             found.push(Wear {
                 cuts: cut,
-                quality: body.mesh().quality().min_mean_ratio.0,
-                elements: body.mesh().tets.len(),
-                pieces: body.pieces().len(),
+                // Cells of an octree are cubes.
+                quality: tets.map_or(1.0, |tets| tets.mesh().quality().min_mean_ratio.0),
+                elements: body.n_elements(),
+                pieces: body.n_pieces(),
                 nodes: body.n_copies(),
-                least_fraction: body.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min),
+                least_fraction: tets.map_or(1.0, least_fraction),
                 parts: body.components().len(),
                 cut_ms,
             });
@@ -84,6 +87,10 @@ pub fn measure(scene: &Scene, base_dir: &Path, once: bool, stop: &AtomicBool) ->
         }
     }
     Some(found)
+}
+
+fn least_fraction(tets: &Tets) -> f64 {
+    tets.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min)
 }
 
 /// A randomly tilted sweep across the box, from outside to a random depth.

@@ -198,7 +198,7 @@ impl Builder<'_> {
     }
 
     fn select(&mut self, at: &str, region: &crate::scene::Region, body: &Body) -> Vec<u32> {
-        let bounds = body.mesh().bounds();
+        let bounds = body.bounds();
         let nodes = region::select(body.rest_positions(), bounds, region);
         if nodes.is_empty() {
             let [low, high] = bounds;

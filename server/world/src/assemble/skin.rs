@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 use scindo_physics::body::Body;
 use scindo_physics::skin::SkinSettings;
+use scindo_physics::space::Tets;
 
 use super::mesh::fault;
 use crate::format::{MeshFile, SurfaceMesh, read_mesh};
@@ -32,9 +33,9 @@ fn rest(surface: &SurfaceBvh, flat: &Vector3<f64>, normal: &Vector3<f64>, reach:
     facing.map_or(*flat, |c| c.point)
 }
 
-/// Mean edge of the elements [m].
+/// Mean edge of the tetrahedra [m]; 0 for a body without them, which gets no skin.
 fn edge(body: &Body) -> f64 {
-    let mesh = body.mesh();
+    let Some(mesh) = body.tets().map(Tets::mesh) else { return 0.0 };
     let sum: f64 = (0..mesh.tets.len()).map(|e| mesh.longest_edge(e)).sum();
     sum / mesh.tets.len() as f64
 }

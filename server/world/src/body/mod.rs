@@ -10,7 +10,7 @@ use std::mem::Discriminant;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, ElementKind, Notice, PointSpring, SolveReport};
+use scindo_physics::body::{Body, Notice, PointSpring, SolveReport};
 use scindo_physics::cut::IncisionMark;
 use scindo_physics::estimate::{MeshError, StressRecovery};
 
@@ -120,10 +120,10 @@ impl SimBody {
         }
     }
 
-    /// Edge [m] of a lattice cell filled by six tetrahedra of mean volume, or by one hexahedron.
+    /// Edge [m] of a lattice cell filled by six tetrahedra of mean volume, or by one hexahedron; that of the
+    /// finest cells of an octree.
     pub fn cell_m(&self) -> f64 {
-        let per_cell = if self.body.settings().element == ElementKind::Hex8 { 1.0 } else { 6.0 };
-        (per_cell * self.rest_volume_m3 / self.size().elements as f64).cbrt()
+        self.body.element_size()
     }
 
     /// Corners of the box around the body in its present state [m].

@@ -1,20 +1,11 @@
 //! Probes: material points whose positions are recorded.
 //!
-//! A probe is bound to an element and barycentric coordinates at rest. On a cut, `side` selects its piece:
-//! the one next to the point in that direction.
+//! A probe is located at rest. On a cut, `side` selects its lip: the one next to the point in that direction.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use scindo_collision::{barycentric_point, closest_point_on_triangle};
 use scindo_physics::body::Body;
-use scindo_physics::mesh::TetMesh;
-
-/// Distance, relative to the element, by which a point is moved towards its side before its piece is looked
-/// up.
-/// Far above rounding, far below any piece that can be seen.
-const SIDE_STEP: f64 = 1e-6;
-
-/// Distance outside an element at which a point still counts as inside, in barycentric units.
-const INSIDE: f64 = 1e-9;
+use scindo_physics::space::RestPoint;
 
 /// A material point that is recorded.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,33 +16,27 @@ pub struct Probe {
     pub body: usize,
     /// Rest position [m].
     pub rest_m: Vector3<f64>,
-    /// Element that contains it.
-    pub element: u32,
-    /// Barycentric coordinates of the point in that element; Σ = 1.
-    pub weights: [f64; 4],
-    /// Barycentric coordinates for the lookup of its piece: those of the point, moved to its side.
-    pub lookup: [f64; 4],
-    /// The short vector from the point to its side [m].
-    towards: Vector3<f64>,
+    /// Where the body finds it again after cuts.
+    point: RestPoint,
     /// The copies (and further nodes of the element) that carry it, with their shape functions at the point.
     /// They change with the topology.
     pub carriers: Vec<(u32, f64)>,
 }
 
-/// A point that lies in no element, and its distance from the mesh.
+/// A point that lies in no element, and its distance from the body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outside {
-    /// The nearest point of the mesh [m].
+    /// The nearest point of the boundary [m].
     pub nearest_m: Vector3<f64>,
     /// Distance of the point from it [m].
     pub distance_m: f64,
 }
 
 impl Probe {
-    /// Binds a point to the uncut mesh.
+    /// Binds a point to the uncut body.
     ///
     /// # Errors
-    /// The nearest point of the mesh, if the point lies in no element.
+    /// The nearest point of the boundary, if the point lies in no element.
     pub fn bind(
         id: &str,
         body: usize,
@@ -59,40 +44,14 @@ impl Probe {
         rest_m: Vector3<f64>,
         side: Option<Vector3<f64>>,
     ) -> Result<Self, Outside> {
-        let mesh = of.mesh();
-        let towards = side.map_or(Vector3::zeros(), |side| side.normalize() * (SIDE_STEP * cell_size(mesh)));
-        let aim = rest_m + towards;
-        let element = element_at(mesh, aim)
-            .or_else(|| element_at(mesh, rest_m))
-            .ok_or_else(|| nearest(mesh, rest_m))?;
-        let corners = mesh.corners(element);
-        let weights = barycentric(&corners, rest_m);
-        Ok(Self {
-            id: id.to_owned(),
-            body,
-            rest_m,
-            element: element as u32,
-            weights,
-            lookup: barycentric(&corners, aim),
-            towards,
-            carriers: of.carriers(element as u32, mesh.tets[element], weights),
-        })
+        let mut point = of.locate(rest_m, side).ok_or_else(|| nearest(of, rest_m))?;
+        let carriers = of.carriers(&mut point);
+        Ok(Self { id: id.to_owned(), body, rest_m, point, carriers })
     }
 
-    /// Updates the probe after a change of topology: takes the copies of the piece that contains the point.
-    /// Where cuts change the mesh, its element is looked up first.
+    /// Updates the probe after a change of topology: takes the copies that now carry the point.
     pub fn follow(&mut self, of: &Body) {
-        let mesh = of.mesh();
-        if of.node_origins().is_some() {
-            let aim = self.rest_m + self.towards;
-            let element = deepest(mesh, aim);
-            let corners = mesh.corners(element);
-            self.element = element as u32;
-            self.weights = barycentric(&corners, self.rest_m);
-            self.lookup = barycentric(&corners, aim);
-        }
-        let copies = of.pieces()[of.piece_at(self.element, self.lookup) as usize].copies;
-        self.carriers = of.carriers(self.element, copies, self.weights);
+        self.carriers = of.carriers(&mut self.point);
     }
 
     /// Present position [m] at the node positions `x`.
@@ -101,40 +60,12 @@ impl Probe {
     }
 }
 
-/// Mean edge length [m] of an element, from the mean volume.
-fn cell_size(mesh: &TetMesh) -> f64 {
-    let volume: f64 = mesh.volumes().iter().sum();
-    (6.0 * volume / mesh.tets.len().max(1) as f64).cbrt()
-}
-
-/// The element that contains a point, if any.
-fn element_at(mesh: &TetMesh, point: Vector3<f64>) -> Option<usize> {
-    let element = deepest(mesh, point);
-    (depth(mesh, point, element) >= -INSIDE).then_some(element)
-}
-
-/// The element in which a point lies deepest; of equals the first.
-fn deepest(mesh: &TetMesh, point: Vector3<f64>) -> usize {
-    let all = (0..mesh.tets.len()).map(|e| (depth(mesh, point, e), e));
-    all.max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))).map_or(0, |(_, e)| e)
-}
-
-/// Smallest barycentric coordinate of a point in element `e`.
-fn depth(mesh: &TetMesh, point: Vector3<f64>, e: usize) -> f64 {
-    barycentric(&mesh.corners(e), point).into_iter().fold(f64::INFINITY, f64::min)
-}
-
-fn barycentric(x: &[Vector3<f64>; 4], point: Vector3<f64>) -> [f64; 4] {
-    let edges = Matrix3::from_columns(&[x[1] - x[0], x[2] - x[0], x[3] - x[0]]);
-    let inner =
-        edges.try_inverse().map_or(Vector3::repeat(f64::NEG_INFINITY), |inverse| inverse * (point - x[0]));
-    [1.0 - inner.sum(), inner.x, inner.y, inner.z]
-}
-
-fn nearest(mesh: &TetMesh, point: Vector3<f64>) -> Outside {
+fn nearest(body: &Body, point: Vector3<f64>) -> Outside {
+    let (surface, rest) = (body.element_surface(), body.rest_positions());
+    let vertices: Vec<Vector3<f64>> = surface.vertices.iter().map(|v| v.position(rest)).collect();
     let mut best = Outside { nearest_m: point, distance_m: f64::INFINITY };
-    for face in mesh.boundary_faces() {
-        let triangle = face.nodes.map(|n| mesh.nodes[n as usize]);
+    for triangle in &surface.triangles {
+        let triangle = triangle.map(|v| vertices[v as usize]);
         let candidate = barycentric_point(&triangle, closest_point_on_triangle(point, &triangle));
         let distance_m = (candidate - point).norm();
         if distance_m < best.distance_m {
@@ -186,11 +117,11 @@ mod tests {
     #[test]
     fn side_chooses_the_element_where_the_point_lies_between_two() {
         let (body, point) = (block(), Vector3::new(0.25, 0.25, 0.5));
-        let mesh = body.mesh();
+        let mesh = body.tets().unwrap().mesh();
         let centre_z = |side: Vector3<f64>| {
             let probe = Probe::bind("p", 0, &body, point, Some(side)).unwrap();
             assert!((probe.position(&mesh.nodes) - point).norm() < 1e-14);
-            mesh.corners(probe.element as usize).iter().map(|x| x.z).sum::<f64>() / 4.0
+            mesh.corners(probe.point.element as usize).iter().map(|x| x.z).sum::<f64>() / 4.0
         };
         assert!(centre_z(Vector3::z()) > 0.5 && centre_z(-Vector3::z()) < 0.5);
     }

@@ -54,17 +54,18 @@ pub fn topology(body: &Body) -> SurfaceTopology {
     }
 }
 
-/// Writes the von Mises stress [Pa] of every surface vertex into `out`. It is the mean over the pieces around
-/// each copy, weighted by volume and interpolated like positions.
+/// Writes the von Mises stress [Pa] of every surface vertex into `out`. It is the mean over the material
+/// around each copy, weighted by volume and interpolated like positions.
 pub fn surface_stress(body: &Body, out: &mut Vec<f32>) {
     let mut mean = vec![(0.0, 0.0); body.n_copies()];
-    for (p, (piece, stress)) in body.pieces().iter().zip(&body.cauchy_stresses()).enumerate() {
-        let stress = von_mises(stress);
-        for (&copy, volume) in piece.copies.iter().zip(body.piece_volumes(p)) {
+    let stresses = body.cauchy_stresses();
+    body.for_pieces(&mut |element, copies, volumes| {
+        let stress = von_mises(&stresses[element]);
+        for (&copy, volume) in copies.iter().zip(volumes) {
             let (sum, weight) = &mut mean[copy as usize];
             (*sum, *weight) = (*sum + stress * volume, *weight + volume);
         }
-    }
+    });
     out.clear();
     out.extend(body.surface().vertices.iter().map(|vertex| {
         let carriers = vertex.carriers().filter(|(_, weight)| *weight > 0.0);

@@ -7,6 +7,7 @@
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, ElementKind, Volumetric};
 use scindo_physics::mesh::TetMesh;
+use scindo_physics::space::Tets;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
 use crate::assemble::Built;
@@ -88,20 +89,24 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
 
 /// The uncut body with fewer elements, or as it is where it has no more.
 fn coarser(body: &Body, elements: f64) -> Option<TetMesh> {
-    let mesh = body.mesh();
-    if mesh.tets.len() as f64 <= 1.5 * elements {
+    let mesh = body.tets().map(Tets::mesh);
+    if let Some(mesh) = mesh.filter(|mesh| mesh.tets.len() as f64 <= 1.5 * elements) {
         return Some(mesh.clone());
     }
-    let volume_m3: f64 = mesh.volumes().iter().sum();
-    let [low, high] = mesh.bounds();
+    let volume_m3 = mesh.map_or_else(|| body.rest_volume(), |mesh| mesh.volumes().iter().sum());
+    let [low, high] = body.bounds();
     let spacing_m = (TETS_PER_CELL * volume_m3 / elements).cbrt();
     let cells = ((high - low).max() / spacing_m).round().clamp(4.0, 128.0) as usize;
-    let skin = SurfaceMesh {
-        file: "copy".into(),
-        vertices: mesh.nodes.clone(),
-        triangles: mesh.boundary_faces().iter().map(|face| face.nodes).collect(),
-        notes: Vec::new(),
+    let (vertices, triangles) = match mesh {
+        Some(mesh) => (mesh.nodes.clone(), mesh.boundary_faces().iter().map(|face| face.nodes).collect()),
+        // Lips of cuts lie on each other at rest and enclose nothing.
+        None => {
+            let (surface, rest) = (body.element_surface(), body.rest_positions());
+            let vertices = surface.vertices.iter().map(|vertex| vertex.position(rest)).collect();
+            (vertices, surface.triangles.clone())
+        }
     };
+    let skin = SurfaceMesh { file: "copy".into(), vertices, triangles, notes: Vec::new() };
     let (copy, report) = lattice_from_surface(&skin, cells, 1.0).ok()?;
     (report.volume_error.abs() < VOLUME).then_some(copy)
 }

@@ -1,5 +1,5 @@
-//! Writes ParaView files: `.vtu` grids of tetrahedra and `.vtp` surfaces with fields, `.vtm` files that group
-//! them, `.pvd` series.
+//! Writes ParaView files: `.vtu` grids of tetrahedra and hexahedra, `.vtp` surfaces with fields, `.vtm` files that
+//! group them, `.pvd` series.
 //!
 //! # Source
 //! "VTK File Formats" (vtk.org): XML, base64 inline, 64-bit headers, little endian. Header and data of
@@ -15,6 +15,19 @@ use nalgebra::Vector3;
 
 /// VTK's number for a tetrahedron.
 const VTK_TETRA: u8 = 10;
+/// VTK's number for a hexahedron.
+const VTK_HEXAHEDRON: u8 = 12;
+/// VTK counts the corners of a hexahedron around its lower face, then around its upper one.
+const VTK_CORNERS: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+
+/// A tetrahedron or a hexahedron.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SolidCell {
+    /// Positively oriented.
+    Tet([u32; 4]),
+    /// Bit k of a corner's number is its end along axis k.
+    Hex([u32; 8]),
+}
 
 /// Components of a symmetric tensor in VTK's order; ParaView shows these names.
 const TENSOR_COMPONENTS: [&str; 6] = ["XX", "YY", "ZZ", "XY", "YZ", "XZ"];
@@ -24,6 +37,8 @@ const TENSOR_COMPONENTS: [&str; 6] = ["XX", "YY", "ZZ", "XY", "YZ", "XZ"];
 pub enum Cells<'a> {
     /// Tetrahedra, positively oriented: a `.vtu` file.
     Tets(&'a [[u32; 4]]),
+    /// Tetrahedra and hexahedra: a `.vtu` file.
+    Solids(&'a [SolidCell]),
     /// Triangles, counter-clockwise from outside: a `.vtp` file.
     Triangles(&'a [[u32; 3]]),
 }
@@ -95,7 +110,7 @@ pub enum VtuError {
     Io(#[from] io::Error),
 }
 
-/// Writes a grid to a file, replacing it: `.vtu` for tetrahedra, `.vtp` for triangles.
+/// Writes a grid to a file, replacing it: `.vtu` for solids, `.vtp` for triangles.
 pub fn save_grid(path: &Path, grid: &Grid) -> Result<(), VtuError> {
     let mut out = BufWriter::new(File::create(path)?);
     write_grid(&mut out, grid)?;
@@ -110,7 +125,7 @@ pub fn write_grid(out: &mut impl Write, grid: &Grid) -> Result<(), VtuError> {
     check_lengths(grid.point_fields, n_points, "points")?;
     check_lengths(grid.cell_fields, n_cells, "cells")?;
     let (kind, cells_of, counted) = match grid.cells {
-        Cells::Tets(_) => ("UnstructuredGrid", "Cells", "NumberOfCells"),
+        Cells::Tets(_) | Cells::Solids(_) => ("UnstructuredGrid", "Cells", "NumberOfCells"),
         Cells::Triangles(_) => ("PolyData", "Polys", "NumberOfPolys"),
     };
     begin(out, kind, "1.0")?;
@@ -128,8 +143,13 @@ pub fn write_grid(out: &mut impl Write, grid: &Grid) -> Result<(), VtuError> {
     writeln!(out, "</Points>\n<{cells_of}>")?;
     array(out, &Array::of("Int64", "connectivity", 1), &bytes(&cells.connectivity, i64::to_le_bytes))?;
     array(out, &Array::of("Int64", "offsets", 1), &bytes(&cells.offsets, i64::to_le_bytes))?;
-    if let Cells::Tets(tets) = grid.cells {
-        array(out, &Array::of("UInt8", "types", 1), &vec![VTK_TETRA; tets.len()])?;
+    let types = match grid.cells {
+        Cells::Tets(tets) => Some(vec![VTK_TETRA; tets.len()]),
+        Cells::Solids(cells) => Some(cells.iter().map(SolidCell::vtk_type).collect()),
+        Cells::Triangles(_) => None,
+    };
+    if let Some(types) = types {
+        array(out, &Array::of("UInt8", "types", 1), &types)?;
     }
     writeln!(out, "</{cells_of}>\n</Piece>\n</{kind}>\n</VTKFile>")?;
     Ok(())
@@ -188,6 +208,15 @@ pub fn save_pvd(path: &Path, series: &[(f64, Vec<String>)]) -> io::Result<()> {
     out.flush()
 }
 
+impl SolidCell {
+    fn vtk_type(&self) -> u8 {
+        match self {
+            Self::Tet(_) => VTK_TETRA,
+            Self::Hex(_) => VTK_HEXAHEDRON,
+        }
+    }
+}
+
 /// Cells in the arrays that VTK expects.
 struct CellArrays {
     connectivity: Vec<i64>,
@@ -201,6 +230,10 @@ impl CellArrays {
         let n_points = grid.points.len();
         match grid.cells {
             Cells::Tets(tets) => tets.iter().try_for_each(|t| arrays.push(t, n_points))?,
+            Cells::Solids(cells) => cells.iter().try_for_each(|cell| match cell {
+                SolidCell::Tet(tet) => arrays.push(tet, n_points),
+                SolidCell::Hex(hex) => arrays.push(&VTK_CORNERS.map(|corner| hex[corner]), n_points),
+            })?,
             Cells::Triangles(triangles) => triangles.iter().try_for_each(|t| arrays.push(t, n_points))?,
         }
         Ok(arrays)
@@ -310,6 +343,22 @@ mod tests {
         write_grid(&mut out, &grid).unwrap();
         let Ok(MeshFile::Volume(mesh)) = read_mesh_bytes("a.vtu", &out) else { panic!("not a volume") };
         assert_eq!((mesh.nodes, mesh.tets), (points, TETS.to_vec()));
+    }
+
+    #[test]
+    fn hexahedra_stand_beside_tetrahedra_with_their_corners_in_vtks_order() {
+        let corner = |c: usize| Vector3::from_fn(|k, _| (c >> k & 1) as f64);
+        let points: Vec<Vector3<f64>> = (0..8).map(corner).collect();
+        let cells = [SolidCell::Hex([0, 1, 2, 3, 4, 5, 6, 7]), SolidCell::Tet([0, 1, 2, 4])];
+        let cells = Cells::Solids(&cells);
+        let grid = Grid { points: &points, cells, point_fields: &[], cell_fields: &[], time_s: None };
+        let arrays = CellArrays::of(&grid).unwrap();
+        assert_eq!(arrays.connectivity, [0, 1, 3, 2, 4, 5, 7, 6, 0, 1, 2, 4]);
+        assert_eq!(arrays.offsets, [8, 12]);
+        let mut out = Vec::new();
+        write_grid(&mut out, &grid).unwrap();
+        let refused = read_mesh_bytes("a.vtu", &out).unwrap_err().to_string();
+        assert!(refused.contains("hexahedron"), "{refused}");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The state of all bodies on disk, as ParaView and other readers of VTK files take it.
 //!
-//! * `NAME.vtu`: the material as tetrahedra that fill it once. An element that is cut is written as the tetrahedra
-//!   its pieces consist of, so that slices, volumes and integrals are right: their points are moved by the copies of
-//!   the piece, their stress is that of the piece. `element` and `piece` say where a tetrahedron belongs, `copy`
+//! * `NAME.vtu`: the material as tetrahedra or hexahedra that fill it once. A tetrahedron that is cut is written as
+//!   those its pieces consist of, so that slices, volumes and integrals are right: their points are moved by the copies of
+//!   the piece, their stress is that of the piece. `element` and `piece` say where a cell belongs, `copy`
 //!   which copy of a node a point is.
 //! * `NAME-surface.vtp`: the surface that is shown, lips included, every triangle with its cut tag.
 //!
@@ -13,10 +13,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Matrix3, Vector3};
 
 use scindo_physics::body::Body;
+use scindo_physics::cut::SolidCells;
 use scindo_physics::element::MaterialPoint;
 
 use crate::body::{SimBody, von_mises};
-use crate::format::vtu::{Cells, Field, FieldValues, Grid, VtuError, save_grid, save_vtm};
+use crate::format::vtu::{Cells, Field, FieldValues, Grid, SolidCell, VtuError, save_grid, save_vtm};
 use crate::simulation::Simulation;
 
 /// Copy of a point that is not at a node.
@@ -36,7 +37,7 @@ struct Points {
 #[derive(Default)]
 struct Solid {
     points: Points,
-    tets: Vec<[u32; 4]>,
+    cells: Vec<SolidCell>,
     body: Vec<i32>,
     element: Vec<i32>,
     piece: Vec<i32>,
@@ -122,13 +123,20 @@ impl Solid {
         let solid = body.solid();
         let stresses = body.cauchy_stresses();
         let first = self.points.add(body, &solid.vertices);
-        for (tet, &p) in solid.tets.iter().zip(&solid.piece) {
-            let (piece, stress) = (&body.pieces()[p as usize], &stresses[p as usize]);
-            self.tets.push(tet.map(|vertex| first + vertex));
+        match &solid.cells {
+            SolidCells::Tets(tets) => {
+                self.cells.extend(tets.iter().map(|tet| SolidCell::Tet(tet.map(|vertex| first + vertex))));
+            }
+            SolidCells::Hexes(hexes) => {
+                self.cells.extend(hexes.iter().map(|hex| SolidCell::Hex(hex.map(|vertex| first + vertex))));
+            }
+        }
+        for origin in &solid.origins {
+            let stress = &stresses[origin.stress as usize];
             self.body.push(number);
-            self.element.push(piece.element as i32);
-            self.piece.push(p as i32);
-            self.fraction.push(piece.fraction);
+            self.element.push(origin.element as i32);
+            self.piece.push(origin.piece as i32);
+            self.fraction.push(origin.fraction);
             self.von_mises.push(von_mises(stress));
             self.stress.push(in_vtk_order(stress));
         }
@@ -138,7 +146,7 @@ impl Solid {
         let field = |name, values| Field { name, values };
         let grid = Grid {
             points: &self.points.current,
-            cells: Cells::Tets(&self.tets),
+            cells: Cells::Solids(&self.cells),
             point_fields: &self.points.fields(),
             cell_fields: &[
                 field("body", FieldValues::Integers(&self.body)),

@@ -47,7 +47,7 @@ fn iterations(law: Law, arithmetic: Arithmetic, cut: Option<(f64, f64)>) -> Coun
         let z = SIDE / CELLS as f64 * (2.0 + fraction.cbrt());
         let blade = |x: f64| [V::new(x, -0.1, z), V::new(x, 0.2, z)];
         body.cut(&BladeSweep { segments: vec![blade(-0.1), blade(reach)] }, 1).unwrap();
-        let least = body.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min);
+        let least = body.tets().unwrap().pieces().iter().map(|p| p.fraction).fold(1.0, f64::min);
         assert!((least / fraction).ln().abs() < 0.1, "least fraction {least:e} instead of {fraction:e}");
     }
     let mut counts = Vec::new();

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix4, Vector3};
 
-use crate::cut::CutMesh;
 use crate::cut::shell::surface_builder::{Material, SurfaceBuilder};
 use crate::cut::topology::fragments::NONE;
+use crate::cut::{CutMesh, SolidCells};
 use crate::mesh::TET_FACES;
 use crate::testing::{Random, surface_is_closed_and_manifold};
 
@@ -25,13 +25,14 @@ pub fn everything(cut: &CutMesh) {
 /// The tetrahedra of the solid are positive at rest and fill the surface, wherever its copies are.
 pub fn solid_fills_the_surface(cut: &CutMesh) {
     let solid = cut.solid();
+    let SolidCells::Tets(tets) = &solid.cells else { panic!("tetrahedra are filled by tetrahedra") };
     let volumes = |x: &[Vector3<f64>]| -> Vec<f64> {
         let points: Vec<_> = solid.vertices.iter().map(|vertex| vertex.position(x)).collect();
         let volume = |tet: &[u32; 4]| {
             let [a, b, c, d] = tet.map(|v| points[v as usize]);
             (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
         };
-        solid.tets.iter().map(volume).collect()
+        tets.iter().map(volume).collect()
     };
     let rest = cut.rest_positions();
     let total: f64 = cut.mesh().volumes().iter().sum();
@@ -44,8 +45,8 @@ pub fn solid_fills_the_surface(cut: &CutMesh) {
     let (filled, enclosed) = (volumes(&moved).iter().sum::<f64>(), cut.surface().volume(&moved));
     assert!((filled - enclosed).abs() < 1e-9 * total, "solid fills {filled}, surface encloses {enclosed}");
     let mut of_pieces = vec![0.0; cut.pieces().len()];
-    for (&piece, volume) in solid.piece.iter().zip(at_rest) {
-        of_pieces[piece as usize] += volume;
+    for (origin, volume) in solid.origins.iter().zip(at_rest) {
+        of_pieces[origin.piece as usize] += volume;
     }
     for (p, volume) in of_pieces.into_iter().enumerate() {
         assert!((volume - cut.pieces.volume(p)).abs() < 1e-12 * total);

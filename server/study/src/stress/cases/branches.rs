@@ -193,7 +193,8 @@ fn random(setting: &Setting) -> Result<Evidence, Trouble> {
             "off",
         );
         let body = watch.finish(&mut common, &mut energies, &mut iterations);
-        let drawn = apart(body.mesh(), body.pieces(), body.rest_positions());
+        let cut = body.tets().map(|tets| (tets.mesh(), tets.pieces())).ok_or("a body without tetrahedra")?;
+        let drawn = apart(cut.0, cut.1, body.rest_positions());
         evidence.pictures.push(view::surface(
             body.surface(),
             &drawn,
@@ -336,7 +337,7 @@ fn clamped(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.pictures.push(view::body(&body, "Cut beside the clamp, after 0.2 s"));
     // Through the clamp.
     let mut body = setting.body(cube(4), damped(0.5, 0.005), 200, 1e-5)?;
-    let clamp = nodes(body.mesh(), |X| X.y == 0.0);
+    let clamp = nodes(body.rest_positions(), |X| X.y == 0.0);
     body.fix(&clamp, [true; 3], V::zeros())?;
     let mut watch = Watch::new("through", body, 0.01, DOWN);
     watch.cut(&slice(0.55, -5.0, 5.0), 1)?;

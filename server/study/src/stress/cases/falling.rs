@@ -1,13 +1,13 @@
 //! Cases 7 and 8: what is cut loose falls.
 
 use super::flaws::{mass_of_parts, tell};
-use super::support::{DOWN, L, SOFT, V, clamp_left, cube, slice};
+use super::support::{DOWN, L, SOFT, V, clamp_left, cube, pieces, slice};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::Evidence;
 use crate::stress::view;
 use crate::stress::watch::{Common, Watch, charts};
 use scindo_physics::body::Body;
-use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::{BladeSweep, Piece};
 
 /// Case 7.
 pub const FREED_NODE: Case = Case {
@@ -58,10 +58,9 @@ fn fragments_of(body: &Body) -> Vec<Fragment> {
         fragment.centre += m * body.positions()[c];
         fragment.momentum += m * body.velocities()[c];
     }
-    for piece in body.pieces() {
+    for (piece, volume) in pieces(body) {
         let part = parts.of_copy[piece.copies[0] as usize] as usize;
-        let volume = piece.fraction * body.mesh().volume(piece.element as usize);
-        all[part].weighed += body.material().density_kg_m3 * volume;
+        all[part].weighed += body.material().density_kg_m3 * (piece.fraction * volume);
     }
     all.iter_mut().for_each(|fragment| fragment.centre /= fragment.mass);
     all
@@ -111,10 +110,8 @@ fn freed_node(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.exactly("parts", components.len(), 2);
     let freed = components.volume.iter().fold(f64::INFINITY, |a, b| a.min(*b));
     let tiny = |part: usize| {
-        let of = |p: &&scindo_physics::cut::Piece| {
-            watch.body.parts().of_copy[p.copies[0] as usize] as usize == part
-        };
-        watch.body.pieces().iter().filter(of).map(|p| p.fraction).fold(0.0, f64::max)
+        let of = |p: &&Piece| watch.body.parts().of_copy[p.copies[0] as usize] as usize == part;
+        pieces(&watch.body).map(|(p, _)| p).filter(of).map(|p| p.fraction).fold(0.0, f64::max)
     };
     let largest = (0..watch.body.parts().len()).map(tiny).fold(f64::INFINITY, f64::min);
     evidence.tell("volume of the fragment over that of the cube", freed / L.powi(3), "");

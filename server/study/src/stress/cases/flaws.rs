@@ -3,6 +3,7 @@
 use scindo_physics::body::Body;
 use scindo_physics::cut::Flaws;
 
+use super::support::pieces;
 use crate::stress::evidence::Evidence;
 
 /// Records the flaws of a cut state as figures.
@@ -21,9 +22,9 @@ pub fn tell(flaws: &Flaws, evidence: &mut Evidence) {
 pub fn mass_of_parts(body: &Body) -> f64 {
     let density = body.material().density_kg_m3;
     let mut volume = vec![0.0; body.parts().len()];
-    for piece in body.pieces() {
+    for (piece, element) in pieces(body) {
         let part = body.parts().of_copy[piece.copies[0] as usize] as usize;
-        volume[part] += piece.fraction * body.mesh().volume(piece.element as usize);
+        volume[part] += piece.fraction * element;
     }
     let off = |(mass, volume): (&f64, &f64)| (mass / (density * volume) - 1.0).abs();
     body.parts().mass.iter().zip(&volume).map(off).fold(0.0, f64::max)

@@ -65,7 +65,7 @@ fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut common = Common::default();
     let (mut energies, mut iterations) = charts();
     let mut body = setting.body(block([10.0 * CELL, 3.0 * CELL, 4.0 * CELL], [10, 3, 4]), SOFT, 300, 1e-6)?;
-    let clamp = nodes(body.mesh(), |X| X.z == 0.0);
+    let clamp = nodes(body.rest_positions(), |X| X.z == 0.0);
     body.fix(&clamp, [true; 3], V::zeros())?;
     let mut watch = Watch::new("", body, 0.01, V::new(-2.0, 0.0, 9.0));
     let height = 2.03 * CELL;

@@ -1,7 +1,7 @@
 //! Cases 2, 3 and 4: cuts through nodes, along edges and along faces of the mesh.
 
 use super::flaws::tell;
-use super::support::{DOWN, SOFT, Shaped, V, block, nodes, plane};
+use super::support::{DOWN, SOFT, Shaped, V, block, nodes, pieces, plane};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::{Evidence, short};
 use crate::stress::view;
@@ -9,7 +9,7 @@ use crate::stress::watch::{Common, Watch, charts};
 use nalgebra::Rotation3;
 use scindo_physics::body::{Arithmetic, Body, BodySettings, PcgSettings};
 use scindo_physics::cut::{BladeSweep, Flaws};
-use scindo_physics::mesh::{TetMesh, tet_volume};
+use scindo_physics::mesh::TetMesh;
 
 /// Case 2.
 pub const NODE: Case = Case {
@@ -77,7 +77,7 @@ fn exact(setting: &Setting, mesh: TetMesh, clamped: fn(&V) -> bool) -> Result<Bo
         ..BodySettings::default()
     };
     let mut body = setting.with(mesh, SOFT, settings)?;
-    let clamp = nodes(body.mesh(), clamped);
+    let clamp = nodes(body.rest_positions(), clamped);
     body.fix(&clamp, [true; 3], V::zeros())?;
     Ok(body)
 }
@@ -89,8 +89,8 @@ fn far_side(X: &V) -> bool {
 
 /// Centre of every element that is still one piece; `None` for the others.
 fn middles(body: &Body) -> Vec<Option<V>> {
-    let mut middle = vec![None; body.mesh().tets.len()];
-    for piece in body.pieces().iter().filter(|piece| piece.fraction == 1.0) {
+    let mut middle = vec![None; body.n_elements()];
+    for (piece, _) in pieces(body).filter(|(piece, _)| piece.fraction == 1.0) {
         let sum: V = piece.copies.iter().map(|&c| body.positions()[c as usize]).sum();
         middle[piece.element as usize] = Some(sum / 4.0);
     }
@@ -178,7 +178,7 @@ fn duplicated(to: f64) -> TetMesh {
     let mut mesh = mesh();
     let on = |X: &V| X.z == 0.5 * EDGE_M && X.y < to * EDGE_M;
     let mut twin = vec![None; mesh.nodes.len()];
-    for n in nodes(&mesh, on) {
+    for n in nodes(&mesh.nodes, on) {
         twin[n as usize] = Some(mesh.nodes.len() as u32);
         mesh.nodes.push(mesh.nodes[n as usize]);
     }
@@ -202,16 +202,13 @@ fn face(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut whole = Shaped::new(setting.cut_mesh(mesh())?);
     let before = whole.topology();
     whole.sweep(&sweep(2.0), 1)?;
-    let [parts, pieces, copies] = whole.topology();
+    let [parts, n_pieces, copies] = whole.topology();
     evidence.exactly("parts, cut through", parts, 2);
-    evidence.exactly("pieces, cut through", pieces, before[1]);
+    evidence.exactly("pieces, cut through", n_pieces, before[1]);
     evidence.exactly("additional copies, cut through", copies - before[2], 25);
     tell(&Flaws::of(&whole.mesh), &mut evidence);
     let least = |body: &Body| {
-        let volume = |p: &scindo_physics::cut::Piece| {
-            p.fraction * tet_volume(&body.mesh().corners(p.element as usize))
-        };
-        let all = body.pieces().iter().map(volume);
+        let all = pieces(body).map(|(piece, volume)| piece.fraction * volume);
         all.fold(f64::INFINITY, f64::min)
     };
 

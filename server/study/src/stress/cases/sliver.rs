@@ -1,6 +1,6 @@
 //! Case 1: a cut that leaves almost nothing on one side of an element.
 
-use super::support::{DOWN, L, SOFT, V, clamp_left, cube, slice};
+use super::support::{DOWN, L, SOFT, V, clamp_left, cube, pieces, slice};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::{Evidence, short};
 use crate::stress::view;
@@ -39,7 +39,7 @@ fn run(setting: &Setting) -> Result<Evidence, Trouble> {
             // edge.
             let at = 0.5 + fraction.cbrt() / 6.0;
             watch.cut(&slice(at, -5.0, 0.5), 1)?;
-            let least = watch.body.pieces().iter().map(|p| p.fraction).fold(1.0, f64::min);
+            let least = pieces(&watch.body).map(|(p, _)| p.fraction).fold(1.0, f64::min);
             evidence.at_most(
                 format!("smallest piece of the cut meant to leave {}", short(fraction)),
                 (least / fraction - 1.0).abs(),

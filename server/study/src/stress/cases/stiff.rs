@@ -111,7 +111,7 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
     for (name, stiff) in kinds {
         let K = stiffness(&mesh, stiff)?;
         let mass = Model::tet4(&mesh, &linear(1e3), Volumetric::Full)?.lumped_mass(1e3);
-        let fixed: Vec<FixedCopy> = nodes(&mesh, |X| X.x == 0.0)
+        let fixed: Vec<FixedCopy> = nodes(&mesh.nodes, |X| X.x == 0.0)
             .into_iter()
             .map(|copy| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] })
             .collect();

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use scindo_physics::body::Body;
-use scindo_physics::cut::{BladeSweep, CutMesh, CutReport};
+use scindo_physics::cut::{BladeSweep, CutMesh, CutReport, Piece};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 
@@ -41,14 +41,20 @@ pub fn block(size: [f64; 3], cells: [usize; 3]) -> TetMesh {
     box_mesh(V::zeros(), size.into(), cells, BoxPattern::Tet6)
 }
 
-/// Nodes for which `chosen` is true.
-pub fn nodes(mesh: &TetMesh, chosen: impl Fn(&V) -> bool) -> Vec<u32> {
-    (0u32..).zip(&mesh.nodes).filter(|(_, X)| chosen(X)).map(|(n, _)| n).collect()
+/// The pieces of a body of tetrahedra, each with the volume [m³] of its uncut element.
+pub fn pieces(body: &Body) -> impl Iterator<Item = (&Piece, f64)> {
+    let tets = body.tets().into_iter();
+    tets.flat_map(|tets| tets.pieces().iter().map(|p| (p, tets.mesh().volume(p.element as usize))))
+}
+
+/// Nodes whose rest position `chosen` accepts.
+pub fn nodes(rest: &[V], chosen: impl Fn(&V) -> bool) -> Vec<u32> {
+    (0u32..).zip(rest).filter(|(_, X)| chosen(X)).map(|(n, _)| n).collect()
 }
 
 /// Clamps the nodes at x = 0.
 pub fn clamp_left(body: &mut Body) -> Result<Vec<u32>, Trouble> {
-    let clamp = nodes(body.mesh(), |X| X.x == 0.0);
+    let clamp = nodes(body.rest_positions(), |X| X.x == 0.0);
     body.fix(&clamp, [true; 3], V::zeros())?;
     Ok(clamp)
 }
