@@ -551,7 +551,8 @@ impl LinearStep {
                     *load = padded(&(s * (inputs.step.mass[c] * inputs.step.gravity + inputs.step.load[c])));
                 }
                 filter(inputs.step.fixed, &mut self.scratch);
-                self.pcg.norm(team, &mut self.preconditioner, &self.scratch)
+                let mut A = system(elastic, &[], inputs);
+                self.pcg.norm(team, &mut A, &mut self.preconditioner, &self.scratch)
             };
             self.reference = self.least_reference(loads, inputs);
         }
@@ -585,14 +586,14 @@ impl LinearStep {
         (pass, first): (usize, bool),
     ) -> LinearReport {
         let Self { pcg, preconditioner, terms, delta, reference, began, .. } = self;
-        let rz = pcg.precondition(team, preconditioner);
+        let mut A = system(elastic, terms, inputs);
+        let rz = pcg.precondition(team, &mut A, preconditioner);
         if first && pass == 0 {
             *reference = reference.max(rz.max(0.0).sqrt());
         }
         if pass == 0 {
             *began = if *reference > 0.0 { rz.max(0.0).sqrt() / *reference } else { 0.0 };
         }
-        let mut A = system(elastic, terms, inputs);
         pcg.run(team, &mut A, preconditioner, delta, (rz, *reference, inputs.solver))
     }
 

@@ -1,24 +1,44 @@
 //! What a solver asks of a preconditioner M⁻¹.
 
-use super::{BLOCK, Padded, block_of};
+use super::{BLOCK, LinearOperator, Padded, block_of};
 use crate::team::{Team, blocks};
 
 /// A symmetric positive semidefinite M⁻¹, 0 in prescribed directions.
 ///
 /// A preconditioner may keep residuals in variables of its own; [`enter`](Self::enter) takes one there, and
-/// everything else is given residuals that are there.
+/// everything else is given residuals that are there. One that smooths applies the operator `A` itself; the
+/// others ignore it.
 pub trait Preconditioner {
+    /// Whether it applies A. An operator may keep the direction of its last product, so the solver then hands
+    /// over every direction as a whole.
+    fn uses_operator(&self) -> bool {
+        false
+    }
+
     /// Takes a residual (or q = A p) into the variables in which residuals are kept.
     fn enter(&self, r: &mut [Padded]) {
         let _ = r;
     }
 
     /// z = M⁻¹ r; returns rᵀz. `partial` is scratch with one entry per [`BLOCK`].
-    fn apply(&mut self, team: &mut Team, r: &[Padded], z: &mut [Padded], partial: &mut [f64]) -> f64;
+    fn apply(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        r: &[Padded],
+        z: &mut [Padded],
+        partial: &mut [f64],
+    ) -> f64;
 
     /// x ← x + α p, r ← r − α q, z = M⁻¹ r; returns rᵀz. A preconditioner that works copy by copy does all of
     /// it in one pass.
-    fn advance(&mut self, team: &mut Team, alpha: f32, pq: [&[Padded]; 2], iterate: Iterate<'_>) -> f64 {
+    fn advance(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        (alpha, pq): (f32, [&[Padded]; 2]),
+        iterate: Iterate<'_>,
+    ) -> f64 {
         let Iterate { x, r, z, partial } = iterate;
         team.for_blocks((blocks(x, BLOCK), blocks(r, BLOCK)), |block, (x, r)| {
             let [p, q] = pq.map(|v| block_of(v, block));
@@ -29,14 +49,21 @@ pub trait Preconditioner {
                 }
             }
         });
-        self.apply(team, r, z, partial)
+        self.apply(team, A, r, z, partial)
     }
 
     /// √(vᵀM⁻¹v) of a vector in the variables of A; `z` and `partial` are scratch. This one allocates.
-    fn norm(&mut self, team: &mut Team, v: &[Padded], z: &mut [Padded], partial: &mut [f64]) -> f64 {
+    fn norm(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        v: &[Padded],
+        z: &mut [Padded],
+        partial: &mut [f64],
+    ) -> f64 {
         let mut r = v.to_vec();
         self.enter(&mut r);
-        self.apply(team, &r, z, partial).max(0.0).sqrt()
+        self.apply(team, A, &r, z, partial).max(0.0).sqrt()
     }
 }
 

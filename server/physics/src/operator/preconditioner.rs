@@ -1,7 +1,9 @@
 //! The inverse of the 3×3 diagonal blocks, one per copy; on degenerate elements in variables in which
 //! they are not stiff.
 
-use super::{BLOCK, Block6, FixedCopy, Iterate, Padded, Preconditioner, Substitution, Sum, block_of, rows};
+use super::{
+    BLOCK, Block6, FixedCopy, Iterate, LinearOperator, Padded, Preconditioner, Substitution, Sum, block_of, rows,
+};
 use crate::lists::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
@@ -90,7 +92,14 @@ impl Preconditioner for BlockJacobi {
         self.substitution.fold(r);
     }
 
-    fn apply(&mut self, team: &mut Team, r: &[Padded], z: &mut [Padded], partial: &mut [f64]) -> f64 {
+    fn apply(
+        &mut self,
+        team: &mut Team,
+        _: &mut dyn LinearOperator,
+        r: &[Padded],
+        z: &mut [Padded],
+        partial: &mut [f64],
+    ) -> f64 {
         let M = &*self;
         team.for_blocks((blocks(z, BLOCK), blocks(partial, 1)), |block, (z, partial)| {
             partial[0] = rows::precondition(M.block(block), block_of(r, block), z);
@@ -99,7 +108,13 @@ impl Preconditioner for BlockJacobi {
         partial.iter().sum()
     }
 
-    fn advance(&mut self, team: &mut Team, alpha: f32, pq: [&[Padded]; 2], iterate: Iterate<'_>) -> f64 {
+    fn advance(
+        &mut self,
+        team: &mut Team,
+        _: &mut dyn LinearOperator,
+        (alpha, pq): (f32, [&[Padded]; 2]),
+        iterate: Iterate<'_>,
+    ) -> f64 {
         let Iterate { x, r, z, partial } = iterate;
         let M = &*self;
         let state = (blocks(x, BLOCK), blocks(r, BLOCK), blocks(z, BLOCK), blocks(partial, 1));
@@ -111,7 +126,14 @@ impl Preconditioner for BlockJacobi {
         partial.iter().sum()
     }
 
-    fn norm(&mut self, team: &mut Team, v: &[Padded], z: &mut [Padded], partial: &mut [f64]) -> f64 {
+    fn norm(
+        &mut self,
+        team: &mut Team,
+        _: &mut dyn LinearOperator,
+        v: &[Padded],
+        z: &mut [Padded],
+        partial: &mut [f64],
+    ) -> f64 {
         let v = if self.substitution.is_empty() {
             v
         } else {

@@ -6,8 +6,8 @@
 use super::algebraic_error::AlgebraicError;
 use super::report::{LinearReport, StopReason};
 use crate::lists::reserve::resize_reserving;
-use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Preconditioner};
-use crate::team::Team;
+use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Preconditioner, block_of, rows};
+use crate::team::{Team, blocks};
 
 /// Stopping criteria of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,7 @@ impl Pcg {
         x: &mut [Padded],
         (reference, settings): (f64, PcgSettings),
     ) -> LinearReport {
-        let start = self.precondition(team, M);
+        let start = self.precondition(team, A, M);
         self.run(team, A, M, x, (start, reference, settings))
     }
 
@@ -106,6 +106,18 @@ impl Pcg {
                 return report;
             }
             // p ← z + β p, q = A p, pᵀA p
+            if M.uses_operator() && beta != 0.0 {
+                // Products inside M made A forget p, so the new one is handed over as a whole.
+                let (p, factor) = (&self.p, beta as f32);
+                team.for_blocks(blocks(&mut self.z, BLOCK), |block, z| {
+                    for (z, p) in z.iter_mut().zip(block_of(p, block)) {
+                        let mut next = *p;
+                        rows::direction(&mut next, z, factor);
+                        *z = next;
+                    }
+                });
+                beta = 0.0;
+            }
             let out = Advance { p: &mut self.p, q: &mut self.q, partial: &mut self.partial };
             let curvature = A.advance(team, beta as f32, &self.z, out);
             M.enter(&mut self.q);
@@ -122,7 +134,7 @@ impl Pcg {
             report.algebraic_error = error.norm();
             // x += α p, r −= α q, z = M⁻¹ r, rᵀz
             let Self { r, z, p, q, partial, .. } = self;
-            let next = M.advance(team, alpha as f32, [p, q], Iterate { x, r, z, partial });
+            let next = M.advance(team, A, (alpha as f32, [p, q]), Iterate { x, r, z, partial });
             beta = next / rz;
             rz = next;
             // Kept for a later continuation.
@@ -132,14 +144,25 @@ impl Pcg {
     }
 
     /// √(vᵀM⁻¹v), the norm in which `reference` is given.
-    pub fn norm(&mut self, team: &mut Team, M: &mut impl Preconditioner, v: &[Padded]) -> f64 {
-        M.norm(team, v, &mut self.z, &mut self.partial)
+    pub fn norm(
+        &mut self,
+        team: &mut Team,
+        A: &mut impl LinearOperator,
+        M: &mut impl Preconditioner,
+        v: &[Padded],
+    ) -> f64 {
+        M.norm(team, A, v, &mut self.z, &mut self.partial)
     }
 
     /// z = M⁻¹ r of the residual just put into `self.r`; returns rᵀz.
-    pub fn precondition(&mut self, team: &mut Team, M: &mut impl Preconditioner) -> f64 {
+    pub fn precondition(
+        &mut self,
+        team: &mut Team,
+        A: &mut impl LinearOperator,
+        M: &mut impl Preconditioner,
+    ) -> f64 {
         M.enter(&mut self.r);
-        M.apply(team, &self.r, &mut self.z, &mut self.partial)
+        M.apply(team, A, &self.r, &mut self.z, &mut self.partial)
     }
 }
 
@@ -176,7 +199,7 @@ mod tests {
         pcg.resize(n);
         pcg.r.fill([1.0, -2.0, 0.5, 0.0]);
         let b = pcg.r.clone();
-        let reference = pcg.norm(&mut team, &mut M, &b);
+        let reference = pcg.norm(&mut team, &mut Chain { shift }, &mut M, &b);
         let mut x = vec![[0.0; 4]; n];
         let settings = PcgSettings { iterations, tolerance: 1e-5 };
         let report = pcg.solve(&mut team, &mut Chain { shift }, &mut M, &mut x, (reference, settings));
