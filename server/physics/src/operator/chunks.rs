@@ -183,10 +183,23 @@ pub struct Gather {
 impl Gather {
     /// Lists the rows of every copy. Every chunk gets rows for as many copies again.
     pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
+        Self::with_rows(chunks, n_copies, |n| 2 * n + 1)
+    }
+
+    /// Lists the rows of every copy; chunks have rows for the copies they have now and no more.
+    pub fn without_room<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
+        Self::with_rows(chunks, n_copies, |n| n)
+    }
+
+    fn with_rows<'a>(
+        chunks: impl Iterator<Item = &'a [u32]> + Clone,
+        n_copies: usize,
+        rows_of: impl Fn(u32) -> u32,
+    ) -> Self {
         let mut gather = Self { first_row: vec![1], ..Self::default() };
         let mut row = 1;
         for copies in chunks.clone() {
-            row += 2 * copies.len() as u32 + 1;
+            row += rows_of(copies.len() as u32);
             gather.first_row.push(row);
         }
         gather.arrange(chunks, n_copies);

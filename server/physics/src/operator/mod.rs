@@ -1,5 +1,6 @@
 //! Linear operators on the copies of a body: K̂ matrix-free, and the system matrix of a step.
 
+pub mod cells;
 mod shared_lanes;
 mod chunk;
 mod chunks;

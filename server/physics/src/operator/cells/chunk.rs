@@ -1,0 +1,255 @@
+//! A run of cells with local numbers for its vertices: the unit of work of one thread.
+
+#![allow(unsafe_code)] // unchecked local numbers, made and checked here
+
+use std::array::from_fn;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use nalgebra::Matrix3;
+
+use super::super::Padded;
+use super::super::chunks::{NO_PIECE, pack};
+use super::super::kernel::Block6;
+use super::batch::{self, HangingWeights, SectorBatch, TableLanes};
+use super::blocks::{self, BlockTable};
+use super::lane::{CellLane, CellMatrix, HANGING_SLOTS, frame, turned};
+use super::sectors::hanging_slots;
+use super::stored::{self, STORED, StoredBatch};
+use crate::element::{LANES, Lanes, Simd};
+
+/// A table in the forms that the loops read.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// For products.
+    pub lanes: TableLanes,
+    /// For diagonal blocks.
+    pub blocks: BlockTable,
+}
+
+/// Batches with the same table, or stored ones; with or without hanging slots.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// Table or stored.
+    pub matrix: CellMatrix,
+    /// Batches, counted over all groups of the chunk.
+    pub batches: Range<usize>,
+    /// Their weights in the chunk's list; empty if no slot hangs.
+    pub weights: Range<usize>,
+}
+
+/// What the lanes of a batch hold.
+#[derive(Clone, Copy, Debug)]
+pub struct BatchLanes {
+    /// Number of every cell, [`NO_PIECE`] in unused lanes.
+    pub cells: [u32; LANES],
+    /// Octants of the cells.
+    pub octants: [u8; LANES],
+    /// Hanging slots of the cells.
+    pub hanging: [u8; LANES],
+}
+
+/// A run of cells in batches.
+#[derive(Clone, Debug)]
+pub struct CellChunk {
+    /// Vertex of every local number, ascending.
+    pub vertices: Vec<u32>,
+    /// Vector that the stiffness is applied to, by local number.
+    pub x: Vec<Padded>,
+    /// Batches of tables come before stored ones.
+    pub groups: Vec<Group>,
+    /// Batches with tables.
+    pub batches: Vec<SectorBatch>,
+    /// Batches with matrices of their own; their numbers follow.
+    pub stored: Vec<StoredBatch>,
+    /// Cells of every batch.
+    pub lanes: Vec<BatchLanes>,
+    /// Sets of hanging slots in the order of `weights`.
+    hanging: Vec<[u8; LANES]>,
+    pub weights: Vec<HangingWeights>,
+    /// Cells with det F ≤ 0 at the last update.
+    pub inverted: usize,
+}
+
+impl CellChunk {
+    /// Arranges the cells `members` in batches.
+    pub fn new(members: &[u32], cells: &[CellLane]) -> Self {
+        let held: Vec<[u32; 8]> = members.iter().map(|&id| cells[id as usize].vertices).collect();
+        let mut vertices = held.as_flattened().to_vec();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let mut kinds: BTreeMap<(CellMatrix, bool), Vec<u32>> = BTreeMap::new();
+        for &id in members {
+            let cell = &cells[id as usize];
+            kinds.entry((cell.matrix, cell.hanging != 0)).or_default().push(id);
+        }
+        let n = vertices.len();
+        let mut chunk = Self {
+            vertices,
+            x: vec![[0.0; 4]; n],
+            groups: Vec::new(),
+            batches: Vec::new(),
+            stored: Vec::new(),
+            lanes: Vec::new(),
+            hanging: Vec::new(),
+            weights: Vec::new(),
+            inverted: 0,
+        };
+        for ((matrix, hangs), members) in kinds {
+            chunk.add_group(matrix, hangs, &members, cells);
+        }
+        chunk
+    }
+
+    fn add_group(&mut self, matrix: CellMatrix, hangs: bool, members: &[u32], cells: &[CellLane]) {
+        let local = |vertex: u32| self.vertices.binary_search(&vertex).map_or(0, |local| local as u16);
+        let ids: Vec<[u16; 8]> = members.iter().map(|&id| cells[id as usize].vertices.map(local)).collect();
+        let (first, first_weight) = (self.lanes.len(), self.weights.len());
+        for lanes in pack(&ids, self.vertices.len()) {
+            let mut batch = BatchLanes { cells: [NO_PIECE; LANES], octants: [0; LANES], hanging: [0; LANES] };
+            // Unused lanes compute with the first cell and a factor of 0: nothing in them is out of range.
+            let of_lane = lanes.map(|k| ids[if k == NO_PIECE { lanes[0] } else { k } as usize]);
+            let nodes = from_fn(|j| of_lane.map(|ids| ids[j]));
+            let mut sectors = SectorBatch { rotation: Default::default(), root: Lanes::default(), nodes };
+            for (lane, &k) in lanes.iter().enumerate().filter(|(_, k)| **k != NO_PIECE) {
+                let id = members[k as usize];
+                let cell = &cells[id as usize];
+                batch.cells[lane] = id;
+                (batch.octants[lane], batch.hanging[lane]) = (cell.octant, cell.hanging);
+                sectors.root.0[lane] = cell.factor.sqrt();
+                let frame = frame(cell.octant);
+                for k in 0..3 {
+                    sectors.rotation[4 * k].0[lane] = frame[k] * cell.factor.sqrt();
+                }
+            }
+            match matrix {
+                CellMatrix::Table(_) => self.batches.push(sectors),
+                CellMatrix::Stored => self.stored.push(StoredBatch::new(nodes)),
+            }
+            if hangs {
+                self.weights.push(weights(&batch.hanging));
+                self.hanging.push(batch.hanging);
+            }
+            self.lanes.push(batch);
+        }
+        let (batches, weights) = (first..self.lanes.len(), first_weight..self.weights.len());
+        self.groups.push(Group { matrix, batches, weights });
+    }
+
+    /// y = s K̂ x; `y` has a row for every local number and perhaps more.
+    #[inline(always)]
+    pub fn apply(&self, simd: Simd, tables: &[Table], y: &mut [Padded]) {
+        let y = &mut y[..self.x.len()];
+        y.fill([0.0; 4]);
+        let first_stored = self.batches.len();
+        for group in &self.groups {
+            let weights = &self.weights[group.weights.clone()];
+            let Range { start, end } = group.batches;
+            match group.matrix {
+                CellMatrix::Table(t) => {
+                    let (batches, table) = (&self.batches[start..end], &tables[usize::from(t)].lanes);
+                    // SAFETY: local numbers are indices into `vertices`, which is as long as `x` and `y`.
+                    unsafe { batch::multiply(simd, batches, weights, table, &self.x, y) }
+                }
+                CellMatrix::Stored => {
+                    let batches = &self.stored[start - first_stored..end - first_stored];
+                    // SAFETY: as above.
+                    unsafe { stored::multiply(simd, batches, weights, &self.x, y) }
+                }
+            }
+        }
+    }
+
+    /// Diagonal blocks of s K̂, by local number.
+    pub fn diagonals(&self, simd: Simd, tables: &[Table], rows: &mut [Block6]) {
+        let rows = &mut rows[..self.x.len()];
+        rows.fill([0.0; 8]);
+        let first_stored = self.batches.len();
+        for group in &self.groups {
+            match group.matrix {
+                CellMatrix::Table(t) => {
+                    let hanging = &self.hanging[group.weights.clone()];
+                    let (batches, table) =
+                        (&self.batches[group.batches.clone()], &tables[usize::from(t)].blocks);
+                    // SAFETY: local numbers are indices into `vertices`, which is as long as `rows`.
+                    unsafe { blocks::add(simd, batches, hanging, table, rows) }
+                }
+                CellMatrix::Stored => {
+                    for b in group.batches.clone() {
+                        let (batch, lanes) = (&self.stored[b - first_stored], &self.lanes[b]);
+                        for lane in (0..LANES).filter(|&lane| lanes.cells[lane] != NO_PIECE) {
+                            let hanging = lanes.hanging[lane];
+                            blocks::add_stored(&batch.matrix(lane), hanging, &batch.nodes, lane, rows);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Cell, batch and lane of all lanes in use.
+    pub fn places(&self) -> impl Iterator<Item = (u32, usize, usize)> + '_ {
+        let lanes = self.lanes.iter().enumerate();
+        let lanes = lanes.flat_map(|(b, batch)| batch.cells.iter().enumerate().map(move |(l, &c)| (c, b, l)));
+        lanes.filter(|&(cell, ..)| cell != NO_PIECE)
+    }
+
+    /// Rotation R of a lane; I for a stored matrix.
+    pub fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
+        match self.batches.get(batch) {
+            Some(b) => {
+                let R = Matrix3::from_fn(|i, j| b.rotation[3 * i + j].0[lane] / b.root.0[lane]);
+                turned(&R, self.lanes[batch].octants[lane])
+            }
+            None => Matrix3::identity(),
+        }
+    }
+
+    /// Sets the factor c of every cell with a table; `of` gives it from the number of the cell.
+    pub fn set_factors(&mut self, of: &impl Fn(u32) -> f32) {
+        for (batch, lanes) in self.batches.iter_mut().zip(&self.lanes) {
+            for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
+                let (root, before) = (of(cell).sqrt(), batch.root.0[lane]);
+                batch.root.0[lane] = root;
+                batch.rotation.iter_mut().for_each(|r| r.0[lane] = r.0[lane] / before * root);
+            }
+        }
+    }
+
+    /// Sets the rotation R of every cell with a table; `of` gives it from the number of the cell.
+    pub fn set_rotations(&mut self, of: &impl Fn(u32) -> Matrix3<f32>) {
+        for (batch, lanes) in self.batches.iter_mut().zip(&self.lanes) {
+            for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
+                let R = turned(&of(cell), lanes.octants[lane]);
+                for i in 0..9 {
+                    batch.rotation[i].0[lane] = batch.root.0[lane] * R[(i / 3, i % 3)];
+                }
+            }
+        }
+    }
+
+    /// Sets the stored matrices; `of` writes that of the cell with the given number.
+    pub fn set_stored(&mut self, of: &impl Fn(u32, &mut [f32; STORED])) {
+        let mut entries = [0.0; STORED];
+        let lanes = &self.lanes[self.batches.len()..];
+        for (batch, lanes) in self.stored.iter_mut().zip(lanes) {
+            for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
+                of(cell, &mut entries);
+                batch.entries.iter_mut().zip(entries).for_each(|(to, from)| to.0[lane] = from);
+            }
+        }
+    }
+
+    /// Bytes that one application streams.
+    pub fn bytes(&self) -> usize {
+        self.batches.len() * size_of::<SectorBatch>()
+            + self.stored.len() * size_of::<StoredBatch>()
+            + self.weights.len() * size_of::<HangingWeights>()
+    }
+}
+
+fn weights(hanging: &[u8; LANES]) -> HangingWeights {
+    HANGING_SLOTS.map(|j| {
+        Lanes(hanging.map(|hanging| if hanging >> j & 1 == 1 { hanging_slots(j).1 as f32 } else { 0.0 }))
+    })
+}

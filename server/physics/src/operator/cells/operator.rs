@@ -1,0 +1,215 @@
+//! The cells of one octree, or of one level above it, as a linear operator.
+
+use nalgebra::Matrix3;
+
+use super::super::chunks::Gather;
+use super::super::kernel::Block6;
+use super::super::rows::{self, Sum, gather_direction};
+use super::super::stiffness::{Direction, Place};
+use super::super::{BLOCK, LinearOperator, Padded, block_of};
+use super::batch::TableLanes;
+use super::blocks::BlockTable;
+use super::chunk::{CellChunk, Table};
+use super::lane::CellLane;
+use super::sectors::SectorTable;
+use super::stored::STORED;
+use crate::element::Simd;
+use crate::octree::Cell;
+use crate::team::{Team, blocks, ranges};
+
+/// Cells per chunk: its vectors stay in the first cache, and a body of a few thousand cells still has work for
+/// several threads.
+const CHUNK_CELLS: usize = 512;
+
+/// Σ Wᵀ A W over cells with matrices A, in single precision.
+///
+/// Everything is computed in two halves, each a pass over all threads: sums of the chunks, then what the
+/// vertices gather of them in blocks of 256. The division depends on the cells only.
+#[derive(Clone, Debug)]
+pub struct CellOperator {
+    pub(super) simd: Simd,
+    pub(super) tables: Vec<Table>,
+    pub(super) chunks: Vec<CellChunk>,
+    pub(super) gather: Gather,
+    /// Sums of all chunks, rows as in `gather`.
+    pub(super) sums: Vec<Padded>,
+    /// Likewise, diagonal blocks.
+    pub(super) diagonals: Vec<Block6>,
+    places: Vec<Place>,
+}
+
+impl CellOperator {
+    /// Arranges `cells` for the kernels, their rotations I and their stored matrices 0. `order` lists all of them
+    /// so that near ones are near, see [`morton_order`].
+    pub fn new(
+        simd: Simd,
+        tables: &[SectorTable],
+        cells: &[CellLane],
+        order: &[u32],
+        n_vertices: usize,
+    ) -> Self {
+        let chunks: Vec<CellChunk> =
+            order.chunks(CHUNK_CELLS).map(|members| CellChunk::new(members, cells)).collect();
+        let gather = Gather::without_room(chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
+        let mut places = vec![Place::default(); cells.len()];
+        for (chunk, c) in (0u32..).zip(&chunks) {
+            for (cell, batch, lane) in c.places() {
+                places[cell as usize] = Place { chunk, batch: batch as u32, lane: lane as u32 };
+            }
+        }
+        let sums = vec![[0.0; 4]; gather.n_rows()];
+        let diagonals = vec![[0.0; 8]; gather.n_rows()];
+        let mut operator = Self { simd, tables: Vec::new(), chunks, gather, sums, diagonals, places };
+        operator.set_tables(tables);
+        operator
+    }
+
+    /// Replaces the tables; they keep their numbers.
+    pub fn set_tables(&mut self, tables: &[SectorTable]) {
+        self.tables.clear();
+        self.tables.extend(
+            tables
+                .iter()
+                .map(|table| Table { lanes: TableLanes::new(table), blocks: BlockTable::new(table) }),
+        );
+    }
+
+    /// Sets the factor c > 0 of every cell with a table; `of` gives it from the number of the cell.
+    pub fn set_factors(&mut self, team: &mut Team, of: impl Fn(u32) -> f32 + Sync) {
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_factors(&of));
+    }
+
+    /// Sets the rotation R of every cell with a table; `of` gives it from the number of the cell.
+    pub fn set_rotations(&mut self, team: &mut Team, of: impl Fn(u32) -> Matrix3<f32> + Sync) {
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_rotations(&of));
+    }
+
+    /// Sets the stored matrices: `of` writes the upper triangle of the matrix of the cell with the given number,
+    /// row by row; row 3 j + i is component i of slot j.
+    pub fn set_stored(&mut self, team: &mut Team, of: impl Fn(u32, &mut [f32; STORED]) + Sync) {
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_stored(&of));
+    }
+
+    /// First half of the diagonal blocks.
+    pub fn update_diagonals(&mut self, team: &mut Team) {
+        let Self { simd, tables, chunks, gather, diagonals, .. } = self;
+        let rows = ranges(diagonals, &gather.first_row);
+        team.for_blocks((blocks(chunks, 1), rows), |_, (chunk, rows)| {
+            chunk[0].diagonals(*simd, tables, rows);
+        });
+    }
+
+    /// Second half: adds the diagonal blocks of the vertices of block number `block`.
+    #[inline(always)]
+    pub fn add_diagonals(&self, block: usize, diagonal: &mut [Block6]) {
+        self.gather.add(block, &self.diagonals, diagonal);
+    }
+
+    /// First half of a product with `x`.
+    pub fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
+        self.for_chunks(team, |local, vertices| {
+            for (local, &vertex) in local.iter_mut().zip(vertices) {
+                *local = x[vertex as usize];
+            }
+        });
+    }
+
+    /// The same with x ← z + β x, where x is that of the last product (nothing if β = 0).
+    pub fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
+        self.for_chunks(team, |local, vertices| gather_direction(local, vertices, z, beta));
+    }
+
+    fn for_chunks(&mut self, team: &mut Team, fill: impl Fn(&mut [Padded], &[u32]) + Sync) {
+        let Self { simd, tables, chunks, gather, sums, .. } = self;
+        let sums = ranges(sums, &gather.first_row);
+        team.for_blocks((blocks(chunks, 1), sums), |_, (chunk, y)| {
+            let CellChunk { x, vertices, .. } = &mut chunk[0];
+            fill(x, vertices);
+            chunk[0].apply(*simd, tables, y);
+        });
+    }
+
+    /// Second half: the product at the vertices of block number `block`, added to `y`.
+    #[inline(always)]
+    pub fn add_products(&self, block: usize, y: &mut [Padded]) {
+        self.gather.add(block, &self.sums, y);
+    }
+
+    /// Second half after [`multiply_direction`](Self::multiply_direction): p ← z + β p, q = A p with the masses,
+    /// and the share of the block in pᵀq.
+    #[inline(always)]
+    pub fn advance(&self, block: usize, with: &Direction<'_>, p: &mut [Padded], q: &mut [Padded]) -> f64 {
+        let (z, mass) = (block_of(with.z, block), block_of(with.mass, block));
+        let sums = (self.gather.pairs(block), &self.sums[..]);
+        let product = rows::advance_direction(z, with.beta, (mass, with.factor), sums, [&mut *p, &mut *q]);
+        let mut further = Sum::default();
+        for (vertex, row) in self.gather.further(block) {
+            further.add(&p[vertex], &self.sums[row]);
+            q[vertex].iter_mut().zip(&self.sums[row]).for_each(|(q, part)| *q += part);
+        }
+        product + further.total()
+    }
+
+    /// Where every cell is kept.
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// Rotation R of a cell; I for a stored matrix.
+    #[inline(always)]
+    pub fn rotation(&self, place: Place) -> Matrix3<f32> {
+        self.chunks[place.chunk as usize].rotation(place.batch as usize, place.lane as usize)
+    }
+
+    /// Bytes of stiffness that one application streams.
+    pub fn bytes(&self) -> usize {
+        self.chunks.iter().map(CellChunk::bytes).sum()
+    }
+
+    /// Bytes per cell of unused lanes and of vertices that chunks share, as factors: lanes / cells, rows /
+    /// vertices.
+    pub fn overheads(&self, n_vertices: usize) -> [f64; 2] {
+        let lanes: usize = self.chunks.iter().map(|chunk| chunk.lanes.len()).sum();
+        let cells = self.places.len().max(1);
+        [
+            (lanes * crate::element::LANES) as f64 / cells as f64,
+            self.gather.n_rows() as f64 / n_vertices as f64,
+        ]
+    }
+}
+
+impl LinearOperator for CellOperator {
+    fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
+        self.multiply(team, x);
+        let operator = &*self;
+        team.for_blocks(blocks(y, BLOCK), |block, y| {
+            y.fill([0.0; 4]);
+            operator.add_products(block, y);
+        });
+    }
+}
+
+/// Numbers of the cells along Morton's curve.
+pub fn morton_order(cells: &[Cell]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..cells.len() as u32).collect();
+    order.sort_by_cached_key(|&id| {
+        let at = cells[id as usize].at.map(|c| spread(c as u32));
+        (at[0] | at[1] << 1 | at[2] << 2, id)
+    });
+    order
+}
+
+/// The lower 21 bits of `x`, two zeros between any two.
+fn spread(x: u32) -> u64 {
+    let mut x = u64::from(x) & 0x1f_ffff;
+    for (shift, mask) in [
+        (32, 0x1f_0000_0000_ffff),
+        (16, 0x1f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+        (2, 0x1249_2492_4924_9249),
+    ] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}

@@ -1,0 +1,243 @@
+//! s K̂ of an octree.
+
+use nalgebra::Matrix3;
+use nalgebra::Vector3;
+
+use super::super::kernel::Block6;
+use super::super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
+use super::super::{LinearOperator, OperatorChoice, Padded};
+use super::chunk::CellChunk;
+use super::lane::{CellLane, CellMatrix};
+use super::operator::{CellOperator, morton_order};
+use super::sectors::SectorTable;
+use super::update::RestChunk;
+use crate::element::Simd;
+use crate::material::Lame;
+use crate::octree::{Cell, Octree};
+use crate::team::{Team, blocks, ranges};
+
+/// s K̂ of the cells of an octree, its internal forces and diagonal blocks. The law is linear or corotational with
+/// one rotation per cell.
+///
+/// K̂ is always applied matrix-free; the [choice](OperatorChoice) of an assembled one is ignored.
+///
+/// # Source
+/// Dick, Georgii, Westermann 2011, §5; Georgii, Westermann 2008 (the rotation that minimises the distance of
+/// the whole cell; for a cube it is that of the deformation gradient at the centre).
+#[derive(Debug)]
+pub struct CellStiffness {
+    operator: CellOperator,
+    rest: Vec<RestChunk>,
+    cells: Vec<Cell>,
+    /// Side of a finest cell [m].
+    h: f64,
+    materials: Materials,
+    /// Parameters of the last update.
+    made_with: Option<ElasticUpdate>,
+    version: u64,
+}
+
+impl CellStiffness {
+    /// Arranges the cells of `octree` for the kernels, all rotations at rest. A cell has the parameters of its
+    /// material's number in `materials`; those of other cells come with every
+    /// [update](Stiffness::update).
+    pub fn new(simd: Simd, octree: &Octree, materials: &[Lame]) -> Self {
+        let materials = Materials::new(materials);
+        let (operator, rest) = arrange(simd, octree, &materials);
+        let (cells, h) = (octree.cells().to_vec(), octree.lattice().h);
+        Self { operator, rest, cells, h, materials, made_with: None, version: 0 }
+    }
+
+    /// Follows a cut or a refinement of the octree. Cells keep their rotations; new ones have that of the leaf
+    /// they were part of.
+    pub fn follow(&mut self, octree: &Octree) {
+        let known = |id: usize| self.operator.rotation(self.operator.places()[id]);
+        let rotations: Vec<Matrix3<f32>> = (0..octree.cells().len())
+            .map(|id| self.source(octree, id).map_or_else(Matrix3::identity, known))
+            .collect();
+        let (operator, rest) = arrange(self.operator.simd, octree, &self.materials);
+        (self.operator, self.rest, self.made_with) = (operator, rest, None);
+        self.cells.clear();
+        self.cells.extend_from_slice(octree.cells());
+        for chunk in &mut self.operator.chunks {
+            chunk.set_rotations(&|id| rotations[id as usize]);
+        }
+    }
+
+    /// The earlier leaf that cell `id` was part of. The first child of a divided leaf has its number.
+    fn source(&self, octree: &Octree, id: usize) -> Option<usize> {
+        if id < self.cells.len() {
+            return Some(id);
+        }
+        let cell = &octree.cells()[id];
+        (cell.level + 1..=octree.lattice().levels).find_map(|level| {
+            let at = cell.at.map(|c| c >> level << level);
+            let first = octree.leaf(at) as usize;
+            let same = self.cells.get(first).is_some_and(|known| known.level == level && known.at == at);
+            same.then_some(first)
+        })
+    }
+
+    /// The cells as an operator.
+    pub fn operator(&self) -> &CellOperator {
+        &self.operator
+    }
+
+    /// Factors and tables for the parameters of an update.
+    fn set(&mut self, team: &mut Team, with: &ElasticUpdate) {
+        self.operator.set_tables(&self.materials.tables(with.lame));
+        let (cells, h, materials) = (&self.cells, self.h, &self.materials);
+        self.operator.set_factors(team, |id| {
+            let cell = &cells[id as usize];
+            (materials.lame(cell.material, with.lame).mu * f64::from(cell.side()) * h * with.scale) as f32
+        });
+        if !with.law.rotates() {
+            self.operator.set_rotations(team, |_| Matrix3::identity());
+        }
+    }
+}
+
+fn arrange(simd: Simd, octree: &Octree, materials: &Materials) -> (CellOperator, Vec<RestChunk>) {
+    let cells = octree.cells();
+    let lanes: Vec<CellLane> = (0..cells.len())
+        .map(|id| {
+            let matrix = CellMatrix::Table(materials.table_of(cells[id].material));
+            CellLane { factor: 1.0, ..CellLane::of_leaf(octree, id, matrix) }
+        })
+        .collect();
+    // Those of other materials come with the first update.
+    let tables = materials.tables(Lame { mu: 1.0, lambda: 0.0 });
+    let operator = CellOperator::new(simd, &tables, &lanes, &morton_order(cells), octree.n_vertices());
+    let (positions, h) = (octree.rest_positions(), octree.lattice().h);
+    let side = |id: u32| f64::from(cells[id as usize].side()) * h;
+    let rest = operator.chunks.iter().map(|chunk| RestChunk::new(chunk, &positions, side)).collect();
+    (operator, rest)
+}
+
+impl Stiffness for CellStiffness {
+    fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize {
+        let rotates = with.law.rotates();
+        let same = self.made_with.is_some_and(|made| {
+            (made.lame, made.scale, made.law.rotates()) == (with.lame, with.scale, rotates)
+        });
+        if !same {
+            self.set(team, with);
+            self.made_with = Some(*with);
+        }
+        self.version += u64::from(rotates || !same);
+        let CellOperator { simd, tables, chunks, gather, sums, diagonals, .. } = &mut self.operator;
+        let (simd, with) = (*simd, (&tables[..], with.scale as f32));
+        let rows = (ranges(sums, &gather.first_row), ranges(diagonals, &gather.first_row));
+        team.for_blocks(
+            (blocks(chunks, 1), blocks(&mut self.rest, 1), rows),
+            |_, (chunk, rest, (f, diagonal))| {
+                let (chunk, rest): (&mut CellChunk, &mut RestChunk) = (&mut chunk[0], &mut rest[0]);
+                if rotates {
+                    rest.update(simd, chunk, with, positions, f);
+                } else {
+                    chunk.inverted = 0;
+                    rest.linear_forces(simd, chunk, with, positions, f);
+                }
+                if rotates || !same {
+                    chunk.diagonals(simd, with.0, diagonal);
+                }
+            },
+        );
+        self.operator.chunks.iter().map(|chunk| chunk.inverted).sum()
+    }
+
+    #[inline(always)]
+    fn forces(&self, block: usize, f: &mut [Padded]) {
+        f.fill([0.0; 4]);
+        self.operator.add_products(block, f);
+    }
+
+    #[inline(always)]
+    fn diagonals(&self, block: usize, diagonal: &mut [Block6]) {
+        diagonal.fill([0.0; 8]);
+        self.operator.add_diagonals(block, diagonal);
+    }
+
+    fn version(&self) -> u64 {
+        self.version
+    }
+
+    fn multiply(&mut self, team: &mut Team, x: &[Padded]) {
+        self.operator.multiply(team, x);
+    }
+
+    fn multiply_direction(&mut self, team: &mut Team, z: &[Padded], beta: f32) {
+        self.operator.multiply_direction(team, z, beta);
+    }
+
+    #[inline(always)]
+    fn add_products(&self, block: usize, y: &mut [Padded]) {
+        self.operator.add_products(block, y);
+    }
+
+    #[inline(always)]
+    fn advance(&self, block: usize, with: &Direction<'_>, p: &mut [Padded], q: &mut [Padded]) -> f64 {
+        self.operator.advance(block, with, p, q)
+    }
+
+    /// Nothing: there is only [`OperatorChoice::MatrixFree`].
+    fn set_choice(&mut self, _: OperatorChoice) {}
+
+    fn choice(&self) -> OperatorChoice {
+        OperatorChoice::MatrixFree
+    }
+
+    fn places(&self) -> Vec<Place> {
+        self.operator.places().to_vec()
+    }
+
+    #[inline(always)]
+    fn rotation(&self, place: Place) -> Matrix3<f32> {
+        self.operator.rotation(place)
+    }
+}
+
+impl LinearOperator for CellStiffness {
+    fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
+        apply(self, team, x, y);
+    }
+}
+
+/// Parameters by number of material. Materials with the same λ/μ have one table.
+#[derive(Debug)]
+struct Materials {
+    lame: Vec<Lame>,
+    /// Table of each of them.
+    table: Vec<u16>,
+    /// λ/μ of every table but the last, which is that of all other numbers.
+    ratios: Vec<f64>,
+}
+
+impl Materials {
+    fn new(lame: &[Lame]) -> Self {
+        let mut materials = Self { lame: lame.to_vec(), table: Vec::new(), ratios: Vec::new() };
+        for lame in lame {
+            let ratio = lame.lambda / lame.mu;
+            let at = materials.ratios.iter().position(|r| *r == ratio).unwrap_or_else(|| {
+                materials.ratios.push(ratio);
+                materials.ratios.len() - 1
+            });
+            materials.table.push(at as u16);
+        }
+        materials
+    }
+
+    fn table_of(&self, material: u16) -> u16 {
+        self.table.get(usize::from(material)).copied().unwrap_or(self.ratios.len() as u16)
+    }
+
+    fn lame(&self, material: u16, other: Lame) -> Lame {
+        self.lame.get(usize::from(material)).copied().unwrap_or(other)
+    }
+
+    /// Tables of cubes of side 1 m with μ = 1 Pa.
+    fn tables(&self, other: Lame) -> Vec<SectorTable> {
+        let ratios = self.ratios.iter().copied().chain([other.lambda / other.mu]);
+        ratios.map(|lambda| SectorTable::elastic(Lame { mu: 1.0, lambda })).collect()
+    }
+}

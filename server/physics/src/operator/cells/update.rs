@@ -1,0 +1,251 @@
+//! Rotations and internal forces of the cells of a chunk at given positions.
+
+#![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::super::chunks::NO_PIECE;
+use super::super::{Padded, padded};
+use super::batch::{
+    Corners, HangingWeights, SectorBatch, TableLanes, distribute, from_cell, interpolate, multiply_sectors,
+    scatter, to_cell, transform,
+};
+use super::chunk::{BatchLanes, CellChunk, Table};
+use super::lane::{CellMatrix, handedness};
+use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
+
+/// What only an update needs of a chunk.
+#[derive(Clone, Debug)]
+pub struct RestChunk {
+    /// Positions of the last update [m], by local number.
+    positions: Vec<[f64; 4]>,
+    /// Rest positions [m].
+    rest: Vec<Vector3<f64>>,
+    /// Of every batch.
+    sides: Vec<RestBatch>,
+}
+
+/// Sides of eight cells.
+#[derive(Clone, Copy, Debug)]
+struct RestBatch {
+    /// 4 δ times the side [m], δ the handedness of the octant: minus the only components of the rest state in
+    /// the coordinates of the kernel. 0 in unused lanes.
+    span: Lanes,
+    /// −1/span.
+    inverse: Lanes,
+}
+
+impl RestChunk {
+    /// The rest state of `chunk`: `positions` of all vertices [m] and the side of each cell [m] by number.
+    pub fn new(chunk: &CellChunk, positions: &[Vector3<f64>], side: impl Fn(u32) -> f64) -> Self {
+        let sides = chunk.lanes.iter().map(|lanes| {
+            let mut batch = RestBatch { span: Lanes::default(), inverse: Lanes([-1.0; LANES]) };
+            for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
+                let span = 4.0 * side(cell) as f32 * handedness(lanes.octants[lane]);
+                (batch.span.0[lane], batch.inverse.0[lane]) = (span, -1.0 / span);
+            }
+            batch
+        });
+        Self {
+            positions: vec![[0.0; 4]; chunk.vertices.len()],
+            rest: chunk.vertices.iter().map(|&v| positions[v as usize]).collect(),
+            sides: sides.collect(),
+        }
+    }
+
+    /// Updates the rotations of `chunk` and writes the internal forces [N] of its vertices. `scale` is the s in
+    /// the factors of the cells.
+    pub fn update(
+        &mut self,
+        simd: Simd,
+        chunk: &mut CellChunk,
+        (tables, scale): (&[Table], f32),
+        positions: &[Vector3<f64>],
+        f: &mut [Padded],
+    ) {
+        for (local, &vertex) in self.positions.iter_mut().zip(&chunk.vertices) {
+            let x = &positions[vertex as usize];
+            *local = [x.x, x.y, x.z, 0.0];
+        }
+        let f = &mut f[..chunk.vertices.len()];
+        f.fill([0.0; 4]);
+        assert!(self.positions.len() == f.len());
+        chunk.inverted = 0;
+        for group in &chunk.groups {
+            let CellMatrix::Table(t) = group.matrix else { continue };
+            let range = group.batches.clone();
+            let mut part = Part {
+                batches: &mut chunk.batches[range.clone()],
+                lanes: &chunk.lanes[range.clone()],
+                sides: &self.sides[range],
+                weights: &chunk.weights[group.weights.clone()],
+                table: &tables[usize::from(t)].lanes,
+                per_scale: 1.0 / scale,
+            };
+            // SAFETY: local numbers are indices into `vertices`, which is as long as `positions` and `f`.
+            chunk.inverted += unsafe { update(simd, &mut part, &self.positions, f) };
+        }
+    }
+
+    /// f = K u with displacements u relative to the chunk's first vertex, subtracted in double precision: the
+    /// error is relative to the chunk, not to how far the body has moved.
+    pub fn linear_forces(
+        &self,
+        simd: Simd,
+        chunk: &mut CellChunk,
+        (tables, scale): (&[Table], f32),
+        positions: &[Vector3<f64>],
+        f: &mut [Padded],
+    ) {
+        let displacement = |k: usize| positions[chunk.vertices[k] as usize] - self.rest[k];
+        let origin = if chunk.vertices.is_empty() { Vector3::zeros() } else { displacement(0) };
+        for (k, local) in chunk.x.iter_mut().enumerate() {
+            *local = padded(&(displacement(k) - origin));
+        }
+        chunk.apply(simd, tables, f);
+        let factor = 1.0 / scale;
+        f[..chunk.x.len()].as_flattened_mut().iter_mut().for_each(|f| *f *= factor);
+    }
+}
+
+/// The batches of one group.
+struct Part<'a> {
+    batches: &'a mut [SectorBatch],
+    lanes: &'a [BatchLanes],
+    sides: &'a [RestBatch],
+    weights: &'a [HangingWeights],
+    table: &'a TableLanes,
+    /// 1/s.
+    per_scale: f32,
+}
+
+/// Returns the number of cells with det F ≤ 0.
+///
+/// # Safety
+/// All local numbers are below the lengths of `x` and `f`.
+unsafe fn update(simd: Simd, part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
+    match simd {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only; the rest is the caller's promise.
+        Simd::Avx2 => unsafe { avx2::update(part, x, f) },
+        // SAFETY: the caller's promise.
+        _ => unsafe { update_with::<Lanes>(part, x, f) },
+    }
+}
+
+/// # Safety
+/// As for [`update`].
+#[inline(always)]
+unsafe fn update_with<V: Vector8>(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
+    let mut inverted = 0;
+    for b in 0..part.batches.len() {
+        let (batch, side) = (&mut part.batches[b], &part.sides[b]);
+        let mut u: Corners<V> = [[V::splat(0.0); 8]; 3];
+        for j in 1..8 {
+            // SAFETY: the caller's promise.
+            let edge = unsafe { V::gather_edges(x, &batch.nodes[0], &batch.nodes[j]) };
+            for i in 0..3 {
+                u[i][j] = edge[i];
+            }
+        }
+        let weights = part.weights.get(b);
+        if let Some(weights) = weights {
+            interpolate(&mut u, weights);
+        }
+        transform(&mut u);
+        // F̂ = δ F D: column k is the difference across axis k.
+        let inverse = V::load(&side.inverse);
+        let mut F = [inverse; 9];
+        for i in 0..3 {
+            for k in 0..3 {
+                F[3 * i + k] = inverse * u[i][1 << k];
+            }
+        }
+        inverted += rotate(&F, batch, &part.lanes[b]);
+        // R̂ᵀ x − X in the frame of the cell, then as in a product.
+        to_cell(&mut u, &batch.rotation);
+        let rest = V::load(&batch.root) * V::load(&side.span);
+        for k in 0..3 {
+            u[k][1 << k] = u[k][1 << k] + rest;
+        }
+        multiply_sectors(&mut u, part.table);
+        from_cell(&mut u, &batch.rotation);
+        let per_scale = V::splat(part.per_scale);
+        for i in 0..3 {
+            for p in 0..8 {
+                u[i][p] = u[i][p] * per_scale;
+            }
+        }
+        transform(&mut u);
+        if let Some(weights) = weights {
+            distribute(&mut u, weights);
+        }
+        // SAFETY: the caller's promise.
+        unsafe { scatter(f, &batch.nodes, &u) };
+    }
+    inverted
+}
+
+/// Updates the rotation of every used lane; returns how many have det F ≤ 0.
+#[inline(always)]
+fn rotate<V: Vector8>(F: &Mat3<V>, batch: &mut SectorBatch, lanes: &BatchLanes) -> usize {
+    let (R, trusted) = polar_newton(F);
+    let root = V::load(&batch.root);
+    // Lanes that Newton's method cannot handle are rare and leave the hot loop.
+    if trusted == u8::MAX {
+        for i in 0..9 {
+            batch.rotation[i] = (root * R[i]).store();
+        }
+        return 0;
+    }
+    let (mut stored_F, mut stored_R) = ([Lanes::default(); 9], [Lanes::default(); 9]);
+    for i in 0..9 {
+        (stored_F[i], stored_R[i]) = (F[i].store(), (root * R[i]).store());
+    }
+    rotate_guarded(&stored_F, &stored_R, trusted, batch, lanes)
+}
+
+#[cold]
+#[inline(never)]
+fn rotate_guarded(
+    F: &Mat3<Lanes>,
+    turned: &Mat3<Lanes>,
+    trusted: u8,
+    batch: &mut SectorBatch,
+    lanes: &BatchLanes,
+) -> usize {
+    let mut inverted = 0;
+    for lane in (0..LANES).filter(|&lane| lanes.cells[lane] != NO_PIECE) {
+        let root = batch.root.0[lane];
+        if trusted >> lane & 1 == 1 {
+            for i in 0..9 {
+                batch.rotation[i].0[lane] = turned[i].0[lane];
+            }
+        } else {
+            let F = Matrix3::from_fn(|i, j| f64::from(F[3 * i + j].0[lane]));
+            let warm = Matrix3::from_fn(|i, j| f64::from(batch.rotation[3 * i + j].0[lane] / root));
+            let R = polar_rotation(&F, &warm);
+            for i in 0..9 {
+                batch.rotation[i].0[lane] = root * R[(i / 3, i % 3)] as f32;
+            }
+            inverted += usize::from(F.determinant() <= 0.0);
+        }
+    }
+    inverted
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    //! The same loop compiled for AVX2 and FMA.
+
+    use super::{Padded, Part};
+    use crate::element::avx2::Register;
+
+    /// # Safety
+    /// As for [`super::update`].
+    #[target_feature(enable = "avx2,fma")]
+    pub unsafe fn update(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [Padded]) -> usize {
+        // SAFETY: the caller's promise.
+        unsafe { super::update_with::<Register>(part, x, f) }
+    }
+}
