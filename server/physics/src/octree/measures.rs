@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::cells::{Cell, Octree};
 use super::lattice::{At, OUTSIDE};
 use super::vertices::corner_weights;
-use crate::cut::{Components, Solid, SolidCells, SolidOrigin};
-use crate::element::{MaterialPoint, Point, Points, deformation_gradient, hex8, quadrature};
+use crate::cut::Components;
+use crate::element::{Point, Points, deformation_gradient, hex8, quadrature};
 use crate::lists::disjoint::{find, join};
 use crate::material::Region;
 
@@ -191,29 +191,6 @@ impl Octree {
             }
         }
         id
-    }
-
-    /// The leaves as hexahedra. Leaves share a point where the same vertices carry it.
-    pub fn solid(&self) -> Solid {
-        let mut solid = Solid::default();
-        let mut hexes = Vec::with_capacity(self.cells.len());
-        let mut ids: BTreeMap<Vec<(u32, u64)>, u32> = BTreeMap::new();
-        for (id, (cell, vertices)) in (0u32..).zip(self.cells.iter().zip(&self.vertices)) {
-            let W = corner_weights(cell, self.hanging[id as usize]);
-            hexes.push(W.map(|row| {
-                let mut carriers: Vec<(u32, f64)> =
-                    vertices.iter().copied().zip(row).filter(|(_, w)| *w != 0.0).collect();
-                carriers.sort_unstable_by_key(|(vertex, _)| *vertex);
-                let key = carriers.iter().map(|(vertex, w)| (*vertex, w.to_bits())).collect();
-                *ids.entry(key).or_insert_with(|| {
-                    solid.vertices.push(MaterialPoint::new(carriers));
-                    solid.vertices.len() as u32 - 1
-                })
-            }));
-            solid.origins.push(SolidOrigin { element: id, piece: id, stress: id, fraction: 1.0 });
-        }
-        solid.cells = SolidCells::Hexes(hexes);
-        solid
     }
 }
 

@@ -20,7 +20,6 @@ pub use cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree, OctreeError};
 pub use change::OctreeChange;
 pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
 pub use shape::{BoxShape, Shape};
-pub use solid::OctreeSolid;
 pub use space::OctreeSpace;
 pub use surface::OctreeSurface;
 pub use vertices::{Octants, corner_weights};

@@ -4,24 +4,13 @@ use std::collections::BTreeMap;
 
 use super::cells::Octree;
 use super::vertices::corner_weights;
+use crate::cut::{Solid, SolidCells, SolidOrigin};
 use crate::element::MaterialPoint;
 
-/// Corners of a cell in the order of VTK_HEXAHEDRON (cell type 12): around the lower face, then the upper one.
-const VTK_ORDER: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
-
-/// Hexahedra that fill the body without overlap.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct OctreeSolid {
-    /// Points of the material: the vertices of the octree under their numbers, then the hanging corners. The two
-    /// sides of a cut have separate points.
-    pub points: Vec<MaterialPoint>,
-    /// Points at the corners of each leaf, in the order of VTK_HEXAHEDRON.
-    pub cells: Vec<[u32; 8]>,
-}
-
 impl Octree {
-    /// The leaves as hexahedra, built anew at each call.
-    pub fn solid(&self) -> OctreeSolid {
+    /// The leaves as hexahedra, built anew at each call. The first points are the vertices of the octree under
+    /// their numbers, then come the hanging corners.
+    pub fn solid(&self) -> Solid {
         let mut points: Vec<MaterialPoint> =
             (0..self.n_vertices() as u32).map(|v| MaterialPoint::new([(v, 1.0)])).collect();
         // Hanging corners at one lattice point are one point if the same vertices carry them.
@@ -42,9 +31,11 @@ impl Octree {
                     });
                 }
             }
-            cells.push(VTK_ORDER.map(|c| corners[c]));
+            cells.push(corners);
         }
-        OctreeSolid { points, cells }
+        let origin = |id: u32| SolidOrigin { element: id, piece: id, stress: id, fraction: 1.0 };
+        let origins = (0..cells.len() as u32).map(origin).collect();
+        Solid { vertices: points, cells: SolidCells::Hexes(cells), origins }
     }
 }
 
@@ -54,6 +45,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::super::*;
+    use crate::cut::SolidCells;
 
     #[test]
     fn hexahedra_share_points_where_the_material_does() {
@@ -68,21 +60,22 @@ mod tests {
             }
             let solid = octree.solid();
             let rest = octree.rest_positions();
-            let at: Vec<Vector3<f64>> = solid.points.iter().map(|p| p.position(&rest)).collect();
-            let mut volume = 0.0;
-            for (corners, cell) in solid.cells.iter().zip(octree.cells()) {
-                for (k, c) in [0, 1, 3, 2, 4, 5, 7, 6].into_iter().enumerate() {
+            let at: Vec<Vector3<f64>> = solid.vertices.iter().map(|p| p.position(&rest)).collect();
+            let mut volume: f64 = 0.0;
+            let SolidCells::Hexes(hexes) = &solid.cells else { panic!("cells are hexahedra") };
+            for (corners, cell) in hexes.iter().zip(octree.cells()) {
+                for c in 0..8 {
                     let corner = octree.lattice().point(cell.corner(c));
-                    assert!((at[corners[k] as usize] - corner).norm() < 1e-12);
+                    assert!((at[corners[c] as usize] - corner).norm() < 1e-12);
                 }
                 let edge = |k: usize| at[corners[k] as usize] - at[corners[0] as usize];
-                volume += edge(1).cross(&edge(3)).dot(&edge(4));
+                volume += edge(1).cross(&edge(2)).dot(&edge(4));
             }
             assert!((volume - 1.0).abs() < 1e-12);
             // Without a cut every corner of a leaf is one point.
             let places: std::collections::BTreeSet<At> =
                 octree.cells().iter().flat_map(|cell| (0..8).map(|c| cell.corner(c))).collect();
-            let separate = solid.points.len() - places.len();
+            let separate = solid.vertices.len() - places.len();
             // The points at the end of the cut are not doubled.
             assert_eq!(separate, if cut { 12 * 17 } else { 0 });
         }

@@ -374,7 +374,9 @@ impl Space for OctreeSpace {
 
     fn bytes(&self) -> usize {
         // The uncut state is shared.
-        self.octree.bytes() + 16 * self.node_of_copy.len() + TRIANGLE_BYTES * self.surface.triangles.len()
+        self.octree.bytes()
+            + 16 * self.node_of_copy.len()
+            + TRIANGLE_BYTES * self.surface.surface().triangles.len()
     }
 
     fn stiffness(&self, _: bool) -> Option<Box<dyn Stiffness>> {

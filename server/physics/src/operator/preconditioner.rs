@@ -2,7 +2,8 @@
 //! they are not stiff.
 
 use super::{
-    BLOCK, Block6, FixedCopy, Iterate, LinearOperator, Padded, Preconditioner, Substitution, Sum, block_of, rows,
+    BLOCK, Block6, FixedCopy, Iterate, LinearOperator, Padded, Preconditioner, Substitution, Sum, block_of,
+    rows,
 };
 use crate::lists::reserve::resize_reserving;
 use crate::team::{Team, blocks};
