@@ -55,8 +55,9 @@ fn measure(name: &str, settings: OctreeSettings, rounds: usize) {
         arranged * 1e3,
         bytes as f64 / n_cells as f64
     );
-    let bend =
-        |X: &Vector3<f64>| X + 0.1 * Vector3::new((3.0 * X.y).sin(), 0.3 * X.z * X.z, (2.0 * X.x).cos());
+    let bend = |rest: &Vector3<f64>| {
+        rest + 0.1 * Vector3::new((3.0 * rest.y).sin(), 0.3 * rest.z * rest.z, (2.0 * rest.x).cos())
+    };
     let positions: Vec<_> = octree.rest_positions().iter().map(bend).collect();
     let x: Vec<Padded> = (0..n).map(|n| [(0.3 * n as f32).sin(), 1.0, (0.7 * n as f32).cos(), 0.0]).collect();
     let mut y = vec![[0.0; 4]; n];

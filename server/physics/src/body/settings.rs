@@ -114,7 +114,6 @@ impl BodySettings {
         let reasons = [
             (self.element == ElementKind::Tet10, "element tet10"),
             (self.element == ElementKind::Hex8, "element hex8"),
-            (self.element == ElementKind::Octree, "element octree"),
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
             (self.scheme.is_explicit(), "an explicit integrator"),
             (self.scheme == Scheme::Static && law.rotates(), "the static integrator with a law that rotates"),

@@ -1,5 +1,6 @@
 //! The octree as a discretisation of a body.
 
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -12,9 +13,10 @@ use crate::cut::{
     BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
     Surroundings, Work, sweep_triangles, swept_area,
 };
-use crate::element::{Point, Points};
-use crate::material::{Material, Region};
+use crate::element::{Point, Points, Simd};
+use crate::material::{Lame, Material, Region};
 use crate::mesh::MeshError;
+use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 use crate::space::{RestPoint, Space};
@@ -379,11 +381,17 @@ impl Space for OctreeSpace {
             + TRIANGLE_BYTES * self.surface.surface().triangles.len()
     }
 
-    fn stiffness(&self, _: bool) -> Option<Box<dyn Stiffness>> {
-        None
+    fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
+        let simd = if portable { Simd::Baseline } else { Simd::detect() };
+        let lame: Vec<Lame> = self.octree.regions().iter().map(Region::lame).collect();
+        Some(Box::new(CellStiffness::new(simd, &self.octree, &lame)))
     }
 
-    fn follow_stiffness(&self, _: &mut dyn Stiffness) {}
+    fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {
+        if let Some(cells) = (stiffness as &mut dyn Any).downcast_mut::<CellStiffness>() {
+            cells.follow(&self.octree);
+        }
+    }
 
     fn stiff_modes(&self) -> Option<StiffModes> {
         None

@@ -1,7 +1,9 @@
 //! Bodies of octree cells on the general path, in double precision: the reference for everything faster.
 
 use nalgebra::{Matrix3, Vector3};
-use scindo_physics::body::{Body, BodySettings, ElementKind, Method, Outcome, PcgSettings, Scheme};
+use scindo_physics::body::{
+    Arithmetic, Body, BodySettings, ElementKind, Method, Outcome, PcgSettings, Scheme,
+};
 use scindo_physics::cut::{BladeSweep, SolidCells};
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::mesh::box_hexes;
@@ -245,4 +247,59 @@ fn an_octree_answers_what_any_body_is_asked() {
         })
         .sum();
     assert!((filled - 1.0).abs() < 1e-12, "{filled}");
+}
+
+/// Both ways of stepping, from the same state, cut in the same way.
+#[test]
+fn the_kernels_step_like_the_discrete_model() {
+    let shape = BoxShape { min: Vector3::zeros(), max: Vector3::new(0.5, 0.2, 0.2) };
+    let mut octree =
+        Octree::fill(&shape, OctreeSettings { cells: 20, levels: 2 }, &|p| u16::from(p.x > 0.3)).unwrap();
+    octree.set_regions(vec![Region { young_pa: 4e5, poisson: 0.4, density_kg_m3: 500.0 }]);
+    let edge = |z: f64| [Vector3::new(0.2, -0.1, z), Vector3::new(0.24, 0.3, z)];
+    let blade = BladeSweep { segments: vec![edge(0.3), edge(0.07)] };
+    for law in [Law::Linear, Law::Corotational] {
+        for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2, Scheme::Newmark { beta: 0.25, gamma: 0.5 }] {
+            let moved = [None, Some(Arithmetic::Double)].map(|arithmetic| {
+                let solver = PcgSettings { iterations: 2000, tolerance: 1e-6 };
+                let settings = BodySettings { solver, scheme, arithmetic, ..BodySettings::default() };
+                let mut body = body(octree.clone(), Material { law, ..LINEAR }, settings);
+                assert_eq!(body.is_fast(), arithmetic.is_none());
+                body.fix(&at(&body, |X| X.x < 1e-9), [true; 3], Vector3::zeros()).unwrap();
+                for k in 0..8 {
+                    if k == 4 {
+                        body.cut(&blade, 1).unwrap();
+                    }
+                    let report = body.step(0.005, FALL, &[]);
+                    assert_eq!(report.outcome, Outcome::Advanced, "{report:?}");
+                }
+                body.positions().iter().zip(body.rest_positions()).map(|(x, X)| x - X).collect::<Vec<_>>()
+            });
+            let largest = |u: &mut dyn Iterator<Item = f64>| u.fold(0.0, f64::max);
+            let size = largest(&mut moved[1].iter().map(Vector3::norm));
+            let apart = largest(&mut moved[0].iter().zip(&moved[1]).map(|(a, b)| (a - b).norm()));
+            // One rotation per cell and one per quadrature point differ a little.
+            let allowed = if law == Law::Linear { 1e-4 } else { 5e-3 };
+            assert!(size > 1e-3 && apart < allowed * size, "{law:?} {scheme:?}: {}", apart / size);
+        }
+    }
+}
+
+#[test]
+fn steps_have_the_same_bits_for_any_number_of_threads() {
+    let run = |threads| {
+        let material = Material { law: Law::Corotational, young_pa: 1e5, ..LINEAR };
+        let mut body = body(unit_cube(12, 2), material, BodySettings { threads, ..BodySettings::default() });
+        body.fix(&at(&body, |X| X.z < 1e-9), [true; 3], Vector3::zeros()).unwrap();
+        let edge = |x: f64| [Vector3::new(x, -0.2, 0.52), Vector3::new(x, 1.2, 0.55)];
+        for k in 0..10 {
+            if k == 5 {
+                body.cut(&BladeSweep { segments: vec![edge(-0.1), edge(0.7)] }, 1).unwrap();
+            }
+            body.step(0.01, Vector3::new(3.0, 0.0, -9.81), &[]);
+        }
+        body.positions().to_vec()
+    };
+    assert_eq!(run(1), run(2));
+    assert_eq!(run(1), run(3));
 }

@@ -38,9 +38,8 @@ pub struct CellStiffness {
 }
 
 impl CellStiffness {
-    /// Arranges the cells of `octree` for the kernels, all rotations at rest. A cell has the parameters of its
-    /// material's number in `materials`; those of other cells come with every
-    /// [update](Stiffness::update).
+    /// Arranges the cells of `octree` for the kernels, all rotations at rest. A cell of material n has the
+    /// parameters `materials[n − 1]`; those of other cells come with every [update](Stiffness::update).
     pub fn new(simd: Simd, octree: &Octree, materials: &[Lame]) -> Self {
         let materials = Materials::new(materials);
         let (operator, rest) = arrange(simd, octree, &materials);
@@ -203,7 +202,8 @@ impl LinearOperator for CellStiffness {
     }
 }
 
-/// Parameters by number of material. Materials with the same λ/μ have one table.
+/// Parameters by number of region, from 1; region 0 has those of the body. Regions with the same λ/μ have one
+/// table.
 #[derive(Debug)]
 struct Materials {
     lame: Vec<Lame>,
@@ -228,11 +228,12 @@ impl Materials {
     }
 
     fn table_of(&self, material: u16) -> u16 {
-        self.table.get(usize::from(material)).copied().unwrap_or(self.ratios.len() as u16)
+        let region = usize::from(material).checked_sub(1).and_then(|r| self.table.get(r));
+        region.copied().unwrap_or(self.ratios.len() as u16)
     }
 
     fn lame(&self, material: u16, other: Lame) -> Lame {
-        self.lame.get(usize::from(material)).copied().unwrap_or(other)
+        usize::from(material).checked_sub(1).and_then(|r| self.lame.get(r)).copied().unwrap_or(other)
     }
 
     /// Tables of cubes of side 1 m with μ = 1 Pa.

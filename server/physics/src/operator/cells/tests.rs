@@ -92,7 +92,7 @@ struct Updated {
 }
 
 fn updated(simd: Simd, threads: usize, octree: &Octree, law: Law, x: &[Vector3<f64>]) -> Updated {
-    let mut stiffness = CellStiffness::new(simd, octree, &[SOFT, HARD, HARDER]);
+    let mut stiffness = CellStiffness::new(simd, octree, &[HARD, HARDER]);
     let mut team = Team::new(threads).unwrap();
     let inverted = stiffness.update(&mut team, &with(law), x);
     let (f, diagonal) = read(&stiffness, x.len());
