@@ -15,7 +15,8 @@
 //! changing topology. Dick, Georgii, Westermann 2011, §7, for the binding.
 //!
 //! # Limit
-//! Parts of the surface may pass through each other within a dual cell, by less than the side of a finest cell.
+//! Parts of the surface may pass through each other by less than the side of a finest cell, e.g. the lips of two
+//! incisions near their crossing.
 
 mod links;
 mod patches;

@@ -9,6 +9,11 @@ use crate::element::MaterialPoint;
 /// Eigenvalues of the normals' Σ n nᵀ below this part of the largest count as zero: planes that meet at less than
 /// about 25° are one smooth surface.
 const SMOOTH: f64 = 0.05;
+/// Planes that all pass this close to a point meet in it, in sides of finest cells.
+const AGREE: f64 = 0.02;
+/// Where planes meet, the vertex may be this far from the lattice point along every axis: beyond the dual cell by
+/// half the side of a cell.
+const REACH: f64 = 1.0;
 /// Sweeps of the search for the best place within the dual cell.
 const SWEEPS: usize = 20;
 
@@ -80,16 +85,24 @@ pub fn bind(octree: &Octree, leaf: u32, at: Vector3<f64>) -> Placed {
     Placed { at, point: octree.point_in(leaf, xi) }
 }
 
-/// The point nearest to planes through these points with these unit normals, in the least-squares sense, in the
+/// The point nearest to planes through these points with these unit normals, in the least-squares sense, near the
 /// cube of side 1 around 0. In directions that the planes leave free it keeps the mean of their points.
 fn meet(planes: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> + Clone) -> Vector3<f64> {
     let (sum, n) = planes.clone().fold((Vector3::zeros(), 0.0), |(sum, n), (p, _)| (sum + p, n + 1.0));
     let mean = sum / n;
     let (mut A, mut b) = (Matrix3::zeros(), Vector3::zeros());
-    for (p, normal) in planes {
+    for (p, normal) in planes.clone() {
         A += normal * normal.transpose();
         b += normal * normal.dot(&(p - mean));
     }
+    let x = mean + solve(A, b);
+    // An edge may pass outside the dual cell, if no link there tells of it.
+    let agree = |reach: f64| x.amax() <= reach && planes.clone().all(|(p, n)| n.dot(&(x - p)).abs() < AGREE);
+    if x.amax() <= 0.5 || agree(REACH) { x } else { within(x, mean, A, b) }
+}
+
+/// The shortest solution of A y = b with A = Σ n nᵀ, for the eigenvalues of A that are not small.
+fn solve(A: Matrix3<f64>, b: Vector3<f64>) -> Vector3<f64> {
     let eigen = A.symmetric_eigen();
     let least = SMOOTH * eigen.eigenvalues.max();
     let mut y = Vector3::zeros();
@@ -98,8 +111,7 @@ fn meet(planes: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> + Clone) -> V
             y += v * (v.dot(&b) / value);
         }
     }
-    let x = mean + y;
-    if x.amax() <= 0.5 { x } else { within(x, mean, A, b) }
+    y
 }
 
 /// Minimises (x − mean)ᵀA(x − mean)/2 − b·(x − mean) in the cube by cyclic coordinate descent from `x`.

@@ -212,6 +212,42 @@ fn cells_that_touch_in_edges_and_points_have_a_closed_surface() {
     assert!(doubled > 10, "doubled edges in {doubled} rounds");
 }
 
+/// A box turned about the origin.
+struct Turned(nalgebra::Rotation3<f64>, Vector3<f64>);
+
+impl Shape for Turned {
+    fn bounds(&self) -> [Vector3<f64>; 2] {
+        let reach = self.0.matrix().abs() * self.1;
+        [-reach, reach]
+    }
+
+    fn contains(&self, p: &Vector3<f64>) -> bool {
+        BoxShape { min: -self.1, max: self.1 }.contains(&self.0.inverse_transform_vector(p))
+    }
+
+    fn crossing(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
+        let [a, b] = [a, b].map(|p| self.0.inverse_transform_vector(p));
+        let (fraction, normal) = BoxShape { min: -self.1, max: self.1 }.crossing(&a, &b)?;
+        Some((fraction, self.0 * normal))
+    }
+}
+
+#[test]
+fn a_turned_box_keeps_sharp_edges() {
+    let mut random = Random(21);
+    for round in 0..10 {
+        let [roll, pitch, yaw] = (random.vector() * 3.0).into();
+        let half = Vector3::new(0.6, 0.5, 0.35);
+        let shape = Turned(nalgebra::Rotation3::from_euler_angles(roll, pitch, yaw), half);
+        let octree = Octree::fill(&shape, OctreeSettings { cells: 24, levels: 2 }, &|_| 0).unwrap();
+        let surface = OctreeSurface::build(&octree);
+        check(&octree, &surface);
+        let found = surface.surface().volume(&octree.rest_positions());
+        let error = found / (8.0 * half.product()) - 1.0;
+        assert!(error.abs() < 5e-4, "round {round}: {error}");
+    }
+}
+
 /// The tags around every vertex.
 fn tags_around(whole: &OctreeSurface) -> Vec<BTreeSet<u32>> {
     let mut tags = vec![BTreeSet::new(); whole.rest.len()];
@@ -297,7 +333,6 @@ fn sweep_random_bodies(bodies: u64, sweeps: u32) {
             worst.volume = worst.volume.max(lost.abs() / h.powi(3) / rims.max(1) as f64);
         }
     }
-    println!("{worst:?}");
     assert!(worst.vertices > 10_000 && worst.triangles > 10_000, "{worst:?}");
     assert!(worst.off < 1e-9 && worst.angle < 1e-3, "{worst:?}");
     assert!(worst.volume < 0.2, "{worst:?}");
