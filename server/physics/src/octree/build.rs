@@ -116,12 +116,12 @@ impl Octree {
         let lattice = Lattice::around(shape.bounds(), settings)?;
         let mut inside = Bits::new(lattice.size);
         let [nx, ny, nz] = lattice.size.map(|n| n as i32);
+        let mut row = vec![false; nx as usize];
         for k in 0..nz {
             for j in 0..ny {
-                for i in 0..nx {
-                    if shape.contains(&lattice.centre([i, j, k])) {
-                        inside.insert([i, j, k]);
-                    }
+                shape.contains_row(&|i| lattice.centre([i as i32, j, k]), &mut row);
+                for (i, _) in (0..nx).zip(&row).filter(|(_, inside)| **inside) {
+                    inside.insert([i, j, k]);
                 }
             }
         }

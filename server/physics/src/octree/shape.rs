@@ -10,6 +10,13 @@ pub trait Shape: Sync {
     /// Whether `p` [m] is inside.
     fn contains(&self, p: &Vector3<f64>) -> bool;
 
+    /// Whether the points of a row are inside. They lie on a line at equal distances, `point` gives them by
+    /// number. An implementation may share work between them, but its answers are those of
+    /// [`contains`](Self::contains).
+    fn contains_row(&self, point: &dyn Fn(usize) -> Vector3<f64>, inside: &mut [bool]) {
+        inside.iter_mut().enumerate().for_each(|(i, inside)| *inside = self.contains(&point(i)));
+    }
+
     /// The first crossing of the boundary on the way from `a` to `b` [m]: its fraction of the way in 0 … 1 and
     /// the outward unit normal there.
     fn crossing(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Option<(f64, Vector3<f64>)>;

@@ -10,11 +10,14 @@ mod progress;
 mod lattice;
 mod implicit;
 mod organ;
+mod solid_surface;
+mod cubes;
 mod load;
 mod write;
 #[cfg(test)]
 mod shapes;
 
+pub use cubes::{FillError, OctreeReport, fill_observed};
 pub use estimate::{CELLS, MeshEstimate, estimate, largest};
 pub(crate) use estimate::{body_bytes, memory_for_meshes, most_cells};
 pub(crate) use health::connectivity::components;
@@ -25,4 +28,5 @@ pub use lattice::{LatticeReport, lattice_from_surface};
 pub use load::{MeshHealth, load_any, load_surface, load_volume};
 pub use organ::Organ;
 pub use progress::{Meshing, Observer};
+pub use solid_surface::SolidSurface;
 pub use write::write_mesh;

@@ -57,6 +57,15 @@ impl TriangleTree {
         &self.corners
     }
 
+    /// Unit normals of all triangles, by their numbers in the list from which the tree was built.
+    pub fn normals(&self) -> Vec<Vector3<f64>> {
+        let mut normals = vec![Vector3::zeros(); self.source.len()];
+        for ([a, b, c], &number) in self.corners.iter().zip(&self.source) {
+            normals[number as usize] = (b - a).cross(&(c - a)).normalize();
+        }
+        normals
+    }
+
     fn split(
         &mut self,
         node: usize,
