@@ -68,6 +68,10 @@ pub trait Vector8:
     /// One bit per lane, lane 0 lowest: set if the lane is above `threshold`. It is not set for NaN.
     fn above(self, threshold: f32) -> u8;
 
+    /// Asks for a value that is read soon, where the machine can.
+    #[inline(always)]
+    fn prefetch<T>(_: &T) {}
+
     /// Rows `ids` of `x` as vectors of x, y and z.
     ///
     /// # Safety

@@ -3,7 +3,6 @@
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
 use super::super::Padded;
-use super::lane::HANGING_SLOTS;
 use super::sectors::SectorTable;
 use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8};
 
@@ -19,7 +18,10 @@ pub struct SectorBatch {
     pub nodes: [Ids; 8],
 }
 
-/// Weights of hanging slots, in the order of [`HANGING_SLOTS`]: ½ or ¼ where the slot hangs, 0 elsewhere.
+/// Batches are asked for so many turns before they are needed.
+const AHEAD: usize = 2;
+
+/// Weights of hanging slots, in the order of [`HANGING_SLOTS`](super::lane::HANGING_SLOTS): ½ or ¼ where the slot hangs, 0 elsewhere.
 pub type HangingWeights = [Lanes; 6];
 
 /// A table as the kernel reads it: every entry in all lanes.
@@ -80,23 +82,52 @@ unsafe fn multiply_with<V: Vector8, const HANGING: bool>(
     y: &mut [Padded],
 ) {
     for (b, batch) in batches.iter().enumerate() {
+        prefetch::<V, _>(batches, b + AHEAD);
+        if HANGING {
+            prefetch::<V, _>(weights, b + AHEAD);
+        }
+        // Rotations act on components, all other steps on slots: they commute.
         // SAFETY: the caller's promise.
         let mut u: Corners<V> = unsafe { gather(x, &batch.nodes) };
+        to_cell(&mut u, &batch.rotation);
         if HANGING {
             interpolate(&mut u, &weights[b]);
         }
         transform(&mut u);
-        to_cell(&mut u, &batch.rotation);
         multiply_sectors(&mut u, table);
-        from_cell(&mut u, &batch.rotation);
         transform(&mut u);
         if HANGING {
             distribute(&mut u, &weights[b]);
         }
+        from_cell(&mut u, &batch.rotation);
         // SAFETY: the caller's promise.
         unsafe { scatter(y, &batch.nodes, &u) };
     }
 }
+
+/// Asks for an entry that is needed soon, if there is one.
+#[inline(always)]
+fn prefetch<V: Vector8, T>(entries: &[T], at: usize) {
+    if let Some(entry) = entries.get(at) {
+        V::prefetch(entry);
+    }
+}
+
+/// Repeats a block for the numbers 0 … 7. The compiler leaves a loop with so long a body rolled, and then keeps
+/// all corners in memory to index them.
+macro_rules! for_eight {
+    ($k:ident => $body:block) => {
+        for_eight!($k => $body, 0 1 2 3 4 5 6 7)
+    };
+    ($k:ident => $body:block, $($number:literal)*) => {
+        $({
+            let $k: usize = $number;
+            $body
+        })*
+    };
+}
+
+pub(super) use for_eight;
 
 // Loops instead of closures below: see `Vector8`.
 
@@ -104,114 +135,142 @@ unsafe fn multiply_with<V: Vector8, const HANGING: bool>(
 /// All local numbers are below the length of `x`.
 #[inline(always)]
 pub unsafe fn gather<V: Vector8>(x: &[Padded], nodes: &[Ids; 8]) -> Corners<V> {
-    let mut u = [[V::splat(0.0); 8]; 3];
-    for j in 0..8 {
-        // SAFETY: the caller's promise.
-        let row = unsafe { V::gather(x, &nodes[j]) };
-        for i in 0..3 {
-            u[i][j] = row[i];
-        }
-    }
-    u
+    // Written out: a loop over slots would keep everything in memory.
+    // SAFETY: the caller's promise.
+    let [a, b, c, d, e, f, g, h] = unsafe {
+        [
+            V::gather(x, &nodes[0]),
+            V::gather(x, &nodes[1]),
+            V::gather(x, &nodes[2]),
+            V::gather(x, &nodes[3]),
+            V::gather(x, &nodes[4]),
+            V::gather(x, &nodes[5]),
+            V::gather(x, &nodes[6]),
+            V::gather(x, &nodes[7]),
+        ]
+    };
+    [
+        [a[0], b[0], c[0], d[0], e[0], f[0], g[0], h[0]],
+        [a[1], b[1], c[1], d[1], e[1], f[1], g[1], h[1]],
+        [a[2], b[2], c[2], d[2], e[2], f[2], g[2], h[2]],
+    ]
 }
 
 /// # Safety
 /// All local numbers are below the length of `y`.
 #[inline(always)]
 pub unsafe fn scatter<V: Vector8>(y: &mut [Padded], nodes: &[Ids; 8], f: &Corners<V>) {
-    for j in 0..8 {
+    for_eight!(j => {
         // SAFETY: the caller's promise.
         unsafe { V::scatter(y, &nodes[j], [f[0][j], f[1][j], f[2][j]]) };
-    }
+    });
 }
 
 /// W: displacements of the corners from those of the vertices.
 #[inline(always)]
 pub fn interpolate<V: Vector8>(u: &mut Corners<V>, weights: &HangingWeights) {
+    let [w1, w2, w4, w3, w5, w6] = load_weights::<V>(weights);
+    let minus_three = V::splat(-3.0);
     for i in 0..3 {
-        let v = u[i];
-        for (k, &j) in HANGING_SLOTS.iter().enumerate() {
-            let weight = V::load(&weights[k]);
-            let mut between = v[0] - v[j];
-            if k >= 3 {
-                for s in [1, 2, 4] {
-                    if s & j != 0 {
-                        between = between + (v[s] - v[j]);
-                    }
-                }
-            }
-            u[i][j] = weight.mul_add(between, v[j]);
-        }
+        let [v0, v1, v2, v3, v4, v5, v6, v7] = u[i];
+        let (v01, v24) = (v0 + v1, v2 + v4);
+        u[i] = [
+            v0,
+            w1.mul_add(v0 - v1, v1),
+            w2.mul_add(v0 - v2, v2),
+            w3.mul_add(minus_three.mul_add(v3, v01 + v2), v3),
+            w4.mul_add(v0 - v4, v4),
+            w5.mul_add(minus_three.mul_add(v5, v01 + v4), v5),
+            w6.mul_add(minus_three.mul_add(v6, v0 + v24), v6),
+            v7,
+        ];
     }
 }
 
 /// Wᵀ: forces on the vertices from those on the corners.
 #[inline(always)]
 pub fn distribute<V: Vector8>(f: &mut Corners<V>, weights: &HangingWeights) {
-    let (minus, minus_three) = (V::splat(-1.0), V::splat(-3.0));
+    let [w1, w2, w4, w3, w5, w6] = load_weights::<V>(weights);
+    let minus_three = V::splat(-3.0);
     for i in 0..3 {
-        let g = f[i];
-        for (k, &j) in HANGING_SLOTS.iter().enumerate() {
-            let share = V::load(&weights[k]) * g[j];
-            f[i][0] = f[i][0] + share;
-            if k < 3 {
-                f[i][j] = minus.mul_add(share, f[i][j]);
-            } else {
-                f[i][j] = minus_three.mul_add(share, f[i][j]);
-                for s in [1, 2, 4] {
-                    if s & j != 0 {
-                        f[i][s] = f[i][s] + share;
-                    }
-                }
-            }
-        }
+        let [g0, g1, g2, g3, g4, g5, g6, g7] = f[i];
+        let (s1, s2, s4) = (w1 * g1, w2 * g2, w4 * g4);
+        let (s3, s5, s6) = (w3 * g3, w5 * g5, w6 * g6);
+        f[i] = [
+            g0 + (s1 + s2) + (s4 + s3) + (s5 + s6),
+            (g1 - s1) + (s3 + s5),
+            (g2 - s2) + (s3 + s6),
+            minus_three.mul_add(s3, g3),
+            (g4 - s4) + (s5 + s6),
+            minus_three.mul_add(s5, g5),
+            minus_three.mul_add(s6, g6),
+            g7,
+        ];
     }
+}
+
+#[inline(always)]
+fn load_weights<V: Vector8>(weights: &HangingWeights) -> [V; 6] {
+    let [a, b, c, d, e, f] = weights;
+    [V::load(a), V::load(b), V::load(c), V::load(d), V::load(e), V::load(f)]
 }
 
 /// û_p = Σ_j (−1)^{|j & p|} u_j, in place.
 #[inline(always)]
 pub fn transform<V: Vector8>(u: &mut Corners<V>) {
     for i in 0..3 {
-        for bit in [1, 2, 4] {
-            for j in 0..8 {
-                if j & bit == 0 {
-                    let (a, b) = (u[i][j], u[i][j | bit]);
-                    u[i][j] = a + b;
-                    u[i][j | bit] = a - b;
-                }
-            }
-        }
+        let [a, b, c, d, e, f, g, h] = u[i];
+        let (a, b, c, d) = (a + b, a - b, c + d, c - d);
+        let (e, f, g, h) = (e + f, e - f, g + h, g - h);
+        let (a, b, c, d) = (a + c, b + d, a - c, b - d);
+        let (e, f, g, h) = (e + g, f + h, e - g, f - h);
+        u[i] = [a + e, b + f, c + g, d + h, a - e, b - f, c - g, d - h];
     }
 }
 
 /// √c R̂ᵀ u.
 #[inline(always)]
 pub fn to_cell<V: Vector8>(u: &mut Corners<V>, R: &Mat3<Lanes>) {
-    for p in 0..8 {
-        let v = [u[0][p], u[1][p], u[2][p]];
-        for i in 0..3 {
-            let (a, b, c) = (V::load(&R[i]), V::load(&R[3 + i]), V::load(&R[6 + i]));
-            u[i][p] = a.mul_add(v[0], b.mul_add(v[1], c * v[2]));
-        }
-    }
+    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = load_matrix::<V>(R);
+    for_eight!(p => {
+        let (x, y, z) = (u[0][p], u[1][p], u[2][p]);
+        u[0][p] = xx.mul_add(x, yx.mul_add(y, zx * z));
+        u[1][p] = xy.mul_add(x, yy.mul_add(y, zy * z));
+        u[2][p] = xz.mul_add(x, yz.mul_add(y, zz * z));
+    });
 }
 
 /// √c R̂ f.
 #[inline(always)]
 pub fn from_cell<V: Vector8>(f: &mut Corners<V>, R: &Mat3<Lanes>) {
-    for p in 0..8 {
-        let v = [f[0][p], f[1][p], f[2][p]];
-        for i in 0..3 {
-            let (a, b, c) = (V::load(&R[3 * i]), V::load(&R[3 * i + 1]), V::load(&R[3 * i + 2]));
-            f[i][p] = a.mul_add(v[0], b.mul_add(v[1], c * v[2]));
-        }
-    }
+    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = load_matrix::<V>(R);
+    for_eight!(p => {
+        let (x, y, z) = (f[0][p], f[1][p], f[2][p]);
+        f[0][p] = xx.mul_add(x, xy.mul_add(y, xz * z));
+        f[1][p] = yx.mul_add(x, yy.mul_add(y, yz * z));
+        f[2][p] = zx.mul_add(x, zy.mul_add(y, zz * z));
+    });
+}
+
+#[inline(always)]
+fn load_matrix<V: Vector8>(R: &Mat3<Lanes>) -> Mat3<V> {
+    [
+        V::load(&R[0]),
+        V::load(&R[1]),
+        V::load(&R[2]),
+        V::load(&R[3]),
+        V::load(&R[4]),
+        V::load(&R[5]),
+        V::load(&R[6]),
+        V::load(&R[7]),
+        V::load(&R[8]),
+    ]
 }
 
 /// S û.
 #[inline(always)]
 pub fn multiply_sectors<V: Vector8>(u: &mut Corners<V>, table: &TableLanes) {
-    for q in 0..8 {
+    for_eight!(q => {
         let [xx, xy, xz, yy, yz, zz] = &table.0[q];
         let (xx, xy, xz) = (V::load(xx), V::load(xy), V::load(xz));
         let (yy, yz, zz) = (V::load(yy), V::load(yz), V::load(zz));
@@ -219,7 +278,7 @@ pub fn multiply_sectors<V: Vector8>(u: &mut Corners<V>, table: &TableLanes) {
         u[0][q ^ 1] = xx.mul_add(a, xy.mul_add(b, xz * c));
         u[1][q ^ 2] = xy.mul_add(a, yy.mul_add(b, yz * c));
         u[2][q ^ 4] = xz.mul_add(a, yz.mul_add(b, zz * c));
-    }
+    });
 }
 
 #[cfg(target_arch = "x86_64")]

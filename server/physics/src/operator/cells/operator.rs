@@ -166,8 +166,7 @@ impl CellOperator {
         self.chunks.iter().map(CellChunk::bytes).sum()
     }
 
-    /// Bytes per cell of unused lanes and of vertices that chunks share, as factors: lanes / cells, rows /
-    /// vertices.
+    /// Lanes per cell (some are unused), and rows of sums per vertex of `n_vertices` (chunks share some).
     pub fn overheads(&self, n_vertices: usize) -> [f64; 2] {
         let lanes: usize = self.chunks.iter().map(|chunk| chunk.lanes.len()).sum();
         let cells = self.places.len().max(1);

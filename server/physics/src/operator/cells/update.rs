@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::super::chunks::NO_PIECE;
 use super::super::{Padded, padded};
 use super::batch::{
-    Corners, HangingWeights, SectorBatch, TableLanes, distribute, from_cell, interpolate, multiply_sectors,
-    scatter, to_cell, transform,
+    Corners, HangingWeights, SectorBatch, TableLanes, distribute, for_eight, from_cell, interpolate,
+    multiply_sectors, scatter, to_cell, transform,
 };
 use super::chunk::{BatchLanes, CellChunk, Table};
 use super::lane::{CellMatrix, handedness};
@@ -141,13 +141,13 @@ unsafe fn update_with<V: Vector8>(part: &mut Part<'_>, x: &[[f64; 4]], f: &mut [
     for b in 0..part.batches.len() {
         let (batch, side) = (&mut part.batches[b], &part.sides[b]);
         let mut u: Corners<V> = [[V::splat(0.0); 8]; 3];
-        for j in 1..8 {
-            // SAFETY: the caller's promise.
-            let edge = unsafe { V::gather_edges(x, &batch.nodes[0], &batch.nodes[j]) };
-            for i in 0..3 {
-                u[i][j] = edge[i];
+        for_eight!(j => {
+            if j > 0 {
+                // SAFETY: the caller's promise.
+                let edge = unsafe { V::gather_edges(x, &batch.nodes[0], &batch.nodes[j]) };
+                (u[0][j], u[1][j], u[2][j]) = (edge[0], edge[1], edge[2]);
             }
-        }
+        });
         let weights = part.weights.get(b);
         if let Some(weights) = weights {
             interpolate(&mut u, weights);
