@@ -29,6 +29,7 @@ pub mod team;
 pub mod assembly;
 pub mod operator;
 pub mod solver;
+pub mod multigrid;
 pub mod space;
 pub mod integrator;
 pub mod estimate;

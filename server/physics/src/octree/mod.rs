@@ -22,7 +22,7 @@ pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
 pub use shape::{BoxShape, Shape};
 pub use space::OctreeSpace;
 pub use surface::OctreeSurface;
-pub use vertices::{Octants, corner_weights};
+pub use vertices::{Octants, corner_weights, parent_corner};
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -22,6 +22,12 @@ impl Filter {
         self.held.extend(fixed.iter().map(|f| (f.copy, f.axes)));
     }
 
+    /// Sets the copies with prescribed directions, and which directions these are.
+    pub fn set_held(&mut self, held: &[(u32, [bool; 3])]) {
+        self.held.clear();
+        self.held.extend_from_slice(held);
+    }
+
     /// Copies with prescribed directions, and which directions these are.
     pub fn held(&self) -> &[(u32, [bool; 3])] {
         &self.held

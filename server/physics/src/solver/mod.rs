@@ -20,6 +20,7 @@ mod eigen;
 mod pcg;
 
 pub use algebraic_error::AlgebraicError;
+pub(crate) use cholesky::Cholesky;
 pub use block_jacobi::DiagonalInverse;
 pub use constraint::Filter;
 pub use eigen::{EigenError, EigenSettings, Modes, natural_frequencies};

@@ -1,0 +1,116 @@
+//! The coarsest level: a factorisation, or sweeps where it is too large for one.
+
+use nalgebra::{UnitQuaternion, Vector3};
+
+use super::galerkin::Galerkin;
+use super::hierarchy::{COARSE_ENOUGH, Hierarchy};
+use crate::assembly::BlockCsr;
+use crate::operator::Padded;
+use crate::solver::{Cholesky, Filter};
+
+/// How the coarsest level is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CoarsestSolve {
+    /// Exactly, by sparse Cholesky factorisation.
+    Cholesky,
+    /// By a Chebyshev polynomial of this degree: coarsening stalled above the size for a factorisation, or the
+    /// matrix is not positive definite.
+    Sweeps {
+        /// Products with the coarsest operator.
+        degree: u32,
+    },
+}
+
+/// Degree of the polynomial that takes the place of a factorisation.
+const SWEEPS: u32 = 24;
+
+/// The matrix of the coarsest level and its factors.
+#[derive(Debug, Default)]
+pub struct Coarsest {
+    matrix: BlockCsr<f64>,
+    cholesky: Cholesky<f64>,
+    /// Whether the pattern was analysed.
+    analysed: bool,
+    factored: bool,
+    /// Frames of the cells when it was factored.
+    frames: Vec<UnitQuaternion<f32>>,
+    r: Vec<Vector3<f64>>,
+    z: Vec<Vector3<f64>>,
+    /// Positions of the 64 blocks of every cell.
+    places: Vec<[u32; 64]>,
+}
+
+impl Coarsest {
+    /// Analyses the pattern of the coarsest level, if it is small enough.
+    pub fn new(hierarchy: &Hierarchy) -> Self {
+        let Some(level) = hierarchy.levels.last().filter(|level| 3 * level.n_vertices <= COARSE_ENOUGH) else {
+            return Self::default();
+        };
+        let mut rows = vec![Vec::new(); level.n_vertices];
+        for vertices in &level.vertices {
+            vertices.iter().for_each(|&v| rows[v as usize].extend_from_slice(vertices));
+        }
+        let matrix = BlockCsr::with_rows(rows);
+        let place = |a: u32, b: u32| matrix.position(a as usize, b).map_or(0, |at| at as u32);
+        let places = level.vertices.iter().map(|v| std::array::from_fn(|i| place(v[i / 8], v[i % 8]))).collect();
+        let mut cholesky = Cholesky::default();
+        let analysed = cholesky.analyse(&matrix).is_ok();
+        let n = level.n_vertices;
+        Self {
+            matrix,
+            cholesky,
+            analysed,
+            places,
+            r: vec![Vector3::zeros(); n],
+            z: vec![Vector3::zeros(); n],
+            ..Self::default()
+        }
+    }
+
+    /// How it is solved.
+    pub fn solve_kind(&self) -> CoarsestSolve {
+        if self.factored { CoarsestSolve::Cholesky } else { CoarsestSolve::Sweeps { degree: SWEEPS } }
+    }
+
+    /// Factorises anew if matrices changed or the frame of a cell turned by more than `tolerance` [rad].
+    pub fn update(&mut self, hierarchy: &Hierarchy, galerkin: &Galerkin, changed: bool, tolerance: f64) {
+        if !self.analysed {
+            return;
+        }
+        let last = hierarchy.levels.len() - 1;
+        let frames = &galerkin.levels[last].frame;
+        let turned = |(a, b): (&UnitQuaternion<f32>, &UnitQuaternion<f32>)| f64::from(a.angle_to(b)) > tolerance;
+        if !changed && self.frames.len() == frames.len() && !frames.iter().zip(&self.frames).any(turned) {
+            return;
+        }
+        self.frames.clone_from(frames);
+        self.matrix.clear();
+        let mut fixed = Filter::default();
+        for (id, places) in self.places.iter().enumerate() {
+            let R = frames[id].to_rotation_matrix().into_inner();
+            let A = galerkin.cell_matrix(hierarchy, last, id).rotated(&R);
+            for (i, &at) in places.iter().enumerate() {
+                let block = &mut self.matrix.blocks[at as usize];
+                for (e, entry) in block.iter_mut().enumerate() {
+                    *entry += f64::from(A.0[3 * (i % 8) + e % 3][3 * (i / 8) + e / 3]);
+                }
+            }
+        }
+        // With one level, it is the finest, where directions may be prescribed.
+        if last == 0 {
+            fixed.set_held(galerkin.held());
+        }
+        self.factored = self.cholesky.factorise(&self.matrix, &fixed).is_ok();
+    }
+
+    /// x = A⁻¹ b with the factors.
+    pub fn solve(&mut self, b: &[Padded], x: &mut [Padded]) {
+        for (r, b) in self.r.iter_mut().zip(b) {
+            *r = Vector3::new(f64::from(b[0]), f64::from(b[1]), f64::from(b[2]));
+        }
+        self.cholesky.solve(&self.r, &mut self.z, 1.0);
+        for (x, z) in x.iter_mut().zip(&self.z) {
+            *x = crate::operator::padded(z);
+        }
+    }
+}

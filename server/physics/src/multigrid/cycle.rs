@@ -1,0 +1,354 @@
+//! V-cycles over the levels of a body.
+
+use nalgebra::Matrix3;
+
+use super::coarsest::{Coarsest, CoarsestSolve};
+use super::galerkin::{CellMatrix, Coefficients, Galerkin};
+use super::hierarchy::Hierarchy;
+use super::operator::CellProducts;
+use super::smoother::{Smoother, Smoothing, chebyshev, gauss_seidel};
+use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, block_of, filter, rows};
+use crate::team::{Team, blocks};
+
+/// Power iterations for the largest eigenvalue of D⁻¹A.
+const POWER_ITERATIONS: u32 = 10;
+/// They estimate it from below; the smoother must not see a larger one.
+const SAFETY: f64 = 1.1;
+
+/// Settings of the cycles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MultigridSettings {
+    /// Smoother, before and after each correction.
+    pub smoother: Smoother,
+    /// Rotations within a merged cell that differ from their mean by no more than this [rad] count as equal. 0
+    /// gives exact Galerkin operators.
+    pub same_rotation_rad: f64,
+}
+
+impl Default for MultigridSettings {
+    fn default() -> Self {
+        Self { smoother: Smoother::default(), same_rotation_rad: 0.1 }
+    }
+}
+
+/// Figures of one level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelReport {
+    /// Number of cells.
+    pub cells: usize,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Cells with a matrix of their own.
+    pub stored: usize,
+    /// Estimate of the largest eigenvalue of D⁻¹A, from above.
+    pub largest_eigenvalue: f64,
+}
+
+/// Multigrid for one body: hierarchy, operators and vectors.
+///
+/// Nothing is allocated between cuts, unless more cells need a matrix of their own.
+#[derive(Debug)]
+pub struct Multigrid {
+    settings: MultigridSettings,
+    hierarchy: Hierarchy,
+    galerkin: Galerkin,
+    coarsest: Coarsest,
+    levels: Vec<Vectors>,
+    fixed: Vec<FixedCopy>,
+    /// Whether λ has to be estimated anew.
+    estimate: bool,
+    partial: Vec<f64>,
+}
+
+/// Vectors of one level, one entry per vertex. The finest level has its solution outside.
+#[derive(Clone, Debug, Default)]
+struct Vectors {
+    inverse: Vec<Inverse3>,
+    largest: f64,
+    x: Vec<Padded>,
+    b: Vec<Padded>,
+    r: Vec<Padded>,
+    d: Vec<Padded>,
+    q: Vec<Padded>,
+    products: CellProducts,
+}
+
+impl Multigrid {
+    /// Multigrid on `hierarchy`. [`update`](Self::update) comes before the first cycle.
+    pub fn new(hierarchy: Hierarchy, settings: MultigridSettings) -> Self {
+        let levels = hierarchy.levels.iter().enumerate().map(|(l, level)| {
+            let zeros = || vec![[0.0; 4]; level.n_vertices];
+            let inner = || if l > 0 { zeros() } else { Vec::new() };
+            let n = level.n_vertices;
+            let products = if l > 0 { level.cells.len() } else { 0 };
+            Vectors {
+                inverse: if l > 0 { vec![Inverse3::default(); n] } else { Vec::new() },
+                largest: 1.0,
+                x: inner(),
+                b: inner(),
+                r: zeros(),
+                d: zeros(),
+                q: zeros(),
+                products: vec![[[0.0; 4]; 8]; products],
+            }
+        });
+        Self {
+            settings,
+            galerkin: Galerkin::new(&hierarchy),
+            coarsest: Coarsest::new(&hierarchy),
+            levels: levels.collect(),
+            fixed: Vec::new(),
+            estimate: true,
+            partial: vec![0.0; hierarchy.n_vertices().div_ceil(BLOCK)],
+            hierarchy,
+        }
+    }
+
+    /// Brings the coarse operators up to date with the constants, the prescribed directions and the rotation of
+    /// every leaf. What has not changed is kept. `A` is the operator of the finest level and `inverse` has the
+    /// inverses of its diagonal blocks.
+    pub fn update(
+        &mut self,
+        team: &mut Team,
+        (with, fixed): (&Coefficients, &[FixedCopy]),
+        rotation: &(dyn Fn(u32) -> Matrix3<f32> + Sync),
+        (A, inverse): (&mut dyn LinearOperator, &[Inverse3]),
+    ) {
+        let Self { settings, hierarchy, galerkin, coarsest, levels, .. } = self;
+        let tolerance = settings.same_rotation_rad;
+        let [anew, any] = galerkin.update(team, hierarchy, (with, fixed), rotation, tolerance);
+        self.fixed.clear();
+        self.fixed.extend_from_slice(fixed);
+        for l in 1..levels.len() {
+            let operator = galerkin.operator(&hierarchy.levels[l], l);
+            operator.invert_diagonal(team, |_| 0, &mut levels[l].inverse);
+        }
+        coarsest.update(hierarchy, galerkin, any, tolerance);
+        if anew || self.estimate {
+            self.estimate = false;
+            self.estimate_eigenvalues(team, A, inverse);
+        }
+    }
+
+    /// Forgets the estimates of eigenvalues: the next update makes them anew.
+    pub fn estimate_anew(&mut self) {
+        self.estimate = true;
+    }
+
+    /// Power iteration on D⁻¹A of every level, from the same vector each time.
+    fn estimate_eigenvalues(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
+        let Self { hierarchy, galerkin, levels, fixed, partial, .. } = self;
+        for (l, level) in levels.iter_mut().enumerate() {
+            let Vectors { inverse: own, largest, r, d, q, products, .. } = level;
+            let inverse = if l == 0 { inverse } else { &own[..] };
+            for (v, d) in (0_u32..).zip(d.iter_mut()) {
+                let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
+                *d = [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 });
+            }
+            if l == 0 {
+                filter(fixed, d);
+            }
+            let partial = &mut partial[..d.len().div_ceil(BLOCK)];
+            let mut estimate: f64 = 0.0;
+            for _ in 0..POWER_ITERATIONS {
+                if l == 0 {
+                    A.apply(team, d, q);
+                } else {
+                    galerkin.operator(&hierarchy.levels[l], l).apply(team, d, q, products);
+                }
+                // With q = A d and z = D⁻¹ q: λ ≈ qᵀz / qᵀd.
+                let (known, product) = (&*d, &*q);
+                team.for_blocks((blocks(r, BLOCK), blocks(partial, 1)), |block, (z, partial)| {
+                    let q = block_of(product, block);
+                    for (z, (q, M)) in z.iter_mut().zip(q.iter().zip(block_of(inverse, block))) {
+                        *z = M.times(q);
+                    }
+                    partial[0] = rows::dot(block_of(known, block), q);
+                });
+                let dq: f64 = partial.iter().sum();
+                let z = &*r;
+                team.for_blocks(blocks(partial, 1), |block, partial| {
+                    partial[0] = rows::dot(block_of(product, block), block_of(z, block));
+                });
+                let qz: f64 = partial.iter().sum();
+                if !(dq > 0.0 && qz.is_finite()) {
+                    break;
+                }
+                estimate = estimate.max(qz / dq);
+                let scale = (1.0 / qz.sqrt()) as f32;
+                d.iter_mut().zip(&*r).for_each(|(d, z)| *d = z.map(|z| scale * z));
+            }
+            *largest = if estimate > 0.0 { SAFETY * estimate } else { 1.0 };
+        }
+    }
+
+    /// z = V r: one cycle on A z = r from z = 0. `inverse` has the inverse diagonal blocks of A.
+    ///
+    /// `largest` raises the largest eigenvalue of the finest level, where terms were added to A since the update.
+    pub fn cycle(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        (inverse, largest): (&[Inverse3], f64),
+        r: &[Padded],
+        z: &mut [Padded],
+    ) {
+        let last = self.levels.len() - 1;
+        // Down: smooth, restrict the residual.
+        for l in 0..last {
+            if l == 0 {
+                z.fill([0.0; 4]);
+                self.smooth(team, A, (0, inverse, largest), (r, z), true);
+            } else {
+                self.smooth_inner(team, A, l, true);
+            }
+            let (fine, coarse) = self.levels.split_at_mut(l + 1);
+            self.hierarchy.steps[l].transfer.restrict(team, &fine[l].r, &mut coarse[0].b);
+        }
+        if last == 0 {
+            z.fill([0.0; 4]);
+            return self.solve_coarsest(team, A, (inverse, largest), Some((r, z)));
+        }
+        self.solve_coarsest(team, A, (inverse, largest), None);
+        // Up: correct, smooth.
+        for l in (0..last).rev() {
+            let (fine, coarse) = self.levels.split_at_mut(l + 1);
+            let transfer = &self.hierarchy.steps[l].transfer;
+            let d = &mut fine[l].d;
+            d.fill([0.0; 4]);
+            transfer.prolong(team, &coarse[0].x, d);
+            if l == 0 {
+                filter(&self.fixed, d);
+                self.smooth(team, A, (0, inverse, largest), (r, z), false);
+            } else {
+                self.smooth_inner(team, A, l, false);
+            }
+        }
+    }
+
+    fn smooth_inner(&mut self, team: &mut Team, A: &mut dyn LinearOperator, l: usize, before: bool) {
+        let Vectors { x, b, inverse, .. } = &mut self.levels[l];
+        let (mut x, b, inverse) = (std::mem::take(x), std::mem::take(b), std::mem::take(inverse));
+        if before {
+            x.fill([0.0; 4]);
+        }
+        self.smooth(team, A, (l, &inverse, 0.0), (&b, &mut x), before);
+        let level = &mut self.levels[l];
+        (level.x, level.b, level.inverse) = (x, b, inverse);
+    }
+
+    /// Smooths on level `l` before the correction, which leaves the residual in `r`, or after it, with the
+    /// correction in `d`.
+    fn smooth(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        (l, inverse, largest): (usize, &[Inverse3], f64),
+        (b, x): (&[Padded], &mut [Padded]),
+        before: bool,
+    ) {
+        let Self { settings, hierarchy, galerkin, levels, .. } = self;
+        let operator = galerkin.operator(&hierarchy.levels[l], l);
+        let Vectors { largest: known, r, d, q, products, .. } = &mut levels[l];
+        let largest = largest.max(*known);
+        let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match l {
+            0 => A.apply(team, x, y),
+            _ => operator.apply(team, x, y, products),
+        };
+        if before {
+            team.for_blocks(blocks(r, BLOCK), |block, r| r.copy_from_slice(block_of(b, block)));
+        } else {
+            let d = &*d;
+            team.for_blocks(blocks(x, BLOCK), |block, x| {
+                for (x, d) in x.iter_mut().zip(block_of(d, block)) {
+                    (0..4).for_each(|k| x[k] += d[k]);
+                }
+            });
+        }
+        match settings.smoother {
+            Smoother::Chebyshev { degree } => {
+                if !before {
+                    multiply(team, d, q);
+                    subtract(team, r, q);
+                }
+                let degree = u32::from(degree.clamp(1, 4));
+                let v = Smoothing { x, r, d, q };
+                chebyshev(team, &mut multiply, (inverse, largest), degree, (v, before));
+            }
+            Smoother::GaussSeidel { sweeps, omega } => {
+                (0..sweeps).for_each(|_| gauss_seidel(&operator, inverse, b, x, omega));
+                if before {
+                    multiply(team, x, q);
+                    subtract(team, r, q);
+                }
+            }
+        }
+    }
+
+    /// Solves on the coarsest level; `outer` has its right-hand side and solution if that is the finest one.
+    fn solve_coarsest(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        (inverse, largest): (&[Inverse3], f64),
+        outer: Option<(&[Padded], &mut [Padded])>,
+    ) {
+        let Self { hierarchy, galerkin, coarsest, levels, .. } = self;
+        let last = levels.len() - 1;
+        let is_outer = outer.is_some();
+        let Vectors { inverse: own, largest: known, x, b, r, d, q, products } = &mut levels[last];
+        let (b, x, inverse) = match outer {
+            Some((b, x)) => (b, x, inverse),
+            None => (&b[..], &mut x[..], &own[..]),
+        };
+        match coarsest.solve_kind() {
+            CoarsestSolve::Cholesky => coarsest.solve(b, x),
+            CoarsestSolve::Sweeps { degree } => {
+                x.fill([0.0; 4]);
+                r.copy_from_slice(b);
+                let operator = galerkin.operator(&hierarchy.levels[last], last);
+                let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| {
+                    if is_outer { A.apply(team, x, y) } else { operator.apply(team, x, y, products) }
+                };
+                let largest = known.max(if is_outer { largest } else { 0.0 });
+                let v = Smoothing { x, r, d, q };
+                chebyshev(team, &mut multiply, (inverse, largest), degree, (v, false));
+            }
+        }
+    }
+
+    /// Figures of every level, from the finest on, and how the coarsest one is solved.
+    pub fn report(&self) -> (Vec<LevelReport>, CoarsestSolve) {
+        let levels = self.hierarchy.levels.iter().zip(&self.galerkin.levels).zip(&self.levels);
+        let levels = levels.map(|((level, matrices), vectors)| LevelReport {
+            cells: level.cells.len(),
+            vertices: level.n_vertices,
+            stored: matrices.matrix.iter().filter(|m| matches!(m, CellMatrix::Stored(_))).count(),
+            largest_eigenvalue: vectors.largest,
+        });
+        (levels.collect(), self.coarsest.solve_kind())
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &MultigridSettings {
+        &self.settings
+    }
+
+    /// Number of vertices of the finest level.
+    pub fn n_vertices(&self) -> usize {
+        self.hierarchy.n_vertices()
+    }
+
+    #[cfg(test)]
+    pub(super) fn parts(&self) -> (&Hierarchy, &Galerkin) {
+        (&self.hierarchy, &self.galerkin)
+    }
+}
+
+fn subtract(team: &mut Team, r: &mut [Padded], q: &[Padded]) {
+    team.for_blocks(blocks(r, BLOCK), |block, r| {
+        for (r, q) in r.iter_mut().zip(block_of(q, block)) {
+            (0..4).for_each(|k| r[k] -= q[k]);
+        }
+    });
+}

@@ -1,0 +1,418 @@
+//! The operators of the levels: A^{ℓ+1} = Pᵀ A^ℓ P, cell by cell.
+//!
+//! A coarse cell deforms its children trilinearly, so its matrix is the sum of theirs in the corners of the coarse
+//! cell. Eight whole children of one material and nearly one rotation give the matrix of a cube of twice the side,
+//! which all such cells share. Every other matrix is stored, in the frame of the cell's mean rotation: a rotation
+//! of everything changes nothing that is stored.
+//!
+//! # Source
+//! Dick, Georgii, Westermann 2011, §6.1 and eq. 2.
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+
+use super::dense::{Dense, Packed};
+use super::hierarchy::Hierarchy;
+use super::level::{NONE, place_in, trilinear};
+use super::table::{self, Weights};
+use crate::lists::reserve::resize_reserving;
+use crate::material::Lame;
+use crate::octree::{Cell, corner_weights};
+use crate::operator::{BLOCK, FixedCopy};
+use crate::team::{Team, blocks};
+
+/// Rotations that differ by less [rad] are the same; single precision tells them apart no better.
+const SAME: f32 = 2e-6;
+/// Stored cells per unit of work.
+const STORED_BLOCK: usize = 8;
+
+type Rotation = UnitQuaternion<f32>;
+
+/// Constants of the material of cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellMaterial {
+    /// Lamé parameters [Pa].
+    pub lame: Lame,
+    /// Density [kg/m³].
+    pub density_kg_m3: f64,
+}
+
+/// The constants of A = `mass_factor` M + `scale` K̂.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coefficients {
+    /// By number of the material; cells of further numbers have those of the last one.
+    pub materials: Vec<CellMaterial>,
+    /// Factor of K̂.
+    pub scale: f64,
+    /// Factor of the lumped mass.
+    pub mass_factor: f64,
+}
+
+/// The matrix of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellMatrix {
+    /// That of its kind.
+    Shared(u32),
+    /// Its number among the stored ones of the level.
+    Stored(u32),
+}
+
+/// A matrix that belongs to one cell.
+#[derive(Clone, Debug)]
+pub struct Stored {
+    /// The cell, or [`NONE`] if the place is free.
+    pub cell: u32,
+    /// Whether it has to be computed again.
+    stale: bool,
+    /// Rotations of the children in the frame of the cell when it was computed.
+    relative: [Rotation; 8],
+    /// Over the vertices that carry the cell, in its frame.
+    pub matrix: Packed,
+}
+
+/// The matrices of one level.
+#[derive(Clone, Debug, Default)]
+pub struct LevelMatrices {
+    /// Frame of every cell: its rotation, or the mean one of its children; I where vertices are prescribed in
+    /// some directions only.
+    pub frame: Vec<Rotation>,
+    pub matrix: Vec<CellMatrix>,
+    pub stored: Vec<Stored>,
+    free: Vec<u32>,
+    /// Lumped mass of the leaves with shared matrices times its factor, by vertex [kg].
+    pub mass: Vec<f32>,
+    /// Whether prescribed vertices are below the cell, and whether some of them in some directions only.
+    holds: Vec<[bool; 2]>,
+    /// Whether the matrix in the frame of the cell changed in this update.
+    changed: Vec<bool>,
+}
+
+/// The matrices of all levels.
+#[derive(Clone, Debug, Default)]
+pub struct Galerkin {
+    pub levels: Vec<LevelMatrices>,
+    /// Matrix of every kind of cell; for leaves without mass.
+    pub shared: Vec<Dense>,
+    /// Mass [kg] times its factor of an eighth of a leaf of every kind.
+    eighth: Vec<f32>,
+    /// Prescribed directions of every vertex of the finest level, one bit each.
+    fixed: Vec<u8>,
+    coefficients: Option<Coefficients>,
+    known_fixed: Vec<(u32, [bool; 3])>,
+}
+
+impl Galerkin {
+    /// Room for the matrices of `hierarchy`.
+    pub fn new(hierarchy: &Hierarchy) -> Self {
+        let levels = hierarchy.levels.iter().enumerate().map(|(l, level)| {
+            let n = level.cells.len();
+            let kinds = &hierarchy.kind_of[l];
+            LevelMatrices {
+                frame: vec![Rotation::identity(); n],
+                // A cell without a kind is stored by the first update.
+                matrix: kinds.iter().map(|&kind| CellMatrix::Shared(kind)).collect(),
+                mass: vec![0.0; level.n_vertices],
+                holds: vec![[false; 2]; n],
+                changed: vec![false; n],
+                ..LevelMatrices::default()
+            }
+        });
+        Self {
+            levels: levels.collect(),
+            fixed: vec![0; hierarchy.n_vertices()],
+            ..Self::default()
+        }
+    }
+
+    /// Brings all matrices up to date. `rotation` gives that of a leaf of the octree; merged cells count as cubes
+    /// if the rotations of their children differ by at most `tolerance` [rad] from the mean, and stored ones are
+    /// computed again when these turned by more than that relative to each other. Returns whether the constants,
+    /// the prescribed directions or any stored matrix changed.
+    pub fn update(
+        &mut self,
+        team: &mut Team,
+        hierarchy: &Hierarchy,
+        (with, fixed): (&Coefficients, &[FixedCopy]),
+        rotation: &(dyn Fn(u32) -> Matrix3<f32> + Sync),
+        tolerance: f64,
+    ) -> [bool; 2] {
+        let axes = |f: &FixedCopy| (f.copy, f.axes);
+        let held_anew = !fixed.iter().map(axes).eq(self.known_fixed.iter().copied());
+        let anew = held_anew || self.coefficients.as_ref() != Some(with);
+        if anew {
+            self.known_fixed.clear();
+            self.known_fixed.extend(fixed.iter().map(axes));
+            self.mark_held(hierarchy);
+            self.set_coefficients(hierarchy, with);
+        }
+        let tolerance = (tolerance as f32).max(SAME);
+        let exact = tolerance == SAME;
+        let finest = &mut self.levels[0];
+        finest.changed.fill(anew);
+        let leaves = &hierarchy.levels[0].leaf;
+        team.for_blocks(blocks(&mut finest.frame, BLOCK), |block, frames| {
+            for (i, frame) in frames.iter_mut().enumerate() {
+                let R = rotation(leaves[block * BLOCK + i]);
+                *frame = Rotation::from_rotation_matrix(&Rotation3::from_matrix_unchecked(R));
+            }
+        });
+        let mut any = anew;
+        for l in 1..self.levels.len() {
+            any |= self.update_level(team, hierarchy, l, (tolerance, exact, anew));
+        }
+        [anew, any]
+    }
+
+    /// Notes which cells have prescribed vertices below them.
+    fn mark_held(&mut self, hierarchy: &Hierarchy) {
+        self.fixed.fill(0);
+        for &(copy, axes) in &self.known_fixed {
+            if let Some(fixed) = self.fixed.get_mut(copy as usize) {
+                *fixed = (0..3).fold(0, |bits, k| bits | u8::from(axes[k]) << k);
+            }
+        }
+        for (holds, vertices) in self.levels[0].holds.iter_mut().zip(&hierarchy.levels[0].vertices) {
+            let fixed = vertices.map(|v| self.fixed[v as usize]);
+            *holds = [fixed.iter().any(|&f| f != 0), fixed.iter().any(|&f| f != 0 && f != 7)];
+        }
+        for l in 1..self.levels.len() {
+            let (below, level) = self.levels.split_at_mut(l);
+            let (below, level) = (&below[l - 1].holds, &mut level[0].holds);
+            level.fill([false; 2]);
+            for (child, &parent) in hierarchy.steps[l - 1].parent.iter().enumerate() {
+                (0..2).for_each(|k| level[parent as usize][k] |= below[child][k]);
+            }
+        }
+    }
+
+    /// Computes shared matrices and lumped masses.
+    fn set_coefficients(&mut self, hierarchy: &Hierarchy, with: &Coefficients) {
+        let of = |number: u16| with.materials.get(usize::from(number)).or(with.materials.last());
+        self.shared.clear();
+        self.eighth.clear();
+        for kind in &hierarchy.kinds {
+            let none = CellMaterial { lame: Lame { mu: 0.0, lambda: 0.0 }, density_kg_m3: 0.0 };
+            let material = of(kind.material).unwrap_or(&none);
+            let side = f64::from(1_u32 << kind.side) * hierarchy.h;
+            let mass = with.mass_factor * material.density_kg_m3 * side.powi(3);
+            let K = table::unit_stiffness(material.lame);
+            let M = (kind.merged > 0).then(|| table::merged_mass(kind.merged));
+            self.shared.push(table::cube(&K, with.scale * side, M.as_ref(), mass));
+            self.eighth.push((mass / 8.0) as f32);
+        }
+        for (l, level) in hierarchy.levels.iter().enumerate() {
+            let mass = &mut self.levels[l].mass;
+            mass.fill(0.0);
+            for id in (0..level.cells.len()).filter(|&id| level.leaf[id] != NONE) {
+                if l > 0 && self.levels[l].holds[id][0] {
+                    continue;
+                }
+                let share = self.eighth[hierarchy.kind_of[l][id] as usize];
+                let mass = &mut self.levels[l].mass;
+                if level.hanging[id] == 0 {
+                    level.vertices[id].iter().for_each(|&v| mass[v as usize] += share);
+                    continue;
+                }
+                for row in corner_weights(&level.cells[id], level.hanging[id]) {
+                    for (&v, w) in level.vertices[id].iter().zip(row) {
+                        mass[v as usize] += w as f32 * share;
+                    }
+                }
+            }
+        }
+        self.coefficients = Some(with.clone());
+    }
+
+    fn update_level(
+        &mut self,
+        team: &mut Team,
+        hierarchy: &Hierarchy,
+        l: usize,
+        (tolerance, exact, anew): (f32, bool, bool),
+    ) -> bool {
+        let (below, level) = self.levels.split_at_mut(l);
+        let (fine, level) = (&below[l - 1], &mut level[0]);
+        let step = &hierarchy.steps[l - 1];
+        let (kinds, exactness) = (&hierarchy.kind_of[l], &hierarchy.exact[l]);
+        let LevelMatrices { frame, matrix, stored, free, holds, changed, .. } = level;
+        // Frames, and which cells are cubes.
+        let cubes = (blocks(frame, BLOCK), blocks(changed, BLOCK));
+        team.for_blocks(cubes, |block, (frames, cubes)| {
+            for (i, (frame, cube)) in frames.iter_mut().zip(cubes).enumerate() {
+                let id = block * BLOCK + i;
+                let children = step.children_of(id);
+                let [holds_any, holds_partly] = holds[id];
+                *frame = if holds_partly { Rotation::identity() } else { mean(children, &fine.frame) };
+                let near = |&c: &u32| {
+                    let c = c as usize;
+                    matches!(fine.matrix[c], CellMatrix::Shared(_))
+                        && frame.angle_to(&fine.frame[c]) <= tolerance
+                };
+                let is_kind = kinds[id] != NONE && (exactness[id] || !exact);
+                *cube = !holds_any && is_kind && children.iter().all(near);
+            }
+        });
+        // Places for stored matrices.
+        for id in 0..matrix.len() {
+            let cube = changed[id];
+            changed[id] = anew;
+            match (matrix[id], cube) {
+                (CellMatrix::Stored(place), true) => {
+                    stored[place as usize].cell = NONE;
+                    free.push(place);
+                    matrix[id] = CellMatrix::Shared(kinds[id]);
+                    changed[id] = true;
+                }
+                (CellMatrix::Shared(_), false) => {
+                    let place = free.pop().unwrap_or(stored.len() as u32);
+                    if place as usize == stored.len() {
+                        resize_reserving(stored, place as usize + 1, Stored::empty());
+                    }
+                    stored[place as usize] = Stored { cell: id as u32, stale: true, ..Stored::empty() };
+                    matrix[id] = CellMatrix::Stored(place);
+                }
+                _ => {}
+            }
+        }
+        let context = Context { hierarchy, l, fine, shared: &self.shared, fixed: &self.fixed, eighth: &self.eighth };
+        let frame = &*frame;
+        team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
+            for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
+                context.refresh(stored, &frame[stored.cell as usize], (tolerance, anew));
+            }
+        });
+        let mut any = false;
+        for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
+            changed[stored.cell as usize] |= stored.stale;
+            any |= stored.stale;
+            stored.stale = false;
+        }
+        any
+    }
+
+    /// The matrix of cell `id` of level `l` over the vertices that carry it, in its frame, with all of its mass.
+    pub fn cell_matrix(&self, hierarchy: &Hierarchy, l: usize, id: usize) -> Dense {
+        cell_matrix(hierarchy, (l, id), &self.levels[l], &self.shared, &self.eighth)
+    }
+
+    /// Vertices of the finest level with prescribed directions, and which directions these are.
+    pub fn held(&self) -> &[(u32, [bool; 3])] {
+        &self.known_fixed
+    }
+
+    /// Prescribed directions of vertex `v` of the finest level, one bit each.
+    #[cfg(test)]
+    pub fn fixed(&self, v: u32) -> u8 {
+        self.fixed[v as usize]
+    }
+}
+
+impl Stored {
+    fn empty() -> Self {
+        Self {
+            cell: NONE,
+            stale: true,
+            relative: [Rotation::identity(); 8],
+            matrix: [0.0; super::dense::PACKED],
+        }
+    }
+}
+
+/// What the matrices of level `l` are computed from.
+struct Context<'a> {
+    hierarchy: &'a Hierarchy,
+    l: usize,
+    fine: &'a LevelMatrices,
+    shared: &'a [Dense],
+    fixed: &'a [u8],
+    eighth: &'a [f32],
+}
+
+impl Context<'_> {
+    /// Computes a stored matrix if anything below it changed.
+    fn refresh(&self, stored: &mut Stored, frame: &Rotation, (tolerance, anew): (f32, bool)) {
+        let id = stored.cell as usize;
+        let children = self.hierarchy.steps[self.l - 1].children_of(id);
+        let to_frame = frame.inverse();
+        let relative = |c: u32| to_frame * self.fine.frame[c as usize];
+        stored.stale |= anew
+            || children.iter().zip(&stored.relative).any(|(&c, known)| {
+                self.fine.changed[c as usize] || relative(c).angle_to(known) > tolerance
+            });
+        if !stored.stale {
+            return;
+        }
+        let (fine, coarse) = (&self.hierarchy.levels[self.l - 1], &self.hierarchy.levels[self.l]);
+        let cell = &coarse.cells[id];
+        let mut sum = Dense::default();
+        for (&child, known) in children.iter().zip(&mut stored.relative) {
+            *known = relative(child);
+            let child = child as usize;
+            let mut A = cell_matrix(self.hierarchy, (self.l - 1, child), self.fine, self.shared, self.eighth);
+            if known.angle() > SAME {
+                A = A.rotated(&known.to_rotation_matrix().into_inner());
+            }
+            if self.l == 1 {
+                for (c, &v) in fine.vertices[child].iter().enumerate() {
+                    A.hold(c, self.fixed[v as usize]);
+                }
+            }
+            let passes = fine.cells[child].level == cell.level;
+            if passes {
+                sum.add(&A);
+            } else {
+                let T: Weights = std::array::from_fn(|c| trilinear(place_in(fine, child, c, cell)));
+                sum.add(&A.carried(&T));
+            }
+        }
+        if coarse.leaf[id] == NONE && coarse.hanging[id] != 0 {
+            sum = sum.carried(&weights(cell, coarse.hanging[id]));
+        }
+        stored.matrix = sum.packed();
+    }
+}
+
+fn cell_matrix(
+    hierarchy: &Hierarchy,
+    (l, id): (usize, usize),
+    of: &LevelMatrices,
+    shared: &[Dense],
+    eighth: &[f32],
+) -> Dense {
+    let level = &hierarchy.levels[l];
+    let kind = match of.matrix[id] {
+        CellMatrix::Stored(place) => return Dense::unpacked(&of.stored[place as usize].matrix),
+        CellMatrix::Shared(kind) => kind as usize,
+    };
+    let mut A = shared[kind];
+    if level.leaf[id] == NONE {
+        return A;
+    }
+    if level.hanging[id] == 0 {
+        (0..8).for_each(|c| A.add_mass(c, eighth[kind]));
+        return A;
+    }
+    let W = weights(&level.cells[id], level.hanging[id]);
+    A = A.carried(&W);
+    for row in W {
+        row.iter().enumerate().for_each(|(c, w)| A.add_mass(c, w * eighth[kind]));
+    }
+    A
+}
+
+/// Weights of the vertices of a cell in its corners.
+fn weights(cell: &Cell, hanging: u8) -> Weights {
+    corner_weights(cell, hanging).map(|row| row.map(|w| w as f32))
+}
+
+/// The mean of rotations that are near each other.
+fn mean(children: &[u32], frames: &[Rotation]) -> Rotation {
+    let first = frames[children[0] as usize];
+    if children.len() == 1 {
+        return first;
+    }
+    let sum = children.iter().fold(nalgebra::Quaternion::new(0.0, 0.0, 0.0, 0.0), |sum, &c| {
+        let q = frames[c as usize];
+        if q.coords.dot(&first.coords) < 0.0 { sum - q.into_inner() } else { sum + q.into_inner() }
+    });
+    Rotation::try_new(sum, 1e-6).unwrap_or(first)
+}

@@ -1,0 +1,31 @@
+//! Geometric multigrid for the cells of an octree, as a preconditioner and as a solver.
+//!
+//! Cells of a level are merged block by block into those of the next one; parts of a block that a cut separates
+//! become cells of their own, so that every level is cut where the body is. The operators of the levels are
+//! Galerkin products, cell by cell. One cycle smooths on every level and solves on the coarsest one.
+//!
+//! # Source
+//! Dick, Georgii, Westermann 2011, §6 (hierarchy and Galerkin operators on cut octrees); Lottes 2023 (smoother).
+
+mod level;
+mod hierarchy;
+mod transfer;
+mod dense;
+mod table;
+mod galerkin;
+mod operator;
+mod smoother;
+mod coarsest;
+mod cycle;
+mod precondition;
+
+pub use coarsest::CoarsestSolve;
+pub use cycle::{LevelReport, Multigrid, MultigridSettings};
+pub use galerkin::{CellMaterial, Coefficients};
+pub use hierarchy::Hierarchy;
+pub use precondition::Cycle;
+pub use smoother::Smoother;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

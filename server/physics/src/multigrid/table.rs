@@ -1,0 +1,94 @@
+//! The matrices of cubes: stiffness by exact integration, and the mass of merged leaves.
+
+use super::dense::Dense;
+use super::level::trilinear;
+use crate::element::{hex8, quadrature};
+use crate::material::Lame;
+
+/// Row c: coefficients of the corners.
+pub type Weights = [[f32; 8]; 8];
+
+/// ∫ Bᵀ D B over a cube of side 1 m [N/m]; that of side s is s times as large. Row and column 3 c + i belong to
+/// corner c and component i.
+pub fn unit_stiffness(Lame { mu, lambda }: Lame) -> [[f64; 24]; 24] {
+    let mut K = [[0.0; 24]; 24];
+    for (xi, weight) in quadrature::cube_gauss(2) {
+        // From [−1, 1]³ to side 1: gradients double, and the volume is an eighth.
+        let g = hex8::reference_gradients(&xi).map(|g| 2.0 * g);
+        for (r, row) in K.iter_mut().enumerate() {
+            for (s, entry) in row.iter_mut().enumerate() {
+                let ((a, i), (b, j)) = ((r / 3, r % 3), (s / 3, s % 3));
+                let shear = g[a][j] * g[b][i] + if i == j { g[a].dot(&g[b]) } else { 0.0 };
+                *entry += weight / 8.0 * (mu * shear + lambda * g[a][i] * g[b][j]);
+            }
+        }
+    }
+    K
+}
+
+/// The mass of a cube of mass 1 whose lumped leaves were merged `merged` times: one scalar for every two corners.
+///
+/// # Derivation
+/// M₀ = I/8; merging eight cubes with the trilinear weights T_c of their corners gives Σ T_cᵀ (M/8) T_c.
+pub fn merged_mass(merged: u8) -> [[f64; 8]; 8] {
+    let mut M = [[0.0; 8]; 8];
+    (0..8).for_each(|c| M[c][c] = 0.125);
+    for _ in 0..merged {
+        let fine = std::mem::replace(&mut M, [[0.0; 8]; 8]);
+        for child in 0..8 {
+            let T = child_weights(child);
+            for (c, d) in (0..64).map(|pair| (pair / 8, pair % 8)) {
+                for (a, b) in (0..64).map(|pair| (pair / 8, pair % 8)) {
+                    M[a][b] += f64::from(T[c][a]) * fine[c][d] / 8.0 * f64::from(T[d][b]);
+                }
+            }
+        }
+    }
+    M
+}
+
+/// Weights of the parent's corners in those of its child number `child`.
+pub fn child_weights(child: usize) -> Weights {
+    std::array::from_fn(|c| trilinear([0, 1, 2].map(|k| (child >> k & 1) as i32 + (c >> k & 1) as i32)))
+}
+
+/// `stiffness` · K + `mass` · M in single precision, for K of side 1.
+pub fn cube(K: &[[f64; 24]; 24], stiffness: f64, M: Option<&[[f64; 8]; 8]>, mass: f64) -> Dense {
+    let mut out = Dense::default();
+    for (r, row) in K.iter().enumerate() {
+        for (s, k) in row.iter().enumerate() {
+            let inertia = M.filter(|_| r % 3 == s % 3).map_or(0.0, |M| mass * M[r / 3][s / 3]);
+            out.0[s][r] = (stiffness * k + inertia) as f32;
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_cubes_make_one_of_twice_the_side() {
+        let K = unit_stiffness(Lame { mu: 3.0, lambda: 7.0 });
+        let fine = cube(&K, 1.0, None, 0.0);
+        let mut merged = Dense::default();
+        (0..8).for_each(|child| merged.add(&fine.carried(&child_weights(child))));
+        for (column, expected) in merged.0.iter().zip(&K) {
+            for (a, b) in column.iter().zip(expected) {
+                assert!((f64::from(*a) - 2.0 * b).abs() < 1e-5, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn merged_mass_is_that_of_the_cube_and_tends_to_the_consistent_one() {
+        for merged in 0..6 {
+            let total: f64 = merged_mass(merged).iter().flatten().sum();
+            assert!((total - 1.0).abs() < 1e-12);
+        }
+        // ∫ N_a² = 1/27, ∫ N_a N_b = 1/216 of opposite corners.
+        let M = merged_mass(9);
+        assert!((M[0][0] - 1.0 / 27.0).abs() < 1e-5 && (M[0][7] - 1.0 / 216.0).abs() < 1e-5);
+    }
+}

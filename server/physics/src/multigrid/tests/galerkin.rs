@@ -1,0 +1,147 @@
+//! Operators of the levels against Pᵀ A P in double precision.
+
+use nalgebra::Rotation3;
+
+use super::levels::random_cuts;
+use super::support::{Exact, V3, blade_grid, clamped, coefficients, cube, dot, vector};
+use crate::multigrid::galerkin::{CellMatrix, Galerkin};
+use crate::multigrid::{CellMaterial, Coefficients, Hierarchy};
+use crate::octree::Octree;
+use crate::operator::{FixedCopy, padded};
+use crate::team::Team;
+
+/// Largest relative difference of A^ℓ x and Pᵀ … A … P x over all levels.
+fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
+    let mut team = Team::new(1).unwrap();
+    let mut worst = 0.0_f64;
+    for l in 0..hierarchy.n_levels() {
+        let level = &hierarchy.levels[l];
+        let x = vector(level.n_vertices, l);
+        let mut fine = x.clone();
+        for step in hierarchy.steps[..l].iter().rev() {
+            let n = step.transfer.n_rows();
+            fine = (0..n)
+                .map(|v| step.transfer.row(v).iter().map(|&(c, w)| f64::from(w) * fine[c as usize]).sum())
+                .collect();
+        }
+        let mut y = exact.apply(&fine);
+        for (s, step) in hierarchy.steps[..l].iter().enumerate() {
+            let mut coarse = vec![V3::zeros(); hierarchy.levels[s + 1].n_vertices];
+            for (v, y) in y.iter().enumerate() {
+                step.transfer.row(v).iter().for_each(|&(c, w)| coarse[c as usize] += f64::from(w) * y);
+            }
+            y = coarse;
+        }
+        let x32: Vec<_> = x.iter().map(padded).collect();
+        let mut y32 = vec![[0.0; 4]; x.len()];
+        let mut products = vec![[[0.0; 4]; 8]; level.cells.len()];
+        if l > 0 {
+            galerkin.operator(level, l).apply(&mut team, &x32, &mut y32, &mut products);
+            let difference: Vec<V3> = y32
+                .iter()
+                .zip(&y)
+                .map(|(a, b)| V3::new(a[0].into(), a[1].into(), a[2].into()) - b)
+                .collect();
+            worst = worst.max((dot(&difference, &difference) / dot(&y, &y)).sqrt());
+        }
+    }
+    worst
+}
+
+fn check(octree: &Octree, with: &Coefficients, fixed: &[FixedCopy], turn: impl Fn(V3) -> V3) -> f64 {
+    let mut team = Team::new(1).unwrap();
+    let hierarchy = Hierarchy::with(octree, 60, true);
+    assert!(hierarchy.n_levels() > 2);
+    let mut exact = Exact::new(octree, with, fixed);
+    exact.turn(turn);
+    let mut galerkin = Galerkin::new(&hierarchy);
+    galerkin.update(&mut team, &hierarchy, (with, fixed), &|id| exact.rotation(id), 0.0);
+    error(&hierarchy, &galerkin, &exact)
+}
+
+#[test]
+fn operators_are_galerkin_products() {
+    let with = coefficients(0.3, 0.0);
+    let heavy = coefficients(0.45, 2e4);
+    let none = |_: V3| V3::zeros();
+    let wild = |p: V3| 3.0 * V3::new((7.0 * p.y).sin(), (5.0 * p.z).cos(), p.x);
+    let mut grid = cube(16, 2);
+    blade_grid(&mut grid, &[3, 8, 13]);
+    let bodies = [
+        cube(8, 0),
+        cube(16, 2),
+        cube(16, 3),
+        grid,
+        random_cuts(8, 0, 0.3, 1),
+        random_cuts(16, 2, 0.003, 2),
+    ];
+    for (b, octree) in bodies.iter().enumerate() {
+        let clamp = clamped(octree, 0);
+        // Some prescribed in single directions, inside the body, too.
+        let partly: Vec<FixedCopy> = (0..octree.n_vertices() as u32)
+            .step_by(7)
+            .map(|copy| FixedCopy {
+                copy,
+                axes: [copy % 2 == 0, copy % 3 == 0, copy % 5 == 0],
+                position_m: [0.0; 3],
+            })
+            .collect();
+        let errors = [
+            check(octree, &with, &[], none),
+            check(octree, &heavy, &[], none),
+            check(octree, &heavy, &clamp, wild),
+            check(octree, &heavy, &partly, wild),
+        ];
+        assert!(errors.iter().all(|&e| e < 3e-6), "body {b}: {errors:?}");
+    }
+}
+
+#[test]
+fn materials_are_kept_apart() {
+    let shape = crate::octree::BoxShape { min: V3::zeros(), max: V3::repeat(1.0) };
+    let settings = crate::octree::OctreeSettings { cells: 16, levels: 2 };
+    let octree = Octree::fill(&shape, settings, &|p| u16::from(p.z > 0.5)).unwrap();
+    let soft = coefficients(0.2, 1.0).materials[0];
+    let with = coefficients(0.45, 1.0);
+    let hard = CellMaterial { density_kg_m3: 3000.0, ..with.materials[0] };
+    let with = Coefficients { materials: vec![soft, hard], ..with };
+    assert!(check(&octree, &with, &clamped(&octree, 2), |p| p) < 3e-6);
+}
+
+/// A rigid rotation of everything computes nothing again, and the operators turn with it.
+#[test]
+fn rigid_rotations_refresh_nothing() {
+    let mut team = Team::new(1).unwrap();
+    let mut octree = cube(16, 2);
+    blade_grid(&mut octree, &[5]);
+    let with = coefficients(0.3, 1e3);
+    let hierarchy = Hierarchy::with(&octree, 60, true);
+    let mut galerkin = Galerkin::new(&hierarchy);
+    let mut exact = Exact::new(&octree, &with, &[]);
+    let bend = |p: V3| V3::new(0.0, 0.6 * p.x, 0.0);
+    exact.turn(bend);
+    let update = |galerkin: &mut Galerkin, team: &mut Team, exact: &Exact, tolerance: f64| {
+        let rotation = |id: u32| exact.rotation(id);
+        galerkin.update(team, &hierarchy, (&with, &[]), &rotation, tolerance)
+    };
+    assert_eq!(update(&mut galerkin, &mut team, &exact, 1e-4), [true, true]);
+    for turn in 1..4 {
+        let Q = Rotation3::new(V3::new(0.3, -0.8, 0.5) * f64::from(turn)).into_inner();
+        exact.turn(bend);
+        exact.rotations.iter_mut().for_each(|R| *R = Q * *R);
+        assert_eq!(update(&mut galerkin, &mut team, &exact, 1e-4), [false, false]);
+        assert!(error(&hierarchy, &galerkin, &exact) < 2e-4);
+    }
+    // Bending on by more than the tolerance does.
+    exact.turn(|p| 1.5 * bend(p));
+    assert_eq!(update(&mut galerkin, &mut team, &exact, 1e-4), [false, true]);
+    assert!(error(&hierarchy, &galerkin, &exact) < 2e-4);
+    // With a wide tolerance almost everything inside counts as cubes.
+    update(&mut galerkin, &mut team, &exact, 0.1);
+    let stored = |g: &Galerkin| {
+        g.levels[1].matrix.iter().filter(|m| matches!(m, CellMatrix::Stored(_))).count()
+    };
+    let (wide, all) = (stored(&galerkin), hierarchy.levels[1].cells.len());
+    assert!(wide < all / 5, "{wide} of {all}");
+    assert!(error(&hierarchy, &galerkin, &exact) < 0.1);
+}

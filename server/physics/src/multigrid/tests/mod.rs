@@ -1,0 +1,7 @@
+//! Tests of multigrid against brute force, stored numbers and known rates.
+
+mod support;
+mod galerkin;
+mod levels;
+mod rates;
+mod reference;

@@ -1,0 +1,84 @@
+//! Rates of the cycle and iterations of conjugate gradients with it.
+
+use super::support::{Exact, Scene, blade_grid, clamped, coefficients, cube};
+use crate::multigrid::{Hierarchy, MultigridSettings, Smoother};
+use crate::octree::Octree;
+
+fn scene(octree: &Octree, poisson: f64) -> Scene {
+    let fixed = clamped(octree, 2);
+    Scene::new(octree, coefficients(poisson, 0.0), &fixed, MultigridSettings::default())
+}
+
+fn measured(name: &str, mut scene: Scene) -> (f64, u32) {
+    let rate = scene.rate();
+    let b = scene.gravity();
+    let (iterations, _) = scene.mg_pcg(&b, 1e-6);
+    let (levels, coarsest) = scene.multigrid.report();
+    println!("{name}: rate {rate:.3}, {iterations} iterations; {coarsest:?}");
+    for level in &levels {
+        println!(
+            "    {} cells, {} vertices, {} stored, λ {:.2}",
+            level.cells, level.vertices, level.stored, level.largest_eigenvalue
+        );
+    }
+    (rate, iterations)
+}
+
+#[test]
+fn uncut_bodies_converge_at_a_rate_that_does_not_depend_on_their_size() {
+    let small = measured("uniform 16³", scene(&cube(16, 0), 0.3));
+    let large = measured("uniform 32³", scene(&cube(32, 0), 0.3));
+    let adaptive = measured("adaptive 32³", scene(&cube(32, 3), 0.3));
+    assert!(small.0 <= 0.45 && large.0 <= 0.45 && adaptive.0 <= 0.50);
+    assert!(small.1 <= 12 && large.1 <= 12 && large.1 <= small.1 + 2 && adaptive.1 <= 12);
+}
+
+#[test]
+fn nearly_incompressible_bodies_converge_more_slowly() {
+    for poisson in [0.45, 0.49] {
+        let (_, iterations) = measured(&format!("ν {poisson}, 16³"), scene(&cube(16, 0), poisson));
+        assert!(iterations < 60);
+    }
+}
+
+#[test]
+fn bodies_cut_by_a_grid_of_blades_converge() {
+    for (cells, planes) in [(16, vec![3, 7, 11]), (32, vec![5, 11, 17, 21, 27])] {
+        for (levels, limit) in [(0, 0.82), (3, 0.85)] {
+            let mut octree = cube(cells, levels);
+            blade_grid(&mut octree, &planes);
+            let name = format!("blade grid, {cells}³, {levels} levels");
+            let (rate, iterations) = measured(&name, scene(&octree, 0.3));
+            assert!(rate <= limit && iterations <= 25, "{name}");
+        }
+    }
+}
+
+#[test]
+fn without_duplicates_cuts_slow_the_cycle_down() {
+    let mut octree = cube(16, 0);
+    blade_grid(&mut octree, &[3, 7, 11]);
+    let fixed = clamped(&octree, 2);
+    let with = coefficients(0.3, 0.0);
+    let [cut, blind] = [true, false].map(|duplicates| {
+        let exact = Exact::new(&octree, &with, &fixed);
+        let hierarchy = Hierarchy::with(&octree, 600, duplicates);
+        let name = if duplicates { "duplicates" } else { "no duplicates" };
+        measured(name, Scene::of(exact, with.clone(), hierarchy, MultigridSettings::default()))
+    });
+    assert!(blind.0 > cut.0 + 0.05 && f64::from(blind.1) > 1.3 * f64::from(cut.1));
+}
+
+#[test]
+fn the_smoothers_of_the_paper_converge_as_printed() {
+    let octree = cube(16, 0);
+    let fixed = clamped(&octree, 2);
+    for (omega, limit) in [(1.0, 0.5), (1.7, 0.8)] {
+        let smoother = Smoother::GaussSeidel { sweeps: 1, omega };
+        let settings = MultigridSettings { smoother, ..MultigridSettings::default() };
+        let mut scene = Scene::new(&octree, coefficients(0.3, 0.0), &fixed, settings);
+        let rate = scene.rate();
+        println!("V(1,1), ω = {omega}: rate {rate:.3}");
+        assert!(rate <= limit);
+    }
+}

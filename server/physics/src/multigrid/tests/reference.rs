@@ -1,0 +1,1 @@
+//! The reference cube R7.
