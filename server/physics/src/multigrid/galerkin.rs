@@ -63,8 +63,9 @@ pub struct Stored {
     pub cell: u32,
     /// Whether it has to be computed again.
     stale: bool,
-    /// Rotations of the children in the frame of the cell when it was computed.
-    relative: [Rotation; 8],
+    /// Rotations of the children in the frame of the cell when it was computed. Where cells at one place are
+    /// duplicates, there may be more than eight.
+    relative: Vec<Rotation>,
     /// Over the vertices that carry the cell, in its frame.
     pub matrix: Packed,
 }
@@ -267,7 +268,10 @@ impl Galerkin {
                     if place as usize == stored.len() {
                         resize_reserving(stored, place as usize + 1, Stored::empty());
                     }
-                    stored[place as usize] = Stored { cell: id as u32, stale: true, ..Stored::empty() };
+                    let new = &mut stored[place as usize];
+                    (new.cell, new.stale) = (id as u32, true);
+                    new.relative.clear();
+                    new.relative.resize(step.children_of(id).len(), Rotation::identity());
                     matrix[id] = CellMatrix::Stored(place);
                 }
                 _ => {}
@@ -311,7 +315,7 @@ impl Stored {
         Self {
             cell: NONE,
             stale: true,
-            relative: [Rotation::identity(); 8],
+            relative: Vec::new(),
             matrix: [0.0; super::dense::PACKED],
         }
     }
