@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::Body;
 use crate::cut::{Components, Flaws, Solid, Surface};
-use crate::space::{RestPoint, Tets};
+use crate::space::{RestPoint, Tets, VisitPiece};
 
 impl Body {
     /// Topology epoch; rises with every cut that changes the surface and with every reset.
@@ -65,7 +65,7 @@ impl Body {
     /// Calls `visit` for every part that fills the volume without overlap and moves with its own copies: its
     /// entry in [`cauchy_stresses`](Self::cauchy_stresses), its copies, and ∫ N_a dV [m³] over it for each of
     /// them.
-    pub fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+    pub fn for_pieces(&self, visit: &mut VisitPiece<'_>) {
         self.space.for_pieces(visit);
     }
 

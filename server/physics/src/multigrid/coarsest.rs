@@ -43,7 +43,8 @@ pub struct Coarsest {
 impl Coarsest {
     /// Analyses the pattern of the coarsest level, if it is small enough.
     pub fn new(hierarchy: &Hierarchy) -> Self {
-        let Some(level) = hierarchy.levels.last().filter(|level| 3 * level.n_vertices <= COARSE_ENOUGH) else {
+        let Some(level) = hierarchy.levels.last().filter(|level| 3 * level.n_vertices <= COARSE_ENOUGH)
+        else {
             return Self::default();
         };
         let mut rows = vec![Vec::new(); level.n_vertices];
@@ -52,7 +53,8 @@ impl Coarsest {
         }
         let matrix = BlockCsr::with_rows(rows);
         let place = |a: u32, b: u32| matrix.position(a as usize, b).map_or(0, |at| at as u32);
-        let places = level.vertices.iter().map(|v| std::array::from_fn(|i| place(v[i / 8], v[i % 8]))).collect();
+        let places =
+            level.vertices.iter().map(|v| std::array::from_fn(|i| place(v[i / 8], v[i % 8]))).collect();
         let mut cholesky = Cholesky::default();
         let analysed = cholesky.analyse(&matrix).is_ok();
         let n = level.n_vertices;
@@ -79,7 +81,8 @@ impl Coarsest {
         }
         let last = hierarchy.levels.len() - 1;
         let frames = &galerkin.levels[last].frame;
-        let turned = |(a, b): (&UnitQuaternion<f32>, &UnitQuaternion<f32>)| f64::from(a.angle_to(b)) > tolerance;
+        let turned =
+            |(a, b): (&UnitQuaternion<f32>, &UnitQuaternion<f32>)| f64::from(a.angle_to(b)) > tolerance;
         if !changed && self.frames.len() == frames.len() && !frames.iter().zip(&self.frames).any(turned) {
             return;
         }

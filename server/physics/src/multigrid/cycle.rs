@@ -143,7 +143,8 @@ impl Multigrid {
             let inverse = if l == 0 { inverse } else { &own[..] };
             for (v, d) in (0_u32..).zip(d.iter_mut()) {
                 let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
-                *d = [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 });
+                *d =
+                    [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 });
             }
             if l == 0 {
                 filter(fixed, d);

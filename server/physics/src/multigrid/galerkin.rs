@@ -117,11 +117,7 @@ impl Galerkin {
                 ..LevelMatrices::default()
             }
         });
-        Self {
-            levels: levels.collect(),
-            fixed: vec![0; hierarchy.n_vertices()],
-            ..Self::default()
-        }
+        Self { levels: levels.collect(), fixed: vec![0; hierarchy.n_vertices()], ..Self::default() }
     }
 
     /// Brings all matrices up to date. `rotation` gives that of a leaf of the octree; merged cells count as cubes
@@ -277,7 +273,8 @@ impl Galerkin {
                 _ => {}
             }
         }
-        let context = Context { hierarchy, l, fine, shared: &self.shared, fixed: &self.fixed, eighth: &self.eighth };
+        let context =
+            Context { hierarchy, l, fine, shared: &self.shared, fixed: &self.fixed, eighth: &self.eighth };
         let frame = &*frame;
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
             for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
@@ -312,12 +309,7 @@ impl Galerkin {
 
 impl Stored {
     fn empty() -> Self {
-        Self {
-            cell: NONE,
-            stale: true,
-            relative: Vec::new(),
-            matrix: [0.0; super::dense::PACKED],
-        }
+        Self { cell: NONE, stale: true, relative: Vec::new(), matrix: [0.0; super::dense::PACKED] }
     }
 }
 
@@ -339,9 +331,10 @@ impl Context<'_> {
         let to_frame = frame.inverse();
         let relative = |c: u32| to_frame * self.fine.frame[c as usize];
         stored.stale |= anew
-            || children.iter().zip(&stored.relative).any(|(&c, known)| {
-                self.fine.changed[c as usize] || relative(c).angle_to(known) > tolerance
-            });
+            || children
+                .iter()
+                .zip(&stored.relative)
+                .any(|(&c, known)| self.fine.changed[c as usize] || relative(c).angle_to(known) > tolerance);
         if !stored.stale {
             return;
         }

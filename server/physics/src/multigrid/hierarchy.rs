@@ -139,9 +139,7 @@ impl Hierarchy {
                     continue;
                 };
                 exact.push(children.iter().all(|&c| {
-                    self.exact[l - 1][c as usize]
-                        && kind(c) == Some(first)
-                        && fine.hanging[c as usize] == 0
+                    self.exact[l - 1][c as usize] && kind(c) == Some(first) && fine.hanging[c as usize] == 0
                 }));
                 kind_of.push(number(Kind { merged: first.merged + 1, ..own }, &mut self.kinds));
             }

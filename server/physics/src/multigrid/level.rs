@@ -217,5 +217,5 @@ pub fn trilinear(at: [i32; 3]) -> [f32; 8] {
 /// Where vertex `c` of the fine cell `id` is in its coarse cell, in halves of the coarse side.
 pub fn place_in(fine: &Level, id: usize, c: usize, coarse: &Cell) -> [i32; 3] {
     let p = fine.vertex_point(id, c);
-    [0, 1, 2].map(|k| 2 * (p[k] - coarse.at[k]) >> coarse.level)
+    [0, 1, 2].map(|k| (2 * (p[k] - coarse.at[k])) >> coarse.level)
 }

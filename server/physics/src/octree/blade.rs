@@ -111,7 +111,7 @@ impl Search<'_> {
                 let xi = [0, 1, 2].map(|k| 0.5 * f64::from((child >> k & 1) as u8 + (c >> k & 1) as u8));
                 interpolate(corners, xi)
             });
-            let at = [0, 1, 2].map(|k| at[k] + half * (child >> k & 1) as i32);
+            let at = [0, 1, 2].map(|k| at[k] + half * (child >> k & 1));
             self.part(&part, at, level - 1, &near);
         }
     }

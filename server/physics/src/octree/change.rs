@@ -19,6 +19,8 @@ pub struct OctreeChange {
     pub new_vertices: Vec<MaterialPoint>,
     /// Number of links that were whole before and are cut now.
     pub links: usize,
+    /// Links that are cut now, or cut nearer to an end than before.
+    pub moved: Vec<LinkKey>,
     /// Number of leaves that were divided.
     pub divided: usize,
 }
@@ -73,7 +75,7 @@ impl Octree {
     /// incision, and the two cuts nearest to its ends.
     pub fn cut(&mut self, cuts: &[(LinkKey, CutLink)]) -> OctreeChange {
         let mut history = History::new(self.cells.len());
-        let mut links = 0;
+        let (mut links, mut moved) = (0, Vec::new());
         for &((at, axis), cut) in cuts {
             let mut upper = at;
             upper[usize::from(axis)] += 1;
@@ -91,9 +93,15 @@ impl Octree {
                 history.tell(low);
                 history.tell(high);
             }
-            self.links.entry((at, axis)).and_modify(|known| known.join(&cut)).or_insert(cut);
+            let known = self.links.entry((at, axis)).or_insert_with(|| {
+                moved.push((at, axis));
+                cut
+            });
+            if known.join(&cut) {
+                moved.push((at, axis));
+            }
         }
-        self.follow(history, links)
+        OctreeChange { links, moved, ..self.follow(history) }
     }
 
     /// Divides leaves until those at `at` have sides of 2^level finest cells at most.
@@ -104,7 +112,7 @@ impl Octree {
                 self.divide_to(at, level, &mut history);
             }
         }
-        self.follow(history, 0)
+        self.follow(history)
     }
 
     /// Divides leaves until that at `at` has sides of 2^level at most; returns it.
@@ -158,7 +166,7 @@ impl Octree {
     }
 
     /// Finds the vertices anew around the leaves that were told of.
-    fn follow(&mut self, mut history: History, links: usize) -> OctreeChange {
+    fn follow(&mut self, mut history: History) -> OctreeChange {
         let mut new_vertices = Vec::new();
         // The list grows by leaves around; only the corners of those at first are examined.
         for k in 0..history.changed.len() {
@@ -183,7 +191,7 @@ impl Octree {
         }
         let History { mut changed, divided, .. } = history;
         changed.sort_unstable();
-        OctreeChange { cells: changed, new_vertices, links, divided }
+        OctreeChange { cells: changed, new_vertices, divided, ..OctreeChange::default() }
     }
 
     /// Gives the classes of leaves around lattice point `p` their vertices. The first class keeps a vertex that
@@ -301,13 +309,16 @@ impl Earlier {
 }
 
 impl CutLink {
-    /// Adds another cut of the same link: the cuts nearest to the two ends count.
-    pub(super) fn join(&mut self, other: &CutLink) {
+    /// Adds another cut of the same link: the cuts nearest to the two ends count. Returns whether it is one of
+    /// them.
+    pub(super) fn join(&mut self, other: &CutLink) -> bool {
+        let before = self.at;
         if other.at[0] < self.at[0] {
             (self.at[0], self.normal[0]) = (other.at[0], other.normal[0]);
         }
         if other.at[1] > self.at[1] {
             (self.at[1], self.normal[1]) = (other.at[1], other.normal[1]);
         }
+        self.at != before
     }
 }

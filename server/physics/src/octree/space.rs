@@ -19,7 +19,7 @@ use crate::mesh::MeshError;
 use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
-use crate::space::{RestPoint, Space};
+use crate::space::{RestPoint, Space, VisitPiece};
 
 /// Most leaves that cuts by clients may make of one.
 const MOST_GROWTH: usize = 8;
@@ -157,11 +157,13 @@ impl OctreeSpace {
             new_copies.push(NewCopy { copy, parent, between });
         }
         self.changed = change.cells;
-        if change.links > 0 || change.divided > 0 {
+        // Another cut of a link that was cut before may show at another place.
+        if !change.moved.is_empty() || !self.changed.is_empty() {
+            self.surface.follow(&self.octree, &self.changed, &change.moved);
             self.epoch += 1;
+        }
+        if change.links > 0 || change.divided > 0 {
             self.volumes = self.octree.vertex_volumes();
-            let links: Vec<LinkKey> = cuts.iter().map(|(link, _)| *link).collect();
-            self.surface.follow(&self.octree, &self.changed, &links);
         }
         CutReport {
             new_copies,
@@ -240,7 +242,7 @@ impl Space for OctreeSpace {
         self.volumes.iter().zip(selected).map(|(v, &chosen)| if chosen { *v } else { 0.0 }).collect()
     }
 
-    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+    fn for_pieces(&self, visit: &mut VisitPiece<'_>) {
         for (id, vertices) in self.octree.vertices().iter().enumerate() {
             visit(id, vertices, &self.octree.shape_integrals(id));
         }

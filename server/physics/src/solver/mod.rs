@@ -20,8 +20,8 @@ mod eigen;
 mod pcg;
 
 pub use algebraic_error::AlgebraicError;
-pub(crate) use cholesky::Cholesky;
 pub use block_jacobi::DiagonalInverse;
+pub(crate) use cholesky::Cholesky;
 pub use constraint::Filter;
 pub use eigen::{EigenError, EigenSettings, Modes, natural_frequencies};
 pub use linear::{LinearSettings, LinearSolver, Method, Precision};

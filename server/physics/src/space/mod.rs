@@ -27,6 +27,9 @@ use crate::mesh::MeshError;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 
+/// What is called for a piece: with its element, its copies, and ∫ N_a dV [m³] over it for each of them.
+pub type VisitPiece<'a> = dyn FnMut(usize, &[u32], &[f64]) + 'a;
+
 /// What a discretisation offers a body. Its functions are called once per phase of a step or per cut, never
 /// per element.
 ///
@@ -108,7 +111,7 @@ pub trait Space: Points + Send {
     /// Calls `visit` for every part that fills the volume without overlap and moves with its own copies: the
     /// [element](crate::element::Point::element) of its quadrature points, its copies, and ∫ N_a dV [m³]
     /// over it for each of them.
-    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64]));
+    fn for_pieces(&self, visit: &mut VisitPiece<'_>);
 
     /// Calls `visit` with the nodes of every group that hangs together: a piece, or an element.
     fn for_groups(&self, visit: &mut dyn FnMut(&[u32]));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space};
+use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space, VisitPiece};
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutLimits, CutMesh, CutReport, Flaws, IncisionMark, Piece, Solid,
@@ -197,7 +197,7 @@ impl Space for Tets {
         if self.is_linear() { self.cut.pieces().len() } else { self.n_elements() }
     }
 
-    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+    fn for_pieces(&self, visit: &mut VisitPiece<'_>) {
         for (p, piece) in self.cut.pieces().iter().enumerate() {
             visit(self.element.element_of(p), &piece.copies, &self.cut.piece_node_volume(p));
         }

@@ -13,7 +13,7 @@ use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
 use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
 use scindo_physics::skin::{Skin, SkinError, SkinSettings, SkinShape};
-use scindo_physics::space::{RestPoint, Space, Tets};
+use scindo_physics::space::{RestPoint, Space, Tets, VisitPiece};
 use scindo_physics::team::Team;
 
 use super::{DOWN, SOFT, left_face, settings};
@@ -243,7 +243,7 @@ impl Space for Lattice {
         self.tets.n_pieces()
     }
 
-    fn for_pieces(&self, visit: &mut dyn FnMut(usize, &[u32], &[f64])) {
+    fn for_pieces(&self, visit: &mut VisitPiece<'_>) {
         self.tets.for_pieces(visit);
     }
 

@@ -37,11 +37,8 @@ fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
         let mut products = vec![[[0.0; 4]; 8]; level.cells.len()];
         if l > 0 {
             galerkin.operator(level, l).apply(&mut team, &x32, &mut y32, &mut products);
-            let difference: Vec<V3> = y32
-                .iter()
-                .zip(&y)
-                .map(|(a, b)| V3::new(a[0].into(), a[1].into(), a[2].into()) - b)
-                .collect();
+            let difference: Vec<V3> =
+                y32.iter().zip(&y).map(|(a, b)| V3::new(a[0].into(), a[1].into(), a[2].into()) - b).collect();
             worst = worst.max((dot(&difference, &difference) / dot(&y, &y)).sqrt());
         }
     }
@@ -67,14 +64,8 @@ fn operators_are_galerkin_products() {
     let wild = |p: V3| 3.0 * V3::new((7.0 * p.y).sin(), (5.0 * p.z).cos(), p.x);
     let mut grid = cube(16, 2);
     blade_grid(&mut grid, &[3, 8, 13]);
-    let bodies = [
-        cube(8, 0),
-        cube(16, 2),
-        cube(16, 3),
-        grid,
-        random_cuts(8, 0, 0.3, 1),
-        random_cuts(16, 2, 0.003, 2),
-    ];
+    let bodies =
+        [cube(8, 0), cube(16, 2), cube(16, 3), grid, random_cuts(8, 0, 0.3, 1), random_cuts(16, 2, 0.003, 2)];
     for (b, octree) in bodies.iter().enumerate() {
         let clamp = clamped(octree, 0);
         // Some prescribed in single directions, inside the body, too.
@@ -138,9 +129,8 @@ fn rigid_rotations_refresh_nothing() {
     assert!(error(&hierarchy, &galerkin, &exact) < 2e-4);
     // With a wide tolerance almost everything inside counts as cubes.
     update(&mut galerkin, &mut team, &exact, 0.1);
-    let stored = |g: &Galerkin| {
-        g.levels[1].matrix.iter().filter(|m| matches!(m, CellMatrix::Stored(_))).count()
-    };
+    let stored =
+        |g: &Galerkin| g.levels[1].matrix.iter().filter(|m| matches!(m, CellMatrix::Stored(_))).count();
     let (wide, all) = (stored(&galerkin), hierarchy.levels[1].cells.len());
     assert!(wide < all / 3, "{wide} of {all}");
     assert!(error(&hierarchy, &galerkin, &exact) < 0.1);

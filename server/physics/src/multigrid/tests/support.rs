@@ -64,11 +64,7 @@ pub fn coefficients(poisson: f64, mass_factor: f64) -> Coefficients {
         mu: E / (2.0 * (1.0 + poisson)),
         lambda: E * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
     };
-    Coefficients {
-        materials: vec![CellMaterial { lame, density_kg_m3: 1000.0 }],
-        scale: 1.0,
-        mass_factor,
-    }
+    Coefficients { materials: vec![CellMaterial { lame, density_kg_m3: 1000.0 }], scale: 1.0, mass_factor }
 }
 
 /// A of the finest level in double precision, cell by cell.
@@ -213,7 +209,12 @@ pub struct Scene {
 }
 
 impl Scene {
-    pub fn new(octree: &Octree, with: Coefficients, fixed: &[FixedCopy], settings: MultigridSettings) -> Self {
+    pub fn new(
+        octree: &Octree,
+        with: Coefficients,
+        fixed: &[FixedCopy],
+        settings: MultigridSettings,
+    ) -> Self {
         Self::of(Exact::new(octree, &with, fixed), with, Hierarchy::with(octree, 600, true), settings)
     }
 

@@ -62,11 +62,13 @@ unsafe fn add_with<V: Vector8>(
         let R: [[V; 3]; 3] = [load(&batch.rotation, 0), load(&batch.rotation, 1), load(&batch.rotation, 2)];
         // SAFETY: the caller's promise, also below.
         match hanging.get(b) {
+            // SAFETY: the caller keeps all numbers below the length.
             None => unsafe { add_plain(&R, &table.of(0)[0], &batch.nodes, rows) },
             Some(hanging) => {
                 let blocks = lanes_of(table, hanging);
                 for j in 0..8 {
                     let block = turned(&R, &blocks[j]);
+                    // SAFETY: as above.
                     unsafe { V::scatter_blocks(rows, &batch.nodes[j], block) };
                 }
             }

@@ -389,7 +389,7 @@ fn stored_matrices_do_what_tables_do() {
             let own = octree.cells()[id].octant();
             for r in 0..24 {
                 for s in r..24 {
-                    let row = |r: usize| 3 * (r / 3 ^ own) + r % 3;
+                    let row = |r: usize| 3 * ((r / 3) ^ own) + r % 3;
                     entries[at] = (factor(id) * K[row(r)][row(s)]) as f32;
                     at += 1;
                 }
