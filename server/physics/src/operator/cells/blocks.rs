@@ -60,15 +60,14 @@ unsafe fn add_with<V: Vector8>(
 ) {
     for (b, batch) in batches.iter().enumerate() {
         let R: [[V; 3]; 3] = [load(&batch.rotation, 0), load(&batch.rotation, 1), load(&batch.rotation, 2)];
-        // SAFETY: the caller's promise, also below.
         match hanging.get(b) {
-            // SAFETY: the caller keeps all numbers below the length.
+            // SAFETY: the caller's promise.
             None => unsafe { add_plain(&R, &table.of(0)[0], &batch.nodes, rows) },
             Some(hanging) => {
                 let blocks = lanes_of(table, hanging);
                 for j in 0..8 {
                     let block = turned(&R, &blocks[j]);
-                    // SAFETY: as above.
+                    // SAFETY: the caller's promise.
                     unsafe { V::scatter_blocks(rows, &batch.nodes[j], block) };
                 }
             }

@@ -371,7 +371,7 @@ fn stored_matrices_do_what_tables_do() {
     // Every third cell keeps a table; the others are stored.
     let units = [SOFT, HARD, HARDER].map(unit_stiffness);
     let tables = [SOFT, HARD, HARDER].map(SectorTable::elastic);
-    let stored = |id: usize| id % 3 != 0;
+    let stored = |id: usize| !id.is_multiple_of(3);
     let factor = |id: usize| SCALE * f64::from(octree.cells()[id].side()) * octree.lattice().h;
     let lanes: Vec<CellLane> = (0..octree.cells().len())
         .map(|id| {
