@@ -16,6 +16,7 @@ use nalgebra::Vector3;
 use super::parts::Translations;
 use super::springs::ActiveSpring;
 use super::state::{State, WEIGHTLESS, hold};
+use super::step_grid::StepGrid;
 use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
 use super::step_solver::ActiveSprings;
 use crate::lists::reserve::resize_reserving;
@@ -24,8 +25,9 @@ use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
     Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
 };
+use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport};
 use crate::phase::Phase;
-use crate::solver::{LEAST_REFERENCE, LinearReport, Pcg, StopReason};
+use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
 use crate::team::{Team, blocks};
 
 /// Largest number of passes of a linear solve, repeated while springs open, close or reach their cap.
@@ -58,6 +60,9 @@ pub struct LinearStep {
     /// Their blocks without springs, while those with springs are inverted.
     bare: Vec<Block6>,
     pcg: Pcg,
+    method: Method,
+    /// Multigrid, if the discretisation has levels and the method asks for it.
+    grid: Option<Box<StepGrid>>,
     /// One entry per block of the vector loops.
     partial: Vec<f64>,
     springs: ActiveSprings,
@@ -124,6 +129,27 @@ impl LinearStep {
         });
     }
 
+    /// Sets the method of linear solves; one of multigrid needs a [hierarchy](Self::set_hierarchy), too.
+    pub fn set_method(&mut self, method: Method) {
+        self.method = method;
+        self.searched = None;
+    }
+
+    /// Sets the levels of the present topology, whose stiffness is `elastic`.
+    pub fn set_hierarchy(&mut self, hierarchy: Option<Hierarchy>, elastic: &dyn Stiffness) {
+        self.grid = hierarchy.map(|hierarchy| Box::new(StepGrid::new(hierarchy, elastic)));
+    }
+
+    /// Figures of the levels of multigrid, and how the coarsest one is solved.
+    pub fn levels(&self) -> Option<(Vec<LevelReport>, CoarsestSolve)> {
+        self.grid.as_ref().map(|grid| grid.multigrid().report())
+    }
+
+    /// Whether a step may continue the search of the one before. Cycles have no search direction.
+    fn searches(&self, inputs: &LinearInputs<'_>) -> bool {
+        inputs.relaxes() && (self.method != Method::Multigrid || self.grid.is_none())
+    }
+
     /// Of the last step: pieces of degenerate elements, copies moved relative to others for them, and
     /// pieces that keep a stiff motion.
     pub fn stiff_motions(&self) -> [usize; 3] {
@@ -144,7 +170,7 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         spring_forces: &mut [Vector3<f64>],
     ) -> StepOutcome {
-        if inputs.relaxes() && self.goes_on(elastic, state, inputs) {
+        if self.searches(inputs) && self.goes_on(elastic, state, inputs) {
             return self.relax(team, elastic, state, inputs, spring_forces);
         }
         self.predict(team, state, inputs);
@@ -180,7 +206,7 @@ impl LinearStep {
         team.begin(Phase::Guards);
         // Relaxation may continue this search in the next step if nothing changes until then.
         self.searched = None;
-        if finite && inputs.relaxes() && inputs.step.springs.is_empty() {
+        if finite && self.searches(inputs) && inputs.step.springs.is_empty() {
             self.searched.get_or_insert_default().note(inputs);
             self.ended.clone_from(&state.x);
         }
@@ -209,9 +235,15 @@ impl LinearStep {
         self.delta.fill([0.0; 4]);
         self.translations.restart(inputs.step.parts);
         team.begin(Phase::Solve);
-        let Self { pcg, preconditioner, delta, reference, .. } = self;
+        let Self { pcg, preconditioner, delta, reference, grid, .. } = self;
         let mut A = system(elastic, &[], inputs);
-        let solve = pcg.go_on(team, &mut A, preconditioner, delta, (*reference, inputs.solver));
+        let until = (*reference, inputs.solver);
+        let solve = match grid {
+            None => pcg.go_on(team, &mut A, preconditioner, delta, until),
+            Some(grid) => {
+                pcg.go_on(team, &mut A, &mut grid.cycle(preconditioner.inverses()), delta, until)
+            }
+        };
         let finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
         if finite {
             self.commit(team, state, inputs, spring_forces);
@@ -239,6 +271,7 @@ impl LinearStep {
         for pass in 0..SPRING_PASSES {
             team.begin(Phase::Operator);
             self.complete_operator(elastic, inputs);
+            self.complete_grid(team, elastic, inputs, pass);
             team.begin(Phase::Residual);
             self.balance_parts(state, inputs);
             self.residual(team, elastic, state, inputs, (pass, first));
@@ -464,6 +497,23 @@ impl LinearStep {
         }
     }
 
+    /// Brings the levels of multigrid up to date with the operator.
+    fn complete_grid(
+        &mut self,
+        team: &mut Team,
+        elastic: &mut dyn Stiffness,
+        inputs: &LinearInputs<'_>,
+        pass: usize,
+    ) {
+        if let Some(grid) = &mut self.grid {
+            if pass == 0 {
+                grid.follow(team, elastic, inputs);
+            }
+            let mut A = system(elastic, &self.terms, inputs);
+            grid.complete(team, &mut A, self.preconditioner.inverses(), &self.terms);
+        }
+    }
+
     /// Solves the translation equations of every free part for the imbalance that δ leaves.
     fn balance_parts(&mut self, state: &State, inputs: &LinearInputs<'_>) {
         if !inputs.step.parts.any_free() {
@@ -542,17 +592,23 @@ impl LinearStep {
             }
             partial[0] = load.total();
         });
-        // A substitution mixes copies, so the norm of the loads then needs a pass of its own.
+        // A substitution and cycles mix copies, so the norm of the loads then needs a pass of its own.
         if first && pass == 0 {
-            let loads = if self.preconditioner.substitution().is_empty() {
+            let loads = if self.preconditioner.substitution().is_empty() && self.grid.is_none() {
                 self.partial.iter().sum::<f64>().max(0.0).sqrt()
             } else {
                 for (c, load) in self.scratch.iter_mut().enumerate() {
                     *load = padded(&(s * (inputs.step.mass[c] * inputs.step.gravity + inputs.step.load[c])));
                 }
                 filter(inputs.step.fixed, &mut self.scratch);
-                let mut A = system(elastic, &[], inputs);
-                self.pcg.norm(team, &mut A, &mut self.preconditioner, &self.scratch)
+                let Self { pcg, preconditioner, scratch, grid, terms, .. } = self;
+                let mut A = system(elastic, terms, inputs);
+                match grid {
+                    None => pcg.norm(team, &mut A, preconditioner, scratch),
+                    Some(grid) => {
+                        pcg.norm(team, &mut A, &mut grid.cycle(preconditioner.inverses()), scratch)
+                    }
+                }
             };
             self.reference = self.least_reference(loads, inputs);
         }
@@ -585,16 +641,30 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         (pass, first): (usize, bool),
     ) -> LinearReport {
-        let Self { pcg, preconditioner, terms, delta, reference, began, .. } = self;
+        let Self { pcg, preconditioner, terms, delta, grid, .. } = self;
         let mut A = system(elastic, terms, inputs);
-        let rz = pcg.precondition(team, &mut A, preconditioner);
+        let rz = match grid {
+            None => pcg.precondition(team, &mut A, preconditioner),
+            Some(grid) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
+        };
+        let norm = rz.max(0.0).sqrt();
         if first && pass == 0 {
-            *reference = reference.max(rz.max(0.0).sqrt());
+            self.reference = self.reference.max(norm);
         }
         if pass == 0 {
-            *began = if *reference > 0.0 { rz.max(0.0).sqrt() / *reference } else { 0.0 };
+            self.began = if self.reference > 0.0 { norm / self.reference } else { 0.0 };
         }
-        pcg.run(team, &mut A, preconditioner, delta, (rz, *reference, inputs.solver))
+        let from = (rz, self.reference, inputs.solver);
+        match grid {
+            None => pcg.run(team, &mut A, preconditioner, delta, from),
+            Some(grid) => {
+                let mut V = grid.cycle(preconditioner.inverses());
+                match self.method {
+                    Method::Multigrid => pcg.cycles(team, &mut A, &mut V, delta, from),
+                    _ => pcg.run(team, &mut A, &mut V, delta, from),
+                }
+            }
+        }
     }
 
     fn springs_changed(&mut self, inputs: &LinearInputs<'_>, pass: usize) -> bool {

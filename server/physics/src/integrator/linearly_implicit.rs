@@ -17,7 +17,7 @@ use crate::element::Points;
 use crate::lists::reserve::refill;
 use crate::material::Material;
 use crate::operator::Stiffness;
-use crate::solver::PcgSettings;
+use crate::solver::{Method, PcgSettings};
 use crate::space::Space;
 use crate::team::Team;
 
@@ -47,6 +47,7 @@ pub struct LinearlyImplicit {
     material: Material,
     solves: u32,
     pcg: PcgSettings,
+    method: Method,
     relaxes: bool,
     stiffness: Box<dyn Stiffness>,
     /// Whether the stiffness uses only instructions that every machine has.
@@ -81,6 +82,7 @@ impl LinearlyImplicit {
             material,
             solves,
             pcg,
+            method: settings.method,
             relaxes: settings.relaxation.is_some(),
             stiffness,
             portable,
@@ -245,6 +247,8 @@ impl StepSolver for LinearlyImplicit {
 
     fn set_solver(&mut self, settings: SolverSettings) {
         (self.solves, self.pcg) = settings.linear;
+        self.method = settings.method;
+        self.step.set_method(self.method);
         self.relaxes = settings.relaxation.is_some();
     }
 
@@ -271,6 +275,9 @@ impl StepSolver for LinearlyImplicit {
             self.held.follow(space, &*self.stiffness);
         }
         self.step.set_stiff_modes(space.stiff_modes());
+        self.step.set_method(self.method);
+        let hierarchy = if self.method.is_multigrid() { space.hierarchy() } else { None };
+        self.step.set_hierarchy(hierarchy, &*self.stiffness);
     }
 
     fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) {

@@ -19,6 +19,7 @@ mod free_motion;
 mod spin;
 mod springs;
 mod linearly_implicit;
+mod step_grid;
 mod linear_step;
 mod held_energy;
 mod model_solver;

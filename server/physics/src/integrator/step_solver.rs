@@ -15,7 +15,7 @@ use crate::assembly::{Model, ModelError};
 use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{FixedCopy, Stiffness};
-use crate::solver::{NewtonSettings, PcgSettings};
+use crate::solver::{Method, NewtonSettings, PcgSettings};
 use crate::space::Space;
 use crate::team::Team;
 
@@ -121,6 +121,8 @@ pub struct SolverSettings {
     pub newton: NewtonSettings,
     /// Linear solves of a step that is a fixed number of them by design, and when each of them stops.
     pub linear: (u32, PcgSettings),
+    /// Method of these linear solves.
+    pub method: Method,
     /// [`Scheme::Static`] only: number of iterations of matrix-free relaxation per step, in place of Newton's
     /// method. They continue from step to step.
     pub relaxation: Option<u32>,

@@ -105,14 +105,12 @@ impl Multigrid {
     }
 
     /// Brings the coarse operators up to date with the constants, the prescribed directions and the rotation of
-    /// every leaf. What has not changed is kept. `A` is the operator of the finest level and `inverse` has the
-    /// inverses of its diagonal blocks.
+    /// every leaf. What has not changed is kept. [`estimate_eigenvalues`](Self::estimate_eigenvalues) comes next.
     pub fn update(
         &mut self,
         team: &mut Team,
         (with, fixed): (&Coefficients, &[FixedCopy]),
         rotation: &(dyn Fn(u32) -> Matrix3<f32> + Sync),
-        (A, inverse): (&mut dyn LinearOperator, &[Inverse3]),
     ) {
         let Self { settings, hierarchy, galerkin, coarsest, levels, .. } = self;
         let tolerance = settings.same_rotation_rad;
@@ -124,19 +122,30 @@ impl Multigrid {
             operator.invert_diagonal(team, |_| 0, &mut levels[l].inverse);
         }
         coarsest.update(hierarchy, galerkin, any, tolerance);
-        if anew || self.estimate {
-            self.estimate = false;
-            self.estimate_eigenvalues(team, A, inverse);
+        self.estimate |= anew;
+    }
+
+    /// Whether the last update had these constants and prescribed directions.
+    pub fn is_made_for(&self, with: &Coefficients, fixed: &[FixedCopy]) -> bool {
+        self.galerkin.is_made_for(with, fixed)
+    }
+
+    /// Estimates the largest eigenvalue of D⁻¹A of every level by power iteration, if constants or prescribed
+    /// directions changed since the last time. `A` is the operator of the finest level and `inverse` has the
+    /// inverses of its diagonal blocks.
+    pub fn estimate_eigenvalues(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        inverse: &[Inverse3],
+    ) {
+        if std::mem::take(&mut self.estimate) {
+            self.power_iterations(team, A, inverse);
         }
     }
 
-    /// Forgets the estimates of eigenvalues: the next update makes them anew.
-    pub fn estimate_anew(&mut self) {
-        self.estimate = true;
-    }
-
-    /// Power iteration on D⁻¹A of every level, from the same vector each time.
-    fn estimate_eigenvalues(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
+    /// Power iterations on every level, from the same vector each time.
+    fn power_iterations(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
         let Self { hierarchy, galerkin, levels, fixed, partial, .. } = self;
         for (l, level) in levels.iter_mut().enumerate() {
             let Vectors { inverse: own, largest, r, d, q, products, .. } = level;
@@ -340,9 +349,14 @@ impl Multigrid {
         self.hierarchy.n_vertices()
     }
 
-    #[cfg(test)]
-    pub(super) fn parts(&self) -> (&Hierarchy, &Galerkin) {
-        (&self.hierarchy, &self.galerkin)
+    /// Cells, vertices and transfers.
+    pub fn hierarchy(&self) -> &Hierarchy {
+        &self.hierarchy
+    }
+
+    /// Estimate of the largest eigenvalue of D⁻¹A of the finest level, from above.
+    pub fn largest_eigenvalue(&self) -> f64 {
+        self.levels[0].largest
     }
 }
 

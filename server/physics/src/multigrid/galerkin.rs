@@ -39,7 +39,7 @@ pub struct CellMaterial {
 /// The constants of A = `mass_factor` M + `scale` K̂.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coefficients {
-    /// By number of the material; cells of further numbers have those of the last one.
+    /// By number of the material; cells of further numbers have those of number 0, the body.
     pub materials: Vec<CellMaterial>,
     /// Factor of K̂.
     pub scale: f64,
@@ -132,12 +132,10 @@ impl Galerkin {
         rotation: &(dyn Fn(u32) -> Matrix3<f32> + Sync),
         tolerance: f64,
     ) -> [bool; 2] {
-        let axes = |f: &FixedCopy| (f.copy, f.axes);
-        let held_anew = !fixed.iter().map(axes).eq(self.known_fixed.iter().copied());
-        let anew = held_anew || self.coefficients.as_ref() != Some(with);
+        let anew = !self.is_made_for(with, fixed);
         if anew {
             self.known_fixed.clear();
-            self.known_fixed.extend(fixed.iter().map(axes));
+            self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.axes)));
             self.mark_held(hierarchy);
             self.set_coefficients(hierarchy, with);
         }
@@ -157,6 +155,12 @@ impl Galerkin {
             any |= self.update_level(team, hierarchy, l, (tolerance, exact, anew));
         }
         [anew, any]
+    }
+
+    /// Whether the last update had these constants and prescribed directions.
+    pub fn is_made_for(&self, with: &Coefficients, fixed: &[FixedCopy]) -> bool {
+        self.coefficients.as_ref() == Some(with)
+            && fixed.iter().map(|f| (f.copy, f.axes)).eq(self.known_fixed.iter().copied())
     }
 
     /// Notes which cells have prescribed vertices below them.
@@ -183,7 +187,7 @@ impl Galerkin {
 
     /// Computes shared matrices and lumped masses.
     fn set_coefficients(&mut self, hierarchy: &Hierarchy, with: &Coefficients) {
-        let of = |number: u16| with.materials.get(usize::from(number)).or(with.materials.last());
+        let of = |number: u16| with.materials.get(usize::from(number)).or(with.materials.first());
         self.shared.clear();
         self.eighth.clear();
         for kind in &hierarchy.kinds {
@@ -216,7 +220,10 @@ impl Galerkin {
                 }
             }
         }
-        self.coefficients = Some(with.clone());
+        match &mut self.coefficients {
+            Some(known) => known.clone_from(with),
+            None => self.coefficients = Some(with.clone()),
+        }
     }
 
     fn update_level(

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::level::{Level, NONE};
 use super::transfer::Transfer;
+use crate::material::Region;
 use crate::octree::{Lattice, Octree};
 
 /// Coarsening ends at this number of unknowns.
@@ -16,6 +17,8 @@ const STALLED: f64 = 0.9;
 pub struct Hierarchy {
     /// Side of a finest cell [m].
     pub(super) h: f64,
+    /// Regions with other constants than the body; region number n is entry n − 1.
+    regions: Vec<Region>,
     /// Level 0 is the finest.
     pub(super) levels: Vec<Level>,
     /// Between levels ℓ and ℓ + 1.
@@ -89,6 +92,7 @@ impl Hierarchy {
         }
         let mut hierarchy = Self {
             h: octree.lattice().h,
+            regions: octree.regions().to_vec(),
             levels,
             steps,
             kinds: Vec::new(),
@@ -102,6 +106,11 @@ impl Hierarchy {
     /// Number of levels.
     pub fn n_levels(&self) -> usize {
         self.levels.len()
+    }
+
+    /// Regions with other constants than the body; those of material number n are entry n − 1.
+    pub fn regions(&self) -> &[Region] {
+        &self.regions
     }
 
     /// Number of vertices of the finest level.

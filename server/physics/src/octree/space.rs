@@ -16,6 +16,7 @@ use crate::cut::{
 use crate::element::{Point, Points, Simd};
 use crate::material::{Lame, Material, Region};
 use crate::mesh::MeshError;
+use crate::multigrid::Hierarchy;
 use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
@@ -393,6 +394,10 @@ impl Space for OctreeSpace {
         if let Some(cells) = (stiffness as &mut dyn Any).downcast_mut::<CellStiffness>() {
             cells.follow(&self.octree);
         }
+    }
+
+    fn hierarchy(&self) -> Option<Hierarchy> {
+        Some(Hierarchy::new(&self.octree))
     }
 
     fn stiff_modes(&self) -> Option<StiffModes> {

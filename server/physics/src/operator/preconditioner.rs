@@ -59,6 +59,12 @@ impl BlockJacobi {
         &self.substitution
     }
 
+    /// The inverses.
+    #[inline]
+    pub fn inverses(&self) -> &[Inverse3] {
+        &self.inverse
+    }
+
     /// The inverses, to be written block by block with [`invert`] and [`Self::set`].
     pub fn inverses_mut(&mut self) -> &mut [Inverse3] {
         &mut self.inverse

@@ -24,6 +24,11 @@ pub enum Method {
     /// Conjugate gradients preconditioned by the inverse 3×3 diagonal blocks.
     #[default]
     Pcg,
+    /// Cycles of multigrid alone: x ← x + V (b − A x). Bodies without levels, and assembled matrices, are solved
+    /// by [`Pcg`](Self::Pcg) instead.
+    Multigrid,
+    /// Conjugate gradients preconditioned by one cycle of multigrid; the same holds.
+    MgPcg,
     /// Sparse Cholesky factorisation; the analysis is kept while the pattern stays.
     Cholesky,
 }
@@ -50,6 +55,13 @@ pub struct LinearSettings {
     pub iterations: u32,
     /// Stop at √(rᵀM⁻¹r) ≤ tolerance · reference, with M the 3×3 diagonal blocks of A.
     pub tolerance: f64,
+}
+
+impl Method {
+    /// Whether it asks for multigrid.
+    pub fn is_multigrid(self) -> bool {
+        matches!(self, Self::Multigrid | Self::MgPcg)
+    }
 }
 
 impl Default for LinearSettings {
@@ -160,7 +172,7 @@ impl LinearSolver {
         let stop = Stop { target: self.settings.tolerance * reference, iterations: self.settings.iterations };
         let mut report = match self.settings.method {
             Method::Cholesky => self.direct(team, A, b, x, stop),
-            method => self.iterate(team, A, b, x, (stop, method == Method::Pcg)),
+            method => self.iterate(team, A, b, x, (stop, method != Method::Cg)),
         };
         if reference > 0.0 {
             report.residual /= reference;

@@ -18,6 +18,7 @@ mod newton;
 mod mixed;
 mod eigen;
 mod pcg;
+mod cycles;
 
 pub use algebraic_error::AlgebraicError;
 pub use block_jacobi::DiagonalInverse;

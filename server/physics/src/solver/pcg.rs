@@ -24,10 +24,10 @@ pub struct Pcg {
     /// On input the residual b − A x of the start. On output that of the result, by recurrence, in the
     /// variables of the preconditioner.
     pub r: Vec<Padded>,
-    z: Vec<Padded>,
-    p: Vec<Padded>,
-    q: Vec<Padded>,
-    partial: Vec<f64>,
+    pub(super) z: Vec<Padded>,
+    pub(super) p: Vec<Padded>,
+    pub(super) q: Vec<Padded>,
+    pub(super) partial: Vec<f64>,
     /// rᵀM⁻¹r and β where the last run ended.
     rz: f64,
     beta: f64,

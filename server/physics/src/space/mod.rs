@@ -23,6 +23,7 @@ use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work};
 use crate::element::Points;
 use crate::material::Material;
+use crate::multigrid::Hierarchy;
 use crate::mesh::MeshError;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
@@ -198,6 +199,11 @@ pub trait Space: Points + Send {
     /// Brings the stiffness that this space made up to date after the last cut. Earlier pieces keep their
     /// rotations.
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness);
+
+    /// The levels for multigrid on the elements as they are cut now; `None` if there are none.
+    fn hierarchy(&self) -> Option<Hierarchy> {
+        None
+    }
 
     /// Stiff motions of degenerate elements, as these are cut now; `None` if there are none.
     fn stiff_modes(&self) -> Option<StiffModes>;

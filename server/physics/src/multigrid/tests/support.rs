@@ -230,7 +230,8 @@ impl Scene {
 
     pub fn update(&mut self) {
         let Self { team, exact, with, fine, inverse, multigrid } = self;
-        multigrid.update(team, (with, &exact.fixed), &|id| exact.rotation(id), (fine, inverse));
+        multigrid.update(team, (with, &exact.fixed), &|id| exact.rotation(id));
+        multigrid.estimate_eigenvalues(team, fine, inverse);
     }
 
     /// V r, scaled into the range of single precision.

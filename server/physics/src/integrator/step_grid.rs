@@ -1,0 +1,124 @@
+//! Multigrid in a step by linear solves.
+
+use super::step_inputs::LinearInputs;
+use crate::material::Material;
+use crate::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
+use crate::operator::{Inverse3, LinearOperator, Place, Spring, Stiffness};
+use crate::team::Team;
+
+/// Multigrid, and what it was brought up to date with.
+#[derive(Debug)]
+pub struct StepGrid {
+    multigrid: Multigrid,
+    /// Where the stiffness keeps every cell.
+    places: Vec<Place>,
+    coefficients: Coefficients,
+    /// Version of the stiffness at the last update.
+    version: Option<u64>,
+    /// λ of the finest level, where springs add to that of the last estimate; else 0.
+    largest: f64,
+}
+
+impl StepGrid {
+    /// Multigrid for the cells of `hierarchy`, whose stiffness is `elastic`.
+    pub fn new(hierarchy: Hierarchy, elastic: &dyn Stiffness) -> Self {
+        let none = Coefficients { materials: Vec::new(), scale: 0.0, mass_factor: 0.0 };
+        Self {
+            multigrid: Multigrid::new(hierarchy, MultigridSettings::default()),
+            places: elastic.places(),
+            coefficients: none,
+            version: None,
+            largest: 0.0,
+        }
+    }
+
+    /// Hierarchy and operators.
+    pub fn multigrid(&self) -> &Multigrid {
+        &self.multigrid
+    }
+
+    /// Follows the stiffness as it was last updated.
+    pub fn follow(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
+        let Self { multigrid, places, coefficients, version, .. } = self;
+        set_coefficients(coefficients, multigrid.hierarchy(), inputs);
+        let fixed = inputs.step.fixed;
+        let now = Some(elastic.version());
+        if *version == now && multigrid.is_made_for(coefficients, fixed) {
+            return;
+        }
+        *version = now;
+        multigrid.update(team, (coefficients, fixed), &|cell| elastic.rotation(places[cell as usize]));
+    }
+
+    /// Estimates eigenvalues if they are not known for the operator `A` with these `springs`, whose diagonal
+    /// blocks have the inverses `inverse`.
+    pub fn complete(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        inverse: &[Inverse3],
+        springs: &[Spring],
+    ) {
+        self.multigrid.estimate_eigenvalues(team, A, inverse);
+        self.largest = with_springs(self.multigrid.largest_eigenvalue(), inverse, springs);
+    }
+
+    /// One cycle as a preconditioner.
+    pub fn cycle<'a>(&'a mut self, inverse: &'a [Inverse3]) -> Cycle<'a> {
+        Cycle { multigrid: &mut self.multigrid, inverse, largest: self.largest }
+    }
+}
+
+fn set_coefficients(out: &mut Coefficients, hierarchy: &Hierarchy, inputs: &LinearInputs<'_>) {
+    let of = |material: &Material| CellMaterial {
+        lame: material.lame(),
+        density_kg_m3: material.density_kg_m3,
+    };
+    out.materials.clear();
+    out.materials.push(of(inputs.material));
+    let regions = hierarchy.regions().iter().map(|region| of(&inputs.material.of_region(region)));
+    out.materials.extend(regions);
+    (out.scale, out.mass_factor) = (inputs.elastic_update().scale, inputs.mass_factor());
+}
+
+/// A bound of the largest eigenvalue of D⁻¹A with springs, where it is `known` without them; 0 without springs.
+///
+/// # Derivation
+/// A = A₀ + Σ Sⱼ with Sⱼ = kⱼ Jⱼ Jⱼᵀ, and D = D₀ + Σ Dⱼ. Sⱼ ≤ cⱼ Dⱼ for c carriers (Cauchy–Schwarz), so that λ ≤
+/// max(λ₀, cⱼ). Also Sⱼ ≤ κⱼ D with κⱼ = kⱼ Jⱼᵀ D⁻¹ Jⱼ, so that λ ≤ λ₀ + Σ κⱼ. The smaller bound counts.
+fn with_springs(known: f64, inverse: &[Inverse3], springs: &[Spring]) -> f64 {
+    if springs.is_empty() {
+        return 0.0;
+    }
+    let (mut most, mut sum) = (known, known);
+    for spring in springs {
+        let mut carriers = 0.0;
+        for (copy, w) in spring.point.carriers().filter(|(_, w)| *w != 0.0) {
+            let [x, y, z] = inverse[copy].columns();
+            let along = match spring.direction {
+                Some(n) => (0..3).map(|i| n[i] * (x[i] * n[0] + y[i] * n[1] + z[i] * n[2])).sum(),
+                None => x[0] + y[1] + z[2],
+            };
+            sum += f64::from(spring.stiffness) * f64::from(w * w) * f64::from(along);
+            carriers += 1.0;
+        }
+        most = most.max(carriers);
+    }
+    most.min(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::MaterialPoint;
+
+    #[test]
+    fn springs_raise_the_bound_by_no_more_than_they_can() {
+        let inverse = vec![Inverse3([[1.0, 0.0, 1.0, 0.0], [0.0, 0.0, 1.0, 0.0]]); 8];
+        let point = MaterialPoint::new((0..4).map(|copy| (copy, 0.25_f32)));
+        let spring = |stiffness| Spring { point, direction: Some([0.0, 0.6, 0.8]), stiffness };
+        assert_eq!(with_springs(2.5, &inverse, &[]), 0.0);
+        assert!((with_springs(2.5, &inverse, &[spring(0.4)]) - 2.6).abs() < 1e-6);
+        assert_eq!(with_springs(2.5, &inverse, &[spring(1e6)]), 4.0);
+    }
+}
