@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Body;
 use crate::estimate::{CutTets, MeshError, StressRecovery};
+use crate::multigrid::{CoarsestSolve, LevelReport};
 
 /// Counts of elements so flat that one of their motions is far stiffer than the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,6 +45,12 @@ impl Body {
     pub fn stiff_motions(&self) -> StiffMotions {
         let [pieces, substituted, left] = self.dynamics.solver().stiff_motions();
         StiffMotions { pieces, substituted, left }
+    }
+
+    /// Figures of the levels of multigrid, from the finest on, and how the coarsest one is solved; `None` if the
+    /// method is another one or the discretisation has no levels.
+    pub fn levels(&self) -> Option<(Vec<LevelReport>, CoarsestSolve)> {
+        self.dynamics.solver().levels()
     }
 
     /// ½ vᵀ M v [J].

@@ -660,7 +660,8 @@ impl LinearStep {
             Some(grid) => {
                 let mut V = grid.cycle(preconditioner.inverses());
                 match self.method {
-                    Method::Multigrid => pcg.cycles(team, &mut A, &mut V, delta, from),
+                    // The coarse levels know no springs: cycles alone would overshoot along them.
+                    Method::Multigrid if terms.is_empty() => pcg.cycles(team, &mut A, &mut V, delta, from),
                     _ => pcg.run(team, &mut A, &mut V, delta, from),
                 }
             }

@@ -16,6 +16,7 @@ use crate::assembly::ModelError;
 use crate::element::Points;
 use crate::lists::reserve::refill;
 use crate::material::Material;
+use crate::multigrid::{CoarsestSolve, LevelReport};
 use crate::operator::Stiffness;
 use crate::solver::{Method, PcgSettings};
 use crate::space::Space;
@@ -286,6 +287,10 @@ impl StepSolver for LinearlyImplicit {
 
     fn stiff_motions(&self) -> [usize; 3] {
         self.step.stiff_motions()
+    }
+
+    fn levels(&self) -> Option<(Vec<LevelReport>, CoarsestSolve)> {
+        self.step.levels()
     }
 
     fn stiffness_mut(&mut self) -> Option<&mut dyn Stiffness> {

@@ -14,6 +14,7 @@ use super::step_inputs::StepInputs;
 use crate::assembly::{Model, ModelError};
 use crate::element::Points;
 use crate::material::Material;
+use crate::multigrid::{CoarsestSolve, LevelReport};
 use crate::operator::{FixedCopy, Stiffness};
 use crate::solver::{Method, NewtonSettings, PcgSettings};
 use crate::space::Space;
@@ -102,6 +103,11 @@ pub trait StepSolver: Debug + Send {
     /// Of the last step: pieces of degenerate elements, nodes moved relative to others for them, and pieces
     /// that keep a stiff motion.
     fn stiff_motions(&self) -> [usize; 3];
+
+    /// Figures of the levels of multigrid, from the finest on, and how the coarsest one is solved, if it is used.
+    fn levels(&self) -> Option<(Vec<LevelReport>, CoarsestSolve)> {
+        None
+    }
 
     /// The discrete model in double precision, if this way has one.
     fn model(&self) -> Option<&Model> {

@@ -12,6 +12,7 @@ mod dynamics;
 mod equilibrium;
 mod foreign_space;
 mod half_cut_beam;
+mod multigrid;
 mod multistep;
 mod octree;
 mod phases;

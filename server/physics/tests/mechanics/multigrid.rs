@@ -1,0 +1,158 @@
+//! Octree bodies stepped with multigrid: the same motion in few iterations, whatever is cut or touched.
+
+use nalgebra::Vector3;
+use scindo_allocations::allocations;
+use scindo_physics::body::{
+    Body, BodySettings, Method, Outcome, PcgSettings, PointSpring, Scheme, SolveReport, SpringKind,
+};
+use scindo_physics::cut::BladeSweep;
+use scindo_physics::element::MaterialPoint;
+use scindo_physics::material::{Law, Material, Rayleigh, Region};
+use scindo_physics::multigrid::CoarsestSolve;
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
+
+const MATERIAL: Material = Material {
+    young_pa: 2e5,
+    poisson: 0.3,
+    density_kg_m3: 1000.0,
+    rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.002 },
+    law: Law::Corotational,
+};
+const FALL: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
+
+fn cube(cells: u32, levels: u8, law: Law, settings: BodySettings) -> Body {
+    let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
+    let region = |p: &Vector3<f64>| u16::from(p.z > 0.5 && p.x > 0.5);
+    let mut octree = Octree::fill(&shape, OctreeSettings { cells, levels }, &region).unwrap();
+    octree.set_regions(vec![Region { young_pa: 6e5, poisson: 0.4, density_kg_m3: 500.0 }]);
+    let space = Box::new(OctreeSpace::new(octree));
+    let mut body = Body::of_space(space, Material { law, ..MATERIAL }, settings).unwrap();
+    assert!(body.is_fast());
+    let held: Vec<u32> =
+        (0..).zip(body.rest_positions()).filter(|(_, X)| X.x < 1e-9).map(|(n, _)| n).collect();
+    body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+    body
+}
+
+fn with(method: Method, scheme: Scheme, tolerance: f64) -> BodySettings {
+    let solver = PcgSettings { iterations: 3000, tolerance };
+    BodySettings { solver, method, scheme, ..BodySettings::default() }
+}
+
+fn slit(x: f64) -> BladeSweep {
+    let edge = |z: f64| [Vector3::new(x, -0.2, z), Vector3::new(x + 0.06, 1.2, z)];
+    BladeSweep { segments: vec![edge(1.2), edge(0.35)] }
+}
+
+fn moved(body: &Body) -> Vec<Vector3<f64>> {
+    body.positions().iter().zip(body.rest_positions()).map(|(x, X)| x - X).collect()
+}
+
+fn difference(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    let largest = |u: &mut dyn Iterator<Item = f64>| u.fold(0.0, f64::max);
+    let apart = largest(&mut a.iter().zip(b).map(|(a, b)| (a - b).norm()));
+    apart / largest(&mut b.iter().map(Vector3::norm))
+}
+
+fn advance(body: &mut Body, h: f64, springs: &[PointSpring]) -> SolveReport {
+    let report = body.step(h, FALL, springs);
+    assert_eq!(report.outcome, Outcome::Advanced, "{report:?}");
+    assert!(!report.is_unconverged(), "{report:?}");
+    report
+}
+
+#[test]
+fn equilibria_take_few_iterations_at_any_size() {
+    let mut iterations = Vec::new();
+    for cells in [12, 24] {
+        let solve = |method| {
+            let mut body = cube(cells, 2, Law::Linear, with(method, Scheme::Static, 1e-5));
+            body.cut(&slit(0.55), 1).unwrap();
+            let report = advance(&mut body, 1.0, &[]);
+            assert_eq!(body.levels().is_some(), method != Method::Pcg);
+            if let Some((levels, coarsest)) = body.levels() {
+                assert!(coarsest == CoarsestSolve::Cholesky && levels.len() > 1);
+            }
+            (moved(&body), report.iterations)
+        };
+        let [pcg, cycles, mg_pcg] = [Method::Pcg, Method::Multigrid, Method::MgPcg].map(solve);
+        println!("{cells}³: {} PCG, {} cycles, {} MG-PCG", pcg.1, cycles.1, mg_pcg.1);
+        assert!(difference(&cycles.0, &pcg.0) < 1e-3 && difference(&mg_pcg.0, &pcg.0) < 1e-3);
+        assert!(mg_pcg.1 <= cycles.1 && 4 * mg_pcg.1 < pcg.1);
+        iterations.push(mg_pcg.1);
+    }
+    assert!(iterations[1] <= iterations[0] + 6);
+}
+
+#[test]
+fn motion_is_that_of_other_solvers_through_cuts_and_springs() {
+    for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2, Scheme::Newmark { beta: 0.25, gamma: 0.5 }] {
+        let run = |method| {
+            let mut body = cube(12, 2, Law::Corotational, with(method, scheme, 1e-5));
+            let top = Vector3::new(0.98, 0.51, 0.97);
+            let mut iterations = 0;
+            for k in 0..8 {
+                if k == 4 {
+                    body.cut(&slit(0.55), 1).unwrap();
+                }
+                // A stiff spring on the corner, and a floor under the body.
+                let mut at = body.locate(top, None).unwrap();
+                let at = MaterialPoint::new(body.carriers(&mut at));
+                let kinds = [
+                    SpringKind::Hold { target_m: top + Vector3::new(0.0, 0.03, 0.0) },
+                    SpringKind::OneSided { normal: Vector3::z(), offset_m: 0.96 },
+                ];
+                let springs = kinds.map(|kind| PointSpring {
+                    point: at,
+                    kind,
+                    stiffness_n_m: 3e6,
+                    max_force_n: 1e9,
+                });
+                let springs = if k < 2 { &[][..] } else { &springs[..] };
+                iterations += advance(&mut body, 0.02, springs).iterations;
+            }
+            (moved(&body), iterations)
+        };
+        let [pcg, cycles, mg_pcg] = [Method::Pcg, Method::Multigrid, Method::MgPcg].map(run);
+        println!("{scheme:?}: {} PCG, {} cycles, {} MG-PCG", pcg.1, cycles.1, mg_pcg.1);
+        let apart = [difference(&cycles.0, &pcg.0), difference(&mg_pcg.0, &pcg.0)];
+        assert!(apart.iter().all(|&d| d < 1e-3), "{scheme:?}: {apart:?}");
+        assert!(2 * mg_pcg.1 < pcg.1);
+    }
+}
+
+#[test]
+fn steps_with_multigrid_have_the_same_bits_for_any_number_of_threads() {
+    let run = |threads, method| {
+        let settings = BodySettings { threads, ..with(method, Scheme::ImplicitEuler, 1e-4) };
+        let mut body = cube(12, 2, Law::Corotational, settings);
+        for k in 0..6 {
+            if k == 3 {
+                body.cut(&slit(0.3), 1).unwrap();
+            }
+            advance(&mut body, 0.02, &[]);
+        }
+        body.positions().to_vec()
+    };
+    for method in [Method::Multigrid, Method::MgPcg] {
+        assert_eq!(run(1, method), run(2, method));
+        assert_eq!(run(1, method), run(3, method));
+    }
+}
+
+#[test]
+fn a_steady_step_with_multigrid_does_not_allocate() {
+    for method in [Method::Multigrid, Method::MgPcg] {
+        let settings = BodySettings { threads: 2, ..with(method, Scheme::ImplicitEuler, 1e-3) };
+        let mut body = cube(12, 2, Law::Corotational, settings);
+        body.cut(&slit(0.55), 1).unwrap();
+        for _ in 0..5 {
+            advance(&mut body, 0.01, &[]);
+        }
+        let before = allocations();
+        for _ in 0..5 {
+            advance(&mut body, 0.01, &[]);
+        }
+        assert_eq!(allocations() - before, 0, "{method:?}");
+    }
+}
