@@ -116,7 +116,7 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
         assert_says(&with(line), &parts);
     }
     let cut = |method: &str| message_after("sweep_m =", &format!("method = \"{method}\"\nsweep_m ="));
-    assert_says(&cut("links"), &["`links` is not supported yet", "xfem, snap"]);
+    assert_says(&cut("links"), &["found `links`, but all cuts of `beam` are made by xfem"]);
     assert_says(&cut("snap"), &["found `snap`, but all cuts of `beam` are made by xfem", "[body.cutting]"]);
     let snap = "cutting = { method = \"snap\" }";
     assert_says(&with(&format!("{snap}\nelement = \"tet10\"")), &["found `snap` with tet10, allowed: tet4"]);
@@ -234,7 +234,7 @@ fn only_linear_tetrahedra_have_an_error_estimate() {
 #[test]
 fn only_linear_tetrahedra_are_cut() {
     let tet10 = message_after("young_pa", "element = \"tet10\"\nyoung_pa");
-    assert_says(&tet10, &["cut.0.body", "body `beam` of tet10", "allowed: only tet4"]);
+    assert_says(&tet10, &["cut.0.body", "body `beam` of tet10", "allowed: tet4, octree"]);
     let path = "path = [{ at_s = 0, tip_m = [0, 0, 0], mode = \"cut\" }]\n";
     let text = GOOD.replace("tet5", "hex").replace("young_pa", "element = \"hex8\"\nyoung_pa") + path;
     let message = Scene::from_toml(&text).unwrap_err().to_string();

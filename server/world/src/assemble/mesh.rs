@@ -3,15 +3,19 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
+use scindo_physics::material;
 use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh, graded_hexes};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, Shape};
 
-use crate::format::MeshInError;
+use super::region::holds;
+use crate::format::{MeshFile, MeshInError, read_mesh};
 use crate::mesh_in::{
-    MeshHealth, Observer, VolumeHealth, body_bytes, check_scale, components, load_surface, load_volume,
-    memory_for_meshes,
+    MeshHealth, Observer, OctreeReport, SolidSurface, SurfaceHealth, VolumeHealth, body_bytes, check_scale,
+    components, fill_observed, load_surface, load_volume, memory_for_meshes,
 };
 use crate::quantity::memory;
-use crate::scene::{BodySpec, CellSplit, Fault, MeshSource};
+use crate::scene::checked::Region;
+use crate::scene::{BodySpec, CellSplit, Fault, MaterialPlace, MaterialSpec, MeshSource, OctreeSpec};
 
 /// The elements of a body.
 pub enum Mesh {
@@ -19,6 +23,8 @@ pub enum Mesh {
     Tets(TetMesh),
     /// Hexahedra.
     Hexes(HexMesh),
+    /// Cells of an octree.
+    Octree(Octree),
 }
 
 impl Mesh {
@@ -27,6 +33,7 @@ impl Mesh {
         match self {
             Mesh::Tets(mesh) => mesh.nodes.len(),
             Mesh::Hexes(mesh) => mesh.nodes.len(),
+            Mesh::Octree(octree) => octree.n_vertices(),
         }
     }
 
@@ -38,6 +45,7 @@ impl Mesh {
                 [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)],
                 |[low, high], x| [low.inf(x), high.sup(x)],
             ),
+            Mesh::Octree(octree) => octree.bounds(),
         }
     }
 
@@ -45,6 +53,9 @@ impl Mesh {
     pub fn nodes_along(&self) -> f64 {
         let [low, high] = self.bounds();
         let (extent, nodes) = (high - low, self.n_nodes() as f64);
+        if let Mesh::Octree(octree) = self {
+            return extent.amax() / octree.lattice().h + 1.0;
+        }
         let along = extent.amax() * (nodes / extent.product()).cbrt();
         // A flat mesh fills no volume; no way has more nodes than there are.
         if along.is_finite() { along.min(nodes) } else { nodes }
@@ -95,6 +106,81 @@ pub fn open(source: &MeshSource, base_dir: &Path, observer: &Observer<'_>) -> Re
             .observed(*cells, observer)
             .map(|(mesh, report)| Opened::read(mesh, MeshHealth::Surface(report)))
             .map_err(fault),
+    }
+}
+
+/// Fills the mesh of `body` with the cells of `octree`; paths are relative to `base_dir`.
+pub fn fill(
+    body: &BodySpec,
+    octree: OctreeSpec,
+    base_dir: &Path,
+    observer: &Observer<'_>,
+) -> Result<Opened, Fault> {
+    let (shape, surface): (Box<dyn Shape>, _) = match &body.mesh {
+        MeshSource::Box { min_m, max_m, .. } => (Box::new(BoxShape { min: *min_m, max: *max_m }), None),
+        MeshSource::Surface { path, scale, .. } => {
+            let (solid, health) = enclosed(path, *scale, base_dir)?;
+            (Box::new(solid), Some(health))
+        }
+        MeshSource::Organ { shape, .. } => {
+            let (solid, health) = SolidSurface::new(&shape.surface(), 1.0).map_err(fault)?;
+            (Box::new(solid), Some(health))
+        }
+        MeshSource::File { .. } | MeshSource::Grid { .. } => {
+            return Err(Fault::Mesh { reason: "octree cells fill a box, a surface or an organ".into() });
+        }
+    };
+    let bounds = shape.bounds();
+    let regions = body.materials.iter().map(|material| -> Result<Box<dyn Shape>, Fault> {
+        Ok(match &material.place {
+            MaterialPlace::Region(region) => Box::new(RegionShape { region: region.clone(), bounds }),
+            MaterialPlace::Surface { path, scale } => Box::new(enclosed(path, *scale, base_dir)?.0),
+        })
+    });
+    let regions: Vec<Box<dyn Shape>> = regions.collect::<Result<_, _>>()?;
+    let regions: Vec<&dyn Shape> = regions.iter().map(|region| &**region).collect();
+    let settings = OctreeSettings { cells: octree.cells, levels: octree.levels };
+    let (mut octree, report) = fill_observed(&*shape, settings, &regions, observer)
+        .map_err(|error| Fault::Mesh { reason: error.to_string() })?;
+    let constants = body.materials.iter().map(|material| {
+        let MaterialSpec { young_pa, poisson, density_kg_m3, .. } = *material;
+        material::Region { young_pa, poisson, density_kg_m3 }
+    });
+    octree.set_regions(constants.collect());
+    let health = MeshHealth::Octree(OctreeReport { surface, ..report });
+    Ok(Opened { mesh: Mesh::Octree(octree), health: Some(health) })
+}
+
+/// The solid inside a surface file.
+fn enclosed(path: &str, scale: f64, base_dir: &Path) -> Result<(SolidSurface, SurfaceHealth), Fault> {
+    match read_mesh(&base_dir.join(path)).map_err(fault)? {
+        MeshFile::Surface(surface) => SolidSurface::new(&surface, scale).map_err(fault),
+        MeshFile::Volume(volume) => Err(Fault::Mesh {
+            reason: format!(
+                "{} holds tetrahedra; octree cells fill a surface: .obj, .stl or .ply",
+                volume.file
+            ),
+        }),
+    }
+}
+
+/// A region of a body between the corners `bounds` [m]. Only its inside is asked for.
+struct RegionShape {
+    region: Region,
+    bounds: [Vector3<f64>; 2],
+}
+
+impl Shape for RegionShape {
+    fn bounds(&self) -> [Vector3<f64>; 2] {
+        self.bounds
+    }
+
+    fn contains(&self, p: &Vector3<f64>) -> bool {
+        holds(&self.region, self.bounds, p)
+    }
+
+    fn crossing(&self, _: &Vector3<f64>, _: &Vector3<f64>) -> Option<(f64, Vector3<f64>)> {
+        None
     }
 }
 

@@ -15,6 +15,7 @@ use std::path::Path;
 use scindo_physics::assembly::ModelError;
 use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants};
 use scindo_physics::material::{Material, MaterialError, Rayleigh};
+use scindo_physics::octree::OctreeSpace;
 use scindo_physics::team::Lead;
 
 use crate::body::{Probe, SimBody};
@@ -107,8 +108,11 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn body(&mut self, spec: &BodySpec) -> Option<SimBody> {
         let at = format!("body.{}", spec.id);
-        let mesh::Opened { mut mesh, mut health } = match mesh::open(&spec.mesh, self.base_dir, self.observer)
-        {
+        let opened = match spec.octree {
+            Some(octree) => mesh::fill(spec, octree, self.base_dir, self.observer),
+            None => mesh::open(&spec.mesh, self.base_dir, self.observer),
+        };
+        let mesh::Opened { mut mesh, mut health } = match opened {
             Ok(opened) => opened,
             Err(fault) => {
                 self.findings.push((format!("{at}.mesh"), fault));
@@ -134,6 +138,9 @@ impl Builder<'_> {
         let made = match mesh {
             mesh::Mesh::Tets(mesh) => Body::new(mesh, material(spec), settings),
             mesh::Mesh::Hexes(mesh) => Body::hex8(mesh, material(spec), settings),
+            mesh::Mesh::Octree(octree) => {
+                Body::of_space(Box::new(OctreeSpace::new(octree)), material(spec), settings)
+            }
         };
         let mut body = match made {
             Ok(body) => body,

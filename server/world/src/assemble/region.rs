@@ -4,10 +4,9 @@ use nalgebra::Vector3;
 
 use crate::scene::checked::Region;
 
-/// Nodes whose rest position [m] lies in `region`, ascending; `low` and `high` are the corners of the
-/// body's bounding box [m].
-pub fn select(rest: &[Vector3<f64>], [low, high]: [Vector3<f64>; 2], region: &Region) -> Vec<u32> {
-    let inside = |x: &Vector3<f64>| match region {
+/// Whether the point `x` [m] lies in `region`; `low` and `high` are the corners of the body's bounding box [m].
+pub fn holds(region: &Region, [low, high]: [Vector3<f64>; 2], x: &Vector3<f64>) -> bool {
+    match region {
         Region::Box { min_m, max_m } => (0..3).all(|i| x[i] >= min_m[i] && x[i] <= max_m[i]),
         Region::Ball { centre_m, radius_m } => (x - centre_m).norm_squared() <= radius_m * radius_m,
         Region::HalfSpace { point_m, normal } => normal.dot(&(x - point_m)) >= 0.0,
@@ -17,8 +16,13 @@ pub fn select(rest: &[Vector3<f64>], [low, high]: [Vector3<f64>; 2], region: &Re
             let height = x[*axis] - low[*axis];
             height >= from * extent - slack && height <= to * extent + slack
         }
-    };
-    (0..rest.len() as u32).filter(|n| inside(&rest[*n as usize])).collect()
+    }
+}
+
+/// Nodes whose rest position [m] lies in `region`, ascending; `low` and `high` are the corners of the
+/// body's bounding box [m].
+pub fn select(rest: &[Vector3<f64>], bounds: [Vector3<f64>; 2], region: &Region) -> Vec<u32> {
+    (0..rest.len() as u32).filter(|n| holds(region, bounds, &rest[*n as usize])).collect()
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use nalgebra::Vector3;
 use rayon::prelude::*;
 use scindo_physics::octree::{At, Bits, Lattice, Octree, OctreeError, OctreeSettings, Shape};
 use serde::Serialize;
@@ -39,6 +38,8 @@ pub struct OctreeReport {
     pub finest: usize,
     /// Vertices.
     pub vertices: usize,
+    /// Leaves of each region of another material.
+    pub cells_of_region: Vec<usize>,
     /// Volume of the cells [m³].
     pub volume_m3: f64,
     /// Smallest corner of the box around the solid [m].
@@ -65,14 +66,15 @@ pub enum FillError {
     },
 }
 
-/// Fills `shape` with cells. `material` gives the number of the material at a point [m].
+/// Fills `shape` with cells. Those whose centres lie in one of `regions` get the number of the last such region
+/// as their material, from 1.
 ///
 /// # Errors
 /// See [`FillError`].
 pub fn fill_observed(
     shape: &dyn Shape,
     settings: OctreeSettings,
-    material: &(dyn Fn(&Vector3<f64>) -> u16 + Sync),
+    regions: &[&dyn Shape],
     observer: &Observer<'_>,
 ) -> Result<(Octree, OctreeReport), FillError> {
     let lattice = Lattice::around(shape.bounds(), settings)?;
@@ -84,9 +86,20 @@ pub fn fill_observed(
     }
     let tell = |stage, done| observer(Meshing { stage, done, estimate: expected });
     tell("inside and outside", 0.0);
-    let inside = classify(shape, &lattice, &|done| tell("inside and outside", CLASSIFIED * done));
+    let all = 1.0 + regions.len() as f64;
+    let part = |number: usize, shape| {
+        let before = number as f64;
+        classify(shape, &lattice, &|done| tell("inside and outside", CLASSIFIED * (before + done) / all))
+    };
+    let inside = part(0, shape);
+    let regions: Vec<Bits> = (1..).zip(regions).map(|(number, region)| part(number, *region)).collect();
     tell("cells", CLASSIFIED);
-    let octree = Octree::of_cells(lattice, &inside, &|at| material(&lattice.centre(at)))?;
+    let material = |at: At| regions.iter().rposition(|region| region.has(at)).map_or(0, |i| i as u16 + 1);
+    let octree = Octree::of_cells(lattice, &inside, &material)?;
+    let mut cells_of_region = vec![0; regions.len()];
+    for cell in octree.cells().iter().filter(|cell| cell.material > 0) {
+        cells_of_region[usize::from(cell.material) - 1] += 1;
+    }
     let [low, high] = shape.bounds();
     let report = OctreeReport {
         surface: None,
@@ -96,6 +109,7 @@ pub fn fill_observed(
         leaves: octree.cells().len(),
         finest: octree.cells().iter().filter(|cell| cell.level == 0).count(),
         vertices: octree.n_vertices(),
+        cells_of_region,
         volume_m3: (0..octree.cells().len()).map(|id| octree.cell_volume(id)).sum(),
         min_m: low.into(),
         max_m: high.into(),
@@ -162,6 +176,8 @@ impl fmt::Display for OctreeReport {
 mod tests {
     use std::sync::Mutex;
 
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::mesh_in::{Organ, SolidSurface};
 
@@ -171,7 +187,7 @@ mod tests {
         let settings = OctreeSettings { cells: 40, levels: 3 };
         let told = Mutex::new(Vec::new());
         let observer = |at: Meshing| told.lock().unwrap().push(at.done);
-        let (octree, report) = fill_observed(&solid, settings, &|_| 0, &observer).unwrap();
+        let (octree, report) = fill_observed(&solid, settings, &[], &observer).unwrap();
         let single = Octree::fill(&solid, settings, &|_| 0).unwrap();
         assert_eq!(octree.cells(), single.cells());
         assert!((report.volume_m3 / health.volume_m3 - 1.0).abs() < 0.02, "{report}");
@@ -184,7 +200,7 @@ mod tests {
     fn a_lattice_beyond_the_memory_is_refused() {
         let shape = scindo_physics::octree::BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
         let settings = OctreeSettings { cells: 1000, levels: 0 };
-        let error = fill_observed(&shape, settings, &|_| 0, &|_| ()).unwrap_err().to_string();
+        let error = fill_observed(&shape, settings, &[], &|_| ()).unwrap_err().to_string();
         assert!(error.contains("need about") || error.contains("cells"), "{error}");
     }
 }

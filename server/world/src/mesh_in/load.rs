@@ -6,6 +6,7 @@ use std::path::Path;
 use scindo_physics::mesh::TetMesh;
 use serde::Serialize;
 
+use super::cubes::OctreeReport;
 use super::health::volume::{VolumeHealth, repair_volume};
 use super::lattice::{LatticeReport, lattice_observed};
 use super::progress::Observer;
@@ -20,6 +21,8 @@ pub enum MeshHealth {
     Volume(VolumeHealth),
     /// The file held a surface, filled with a lattice.
     Surface(LatticeReport),
+    /// A box or surface was filled with octree cells.
+    Octree(OctreeReport),
 }
 
 /// Reads a volumetric mesh (`mesh = { file = … }`) and repairs it. `scale` converts its unit to metres.
@@ -75,6 +78,7 @@ impl fmt::Display for MeshHealth {
         match self {
             MeshHealth::Volume(health) => health.fmt(f),
             MeshHealth::Surface(report) => report.fmt(f),
+            MeshHealth::Octree(report) => report.fmt(f),
         }
     }
 }
@@ -85,6 +89,7 @@ impl MeshHealth {
         match self {
             MeshHealth::Volume(health) => [health.min_m, health.max_m],
             MeshHealth::Surface(report) => [report.surface.min_m, report.surface.max_m],
+            MeshHealth::Octree(report) => [report.min_m, report.max_m],
         }
     }
 
@@ -96,6 +101,8 @@ impl MeshHealth {
                 report.dropped_components += report.components - 1;
                 report.components = 1;
             }
+            // An octree keeps all parts.
+            MeshHealth::Octree(_) => {}
         }
     }
 }

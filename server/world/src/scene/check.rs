@@ -4,6 +4,8 @@ mod look;
 
 mod mechanics;
 
+mod octree;
+
 use std::collections::BTreeSet;
 
 use nalgebra::{Unit, Vector3};
@@ -16,6 +18,7 @@ use super::problem::{Fault, nearest_word};
 use super::raw::*;
 use super::schema::{Finding, json_schema, validate};
 use super::source::Node;
+use octree::Ready;
 
 /// Most tetrahedra a box may have; more would not fit the memory of an ordinary machine.
 const MAX_BOX_CELLS: u64 = 8_000_000;
@@ -28,7 +31,7 @@ pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
     }
     let raw: RawScene = serde_json::from_value(tree.to_json())
         .map_err(|error| vec![(String::new(), Fault::Syntax { message: error.to_string() })])?;
-    let mut check = Check { raw: &raw, findings: Vec::new() };
+    let mut check = Check { raw: &raw, findings: Vec::new(), ready: Ready::NOW };
     let scene = check.scene();
     if check.findings.is_empty() { Ok(scene) } else { Err(check.findings) }
 }
@@ -36,6 +39,7 @@ pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
 struct Check<'a> {
     raw: &'a RawScene,
     findings: Vec<Finding>,
+    ready: Ready,
 }
 
 impl Check<'_> {
@@ -92,13 +96,16 @@ impl Check<'_> {
 
     fn body(&mut self, body: &RawBody) -> BodySpec {
         let at = format!("body.{}", body.id);
-        let mesh = self.mesh(&format!("{at}.mesh"), &body.mesh);
+        let mesh = self.mesh(&format!("{at}.mesh"), body);
         let mechanics = self.mechanics(&at, body, &mesh);
+        let octree = self.octree(&at, body, &mesh);
         BodySpec {
             id: body.id.clone(),
             skin: body.skin.as_ref().map(|skin| self.skin(&at, skin, body)),
             largest_part: body.mesh.parts == Some(RawParts::Largest),
             mesh,
+            octree,
+            materials: self.materials(&at, body),
             mechanics,
             young_pa: body.young_pa,
             poisson: body.poisson,
@@ -113,7 +120,7 @@ impl Check<'_> {
     }
 
     fn skin(&mut self, at: &str, skin: &RawSkin, body: &RawBody) -> SkinSpec {
-        if body.cutting.method == RawCutMethod::Snap {
+        if body.cut_method() == RawCutMethod::Snap {
             let next = "write cutting.method = \"xfem\", or remove the skin";
             let what =
                 "found a skin with cutting.method = `snap`, which moves the nodes below it; allowed: xfem";
@@ -134,7 +141,8 @@ impl Check<'_> {
         }
     }
 
-    fn mesh(&mut self, at: &str, mesh: &RawMesh) -> MeshSource {
+    fn mesh(&mut self, at: &str, body: &RawBody) -> MeshSource {
+        let mesh = &body.mesh;
         if mesh.cells.is_some() && mesh.surface.is_none() {
             let next = "a box has its own `cells`; a volumetric file brings its elements";
             self.conflict(format!("{at}.cells"), "`cells` only goes with `surface`", next);
@@ -168,7 +176,7 @@ impl Check<'_> {
             };
         }
         if let Some(block) = &mesh.r#box {
-            return self.block(&format!("{at}.box"), block);
+            return self.block(&format!("{at}.box"), block, body.element == RawElement::Octree);
         }
         if let Some(grid) = &mesh.grid {
             return self.grid(&format!("{at}.grid"), grid);
@@ -178,9 +186,12 @@ impl Check<'_> {
         MeshSource::Organ { shape, cells: organ.map_or(4, |organ| organ.cells) as usize }
     }
 
-    fn block(&mut self, at: &str, block: &RawBox) -> MeshSource {
+    fn block(&mut self, at: &str, block: &RawBox, octree: bool) -> MeshSource {
         self.rising_corners(at, block.min_m, block.max_m, true);
-        self.cell_count(&format!("{at}.cells"), block.cells.map(u64::from));
+        // Most cells of an octree are joined to larger ones.
+        if !octree {
+            self.cell_count(&format!("{at}.cells"), block.cells.map(u64::from));
+        }
         MeshSource::Box {
             min_m: Vector3::from(block.min_m),
             max_m: Vector3::from(block.max_m),

@@ -40,6 +40,10 @@ pub struct BodySpec {
     pub id: String,
     /// Where its elements come from.
     pub mesh: MeshSource,
+    /// Its cells, if it consists of octree cells.
+    pub octree: Option<OctreeSpec>,
+    /// Regions of another material; the last one that holds a point counts.
+    pub materials: Vec<MaterialSpec>,
     /// Its skin; none: the elements' boundary.
     pub skin: Option<SkinSpec>,
     /// Whether only the largest part of the mesh is kept.
@@ -64,6 +68,44 @@ pub struct BodySpec {
     pub loads: Vec<LoadSpec>,
     /// How it is drawn.
     pub look: LookSpec,
+}
+
+/// Cells of an octree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OctreeSpec {
+    /// Finest cells along the longest side.
+    pub cells: u32,
+    /// The largest cells are 2^levels finest cells wide.
+    pub levels: u8,
+    /// Level that is simulated; 0: the cells themselves.
+    pub simulate_level: u8,
+}
+
+/// A region of another material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MaterialSpec {
+    /// Where.
+    pub place: MaterialPlace,
+    /// Young's modulus [Pa].
+    pub young_pa: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// Density at rest [kg/m³].
+    pub density_kg_m3: f64,
+}
+
+/// Where a material is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MaterialPlace {
+    /// In a region of rest space.
+    Region(Region),
+    /// Inside a surface file.
+    Surface {
+        /// Path as written.
+        path: String,
+        /// Metres per length unit of the file.
+        scale: f64,
+    },
 }
 
 /// How a body is drawn.

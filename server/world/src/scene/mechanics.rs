@@ -114,6 +114,7 @@ impl Mechanics {
                 RawElement::Tet4 => ElementKind::Tet4,
                 RawElement::Tet10 => ElementKind::Tet10,
                 RawElement::Hex8 => ElementKind::Hex8,
+                RawElement::Octree => ElementKind::Octree,
             },
             volumetric: match self.locking {
                 RawLocking::None => Volumetric::Full,
@@ -138,7 +139,7 @@ impl Mechanics {
             method: match self.method {
                 RawMethod::Cg => Method::Cg,
                 RawMethod::Cholesky => Method::Cholesky,
-                // The others are refused before a body is made.
+                // Multigrid is refused before a body is made.
                 RawMethod::Pcg | RawMethod::Relaxation | RawMethod::Multigrid | RawMethod::MgPcg => {
                     Method::Pcg
                 }
@@ -156,7 +157,7 @@ impl Mechanics {
             },
             newton_steps: self.newton_steps,
             cutting: match self.cutting {
-                // Links are refused before a body is made.
+                // An octree has no other method.
                 RawCutMethod::Xfem | RawCutMethod::Links => CuttingMethod::Xfem,
                 RawCutMethod::Snap => CuttingMethod::Snap,
             },

@@ -27,7 +27,8 @@ use std::path::{Path, PathBuf};
 
 pub use checked::{
     BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec, LookSpec,
-    MeshSource, PathPoint, ProbeSpec, PublishRates, Region, Share, SkinSpec, ToolSpec,
+    MaterialPlace, MaterialSpec, MeshSource, OctreeSpec, PathPoint, ProbeSpec, PublishRates, Region, Share,
+    SkinSpec, ToolSpec,
 };
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};
 pub use mechanics::{Mechanics, Newmark};

@@ -9,8 +9,11 @@ mod look;
 
 mod mechanics;
 
+mod octree;
+
 pub use look::*;
 pub use mechanics::*;
+pub use octree::*;
 
 use schemars::JsonSchema;
 use scindo_physics::material::Material;
@@ -99,6 +102,9 @@ pub struct RawBody {
     /// Finite element.
     #[serde(default)]
     pub element: RawElement,
+    /// Cells of `element = "octree"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub octree: Option<RawOctree>,
     /// Constitutive law. `neo-hookean` is the stable law of Smith et al. 2018. `stvk` is modified below a
     /// stretch of 0.65, so that it resists inversion.
     #[serde(default)]
@@ -115,6 +121,9 @@ pub struct RawBody {
     #[schemars(extend("minimum" = *Material::DENSITY_KG_M3.start(), "maximum" = *Material::DENSITY_KG_M3.end(),
         "x-next" = "soft tissue has about 1000 kg/m3"))]
     pub density_kg_m3: f64,
+    /// Regions of another material, for `element = "octree"`. Law and damping are those of the body.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub material: Vec<RawMaterial>,
     /// Rayleigh damping: a mass term and a stiffness term.
     #[serde(default)]
     pub rayleigh: RawRayleigh,
@@ -470,7 +479,8 @@ pub enum RawCutMethod {
     Xfem,
     /// Nodes are moved onto the sweep, and the mesh is separated along element faces. For `tet4`.
     Snap,
-    /// Hexahedral cells are unlinked from each other. Not supported yet.
+    /// Cells are unlinked from each other, which divides those along the cut into the finest ones. For
+    /// `octree`.
     Links,
 }
 
@@ -478,11 +488,23 @@ pub enum RawCutMethod {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawCutting {
-    /// Cutting method: inside elements (`xfem`) or along element faces (`snap`).
-    pub method: RawCutMethod,
+    /// Cutting method: inside elements (`xfem`), along element faces (`snap`) or between cells (`links`).
+    /// Default: `links` for `octree`, otherwise `xfem`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<RawCutMethod>,
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs
     /// the method `snap`.
     pub loose: RawLoose,
+}
+
+impl RawBody {
+    /// How the body is cut.
+    pub fn cut_method(&self) -> RawCutMethod {
+        self.cutting.method.unwrap_or(match self.element {
+            RawElement::Octree => RawCutMethod::Links,
+            _ => RawCutMethod::Xfem,
+        })
+    }
 }
 
 /// What happens to a part without held nodes.

@@ -24,7 +24,7 @@ fn points(model: &Model, e: usize) -> Vec<Point> {
                 Point { X: place(&N), N, w: w * model.volume(e) }
             })
             .collect(),
-        ElementKind::Hex8 => {
+        ElementKind::Hex8 | ElementKind::Octree => {
             let X: [Vector3<f64>; 8] = corners.clone().try_into().unwrap();
             quadrature::cube_gauss(3)
                 .iter()

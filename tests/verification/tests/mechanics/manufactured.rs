@@ -66,7 +66,9 @@ fn model(kind: ElementKind, cells: usize, law: Law) -> Model {
             Model::tet4(&box_mesh(low, high, [cells; 3], BoxPattern::Tet6), &material, Volumetric::Full)
         }
         ElementKind::Tet10 => Model::tet10(&box_mesh(low, high, [cells; 3], BoxPattern::Tet6), &material),
-        ElementKind::Hex8 => Model::hex8(&box_hexes(low, high, [cells; 3]), &material, Volumetric::Full),
+        ElementKind::Hex8 | ElementKind::Octree => {
+            Model::hex8(&box_hexes(low, high, [cells; 3]), &material, Volumetric::Full)
+        }
     }
     .unwrap()
 }

@@ -1,7 +1,7 @@
 //! What meshing lost, and elements that a law or a load does not suit.
 
 use crate::body::SimBody;
-use crate::mesh_in::{LatticeReport, MeshHealth, VolumeHealth, most_cells};
+use crate::mesh_in::{LatticeReport, MeshHealth, OctreeReport, VolumeHealth, most_cells};
 use crate::quantity::{coordinates, length, percent};
 use crate::scene::BodySpec;
 use crate::scene::raw::{RawElement, RawLocking};
@@ -23,6 +23,7 @@ pub fn doubts(spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
     match &body.health {
         Some(MeshHealth::Surface(report)) => lattice(&at, report, doubts),
         Some(MeshHealth::Volume(health)) => volume(&at, health, doubts),
+        Some(MeshHealth::Octree(report)) => octree(&at, report, doubts),
         None => {}
     }
     if spec.poisson > LOCKING
@@ -36,6 +37,23 @@ pub fn doubts(spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
         ));
     }
     forces(&at, spec, body, doubts);
+}
+
+fn octree(at: &str, report: &OctreeReport, doubts: &mut Vec<String>) {
+    let solid_m3 = report.surface.as_ref().map_or(0.0, |surface| surface.volume_m3);
+    let error = report.volume_m3 / solid_m3 - 1.0;
+    if solid_m3 > 0.0 && error.abs() > VOLUME {
+        let verb = if error < 0.0 { "lose" } else { "add" };
+        let (error, cells) = (percent(error.abs()), report.cells);
+        doubts
+            .push(format!("{at}.mesh: the cells {verb} {error} of the volume at {cells} cells; raise cells"));
+    }
+    for (i, _) in report.cells_of_region.iter().enumerate().filter(|(_, cells)| **cells == 0) {
+        doubts.push(format!(
+            "{at}.material.{i}: no cell has its centre in the region, or later regions cover it; make it larger or \
+             raise cells"
+        ));
+    }
 }
 
 fn lattice(at: &str, report: &LatticeReport, doubts: &mut Vec<String>) {

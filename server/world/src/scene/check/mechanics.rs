@@ -25,7 +25,7 @@ impl Check<'_> {
             iterations: body.solver.iterations,
             fixed_iterations: body.solver.fixed_iterations,
             tolerance: body.solver.tolerance,
-            cutting: body.cutting.method,
+            cutting: body.cut_method(),
             loose: body.cutting.loose,
         };
         self.cutting(at, &mechanics);
@@ -40,8 +40,14 @@ impl Check<'_> {
 
     fn cutting(&mut self, at: &str, m: &Mechanics) {
         let key = format!("{at}.cutting.method");
-        if m.cutting == RawCutMethod::Links {
-            return self.unsupported(key, "links", &["xfem", "snap"]);
+        if (m.cutting == RawCutMethod::Links) != (m.element == RawElement::Octree) {
+            let (found, element) = (word(&m.cutting), word(&m.element));
+            let (allowed, next) = match m.cutting {
+                RawCutMethod::Links => ("octree", "write element = \"octree\", or remove cutting.method"),
+                _ => ("tet4", "remove cutting.method; octree cells are cut along links"),
+            };
+            let what = format!("found `{found}` with {element}, allowed: {allowed}");
+            return self.conflict(key, what, next);
         }
         if m.cutting == RawCutMethod::Snap && m.element != RawElement::Tet4 {
             let what = format!("found `snap` with {}, allowed: tet4", word(&m.element));
@@ -58,10 +64,7 @@ impl Check<'_> {
     pub(super) fn cut_method(&mut self, at: &str, cut: &RawCut, body: usize) {
         let Some(found) = cut.method else { return };
         let key = format!("{at}.method");
-        if found == RawCutMethod::Links {
-            return self.unsupported(key, "links", &["xfem", "snap"]);
-        }
-        let own = self.raw.body.get(body).map_or(found, |body| body.cutting.method);
+        let own = self.raw.body.get(body).map_or(found, RawBody::cut_method);
         if found != own {
             let what = format!(
                 "found `{}`, but all cuts of `{}` are made by {}",
@@ -81,7 +84,8 @@ impl Check<'_> {
             let next = "give mesh.box or mesh.grid the pattern `hex`, or choose tet4 or tet10";
             self.conflict(format!("{at}.element"), what, next);
         }
-        if element != RawElement::Hex8 && hexahedra {
+        // Octree cells are cubes, whatever the pattern.
+        if !matches!(element, RawElement::Hex8 | RawElement::Octree) && hexahedra {
             let what = format!("found `{}` on the box pattern `hex`, allowed there: hex8", word(&element));
             let next = "write element = \"hex8\", or choose the pattern tet5, tet6 or oct6";
             self.conflict(format!("{at}.element"), what, next);
@@ -145,7 +149,13 @@ impl Check<'_> {
         let key = format!("{at}.solver.method");
         let found = word(&m.method);
         if matches!(m.method, RawMethod::Multigrid | RawMethod::MgPcg) {
-            return self.unsupported(key, &found, &["cg", "pcg", "cholesky", "relaxation"]);
+            if !self.ready.multigrid {
+                return self.unsupported(key, &found, &["cg", "pcg", "cholesky", "relaxation"]);
+            }
+            if m.element != RawElement::Octree {
+                let what = format!("found `{found}` with {}, allowed: octree", word(&m.element));
+                return self.conflict(key, what, "write element = \"octree\", or choose cg, pcg or cholesky");
+            }
         }
         if m.method == RawMethod::Relaxation && m.integrator != RawIntegrator::Static {
             let what = format!("found `relaxation` with {}, allowed: static", word(&m.integrator));
@@ -207,11 +217,11 @@ impl Check<'_> {
     /// Bodies whose mesh cannot be cut, against the cuts and blades of the scene.
     pub(super) fn cuttable(&mut self) {
         let raw = self.raw;
-        let whole = |body: &&RawBody| body.element != RawElement::Tet4;
+        let whole = |body: &&RawBody| !matches!(body.element, RawElement::Tet4 | RawElement::Octree);
         for (i, cut) in raw.cut.iter().enumerate() {
             if let Some(body) = raw.body.iter().filter(whole).find(|body| body.id == cut.body) {
                 let what = format!(
-                    "the cut goes through body `{}` of {} elements, allowed: only tet4",
+                    "the cut goes through body `{}` of {} elements, allowed: tet4, octree",
                     body.id,
                     word(&body.element)
                 );
@@ -222,7 +232,7 @@ impl Check<'_> {
         for tool in &raw.tool {
             if let Some(i) = tool.path.iter().position(|point| point.mode == RawMode::Cut) {
                 let what = format!(
-                    "a blade cuts every body it meets, but body `{}` is of {} elements; allowed: only tet4",
+                    "a blade cuts every body it meets, but body `{}` is of {} elements; allowed: tet4, octree",
                     body.id,
                     word(&body.element)
                 );
@@ -237,6 +247,6 @@ impl Check<'_> {
 }
 
 /// A word of the format as it is written in a scene.
-fn word<T: serde::Serialize>(value: &T) -> String {
+pub(super) fn word<T: serde::Serialize>(value: &T) -> String {
     serde_json::to_value(value).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }

@@ -8,13 +8,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawElement {
-    /// Linear tetrahedron. It is the only element that can be cut.
+    /// Linear tetrahedron. It can be cut anywhere.
     #[default]
     Tet4,
     /// Quadratic tetrahedron, for accuracy.
     Tet10,
     /// Trilinear hexahedron. It needs the pattern `hex`.
     Hex8,
+    /// Cubes on an adaptive octree, for very fine cuts along the links between them. It fills a `box`, a
+    /// `surface` or an `organ`.
+    Octree,
 }
 
 /// Constitutive law.
@@ -194,9 +197,9 @@ pub enum RawMethod {
     /// Matrix-free static relaxation, for the integrator `static`. Each step makes a fixed number of
     /// iterations and continues where the last one ended.
     Relaxation,
-    /// Not supported yet.
+    /// Multigrid cycles on the levels of an `octree`. Not supported yet.
     Multigrid,
-    /// Not supported yet.
+    /// Conjugate gradients with one multigrid cycle as preconditioner, for `octree`. Not supported yet.
     MgPcg,
 }
 

@@ -69,6 +69,7 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         RawElement::Tet4 => "tet4",
         RawElement::Tet10 => "tet10",
         RawElement::Hex8 => "hex8",
+        RawElement::Octree => "octree",
     };
     let remedy = match m.locking {
         RawLocking::None => "",
@@ -99,7 +100,16 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         RawMethod::Cg => {
             format!("cg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance)
         }
-        _ => format!("pcg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance),
+        RawMethod::Multigrid => {
+            format!("multigrid, at most {} cycles to {:e}, {precision}", size.iterations, m.tolerance)
+        }
+        RawMethod::MgPcg => format!(
+            "cg preconditioned by multigrid, at most {} iterations to {:e}, {precision}",
+            size.iterations, m.tolerance
+        ),
+        RawMethod::Pcg => {
+            format!("pcg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance)
+        }
     };
     let path = if m.arithmetic() == Arithmetic::Single {
         let operator = match m.body_settings().operator(m.constitutive_law(), size.elements) {
@@ -128,7 +138,7 @@ fn seconds(m: &Mechanics, size: &BodySize) -> f64 {
         (RawElement::Tet4, RawLocking::NodeAveraged) => (2.0, 4.0, 60.0),
         (RawElement::Tet4, _) => (1.0, 4.0, 14.0),
         (RawElement::Tet10, _) => (4.0, 10.0, 28.0),
-        (RawElement::Hex8, _) => (8.0, 8.0, 27.0),
+        (RawElement::Hex8 | RawElement::Octree, _) => (8.0, 8.0, 27.0),
     };
     let forces = elements * points * POINT_FORCES;
     let evaluations = match m.integrator {

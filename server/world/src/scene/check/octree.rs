@@ -1,0 +1,158 @@
+//! Bodies of octree cells, and regions of another material.
+
+use nalgebra::Vector3;
+
+use super::super::checked::{MaterialPlace, MaterialSpec, MeshSource, OctreeSpec};
+use super::super::raw::*;
+use super::Check;
+use super::mechanics::word;
+
+/// What physics can do for bodies of octree cells. The rest is parsed and checked, then refused as not supported
+/// yet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ready {
+    /// `element = "octree"`, `cutting.method = "links"` and `[[body.material]]`.
+    pub octree: bool,
+    /// `solver.method = "multigrid"` and `"mg-pcg"`.
+    pub multigrid: bool,
+    /// `octree.simulate_level = 1` and `2`.
+    pub simulate_level: bool,
+}
+
+impl Ready {
+    /// As physics is now.
+    pub const NOW: Self = Self { octree: true, multigrid: false, simulate_level: false };
+}
+
+impl Check<'_> {
+    /// The cells of a body of octree cells; `None` for other elements.
+    pub(super) fn octree(&mut self, at: &str, body: &RawBody, mesh: &MeshSource) -> Option<OctreeSpec> {
+        if body.element != RawElement::Octree {
+            if body.octree.is_some() {
+                let what = format!("`octree` only goes with element octree, found {}", word(&body.element));
+                self.conflict(format!("{at}.octree"), what, "remove it or write element = \"octree\"");
+            }
+            return None;
+        }
+        if !self.ready.octree {
+            self.unsupported(format!("{at}.element"), "octree", &["tet4", "tet10", "hex8"]);
+            return None;
+        }
+        if body.mesh.parts == Some(RawParts::Largest) {
+            let what = "`parts = \"largest\"` does not go with element octree";
+            self.conflict(format!("{at}.mesh.parts"), what, "remove it, and drop small parts in the file");
+        }
+        let octree = body.octree.clone().unwrap_or_default();
+        if octree.simulate_level > octree.levels {
+            let what =
+                format!("found {}, allowed: at most levels = {}", octree.simulate_level, octree.levels);
+            self.conflict(format!("{at}.octree.simulate_level"), what, "raise octree.levels or write 0");
+        }
+        if octree.simulate_level > 0 && !self.ready.simulate_level {
+            let found = octree.simulate_level.to_string();
+            self.unsupported(format!("{at}.octree.simulate_level"), &found, &["0"]);
+        }
+        let cells = match mesh {
+            MeshSource::Box { min_m, max_m, cells, .. } => {
+                self.cubes(&format!("{at}.mesh.box.cells"), max_m - min_m, *cells)
+            }
+            MeshSource::Surface { cells, .. } | MeshSource::Organ { cells, .. } => *cells,
+            MeshSource::File { .. } => {
+                let what = "found `octree` on a file of tetrahedra, allowed there: tet4, tet10";
+                let next = "fill a surface: mesh = { surface = \"…\", cells = 64 }";
+                self.conflict(format!("{at}.element"), what, next);
+                0
+            }
+            MeshSource::Grid { .. } => {
+                let what = "found `octree` on a grid, whose cells are not cubes";
+                self.conflict(format!("{at}.element"), what, "give the block as mesh.box");
+                0
+            }
+        };
+        let RawOctree { levels, simulate_level } = octree;
+        Some(OctreeSpec { cells: cells as u32, levels, simulate_level })
+    }
+
+    /// Cells of a box along its longest side, which must be cubes.
+    fn cubes(&mut self, at: &str, extent: Vector3<f64>, cells: [usize; 3]) -> usize {
+        let along = cells[extent.imax()];
+        let h = extent.max() / along as f64;
+        let fit = [0, 1, 2].map(|axis| (extent[axis] / h - 1e-6).ceil().max(1.0) as usize);
+        if h > 0.0 && fit != cells {
+            let what = format!("found {cells:?}, but the cells of an octree are cubes");
+            self.conflict(at.to_owned(), what, &format!("write {fit:?}"));
+        }
+        along
+    }
+
+    /// Regions of another material.
+    pub(super) fn materials(&mut self, at: &str, body: &RawBody) -> Vec<MaterialSpec> {
+        if !body.material.is_empty() && body.element != RawElement::Octree {
+            let what = format!(
+                "found regions of another material in a body of {} elements, allowed: only octree",
+                word(&body.element)
+            );
+            let next = "write element = \"octree\", or remove [[body.material]]";
+            self.conflict(format!("{at}.material"), what, next);
+            return Vec::new();
+        }
+        let spec = |(i, raw): (usize, &RawMaterial)| {
+            let at = format!("{at}.material.{i}");
+            if raw.scale.is_some() && raw.surface.is_none() {
+                let what = "`scale` only goes with `surface`";
+                self.conflict(format!("{at}.scale"), what, "give other regions in metres");
+            }
+            if raw.young_pa.is_none() && raw.poisson.is_none() && raw.density_kg_m3.is_none() {
+                let what = "the region has the material of the body";
+                self.conflict(at.clone(), what, "give young_pa, poisson or density_kg_m3, or remove it");
+            }
+            let place = match (&raw.surface, &raw.r#where) {
+                (Some(path), _) => {
+                    MaterialPlace::Surface { path: path.clone(), scale: raw.scale.unwrap_or(1.0) }
+                }
+                (None, region) => {
+                    let region = region.clone().unwrap_or_default();
+                    MaterialPlace::Region(self.region(&format!("{at}.where"), &region))
+                }
+            };
+            MaterialSpec {
+                place,
+                young_pa: raw.young_pa.unwrap_or(body.young_pa),
+                poisson: raw.poisson.unwrap_or(body.poisson),
+                density_kg_m3: raw.density_kg_m3.unwrap_or(body.density_kg_m3),
+            }
+        };
+        body.material.iter().enumerate().map(spec).collect()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// What a body with this line is refused for, once physics can do everything.
+    fn found(element: &str, line: &str) -> Vec<String> {
+        let text = format!(
+            "schema = 1\n[[body]]\nid = \"b\"\nelement = \"{element}\"\nyoung_pa = 1e4\npoisson = 0.3\n\
+             density_kg_m3 = 1000\nmesh = {{ organ = {{ cells = 16 }} }}\n{line}"
+        );
+        let raw: RawScene = toml::from_str(&text).unwrap();
+        let ready = Ready { octree: true, multigrid: true, simulate_level: true };
+        let mut check = Check { raw: &raw, findings: Vec::new(), ready };
+        check.scene();
+        check.findings.into_iter().map(|(path, fault)| format!("{path}: {fault}")).collect()
+    }
+
+    #[test]
+    fn what_is_still_to_come_is_accepted_once_it_is_there() {
+        for method in ["multigrid", "mg-pcg"] {
+            let line = format!("solver = {{ method = \"{method}\" }}\noctree = {{ simulate_level = 2 }}");
+            assert_eq!(found("octree", &line), [""; 0]);
+            let tets = found("tet4", &format!("solver = {{ method = \"{method}\" }}"));
+            assert!(tets[0].contains("allowed: octree"), "{tets:?}");
+        }
+        let coarse = found("octree", "octree = { levels = 1, simulate_level = 2 }");
+        assert!(coarse[0].contains("at most levels = 1"), "{coarse:?}");
+    }
+}

@@ -1,0 +1,128 @@
+//! Scenes with bodies of octree cells, from the text to the results.
+
+use std::path::Path;
+
+use scindo_world::inputs::Inputs;
+use scindo_world::mesh_in::MeshHealth;
+use scindo_world::results::Results;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+
+const BLOCK: &str = r#"
+    schema = 1
+    [world]
+    gravity_m_s2 = [0, 0, -9.81]
+    [[body]]
+    id = "block"
+    element = "octree"
+    mesh = { box = { min_m = [0, 0, 0], max_m = [0.08, 0.04, 0.04], cells = [16, 8, 8] } }
+    octree = { levels = 2 }
+    young_pa = 2e5
+    poisson = 0.3
+    density_kg_m3 = 1000
+    [[body.material]]
+    where = { sphere = { centre_m = [0.05, 0.02, 0.02], radius_m = 0.012 } }
+    young_pa = 2e6
+    density_kg_m3 = 2000
+    [[body.fix]]
+    where = { slab = { axis = "x", from = 0, to = 0 } }
+    [[body.load]]
+    where = { slab = { axis = "x", from = 1, to = 1 } }
+    force_n = [0, 0, -0.01]
+    [[cut]]
+    body = "block"
+    at_s = 0.0
+    sweep_m = [[[0.031, -0.01, 0.05], [0.031, 0.05, 0.05]], [[0.031, -0.01, 0.02], [0.031, 0.05, 0.02]]]
+    [[probe]]
+    id = "left"
+    body = "block"
+    point_m = [0.031, 0.02, 0.035]
+    side = [-1, 0, 0]
+    [[probe]]
+    id = "right"
+    body = "block"
+    point_m = [0.031, 0.02, 0.035]
+    side = [1, 0, 0]
+"#;
+
+fn start(text: &str) -> Result<Simulation, String> {
+    let scene = Scene::from_toml(text).map_err(|error| error.to_string())?;
+    Simulation::new(&scene, Path::new("")).map_err(|error| error.to_string())
+}
+
+fn refused(find: &str, replace: &str, parts: &[&str]) {
+    assert!(BLOCK.contains(find), "{find}");
+    let message = start(&BLOCK.replace(find, replace)).unwrap_err();
+    assert!(parts.iter().all(|part| message.contains(part)), "{parts:?} in: {message}");
+}
+
+#[test]
+fn a_block_sags_and_is_cut_and_its_lips_part() {
+    let mut sim = start(BLOCK).unwrap();
+    let (scene, directory) = (Scene::from_toml(BLOCK).unwrap(), tempfile::tempdir().unwrap());
+    let mut results = Results::begin(directory.path(), &scene, &sim).unwrap();
+    assert_eq!(sim.warnings(), [""; 0]);
+    let Some(MeshHealth::Octree(report)) = &sim.bodies()[0].health else { panic!("cells fill the block") };
+    assert!(report.leaves < 16 * 8 * 8 && report.cells_of_region[0] > 50, "{report}");
+    let sphere_m3 = 4.0 / 3.0 * std::f64::consts::PI * 0.012_f64.powi(3);
+    let mass = sim.bodies()[0].body.total_mass();
+    assert!((mass / (1000.0 * (0.08 * 0.04 * 0.04 + sphere_m3)) - 1.0).abs() < 0.03, "{mass}");
+    for _ in 0..8 {
+        sim.step(&Inputs::default());
+        results.record(&sim).unwrap();
+    }
+    assert_eq!((sim.cuts_applied(), sim.failures()), (1, Vec::<String>::new()));
+    let [left, right] = [0, 1].map(|i| sim.probe_position(&sim.probes()[i]));
+    assert!(right.x - left.x > 1e-4, "{left} {right}");
+    let body = &sim.bodies()[0].body;
+    assert!(body.surface().tags.contains(&1) && body.can_be_cut() && body.tets().is_none());
+    results.finish(&sim, "done").unwrap();
+    assert!(std::fs::metadata(directory.path().join("final.vtu")).unwrap().len() > 10_000);
+    sim.reset().unwrap();
+    assert!(!sim.step(&Inputs::default()).bodies[0].solve.is_unconverged());
+}
+
+#[test]
+fn an_organ_of_cells_follows_its_surface() {
+    let text = BLOCK
+        .replace(
+            "box = { min_m = [0, 0, 0], max_m = [0.08, 0.04, 0.04], cells = [16, 8, 8] }",
+            "organ = { cells = 24 }",
+        )
+        .split("[[body.material]]")
+        .next()
+        .unwrap()
+        .to_owned();
+    let sim = start(&text).unwrap();
+    let Some(MeshHealth::Octree(report)) = &sim.bodies()[0].health else { panic!("cells fill the organ") };
+    let surface = report.surface.as_ref().unwrap();
+    assert!((report.volume_m3 / surface.volume_m3 - 1.0).abs() < 0.03 && surface.is_clean(), "{report}");
+    assert!((sim.bodies()[0].cell_m() - report.spacing_m).abs() < 1e-15);
+}
+
+#[test]
+fn what_does_not_go_with_an_octree_is_refused() {
+    refused("cells = [16, 8, 8]", "cells = [16, 8, 9]", &["mesh.box.cells", "are cubes", "[16, 8, 8]"]);
+    refused("element = \"octree\"", "", &["body.block.octree", "write element = \"octree\""]);
+    let tets = ["body.block.material", "allowed: only octree"];
+    refused("element = \"octree\"\n    mesh", "mesh", &tets);
+    refused("levels = 2", "levels = 9", &["body.block.octree.levels"]);
+    refused("levels = 2", "levels = 2, simulate_level = 1", &["simulate_level", "`1` is not supported yet"]);
+    let method = "young_pa = 2e5\n    solver = { method = \"multigrid\" }";
+    refused("young_pa = 2e5", method, &["`multigrid` is not supported yet", "pcg"]);
+    let xfem = "young_pa = 2e5\n    cutting = { method = \"xfem\" }";
+    refused("young_pa = 2e5", xfem, &["found `xfem` with octree", "cut along links"]);
+    refused("young_pa = 2e5", "young_pa = 2e5\n    skin = {}", &["body.block.skin", "linear tetrahedra"]);
+    let bare = "where = { sphere = { centre_m = [0.05, 0.02, 0.02], radius_m = 0.012 } }\n    young_pa = 2e6\n    density_kg_m3 = 2000";
+    refused(bare, "where = { slab = { axis = \"x\", from = 0, to = 1 } }", &["material of the body"]);
+    refused(
+        "where = { sphere",
+        "surface = \"a.obj\"\n    where = { sphere",
+        &["exactly one of where, surface"],
+    );
+    refused(
+        "where = { sphere = { centre_m = [0.05, 0.02, 0.02], radius_m = 0.012 } }",
+        "surface = \"none.obj\"",
+        &["none.obj"],
+    );
+}
