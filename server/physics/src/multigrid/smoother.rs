@@ -9,6 +9,9 @@ use super::operator::LevelOperator;
 use crate::operator::{BLOCK, Inverse3, Padded, block_of};
 use crate::team::{Team, blocks};
 
+/// y = A x.
+pub type Multiply<'a> = dyn FnMut(&mut Team, &[Padded], &mut [Padded]) + 'a;
+
 /// How a cycle smooths, before and after the correction by the coarser level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Smoother {
@@ -65,7 +68,7 @@ pub struct Smoothing<'a> {
 /// set; otherwise `r` belongs to the iterate before.
 pub fn chebyshev(
     team: &mut Team,
-    multiply: &mut dyn FnMut(&mut Team, &[Padded], &mut [Padded]),
+    multiply: &mut Multiply<'_>,
     (inverse, largest): (&[Inverse3], f64),
     degree: u32,
     (v, residual): (Smoothing<'_>, bool),

@@ -139,10 +139,9 @@ impl Mechanics {
             method: match self.method {
                 RawMethod::Cg => Method::Cg,
                 RawMethod::Cholesky => Method::Cholesky,
-                // Multigrid is refused before a body is made.
-                RawMethod::Pcg | RawMethod::Relaxation | RawMethod::Multigrid | RawMethod::MgPcg => {
-                    Method::Pcg
-                }
+                RawMethod::Pcg | RawMethod::Relaxation => Method::Pcg,
+                RawMethod::Multigrid => Method::Multigrid,
+                RawMethod::MgPcg => Method::MgPcg,
             },
             relaxation: self.method == RawMethod::Relaxation,
             arithmetic: self.precision.map(|precision| match precision {

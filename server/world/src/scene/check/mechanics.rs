@@ -156,6 +156,11 @@ impl Check<'_> {
                 let what = format!("found `{found}` with {}, allowed: octree", word(&m.element));
                 return self.conflict(key, what, "write element = \"octree\", or choose cg, pcg or cholesky");
             }
+            // Multigrid works on the kernels of the fast path; a step of an assembled model has no levels.
+            if let Some(why) = m.why_general() {
+                let what = format!("found `{found}` with {why}");
+                return self.conflict(key, what, "change that, or choose cg, pcg or cholesky");
+            }
         }
         if m.method == RawMethod::Relaxation && m.integrator != RawIntegrator::Static {
             let what = format!("found `relaxation` with {}, allowed: static", word(&m.integrator));

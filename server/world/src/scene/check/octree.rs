@@ -21,7 +21,7 @@ pub(super) struct Ready {
 
 impl Ready {
     /// As physics is now.
-    pub const NOW: Self = Self { octree: true, multigrid: false, simulate_level: false };
+    pub const NOW: Self = Self { octree: true, multigrid: true, simulate_level: false };
 }
 
 impl Check<'_> {

@@ -197,9 +197,9 @@ pub enum RawMethod {
     /// Matrix-free static relaxation, for the integrator `static`. Each step makes a fixed number of
     /// iterations and continues where the last one ended.
     Relaxation,
-    /// Multigrid cycles on the levels of an `octree`. Not supported yet.
+    /// Multigrid cycles on the levels of an `octree`.
     Multigrid,
-    /// Conjugate gradients with one multigrid cycle as preconditioner, for `octree`. Not supported yet.
+    /// Conjugate gradients with one multigrid cycle as preconditioner, for `octree`.
     MgPcg,
 }
 
