@@ -117,7 +117,10 @@ impl BodySettings {
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
             (self.scheme.is_explicit(), "an explicit integrator"),
             (self.scheme == Scheme::Static && law.rotates(), "the static integrator with a law that rotates"),
-            (self.method != Method::Pcg && !self.method.is_multigrid(), "a solver other than pcg or multigrid"),
+            (
+                self.method != Method::Pcg && !self.method.is_multigrid(),
+                "a solver other than pcg or multigrid",
+            ),
             (self.mass != MassKind::Lumped, "consistent mass"),
             (self.volumetric != Volumetric::Full, "a locking remedy"),
             (self.newton_steps.is_some_and(|steps| steps > 1), "more than one Newton step"),

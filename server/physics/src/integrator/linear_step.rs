@@ -21,11 +21,11 @@ use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
 use super::step_solver::ActiveSprings;
 use crate::lists::reserve::resize_reserving;
 use crate::material::Rayleigh;
+use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport};
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
     Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
 };
-use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport};
 use crate::phase::Phase;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
 use crate::team::{Team, blocks};
@@ -238,11 +238,9 @@ impl LinearStep {
         let Self { pcg, preconditioner, delta, reference, grid, .. } = self;
         let mut A = system(elastic, &[], inputs);
         let until = (*reference, inputs.solver);
-        let solve = match grid {
+        let solve = match active(grid) {
             None => pcg.go_on(team, &mut A, preconditioner, delta, until),
-            Some(grid) => {
-                pcg.go_on(team, &mut A, &mut grid.cycle(preconditioner.inverses()), delta, until)
-            }
+            Some(grid) => pcg.go_on(team, &mut A, &mut grid.cycle(preconditioner.inverses()), delta, until),
         };
         let finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
         if finite {
@@ -510,7 +508,8 @@ impl LinearStep {
                 grid.follow(team, elastic, inputs);
             }
             let mut A = system(elastic, &self.terms, inputs);
-            grid.complete(team, &mut A, self.preconditioner.inverses(), &self.terms);
+            let blocks = (&self.diagonal[..], self.preconditioner.inverses());
+            grid.complete(team, &mut A, blocks, &self.terms);
         }
     }
 
@@ -594,7 +593,7 @@ impl LinearStep {
         });
         // A substitution and cycles mix copies, so the norm of the loads then needs a pass of its own.
         if first && pass == 0 {
-            let loads = if self.preconditioner.substitution().is_empty() && self.grid.is_none() {
+            let loads = if self.preconditioner.substitution().is_empty() && active(&mut self.grid).is_none() {
                 self.partial.iter().sum::<f64>().max(0.0).sqrt()
             } else {
                 for (c, load) in self.scratch.iter_mut().enumerate() {
@@ -603,11 +602,9 @@ impl LinearStep {
                 filter(inputs.step.fixed, &mut self.scratch);
                 let Self { pcg, preconditioner, scratch, grid, terms, .. } = self;
                 let mut A = system(elastic, terms, inputs);
-                match grid {
+                match active(grid) {
                     None => pcg.norm(team, &mut A, preconditioner, scratch),
-                    Some(grid) => {
-                        pcg.norm(team, &mut A, &mut grid.cycle(preconditioner.inverses()), scratch)
-                    }
+                    Some(grid) => pcg.norm(team, &mut A, &mut grid.cycle(preconditioner.inverses()), scratch),
                 }
             };
             self.reference = self.least_reference(loads, inputs);
@@ -643,7 +640,7 @@ impl LinearStep {
     ) -> LinearReport {
         let Self { pcg, preconditioner, terms, delta, grid, .. } = self;
         let mut A = system(elastic, terms, inputs);
-        let rz = match grid {
+        let rz = match active(grid) {
             None => pcg.precondition(team, &mut A, preconditioner),
             Some(grid) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
         };
@@ -655,7 +652,7 @@ impl LinearStep {
             self.began = if self.reference > 0.0 { norm / self.reference } else { 0.0 };
         }
         let from = (rz, self.reference, inputs.solver);
-        match grid {
+        match active(grid) {
             None => pcg.run(team, &mut A, preconditioner, delta, from),
             Some(grid) => {
                 let mut V = grid.cycle(preconditioner.inverses());
@@ -730,6 +727,11 @@ impl LinearStep {
             }
         });
     }
+}
+
+/// Multigrid, if the springs of the present solve allow cycles.
+fn active(grid: &mut Option<Box<StepGrid>>) -> Option<&mut StepGrid> {
+    grid.as_deref_mut().filter(|grid| grid.is_active())
 }
 
 fn system<'a>(

@@ -3,8 +3,12 @@
 use super::step_inputs::LinearInputs;
 use crate::material::Material;
 use crate::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
-use crate::operator::{Inverse3, LinearOperator, Place, Spring, Stiffness};
+use crate::operator::{Block6, Inverse3, LinearOperator, Place, Spring, Stiffness, invert};
 use crate::team::Team;
+
+/// Springs stiffer than this times the body at their point are left to block-Jacobi. Only the finest level has
+/// springs: corrections by the coarser ones overshoot along stiff ones, and single precision spoils the cycle.
+const STIFFEST_SPRING: f64 = 1.0;
 
 /// Multigrid, and what it was brought up to date with.
 #[derive(Debug)]
@@ -17,6 +21,8 @@ pub struct StepGrid {
     version: Option<u64>,
     /// λ of the finest level, where springs add to that of the last estimate; else 0.
     largest: f64,
+    /// Whether the springs of the present solve allow cycles.
+    active: bool,
 }
 
 impl StepGrid {
@@ -29,6 +35,7 @@ impl StepGrid {
             coefficients: none,
             version: None,
             largest: 0.0,
+            active: true,
         }
     }
 
@@ -50,17 +57,27 @@ impl StepGrid {
         multigrid.update(team, (coefficients, fixed), &|cell| elastic.rotation(places[cell as usize]));
     }
 
-    /// Estimates eigenvalues if they are not known for the operator `A` with these `springs`, whose diagonal
-    /// blocks have the inverses `inverse`.
+    /// Decides whether the `springs` allow cycles, and estimates eigenvalues if they are not known for the
+    /// operator `A`. Its diagonal blocks are those in `diagonal`, without springs; with them they have the
+    /// inverses `inverse`.
     pub fn complete(
         &mut self,
         team: &mut Team,
         A: &mut dyn LinearOperator,
-        inverse: &[Inverse3],
+        (diagonal, inverse): (&[Block6], &[Inverse3]),
         springs: &[Spring],
     ) {
+        self.active = springs.iter().all(|spring| stiffness_at_point(spring, diagonal) <= STIFFEST_SPRING);
+        if !self.active {
+            return;
+        }
         self.multigrid.estimate_eigenvalues(team, A, inverse);
         self.largest = with_springs(self.multigrid.largest_eigenvalue(), inverse, springs);
+    }
+
+    /// Whether the springs of the present solve allow cycles.
+    pub fn is_active(&self) -> bool {
+        self.active
     }
 
     /// One cycle as a preconditioner.
@@ -70,10 +87,8 @@ impl StepGrid {
 }
 
 fn set_coefficients(out: &mut Coefficients, hierarchy: &Hierarchy, inputs: &LinearInputs<'_>) {
-    let of = |material: &Material| CellMaterial {
-        lame: material.lame(),
-        density_kg_m3: material.density_kg_m3,
-    };
+    let of =
+        |material: &Material| CellMaterial { lame: material.lame(), density_kg_m3: material.density_kg_m3 };
     out.materials.clear();
     out.materials.push(of(inputs.material));
     let regions = hierarchy.regions().iter().map(|region| of(&inputs.material.of_region(region)));
@@ -92,19 +107,29 @@ fn with_springs(known: f64, inverse: &[Inverse3], springs: &[Spring]) -> f64 {
     }
     let (mut most, mut sum) = (known, known);
     for spring in springs {
-        let mut carriers = 0.0;
-        for (copy, w) in spring.point.carriers().filter(|(_, w)| *w != 0.0) {
-            let [x, y, z] = inverse[copy].columns();
-            let along = match spring.direction {
-                Some(n) => (0..3).map(|i| n[i] * (x[i] * n[0] + y[i] * n[1] + z[i] * n[2])).sum(),
-                None => x[0] + y[1] + z[2],
-            };
-            sum += f64::from(spring.stiffness) * f64::from(w * w) * f64::from(along);
-            carriers += 1.0;
-        }
-        most = most.max(carriers);
+        sum += compliance(spring, |copy| inverse[copy]);
+        most = most.max(spring.point.weights().iter().filter(|w| **w != 0.0).count() as f64);
     }
     most.min(sum)
+}
+
+/// The stiffness of a spring over that of the body at its point: k Jᵀ D⁻¹ J with the `diagonal` of the body.
+fn stiffness_at_point(spring: &Spring, diagonal: &[Block6]) -> f64 {
+    compliance(spring, |copy| invert(&diagonal[copy], [false; 3]))
+}
+
+/// k Jᵀ D⁻¹ J of a spring.
+fn compliance(spring: &Spring, inverse: impl Fn(usize) -> Inverse3) -> f64 {
+    let mut sum = 0.0;
+    for (copy, w) in spring.point.carriers().filter(|(_, w)| *w != 0.0) {
+        let [x, y, z] = inverse(copy).columns();
+        let along: f32 = match spring.direction {
+            Some(n) => (0..3).map(|i| n[i] * (x[i] * n[0] + y[i] * n[1] + z[i] * n[2])).sum(),
+            None => x[0] + y[1] + z[2],
+        };
+        sum += f64::from(w * w) * f64::from(along);
+    }
+    f64::from(spring.stiffness) * sum
 }
 
 #[cfg(test)]

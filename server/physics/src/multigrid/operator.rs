@@ -150,7 +150,8 @@ impl LevelOperator<'_> {
         });
     }
 
-    fn diagonal(&self, v: usize) -> Block6 {
+    /// Diagonal block of vertex `v`.
+    pub fn diagonal(&self, v: usize) -> Block6 {
         let mut sum = Matrix3::identity() * self.matrices.mass[v];
         for (id, c) in self.level.slots_of(v) {
             let R = matrix(&self.matrices.frame[id]);

@@ -129,7 +129,8 @@ impl Spring {
         f64::from(self.stiffness) * squared
     }
 
-    fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
+    /// y += k J Jᵀ x.
+    pub fn add_to(&self, x: &[Padded], y: &mut [Padded]) {
         let p = self.moved(x);
         let f = match self.direction {
             Some(n) => {

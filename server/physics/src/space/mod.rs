@@ -23,8 +23,8 @@ use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work};
 use crate::element::Points;
 use crate::material::Material;
-use crate::multigrid::Hierarchy;
 use crate::mesh::MeshError;
+use crate::multigrid::Hierarchy;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 

@@ -1,8 +1,10 @@
 //! Rates of the cycle and iterations of conjugate gradients with it.
 
-use super::support::{Exact, Scene, blade_grid, clamped, coefficients, cube};
+use super::support::{Exact, Scene, blade_grid, clamped, coefficients, cube, dot, vector};
+use crate::element::MaterialPoint;
 use crate::multigrid::{Hierarchy, MultigridSettings, Smoother};
 use crate::octree::Octree;
+use crate::operator::Spring;
 
 fn scene(octree: &Octree, poisson: f64) -> Scene {
     let fixed = clamped(octree, 2);
@@ -80,5 +82,40 @@ fn the_smoothers_of_the_paper_converge_as_printed() {
         let rate = scene.rate();
         println!("V(1,1), ω = {omega}: rate {rate:.3}");
         assert!(rate <= limit);
+    }
+}
+
+/// Springs are on the finest level only; the cycle stays a symmetric preconditioner, and each spring costs a few
+/// iterations.
+#[test]
+fn springs_cost_few_iterations() {
+    let mut octree = cube(12, 2);
+    blade_grid(&mut octree, &[6]);
+    let mut scene = scene(&octree, 0.3);
+    let free = measured("without springs", self::scene(&octree, 0.3));
+    let id = octree.cells().len() - 1;
+    let cell = octree.vertices()[id];
+    let point = |weights: [f32; 8]| MaterialPoint::new(cell.into_iter().zip(weights));
+    for stiffness in [1e3, 1e4, 1e5] {
+        let springs = [
+            Spring { point: point([0.0, 0.0, 0.0, 0.0, 0.5, 0.3, 0.15, 0.05]), direction: None, stiffness },
+            Spring {
+                point: point([0.0, 0.3, 0.0, 0.2, 0.0, 0.4, 0.0, 0.1]),
+                direction: Some([0.6, 0.0, 0.8]),
+                stiffness,
+            },
+        ];
+        scene.add_springs(&springs, 4.0);
+        let [u, w] = [vector(scene.exact.mass.len(), 1), vector(scene.exact.mass.len(), 2)].map(|mut v| {
+            scene.exact.filter(&mut v);
+            v
+        });
+        let (Vu, Vw) = (scene.cycle(&u), scene.cycle(&w));
+        let (one, other) = (dot(&w, &Vu), dot(&u, &Vw));
+        assert!((one - other).abs() < 1e-3 * (dot(&u, &Vu) * dot(&w, &Vw)).sqrt());
+        let b = scene.gravity();
+        let (iterations, _) = scene.mg_pcg(&b, 1e-6);
+        println!("springs of {stiffness:e} N/m: {iterations} iterations");
+        assert!(iterations <= free.1 + 12);
     }
 }

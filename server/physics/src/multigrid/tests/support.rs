@@ -9,7 +9,7 @@ use crate::multigrid::table::unit_stiffness;
 use crate::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
 use crate::octree::{BoxShape, CutLink, LinkKey, Octree, OctreeSettings, corner_weights};
 use crate::operator::{
-    BlockJacobi, FixedCopy, Inverse3, LinearOperator, Padded, Preconditioner, filter, padded,
+    BlockJacobi, FixedCopy, Inverse3, LinearOperator, Padded, Preconditioner, Spring, filter, invert, padded,
 };
 use crate::team::Team;
 
@@ -75,6 +75,7 @@ pub struct Exact {
     scale: f64,
     pub mass: Vec<f64>,
     pub fixed: Vec<FixedCopy>,
+    pub springs: Vec<Spring>,
 }
 
 impl Exact {
@@ -97,6 +98,7 @@ impl Exact {
             scale: with.scale,
             mass,
             fixed: fixed.to_vec(),
+            springs: Vec::new(),
         }
     }
 
@@ -148,6 +150,13 @@ impl Exact {
                 }
             }
         }
+        for spring in &self.springs {
+            let moved: V3 = spring.point.carriers().map(|(c, w)| f64::from(w) * x[c]).sum();
+            let k = f64::from(spring.stiffness);
+            let n = spring.direction.map(|n| V3::new(n[0].into(), n[1].into(), n[2].into()));
+            let f = n.map_or(k * moved, |n| k * n.dot(&moved) * n);
+            spring.point.carriers().for_each(|(c, w)| y[c] += f64::from(w) * f);
+        }
         self.filter(&mut y);
         y
     }
@@ -169,6 +178,7 @@ pub struct Fine {
     galerkin: Galerkin,
     products: CellProducts,
     fixed: Vec<FixedCopy>,
+    pub springs: Vec<Spring>,
     pub jacobi: BlockJacobi,
 }
 
@@ -182,7 +192,7 @@ impl Fine {
         let operator = galerkin.operator(&hierarchy.levels[0], 0);
         operator.invert_diagonal(team, |v| galerkin.fixed(v as u32), jacobi.inverses_mut());
         let products = vec![[[0.0; 4]; 8]; exact.octree.cells().len()];
-        Self { hierarchy, galerkin, products, fixed: exact.fixed.clone(), jacobi }
+        Self { hierarchy, galerkin, products, fixed: exact.fixed.clone(), springs: Vec::new(), jacobi }
     }
 
     pub fn inverses(&mut self) -> Vec<Inverse3> {
@@ -192,8 +202,9 @@ impl Fine {
 
 impl LinearOperator for Fine {
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
-        let Self { hierarchy, galerkin, products, fixed, .. } = self;
+        let Self { hierarchy, galerkin, products, fixed, springs, .. } = self;
         galerkin.operator(&hierarchy.levels[0], 0).apply(team, x, y, products);
+        springs.iter().for_each(|spring| spring.add_to(x, y));
         filter(fixed, y);
     }
 }
@@ -205,6 +216,7 @@ pub struct Scene {
     pub with: Coefficients,
     pub fine: Fine,
     pub inverse: Vec<Inverse3>,
+    pub largest: f64,
     pub multigrid: Multigrid,
 }
 
@@ -223,15 +235,31 @@ impl Scene {
         let mut fine = Fine::new(&mut team, &exact, &with);
         let inverse = fine.inverses();
         let multigrid = Multigrid::new(hierarchy, settings);
-        let mut scene = Self { team, exact, with, fine, inverse, multigrid };
+        let mut scene = Self { team, exact, with, fine, inverse, largest: 0.0, multigrid };
         scene.update();
         scene
     }
 
     pub fn update(&mut self) {
-        let Self { team, exact, with, fine, inverse, multigrid } = self;
+        let Self { team, exact, with, fine, inverse, multigrid, .. } = self;
         multigrid.update(team, (with, &exact.fixed), &|id| exact.rotation(id));
         multigrid.estimate_eigenvalues(team, fine, inverse);
+    }
+
+    /// Adds springs to the finest level; `largest` is the bound of its largest eigenvalue then.
+    pub fn add_springs(&mut self, springs: &[Spring], largest: f64) {
+        let mut diagonal = vec![[0.0; 8]; self.exact.mass.len()];
+        let operator = self.fine.galerkin.operator(&self.fine.hierarchy.levels[0], 0);
+        diagonal.iter_mut().enumerate().for_each(|(v, block)| *block = operator.diagonal(v));
+        for spring in springs {
+            spring.point.carriers().for_each(|(c, w)| spring.add_to_block(w, &mut diagonal[c]));
+        }
+        for (c, _) in springs.iter().flat_map(|spring| spring.point.carriers()) {
+            self.inverse[c] = invert(&diagonal[c], [false; 3]);
+        }
+        self.exact.springs = springs.to_vec();
+        self.fine.springs = springs.to_vec();
+        self.largest = largest;
     }
 
     /// V r, scaled into the range of single precision.
@@ -240,8 +268,8 @@ impl Scene {
         let r: Vec<Padded> = r.iter().map(|r| padded(&(scale * r))).collect();
         let mut z = vec![[0.0; 4]; r.len()];
         let mut partial = vec![0.0; r.len().div_ceil(crate::operator::BLOCK)];
-        let Self { team, fine, inverse, multigrid, .. } = self;
-        let mut M = Cycle { multigrid, inverse, largest: 0.0 };
+        let Self { team, fine, inverse, largest, multigrid, .. } = self;
+        let mut M = Cycle { multigrid, inverse, largest: *largest };
         M.apply(team, fine, &r, &mut z, &mut partial);
         z.iter().map(|z| V3::new(z[0].into(), z[1].into(), z[2].into()) / scale).collect()
     }
