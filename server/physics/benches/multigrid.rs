@@ -1,0 +1,89 @@
+//! Measures multigrid on octree cells: `cargo bench -p scindo-physics --bench multigrid`. `-- --quick` makes a short
+//! run. Times of building, updates and a cycle, V(2,2) with the Chebyshev smoother.
+
+#![allow(clippy::unwrap_used, clippy::disallowed_methods)] // a bench times
+#![allow(non_snake_case)] // the symbols of the field: A, D
+
+use std::time::Instant;
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use scindo_physics::element::Simd;
+use scindo_physics::material::{Lame, Law};
+use scindo_physics::multigrid::{CellMaterial, Coefficients, Hierarchy, Multigrid, MultigridSettings};
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
+use scindo_physics::operator::cells::CellStiffness;
+use scindo_physics::operator::{BLOCK, BlockJacobi, ElasticUpdate, FixedCopy, Stiffness};
+use scindo_physics::team::{Team, blocks};
+
+const LAME: Lame = Lame { mu: 4e5, lambda: 6e5 };
+
+fn main() {
+    let quick = std::env::args().any(|a| a == "--quick" || a == "--test");
+    let sizes: &[(u32, u8)] = if quick { &[(16, 2)] } else { &[(32, 0), (64, 0), (80, 4)] };
+    for &(cells, levels) in sizes {
+        let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
+        let octree = Octree::fill(&shape, OctreeSettings { cells, levels }, &|_| 0).unwrap();
+        for threads in [1, 2] {
+            measure(&octree, threads);
+        }
+    }
+}
+
+fn measure(octree: &Octree, threads: usize) {
+    let mut team = Team::new(threads).unwrap();
+    let low = (0_u32..).zip(octree.points()).filter(|(_, p)| p[2] == 0);
+    let fixed: Vec<FixedCopy> =
+        low.map(|(copy, _)| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] }).collect();
+    let mut A = CellStiffness::new(Simd::detect(), octree, &[]);
+    let x = octree.rest_positions();
+    A.update(&mut team, &ElasticUpdate { lame: LAME, law: Law::Linear, scale: 1.0 }, &x);
+    let mut diagonal = vec![[0.0; 8]; x.len()];
+    let K = &A;
+    team.for_blocks(blocks(&mut diagonal, BLOCK), |block, d| K.diagonals(block, d));
+    let mut D = BlockJacobi::default();
+    D.resize(x.len());
+    D.update(&mut team, &diagonal, &fixed);
+
+    let begin = Instant::now();
+    let mut multigrid = Multigrid::new(Hierarchy::new(octree), MultigridSettings::default());
+    let built = begin.elapsed();
+    let materials = vec![CellMaterial { lame: LAME, density_kg_m3: 1000.0 }];
+    let with = Coefficients { materials, scale: 1.0, mass_factor: 0.0 };
+    let begin = Instant::now();
+    multigrid.update(&mut team, (&with, &fixed), &|_| Matrix3::identity());
+    let first = begin.elapsed();
+    let begin = Instant::now();
+    multigrid.estimate_eigenvalues(&mut team, &mut A, D.inverses());
+    let estimated = begin.elapsed();
+    let turned = Rotation3::new(Vector3::new(0.2, 0.3, 0.1)).into_inner();
+    let begin = Instant::now();
+    multigrid.update(&mut team, (&with, &fixed), &|_| turned);
+    let followed = begin.elapsed();
+    multigrid.update(&mut team, (&with, &fixed), &|_| Matrix3::identity());
+
+    let r = vec![[1.0, -0.5, 0.25, 0.0]; x.len()];
+    let mut z = r.clone();
+    let mut best = f64::INFINITY;
+    for _ in 0..5 {
+        let begin = Instant::now();
+        multigrid.cycle(&mut team, &mut A, (D.inverses(), 0.0), &r, &mut z);
+        best = best.min(begin.elapsed().as_secs_f64());
+    }
+    let cells = octree.cells().len();
+    let ms = |t: std::time::Duration| 1e3 * t.as_secs_f64();
+    println!(
+        "{cells} cells, {threads} threads: built in {:.0} ms, first update {:.0} ms, eigenvalues {:.0} ms, \
+         rigid rotation {:.0} ms, cycle {:.1} ms ({:.2} M cells/s)",
+        ms(built),
+        ms(first),
+        ms(estimated),
+        ms(followed),
+        1e3 * best,
+        cells as f64 / best / 1e6,
+    );
+    if threads == 1 {
+        let (levels, coarsest) = multigrid.report();
+        levels.iter().for_each(|level| println!("    {level:?}"));
+        println!("    {coarsest:?}");
+    }
+}
