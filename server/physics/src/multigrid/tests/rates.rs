@@ -2,7 +2,7 @@
 
 use super::support::{Exact, Scene, blade_grid, clamped, coefficients, cube, dot, vector};
 use crate::element::MaterialPoint;
-use crate::multigrid::{Hierarchy, MultigridSettings, Smoother};
+use crate::multigrid::{CoarsestSolve, Hierarchy, MultigridSettings, Smoother};
 use crate::octree::Octree;
 use crate::operator::Spring;
 
@@ -118,4 +118,19 @@ fn springs_cost_few_iterations() {
         println!("springs of {stiffness:e} N/m: {iterations} iterations");
         assert!(iterations <= free.1 + 12);
     }
+}
+
+/// Where coarsening ends above the size for a factorisation, a polynomial of high degree takes its place.
+#[test]
+fn a_large_coarsest_level_is_smoothed() {
+    let octree = cube(24, 0);
+    let (fixed, with) = (clamped(&octree, 2), coefficients(0.3, 0.0));
+    let exact = Exact::new(&octree, &with, &fixed);
+    let hierarchy = Hierarchy::with(&octree, 8_000, true);
+    let scene = Scene::of(exact, with, hierarchy, MultigridSettings::default());
+    let (levels, coarsest) = scene.multigrid.report();
+    assert!(levels.len() == 2 && 3 * levels[1].vertices > 3_000);
+    assert_eq!(coarsest, CoarsestSolve::Sweeps { degree: 24 });
+    let (rate, iterations) = measured("large coarsest level", scene);
+    assert!(rate < 0.9 && iterations <= 20);
 }
