@@ -55,9 +55,8 @@ fn measure(name: &str, settings: OctreeSettings, rounds: usize) {
         arranged * 1e3,
         bytes as f64 / n_cells as f64
     );
-    let bend = |rest: &Vector3<f64>| {
+    let bend =
         |p: &Vector3<f64>| p + 0.1 * Vector3::new((3.0 * p.y).sin(), 0.3 * p.z * p.z, (2.0 * p.x).cos());
-    };
     let positions: Vec<_> = octree.rest_positions().iter().map(bend).collect();
     let x: Vec<Padded> = (0..n).map(|n| [(0.3 * n as f32).sin(), 1.0, (0.7 * n as f32).cos(), 0.0]).collect();
     let mut y = vec![[0.0; 4]; n];

@@ -5,8 +5,9 @@ use nalgebra::Matrix3;
 use super::coarsest::{Coarsest, CoarsestSolve};
 use super::galerkin::{CellMatrix, Coefficients, Galerkin};
 use super::hierarchy::Hierarchy;
-use super::operator::CellProducts;
+use super::kernel::LevelKernel;
 use super::smoother::{Smoother, Smoothing, chebyshev, gauss_seidel};
+use crate::element::Simd;
 use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, block_of, filter, rows};
 use crate::team::{Team, blocks};
 
@@ -23,11 +24,13 @@ pub struct MultigridSettings {
     /// Rotations within a merged cell that differ from their mean by no more than this [rad] count as equal. 0
     /// gives exact Galerkin operators.
     pub same_rotation_rad: f64,
+    /// Instructions of the kernels.
+    pub simd: Simd,
 }
 
 impl Default for MultigridSettings {
     fn default() -> Self {
-        Self { smoother: Smoother::default(), same_rotation_rad: 0.1 }
+        Self { smoother: Smoother::default(), same_rotation_rad: 0.1, simd: Simd::detect() }
     }
 }
 
@@ -70,17 +73,19 @@ struct Vectors {
     r: Vec<Padded>,
     d: Vec<Padded>,
     q: Vec<Padded>,
-    products: CellProducts,
+    /// Below the finest level its operator.
+    kernel: Option<LevelKernel>,
 }
 
 impl Multigrid {
     /// Multigrid on `hierarchy`. [`update`](Self::update) comes before the first cycle.
     pub fn new(hierarchy: Hierarchy, settings: MultigridSettings) -> Self {
+        let galerkin = Galerkin::new(&hierarchy);
         let levels = hierarchy.levels.iter().enumerate().map(|(l, level)| {
             let zeros = || vec![[0.0; 4]; level.n_vertices];
             let inner = || if l > 0 { zeros() } else { Vec::new() };
             let n = level.n_vertices;
-            let products = if l > 0 { level.cells.len() } else { 0 };
+            let kernel = (l > 0).then(|| LevelKernel::new(settings.simd, level, &galerkin.levels[l]));
             Vectors {
                 inverse: if l > 0 { vec![Inverse3::default(); n] } else { Vec::new() },
                 largest: 1.0,
@@ -89,14 +94,15 @@ impl Multigrid {
                 r: zeros(),
                 d: zeros(),
                 q: zeros(),
-                products: vec![[[0.0; 4]; 8]; products],
+                kernel,
             }
         });
+        let levels = levels.collect();
         Self {
             settings,
-            galerkin: Galerkin::new(&hierarchy),
+            galerkin,
             coarsest: Coarsest::new(&hierarchy),
-            levels: levels.collect(),
+            levels,
             fixed: Vec::new(),
             estimate: true,
             partial: vec![0.0; hierarchy.n_vertices().div_ceil(BLOCK)],
@@ -120,6 +126,9 @@ impl Multigrid {
         for l in 1..levels.len() {
             let operator = galerkin.operator(&hierarchy.levels[l], l);
             operator.invert_diagonal(team, |_| 0, &mut levels[l].inverse);
+            if let Some(kernel) = &mut levels[l].kernel {
+                kernel.follow(team, &hierarchy.levels[l], (galerkin, l, anew));
+            }
         }
         coarsest.update(hierarchy, galerkin, any, tolerance);
         self.estimate |= anew;
@@ -146,9 +155,9 @@ impl Multigrid {
 
     /// Power iterations on every level, from the same vector each time.
     fn power_iterations(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
-        let Self { hierarchy, galerkin, levels, fixed, partial, .. } = self;
+        let Self { galerkin, levels, fixed, partial, .. } = self;
         for (l, level) in levels.iter_mut().enumerate() {
-            let Vectors { inverse: own, largest, r, d, q, products, .. } = level;
+            let Vectors { inverse: own, largest, r, d, q, kernel, .. } = level;
             let inverse = if l == 0 { inverse } else { &own[..] };
             for (v, d) in (0_u32..).zip(d.iter_mut()) {
                 let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
@@ -161,10 +170,9 @@ impl Multigrid {
             let partial = &mut partial[..d.len().div_ceil(BLOCK)];
             let mut estimate: f64 = 0.0;
             for _ in 0..POWER_ITERATIONS {
-                if l == 0 {
-                    A.apply(team, d, q);
-                } else {
-                    galerkin.operator(&hierarchy.levels[l], l).apply(team, d, q, products);
+                match kernel {
+                    Some(kernel) => kernel.apply(team, &galerkin.levels[l].mass, d, q),
+                    None => A.apply(team, d, q),
                 }
                 // With q = A d and z = D⁻¹ q: λ ≈ qᵀz / qᵀd.
                 let (known, product) = (&*d, &*q);
@@ -259,11 +267,12 @@ impl Multigrid {
     ) {
         let Self { settings, hierarchy, galerkin, levels, .. } = self;
         let operator = galerkin.operator(&hierarchy.levels[l], l);
-        let Vectors { largest: known, r, d, q, products, .. } = &mut levels[l];
+        let Vectors { largest: known, r, d, q, kernel, .. } = &mut levels[l];
         let largest = largest.max(*known);
-        let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match l {
-            0 => A.apply(team, x, y),
-            _ => operator.apply(team, x, y, products),
+        let mass = &galerkin.levels[l].mass;
+        let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match kernel {
+            Some(kernel) => kernel.apply(team, mass, x, y),
+            None => A.apply(team, x, y),
         };
         if before {
             team.for_blocks(blocks(r, BLOCK), |block, r| r.copy_from_slice(block_of(b, block)));
@@ -303,10 +312,10 @@ impl Multigrid {
         (inverse, largest): (&[Inverse3], f64),
         outer: Option<(&[Padded], &mut [Padded])>,
     ) {
-        let Self { hierarchy, galerkin, coarsest, levels, .. } = self;
+        let Self { galerkin, coarsest, levels, .. } = self;
         let last = levels.len() - 1;
         let is_outer = outer.is_some();
-        let Vectors { inverse: own, largest: known, x, b, r, d, q, products } = &mut levels[last];
+        let Vectors { inverse: own, largest: known, x, b, r, d, q, kernel } = &mut levels[last];
         let (b, x, inverse) = match outer {
             Some((b, x)) => (b, x, inverse),
             None => (&b[..], &mut x[..], &own[..]),
@@ -316,9 +325,10 @@ impl Multigrid {
             CoarsestSolve::Sweeps { degree } => {
                 x.fill([0.0; 4]);
                 r.copy_from_slice(b);
-                let operator = galerkin.operator(&hierarchy.levels[last], last);
-                let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| {
-                    if is_outer { A.apply(team, x, y) } else { operator.apply(team, x, y, products) }
+                let mass = &galerkin.levels[last].mass;
+                let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match kernel {
+                    Some(kernel) => kernel.apply(team, mass, x, y),
+                    None => A.apply(team, x, y),
                 };
                 let largest = known.max(if is_outer { largest } else { 0.0 });
                 let v = Smoothing { x, r, d, q };

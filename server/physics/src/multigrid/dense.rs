@@ -2,6 +2,8 @@
 
 use nalgebra::Matrix3;
 
+use crate::operator::cells::Matrix24;
+
 /// Entries of a packed matrix: the upper triangle by columns.
 pub const PACKED: usize = 300;
 
@@ -30,6 +32,11 @@ impl Dense {
             }
         }
         out
+    }
+
+    /// The same in double precision.
+    pub fn wide(&self) -> Matrix24 {
+        self.0.map(|column| column.map(f64::from))
     }
 
     /// Its upper triangle.

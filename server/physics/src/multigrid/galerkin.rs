@@ -17,6 +17,7 @@ use super::table::{self, Weights};
 use crate::lists::reserve::resize_reserving;
 use crate::material::Lame;
 use crate::octree::{Cell, corner_weights};
+use crate::operator::cells::unit_stiffness;
 use crate::operator::{BLOCK, FixedCopy};
 use crate::team::{Team, blocks};
 
@@ -84,7 +85,7 @@ pub struct LevelMatrices {
     /// Whether prescribed vertices are below the cell, and whether some of them in some directions only.
     holds: Vec<[bool; 2]>,
     /// Whether the matrix in the frame of the cell changed in this update.
-    changed: Vec<bool>,
+    pub changed: Vec<bool>,
 }
 
 /// The matrices of all levels.
@@ -195,7 +196,7 @@ impl Galerkin {
             let material = of(kind.material).unwrap_or(&none);
             let side = f64::from(1_u32 << kind.side) * hierarchy.h;
             let mass = with.mass_factor * material.density_kg_m3 * side.powi(3);
-            let K = table::unit_stiffness(material.lame);
+            let K = unit_stiffness(material.lame);
             let M = (kind.merged > 0).then(|| table::merged_mass(kind.merged));
             self.shared.push(table::cube(&K, with.scale * side, M.as_ref(), mass));
             self.eighth.push((mass / 8.0) as f32);

@@ -14,6 +14,7 @@ mod dense;
 mod table;
 mod galerkin;
 mod operator;
+mod kernel;
 mod smoother;
 mod coarsest;
 mod cycle;

@@ -13,9 +13,11 @@ use crate::operator::{BLOCK, Block6, Inverse3, Padded, invert};
 use crate::team::{Team, blocks};
 
 /// Cells per unit of work.
+#[cfg(test)]
 const CELLS: usize = 64;
 
 /// What every cell adds to its eight vertices.
+#[cfg(test)]
 pub type CellProducts = Vec<[Padded; 8]>;
 
 /// One level: its cells and their matrices.
@@ -37,7 +39,8 @@ impl Galerkin {
 }
 
 impl LevelOperator<'_> {
-    /// y = A x; `products` is scratch with one entry per cell.
+    /// y = A x, cell by cell: what the kernels are tested against. `products` is scratch with one entry per cell.
+    #[cfg(test)]
     pub fn apply(&self, team: &mut Team, x: &[Padded], y: &mut [Padded], products: &mut CellProducts) {
         team.for_blocks(blocks(products, CELLS), |block, products| {
             for (i, product) in products.iter_mut().enumerate() {

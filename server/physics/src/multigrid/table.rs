@@ -2,29 +2,9 @@
 
 use super::dense::Dense;
 use super::level::trilinear;
-use crate::element::{hex8, quadrature};
-use crate::material::Lame;
 
 /// Row c: coefficients of the corners.
 pub type Weights = [[f32; 8]; 8];
-
-/// ∫ Bᵀ D B over a cube of side 1 m [N/m]; that of side s is s times as large. Row and column 3 c + i belong to
-/// corner c and component i.
-pub fn unit_stiffness(Lame { mu, lambda }: Lame) -> [[f64; 24]; 24] {
-    let mut K = [[0.0; 24]; 24];
-    for (xi, weight) in quadrature::cube_gauss(2) {
-        // From [−1, 1]³ to side 1: gradients double, and the volume is an eighth.
-        let g = hex8::reference_gradients(&xi).map(|g| 2.0 * g);
-        for (r, row) in K.iter_mut().enumerate() {
-            for (s, entry) in row.iter_mut().enumerate() {
-                let ((a, i), (b, j)) = ((r / 3, r % 3), (s / 3, s % 3));
-                let shear = g[a][j] * g[b][i] + if i == j { g[a].dot(&g[b]) } else { 0.0 };
-                *entry += weight / 8.0 * (mu * shear + lambda * g[a][i] * g[b][j]);
-            }
-        }
-    }
-    K
-}
 
 /// The mass of a cube of mass 1 whose lumped leaves were merged `merged` times: one scalar for every two corners.
 ///
@@ -67,6 +47,8 @@ pub fn cube(K: &[[f64; 24]; 24], stiffness: f64, M: Option<&[[f64; 8]; 8]>, mass
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::Lame;
+    use crate::operator::cells::unit_stiffness;
 
     #[test]
     fn eight_cubes_make_one_of_twice_the_side() {

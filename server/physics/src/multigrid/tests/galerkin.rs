@@ -1,5 +1,7 @@
 //! Operators of the levels against Pᵀ A P in double precision.
 
+use crate::element::Simd;
+use crate::multigrid::kernel::LevelKernel;
 use nalgebra::Rotation3;
 
 use super::levels::random_cuts;
@@ -37,9 +39,16 @@ fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
         let mut products = vec![[[0.0; 4]; 8]; level.cells.len()];
         if l > 0 {
             galerkin.operator(level, l).apply(&mut team, &x32, &mut y32, &mut products);
-            let difference: Vec<V3> =
-                y32.iter().zip(&y).map(|(a, b)| V3::new(a[0].into(), a[1].into(), a[2].into()) - b).collect();
-            worst = worst.max((dot(&difference, &difference) / dot(&y, &y)).sqrt());
+            // The kernels do the same.
+            let mut kernel = LevelKernel::new(Simd::detect(), level, &galerkin.levels[l]);
+            kernel.follow(&mut team, level, (galerkin, l, true));
+            let mut by_kernel = vec![[0.0; 4]; x.len()];
+            kernel.apply(&mut team, &galerkin.levels[l].mass, &x32, &mut by_kernel);
+            for y32 in [&y32, &by_kernel] {
+                let wide = |a: &[f32; 4]| V3::new(a[0].into(), a[1].into(), a[2].into());
+                let difference: Vec<V3> = y32.iter().zip(&y).map(|(a, b)| wide(a) - b).collect();
+                worst = worst.max((dot(&difference, &difference) / dot(&y, &y)).sqrt());
+            }
         }
     }
     worst

@@ -194,7 +194,7 @@ impl CellChunk {
         lanes.filter(|&(cell, ..)| cell != NO_PIECE)
     }
 
-    /// Rotation R of a lane; I for a stored matrix.
+    /// Rotation R of a lane with a table; I for a stored matrix.
     pub fn rotation(&self, batch: usize, lane: usize) -> Matrix3<f32> {
         match self.batches.get(batch) {
             Some(b) => {
@@ -228,14 +228,26 @@ impl CellChunk {
         }
     }
 
-    /// Sets the stored matrices; `of` writes that of the cell with the given number.
-    pub fn set_stored(&mut self, of: &impl Fn(u32, &mut [f32; STORED])) {
+    /// Sets the rotation R of every cell with a stored matrix.
+    pub fn set_stored_rotations(&mut self, of: &impl Fn(u32) -> Matrix3<f32>) {
+        for (batch, lanes) in self.stored.iter_mut().zip(&self.lanes[self.batches.len()..]) {
+            for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
+                let R = of(cell);
+                (0..9).for_each(|i| batch.rotation[i].0[lane] = R[(i / 3, i % 3)]);
+            }
+        }
+    }
+
+    /// Sets stored matrices; `of` writes that of the cell with the given number and returns `true`, or leaves the
+    /// cell as it is.
+    pub fn set_stored(&mut self, of: &impl Fn(u32, &mut [f32; STORED]) -> bool) {
         let mut entries = [0.0; STORED];
         let lanes = &self.lanes[self.batches.len()..];
         for (batch, lanes) in self.stored.iter_mut().zip(lanes) {
             for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
-                of(cell, &mut entries);
-                batch.entries.iter_mut().zip(entries).for_each(|(to, from)| to.0[lane] = from);
+                if of(cell, &mut entries) {
+                    batch.entries.iter_mut().zip(entries).for_each(|(to, from)| to.0[lane] = from);
+                }
             }
         }
     }

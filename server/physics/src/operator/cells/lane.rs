@@ -13,7 +13,7 @@ pub enum CellMatrix {
     /// c R S Rᵀ with S the table of this number, c the factor and R the rotation of the cell.
     Table(u16),
     /// A stored symmetric matrix of the cell's own, as
-    /// [`CellOperator::set_stored`](super::CellOperator::set_stored) gives it; without factor and rotation.
+    /// [`CellOperator::set_stored`](super::CellOperator::set_stored) gives it; without factor.
     Stored,
 }
 

@@ -24,7 +24,7 @@ mod stiffness;
 
 pub use lane::{CellLane, CellMatrix, slot_corners, slot_hanging};
 pub use operator::{CellOperator, morton_order};
-pub use sectors::{Matrix24, SectorTable};
+pub use sectors::{Matrix24, SectorTable, unit_stiffness};
 pub use stiffness::CellStiffness;
 pub use stored::STORED;
 

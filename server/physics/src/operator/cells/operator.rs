@@ -39,6 +39,9 @@ pub struct CellOperator {
 }
 
 impl CellOperator {
+    /// Cells per chunk, in the order given to [`new`](Self::new).
+    pub const CHUNK_CELLS: usize = CHUNK_CELLS;
+
     /// Arranges `cells` for the kernels, their rotations I and their stored matrices 0. `order` lists all of them
     /// so that near ones are near, see [`morton_order`].
     pub fn new(
@@ -51,17 +54,20 @@ impl CellOperator {
         let chunks: Vec<CellChunk> =
             order.chunks(CHUNK_CELLS).map(|members| CellChunk::new(members, cells)).collect();
         let gather = Gather::without_room(chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
-        let mut places = vec![Place::default(); cells.len()];
-        for (chunk, c) in (0u32..).zip(&chunks) {
-            for (cell, batch, lane) in c.places() {
-                places[cell as usize] = Place { chunk, batch: batch as u32, lane: lane as u32 };
-            }
-        }
+        let places = vec![Place::default(); cells.len()];
         let sums = vec![[0.0; 4]; gather.n_rows()];
         let diagonals = vec![[0.0; 8]; gather.n_rows()];
         let mut operator = Self { simd, tables: Vec::new(), chunks, gather, sums, diagonals, places };
+        (0..operator.chunks.len()).for_each(|chunk| operator.find_places(chunk));
         operator.set_tables(tables);
         operator
+    }
+
+    fn find_places(&mut self, chunk: usize) {
+        for (cell, batch, lane) in self.chunks[chunk].places() {
+            let place = Place { chunk: chunk as u32, batch: batch as u32, lane: lane as u32 };
+            self.places[cell as usize] = place;
+        }
     }
 
     /// Replaces the tables; they keep their numbers.
@@ -84,10 +90,37 @@ impl CellOperator {
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_rotations(&of));
     }
 
-    /// Sets the stored matrices: `of` writes the upper triangle of the matrix of the cell with the given number,
-    /// row by row; row 3 j + i is component i of slot j.
-    pub fn set_stored(&mut self, team: &mut Team, of: impl Fn(u32, &mut [f32; STORED]) + Sync) {
+    /// Sets stored matrices: `of` writes the upper triangle of the matrix of the cell with the given number, row by
+    /// row, and returns `true`, or leaves it as it is. Row 3 j + i is component i of slot j.
+    pub fn set_stored(&mut self, team: &mut Team, of: impl Fn(u32, &mut [f32; STORED]) -> bool + Sync) {
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_stored(&of));
+    }
+
+    /// Sets the rotation R of every cell with a stored matrix A, which then stands for R A Rᵀ.
+    pub fn set_stored_rotations(&mut self, team: &mut Team, of: impl Fn(u32) -> Matrix3<f32> + Sync) {
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_stored_rotations(&of));
+    }
+
+    /// Takes other tables, matrices and hanging slots for the cells that `changed` names; their vertices stay.
+    /// `order` is that of [`new`](Self::new). Chunks of such cells forget rotations and stored matrices.
+    pub fn rearrange(
+        &mut self,
+        team: &mut Team,
+        cells: &[CellLane],
+        order: &[u32],
+        changed: impl Fn(u32) -> bool + Sync,
+    ) {
+        team.for_blocks(blocks(&mut self.chunks, 1), |k, chunk| {
+            let members = &order[k * CHUNK_CELLS..order.len().min((k + 1) * CHUNK_CELLS)];
+            if members.iter().any(|&id| changed(id)) {
+                chunk[0] = CellChunk::new(members, cells);
+            }
+        });
+        for (k, members) in order.chunks(CHUNK_CELLS).enumerate() {
+            if members.iter().any(|&id| changed(id)) {
+                self.find_places(k);
+            }
+        }
     }
 
     /// First half of the diagonal blocks.

@@ -3,9 +3,9 @@
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
 use super::super::Padded;
-use super::batch::{Corners, HangingWeights, distribute, gather, interpolate, scatter};
+use super::batch::{Corners, HangingWeights, distribute, from_cell, gather, interpolate, scatter, to_cell};
 use super::sectors::Matrix24;
-use crate::element::{Ids, LANES, Lanes, Simd, Vector8};
+use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8};
 
 /// Entries of a stored matrix: the upper triangle, row by row. Row 3 j + i is component i of slot j.
 pub const STORED: usize = 300;
@@ -16,6 +16,8 @@ pub const STORED: usize = 300;
 pub struct StoredBatch {
     /// Upper triangles; 0 in unused lanes.
     pub entries: [Lanes; STORED],
+    /// Rotation of every cell.
+    pub rotation: Mat3<Lanes>,
     /// Local numbers of the vertices, by slot. Unused lanes have those of the first lane.
     pub nodes: [Ids; 8],
 }
@@ -23,10 +25,12 @@ pub struct StoredBatch {
 impl StoredBatch {
     /// A batch whose matrices are 0.
     pub fn new(nodes: [Ids; 8]) -> Self {
-        Self { entries: [Lanes([0.0; LANES]); STORED], nodes }
+        let mut rotation = Mat3::<Lanes>::default();
+        [0, 4, 8].into_iter().for_each(|i| rotation[i] = Lanes([1.0; LANES]));
+        Self { entries: [Lanes([0.0; LANES]); STORED], rotation, nodes }
     }
 
-    /// The matrix of a lane.
+    /// The matrix A of a lane, without its rotation.
     pub fn matrix(&self, lane: usize) -> Matrix24 {
         let mut A = [[0.0; 24]; 24];
         let mut entries = self.entries.iter();
@@ -39,7 +43,7 @@ impl StoredBatch {
     }
 }
 
-/// y += Σ Wᵀ A W x over the batches; see [`multiply`](super::batch::multiply).
+/// y += Σ Wᵀ R A Rᵀ W x over the batches; see [`multiply`](super::batch::multiply).
 ///
 /// # Safety
 /// All local numbers are below the lengths of `x` and `y`, which are the same.
@@ -71,6 +75,7 @@ unsafe fn multiply_with<V: Vector8>(
     for (b, batch) in batches.iter().enumerate() {
         // SAFETY: the caller's promise.
         let mut u: Corners<V> = unsafe { gather(x, &batch.nodes) };
+        to_cell(&mut u, &batch.rotation);
         if let Some(weights) = weights.get(b) {
             interpolate(&mut u, weights);
         }
@@ -100,6 +105,7 @@ unsafe fn multiply_with<V: Vector8>(
         if let Some(weights) = weights.get(b) {
             distribute(&mut u, weights);
         }
+        from_cell(&mut u, &batch.rotation);
         // SAFETY: the caller's promise.
         unsafe { scatter(y, &batch.nodes, &u) };
     }

@@ -394,6 +394,7 @@ fn stored_matrices_do_what_tables_do() {
                     at += 1;
                 }
             }
+            true
         });
         let (x, mut y, mut expected) = (direction(n), vec![[0.0; 4]; n], vec![[0.0; 4]; n]);
         operator.apply(&mut team, &x, &mut y);

@@ -1,0 +1,112 @@
+//! The operator of a level in the kernels of cells: eight of them at once.
+
+use nalgebra::Matrix3;
+
+use super::dense::at;
+use super::galerkin::{CellMatrix, Galerkin, LevelMatrices};
+use super::level::Level;
+use crate::element::Simd;
+use crate::operator::cells::{
+    CellLane, CellMatrix as LaneMatrix, CellOperator, SectorTable, morton_order, slot_corners, slot_hanging,
+};
+use crate::operator::{BLOCK, Padded, block_of};
+use crate::team::{Team, blocks};
+
+/// The cells of a level, arranged for the kernels.
+#[derive(Clone, Debug)]
+pub struct LevelKernel {
+    operator: CellOperator,
+    lanes: Vec<CellLane>,
+    order: Vec<u32>,
+    /// Cells that were arranged anew in this update.
+    moved: Vec<bool>,
+    /// Whether no matrix was given yet.
+    fresh: bool,
+}
+
+impl LevelKernel {
+    /// Arranges the cells of `level`, as if all had the matrices of their kinds.
+    pub fn new(simd: Simd, level: &Level, matrices: &LevelMatrices) -> Self {
+        let lanes: Vec<CellLane> =
+            (0..level.cells.len()).map(|id| lane(level, id, matrices.matrix[id])).collect();
+        let order = morton_order(&level.cells);
+        let operator = CellOperator::new(simd, &[], &lanes, &order, level.n_vertices);
+        Self { operator, moved: vec![false; lanes.len()], lanes, order, fresh: true }
+    }
+
+    /// Follows an update of the matrices of level `l`; `anew` if those of the kinds changed.
+    pub fn follow(&mut self, team: &mut Team, level: &Level, (galerkin, l, anew): (&Galerkin, usize, bool)) {
+        if anew {
+            let table = |shared: &super::dense::Dense| SectorTable::of_matrix(&shared.wide()).0;
+            self.operator.set_tables(&galerkin.shared.iter().map(table).collect::<Vec<_>>());
+        }
+        let matrices = &galerkin.levels[l];
+        let Self { operator, lanes, order, moved, fresh } = self;
+        let mut any = false;
+        for (id, (known, moved)) in lanes.iter_mut().zip(moved.iter_mut()).enumerate() {
+            let now = lane(level, id, matrices.matrix[id]);
+            *moved = *known != now;
+            if *moved {
+                (*known, any) = (now, true);
+            }
+        }
+        // All cells of a chunk that is arranged anew lose their matrices.
+        if any {
+            operator.rearrange(team, lanes, order, |id| moved[id as usize]);
+            for members in order.chunks(CellOperator::CHUNK_CELLS) {
+                if members.iter().any(|&id| moved[id as usize]) {
+                    members.iter().for_each(|&id| moved[id as usize] = true);
+                }
+            }
+        }
+        let rotation =
+            |id: u32| -> Matrix3<f32> { matrices.frame[id as usize].to_rotation_matrix().into_inner() };
+        operator.set_rotations(team, rotation);
+        operator.set_stored_rotations(team, rotation);
+        let (moved, fresh) = (&*moved, std::mem::take(fresh));
+        operator.set_stored(team, |id, entries| {
+            let (id, mut entry) = (id as usize, 0);
+            let CellMatrix::Stored(place) = matrices.matrix[id] else { return false };
+            if !(fresh || moved[id] || matrices.changed[id]) {
+                return false;
+            }
+            let packed = &matrices.stored[place as usize].matrix;
+            for r in 0..24 {
+                for s in r..24 {
+                    entries[entry] = packed[at(r, s)];
+                    entry += 1;
+                }
+            }
+            true
+        });
+    }
+
+    /// y = A x, with the lumped `mass` of every vertex.
+    pub fn apply(&mut self, team: &mut Team, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
+        self.operator.multiply(team, x);
+        let operator = &self.operator;
+        team.for_blocks(blocks(y, BLOCK), |block, y| {
+            for (y, (x, &mass)) in y.iter_mut().zip(block_of(x, block).iter().zip(block_of(mass, block))) {
+                *y = x.map(|x| mass * x);
+            }
+            operator.add_products(block, y);
+        });
+    }
+}
+
+fn lane(level: &Level, id: usize, matrix: CellMatrix) -> CellLane {
+    let (octant, vertices) = (level.cells[id].octant() as u8, level.vertices[id]);
+    match matrix {
+        CellMatrix::Shared(kind) => CellLane {
+            vertices: slot_corners(vertices, octant),
+            octant,
+            hanging: slot_hanging(level.hanging[id], octant),
+            matrix: LaneMatrix::Table(kind as u16),
+            factor: 1.0,
+        },
+        // A stored matrix is over the vertices themselves.
+        CellMatrix::Stored(_) => {
+            CellLane { vertices, octant: 0, hanging: 0, matrix: LaneMatrix::Stored, factor: 1.0 }
+        }
+    }
+}
