@@ -1,5 +1,7 @@
 //! Scenes with bodies of octree cells, from the text to the results.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::Path;
 
 use scindo_world::inputs::Inputs;

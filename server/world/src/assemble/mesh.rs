@@ -24,7 +24,7 @@ pub enum Mesh {
     /// Hexahedra.
     Hexes(HexMesh),
     /// Cells of an octree.
-    Octree(Octree),
+    Octree(Box<Octree>),
 }
 
 impl Mesh {
@@ -148,7 +148,7 @@ pub fn fill(
     });
     octree.set_regions(constants.collect());
     let health = MeshHealth::Octree(OctreeReport { surface, ..report });
-    Ok(Opened { mesh: Mesh::Octree(octree), health: Some(health) })
+    Ok(Opened { mesh: Mesh::Octree(Box::new(octree)), health: Some(health) })
 }
 
 /// The solid inside a surface file.

@@ -139,7 +139,7 @@ impl Builder<'_> {
             mesh::Mesh::Tets(mesh) => Body::new(mesh, material(spec), settings),
             mesh::Mesh::Hexes(mesh) => Body::hex8(mesh, material(spec), settings),
             mesh::Mesh::Octree(octree) => {
-                Body::of_space(Box::new(OctreeSpace::new(octree)), material(spec), settings)
+                Body::of_space(Box::new(OctreeSpace::new(*octree)), material(spec), settings)
             }
         };
         let mut body = match made {
