@@ -12,6 +12,8 @@
 //!   times as long.
 //! - Skin: the time a skin takes to follow a cut, early and late in a hundred of them.
 
+#![allow(clippy::unwrap_used)]
+
 use std::time::Instant;
 
 use nalgebra::Vector3;
