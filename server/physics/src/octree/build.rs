@@ -131,7 +131,7 @@ impl Octree {
     }
 
     /// Finds where the links that lead out of the body meet the boundary of `shape`.
-    fn cross_boundary(&mut self, shape: &dyn Shape) {
+    pub fn cross_boundary(&mut self, shape: &dyn Shape) {
         for cell in self.cells.iter().filter(|cell| cell.cut != 0) {
             for (d, outer) in neighbours(cell.at).into_iter().enumerate() {
                 if cell.cut >> d & 1 == 0 || self.map.leaf(outer) != OUTSIDE {

@@ -95,7 +95,8 @@ pub fn fill_observed(
     let regions: Vec<Bits> = (1..).zip(regions).map(|(number, region)| part(number, *region)).collect();
     tell("cells", CLASSIFIED);
     let material = |at: At| regions.iter().rposition(|region| region.has(at)).map_or(0, |i| i as u16 + 1);
-    let octree = Octree::of_cells(lattice, &inside, &material)?;
+    let mut octree = Octree::of_cells(lattice, &inside, &material)?;
+    octree.cross_boundary(shape);
     let mut cells_of_region = vec![0; regions.len()];
     for cell in octree.cells().iter().filter(|cell| cell.material > 0) {
         cells_of_region[usize::from(cell.material) - 1] += 1;
