@@ -232,6 +232,9 @@ impl Space for OctreeSpace {
     }
 
     fn copy_masses(&self, density_kg_m3: f64) -> Vec<f64> {
+        if self.octree.regions().is_empty() {
+            return self.volumes.iter().map(|v| density_kg_m3 * v).collect();
+        }
         self.octree.vertex_masses(density_kg_m3)
     }
 
