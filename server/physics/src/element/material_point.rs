@@ -48,6 +48,13 @@ impl<T: Copy + Default> MaterialPoint<T> {
         self.copies().iter().map(|&copy| copy as usize).zip(self.weights().iter().copied())
     }
 
+    /// The same point with other numbers of its carriers.
+    pub fn renumbered(&self, number: impl Fn(u32) -> u32) -> Self {
+        let mut point = *self;
+        point.copies[..usize::from(self.n)].iter_mut().for_each(|copy| *copy = number(*copy));
+        point
+    }
+
     /// The same point with weights of another type.
     pub fn map<U: Copy + Default>(&self, to: impl Fn(T) -> U) -> MaterialPoint<U> {
         MaterialPoint { copies: self.copies, weights: self.weights.map(to), n: self.n }

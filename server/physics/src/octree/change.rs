@@ -115,6 +115,21 @@ impl Octree {
         self.follow(history)
     }
 
+    /// Divides each of these leaves into eight, and coarser leaves around them as 2:1 balance asks.
+    pub fn divide_leaves(&mut self, leaves: &[u32]) -> OctreeChange {
+        let mut history = History::new(self.cells.len());
+        // Numbers change their meaning as leaves are divided.
+        let asked: Vec<(At, u8)> = leaves
+            .iter()
+            .filter_map(|&id| self.cells.get(id as usize))
+            .filter_map(|cell| Some((cell.at, cell.level.checked_sub(1)?)))
+            .collect();
+        for (at, level) in asked {
+            self.divide_to(at, level, &mut history);
+        }
+        self.follow(history)
+    }
+
     /// Divides leaves until that at `at` has sides of 2^level at most; returns it.
     fn divide_to(&mut self, at: At, level: u8, history: &mut History) -> u32 {
         loop {
@@ -253,7 +268,7 @@ impl Octree {
     }
 
     /// Calls `visit` for the leaves of half the side that touch `cell`.
-    fn for_smaller_around(&self, cell: &Cell, mut visit: impl FnMut(u32)) {
+    pub(super) fn for_smaller_around(&self, cell: &Cell, mut visit: impl FnMut(u32)) {
         let half = cell.side() / 2;
         for k in -1..3 {
             for j in -1..3 {

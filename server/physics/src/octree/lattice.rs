@@ -58,6 +58,8 @@ pub struct LeafMap {
     /// Per brick [`OUTSIDE`], the only leaf with [`WHOLE`], or the number of its entries in `leaves`.
     bricks: Vec<u32>,
     leaves: Vec<[u32; BRICK_CELLS]>,
+    /// Entries of `leaves` that no brick uses, since one leaf covers it again.
+    free: Vec<u32>,
 }
 
 impl LeafMap {
@@ -65,7 +67,7 @@ impl LeafMap {
     pub fn new(size: [u32; 3]) -> Self {
         let bricks_along = size.map(|n| (n as usize).div_ceil(1 << BRICK));
         let bricks = vec![OUTSIDE; bricks_along.iter().product()];
-        Self { size, bricks_along, bricks, leaves: Vec::new() }
+        Self { size, bricks_along, bricks, leaves: Vec::new(), free: Vec::new() }
     }
 
     /// The leaf that covers the finest cell `at`, or [`OUTSIDE`].
@@ -87,7 +89,10 @@ impl LeafMap {
         if u32::from(level) >= BRICK {
             for_cube(side >> BRICK, |d| {
                 let brick = self.brick([0, 1, 2].map(|k| at[k] + (d[k] << BRICK)));
-                self.bricks[brick] = leaf | WHOLE;
+                let known = std::mem::replace(&mut self.bricks[brick], leaf | WHOLE);
+                if known & WHOLE == 0 {
+                    self.free.push(known);
+                }
             });
             return;
         }
@@ -95,8 +100,10 @@ impl LeafMap {
         let known = self.bricks[brick];
         if known & WHOLE != 0 {
             let filled = if known == OUTSIDE { OUTSIDE } else { known & !WHOLE };
-            self.bricks[brick] = self.leaves.len() as u32;
-            self.leaves.push([filled; BRICK_CELLS]);
+            self.bricks[brick] = self.free.pop().unwrap_or(self.leaves.len() as u32);
+            let own = self.bricks[brick] as usize;
+            self.leaves.resize(self.leaves.len().max(own + 1), [OUTSIDE; BRICK_CELLS]);
+            self.leaves[own] = [filled; BRICK_CELLS];
         }
         let leaves = &mut self.leaves[self.bricks[brick] as usize];
         for_cube(side, |d| leaves[entry([0, 1, 2].map(|k| at[k] + d[k]))] = leaf);
@@ -146,5 +153,16 @@ mod tests {
         map.set([16, 0, 0], 1, 8);
         map.set([19, 2, 5], 0, 9);
         assert_eq!([[16, 0, 0], [17, 1, 1], [18, 0, 0], [19, 2, 5]].map(|at| map.leaf(at)), [8, 8, 7, 9]);
+        // What a coarse leaf covers again is used for the next brick that is divided.
+        let bytes = map.bytes();
+        for round in 0..3 {
+            map.set([16, 0, 0], 3, 10);
+            assert_eq!([[16, 0, 0], [19, 2, 5], [24, 0, 0]].map(|at| map.leaf(at)), [10, 10, 7]);
+            map.set([24, 8, 8], 0, 11 + round);
+            assert_eq!([[24, 8, 8], [25, 8, 8]].map(|at| map.leaf(at)), [11 + round, 7]);
+            map.set([24, 8, 8], 3, 7);
+            map.set([16, 0, 0], 0, 12);
+        }
+        assert_eq!(map.bytes(), bytes);
     }
 }

@@ -3,27 +3,37 @@
 //! # Source
 //! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
 
+mod adapt;
 mod blade;
 mod build;
 mod cells;
 mod change;
+mod coarsen;
 mod lattice;
 mod measures;
+mod restriction;
 mod shape;
 mod solid;
 mod space;
 mod surface;
 mod vertices;
 
+pub use adapt::{Activity, AdaptError, AdaptSettings, Plan};
 pub use build::{Bits, OctreeSettings};
 pub use cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree, OctreeError};
 pub use change::OctreeChange;
+pub use coarsen::{Coarsening, Family};
 pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
+pub use restriction::Restriction;
 pub use shape::{BoxShape, Shape};
-pub use space::OctreeSpace;
+pub use space::{OctreeRefinement, OctreeSpace};
 pub use surface::OctreeSurface;
 pub use vertices::{Octants, corner_weights, parent_corner};
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::iter_over_hash_type)] // links are checked one by one, in any order
 mod tests;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod adapt_tests;

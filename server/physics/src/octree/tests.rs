@@ -4,13 +4,13 @@ use nalgebra::Vector3;
 
 use super::*;
 
-fn cube(cells: u32, levels: u8) -> Octree {
+pub fn cube(cells: u32, levels: u8) -> Octree {
     let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
     Octree::fill(&shape, OctreeSettings { cells, levels }, &|_| 0).unwrap()
 }
 
 /// A torus-like solid with a spike and a thin sheet.
-struct Odd;
+pub struct Odd;
 
 impl Shape for Odd {
     fn bounds(&self) -> [Vector3<f64>; 2] {
@@ -29,7 +29,7 @@ impl Shape for Odd {
 }
 
 /// The vertices of an octree by their definition: slots of cells joined over faces, without the shortcut of octants.
-fn check_vertices(octree: &Octree) {
+pub fn check_vertices(octree: &Octree) {
     let cells = octree.cells();
     for (id, cell) in cells.iter().enumerate() {
         let W = corner_weights(cell, octree.hanging()[id]);
@@ -142,20 +142,20 @@ fn a_solid_that_no_cell_can_fill_is_refused() {
 }
 
 /// Random numbers in 0 … 1, the same on every run.
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f64 / f64::from(1 << 24)
     }
 
-    fn below(&mut self, n: i32) -> i32 {
+    pub fn below(&mut self, n: i32) -> i32 {
         (self.next() * f64::from(n)) as i32
     }
 }
 
-fn link(incision: u32) -> CutLink {
+pub fn link(incision: u32) -> CutLink {
     CutLink { at: [0.5; 2], normal: [Vector3::x(); 2], incision }
 }
 
@@ -250,7 +250,7 @@ fn random_cuts_keep_eight_vertices_per_cell_and_the_field_and_momentum() {
 }
 
 /// The vertices are those that numbering from scratch finds, up to their numbers.
-fn check_numbering(octree: &Octree) {
+pub fn check_numbering(octree: &Octree) {
     let mut anew = octree.clone();
     anew.points.clear();
     anew.vertices.iter_mut().for_each(|v| *v = [OUTSIDE; 8]);

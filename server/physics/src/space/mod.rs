@@ -25,6 +25,7 @@ use crate::element::Points;
 use crate::material::Material;
 use crate::mesh::MeshError;
 use crate::multigrid::Hierarchy;
+use crate::octree::OctreeSpace;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 
@@ -35,8 +36,9 @@ pub type VisitPiece<'a> = dyn FnMut(usize, &[u32], &[f64]) + 'a;
 /// per element.
 ///
 /// A *node* of the uncut body has one *copy* at first, and more once cuts run around it. Copies 0..n are those
-/// of the uncut body; further ones are appended, and a reset removes them. Copies come before the nodes that
-/// elements of higher order add.
+/// of the uncut body; further ones are appended, and a reset removes them. Coarsening of an
+/// [octree](Self::octree_mut), and nothing else, removes some of the further ones, and the others close up. Copies
+/// come before the nodes that elements of higher order add.
 pub trait Space: Points + Send {
     /// The finite element.
     fn kind(&self) -> ElementKind;
@@ -59,6 +61,17 @@ pub trait Space: Points + Send {
 
     /// The same, for cuts along faces, which replace the mesh.
     fn tets_mut(&mut self) -> Option<&mut Tets> {
+        None
+    }
+
+    /// The octree, if it consists of cubical cells.
+    fn octree(&self) -> Option<&OctreeSpace> {
+        None
+    }
+
+    /// The same, for refinement and coarsening. Vertices that refinement made may vanish again, and later ones
+    /// then close up; those of the uncut body keep their numbers.
+    fn octree_mut(&mut self) -> Option<&mut OctreeSpace> {
         None
     }
 

@@ -103,6 +103,16 @@ impl Front {
         self.now(x).ends()
     }
 
+    /// The copies that carry it.
+    pub fn copies(&self) -> impl Iterator<Item = u32> + '_ {
+        self.points.iter().flat_map(|p| p.anchor.point.copies().iter().copied())
+    }
+
+    /// Takes new numbers of the copies.
+    pub fn renumber(&mut self, number: impl Fn(u32) -> u32) {
+        self.points.iter_mut().for_each(|p| p.anchor.point = p.anchor.point.renumbered(&number));
+    }
+
     /// The front at the present positions of the copies: only its two ends if nothing has moved.
     fn now(&self, x: &[Vector3<f64>]) -> Row {
         let shifts: Vec<Vector3<f64>> =

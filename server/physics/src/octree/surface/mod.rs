@@ -26,6 +26,7 @@ mod triangles;
 use nalgebra::Vector3;
 
 use super::cells::{DIRECTIONS, LinkKey, Octree};
+use super::coarsen::Coarsening;
 use super::lattice::OUTSIDE;
 use crate::cut::Surface;
 use links::partner;
@@ -86,6 +87,22 @@ impl OctreeSurface {
         self.place_vertices(octree);
         self.triangulate(octree);
         self.divide_doubled_edges(octree);
+    }
+
+    /// Follows a coarsening. Quads belong to finest leaves, which stay.
+    pub fn follow_coarsening(&mut self, octree: &Octree, change: &Coarsening) {
+        let face = |face: u32| 6 * change.cell_of[face as usize / 6] + face % 6;
+        self.faces.iter_mut().for_each(|known| *known = face(*known));
+        self.doubled.renumber(face);
+        self.quad_at.clear();
+        self.quad_at.resize(6 * octree.cells().len(), NONE);
+        for (q, &face) in (0u32..).zip(&self.faces) {
+            self.quad_at[face as usize] = q;
+        }
+        // Points on vertices that vanished are placed anew: their leaves are among the changed ones.
+        let vertex = |v: u32| Some(change.vertex_of[v as usize]).filter(|v| *v != OUTSIDE).unwrap_or(0);
+        self.surface.vertices.iter_mut().for_each(|point| *point = point.renumbered(vertex));
+        self.follow(octree, &change.cells, &[]);
     }
 
     /// Finds the quads of changed cells and links, and where their links are cut.

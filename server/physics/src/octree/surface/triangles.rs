@@ -30,6 +30,11 @@ impl Doubled {
     pub fn forget(&mut self, name: u32) {
         self.edges.remove(&name);
     }
+
+    /// Takes new numbers of the faces, in the same order.
+    pub fn renumber(&mut self, face: impl Fn(u32) -> u32) {
+        self.edges = self.edges.iter().map(|name| 5 * face(name / 5) + name % 5).collect();
+    }
 }
 
 impl OctreeSurface {
