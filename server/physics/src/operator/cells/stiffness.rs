@@ -13,7 +13,7 @@ use super::sectors::SectorTable;
 use super::update::RestChunk;
 use crate::element::Simd;
 use crate::material::Lame;
-use crate::octree::{Cell, Octree};
+use crate::octree::{Cell, OUTSIDE, Octree};
 use crate::team::{Team, blocks, ranges};
 
 /// s K̂ of the cells of an octree, its internal forces and diagonal blocks. The law is linear or corotational with
@@ -47,12 +47,14 @@ impl CellStiffness {
         Self { operator, rest, cells, h, materials, made_with: None, version: 0 }
     }
 
-    /// Follows a cut or a refinement of the octree. Cells keep their rotations; new ones have that of the leaf
-    /// they were part of.
+    /// Follows a cut, a refinement or a coarsening of the octree. Cells keep their rotations; new ones have that of
+    /// the leaf they were part of, and joined ones that of their first part.
     pub fn follow(&mut self, octree: &Octree) {
-        let known = |id: usize| self.operator.rotation(self.operator.places()[id]);
-        let rotations: Vec<Matrix3<f32>> = (0..octree.cells().len())
-            .map(|id| self.source(octree, id).map_or_else(Matrix3::identity, known))
+        let known = |id: u32| self.operator.rotation(self.operator.places()[id as usize]);
+        let rotations: Vec<Matrix3<f32>> = self
+            .sources(octree)
+            .into_iter()
+            .map(|source| if source == OUTSIDE { Matrix3::identity() } else { known(source) })
             .collect();
         let (operator, rest) = arrange(self.operator.simd, octree, &self.materials);
         (self.operator, self.rest, self.made_with) = (operator, rest, None);
@@ -63,18 +65,35 @@ impl CellStiffness {
         }
     }
 
-    /// The earlier leaf that cell `id` was part of. The first child of a divided leaf has its number.
-    fn source(&self, octree: &Octree, id: usize) -> Option<usize> {
-        if id < self.cells.len() {
-            return Some(id);
+    /// For every cell the earlier one that it was part of, or whose place it begins at.
+    ///
+    /// Cells keep their order when others vanish, and new ones come last. A cell that was divided or joined has the
+    /// low corner and the number of its first part.
+    fn sources(&self, octree: &Octree) -> Vec<u32> {
+        let mut sources: Vec<u32> = Vec::with_capacity(octree.cells().len());
+        let mut next = 0;
+        for cell in octree.cells() {
+            let same = self.cells[next..].iter().position(|known| known.at == cell.at);
+            // Once a cell is new, all that follow are.
+            let source = match same {
+                Some(skipped) => {
+                    next += skipped + 1;
+                    next as u32 - 1
+                }
+                None => {
+                    next = self.cells.len();
+                    let first = (cell.level + 1..=octree.lattice().levels).find_map(|level| {
+                        let at = cell.at.map(|c| c >> level << level);
+                        let &source = sources.get(octree.leaf(at) as usize)?;
+                        let known = self.cells.get(source as usize)?;
+                        (known.level == level && known.at == at).then_some(source)
+                    });
+                    first.unwrap_or(OUTSIDE)
+                }
+            };
+            sources.push(source);
         }
-        let cell = &octree.cells()[id];
-        (cell.level + 1..=octree.lattice().levels).find_map(|level| {
-            let at = cell.at.map(|c| c >> level << level);
-            let first = octree.leaf(at) as usize;
-            let same = self.cells.get(first).is_some_and(|known| known.level == level && known.at == at);
-            same.then_some(first)
-        })
+        sources
     }
 
     /// The cells as an operator.
