@@ -4,8 +4,10 @@
 //! solver is part of its report ([`crate::solver::LinearReport::algebraic_error`]). Both are energy norms in
 //! √J, so they can be compared: a solver may stop when its error is a third of that of the mesh.
 
+mod cells;
 mod stress_recovery;
 mod tets;
 
+pub use cells::CellRecovery;
 pub use stress_recovery::{MeshError, StressRecovery};
 pub use tets::{CutTets, Tets};

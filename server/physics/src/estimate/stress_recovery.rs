@@ -102,7 +102,7 @@ impl StressRecovery {
 }
 
 /// Cauchy stress [Pa] and present volume [m³]; both zero for a piece that is flat or inverted.
-fn cauchy(F: &Matrix3<f64>, volume: f64, law: Law, lame: Lame) -> (Matrix3<f64>, f64) {
+pub(super) fn cauchy(F: &Matrix3<f64>, volume: f64, law: Law, lame: Lame) -> (Matrix3<f64>, f64) {
     let P = law.stress(F, lame);
     if law == Law::Linear {
         return (P, volume);
@@ -112,7 +112,7 @@ fn cauchy(F: &Matrix3<f64>, volume: f64, law: Law, lame: Lame) -> (Matrix3<f64>,
 }
 
 /// σ : C⁻¹ : σ [J/m³] of an isotropic material.
-fn complementary(stress: &Matrix3<f64>, Lame { mu, lambda }: Lame) -> f64 {
+pub(super) fn complementary(stress: &Matrix3<f64>, Lame { mu, lambda }: Lame) -> f64 {
     let trace = stress.trace();
     (stress.norm_squared() - lambda / (3.0 * lambda + 2.0 * mu) * trace * trace) / (2.0 * mu)
 }
