@@ -4,7 +4,9 @@ use nalgebra::Vector3;
 
 use super::{Body, BodyError};
 use crate::cut::NewCopy;
+use crate::element::MaterialPoint;
 use crate::lists::reserve::resize_reserving;
+use crate::octree::{Coarsening, OUTSIDE};
 use crate::operator::FixedCopy;
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;
@@ -136,21 +138,56 @@ impl Boundary {
     pub fn hold_between(&mut self, new: &[NewCopy], node_of_copy: &[u32]) {
         for new in new {
             let Some(between) = &new.between else { continue };
-            let (mut axes, mut displacement_m) = ([true; 3], Vector3::zeros());
-            for (copy, weight) in between.carriers() {
-                match self.fixed_at(node_of_copy[copy]) {
-                    Some(held) => {
-                        (0..3).for_each(|k| axes[k] &= held.axes[k]);
-                        displacement_m += weight * held.displacement_m;
-                    }
-                    None => axes = [false; 3],
-                }
-            }
-            if axes.contains(&true) {
+            if let Some((axes, displacement_m)) = self.between(between, node_of_copy) {
                 // New nodes have the highest numbers.
                 self.fixed.push(FixedNode { node: new.copy, axes, displacement_m });
             }
         }
+    }
+
+    /// The axes along which all carriers of a point are held, and the mean of their displacements; `None` if there
+    /// is no such axis.
+    fn between(&self, point: &MaterialPoint, node_of_copy: &[u32]) -> Option<([bool; 3], Vector3<f64>)> {
+        let (mut axes, mut displacement_m) = ([true; 3], Vector3::zeros());
+        for (copy, weight) in point.carriers() {
+            match self.fixed_at(node_of_copy[copy]) {
+                Some(held) => {
+                    (0..3).for_each(|k| axes[k] &= held.axes[k]);
+                    displacement_m += weight * held.displacement_m;
+                }
+                None => axes = [false; 3],
+            }
+        }
+        axes.contains(&true).then_some((axes, displacement_m))
+    }
+
+    /// Whether `node`, which lies between others with these `carriers`, has to stay when cells become coarse: it is
+    /// loaded, or held in another way than the material between the carriers is.
+    pub fn needs(&self, node: u32, carriers: &MaterialPoint, node_of_copy: &[u32]) -> bool {
+        let loaded = [&self.point_force, &self.spread_force]
+            .iter()
+            .any(|forces| forces.get(node as usize).is_some_and(|f| *f != Vector3::zeros()));
+        let held = self.fixed_at(node).copied();
+        let between = self.between(carriers, node_of_copy);
+        let same = match (held, between) {
+            (None, _) => true,
+            (Some(_), None) => false,
+            (Some(held), Some((axes, displacement_m))) => (0..3).all(|k| {
+                let apart = held.displacement_m[k] - displacement_m[k];
+                !held.axes[k] || (axes[k] && apart.abs() <= 1e-12 * held.displacement_m[k].abs())
+            }),
+        };
+        loaded || !same
+    }
+
+    /// Takes the numbers of the nodes after a coarsening. Nodes that vanish carry no load.
+    pub fn renumber(&mut self, change: &Coarsening) {
+        self.fixed.retain_mut(|held| {
+            held.node = change.vertex_of[held.node as usize];
+            held.node != OUTSIDE
+        });
+        change.keep(&mut self.point_force);
+        change.keep(&mut self.spread_force);
     }
 
     /// Forgets the nodes that refinement had added to a body of `n_nodes` nodes.

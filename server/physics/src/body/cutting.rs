@@ -88,7 +88,7 @@ impl Body {
     fn follow_cut(&mut self, report: &CutReport) -> Result<(), BodyError> {
         // While a cut is still on its way through an element, only the surface changes.
         if self.space.has_changed() {
-            self.inherit(report);
+            self.inherit(&report.new_copies);
             self.dynamics.follow_cut(&*self.space, &report.new_copies)?;
             self.follow_new_copies(&report.new_copies);
         }
@@ -111,18 +111,18 @@ impl Body {
         0.5 * lips.map(|(triangle, _)| area(triangle)).sum::<f64>()
     }
 
-    fn inherit(&mut self, report: &CutReport) {
+    pub(super) fn inherit(&mut self, new: &[NewCopy]) {
         let n = self.space.n_copies();
         resize_reserving(&mut self.state.x, n, Vector3::zeros());
         resize_reserving(&mut self.state.v, n, Vector3::zeros());
-        for new in &report.new_copies {
+        for new in new {
             let copy = new.copy as usize;
             self.state.x[copy] = new.inherited(&self.state.x);
             self.state.v[copy] = new.inherited(&self.state.v);
         }
         let known = self.split_from.len();
         resize_reserving(&mut self.split_from, n, 0);
-        for (from, new) in self.split_from[known..].iter_mut().zip(&report.new_copies) {
+        for (from, new) in self.split_from[known..].iter_mut().zip(new) {
             *from = new.parent;
         }
     }

@@ -50,6 +50,16 @@ pub enum BodyError {
         /// Allowed range in words.
         allowed: &'static str,
     },
+    /// A criterion for the size of cells is out of range.
+    #[error("{name} = {found:?}: allowed are {allowed}")]
+    Criterion {
+        /// Name of the criterion.
+        name: &'static str,
+        /// Values found.
+        found: [f64; 2],
+        /// What is allowed.
+        allowed: &'static str,
+    },
     /// The threads could not be started.
     #[error("cannot start the physics threads: {0}; ask for fewer")]
     Threads(std::io::Error),
@@ -88,6 +98,14 @@ pub enum BodyError {
         carrier: &'static str,
         /// Total force [N].
         force_n: [f64; 3],
+    },
+    /// A list of errors with another length than that of the cells.
+    #[error("{found} errors given for {expected} cells")]
+    ErrorLength {
+        /// Length found.
+        found: usize,
+        /// Number of cells.
+        expected: usize,
     },
     /// A state array of the wrong length.
     #[error("{found} entries given for {expected} copies")]

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Body;
-use crate::estimate::{CutTets, MeshError, StressRecovery};
+use crate::estimate::{CellRecovery, CutTets, MeshError, StressRecovery};
 use crate::multigrid::{CoarsestSolve, LevelReport};
 
 /// Counts of elements so flat that one of their motions is far stiffer than the others.
@@ -104,6 +104,13 @@ impl Body {
         let tets = self.space.tets().filter(|tets| tets.is_linear())?;
         let tets = CutTets::new(tets.mesh(), tets.pieces(), self.n_copies());
         Some(recovery.estimate(&tets, &self.state.x, self.material.law, self.material.lame()))
+    }
+
+    /// Estimates the discretisation error of the cells of an octree; `None` for other elements. The error of every
+    /// cell, which [`adapt`](Self::adapt) takes, stays in `recovery`.
+    pub fn cell_error(&self, recovery: &mut CellRecovery) -> Option<MeshError> {
+        let octree = self.space.octree()?.octree();
+        Some(recovery.estimate(octree, &self.state.x, &self.material))
     }
 
     /// Internal force on every node [N]; it pulls the body back, so it is subtracted from the loads.

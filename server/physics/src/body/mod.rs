@@ -1,6 +1,7 @@
 //! One body: what the world holds, steps, cuts, loads and measures.
 
 mod ablation;
+mod adapting;
 mod boundary;
 mod cost;
 mod cutting;
@@ -18,6 +19,7 @@ mod undo;
 
 #[doc(hidden)]
 pub use ablation::Ablation;
+pub use adapting::AdaptReport;
 pub use boundary::FixedNode;
 pub use error::BodyError;
 pub use measures::StiffMotions;
@@ -112,6 +114,8 @@ pub struct Body {
     dynamics: Dynamics,
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
+    /// How often coarsening has given vertices new numbers.
+    renumbered: u32,
     /// State of cutting along faces; `None` for other bodies.
     snap: Option<Box<SnapState>>,
     /// A cut along faces that was begun and is not complete.
@@ -197,6 +201,7 @@ impl Body {
             team: Team::new(settings.threads).map_err(BodyError::Threads)?,
             spring_forces: Vec::new(),
             under_way: None,
+            renumbered: 0,
             space,
             material,
             settings,

@@ -23,6 +23,9 @@ pub struct BodyTopology {
     boundary: Boundary,
     snap: Option<Box<SnapState>>,
     x: Vec<Vector3<f64>>,
+    split_from: Vec<u32>,
+    /// See [`Body::renumberings`].
+    renumbered: u32,
     /// Whether every part was held then; if so, parts that are free now were freed by cuts since.
     held: bool,
 }
@@ -42,6 +45,8 @@ impl Body {
             boundary: self.boundary.clone(),
             snap: self.snap.clone(),
             x: self.state.x.clone(),
+            split_from: self.split_from.clone(),
+            renumbered: self.renumbered,
             held: !self.parts.any_free(),
         }
     }
@@ -54,16 +59,19 @@ impl Body {
     pub fn restore(&mut self, topology: BodyTopology) -> Result<(), BodyError> {
         let epoch = self.space.epoch() + 1;
         let before = Moving::of(self, topology.held);
-        let BodyTopology { space, boundary, snap, x, .. } = topology;
+        let BodyTopology { space, boundary, snap, x, split_from, renumbered, .. } = topology;
+        let same_numbers = renumbered == self.renumbered;
         let state = match (&snap, space.tets()) {
             (Some(_), Some(tets)) => before.on_mesh(tets.mesh(), &x),
+            _ if !same_numbers => before.at_places((&self.rest, &*self.space), (&space.rest_positions(), &x)),
             _ => before.joined(&x, &self.split_from),
         };
         (self.space, self.snap) = (space, snap);
         self.space.set_epoch(epoch);
         self.boundary = boundary;
         self.asleep.clear();
-        self.split_from.truncate(self.space.n_copies());
+        self.split_from = split_from;
+        self.renumbered += u32::from(!same_numbers);
         (self.state.x, self.state.v) = state;
         // Rotations and history of the cut state no longer apply: the integrator starts afresh.
         self.dynamics.rebuild(&*self.space)?;
@@ -84,6 +92,11 @@ type Sum = (f64, Vector3<f64>, Vector3<f64>);
 
 fn mean((mass, mx, mv): &Sum) -> Option<(Vector3<f64>, Vector3<f64>)> {
     (*mass > 0.0).then(|| (mx / *mass, mv / *mass))
+}
+
+/// A place as a key; −0 is 0.
+fn key(place: &Vector3<f64>) -> [u64; 3] {
+    [place.x, place.y, place.z].map(|c| (c + 0.0).to_bits())
 }
 
 /// Motion of a body before its topology was replaced.
@@ -140,7 +153,6 @@ impl Moving {
     /// nodes at the same place, else that of the element around. If a part was cut off, `x` [m] stands in
     /// for the latter.
     fn on_mesh(&self, mesh: &TetMesh, x: &[Vector3<f64>]) -> Motion {
-        let key = |point: &Vector3<f64>| [point.x, point.y, point.z].map(|c| (c + 0.0).to_bits());
         let mut there: BTreeMap<[u64; 3], Sum> = BTreeMap::new();
         for node in (0..self.x.len()).filter(|&node| !self.lost[node]) {
             self.add(node, there.entry(key(&self.mesh.nodes[node])).or_default());
@@ -149,6 +161,34 @@ impl Moving {
         let motion = mesh.nodes.iter().zip(x).map(|(point, x)| {
             let known = there.get(&key(point)).and_then(mean);
             known.unwrap_or_else(|| if whole { self.within(point) } else { (*x, Vector3::zeros()) })
+        });
+        motion.unzip()
+    }
+
+    /// Motion of the material that rests at `places` [m], where coarsening has given other numbers to the vertices
+    /// of `space`, which rest at `rest` [m]: that of vertices there, else that of the element around. If a part
+    /// was cut off, `x` [m] stands in for the latter.
+    fn at_places(
+        &self,
+        (rest, space): (&[Vector3<f64>], &dyn Space),
+        (places, x): (&[Vector3<f64>], &[Vector3<f64>]),
+    ) -> Motion {
+        let mut there: BTreeMap<[u64; 3], Sum> = BTreeMap::new();
+        for copy in (0..self.x.len()).filter(|&copy| !self.lost[copy]) {
+            self.add(copy, there.entry(key(&rest[copy])).or_default());
+        }
+        let whole = !self.lost.contains(&true);
+        let within = |place: &Vector3<f64>| {
+            let point = space.locate(*place, None).filter(|_| whole)?;
+            let carriers = space.carriers(&point);
+            let sample = |values: &[Vector3<f64>]| -> Vector3<f64> {
+                carriers.iter().map(|&(copy, w)| w * values[copy as usize]).sum()
+            };
+            (!carriers.is_empty()).then(|| (sample(&self.x), sample(&self.v)))
+        };
+        let motion = places.iter().zip(x).map(|(place, x)| {
+            let known = there.get(&key(place)).and_then(mean).or_else(|| within(place));
+            known.unwrap_or((*x, Vector3::zeros()))
         });
         motion.unzip()
     }

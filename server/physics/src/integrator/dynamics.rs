@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::course::Course;
 use super::free_motion::{FreeMotion, free_motions};
 use super::model_solver::ModelSolver;
-use super::multistep::Multistep;
+use super::multistep::{Adapted, Multistep};
 use super::notice::Notice;
 use super::parts::LooseParts;
 use super::report::{Outcome, SolveReport};
@@ -125,6 +125,16 @@ impl Dynamics {
     /// Follows the last cut of `space`, which made the copies `new`. All material keeps its history.
     pub fn follow_cut(&mut self, space: &dyn Space, new: &[NewCopy]) -> Result<(), ModelError> {
         self.course.multistep.inherit(new);
+        self.solver.follow_cut(space)
+    }
+
+    /// Carries the history over a change of the elements; [`follow_elements`](Self::follow_elements) ends it.
+    pub fn adapt(&mut self, change: Adapted<'_>) {
+        self.course.multistep.adapt(change);
+    }
+
+    /// Follows the elements of `space` after all of them have [changed](Self::adapt).
+    pub fn follow_elements(&mut self, space: &dyn Space) -> Result<(), ModelError> {
         self.solver.follow_cut(space)
     }
 

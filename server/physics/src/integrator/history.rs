@@ -6,6 +6,7 @@ use super::guard::LARGEST_TURN;
 use super::notice::Notice;
 use super::state::State;
 use crate::cut::NewCopy;
+use crate::octree::Restriction;
 
 /// The last two states.
 #[derive(Clone, Debug, Default)]
@@ -70,6 +71,16 @@ impl History {
         self.last.copy_from(after);
         self.h = h;
         self.known = true;
+    }
+
+    /// Carries positions and velocities over a coarsening.
+    pub fn coarsen(&mut self, restriction: &Restriction<'_>) {
+        if self.known {
+            for kept in [&mut self.before, &mut self.last] {
+                restriction.sample(&mut kept.x);
+                restriction.project(&mut kept.v);
+            }
+        }
     }
 
     /// Gives the copies `new`, which a cut made, the history of their parents.

@@ -38,7 +38,7 @@ pub use increment::Increment;
 pub use linearly_implicit::LinearlyImplicit;
 pub use local_connectivity::LocalConnectivity;
 pub use model_solver::ModelSolver;
-pub use multistep::Multistep;
+pub use multistep::{Adapted, Multistep};
 pub use notice::Notice;
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};

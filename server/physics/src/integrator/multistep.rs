@@ -14,8 +14,18 @@ use super::step_inputs::{StepHistory, StepInputs};
 use crate::cut::NewCopy;
 use crate::lists::reserve::resize_reserving;
 use crate::material::Law;
+use crate::octree::Restriction;
 use crate::operator::BLOCK;
 use crate::team::{Team, blocks};
+
+/// A change of the elements that leaves the material whole.
+#[derive(Clone, Copy, Debug)]
+pub enum Adapted<'a> {
+    /// Leaves were divided, which made these vertices.
+    Refined(&'a [NewCopy]),
+    /// Leaves were joined.
+    Coarsened(&'a Restriction<'a>),
+}
 
 /// History of a scheme; empty for implicit Euler by one linear solve, which needs none.
 #[derive(Debug, Default)]
@@ -102,6 +112,23 @@ impl Multistep {
                 self.acceleration.push(inherited);
             }
         }
+    }
+
+    /// Gives vertices that refinement made, or that are left after a coarsening, their history. The energy jumps,
+    /// because the elements are others.
+    pub fn adapt(&mut self, change: Adapted<'_>) {
+        match change {
+            Adapted::Refined(new) => self.inherit(new),
+            Adapted::Coarsened(restriction) if self.remembers() => {
+                self.forces_jump();
+                self.history.coarsen(restriction);
+                if self.scheme.remembers() {
+                    restriction.project(&mut self.acceleration);
+                }
+            }
+            Adapted::Coarsened(_) => {}
+        }
+        self.forget_energy();
     }
 
     /// See [`History::still`].
