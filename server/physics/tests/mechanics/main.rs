@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 #![allow(non_snake_case)] // the symbols of the field: X, K
 
+mod adapt;
 mod cells;
 mod combinations;
 mod conservation;
