@@ -4,9 +4,12 @@ use nalgebra::Vector3;
 
 use super::{Body, BodyError};
 use crate::cut::NewCopy;
+use crate::element::Points;
 use crate::integrator::Adapted;
 use crate::lists::reserve::resize_reserving;
-use crate::octree::{Activity, AdaptSettings, Coarsening, Family, OUTSIDE, Restriction};
+use crate::octree::{
+    Activity, AdaptSettings, Family, Leaf, OUTSIDE, OctreeRefinement, OctreeSpace, Restriction,
+};
 
 /// What an adaptation changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,10 +22,10 @@ pub struct AdaptReport {
     pub appeared: usize,
     /// Vertices that vanished.
     pub vanished: usize,
-    /// Kinetic energy before and after \[J\].
-    pub kinetic_j: [f64; 2],
-    /// Elastic energy before and after \[J\].
-    pub elastic_j: [f64; 2],
+    /// Change of the kinetic energy \[J\].
+    pub kinetic_change_j: f64,
+    /// Change of the elastic energy \[J\].
+    pub elastic_change_j: f64,
     /// Change of the momentum [kg m/s]; only vertices held on all sides take any.
     pub momentum_change: Vector3<f64>,
 }
@@ -39,7 +42,7 @@ impl Body {
     /// cell in the energy norm [√J], if it is known. Call it between steps.
     ///
     /// Refinement keeps positions and velocities as fields. Coarsening samples positions and projects velocities;
-    /// mass and momentum stay, and both kinds of energy before and after are reported. Vertices of the uncut body
+    /// mass and momentum stay, and the changes of both kinds of energy are reported. Vertices of the uncut body
     /// keep their numbers, but [later ones](Self::renumberings) may get others. The epoch rises if anything changes.
     ///
     /// # Errors
@@ -87,29 +90,44 @@ impl Body {
     }
 
     fn change_cells(&mut self, refine: &[u32], coarsen: &[Family]) -> Result<AdaptReport, BodyError> {
-        let (kinetic_j, elastic_j) = (self.kinetic_energy(), self.elastic_energy());
-        let momentum = self.momentum();
+        let (kinetic_j, momentum) = (self.kinetic_energy(), self.momentum());
+        // On the general path the model may have remedies against locking, whose energy belongs to all cells.
+        let modelled_j = self.dynamics.model().map(|_| self.elastic_energy());
         let mut report = AdaptReport::default();
-        if !refine.is_empty()
-            && let Some(octree) = self.space.octree_mut()
-        {
-            let change = octree.refine(refine);
-            (report.divided, report.appeared) = (change.divided, change.new_copies.len());
-            self.follow_refinement(&change.new_copies);
+        let Self { space, .. } = self;
+        if let (false, Some(octree)) = (refine.is_empty(), space.octree_mut()) {
+            let OctreeRefinement { change, new_copies } = octree.refine(refine);
+            (report.divided, report.appeared) = (change.divided, new_copies.len());
+            self.follow_refinement(&new_copies);
+            report.elastic_change_j += self.energy_of(&change.cells) - self.energy_before(change.earlier);
         }
         if !coarsen.is_empty() {
-            let change = self.coarsen(coarsen);
-            (report.joined, report.vanished) = (change.joined, change.vanished.len());
+            self.coarsen(coarsen, &mut report);
         }
         if !report.has_changed() {
             return Ok(report);
         }
         self.dynamics.follow_elements(&*self.space)?;
         self.follow_topology();
-        report.kinetic_j = [kinetic_j, self.kinetic_energy()];
-        report.elastic_j = [elastic_j, self.elastic_energy()];
+        report.kinetic_change_j = self.kinetic_energy() - kinetic_j;
+        if let Some(elastic_j) = modelled_j {
+            report.elastic_change_j = self.elastic_energy() - elastic_j;
+        }
         report.momentum_change = self.momentum() - momentum;
         Ok(report)
+    }
+
+    /// Elastic energy \[J\] of these leaves as they are now.
+    fn energy_of(&self, cells: &[u32]) -> f64 {
+        let leaves = |octree: &OctreeSpace| cells.iter().map(|&id| octree.octree().now(id)).collect();
+        self.space.octree().map_or(0.0, |octree| self.energy_before(leaves(octree)))
+    }
+
+    /// Elastic energy \[J\] of leaves before a change, with their vertices where they are now.
+    fn energy_before(&self, leaves: Vec<Leaf>) -> f64 {
+        let energy =
+            |octree: &OctreeSpace| octree.octree().some(leaves).energy(&self.material, &self.state.x);
+        self.space.octree().map_or(0.0, energy)
     }
 
     /// Extends everything with a value per vertex by the vertices that refinement made.
@@ -125,19 +143,22 @@ impl Body {
     }
 
     /// Joins families of leaves, and carries everything with a value per vertex over.
-    fn coarsen(&mut self, families: &[Family]) -> Coarsening {
+    fn coarsen(&mut self, families: &[Family], report: &mut AdaptReport) {
         let mass = self.space.copy_masses(self.material.density_kg_m3);
         let Self { space, boundary, .. } = self;
         let node_of_copy = space.node_of_copy().to_vec();
-        let Some(octree) = space.octree_mut() else { return Coarsening::default() };
-        let change = octree.coarsen(families, &|vertex, carriers| {
+        let Some(octree) = space.octree_mut() else { return };
+        let mut change = octree.coarsen(families, &|vertex, carriers| {
             boundary.needs(node_of_copy[vertex as usize], carriers, &node_of_copy)
         });
         if change.joined == 0 {
-            return change;
+            return;
         }
+        (report.joined, report.vanished) = (change.joined, change.vanished.len());
+        report.elastic_change_j -= self.energy_before(std::mem::take(&mut change.earlier));
         let restriction = Restriction::new(&change, &mass, &self.fixed);
         restriction.sample(&mut self.state.x);
+        report.elastic_change_j += self.energy_of(&change.cells);
         restriction.project(&mut self.state.v);
         self.dynamics.adapt(Adapted::Coarsened(&restriction));
         self.boundary.renumber(&change);
@@ -154,6 +175,5 @@ impl Body {
         change.keep(&mut split_from);
         self.split_from = split_from;
         self.renumbered += 1;
-        change
     }
 }

@@ -15,6 +15,8 @@ use crate::element::MaterialPoint;
 pub struct OctreeChange {
     /// Cells that are new or have other links, vertices or hanging corners, ascending.
     pub cells: Vec<u32>,
+    /// The leaves that filled their place before, by the vertices of then, which keep their numbers.
+    pub earlier: Vec<Leaf>,
     /// Where each new vertex is in the earlier material; their numbers follow those of the vertices before.
     pub new_vertices: Vec<MaterialPoint>,
     /// Number of links that were whole before and are cut now.
@@ -25,18 +27,21 @@ pub struct OctreeChange {
     pub divided: usize,
 }
 
-/// A leaf as it was before the change.
-#[derive(Clone, Copy, Debug)]
-struct Earlier {
-    cell: Cell,
-    vertices: [u32; 8],
-    hanging: u8,
+/// A leaf with what carries it, now or before a change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leaf {
+    /// Place and size.
+    pub cell: Cell,
+    /// See [`Octree::vertices`].
+    pub vertices: [u32; 8],
+    /// See [`Octree::hanging`].
+    pub hanging: u8,
 }
 
 /// Leaves as they were before, and what became of them.
 #[derive(Debug)]
 struct History {
-    earlier: Vec<Earlier>,
+    earlier: Vec<Leaf>,
     /// Per leaf one more than the entry of `earlier` that it was part of; 0 if it is as it was.
     part_of: Vec<u32>,
     /// Leaves that have to be told of, in any order.
@@ -60,7 +65,7 @@ impl History {
     }
 
     /// Number of the entry of `earlier` for leaf `id`; `now` is the leaf, should it be as it was.
-    fn keep(&mut self, id: u32, now: Earlier) -> u32 {
+    fn keep(&mut self, id: u32, now: Leaf) -> u32 {
         let part_of = &mut self.part_of[id as usize];
         if *part_of == 0 {
             self.earlier.push(now);
@@ -196,7 +201,10 @@ impl Octree {
         for k in 0..history.changed.len() {
             let cell = self.cells[history.changed[k] as usize];
             if cell.level > 0 {
-                self.for_smaller_around(&cell, |id| history.tell(id));
+                self.for_smaller_around(&cell, |id| {
+                    history.keep(id, self.now(id));
+                    history.tell(id);
+                });
             }
         }
         for &id in &history.changed {
@@ -204,9 +212,9 @@ impl Octree {
                 self.resolve(id as usize);
             }
         }
-        let History { mut changed, divided, .. } = history;
+        let History { mut changed, divided, earlier, .. } = history;
         changed.sort_unstable();
-        OctreeChange { cells: changed, new_vertices, divided, ..OctreeChange::default() }
+        OctreeChange { cells: changed, earlier, new_vertices, divided, ..OctreeChange::default() }
     }
 
     /// Gives the classes of leaves around lattice point `p` their vertices. The first class keeps a vertex that
@@ -262,9 +270,10 @@ impl Octree {
         Carrier::New(within.map_or_else(MaterialPoint::default, |earlier| earlier.carriers(p)))
     }
 
-    fn now(&self, id: u32) -> Earlier {
+    /// A leaf with what carries it.
+    pub fn now(&self, id: u32) -> Leaf {
         let id = id as usize;
-        Earlier { cell: self.cells[id], vertices: self.vertices[id], hanging: self.hanging[id] }
+        Leaf { cell: self.cells[id], vertices: self.vertices[id], hanging: self.hanging[id] }
     }
 
     /// Calls `visit` for the leaves of half the side that touch `cell`.
@@ -304,7 +313,7 @@ enum Carrier {
     New(MaterialPoint),
 }
 
-impl Earlier {
+impl Leaf {
     /// The carriers of lattice point `p`, which is in the cell or on its border.
     fn carriers(&self, p: At) -> MaterialPoint {
         let side = f64::from(self.cell.side());

@@ -9,6 +9,7 @@
 
 use super::build::{child_corner, neighbours};
 use super::cells::{Cell, Octree};
+use super::change::Leaf;
 use super::lattice::{At, OUTSIDE};
 use crate::element::MaterialPoint;
 
@@ -28,6 +29,8 @@ pub struct Coarsening {
     pub joined: usize,
     /// Cells that are new or have other vertices or hanging corners, by their new numbers, ascending.
     pub cells: Vec<u32>,
+    /// The leaves that filled their place before, by earlier vertices.
+    pub earlier: Vec<Leaf>,
     /// New number of each earlier cell. The first of a family has that of the joined leaf, the others have
     /// [`OUTSIDE`].
     pub cell_of: Vec<u32>,
@@ -52,9 +55,19 @@ struct Joining {
     /// Per cell whether its vertices or hanging corners changed, and whether it is part of another cell.
     told: Vec<bool>,
     absorbed: Vec<bool>,
+    /// The told cells as they were.
+    earlier: Vec<Leaf>,
     /// Vertices that vanish, and the leaf inside which they do.
     vanished: Vec<(u32, At, u32)>,
     joined: usize,
+}
+
+impl Joining {
+    fn tell(&mut self, id: u32, now: Leaf) {
+        if !std::mem::replace(&mut self.told[id as usize], true) {
+            self.earlier.push(now);
+        }
+    }
 }
 
 impl Octree {
@@ -114,8 +127,8 @@ impl Octree {
         stays: &dyn Fn(u32, &MaterialPoint) -> bool,
     ) -> Coarsening {
         let n = self.cells.len();
-        let mut joining =
-            Joining { told: vec![false; n], absorbed: vec![false; n], vanished: Vec::new(), joined: 0 };
+        let (told, absorbed) = (vec![false; n], vec![false; n]);
+        let mut joining = Joining { told, absorbed, earlier: Vec::new(), vanished: Vec::new(), joined: 0 };
         let mut families = families.to_vec();
         families.sort_unstable();
         for family in families {
@@ -166,23 +179,15 @@ impl Octree {
         let id = parts[0];
         let first = joining.vanished.len();
         self.for_vanishing(family, |vertex, p| joining.vanished.push((vertex, p, id)));
-        let new = &mut joining.vanished[first..];
+        // Several parts have a vertex in common.
+        let mut new = joining.vanished.split_off(first);
         new.sort_unstable();
-        let n_new = new.len();
-        let mut last = OUTSIDE;
-        let mut kept = first;
-        for k in first..first + n_new {
-            let entry = joining.vanished[k];
-            if std::mem::replace(&mut last, entry.0) != entry.0 {
-                joining.vanished[kept] = entry;
-                kept += 1;
-            }
-        }
-        joining.vanished.truncate(kept);
-
+        new.dedup();
+        joining.vanished.append(&mut new);
         let corners = self.corners_of(family);
         let material = self.cells[id as usize].material;
         for part in parts {
+            joining.tell(part, self.now(part));
             joining.absorbed[part as usize] = part != id;
         }
         self.cells[id as usize] = Cell::new(at, level, material);
@@ -195,11 +200,9 @@ impl Octree {
             let p = [at[0] + k % 3 * half, at[1] + k / 3 % 3 * half, at[2] + k / 9 * half];
             let octants = self.octants(p);
             let Some(own) = (0..8).find(|&o| octants.leaf[o] == id) else { continue };
-            octants
-                .leaf
-                .iter()
-                .filter(|leaf| **leaf != OUTSIDE)
-                .for_each(|&l| joining.told[l as usize] = true);
+            for &leaf in octants.leaf.iter().filter(|leaf| **leaf != OUTSIDE) {
+                joining.tell(leaf, self.now(leaf));
+            }
             let c = 7 - own;
             let vertex = if self.cells[id as usize].corner(c) == p { corners[c] } else { OUTSIDE };
             self.enter(p, &octants, octants.class[own], vertex);
@@ -207,21 +210,22 @@ impl Octree {
     }
 
     /// Drops absorbed cells and vanished vertices, and resolves hanging corners.
-    fn close_up(&mut self, joining: Joining) -> Coarsening {
-        let Joining { mut told, absorbed, mut vanished, joined } = joining;
-        if joined == 0 {
+    fn close_up(&mut self, mut joining: Joining) -> Coarsening {
+        if joining.joined == 0 {
             let numbers = |n: usize| (0..n as u32).collect();
             let (cell_of, vertex_of) = (numbers(self.cells.len()), numbers(self.points.len()));
             return Coarsening { cell_of, vertex_of, ..Coarsening::default() };
         }
         // Corners that hang on a coarse leaf follow the vertices of that leaf.
-        let changed: Vec<usize> = (0..told.len()).filter(|&id| told[id] && !absorbed[id]).collect();
+        let is_left = |id: &usize| joining.told[*id] && !joining.absorbed[*id];
+        let changed: Vec<usize> = (0..joining.told.len()).filter(is_left).collect();
         for id in changed {
             let cell = self.cells[id];
             if cell.level > 0 {
-                self.for_smaller_around(&cell, |id| told[id as usize] = true);
+                self.for_smaller_around(&cell, |id| joining.tell(id, self.now(id)));
             }
         }
+        let Joining { mut told, absorbed, earlier, mut vanished, joined } = joining;
         for id in 0..told.len() {
             told[id] &= !absorbed[id];
             if told[id] && self.hanging[id] != 0 {
@@ -269,7 +273,7 @@ impl Octree {
             (vertex, place.renumbered(|v| vertex_of[v as usize]))
         };
         let vanished = vanished.iter().zip(places).map(renumber).collect();
-        Coarsening { joined, cells, cell_of, vertex_of, vanished }
+        Coarsening { joined, cells, earlier, cell_of, vertex_of, vanished }
     }
 }
 

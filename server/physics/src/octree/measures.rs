@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::cells::{Cell, Octree};
+use super::change::Leaf;
 use super::lattice::{At, OUTSIDE};
 use super::vertices::corner_weights;
 use crate::cut::Components;
@@ -194,33 +195,74 @@ impl Octree {
     }
 }
 
+/// Gradients of the shape functions at the quadrature points of [−1, 1]³.
+fn reference_gradients() -> Vec<[Vector3<f64>; 8]> {
+    quadrature::cube_gauss(2).iter().map(|(xi, _)| hex8::reference_gradients(xi)).collect()
+}
+
+impl Octree {
+    /// Calls `visit` for the quadrature points of a leaf.
+    fn for_points_of(
+        &self,
+        (element, leaf): (usize, &Leaf),
+        reference: &[[Vector3<f64>; 8]],
+        x: &[Vector3<f64>],
+        visit: &mut dyn FnMut(Point<'_>),
+    ) {
+        let Leaf { cell, vertices: nodes, hanging } = leaf;
+        let side = f64::from(cell.side()) * self.lattice.h;
+        // On [−1, 1]³; a side of s gives 2/s.
+        let (per_metre, weight) = (2.0 / side, side.powi(3) / 8.0);
+        let W = (*hanging != 0).then(|| corner_weights(cell, *hanging));
+        let at = nodes.map(|v| x[v as usize]);
+        for of_corners in reference {
+            let mut gradients = of_corners.map(|g| g * per_metre);
+            if let Some(W) = &W {
+                let corners = std::mem::replace(&mut gradients, [Vector3::zeros(); 8]);
+                for (row, g) in W.iter().zip(corners) {
+                    gradients.iter_mut().zip(row).for_each(|(out, w)| *out += *w * g);
+                }
+            }
+            let F: Matrix3<f64> = deformation_gradient(&at, &gradients);
+            visit(Point { element, nodes, gradients: &gradients, weight, F, region: cell.material });
+        }
+    }
+
+    /// Some leaves, now or before a change.
+    pub fn some(&self, leaves: Vec<Leaf>) -> Leaves<'_> {
+        Leaves { octree: self, leaves }
+    }
+}
+
 impl Points for Octree {
     fn for_points(&self, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
-        let rule = quadrature::cube_gauss(2);
-        // On [−1, 1]³; a side of s gives 2/s.
-        let reference: Vec<[Vector3<f64>; 8]> =
-            rule.iter().map(|(xi, _)| hex8::reference_gradients(xi)).collect();
-        for (element, nodes) in self.vertices.iter().enumerate() {
-            let cell = &self.cells[element];
-            let per_metre = 2.0 / (f64::from(cell.side()) * self.lattice.h);
-            let weight = self.cell_volume(element) / 8.0;
-            let W = (self.hanging[element] != 0).then(|| corner_weights(cell, self.hanging[element]));
-            let at = nodes.map(|v| x[v as usize]);
-            for of_corners in &reference {
-                let mut gradients = of_corners.map(|g| g * per_metre);
-                if let Some(W) = &W {
-                    let corners = std::mem::replace(&mut gradients, [Vector3::zeros(); 8]);
-                    for (row, g) in W.iter().zip(corners) {
-                        gradients.iter_mut().zip(row).for_each(|(out, w)| *out += *w * g);
-                    }
-                }
-                let F: Matrix3<f64> = deformation_gradient(&at, &gradients);
-                visit(Point { element, nodes, gradients: &gradients, weight, F, region: cell.material });
-            }
+        let reference = reference_gradients();
+        for id in 0..self.cells.len() {
+            self.for_points_of((id, &self.now(id as u32)), &reference, x, visit);
         }
     }
 
     fn regions(&self) -> &[Region] {
         &self.regions
+    }
+}
+
+/// Some leaves of an octree, numbered from 0.
+#[derive(Clone, Debug)]
+pub struct Leaves<'a> {
+    octree: &'a Octree,
+    leaves: Vec<Leaf>,
+}
+
+impl Points for Leaves<'_> {
+    fn for_points(&self, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
+        let reference = reference_gradients();
+        for leaf in self.leaves.iter().enumerate() {
+            self.octree.for_points_of(leaf, &reference, x, visit);
+        }
+    }
+
+    fn regions(&self) -> &[Region] {
+        &self.octree.regions
     }
 }

@@ -4,6 +4,7 @@
 //! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
 
 mod adapt;
+mod adapt_space;
 mod blade;
 mod build;
 mod cells;
@@ -19,14 +20,16 @@ mod surface;
 mod vertices;
 
 pub use adapt::{Activity, AdaptError, AdaptSettings, Plan};
+pub use adapt_space::OctreeRefinement;
 pub use build::{Bits, OctreeSettings};
 pub use cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree, OctreeError};
-pub use change::OctreeChange;
+pub use change::{Leaf, OctreeChange};
 pub use coarsen::{Coarsening, Family};
 pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
+pub use measures::Leaves;
 pub use restriction::Restriction;
 pub use shape::{BoxShape, Shape};
-pub use space::{OctreeRefinement, OctreeSpace};
+pub use space::OctreeSpace;
 pub use surface::OctreeSurface;
 pub use vertices::{Octants, corner_weights, parent_corner};
 

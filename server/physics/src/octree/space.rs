@@ -6,17 +6,15 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::adapt::{Activity, AdaptSettings, Plan};
 use super::cells::{CutLink, LinkKey, Octree};
 use super::change::OctreeChange;
-use super::coarsen::{Coarsening, Family};
 use super::surface::OctreeSurface;
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
     Surroundings, Work, sweep_triangles, swept_area,
 };
-use crate::element::{MaterialPoint, Point, Points, Simd};
+use crate::element::{Point, Points, Simd};
 use crate::material::{Lame, Material, Region};
 use crate::mesh::MeshError;
 use crate::multigrid::Hierarchy;
@@ -38,29 +36,20 @@ const TRIANGLE_BYTES: usize = 100;
 /// Distance, in finest cells, by which a point is moved towards its side before its cell is looked up.
 const SIDE_STEP: f64 = 1e-6;
 
-/// What a refinement did.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct OctreeRefinement {
-    /// Leaves that were divided, for 2:1 balance too.
-    pub divided: usize,
-    /// New vertices.
-    pub new_copies: Vec<NewCopy>,
-}
-
 /// An octree that is cut, with everything that a body asks of it.
 #[derive(Clone, Debug)]
 pub struct OctreeSpace {
-    octree: Octree,
+    pub(super) octree: Octree,
     /// The uncut state.
-    initial: Arc<Octree>,
+    pub(super) initial: Arc<Octree>,
     /// The first vertex at the lattice point of each vertex.
-    node_of_copy: Vec<u32>,
-    volumes: Vec<f64>,
+    pub(super) node_of_copy: Vec<u32>,
+    pub(super) volumes: Vec<f64>,
     /// Leaves that the last cut changed.
-    changed: Vec<u32>,
-    fronts: BTreeMap<u32, Front>,
-    surface: OctreeSurface,
-    epoch: u32,
+    pub(super) changed: Vec<u32>,
+    pub(super) fronts: BTreeMap<u32, Front>,
+    pub(super) surface: OctreeSurface,
+    pub(super) epoch: u32,
     under_way: Option<(Vec<(LinkKey, CutLink)>, CutReport)>,
 }
 
@@ -156,66 +145,8 @@ impl OctreeSpace {
         Ok(cuts)
     }
 
-    /// Divides these leaves. Returns the new vertices; all earlier ones keep their numbers.
-    pub fn refine(&mut self, leaves: &[u32]) -> OctreeRefinement {
-        let known = self.octree.n_vertices() as u32;
-        let change = self.octree.divide_leaves(leaves);
-        let new_copies = self.number_copies(known, &change);
-        self.changed = change.cells;
-        if change.divided > 0 {
-            self.epoch += 1;
-            self.volumes = self.octree.vertex_volumes();
-            self.surface.follow(&self.octree, &self.changed, &[]);
-        }
-        OctreeRefinement { divided: change.divided, new_copies }
-    }
-
-    /// What to change by `settings`; no leaf of the uncut body is ever joined with others.
-    pub fn plan(&self, settings: &AdaptSettings, activity: &Activity<'_>) -> Plan {
-        let mut plan = self.octree.plan(settings, activity);
-        plan.coarsen.retain(|family| self.was_one(family));
-        plan
-    }
-
-    /// Whether one leaf of the uncut body fills a family.
-    fn was_one(&self, family: &Family) -> bool {
-        let leaf = self.initial.leaf(family.at);
-        self.initial.cells().get(leaf as usize).is_some_and(|cell| cell.level >= family.level)
-    }
-
-    /// Joins these families where that is allowed, so far as the uncut body had larger leaves: its vertices keep
-    /// their numbers. Vertices that a cut has split, or that the front of an incision hangs on, stay too, and
-    /// those for which `stays` says so.
-    pub fn coarsen(
-        &mut self,
-        families: &[Family],
-        stays: &dyn Fn(u32, &MaterialPoint) -> bool,
-    ) -> Coarsening {
-        let mut bound = vec![false; self.octree.n_vertices()];
-        let copies = (0u32..).zip(&self.node_of_copy).filter(|(copy, node)| copy != *node);
-        for vertex in copies.flat_map(|(copy, &node)| [copy, node]) {
-            bound[vertex as usize] = true;
-        }
-        self.fronts.values().flat_map(Front::copies).for_each(|vertex| bound[vertex as usize] = true);
-        let families: Vec<Family> = families.iter().copied().filter(|family| self.was_one(family)).collect();
-        let change =
-            self.octree.coarsen(&families, &|vertex, point| bound[vertex as usize] || stays(vertex, point));
-        if change.joined == 0 {
-            return change;
-        }
-        self.epoch += 1;
-        change.keep(&mut self.node_of_copy);
-        let number = |vertex: u32| change.vertex_of[vertex as usize];
-        self.node_of_copy.iter_mut().for_each(|node| *node = number(*node));
-        self.fronts.values_mut().for_each(|front| front.renumber(number));
-        self.changed.clone_from(&change.cells);
-        self.volumes = self.octree.vertex_volumes();
-        self.surface.follow_coarsening(&self.octree, &change);
-        change
-    }
-
     /// Enters the new vertices of `change`; `known` were there before.
-    fn number_copies(&mut self, known: u32, change: &OctreeChange) -> Vec<NewCopy> {
+    pub(super) fn number_copies(&mut self, known: u32, change: &OctreeChange) -> Vec<NewCopy> {
         let mut new_copies = Vec::with_capacity(change.new_vertices.len());
         for (copy, between) in (known..).zip(&change.new_vertices) {
             let parent = between.main_copy();
