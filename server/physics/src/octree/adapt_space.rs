@@ -23,6 +23,7 @@ impl OctreeSpace {
         let change = self.octree.divide_leaves(leaves);
         let new_copies = self.number_copies(known, &change);
         self.changed.clone_from(&change.cells);
+        self.only_cut = false;
         if change.divided > 0 {
             self.epoch += 1;
             self.volumes = self.octree.vertex_volumes();
@@ -70,6 +71,7 @@ impl OctreeSpace {
         self.node_of_copy.iter_mut().for_each(|node| *node = number(*node));
         self.fronts.values_mut().for_each(|front| front.renumber(number));
         self.changed.clone_from(&change.cells);
+        self.only_cut = false;
         self.volumes = self.octree.vertex_volumes();
         self.surface.follow_coarsening(&self.octree, &change);
         change

@@ -47,6 +47,8 @@ pub struct OctreeSpace {
     pub(super) volumes: Vec<f64>,
     /// Leaves that the last cut changed.
     pub(super) changed: Vec<u32>,
+    /// Whether the last change was a cut, which leaves the numbers of all earlier leaves.
+    pub(super) only_cut: bool,
     pub(super) fronts: BTreeMap<u32, Front>,
     pub(super) surface: OctreeSurface,
     pub(super) epoch: u32,
@@ -63,6 +65,7 @@ impl OctreeSpace {
             node_of_copy: (0..n).collect(),
             volumes: Vec::new(),
             changed: Vec::new(),
+            only_cut: false,
             fronts: BTreeMap::new(),
             surface: OctreeSurface::default(),
             epoch: 0,
@@ -165,6 +168,7 @@ impl OctreeSpace {
         let change = self.octree.cut(cuts);
         let new_copies = self.number_copies(known, &change);
         self.changed = change.cells;
+        self.only_cut = true;
         // Another cut of a link that was cut before may show at another place.
         if !change.moved.is_empty() || !self.changed.is_empty() {
             self.surface.follow(&self.octree, &self.changed, &change.moved);
@@ -384,6 +388,7 @@ impl Space for OctreeSpace {
         self.under_way = None;
         self.fronts.clear();
         self.changed.clear();
+        self.only_cut = false;
         self.octree = (*self.initial).clone();
         self.node_of_copy.truncate(self.octree.n_vertices());
         self.epoch += 1;
@@ -410,7 +415,10 @@ impl Space for OctreeSpace {
 
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {
         if let Some(cells) = (stiffness as &mut dyn Any).downcast_mut::<CellStiffness>() {
-            cells.follow(&self.octree);
+            match self.only_cut {
+                true => cells.follow_cut(&self.octree, &self.changed),
+                false => cells.follow(&self.octree),
+            }
         }
     }
 

@@ -72,16 +72,18 @@ pub struct CellChunk {
 }
 
 impl CellChunk {
-    /// Arranges the cells `members` in batches.
-    pub fn new(members: &[u32], cells: &[CellLane]) -> Self {
-        let held: Vec<[u32; 8]> = members.iter().map(|&id| cells[id as usize].vertices).collect();
+    /// Arranges the cells `members` in batches; `lane` gives what each of them is.
+    pub fn new(members: &[u32], lane: &dyn Fn(u32) -> CellLane) -> Self {
+        let cells: Vec<CellLane> = members.iter().map(|&id| lane(id)).collect();
+        let held: Vec<[u32; 8]> = cells.iter().map(|cell| cell.vertices).collect();
         let mut vertices = held.as_flattened().to_vec();
         vertices.sort_unstable();
         vertices.dedup();
-        let mut kinds: BTreeMap<(CellMatrix, bool), Vec<u32>> = BTreeMap::new();
-        for &id in members {
-            let cell = &cells[id as usize];
-            kinds.entry((cell.matrix, cell.hanging != 0)).or_default().push(id);
+        let mut kinds: BTreeMap<(CellMatrix, bool), (Vec<u32>, Vec<CellLane>)> = BTreeMap::new();
+        for (&id, cell) in members.iter().zip(&cells) {
+            let (members, lanes) = kinds.entry((cell.matrix, cell.hanging != 0)).or_default();
+            members.push(id);
+            lanes.push(*cell);
         }
         let n = vertices.len();
         let mut chunk = Self {
@@ -95,15 +97,15 @@ impl CellChunk {
             weights: Vec::new(),
             inverted: 0,
         };
-        for ((matrix, hangs), members) in kinds {
-            chunk.add_group(matrix, hangs, &members, cells);
+        for ((matrix, hangs), (members, cells)) in kinds {
+            chunk.add_group(matrix, hangs, &members, &cells);
         }
         chunk
     }
 
     fn add_group(&mut self, matrix: CellMatrix, hangs: bool, members: &[u32], cells: &[CellLane]) {
         let local = |vertex: u32| self.vertices.binary_search(&vertex).map_or(0, |local| local as u16);
-        let ids: Vec<[u16; 8]> = members.iter().map(|&id| cells[id as usize].vertices.map(local)).collect();
+        let ids: Vec<[u16; 8]> = cells.iter().map(|cell| cell.vertices.map(local)).collect();
         let (first, first_weight) = (self.lanes.len(), self.weights.len());
         for lanes in pack(&ids, self.vertices.len()) {
             let mut batch = BatchLanes { cells: [NO_PIECE; LANES], octants: [0; LANES], hanging: [0; LANES] };
@@ -112,8 +114,7 @@ impl CellChunk {
             let nodes = from_fn(|j| of_lane.map(|ids| ids[j]));
             let mut sectors = SectorBatch { rotation: Default::default(), root: Lanes::default(), nodes };
             for (lane, &k) in lanes.iter().enumerate().filter(|(_, k)| **k != NO_PIECE) {
-                let id = members[k as usize];
-                let cell = &cells[id as usize];
+                let (id, cell) = (members[k as usize], &cells[k as usize]);
                 batch.cells[lane] = id;
                 (batch.octants[lane], batch.hanging[lane]) = (cell.octant, cell.hanging);
                 sectors.root.0[lane] = cell.factor.sqrt();

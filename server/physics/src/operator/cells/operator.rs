@@ -1,5 +1,7 @@
 //! The cells of one octree, or of one level above it, as a linear operator.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Matrix3;
 
 use super::super::chunks::Gather;
@@ -51,8 +53,10 @@ impl CellOperator {
         order: &[u32],
         n_vertices: usize,
     ) -> Self {
-        let chunks: Vec<CellChunk> =
-            order.chunks(CHUNK_CELLS).map(|members| CellChunk::new(members, cells)).collect();
+        let chunks: Vec<CellChunk> = order
+            .chunks(CHUNK_CELLS)
+            .map(|members| CellChunk::new(members, &|id| cells[id as usize]))
+            .collect();
         let gather = Gather::without_room(chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
         let places = vec![Place::default(); cells.len()];
         let sums = vec![[0.0; 4]; gather.n_rows()];
@@ -113,7 +117,7 @@ impl CellOperator {
         team.for_blocks(blocks(&mut self.chunks, 1), |k, chunk| {
             let members = &order[k * CHUNK_CELLS..order.len().min((k + 1) * CHUNK_CELLS)];
             if members.iter().any(|&id| changed(id)) {
-                chunk[0] = CellChunk::new(members, cells);
+                chunk[0] = CellChunk::new(members, &|id| cells[id as usize]);
             }
         });
         for (k, members) in order.chunks(CHUNK_CELLS).enumerate() {
@@ -121,6 +125,56 @@ impl CellOperator {
                 self.find_places(k);
             }
         }
+    }
+
+    /// Follows a cut after which there are `n_cells` cells on `n_vertices` vertices. The cells in `changed`, ascending,
+    /// are new or have other vertices or hanging slots; `lane` gives what each of them and of their neighbours in
+    /// a chunk is now, and `source` an earlier cell near a new one. Returns which chunks were arranged anew: these
+    /// forget factors, rotations and stored matrices.
+    pub fn follow(
+        &mut self,
+        changed: &[u32],
+        [n_cells, n_vertices]: [usize; 2],
+        lane: &dyn Fn(u32) -> CellLane,
+        source: &dyn Fn(u32) -> u32,
+    ) -> Vec<usize> {
+        let known = self.places.len();
+        let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for &id in changed {
+            let new = id as usize >= known;
+            let chunk = self.places[if new { source(id) } else { id } as usize].chunk;
+            let held = members
+                .entry(chunk)
+                .or_insert_with(|| self.chunks[chunk as usize].places().map(|(cell, ..)| cell).collect());
+            if new {
+                held.push(id);
+            }
+        }
+        self.places.resize(n_cells, Place::default());
+        let mut renewed = Vec::with_capacity(members.len());
+        for (chunk, mut members) in members {
+            members.sort_unstable();
+            // A chunk that has grown is divided; its later parts come last.
+            let size = if members.len() > 2 * CHUNK_CELLS { CHUNK_CELLS } else { members.len() };
+            for (part, members) in members.chunks(size).enumerate() {
+                let arranged = CellChunk::new(members, lane);
+                let at = if part == 0 { chunk as usize } else { self.chunks.len() };
+                if part == 0 {
+                    self.chunks[at] = arranged
+                } else {
+                    self.chunks.push(arranged)
+                }
+                renewed.push(at);
+            }
+        }
+        for &chunk in &renewed {
+            self.find_places(chunk);
+        }
+        self.gather = Gather::without_room(self.chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
+        let rows = self.gather.n_rows();
+        (self.sums, self.diagonals) = (vec![[0.0; 4]; rows], vec![[0.0; 8]; rows]);
+        renewed.sort_unstable();
+        renewed
     }
 
     /// First half of the diagonal blocks.

@@ -1,7 +1,8 @@
 //! s K̂ of an octree.
 
-use nalgebra::Matrix3;
-use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Vector3};
 
 use super::super::kernel::Block6;
 use super::super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
@@ -65,6 +66,51 @@ impl CellStiffness {
         }
     }
 
+    /// The same after a cut that changed the cells in `changed`, ascending, and left the numbers of all others.
+    /// Only the chunks of these cells are arranged anew.
+    pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) {
+        let cells = octree.cells();
+        let Self { operator, rest, cells: known, materials, .. } = self;
+        let lane = |id: u32| {
+            let matrix = CellMatrix::Table(materials.table_of(cells[id as usize].material));
+            CellLane { factor: 1.0, ..CellLane::of_leaf(octree, id as usize, matrix) }
+        };
+        let source = |id: u32| whole_of(known, octree, id);
+        let rotation = |operator: &CellOperator, id: u32| operator.rotation(operator.places()[id as usize]);
+        // Rotations of all cells in the chunks that change, by number.
+        let mut kept: BTreeMap<u32, Matrix3<f32>> = BTreeMap::new();
+        for &id in changed {
+            let old = if (id as usize) < known.len() { id } else { source(id) };
+            let chunk = operator.places()[old as usize].chunk as usize;
+            let first = operator.chunks[chunk].places().next();
+            if first.is_some_and(|(cell, ..)| !kept.contains_key(&cell)) {
+                for (cell, ..) in operator.chunks[chunk].places() {
+                    kept.insert(cell, rotation(operator, cell));
+                }
+            }
+        }
+        for &id in changed.iter().filter(|&&id| id as usize >= known.len()) {
+            kept.insert(id, kept.get(&source(id)).copied().unwrap_or_else(Matrix3::identity));
+        }
+        let renewed = operator.follow(changed, [cells.len(), octree.n_vertices()], &lane, &source);
+        let (positions, h) = (octree.rest_positions(), octree.lattice().h);
+        let side = |id: u32| f64::from(cells[id as usize].side()) * h;
+        for chunk in renewed {
+            let arranged = &mut operator.chunks[chunk];
+            arranged.set_rotations(&|id| kept.get(&id).copied().unwrap_or_else(Matrix3::identity));
+            let arranged = RestChunk::new(arranged, &positions, side);
+            if chunk < rest.len() { rest[chunk] = arranged } else { rest.push(arranged) }
+        }
+        for &id in changed {
+            match known.get_mut(id as usize) {
+                Some(cell) => *cell = cells[id as usize],
+                None => known.push(cells[id as usize]),
+            }
+        }
+        // New cells need their factors.
+        self.made_with = None;
+    }
+
     /// For every cell the earlier one that it was part of, or whose place it begins at.
     ///
     /// Cells keep their order when others vanish, and new ones come last. A cell that was divided or joined has the
@@ -113,6 +159,18 @@ impl CellStiffness {
             self.operator.set_rotations(team, |_| Matrix3::identity());
         }
     }
+}
+
+/// Which of the leaves `known` the new cell `id` was part of. The first part of a divided leaf has its number.
+fn whole_of(known: &[Cell], octree: &Octree, id: u32) -> u32 {
+    let cell = &octree.cells()[id as usize];
+    let whole = (cell.level + 1..=octree.lattice().levels).find_map(|level| {
+        let at = cell.at.map(|c| c >> level << level);
+        let first = octree.leaf(at);
+        let whole = known.get(first as usize)?;
+        (whole.level == level && whole.at == at).then_some(first)
+    });
+    whole.unwrap_or(0)
 }
 
 fn arrange(simd: Simd, octree: &Octree, materials: &Materials) -> (CellOperator, Vec<RestChunk>) {

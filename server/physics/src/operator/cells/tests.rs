@@ -443,3 +443,46 @@ fn the_stiffness_follows_a_cut_and_cells_keep_their_rotations() {
     assert_eq!((stiffness.version(), read(&stiffness, x.len())), (version, first));
     assert!(stiffness.places().into_iter().all(|p| stiffness.rotation(p) == Matrix3::identity()));
 }
+
+#[test]
+fn a_cut_that_is_followed_gives_the_stiffness_of_a_new_arrangement() {
+    let mut octree = cube(32, 3);
+    let mut team = Team::new(2).unwrap();
+    let mut stiffness = CellStiffness::new(Simd::detect(), &octree, &[]);
+    let bend = |X: &Vector3<f64>| X + 0.1 * Vector3::new((3.0 * X.y).sin(), X.z * X.z, (2.0 * X.x).cos());
+    let x: Vec<_> = octree.rest_positions().iter().map(bend).collect();
+    stiffness.update(&mut team, &with(Law::Corotational), &x);
+    let cut = CutLink { at: [0.5; 2], normal: [Vector3::x(); 2], incision: 1 };
+    for (axis, plane) in [(0, 9), (1, 20), (2, 15)] {
+        let links = (0..20).flat_map(|s| {
+            (4..29).map(move |t| {
+                let mut at = [0; 3];
+                (at[axis], at[(axis + 1) % 3], at[(axis + 2) % 3]) = (plane, s, t);
+                ((at, axis as u8), cut)
+            })
+        });
+        let change = octree.cut(&links.collect::<Vec<_>>());
+        assert!(change.links > 400 && change.divided > 50);
+        stiffness.follow_cut(&octree, &change.cells);
+        let x: Vec<_> = octree.rest_positions().iter().map(bend).collect();
+        // Rotations of cells that were there are kept until the next update.
+        let places = stiffness.places();
+        assert_eq!(places.len(), octree.cells().len());
+        assert!((stiffness.rotation(places[0]) - Matrix3::identity()).norm() > 1e-2);
+        stiffness.update(&mut team, &with(Law::Corotational), &x);
+        let anew = updated(Simd::detect(), 1, &octree, Law::Corotational, &x);
+        let (f, diagonal) = read(&stiffness, x.len());
+        let exact: Vec<_> = anew.f.iter().map(wide).collect();
+        assert!(error(&f, &exact) < 1e-5, "{:e}", error(&f, &exact));
+        let of = |d: &[Block6]| d.iter().map(|d| [d[0], d[4], d[6], 0.0]).collect::<Vec<Padded>>();
+        let exact: Vec<_> = of(&anew.diagonal).iter().map(wide).collect();
+        assert!(error(&of(&diagonal), &exact) < 1e-5);
+        let p = direction(x.len());
+        let [mut y, mut expected] = [vec![[0.0; 4]; x.len()], vec![[0.0; 4]; x.len()]];
+        stiffness.apply(&mut team, &p, &mut y);
+        let mut anew = anew.stiffness;
+        anew.apply(&mut team, &p, &mut expected);
+        let expected: Vec<_> = expected.iter().map(wide).collect();
+        assert!(error(&y, &expected) < 1e-5);
+    }
+}
