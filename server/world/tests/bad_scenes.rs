@@ -102,11 +102,11 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
     for (line, parts) in [
         (
             r#"solver = { method = "multigrid" }"#,
-            ["`multigrid` is not supported yet", "cg, pcg, cholesky, relaxation"],
+            ["found `multigrid` with tet4, allowed: octree", "choose cg, pcg or cholesky"],
         ),
         (
             r#"solver = { method = "mg-pcg" }"#,
-            ["`mg-pcg` is not supported yet", "cg, pcg, cholesky, relaxation"],
+            ["found `mg-pcg` with tet4, allowed: octree", "choose cg, pcg or cholesky"],
         ),
         (
             r#"integrator = "implict-euler""#,
