@@ -167,7 +167,7 @@ const AT_ONCE: &[Mistake] = &[
         &["tool.finger.path.1.at_s", "give the times of a path in ascending order"],
     ),
     // what does not exist
-    (BODY_END, "solver = { method = \"multigrid\" }", &["`multigrid` is not supported yet"]),
+    (BODY_END, "solver = { method = \"multigrid\" }", &["found `multigrid` with tet4"]),
 ];
 
 /// Found by the first steps.
