@@ -57,6 +57,7 @@ fn check(scene: &str, budget_ms: f64, within_s: f64, out: PathBuf) -> Result<Str
         seconds: None,
         only: Vec::new(),
         cells: Vec::new(),
+        surface: None,
         stop: Arc::new(AtomicBool::new(false)),
     };
     let study = run(&settings, &mut |progress| progress.note.iter().for_each(|note| eprintln!("{note}")))

@@ -39,6 +39,10 @@ pub mod page;
 
 pub mod study;
 
+// Measurements of octree cells and multigrid.
+#[allow(non_snake_case)] // the symbols of the field: A, X, K
+pub mod cells;
+
 // The other study: what breaks codes that deform and cut.
 #[allow(non_snake_case)] // the symbols of the field: X, K, M
 pub mod stress;

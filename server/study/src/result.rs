@@ -6,6 +6,7 @@ use crate::advice::recommend::Recommendation;
 use crate::advice::sources::Sources;
 use crate::bench::store::Origin;
 use crate::case::Case;
+use crate::cells::CellsResult;
 use crate::design::Configuration;
 use crate::distance::Errors;
 use crate::reference::Reference;
@@ -57,6 +58,8 @@ pub struct CaseResult {
 pub struct StudyResult {
     /// One result per case.
     pub cases: Vec<CaseResult>,
+    /// One result per experiment.
+    pub cells: Vec<CellsResult>,
     /// Build and machine of the study.
     pub origin: Origin,
     /// Number of points taken over from an earlier study.
@@ -87,9 +90,11 @@ impl CaseResult {
 }
 
 impl StudyResult {
-    /// Whether every case gave at least one result.
+    /// Whether every case gave at least one result, and every experiment was made.
     pub fn has_results(&self) -> bool {
         let counts = self.cases.iter().map(CaseResult::counts);
-        !self.cases.is_empty() && counts.into_iter().all(|counts| counts.points > counts.failures)
+        let made = self.cells.iter().all(|result| result.trouble.is_none());
+        let any = !self.cases.is_empty() || !self.cells.is_empty();
+        any && made && counts.into_iter().all(|counts| counts.points > counts.failures)
     }
 }

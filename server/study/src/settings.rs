@@ -9,7 +9,8 @@ use crate::design::axes::Factor;
 /// Cases to study, time limits, and factors to narrow.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Names of cases (see [`NAMES`](crate::case::NAMES)) and paths of scene files.
+    /// Names of cases (see [`NAMES`](crate::case::NAMES)) and of [experiments](crate::cells::NAMES), and paths of
+    /// scene files.
     pub cases: Vec<String>,
     /// Directory of the results. Finished points in it are taken over.
     pub out: PathBuf,
@@ -26,6 +27,8 @@ pub struct Settings {
     pub only: Vec<(Factor, Vec<String>)>,
     /// Cells along the longest side, which replace the default meshes; empty for the defaults.
     pub cells: Vec<usize>,
+    /// Surface of a solid that takes the place of the built-in one in [experiments](crate::cells).
+    pub surface: Option<PathBuf>,
     /// Raised from elsewhere to end the study. Finished runs are kept and shown.
     pub stop: Arc<AtomicBool>,
 }

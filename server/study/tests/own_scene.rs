@@ -29,6 +29,7 @@ fn study(directory: &Path, scene: &str) -> StudyResult {
         seconds: None,
         only: Vec::new(),
         cells: Vec::new(),
+        surface: None,
         stop: Arc::new(AtomicBool::new(false)),
     };
     let mut told = Vec::new();

@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use scindo_study::design::axes::Factor;
-use scindo_study::words::percent;
+use scindo_study::cells::CellsResult;
+use scindo_study::words::{percent, short};
 use scindo_study::{CaseResult, Settings, StudyResult};
 use serde_json::json;
 
@@ -30,6 +31,7 @@ pub fn accuracy(args: &AccuracyArgs) -> Result<ExitCode, RuntimeError> {
         seconds: args.seconds,
         only: narrowed(args),
         cells: args.cells.iter().map(|n| *n as usize).collect(),
+        surface: args.surface.clone(),
         stop,
     };
     let progress = StudyProgress::begin();
@@ -113,6 +115,7 @@ fn print(args: &AccuracyArgs, study: &StudyResult) {
     for result in &study.cases {
         print_case(result);
     }
+    study.cells.iter().for_each(print_experiment);
     let directory = args.out.display();
     let how = if study.interrupted { "interrupted; the same command resumes from here" } else { "done" };
     say!("{how}: {:.0} s, {} runs reused", study.seconds, study.resumed);
@@ -158,6 +161,24 @@ fn print_case(result: &CaseResult) {
     }
 }
 
+fn print_experiment(result: &CellsResult) {
+    say!("{}", result.title);
+    if let Some(trouble) = &result.trouble {
+        say!("  no result: {trouble}");
+    }
+    for note in &result.notes {
+        say!("  note: {note}");
+    }
+    for table in &result.tables {
+        say!("  {}", table.title);
+        for row in &table.rows {
+            let values = table.columns.iter().zip(&row.values);
+            let words = values.filter_map(|(column, value)| Some(format!("{} {}", column.name, short((*value)?))));
+            say!("    {:36} {}", row.name, words.collect::<Vec<_>>().join(", "));
+        }
+    }
+}
+
 fn as_json(args: &AccuracyArgs, study: &StudyResult) -> serde_json::Value {
     let case = |result: &CaseResult| {
         json!({
@@ -179,5 +200,6 @@ fn as_json(args: &AccuracyArgs, study: &StudyResult) -> serde_json::Value {
         "seconds": study.seconds,
         "interrupted": study.interrupted,
         "cases": study.cases.iter().map(case).collect::<Vec<_>>(),
+        "experiments": study.cells.iter().map(CellsResult::to_json).collect::<Vec<_>>(),
     })
 }

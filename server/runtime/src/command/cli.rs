@@ -170,7 +170,8 @@ pub struct MeshArgs {
 #[derive(Debug, Args)]
 pub struct AccuracyArgs {
     /// Cases (r1, r2-tc1, bar-rest, bar-motion; bar is both; cut-tc1, cut-tc2force and cut-tc2strip compare
-    /// methods of cutting; cutting is all three) and scene files.
+    /// methods of cutting; cutting is all three), experiments on octree cells and multigrid (dick-tables,
+    /// dick-convergence, dick-solvers, dick-layer, dick-sizes; dick is all of them), and scene files.
     #[arg(value_name = "CASE|SCENE", default_values = ["r1", "r2-tc1", "bar"])]
     pub cases: Vec<String>,
     /// Recommend a configuration that fits into this time, per static solution or per frame of a motion.
@@ -207,6 +208,9 @@ pub struct AccuracyArgs {
     /// Meshes of a block, given as cells along its longest side.
     #[arg(long, value_name = "N", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub cells: Vec<u32>,
+    /// Surface of a solid for dick-tables, in place of the built-in one.
+    #[arg(long, value_name = "FILE")]
+    pub surface: Option<PathBuf>,
     /// Report as JSON.
     #[arg(long)]
     pub json: bool,

@@ -5,9 +5,11 @@ pub(crate) mod html;
 
 mod case;
 
+mod cells;
+
 mod json;
 
-mod plot;
+pub(crate) mod plot;
 
 mod scale;
 
@@ -51,10 +53,15 @@ fn html(study: &StudyResult) -> String {
     out += style::PAGE;
     out += style::COLOURS;
     out += style::PLOT;
+    out += style::LINES;
+    out += &crate::stress::view::style();
     out += "</style>\n</head>\n<body>\n<main>\n";
     out += &text::opening(study);
     for result in &study.cases {
         out += &case::section(result);
+    }
+    for result in &study.cells {
+        out += &cells::section(result);
     }
     out += &text::method(study);
     out += "</main>\n</body>\n</html>\n";

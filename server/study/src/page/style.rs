@@ -46,6 +46,15 @@ svg.plot .c3 { fill: var(--c3); } svg.plot .c4 { fill: var(--c4); } svg.plot .c5
 svg.plot .key { fill: var(--soft); }
 ";
 
+/// Style of the lines of charts.
+pub const LINES: &str = "
+svg.plot .line { fill: none; stroke-width: 1.8; stroke-linejoin: round; }
+svg.plot .line.l0 { stroke: var(--c0); } svg.plot .line.l1 { stroke: var(--c1); } svg.plot .line.l2 { stroke: var(--c2); }
+svg.plot .line.l3 { stroke: var(--c3); } svg.plot .line.l4 { stroke: var(--c4); } svg.plot .line.l5 { stroke: var(--c5); }
+svg.plot .line.key { stroke: var(--soft); }
+svg.plot .line.d1 { stroke-dasharray: 7 4; } svg.plot .line.d2 { stroke-dasharray: 2 3; }
+";
+
 /// Style of the page around the plots.
 pub const PAGE: &str = "
 :root { color-scheme: light dark; }

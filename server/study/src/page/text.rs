@@ -39,7 +39,12 @@ pub fn opening(study: &StudyResult) -> String {
         let name = escape(&result.case.name);
         let _ = write!(out, " · <a href=\"pareto-{name}.svg\">pareto-{name}.svg</a>");
     }
-    out += "</p>\n<p>Every case below is one scene, solved with many settings. The cost of a setting is its time \
+    out += "</p>\n";
+    if study.cases.is_empty() {
+        out += "</header>\n";
+        return out;
+    }
+    out += "<p>Every case below is one scene, solved with many settings. The cost of a setting is its time \
             on this machine. Its error is the distance from a reference that is known more accurately than any \
             of them. Failed runs are shown as well.</p>\n</header>\n";
     out += &glance(study);

@@ -24,11 +24,6 @@ table.figures td:first-child { white-space: normal; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(260px, 1fr)); gap: 12px 24px; }
 .pictures figure, .charts figure { margin: 8px 0 0; }
 h2 .state { vertical-align: 4px; margin-left: 10px; }
-svg.plot .line { fill: none; stroke-width: 1.8; stroke-linejoin: round; }
-svg.plot .line.l0 { stroke: var(--c0); } svg.plot .line.l1 { stroke: var(--c1); } svg.plot .line.l2 { stroke: var(--c2); }
-svg.plot .line.l3 { stroke: var(--c3); } svg.plot .line.l4 { stroke: var(--c4); } svg.plot .line.l5 { stroke: var(--c5); }
-svg.plot .line.key { stroke: var(--soft); }
-svg.plot .line.d1 { stroke-dasharray: 7 4; } svg.plot .line.d2 { stroke-dasharray: 2 3; }
 ";
 
 /// The page as one self-contained file.
@@ -40,6 +35,7 @@ pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
     out += style::PAGE;
     out += style::COLOURS;
     out += style::PLOT;
+    out += style::LINES;
     out += STYLE;
     out += &view::style();
     out += "</style>\n</head>\n<body>\n<main>\n";

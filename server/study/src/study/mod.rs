@@ -5,6 +5,7 @@ mod survey;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 use scindo_world::scene::{Scene, SceneError};
 use thiserror::Error;
@@ -13,6 +14,7 @@ use crate::bench::Bench;
 use crate::bench::progress::Progress;
 use crate::bench::store::{Origin, Store};
 use crate::case::{self, Case, Wishes};
+use crate::cells::{self, CellsBench};
 use crate::design::axes::{Factor, block};
 use crate::design::narrow;
 use crate::page::table::Table;
@@ -26,7 +28,7 @@ pub enum StudyError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A name is neither a case nor a file.
-    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting", case::NAMES.join(", "))]
+    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting; experiments: {}; all of these: dick", case::NAMES.join(", "), cells::NAMES.join(", "))]
     UnknownCase {
         /// The name that was given.
         name: String,
@@ -90,6 +92,7 @@ pub enum StudyError {
 ///     seconds: None,
 ///     only: Vec::new(),
 ///     cells: Vec::new(),
+///     surface: None,
 ///     stop: Arc::new(AtomicBool::new(false)),
 /// };
 /// let result = run(&settings, &mut |progress| println!("{}", progress.what))?;
@@ -104,10 +107,13 @@ pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<Study
     let io = |(path, source)| StudyError::Io { path, source };
     let store = Store::open(&settings.out, &origin).map_err(io)?;
     Table::begin(&settings.out).map_err(io)?;
-    let mut bench = Bench::new(settings, store, tell);
+    let wanted = experiments(settings);
+    let started = Instant::now();
+    let mut bench = Bench::new(settings, store, &mut *tell);
     let resumed = bench.store.resumed;
     let mut result = StudyResult {
         cases: Vec::new(),
+        cells: Vec::new(),
         origin,
         resumed,
         seconds: 0.0,
@@ -131,6 +137,18 @@ pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<Study
             break;
         }
     }
+    drop(bench);
+    for name in wanted {
+        if settings.stop.load(Ordering::Relaxed) {
+            result.interrupted = true;
+            break;
+        }
+        result.cells.push(cells::study(name, &mut CellsBench::new(name, settings, &mut *tell)));
+        result.seconds = started.elapsed().as_secs_f64();
+        result.load[1] = load();
+        result.interrupted = settings.stop.load(Ordering::Relaxed);
+        crate::page::write(&settings.out, &result).map_err(io)?;
+    }
     Ok(result)
 }
 
@@ -147,7 +165,7 @@ fn share(settings: &Settings, case: &Case, waiting: usize, elapsed_s: f64) -> f6
 fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     let mut cases = Vec::new();
     let threads = threads(settings);
-    for name in &settings.cases {
+    for name in settings.cases.iter().filter(|name| experiment(name).is_empty()) {
         let several: &[&str] = match name.as_str() {
             "bar" => &["bar-rest", "bar-motion"],
             "cutting" => &["cut-tc1", "cut-tc2force", "cut-tc2strip"],
@@ -172,6 +190,19 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
         }
     }
     Ok(cases)
+}
+
+/// The experiments that a name stands for: one, all, or none if it is a case or a scene.
+fn experiment(name: &str) -> &'static [&'static str] {
+    match cells::NAMES.iter().position(|known| *known == name) {
+        Some(i) => &cells::NAMES[i..=i],
+        None if name == "dick" => &cells::NAMES,
+        None => &[],
+    }
+}
+
+fn experiments(settings: &Settings) -> Vec<&'static str> {
+    settings.cases.iter().flat_map(|name| experiment(name)).copied().collect()
 }
 
 /// The user's choices that concern scenes.

@@ -1,0 +1,49 @@
+//! What an experiment gets from the study: the user's choices, and a way to report progress.
+
+use std::path::Path;
+use std::sync::atomic::Ordering;
+
+use super::Trouble;
+use crate::bench::progress::Progress;
+use crate::settings::Settings;
+
+/// The surroundings of an experiment.
+pub struct CellsBench<'a> {
+    settings: &'a Settings,
+    tell: &'a mut dyn FnMut(&Progress),
+    progress: Progress,
+}
+
+impl<'a> CellsBench<'a> {
+    /// A bench for the experiment `name`.
+    pub fn new(name: &str, settings: &'a Settings, tell: &'a mut dyn FnMut(&Progress)) -> Self {
+        let progress =
+            Progress { case: name.to_owned(), case_s: [0.0, f64::INFINITY], ..Progress::default() };
+        Self { settings, tell, progress }
+    }
+
+    /// Whether only small bodies are wanted.
+    pub fn is_quick(&self) -> bool {
+        self.settings.quick
+    }
+
+    /// A surface that takes the place of the animal.
+    pub fn surface(&self) -> Option<&Path> {
+        self.settings.surface.as_deref()
+    }
+
+    /// Announces the next of `total` measurements.
+    ///
+    /// # Errors
+    /// The user has ended the study.
+    pub fn begin(&mut self, what: impl Into<String>, total: usize) -> Result<(), Trouble> {
+        if self.settings.stop.load(Ordering::Relaxed) {
+            return Err("interrupted".into());
+        }
+        self.progress.what = what.into();
+        self.progress.done += 1;
+        self.progress.total = total.max(self.progress.done);
+        (self.tell)(&self.progress);
+        Ok(())
+    }
+}

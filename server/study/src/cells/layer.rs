@@ -1,0 +1,150 @@
+//! Figure 14: a stiff cube with a soft layer at half height, whose rods buckle at the layer once they are cut.
+
+use nalgebra::Vector3;
+use scindo_physics::body::{Body, BodySettings, PcgSettings};
+use scindo_physics::material::{Law, Material, Region};
+use scindo_physics::octree::OctreeSpace;
+use scindo_physics::solver::Method;
+
+use super::model::{CUBE, Grid, Model, layered_cube};
+use super::printed::{LAYERED, LAYERED_S};
+use super::system::MATERIAL;
+use super::{CellsBench, CellsResult, Table, Trouble, Unit};
+use crate::stress::view;
+
+/// Lowest and highest point of the soft layer [m], of a cube of 1 m.
+const LAYER: [f64; 2] = [0.475, 0.525];
+/// Height to which the blades reach [m]. The cube without the layer then has 321,698 leaves, the 321 K of the paper,
+/// where the depth is not printed.
+pub const TIP: f64 = 0.2;
+/// Young's moduli of the cube and of the layer [Pa]. A rod of 8 cm on the layer falls over under its own weight below
+/// some 1e5 Pa.
+const YOUNG_PA: [f64; 2] = [5e7, 5e4];
+/// Gravity leans by three degrees, so that rods know where to fall [m/s²].
+const GRAVITY: Vector3<f64> = Vector3::new(0.45, 0.25, -9.81);
+/// Step [s] and number of steps.
+const STEP_S: f64 = 0.04;
+const STEPS: u32 = 10;
+/// Cells across the cube of the picture.
+const SMALL: u32 = 32;
+
+/// The experiment.
+///
+/// # Errors
+/// A cut that is refused, or the user ended the study.
+pub fn layer(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
+    let mut result = CellsResult {
+        name: "dick-layer",
+        title: "A soft layer under stiff rods: figure 14".into(),
+        about: format!(
+            "A cube of {:.0e} Pa with a horizontal layer of {:.0e} Pa, a twentieth of its height, is cut by rotated \
+             blades down through the layer and stands in gravity that leans by three degrees. Steps of 40 ms by \
+             conjugate gradients with multigrid to 1e-3, on one thread. The same without the layer, and without \
+             cuts, is shown beside it.",
+            YOUNG_PA[0], YOUNG_PA[1]
+        ),
+        ..CellsResult::default()
+    };
+    let mut table = Table::new(
+        "Rods on a soft layer",
+        "Sideways: mean horizontal motion of the top after 0.4 s, in edges of the cube. Here the octree is finest at \
+         both faces of the layer; the counts of the paper are those without a layer.",
+        &[
+            ("cells", Unit::Count),
+            ("after the cut", Unit::Count),
+            ("cutting", Unit::Seconds),
+            ("step", Unit::Seconds),
+            ("iterations", Unit::Number),
+            ("sideways", Unit::Number),
+        ],
+    );
+    let (across, levels) = if bench.is_quick() { (SMALL, 3) } else { (CUBE, 4) };
+    for (name, cut, soft) in
+        [("layer, cut", true, true), ("no layer, cut", true, false), ("layer, uncut", false, true)]
+    {
+        bench.begin(name, 4)?;
+        let run = run(across, levels, cut, soft)?;
+        table.row(
+            name,
+            &[
+                Some(run.cells[0]),
+                Some(run.cells[1]),
+                Some(run.cutting_s).filter(|_| cut),
+                Some(run.step_s),
+                Some(run.iterations),
+                Some(run.sideways),
+            ],
+        );
+    }
+    table.printed("figure 14", &[Some(LAYERED[0]), Some(LAYERED[1]), None, Some(LAYERED_S), None, None]);
+    bench.begin("picture", 4)?;
+    let small = run(SMALL, 3, true, true)?;
+    result.pictures.push(view::surface(
+        small.body.surface(),
+        small.body.positions(),
+        Vector3::z(),
+        format!("The rods after 0.4 s, {SMALL} cells across"),
+    ));
+    result.tables.push(table);
+    Ok(result)
+}
+
+/// A body after its steps.
+pub struct Rods {
+    /// The body.
+    pub body: Body,
+    /// Leaves before and after the cut.
+    pub cells: [f64; 2],
+    cutting_s: f64,
+    /// Median of the steps [s].
+    step_s: f64,
+    /// Mean number of iterations per step.
+    pub iterations: f64,
+    /// Mean horizontal motion of the top [m].
+    pub sideways: f64,
+}
+
+/// Cuts the cube and makes its steps; the layer is `soft` or not there.
+///
+/// # Errors
+/// A cut that is refused.
+pub fn run(across: u32, levels: u8, cut: bool, soft: bool) -> Result<Rods, Trouble> {
+    let region =
+        Region { young_pa: YOUNG_PA[1], poisson: MATERIAL.poisson, density_kg_m3: MATERIAL.density_kg_m3 };
+    let grid = if cut { Grid::Rotated } else { Grid::Uncut };
+    let layer = soft.then_some((LAYER, region));
+    let Model { octree, blades, held, .. } = layered_cube(across, levels, (grid, TIP), layer)?;
+    let before = octree.cells().len() as f64;
+    let material = Material { young_pa: YOUNG_PA[0], law: Law::Corotational, ..MATERIAL };
+    let settings = BodySettings {
+        solver: PcgSettings { iterations: 200, tolerance: 1e-3 },
+        method: Method::MgPcg,
+        ..BodySettings::default()
+    };
+    let mut body = Body::of_space(Box::new(OctreeSpace::new(octree)), material, settings)?;
+    let ground: Vec<u32> =
+        (0..).zip(body.rest_positions()).filter(|(_, X)| held(X)).map(|(node, _)| node).collect();
+    body.fix(&ground, [true; 3], Vector3::zeros())?;
+    let started = std::time::Instant::now();
+    for (incision, blade) in (1..).zip(&blades) {
+        body.cut(blade, incision)?;
+    }
+    let cutting_s = started.elapsed().as_secs_f64();
+    let (mut seconds, mut iterations) = (Vec::new(), 0);
+    for _ in 0..STEPS {
+        let started = std::time::Instant::now();
+        iterations += body.step(STEP_S, GRAVITY, &[]).iterations;
+        seconds.push(started.elapsed().as_secs_f64());
+    }
+    seconds.sort_by(f64::total_cmp);
+    let moved = body.rest_positions().iter().zip(body.positions()).filter(|(X, _)| X.z > 1.0 - 1e-9);
+    let (sum, n) = moved.fold((0.0, 0.0), |(sum, n), (X, x)| (sum + (x - X).xy().norm(), n + 1.0));
+    Ok(Rods {
+        cells: [before, body.n_elements() as f64],
+        cutting_s,
+        step_s: seconds[seconds.len() / 2],
+        iterations: f64::from(iterations) / f64::from(STEPS),
+        sideways: sum / n,
+        body,
+    })
+}

@@ -1,0 +1,76 @@
+//! Experiments on octree cells and multigrid: those of Dick, Georgii, Westermann 2011, at their sizes.
+//!
+//! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
+//! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
+//! runs solvers on it and records their errors. Every experiment has a module of its own and gives a
+//! [`CellsResult`]: tables, plots and pictures. [`printed`] has the figures of the paper.
+//!
+//! # Source
+//! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
+
+pub mod printed;
+
+pub mod result;
+
+pub mod shape;
+
+pub mod model;
+
+pub mod system;
+
+pub mod solve;
+
+mod bench;
+
+mod tables;
+
+mod convergence;
+
+mod solvers;
+
+mod layer;
+
+mod sizes;
+
+pub use bench::CellsBench;
+pub use result::{CellsResult, Column, Picture, Plots, Row, Table, Unit};
+
+/// Why an experiment could not be made.
+pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
+
+/// An experiment.
+pub type Experiment = fn(&mut CellsBench<'_>) -> Result<CellsResult, Trouble>;
+
+/// Names of the experiments.
+pub const NAMES: [&str; 5] = ["dick-tables", "dick-convergence", "dick-solvers", "dick-layer", "dick-sizes"];
+
+/// The experiment `name`.
+fn find(name: &str) -> Option<Experiment> {
+    match name {
+        "dick-tables" => Some(tables::tables),
+        "dick-convergence" => Some(convergence::convergence),
+        "dick-solvers" => Some(solvers::solvers),
+        "dick-layer" => Some(layer::layer),
+        "dick-sizes" => Some(sizes::sizes),
+        _ => None,
+    }
+}
+
+/// Makes the experiment `name`. What keeps it from being made is part of the result.
+pub fn study(name: &'static str, bench: &mut CellsBench<'_>) -> CellsResult {
+    let made = match find(name) {
+        Some(experiment) => experiment(bench),
+        None => Err("there is no such experiment".into()),
+    };
+    let failed = |trouble: Trouble| CellsResult {
+        name,
+        title: name.to_owned(),
+        trouble: Some(trouble.to_string()),
+        ..CellsResult::default()
+    };
+    made.unwrap_or_else(failed)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;

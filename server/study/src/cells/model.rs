@@ -1,0 +1,192 @@
+//! The bodies of the experiments, and the blades that cut them.
+
+use std::time::Instant;
+
+use nalgebra::{Rotation3, Vector3};
+use scindo_physics::cut::BladeSweep;
+use scindo_physics::material::Region;
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
+use scindo_physics::space::Space;
+
+use super::Trouble;
+use super::shape::Animal;
+
+type V = Vector3<f64>;
+
+/// Finest cells across the cube of the paper. With four levels it has 83,299 leaves, the 83.3 K of the paper.
+pub const CUBE: u32 = 80;
+/// Finest cells across the cube at which the blades stand, 80 cells wide. With aligned blades the cube has 203,503
+/// leaves, the 204 K of the paper, where the places are not printed.
+const BLADES: [f64; 11] = [7.0, 13.0, 21.0, 27.0, 33.0, 41.0, 47.0, 53.0, 61.0, 67.0, 73.0];
+/// Angle of the rotated blades about the vertical [°]; the paper does not print it. The cube has as many leaves as
+/// printed, 230 K ± 2 %.
+pub const ROTATION_DEG: f64 = 37.0;
+
+/// How a cube is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grid {
+    /// Not at all.
+    Uncut,
+    /// By blades along faces of cells, to half depth.
+    Aligned,
+    /// By the same blades, turned about the vertical.
+    Rotated,
+}
+
+impl Grid {
+    /// Stable name for programs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uncut => "uncut",
+            Self::Aligned => "aligned",
+            Self::Rotated => "rotated",
+        }
+    }
+}
+
+/// A body before it is cut.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Name in tables.
+    pub name: String,
+    /// Its cells.
+    pub octree: Octree,
+    /// The blades that cut it, one incision each.
+    pub blades: Vec<BladeSweep>,
+    /// Whether a vertex with this rest position is held.
+    pub held: fn(&V) -> bool,
+    /// Force per mass [N/kg] at a rest position.
+    pub pull: fn(&V) -> V,
+}
+
+/// A body that was cut.
+#[derive(Debug)]
+pub struct Cut {
+    /// Cells, links and surface.
+    pub space: OctreeSpace,
+    /// Seconds that all cuts took, surface included.
+    pub seconds: f64,
+    /// Number of links that are cut.
+    pub links: usize,
+}
+
+/// A cube of 1 m on the ground, with blades down to half its height, that a radial force fans out.
+///
+/// # Errors
+/// More cells than a lattice may have.
+pub fn cube(across: u32, levels: u8, grid: Grid) -> Result<Model, Trouble> {
+    layered_cube(across, levels, (grid, 0.5), None)
+}
+
+/// The same with a horizontal layer of another material: its lowest and highest height [m], and its constants.
+///
+/// # Errors
+/// More cells than a lattice may have.
+pub fn layered_cube(
+    across: u32,
+    levels: u8,
+    (grid, tip): (Grid, f64),
+    layer: Option<([f64; 2], Region)>,
+) -> Result<Model, Trouble> {
+    let shape = BoxShape { min: V::zeros(), max: V::repeat(1.0) };
+    let inside = |p: &V| layer.is_some_and(|([low, high], _)| low < p.z && p.z < high);
+    let mut octree =
+        Octree::fill(&shape, OctreeSettings { cells: across, levels }, &|p| u16::from(inside(p)))?;
+    octree.set_regions(layer.iter().map(|(_, region)| *region).collect());
+    Ok(Model {
+        name: format!("Cube, {}", grid.name()),
+        octree,
+        blades: match grid {
+            Grid::Uncut => Vec::new(),
+            Grid::Aligned => grid_of_blades(across, 0.0, tip),
+            Grid::Rotated => grid_of_blades(across, ROTATION_DEG, tip),
+        },
+        held: |X| X.z == 0.0,
+        pull: |X| 9.81 * V::new(2.0 * X.x - 1.0, 2.0 * X.y - 1.0, 0.0),
+    })
+}
+
+/// Two families of upright blades, turned by an angle [°], from above the cube down to the height `tip` [m].
+pub fn grid_of_blades(across: u32, angle_deg: f64, tip: f64) -> Vec<BladeSweep> {
+    let turn = Rotation3::from_axis_angle(&V::z_axis(), angle_deg.to_radians());
+    let middle = V::new(0.5, 0.5, 0.0);
+    // Smaller cubes have the same blades on their own faces.
+    let snapped = |place: f64| (place / 80.0 * f64::from(across)).round() / f64::from(across);
+    let mut places: Vec<f64> = BLADES.iter().map(|&place| snapped(place)).collect();
+    places.dedup();
+    let blade = |place: f64, axis: usize| {
+        let edge = |z: f64| {
+            [-2.0, 3.0].map(|along| {
+                let mut end = V::new(along, along, z);
+                end[axis] = place;
+                middle + turn * (end - middle)
+            })
+        };
+        BladeSweep { segments: vec![edge(1.5), edge(tip)] }
+    };
+    (0..2).flat_map(|axis| places.iter().map(move |&place| (place, axis))).map(|(p, a)| blade(p, a)).collect()
+}
+
+/// Height below which an animal is held, in parts of its width.
+const HELD: f64 = 0.02;
+
+/// The animal, or another solid that stands upright along y, cut three times along curves.
+///
+/// # Errors
+/// A solid too thin for its cells, or more of them than a lattice may have.
+pub fn animal(solid: Option<&dyn Shape>, across: u32, levels: u8, curved: bool) -> Result<Model, Trouble> {
+    let is_own = solid.is_none();
+    let solid = solid.unwrap_or(&Animal);
+    let octree = Octree::fill(solid, OctreeSettings { cells: across, levels }, &|_| 0)?;
+    let blades = if curved { curved_blades(solid.bounds()) } else { Vec::new() };
+    Ok(Model {
+        name: format!("{}, {across} across", if is_own { "Animal" } else { "Surface" }),
+        octree,
+        blades,
+        held: |X| X.y < HELD,
+        pull: |_| V::new(0.0, -9.81, 0.0),
+    })
+}
+
+/// Three blades along z that are led into the solid on arcs, in parts of its bounds. The solid stays one
+/// part: a part that falls freely would be all of the solution.
+const ARCS: [([f64; 2], [f64; 2], [f64; 2]); 3] = [
+    ([-0.05, 0.42], [0.25, 0.42], [0.52, 0.30]),
+    ([0.56, 1.05], [0.72, 0.50], [0.58, 0.07]),
+    ([0.76, 1.05], [0.90, 0.55], [0.74, 0.06]),
+];
+/// Places of the blade along an arc.
+const PLACES: u32 = 16;
+
+fn curved_blades([low, high]: [V; 2]) -> Vec<BladeSweep> {
+    let extent = high - low;
+    let of_arc = |(a, b, c): ([f64; 2], [f64; 2], [f64; 2])| {
+        let place = |k: u32| {
+            let t = f64::from(k) / f64::from(PLACES);
+            let w = [(1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t];
+            [-0.2, 1.2].map(|z| {
+                let in_plane = |i: usize| w[0] * a[i] + w[1] * b[i] + w[2] * c[i];
+                low + V::new(in_plane(0), in_plane(1), z).component_mul(&extent)
+            })
+        };
+        BladeSweep { segments: (0..=PLACES).map(place).collect() }
+    };
+    ARCS.map(of_arc).into()
+}
+
+impl Model {
+    /// Cuts the body at rest.
+    ///
+    /// # Errors
+    /// A cut that is refused.
+    pub fn cut(&self) -> Result<Cut, Trouble> {
+        let mut space = OctreeSpace::new(self.octree.clone());
+        let started = Instant::now();
+        let mut links = 0;
+        for (incision, blade) in (1..).zip(&self.blades) {
+            let x = space.rest_positions();
+            links += space.cut(&x, blade, incision)?.faces_opened;
+        }
+        Ok(Cut { space, seconds: started.elapsed().as_secs_f64(), links })
+    }
+}

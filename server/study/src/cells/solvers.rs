@@ -1,0 +1,132 @@
+//! Figure 12: error over time of direct and iterative solvers, their initialisation included.
+
+use super::model::{CUBE, Grid, Model, animal, cube};
+use super::solve::{Course, FLOOR, Solver, Until, cholesky, run};
+use super::system::{Problem, System, smoothers};
+use super::tables::{S_BUNNY_2, S_BUNNY_3, S_CUBE};
+use super::{CellsBench, CellsResult, Plots, Table, Trouble, Unit};
+use crate::page::plot::{Mark, Plot};
+
+/// Iterations at most: of conjugate gradients alone, and with cycles.
+const PATIENCE: [usize; 2] = [4_000, 60];
+/// Points of a curve at most.
+const POINTS: usize = 60;
+/// Cells up to which a factorisation is tried.
+const DIRECT: usize = 12_000;
+/// Names of the solvers, in the order of their colours.
+const NAMES: [&str; 6] =
+    ["Cholesky", "CG, block-Jacobi", "MG, SOR", "MG, Chebyshev", "CG with MG, Chebyshev", "CG with MG, SOR"];
+
+/// The experiment.
+///
+/// # Errors
+/// The user ended the study.
+pub fn solvers(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
+    let mut result = CellsResult {
+        name: "dick-solvers",
+        title: "Solvers on cut cells: figure 12".into(),
+        about: "The first step after the cut from displacements of 0, on one thread. Times include what a solver \
+            needs before it begins: levels and operators of the coarse levels, or analysis and factorisation. \
+            Iterations work in single precision, which ends at a few millionths."
+            .into(),
+        notes: vec![
+            "SOR sweeps forward before and after the correction, so that the cycle is not symmetric: as a \
+             preconditioner of conjugate gradients it does not converge reliably (the paper's CGMG must have \
+             swept backward once)"
+                .into(),
+        ],
+        ..CellsResult::default()
+    };
+    let mut table = Table::new(
+        "Time to an error",
+        "Seconds from the beginning until ‖e‖/‖e₀‖ has fallen so far. The crosses of the paper are the structural \
+         times: levels, which only a cut needs.",
+        &[
+            ("cells", Unit::Count),
+            ("levels", Unit::Seconds),
+            ("before the first iteration", Unit::Seconds),
+            ("to 0.1", Unit::Seconds),
+            ("to 0.01", Unit::Seconds),
+            ("to 1e-4", Unit::Seconds),
+            ("iterations to 1e-4", Unit::Count),
+        ],
+    );
+    let mut models = vec![(animal(None, 39, 2, true)?, S_BUNNY_3), (animal(None, 77, 3, true)?, S_BUNNY_2)];
+    if !bench.is_quick() {
+        models.push((cube(CUBE, 4, Grid::Rotated)?, S_CUBE));
+    }
+    let total = 2 * models.len();
+    for (model, s) in &models {
+        let mut plots =
+            Plots { caption: format!("{}: left with mass, right without.", model.name), ..Plots::default() };
+        for problem in [Problem::Step(*s), Problem::Equilibrium] {
+            bench.begin(format!("{}, {}", model.name, problem.words()), total)?;
+            plots.plots.push(of(model, problem, &mut table)?);
+        }
+        result.plots.push(plots);
+    }
+    result.tables.push(table);
+    Ok(result)
+}
+
+fn of(model: &Model, problem: Problem, table: &mut Table) -> Result<Plot, Trouble> {
+    let cut = model.cut()?;
+    let cells = cut.space.octree().cells().len();
+    let mut system = System::new(cut.space.octree(), (model.held, model.pull), problem)?;
+    let (exact, _) = system.converged();
+    let until = |iterations| Until { iterations, error: FLOOR, seconds: 0.0 };
+    let mut plot = Plot {
+        size: [520.0, 420.0],
+        x_label: "time, initialisation included".into(),
+        y_label: "‖e‖/‖e₀‖".into(),
+        marks: Vec::new(),
+        failures: Vec::new(),
+        error_bar: 0.0,
+        budget_ms: None,
+        colours: Vec::new(),
+        shapes: vec![(0, String::new())],
+        title: Some(format!("{}, {}", model.name, problem.words())),
+    };
+    let mut add = |number: usize, levels: Option<f64>, course: &Course| {
+        let name = NAMES[number];
+        plot.colours.push((number, name.to_owned()));
+        let stride = course.points.len().div_ceil(POINTS).max(1);
+        for (k, (seconds, error)) in course.points.iter().enumerate().filter(|(k, _)| k % stride == 0) {
+            plot.marks.push(Mark {
+                x: 1e3 * (course.begin_s + seconds),
+                y: *error,
+                colour: number,
+                shape: 0,
+                rank: None,
+                title: format!("{name}, after {} iterations: {error:.2e}", k + 1),
+            });
+        }
+        let to = |error: f64| course.seconds_to(error).map(|seconds| course.begin_s + seconds);
+        let iterations = course.points.iter().position(|point| point.1 <= 1e-4).map(|k| (k + 1) as f64);
+        table.row(
+            format!("{}, {}: {name}", model.name, problem.words()),
+            &[
+                Some(cells as f64),
+                levels,
+                Some(course.begin_s).filter(|s| *s > 0.0),
+                to(0.1),
+                to(0.01),
+                to(1e-4),
+                iterations.filter(|_| number > 0),
+            ],
+        );
+    };
+    if cells <= DIRECT {
+        add(0, None, &cholesky(&system, &exact)?);
+    }
+    add(1, None, &run(&mut system, Solver::Jacobi, &exact, until(PATIENCE[0])));
+    for (i, (_, smoother)) in smoothers().into_iter().enumerate() {
+        let (mut multigrid, seconds) = system.multigrid(smoother);
+        let begin_s = seconds.levels + seconds.coarse;
+        let course = run(&mut system, Solver::Cycles(&mut multigrid), &exact, until(PATIENCE[1]));
+        add(2 + i, Some(seconds.levels), &Course { begin_s, ..course });
+        let course = run(&mut system, Solver::Preconditioned(&mut multigrid), &exact, until(PATIENCE[1]));
+        add(5 - i, Some(seconds.levels), &Course { begin_s, ..course });
+    }
+    Ok(plot)
+}

@@ -1,0 +1,288 @@
+//! The linear system of a step, A u = b, at rest: operator in single precision, residuals in double precision.
+//!
+//! A = M + Δt² K for a step from rest, and K for an equilibrium. Its stiffness number is s = E Δt²/(ρ h²), with h
+//! the side of a finest cell: the ratio of the two terms.
+
+use std::time::Instant;
+
+use nalgebra::{Matrix3, Vector3};
+use scindo_physics::element::{Points, Simd};
+use scindo_physics::material::{Law, Material, Rayleigh, Region};
+use scindo_physics::multigrid::{
+    CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings, Smoother,
+};
+use scindo_physics::octree::Octree;
+use scindo_physics::operator::cells::CellStiffness;
+use scindo_physics::operator::{
+    BLOCK, BlockJacobi, ElasticUpdate, FixedCopy, Padded, Stiffness, SystemOperator,
+};
+use scindo_physics::solver::{Pcg, PcgSettings};
+use scindo_physics::team::{Team, blocks};
+
+use super::Trouble;
+
+type V = Vector3<f64>;
+
+/// Constants of all bodies. The paper prints none; only the stiffness number matters to a solver.
+pub const MATERIAL: Material = Material {
+    young_pa: 1e5,
+    poisson: 0.3,
+    density_kg_m3: 1000.0,
+    rayleigh: Rayleigh { mass_1_s: 0.0, stiffness_s: 0.0 },
+    law: Law::Linear,
+};
+
+/// The smoother of the paper: one sweep before and after, ω = 1.7.
+pub const PAPERS: Smoother = Smoother::GaussSeidel { sweeps: 1, omega: 1.7 };
+
+/// The smoothers that are compared, with their names.
+pub fn smoothers() -> [(&'static str, Smoother); 2] {
+    [("SOR", PAPERS), ("Chebyshev", Smoother::default())]
+}
+
+/// Largest number of rounds of refinement of the converged solution.
+const ROUNDS: usize = 12;
+/// The residual of the converged solution over that at the start.
+const CONVERGED: f64 = 1e-9;
+
+/// Seconds that the parts of bringing a system up to date take.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seconds {
+    /// Rotations, forces and diagonal blocks of the finest level.
+    pub operator: f64,
+    /// Hierarchy: cells, vertices and transfers of all levels. Only after a cut.
+    pub levels: f64,
+    /// Operators of the coarse levels.
+    pub coarse: f64,
+}
+
+/// A x = b of a body.
+#[derive(Debug)]
+pub struct System {
+    octree: Octree,
+    rest: Vec<V>,
+    /// Prescribed directions.
+    pub fixed: Vec<FixedCopy>,
+    mass: Vec<f64>,
+    mass_f32: Vec<f32>,
+    /// Factors of M and of K in A.
+    factors: [f64; 2],
+    stiffness: CellStiffness,
+    jacobi: BlockJacobi,
+    /// The right-hand side in double precision.
+    b: Vec<V>,
+    /// One thread, as in the paper.
+    pub team: Team,
+}
+
+/// What kind of problem a system is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Problem {
+    /// The first time step, with this stiffness number s.
+    Step(f64),
+    /// An equilibrium: no mass.
+    Equilibrium,
+}
+
+impl Problem {
+    /// Name in tables.
+    pub fn words(self) -> String {
+        match self {
+            Self::Step(s) => format!("s = {}", crate::stress::evidence::short(s)),
+            Self::Equilibrium => "no mass".to_owned(),
+        }
+    }
+}
+
+impl System {
+    /// The system of a body of `octree` as it is cut now; `held` and `pull` as in a [model](super::model::Model).
+    ///
+    /// # Errors
+    /// The system cannot start a thread.
+    pub fn new(
+        octree: &Octree,
+        (held, pull): (fn(&V) -> bool, fn(&V) -> V),
+        problem: Problem,
+    ) -> Result<Self, Trouble> {
+        let rest = octree.rest_positions();
+        let h = octree.lattice().h;
+        let factors = match problem {
+            Problem::Step(s) => [1.0, s * MATERIAL.density_kg_m3 * h * h / MATERIAL.young_pa],
+            Problem::Equilibrium => [0.0, 1.0],
+        };
+        let mass = octree.vertex_masses(MATERIAL.density_kg_m3);
+        let fixed: Vec<FixedCopy> = (0_u32..)
+            .zip(&rest)
+            .filter(|(_, X)| held(X))
+            .map(|(copy, _)| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] })
+            .collect();
+        let mut b: Vec<V> = mass.iter().zip(&rest).map(|(m, X)| factors[1] * *m * pull(X)).collect();
+        hold(&fixed, &mut b);
+        // Within the range of single precision, whatever the units are.
+        let scale = 1.0 / norm(&b).max(f64::MIN_POSITIVE);
+        b.iter_mut().for_each(|b| *b *= scale);
+        let lame: Vec<_> = octree.regions().iter().map(Region::lame).collect();
+        let stiffness = CellStiffness::new(Simd::detect(), octree, &lame);
+        let mut jacobi = BlockJacobi::default();
+        jacobi.resize(rest.len());
+        let mass_f32 = mass.iter().map(|m| *m as f32).collect();
+        let mut system = Self {
+            octree: octree.clone(),
+            rest,
+            fixed,
+            mass,
+            mass_f32,
+            factors,
+            stiffness,
+            jacobi,
+            b,
+            team: Team::new(1)?,
+        };
+        system.update();
+        Ok(system)
+    }
+
+    /// Brings the finest level up to date: rotations, forces and diagonal blocks. Returns the seconds.
+    pub fn update(&mut self) -> f64 {
+        let started = Instant::now();
+        let [mass_factor, scale] = self.factors;
+        let with = ElasticUpdate { lame: MATERIAL.lame(), law: Law::Corotational, scale };
+        self.stiffness.update(&mut self.team, &with, &self.rest);
+        let mut diagonal = vec![[0.0; 8]; self.rest.len()];
+        let (K, mass) = (&self.stiffness, &self.mass_f32);
+        self.team.for_blocks(blocks(&mut diagonal, BLOCK), |block, diagonal| {
+            K.diagonals(block, diagonal);
+            for (d, m) in diagonal.iter_mut().zip(&mass[block * BLOCK..]) {
+                [0, 4, 6].into_iter().for_each(|k| d[k] += mass_factor as f32 * m);
+            }
+        });
+        self.jacobi.update(&mut self.team, &diagonal, &self.fixed);
+        started.elapsed().as_secs_f64()
+    }
+
+    /// The cells.
+    pub fn octree(&self) -> &Octree {
+        &self.octree
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        3 * self.rest.len()
+    }
+
+    /// The right-hand side, rounded.
+    pub fn right_hand_side(&self) -> Vec<Padded> {
+        self.b.iter().map(|b| [b.x as f32, b.y as f32, b.z as f32, 0.0]).collect()
+    }
+
+    /// Factors of M and of K in A.
+    pub fn factors(&self) -> [f64; 2] {
+        self.factors
+    }
+
+    /// Lumped masses [kg].
+    pub fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// The right-hand side.
+    pub fn load(&self) -> &[V] {
+        &self.b
+    }
+
+    /// Multigrid with this smoother, and the seconds that its levels and operators took.
+    pub fn multigrid(&mut self, smoother: Smoother) -> (Multigrid, Seconds) {
+        self.multigrid_on(Hierarchy::new, smoother)
+    }
+
+    /// The same with another way to make the levels.
+    pub fn multigrid_on(
+        &mut self,
+        levels: impl Fn(&Octree) -> Hierarchy,
+        smoother: Smoother,
+    ) -> (Multigrid, Seconds) {
+        let started = Instant::now();
+        let settings = MultigridSettings { smoother, ..MultigridSettings::default() };
+        let mut multigrid = Multigrid::new(levels(&self.octree), settings);
+        let levels = started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        let material =
+            |region: &Region| CellMaterial { lame: region.lame(), density_kg_m3: region.density_kg_m3 };
+        let own = CellMaterial { lame: MATERIAL.lame(), density_kg_m3: MATERIAL.density_kg_m3 };
+        let materials = [own].into_iter().chain(self.octree.regions().iter().map(material)).collect();
+        let [mass_factor, scale] = self.factors;
+        let with = Coefficients { materials, scale, mass_factor };
+        multigrid.update(&mut self.team, (&with, &self.fixed), &|_| Matrix3::identity());
+        let (mut A, jacobi, team) = self.parts();
+        multigrid.estimate_eigenvalues(team, &mut A, jacobi.inverses());
+        (multigrid, Seconds { operator: 0.0, levels, coarse: started.elapsed().as_secs_f64() })
+    }
+
+    /// A, its block-diagonal preconditioner, and the thread.
+    pub fn parts(&mut self) -> (SystemOperator<'_>, &mut BlockJacobi, &mut Team) {
+        let A = SystemOperator {
+            elastic: &mut self.stiffness,
+            mass: &self.mass_f32,
+            mass_factor: self.factors[0] as f32,
+            springs: &[],
+            fixed: &self.fixed,
+        };
+        (A, &mut self.jacobi, &mut self.team)
+    }
+
+    /// b − A u in double precision.
+    pub fn residual(&self, u: &[V]) -> Vec<V> {
+        let x: Vec<V> = self.rest.iter().zip(u).map(|(X, u)| X + u).collect();
+        let mut r = vec![V::zeros(); u.len()];
+        self.octree.elastic_forces(&MATERIAL, &x, &mut r);
+        for (i, r) in r.iter_mut().enumerate() {
+            *r = self.b[i] - self.factors[0] * self.mass[i] * u[i] - self.factors[1] * *r;
+        }
+        hold(&self.fixed, &mut r);
+        r
+    }
+
+    /// The converged solution, by conjugate gradients with multigrid inside and residuals in double precision
+    /// outside; and the residual that is left, relative to b.
+    pub fn converged(&mut self) -> (Vec<V>, f64) {
+        let (mut multigrid, _) = self.multigrid(Smoother::default());
+        let mut u = vec![V::zeros(); self.b.len()];
+        let start = norm(&self.b);
+        let mut pcg = Pcg::default();
+        pcg.resize(u.len());
+        let mut left = 1.0;
+        for _ in 0..ROUNDS {
+            let r = self.residual(&u);
+            left = norm(&r) / start;
+            if left <= CONVERGED {
+                break;
+            }
+            let scale = 1.0 / norm(&r);
+            for (to, r) in pcg.r.iter_mut().zip(&r) {
+                *to = [(scale * r.x) as f32, (scale * r.y) as f32, (scale * r.z) as f32, 0.0];
+            }
+            let mut change = vec![[0.0; 4]; u.len()];
+            let (mut A, jacobi, team) = self.parts();
+            let mut M = Cycle { multigrid: &mut multigrid, inverse: jacobi.inverses(), largest: 0.0 };
+            let rz = pcg.precondition(team, &mut A, &mut M);
+            let settings = PcgSettings { iterations: 60, tolerance: 1e-4 };
+            pcg.run(team, &mut A, &mut M, &mut change, (rz, rz.max(0.0).sqrt(), settings));
+            for (u, c) in u.iter_mut().zip(&change) {
+                *u += V::new(c[0].into(), c[1].into(), c[2].into()) / scale;
+            }
+        }
+        (u, left)
+    }
+}
+
+/// Sets the prescribed directions of `v` to 0.
+pub fn hold(fixed: &[FixedCopy], v: &mut [V]) {
+    for f in fixed {
+        (0..3).filter(|&k| f.axes[k]).for_each(|k| v[f.copy as usize][k] = 0.0);
+    }
+}
+
+/// √Σ|v|².
+pub fn norm(v: &[V]) -> f64 {
+    v.iter().map(V::norm_squared).sum::<f64>().sqrt()
+}

@@ -1,0 +1,210 @@
+//! Tables 1 and 2: what cutting and a step cost, and multigrid against conjugate gradients.
+
+use scindo_physics::octree::Shape;
+use scindo_world::format::{MeshFile, read_mesh};
+use scindo_world::mesh_in::SolidSurface;
+
+use super::model::{CUBE, Grid, Model, animal, cube};
+use super::printed::{self, Printed};
+use super::shape::Placed;
+use super::solve::{Solver, Until, run};
+use super::system::{Problem, System, smoothers};
+use super::{CellsBench, CellsResult, Table, Trouble, Unit};
+
+/// Most iterations of conjugate gradients.
+const PATIENCE: usize = 6_000;
+
+/// A model of the tables.
+struct Entry {
+    printed: Printed,
+    adaptive: Model,
+    uniform: Option<Model>,
+    /// Leaves of the uniform grid at the finest resolution.
+    uniform_cells: usize,
+    s: f64,
+}
+
+/// The experiment.
+///
+/// # Errors
+/// A surface that cannot be read, or the user ended the study.
+pub fn tables(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
+    let mut result = CellsResult {
+        name: "dick-tables",
+        title: "Cutting octree cells: tables 1 and 2".into(),
+        about: "Bodies are cut at rest and make their first step, from displacements of 0, on one thread. A step \
+            is rotations and blocks of the finest level, the operators of all levels, and three cycles. The \
+            error is the distance from the converged solution. The paper prints neither material nor time step: \
+            the stiffness number s = E Δt²/(ρ h²) of each model is the one with which three cycles with the \
+            paper's smoother, V(1,1) with SOR and ω = 1.7, reduce the error as printed."
+            .into(),
+        ..CellsResult::default()
+    };
+    let solid = read(bench, &mut result)?;
+    let solid = solid.as_ref().map(|solid| Placed::new(solid));
+    let solid = solid.as_ref().map(|solid| solid as &dyn Shape);
+    if solid.is_none() {
+        result.notes.push(
+            "the Stanford bunny is not part of the program: a smooth solid in the shape of an animal with two \
+             ears stands in for it, of about as many cells; `--surface FILE` takes another one"
+                .into(),
+        );
+    }
+    let mut costs = Table::new(
+        "Table 1: cells and times",
+        "Uniform: a grid of finest cells only. Cutting includes refinement, vertices and surface; levels are what \
+         else a cut costs multigrid. Rows of the paper are from one core at 2.8 GHz.",
+        &[
+            ("cells", Unit::Count),
+            ("uniform", Unit::Count),
+            ("after the cut", Unit::Count),
+            ("cutting", Unit::Seconds),
+            ("levels", Unit::Seconds),
+            ("step", Unit::Seconds),
+            ("uniform step", Unit::Seconds),
+            ("per cell", Unit::Seconds),
+        ],
+    );
+    let mut solvers = Table::new(
+        "Table 2: multigrid against conjugate gradients",
+        "Multigrid: operators of the coarse levels and three cycles. Conjugate gradients are preconditioned by the \
+         3×3 diagonal blocks. Ratio: their time to the same error over that of multigrid.",
+        &[
+            ("s", Unit::Number),
+            ("multigrid", Unit::Seconds),
+            ("its ‖e₃‖/‖e₀‖", Unit::Number),
+            ("CG: ‖e‖/‖e₀‖ in that time", Unit::Number),
+            ("CG: time to ‖e₃‖", Unit::Seconds),
+            ("ratio", Unit::Times),
+        ],
+    );
+    let names: &[&str] =
+        if bench.is_quick() { &["Bunny 3", "Bunny 2"] } else { &["Bunny", "Cube", "Bunny 2", "Bunny 3"] };
+    for name in names {
+        bench.begin(*name, names.len())?;
+        let entry = entry(name, solid, bench.is_quick())?;
+        measure(&entry, &mut costs, &mut solvers)?;
+    }
+    if !bench.is_quick() {
+        let aligned = cube(CUBE, 4, Grid::Aligned)?;
+        let cut = aligned.cut()?;
+        let counts = [aligned.octree.cells().len(), CUBE.pow(3) as usize, cut.space.octree().cells().len()];
+        let mut values: Vec<Option<f64>> = counts.iter().map(|&n| Some(n as f64)).collect();
+        values.extend([Some(cut.seconds), None, None, None, None]);
+        costs.row("Cube, aligned blades", &values);
+        costs.printed(
+            "Cube, aligned blades (figure 11)",
+            &[Some(83.3e3), Some(512e3), Some(204e3), None, None, None, None, None],
+        );
+    }
+    result.tables.extend([costs, solvers]);
+    Ok(result)
+}
+
+fn read(bench: &CellsBench<'_>, result: &mut CellsResult) -> Result<Option<SolidSurface>, Trouble> {
+    let Some(path) = bench.surface() else { return Ok(None) };
+    let MeshFile::Surface(surface) = read_mesh(path)? else {
+        return Err(format!("{} is not a surface", path.display()).into());
+    };
+    let (solid, _) = SolidSurface::new(&surface, 1.0)?;
+    result.notes.push(format!("the solid is that of `{}`", path.display()));
+    Ok(Some(solid))
+}
+
+fn entry(name: &str, solid: Option<&dyn Shape>, quick: bool) -> Result<Entry, Trouble> {
+    let of = |printed: Printed, across: u32, levels: u8, s: f64| -> Result<Entry, Trouble> {
+        let uniform = animal(solid, across, 0, true)?;
+        let uniform_cells = uniform.octree.cells().len();
+        let adaptive = animal(solid, across, levels, true)?;
+        Ok(Entry { printed, adaptive, uniform: Some(uniform).filter(|_| !quick), uniform_cells, s })
+    };
+    match name {
+        "Bunny" => of(printed::BUNNY, 155, 4, S_BUNNY),
+        "Bunny 2" => of(printed::BUNNY_2, 77, 3, S_BUNNY_2),
+        "Bunny 3" => of(printed::BUNNY_3, 39, 2, S_BUNNY_3),
+        _ => Ok(Entry {
+            printed: printed::CUBE,
+            adaptive: cube(CUBE, 4, Grid::Rotated)?,
+            uniform: Some(cube(CUBE, 0, Grid::Rotated)?),
+            uniform_cells: CUBE.pow(3) as usize,
+            s: S_CUBE,
+        }),
+    }
+}
+
+/// Stiffness numbers with which three cycles reduce the error as printed.
+pub const S_BUNNY: f64 = 34_950.0;
+/// Likewise.
+pub const S_CUBE: f64 = 462.0;
+/// Likewise.
+pub const S_BUNNY_2: f64 = 13_250.0;
+/// Likewise.
+pub const S_BUNNY_3: f64 = 4_110.0;
+
+/// One step: seconds of the parts, and of three cycles.
+fn measure(entry: &Entry, costs: &mut Table, solvers: &mut Table) -> Result<(), Trouble> {
+    let Entry { printed, adaptive, uniform, uniform_cells, s } = entry;
+    let cut = adaptive.cut()?;
+    let cells = cut.space.octree().cells().len();
+    let mut system = System::new(cut.space.octree(), (adaptive.held, adaptive.pull), Problem::Step(*s))?;
+    let operator_s = system.update();
+    let (exact, _) = system.converged();
+    let mut of_uniform = match uniform {
+        Some(model) => {
+            let cut = model.cut()?;
+            Some(System::new(cut.space.octree(), (model.held, model.pull), Problem::Step(*s))?)
+        }
+        None => None,
+    };
+    for (name, smoother) in smoothers() {
+        let three = Until { iterations: 3, error: 0.0, seconds: 0.0 };
+        let (mut multigrid, seconds) = system.multigrid(smoother);
+        let course = run(&mut system, Solver::Cycles(&mut multigrid), &exact, three);
+        let multigrid_s = seconds.coarse + course.points[2].0;
+        drop(multigrid);
+        let until = Until { iterations: PATIENCE, error: course.error(3), seconds: multigrid_s };
+        let gradients = run(&mut system, Solver::Jacobi, &exact, until);
+        let uniform_s = of_uniform.as_mut().map(|system| {
+            let operator_s = system.update();
+            let (mut multigrid, seconds) = system.multigrid(smoother);
+            let none = vec![nalgebra::Vector3::zeros(); system.unknowns() / 3];
+            let course = run(system, Solver::Cycles(&mut multigrid), &none, three);
+            operator_s + seconds.coarse + course.points.last().map_or(f64::NAN, |p| p.0)
+        });
+        let step_s = operator_s + multigrid_s;
+        costs.row(
+            format!("{}, {name}", adaptive.name),
+            &[
+                Some(adaptive.octree.cells().len() as f64),
+                Some(*uniform_cells as f64),
+                Some(cells as f64),
+                Some(cut.seconds),
+                Some(seconds.levels),
+                Some(step_s),
+                uniform_s,
+                Some(step_s / cells as f64),
+            ],
+        );
+        let to_same = gradients.seconds_to(course.error(3));
+        solvers.row(
+            format!("{}, {name}", adaptive.name),
+            &[
+                Some(*s),
+                Some(multigrid_s),
+                Some(course.error(3)),
+                Some(gradients.error_after(multigrid_s)),
+                to_same,
+                to_same.map(|t| t / multigrid_s),
+            ],
+        );
+    }
+    let [before, uniform, after] = printed.cells.map(Some);
+    let [cutting, step, uniform_step] = printed.seconds.map(Some);
+    let per_cell = Some(printed.seconds[1] / printed.cells[2]);
+    let name = format!("{} of the paper", printed.name);
+    costs.printed(&*name, &[before, uniform, after, cutting, None, step, uniform_step, per_cell]);
+    let [error, seconds] = printed.gradients.map(Some);
+    let ratio = Some(printed.gradients[1] / printed.multigrid_s);
+    solvers.printed(name, &[None, Some(printed.multigrid_s), Some(printed.reduction), error, seconds, ratio]);
+    Ok(())
+}

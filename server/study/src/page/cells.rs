@@ -1,0 +1,112 @@
+//! The section of an experiment on octree cells: tables, plots, pictures.
+
+use std::fmt::Write as _;
+
+use super::html::{escape, prose, time};
+use crate::cells::{CellsResult, Row, Table, Unit};
+use crate::stress::evidence::short;
+
+/// The whole section as HTML.
+pub fn section(result: &CellsResult) -> String {
+    let mut out = format!(
+        "<section id=\"{0}\">\n<h2>{1}</h2>\n<p>{2}</p>\n",
+        result.name,
+        escape(&result.title),
+        prose(&result.about)
+    );
+    if let Some(trouble) = &result.trouble {
+        let _ = writeln!(out, "<p class=\"advice\"><strong>No result.</strong> {}.</p>", escape(trouble));
+    }
+    for note in &result.notes {
+        let _ = writeln!(out, "<p class=\"note\">{}.</p>", prose(note));
+    }
+    result.tables.iter().for_each(|t| out += &table(t));
+    for plots in &result.plots {
+        out += "<figure>\n<div class=\"pair\">\n";
+        plots.plots.iter().for_each(|plot| out += &plot.svg());
+        for chart in &plots.charts {
+            let _ = writeln!(out, "<div><strong>{}</strong>{}</div>", escape(&chart.title), chart.svg());
+        }
+        let _ = writeln!(out, "</div>\n<figcaption>{}</figcaption>\n</figure>", prose(&plots.caption));
+    }
+    if !result.pictures.is_empty() {
+        out += "<div class=\"pair\">\n";
+        for picture in &result.pictures {
+            let _ = writeln!(
+                out,
+                "<figure>{}<figcaption>{}</figcaption></figure>",
+                picture.svg,
+                escape(&picture.caption)
+            );
+        }
+        out += "</div>\n";
+    }
+    out + "</section>\n"
+}
+
+fn table(table: &Table) -> String {
+    let mut out = format!(
+        "<h3>{}</h3>\n<p class=\"soft\">{}</p>\n<div class=\"scroll\"><table class=\"tight\">\n<thead><tr><th></th>",
+        escape(&table.title),
+        prose(&table.about)
+    );
+    for column in &table.columns {
+        let _ = write!(out, "<th class=\"number\">{}</th>", escape(column.name));
+    }
+    out += "</tr></thead>\n<tbody>\n";
+    for row in &table.rows {
+        out += &line(table, row);
+    }
+    out + "</tbody></table></div>\n"
+}
+
+fn line(table: &Table, row: &Row) -> String {
+    let class = if row.printed { " class=\"soft\"" } else { "" };
+    let mut out = format!("<tr{class}><td>{}</td>", escape(&row.name));
+    for (column, value) in table.columns.iter().zip(&row.values) {
+        let _ = write!(
+            out,
+            "<td class=\"number\">{}</td>",
+            value.map_or("–".to_owned(), |value| number(value, column.unit))
+        );
+    }
+    out + "</tr>\n"
+}
+
+/// A number for people.
+fn number(value: f64, unit: Unit) -> String {
+    match unit {
+        _ if !value.is_finite() => "–".to_owned(),
+        Unit::Count => thousands(value.round() as u64),
+        Unit::Seconds if value < 1e-4 => format!("{:.3} µs", 1e6 * value),
+        Unit::Seconds => time(1e3 * value),
+        Unit::Number => short(value),
+        Unit::Times => format!("{} ×", short(value)),
+    }
+}
+
+/// A whole number with its thousands apart.
+fn thousands(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_units() {
+        assert_eq!(number(203_503.0, Unit::Count), "203,503");
+        assert_eq!(number(1.5e-6, Unit::Seconds), "1.500 µs");
+        assert_eq!(number(2.42, Unit::Seconds), "2.42 s");
+        assert_eq!(number(f64::NAN, Unit::Times), "–");
+    }
+}
