@@ -13,4 +13,10 @@ pub struct Ablation {
     pub predictor: bool,
     /// Newton's method takes every full step, even if the potential rises.
     pub line_search: bool,
+    /// Coarse levels of multigrid do not see cuts inside their cells. Cases apply this themselves.
+    pub duplicates: bool,
+    /// Hanging corners of octree cells count as vertices of their own. Cases apply this themselves.
+    pub hanging_weights: bool,
+    /// Hanging corners keep the vertices that they had before a cut. Cases apply this themselves.
+    pub stale_vertices: bool,
 }

@@ -69,6 +69,11 @@ impl Hierarchy {
         Self::with(octree, COARSE_ENOUGH, true)
     }
 
+    /// The same with coarse levels that do not see cuts inside their cells; only for comparison.
+    pub fn without_duplicates(octree: &Octree) -> Self {
+        Self::with(octree, COARSE_ENOUGH, false)
+    }
+
     /// The same down to some number of unknowns; without `duplicates` the coarse levels do not see cuts inside
     /// their cells.
     pub(super) fn with(octree: &Octree, coarse_enough: usize, duplicates: bool) -> Self {

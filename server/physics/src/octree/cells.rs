@@ -92,6 +92,8 @@ pub struct Octree {
     pub(super) links: HashMap<LinkKey, CutLink>,
     /// Where links that lead out of the body meet its boundary; halfway if nothing is known.
     pub(super) boundary: HashMap<LinkKey, CutLink>,
+    /// Hanging corners do not follow cuts; only a mutation test sets it.
+    pub(super) stale: bool,
 }
 
 impl Octree {
@@ -101,7 +103,9 @@ impl Octree {
         let (vertices, hanging) = (vec![[OUTSIDE; 8]; n], vec![0; n]);
         let (points, regions) = (Vec::new(), Vec::new());
         let (links, boundary) = (HashMap::new(), HashMap::new());
-        let mut octree = Self { lattice, map, cells, vertices, hanging, points, regions, links, boundary };
+        let stale = false;
+        let mut octree =
+            Self { lattice, map, cells, vertices, hanging, points, regions, links, boundary, stale };
         octree.mark_boundary();
         octree.number_vertices();
         octree
@@ -116,6 +120,18 @@ impl Octree {
                 self.cells[i].cut = (0..6).filter(out).fold(0, |cut, d| cut | 1 << d);
             }
         }
+    }
+
+    /// Hanging corners do not follow cuts from now on; only for checking the tests themselves.
+    #[doc(hidden)]
+    pub fn keep_stale_vertices(&mut self) {
+        self.stale = true;
+    }
+
+    /// Hanging corners count as the vertices that stand in for them; only for checking the tests themselves.
+    #[doc(hidden)]
+    pub fn forget_hanging(&mut self) {
+        self.hanging.fill(0);
     }
 
     /// Gives the cells of material n the constants `regions[n − 1]`.

@@ -200,7 +200,7 @@ impl Octree {
         // Corners that hang on a coarse leaf follow the vertices of that leaf.
         for k in 0..history.changed.len() {
             let cell = self.cells[history.changed[k] as usize];
-            if cell.level > 0 {
+            if cell.level > 0 && !self.stale {
                 self.for_smaller_around(&cell, |id| {
                     history.keep(id, self.now(id));
                     history.tell(id);

@@ -7,7 +7,7 @@ use super::tables::S_CUBE;
 use super::{CellsBench, CellsResult, Table, Trouble, Unit};
 
 /// Finest cells across, and levels.
-const SIZES: [(u32, u8); 4] = [(24, 3), (48, 4), (80, 4), (144, 4)];
+const SIZES: [(u32, u8); 4] = [(24, 3), (48, 4), (80, 4), (120, 3)];
 /// Uniform grids up to this many cells across.
 const UNIFORM: u32 = 80;
 
@@ -41,7 +41,7 @@ pub fn sizes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
             ("faster by", Unit::Times),
         ],
     );
-    let sizes = if bench.is_quick() { &SIZES[..2] } else { &SIZES[..] };
+    let sizes = if bench.is_quick() { &SIZES[..3] } else { &SIZES[..] };
     for &(across, levels) in sizes {
         bench.begin(format!("{across} cells across"), sizes.len())?;
         let own = step(across, levels)?;

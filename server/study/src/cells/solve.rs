@@ -155,6 +155,22 @@ fn cycles(system: &mut System, multigrid: &mut Multigrid, exact: &[V], until: Un
     course
 }
 
+/// Iterations of conjugate gradients with a cycle until √(rᵀVr) has fallen by `tolerance`; `None` if they do not
+/// converge.
+pub fn iterations(system: &mut System, multigrid: &mut Multigrid, tolerance: f64) -> Option<u32> {
+    let b = system.right_hand_side();
+    let mut pcg = Pcg::default();
+    pcg.resize(b.len());
+    pcg.r.copy_from_slice(&b);
+    let mut u = vec![[0.0; 4]; b.len()];
+    let (mut A, jacobi, team) = system.parts();
+    let mut M = Cycle { multigrid, inverse: jacobi.inverses(), largest: 0.0 };
+    let rz = pcg.precondition(team, &mut A, &mut M);
+    let settings = PcgSettings { iterations: 1_000, tolerance };
+    let report = pcg.run(team, &mut A, &mut M, &mut u, (rz, rz.max(0.0).sqrt(), settings));
+    (report.stop == StopReason::Converged).then_some(report.iterations)
+}
+
 /// ‖e_k‖/‖e₀‖ of k cycles from u = 0, e₀ = −`exact`: e ← e − V A e, scaled into the range of single precision.
 /// The rounding of a solution does not end it.
 pub fn decay(system: &mut System, multigrid: &mut Multigrid, exact: &[V], n: usize) -> Vec<f64> {

@@ -9,10 +9,12 @@ use crate::page::plot::{Mark, Plot};
 
 /// Iterations at most: of conjugate gradients alone, and with cycles.
 const PATIENCE: [usize; 2] = [4_000, 60];
+/// Least error that is drawn.
+const LEAST: f64 = 1e-6;
 /// Points of a curve at most.
 const POINTS: usize = 60;
-/// Cells up to which a factorisation is tried.
-const DIRECT: usize = 12_000;
+/// Cells up to which a factorisation is tried, in a full study and in a quick one.
+const DIRECT: [usize; 2] = [45_000, 12_000];
 /// Names of the solvers, in the order of their colours.
 const NAMES: [&str; 6] =
     ["Cholesky", "CG, block-Jacobi", "MG, SOR", "MG, Chebyshev", "CG with MG, Chebyshev", "CG with MG, SOR"];
@@ -55,13 +57,14 @@ pub fn solvers(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
     if !bench.is_quick() {
         models.push((cube(CUBE, 4, Grid::Rotated)?, S_CUBE));
     }
+    let direct = DIRECT[usize::from(bench.is_quick())];
     let total = 2 * models.len();
     for (model, s) in &models {
         let mut plots =
             Plots { caption: format!("{}: left with mass, right without.", model.name), ..Plots::default() };
         for problem in [Problem::Step(*s), Problem::Equilibrium] {
             bench.begin(format!("{}, {}", model.name, problem.words()), total)?;
-            plots.plots.push(of(model, problem, &mut table)?);
+            plots.plots.push(of(model, problem, direct, &mut table)?);
         }
         result.plots.push(plots);
     }
@@ -69,7 +72,7 @@ pub fn solvers(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
     Ok(result)
 }
 
-fn of(model: &Model, problem: Problem, table: &mut Table) -> Result<Plot, Trouble> {
+fn of(model: &Model, problem: Problem, direct: usize, table: &mut Table) -> Result<Plot, Trouble> {
     let cut = model.cut()?;
     let cells = cut.space.octree().cells().len();
     let mut system = System::new(cut.space.octree(), (model.held, model.pull), problem)?;
@@ -94,7 +97,8 @@ fn of(model: &Model, problem: Problem, table: &mut Table) -> Result<Plot, Troubl
         for (k, (seconds, error)) in course.points.iter().enumerate().filter(|(k, _)| k % stride == 0) {
             plot.marks.push(Mark {
                 x: 1e3 * (course.begin_s + seconds),
-                y: *error,
+                // Below, only the factorisation in double precision goes on.
+                y: error.max(LEAST),
                 colour: number,
                 shape: 0,
                 rank: None,
@@ -116,7 +120,7 @@ fn of(model: &Model, problem: Problem, table: &mut Table) -> Result<Plot, Troubl
             ],
         );
     };
-    if cells <= DIRECT {
+    if cells <= direct {
         add(0, None, &cholesky(&system, &exact)?);
     }
     add(1, None, &run(&mut system, Solver::Jacobi, &exact, until(PATIENCE[0])));

@@ -1,176 +1,105 @@
 //! Counts, rates and iterations on small bodies. Times are never tested.
 
+use scindo_physics::octree::Shape;
+use scindo_physics::space::Space;
+
+use super::model::{CUBE, Grid, animal, cube, layered_cube};
+use super::printed::{BUNNY_2, BUNNY_3, CUBE as PRINTED, LAYERED};
+use super::shape::Placed;
+use super::solve::{Solver, Until, cholesky, decay, iterations, rate, run};
+use super::system::{PAPERS, Problem, System, norm};
+use super::tables::{S_BUNNY_3, S_CUBE};
+use super::{NAMES, find, layer};
+
+/// The cubes of the paper have its numbers of leaves.
 #[test]
-#[ignore]
-fn probe_counts() {
-    use super::model::*;
-    for angle in [37.0] {
-        let mut m = cube(80, 4, Grid::Uncut).unwrap();
-        m.blades = grid_of_blades(80, angle, 0.5);
-        println!("{angle}: {}", m.cut().unwrap().space.octree().cells().len());
+fn cubes_have_the_printed_counts() {
+    let uncut = cube(CUBE, 4, Grid::Uncut).unwrap();
+    assert_eq!(uncut.octree.cells().len(), 83_299);
+    let aligned = cube(CUBE, 4, Grid::Aligned).unwrap().cut().unwrap();
+    assert_eq!(aligned.space.octree().cells().len(), 203_503);
+    for (tip, printed) in [(0.5, PRINTED.cells[2]), (layer::TIP, LAYERED[1])] {
+        let cut = layered_cube(CUBE, 4, (Grid::Rotated, tip), None).unwrap().cut().unwrap();
+        let count = cut.space.octree().cells().len() as f64;
+        assert!((count / printed - 1.0).abs() < 0.02, "{count} instead of {printed}");
     }
-    {
-        for grid in [Grid::Uncut, Grid::Aligned, Grid::Rotated] {
-            let m = cube(80, 4, grid).unwrap();
-            let cut = m.cut().unwrap();
-            println!(
-                "{} {} -> {} links {} {:.2} s",
-                m.name,
-                m.octree.cells().len(),
-                cut.space.octree().cells().len(),
-                cut.links,
-                cut.seconds
-            );
+}
+
+/// The animal has about as many leaves as the bunny, and its cuts leave it in one part.
+#[test]
+fn the_animal_resembles_the_bunny() {
+    for (across, levels, printed) in [(77, 3, BUNNY_2), (39, 2, BUNNY_3)] {
+        let model = animal(None, across, levels, true).unwrap();
+        let uniform = animal(None, across, 0, false).unwrap().octree.cells().len();
+        let cut = model.cut().unwrap();
+        let counts = [model.octree.cells().len(), uniform, cut.space.octree().cells().len()];
+        for (count, printed) in counts.into_iter().zip(printed.cells) {
+            assert!((count as f64 / printed - 1.0).abs() < 0.1, "{counts:?}");
         }
-    }
-    for (n, l) in [(155, 4), (77, 3), (39, 2)] {
-        let u = animal(None, n, 0, false).unwrap();
-        let m = animal(None, n, l, true).unwrap();
-        let cut = m.cut().unwrap();
-        println!("parts {}", cut.space.octree().components().len());
-        println!(
-            "{n}: uniform {} uncut {} cut {} links {} {:.2} s bounds {:?}",
-            u.octree.cells().len(),
-            m.octree.cells().len(),
-            cut.space.octree().cells().len(),
-            cut.links,
-            cut.seconds,
-            u.octree.bounds()
-        );
+        assert_eq!(cut.space.components().len(), 1);
+        assert_eq!(cut.space.flaws().surface, 0);
     }
 }
 
+/// Three cycles with the paper's smoother reduce the error as printed, and the converged solution is that of a
+/// factorisation.
 #[test]
-#[ignore]
-fn probe_rates() {
-    use super::{model::*, solve::*, system::*};
-    for (n, l) in [(39, 2), (77, 3)] {
-        let m = animal(None, n, l, true).unwrap();
-        rates_of(&m, n == 39);
-    }
-    for g in [Grid::Uncut, Grid::Aligned, Grid::Rotated] {
-        rates_of(&cube(40, 3, g).unwrap(), false);
-    }
-    fn rates_of(m: &Model, chol: bool) {
-        let cut = m.cut().unwrap();
-        for p in [Problem::Equilibrium, Problem::Step(1e3), Problem::Step(1e2), Problem::Step(1e1)] {
-            let mut s = System::new(cut.space.octree(), (m.held, m.pull), p).unwrap();
-            let up = s.update();
-            let (u, left) = s.converged();
-            println!("{} {} cells {:?}: left {left:.1e} update {up:.3}", m.name, s.octree().cells().len(), p);
-            let cg = run(&mut s, Solver::Jacobi, &u, Until { iterations: 3000, error: 1e-5, seconds: 0.0 });
-            println!("   cg {} its {:.2} s", cg.points.len(), cg.points.last().unwrap().0);
-            for (name, sm) in smoothers() {
-                let (mut mg, sec) = s.multigrid(sm);
-                let c = run(
-                    &mut s,
-                    Solver::Cycles(&mut mg),
-                    &u,
-                    Until { iterations: 40, error: 1e-5, seconds: 0.0 },
-                );
-                let d = decay(&mut s, &mut mg, &u, 24);
-                println!(
-                    "   {name}: e3 {:.4} ({:.4}) in {:.3}+{:.3}+{:.3} s, rate {:.3} {:.3}; cg at same time {:.3}, to same {:?}",
-                    c.error(3),
-                    d[3],
-                    sec.levels,
-                    sec.coarse,
-                    c.points[2].0,
-                    rate(&d, [8, 16]),
-                    rate(&d, [16, 24]),
-                    cg.error_after(sec.coarse + c.points[2].0),
-                    cg.seconds_to(c.error(3))
-                );
-                let c = run(
-                    &mut s,
-                    Solver::Preconditioned(&mut mg),
-                    &u,
-                    Until { iterations: 40, error: 1e-5, seconds: 0.0 },
-                );
-                println!("      mgcg {} its to {:.1e}", c.points.len(), c.points.last().unwrap().1);
-            }
-            if chol {
-                println!("   chol {:?}", cholesky(&s, &u).unwrap().points);
-            }
-        }
-    }
+fn small_systems_are_solved_as_printed() {
+    let model = animal(None, 39, 2, true).unwrap();
+    let cut = model.cut().unwrap();
+    let mut system =
+        System::new(cut.space.octree(), (model.held, model.pull), Problem::Step(S_BUNNY_3)).unwrap();
+    let (exact, left) = system.converged();
+    assert!(left < 1e-8);
+    assert!(norm(&system.residual(&exact)) < 1e-8 * norm(system.load()));
+    assert!(cholesky(&system, &exact).unwrap().points[0].1 < 1e-6);
+    let (mut multigrid, _) = system.multigrid(PAPERS);
+    let three = Until { iterations: 3, error: 0.0, seconds: 0.0 };
+    let reduction = run(&mut system, Solver::Cycles(&mut multigrid), &exact, three).error(3);
+    assert!((reduction / BUNNY_3.reduction - 1.0).abs() < 0.05, "{reduction}");
+    let (mut multigrid, _) = system.multigrid(scindo_physics::multigrid::Smoother::default());
+    let found = iterations(&mut system, &mut multigrid, 1e-6).unwrap();
+    assert!(found <= 25, "{found} iterations");
+    let until = Until { iterations: 600, error: 1e-4, seconds: 0.0 };
+    let gradients = run(&mut system, Solver::Jacobi, &exact, until);
+    assert!(gradients.points.len() > 15 * found as usize);
 }
 
+/// Cycles converge on the uncut cube as printed, and more slowly on the cut ones.
 #[test]
-#[ignore]
-fn probe_find() {
-    use super::{model::*, solve::*, system::*};
-    find(&animal(None, 39, 2, true).unwrap(), 0.0734);
-    find(&animal(None, 77, 3, true).unwrap(), 0.107);
-    find(&cube(80, 4, Grid::Rotated).unwrap(), 0.0145);
-    find(&animal(None, 155, 4, true).unwrap(), 0.100);
-    fn find(m: &Model, target: f64) {
-        let cut = m.cut().unwrap();
-        let (mut low, mut high) = (100f64.ln(), 1e5f64.ln());
-        for _ in 0..9 {
-            let mid = 0.5 * (low + high);
-            let mut s = System::new(cut.space.octree(), (m.held, m.pull), Problem::Step(mid.exp())).unwrap();
-            let (u, _) = s.converged();
-            let (mut mg, sec) = s.multigrid(PAPERS);
-            let c =
-                run(&mut s, Solver::Cycles(&mut mg), &u, Until { iterations: 3, error: 0.0, seconds: 0.0 });
-            println!(
-                "{} s {:.1}: {:.4} levels {:.2} coarse {:.2} cycles {:.2}",
-                m.name,
-                mid.exp(),
-                c.error(3),
-                sec.levels,
-                sec.coarse,
-                c.points[2].0
-            );
-            if c.error(3) > target { high = mid } else { low = mid }
-        }
-    }
-}
-
-#[test]
-#[ignore]
-fn probe_layer() {
-    use super::{layer, model::*};
-    for tip in [0.45, 0.4, 0.35, 0.3, 0.25, 0.2] {
-        let mut m = cube(80, 4, Grid::Uncut).unwrap();
-        m.blades = grid_of_blades(80, 37.0, tip);
-        println!("tip {tip}: {}", m.cut().unwrap().space.octree().cells().len());
-    }
-    for (cut, soft) in [(true, true), (true, false), (false, true)] {
-        let r = layer::run(32, 3, cut, soft).unwrap();
-        println!("{cut} {soft}: cells {:?} its {} sideways {:.4}", r.cells, r.iterations, r.sideways);
-    }
-}
-
-#[test]
-#[ignore]
-fn probe_study() {
-    let case = std::env::var("DCASE").unwrap();
-    let settings = crate::Settings {
-        cases: case.split(',').map(str::to_owned).collect(),
-        out: std::env::var("DOUT").unwrap().into(),
-        quick: std::env::var("DQUICK").is_ok(),
-        within_s: None,
-        budget_ms: None,
-        seconds: None,
-        only: Vec::new(),
-        cells: Vec::new(),
-        surface: std::env::var("DSURF").ok().map(Into::into),
-        stop: Default::default(),
+fn rates_are_those_of_the_paper_where_nothing_is_cut() {
+    let of = |grid| {
+        let model = cube(32, 3, grid).unwrap();
+        let cut = model.cut().unwrap();
+        let mut system =
+            System::new(cut.space.octree(), (model.held, model.pull), Problem::Step(S_CUBE)).unwrap();
+        let (exact, _) = system.converged();
+        let (mut multigrid, _) = system.multigrid(PAPERS);
+        rate(&decay(&mut system, &mut multigrid, &exact, 16), [6, 16])
     };
-    let r = crate::run(&settings, &mut |p| println!("{} {}/{} {}", p.case, p.done, p.total, p.what)).unwrap();
-    for c in &r.cells {
-        println!("{:?} {:?}", c.name, c.trouble);
-        for t in &c.tables {
-            println!("{} {:?}", t.title, t.columns.iter().map(|c| c.name).collect::<Vec<_>>());
-            for r in &t.rows {
-                println!(
-                    "  {:40} {:?}",
-                    r.name,
-                    r.values.iter().map(|v| v.map_or("-".into(), crate::words::short)).collect::<Vec<_>>()
-                );
-            }
-        }
-    }
+    let [uncut, rotated] = [Grid::Uncut, Grid::Rotated].map(of);
+    println!("rates {uncut:.3} {rotated:.3}");
+    assert!((uncut - 0.66).abs() < 0.1 && rotated > uncut && rotated < 0.85);
+}
+
+#[test]
+fn rods_buckle_at_the_soft_layer() {
+    let run = |cut, soft| layer::run(24, 3, cut, soft).unwrap().sideways;
+    let (rods, stiff, uncut) = (run(true, true), run(true, false), run(false, true));
+    println!("sideways {rods:.4} {stiff:.4} {uncut:.4}");
+    assert!(rods > 10.0 * stiff && rods > 10.0 * uncut);
+}
+
+#[test]
+fn solids_are_placed_at_the_origin() {
+    let shape = scindo_physics::octree::BoxShape { min: [1.0, 2.0, 3.0].into(), max: [3.0, 3.0, 3.5].into() };
+    let placed = Placed::new(&shape);
+    let bounds = placed.bounds().map(<[f64; 3]>::from);
+    assert_eq!(bounds, [[0.0; 3], [1.0, 0.5, 0.25]]);
+    assert!(placed.contains(&[0.5, 0.4, 0.2].into()) && !placed.contains(&[0.5, 0.6, 0.2].into()));
+}
+
+#[test]
+fn every_name_is_an_experiment() {
+    assert!(NAMES.iter().all(|name| find(name).is_some()) && find("dick").is_none());
 }

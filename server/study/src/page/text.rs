@@ -115,7 +115,8 @@ fn glance(study: &StudyResult) -> String {
 /// Definitions, method and machine.
 pub fn method(study: &StudyResult) -> String {
     let mut out = "<section id=\"method\">\n<h2>How it was measured</h2>\n<dl>\n".to_owned();
-    for (term, meaning) in DEFINITIONS {
+    // Experiments say themselves what they measure.
+    for (term, meaning) in DEFINITIONS.iter().filter(|_| !study.cases.is_empty()) {
         let _ = writeln!(out, "<dt>{term}</dt><dd>{meaning}</dd>");
     }
     let machine = &study.origin.machine;

@@ -16,11 +16,25 @@ pub enum Mutation {
     Predictor,
     /// The line search of Newton's method.
     LineSearch,
+    /// Duplicated cells on the coarse levels of multigrid.
+    Duplicates,
+    /// Weights of hanging corners.
+    HangingWeights,
+    /// Vertices of hanging corners that follow a cut.
+    StaleVertices,
 }
 
 impl Mutation {
     /// All mutations, in the order of the table.
-    pub const ALL: [Self; 4] = [Self::PieceMasses, Self::ExactPredicates, Self::Predictor, Self::LineSearch];
+    pub const ALL: [Self; 7] = [
+        Self::PieceMasses,
+        Self::ExactPredicates,
+        Self::Predictor,
+        Self::LineSearch,
+        Self::Duplicates,
+        Self::HangingWeights,
+        Self::StaleVertices,
+    ];
 
     /// Stable name for programs.
     pub fn name(self) -> &'static str {
@@ -29,6 +43,9 @@ impl Mutation {
             Self::ExactPredicates => "exact-predicates",
             Self::Predictor => "predictor",
             Self::LineSearch => "line-search",
+            Self::Duplicates => "duplicates",
+            Self::HangingWeights => "hanging-weights",
+            Self::StaleVertices => "stale-vertices",
         }
     }
 
@@ -41,6 +58,9 @@ impl Mutation {
             Self::ExactPredicates => "signs by plain floating-point determinants",
             Self::Predictor => "the fast path linearises at the positions of the previous step",
             Self::LineSearch => "Newton's method takes every full step",
+            Self::Duplicates => "coarse levels of multigrid do not see cuts inside their cells",
+            Self::HangingWeights => "hanging corners count as the vertices that stand in for them",
+            Self::StaleVertices => "hanging corners keep the vertices that they had before a cut",
         }
     }
 
@@ -51,6 +71,9 @@ impl Mutation {
             Self::ExactPredicates => &["edge-on-cut"],
             Self::Predictor => &["step-sweep", "free-spin"],
             Self::LineSearch => &["inverted"],
+            Self::Duplicates => &["blade-grid"],
+            Self::HangingWeights => &["cells-patch"],
+            Self::StaleVertices => &["cells-patch"],
         }
     }
 
@@ -62,6 +85,9 @@ impl Mutation {
             Self::ExactPredicates => Ablation { exact_predicates: true, ..none },
             Self::Predictor => Ablation { predictor: true, ..none },
             Self::LineSearch => Ablation { line_search: true, ..none },
+            Self::Duplicates => Ablation { duplicates: true, ..none },
+            Self::HangingWeights => Ablation { hanging_weights: true, ..none },
+            Self::StaleVertices => Ablation { stale_vertices: true, ..none },
         };
         Setting { ablation }
     }

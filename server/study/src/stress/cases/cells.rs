@@ -120,8 +120,8 @@ fn aligned(setting: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-/// Parts by walking over whole links, and parts by shared vertices.
-fn counted_parts(body: &Body, octree: &Octree) -> [usize; 2] {
+/// Parts by shared vertices.
+pub fn parts_by_vertices(octree: &Octree) -> usize {
     let mut root: Vec<usize> = (0..octree.cells().len()).collect();
     fn find(root: &[usize], mut i: usize) -> usize {
         while root[i] != i {
@@ -137,8 +137,7 @@ fn counted_parts(body: &Body, octree: &Octree) -> [usize; 2] {
             root[a.max(b)] = a.min(b);
         }
     }
-    let by_vertices = (0..root.len()).filter(|&i| root[i] == i).count();
-    [body.components().len(), by_vertices]
+    (0..root.len()).filter(|&i| find(&root, i) == i).count()
 }
 
 fn branches(setting: &Setting) -> Result<Evidence, Trouble> {
@@ -154,7 +153,7 @@ fn branches(setting: &Setting) -> Result<Evidence, Trouble> {
         cut.cut(&blade, incision)?;
         let x = scindo_physics::space::Space::rest_positions(&counted);
         scindo_physics::space::Space::cut(&mut counted, &x, &blade, incision)?;
-        let [links, vertices] = counted_parts(&cut, counted.octree());
+        let [links, vertices] = [cut.components().len(), parts_by_vertices(counted.octree())];
         apart += links.abs_diff(vertices) + links.abs_diff(cut.parts().len());
         defects += cut.flaws().surface;
         volume = volume.max(volume_error(&cut));

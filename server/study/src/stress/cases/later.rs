@@ -50,18 +50,6 @@ pub const LIPS: Case = Case {
     ..NOT_YET
 };
 
-/// Case 29.
-pub const BLADES: Case = Case {
-    number: Some(29),
-    name: "blade-grid",
-    title: "A grid of blades in hexahedra, multigrid",
-    set_up: "Aligned and rotated grids of cuts to half depth, 83 000 to 230 000 cells. Needs linked hexahedra \
-        and multigrid.",
-    rule: "Convergence factor at most 0.80, at most 25 iterations to 1e-6; worse without duplicated coarse cells.",
-    source: "Dick 2011, Figs. 10 and 11",
-    ..NOT_YET
-};
-
 /// Case 30.
 pub const SOAK: Case = Case {
     number: Some(30),

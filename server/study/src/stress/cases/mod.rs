@@ -9,6 +9,7 @@ mod far;
 mod growth;
 mod input;
 mod later;
+mod multigrid;
 mod on_mesh;
 mod ruined;
 mod sliver;
@@ -48,7 +49,7 @@ pub const ALL: &[Case] = &[
     input::CASE,
     later::WALL,
     later::LIPS,
-    later::BLADES,
+    multigrid::BLADES,
     later::SOAK,
     later::OVERLOAD,
     far::CASE,
@@ -57,4 +58,5 @@ pub const ALL: &[Case] = &[
     cells::BRANCHES,
     cells::FALLING,
     cells::GROWTH,
+    multigrid::PATCH,
 ];

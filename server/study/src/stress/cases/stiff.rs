@@ -1,6 +1,8 @@
 //! Cases 21, 22 and 23: a stiffness ratio of a million, near incompressibility, ruined meshes.
 
 use super::support::{DOWN, L, SOFT, V, block, clamp_left, cube, nodes};
+use crate::cells::solve;
+use crate::cells::system::{MATERIAL, Problem, System};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::chart::{Chart, Line};
 use crate::stress::evidence::Evidence;
@@ -9,8 +11,10 @@ use crate::stress::watch::{Common, Watch, charts};
 use scindo_physics::assembly::{BlockCsr, Model, Tangent, Volumetric};
 use scindo_physics::body::{Arithmetic, Body, BodySettings, ElementKind, PcgSettings, StaticSettings};
 use scindo_physics::cut::CutMesh;
-use scindo_physics::material::{Law, Material, Rayleigh};
+use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_hexes, box_mesh};
+use scindo_physics::multigrid::Smoother;
+use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
 use scindo_physics::operator::FixedCopy;
 use scindo_physics::solver::{LinearSettings, LinearSolver, Method, Precision, StopReason};
 use scindo_physics::team::Team;
@@ -23,8 +27,8 @@ pub const LAYERS: Case = Case {
     set_up: "A clamped block of 8 × 8 × 8 cells of E = 1e3 Pa with an inclusion of 1e9 Pa in its middle; then \
              four glued layers of 1e3 and 1e9 Pa in turn. Implicit Euler, small strains, 25 steps of 20 ms under \
              gravity; every step solved by block-Jacobi PCG to 1e-6.",
-    rule: "C. Every solve reaches 1e-6; its iterations are listed. (Multigrid on hexahedra, which is not \
-           implemented yet, must need at most 60 iterations.)",
+    rule: "C. Every solve of the tetrahedra reaches 1e-6; its iterations are listed. Conjugate gradients with \
+           multigrid on octree cells, 16 across, reach 1e-6 of an equilibrium in at most 60 iterations.",
     source: "Dick 2011, Fig. 14",
     quick: false,
     run: Some(layers),
@@ -166,7 +170,33 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
         ));
     }
     evidence.charts.extend([energies, iterations]);
+    let centred: (&str, Inside) = ("inclusion", |X| (X - V::repeat(0.5)).amax() < 0.25);
+    for (name, stiff) in [centred, ("layers", |X| (X.z / 0.25) as usize % 2 == 1)] {
+        cells_with(name, stiff, &mut evidence)?;
+    }
     Ok(evidence)
+}
+
+/// Whether a point is in the stiff material.
+type Inside = fn(&V) -> bool;
+
+/// The same stiffness ratio on octree cells, in equilibrium.
+fn cells_with(name: &str, stiff: Inside, evidence: &mut Evidence) -> Result<(), Trouble> {
+    let shape = BoxShape { min: V::zeros(), max: V::repeat(1.0) };
+    let mut octree = Octree::fill(&shape, OctreeSettings { cells: 16, levels: 2 }, &|p| u16::from(stiff(p)))?;
+    let young_pa = 1e6 * MATERIAL.young_pa;
+    octree.set_regions(vec![Region {
+        young_pa,
+        poisson: MATERIAL.poisson,
+        density_kg_m3: MATERIAL.density_kg_m3,
+    }]);
+    let held: fn(&V) -> bool = |X| X.x == 0.0;
+    let mut system = System::new(&octree, (held, |_| DOWN), Problem::Equilibrium)?;
+    let (mut multigrid, _) = system.multigrid(Smoother::default());
+    let found = solve::iterations(&mut system, &mut multigrid, 1e-6);
+    let found = found.map_or(f64::INFINITY, f64::from);
+    evidence.at_most(format!("iterations with multigrid on octree cells, {name}"), found, 60.0, "");
+    Ok(())
 }
 
 /// Downward motion of corner, centre and mean of the top, in edges, and the volume change V/V₀ − 1.
