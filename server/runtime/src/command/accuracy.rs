@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use scindo_study::design::axes::Factor;
 use scindo_study::cells::CellsResult;
+use scindo_study::design::axes::Factor;
 use scindo_study::words::{percent, short};
 use scindo_study::{CaseResult, Settings, StudyResult};
 use serde_json::json;
@@ -173,7 +173,8 @@ fn print_experiment(result: &CellsResult) {
         say!("  {}", table.title);
         for row in &table.rows {
             let values = table.columns.iter().zip(&row.values);
-            let words = values.filter_map(|(column, value)| Some(format!("{} {}", column.name, short((*value)?))));
+            let words =
+                values.filter_map(|(column, value)| Some(format!("{} {}", column.name, short((*value)?))));
             say!("    {:36} {}", row.name, words.collect::<Vec<_>>().join(", "));
         }
     }

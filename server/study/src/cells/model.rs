@@ -44,6 +44,11 @@ impl Grid {
     }
 }
 
+/// Whether a vertex with this rest position is held.
+pub type Held = fn(&V) -> bool;
+/// Force per mass [N/kg] at a rest position.
+pub type Pull = fn(&V) -> V;
+
 /// A body before it is cut.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -54,9 +59,9 @@ pub struct Model {
     /// The blades that cut it, one incision each.
     pub blades: Vec<BladeSweep>,
     /// Whether a vertex with this rest position is held.
-    pub held: fn(&V) -> bool,
+    pub held: Held,
     /// Force per mass [N/kg] at a rest position.
-    pub pull: fn(&V) -> V,
+    pub pull: Pull,
 }
 
 /// A body that was cut.

@@ -20,6 +20,7 @@ use scindo_physics::solver::{Pcg, PcgSettings};
 use scindo_physics::team::{Team, blocks};
 
 use super::Trouble;
+use super::model::{Held, Pull};
 
 type V = Vector3<f64>;
 
@@ -99,11 +100,7 @@ impl System {
     ///
     /// # Errors
     /// The system cannot start a thread.
-    pub fn new(
-        octree: &Octree,
-        (held, pull): (fn(&V) -> bool, fn(&V) -> V),
-        problem: Problem,
-    ) -> Result<Self, Trouble> {
+    pub fn new(octree: &Octree, (held, pull): (Held, Pull), problem: Problem) -> Result<Self, Trouble> {
         let rest = octree.rest_positions();
         let h = octree.lattice().h;
         let factors = match problem {

@@ -148,7 +148,10 @@ fn measure(entry: &Entry, costs: &mut Table, solvers: &mut Table) -> Result<(), 
     let cells = cut.space.octree().cells().len();
     let mut system = System::new(cut.space.octree(), (adaptive.held, adaptive.pull), Problem::Step(*s))?;
     let operator_s = system.update();
-    let (exact, _) = system.converged();
+    let (exact, left) = system.converged();
+    if left.is_nan() || left > 1e-7 {
+        return Err(format!("{}: the solution is not converged", adaptive.name).into());
+    }
     let mut of_uniform = match uniform {
         Some(model) => {
             let cut = model.cut()?;

@@ -140,8 +140,10 @@ fn patch(setting: &Setting) -> Result<Evidence, Trouble> {
 /// cut needs: in the second, corners far from the cut must follow the new vertex of the coarser cell. Returns the
 /// number of corners that are carried otherwise.
 fn order_of_work(setting: &Setting) -> Result<usize, Trouble> {
-    let octree = cube(24, 3, Grid::Uncut)?.octree;
+    let mut octree = cube(24, 3, Grid::Uncut)?.octree;
     let corner: At = [11; 3];
+    // A cell that does not touch the cut, and hangs on the coarser cell beside it.
+    octree.refine(&[[11, 13, 13]], 0);
     let link = |axis: u8| {
         let normal = [V::ith(usize::from(axis), 1.0); 2];
         ((corner, axis), CutLink { at: [0.5; 2], normal, incision: 1 })
