@@ -2,7 +2,7 @@
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
-//! runs solvers on it and records their errors. Every experiment has a module of its own and gives a
+//! and [`refine`] run solvers on it. Every experiment has a module of its own and gives a
 //! [`CellsResult`]: tables, plots and pictures. [`printed`] has the figures of the paper.
 //!
 //! # Source
@@ -20,6 +20,8 @@ pub mod system;
 
 pub mod solve;
 
+pub mod refine;
+
 mod bench;
 
 mod tables;
@@ -32,6 +34,8 @@ mod layer;
 
 mod sizes;
 
+mod reference;
+
 pub use bench::CellsBench;
 pub use result::{CellsResult, Column, Picture, Plots, Row, Table, Unit};
 
@@ -41,8 +45,11 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 /// An experiment.
 pub type Experiment = fn(&mut CellsBench<'_>) -> Result<CellsResult, Trouble>;
 
-/// Names of the experiments.
-pub const NAMES: [&str; 5] = ["dick-tables", "dick-convergence", "dick-solvers", "dick-layer", "dick-sizes"];
+/// Names of the experiments; those of the paper first.
+pub const NAMES: [&str; 6] =
+    ["dick-tables", "dick-convergence", "dick-solvers", "dick-layer", "dick-sizes", "cells-cube"];
+/// How many of them are those of the paper.
+pub const PAPERS: usize = 5;
 
 /// The experiment `name`.
 fn find(name: &str) -> Option<Experiment> {
@@ -52,6 +59,7 @@ fn find(name: &str) -> Option<Experiment> {
         "dick-solvers" => Some(solvers::solvers),
         "dick-layer" => Some(layer::layer),
         "dick-sizes" => Some(sizes::sizes),
+        "cells-cube" => Some(reference::reference),
         _ => None,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::model::{CUBE, Grid, Model, animal, cube};
 use super::solve::{Course, FLOOR, Solver, Until, cholesky, run};
-use super::system::{Problem, System, smoothers};
+use super::system::{Problem, System, norm, smoothers};
 use super::tables::{S_BUNNY_2, S_BUNNY_3, S_CUBE};
 use super::{CellsBench, CellsResult, Plots, Table, Trouble, Unit};
 use crate::page::plot::{Mark, Plot};
@@ -139,7 +139,10 @@ fn of(
         );
     };
     if cells <= direct {
-        add(0, None, &cholesky(&system, &exact)?);
+        let (u, seconds) = cholesky(&system)?;
+        let off: f64 = u.iter().zip(&exact).map(|(u, e)| (u - e).norm_squared()).sum();
+        let points = vec![(seconds, off.sqrt() / norm(&exact))];
+        add(0, None, &Course { begin_s: 0.0, points });
     }
     add(1, None, &run(&mut system, Solver::Jacobi, &exact, until(PATIENCE[0])));
     for (i, (_, smoother)) in smoothers().into_iter().enumerate() {

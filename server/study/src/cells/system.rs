@@ -9,18 +9,18 @@ use nalgebra::{Matrix3, Vector3};
 use scindo_physics::element::{Points, Simd};
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::multigrid::{
-    CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings, Smoother,
+    CellMaterial, Coefficients, Hierarchy, Multigrid, MultigridSettings, Smoother,
 };
 use scindo_physics::octree::Octree;
 use scindo_physics::operator::cells::CellStiffness;
 use scindo_physics::operator::{
     BLOCK, BlockJacobi, ElasticUpdate, FixedCopy, Padded, Stiffness, SystemOperator,
 };
-use scindo_physics::solver::{Pcg, PcgSettings};
 use scindo_physics::team::{Team, blocks};
 
 use super::Trouble;
 use super::model::{Held, Pull};
+use super::refine::refine;
 
 type V = Vector3<f64>;
 
@@ -41,8 +41,6 @@ pub fn smoothers() -> [(&'static str, Smoother); 2] {
     [("SOR", PAPERS), ("Chebyshev", Smoother::default())]
 }
 
-/// Largest number of rounds of refinement of the converged solution.
-const ROUNDS: usize = 12;
 /// The residual of the converged solution over that at the start.
 const CONVERGED: f64 = 1e-9;
 
@@ -68,10 +66,13 @@ pub struct System {
     mass_f32: Vec<f32>,
     /// Factors of M and of K in A.
     factors: [f64; 2],
+    material: Material,
     stiffness: CellStiffness,
     jacobi: BlockJacobi,
     /// The right-hand side in double precision.
     b: Vec<V>,
+    /// Factor by which loads, and so solutions, are smaller than those of the problem.
+    scale: f64,
     /// One thread, as in the paper.
     pub team: Team,
 }
@@ -101,13 +102,26 @@ impl System {
     /// # Errors
     /// The system cannot start a thread.
     pub fn new(octree: &Octree, (held, pull): (Held, Pull), problem: Problem) -> Result<Self, Trouble> {
+        Self::of_material(octree, (held, pull), problem, MATERIAL)
+    }
+
+    /// The same of another linear material.
+    ///
+    /// # Errors
+    /// The system cannot start a thread.
+    pub fn of_material(
+        octree: &Octree,
+        (held, pull): (Held, Pull),
+        problem: Problem,
+        material: Material,
+    ) -> Result<Self, Trouble> {
         let rest = octree.rest_positions();
         let h = octree.lattice().h;
         let factors = match problem {
-            Problem::Step(s) => [1.0, s * MATERIAL.density_kg_m3 * h * h / MATERIAL.young_pa],
+            Problem::Step(s) => [1.0, s * material.density_kg_m3 * h * h / material.young_pa],
             Problem::Equilibrium => [0.0, 1.0],
         };
-        let mass = octree.vertex_masses(MATERIAL.density_kg_m3);
+        let mass = octree.vertex_masses(material.density_kg_m3);
         let fixed: Vec<FixedCopy> = (0_u32..)
             .zip(&rest)
             .filter(|(_, X)| held(X))
@@ -130,9 +144,11 @@ impl System {
             mass,
             mass_f32,
             factors,
+            material,
             stiffness,
             jacobi,
             b,
+            scale,
             team: Team::new(1)?,
         };
         system.update();
@@ -143,7 +159,7 @@ impl System {
     pub fn update(&mut self) -> f64 {
         let started = Instant::now();
         let [mass_factor, scale] = self.factors;
-        let with = ElasticUpdate { lame: MATERIAL.lame(), law: Law::Corotational, scale };
+        let with = ElasticUpdate { lame: self.material.lame(), law: Law::Corotational, scale };
         self.stiffness.update(&mut self.team, &with, &self.rest);
         let mut diagonal = vec![[0.0; 8]; self.rest.len()];
         let (K, mass) = (&self.stiffness, &self.mass_f32);
@@ -182,6 +198,16 @@ impl System {
         &self.mass
     }
 
+    /// The material of cells outside regions.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    /// Factor by which solutions are smaller than the displacements [m] under the pull.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
     /// The right-hand side.
     pub fn load(&self) -> &[V] {
         &self.b
@@ -205,7 +231,7 @@ impl System {
         let started = Instant::now();
         let material =
             |region: &Region| CellMaterial { lame: region.lame(), density_kg_m3: region.density_kg_m3 };
-        let own = CellMaterial { lame: MATERIAL.lame(), density_kg_m3: MATERIAL.density_kg_m3 };
+        let own = CellMaterial { lame: self.material.lame(), density_kg_m3: self.material.density_kg_m3 };
         let materials = [own].into_iter().chain(self.octree.regions().iter().map(material)).collect();
         let [mass_factor, scale] = self.factors;
         let with = Coefficients { materials, scale, mass_factor };
@@ -231,7 +257,7 @@ impl System {
     pub fn residual(&self, u: &[V]) -> Vec<V> {
         let x: Vec<V> = self.rest.iter().zip(u).map(|(X, u)| X + u).collect();
         let mut r = vec![V::zeros(); u.len()];
-        self.octree.elastic_forces(&MATERIAL, &x, &mut r);
+        self.octree.elastic_forces(&self.material, &x, &mut r);
         for (i, r) in r.iter_mut().enumerate() {
             *r = self.b[i] - self.factors[0] * self.mass[i] * u[i] - self.factors[1] * *r;
         }
@@ -243,32 +269,8 @@ impl System {
     /// outside; and the residual that is left, relative to b.
     pub fn converged(&mut self) -> (Vec<V>, f64) {
         let (mut multigrid, _) = self.multigrid(Smoother::default());
-        let mut u = vec![V::zeros(); self.b.len()];
-        let start = norm(&self.b);
-        let mut pcg = Pcg::default();
-        pcg.resize(u.len());
-        let mut left = 1.0;
-        for _ in 0..ROUNDS {
-            let r = self.residual(&u);
-            left = norm(&r) / start;
-            if left <= CONVERGED {
-                break;
-            }
-            let scale = 1.0 / norm(&r);
-            for (to, r) in pcg.r.iter_mut().zip(&r) {
-                *to = [(scale * r.x) as f32, (scale * r.y) as f32, (scale * r.z) as f32, 0.0];
-            }
-            let mut change = vec![[0.0; 4]; u.len()];
-            let (mut A, jacobi, team) = self.parts();
-            let mut M = Cycle { multigrid: &mut multigrid, inverse: jacobi.inverses(), largest: 0.0 };
-            let rz = pcg.precondition(team, &mut A, &mut M);
-            let settings = PcgSettings { iterations: 60, tolerance: 1e-4 };
-            pcg.run(team, &mut A, &mut M, &mut change, (rz, rz.max(0.0).sqrt(), settings));
-            for (u, c) in u.iter_mut().zip(&change) {
-                *u += V::new(c[0].into(), c[1].into(), c[2].into()) / scale;
-            }
-        }
-        (u, left)
+        let refined = refine(self, Some(&mut multigrid), CONVERGED, [1e-4, 60.0]);
+        (refined.u, refined.left)
     }
 }
 

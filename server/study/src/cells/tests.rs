@@ -1,15 +1,17 @@
 //! Counts, rates and iterations on small bodies. Times are never tested.
 
+use scindo_physics::material::Material;
 use scindo_physics::octree::Shape;
 use scindo_physics::space::Space;
 
 use super::model::{CUBE, Grid, animal, cube, layered_cube};
 use super::printed::{BUNNY_2, BUNNY_3, CUBE as PRINTED, LAYERED};
+use super::refine::refine;
 use super::shape::Placed;
 use super::solve::{Solver, Until, cholesky, decay, iterations, rate, run};
-use super::system::{PAPERS, Problem, System, norm};
+use super::system::{MATERIAL, PAPERS, Problem, System, norm};
 use super::tables::{S_BUNNY_3, S_CUBE};
-use super::{NAMES, find, layer};
+use super::{NAMES, find, layer, reference};
 
 /// The cubes of the paper have its numbers of leaves.
 #[test]
@@ -52,7 +54,9 @@ fn small_systems_are_solved_as_printed() {
     let (exact, left) = system.converged();
     assert!(left < 1e-8);
     assert!(norm(&system.residual(&exact)) < 1e-8 * norm(system.load()));
-    assert!(cholesky(&system, &exact).unwrap().points[0].1 < 1e-6);
+    let (direct, _) = cholesky(&system).unwrap();
+    let off: f64 = direct.iter().zip(&exact).map(|(u, e)| (u - e).norm_squared()).sum();
+    assert!(off.sqrt() < 1e-6 * norm(&exact));
     let (mut multigrid, _) = system.multigrid(PAPERS);
     let three = Until { iterations: 3, error: 0.0, seconds: 0.0 };
     let reduction = run(&mut system, Solver::Cycles(&mut multigrid), &exact, three).error(3);
@@ -78,16 +82,34 @@ fn rates_are_those_of_the_paper_where_nothing_is_cut() {
         rate(&decay(&mut system, &mut multigrid, &exact, 16), [6, 16])
     };
     let [uncut, rotated] = [Grid::Uncut, Grid::Rotated].map(of);
-    println!("rates {uncut:.3} {rotated:.3}");
-    assert!((uncut - 0.66).abs() < 0.1 && rotated > uncut && rotated < 0.85);
+    assert!((uncut - 0.66).abs() < 0.1 && rotated > uncut && rotated < 0.85, "rates {uncut:.3} {rotated:.3}");
+}
+
+/// Refinement reaches the stored solution of 40³ cells at all of its points.
+#[test]
+fn the_stored_cube_is_reached() {
+    let model = reference::clamped(40).unwrap();
+    let material = Material { young_pa: 1e6, ..MATERIAL };
+    let loads = (model.held, model.pull);
+    let mut system = System::of_material(&model.octree, loads, Problem::Equilibrium, material).unwrap();
+    let (mut multigrid, _) = system.multigrid(scindo_physics::multigrid::Smoother::default());
+    let rough = refine(&mut system, Some(&mut multigrid), 1e-6, [1e-4, 60.0]);
+    assert!(
+        rough.left <= 1e-6 && rough.iterations <= 12,
+        "{} iterations, {:e}",
+        rough.iterations,
+        rough.left
+    );
+    let fine = refine(&mut system, Some(&mut multigrid), 1e-9, [1e-4, 60.0]);
+    let off = reference::off(&system, 40, &fine.u).unwrap();
+    assert!(fine.left <= 1e-9 && off < 1e-8, "off by {off:e}, residual {:e}", fine.left);
 }
 
 #[test]
 fn rods_buckle_at_the_soft_layer() {
     let run = |cut, soft| layer::run(24, 3, cut, soft).unwrap().sideways;
     let (rods, stiff, uncut) = (run(true, true), run(true, false), run(false, true));
-    println!("sideways {rods:.4} {stiff:.4} {uncut:.4}");
-    assert!(rods > 10.0 * stiff && rods > 10.0 * uncut);
+    assert!(rods > 10.0 * stiff && rods > 10.0 * uncut, "sideways {rods:.4} {stiff:.4} {uncut:.4}");
 }
 
 #[test]

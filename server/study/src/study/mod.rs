@@ -28,7 +28,7 @@ pub enum StudyError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A name is neither a case nor a file.
-    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting; experiments: {}; all of these: dick", case::NAMES.join(", "), cells::NAMES.join(", "))]
+    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting; experiments: {}; groups of them: dick, cells (all)", case::NAMES.join(", "), cells::NAMES.join(", "))]
     UnknownCase {
         /// The name that was given.
         name: String,
@@ -192,11 +192,12 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
     Ok(cases)
 }
 
-/// The experiments that a name stands for: one, all, or none if it is a case or a scene.
+/// The experiments that a name stands for: one, a group, or none if it is a case or a scene.
 fn experiment(name: &str) -> &'static [&'static str] {
     match cells::NAMES.iter().position(|known| *known == name) {
         Some(i) => &cells::NAMES[i..=i],
-        None if name == "dick" => &cells::NAMES,
+        None if name == "cells" => &cells::NAMES,
+        None if name == "dick" => &cells::NAMES[..cells::PAPERS],
         None => &[],
     }
 }
