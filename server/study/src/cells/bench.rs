@@ -1,7 +1,7 @@
 //! What an experiment gets from the study: the user's choices, and a way to report progress.
 
 use std::path::Path;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Trouble;
 use crate::bench::progress::Progress;
@@ -30,6 +30,11 @@ impl<'a> CellsBench<'a> {
     /// A surface that takes the place of the animal.
     pub fn surface(&self) -> Option<&Path> {
         self.settings.surface.as_deref()
+    }
+
+    /// Set when the user ends the study.
+    pub fn stop(&self) -> &'a AtomicBool {
+        &self.settings.stop
     }
 
     /// Announces the next of `total` measurements.

@@ -36,6 +36,8 @@ mod sizes;
 
 mod reference;
 
+mod elements;
+
 pub use bench::CellsBench;
 pub use result::{CellsResult, Column, Picture, Plots, Row, Table, Unit};
 
@@ -46,8 +48,15 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut CellsBench<'_>) -> Result<CellsResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 6] =
-    ["dick-tables", "dick-convergence", "dick-solvers", "dick-layer", "dick-sizes", "cells-cube"];
+pub const NAMES: [&str; 7] = [
+    "dick-tables",
+    "dick-convergence",
+    "dick-solvers",
+    "dick-layer",
+    "dick-sizes",
+    "cells-cube",
+    "cells-elements",
+];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
 
@@ -60,6 +69,7 @@ fn find(name: &str) -> Option<Experiment> {
         "dick-layer" => Some(layer::layer),
         "dick-sizes" => Some(sizes::sizes),
         "cells-cube" => Some(reference::reference),
+        "cells-elements" => Some(elements::elements),
         _ => None,
     }
 }
