@@ -103,22 +103,27 @@ pub fn layered_cube(
         octree,
         blades: match grid {
             Grid::Uncut => Vec::new(),
-            Grid::Aligned => grid_of_blades(across, 0.0, tip),
-            Grid::Rotated => grid_of_blades(across, ROTATION_DEG, tip),
+            Grid::Aligned => grid_of_blades(&places(across), 0.0, tip),
+            Grid::Rotated => grid_of_blades(&places(across), ROTATION_DEG, tip),
         },
         held: |X| X.z == 0.0,
         pull: |X| 9.81 * V::new(2.0 * X.x - 1.0, 2.0 * X.y - 1.0, 0.0),
     })
 }
 
-/// Two families of upright blades, turned by an angle [°], from above the cube down to the height `tip` [m].
-pub fn grid_of_blades(across: u32, angle_deg: f64, tip: f64) -> Vec<BladeSweep> {
+/// Places of the paper's blades [m]. Smaller cubes have the same blades on their own faces.
+fn places(across: u32) -> Vec<f64> {
+    let snapped = |place: &f64| (place / 80.0 * f64::from(across)).round() / f64::from(across);
+    let mut places: Vec<f64> = BLADES.iter().map(snapped).collect();
+    places.dedup();
+    places
+}
+
+/// Two families of upright blades at these `places` [m], turned by an angle [°], from above the cube down to the
+/// height `tip` [m].
+pub fn grid_of_blades(places: &[f64], angle_deg: f64, tip: f64) -> Vec<BladeSweep> {
     let turn = Rotation3::from_axis_angle(&V::z_axis(), angle_deg.to_radians());
     let middle = V::new(0.5, 0.5, 0.0);
-    // Smaller cubes have the same blades on their own faces.
-    let snapped = |place: f64| (place / 80.0 * f64::from(across)).round() / f64::from(across);
-    let mut places: Vec<f64> = BLADES.iter().map(|&place| snapped(place)).collect();
-    places.dedup();
     let blade = |place: f64, axis: usize| {
         let edge = |z: f64| {
             [-2.0, 3.0].map(|along| {

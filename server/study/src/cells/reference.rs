@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde_json::Value;
 
-use super::model::{Grid, Model, cube};
+use super::model::{Grid, Model, ROTATION_DEG, cube, grid_of_blades};
 use super::refine::refine;
 use super::solve::cholesky;
 use super::system::{MATERIAL, Problem, System};
@@ -21,8 +21,11 @@ const STORED_ACROSS: u32 = 40;
 const TO: f64 = 1e-6;
 /// Tolerance and iterations of a round in single precision: of multigrid, and of block-Jacobi.
 const ROUNDS: [[f64; 2]; 2] = [[1e-4, 60.0], [1e-4, 4_000.0]];
-/// Cells across in the table of iterations.
-const ACROSS: [u32; 3] = [16, 32, 64];
+/// Cells across in the table of iterations, and the faces of cells at which blades stand.
+const ACROSS: [(u32, &[u32]); 3] =
+    [(16, &[3, 7, 11]), (32, &[5, 11, 17, 21, 27]), (64, &[11, 21, 33, 43, 53])];
+/// Height to which the blades reach [m].
+const TIP: f64 = 0.5;
 /// Poisson's ratios, and cells across the cube that has them.
 const POISSON: ([f64; 3], u32) = ([0.3, 0.45, 0.49], 32);
 
@@ -136,8 +139,8 @@ pub fn off(system: &System, across: u32, u: &[V]) -> Result<f64, Trouble> {
 fn iterations(bench: &mut CellsBench<'_>) -> Result<Table, Trouble> {
     let mut table = Table::new(
         "Iterations of conjugate gradients with multigrid",
-        "From 16³ to 64³ cells, uncut and cut to half depth by 22 blades along faces of cells and turned; and with \
-         other Poisson's ratios.",
+        "From 16³ to 64³ cells, uncut and cut to half depth by a grid of blades along faces of cells and turned; and \
+         with other Poisson's ratios.",
         &[
             ("cells", Unit::Count),
             ("unknowns", Unit::Count),
@@ -147,11 +150,18 @@ fn iterations(bench: &mut CellsBench<'_>) -> Result<Table, Trouble> {
         ],
     );
     let most = if bench.is_quick() { 32 } else { 64 };
-    for across in ACROSS.into_iter().filter(|&n| n <= most) {
+    for (across, faces) in ACROSS.into_iter().filter(|&(n, _)| n <= most) {
+        let places: Vec<f64> = faces.iter().map(|&face| f64::from(face) / f64::from(across)).collect();
         for grid in [Grid::Uncut, Grid::Aligned, Grid::Rotated] {
-            bench
-                .begin(format!("{across}³ cells, {}", grid.name()), 3 + 3 * ACROSS.len() + POISSON.0.len())?;
-            row(&mut table, &cube(across, 0, grid)?, (format!("{across}³, {}", grid.name()), MATERIAL))?;
+            let name = format!("{across}³, {}", grid.name());
+            bench.begin(name.clone(), 3 + 3 * ACROSS.len() + POISSON.0.len())?;
+            let blades = match grid {
+                Grid::Uncut => Vec::new(),
+                Grid::Aligned => grid_of_blades(&places, 0.0, TIP),
+                Grid::Rotated => grid_of_blades(&places, ROTATION_DEG, TIP),
+            };
+            let model = Model { blades, ..cube(across, 0, Grid::Uncut)? };
+            row(&mut table, &model, (name, MATERIAL))?;
         }
     }
     for poisson in POISSON.0 {
