@@ -124,11 +124,9 @@ impl Multigrid {
         self.fixed.clear();
         self.fixed.extend_from_slice(fixed);
         for l in 1..levels.len() {
-            let operator = galerkin.operator(&hierarchy.levels[l], l);
-            operator.invert_diagonal(team, |_| 0, &mut levels[l].inverse);
-            if let Some(kernel) = &mut levels[l].kernel {
-                kernel.follow(team, &hierarchy.levels[l], (galerkin, l, anew));
-            }
+            let Vectors { kernel: Some(kernel), inverse, .. } = &mut levels[l] else { continue };
+            kernel.follow(team, &hierarchy.levels[l], (galerkin, l, anew));
+            kernel.invert_diagonal(team, &galerkin.levels[l].mass, inverse);
         }
         coarsest.update(hierarchy, galerkin, any, tolerance);
         self.estimate |= anew;

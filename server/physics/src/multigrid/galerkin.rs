@@ -10,9 +10,10 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
+use super::carried::{Carried, corners_in};
 use super::dense::{Dense, Packed};
 use super::hierarchy::Hierarchy;
-use super::level::{NONE, place_in, trilinear};
+use super::level::{Level, NONE};
 use super::table::{self, Weights};
 use crate::lists::reserve::resize_reserving;
 use crate::material::Lame;
@@ -94,6 +95,8 @@ pub struct Galerkin {
     pub levels: Vec<LevelMatrices>,
     /// Matrix of every kind of cell; for leaves without mass.
     pub shared: Vec<Dense>,
+    /// The same in the corners of a parent.
+    carried: Carried,
     /// Mass [kg] times its factor of an eighth of a leaf of every kind.
     eighth: Vec<f32>,
     /// Prescribed directions of every vertex of the finest level, one bit each.
@@ -201,6 +204,11 @@ impl Galerkin {
             self.shared.push(table::cube(&K, with.scale * side, M.as_ref(), mass));
             self.eighth.push((mass / 8.0) as f32);
         }
+        let (shared, eighth) = (&self.shared, &self.eighth);
+        self.carried.update(hierarchy, |l, id| {
+            let kind = hierarchy.kind_of[l][id] as usize;
+            shared_matrix(&hierarchy.levels[l], id, &shared[kind], eighth[kind])
+        });
         for (l, level) in hierarchy.levels.iter().enumerate() {
             let mass = &mut self.levels[l].mass;
             mass.fill(0.0);
@@ -281,8 +289,9 @@ impl Galerkin {
                 _ => {}
             }
         }
+        let (shared, carried) = (&self.shared, &self.carried);
         let context =
-            Context { hierarchy, l, fine, shared: &self.shared, fixed: &self.fixed, eighth: &self.eighth };
+            Context { hierarchy, l, fine, shared, carried, fixed: &self.fixed, eighth: &self.eighth };
         let frame = &*frame;
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
             for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
@@ -327,6 +336,7 @@ struct Context<'a> {
     l: usize,
     fine: &'a LevelMatrices,
     shared: &'a [Dense],
+    carried: &'a Carried,
     fixed: &'a [u8],
     eighth: &'a [f32],
 }
@@ -352,27 +362,47 @@ impl Context<'_> {
         for (&child, known) in children.iter().zip(&mut stored.relative) {
             *known = relative(child);
             let child = child as usize;
+            let turn = (known.angle() > SAME).then(|| known.to_rotation_matrix().into_inner());
+            let merges = fine.cells[child].level != cell.level;
+            if let Some(A) = self.carried(child).filter(|_| merges) {
+                match turn {
+                    Some(Q) => sum.add(&A.rotated(&Q)),
+                    None => sum.add(A),
+                }
+                continue;
+            }
             let mut A = cell_matrix(self.hierarchy, (self.l - 1, child), self.fine, self.shared, self.eighth);
-            if known.angle() > SAME {
-                A = A.rotated(&known.to_rotation_matrix().into_inner());
+            if let Some(Q) = turn {
+                A = A.rotated(&Q);
             }
             if self.l == 1 {
                 for (c, &v) in fine.vertices[child].iter().enumerate() {
                     A.hold(c, self.fixed[v as usize]);
                 }
             }
-            let passes = fine.cells[child].level == cell.level;
-            if passes {
-                sum.add(&A);
+            if merges {
+                sum.add(&A.carried(&corners_in(fine, child, cell)));
             } else {
-                let T: Weights = std::array::from_fn(|c| trilinear(place_in(fine, child, c, cell)));
-                sum.add(&A.carried(&T));
+                sum.add(&A);
             }
         }
         if coarse.leaf[id] == NONE && coarse.hanging[id] != 0 {
             sum = sum.carried(&weights(cell, coarse.hanging[id]));
         }
         stored.matrix = sum.packed();
+    }
+}
+
+impl Context<'_> {
+    /// The matrix of a child in the corners of its parent, if its kind and place alone give it.
+    #[inline]
+    fn carried(&self, child: usize) -> Option<&Dense> {
+        let CellMatrix::Shared(kind) = self.fine.matrix[child] else { return None };
+        if self.l == 1 && self.fine.holds[child][0] {
+            return None;
+        }
+        let fine = &self.hierarchy.levels[self.l - 1];
+        self.carried.get(kind, &fine.cells[child], fine.hanging[child])
     }
 }
 
@@ -383,23 +413,30 @@ fn cell_matrix(
     shared: &[Dense],
     eighth: &[f32],
 ) -> Dense {
-    let level = &hierarchy.levels[l];
-    let kind = match of.matrix[id] {
-        CellMatrix::Stored(place) => return Dense::unpacked(&of.stored[place as usize].matrix),
-        CellMatrix::Shared(kind) => kind as usize,
-    };
-    let mut A = shared[kind];
+    match of.matrix[id] {
+        CellMatrix::Stored(place) => Dense::unpacked(&of.stored[place as usize].matrix),
+        CellMatrix::Shared(kind) => {
+            let kind = kind as usize;
+            shared_matrix(&hierarchy.levels[l], id, &shared[kind], eighth[kind])
+        }
+    }
+}
+
+/// The matrix of a cell of a kind over the vertices that carry it, with an `eighth` of the mass of a leaf at every
+/// corner.
+fn shared_matrix(level: &Level, id: usize, of_kind: &Dense, eighth: f32) -> Dense {
+    let mut A = *of_kind;
     if level.leaf[id] == NONE {
         return A;
     }
     if level.hanging[id] == 0 {
-        (0..8).for_each(|c| A.add_mass(c, eighth[kind]));
+        (0..8).for_each(|c| A.add_mass(c, eighth));
         return A;
     }
     let W = weights(&level.cells[id], level.hanging[id]);
     A = A.carried(&W);
     for row in W {
-        row.iter().enumerate().for_each(|(c, w)| A.add_mass(c, w * eighth[kind]));
+        row.iter().enumerate().for_each(|(c, w)| A.add_mass(c, w * eighth));
     }
     A
 }

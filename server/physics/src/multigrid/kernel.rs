@@ -9,8 +9,11 @@ use crate::element::Simd;
 use crate::operator::cells::{
     CellLane, CellMatrix as LaneMatrix, CellOperator, SectorTable, morton_order, slot_corners, slot_hanging,
 };
-use crate::operator::{BLOCK, Padded, block_of};
+use crate::operator::{BLOCK, Inverse3, Padded, block_of, invert};
 use crate::team::{Team, blocks};
+
+/// Places of xx, yy, zz in a block.
+const DIAGONAL: [usize; 3] = [0, 4, 6];
 
 /// The cells of a level, arranged for the kernels.
 #[derive(Clone, Debug)]
@@ -78,6 +81,24 @@ impl LevelKernel {
                 }
             }
             true
+        });
+    }
+
+    /// Inverses of the diagonal blocks of A, with the lumped `mass` of every vertex; 0 in directions without
+    /// stiffness and mass.
+    pub fn invert_diagonal(&mut self, team: &mut Team, mass: &[f32], out: &mut [Inverse3]) {
+        self.operator.update_diagonals(team);
+        let operator = &self.operator;
+        team.for_blocks(blocks(out, BLOCK), |block, out| {
+            let mut sums = [[0.0; 8]; BLOCK];
+            let sums = &mut sums[..out.len()];
+            for (sum, &mass) in sums.iter_mut().zip(block_of(mass, block)) {
+                DIAGONAL.into_iter().for_each(|at| sum[at] = mass);
+            }
+            operator.add_diagonals(block, sums);
+            for (out, sum) in out.iter_mut().zip(sums) {
+                *out = invert(sum, DIAGONAL.map(|at| sum[at] == 0.0));
+            }
         });
     }
 

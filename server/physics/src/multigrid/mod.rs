@@ -12,6 +12,7 @@ mod hierarchy;
 mod transfer;
 mod dense;
 mod table;
+mod carried;
 mod galerkin;
 mod operator;
 mod kernel;

@@ -7,9 +7,10 @@ use nalgebra::Rotation3;
 use super::levels::random_cuts;
 use super::support::{Exact, V3, blade_grid, clamped, coefficients, cube, dot, vector};
 use crate::multigrid::galerkin::{CellMatrix, Galerkin};
+use crate::multigrid::level::Level;
 use crate::multigrid::{CellMaterial, Coefficients, Hierarchy};
 use crate::octree::Octree;
-use crate::operator::{FixedCopy, padded};
+use crate::operator::{FixedCopy, Inverse3, padded};
 use crate::team::Team;
 
 /// Largest relative difference of A^ℓ x and Pᵀ … A … P x over all levels.
@@ -48,6 +49,38 @@ fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
                 let wide = |a: &[f32; 4]| V3::new(a[0].into(), a[1].into(), a[2].into());
                 let difference: Vec<V3> = y32.iter().zip(&y).map(|(a, b)| wide(a) - b).collect();
                 worst = worst.max((dot(&difference, &difference) / dot(&y, &y)).sqrt());
+            }
+            worst = worst.max(diagonals(&mut team, &mut kernel, galerkin, (level, l)));
+        }
+    }
+    worst
+}
+
+/// A hundredth of the largest entry of M⁻¹ M − I, for the diagonal blocks M of single cells and their inverses by the
+/// kernel.
+fn diagonals(
+    team: &mut Team,
+    kernel: &mut LevelKernel,
+    galerkin: &Galerkin,
+    (level, l): (&Level, usize),
+) -> f64 {
+    let operator = galerkin.operator(level, l);
+    let mut found = vec![Inverse3::default(); level.n_vertices];
+    kernel.invert_diagonal(team, &galerkin.levels[l].mass, &mut found);
+    let mut worst = 0.0_f64;
+    for (v, found) in found.iter().enumerate() {
+        let block = operator.diagonal(v);
+        let held = [0, 4, 6].map(|at| block[at] == 0.0);
+        for (k, x) in [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]].iter().enumerate() {
+            // M⁻¹ M e = e, and 0 in directions that are held.
+            let Mx = [[0, 1, 2], [1, 4, 5], [2, 5, 6]].map(|row| row.map(|at| block[at]));
+            let [a, b, c] = Mx.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2]);
+            let y = found.times(&[a, b, c, 0.0]);
+            for i in 0..3 {
+                let expected = if i == k && !held[i] { 1.0 } else { 0.0 };
+                if !held[k] {
+                    worst = worst.max(0.01 * f64::from((y[i] - expected).abs()));
+                }
             }
         }
     }

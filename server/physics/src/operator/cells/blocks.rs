@@ -2,9 +2,12 @@
 
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked rows
 
+use nalgebra::Matrix3;
+
 use super::super::kernel::Block6;
 use super::batch::SectorBatch;
 use super::sectors::{ENTRY, Matrix24, SectorTable, diagonal_blocks};
+use super::stored::{StoredBatch, stored_entry};
 use crate::element::{Ids, LANES, Lanes, Simd, Vector8};
 
 /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of a table in the frame of a cell, by the set of hanging slots.
@@ -145,12 +148,44 @@ unsafe fn add_plain<V: Vector8>(R: &[[V; 3]; 3], B: &[f32; 6], nodes: &[Ids; 8],
     }
 }
 
-/// Adds the blocks of a stored matrix of one lane.
-pub fn add_stored(A: &Matrix24, hanging: u8, nodes: &[Ids; 8], lane: usize, rows: &mut [Block6]) {
-    for (block, ids) in rounded(A, hanging).iter().zip(nodes) {
+/// Adds the blocks of R A Rᵀ of stored matrices without hanging slots.
+///
+/// # Safety
+/// All local numbers are below the length of `rows`.
+pub unsafe fn add_stored(simd: Simd, batches: &[StoredBatch], rows: &mut [Block6]) {
+    match simd {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `Simd::Avx2` comes from `Simd::detect` only; the rest is the caller's promise.
+        Simd::Avx2 => unsafe { avx2::add_stored(batches, rows) },
+        // SAFETY: the caller's promise.
+        _ => unsafe { add_stored_with::<Lanes>(batches, rows) },
+    }
+}
+
+/// # Safety
+/// As for [`add_stored`].
+#[inline(always)]
+unsafe fn add_stored_with<V: Vector8>(batches: &[StoredBatch], rows: &mut [Block6]) {
+    for batch in batches {
+        let R: [[V; 3]; 3] = [load(&batch.rotation, 0), load(&batch.rotation, 1), load(&batch.rotation, 2)];
+        for (j, ids) in batch.nodes.iter().enumerate() {
+            let entry = |r: usize, s: usize| batch.entries[stored_entry(3 * j + r, 3 * j + s)];
+            let B = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+            // SAFETY: the caller's promise.
+            unsafe { V::scatter_blocks(rows, ids, turned(&R, &B)) };
+        }
+    }
+}
+
+/// The same of one lane whose slots `hanging` hang: blocks of R Wᵀ A W Rᵀ.
+pub fn add_stored_lane(batch: &StoredBatch, hanging: u8, lane: usize, rows: &mut [Block6]) {
+    let R = Matrix3::from_fn(|i, j| batch.rotation[3 * i + j].0[lane]);
+    for ([xx, xy, xz, yy, yz, zz], ids) in rounded(&batch.matrix(lane), hanging).into_iter().zip(&batch.nodes)
+    {
+        let block = R * Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * R.transpose();
         let row = &mut rows[usize::from(ids[lane])];
-        for (&at, b) in [0, 1, 2, 4, 5, 6].iter().zip(block) {
-            row[at] += b;
+        for (at, (i, j)) in [(0, (0, 0)), (1, (0, 1)), (2, (0, 2)), (4, (1, 1)), (5, (1, 2)), (6, (2, 2))] {
+            row[at] += block[(i, j)];
         }
     }
 }
@@ -159,7 +194,7 @@ pub fn add_stored(A: &Matrix24, hanging: u8, nodes: &[Ids; 8], lane: usize, rows
 mod avx2 {
     //! The same loop compiled for AVX2 and FMA.
 
-    use super::{Block6, BlockTable, LANES, SectorBatch};
+    use super::{Block6, BlockTable, LANES, SectorBatch, StoredBatch};
     use crate::element::avx2::Register;
 
     /// # Safety
@@ -173,5 +208,13 @@ mod avx2 {
     ) {
         // SAFETY: the caller's promise.
         unsafe { super::add_with::<Register>(batches, hanging, table, rows) };
+    }
+
+    /// # Safety
+    /// As for [`super::add_stored`].
+    #[target_feature(enable = "avx2,fma")]
+    pub unsafe fn add_stored(batches: &[StoredBatch], rows: &mut [Block6]) {
+        // SAFETY: the caller's promise.
+        unsafe { super::add_stored_with::<Register>(batches, rows) };
     }
 }

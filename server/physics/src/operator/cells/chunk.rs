@@ -175,12 +175,18 @@ impl CellChunk {
                     // SAFETY: local numbers are indices into `vertices`, which is as long as `rows`.
                     unsafe { blocks::add(simd, batches, hanging, table, rows) }
                 }
+                CellMatrix::Stored if group.weights.is_empty() => {
+                    let Range { start, end } = group.batches;
+                    // SAFETY: as above.
+                    unsafe {
+                        blocks::add_stored(simd, &self.stored[start - first_stored..end - first_stored], rows)
+                    }
+                }
                 CellMatrix::Stored => {
                     for b in group.batches.clone() {
                         let (batch, lanes) = (&self.stored[b - first_stored], &self.lanes[b]);
                         for lane in (0..LANES).filter(|&lane| lanes.cells[lane] != NO_PIECE) {
-                            let hanging = lanes.hanging[lane];
-                            blocks::add_stored(&batch.matrix(lane), hanging, &batch.nodes, lane, rows);
+                            blocks::add_stored_lane(batch, lanes.hanging[lane], lane, rows);
                         }
                     }
                 }

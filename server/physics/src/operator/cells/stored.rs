@@ -10,6 +10,11 @@ use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8};
 /// Entries of a stored matrix: the upper triangle, row by row. Row 3 j + i is component i of slot j.
 pub const STORED: usize = 300;
 
+/// Place of entry (r, s), r ≤ s, of a stored matrix.
+pub const fn stored_entry(r: usize, s: usize) -> usize {
+    r * 24 - r * (r + 1) / 2 + s
+}
+
 /// Eight cells with their matrices interleaved: 1.2 kB per cell.
 #[derive(Clone, Debug)]
 #[repr(C)]
