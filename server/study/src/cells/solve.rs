@@ -65,6 +65,13 @@ pub enum Solver<'a> {
     Preconditioned(&'a mut Multigrid),
 }
 
+impl<'a> Solver<'a> {
+    /// Cycles of `multigrid`, alone or in conjugate gradients.
+    pub fn of(multigrid: &'a mut Multigrid, in_gradients: bool) -> Self {
+        if in_gradients { Self::Preconditioned(multigrid) } else { Self::Cycles(multigrid) }
+    }
+}
+
 /// ‖u − exact‖ relative to ‖exact‖, which is the error at the start, from u = 0.
 fn error(u: &[Padded], exact: &[V], size: f64) -> f64 {
     let off = |(u, e): (&Padded, &V)| (V::new(u[0].into(), u[1].into(), u[2].into()) - e).norm_squared();

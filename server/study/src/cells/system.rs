@@ -53,6 +53,8 @@ pub struct Seconds {
     pub levels: f64,
     /// Operators of the coarse levels.
     pub coarse: f64,
+    /// Largest eigenvalues for the smoothers of all levels. Only after a cut, or with another step or material.
+    pub eigenvalues: f64,
 }
 
 /// A x = b of a body.
@@ -236,9 +238,14 @@ impl System {
         let [mass_factor, scale] = self.factors;
         let with = Coefficients { materials, scale, mass_factor };
         multigrid.update(&mut self.team, (&with, &self.fixed), &|_| Matrix3::identity());
-        let (mut A, jacobi, team) = self.parts();
-        multigrid.estimate_eigenvalues(team, &mut A, jacobi.inverses());
-        (multigrid, Seconds { operator: 0.0, levels, coarse: started.elapsed().as_secs_f64() })
+        let coarse = started.elapsed().as_secs_f64();
+        let started = Instant::now();
+        if let Smoother::Chebyshev { .. } = smoother {
+            let (mut A, jacobi, team) = self.parts();
+            multigrid.estimate_eigenvalues(team, &mut A, jacobi.inverses());
+        }
+        let eigenvalues = started.elapsed().as_secs_f64();
+        (multigrid, Seconds { operator: 0.0, levels, coarse, eigenvalues })
     }
 
     /// A, its block-diagonal preconditioner, and the thread.

@@ -50,40 +50,13 @@ pub fn tables(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
                 .into(),
         );
     }
-    let mut costs = Table::new(
-        "Table 1: cells and times",
-        "Uniform: a grid of finest cells only. Cutting includes refinement, vertices and surface; levels are what \
-         else a cut costs multigrid. Rows of the paper are from one core at 2.8 GHz.",
-        &[
-            ("cells", Unit::Count),
-            ("uniform", Unit::Count),
-            ("after the cut", Unit::Count),
-            ("cutting", Unit::Seconds),
-            ("levels", Unit::Seconds),
-            ("step", Unit::Seconds),
-            ("uniform step", Unit::Seconds),
-            ("per cell", Unit::Seconds),
-        ],
-    );
-    let mut solvers = Table::new(
-        "Table 2: multigrid against conjugate gradients",
-        "Multigrid: operators of the coarse levels and three cycles. Conjugate gradients are preconditioned by the \
-         3×3 diagonal blocks. Ratio: their time to the same error over that of multigrid.",
-        &[
-            ("s", Unit::Number),
-            ("multigrid", Unit::Seconds),
-            ("its ‖e₃‖/‖e₀‖", Unit::Number),
-            ("CG: ‖e‖/‖e₀‖ in that time", Unit::Number),
-            ("CG: time to ‖e₃‖", Unit::Seconds),
-            ("ratio", Unit::Times),
-        ],
-    );
+    let mut tables = Tables::new();
     let names: &[&str] =
         if bench.is_quick() { &["Bunny 3", "Bunny 2"] } else { &["Bunny", "Cube", "Bunny 2", "Bunny 3"] };
     for name in names {
         bench.begin(*name, names.len())?;
         let entry = entry(name, solid, bench.is_quick())?;
-        measure(&entry, &mut costs, &mut solvers)?;
+        measure(&entry, &mut tables)?;
     }
     if !bench.is_quick() {
         let aligned = cube(CUBE, 4, Grid::Aligned)?;
@@ -91,14 +64,68 @@ pub fn tables(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
         let counts = [aligned.octree.cells().len(), CUBE.pow(3) as usize, cut.space.octree().cells().len()];
         let mut values: Vec<Option<f64>> = counts.iter().map(|&n| Some(n as f64)).collect();
         values.extend([Some(cut.seconds), None, None, None, None]);
-        costs.row("Cube, aligned blades", &values);
-        costs.printed(
+        tables.costs.row("Cube, aligned blades", &values);
+        tables.costs.printed(
             "Cube, aligned blades (figure 11)",
             &[Some(83.3e3), Some(512e3), Some(204e3), None, None, None, None, None],
         );
     }
-    result.tables.extend([costs, solvers]);
+    result.tables.extend([tables.costs, tables.solvers, tables.parts]);
     Ok(result)
+}
+
+/// The tables of the experiment.
+struct Tables {
+    costs: Table,
+    solvers: Table,
+    parts: Table,
+}
+
+impl Tables {
+    fn new() -> Self {
+        let costs = Table::new(
+            "Table 1: cells and times",
+            "Uniform: a grid of finest cells only. Cutting includes refinement, vertices and surface; levels are what \
+         else a cut costs multigrid. Rows of the paper are from one core at 2.8 GHz.",
+            &[
+                ("cells", Unit::Count),
+                ("uniform", Unit::Count),
+                ("after the cut", Unit::Count),
+                ("cutting", Unit::Seconds),
+                ("levels", Unit::Seconds),
+                ("step", Unit::Seconds),
+                ("uniform step", Unit::Seconds),
+                ("per cell", Unit::Seconds),
+            ],
+        );
+        let solvers = Table::new(
+            "Table 2: multigrid against conjugate gradients",
+            "Multigrid: operators of the coarse levels and three cycles. Conjugate gradients are preconditioned by the \
+         3×3 diagonal blocks. Ratio: their time to the same error over that of multigrid.",
+            &[
+                ("s", Unit::Number),
+                ("multigrid", Unit::Seconds),
+                ("its ‖e₃‖/‖e₀‖", Unit::Number),
+                ("CG: ‖e‖/‖e₀‖ in that time", Unit::Number),
+                ("CG: time to ‖e₃‖", Unit::Seconds),
+                ("ratio", Unit::Times),
+            ],
+        );
+        let parts = Table::new(
+            "Parts of a step",
+            "What the step of table 1 consists of, and what multigrid needs besides after a cut: levels, and the \
+             largest eigenvalues for its smoothers.",
+            &[
+                ("rotations", Unit::Seconds),
+                ("coarse operators", Unit::Seconds),
+                ("three cycles", Unit::Seconds),
+                ("step", Unit::Seconds),
+                ("levels", Unit::Seconds),
+                ("eigenvalues", Unit::Seconds),
+            ],
+        );
+        Self { costs, solvers, parts }
+    }
 }
 
 fn read(bench: &CellsBench<'_>, result: &mut CellsResult) -> Result<Option<SolidSurface>, Trouble> {
@@ -142,7 +169,7 @@ pub const S_BUNNY_2: f64 = 13_250.0;
 pub const S_BUNNY_3: f64 = 4_110.0;
 
 /// One step: seconds of the parts, and of three cycles.
-fn measure(entry: &Entry, costs: &mut Table, solvers: &mut Table) -> Result<(), Trouble> {
+fn measure(entry: &Entry, tables: &mut Tables) -> Result<(), Trouble> {
     let Entry { printed, adaptive, uniform, uniform_cells, s } = entry;
     let cut = adaptive.cut()?;
     let cells = cut.space.octree().cells().len();
@@ -159,11 +186,22 @@ fn measure(entry: &Entry, costs: &mut Table, solvers: &mut Table) -> Result<(), 
         }
         None => None,
     };
-    for (name, smoother) in smoothers() {
+    let [sor, chebyshev] = smoothers();
+    let ways =
+        [(sor.0, sor.1, false), (chebyshev.0, chebyshev.1, false), ("Chebyshev in CG", chebyshev.1, true)];
+    for (name, smoother, in_gradients) in ways {
         let three = Until { iterations: 3, error: 0.0, seconds: 0.0 };
         let (mut multigrid, seconds) = system.multigrid(smoother);
-        let course = run(&mut system, Solver::Cycles(&mut multigrid), &exact, three);
+        let course = run(&mut system, Solver::of(&mut multigrid, in_gradients), &exact, three);
         let multigrid_s = seconds.coarse + course.points[2].0;
+        eprintln!(
+            "SPLIT {name} op {operator_s:.4} levels {:.4} coarse {:.4} eig {:.4} cycles {:.4} {:?}",
+            seconds.levels,
+            seconds.coarse,
+            seconds.eigenvalues,
+            course.points[2].0,
+            multigrid.report()
+        );
         drop(multigrid);
         let until = Until { iterations: PATIENCE, error: course.error(3), seconds: multigrid_s };
         let gradients = run(&mut system, Solver::Jacobi, &exact, until);
@@ -171,11 +209,23 @@ fn measure(entry: &Entry, costs: &mut Table, solvers: &mut Table) -> Result<(), 
             let operator_s = system.update();
             let (mut multigrid, seconds) = system.multigrid(smoother);
             let none = vec![nalgebra::Vector3::zeros(); system.unknowns() / 3];
-            let course = run(system, Solver::Cycles(&mut multigrid), &none, three);
+            let course = run(system, Solver::of(&mut multigrid, in_gradients), &none, three);
             operator_s + seconds.coarse + course.points.last().map_or(f64::NAN, |p| p.0)
         });
         let step_s = operator_s + multigrid_s;
-        costs.row(
+        tables.parts.row(
+            format!("{}, {name}", adaptive.name),
+            &[
+                operator_s,
+                seconds.coarse,
+                multigrid_s - seconds.coarse,
+                step_s,
+                seconds.levels,
+                seconds.eigenvalues,
+            ]
+            .map(Some),
+        );
+        tables.costs.row(
             format!("{}, {name}", adaptive.name),
             &[
                 Some(adaptive.octree.cells().len() as f64),
@@ -189,7 +239,7 @@ fn measure(entry: &Entry, costs: &mut Table, solvers: &mut Table) -> Result<(), 
             ],
         );
         let to_same = gradients.seconds_to(course.error(3));
-        solvers.row(
+        tables.solvers.row(
             format!("{}, {name}", adaptive.name),
             &[
                 Some(*s),
@@ -205,9 +255,11 @@ fn measure(entry: &Entry, costs: &mut Table, solvers: &mut Table) -> Result<(), 
     let [cutting, step, uniform_step] = printed.seconds.map(Some);
     let per_cell = Some(printed.seconds[1] / printed.cells[2]);
     let name = format!("{} of the paper", printed.name);
-    costs.printed(&*name, &[before, uniform, after, cutting, None, step, uniform_step, per_cell]);
+    tables.costs.printed(&*name, &[before, uniform, after, cutting, None, step, uniform_step, per_cell]);
     let [error, seconds] = printed.gradients.map(Some);
     let ratio = Some(printed.gradients[1] / printed.multigrid_s);
-    solvers.printed(name, &[None, Some(printed.multigrid_s), Some(printed.reduction), error, seconds, ratio]);
+    tables
+        .solvers
+        .printed(name, &[None, Some(printed.multigrid_s), Some(printed.reduction), error, seconds, ratio]);
     Ok(())
 }
