@@ -226,6 +226,8 @@ fn stats() -> impl Strategy<Value = Stats> {
             inverted: b,
             fixed_iterations: c % 2 == 0,
             unconverged: d % 2 == 0,
+            divided_cells: a.into(),
+            joined_cells: b.into(),
         }],
         tools: vec![ToolStats {
             tool_id: id,

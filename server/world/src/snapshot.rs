@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::body::StepCounts;
 pub use crate::body::SurfaceTopology;
+use crate::body::{AdaptCounts, StepCounts};
 use crate::inputs::{ToolMode, ToolShape};
 use crate::report::Energy;
 
@@ -97,6 +97,8 @@ pub struct BodySnapshot {
     pub pieces: u32,
     /// Node copies, three unknowns each.
     pub copies: u32,
+    /// What adaptations of the cells did since the start or the last reset; zeros where they are not adapted.
+    pub adapted: AdaptCounts,
     /// Volume at rest [m³].
     pub rest_volume_m3: f64,
 }

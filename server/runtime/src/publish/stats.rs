@@ -80,6 +80,8 @@ pub fn body_stats(body: &BodySnapshot) -> BodyStats {
         inverted: body.inverted,
         fixed_iterations: body.fixed_iterations,
         unconverged: body.unconverged,
+        divided_cells: body.adapted.divided,
+        joined_cells: body.adapted.joined,
     }
 }
 

@@ -18,7 +18,7 @@ use scindo_physics::material::{Material, MaterialError, Rayleigh};
 use scindo_physics::octree::OctreeSpace;
 use scindo_physics::team::Lead;
 
-use crate::body::{Probe, SimBody};
+use crate::body::{Adaptation, Probe, SimBody};
 use crate::mesh_in::{MeshHealth, Observer};
 use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
 
@@ -163,6 +163,10 @@ impl Builder<'_> {
         let mut body = SimBody::new(&spec.id, body, health);
         body.fixed_iterations = spec.mechanics.fixed_iterations;
         body.displacement_over_s = spec.displacement_over_s;
+        if let Some(adapt) = spec.octree.and_then(|octree| octree.adapt) {
+            let held = spec.fixes.iter().map(|fix| fix.region.clone()).collect();
+            body.set_adaptation(Adaptation::new(adapt, held));
+        }
         for (i, fix) in spec.fixes.iter().enumerate() {
             self.fix(&format!("{at}.fix.{i}"), fix, &mut body);
         }

@@ -1,5 +1,7 @@
 //! A body of the simulation: its mechanics, and the data that scene and reports attach to it.
 
+mod adaptation;
+
 mod counts;
 
 mod probe;
@@ -10,12 +12,14 @@ use std::mem::Discriminant;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, Notice, PointSpring, SolveReport};
+use scindo_physics::body::{AdaptReport, Body, BodyError, Notice, PointSpring, SolveReport};
 use scindo_physics::cut::IncisionMark;
 use scindo_physics::estimate::{MeshError, StressRecovery};
 
 use crate::mesh_in::MeshHealth;
 use crate::report::{Energy, StepReport};
+pub use adaptation::AdaptCounts;
+pub(crate) use adaptation::Adaptation;
 pub use counts::StepCounts;
 use counts::Watch;
 pub use probe::Probe;
@@ -41,6 +45,8 @@ pub struct SimBody {
     pub fixed_iterations: bool,
     /// Time over which prescribed displacements grow to their full value [s].
     pub displacement_over_s: f64,
+    /// How its cells are adapted; none: they are not.
+    adaptation: Option<Box<Adaptation>>,
     watch: Watch,
     /// The kind of notice reported for the last step, so that it is not repeated.
     pub(crate) noticed: Option<Discriminant<Notice>>,
@@ -79,6 +85,7 @@ impl SimBody {
             rest_volume_m3,
             fixed_iterations: false,
             displacement_over_s: 0.0,
+            adaptation: None,
             watch: Watch::default(),
             noticed: None,
             recovery: StressRecovery::default(),
@@ -103,7 +110,36 @@ impl SimBody {
         self.as_it_ended(solve)
     }
 
-    /// Topology epoch. It rises with every cut that changed something, and with every reset.
+    /// Lets the cells be adapted between steps.
+    pub(crate) fn set_adaptation(&mut self, adaptation: Adaptation) {
+        self.adaptation = Some(Box::new(adaptation));
+    }
+
+    /// How the cells are adapted; none: they are not.
+    pub(crate) fn adaptation(&self) -> Option<&Adaptation> {
+        self.adaptation.as_deref()
+    }
+
+    /// Adapts the cells before step number `step`, with tools at these places [m].
+    ///
+    /// # Errors
+    /// As [`Body::adapt`].
+    pub(crate) fn adapt(&mut self, step: u64, tools: &[Vector3<f64>]) -> Result<AdaptReport, BodyError> {
+        let Some(adaptation) = &mut self.adaptation else { return Ok(AdaptReport::default()) };
+        let report = adaptation.adapt(&mut self.body, step, tools)?;
+        if report.has_changed() {
+            self.has_changed_topology();
+        }
+        Ok(report)
+    }
+
+    /// What adaptations of the cells did since the start or the last reset; none: they are not adapted.
+    pub fn adapt_counts(&self) -> Option<AdaptCounts> {
+        self.adaptation.as_ref().map(|adaptation| adaptation.counts)
+    }
+
+    /// Topology epoch. It rises with every cut that changed something, with every adaptation of the
+    /// cells, and with every reset.
     pub fn epoch(&self) -> u32 {
         self.body.epoch()
     }
@@ -234,6 +270,9 @@ impl SimBody {
     /// Forgets all troubles after a reset.
     pub(crate) fn has_been_reset(&mut self) {
         self.watch = Watch::default();
+        if let Some(adaptation) = &mut self.adaptation {
+            adaptation.counts = AdaptCounts::default();
+        }
     }
 
     /// Present kinetic and elastic energy.
@@ -256,7 +295,7 @@ impl SimBody {
         self.marks_are_old = true;
     }
 
-    /// Must be called whenever the body was cut or reset.
+    /// Must be called whenever the body was cut, adapted or reset.
     pub(crate) fn has_changed_topology(&mut self) {
         self.topology = None;
         self.surface_is_old = true;
@@ -265,8 +304,12 @@ impl SimBody {
     }
 
     /// Updates the groups of held nodes after a cut that changed the mesh: a duplicate belongs to the groups
-    /// of its node.
+    /// of its node. An adaptation adds and removes nodes, so there the region decides.
     fn follow_nodes(&mut self) {
+        if let Some(adaptation) = &self.adaptation {
+            self.fix_groups.clear();
+            self.fix_groups.extend(adaptation.held_nodes(&self.body));
+        }
         let Some(origins) = self.body.node_origins() else { return };
         let uncut = self.fix_groups_uncut.get_or_insert_with(|| self.fix_groups.clone());
         for (now, uncut) in self.fix_groups.iter_mut().zip(uncut) {

@@ -7,7 +7,7 @@ mod stages;
 use std::mem::{Discriminant, discriminant};
 use std::sync::Arc;
 
-use scindo_physics::body::{Notice, Outcome, SolveReport};
+use scindo_physics::body::{AdaptReport, Notice, Outcome, SolveReport};
 use scindo_physics::estimate::MeshError;
 
 use crate::inputs::CutOutcome;
@@ -40,6 +40,8 @@ pub struct StepReport {
 pub struct BodyReport {
     /// Solver and outcome.
     pub solve: SolveReport,
+    /// How its cells were adapted before the step.
+    pub adapted: AdaptReport,
     /// Energies, when asked for.
     pub energy: Option<Energy>,
     /// Estimated discretisation error, when asked for.

@@ -7,6 +7,8 @@ pub enum Stage {
     Tools,
     /// Blades separate material.
     Cuts,
+    /// Cells are divided and joined.
+    Adapt,
     /// Tools meet surfaces.
     Contacts,
     /// Bodies deform: operator, solver, integrator.
@@ -19,14 +21,22 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in their order.
-    pub const ALL: [Stage; 6] =
-        [Stage::Tools, Stage::Cuts, Stage::Contacts, Stage::Deform, Stage::Reactions, Stage::Measure];
+    pub const ALL: [Stage; 7] = [
+        Stage::Tools,
+        Stage::Cuts,
+        Stage::Adapt,
+        Stage::Contacts,
+        Stage::Deform,
+        Stage::Reactions,
+        Stage::Measure,
+    ];
 
     /// Name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Tools => "tools",
             Stage::Cuts => "cuts",
+            Stage::Adapt => "adapt",
             Stage::Contacts => "contacts",
             Stage::Deform => "deform",
             Stage::Reactions => "reactions",

@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::machine::Machine;
-use crate::body::{Probe, SimBody};
+use crate::body::{AdaptCounts, Probe, SimBody};
 use crate::report::{Event, Level, StepReport};
 use crate::simulation::{Plan, Simulation};
 
@@ -106,6 +106,9 @@ pub struct BodySummary {
     pub surface_vertices: usize,
     /// Surface triangles.
     pub surface_triangles: usize,
+    /// What became of its cells, where they are adapted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adaptation: Option<AdaptationSummary>,
     /// Triangles on the lips of cuts.
     pub lip_triangles: usize,
     /// Incisions that left a lip.
@@ -139,6 +142,19 @@ pub struct BodySummary {
     pub finite: bool,
     /// What was found and repaired in the mesh file.
     pub mesh: Value,
+}
+
+/// Division and joining of cells over the run.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct AdaptationSummary {
+    /// Steps that began with other cells than the step before ended with.
+    pub changes: u64,
+    /// Cells that were divided into eight, for 2:1 balance too.
+    pub divided: u64,
+    /// Groups of eight cells that were joined.
+    pub joined: u64,
+    /// Most cells at any time; `elements` are those at the end.
+    pub most_cells: usize,
 }
 
 /// Estimate of the discretisation error by stress recovery (Zienkiewicz, Zhu 1987).
@@ -366,6 +382,9 @@ fn body_summary(
         parts: body.components().len(),
         surface_vertices: surface.vertices.len(),
         surface_triangles: surface.triangles.len(),
+        adaptation: sim.adapt_counts().map(|AdaptCounts { changes, divided, joined, most_cells }| {
+            AdaptationSummary { changes, divided, joined, most_cells }
+        }),
         lip_triangles,
         incisions: lips.len(),
         epoch: body.epoch(),

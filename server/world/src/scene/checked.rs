@@ -1,6 +1,7 @@
 //! A scene as ready objects: names resolved to indices, words to types, lists to vectors.
 
 use nalgebra::{Unit, Vector3};
+use scindo_physics::octree::AdaptSettings;
 
 use super::mechanics::Mechanics;
 use crate::inputs::{ToolMode, ToolShape};
@@ -71,7 +72,7 @@ pub struct BodySpec {
 }
 
 /// Cells of an octree.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OctreeSpec {
     /// Finest cells along the longest side.
     pub cells: u32,
@@ -79,6 +80,19 @@ pub struct OctreeSpec {
     pub levels: u8,
     /// Level that is simulated; 0: the cells themselves.
     pub simulate_level: u8,
+    /// Refinement and coarsening between steps; none: the cells stay as they are.
+    pub adapt: Option<AdaptSpec>,
+}
+
+/// When cells of an octree are divided and joined between steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AdaptSpec {
+    /// Where cells are fine.
+    pub settings: AdaptSettings,
+    /// Steps from one adaptation to the next.
+    pub every_steps: u32,
+    /// Steps from one estimate of the error to the next; each is followed by an adaptation.
+    pub error_every_steps: u32,
 }
 
 /// A region of another material.

@@ -26,9 +26,9 @@ mod shipped;
 use std::path::{Path, PathBuf};
 
 pub use checked::{
-    BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec, LookSpec,
-    MaterialPlace, MaterialSpec, MeshSource, OctreeSpec, PathPoint, ProbeSpec, PublishRates, Region, Share,
-    SkinSpec, ToolSpec,
+    AdaptSpec, BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec,
+    LookSpec, MaterialPlace, MaterialSpec, MeshSource, OctreeSpec, PathPoint, ProbeSpec, PublishRates,
+    Region, Share, SkinSpec, ToolSpec,
 };
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};
 pub use mechanics::{Mechanics, Newmark};

@@ -67,6 +67,7 @@ fn fill_body(
     out.elements = body.body.n_elements() as u32;
     out.pieces = body.body.n_pieces() as u32;
     out.copies = body.body.rest_positions().len() as u32;
+    out.adapted = body.adapt_counts().unwrap_or_default();
     out.rest_volume_m3 = body.rest_volume_m3;
     out.positions.clear();
     out.marks.clear();

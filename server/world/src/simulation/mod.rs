@@ -1,4 +1,4 @@
-//! The step: tools, cuts, contacts, deformation, reactions, in this order.
+//! The step: tools, cuts, adaptation, contacts, deformation, reactions, in this order.
 //!
 //! [`Simulation::step`] is the table of contents of the system; each line is one stage, timed.
 
@@ -7,6 +7,8 @@ mod plan;
 mod stopwatch;
 
 mod phase_clock;
+
+mod adapting;
 
 mod cuts;
 
@@ -39,6 +41,7 @@ pub use crate::report::{BodyReport, Energy, Event, Level, PhaseSeconds, Stage, S
 use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
 use crate::snapshot::Snapshot;
 use crate::tool::Tools;
+use adapting::ToolPlaces;
 use cuts::{CutContext, Cuts};
 use fill::Sources;
 use phase_clock::PhaseClock;
@@ -84,6 +87,7 @@ pub struct Simulation {
     bodies: Vec<SimBody>,
     lead: Option<Lead>,
     tools: Tools,
+    tool_places: ToolPlaces,
     cuts: Cuts,
     contacts: Contacts,
     sleep: Sleep,
@@ -145,6 +149,7 @@ impl Simulation {
         let mut simulation = Self {
             plan,
             tools: Tools::new(&scene.tools),
+            tool_places: ToolPlaces::default(),
             cuts: Cuts::new(&scene.cuts, &built.bodies),
             contacts,
             sleep: Sleep::new(&built.bodies),
@@ -174,6 +179,8 @@ impl Simulation {
         watch.book(Stage::Tools);
         self.cut(&inputs.cuts);
         watch.book(Stage::Cuts);
+        self.adapt();
+        watch.book(Stage::Adapt);
         self.touch();
         watch.book(Stage::Contacts);
         self.deform();
@@ -481,6 +488,7 @@ impl Simulation {
             let per_step = |stage| self.total.of(stage) * 1e3 / self.steps as f64;
             plan.measured("deformation", per_step(Stage::Deform));
             plan.measured("cutting", per_step(Stage::Cuts));
+            plan.measured("adaptation", per_step(Stage::Adapt));
             plan.measured("contact", per_step(Stage::Contacts) + per_step(Stage::Reactions));
             plan.measured("energies", per_step(Stage::Measure));
         }

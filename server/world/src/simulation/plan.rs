@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use crate::body::BodySize;
 use crate::inputs::Wants;
-use crate::scene::CheckedScene;
 use crate::scene::raw::RawCutMethod;
+use crate::scene::{AdaptSpec, BodySpec, CheckedScene};
 
 /// Seconds per element and step for energies.
 const SECONDS_PER_ELEMENT: f64 = 80e-9;
@@ -56,6 +56,7 @@ impl Plan {
         plan.external_forces(scene);
         plan.mechanics(scene, sizes);
         plan.cutting(scene, sizes);
+        plan.adaptation(scene);
         plan.contact(scene, sizes);
         plan.listeners(scene, sizes);
         plan
@@ -146,6 +147,19 @@ impl Plan {
         let seconds: f64 = sizes.iter().map(|size| size.elements as f64 * SECONDS_PER_ELEMENT_CUT).sum();
         let always = if blades > 0 { seconds } else { 0.0 };
         self.push("cutting", allowed, why, always);
+    }
+
+    fn adaptation(&mut self, scene: &CheckedScene) {
+        let of = |body: &BodySpec| Some((body.id.clone(), body.octree?.adapt?));
+        let bodies: Vec<_> = scene.bodies.iter().filter_map(of).collect();
+        let each = |(id, adapt): &(String, AdaptSpec)| {
+            format!("{id} every {}", count(adapt.every_steps as usize, "step"))
+        };
+        let why = match bodies.is_empty() {
+            true => "no body has octree.adapt".into(),
+            false => format!("octree.adapt: {}", bodies.iter().map(each).collect::<Vec<_>>().join(", ")),
+        };
+        self.push("adaptation", !bodies.is_empty(), why, 0.0);
     }
 
     fn contact(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {

@@ -1,11 +1,16 @@
 //! Bodies of octree cells, and regions of another material.
 
 use nalgebra::Vector3;
+use scindo_physics::octree::{AdaptError, AdaptSettings};
 
-use super::super::checked::{MaterialPlace, MaterialSpec, MeshSource, OctreeSpec};
+use super::super::checked::{AdaptSpec, MaterialPlace, MaterialSpec, MeshSource, OctreeSpec};
+use super::super::problem::Fault;
 use super::super::raw::*;
 use super::Check;
 use super::mechanics::word;
+
+/// Adaptations from one estimate of the error to the next, where the scene does not say.
+const ERROR_EVERY: u32 = 5;
 
 /// What physics can do for bodies of octree cells. The rest is parsed and checked, then refused as not supported
 /// yet.
@@ -69,8 +74,49 @@ impl Check<'_> {
                 0
             }
         };
-        let RawOctree { levels, simulate_level } = octree;
-        Some(OctreeSpec { cells: cells as u32, levels, simulate_level })
+        let adapt = octree
+            .adapt
+            .as_ref()
+            .map(|adapt| self.adapt(&format!("{at}.octree.adapt"), adapt, octree.levels));
+        let RawOctree { levels, simulate_level, .. } = octree;
+        Some(OctreeSpec { cells: cells as u32, levels, simulate_level, adapt })
+    }
+
+    /// Refinement and coarsening of cells that are at most on level `levels`.
+    fn adapt(&mut self, at: &str, raw: &RawAdapt, levels: u8) -> AdaptSpec {
+        let &RawAdapt { level, distance_m, speed_m_s, error_sqrt_j, every_steps, error_every_steps } = raw;
+        let settings = AdaptSettings { distance_m, speed_m_s, error: error_sqrt_j, level };
+        if settings.is_off() {
+            let meaning = "where cells are divided; at least one of distance_m, speed_m_s and error_sqrt_j is \
+                           needed, such as distance_m = [0.01, 0.02]";
+            let fault = Fault::MissingKey { key: "distance_m".into(), meaning: meaning.into() };
+            self.report(at.to_owned(), fault);
+        }
+        if let Err(AdaptError { name, found, allowed }) = settings.check() {
+            let key = if name == "error" { "error_sqrt_j" } else { name };
+            let next = if name == "distance_m" {
+                "cells are divided below the first and joined above the second"
+            } else {
+                "cells are divided above the first and joined below the second"
+            };
+            let (found, allowed) = (format!("{found:?}"), allowed.to_owned());
+            self.report(format!("{at}.{key}"), Fault::OutOfRange { found, allowed, next: next.into() });
+        }
+        if level >= levels {
+            let what =
+                format!("found {level}, allowed: below levels = {levels}, or no cell is larger than that");
+            self.conflict(
+                format!("{at}.level"),
+                what,
+                "lower it, raise octree.levels, or remove octree.adapt",
+            );
+        }
+        if error_every_steps.is_some() && error_sqrt_j.is_none() {
+            let what = "`error_every_steps` only goes with `error_sqrt_j`";
+            self.conflict(format!("{at}.error_every_steps"), what, "remove it, or give error_sqrt_j");
+        }
+        let error_every_steps = error_every_steps.unwrap_or(every_steps.saturating_mul(ERROR_EVERY));
+        AdaptSpec { settings, every_steps, error_every_steps }
     }
 
     /// Cells of a box along its longest side, which must be cubes.
