@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use scindo_physics::body::Method;
 use scindo_world::inputs::Inputs;
 use scindo_world::mesh_in::MeshHealth;
 use scindo_world::results::Results;
@@ -127,4 +128,30 @@ fn what_does_not_go_with_an_octree_is_refused() {
         "surface = \"none.obj\"",
         &["none.obj"],
     );
+}
+
+#[test]
+fn cells_are_solved_by_multigrid_where_the_scene_leaves_it_open() {
+    let plan_of = |line: &str| {
+        let sim = start(&BLOCK.replace("young_pa = 2e5", &format!("young_pa = 2e5\n    {line}"))).unwrap();
+        let plan = sim.plan();
+        let effect = plan.effects.iter().find(|effect| effect.name == "deformation block").unwrap();
+        (sim.bodies()[0].body.settings().method, effect.why.clone())
+    };
+    let (method, why) = plan_of("");
+    assert_eq!(method, Method::MgPcg);
+    assert!(why.contains("cg preconditioned by multigrid by default"), "{why}");
+    let (method, why) = plan_of("solver = { method = \"mg-pcg\" }");
+    assert!(method == Method::MgPcg && !why.contains("by default"), "{why}");
+    assert_eq!(plan_of("solver = { method = \"pcg\" }").0, Method::Pcg);
+    for line in [
+        "law = \"neo-hookean\"",
+        "integrator = \"symplectic-euler\"",
+        "mass = \"consistent\"",
+        "solver = { precision = \"double\" }",
+        "solver = { tolerance = 1e-9 }",
+        "solver = { newton_steps = 3 }",
+    ] {
+        assert_eq!(plan_of(line).0, Method::Pcg, "{line}");
+    }
 }

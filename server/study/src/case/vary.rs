@@ -1,5 +1,6 @@
 //! The factors to vary in a scene. The base of every axis is the scene's own setting, untouched.
 
+use scindo_world::scene::raw::RawMethod;
 use scindo_world::scene::{CellSplit, CheckedScene, MeshSource};
 use serde_json::Value;
 
@@ -62,7 +63,9 @@ pub fn axes(of: Subject<'_>, quick: bool, cells_wanted: &[usize], threads_wanted
         axes.push(steps(of.scene.step_s, if quick { &[2.0, 0.5] } else { &[2.0, 0.5, 0.25, 0.125] }));
     }
     if !explicit {
-        axes.push(words(of, Factor::Solver, "solver.method", "pcg", &["pcg", "cholesky"]));
+        let multigrid = of.scene.bodies.iter().all(|body| body.mechanics.method == RawMethod::MgPcg);
+        let own = if multigrid { "mg-pcg" } else { "pcg" };
+        axes.push(words(of, Factor::Solver, "solver.method", own, &["pcg", "cholesky"]));
         axes.push(with_own(
             Factor::Tolerance,
             OWN,

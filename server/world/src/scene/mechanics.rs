@@ -41,6 +41,8 @@ pub struct Mechanics {
     pub locking: RawLocking,
     /// Linear solver.
     pub method: RawMethod,
+    /// Whether the scene leaves the linear solver open.
+    pub method_is_default: bool,
     /// Arithmetic; none: as the other settings allow.
     pub precision: Option<RawPrecision>,
     /// Most Newton steps per step of time; none: as law and integrator call for.
@@ -72,6 +74,17 @@ impl Mechanics {
     /// What keeps the body from the fast path, which runs in single precision; none if nothing does.
     pub fn why_general(&self) -> Option<&'static str> {
         self.body_settings().why_general(self.constitutive_law())
+    }
+
+    /// With the linear solver that suits it, if the scene leaves it open: multigrid where octree cells take the
+    /// fast path.
+    pub(super) fn with_method(self) -> Self {
+        let with_multigrid = Self { method: RawMethod::MgPcg, ..self };
+        let multigrid = self.method_is_default
+            && self.element == RawElement::Octree
+            && with_multigrid.arithmetic() == Arithmetic::Single
+            && with_multigrid.why_general().is_none();
+        if multigrid { with_multigrid } else { self }
     }
 
     /// Whether an equilibrium is approached by relaxation, step after step.

@@ -18,7 +18,8 @@ impl Check<'_> {
             newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
             mass: body.mass,
             locking: body.locking,
-            method: body.solver.method,
+            method: body.solver.method.unwrap_or_default(),
+            method_is_default: body.solver.method.is_none(),
             precision: body.solver.precision,
             operator: body.solver.operator,
             newton_steps: body.solver.newton_steps,
@@ -27,7 +28,8 @@ impl Check<'_> {
             tolerance: body.solver.tolerance,
             cutting: body.cut_method(),
             loose: body.cutting.loose,
-        };
+        }
+        .with_method();
         self.cutting(at, &mechanics);
         self.element(at, mechanics.element, mesh);
         self.locking(at, &mechanics);

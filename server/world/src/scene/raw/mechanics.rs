@@ -128,10 +128,12 @@ pub enum RawLocking {
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSolver {
-    /// Linear solver. For a solution to round-off, take `cholesky` with precision `double` and tolerance
+    /// Linear solver. Default: `mg-pcg` for `octree` where law, integrator and precision allow it, otherwise
+    /// `pcg`. For a solution to round-off, take `cholesky` with precision `double` and tolerance
     /// 1e-12. It is also the fastest for equilibria with thin layers, where `pcg` needs hundreds of
     /// iterations.
-    pub method: RawMethod,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<RawMethod>,
     /// Maximum number of iterations of a linear solve. Default: several times an estimate from the size of
     /// the mesh and `poisson`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -162,7 +164,7 @@ pub struct RawSolver {
 impl Default for RawSolver {
     fn default() -> Self {
         Self {
-            method: RawMethod::Pcg,
+            method: None,
             iterations: None,
             fixed_iterations: false,
             tolerance: 1e-4,

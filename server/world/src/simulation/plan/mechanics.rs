@@ -104,8 +104,10 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
             format!("multigrid, at most {} cycles to {:e}, {precision}", size.iterations, m.tolerance)
         }
         RawMethod::MgPcg => format!(
-            "cg preconditioned by multigrid, at most {} iterations to {:e}, {precision}",
-            size.iterations, m.tolerance
+            "cg preconditioned by multigrid{}, at most {} iterations to {:e}, {precision}",
+            if m.method_is_default { " by default" } else { "" },
+            size.iterations,
+            m.tolerance
         ),
         RawMethod::Pcg => {
             format!("pcg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance)
