@@ -4,7 +4,7 @@ pub mod doubts;
 
 pub mod region;
 
-mod mesh;
+pub(crate) mod mesh;
 
 mod skin;
 

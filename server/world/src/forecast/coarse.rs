@@ -1,19 +1,23 @@
 //! Coarse copies of a scene: what is too large to be followed until it turns is followed on fewer elements.
 //!
 //! A copy has the skin of the body's elements, filled with a coarser lattice, and its constraints, loads, cuts and
-//! tools. Linear tetrahedra are too stiff by an error of the order h²: two copies tell its factor, and with it
-//! what the mesh of the scene would do.
+//! tools. A body of octree cells is filled anew with larger cells, regions of other materials included; the cells
+//! of a copy are not adapted. Linear tetrahedra and trilinear cells are too stiff by an error of the order h²: two
+//! copies tell its factor, and with it what the mesh of the scene would do.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, ElementKind, Volumetric};
+use scindo_physics::body::{Body, BodySettings, ElementKind, Volumetric};
 use scindo_physics::mesh::TetMesh;
+use scindo_physics::octree::OctreeSpace;
 use scindo_physics::space::Tets;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
-use crate::assemble::Built;
+use crate::assemble::mesh::{Mesh, fill};
+use crate::assemble::{Built, region};
 use crate::body::SimBody;
 use crate::format::SurfaceMesh;
 use crate::mesh_in::lattice_from_surface;
+use crate::scene::{BodySpec, MeshSource, OctreeSpec};
 use crate::simulation::Simulation;
 
 /// Elements of the two copies.
@@ -22,6 +26,8 @@ const ELEMENTS: [f64; 2] = [1_500.0, 6_000.0];
 const SHARES: [f64; 2] = [0.3, 0.7];
 /// Lattice tetrahedra per cube of the lattice, a third more of them where the lattice meets the surface.
 const TETS_PER_CELL: f64 = 16.0;
+/// Tetrahedra that take as long as one cell of an octree.
+const TETS_PER_LEAF: f64 = 3.0;
 /// A copy that lost more of its volume is another body.
 const VOLUME: f64 = 0.15;
 /// Largest change that the finer copy may suggest for the scene, as a factor.
@@ -64,20 +70,32 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
     let mut bodies = Vec::new();
     for (spec, fine) in scene.bodies.iter_mut().zip(simulation.bodies()) {
         spec.skin = None;
-        let mesh = coarser(&fine.body, elements)?;
-        let wanted = spec.mechanics.body_settings();
-        let volumetric = match wanted.volumetric {
-            Volumetric::Selective => Volumetric::Full,
-            other => other,
+        let wanted = BodySettings { solver: fine.body.settings().solver, ..spec.mechanics.body_settings() };
+        let mut body = match spec.octree {
+            Some(octree) => {
+                let base_dir = simulation.source().base_dir();
+                let cells = larger_cells(spec, octree, fine, elements / TETS_PER_LEAF);
+                let opened = fill(spec, OctreeSpec { cells, ..octree }, base_dir, &|_| ()).ok()?;
+                let Mesh::Octree(octree) = opened.mesh else { return None };
+                let space = Box::new(OctreeSpace::new(*octree));
+                Body::of_space(space, *fine.body.material(), wanted).ok()?
+            }
+            None => {
+                let volumetric = match wanted.volumetric {
+                    Volumetric::Selective => Volumetric::Full,
+                    other => other,
+                };
+                let settings = BodySettings { element: ElementKind::Tet4, volumetric, ..wanted };
+                let mesh = coarser(&fine.body, elements)?;
+                Body::new(mesh, *fine.body.material(), settings).ok()?
+            }
         };
-        let settings = scindo_physics::body::BodySettings {
-            element: ElementKind::Tet4,
-            volumetric,
-            solver: fine.body.settings().solver,
-            ..wanted
-        };
-        let mut body = Body::new(mesh, *fine.body.material(), settings).ok()?;
-        hold(&mut body, fine)?;
+        if (body.rest_volume() / fine.rest_volume_m3 - 1.0).abs() > VOLUME {
+            return None;
+        }
+        if spec.octree.is_none() || hold_regions(&mut body, spec).is_none() {
+            hold(&mut body, fine)?;
+        }
         load(&mut body, &fine.body)?;
         let mut body = SimBody::new(&spec.id, body, None);
         body.displacement_over_s = fine.displacement_over_s;
@@ -85,6 +103,39 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
     }
     let built = Built { bodies, lead: None, probes: Vec::new(), warnings: Vec::new() };
     Some(Simulation::assemble(simulation.source().clone(), scene, built))
+}
+
+/// Finest cells along the longest side of the body `spec`, so that an octree with as many levels has about so many
+/// `leaves`; at most those of `fine`. A box is divided without remainder if there is such a number nearby.
+fn larger_cells(spec: &BodySpec, octree: OctreeSpec, fine: &SimBody, leaves: f64) -> u32 {
+    let now = fine.body.n_elements() as f64;
+    if now <= 1.5 * leaves {
+        return octree.cells;
+    }
+    // Leaves are as many as the surface calls for, but no more than cells of equal size would be.
+    let along = f64::from(octree.cells);
+    let equal = along * fine.cell_m() * (leaves / fine.rest_volume_m3).cbrt();
+    let wanted = equal.max(along * (leaves / now).sqrt());
+    let nearest = (wanted.round() as u32).clamp(2, octree.cells);
+    let MeshSource::Box { cells: n, .. } = &spec.mesh else { return nearest };
+    let along = u64::from(octree.cells);
+    let divides = |c: &u32| n.iter().all(|&n| (n as u64 * u64::from(*c)).is_multiple_of(along));
+    let near = (1..=octree.cells).filter(divides).min_by_key(|c| c.abs_diff(nearest));
+    near.filter(|c| 2 * c >= nearest && *c <= 2 * nearest).unwrap_or(nearest)
+}
+
+/// Holds what the regions of the scene select in `copy`; `None` if one of them selects nothing.
+fn hold_regions(copy: &mut Body, spec: &BodySpec) -> Option<()> {
+    let (rest, bounds) = (copy.rest_positions().to_vec(), copy.bounds());
+    let groups: Vec<Vec<u32>> =
+        spec.fixes.iter().map(|fix| region::select(&rest, bounds, &fix.region)).collect();
+    if groups.iter().any(Vec::is_empty) {
+        return None;
+    }
+    for (fix, nodes) in spec.fixes.iter().zip(&groups) {
+        copy.fix(nodes, fix.axes, fix.displacement_m).ok()?;
+    }
+    Some(())
 }
 
 /// The uncut body with fewer elements, or as it is where it has no more.
@@ -193,5 +244,58 @@ mod tests {
         assert_eq!(foretold[0].displacement, Source::CoarseCopies);
         let ratio = foretold[0].largest_displacement_m / seen.largest_displacement_m;
         assert!((0.85..1.15).contains(&ratio), "{ratio}");
+    }
+
+    /// A bar of cells, stiff but for a quarter of its length beside the wall, and heavy at its end.
+    const BAR: &str = r#"
+        schema = 1
+        [world]
+        gravity_m_s2 = [0, 0, -9.81]
+        step_s = 0.02
+        [[body]]
+        id = "bar"
+        element = "octree"
+        mesh = { box = { min_m = [0, 0, 0], max_m = [0.08, 0.04, 0.04], cells = [48, 24, 24] } }
+        octree = { levels = 2, adapt = { distance_m = [0.01, 0.02] } }
+        young_pa = 2e5
+        poisson = 0.3
+        density_kg_m3 = 1000
+        [[body.material]]
+        where = { half_space = { point_m = [0.02, 0, 0], normal = [1, 0, 0] } }
+        young_pa = 1e7
+        [[body.material]]
+        where = { half_space = { point_m = [0.06, 0, 0], normal = [1, 0, 0] } }
+        young_pa = 1e7
+        density_kg_m3 = 4000
+        [[body.fix]]
+        where = { slab = { axis = "x", from = 0, to = 0 } }
+    "#;
+
+    #[test]
+    fn copies_of_cells_are_cells_with_the_same_regions() {
+        let mut simulation = Simulation::new(&Scene::from_toml(BAR).unwrap(), Path::new("")).unwrap();
+        let fine = &simulation.bodies()[0].body;
+        let (mass, n) = (fine.total_mass(), fine.n_elements());
+        for elements in ELEMENTS {
+            let copy = copy_of(&simulation, elements).unwrap();
+            let body = &copy.bodies()[0].body;
+            assert_eq!(body.settings().element, ElementKind::Octree);
+            assert_eq!(body.settings().method, scindo_physics::body::Method::MgPcg);
+            let leaves = body.n_elements() as f64;
+            let wanted = elements / TETS_PER_LEAF;
+            assert!(leaves < n as f64 && leaves > 0.3 * wanted && leaves < 3.0 * wanted, "{leaves} {wanted}");
+            // The planes between the materials lie between cells of every copy.
+            assert!((body.total_mass() / mass - 1.0).abs() < 1e-9, "{}", body.total_mass());
+            assert!(!body.fixed_nodes().is_empty());
+            assert!(body.fixed_nodes().iter().all(|held| body.rest_positions()[held.node as usize].x == 0.0));
+        }
+        let effort = Effort { processor_s: 60.0, end_s: Some(0.1) };
+        let seen = forecast(&mut simulation, effort, &mut |_| ()).unwrap().bodies.remove(0);
+        let nothing = BodyForecast { id: "bar".into(), ..BodyForecast::default() };
+        let mut foretold = [BodyForecast { displacement: Source::AtLeast, ..nothing }];
+        follow(&simulation, &mut foretold, &[true], effort);
+        assert_eq!(foretold[0].displacement, Source::CoarseCopies);
+        let ratio = foretold[0].largest_displacement_m / seen.largest_displacement_m;
+        assert!((0.9..1.1).contains(&ratio), "{ratio}");
     }
 }
