@@ -347,6 +347,18 @@ impl Multigrid {
         (levels.collect(), self.coarsest.solve_kind())
     }
 
+    /// Bytes in use: all but stored matrices, and these. The factor of the coarsest level is left out.
+    pub fn memory(&self) -> [usize; 2] {
+        let vectors = |level: &Vectors| {
+            let Vectors { inverse, x, b, r, d, q, .. } = level;
+            size_of_val(&inverse[..]) + [x, b, r, d, q].iter().map(|v| size_of_val(&v[..])).sum::<usize>()
+        };
+        let kernels = self.levels.iter().filter_map(|level| level.kernel.as_ref()).map(LevelKernel::memory);
+        let parts = kernels.chain([self.galerkin.memory()]);
+        let [others, stored] = parts.fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
+        [others + self.hierarchy.memory() + self.levels.iter().map(vectors).sum::<usize>(), stored]
+    }
+
     /// The settings.
     pub fn settings(&self) -> &MultigridSettings {
         &self.settings

@@ -307,6 +307,23 @@ impl Galerkin {
         any
     }
 
+    /// Bytes in use: all but stored matrices, and these.
+    pub fn memory(&self) -> [usize; 2] {
+        let of = |level: &LevelMatrices| {
+            let relative: usize = level.stored.iter().map(|s| size_of_val(&s.relative[..])).sum();
+            let others = size_of_val(&level.frame[..])
+                + size_of_val(&level.matrix[..])
+                + size_of_val(&level.mass[..])
+                + size_of_val(&level.holds[..])
+                + size_of_val(&level.changed[..])
+                + size_of_val(&level.free[..]);
+            [others, size_of_val(&level.stored[..]) + relative]
+        };
+        let levels = self.levels.iter().map(of);
+        let [others, stored] = levels.fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
+        [others + size_of_val(&self.fixed[..]), stored]
+    }
+
     /// The matrix of cell `id` of level `l` over the vertices that carry it, in its frame, with all of its mass.
     pub fn cell_matrix(&self, hierarchy: &Hierarchy, l: usize, id: usize) -> Dense {
         cell_matrix(hierarchy, (l, id), &self.levels[l], &self.shared, &self.eighth)

@@ -108,6 +108,20 @@ impl Hierarchy {
         hierarchy
     }
 
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        let levels: usize = self.levels.iter().map(Level::memory).sum();
+        let step = |step: &Step| {
+            size_of_val(&step.parent[..])
+                + size_of_val(&step.first_child[..])
+                + size_of_val(&step.children[..])
+                + step.transfer.memory()
+        };
+        let kinds: usize = self.kind_of.iter().map(|kinds| size_of_val(&kinds[..])).sum();
+        let exact: usize = self.exact.iter().map(|exact| size_of_val(&exact[..])).sum();
+        levels + self.steps.iter().map(step).sum::<usize>() + kinds + exact
+    }
+
     /// Number of levels.
     pub fn n_levels(&self) -> usize {
         self.levels.len()

@@ -84,6 +84,14 @@ impl LevelKernel {
         });
     }
 
+    /// Bytes in use: all but stored matrices, and these.
+    pub fn memory(&self) -> [usize; 2] {
+        let [operator, stored] = self.operator.memory();
+        let lists =
+            size_of_val(&self.lanes[..]) + size_of_val(&self.order[..]) + size_of_val(&self.moved[..]);
+        [operator + lists, stored]
+    }
+
     /// Inverses of the diagonal blocks of A, with the lumped `mass` of every vertex; 0 in directions without
     /// stiffness and mass.
     pub fn invert_diagonal(&mut self, team: &mut Team, mass: &[f32], out: &mut [Inverse3]) {

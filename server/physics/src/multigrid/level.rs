@@ -42,6 +42,16 @@ pub struct Coarsened {
 }
 
 impl Level {
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.cells[..])
+            + size_of_val(&self.leaf[..])
+            + size_of_val(&self.vertices[..])
+            + size_of_val(&self.hanging[..])
+            + size_of_val(&self.first_slot[..])
+            + size_of_val(&self.slots[..])
+    }
+
     /// The finest level: the leaves of an octree, with its vertices.
     pub fn finest(octree: &Octree) -> (Self, Vec<Link>) {
         let mut links = Vec::new();

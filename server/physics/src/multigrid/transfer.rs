@@ -92,6 +92,12 @@ impl Transfer {
         self.rows.get(v)
     }
 
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        let of = |lists: &Lists| size_of_val(&lists.first[..]) + size_of_val(&lists.entries[..]);
+        of(&self.rows) + of(&self.columns)
+    }
+
     /// x += P e.
     pub fn prolong(&self, team: &mut Team, e: &[Padded], x: &mut [Padded]) {
         team.for_blocks(blocks(x, BLOCK), |block, x| {

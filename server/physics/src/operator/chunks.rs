@@ -181,6 +181,14 @@ pub struct Gather {
 }
 
 impl Gather {
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.first_row[..])
+            + size_of_val(&self.pairs[..])
+            + size_of_val(&self.further[..])
+            + size_of_val(&self.first_further[..])
+    }
+
     /// Lists the rows of every copy. Every chunk gets rows for as many copies again.
     pub fn new<'a>(chunks: impl Iterator<Item = &'a [u32]> + Clone, n_copies: usize) -> Self {
         Self::with_rows(chunks, n_copies, |n| 2 * n + 1)

@@ -41,10 +41,26 @@ pub fn sizes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
             ("faster by", Unit::Times),
         ],
     );
+    let mut memory = Table::new(
+        "Bytes per cell",
+        "Finest level: octree, kernels, positions, velocities and vectors. Coarse levels: cells, transfers, kernels \
+         and vectors; stored matrices are those of coarse cells that are cut, not full or turned in themselves, with \
+         their copies in the kernels.",
+        &[
+            ("cells", Unit::Count),
+            ("finest level", Unit::Number),
+            ("levels of multigrid", Unit::Number),
+            ("stored matrices", Unit::Number),
+        ],
+    );
     let sizes = if bench.is_quick() { &SIZES[..3] } else { &SIZES[..] };
     for &(across, levels) in sizes {
         bench.begin(format!("{across} cells across"), sizes.len())?;
         let own = step(across, levels)?;
+        memory.row(
+            format!("{across} across, {levels} levels"),
+            &[Some(own.cells), Some(own.bytes[0]), Some(own.bytes[1]), Some(own.bytes[2])],
+        );
         let uniform = if across <= UNIFORM { Some(step(across, 0)?) } else { None };
         table.row(
             format!("{across} across, {levels} levels"),
@@ -61,7 +77,7 @@ pub fn sizes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
             ],
         );
     }
-    result.tables.push(table);
+    result.tables.extend([table, memory]);
     Ok(result)
 }
 
@@ -71,6 +87,8 @@ struct Step {
     levels_s: f64,
     step_s: f64,
     multigrid_s: f64,
+    /// Bytes per cell: finest level, levels of multigrid, stored matrices.
+    bytes: [f64; 3],
 }
 
 fn step(across: u32, levels: u8) -> Result<Step, Trouble> {
@@ -83,7 +101,11 @@ fn step(across: u32, levels: u8) -> Result<Step, Trouble> {
     let until = Until { iterations: 3, error: -1.0, seconds: 0.0 };
     let course = run(&mut system, Solver::Cycles(&mut multigrid), &none, until);
     let multigrid_s = seconds.coarse + course.points.last().map_or(f64::NAN, |point| point.0);
+    let [levels, stored] = multigrid.memory();
+    drop(multigrid);
+    let n = cut.space.octree().cells().len() as f64;
     Ok(Step {
+        bytes: [system.memory(), levels, stored].map(|bytes| bytes as f64 / n),
         cells: cut.space.octree().cells().len() as f64,
         cutting_s: cut.seconds,
         levels_s: seconds.levels,

@@ -175,6 +175,12 @@ impl System {
         started.elapsed().as_secs_f64()
     }
 
+    /// Bytes of the finest level: kernels, state in double precision, and vectors of conjugate gradients.
+    pub fn memory(&self) -> usize {
+        let vertex = size_of::<V>() * 4 + size_of::<Padded>() * 5 + size_of::<[f32; 8]>() + 12;
+        self.octree.bytes() + self.stiffness.memory() + vertex * self.rest.len()
+    }
+
     /// The cells.
     pub fn octree(&self) -> &Octree {
         &self.octree

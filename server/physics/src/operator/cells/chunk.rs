@@ -259,6 +259,19 @@ impl CellChunk {
         }
     }
 
+    /// Bytes in use: all but stored matrices, and these.
+    pub fn memory(&self) -> [usize; 2] {
+        let stored = size_of_val(&self.stored[..]);
+        let others = size_of_val(&self.vertices[..])
+            + size_of_val(&self.x[..])
+            + size_of_val(&self.groups[..])
+            + size_of_val(&self.batches[..])
+            + size_of_val(&self.lanes[..])
+            + size_of_val(&self.hanging[..])
+            + size_of_val(&self.weights[..]);
+        [others, stored]
+    }
+
     /// Bytes that one application streams.
     pub fn bytes(&self) -> usize {
         self.batches.len() * size_of::<SectorBatch>()

@@ -248,6 +248,14 @@ impl CellOperator {
         self.chunks[place.chunk as usize].rotation(place.batch as usize, place.lane as usize)
     }
 
+    /// Bytes in use: all but stored matrices, and these.
+    pub fn memory(&self) -> [usize; 2] {
+        let chunks = self.chunks.iter().map(CellChunk::memory);
+        let [others, stored] = chunks.fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
+        let vectors = size_of_val(&self.sums[..]) + size_of_val(&self.diagonals[..]);
+        [others + self.gather.memory() + vectors + size_of_val(&self.places[..]), stored]
+    }
+
     /// Bytes of stiffness that one application streams.
     pub fn bytes(&self) -> usize {
         self.chunks.iter().map(CellChunk::bytes).sum()

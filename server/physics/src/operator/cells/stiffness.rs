@@ -48,6 +48,13 @@ impl CellStiffness {
         Self { operator, rest, cells, h, materials, made_with: None, version: 0 }
     }
 
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        let [operator, stored] = self.operator.memory();
+        let rest: usize = self.rest.iter().map(RestChunk::memory).sum();
+        operator + stored + rest + size_of_val(&self.cells[..])
+    }
+
     /// Follows a cut, a refinement or a coarsening of the octree. Cells keep their rotations; new ones have that of
     /// the leaf they were part of, and joined ones that of their first part.
     pub fn follow(&mut self, octree: &Octree) {

@@ -25,6 +25,13 @@ pub struct RestChunk {
     sides: Vec<RestBatch>,
 }
 
+impl RestChunk {
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.positions[..]) + size_of_val(&self.rest[..]) + size_of_val(&self.sides[..])
+    }
+}
+
 /// Sides of eight cells.
 #[derive(Clone, Copy, Debug)]
 struct RestBatch {
