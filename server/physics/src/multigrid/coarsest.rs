@@ -99,8 +99,8 @@ impl Coarsest {
                 }
             }
         }
-        // With one level, it is the finest, where directions may be prescribed.
-        if last == 0 {
+        // If it is the only one that is solved on, directions may be prescribed.
+        if last == galerkin.first {
             fixed.set_held(galerkin.held());
         }
         self.factored = self.cholesky.factorise(&self.matrix, &fixed).is_ok();

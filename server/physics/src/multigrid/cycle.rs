@@ -53,42 +53,54 @@ pub struct LevelReport {
 #[derive(Debug)]
 pub struct Multigrid {
     settings: MultigridSettings,
-    hierarchy: Hierarchy,
-    galerkin: Galerkin,
+    pub(super) hierarchy: Hierarchy,
+    pub(super) galerkin: Galerkin,
     coarsest: Coarsest,
-    levels: Vec<Vectors>,
+    pub(super) levels: Vec<Vectors>,
+    /// The level that is solved on. Its operator is given from outside.
+    pub(super) first: usize,
+    /// Prescribed directions there.
     fixed: Vec<FixedCopy>,
     /// Whether λ has to be estimated anew.
     estimate: bool,
     partial: Vec<f64>,
 }
 
-/// Vectors of one level, one entry per vertex. The finest level has its solution outside.
+/// Vectors of one level, one entry per vertex. The level that is solved on has its solution outside; finer ones
+/// have scratch for restriction and prolongation alone.
 #[derive(Clone, Debug, Default)]
-struct Vectors {
+pub struct Vectors {
     inverse: Vec<Inverse3>,
     largest: f64,
-    x: Vec<Padded>,
-    b: Vec<Padded>,
+    pub(super) x: Vec<Padded>,
+    pub(super) b: Vec<Padded>,
     r: Vec<Padded>,
     d: Vec<Padded>,
     q: Vec<Padded>,
-    /// Below the finest level its operator.
-    kernel: Option<LevelKernel>,
+    /// Below the level that is solved on its operator.
+    pub(super) kernel: Option<LevelKernel>,
 }
 
 impl Multigrid {
     /// Multigrid on `hierarchy`. [`update`](Self::update) comes before the first cycle.
     pub fn new(hierarchy: Hierarchy, settings: MultigridSettings) -> Self {
-        let galerkin = Galerkin::new(&hierarchy);
+        Self::on_level(hierarchy, settings, 0)
+    }
+
+    /// The same with equations on level `first`, if there is one, and else on the coarsest level.
+    pub(super) fn on_level(hierarchy: Hierarchy, settings: MultigridSettings, first: usize) -> Self {
+        let first = first.min(hierarchy.n_levels() - 1);
+        let mut galerkin = Galerkin::new(&hierarchy);
+        galerkin.solve_on(&hierarchy, first);
         let levels = hierarchy.levels.iter().enumerate().map(|(l, level)| {
-            let zeros = || vec![[0.0; 4]; level.n_vertices];
-            let inner = || if l > 0 { zeros() } else { Vec::new() };
             let n = level.n_vertices;
-            let kernel = (l > 0).then(|| LevelKernel::new(settings.simd, level, &galerkin.levels[l]));
+            let if_needed = |needed: bool| if needed { vec![[0.0; 4]; n] } else { Vec::new() };
+            let (zeros, inner) = (|| if_needed(l >= first), || if_needed(l > 0 && l != first));
+            let kernel =
+                (l > 0 && l >= first).then(|| LevelKernel::new(settings.simd, level, &galerkin.levels[l]));
             Vectors {
-                inverse: if l > 0 { vec![Inverse3::default(); n] } else { Vec::new() },
-                largest: 1.0,
+                inverse: if l > first { vec![Inverse3::default(); n] } else { Vec::new() },
+                largest: if l < first { 0.0 } else { 1.0 },
                 x: inner(),
                 b: inner(),
                 r: zeros(),
@@ -103,9 +115,10 @@ impl Multigrid {
             galerkin,
             coarsest: Coarsest::new(&hierarchy),
             levels,
+            first,
             fixed: Vec::new(),
             estimate: true,
-            partial: vec![0.0; hierarchy.n_vertices().div_ceil(BLOCK)],
+            partial: vec![0.0; hierarchy.levels[first].n_vertices.div_ceil(BLOCK)],
             hierarchy,
         }
     }
@@ -118,15 +131,22 @@ impl Multigrid {
         (with, fixed): (&Coefficients, &[FixedCopy]),
         rotation: &(dyn Fn(u32) -> Matrix3<f32> + Sync),
     ) {
-        let Self { settings, hierarchy, galerkin, coarsest, levels, .. } = self;
+        let Self { settings, hierarchy, galerkin, coarsest, levels, first, .. } = self;
         let tolerance = settings.same_rotation_rad;
         let [anew, any] = galerkin.update(team, hierarchy, (with, fixed), rotation, tolerance);
         self.fixed.clear();
-        self.fixed.extend_from_slice(fixed);
-        for l in 1..levels.len() {
+        if *first == 0 {
+            self.fixed.extend_from_slice(fixed);
+        } else {
+            let held = |&(copy, axes)| FixedCopy { copy, axes, position_m: [0.0; 3] };
+            self.fixed.extend(galerkin.held().iter().map(held));
+        }
+        for l in (*first).max(1)..levels.len() {
             let Vectors { kernel: Some(kernel), inverse, .. } = &mut levels[l] else { continue };
             kernel.follow(team, &hierarchy.levels[l], (galerkin, l, anew));
-            kernel.invert_diagonal(team, &galerkin.levels[l].mass, inverse);
+            if l > *first {
+                kernel.invert_diagonal(team, &galerkin.levels[l].mass, inverse);
+            }
         }
         coarsest.update(hierarchy, galerkin, any, tolerance);
         self.estimate |= anew;
@@ -153,16 +173,17 @@ impl Multigrid {
 
     /// Power iterations on every level, from the same vector each time.
     fn power_iterations(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
-        let Self { galerkin, levels, fixed, partial, .. } = self;
-        for (l, level) in levels.iter_mut().enumerate() {
+        let Self { galerkin, levels, fixed, partial, first, .. } = self;
+        let first = *first;
+        for (l, level) in levels.iter_mut().enumerate().skip(first) {
             let Vectors { inverse: own, largest, r, d, q, kernel, .. } = level;
-            let inverse = if l == 0 { inverse } else { &own[..] };
+            let inverse = if l == first { inverse } else { &own[..] };
             for (v, d) in (0_u32..).zip(d.iter_mut()) {
                 let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
                 *d =
                     [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 });
             }
-            if l == 0 {
+            if l == first {
                 filter(fixed, d);
             }
             let partial = &mut partial[..d.len().div_ceil(BLOCK)];
@@ -209,33 +230,33 @@ impl Multigrid {
         r: &[Padded],
         z: &mut [Padded],
     ) {
-        let last = self.levels.len() - 1;
+        let (first, last) = (self.first, self.levels.len() - 1);
         // Down: smooth, restrict the residual.
-        for l in 0..last {
-            if l == 0 {
+        for l in first..last {
+            if l == first {
                 z.fill([0.0; 4]);
-                self.smooth(team, A, (0, inverse, largest), (r, z), true);
+                self.smooth(team, A, (l, inverse, largest), (r, z), true);
             } else {
                 self.smooth_inner(team, A, l, true);
             }
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
             self.hierarchy.steps[l].transfer.restrict(team, &fine[l].r, &mut coarse[0].b);
         }
-        if last == 0 {
+        if last == first {
             z.fill([0.0; 4]);
             return self.solve_coarsest(team, A, (inverse, largest), Some((r, z)));
         }
         self.solve_coarsest(team, A, (inverse, largest), None);
         // Up: correct, smooth.
-        for l in (0..last).rev() {
+        for l in (first..last).rev() {
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
             let transfer = &self.hierarchy.steps[l].transfer;
             let d = &mut fine[l].d;
             d.fill([0.0; 4]);
             transfer.prolong(team, &coarse[0].x, d);
-            if l == 0 {
+            if l == first {
                 filter(&self.fixed, d);
-                self.smooth(team, A, (0, inverse, largest), (r, z), false);
+                self.smooth(team, A, (l, inverse, largest), (r, z), false);
             } else {
                 self.smooth_inner(team, A, l, false);
             }
@@ -374,9 +395,9 @@ impl Multigrid {
         &self.hierarchy
     }
 
-    /// Estimate of the largest eigenvalue of D⁻¹A of the finest level, from above.
+    /// Estimate of the largest eigenvalue of D⁻¹A of the level that is solved on, from above.
     pub fn largest_eigenvalue(&self) -> f64 {
-        self.levels[0].largest
+        self.levels[self.first].largest
     }
 }
 

@@ -125,7 +125,6 @@ impl Dense {
     }
 
     /// Block of vertices `a` and `b`.
-    #[cfg(test)]
     pub fn block(&self, a: usize, b: usize) -> Matrix3<f32> {
         Matrix3::from_fn(|i, j| self.0[3 * b + j][3 * a + i])
     }

@@ -100,9 +100,13 @@ pub struct Galerkin {
     /// Mass [kg] times its factor of an eighth of a leaf of every kind.
     eighth: Vec<f32>,
     /// Prescribed directions of every vertex of the finest level, one bit each.
-    fixed: Vec<u8>,
+    pub(super) fixed: Vec<u8>,
     coefficients: Option<Coefficients>,
-    known_fixed: Vec<(u32, [bool; 3])>,
+    pub(super) known_fixed: Vec<(u32, [bool; 3])>,
+    /// The level that is solved on, and its prescribed directions if it is not the finest one.
+    pub(super) first: usize,
+    pub(super) held: Vec<(u32, [bool; 3])>,
+    pub(super) held_bits: Vec<u8>,
 }
 
 impl Galerkin {
@@ -175,6 +179,7 @@ impl Galerkin {
                 *fixed = (0..3).fold(0, |bits, k| bits | u8::from(axes[k]) << k);
             }
         }
+        self.hold_coarse(hierarchy);
         for (holds, vertices) in self.levels[0].holds.iter_mut().zip(&hierarchy.levels[0].vertices) {
             let fixed = vertices.map(|v| self.fixed[v as usize]);
             *holds = [fixed.iter().any(|&f| f != 0), fixed.iter().any(|&f| f != 0 && f != 7)];
@@ -289,9 +294,13 @@ impl Galerkin {
                 _ => {}
             }
         }
+        let held = match l {
+            1 => &self.fixed[..],
+            _ if l == self.first + 1 => &self.held_bits[..],
+            _ => &[],
+        };
         let (shared, carried) = (&self.shared, &self.carried);
-        let context =
-            Context { hierarchy, l, fine, shared, carried, fixed: &self.fixed, eighth: &self.eighth };
+        let context = Context { hierarchy, l, fine, shared, carried, held, eighth: &self.eighth };
         let frame = &*frame;
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
             for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
@@ -329,9 +338,9 @@ impl Galerkin {
         cell_matrix(hierarchy, (l, id), &self.levels[l], &self.shared, &self.eighth)
     }
 
-    /// Vertices of the finest level with prescribed directions, and which directions these are.
+    /// Vertices with prescribed directions, and which directions these are, on the level that is solved on.
     pub fn held(&self) -> &[(u32, [bool; 3])] {
-        &self.known_fixed
+        if self.first == 0 { &self.known_fixed } else { &self.held }
     }
 
     /// Prescribed directions of vertex `v` of the finest level, one bit each.
@@ -354,7 +363,8 @@ struct Context<'a> {
     fine: &'a LevelMatrices,
     shared: &'a [Dense],
     carried: &'a Carried,
-    fixed: &'a [u8],
+    /// Prescribed directions of the fine vertices; empty where they are in the matrices already.
+    held: &'a [u8],
     eighth: &'a [f32],
 }
 
@@ -392,9 +402,9 @@ impl Context<'_> {
             if let Some(Q) = turn {
                 A = A.rotated(&Q);
             }
-            if self.l == 1 {
+            if !self.held.is_empty() {
                 for (c, &v) in fine.vertices[child].iter().enumerate() {
-                    A.hold(c, self.fixed[v as usize]);
+                    A.hold(c, self.held[v as usize]);
                 }
             }
             if merges {
@@ -415,10 +425,10 @@ impl Context<'_> {
     #[inline]
     fn carried(&self, child: usize) -> Option<&Dense> {
         let CellMatrix::Shared(kind) = self.fine.matrix[child] else { return None };
-        if self.l == 1 && self.fine.holds[child][0] {
+        let fine = &self.hierarchy.levels[self.l - 1];
+        if !self.held.is_empty() && fine.vertices[child].iter().any(|&v| self.held[v as usize] != 0) {
             return None;
         }
-        let fine = &self.hierarchy.levels[self.l - 1];
         self.carried.get(kind, &fine.cells[child], fine.hanging[child])
     }
 }

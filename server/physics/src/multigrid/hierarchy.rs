@@ -69,6 +69,11 @@ impl Hierarchy {
         Self::with(octree, COARSE_ENOUGH, true)
     }
 
+    /// The same with a level `least`, if the body is wide enough for it.
+    pub fn with_level(octree: &Octree, least: usize) -> Self {
+        Self::down_to(octree, (COARSE_ENOUGH, least), true)
+    }
+
     /// The same with coarse levels that do not see cuts inside their cells; only for comparison.
     pub fn without_duplicates(octree: &Octree) -> Self {
         Self::with(octree, COARSE_ENOUGH, false)
@@ -77,17 +82,24 @@ impl Hierarchy {
     /// The same down to some number of unknowns; without `duplicates` the coarse levels do not see cuts inside
     /// their cells.
     pub(super) fn with(octree: &Octree, coarse_enough: usize, duplicates: bool) -> Self {
+        Self::down_to(octree, (coarse_enough, 0), duplicates)
+    }
+
+    fn down_to(octree: &Octree, (coarse_enough, least): (usize, usize), duplicates: bool) -> Self {
         let (finest, mut links) = Level::finest(octree);
         let mut levels = vec![finest];
         let mut steps = Vec::new();
         let across = largest_extent(octree.lattice());
         let mut size = 0;
-        while 3 * levels[levels.len() - 1].n_vertices > coarse_enough && 1 << size < across {
+        let enough = |levels: &[Level]| {
+            levels.len() > least && 3 * levels[levels.len() - 1].n_vertices <= coarse_enough
+        };
+        while !enough(&levels) && 1 << size < across {
             let fine = &levels[levels.len() - 1];
             let coarsened = fine.coarsened(&links, size, duplicates);
             let (before, after) = (fine.n_vertices as f64, coarsened.level.n_vertices as f64);
             let larger_wait = fine.cells.iter().any(|cell| cell.level > size);
-            if after > STALLED * before && !larger_wait {
+            if after > STALLED * before && !larger_wait && levels.len() > least {
                 break;
             }
             steps.push(Step::new(fine, &coarsened.level, coarsened.parent));

@@ -20,12 +20,15 @@ mod smoother;
 mod coarsest;
 mod cycle;
 mod precondition;
+mod restricted;
+mod simulated;
 
 pub use coarsest::CoarsestSolve;
 pub use cycle::{LevelReport, Multigrid, MultigridSettings};
 pub use galerkin::{CellMaterial, Coefficients};
 pub use hierarchy::Hierarchy;
 pub use precondition::Cycle;
+pub use simulated::{Composite, CompositePreconditioner, CompositeSystem};
 pub use smoother::Smoother;
 
 #[cfg(test)]

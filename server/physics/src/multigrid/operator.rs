@@ -9,10 +9,7 @@ use super::dense::{Dense, rows_packed, times_packed};
 use super::galerkin::{CellMatrix, Galerkin, LevelMatrices};
 use super::level::Level;
 use crate::octree::Cell;
-use crate::operator::Padded;
-#[cfg(test)]
-use crate::operator::{BLOCK, Block6, Inverse3, invert};
-#[cfg(test)]
+use crate::operator::{BLOCK, Block6, Inverse3, Padded, invert};
 use crate::team::{Team, blocks};
 
 /// Cells per unit of work.
@@ -143,8 +140,7 @@ impl LevelOperator<'_> {
     }
 
     /// Inverses of the diagonal blocks; 0 in directions without stiffness and mass. `fixed` gives the prescribed
-    /// directions of a vertex, one bit each. What the kernels are tested against.
-    #[cfg(test)]
+    /// directions of a vertex, one bit each.
     pub fn invert_diagonal(&self, team: &mut Team, fixed: impl Fn(usize) -> u8 + Sync, out: &mut [Inverse3]) {
         team.for_blocks(blocks(out, BLOCK), |block, out| {
             for (i, out) in out.iter_mut().enumerate() {
@@ -158,7 +154,6 @@ impl LevelOperator<'_> {
     }
 
     /// Diagonal block of vertex `v`.
-    #[cfg(test)]
     pub fn diagonal(&self, v: usize) -> Block6 {
         let mut sum = Matrix3::identity() * self.matrices.mass[v];
         for (id, c) in self.level.slots_of(v) {

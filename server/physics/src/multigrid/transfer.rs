@@ -87,7 +87,6 @@ impl Transfer {
     }
 
     /// Coarse vertices of fine vertex `v`, and their weights.
-    #[cfg(test)]
     pub fn row(&self, v: usize) -> &[(u32, f32)] {
         self.rows.get(v)
     }

@@ -5,3 +5,4 @@ mod galerkin;
 mod levels;
 mod rates;
 mod reference;
+mod simulated;
