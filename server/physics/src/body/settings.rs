@@ -39,6 +39,10 @@ pub struct BodySettings {
     pub mass: MassKind,
     /// Method of the linear solver.
     pub method: Method,
+    /// Octree cells only: the level of multigrid that is simulated. With 1 and 2 composite elements 2 and 4 finest
+    /// cells wide move the vertices of the finest cells; cuts, surface and materials stay as fine as these. Needs
+    /// a method of multigrid on the fast path.
+    pub simulate_level: u8,
     /// Solve [`Scheme::Static`] by matrix-free relaxation: `solver.iterations` of it per step, continued
     /// from step to step. `method` is then unused.
     pub relaxation: bool,
@@ -92,6 +96,7 @@ impl Default for BodySettings {
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
             method: Method::Pcg,
+            simulate_level: 0,
             relaxation: false,
             operator: OperatorChoice::Auto,
             arithmetic: None,
@@ -106,6 +111,8 @@ impl Default for BodySettings {
 impl BodySettings {
     /// Largest number of threads that may work on a step.
     pub const MOST_THREADS: usize = 64;
+    /// Coarsest level that may be simulated.
+    pub const COARSEST_SIMULATED: u8 = 2;
 
     /// The setting that keeps a body of this law from the fast path; `None` if it can be taken.
     ///
@@ -220,6 +227,7 @@ impl BodySettings {
             newton: self.newton(law),
             linear: (self.solves(law), PcgSettings { iterations, ..self.solver }),
             method: self.method,
+            simulate_level: self.simulate_level,
             relaxation: self.relaxation.then_some(self.solver.iterations),
         }
     }
@@ -262,6 +270,7 @@ impl BodySettings {
             }
             _ => {}
         }
+        self.check_level(law)?;
         match (self.arithmetic, self.why_general(law)) {
             (Some(Arithmetic::Single), Some(with)) => {
                 Err(BodyError::Combination { what: "single precision", with, instead: "mixed or double" })
@@ -280,6 +289,32 @@ impl BodySettings {
                 instead: "double",
             }),
             _ => Ok(()),
+        }
+    }
+
+    /// Checks that the simulated level goes with the other settings.
+    fn check_level(&self, law: Law) -> Result<(), BodyError> {
+        if self.simulate_level == 0 {
+            return Ok(());
+        }
+        if self.simulate_level > Self::COARSEST_SIMULATED {
+            let found = f64::from(self.simulate_level);
+            return Err(BodyError::Setting { name: "simulate_level", found, allowed: "0, 1, 2" });
+        }
+        let why = [
+            (self.element != ElementKind::Octree, "elements other than octree cells", "element octree"),
+            (!self.method.is_multigrid(), "a solver without levels", "mg-pcg or multigrid"),
+            (self.relaxation, "relaxation", "mg-pcg or multigrid"),
+        ];
+        let why = why.into_iter().find(|why| why.0).map(|(_, with, instead)| (with, instead));
+        let general = || self.why_general(law).map(|with| (with, "the fast path, or level 0"));
+        let slow = self.arithmetic(law) != Arithmetic::Single;
+        let arithmetic = || slow.then_some(("arithmetic other than single", "single precision, or level 0"));
+        match why.or_else(general).or_else(arithmetic) {
+            Some((with, instead)) => {
+                Err(BodyError::Combination { what: "simulating a coarse level", with, instead })
+            }
+            None => Ok(()),
         }
     }
 }

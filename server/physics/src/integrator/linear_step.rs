@@ -14,6 +14,7 @@
 use nalgebra::Vector3;
 
 use super::parts::Translations;
+use super::simulated_level::SimulatedLevel;
 use super::springs::ActiveSpring;
 use super::state::{State, WEIGHTLESS, hold};
 use super::step_grid::StepGrid;
@@ -21,10 +22,10 @@ use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
 use super::step_solver::ActiveSprings;
 use crate::lists::reserve::resize_reserving;
 use crate::material::Rayleigh;
-use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport};
+use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport, Multigrid};
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
-    Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
+    Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded, unpadded,
 };
 use crate::phase::Phase;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
@@ -63,6 +64,8 @@ pub struct LinearStep {
     method: Method,
     /// Multigrid, if the discretisation has levels and the method asks for it.
     grid: Option<Box<StepGrid>>,
+    /// The level that is simulated, if it is not the finest one; there is no `grid` then.
+    simulated: Option<Box<SimulatedLevel>>,
     /// One entry per block of the vector loops.
     partial: Vec<f64>,
     springs: ActiveSprings,
@@ -135,19 +138,27 @@ impl LinearStep {
         self.searched = None;
     }
 
-    /// Sets the levels of the present topology, whose stiffness is `elastic`.
-    pub fn set_hierarchy(&mut self, hierarchy: Option<Hierarchy>, elastic: &dyn Stiffness) {
-        self.grid = hierarchy.map(|hierarchy| Box::new(StepGrid::new(hierarchy, elastic)));
+    /// Sets the levels of the present topology, whose stiffness is `elastic`, and which of them is simulated, or the
+    /// coarsest one if there are fewer.
+    pub fn set_hierarchy(&mut self, hierarchy: Option<Hierarchy>, elastic: &dyn Stiffness, simulate: usize) {
+        (self.grid, self.simulated) = (None, None);
+        let Some(hierarchy) = hierarchy else { return };
+        match simulate.min(hierarchy.n_levels() - 1) {
+            0 => self.grid = Some(Box::new(StepGrid::new(hierarchy, elastic))),
+            level => self.simulated = Some(Box::new(SimulatedLevel::new(hierarchy, elastic, level))),
+        }
     }
 
     /// Figures of the levels of multigrid, and how the coarsest one is solved.
     pub fn levels(&self) -> Option<(Vec<LevelReport>, CoarsestSolve)> {
-        self.grid.as_ref().map(|grid| grid.multigrid().report())
+        let simulated = self.simulated.as_ref().map(|level| level.multigrid());
+        self.grid.as_ref().map(|grid| grid.multigrid()).or(simulated).map(Multigrid::report)
     }
 
     /// Whether a step may continue the search of the one before. Cycles have no search direction.
     fn searches(&self, inputs: &LinearInputs<'_>) -> bool {
-        inputs.relaxes() && (self.method != Method::Multigrid || self.grid.is_none())
+        let cycles = self.method == Method::Multigrid && self.grid.is_some();
+        inputs.relaxes() && !cycles && self.simulated.is_none()
     }
 
     /// Of the last step: pieces of degenerate elements, copies moved relative to others for them, and
@@ -318,6 +329,11 @@ impl LinearStep {
             let force = spring.potential(spring.point(&state.x)).force;
             spring.carriers().for_each(|(c, w)| acceleration[c] += w * force);
         }
+        if let Some(level) = &mut self.simulated {
+            level.follow(team, elastic, inputs);
+            level.accelerate(team, acceleration, inputs);
+            return team.begin(Phase::Guards);
+        }
         for (a, &m) in acceleration.iter_mut().zip(inputs.step.mass) {
             *a = if m > WEIGHTLESS { *a / m } else { Vector3::zeros() };
         }
@@ -340,6 +356,9 @@ impl LinearStep {
                 *predicted = x + inputs.step.h * v;
             }
         });
+        if let Some(level) = &mut self.simulated {
+            level.follow_prescribed(team, inputs.step.fixed, &mut self.predicted);
+        }
         for fixed in inputs.step.fixed {
             for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
                 self.predicted[fixed.copy as usize][axis] = fixed.position_m[axis];
@@ -511,6 +530,12 @@ impl LinearStep {
             let blocks = (&self.diagonal[..], self.preconditioner.inverses());
             grid.complete(team, &mut A, blocks, &self.terms);
         }
+        if let Some(level) = &mut self.simulated {
+            if pass == 0 {
+                level.follow(team, elastic, inputs);
+            }
+            level.set_springs(team, &self.terms);
+        }
     }
 
     /// Solves the translation equations of every free part for the imbalance that δ leaves.
@@ -593,18 +618,22 @@ impl LinearStep {
         });
         // A substitution and cycles mix copies, so the norm of the loads then needs a pass of its own.
         if first && pass == 0 {
-            let loads = if self.preconditioner.substitution().is_empty() && active(&mut self.grid).is_none() {
+            let by_copy = active(&mut self.grid).is_none() && self.simulated.is_none();
+            let loads = if self.preconditioner.substitution().is_empty() && by_copy {
                 self.partial.iter().sum::<f64>().max(0.0).sqrt()
             } else {
                 for (c, load) in self.scratch.iter_mut().enumerate() {
                     *load = padded(&(s * (inputs.step.mass[c] * inputs.step.gravity + inputs.step.load[c])));
                 }
                 filter(inputs.step.fixed, &mut self.scratch);
-                let Self { pcg, preconditioner, scratch, grid, terms, .. } = self;
+                let Self { pcg, preconditioner, scratch, grid, simulated, terms, .. } = self;
                 let mut A = system(elastic, terms, inputs);
-                match active(grid) {
-                    None => pcg.norm(team, &mut A, preconditioner, scratch),
-                    Some(grid) => pcg.norm(team, &mut A, &mut grid.cycle(preconditioner.inverses()), scratch),
+                match (active(grid), simulated) {
+                    (_, Some(level)) => level.norm(team, scratch),
+                    (None, _) => pcg.norm(team, &mut A, preconditioner, scratch),
+                    (Some(grid), _) => {
+                        pcg.norm(team, &mut A, &mut grid.cycle(preconditioner.inverses()), scratch)
+                    }
                 }
             };
             self.reference = self.least_reference(loads, inputs);
@@ -638,11 +667,12 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         (pass, first): (usize, bool),
     ) -> LinearReport {
-        let Self { pcg, preconditioner, terms, delta, grid, .. } = self;
+        let Self { pcg, preconditioner, terms, delta, grid, simulated, .. } = self;
         let mut A = system(elastic, terms, inputs);
-        let rz = match active(grid) {
-            None => pcg.precondition(team, &mut A, preconditioner),
-            Some(grid) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
+        let rz = match (active(grid), &mut *simulated) {
+            (_, Some(level)) => level.norm(team, &pcg.r).powi(2),
+            (None, _) => pcg.precondition(team, &mut A, preconditioner),
+            (Some(grid), _) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
         };
         let norm = rz.max(0.0).sqrt();
         if first && pass == 0 {
@@ -652,6 +682,11 @@ impl LinearStep {
             self.began = if self.reference > 0.0 { norm / self.reference } else { 0.0 };
         }
         let from = (rz, self.reference, inputs.solver);
+        if let Some(level) = simulated {
+            let (exact, fixed) = (!inputs.material.law.rotates(), inputs.step.fixed);
+            let from = (norm, self.reference, inputs.solver, self.method);
+            return level.solve(team, (&mut A, exact), fixed, delta, from);
+        }
         match active(grid) {
             None => pcg.run(team, &mut A, preconditioner, delta, from),
             Some(grid) => {
@@ -746,9 +781,4 @@ fn system<'a>(
         springs,
         fixed: inputs.step.fixed,
     }
-}
-
-#[inline(always)]
-fn unpadded(v: &Padded) -> Vector3<f64> {
-    Vector3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
 }

@@ -49,6 +49,7 @@ pub struct LinearlyImplicit {
     solves: u32,
     pcg: PcgSettings,
     method: Method,
+    simulate_level: usize,
     relaxes: bool,
     stiffness: Box<dyn Stiffness>,
     /// Whether the stiffness uses only instructions that every machine has.
@@ -84,6 +85,7 @@ impl LinearlyImplicit {
             solves,
             pcg,
             method: settings.method,
+            simulate_level: usize::from(settings.simulate_level),
             relaxes: settings.relaxation.is_some(),
             stiffness,
             portable,
@@ -277,8 +279,8 @@ impl StepSolver for LinearlyImplicit {
         }
         self.step.set_stiff_modes(space.stiff_modes());
         self.step.set_method(self.method);
-        let hierarchy = if self.method.is_multigrid() { space.hierarchy() } else { None };
-        self.step.set_hierarchy(hierarchy, &*self.stiffness);
+        let hierarchy = if self.method.is_multigrid() { space.hierarchy(self.simulate_level) } else { None };
+        self.step.set_hierarchy(hierarchy, &*self.stiffness, self.simulate_level);
     }
 
     fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) {

@@ -20,6 +20,7 @@ mod spin;
 mod springs;
 mod linearly_implicit;
 mod step_grid;
+mod simulated_level;
 mod linear_step;
 mod held_energy;
 mod model_solver;

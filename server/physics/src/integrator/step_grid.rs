@@ -86,7 +86,8 @@ impl StepGrid {
     }
 }
 
-fn set_coefficients(out: &mut Coefficients, hierarchy: &Hierarchy, inputs: &LinearInputs<'_>) {
+/// Writes the constants of A.
+pub(super) fn set_coefficients(out: &mut Coefficients, hierarchy: &Hierarchy, inputs: &LinearInputs<'_>) {
     let of =
         |material: &Material| CellMaterial { lame: material.lame(), density_kg_m3: material.density_kg_m3 };
     out.materials.clear();

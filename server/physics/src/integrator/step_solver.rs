@@ -129,6 +129,8 @@ pub struct SolverSettings {
     pub linear: (u32, PcgSettings),
     /// Method of these linear solves.
     pub method: Method,
+    /// Level of multigrid that is simulated; 0 is the finest one.
+    pub simulate_level: u8,
     /// [`Scheme::Static`] only: number of iterations of matrix-free relaxation per step, in place of Newton's
     /// method. They continue from step to step.
     pub relaxation: Option<u32>,

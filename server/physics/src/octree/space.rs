@@ -422,8 +422,8 @@ impl Space for OctreeSpace {
         }
     }
 
-    fn hierarchy(&self) -> Option<Hierarchy> {
-        Some(Hierarchy::new(&self.octree))
+    fn hierarchy(&self, least: usize) -> Option<Hierarchy> {
+        Some(Hierarchy::with_level(&self.octree, least))
     }
 
     fn stiff_modes(&self) -> Option<StiffModes> {

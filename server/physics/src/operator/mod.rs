@@ -81,6 +81,12 @@ pub fn padded(v: &nalgebra::Vector3<f64>) -> Padded {
     [v.x as f32, v.y as f32, v.z as f32, 0.0]
 }
 
+/// x, y, z of a padded vector in double precision.
+#[inline(always)]
+pub fn unpadded(v: &Padded) -> nalgebra::Vector3<f64> {
+    nalgebra::Vector3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests;

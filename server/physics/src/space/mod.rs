@@ -213,8 +213,10 @@ pub trait Space: Points + Send {
     /// rotations.
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness);
 
-    /// The levels for multigrid on the elements as they are cut now; `None` if there are none.
-    fn hierarchy(&self) -> Option<Hierarchy> {
+    /// The levels for multigrid on the elements as they are cut now, with a level `least` if the body is wide enough
+    /// for it; `None` if there are none.
+    fn hierarchy(&self, least: usize) -> Option<Hierarchy> {
+        let _ = least;
         None
     }
 

@@ -21,6 +21,7 @@ mod reference;
 mod repeated_solves;
 mod robustness;
 mod sensible;
+mod simulated;
 mod snapping;
 mod springs;
 mod verdicts;
