@@ -110,7 +110,9 @@ fn what_does_not_go_with_an_octree_is_refused() {
     let tets = ["body.block.material", "allowed: only octree"];
     refused("element = \"octree\"\n    mesh", "mesh", &tets);
     refused("levels = 2", "levels = 9", &["body.block.octree.levels"]);
-    refused("levels = 2", "levels = 2, simulate_level = 1", &["simulate_level", "`1` is not supported yet"]);
+    let pcg = ["body.block.octree.simulate_level", "found 1 with solver.method = `pcg`", "mg-pcg"];
+    refused("levels = 2", "levels = 2, simulate_level = 1", &pcg);
+    refused("levels = 2", "levels = 1, simulate_level = 2", &["simulate_level", "at most levels = 1"]);
     let method = "young_pa = 2e5\n    law = \"neo-hookean\"\n    solver = { method = \"multigrid\" }";
     refused("young_pa = 2e5", method, &["found `multigrid` with a law", "pcg"]);
     let xfem = "young_pa = 2e5\n    cutting = { method = \"xfem\" }";
@@ -154,4 +156,33 @@ fn cells_are_solved_by_multigrid_where_the_scene_leaves_it_open() {
     ] {
         assert_eq!(plan_of(line).0, Method::Pcg, "{line}");
     }
+}
+
+/// The lips of the cut part, and the surface is as fine, whatever level is simulated.
+#[test]
+fn a_coarse_level_carries_the_cut_the_surface_and_the_probes() {
+    let run = |level: u8| {
+        let octree = format!(
+            "octree = {{ levels = 2, simulate_level = {level} }}\n    solver = {{ method = \"mg-pcg\" }}"
+        );
+        let mut sim =
+            start(&BLOCK.replace("octree = { levels = 2 }", &octree).replace("[16, 8, 8]", "[32, 16, 16]"))
+                .unwrap();
+        for _ in 0..12 {
+            assert!(!sim.step(&Inputs::default()).bodies[0].solve.is_unconverged());
+        }
+        assert_eq!((sim.cuts_applied(), sim.failures()), (1, Vec::<String>::new()));
+        let [left, right] = [0, 1].map(|i| sim.probe_position(&sim.probes()[i]));
+        (sim.bodies()[0].body.surface().triangles.len(), [right.x - left.x, right.z])
+    };
+    let (triangles, [gap, low]) = run(0);
+    let mut before = 0.0;
+    for level in [1, 2] {
+        let (same, [wide, z]) = run(level);
+        let (wide, off) = (wide / gap, (z - low).abs());
+        assert_eq!(same, triangles);
+        assert!(wide > 0.4 && wide < 1.05 && off > before, "level {level}: {wide} of {gap:e}, {off:e} off");
+        before = off;
+    }
+    assert!(before < 1e-3, "{before:e}");
 }

@@ -133,6 +133,7 @@ impl Builder<'_> {
             solver: spec.mechanics.linear_solver(along, spec.poisson),
             threads: threads::of_one_body(self.bodies, self.options.threads),
             portable: self.options.portable,
+            simulate_level: spec.octree.map_or(0, |octree| octree.simulate_level),
             ..spec.mechanics.body_settings()
         };
         let made = match mesh {

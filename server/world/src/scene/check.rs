@@ -98,7 +98,7 @@ impl Check<'_> {
         let at = format!("body.{}", body.id);
         let mesh = self.mesh(&format!("{at}.mesh"), body);
         let mechanics = self.mechanics(&at, body, &mesh);
-        let octree = self.octree(&at, body, &mesh);
+        let octree = self.octree(&at, body, (&mesh, &mechanics));
         BodySpec {
             id: body.id.clone(),
             skin: body.skin.as_ref().map(|skin| self.skin(&at, skin, body)),

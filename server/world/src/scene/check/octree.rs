@@ -1,9 +1,11 @@
 //! Bodies of octree cells, and regions of another material.
 
 use nalgebra::Vector3;
+use scindo_physics::body::Arithmetic;
 use scindo_physics::octree::{AdaptError, AdaptSettings};
 
 use super::super::checked::{AdaptSpec, MaterialPlace, MaterialSpec, MeshSource, OctreeSpec};
+use super::super::mechanics::Mechanics;
 use super::super::problem::Fault;
 use super::super::raw::*;
 use super::Check;
@@ -20,18 +22,21 @@ pub(super) struct Ready {
     pub octree: bool,
     /// `solver.method = "multigrid"` and `"mg-pcg"`.
     pub multigrid: bool,
-    /// `octree.simulate_level = 1` and `2`.
-    pub simulate_level: bool,
 }
 
 impl Ready {
     /// As physics is now.
-    pub const NOW: Self = Self { octree: true, multigrid: true, simulate_level: false };
+    pub const NOW: Self = Self { octree: true, multigrid: true };
 }
 
 impl Check<'_> {
     /// The cells of a body of octree cells; `None` for other elements.
-    pub(super) fn octree(&mut self, at: &str, body: &RawBody, mesh: &MeshSource) -> Option<OctreeSpec> {
+    pub(super) fn octree(
+        &mut self,
+        at: &str,
+        body: &RawBody,
+        (mesh, mechanics): (&MeshSource, &Mechanics),
+    ) -> Option<OctreeSpec> {
         if body.element != RawElement::Octree {
             if body.octree.is_some() {
                 let what = format!("`octree` only goes with element octree, found {}", word(&body.element));
@@ -53,9 +58,8 @@ impl Check<'_> {
                 format!("found {}, allowed: at most levels = {}", octree.simulate_level, octree.levels);
             self.conflict(format!("{at}.octree.simulate_level"), what, "raise octree.levels or write 0");
         }
-        if octree.simulate_level > 0 && !self.ready.simulate_level {
-            let found = octree.simulate_level.to_string();
-            self.unsupported(format!("{at}.octree.simulate_level"), &found, &["0"]);
+        if octree.simulate_level > 0 {
+            self.simulated(at, octree.simulate_level, mechanics);
         }
         let cells = match mesh {
             MeshSource::Box { min_m, max_m, cells, .. } => {
@@ -117,6 +121,22 @@ impl Check<'_> {
         }
         let error_every_steps = error_every_steps.unwrap_or(every_steps.saturating_mul(ERROR_EVERY));
         AdaptSpec { settings, every_steps, error_every_steps }
+    }
+
+    /// Whether the solver of a body can work on a coarse level.
+    fn simulated(&mut self, at: &str, level: u8, m: &Mechanics) {
+        let key = format!("{at}.octree.simulate_level");
+        if !matches!(m.method, RawMethod::Multigrid | RawMethod::MgPcg) {
+            let found = word(&m.method);
+            let what = format!("found {level} with solver.method = `{found}`, allowed: multigrid, mg-pcg");
+            return self.conflict(key, what, "write solver = { method = \"mg-pcg\" }, or simulate level 0");
+        }
+        // What else keeps multigrid from the fast path is said of the method.
+        if m.why_general().is_none() && m.arithmetic() != Arithmetic::Single {
+            let what = format!("found {level}, which is solved in single precision to 1e-7 at best");
+            let next = "remove solver.precision and raise solver.tolerance, or simulate level 0";
+            self.conflict(key, what, next);
+        }
     }
 
     /// Cells of a box along its longest side, which must be cubes.
@@ -184,7 +204,7 @@ mod tests {
              density_kg_m3 = 1000\nmesh = {{ organ = {{ cells = 16 }} }}\n{line}"
         );
         let raw: RawScene = toml::from_str(&text).unwrap();
-        let ready = Ready { octree: true, multigrid: true, simulate_level: true };
+        let ready = Ready { octree: true, multigrid: true };
         let mut check = Check { raw: &raw, findings: Vec::new(), ready };
         check.scene();
         check.findings.into_iter().map(|(path, fault)| format!("{path}: {fault}")).collect()
@@ -198,6 +218,26 @@ mod tests {
             let tets = found("tet4", &format!("solver = {{ method = \"{method}\" }}"));
             assert!(tets[0].contains("allowed: octree"), "{tets:?}");
         }
+        // What has no levels, or none that can be simulated alone.
+        let refused = |line: &str, element: &str, words: &str| {
+            let found = found(element, &format!("octree = {{ simulate_level = 1 }}\n{line}"));
+            assert!(found.iter().any(|fault| fault.contains(words)), "{found:?}");
+        };
+        refused(
+            "",
+            "octree",
+            "simulate_level: found 1 with solver.method = `pcg`, allowed: multigrid, mg-pcg",
+        );
+        refused("solver = { method = \"cg\" }", "octree", "solver.method = `cg`");
+        refused("solver = { method = \"cholesky\" }", "octree", "write solver = { method = \"mg-pcg\" }");
+        refused("integrator = \"symplectic-euler\"", "octree", "solver.method = `pcg`");
+        refused(
+            "solver = { method = \"mg-pcg\" }\nlaw = \"neo-hookean\"",
+            "octree",
+            "found `mg-pcg` with a law",
+        );
+        refused("solver = { method = \"mg-pcg\", tolerance = 1e-9 }", "octree", "single precision");
+        refused("", "tet4", "`octree` only goes with element octree");
         let coarse = found("octree", "octree = { levels = 1, simulate_level = 2 }");
         assert!(coarse[0].contains("at most levels = 1"), "{coarse:?}");
     }

@@ -16,7 +16,8 @@ pub struct RawOctree {
     #[schemars(range(max = 8), extend("x-next" = "3 or 4 suits most bodies; 0 makes all cells equal"))]
     pub levels: u8,
     /// Level that is simulated. 0 simulates the cells themselves. 1 and 2 simulate composite elements that
-    /// are 2 and 4 finest cells wide; cuts and surface stay as fine as the cells.
+    /// are 2 and 4 finest cells wide (Nesme et al. 2009); cuts, surface, probes and materials stay as fine as the
+    /// cells. Needs `solver.method` mg-pcg or multigrid.
     #[schemars(range(max = 2), extend("x-next" = "0 for accuracy, 1 or 2 for speed"))]
     pub simulate_level: u8,
     /// Divides cells inside the body while something happens there, and joins them again afterwards. Without it
