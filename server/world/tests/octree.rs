@@ -111,7 +111,8 @@ fn what_does_not_go_with_an_octree_is_refused() {
     refused("element = \"octree\"\n    mesh", "mesh", &tets);
     refused("levels = 2", "levels = 9", &["body.block.octree.levels"]);
     let pcg = ["body.block.octree.simulate_level", "found 1 with solver.method = `pcg`", "mg-pcg"];
-    refused("levels = 2", "levels = 2, simulate_level = 1", &pcg);
+    let with_pcg = "octree = { levels = 2, simulate_level = 1 }\n    solver = { method = \"pcg\" }";
+    refused("octree = { levels = 2 }", with_pcg, &pcg);
     refused("levels = 2", "levels = 1, simulate_level = 2", &["simulate_level", "at most levels = 1"]);
     let method = "young_pa = 2e5\n    law = \"neo-hookean\"\n    solver = { method = \"multigrid\" }";
     refused("young_pa = 2e5", method, &["found `multigrid` with a law", "pcg"]);
