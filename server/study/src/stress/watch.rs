@@ -7,8 +7,9 @@
 //! the balance.
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Body, BodyError, Outcome, SolveReport};
+use scindo_physics::body::{AdaptReport, Body, BodyError, Outcome, SolveReport};
 use scindo_physics::cut::{BladeSweep, CutReport};
+use scindo_physics::octree::AdaptSettings;
 
 use super::chart::{Chart, Line};
 use super::evidence::Evidence;
@@ -163,6 +164,27 @@ impl Watch {
             let change = (self.body.momentum() - before).norm() / scale;
             self.common.momentum = larger(self.common.momentum, change);
         }
+        Ok(report)
+    }
+
+    /// Adapts the cells to tools at these places [m], and checks that mass and momentum stay the same. The energy
+    /// that the change of cells takes or gives, and reports, counts as work.
+    ///
+    /// # Errors
+    /// The body refuses it.
+    pub fn adapt(
+        &mut self,
+        settings: &AdaptSettings,
+        tools: &[Vector3<f64>],
+    ) -> Result<AdaptReport, BodyError> {
+        let (before, scale) = (self.body.momentum(), flow(&self.body));
+        let report = self.body.adapt(settings, tools, None)?;
+        self.hold_mass();
+        if scale > 0.0 {
+            let change = (self.body.momentum() - before).norm() / scale;
+            self.common.momentum = larger(self.common.momentum, change);
+        }
+        self.start.0 += report.kinetic_change_j + report.elastic_change_j;
         Ok(report)
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use scindo_physics::body::{Body, BodySettings, PcgSettings};
 use scindo_physics::cut::BladeSweep;
-use scindo_physics::octree::{BoxShape, Octree, OctreeError, OctreeSettings, OctreeSpace};
+use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeError, OctreeSettings, OctreeSpace};
 
 use super::flaws::tell;
 use super::support::{DOWN, L, SOFT, V, plane, slice};
@@ -70,6 +70,21 @@ pub const GROWTH: Case = Case {
     source: "cases 10, 11 and 12; Nienhuys 2003, §3.3",
     quick: true,
     run: Some(growing),
+};
+
+/// Cells that are divided and joined while the body moves and is cut.
+pub const ADAPTING: Case = Case {
+    number: None,
+    name: "cells-adapting",
+    title: "Octree cells: divided near a probe and joined behind it, in tissue that moves and is cut",
+    set_up: "A cube of 24 cells across and three levels flies, turns and shakes without gravity. A probe goes to \
+             and fro through its middle; cells closer than 0.15 edges to it are divided, those farther than 0.25 \
+             are joined. Every 20 of 60 ticks of 1 ms a random plane square cuts the cube.",
+    rule: "C. Adaptation keeps mass and momentum to 1e-12 and leaves the surface closed. With the probe gone the \
+           cells are joined again within four rounds. Energy counts without what adaptation changes and reports.",
+    source: "Bangerth 2003, §4; cases 6 and 10",
+    quick: true,
+    run: Some(adapting),
 };
 
 /// A cube of 0.1 m as octree cells.
@@ -285,6 +300,64 @@ fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
     }
     let added: usize = count(&watch.body).iter().zip(first).map(|(now, then)| now.abs_diff(then)).sum();
     evidence.exactly("cells, vertices and triangles added by repeating the last sweep", added, 0);
+    let body = watch.finish(&mut common, &mut energies, &mut iterations);
+    evidence.pictures.push(view::body(&body, "At the end"));
+    evidence.charts.extend([energies, iterations]);
+    common.tell(&mut evidence);
+    Ok(evidence)
+}
+
+fn adapting(setting: &Setting) -> Result<Evidence, Trouble> {
+    let mut evidence = Evidence::default();
+    let mut common = Common::default();
+    let (mut energies, mut iterations) = charts();
+    let mut random = Random(11);
+    let mut body = body(cells(24, 3)?, setting, 400, 1e-6)?;
+    let (centre, coarse) = (body.centre_of_mass(), body.n_elements());
+    let velocity = |x: &V| {
+        let wave = V::new(0.0, 0.0, (50.0 * x.x + 30.0 * x.y).cos());
+        V::new(0.0, 0.5, 0.0) + V::new(0.0, 4.0, 0.0).cross(&(x - centre)) + 0.3 * wave
+    };
+    let x = body.positions().to_vec();
+    let v: Vec<V> = x.iter().map(velocity).collect();
+    body.set_state(&x, &v)?;
+    let settings = AdaptSettings { distance_m: Some([0.15 * L, 0.25 * L]), ..AdaptSettings::default() };
+    let mut watch = Watch::new("", body, 1e-3, V::zeros());
+    let (mut defects, mut volume, mut changes, mut most) = (0, 0.0_f64, [0; 2], 0);
+    for k in 1..=60 {
+        let middle = watch.body.centre_of_mass();
+        let probe = middle + V::new(0.6 * L * (f64::from(k) / 15.0).sin(), 0.0, 0.1 * L);
+        let done = watch.adapt(&settings, &[probe])?;
+        changes = [changes[0] + done.divided, changes[1] + done.joined];
+        if k % 20 == 10 {
+            let (aside, normal) = (random.vector(0.3 * L), random.vector(1.0) + V::repeat(1e-3));
+            watch.cut(&plane(middle + aside, normal, 0.45 * L), k / 20 + 1)?;
+        }
+        most = most.max(watch.body.n_elements());
+        defects += watch.body.flaws().surface;
+        volume = volume.max(volume_error(&watch.body));
+        watch.step();
+        if k == 50 {
+            evidence.pictures.push(view::body(&watch.body, "The probe on its way, after three cuts"));
+        }
+    }
+    let far = watch.body.centre_of_mass() + V::repeat(100.0 * L);
+    let mut rounds = 0;
+    while watch.adapt(&settings, &[far])?.has_changed() && rounds < 10 {
+        rounds += 1;
+    }
+    watch.steps(5);
+    let (parts, walked) = (watch.body.parts().len(), watch.body.components().len());
+    evidence.tell("cells at first", coarse as f64, "");
+    evidence.tell("cells divided", changes[0] as f64, "");
+    evidence.tell("groups of cells joined", changes[1] as f64, "");
+    evidence.tell("most cells", most as f64, "");
+    evidence.tell("cells at the end, fine along the cuts", watch.body.n_elements() as f64, "");
+    evidence.exactly("kinds of change that never occurred", changes.iter().filter(|n| **n == 0).count(), 0);
+    evidence.exactly("rounds beyond four until all is joined", rounds.max(4) - 4, 0);
+    evidence.exactly("difference between parts by links and by vertices", parts.abs_diff(walked), 0);
+    evidence.exactly("defects of the surface", defects + watch.body.flaws().surface, 0);
+    evidence.at_most("largest error of the volume", volume.max(volume_error(&watch.body)), 1e-12, "");
     let body = watch.finish(&mut common, &mut energies, &mut iterations);
     evidence.pictures.push(view::body(&body, "At the end"));
     evidence.charts.extend([energies, iterations]);

@@ -58,5 +58,6 @@ pub const ALL: &[Case] = &[
     cells::BRANCHES,
     cells::FALLING,
     cells::GROWTH,
+    cells::ADAPTING,
     multigrid::PATCH,
 ];
