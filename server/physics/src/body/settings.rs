@@ -31,6 +31,9 @@ pub struct BodySettings {
     pub portable: bool,
     /// Finite element. Only [`ElementKind::Tet4`] can be cut.
     pub element: ElementKind,
+    /// Whether the hexahedra of [`ElementKind::Hex8`] are equal cubes, which the kernels of cells take. A body finds
+    /// out itself.
+    pub cubes: bool,
     /// Integration of the volumetric energy: a remedy against locking, or none.
     pub volumetric: Volumetric,
     /// Time integration scheme; [`Scheme::Static`] for equilibria.
@@ -82,6 +85,8 @@ const STATIC_NEWTON_STEPS: u32 = 100;
 /// Linear solves of an equilibrium of the linear law in single precision: one, and further ones that
 /// check whether the residual agrees with its recurrence.
 const STATIC_SOLVES: u32 = 5;
+/// Linear solves of an equilibrium with a line search, for the prediction of its cost: most take 5 to 30.
+const DESCENT_SOLVES: f64 = 10.0;
 /// Largest forcing term η of inexact Newton methods (Eisenstat, Walker 1996).
 const FORCING: f64 = 0.1;
 
@@ -92,6 +97,7 @@ impl Default for BodySettings {
             threads: 1,
             portable: false,
             element: ElementKind::Tet4,
+            cubes: false,
             volumetric: Volumetric::Full,
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
@@ -120,19 +126,35 @@ impl BodySettings {
     pub fn why_general(&self, law: Law) -> Option<&'static str> {
         let reasons = [
             (self.element == ElementKind::Tet10, "element tet10"),
-            (self.element == ElementKind::Hex8, "element hex8"),
+            (self.element == ElementKind::Hex8 && !self.cubes, "element hex8 without equal cubes"),
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
             (self.scheme.is_explicit(), "an explicit integrator"),
-            (self.scheme == Scheme::Static && law.rotates(), "the static integrator with a law that rotates"),
+            (
+                self.scheme == Scheme::Static && law.rotates() && !self.descends(law),
+                "the static integrator with a law that rotates",
+            ),
             (
                 self.method != Method::Pcg && !self.method.is_multigrid(),
                 "a solver other than pcg or multigrid",
             ),
             (self.mass != MassKind::Lumped, "consistent mass"),
             (self.volumetric != Volumetric::Full, "a locking remedy"),
-            (self.newton_steps.is_some_and(|steps| steps > 1), "more than one Newton step"),
+            (
+                self.newton_steps.is_some_and(|steps| steps > 1) && !self.descends(law),
+                "more than one Newton step",
+            ),
         ];
         reasons.iter().find(|(general, _)| *general).map(|(_, why)| *why)
+    }
+
+    /// Whether the fast path finds equilibria of this law by solves with a line search. Only octree cells do: the
+    /// general path would assemble their tangent.
+    fn descends(&self, law: Law) -> bool {
+        self.scheme == Scheme::Static
+            && self.element == ElementKind::Octree
+            && law == Law::Corotational
+            && self.simulate_level == 0
+            && !self.relaxation
     }
 
     /// The arithmetic of a body of this law: the requested one; else single precision if the fast path
@@ -167,6 +189,7 @@ impl BodySettings {
     pub(super) fn solves(&self, law: Law) -> u32 {
         match self.scheme {
             Scheme::Static if self.relaxation => 1,
+            Scheme::Static if self.descends(law) => self.newton_steps(law),
             Scheme::Static => STATIC_SOLVES,
             scheme => Multistep::solves(scheme, law),
         }
@@ -211,7 +234,11 @@ impl BodySettings {
     /// Predicted time [s] of a step of the fast path on one thread.
     pub fn fast_seconds(&self, law: Law, pieces: usize) -> f64 {
         let assembled = self.operator(law, pieces) == OperatorChoice::Assembled;
-        let solves = if self.scheme == Scheme::Static { 1.0 } else { f64::from(self.solves(law)) };
+        let solves = match self.scheme {
+            Scheme::Static if self.descends(law) => DESCENT_SOLVES,
+            Scheme::Static => 1.0,
+            _ => f64::from(self.solves(law)),
+        };
         solves * cost::step_seconds(law, pieces, self.solver, assembled)
     }
 
@@ -219,7 +246,7 @@ impl BodySettings {
     /// Newton's method would get.
     pub(super) fn step_solver(&self, law: Law) -> SolverSettings {
         let steps = match self.scheme {
-            Scheme::Static if !self.relaxation => self.newton_steps(law),
+            Scheme::Static if !self.relaxation && !self.descends(law) => self.newton_steps(law),
             _ => 1,
         };
         let iterations = self.solver.iterations.saturating_mul(steps);

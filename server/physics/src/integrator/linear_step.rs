@@ -11,8 +11,11 @@
 //! r = h, x̂ = x + h v and v̂ = v. Linearised at x_n, a spinning body would gain energy; linearised at
 //! the predictor it never does. K̂ rotates with the material, so β does not damp rigid motion.
 
+mod equilibrium;
+
 use nalgebra::Vector3;
 
+use super::descent::Descent;
 use super::parts::Translations;
 use super::simulated_level::SimulatedLevel;
 use super::springs::ActiveSpring;
@@ -31,6 +34,9 @@ use crate::phase::Phase;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
 use crate::team::{Team, blocks};
 
+/// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
+/// one reaches the tolerance.
+const FORCING: f64 = 0.1;
 /// Largest number of passes of a linear solve, repeated while springs open, close or reach their cap.
 const SPRING_PASSES: usize = 3;
 /// The residual is measured against the right-hand side, but at least against this fraction of the loads.
@@ -75,6 +81,8 @@ pub struct LinearStep {
     /// For equilibria: internal forces [N] and energy [J] at the predictor in double precision.
     exact: Vec<Vector3<f64>>,
     stored: f64,
+    /// Line search, for equilibria of laws that rotate.
+    descent: Descent,
     /// Relative residual at the start of the last solve.
     began: f64,
     /// For relaxation: loads that its search began with, and positions where the last step ended.
@@ -186,9 +194,13 @@ impl LinearStep {
         }
         self.predict(team, state, inputs);
         self.springs.begin(&inputs.step, &self.predicted);
+        if inputs.descends() {
+            self.choose_modes(inputs);
+        }
         let mut solve = LinearReport::default();
         let (mut inverted_pieces, mut finite, mut solves) = (0, true, 0);
         let mut began = f64::INFINITY;
+        self.descent.begin();
         for number in 0..inputs.solves.max(1) {
             let inverted = self.update_operator(team, elastic, state, inputs);
             if number == 0 {
@@ -197,7 +209,16 @@ impl LinearStep {
             let known = solve.iterations;
             self.improve(team, (elastic, inputs), state, number == 0, &mut solve);
             solves += 1;
-            finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
+            finite = solve.stop != StopReason::NonFinite;
+            let is_last = number + 1 >= inputs.solves;
+            if finite && inputs.descends() && self.descend(team, inputs, known, is_last, &mut solve) {
+                break;
+            }
+            finite = finite && self.move_predictor(team, inputs);
+            if inputs.descends() && finite && !team.told_to_stop() {
+                self.choose_modes(inputs);
+                continue;
+            }
             // In an equilibrium each solve begins with the true residual, while the one before knew only
             // its recurrence. A true residual that has not halved is rounding.
             let none_left = solve.iterations == known;
@@ -221,49 +242,8 @@ impl LinearStep {
             self.searched.get_or_insert_default().note(inputs);
             self.ended.clone_from(&state.x);
         }
-        let refused_springs = self.springs.refused();
-        StepOutcome { solve, solves, inverted_pieces, refused_springs, finite }
-    }
-
-    /// Whether nothing has changed from outside since the last step.
-    fn goes_on(&self, elastic: &dyn Stiffness, state: &State, inputs: &LinearInputs<'_>) -> bool {
-        let made_for = Some((elastic.version(), inputs.mass_factor()));
-        let same = |known| inputs.is_loaded_as(known) && self.made_for == made_for && self.ended == state.x;
-        self.searched.as_ref().is_some_and(same)
-    }
-
-    /// Continues the search of the last step along its direction, as if both steps were one.
-    fn relax(
-        &mut self,
-        team: &mut Team,
-        elastic: &mut dyn Stiffness,
-        state: &mut State,
-        inputs: &LinearInputs<'_>,
-        spring_forces: &mut [Vector3<f64>],
-    ) -> StepOutcome {
-        team.begin(Phase::Predict);
-        self.predicted.copy_from_slice(&state.x);
-        self.delta.fill([0.0; 4]);
-        self.translations.restart(inputs.step.parts);
-        team.begin(Phase::Solve);
-        let Self { pcg, preconditioner, delta, reference, grid, .. } = self;
-        let mut A = system(elastic, &[], inputs);
-        let until = (*reference, inputs.solver);
-        let solve = match active(grid) {
-            None => pcg.go_on(team, &mut A, preconditioner, delta, until),
-            Some(grid) => pcg.go_on(team, &mut A, &mut grid.cycle(preconditioner.inverses()), delta, until),
-        };
-        let finite = solve.stop != StopReason::NonFinite && self.move_predictor(team, inputs);
-        if finite {
-            self.commit(team, state, inputs, spring_forces);
-            self.ended.copy_from_slice(&state.x);
-        }
-        team.begin(Phase::Guards);
-        // Convergence by the recurrence is checked in the next step, from forces.
-        if !finite || solve.stop == StopReason::Converged {
-            self.searched = None;
-        }
-        StepOutcome { solve, solves: 1, finite, ..StepOutcome::default() }
+        let (refused_springs, backtracks) = (self.springs.refused(), self.descent.backtracks);
+        StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, finite }
     }
 
     /// Makes one linear solve for δ, repeated while springs open, close or reach their cap in it.
@@ -667,9 +647,9 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         (pass, first): (usize, bool),
     ) -> LinearReport {
-        let Self { pcg, preconditioner, terms, delta, grid, simulated, .. } = self;
+        let Self { pcg, preconditioner, terms, delta, grid, simulated, descent, .. } = self;
         let mut A = system(elastic, terms, inputs);
-        let rz = match (active(grid), &mut *simulated) {
+        let mut rz = match (active(grid), &mut *simulated) {
             (_, Some(level)) => level.norm(team, &pcg.r).powi(2),
             (None, _) => pcg.precondition(team, &mut A, preconditioner),
             (Some(grid), _) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
@@ -681,13 +661,26 @@ impl LinearStep {
         if pass == 0 {
             self.began = if self.reference > 0.0 { norm / self.reference } else { 0.0 };
         }
-        let from = (rz, self.reference, inputs.solver);
         if let Some(level) = simulated {
             let (exact, fixed) = (!inputs.material.law.rotates(), inputs.step.fixed);
             let from = (norm, self.reference, inputs.solver, self.method);
             return level.solve(team, (&mut A, exact), fixed, delta, from);
         }
-        match active(grid) {
+        let mut until = inputs.solver;
+        // A residual that is small enough ends the search; nothing is left to solve for.
+        let searches = inputs.descends() && self.began > until.tolerance;
+        let corrects = searches && pass == 0;
+        if corrects && descent.memory.begin(&mut pcg.r) {
+            rz = match active(grid) {
+                None => pcg.precondition(team, &mut A, preconditioner),
+                Some(grid) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
+            };
+        }
+        if searches {
+            until.tolerance = FORCING * rz.max(0.0).sqrt() / self.reference;
+        }
+        let from = (rz, self.reference, until);
+        let report = match active(grid) {
             None => pcg.run(team, &mut A, preconditioner, delta, from),
             Some(grid) => {
                 let mut V = grid.cycle(preconditioner.inverses());
@@ -697,7 +690,11 @@ impl LinearStep {
                     _ => pcg.run(team, &mut A, &mut V, delta, from),
                 }
             }
+        };
+        if corrects {
+            descent.memory.end(delta);
         }
+        report
     }
 
     fn springs_changed(&mut self, inputs: &LinearInputs<'_>, pass: usize) -> bool {

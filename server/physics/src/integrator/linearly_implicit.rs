@@ -114,7 +114,7 @@ impl LinearlyImplicit {
             let solves = if scheme == Scheme::ImplicitEuler { 1 } else { self.solves };
             let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
             let inputs = LinearInputs { step: *inputs, mass_f32, material, solver: *pcg, inertia, solves };
-            let StepOutcome { solve, solves, inverted_pieces, refused_springs, finite } =
+            let StepOutcome { solve, solves, inverted_pieces, refused_springs, backtracks, finite } =
                 step.step(team, &mut **stiffness, state, &inputs, spring_forces);
             report.newton_steps += solves;
             report.iterations += solve.iterations;
@@ -124,6 +124,7 @@ impl LinearlyImplicit {
             report.algebraic_error = report.algebraic_error.max(solve.algebraic_error / inputs.root_s());
             report.inverted_pieces = inverted_pieces;
             report.refused_springs = refused_springs;
+            report.backtracks += backtracks;
             if !finite {
                 return false;
             }

@@ -21,6 +21,8 @@ mod springs;
 mod linearly_implicit;
 mod step_grid;
 mod simulated_level;
+mod descent;
+mod quasi_newton;
 mod linear_step;
 mod held_energy;
 mod model_solver;

@@ -144,6 +144,12 @@ impl LinearInputs<'_> {
         !matches!(self.inertia, Inertia::None { .. })
     }
 
+    /// Whether the step is an equilibrium whose stiffness turns with the material, so that its solves need a line
+    /// search.
+    pub(super) fn descends(&self) -> bool {
+        !self.moves() && !self.relaxes() && self.material.law.rotates()
+    }
+
     /// Whether the step may continue the search of the last one.
     pub(super) fn relaxes(&self) -> bool {
         matches!(self.inertia, Inertia::None { relax: true, .. })
@@ -230,6 +236,8 @@ pub struct StepOutcome {
     pub inverted_pieces: usize,
     /// Springs left out because one of their numbers is unusable.
     pub refused_springs: usize,
+    /// Halvings of the line searches of an equilibrium.
+    pub backtracks: u32,
     /// Whether everything stayed finite. If not, the state was left as it was.
     pub finite: bool,
 }

@@ -196,8 +196,8 @@ impl Octree {
 }
 
 /// Gradients of the shape functions at the quadrature points of [−1, 1]³.
-fn reference_gradients() -> Vec<[Vector3<f64>; 8]> {
-    quadrature::cube_gauss(2).iter().map(|(xi, _)| hex8::reference_gradients(xi)).collect()
+fn reference_gradients() -> [[Vector3<f64>; 8]; 8] {
+    quadrature::cube_gauss_2().map(|xi| hex8::reference_gradients(&xi))
 }
 
 impl Octree {

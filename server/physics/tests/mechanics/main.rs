@@ -16,6 +16,7 @@ mod half_cut_beam;
 mod multigrid;
 mod multistep;
 mod octree;
+mod octree_statics;
 mod phases;
 mod reference;
 mod repeated_solves;
