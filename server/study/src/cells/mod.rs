@@ -38,6 +38,8 @@ mod reference;
 
 mod elements;
 
+mod levels;
+
 pub use bench::CellsBench;
 pub use result::{CellsResult, Column, Picture, Plots, Row, Table, Unit};
 
@@ -48,7 +50,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut CellsBench<'_>) -> Result<CellsResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 7] = [
+pub const NAMES: [&str; 8] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -56,6 +58,7 @@ pub const NAMES: [&str; 7] = [
     "dick-sizes",
     "cells-cube",
     "cells-elements",
+    "cells-levels",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -70,6 +73,7 @@ fn find(name: &str) -> Option<Experiment> {
         "dick-sizes" => Some(sizes::sizes),
         "cells-cube" => Some(reference::reference),
         "cells-elements" => Some(elements::elements),
+        "cells-levels" => Some(levels::levels),
         _ => None,
     }
 }

@@ -11,7 +11,7 @@ use super::shape::Placed;
 use super::solve::{Solver, Until, cholesky, decay, iterations, rate, run};
 use super::system::{MATERIAL, PAPERS, Problem, System, norm};
 use super::tables::{S_BUNNY_3, S_CUBE};
-use super::{NAMES, find, layer, reference};
+use super::{NAMES, find, layer, levels, reference};
 
 /// The cubes of the paper have its numbers of leaves.
 #[test]
@@ -110,6 +110,19 @@ fn rods_buckle_at_the_soft_layer() {
     let run = |cut, soft| layer::run(24, 3, cut, soft).unwrap().sideways;
     let (rods, stiff, uncut) = (run(true, true), run(true, false), run(false, true));
     assert!(rods > 10.0 * stiff && rods > 10.0 * uncut, "sideways {rods:.4} {stiff:.4} {uncut:.4}");
+}
+
+/// Coarser levels have fewer unknowns and larger errors, cut or not.
+#[test]
+fn coarse_levels_trade_accuracy_for_unknowns() {
+    for grid in [Grid::Uncut, Grid::Rotated] {
+        let [finest, one, two] = [0, 1, 2].map(|level| levels::run(24, 2, grid, level).unwrap());
+        let (a, b) = (one.errors(&finest)[1], two.errors(&finest)[1]);
+        assert_eq!(finest.errors(&finest), [0.0; 2]);
+        assert!(2.0 * one.unknowns < finest.unknowns && two.unknowns < one.unknowns, "{}", grid.name());
+        assert!(a > 0.0 && a < b && b < 0.6, "{}: errors {a:.3} {b:.3}", grid.name());
+        assert!(one.iterations > 0.0 && two.iterations > 0.0);
+    }
 }
 
 #[test]
