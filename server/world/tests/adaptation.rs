@@ -74,7 +74,7 @@ fn cells_are_fine_under_a_finger_and_coarse_again_behind_it() {
     let mut results = Results::begin(directory.path(), &Scene::from_toml(PRESSED).unwrap(), &sim).unwrap();
     let (coarse, rest) = (cells(&sim), sim.bodies()[0].body.rest_positions().to_vec());
     let held = sim.bodies()[0].fix_groups.clone();
-    let (mut most, mut surface, mut snapshot) = (0, 0, Snapshot::default());
+    let (mut most, mut snapshot) = (0, Snapshot::default());
     let mut epoch = sim.bodies()[0].epoch();
     for k in 0..100 {
         let before = sim.probe_position(&sim.probes()[0]);
@@ -85,7 +85,7 @@ fn cells_are_fine_under_a_finger_and_coarse_again_behind_it() {
         // Viewers learn of new carriers by the epoch, as after a cut; the triangles stay.
         assert_eq!(body.epoch() > epoch, adapted.has_changed(), "{k} {adapted:?}");
         (epoch, most) = (body.epoch(), most.max(cells(&sim)));
-        surface = sim.bodies()[0].body.surface().triangles.len();
+        let surface = sim.bodies()[0].body.surface().triangles.len();
         // A probe follows its material over new numbers.
         let after = sim.probe_position(&sim.probes()[0]);
         assert!((after - before).norm() < 0.002, "{k}: {before} {after}");
@@ -243,7 +243,7 @@ fn the_estimated_error_divides_cells_at_the_clamped_end() {
     let known = sim.bodies()[0].body.node_of_copy().len();
     let rest = sim.bodies()[0].body.rest_positions();
     let uncut = start_with(&text, 1).bodies()[0].body.rest_positions().len();
-    let mean = rest[uncut..known].iter().map(|X| X.x).sum::<f64>() / (known - uncut) as f64;
+    let mean = rest[uncut..known].iter().map(|rest| rest.x).sum::<f64>() / (known - uncut) as f64;
     assert!(mean < 0.08, "{mean}");
 }
 
