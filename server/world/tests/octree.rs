@@ -187,3 +187,55 @@ fn a_coarse_level_carries_the_cut_the_surface_and_the_probes() {
     }
     assert!(before < 1e-3, "{before:e}");
 }
+
+#[test]
+fn hexahedra_that_are_cubes_take_the_kernels_of_cells() {
+    let block = |cells: &str, more: &str| {
+        let text = format!(
+            "schema = 1\nworld = {{ gravity_m_s2 = [0, 0, -9.81] }}\n[[body]]\nid = \"block\"\n\
+             element = \"hex8\"\nyoung_pa = 2e5\npoisson = 0.3\ndensity_kg_m3 = 1000\n{more}\n\
+             mesh = {{ box = {{ min_m = [0.01, 0, 0], max_m = [0.09, 0.04, 0.06], cells = {cells}, \
+             pattern = \"hex\" }} }}\nfix = [{{ where = {{ slab = {{ axis = \"x\", from = 0, to = 0 }} }} }}]\n"
+        );
+        start(&text)
+    };
+    let mut sim = block("[8, 4, 6]", "").unwrap();
+    assert!(sim.bodies()[0].body.is_fast() && sim.warnings().is_empty(), "{:?}", sim.warnings());
+    let why = |sim: &Simulation| {
+        let plan = sim.plan();
+        plan.effects.iter().find(|effect| effect.name == "deformation block").unwrap().why.clone()
+    };
+    assert!(why(&sim).contains("192 hex8") && why(&sim).contains("fast path"), "{}", why(&sim));
+    // Numbers and surface are those of the mesh, as on the general path.
+    let mut general = block("[8, 4, 6]", "solver = { precision = \"double\" }").unwrap();
+    assert!(!general.bodies()[0].body.is_fast());
+    for _ in 0..20 {
+        sim.step(&Inputs::default());
+        general.step(&Inputs::default());
+    }
+    let [a, b] = [&sim, &general].map(|sim| &sim.bodies()[0].body);
+    assert_eq!(a.rest_positions(), b.rest_positions());
+    assert_eq!(a.surface().triangles, b.surface().triangles);
+    let moved = sim.bodies()[0].displacement_m();
+    let apart = a.positions().iter().zip(b.positions()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(moved > 1e-4 && apart < 0.02 * moved, "{apart} {moved}");
+    let cuboids = block("[8, 4, 7]", "").unwrap();
+    assert!(why(&cuboids).contains("general path for element hex8 without equal cubes"), "{}", why(&cuboids));
+    assert!(block("[8, 4, 6]", "solver = { method = \"mg-pcg\" }").is_ok());
+    let message = block("[8, 4, 7]", "solver = { method = \"mg-pcg\" }").map(drop).unwrap_err();
+    assert!(message.contains("hex8 on a box of equal cubes"), "{message}");
+}
+
+#[test]
+fn an_equilibrium_of_corotational_cells_takes_the_fast_path() {
+    let text = BLOCK
+        .replace("young_pa = 2e5", "integrator = \"static\"\n    young_pa = 5e4")
+        .replace("octree = { levels = 2 }", "octree = { levels = 2 }\n    solver = { tolerance = 1e-6 }");
+    let mut sim = start(&text).unwrap();
+    assert!(sim.bodies()[0].body.is_fast());
+    assert_eq!(sim.bodies()[0].body.settings().method, Method::MgPcg);
+    let solve = sim.step(&Inputs::default()).bodies[0].solve;
+    assert!(!solve.is_unconverged() && solve.newton_steps > 2, "{solve:?}");
+    assert!(sim.bodies()[0].displacement_m() > 1e-3);
+    assert_eq!(sim.failures(), Vec::<String>::new());
+}

@@ -158,7 +158,7 @@ impl Body {
         material: Material,
         settings: BodySettings,
     ) -> Result<Self, BodyError> {
-        let settings = BodySettings { element: space.kind(), ..settings };
+        let settings = BodySettings { element: space.kind(), cubes: space.is_of_cubes(), ..settings };
         if settings.cutting == CuttingMethod::Snap && settings.element == ElementKind::Tet4 {
             let (what, with) = ("cutting along faces", "a discretisation that was made beforehand");
             return Err(BodyError::Combination {

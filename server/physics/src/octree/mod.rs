@@ -10,6 +10,7 @@ mod build;
 mod cells;
 mod change;
 mod coarsen;
+mod cubes;
 mod lattice;
 mod measures;
 mod restriction;

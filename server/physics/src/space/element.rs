@@ -10,6 +10,7 @@ use crate::cut::CutMesh;
 use crate::element::Point;
 use crate::material::Material;
 use crate::mesh::TetMesh;
+use crate::octree::Octree;
 
 /// A finite element on the nodes of a tet mesh, with the data it needs beside that.
 pub trait Element: Debug + Send + Sync {
@@ -48,6 +49,11 @@ pub trait Element: Debug + Send + Sync {
     /// Nodes and shape functions of the point with barycentric coordinates `weights` in tet `tet`, whose
     /// piece is on `copies`.
     fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)>;
+
+    /// The elements as cells of an octree, numbered alike, if they are equal cubes; for the kernels of cells.
+    fn cubes(&self) -> Option<Octree> {
+        None
+    }
 
     /// Calls `visit` with the nodes of every group that hangs together.
     fn for_groups(&self, cut: &CutMesh, visit: &mut dyn FnMut(&[u32])) {

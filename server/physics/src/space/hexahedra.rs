@@ -9,6 +9,7 @@ use crate::cut::CutMesh;
 use crate::element::{Point, deformation_gradient, hex8, quadrature};
 use crate::material::Material;
 use crate::mesh::{HexMesh, TetMesh};
+use crate::octree::Octree;
 
 /// Tetrahedra per hexahedron in [`HexMesh::to_tets`].
 const TETS_PER_HEX: usize = 6;
@@ -63,20 +64,24 @@ impl Element for Hexahedra {
         self.0.hexes[hex].into_iter().zip(N).collect()
     }
 
+    fn cubes(&self) -> Option<Octree> {
+        Octree::of_cubes(&self.0)
+    }
+
     fn for_groups(&self, _: &CutMesh, visit: &mut dyn FnMut(&[u32])) {
         self.0.hexes.iter().for_each(|hex| visit(hex));
     }
 
     fn for_points(&self, _: &CutMesh, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
-        let rule = quadrature::cube_gauss(2);
+        let rule = quadrature::cube_gauss_2();
         for (element, hex) in self.0.hexes.iter().enumerate() {
-            for (xi, w) in &rule {
-                if let Some((gradients, det)) = hex8::gradients(&self.0.corners(element), xi) {
+            for xi in &rule {
+                if let Some((gradients, weight)) = hex8::gradients(&self.0.corners(element), xi) {
                     visit(Point {
                         element,
                         nodes: hex,
                         gradients: &gradients,
-                        weight: w * det,
+                        weight,
                         F: deformation_gradient(&hex.map(|n| x[n as usize]), &gradients),
                         region: 0,
                     });

@@ -209,6 +209,11 @@ pub trait Space: Points + Send {
     /// these elements. `portable` uses only instructions that every machine has.
     fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>>;
 
+    /// Whether the elements are equal cubes without being cells of an octree, so that kernels of cells take them.
+    fn is_of_cubes(&self) -> bool {
+        false
+    }
+
     /// Brings the stiffness that this space made up to date after the last cut. Earlier pieces keep their
     /// rotations.
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness);

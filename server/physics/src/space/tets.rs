@@ -14,6 +14,8 @@ use crate::cut::{
 use crate::element::{Point, Points, Simd};
 use crate::material::Material;
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
+use crate::multigrid::Hierarchy;
+use crate::operator::cells::CellStiffness;
 use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
@@ -185,6 +187,15 @@ impl Space for Tets {
         self.cut.copy_volume()
     }
 
+    fn copy_masses(&self, density_kg_m3: f64) -> Vec<f64> {
+        if self.kind() == ElementKind::Hex8 {
+            // The tetrahedra that a hexahedron is split into share it unevenly among its corners.
+            let all = vec![true; self.cut.n_copies()];
+            return self.volumes(&all).iter().map(|v| density_kg_m3 * v).collect();
+        }
+        self.copy_volumes().iter().map(|v| density_kg_m3 * v).collect()
+    }
+
     fn areas(&self, selected: &[bool]) -> Vec<f64> {
         self.element.areas(self.cut.mesh(), selected)
     }
@@ -346,7 +357,18 @@ impl Space for Tets {
     fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
         let simd = if portable { Simd::Baseline } else { Simd::detect() };
         let elastic = || Elastic::new(simd, self.cut.mesh(), self.cut.pieces(), self.cut.n_copies());
+        if let Some(cubes) = self.element.cubes() {
+            return Some(Box::new(CellStiffness::new(simd, &cubes, &[])));
+        }
         self.is_linear().then(|| Box::new(elastic()) as Box<dyn Stiffness>)
+    }
+
+    fn is_of_cubes(&self) -> bool {
+        self.element.cubes().is_some()
+    }
+
+    fn hierarchy(&self) -> Option<Hierarchy> {
+        self.element.cubes().map(|cubes| Hierarchy::new(&cubes))
     }
 
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {

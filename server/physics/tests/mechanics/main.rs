@@ -13,6 +13,7 @@ mod dynamics;
 mod equilibrium;
 mod foreign_space;
 mod half_cut_beam;
+mod hex8_cubes;
 mod multigrid;
 mod multistep;
 mod octree;

@@ -200,6 +200,15 @@ impl MeshSource {
             _ => None,
         }
     }
+
+    /// Whether it is a block of hexahedra that are equal cubes.
+    pub fn has_cubes(&self) -> bool {
+        let MeshSource::Box { min_m, max_m, cells, split: CellSplit::Hex } = self else { return false };
+        let extent = max_m - min_m;
+        let h = extent.x / cells[0] as f64;
+        // As far as rounding of the corners goes; see `Octree::of_cubes`.
+        h > 0.0 && (1..3).all(|k| (extent[k] / h - cells[k] as f64).abs() < 5e-7)
+    }
 }
 
 /// How a cubic cell is split into elements.

@@ -29,6 +29,8 @@ const RELAXATION: u32 = 50;
 pub struct Mechanics {
     /// Finite element.
     pub element: RawElement,
+    /// Whether a mesh of hexahedra consists of equal cubes, which the fast path takes.
+    pub cubes: bool,
     /// Constitutive law.
     pub law: RawLaw,
     /// Time integration.
@@ -129,6 +131,7 @@ impl Mechanics {
                 RawElement::Hex8 => ElementKind::Hex8,
                 RawElement::Octree => ElementKind::Octree,
             },
+            cubes: self.element == RawElement::Hex8 && self.cubes,
             volumetric: match self.locking {
                 RawLocking::None => Volumetric::Full,
                 RawLocking::NodeAveraged => Volumetric::NodeAveraged { kept: KEPT },

@@ -13,6 +13,7 @@ impl Check<'_> {
         let newmark = body.newmark.clone().unwrap_or_default();
         let mechanics = Mechanics {
             element: body.element,
+            cubes: mesh.has_cubes(),
             law: body.law,
             integrator: body.integrator,
             newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
@@ -154,8 +155,9 @@ impl Check<'_> {
             if !self.ready.multigrid {
                 return self.unsupported(key, &found, &["cg", "pcg", "cholesky", "relaxation"]);
             }
-            if m.element != RawElement::Octree {
-                let what = format!("found `{found}` with {}, allowed: octree", word(&m.element));
+            if m.element != RawElement::Octree && !(m.element == RawElement::Hex8 && m.cubes) {
+                let allowed = "octree, or hex8 on a box of equal cubes";
+                let what = format!("found `{found}` with {}, allowed: {allowed}", word(&m.element));
                 return self.conflict(key, what, "write element = \"octree\", or choose cg, pcg or cholesky");
             }
             // Multigrid works on the kernels of the fast path; a step of an assembled model has no levels.
@@ -193,7 +195,7 @@ impl Check<'_> {
             Some(RawPrecision::Single) => {
                 if let Some(why) = m.why_general() {
                     let what = format!("found `single` with {why}, allowed: mixed, double");
-                    let next = "single precision needs tet4, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law), pcg, \
+                    let next = "single precision needs tet4, octree or hex8 on equal cubes, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law, or octree), pcg or multigrid, \
                                 lumped mass, no locking remedy and one Newton step";
                     self.conflict(key, what, next);
                 }

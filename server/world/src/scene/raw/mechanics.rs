@@ -13,7 +13,7 @@ pub enum RawElement {
     Tet4,
     /// Quadratic tetrahedron, for accuracy.
     Tet10,
-    /// Trilinear hexahedron. It needs the pattern `hex`.
+    /// Trilinear hexahedron. It needs the pattern `hex`. A box of equal cubes takes the kernels of octree cells.
     Hex8,
     /// Cubes on an adaptive octree, for very fine cuts along the links between them. It fills a `box`, a
     /// `surface` or an `organ`.
