@@ -62,7 +62,7 @@ fn summary_probes_and_fields_are_complete() {
     assert!(held["finite"].as_bool().unwrap() && held["lip_triangles"].as_u64().unwrap() > 0);
     assert!(held["solver"]["mean_iterations"].as_f64().unwrap() > 1.0);
     assert_eq!(summary["events"][0]["name"], "cut-applied");
-    assert_eq!(summary["timing"]["stages"].as_array().unwrap().len(), 6);
+    assert_eq!(summary["timing"]["stages"].as_array().unwrap().len(), 7);
     assert_eq!(summary["scene"]["name"], "two blocks");
 
     let rows: Vec<csv::StringRecord> = csv::Reader::from_path(directory.path().join("probes.csv"))
