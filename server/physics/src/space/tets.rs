@@ -367,8 +367,8 @@ impl Space for Tets {
         self.element.cubes().is_some()
     }
 
-    fn hierarchy(&self) -> Option<Hierarchy> {
-        self.element.cubes().map(|cubes| Hierarchy::new(&cubes))
+    fn hierarchy(&self, least: usize) -> Option<Hierarchy> {
+        self.element.cubes().map(|cubes| Hierarchy::with_level(&cubes, least))
     }
 
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {
