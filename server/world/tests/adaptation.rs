@@ -219,6 +219,28 @@ fn free_fall_keeps_its_momentum_while_cells_come_and_go() {
 }
 
 #[test]
+fn composite_elements_follow_cells_that_come_and_go() {
+    let run = |level: u8| {
+        let text = PRESSED.replace("levels = 2,", &format!("levels = 2, simulate_level = {level},"));
+        let mut sim = start_with(&text, 1);
+        let (coarse, mut most) = (cells(&sim), 0);
+        for _ in 0..100 {
+            let report = sim.step(&Inputs::default());
+            assert!(!report.bodies[0].solve.is_unconverged(), "level {level}");
+            most = most.max(cells(&sim));
+        }
+        assert_eq!((sim.failures(), sim.troubles()), (Vec::<String>::new(), Vec::new()));
+        assert!(cells(&sim) == coarse && most > coarse + 100);
+        sim.probe_position(&sim.probes()[0])
+    };
+    let finest = run(0);
+    for level in [1, 2] {
+        let off = (run(level) - finest).norm();
+        assert!(off > 0.0 && off < 5e-4, "level {level}: {off:e} m off");
+    }
+}
+
+#[test]
 fn the_estimated_error_divides_cells_at_the_clamped_end() {
     let text = PRESSED
         .split("[[tool]]")
