@@ -2,7 +2,9 @@
 //!
 //! The model is the cube of Dick, Georgii and Westermann 2011, 80 finest cells across with four levels of coarser
 //! ones. First a grid of 22 blades cuts it to half its depth, then a blade goes through it in small advances. Times
-//! are those of everything that the next step needs, and of its parts. Figures are the best of several rounds.
+//! are those of everything that the next step needs, and of its parts. Last come the parts of the same increment on
+//! bodies of two sizes: what only depends on the cut takes the same time on both. Figures are the best of several
+//! rounds.
 
 #![allow(clippy::disallowed_methods, clippy::unwrap_used)] // a bench reads the clock
 
@@ -15,7 +17,9 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::Simd;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::multigrid::Hierarchy;
-use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace, OctreeSurface};
+use scindo_physics::octree::{
+    BoxShape, CutLink, LinkKey, Octree, OctreeSettings, OctreeSpace, OctreeSurface,
+};
 use scindo_physics::operator::cells::CellStiffness;
 use scindo_physics::space::Space;
 
@@ -43,6 +47,60 @@ fn main() {
     );
     grid(&uncut, rounds);
     advances(uncut, rounds);
+    for cells in if quick { [8, 16] } else { [34, 58] } {
+        let settings = OctreeSettings { cells, levels: 0 };
+        increment(Octree::fill(&shape, settings, &|_| 0).unwrap(), rounds);
+    }
+}
+
+/// The parts of one increment of the same size on bodies of finest cells: a strip of links is cut that is two cells
+/// wide and eight deep.
+fn increment(uncut: Octree, rounds: usize) {
+    let middle = uncut.lattice().size.map(|n| n as i32 / 2);
+    let cut = CutLink { at: [0.5; 2], normal: [Vector3::x(); 2], incision: 1 };
+    let links: Vec<(LinkKey, CutLink)> =
+        (0..16).map(|k| (([middle[0], middle[1] + k / 2, middle[2] + k % 2], 0), cut)).collect();
+    let (x, surface) = (uncut.rest_positions(), OctreeSurface::build(&uncut));
+    let kernel = || CellStiffness::new(Simd::detect(), &uncut, &[]);
+    println!(
+        "an increment of {} links on {} cells, {} vertices",
+        links.len(),
+        uncut.cells().len(),
+        uncut.n_vertices()
+    );
+    let report = |part: &str, ms: f64| println!("  {part:<34} {ms:8.3} ms");
+    let z = |k: i32| f64::from(middle[2] + k) * uncut.lattice().h;
+    let y = |k: i32| f64::from(middle[1] + k) * uncut.lattice().h;
+    let edge = |k: i32| {
+        let p = (f64::from(middle[0]) + 0.1) * uncut.lattice().h;
+        [Vector3::new(p, y(0), z(k)), Vector3::new(p, y(8), z(k))]
+    };
+    let sweep = BladeSweep { segments: vec![edge(0), edge(2)] };
+    let space = OctreeSpace::new(uncut.clone());
+    let whole = prepared(rounds, || space.clone(), |space| space.cut(&x, &sweep, 1).unwrap());
+    report("search, division, volumes, surface", whole);
+    let divided = prepared(rounds, || uncut.clone(), |octree| octree.cut(&links));
+    report("division and numbering", divided);
+    let mut octree = uncut.clone();
+    let change = octree.cut(&links);
+    let followed = prepared(rounds, || surface.clone(), |s| s.follow(&octree, &change.cells, &change.moved));
+    report("surface", followed);
+    let followed = prepared(rounds, kernel, |kernel| kernel.follow_cut(&octree, &change.cells));
+    report("kernel", followed);
+    report("volumes anew", best(rounds, || octree.vertex_volumes()));
+    report("levels anew", best(rounds, || Hierarchy::new(&octree)));
+}
+
+/// Best time of a few rounds [ms] without that of `prepare`.
+fn prepared<S, T>(rounds: usize, prepare: impl Fn() -> S, mut run: impl FnMut(&mut S) -> T) -> f64 {
+    (0..rounds.max(1))
+        .map(|_| {
+            let mut state = prepare();
+            let start = Instant::now();
+            black_box(run(&mut state));
+            start.elapsed().as_secs_f64() * 1e3
+        })
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// The grid of blades in one sweep, as it folds back and forth outside the body.

@@ -26,7 +26,7 @@ impl OctreeSpace {
         self.only_cut = false;
         if change.divided > 0 {
             self.epoch += 1;
-            self.volumes = self.octree.vertex_volumes();
+            self.octree.follow_volumes(&change, &mut self.volumes);
             self.surface.follow(&self.octree, &self.changed, &[]);
         }
         OctreeRefinement { change, new_copies }

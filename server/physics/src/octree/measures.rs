@@ -4,18 +4,38 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::cells::{Cell, Octree};
-use super::change::Leaf;
+use super::cells::Octree;
+use super::change::{Leaf, OctreeChange};
 use super::lattice::{At, OUTSIDE};
 use super::vertices::corner_weights;
 use crate::cut::Components;
 use crate::element::{Point, Points, deformation_gradient, hex8, quadrature};
 use crate::lists::disjoint::{find, join};
+use crate::lists::reserve::resize_reserving;
 use crate::material::Region;
 
 /// Corners of the faces in the directions −x, +x, −y, +y, −z, +z.
 pub const FACES: [[usize; 4]; 6] =
     [[0, 2, 4, 6], [1, 3, 5, 7], [0, 1, 4, 5], [2, 3, 6, 7], [0, 1, 2, 3], [4, 5, 6, 7]];
+
+/// Parts of a finest cell that shares of its volume count in: an eighth for each corner, and a quarter of that for
+/// the vertices around a corner that hangs inside a face.
+const PARTS: f64 = 32.0;
+
+impl Leaf {
+    /// Calls `visit` with the vertices that carry the leaf and their shares of its volume, in finest cells: an
+    /// eighth for each corner.
+    fn for_shares(&self, mut visit: impl FnMut(u32, f64)) {
+        let share = f64::from(self.cell.side()).powi(3) / 8.0;
+        if self.hanging == 0 {
+            return self.vertices.iter().for_each(|&v| visit(v, share));
+        }
+        for row in corner_weights(&self.cell, self.hanging) {
+            let carriers = self.vertices.iter().zip(row).filter(|(_, w)| *w != 0.0);
+            carriers.for_each(|(&v, w)| visit(v, w * share));
+        }
+    }
+}
 
 impl Octree {
     /// Rest position of every vertex [m].
@@ -28,35 +48,42 @@ impl Octree {
         (f64::from(self.cells[id].side()) * self.lattice.h).powi(3)
     }
 
-    /// Sum over the leaves of an eighth of their volume [m³] times `factor`, at each of their corners.
-    fn sum_volumes(&self, factor: impl Fn(&Cell) -> f64) -> Vec<f64> {
+    /// ∫ N_a dV of every vertex [m³].
+    pub fn vertex_volumes(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.n_vertices()];
-        for id in 0..self.cells.len() {
-            let share = factor(&self.cells[id]) * self.cell_volume(id) / 8.0;
-            if self.hanging[id] == 0 {
-                self.vertices[id].iter().for_each(|&v| out[v as usize] += share);
-                continue;
-            }
-            for row in corner_weights(&self.cells[id], self.hanging[id]) {
-                for (&v, w) in self.vertices[id].iter().zip(row) {
-                    out[v as usize] += w * share;
-                }
-            }
+        for id in 0..self.cells.len() as u32 {
+            self.now(id).for_shares(|v, share| out[v as usize] += share);
         }
+        let finest = self.lattice.h.powi(3);
+        out.iter_mut().for_each(|volume| *volume *= finest);
         out
     }
 
-    /// ∫ N_a dV of every vertex [m³].
-    pub fn vertex_volumes(&self) -> Vec<f64> {
-        self.sum_volumes(|_| 1.0)
+    /// Brings the volumes of vertices up to date after `change`, in time that only depends on its size. They are
+    /// those of [`vertex_volumes`](Self::vertex_volumes) to the bit: shares of finest cells are sums of 32nds,
+    /// which are exact.
+    pub(super) fn follow_volumes(&self, change: &OctreeChange, volumes: &mut Vec<f64>) {
+        let finest = self.lattice.h.powi(3);
+        resize_reserving(volumes, self.n_vertices(), 0.0);
+        let mut add = |v: u32, share: f64| {
+            let volume = &mut volumes[v as usize];
+            let known = (*volume / finest * PARTS).round() / PARTS;
+            *volume = (known + share) * finest;
+        };
+        change.earlier.iter().for_each(|leaf| leaf.for_shares(|v, share| add(v, -share)));
+        change.cells.iter().for_each(|&id| self.now(id).for_shares(&mut add));
     }
 
     /// Mass of every vertex [kg] in a body of this density.
     pub fn vertex_masses(&self, density_kg_m3: f64) -> Vec<f64> {
-        self.sum_volumes(|cell| {
+        let finest = self.lattice.h.powi(3);
+        let mut out = vec![0.0; self.n_vertices()];
+        for (id, cell) in (0u32..).zip(&self.cells) {
             let region = usize::from(cell.material).checked_sub(1).and_then(|r| self.regions.get(r));
-            region.map_or(density_kg_m3, |region| region.density_kg_m3)
-        })
+            let density = region.map_or(density_kg_m3, |region| region.density_kg_m3);
+            self.now(id).for_shares(|v, share| out[v as usize] += density * finest * share);
+        }
+        out
     }
 
     /// ∫ N_a dA [m²] over the boundary faces all of whose vertices are `selected`, by vertex.

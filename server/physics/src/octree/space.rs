@@ -167,15 +167,15 @@ impl OctreeSpace {
         let known = self.octree.n_vertices() as u32;
         let change = self.octree.cut(cuts);
         let new_copies = self.number_copies(known, &change);
+        if change.links > 0 || change.divided > 0 {
+            self.octree.follow_volumes(&change, &mut self.volumes);
+        }
         self.changed = change.cells;
         self.only_cut = true;
         // Another cut of a link that was cut before may show at another place.
         if !change.moved.is_empty() || !self.changed.is_empty() {
             self.surface.follow(&self.octree, &self.changed, &change.moved);
             self.epoch += 1;
-        }
-        if change.links > 0 || change.divided > 0 {
-            self.volumes = self.octree.vertex_volumes();
         }
         CutReport {
             new_copies,

@@ -427,3 +427,34 @@ fn volumes_areas_and_quadrature_points_fill_the_body() {
         assert!(octree.locate(&Vector3::repeat(1.3)).is_none());
     }
 }
+
+#[test]
+fn volumes_follow_cuts_and_refinement_to_the_bit() {
+    let mut random = Random(5);
+    for round in 0..12 {
+        let mut octree = if round % 3 == 0 {
+            Octree::fill(&Odd, OctreeSettings { cells: 30, levels: 2 }, &|_| 0).unwrap()
+        } else {
+            cube(16, 1 + round as u8 % 3)
+        };
+        let mut volumes = octree.vertex_volumes();
+        let mut hung = false;
+        for step in 0..6 {
+            let change = if step % 3 == 2 {
+                let at = [0, 1, 2].map(|_| (16.0 * random.next()) as i32);
+                octree.refine(&[at], 0)
+            } else {
+                let x = octree.rest_positions();
+                let normal = Vector3::new(random.next() - 0.5, random.next() - 0.5, random.next() - 0.5);
+                let p = x[(random.next() * x.len() as f64) as usize];
+                octree.cut(&octree.crossed_links(&x, &plane(p, normal), 1 + step))
+            };
+            let before = volumes.clone();
+            octree.follow_volumes(&change, &mut volumes);
+            assert!(volumes == octree.vertex_volumes(), "round {round}, step {step}");
+            assert!(change.divided == 0 || volumes != before);
+            hung |= octree.hanging().iter().any(|&hanging| hanging != 0);
+        }
+        assert!(hung, "round {round}");
+    }
+}
