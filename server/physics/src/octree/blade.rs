@@ -30,15 +30,26 @@ struct Search<'a> {
 
 impl Octree {
     /// The links that the triangles of a sweep cross with the vertices at `x` [m], in order.
+    #[cfg(test)]
     pub(crate) fn crossed_links(
         &self,
         x: &[Vector3<f64>],
         triangles: &[SweepTriangle],
         incision: u32,
     ) -> Vec<(LinkKey, CutLink)> {
+        self.crossed_links_in(&self.leaves_near(x, &swept_box(triangles)), x, triangles, incision)
+    }
+
+    /// The same among the links of some leaves, which hold all that may meet the triangles.
+    pub(super) fn crossed_links_in(
+        &self,
+        leaves: &[u32],
+        x: &[Vector3<f64>],
+        triangles: &[SweepTriangle],
+        incision: u32,
+    ) -> Vec<(LinkKey, CutLink)> {
         let mut search = Search { octree: self, x, incision, found: Vec::new() };
         let all: Vec<&SweepTriangle> = triangles.iter().collect();
-        let leaves = self.leaves_near(x, &bounds(triangles.iter().flat_map(|t| [t.low, t.high])));
         for run in leaves.chunks(RUN) {
             let near = among(
                 &all,
@@ -65,15 +76,23 @@ impl Octree {
 
     /// Leaves that may meet the box between two corners [m] with the vertices at `x` [m], ascending.
     pub fn leaves_near(&self, x: &[Vector3<f64>], [low, high]: &[Vector3<f64>; 2]) -> Vec<u32> {
-        // One bit for each face of the box that a vertex is beyond.
-        let beyond = |p: &Vector3<f64>| {
-            (0..3).fold(0u8, |code, k| {
-                code | u8::from(p[k] < low[k]) << k | u8::from(p[k] > high[k]) << (3 + k)
-            })
-        };
-        let codes: Vec<u8> = x.iter().map(beyond).collect();
+        let codes: Vec<u8> = x.iter().map(|p| beyond(p, low, high)).collect();
         let may_meet = |vertices: &[u32; 8]| vertices.iter().fold(!0, |all, &v| all & codes[v as usize]) == 0;
         (0u32..).zip(&self.vertices).filter(|(_, vertices)| may_meet(vertices)).map(|(id, _)| id).collect()
+    }
+
+    /// Those of these leaves that may meet the box between two corners [m], as [`leaves_near`](Self::leaves_near).
+    pub(super) fn leaves_near_of(
+        &self,
+        leaves: &[u32],
+        x: &[Vector3<f64>],
+        [low, high]: &[Vector3<f64>; 2],
+    ) -> Vec<u32> {
+        let may_meet = |id: &u32| {
+            let code = |v: &u32| beyond(&x[*v as usize], low, high);
+            self.vertices[*id as usize].iter().fold(!0, |all, v| all & code(v)) == 0
+        };
+        leaves.iter().copied().filter(may_meet).collect()
     }
 
     /// Positions of the corners of leaf `id` [m].
@@ -185,6 +204,16 @@ fn crossing(triangle: &SweepTriangle, a: &Vector3<f64>, b: &Vector3<f64>) -> Opt
 /// The triangles that may pass through a box.
 fn among<'a>(triangles: &[&'a SweepTriangle], [low, high]: &[Vector3<f64>; 2]) -> Vec<&'a SweepTriangle> {
     triangles.iter().filter(|t| t.overlaps(low, high) && t.may_cross(low, high)).copied().collect()
+}
+
+/// One bit for each face of the box between two corners that `p` is beyond.
+fn beyond(p: &Vector3<f64>, low: &Vector3<f64>, high: &Vector3<f64>) -> u8 {
+    (0..3).fold(0, |code, k| code | u8::from(p[k] < low[k]) << k | u8::from(p[k] > high[k]) << (3 + k))
+}
+
+/// Corners of the smallest box around the triangles of a sweep [m].
+pub(super) fn swept_box(triangles: &[SweepTriangle]) -> [Vector3<f64>; 2] {
+    bounds(triangles.iter().flat_map(|t| [t.low, t.high]))
 }
 
 fn bounds(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::blade::swept_box;
 use super::cells::{CutLink, LinkKey, Octree};
 use super::change::OctreeChange;
 use super::surface::OctreeSurface;
@@ -85,10 +86,22 @@ impl OctreeSpace {
         self.surface = OctreeSurface::build(&self.octree);
     }
 
-    /// Remembers the last position of the blade by the material around it.
-    fn remember(&mut self, blade: &BladeSweep, incision: u32, x: &[Vector3<f64>]) {
+    /// Remembers the last position of the blade by the material around it. `leaves` are all near the box `swept`.
+    fn remember(
+        &mut self,
+        blade: &BladeSweep,
+        incision: u32,
+        x: &[Vector3<f64>],
+        (leaves, swept): (&[u32], &[Vector3<f64>; 2]),
+    ) {
         let Some(last) = blade.segments.last() else { return };
-        let near = self.octree.leaves_near(x, &[last[0].inf(&last[1]), last[0].sup(&last[1])]);
+        let edge = [last[0].inf(&last[1]), last[0].sup(&last[1])];
+        // The sweep ends at the last position, unless it has no triangles yet.
+        let near = if (0..3).all(|k| swept[0][k] <= edge[0][k] && edge[1][k] <= swept[1][k]) {
+            self.octree.leaves_near_of(leaves, x, &edge)
+        } else {
+            self.octree.leaves_near(x, &edge)
+        };
         let near: Vec<[u32; 4]> = near.into_iter().flat_map(|id| self.tets_of(id)).collect();
         let around = |vertex: u32| {
             let mut tets = Vec::new();
@@ -143,8 +156,10 @@ impl OctreeSpace {
             return Err(CutError::Full { what: "cells", found, limit });
         }
         let triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
-        let cuts = self.octree.crossed_links(x, &triangles, incision);
-        self.remember(blade, incision, x);
+        let swept = swept_box(&triangles);
+        let leaves = self.octree.leaves_near(x, &swept);
+        let cuts = self.octree.crossed_links_in(&leaves, x, &triangles, incision);
+        self.remember(blade, incision, x, (&leaves, &swept));
         Ok(cuts)
     }
 
