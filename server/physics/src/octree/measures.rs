@@ -43,6 +43,11 @@ impl Octree {
         self.points.iter().map(|&p| self.lattice.point(p)).collect()
     }
 
+    /// Rest position of one vertex [m].
+    pub fn rest_position(&self, vertex: u32) -> Vector3<f64> {
+        self.lattice.point(self.points[vertex as usize])
+    }
+
     /// Volume of a leaf at rest [m³].
     pub fn cell_volume(&self, id: usize) -> f64 {
         (f64::from(self.cells[id].side()) * self.lattice.h).powi(3)

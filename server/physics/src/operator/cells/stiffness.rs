@@ -100,12 +100,12 @@ impl CellStiffness {
             kept.insert(id, kept.get(&source(id)).copied().unwrap_or_else(Matrix3::identity));
         }
         let renewed = operator.follow(changed, [cells.len(), octree.n_vertices()], &lane, &source);
-        let (positions, h) = (octree.rest_positions(), octree.lattice().h);
+        let h = octree.lattice().h;
         let side = |id: u32| f64::from(cells[id as usize].side()) * h;
         for chunk in renewed {
             let arranged = &mut operator.chunks[chunk];
             arranged.set_rotations(&|id| kept.get(&id).copied().unwrap_or_else(Matrix3::identity));
-            let arranged = RestChunk::new(arranged, &positions, side);
+            let arranged = RestChunk::new(arranged, |v| octree.rest_position(v), side);
             if chunk < rest.len() { rest[chunk] = arranged } else { rest.push(arranged) }
         }
         for &id in changed {
@@ -191,9 +191,13 @@ fn arrange(simd: Simd, octree: &Octree, materials: &Materials) -> (CellOperator,
     // Those of other materials come with the first update.
     let tables = materials.tables(Lame { mu: 1.0, lambda: 0.0 });
     let operator = CellOperator::new(simd, &tables, &lanes, &morton_order(cells), octree.n_vertices());
-    let (positions, h) = (octree.rest_positions(), octree.lattice().h);
+    let h = octree.lattice().h;
     let side = |id: u32| f64::from(cells[id as usize].side()) * h;
-    let rest = operator.chunks.iter().map(|chunk| RestChunk::new(chunk, &positions, side)).collect();
+    let rest = operator
+        .chunks
+        .iter()
+        .map(|chunk| RestChunk::new(chunk, |v| octree.rest_position(v), side))
+        .collect();
     (operator, rest)
 }
 

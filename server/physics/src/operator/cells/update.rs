@@ -43,8 +43,8 @@ struct RestBatch {
 }
 
 impl RestChunk {
-    /// The rest state of `chunk`: `positions` of all vertices [m] and the side of each cell [m] by number.
-    pub fn new(chunk: &CellChunk, positions: &[Vector3<f64>], side: impl Fn(u32) -> f64) -> Self {
+    /// The rest state of `chunk`: the position of each vertex [m] and the side of each cell [m] by number.
+    pub fn new(chunk: &CellChunk, position: impl Fn(u32) -> Vector3<f64>, side: impl Fn(u32) -> f64) -> Self {
         let sides = chunk.lanes.iter().map(|lanes| {
             let mut batch = RestBatch { span: Lanes::default(), inverse: Lanes([-1.0; LANES]) };
             for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
@@ -55,7 +55,7 @@ impl RestChunk {
         });
         Self {
             positions: vec![[0.0; 4]; chunk.vertices.len()],
-            rest: chunk.vertices.iter().map(|&v| positions[v as usize]).collect(),
+            rest: chunk.vertices.iter().map(|&v| position(v)).collect(),
             sides: sides.collect(),
         }
     }
