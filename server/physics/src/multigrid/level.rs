@@ -41,6 +41,28 @@ pub struct Coarsened {
     pub parent: Vec<u32>,
 }
 
+/// These links of `n` cells in ascending order, each once: first by the lower cell, in two passes, then the few of
+/// each one.
+fn in_order(links: impl Iterator<Item = Link> + Clone, n: usize) -> Vec<Link> {
+    let mut first = vec![0_u32; n + 1];
+    links.clone().for_each(|(a, ..)| first[a as usize + 1] += 1);
+    for i in 0..n {
+        first[i + 1] += first[i];
+    }
+    let mut next = first.clone();
+    let mut out = vec![(0, 0, 0); first[n] as usize];
+    for link in links {
+        let place = &mut next[link.0 as usize];
+        out[*place as usize] = link;
+        *place += 1;
+    }
+    for range in first.windows(2) {
+        out[range[0] as usize..range[1] as usize].sort_unstable();
+    }
+    out.dedup();
+    out
+}
+
 impl Level {
     /// Bytes in use.
     pub fn memory(&self) -> usize {
@@ -109,9 +131,7 @@ impl Level {
             }
         }
         let coarse = links.iter().map(|&(a, b, axis)| (parent[a as usize], parent[b as usize], axis));
-        let mut links: Vec<Link> = coarse.filter(|&(a, b, _)| a != b).collect();
-        links.sort_unstable();
-        links.dedup();
+        let links = in_order(coarse.filter(|&(a, b, _)| a != b), level.cells.len());
         level.number_vertices(&links);
         level.list_slots();
         Coarsened { level, links, parent }
