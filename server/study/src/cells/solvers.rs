@@ -134,8 +134,7 @@ fn over_stiffness(bench: &mut CellsBench<'_>, result: &mut CellsResult) -> Resul
     result.tables.push(table);
     result.plots.push(Plots {
         caption: format!(
-            "{}: the paper has 7.5 times at its own s, against gradients whose step takes six times as long as \
-             here.",
+            "{}: the paper has 7.5 times to 0.1, at a stiffness number that it does not print.",
             model.name
         ),
         charts: vec![chart],
