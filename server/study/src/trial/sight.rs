@@ -1,7 +1,7 @@
 //! What the regions of a scene hold and load on a mesh: number of nodes, area and volume.
 
 use scindo_physics::body::Body;
-use scindo_world::assemble::region::select;
+use scindo_world::body::region::select;
 use scindo_world::scene::Region;
 use scindo_world::simulation::Simulation;
 use serde::{Deserialize, Serialize};

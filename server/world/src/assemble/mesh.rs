@@ -7,7 +7,7 @@ use scindo_physics::material;
 use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh, graded_hexes};
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, Shape};
 
-use super::region::holds;
+use crate::body::region::holds;
 use crate::format::{MeshFile, MeshInError, read_mesh};
 use crate::mesh_in::{
     MeshHealth, Observer, OctreeReport, SolidSurface, SurfaceHealth, VolumeHealth, body_bytes, check_scale,

@@ -2,8 +2,6 @@
 
 pub mod doubts;
 
-pub mod region;
-
 pub(crate) mod mesh;
 
 mod skin;
@@ -18,7 +16,7 @@ use scindo_physics::material::{Material, MaterialError, Rayleigh};
 use scindo_physics::octree::OctreeSpace;
 use scindo_physics::team::Lead;
 
-use crate::body::{Adaptation, Probe, SimBody};
+use crate::body::{Adaptation, Probe, SimBody, region};
 use crate::mesh_in::{MeshHealth, Observer};
 use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
 

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use scindo_physics::body::{AdaptReport, Body, BodyError};
 use scindo_physics::estimate::CellRecovery;
 
-use crate::assemble::region;
+use super::region;
 use crate::scene::checked::{AdaptSpec, Region};
 
 /// What adaptations did since the start or the last reset.

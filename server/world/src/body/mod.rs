@@ -6,6 +6,8 @@ mod counts;
 
 mod probe;
 
+pub mod region;
+
 mod shown;
 
 use std::mem::Discriminant;

@@ -12,9 +12,10 @@ use scindo_physics::octree::OctreeSpace;
 use scindo_physics::space::Tets;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
+use crate::assemble::Built;
 use crate::assemble::mesh::{Mesh, fill};
-use crate::assemble::{Built, region};
 use crate::body::SimBody;
+use crate::body::region;
 use crate::format::SurfaceMesh;
 use crate::mesh_in::lattice_from_surface;
 use crate::scene::{BodySpec, MeshSource, OctreeSpec};

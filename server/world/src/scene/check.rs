@@ -18,7 +18,6 @@ use super::problem::{Fault, nearest_word};
 use super::raw::*;
 use super::schema::{Finding, json_schema, validate};
 use super::source::Node;
-use octree::Ready;
 
 /// Most tetrahedra a box may have; more would not fit the memory of an ordinary machine.
 const MAX_BOX_CELLS: u64 = 8_000_000;
@@ -31,7 +30,7 @@ pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
     }
     let raw: RawScene = serde_json::from_value(tree.to_json())
         .map_err(|error| vec![(String::new(), Fault::Syntax { message: error.to_string() })])?;
-    let mut check = Check { raw: &raw, findings: Vec::new(), ready: Ready::NOW };
+    let mut check = Check { raw: &raw, findings: Vec::new() };
     let scene = check.scene();
     if check.findings.is_empty() { Ok(scene) } else { Err(check.findings) }
 }
@@ -39,7 +38,6 @@ pub(crate) fn check(tree: &Node) -> Result<CheckedScene, Vec<Finding>> {
 struct Check<'a> {
     raw: &'a RawScene,
     findings: Vec<Finding>,
-    ready: Ready,
 }
 
 impl Check<'_> {

@@ -152,9 +152,6 @@ impl Check<'_> {
         let key = format!("{at}.solver.method");
         let found = word(&m.method);
         if matches!(m.method, RawMethod::Multigrid | RawMethod::MgPcg) {
-            if !self.ready.multigrid {
-                return self.unsupported(key, &found, &["cg", "pcg", "cholesky", "relaxation"]);
-            }
             if m.element != RawElement::Octree && !(m.element == RawElement::Hex8 && m.cubes) {
                 let allowed = "octree, or hex8 on a box of equal cubes";
                 let what = format!("found `{found}` with {}, allowed: {allowed}", word(&m.element));

@@ -14,21 +14,6 @@ use super::mechanics::word;
 /// Adaptations from one estimate of the error to the next, where the scene does not say.
 const ERROR_EVERY: u32 = 5;
 
-/// What physics can do for bodies of octree cells. The rest is parsed and checked, then refused as not supported
-/// yet.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Ready {
-    /// `element = "octree"`, `cutting.method = "links"` and `[[body.material]]`.
-    pub octree: bool,
-    /// `solver.method = "multigrid"` and `"mg-pcg"`.
-    pub multigrid: bool,
-}
-
-impl Ready {
-    /// As physics is now.
-    pub const NOW: Self = Self { octree: true, multigrid: true };
-}
-
 impl Check<'_> {
     /// The cells of a body of octree cells; `None` for other elements.
     pub(super) fn octree(
@@ -42,10 +27,6 @@ impl Check<'_> {
                 let what = format!("`octree` only goes with element octree, found {}", word(&body.element));
                 self.conflict(format!("{at}.octree"), what, "remove it or write element = \"octree\"");
             }
-            return None;
-        }
-        if !self.ready.octree {
-            self.unsupported(format!("{at}.element"), "octree", &["tet4", "tet10", "hex8"]);
             return None;
         }
         if body.mesh.parts == Some(RawParts::Largest) {
@@ -197,21 +178,20 @@ impl Check<'_> {
 mod tests {
     use super::*;
 
-    /// What a body with this line is refused for, once physics can do everything.
+    /// What a body with this line is refused for.
     fn found(element: &str, line: &str) -> Vec<String> {
         let text = format!(
             "schema = 1\n[[body]]\nid = \"b\"\nelement = \"{element}\"\nyoung_pa = 1e4\npoisson = 0.3\n\
              density_kg_m3 = 1000\nmesh = {{ organ = {{ cells = 16 }} }}\n{line}"
         );
         let raw: RawScene = toml::from_str(&text).unwrap();
-        let ready = Ready { octree: true, multigrid: true };
-        let mut check = Check { raw: &raw, findings: Vec::new(), ready };
+        let mut check = Check { raw: &raw, findings: Vec::new() };
         check.scene();
         check.findings.into_iter().map(|(path, fault)| format!("{path}: {fault}")).collect()
     }
 
     #[test]
-    fn what_is_still_to_come_is_accepted_once_it_is_there() {
+    fn a_coarse_level_needs_multigrid() {
         for method in ["multigrid", "mg-pcg"] {
             let line = format!("solver = {{ method = \"{method}\" }}\noctree = {{ simulate_level = 2 }}");
             assert_eq!(found("octree", &line), [""; 0]);
@@ -223,8 +203,9 @@ mod tests {
             let found = found(element, &format!("octree = {{ simulate_level = 1 }}\n{line}"));
             assert!(found.iter().any(|fault| fault.contains(words)), "{found:?}");
         };
+        assert_eq!(found("octree", "octree = { simulate_level = 1 }"), [""; 0]);
         refused(
-            "",
+            "solver = { method = \"pcg\" }",
             "octree",
             "simulate_level: found 1 with solver.method = `pcg`, allowed: multigrid, mg-pcg",
         );
