@@ -1,9 +1,9 @@
 //! Line search of an equilibrium that is found by linear solves, for laws whose stiffness turns with the material.
 //!
 //! Each solve has the stiffness K̂ = Σ R K Rᵀ with the rotations where it begins. K̂ is positive semidefinite, so δ
-//! points downhill, but it is not the Hessian: the full step may lead too far. [Pairs](QuasiNewton) of earlier
-//! steps correct it. The potential Π(x) = Ψ(x) − f·(x − X)
-//! + springs decides in double precision, as in [`Newton`](crate::solver::Newton).
+//! points downhill, but it is not the Hessian: the full step may lead too far. [Pairs](QuasiNewton) of earlier steps
+//! correct it. The potential decides in double precision, as in [`Newton`](crate::solver::Newton): the stored energy
+//! Ψ(x) and that of the springs, less the work f·(x − X) of the loads.
 //!
 //! # Source
 //! Nocedal, Wright 2006: Numerical Optimization, §3.1 (backtracking), §3.2 (descent with approximate Hessians).
