@@ -9,7 +9,10 @@ use super::dense::{Dense, rows_packed, times_packed};
 use super::galerkin::{CellMatrix, Galerkin, LevelMatrices};
 use super::level::Level;
 use crate::octree::Cell;
-use crate::operator::{BLOCK, Block6, Inverse3, Padded, invert};
+#[cfg(test)]
+use crate::operator::{BLOCK, Inverse3, invert};
+use crate::operator::{Block6, Padded};
+#[cfg(test)]
 use crate::team::{Team, blocks};
 
 /// Cells per unit of work.
@@ -140,7 +143,8 @@ impl LevelOperator<'_> {
     }
 
     /// Inverses of the diagonal blocks; 0 in directions without stiffness and mass. `fixed` gives the prescribed
-    /// directions of a vertex, one bit each.
+    /// directions of a vertex, one bit each. What the kernels are tested against.
+    #[cfg(test)]
     pub fn invert_diagonal(&self, team: &mut Team, fixed: impl Fn(usize) -> u8 + Sync, out: &mut [Inverse3]) {
         team.for_blocks(blocks(out, BLOCK), |block, out| {
             for (i, out) in out.iter_mut().enumerate() {

@@ -160,7 +160,13 @@ impl Composite {
         let held = |&(copy, axes): &(u32, [bool; 3])| FixedCopy { copy, axes, position_m: [0.0; 3] };
         self.held.extend(galerkin.held().iter().map(held));
         let operator = galerkin.operator(&hierarchy.levels[first], first);
-        operator.invert_diagonal(team, |v| galerkin.held_bits[v], self.jacobi.inverses_mut());
+        if let Some(kernel) = &mut self.kernel {
+            kernel.invert_diagonal(team, &self.mass, self.jacobi.inverses_mut());
+        }
+        for held in &self.held {
+            let v = held.copy as usize;
+            self.jacobi.inverses_mut()[v] = invert(&operator.diagonal(v), held.axes);
+        }
         self.sprung.clear();
     }
 
