@@ -189,9 +189,7 @@ fn what_has_no_equilibrium_is_refused_and_what_is_out_of_steps_says_so() {
     assert!(last.is_some());
 }
 
-/// Run it with `cargo test -p scindo-physics --test mechanics octree_statics -- --ignored`.
 #[test]
-#[ignore = "takes about two minutes"]
 fn a_cube_of_64_cells_across_converges() {
     let mut body = cube(64, 0, 1e5, fast(Method::MgPcg, 1e-6));
     let report = step(&mut body, &[]);
