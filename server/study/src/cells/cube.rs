@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde_json::Value;
 
-use super::model::{Grid, Model, ROTATION_DEG, cube, grid_of_blades};
+use super::model::{self, Grid, Model, ROTATION_DEG, grid_of_blades};
 use super::refine::refine;
 use super::solve::cholesky;
 use super::system::{MATERIAL, Problem, System};
@@ -35,7 +35,7 @@ const POISSON: ([f64; 3], u32) = ([0.3, 0.45, 0.49], 32);
 ///
 /// # Errors
 /// The user ended the study.
-pub fn reference(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
+pub fn cubes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
     let mut result = CellsResult {
         name: "cells-cube",
         title: "A cube of cells to a millionth".into(),
@@ -107,7 +107,7 @@ fn of_stored(bench: &mut CellsBench<'_>) -> Result<Table, Trouble> {
 /// # Errors
 /// More cells than a lattice may have.
 pub fn clamped(across: u32) -> Result<Model, Trouble> {
-    let model = cube(across, 0, Grid::Uncut)?;
+    let model = model::cube(across, 0, Grid::Uncut)?;
     Ok(Model { held: |X| X.x == 0.0, pull: |_| V::new(0.0, 0.0, -9.81), ..model })
 }
 
@@ -166,14 +166,14 @@ fn iterations(bench: &mut CellsBench<'_>) -> Result<Table, Trouble> {
                 Grid::Aligned => grid_of_blades(&places, 0.0, TIP),
                 Grid::Rotated => grid_of_blades(&places, ROTATION_DEG, TIP),
             };
-            let model = Model { blades, ..cube(across, 0, Grid::Uncut)? };
+            let model = Model { blades, ..model::cube(across, 0, Grid::Uncut)? };
             row(&mut table, &model, (name, MATERIAL))?;
         }
     }
     for poisson in POISSON.0 {
         let name = format!("{}³, uncut, ν = {poisson}", POISSON.1);
         bench.begin(name.clone(), 3 + 3 * ACROSS.len() + POISSON.0.len())?;
-        row(&mut table, &cube(POISSON.1, 0, Grid::Uncut)?, (name, Material { poisson, ..MATERIAL }))?;
+        row(&mut table, &model::cube(POISSON.1, 0, Grid::Uncut)?, (name, Material { poisson, ..MATERIAL }))?;
     }
     Ok(table)
 }

@@ -34,7 +34,7 @@ mod layer;
 
 mod sizes;
 
-mod reference;
+mod cube;
 
 mod elements;
 
@@ -71,7 +71,7 @@ fn find(name: &str) -> Option<Experiment> {
         "dick-solvers" => Some(solvers::solvers),
         "dick-layer" => Some(layer::layer),
         "dick-sizes" => Some(sizes::sizes),
-        "cells-cube" => Some(reference::reference),
+        "cells-cube" => Some(cube::cubes),
         "cells-elements" => Some(elements::elements),
         "cells-levels" => Some(levels::levels),
         _ => None,

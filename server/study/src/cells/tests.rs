@@ -11,7 +11,7 @@ use super::shape::Placed;
 use super::solve::{Solver, Until, cholesky, decay, iterations, rate, run};
 use super::system::{MATERIAL, PAPERS, Problem, System, norm};
 use super::tables::{S_BUNNY_3, S_CUBE};
-use super::{NAMES, find, layer, levels, reference};
+use super::{NAMES, cube as stored, find, layer, levels};
 
 /// The cubes of the paper have its numbers of leaves.
 #[test]
@@ -88,7 +88,7 @@ fn rates_are_those_of_the_paper_where_nothing_is_cut() {
 /// Refinement reaches the stored solution of 40³ cells at all of its points.
 #[test]
 fn the_stored_cube_is_reached() {
-    let model = reference::clamped(40).unwrap();
+    let model = stored::clamped(40).unwrap();
     let material = Material { young_pa: 1e6, ..MATERIAL };
     let loads = (model.held, model.pull);
     let mut system = System::of_material(&model.octree, loads, Problem::Equilibrium, material).unwrap();
@@ -101,7 +101,7 @@ fn the_stored_cube_is_reached() {
         rough.left
     );
     let fine = refine(&mut system, Some(&mut multigrid), 1e-9, [1e-4, 60.0]);
-    let off = reference::off(&system, 40, &fine.u).unwrap();
+    let off = stored::off(&system, 40, &fine.u).unwrap();
     assert!(fine.left <= 1e-9 && off < 1e-8, "off by {off:e}, residual {:e}", fine.left);
 }
 

@@ -32,12 +32,7 @@ pub fn section(result: &CellsResult) -> String {
     if !result.pictures.is_empty() {
         out += "<div class=\"pair\">\n";
         for picture in &result.pictures {
-            let _ = writeln!(
-                out,
-                "<figure>{}<figcaption>{}</figcaption></figure>",
-                picture.svg,
-                escape(&picture.caption)
-            );
+            out += &picture.figure();
         }
         out += "</div>\n";
     }

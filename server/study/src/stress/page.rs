@@ -155,12 +155,7 @@ fn section(report: &CaseReport) -> String {
     if !evidence.pictures.is_empty() {
         out += "<div class=\"pictures\">\n";
         for picture in &evidence.pictures {
-            let _ = writeln!(
-                out,
-                "<figure>{}<figcaption>{}</figcaption></figure>",
-                picture.svg,
-                escape(&picture.caption)
-            );
+            out += &picture.figure();
         }
         out += "</div>\n";
     }

@@ -6,6 +6,8 @@ use nalgebra::Vector3;
 use scindo_physics::body::Body;
 use scindo_physics::cut::Surface;
 
+use crate::page::html::escape;
+
 /// A picture of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
@@ -13,6 +15,13 @@ pub struct Picture {
     pub caption: String,
     /// The picture as SVG.
     pub svg: String,
+}
+
+impl Picture {
+    /// The picture with its caption as HTML.
+    pub fn figure(&self) -> String {
+        format!("<figure>{}<figcaption>{}</figcaption></figure>\n", self.svg, escape(&self.caption))
+    }
 }
 
 /// Number of shades per colour.
