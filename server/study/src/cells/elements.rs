@@ -83,7 +83,7 @@ pub fn elements(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
     let mut table = Table::new(
         "Time at equal error",
         "Seconds at which a kind of element has the error of uniform cells, 32 across (16 in a quick study), \
-         interpolated between its own runs; and that error's band.",
+         interpolated between its own runs. The limit itself is known to within ±.",
         &[
             ("error", Unit::Number),
             ("± of the limit", Unit::Number),
