@@ -116,7 +116,7 @@ impl PowerIteration {
             let of = |c: usize, w: f64| if mass[c] > 0.0 { w.abs() / mass[c].sqrt() } else { 0.0 };
             let sum: f64 = spring.carriers().map(|(c, w)| of(c, w)).sum();
             for (c, w) in spring.carriers() {
-                self.row[c] += spring.stiffness_n_m() * of(c, w) * sum;
+                self.row[c] += spring.law().stiffness_n_m() * of(c, w) * sum;
             }
         }
         self.row.iter().fold(0.0, |most, row| most.max(*row))

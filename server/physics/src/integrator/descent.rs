@@ -92,7 +92,7 @@ impl Descent {
         }
         let mut phi = stored - work;
         for spring in springs {
-            let response = spring.potential(spring.point(x));
+            let response = spring.law().potential(spring.point(x));
             let along: Vector3<f64> = spring.carriers().map(|(c, w)| w * moved(c)).sum();
             slope -= response.force.dot(&along);
             phi += response.energy;
@@ -115,8 +115,8 @@ impl Descent {
             }
             let mut rise = inputs.step.points.energy(inputs.material, &self.trial) - stored - gained;
             for spring in springs {
-                rise += spring.potential(spring.point(&self.trial)).energy
-                    - spring.potential(spring.point(x)).energy;
+                rise += spring.law().potential(spring.point(&self.trial)).energy
+                    - spring.law().potential(spring.point(x)).energy;
             }
             if rise <= (ARMIJO * t * slope).min(0.0) + rounding {
                 return Some(t);

@@ -165,7 +165,7 @@ impl ModelSolver {
             *f = f_ext - *f;
         }
         for spring in &self.active.springs {
-            let force = spring.potential(spring.point(x)).force;
+            let force = spring.law().potential(spring.point(x)).force;
             spring.carriers().for_each(|(c, w)| self.force[c] += w * force);
         }
         hold(fixed, &mut self.force);

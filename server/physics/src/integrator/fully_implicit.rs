@@ -28,6 +28,34 @@ const RETRY_TOLERANCE: f64 = 1e-3;
 /// Halvings of a Newton step that recovers from a ruined state.
 const RECOVERY_HALVINGS: u32 = 20;
 
+/// Most times that a step is solved again because the bounds of friction have changed, and the relative change
+/// that does not count.
+const GRIP_PASSES: usize = 8;
+const SAME_GRIP: f64 = 1e-3;
+
+/// Φ of the step whose history is `$history`.
+macro_rules! step_potential {
+    ($solver:ident, $history:ident, $definite:ident) => {{
+        let StepHistory { increment, x_a, x_v } = *$history;
+        let Rayleigh { mass_1_s: alpha, stiffness_s: beta } = $solver.material.rayleigh;
+        StepPotential {
+            model: &$solver.model,
+            mass: &$solver.mass,
+            increment,
+            x_a,
+            x_v,
+            alpha,
+            damping: $solver.damping.as_ref().filter(|_| increment.B > 0.0).map(|K| (beta, K)),
+            f_ext: &$solver.f_ext,
+            springs: &$solver.active.springs,
+            definite: $definite,
+            stored: 0.0,
+            scratch: &mut $solver.scratch,
+            force: &mut $solver.force,
+        }
+    }};
+}
+
 impl ModelSolver {
     /// Whether a repeated step is solved more accurately than others.
     pub(super) fn is_coarse(&self) -> bool {
@@ -102,7 +130,7 @@ impl ModelSolver {
         team.begin(Phase::Guards);
         let ruined = self.count_ruined(x, report);
         let (settings, linearised) = self.newton_settings();
-        let StepHistory { increment, x_a, x_v } = *history;
+        let increment = history.increment;
         // With a single solve Newmark's method gains energy where the body turns.
         let least = if report.scheme.is_newmark() { 2 } else { 1 };
         let quadratic = matches!(self.model.law(), Law::Linear | Law::Corotational);
@@ -126,22 +154,8 @@ impl ModelSolver {
         if loose && self.active.springs.is_empty() {
             self.balance_parts(x, (inputs, history));
         }
-        let Rayleigh { mass_1_s: alpha, stiffness_s: beta } = self.material.rayleigh;
-        let mut phi = StepPotential {
-            model: &self.model,
-            mass: &self.mass,
-            increment,
-            x_a,
-            x_v,
-            alpha,
-            damping: self.damping.as_ref().filter(|_| increment.B > 0.0).map(|K| (beta, K)),
-            f_ext: &self.f_ext,
-            springs: &self.active.springs,
-            definite: if single { Tangent::Held } else { Tangent::Projected },
-            stored: 0.0,
-            scratch: &mut self.scratch,
-            force: &mut self.force,
-        };
+        let definite = if single { Tangent::Held } else { Tangent::Projected };
+        let mut phi = step_potential!(self, history, definite);
         team.begin(Phase::Residual);
         if !phi.value(team, x).is_finite() {
             // The velocity is so high that the predictor overflows: start from the present positions.
@@ -160,6 +174,19 @@ impl ModelSolver {
             return NewtonReport { stop: done.stop, ..NewtonReport::default() };
         }
         let mut done = self.newton.minimise(team, &mut phi, x, inputs.fixed);
+        for _ in 0..GRIP_PASSES {
+            // Friction is bounded by the normal force at the end of the step, which only this solve has found.
+            let springs = self.active.springs.iter_mut();
+            let changed = springs.map(|spring| spring.renew_grip(spring.point(x))).fold(0.0, f64::max);
+            if changed <= SAME_GRIP || done.stop == StopReason::NonFinite {
+                break;
+            }
+            let mut phi = step_potential!(self, history, definite);
+            let again = self.newton.minimise(team, &mut phi, x, inputs.fixed);
+            let (steps, backtracks) = (done.steps + again.steps, done.backtracks + again.backtracks);
+            let linear_iterations = done.linear_iterations + again.linear_iterations;
+            done = NewtonReport { steps, backtracks, linear_iterations, ..again };
+        }
         if done.stop != StopReason::NonFinite && loose {
             self.balance_parts(x, (inputs, history));
         }
@@ -201,7 +228,7 @@ impl ModelSolver {
             translations.add(parts, c, *f - *g);
         }
         for spring in &active.springs {
-            let response = spring.potential(spring.point(x));
+            let response = spring.law().potential(spring.point(x));
             translations.add_spring(parts, spring.main_copy(), response.stiffness, response.force);
         }
         translations.solve(parts);

@@ -37,8 +37,8 @@ use crate::team::{Team, blocks};
 /// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
 /// one reaches the tolerance.
 const FORCING: f64 = 0.1;
-/// Largest number of passes of a linear solve, repeated while springs open, close or reach their cap.
-const SPRING_PASSES: usize = 3;
+/// Largest number of passes of a linear solve, repeated while springs open, close, slip or reach their cap.
+const SPRING_PASSES: usize = 8;
 /// The residual is measured against the right-hand side, but at least against this fraction of the loads.
 /// A body at rest would otherwise be solved for rounding noise.
 const LOAD_FLOOR: f64 = 0.01;
@@ -306,7 +306,7 @@ impl LinearStep {
         }
         self.springs.begin(&inputs.step, &self.predicted);
         for spring in &self.springs.springs {
-            let force = spring.potential(spring.point(&state.x)).force;
+            let force = spring.law().potential(spring.point(&state.x)).force;
             spring.carriers().for_each(|(c, w)| acceleration[c] += w * force);
         }
         if let Some(level) = &mut self.simulated {
@@ -452,7 +452,7 @@ impl LinearStep {
     /// Adds the springs to the operator and to the preconditioner.
     fn complete_operator(&mut self, elastic: &mut dyn Stiffness, inputs: &LinearInputs<'_>) {
         self.terms.clear();
-        self.terms.extend(self.springs.springs.iter().filter_map(|s| s.term(inputs.s())));
+        self.terms.extend(self.springs.springs.iter().flat_map(|s| s.terms(inputs.s())));
         let axes_of = |copy: u32| {
             let found = inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy);
             found.map_or([false; 3], |f| inputs.step.fixed[f].axes)
@@ -535,7 +535,7 @@ impl LinearStep {
         }
         for spring in &self.springs.springs {
             let point = self.point_of(spring, inputs);
-            let (S, f) = (s * spring.stiffness(), s * spring.force(point));
+            let (S, f) = (s * spring.law().stiffness(), s * spring.law().force(point));
             self.translations.add_spring(inputs.step.parts, spring.main_copy(), S, f);
         }
         self.translations.solve(inputs.step.parts);
@@ -620,7 +620,7 @@ impl LinearStep {
         }
         // Springs reach few copies: they are added one by one.
         for spring in &self.springs.springs {
-            let f = s * spring.force(self.point_of(spring, inputs));
+            let f = s * spring.law().force(self.point_of(spring, inputs));
             for (c, w) in spring.carriers() {
                 let r = &mut self.pcg.r[c];
                 (0..3).for_each(|k| r[k] += (w * f[k]) as f32);
@@ -735,7 +735,7 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         spring_forces: &mut [Vector3<f64>],
     ) {
-        self.springs.write(spring_forces, |s| s.force(s.point(&self.predicted)));
+        self.springs.write(spring_forces, |s| s.law().force(s.point(&self.predicted)));
         let (predicted, rate) = (&self.predicted, inputs.rate());
         let x_v = match inputs.inertia {
             Inertia::Remembered(history) => Some(history.x_v),

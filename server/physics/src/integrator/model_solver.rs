@@ -140,7 +140,7 @@ impl StepSolver for ModelSolver {
         } else {
             self.implicit_step(team, (course, state), (scheme, inputs), report);
         }
-        self.active.write(spring_forces, |spring| spring.potential(spring.point(&state.x)).force);
+        self.active.write(spring_forces, |spring| spring.law().potential(spring.point(&state.x)).force);
     }
 
     fn be_careful(&mut self, careful: bool) {

@@ -79,7 +79,7 @@ impl StepPotential<'_> {
             }
         }
         for spring in self.springs {
-            let response = spring.potential(spring.point(x));
+            let response = spring.law().potential(spring.point(x));
             phi += response.energy;
             if let Some(g) = g.as_deref_mut() {
                 spring.carriers().for_each(|(c, w)| g[c] -= w * response.force);
@@ -148,7 +148,7 @@ impl Potential for StepPotential<'_> {
 /// Adds w_a w_b S for every pair of carriers. A pair that the pattern lacks is moved to the diagonal,
 /// which keeps the matrix positive semidefinite.
 fn add_spring(spring: &ActiveSpring, x: &[Vector3<f64>], H: &mut BlockCsr<f64>) {
-    let S = spring.potential(spring.point(x)).stiffness;
+    let S = spring.law().potential(spring.point(x)).stiffness;
     if S.amax() == 0.0 {
         return;
     }

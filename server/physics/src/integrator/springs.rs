@@ -60,6 +60,40 @@ pub enum SpringKind {
         /// Where the point is pulled to [m].
         target_m: Vector3<f64>,
     },
+    /// One-sided with dry friction: f_n as for [`OneSided`](Self::OneSided), and across n the force
+    /// f_t = k_t (I − n nᵀ)(anchor − x_p), at most μ f_n of the same instant. A point that sticks is held by its
+    /// anchor without creep; one that slips drags the anchor behind it (see [`PointSpring::after`]).
+    Rough {
+        /// Unit normal n.
+        normal: Vector3<f64>,
+        /// Position of the plane along n [m].
+        offset_m: f64,
+        /// Where the point sticks [m]; only its part across n counts.
+        anchor_m: Vector3<f64>,
+        /// Coefficient of friction μ.
+        friction: f64,
+        /// Stiffness across the normal k_t [N/m], at most k.
+        tangential_n_m: f64,
+        /// Bound μ f_n [N] at the start of the step, from which the search for that at its end begins; 0 where
+        /// there was no contact.
+        grip_n: f64,
+    },
+}
+
+impl PointSpring {
+    /// The kind with which the next step begins after one that left the point at `point` [m] and gave the force
+    /// `force` [N]. The anchor of a rough spring stays while the point sticks, and is dragged along where it
+    /// slipped. Other kinds stay as they are.
+    pub fn after(&self, point: Vector3<f64>, force: Vector3<f64>) -> SpringKind {
+        let mut kind = self.kind;
+        if let SpringKind::Rough { normal, anchor_m, friction, tangential_n_m, grip_n, .. } = &mut kind {
+            let push = force.dot(normal);
+            let across = force - push * *normal;
+            *anchor_m = if *tangential_n_m > 0.0 { point + across / *tangential_n_m } else { point };
+            *grip_n = *friction * push.max(0.0);
+        }
+        kind
+    }
 }
 
 /// Mode of a spring, fixed within one linear solve.
@@ -67,8 +101,43 @@ pub enum SpringKind {
 enum Mode {
     Off,
     Linear,
+    /// Linear along the normal, with friction at its bound across it.
+    Slipping(Slip),
     /// Constant force [N] of the largest size, in the direction it had when the cap was reached.
     Capped(Vector3<f64>),
+}
+
+/// Friction at its bound, linearised. Across the direction t of slipping it turns with the point. Along t it is
+/// constant (Newton's method) or, where that has not settled, a spring to the anchor that gives the bound where it was
+/// linearised: such a spring never pushes a point past its anchor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Slip {
+    /// Force [N] where it was linearised, along t.
+    force: Vector3<f64>,
+    /// Unit vector across t and the normal.
+    across: Vector3<f64>,
+    /// Bound over distance to the anchor [N/m].
+    secant_n_m: f64,
+    /// Whether it is constant along t.
+    is_constant: bool,
+}
+
+impl Slip {
+    /// Linearised where the anchor pulls back by `back` [m] in the plane of this normal, with the bound [N].
+    fn new(back: Vector3<f64>, normal: &Vector3<f64>, bound: f64, is_constant: bool) -> Self {
+        let distance = back.norm();
+        let along = back / distance;
+        let (force, across) = (bound * along, normal.cross(&along));
+        Self { force, across, secant_n_m: bound / distance, is_constant }
+    }
+
+    /// Force [N] where the anchor pulls back by `back` [m].
+    fn at(&self, back: Vector3<f64>) -> Vector3<f64> {
+        match self.is_constant {
+            true => self.force + self.secant_n_m * back.dot(&self.across) * self.across,
+            false => self.secant_n_m * back,
+        }
+    }
 }
 
 /// Energy, force and stiffness of a spring at one position of its point.
@@ -82,53 +151,73 @@ pub struct SpringResponse {
     pub stiffness: Matrix3<f64>,
 }
 
-/// A spring in the course of one step.
+/// After so many choices of a mode in a step, slipping is no longer searched with Newton's method.
+const NEWTON_CHOICES: u8 = 4;
+/// Change of a friction force, relative to its bound, that does not count as a change of mode.
+const SAME_FRICTION: f64 = 1e-3;
+
+/// The law of a spring in the course of one step: force and stiffness by the position of its point.
 #[derive(Clone, Copy, Debug)]
-pub struct ActiveSpring {
-    spring: PointSpring,
+pub struct SpringLaw {
+    kind: SpringKind,
+    /// k [N/m].
+    stiffness_n_m: f64,
+    max_force_n: f64,
     mode: Mode,
+    /// Bound of the friction force [N], from the last position for which there was a solve.
+    grip_n: f64,
+    /// How often a mode was chosen in this step.
+    choices: u8,
 }
 
-impl ActiveSpring {
-    /// Starts a spring at the predicted positions; `None` if it is not [usable](Self::usable).
-    pub fn new(spring: &PointSpring, predicted: &[Vector3<f64>]) -> Option<Self> {
-        let mut active = Self::usable(spring, predicted.len())?;
-        if active.pull(active.point(predicted)).is_none() {
-            active.mode = Mode::Off;
-        }
-        Some(active)
-    }
-
-    /// A spring on a body of `n_copies`; `None` if a number in it is not finite, it has no normal, or a copy
-    /// does not exist.
-    pub fn usable(spring: &PointSpring, n_copies: usize) -> Option<Self> {
-        let mut spring = *spring;
-        let direction_ok = match &mut spring.kind {
-            SpringKind::OneSided { normal, offset_m } => {
-                let length = normal.norm();
-                *normal /= length;
-                *offset_m /= length;
-                length > 1e-12 && length.is_finite() && offset_m.is_finite()
+impl SpringLaw {
+    /// The law of these numbers, with a normal of unit length; `None` if one of them cannot be used.
+    pub fn new(kind: SpringKind, stiffness_n_m: f64, max_force_n: f64) -> Option<Self> {
+        let (mut kind, mut grip_n) = (kind, 0.0);
+        let usable = match &mut kind {
+            SpringKind::OneSided { normal, offset_m } => unit(normal, offset_m),
+            SpringKind::Hold { target_m } => is_finite(target_m),
+            SpringKind::Rough { normal, offset_m, anchor_m, friction, tangential_n_m, grip_n: bound } => {
+                grip_n = *bound;
+                unit(normal, offset_m)
+                    && is_finite(anchor_m)
+                    && (0.0..=1e3).contains(friction)
+                    && (0.0..=1e15).contains(bound)
+                    && (0.0..=stiffness_n_m).contains(tangential_n_m)
             }
-            SpringKind::Hold { target_m } => target_m.iter().all(|t| t.is_finite()),
         };
-        let usable = direction_ok
-            && spring.point.copies().iter().all(|&c| (c as usize) < n_copies)
-            && spring.point.weights().iter().all(|w| w.is_finite())
-            && (0.0..=1e15).contains(&spring.stiffness_n_m)
-            && spring.max_force_n >= 0.0;
-        usable.then_some(Self { spring, mode: Mode::Linear })
+        let usable = usable && (0.0..=1e15).contains(&stiffness_n_m) && max_force_n >= 0.0;
+        usable.then_some(Self { kind, stiffness_n_m, max_force_n, mode: Mode::Linear, grip_n, choices: 0 })
     }
 
-    /// x_p [m].
-    pub fn point(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        self.spring.point.position(x)
+    /// Begins a step with the point at `point`: off without contact, linear otherwise. Friction begins with the
+    /// bound that the spring was given: the normal force at a predictor means nothing.
+    pub fn begin(&mut self, point: Vector3<f64>) {
+        self.mode = match self.pull(point) {
+            None => Mode::Off,
+            Some(_) => self.stick_or_slip(point),
+        };
+    }
+
+    /// The mode of a spring in contact at `point`, with the present bound of friction.
+    fn stick_or_slip(&self, point: Vector3<f64>) -> Mode {
+        match self.kind {
+            SpringKind::Rough { normal, .. } if self.sticking(point).norm() > self.grip_n => {
+                let back = self.back(point);
+                let turned = matches!(self.mode, Mode::Slipping(slip) if slip.force.dot(&back) < 0.0);
+                if turned && self.choices < NEWTON_CHOICES {
+                    return Mode::Linear; // between slipping one way and the other lies sticking
+                }
+                Mode::Slipping(Slip::new(back, &normal, self.grip_n, self.choices < NEWTON_CHOICES))
+            }
+            _ => Mode::Linear,
+        }
     }
 
     /// Extension vector [m] at `point`, which k multiplies; `None` if a one-sided spring has no contact.
     fn pull(&self, point: Vector3<f64>) -> Option<Vector3<f64>> {
-        match self.spring.kind {
-            SpringKind::OneSided { normal, offset_m } => {
+        match self.kind {
+            SpringKind::OneSided { normal, offset_m } | SpringKind::Rough { normal, offset_m, .. } => {
                 let depth = offset_m - normal.dot(&point);
                 (depth > 0.0).then(|| depth * normal)
             }
@@ -136,94 +225,254 @@ impl ActiveSpring {
         }
     }
 
+    /// (I − n nᵀ)(anchor − x_p) [m]; zero for springs without friction.
+    fn back(&self, point: Vector3<f64>) -> Vector3<f64> {
+        let SpringKind::Rough { normal, anchor_m, .. } = self.kind else { return Vector3::zeros() };
+        let back = anchor_m - point;
+        back - back.dot(&normal) * normal
+    }
+
+    /// k_t (I − n nᵀ)(anchor − x_p) [N] at `point`, as if it stuck; zero for springs without friction.
+    fn sticking(&self, point: Vector3<f64>) -> Vector3<f64> {
+        let SpringKind::Rough { tangential_n_m, .. } = self.kind else { return Vector3::zeros() };
+        tangential_n_m * self.back(point)
+    }
+
+    /// Force of friction [N] at `point`, at most `bound`.
+    fn friction(&self, point: Vector3<f64>, bound: f64) -> Vector3<f64> {
+        let sticking = self.sticking(point);
+        let size = sticking.norm();
+        if size > bound { sticking * (bound / size) } else { sticking }
+    }
+
+    /// μ f_n [N] at `point`.
+    fn bound(&self, point: Vector3<f64>) -> f64 {
+        let SpringKind::Rough { friction, .. } = self.kind else { return 0.0 };
+        let push = self.pull(point).map_or(0.0, |pull| self.stiffness_n_m * pull.norm());
+        friction * push.min(self.max_force_n)
+    }
+
+    /// Takes the bound of friction of the [`potential`](Self::potential) from the normal force at `point`.
+    /// Returns by how much it changed, relative to its size.
+    pub fn renew_grip(&mut self, point: Vector3<f64>) -> f64 {
+        let before = self.grip_n;
+        self.grip_n = self.bound(point);
+        let size = self.grip_n.max(before);
+        if size > 0.0 { (self.grip_n - before).abs() / size } else { 0.0 }
+    }
+
     /// Force on the body [N] at `point` in the present mode: what the linear solve assumes.
     pub fn force(&self, point: Vector3<f64>) -> Vector3<f64> {
-        let PointSpring { kind, stiffness_n_m: k, .. } = self.spring;
-        match (self.mode, kind) {
+        let k = self.stiffness_n_m;
+        match (self.mode, self.kind) {
             (Mode::Off, _) => Vector3::zeros(),
-            (Mode::Linear, SpringKind::OneSided { normal, offset_m }) => {
-                k * (offset_m - normal.dot(&point)) * normal
-            }
-            (Mode::Linear, SpringKind::Hold { target_m }) => k * (target_m - point),
             (Mode::Capped(force), _) => force,
+            (_, SpringKind::Hold { target_m }) => k * (target_m - point),
+            (
+                mode,
+                SpringKind::OneSided { normal, offset_m } | SpringKind::Rough { normal, offset_m, .. },
+            ) => {
+                let push = k * (offset_m - normal.dot(&point)) * normal;
+                match mode {
+                    Mode::Slipping(slip) => push + slip.at(self.back(point)),
+                    _ => push + self.sticking(point),
+                }
+            }
         }
     }
 
-    /// Chooses the mode that fits `point`; returns whether it changed.
+    /// Chooses the mode that fits `point`, where a solve has ended; returns whether it changed. The bound of
+    /// friction is that of the normal force there.
     pub fn choose_mode(&mut self, point: Vector3<f64>) -> bool {
         let before = self.mode;
-        let PointSpring { stiffness_n_m: k, max_force_n, .. } = self.spring;
+        self.choices = self.choices.saturating_add(1);
+        // A spring that closes was not part of the solve. Its depth says nothing about its force.
+        self.grip_n = if before == Mode::Off { 0.0 } else { self.bound(point) };
+        let (k, cap) = (self.stiffness_n_m, self.max_force_n);
         self.mode = match self.pull(point) {
             None => Mode::Off,
-            Some(pull) if k * pull.norm() > max_force_n => Mode::Capped(max_force_n * pull.normalize()),
-            Some(_) => Mode::Linear,
+            Some(pull) if k * pull.norm() > cap => {
+                Mode::Capped(cap * pull.normalize() + self.friction(point, self.grip_n))
+            }
+            Some(_) => self.stick_or_slip(point),
         };
-        if matches!((self.mode, before), (Mode::Capped(_), Mode::Capped(_))) {
-            self.mode = before; // the force that the solve was made with
+        match (self.mode, before) {
+            // The force that the solve was made with.
+            (Mode::Capped(_), Mode::Capped(_)) => self.mode = before,
+            (Mode::Slipping(now), Mode::Slipping(known))
+                if (now.force - known.at(self.back(point))).norm() <= SAME_FRICTION * now.force.norm() =>
+            {
+                self.mode = before;
+            }
+            _ => {}
         }
         self.mode != before
     }
 
-    /// k n nᵀ or k I [N/m] while the spring is linear, else 0.
+    /// k n nᵀ, k I, or k n nᵀ + k_t (I − n nᵀ) [N/m] while the spring is linear, else without its constant part.
     pub fn stiffness(&self) -> Matrix3<f64> {
-        match (self.mode, self.spring.kind) {
-            (Mode::Linear, SpringKind::OneSided { normal, .. }) => {
-                self.spring.stiffness_n_m * normal * normal.transpose()
+        let k = self.stiffness_n_m;
+        match (self.mode, self.kind) {
+            (Mode::Off | Mode::Capped(_), _) => Matrix3::zeros(),
+            (_, SpringKind::Hold { .. }) => Matrix3::from_diagonal_element(k),
+            (_, SpringKind::OneSided { normal, .. }) => k * normal * normal.transpose(),
+            (mode, SpringKind::Rough { normal, tangential_n_m, .. }) => {
+                let along = normal * normal.transpose();
+                let sideways = match mode {
+                    Mode::Slipping(Slip { across, secant_n_m, is_constant: true, .. }) => {
+                        secant_n_m * across * across.transpose()
+                    }
+                    Mode::Slipping(slip) => slip.secant_n_m * (Matrix3::identity() - along),
+                    _ => tangential_n_m * (Matrix3::identity() - along),
+                };
+                k * along + sideways
             }
-            (Mode::Linear, SpringKind::Hold { .. }) => {
-                Matrix3::from_diagonal_element(self.spring.stiffness_n_m)
-            }
-            _ => Matrix3::zeros(),
         }
     }
 
     /// Energy [J] of the spring with the point at `point`, whatever the mode: ½ k s² of the extension s,
     /// and beyond the cap f_max the line that continues it, f_max s − f_max²/(2k). It is convex, and its
-    /// gradient is minus the force on the point [N].
+    /// gradient is minus the force on the point [N]. Friction is bounded by the last
+    /// [grip](Self::renew_grip).
     pub fn potential(&self, point: Vector3<f64>) -> SpringResponse {
-        let PointSpring { kind, stiffness_n_m: k, max_force_n: cap, .. } = self.spring;
+        let (k, cap) = (self.stiffness_n_m, self.max_force_n);
         let Some(pull) = self.pull(point) else { return SpringResponse::default() };
-        let s = pull.norm();
-        if k * s <= cap {
-            let stiffness = match kind {
-                SpringKind::OneSided { normal, .. } => k * normal * normal.transpose(),
-                SpringKind::Hold { .. } => Matrix3::from_diagonal_element(k),
-            };
-            return SpringResponse { energy: 0.5 * k * s * s, force: k * pull, stiffness };
-        }
-        let direction = pull / s;
-        let stiffness = match kind {
-            SpringKind::OneSided { .. } => Matrix3::zeros(),
-            SpringKind::Hold { .. } => cap / s * (Matrix3::identity() - direction * direction.transpose()),
+        let sideways = match self.kind {
+            SpringKind::Rough { normal, anchor_m, tangential_n_m, .. } if tangential_n_m > 0.0 => {
+                let back = anchor_m - point;
+                let across = Matrix3::identity() - normal * normal.transpose();
+                capped(across * back, (tangential_n_m, self.grip_n), across)
+            }
+            _ => SpringResponse::default(),
         };
-        SpringResponse { energy: cap * (s - 0.5 * cap / k), force: cap * direction, stiffness }
+        let stiff = match self.kind {
+            SpringKind::Hold { .. } => Matrix3::identity(),
+            SpringKind::OneSided { normal, .. } | SpringKind::Rough { normal, .. } => {
+                normal * normal.transpose()
+            }
+        };
+        let straight = capped(pull, (k, cap), stiff);
+        SpringResponse {
+            energy: straight.energy + sideways.energy,
+            force: straight.force + sideways.force,
+            stiffness: straight.stiffness + sideways.stiffness,
+        }
     }
 
     /// Stiffness k [N/m], whether or not the spring is in contact.
     pub fn stiffness_n_m(&self) -> f64 {
-        self.spring.stiffness_n_m
+        self.stiffness_n_m
     }
 
-    /// The spring as a term h² k J Jᵀ of the operator; `None` unless it is linear.
-    pub fn term(&self, h_squared: f64) -> Option<Spring> {
-        let direction = match self.spring.kind {
-            SpringKind::OneSided { normal, .. } => Some([normal.x as f32, normal.y as f32, normal.z as f32]),
-            SpringKind::Hold { .. } => None,
+    /// The directions of the present stiffness, `None` for all three, each with its size [N/m]; all are ≥ 0.
+    pub fn directions(&self) -> impl Iterator<Item = (Option<[f32; 3]>, f64)> + use<> {
+        let k = self.stiffness_n_m;
+        let single = |n: Vector3<f64>| Some([n.x as f32, n.y as f32, n.z as f32]);
+        let found = match (self.mode, self.kind) {
+            (Mode::Off | Mode::Capped(_), _) => [None, None],
+            (_, SpringKind::Hold { .. }) => [Some((None, k)), None],
+            (_, SpringKind::OneSided { normal, .. }) => [Some((single(normal), k)), None],
+            (Mode::Slipping(slip), SpringKind::Rough { normal, .. }) if slip.is_constant => {
+                [Some((single(normal), k)), Some((single(slip.across), slip.secant_n_m))]
+            }
+            (Mode::Slipping(slip), SpringKind::Rough { normal, .. }) => {
+                [Some((single(normal), k - slip.secant_n_m)), Some((None, slip.secant_n_m))]
+            }
+            (Mode::Linear, SpringKind::Rough { normal, tangential_n_m, .. }) if tangential_n_m > 0.0 => {
+                [Some((single(normal), k - tangential_n_m)), Some((None, tangential_n_m))]
+            }
+            (_, SpringKind::Rough { normal, .. }) => [Some((single(normal), k)), None],
         };
-        (self.mode == Mode::Linear).then(|| Spring {
-            point: self.spring.point.map(|w| w as f32),
+        found.into_iter().flatten()
+    }
+}
+
+/// Energy, force and stiffness of an extension `pull` [m] with stiffness k [N/m] in the directions of `stiff`, up to
+/// the force `cap` [N].
+fn capped(pull: Vector3<f64>, (k, cap): (f64, f64), stiff: Matrix3<f64>) -> SpringResponse {
+    let s = pull.norm();
+    if k * s <= cap {
+        return SpringResponse { energy: 0.5 * k * s * s, force: k * pull, stiffness: k * stiff };
+    }
+    let direction = pull / s;
+    let turned = stiff - direction * direction.transpose();
+    SpringResponse { energy: cap * (s - 0.5 * cap / k), force: cap * direction, stiffness: cap / s * turned }
+}
+
+/// Makes a plane's normal a unit vector; returns whether it can be used.
+fn unit(normal: &mut Vector3<f64>, offset_m: &mut f64) -> bool {
+    let length = normal.norm();
+    *normal /= length;
+    *offset_m /= length;
+    length > 1e-12 && length.is_finite() && offset_m.is_finite()
+}
+
+fn is_finite(v: &Vector3<f64>) -> bool {
+    v.iter().all(|c| c.is_finite())
+}
+
+/// A spring in the course of one step.
+#[derive(Clone, Copy, Debug)]
+pub struct ActiveSpring {
+    point: MaterialPoint,
+    law: SpringLaw,
+}
+
+impl ActiveSpring {
+    /// Starts a spring at the predicted positions; `None` if it is not [usable](Self::usable).
+    pub fn new(spring: &PointSpring, predicted: &[Vector3<f64>]) -> Option<Self> {
+        let mut active = Self::usable(spring, predicted.len())?;
+        active.law.begin(active.point(predicted));
+        Some(active)
+    }
+
+    /// A spring on a body of `n_copies`; `None` if a number in it is not finite, it has no normal, or a copy
+    /// does not exist.
+    pub fn usable(spring: &PointSpring, n_copies: usize) -> Option<Self> {
+        let PointSpring { point, kind, stiffness_n_m, max_force_n } = *spring;
+        let exists = point.copies().iter().all(|&c| (c as usize) < n_copies);
+        let usable = exists && point.weights().iter().all(|w| w.is_finite());
+        let law = SpringLaw::new(kind, stiffness_n_m, max_force_n).filter(|_| usable)?;
+        Some(Self { point, law })
+    }
+
+    /// x_p [m].
+    pub fn point(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+        self.point.position(x)
+    }
+
+    /// Force, stiffness and mode by the position of the point.
+    pub fn law(&self) -> &SpringLaw {
+        &self.law
+    }
+
+    /// See [`SpringLaw::choose_mode`].
+    pub fn choose_mode(&mut self, point: Vector3<f64>) -> bool {
+        self.law.choose_mode(point)
+    }
+
+    /// See [`SpringLaw::renew_grip`].
+    pub fn renew_grip(&mut self, point: Vector3<f64>) -> f64 {
+        self.law.renew_grip(point)
+    }
+
+    /// The spring as terms h² k J Jᵀ of the operator.
+    pub fn terms(&self, h_squared: f64) -> impl Iterator<Item = Spring> + use<> {
+        let point = self.point.map(|w| w as f32);
+        self.law.directions().map(move |(direction, k)| Spring {
+            point,
             direction,
-            stiffness: (h_squared * self.spring.stiffness_n_m) as f32,
+            stiffness: (h_squared * k) as f32,
         })
     }
 
     /// The copy with the largest weight, which tells the part of the point.
     pub fn main_copy(&self) -> usize {
-        self.spring.point.main_copy() as usize
+        self.point.main_copy() as usize
     }
 
     /// Copies and weights.
     pub fn carriers(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.spring.point.carriers()
+        self.point.carriers()
     }
 }

@@ -44,14 +44,14 @@ impl StepInputs<'_> {
     /// Number of springs that push or pull with the nodes at `x` [m].
     pub fn contacts(&self, x: impl Fn(usize) -> Vector3<f64>) -> usize {
         let point = |s: &ActiveSpring| s.carriers().map(|(c, w)| w * x(c)).sum();
-        self.usable_springs().filter(|s| s.potential(point(s)).energy > 0.0).count()
+        self.usable_springs().filter(|s| s.law().potential(point(s)).energy > 0.0).count()
     }
 
     /// Potential energy of springs and loads at `x` [J]; `weight` is the force of gravity on a node [N].
     pub fn load_energy(&self, x: &[Vector3<f64>], weight: impl Fn(usize) -> Vector3<f64>) -> f64 {
         let moved = x.iter().zip(self.rest).enumerate();
         let loads: f64 = moved.map(|(c, (x, X))| (weight(c) + self.load[c]).dot(&(x - X))).sum();
-        self.usable_springs().map(|s| s.potential(s.point(x)).energy).sum::<f64>() - loads
+        self.usable_springs().map(|s| s.law().potential(s.point(x)).energy).sum::<f64>() - loads
     }
 
     fn usable_springs(&self) -> impl Iterator<Item = ActiveSpring> {

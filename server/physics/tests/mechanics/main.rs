@@ -12,6 +12,7 @@ mod determinism;
 mod dynamics;
 mod equilibrium;
 mod foreign_space;
+mod friction;
 mod half_cut_beam;
 mod hex8_cubes;
 mod multigrid;
