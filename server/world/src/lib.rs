@@ -27,11 +27,11 @@ pub mod report;
 // a body as the world knows it, and its recorded points
 pub mod body;
 
+// rigid things: tools where hands and scripts hold them, and obstacles that stand still
+pub mod tool;
+
 // checked objects → bodies, and doubts about them
 pub mod assemble;
-
-// rigid tools: where hands and scripts hold them
-pub mod tool;
 
 // what other threads see of a step
 pub mod snapshot;

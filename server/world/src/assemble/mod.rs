@@ -4,6 +4,8 @@ pub mod doubts;
 
 pub(crate) mod mesh;
 
+mod obstacles;
+
 mod skin;
 
 mod threads;
@@ -19,6 +21,7 @@ use scindo_physics::team::Lead;
 use crate::body::{Adaptation, Probe, SimBody, region};
 use crate::mesh_in::{MeshHealth, Observer};
 use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
+use crate::tool::obstacle::Obstacle;
 
 /// How bodies are computed; belongs to the machine, not to the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +45,8 @@ pub struct Built {
     pub bodies: Vec<SimBody>,
     /// Steps the bodies side by side; `None` for one body or one thread.
     pub lead: Option<Lead>,
+    /// Obstacles in the order of the scene.
+    pub obstacles: Vec<Obstacle>,
     /// Probes in the order of the scene.
     pub probes: Vec<Probe>,
     /// What is odd but allowed.
@@ -68,6 +73,7 @@ pub fn build(
         warnings: Vec::new(),
     };
     let bodies: Vec<Option<SimBody>> = checked.bodies.iter().map(|spec| builder.body(spec)).collect();
+    let obstacles = builder.obstacles(checked);
     let probes = builder.probes(checked, &bodies);
     let mut lead = None;
     let mut bodies: Vec<SimBody> = bodies.into_iter().flatten().collect();
@@ -82,7 +88,7 @@ pub fn build(
         let mut warnings = builder.warnings;
         warnings.extend(builder.doubts.into_iter().map(|(at, doubt)| format!("{at}: {doubt}")));
         warnings.extend(doubts::of(checked, &mut bodies));
-        Ok(Built { bodies, lead, probes, warnings })
+        Ok(Built { bodies, lead, obstacles, probes, warnings })
     } else {
         // A body of the wrong size is why regions and probes miss it.
         let doubts = builder.doubts.into_iter();
@@ -216,6 +222,17 @@ impl Builder<'_> {
             self.findings.push((format!("{at}.where"), fault));
         }
         nodes
+    }
+
+    fn obstacles(&mut self, scene: &CheckedScene) -> Vec<Obstacle> {
+        let mut found = Vec::new();
+        for spec in &scene.obstacles {
+            match obstacles::open(spec, self.base_dir) {
+                Ok(obstacle) => found.push(obstacle),
+                Err(fault) => self.findings.push((format!("obstacle.{}.surface.file", spec.id), fault)),
+            }
+        }
+        found
     }
 
     fn probes(&mut self, scene: &CheckedScene, bodies: &[Option<SimBody>]) -> Vec<Probe> {

@@ -18,6 +18,7 @@ pub mod spring;
 pub mod grab;
 pub mod compliance;
 pub mod hand;
+pub mod rest;
 
 use nalgebra::Vector3;
 use scindo_collision::SurfaceError;
@@ -25,11 +26,14 @@ use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::Surface;
 use scindo_physics::element::MaterialPoint;
 
+use crate::body::SimBody;
 use crate::inputs::MAX_TOOLS;
 use crate::tool::geometry::core_radius;
+use crate::tool::obstacle::Obstacle;
 use crate::tool::{Tool, Tools};
 use hand::Hand;
 use press::{Bearing, MAX_POINTS};
+use rest::{RestReport, Resting};
 use spring::material_points;
 use surface::ContactSurface;
 
@@ -42,8 +46,11 @@ struct BodyContacts {
     young_pa: f64,
     vertices: Vec<MaterialPoint>,
     springs: Vec<PointSpring>,
-    /// Per spring its tool, and its depth before the solve [m].
+    /// Per spring of a tool its tool, and its depth before the solve [m]. The springs of obstacles come after
+    /// these.
     behind: Vec<(u32, f64)>,
+    /// Contacts with obstacles.
+    resting: Resting,
 }
 
 /// Sums over one tool's springs.
@@ -65,9 +72,37 @@ pub struct Contacts {
     /// One hand per tool, in the order of the tools.
     hands: Vec<Hand>,
     sums: Vec<Sums>,
+    obstacles: Vec<Obstacle>,
 }
 
 impl Contacts {
+    /// Puts up the obstacles of the scene.
+    pub fn set_obstacles(&mut self, obstacles: Vec<Obstacle>) {
+        self.obstacles = obstacles;
+    }
+
+    /// The obstacles of the scene.
+    pub fn obstacles(&self) -> &[Obstacle] {
+        &self.obstacles
+    }
+
+    /// Contact of `body` with all obstacles in the last step.
+    pub fn rest_report(&self, body: usize) -> &RestReport {
+        &self.bodies[body].resting.report
+    }
+
+    /// Adds the springs of what a body may meet of the obstacles in a step of `h` seconds under `gravity` [m/s²],
+    /// after [`detect`](Self::detect).
+    pub fn rest(&mut self, number: usize, body: &SimBody, h: f64, gravity: Vector3<f64>) {
+        if self.obstacles.is_empty() {
+            return;
+        }
+        let contacts = &mut self.bodies[number];
+        let size = (contacts.young_pa, body.cell_m());
+        contacts.resting.detect((&body.body, &self.obstacles), (h, gravity), size);
+        contacts.springs.extend_from_slice(contacts.resting.springs());
+    }
+
     /// Registers the next body, in the order of the scene. `young_pa` is its Young's modulus [Pa], and `on`
     /// whether tools touch it.
     pub fn add_body(&mut self, young_pa: f64, on: bool) {
@@ -79,6 +114,7 @@ impl Contacts {
             vertices: Vec::new(),
             springs: Vec::with_capacity(SPRING_CAPACITY),
             behind: Vec::with_capacity(SPRING_CAPACITY),
+            resting: Resting::default(),
         });
         self.hands.reserve(MAX_TOOLS);
         self.sums.reserve(MAX_TOOLS);
@@ -119,6 +155,7 @@ impl Contacts {
             hand.let_go(&tool.pose);
             hand.forget_compliance();
         }
+        self.bodies.iter_mut().for_each(|body| body.resting.forget());
     }
 
     /// The hand on tool number `index`; `None` before the first [`detect`](Self::detect) with it.
@@ -153,7 +190,18 @@ impl Contacts {
         &self.bodies[body].springs
     }
 
-    /// Records the force of each spring on `body` from the solve [N], in the order of the springs.
+    /// Records what the last step of a body did on the obstacles.
+    pub fn settle(&mut self, number: usize, body: &SimBody) {
+        if self.obstacles.is_empty() {
+            return;
+        }
+        let contacts = &mut self.bodies[number];
+        let forces = body.body.spring_forces().get(contacts.behind.len()..).unwrap_or_default();
+        contacts.resting.collect(&body.body, forces, body.cell_m());
+    }
+
+    /// Records the force of each spring of a tool on `body` from the solve [N]; springs of obstacles come after
+    /// them.
     pub fn collect(&mut self, body: usize, forces: &[Vector3<f64>]) {
         let body = &self.bodies[body];
         for ((spring, &(tool, depth)), force) in body.springs.iter().zip(&body.behind).zip(forces) {

@@ -85,7 +85,7 @@ impl Bench {
         let force = |spring: &PointSpring| {
             let x: V = spring.point.position(&self.x);
             let force = match spring.kind {
-                SpringKind::OneSided { normal, offset_m } => {
+                SpringKind::OneSided { normal, offset_m } | SpringKind::Rough { normal, offset_m, .. } => {
                     normal * spring.stiffness_n_m * (offset_m - normal.dot(&x)).max(0.0)
                 }
                 SpringKind::Hold { target_m } => (target_m - x) * spring.stiffness_n_m,

@@ -102,7 +102,8 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
         body.displacement_over_s = fine.displacement_over_s;
         bodies.push(body);
     }
-    let built = Built { bodies, lead: None, probes: Vec::new(), warnings: Vec::new() };
+    let obstacles = simulation.obstacles().to_vec();
+    let built = Built { bodies, lead: None, obstacles, probes: Vec::new(), warnings: Vec::new() };
     Some(Simulation::assemble(simulation.source().clone(), scene, built))
 }
 

@@ -4,6 +4,8 @@ mod look;
 
 mod mechanics;
 
+mod obstacle;
+
 mod octree;
 
 use std::collections::BTreeSet;
@@ -57,6 +59,7 @@ impl Check<'_> {
     fn scene(&mut self) -> CheckedScene {
         let raw = self.raw;
         self.unique("body", "bodies", raw.body.iter().map(|b| b.id.as_str()));
+        self.unique("obstacle", "obstacles", raw.obstacle.iter().map(|o| o.id.as_str()));
         self.unique("probe", "probes", raw.probe.iter().map(|p| p.id.as_str()));
         self.unique("tool", "tools", raw.tool.iter().map(|t| t.id.as_str()));
         if raw.tool.len() > MAX_TOOLS {
@@ -70,6 +73,7 @@ impl Check<'_> {
             gravity_m_s2: Vector3::from(raw.world.gravity_m_s2),
             step_s: raw.world.step_s,
             bodies: raw.body.iter().map(|body| self.body(body)).collect(),
+            obstacles: raw.obstacle.iter().map(|obstacle| self.obstacle(obstacle)).collect(),
             cuts: raw.cut.iter().enumerate().map(|(i, cut)| self.cut(i, cut)).collect(),
             probes: raw.probe.iter().map(|probe| self.probe(probe)).collect(),
             tools: raw.tool.iter().map(|tool| self.tool(tool)).collect(),
@@ -425,6 +429,7 @@ impl Check<'_> {
         EffectSwitches {
             cutting: raw.cutting,
             contact: raw.contact,
+            obstacles: raw.obstacles,
             energy: raw.energy,
             error_estimate: raw.error_estimate,
         }

@@ -20,6 +20,8 @@ pub struct CheckedScene {
     pub step_s: f64,
     /// Soft bodies.
     pub bodies: Vec<BodySpec>,
+    /// Rigid things that stand still.
+    pub obstacles: Vec<ObstacleSpec>,
     /// Cuts by time, in the order of the file.
     pub cuts: Vec<CutSpec>,
     /// Recorded material points.
@@ -328,6 +330,54 @@ pub struct ProbeSpec {
     pub side: Option<Unit<Vector3<f64>>>,
 }
 
+/// A rigid thing that stands still.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObstacleSpec {
+    /// Name.
+    pub id: String,
+    /// What is solid.
+    pub solid: Solid,
+    /// Coefficient of dry friction μ.
+    pub friction: f64,
+    /// Stiffness of the contact in multiples of E/h.
+    pub stiffness: f64,
+}
+
+/// What is solid of an obstacle.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Solid {
+    /// Everything behind a plane.
+    HalfSpace {
+        /// A point of the plane [m].
+        point_m: Vector3<f64>,
+        /// Out of the solid.
+        normal: Unit<Vector3<f64>>,
+    },
+    /// A box along the axes.
+    Box {
+        /// Lower corner [m].
+        min_m: Vector3<f64>,
+        /// Upper corner [m].
+        max_m: Vector3<f64>,
+    },
+    /// A ball, or a segment with a radius.
+    Capsule {
+        /// The ends of the segment [m].
+        ends_m: [Vector3<f64>; 2],
+        /// Radius [m].
+        radius_m: f64,
+    },
+    /// The inside of a closed surface.
+    Surface {
+        /// Path as written.
+        path: String,
+        /// Metres per length unit of the file.
+        scale: f64,
+        /// Where the origin of the file lies [m].
+        at_m: Vector3<f64>,
+    },
+}
+
 /// A rigid tool.
 #[derive(Debug, Clone)]
 pub struct ToolSpec {
@@ -372,6 +422,8 @@ pub struct EffectSwitches {
     pub cutting: Option<bool>,
     /// Tools push bodies.
     pub contact: Option<bool>,
+    /// Obstacles stop bodies.
+    pub obstacles: Option<bool>,
     /// Energies in every report.
     pub energy: Option<bool>,
     /// Estimated discretisation error in every report.

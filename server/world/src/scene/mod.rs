@@ -27,8 +27,8 @@ use std::path::{Path, PathBuf};
 
 pub use checked::{
     AdaptSpec, BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec,
-    LookSpec, MaterialPlace, MaterialSpec, MeshSource, OctreeSpec, PathPoint, ProbeSpec, PublishRates,
-    Region, Share, SkinSpec, ToolSpec,
+    LookSpec, MaterialPlace, MaterialSpec, MeshSource, ObstacleSpec, OctreeSpec, PathPoint, ProbeSpec,
+    PublishRates, Region, Share, SkinSpec, Solid, ToolSpec,
 };
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};
 pub use mechanics::{Mechanics, Newmark};

@@ -9,10 +9,13 @@ mod look;
 
 mod mechanics;
 
+mod obstacle;
+
 mod octree;
 
 pub use look::*;
 pub use mechanics::*;
+pub use obstacle::*;
 pub use octree::*;
 
 use schemars::JsonSchema;
@@ -44,6 +47,9 @@ pub struct RawScene {
     /// Soft bodies.
     #[serde(default)]
     pub body: Vec<RawBody>,
+    /// Rigid things that stand still: floors, tables, posts.
+    #[serde(default)]
+    pub obstacle: Vec<RawObstacle>,
     /// Scheduled cuts.
     #[serde(default)]
     pub cut: Vec<RawCut>,
@@ -663,6 +669,9 @@ pub struct RawEffects {
     /// `false` lets tools pass through bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<bool>,
+    /// `false` lets bodies pass through obstacles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacles: Option<bool>,
     /// Contact of a body with itself. `true` is not supported yet.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub self_collision: Option<bool>,

@@ -35,12 +35,14 @@ use crate::assemble::{self, BuildOptions, Built};
 use crate::body::BodySize;
 pub use crate::body::{Probe, SimBody, StepCounts};
 use crate::contact::Contacts;
+use crate::contact::rest::RestReport;
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
 use crate::mesh_in::Observer;
 pub use crate::report::{BodyReport, Energy, Event, Level, PhaseSeconds, Stage, StageSeconds, StepReport};
 use crate::scene::{BodySpec, CheckedScene, LiveKey, LiveParameter, Scene, SceneError};
 use crate::snapshot::Snapshot;
 use crate::tool::Tools;
+use crate::tool::obstacle::Obstacle;
 use adapting::ToolPlaces;
 use cuts::{CutContext, Cuts};
 use fill::Sources;
@@ -144,6 +146,9 @@ impl Simulation {
         for body in &scene.bodies {
             contacts.add_body(body.young_pa, scene.effects.contact != Some(false));
         }
+        if scene.effects.obstacles != Some(false) {
+            contacts.set_obstacles(built.obstacles);
+        }
         let report =
             StepReport { bodies: vec![BodyReport::default(); built.bodies.len()], ..StepReport::default() };
         let mut simulation = Self {
@@ -226,6 +231,9 @@ impl Simulation {
             }
         }
         self.contacts.detect(&self.tools);
+        for (i, body) in self.bodies.iter().enumerate() {
+            self.contacts.rest(i, body, self.scene.step_s, self.scene.gravity_m_s2);
+        }
     }
 
     fn deform(&mut self) {
@@ -255,6 +263,7 @@ impl Simulation {
     fn react(&mut self) {
         for (i, body) in self.bodies.iter().enumerate() {
             self.contacts.collect(i, body.body.spring_forces());
+            self.contacts.settle(i, body);
         }
         self.contacts.react(&mut self.tools);
     }
@@ -441,6 +450,16 @@ impl Simulation {
     /// Tools, those of the scene first.
     pub fn tools(&self) -> &Tools {
         &self.tools
+    }
+
+    /// Obstacles in the order of the scene.
+    pub fn obstacles(&self) -> &[Obstacle] {
+        self.contacts.obstacles()
+    }
+
+    /// Contact of body number `body` with all obstacles in the last step.
+    pub fn rest_report(&self, body: usize) -> &RestReport {
+        self.contacts.rest_report(body)
     }
 
     /// Probes in the order of the scene.

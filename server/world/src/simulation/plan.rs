@@ -26,6 +26,9 @@ const SECONDS_PER_VERTEX: f64 = 10e-9;
 /// Seconds per surface triangle: refit of the surface tree.
 const SECONDS_PER_TRIANGLE: f64 = 30e-9;
 
+/// Seconds per surface vertex and obstacle: where the vertex is, and how far away.
+const SECONDS_PER_VERTEX_AND_OBSTACLE: f64 = 15e-9;
+
 /// One effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Effect {
@@ -58,6 +61,7 @@ impl Plan {
         plan.cutting(scene, sizes);
         plan.adaptation(scene);
         plan.contact(scene, sizes);
+        plan.obstacles(scene, sizes);
         plan.listeners(scene, sizes);
         plan
     }
@@ -178,6 +182,18 @@ impl Plan {
         }
         self.push("self-collision", false, "not supported yet", 0.0);
         self.push("body-body contact", false, "not supported yet", 0.0);
+    }
+
+    fn obstacles(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
+        let n = scene.obstacles.len();
+        let on = n > 0 && scene.effects.obstacles != Some(false);
+        let why = if scene.effects.obstacles == Some(false) {
+            "effects.obstacles = false".into()
+        } else {
+            count(n, "obstacle")
+        };
+        let vertices: usize = sizes.iter().map(|size| size.vertices).sum();
+        self.push("obstacles", on, why, (n * vertices) as f64 * SECONDS_PER_VERTEX_AND_OBSTACLE);
     }
 
     fn listeners(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {

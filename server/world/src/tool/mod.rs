@@ -1,4 +1,4 @@
-//! Rigid tools: held by a client, moved by a script, or idle.
+//! Rigid tools: held by a client, moved by a script, or idle; and [obstacles](obstacle), which stand still.
 //!
 //! # Order in a step
 //! 1. [`Tools::advance`]: poses and modes of this step, from scripts and clients.
@@ -7,6 +7,7 @@
 
 pub mod blade;
 pub mod geometry;
+pub mod obstacle;
 pub mod script;
 
 use std::sync::Arc;
