@@ -14,6 +14,7 @@ mod settings;
 mod sleep;
 mod snapping;
 mod statics;
+mod together;
 mod topology;
 mod undo;
 
@@ -26,6 +27,7 @@ pub use measures::StiffMotions;
 pub use settings::{Arithmetic, BodySettings};
 pub use snapping::{CuttingMethod, LooseRule};
 pub use statics::{StaticReport, StaticSettings};
+pub use together::Group;
 pub use undo::BodyTopology;
 
 use std::sync::Arc;
@@ -38,7 +40,9 @@ use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::integrator::{
     Dynamics, LinearlyImplicit, LocalConnectivity, LooseParts, ModelSolver, State, StepInputs, StepSolver,
 };
-pub use crate::integrator::{MassKind, Notice, Outcome, PointSpring, Scheme, SolveReport, SpringKind};
+pub use crate::integrator::{
+    MassKind, Notice, Outcome, PairSpring, PointSpring, Scheme, SolveReport, SpringKind,
+};
 use crate::lists::reserve::{refill, resize_reserving};
 use crate::material::{Material, Rayleigh};
 use crate::mesh::{HexMesh, TetMesh};

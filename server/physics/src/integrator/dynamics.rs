@@ -19,6 +19,7 @@ use super::settings::DynamicsSettings;
 use super::state::State;
 use super::step_inputs::StepInputs;
 use super::step_solver::{SolverSettings, StepSolver};
+use super::together::Member;
 use crate::assembly::{Model, ModelError};
 use crate::cut::NewCopy;
 use crate::lists::reserve::resize_reserving;
@@ -211,6 +212,51 @@ impl Dynamics {
             report.notice = Some(Notice::NotFinite);
         }
         report
+    }
+
+    /// Begins a step that several bodies make together. Returns whether this body can: its steps are linear solves,
+    /// and the inputs are usable.
+    pub fn begin_together(&mut self, state: &State, inputs: &StepInputs<'_>) -> bool {
+        if self.solver.linearly_implicit().is_none() || self.solver.why_refused(state, inputs).is_some() {
+            return false;
+        }
+        self.follow_fixed(inputs);
+        self.course.before.copy_from(state);
+        if !self.course.multistep.continues(state) {
+            self.restart();
+        }
+        true
+    }
+
+    /// Whether steps of this body can be solved together with those of others.
+    pub fn can_step_together(&mut self) -> bool {
+        self.solver.linearly_implicit().is_some()
+    }
+
+    /// This body's part of the step that [`begin_together`](Self::begin_together) began.
+    pub fn member<'a>(
+        &'a mut self,
+        team: &'a mut Team,
+        state: &'a mut State,
+        inputs: StepInputs<'a>,
+        spring_forces: &'a mut Vec<Vector3<f64>>,
+    ) -> Option<Member<'a>> {
+        spring_forces.clear();
+        spring_forces.resize(inputs.springs.len(), Vector3::zeros());
+        let Self { course, solver, .. } = self;
+        Some(solver.linearly_implicit()?.member(team, (course, state), inputs, spring_forces))
+    }
+
+    /// Ends a step that several bodies made together; `finite` tells whether it moved them.
+    pub fn end_together(&mut self, state: &mut State, inputs: &StepInputs<'_>, finite: bool) {
+        if !finite {
+            return state.copy_from(&self.course.before);
+        }
+        if let Some(solver) = self.solver.linearly_implicit() {
+            solver.carry_weightless(state, inputs);
+        }
+        self.course.multistep.push((&self.course.before, state), inputs, Scheme::ImplicitEuler);
+        self.course.multistep.forget_energy();
     }
 
     /// Makes the step with the scheme of the body, or with implicit Euler where a guard demands it.

@@ -12,6 +12,7 @@
 //! the predictor it never does. K̂ rotates with the material, so β does not damp rigid motion.
 
 mod equilibrium;
+pub mod together;
 
 use nalgebra::Vector3;
 
@@ -70,12 +71,16 @@ pub struct LinearStep {
     method: Method,
     /// Multigrid, if the discretisation has levels and the method asks for it.
     grid: Option<Box<StepGrid>>,
+    /// Multigrid while a step is solved together with other bodies, of which its levels know nothing.
+    aside: Option<Box<StepGrid>>,
     /// The level that is simulated, if it is not the finest one; there is no `grid` then.
     simulated: Option<Box<SimulatedLevel>>,
     /// One entry per block of the vector loops.
     partial: Vec<f64>,
     springs: ActiveSprings,
     terms: Vec<Spring>,
+    /// Diagonal parts of springs to other bodies, for the preconditioner of a step that is solved together.
+    shared: Vec<Spring>,
     translations: Translations,
     reference: f64,
     /// For equilibria: internal forces [N] and energy [J] at the predictor in double precision.
@@ -463,10 +468,13 @@ impl LinearStep {
         }
         self.sprung.clear();
         match &mut self.stiff {
-            None => self.sprung.extend(self.terms.iter().flat_map(|term| term.point.copies())),
+            None => {
+                let all = self.terms.iter().chain(&self.shared);
+                self.sprung.extend(all.flat_map(|term| term.point.copies()));
+            }
             // A spring also acts on the copies relative to which its own are moved.
             Some(stiff) => {
-                for term in &self.terms {
+                for term in self.terms.iter().chain(&self.shared) {
                     term.expand(self.preconditioner.substitution(), &mut stiff.row);
                     self.sprung.extend(stiff.row.iter().map(|r| r.0));
                 }
@@ -476,7 +484,7 @@ impl LinearStep {
         self.bare.clear();
         self.bare.extend(self.sprung.iter().map(|&copy| self.diagonal[copy as usize]));
         if let Some(stiff) = &mut self.stiff {
-            for term in &self.terms {
+            for term in self.terms.iter().chain(&self.shared) {
                 term.expand(self.preconditioner.substitution(), &mut stiff.row);
                 stiff
                     .row
@@ -485,6 +493,7 @@ impl LinearStep {
             }
         } else {
             system(elastic, &self.terms, inputs).add_springs(&mut self.diagonal);
+            system(elastic, &self.shared, inputs).add_springs(&mut self.diagonal);
         }
         for &copy in &self.sprung {
             self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
@@ -520,9 +529,14 @@ impl LinearStep {
 
     /// Solves the translation equations of every free part for the imbalance that δ leaves.
     fn balance_parts(&mut self, state: &State, inputs: &LinearInputs<'_>) {
-        if !inputs.step.parts.any_free() {
-            return;
+        if inputs.step.parts.any_free() {
+            self.gather_imbalance(state, inputs);
+            self.translations.solve(inputs.step.parts);
         }
+    }
+
+    /// Sets up the translation equations for the imbalance that δ leaves.
+    fn gather_imbalance(&mut self, state: &State, inputs: &LinearInputs<'_>) {
         let factor = inputs.mass_factor();
         let s = inputs.s();
         self.translations.begin(inputs.step.parts, factor);
@@ -538,7 +552,6 @@ impl LinearStep {
             let (S, f) = (s * spring.law().stiffness(), s * spring.law().force(point));
             self.translations.add_spring(inputs.step.parts, spring.main_copy(), S, f);
         }
-        self.translations.solve(inputs.step.parts);
     }
 
     /// Position [m] of the point of a spring with the present δ.

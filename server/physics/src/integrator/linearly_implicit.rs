@@ -12,6 +12,7 @@ use super::scheme::Scheme;
 use super::state::{State, WEIGHTLESS};
 use super::step_inputs::{Inertia, LinearInputs, StepInputs, StepOutcome};
 use super::step_solver::{SolverSettings, StepSolver};
+use super::together::Member;
 use crate::assembly::ModelError;
 use crate::element::Points;
 use crate::lists::reserve::refill;
@@ -135,8 +136,34 @@ impl LinearlyImplicit {
         true
     }
 
+    /// This body's part of a step of several bodies with implicit Euler.
+    pub fn member<'a>(
+        &'a mut self,
+        team: &'a mut Team,
+        (course, state): (&mut Course, &'a mut State),
+        inputs: StepInputs<'a>,
+        spring_forces: &'a mut [Vector3<f64>],
+    ) -> Member<'a> {
+        let _ = course.spin.limit(state, inputs.mass, inputs.parts, (inputs.h, LARGEST_TURN));
+        let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
+        let inputs = LinearInputs {
+            step: inputs,
+            mass_f32,
+            material,
+            solver: *pcg,
+            inertia: Inertia::Euler,
+            solves: 1,
+        };
+        Member { step, team, elastic: &mut **stiffness, state, inputs, spring_forces, inverted_pieces: 0 }
+    }
+
+    /// Stopping criteria of its linear solves.
+    pub fn solver(&self) -> PcgSettings {
+        self.pcg
+    }
+
     /// Moves copies without mass along with the rest of their piece: no force would move them.
-    fn carry_weightless(&self, state: &mut State, inputs: &StepInputs<'_>) {
+    pub fn carry_weightless(&self, state: &mut State, inputs: &StepInputs<'_>) {
         let rest = |c: u32| inputs.rest[c as usize];
         for Weightless { copy, piece } in &self.weightless {
             let (mut moved, mut v, mut hosts) = (Vector3::zeros(), Vector3::zeros(), 0.0);
@@ -294,6 +321,11 @@ impl StepSolver for LinearlyImplicit {
 
     fn levels(&self) -> Option<(Vec<LevelReport>, CoarsestSolve)> {
         self.step.levels()
+    }
+
+    fn linearly_implicit(&mut self) -> Option<&mut LinearlyImplicit> {
+        let can = self.scheme != Scheme::Static && self.step.can_be_shared();
+        can.then_some(self)
     }
 
     fn stiffness_mut(&mut self) -> Option<&mut dyn Stiffness> {

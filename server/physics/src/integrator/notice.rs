@@ -75,6 +75,8 @@ pub enum Notice {
         /// The displacement it belongs to: 3 · copy + axis.
         displacement: u32,
     },
+    /// The step together with the bodies that it touches did not stay finite, so it was made alone.
+    Parted,
     /// The step was taken back because it did not stay finite.
     NotFinite,
     /// The step was taken back because it drew a part of the body out far beyond its size.
@@ -141,6 +143,10 @@ impl fmt::Display for Notice {
                  instead; hardly anything holds the node, or the stiffness ratio exceeds double precision",
                 displacement / 3,
                 ['x', 'y', 'z'][*displacement as usize % 3]
+            ),
+            Self::Parted => write!(
+                f,
+                "the step together with the bodies it touches did not stay finite: made without their contact"
             ),
             Self::NotFinite => write!(f, "did not stay finite: rolled back"),
             Self::OutOfRange { stretch, size_m } => write!(

@@ -124,6 +124,11 @@ impl Translations {
         self.rhs[parts.of_copy[copy] as usize] += b;
     }
 
+    /// S and b of a part.
+    pub fn equation(&self, part: usize) -> (&Matrix3<f64>, &Vector3<f64>) {
+        (&self.matrix[part], &self.rhs[part])
+    }
+
     /// Solves for every free part and adds the result to `shift`.
     pub fn solve(&mut self, parts: &LooseParts) {
         for part in (0..parts.len()).filter(|&p| parts.free[p]) {

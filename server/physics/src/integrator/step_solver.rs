@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use nalgebra::Vector3;
 
 use super::course::Course;
+use super::linearly_implicit::LinearlyImplicit;
 use super::notice::Notice;
 use super::report::SolveReport;
 use super::scheme::Scheme;
@@ -106,6 +107,11 @@ pub trait StepSolver: Debug + Send {
 
     /// Figures of the levels of multigrid, from the finest on, and how the coarsest one is solved, if it is used.
     fn levels(&self) -> Option<(Vec<LevelReport>, CoarsestSolve)> {
+        None
+    }
+
+    /// This way as one that bodies can take together, if it is.
+    fn linearly_implicit(&mut self) -> Option<&mut LinearlyImplicit> {
         None
     }
 

@@ -25,8 +25,8 @@ pub struct Pcg {
     /// variables of the preconditioner.
     pub r: Vec<Padded>,
     pub(super) z: Vec<Padded>,
-    pub(super) p: Vec<Padded>,
-    pub(super) q: Vec<Padded>,
+    pub(crate) p: Vec<Padded>,
+    pub(crate) q: Vec<Padded>,
     pub(super) partial: Vec<f64>,
     /// rᵀM⁻¹r and β where the last run ended.
     rz: f64,
@@ -105,21 +105,7 @@ impl Pcg {
                 report.stop = StopReason::Interrupted;
                 return report;
             }
-            // p ← z + β p, q = A p, pᵀA p
-            if M.uses_operator() && beta != 0.0 {
-                // Products inside M made A forget p, so the new one is handed over as a whole.
-                let (p, factor) = (&self.p, beta as f32);
-                team.for_blocks(blocks(&mut self.z, BLOCK), |block, z| {
-                    for (z, p) in z.iter_mut().zip(block_of(p, block)) {
-                        let mut next = *p;
-                        rows::direction(&mut next, z, factor);
-                        *z = next;
-                    }
-                });
-                beta = 0.0;
-            }
-            let out = Advance { p: &mut self.p, q: &mut self.q, partial: &mut self.partial };
-            let curvature = A.advance(team, beta as f32, &self.z, out);
+            let curvature = self.turn(team, A, M, beta);
             M.enter(&mut self.q);
             if !curvature.is_finite() {
                 report.stop = StopReason::NonFinite;
@@ -132,15 +118,51 @@ impl Pcg {
             let alpha = rz / curvature;
             error.add(alpha * rz);
             report.algebraic_error = error.norm();
-            // x += α p, r −= α q, z = M⁻¹ r, rᵀz
-            let Self { r, z, p, q, partial, .. } = self;
-            let next = M.advance(team, A, (alpha as f32, [p, q]), Iterate { x, r, z, partial });
+            let next = self.descend(team, A, M, alpha, x);
             beta = next / rz;
             rz = next;
             // Kept for a later continuation.
             (self.rz, self.beta) = (rz, beta);
             report.iterations += 1;
         }
+    }
+
+    /// p ← z + β p, q = A p; returns pᵀA p. In q it is still in the variables of A.
+    pub fn turn(
+        &mut self,
+        team: &mut Team,
+        A: &mut impl LinearOperator,
+        M: &mut impl Preconditioner,
+        beta: f64,
+    ) -> f64 {
+        let mut beta = beta as f32;
+        if M.uses_operator() && beta != 0.0 {
+            // Products inside M made A forget p, so the new one is handed over as a whole.
+            let (p, factor) = (&self.p, beta);
+            team.for_blocks(blocks(&mut self.z, BLOCK), |block, z| {
+                for (z, p) in z.iter_mut().zip(block_of(p, block)) {
+                    let mut next = *p;
+                    rows::direction(&mut next, z, factor);
+                    *z = next;
+                }
+            });
+            beta = 0.0;
+        }
+        let out = Advance { p: &mut self.p, q: &mut self.q, partial: &mut self.partial };
+        A.advance(team, beta, &self.z, out)
+    }
+
+    /// x ← x + α p, r ← r − α q, z = M⁻¹ r; returns rᵀz.
+    pub fn descend(
+        &mut self,
+        team: &mut Team,
+        A: &mut impl LinearOperator,
+        M: &mut impl Preconditioner,
+        alpha: f64,
+        x: &mut [Padded],
+    ) -> f64 {
+        let Self { r, z, p, q, partial, .. } = self;
+        M.advance(team, A, (alpha as f32, [p, q]), Iterate { x, r, z, partial })
     }
 
     /// √(vᵀM⁻¹v), the norm in which `reference` is given.

@@ -27,6 +27,7 @@ mod sensible;
 mod simulated;
 mod snapping;
 mod springs;
+mod together;
 mod verdicts;
 
 use nalgebra::Vector3;

@@ -1,0 +1,283 @@
+//! One implicit step of several bodies that touch, solved as one system.
+//!
+//! Springs between the bodies are terms s k J Jᵀ of one matrix, whose other blocks are those of the bodies. Conjugate
+//! gradients run over the vectors of all bodies at once, preconditioned body by body; what the springs add to the
+//! diagonal is part of it. Both sides are implicit, so that stiff contact needs no small step. The translations of
+//! free parts are balanced exactly before and after, so that momentum is exchanged to rounding, however few iterations
+//! are made.
+
+mod translations;
+
+use nalgebra::Vector3;
+
+use super::linear_step::LinearStep;
+use super::linear_step::together::Own;
+use super::pair_springs::{ActivePair, PairSpring};
+use super::state::State;
+use super::step_inputs::LinearInputs;
+use crate::element::MaterialPoint;
+use crate::operator::{Spring, Stiffness};
+use crate::solver::{LinearReport, PcgSettings, StopReason};
+use crate::team::Team;
+use translations::SharedTranslations;
+
+/// Largest number of passes, repeated while springs open, close or slip.
+const PASSES: usize = 8;
+
+/// One body of a group.
+pub struct Member<'a> {
+    /// Its step.
+    pub step: &'a mut LinearStep,
+    /// Its threads.
+    pub team: &'a mut Team,
+    /// Its stiffness.
+    pub elastic: &'a mut dyn Stiffness,
+    /// Its state.
+    pub state: &'a mut State,
+    /// What acts on it.
+    pub inputs: LinearInputs<'a>,
+    /// Receives the force of its own springs [N].
+    pub spring_forces: &'a mut [Vector3<f64>],
+    /// Pieces inverted at the predictor.
+    pub inverted_pieces: usize,
+}
+
+/// Memory of steps that are solved together, reused from step to step.
+#[derive(Debug, Default)]
+pub struct Together {
+    pairs: Vec<ActivePair>,
+    /// Which of the springs given these are.
+    accepted: Vec<bool>,
+    shared: Vec<Spring>,
+    translations: SharedTranslations,
+}
+
+/// How a step of a group went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GroupReport {
+    /// The last linear solve; iterations are those of all passes.
+    pub solve: LinearReport,
+    /// Springs between bodies that were left out because one of their numbers is unusable.
+    pub refused: usize,
+    /// Whether everything stayed finite; no state has changed otherwise.
+    pub finite: bool,
+}
+
+type Members<'a, 'b> = &'a mut [Member<'b>];
+
+impl Together {
+    /// Advances all `members` by one step with implicit Euler. The force of every spring of `pairs` on its point
+    /// goes to `pair_forces` [N].
+    pub fn step(
+        &mut self,
+        members: Members<'_, '_>,
+        pairs: &[PairSpring],
+        pair_forces: &mut Vec<Vector3<f64>>,
+        settings: PcgSettings,
+    ) -> GroupReport {
+        for member in members.iter_mut() {
+            let (step, mut own) = member.split();
+            let inverted = step.begin_together(&mut own);
+            member.inverted_pieces = inverted;
+        }
+        self.begin(members, pairs);
+        let mut report = GroupReport { refused: pairs.len() - self.pairs.len(), ..GroupReport::default() };
+        let mut reference = 0.0;
+        for pass in 0..PASSES {
+            self.complete(members);
+            self.translations.balance(members, &self.pairs);
+            let rz = self.residual(members, pass, &mut reference);
+            let solve = self.solve(members, (rz, reference, settings));
+            let iterations = report.solve.iterations + solve.iterations;
+            report.solve = LinearReport { iterations, ..solve };
+            self.translations.balance(members, &self.pairs);
+            if solve.stop == StopReason::NonFinite || pass + 1 == PASSES || !self.changed(members) {
+                break;
+            }
+        }
+        self.write(members, pair_forces);
+        report.finite = report.solve.stop != StopReason::NonFinite;
+        // No body moves unless all can.
+        report.finite &= members.iter().all(|member| member.step.is_finite_together(&member.inputs));
+        for Member { step, team, state, inputs, spring_forces, .. } in members {
+            report.finite &= step.end_together((team, state), inputs, spring_forces, report.finite);
+        }
+        report
+    }
+
+    /// Takes the usable springs, in the mode of the predicted positions.
+    fn begin(&mut self, members: Members<'_, '_>, pairs: &[PairSpring]) {
+        self.pairs.clear();
+        self.accepted.clear();
+        for spring in pairs {
+            let in_group = spring.bodies.iter().all(|&b| (b as usize) < members.len());
+            let nodes = |body: u32| members[body as usize].state.x.len();
+            let mut active = if in_group { ActivePair::usable(spring, nodes) } else { None };
+            if let Some(pair) = &mut active {
+                let y = relative(pair, members);
+                pair.law.begin(y);
+            }
+            self.accepted.push(active.is_some());
+            self.pairs.extend(active);
+        }
+    }
+
+    /// Completes the operators of all members, with the diagonal parts of the springs between them.
+    fn complete(&mut self, members: Members<'_, '_>) {
+        for (number, member) in (0u32..).zip(members.iter_mut()) {
+            self.shared.clear();
+            let s = member.inputs.s();
+            for pair in &self.pairs {
+                for carrier in pair.carriers.iter().filter(|carrier| carrier.body == number) {
+                    let point = MaterialPoint::new([(carrier.copy, carrier.weight as f32)]);
+                    let of = |(direction, k)| Spring { point, direction, stiffness: (s * k) as f32 };
+                    self.shared.extend(pair.law.directions().map(of));
+                }
+            }
+            let (step, mut own) = member.split();
+            step.complete_together(&mut own, &self.shared);
+        }
+    }
+
+    /// Writes the residuals of all members; returns rᵀM⁻¹r. The reference is set on the first pass.
+    fn residual(&mut self, members: Members<'_, '_>, pass: usize, reference: &mut f64) -> f64 {
+        let mut loads = 0.0;
+        for member in members.iter_mut() {
+            let (step, mut own) = member.split();
+            loads += step.residual_together(&mut own, pass).powi(2);
+        }
+        for pair in &self.pairs {
+            let force = pair.law.force(relative(pair, members));
+            for carrier in &pair.carriers {
+                let member = &mut members[carrier.body as usize];
+                let s = member.inputs.s();
+                member.step.add_to_residual(carrier.copy, &(s * carrier.weight * force));
+            }
+        }
+        let mut rz = 0.0;
+        for member in members.iter_mut() {
+            let (step, mut own) = member.split();
+            rz += step.precondition_together(&mut own);
+        }
+        if pass == 0 {
+            *reference = loads.sqrt().max(rz.max(0.0).sqrt());
+        }
+        rz
+    }
+
+    /// Conjugate gradients over all members.
+    ///
+    /// # Source
+    /// Hestenes, Stiefel 1952.
+    fn solve(
+        &mut self,
+        members: Members<'_, '_>,
+        (rz, reference, settings): (f64, f64, PcgSettings),
+    ) -> LinearReport {
+        let (mut rz, mut beta) = (rz, 0.0);
+        let target = settings.tolerance * reference;
+        let mut report = LinearReport::default();
+        loop {
+            let norm = rz.max(0.0).sqrt();
+            report.residual = if reference > 0.0 { norm / reference } else { norm };
+            report.stop = if !rz.is_finite() {
+                StopReason::NonFinite
+            } else if norm <= target {
+                StopReason::Converged
+            } else {
+                StopReason::IterationLimit
+            };
+            if report.stop != StopReason::IterationLimit || report.iterations == settings.iterations {
+                return report;
+            }
+            if members.iter().any(|member| member.team.told_to_stop()) {
+                report.stop = StopReason::Interrupted;
+                return report;
+            }
+            let mut curvature = 0.0;
+            for member in members.iter_mut() {
+                let (step, mut own) = member.split();
+                curvature += step.turn_together(&mut own, beta);
+            }
+            curvature += self.multiply(members);
+            if !curvature.is_finite() {
+                report.stop = StopReason::NonFinite;
+                return report;
+            }
+            if curvature <= 0.0 {
+                report.stop = StopReason::NonPositiveCurvature;
+                return report;
+            }
+            let alpha = rz / curvature;
+            let mut next = 0.0;
+            for member in members.iter_mut() {
+                let (step, mut own) = member.split();
+                next += step.descend_together(&mut own, alpha);
+            }
+            (beta, rz) = (next / rz, next);
+            report.iterations += 1;
+        }
+    }
+
+    /// Adds s k J Jᵀ p of the springs between members to q; returns their part of pᵀA p.
+    fn multiply(&self, members: Members<'_, '_>) -> f64 {
+        let mut curvature = 0.0;
+        for pair in &self.pairs {
+            let mut y = [0.0f64; 3];
+            for carrier in &pair.carriers {
+                let (p, _) = members[carrier.body as usize].step.direction_together();
+                let p = &p[carrier.copy as usize];
+                (0..3).for_each(|k| y[k] += carrier.weight * f64::from(p[k]));
+            }
+            let s = members[pair.main[0].0 as usize].inputs.s();
+            let f = s * (pair.law.stiffness() * Vector3::from(y));
+            curvature += f.dot(&Vector3::from(y));
+            for carrier in &pair.carriers {
+                let (_, q) = members[carrier.body as usize].step.direction_together();
+                let q = &mut q[carrier.copy as usize];
+                (0..3).for_each(|k| q[k] += (carrier.weight * f[k]) as f32);
+            }
+        }
+        curvature
+    }
+
+    /// Lets all springs change their modes; returns whether one did.
+    fn changed(&mut self, members: Members<'_, '_>) -> bool {
+        let mut changed = false;
+        for member in members.iter_mut() {
+            changed |= member.step.own_springs_changed(&member.inputs);
+        }
+        for pair in &mut self.pairs {
+            let y = relative(pair, members);
+            changed |= pair.law.choose_mode(y);
+        }
+        changed
+    }
+
+    /// Writes the force of every spring on its point, in the order given; 0 for those that were left out.
+    fn write(&self, members: Members<'_, '_>, pair_forces: &mut Vec<Vector3<f64>>) {
+        pair_forces.clear();
+        let mut active = self.pairs.iter();
+        pair_forces.extend(self.accepted.iter().map(|&accepted| {
+            let pair = if accepted { active.next() } else { None };
+            pair.map_or_else(Vector3::zeros, |pair| pair.law.force(relative(pair, members)))
+        }));
+    }
+}
+
+impl<'b> Member<'b> {
+    /// The step, and what acts on it.
+    fn split(&mut self) -> (&mut LinearStep, Own<'_, 'b>) {
+        let Self { step, team, elastic, state, inputs, .. } = self;
+        (step, Own { team, elastic: &mut **elastic, state, inputs })
+    }
+}
+
+/// y of a pair with the present δ [m].
+fn relative(pair: &ActivePair, members: &[Member<'_>]) -> Vector3<f64> {
+    let place = |body: u32, copy: u32| {
+        let member = &members[body as usize];
+        member.step.position_together(copy, &member.inputs)
+    };
+    pair.carriers.iter().map(|c| c.weight * place(c.body, c.copy)).sum()
+}
