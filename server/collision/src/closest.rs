@@ -54,11 +54,24 @@ impl<T> BvhLeafCost for Candidate<T> {
 impl SurfaceBvh {
     /// The point of the surface closest to `p` [m], no farther than `reach` [m].
     pub fn closest_point(&self, p: V, reach: f64) -> Option<ClosestPoint> {
+        self.closest_point_where(p, reach, |_| true)
+    }
+
+    /// The point closest to `p` [m] on the triangles that `accept` takes, no farther than `reach` [m].
+    pub fn closest_point_where(
+        &self,
+        p: V,
+        reach: f64,
+        accept: impl Fn(u32) -> bool,
+    ) -> Option<ClosestPoint> {
         let limit = square_limit(reach);
         let found = self.tree().find_best(
             limit,
             |node, _| box_distance_squared(&node_bounds(node), [p, p]) as f32,
             |leaf, _| {
+                if !accept(leaf) {
+                    return None;
+                }
                 let triangle = self.triangle(leaf);
                 let w = closest_point_on_triangle(p, &triangle);
                 let cost = (barycentric_point(&triangle, w) - p).norm_squared() as f32;
@@ -146,7 +159,8 @@ impl SurfaceBvh {
             .sum()
     }
 
-    fn vertex_normal(&self, v: u32) -> V {
+    /// Normal of a vertex: those of its triangles, weighted by their angles there. Its length says nothing.
+    pub fn vertex_normal(&self, v: u32) -> V {
         let weighted = |&t: &u32| {
             let corners = self.corners(t);
             let at = corners.iter().position(|&c| c == v)?;

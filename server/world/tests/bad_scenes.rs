@@ -128,8 +128,14 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
         &with("cutting = { loose = \"pinned\" }"),
         &["found `pinned` with xfem, allowed: snap", "cutting.method"],
     );
-    let effects = message_after("[world]", "[effects]\nself_collision = true\n[world]");
-    assert_says(&effects, &["effects.self_collision", "not supported yet"]);
+    for (line, needed) in [
+        ("integrator = \"rk4\"", "an implicit integrator of motion"),
+        ("law = \"stvk\"", "steps by linear solves in single precision"),
+    ] {
+        let text = GOOD.replace("[world]", "[effects]\nself_collision = true\n[world]");
+        let error = Scene::from_toml(&text.replace("young_pa", &format!("{line}\nyoung_pa"))).unwrap_err();
+        assert_says(&error.to_string(), &["effects.self_collision", needed, "body `beam`"]);
+    }
 }
 
 /// A body with these lines and without the cut.

@@ -113,6 +113,7 @@ fn steady_contact_does_not_allocate() {
         .collect();
 
     let (mut springs, mut planes, mut steady) = (0, 0, 0);
+    let rest = body.rest_positions();
     let (mut in_step, mut in_take, mut in_models) = (0.0, 0.0, 0.0);
     for (round, positions) in rounds.iter().enumerate() {
         for (i, (input, query)) in inputs.iter_mut().zip(&mut queries).enumerate() {
@@ -127,7 +128,7 @@ fn steady_contact_does_not_allocate() {
         let before = allocations();
         let start = Instant::now();
         tools.advance(0.02 * round as f64, &inputs);
-        contacts.update_surface(0, body.epoch(), surface, positions).unwrap();
+        contacts.update_surface(0, body.epoch(), (surface, &rest), positions).unwrap();
         contacts.detect(&tools);
         contacts.collect(0, &forces[..contacts.springs(0).len()]);
         contacts.react(&mut tools);

@@ -178,6 +178,10 @@ impl Builder<'_> {
         for (i, load) in spec.loads.iter().enumerate() {
             self.load(&format!("{at}.load.{i}"), load, &mut body.body);
         }
+        body.velocity_m_s = spec.velocity_m_s;
+        if let Err(error) = body.throw() {
+            self.refused(&format!("{at}.velocity_m_s"), &error);
+        }
         Some(body)
     }
 

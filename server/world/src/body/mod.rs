@@ -47,6 +47,8 @@ pub struct SimBody {
     pub fixed_iterations: bool,
     /// Time over which prescribed displacements grow to their full value [s].
     pub displacement_over_s: f64,
+    /// Velocity at the start [m/s].
+    pub velocity_m_s: Vector3<f64>,
     /// How its cells are adapted; none: they are not.
     adaptation: Option<Box<Adaptation>>,
     watch: Watch,
@@ -87,6 +89,7 @@ impl SimBody {
             rest_volume_m3,
             fixed_iterations: false,
             displacement_over_s: 0.0,
+            velocity_m_s: Vector3::zeros(),
             adaptation: None,
             watch: Watch::default(),
             noticed: None,
@@ -106,10 +109,31 @@ impl SimBody {
         gravity_m_s2: Vector3<f64>,
         springs: &[PointSpring],
     ) -> SolveReport {
-        let over_s = self.displacement_over_s;
-        self.body.set_prescribed_share(if time_s < over_s { time_s / over_s } else { 1.0 });
+        self.prescribe(time_s);
         let solve = self.body.step(h, gravity_m_s2, springs);
         self.as_it_ended(solve)
+    }
+
+    /// Sets prescribed displacements to those of a step that ends at `time_s` [s].
+    pub(crate) fn prescribe(&mut self, time_s: f64) {
+        let over_s = self.displacement_over_s;
+        self.body.set_prescribed_share(if time_s < over_s { time_s / over_s } else { 1.0 });
+    }
+
+    /// Gives all nodes that nothing holds the velocity of the start.
+    ///
+    /// # Errors
+    /// A velocity out of range.
+    pub(crate) fn throw(&mut self) -> Result<(), BodyError> {
+        if self.velocity_m_s == Vector3::zeros() {
+            return Ok(());
+        }
+        let x = self.body.positions().to_vec();
+        let mut v = vec![self.velocity_m_s; x.len()];
+        for &node in self.fix_groups.iter().flatten() {
+            v[node as usize] = Vector3::zeros();
+        }
+        self.body.set_state(&x, &v)
     }
 
     /// Lets the cells be adapted between steps.
@@ -255,7 +279,7 @@ impl SimBody {
 
     /// The report without elements that were inverted only at the predictor, e.g. where a held place moves
     /// far in one step. Only the end of the step counts.
-    fn as_it_ended(&self, solve: SolveReport) -> SolveReport {
+    pub(crate) fn as_it_ended(&self, solve: SolveReport) -> SolveReport {
         if solve.inverted_pieces == 0 || self.body.least_volume_ratio() <= 0.0 {
             return solve;
         }

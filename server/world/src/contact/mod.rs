@@ -19,6 +19,7 @@ pub mod grab;
 pub mod compliance;
 pub mod hand;
 pub mod rest;
+pub mod pairs;
 
 use nalgebra::Vector3;
 use scindo_collision::SurfaceError;
@@ -32,6 +33,7 @@ use crate::tool::geometry::core_radius;
 use crate::tool::obstacle::Obstacle;
 use crate::tool::{Tool, Tools};
 use hand::Hand;
+use pairs::{PairContacts, TouchSettings};
 use press::{Bearing, MAX_POINTS};
 use rest::{RestReport, Resting};
 use spring::material_points;
@@ -73,9 +75,46 @@ pub struct Contacts {
     hands: Vec<Hand>,
     sums: Vec<Sums>,
     obstacles: Vec<Obstacle>,
+    /// How bodies touch bodies; `None` if they do not.
+    touch: Option<TouchSettings>,
+    pairs: PairContacts,
 }
 
 impl Contacts {
+    /// Lets bodies touch each other, themselves, or both.
+    pub fn set_touch(&mut self, touch: Option<TouchSettings>) {
+        self.touch = touch;
+    }
+
+    /// Whether bodies touch bodies.
+    pub fn bodies_touch(&self) -> bool {
+        self.touch.is_some()
+    }
+
+    /// Contacts of bodies with each other and with themselves.
+    pub fn pairs(&self) -> &PairContacts {
+        &self.pairs
+    }
+
+    /// The same, to hand over the forces of a solve.
+    pub fn pairs_mut(&mut self) -> &mut PairContacts {
+        &mut self.pairs
+    }
+
+    /// Finds what bodies may meet of each other and of themselves in a step of `h` seconds.
+    pub fn meet(&mut self, bodies: &[SimBody], h: f64) {
+        let Some(touch) = self.touch else { return };
+        let Self { pairs, surfaces, bodies: own, .. } = self;
+        pairs.detect(bodies, surfaces, |i| own[i].young_pa, (h, touch));
+    }
+
+    /// Evaluates what bodies did to each other in the last step.
+    pub fn settle_pairs(&mut self, bodies: &[SimBody]) {
+        if self.touch.is_some() {
+            self.pairs.settle(bodies);
+        }
+    }
+
     /// Puts up the obstacles of the scene.
     pub fn set_obstacles(&mut self, obstacles: Vec<Obstacle>) {
         self.obstacles = obstacles;
@@ -134,11 +173,15 @@ impl Contacts {
         &mut self,
         body: usize,
         epoch: u32,
-        surface: &Surface,
+        (surface, rest): (&Surface, &[Vector3<f64>]),
         positions: &[[f32; 3]],
     ) -> Result<(), SurfaceError> {
         if self.surfaces[body].update(epoch, &surface.triangles, positions)? {
             self.bodies[body].vertices.clone_from(&surface.vertices);
+            if self.touch.is_some() {
+                let place = |v: u32| surface.vertices[v as usize].position(rest);
+                self.surfaces[body].measure(surface, place);
+            }
         }
         Ok(())
     }
@@ -156,6 +199,7 @@ impl Contacts {
             hand.forget_compliance();
         }
         self.bodies.iter_mut().for_each(|body| body.resting.forget());
+        self.pairs.forget();
     }
 
     /// The hand on tool number `index`; `None` before the first [`detect`](Self::detect) with it.

@@ -72,7 +72,8 @@ impl Table {
         }
         self.body.surface_positions(&mut self.positions);
         let body = &self.body;
-        self.contacts.update_surface(0, body.epoch(), body.surface(), &self.positions).unwrap();
+        let surface = (body.surface(), body.rest_positions());
+        self.contacts.update_surface(0, body.epoch(), surface, &self.positions).unwrap();
         self.contacts.detect(&self.tools);
         self.body.step(STEP_S, V::zeros(), self.contacts.springs(0));
         self.contacts.collect(0, self.body.spring_forces());

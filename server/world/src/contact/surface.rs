@@ -1,6 +1,8 @@
 //! The surface of one body for contact: one tree per topology, refitted after every motion.
 
+use nalgebra::Vector3;
 use scindo_collision::{SurfaceBvh, SurfaceError};
+use scindo_physics::cut::Surface;
 
 /// The surface of one body. It is empty until its first update.
 #[derive(Debug, Clone, Default)]
@@ -8,6 +10,9 @@ pub struct ContactSurface {
     tree: Option<SurfaceBvh>,
     epoch: u32,
     off: bool,
+    /// Per triangle the incision it is a lip of, and per vertex its area [m²]; only where bodies touch bodies.
+    tags: Vec<u32>,
+    areas: Vec<f64>,
 }
 
 impl ContactSurface {
@@ -32,6 +37,33 @@ impl ContactSurface {
         }
     }
 
+    /// Takes over what contact of bodies needs of `surface`, with the positions of its vertices at rest [m].
+    pub fn measure(&mut self, surface: &Surface, rest: impl Fn(u32) -> Vector3<f64>) {
+        self.tags.clone_from(&surface.tags);
+        self.areas.clear();
+        self.areas.resize(surface.vertices.len(), 0.0);
+        for triangle in &surface.triangles {
+            let [a, b, c] = triangle.map(&rest);
+            let third = (b - a).cross(&(c - a)).norm() / 6.0;
+            triangle.iter().for_each(|&v| self.areas[v as usize] += third);
+        }
+    }
+
+    /// The incision that a triangle is a lip of; 0 for the skin.
+    pub fn tag(&self, triangle: u32) -> u32 {
+        self.tags.get(triangle as usize).copied().unwrap_or(0)
+    }
+
+    /// A third of the area of the triangles around a vertex, at rest [m²].
+    pub fn vertex_area(&self, vertex: u32) -> f64 {
+        self.areas.get(vertex as usize).copied().unwrap_or(0.0)
+    }
+
+    /// Unit normal of a vertex; `None` without a tree or where it has none.
+    pub fn vertex_normal(&self, vertex: u32) -> Option<Vector3<f64>> {
+        self.tree.as_ref()?.vertex_normal(vertex).try_normalize(f64::MIN_POSITIVE)
+    }
+
     /// Includes the body in contact or excludes it.
     pub fn switch(&mut self, on: bool) {
         self.off = !on;
@@ -40,6 +72,11 @@ impl ContactSurface {
     /// The tree; `None` before the first update and while switched off.
     pub fn tree(&self) -> Option<&SurfaceBvh> {
         self.tree.as_ref().filter(|_| !self.off)
+    }
+
+    /// The tree, also while the surface is switched off for tools; `None` before the first update.
+    pub fn whole(&self) -> Option<&SurfaceBvh> {
+        self.tree.as_ref()
     }
 
     /// The topology epoch to which the tree belongs.

@@ -71,7 +71,7 @@ impl Bench {
         self.positions.clear();
         let places = surface.vertices.iter().map(|v| v.position(&self.x));
         self.positions.extend(places.map(|p| [p.x as f32, p.y as f32, p.z as f32]));
-        self.contacts.update_surface(0, self.body.epoch(), surface, &self.positions).unwrap();
+        self.contacts.update_surface(0, self.body.epoch(), (surface, &self.x), &self.positions).unwrap();
         self.contacts.detect(&self.tools);
         self.tools.iter().next().unwrap()
     }

@@ -51,11 +51,6 @@ impl Check<'_> {
         self.report(path, Fault::Conflict { what: what.into(), next: next.to_owned() });
     }
 
-    fn unsupported(&mut self, path: String, found: &str, supported: &[&str]) {
-        let supported = supported.iter().map(|word| (*word).to_owned()).collect();
-        self.report(path, Fault::Unsupported { found: found.to_owned(), supported });
-    }
-
     fn scene(&mut self) -> CheckedScene {
         let raw = self.raw;
         self.unique("body", "bodies", raw.body.iter().map(|b| b.id.as_str()));
@@ -67,12 +62,15 @@ impl Check<'_> {
             self.conflict("tool".into(), what, "remove some");
         }
         self.cuttable();
+        let bodies: Vec<BodySpec> = raw.body.iter().map(|body| self.body(body)).collect();
+        self.touch(&bodies);
         CheckedScene {
             name: raw.name.clone(),
             seed: raw.seed,
             gravity_m_s2: Vector3::from(raw.world.gravity_m_s2),
             step_s: raw.world.step_s,
-            bodies: raw.body.iter().map(|body| self.body(body)).collect(),
+            body_contact: [raw.world.contact.friction, raw.world.contact.stiffness],
+            bodies,
             obstacles: raw.obstacle.iter().map(|obstacle| self.obstacle(obstacle)).collect(),
             cuts: raw.cut.iter().enumerate().map(|(i, cut)| self.cut(i, cut)).collect(),
             probes: raw.probe.iter().map(|probe| self.probe(probe)).collect(),
@@ -114,6 +112,7 @@ impl Check<'_> {
             density_kg_m3: body.density_kg_m3,
             damping_mass_1_s: body.rayleigh.mass_1_s,
             damping_stiffness_s: body.rayleigh.stiffness_s,
+            velocity_m_s: Vector3::from(body.velocity_m_s),
             fixes: self.fixes(&at, &body.fix),
             displacement_over_s: body.displacement_over_s,
             loads: self.loads(&at, &body.load),
@@ -411,9 +410,6 @@ impl Check<'_> {
 
     fn effects(&mut self) -> EffectSwitches {
         let raw = &self.raw.effects;
-        if raw.self_collision == Some(true) {
-            self.unsupported("effects.self_collision".into(), "true", &["false"]);
-        }
         let other = self.raw.body.iter().find(|body| body.element != RawElement::Tet4);
         if let (Some(true), Some(body)) = (raw.error_estimate, other) {
             let what = format!(
@@ -430,6 +426,8 @@ impl Check<'_> {
             cutting: raw.cutting,
             contact: raw.contact,
             obstacles: raw.obstacles,
+            body_collision: raw.body_collision,
+            self_collision: raw.self_collision,
             energy: raw.energy,
             error_estimate: raw.error_estimate,
         }

@@ -18,6 +18,8 @@ pub struct CheckedScene {
     pub gravity_m_s2: Vector3<f64>,
     /// Simulated time per step [s].
     pub step_s: f64,
+    /// Friction μ of bodies on bodies, and stiffness of their contact in multiples of E/h.
+    pub body_contact: [f64; 2],
     /// Soft bodies.
     pub bodies: Vec<BodySpec>,
     /// Rigid things that stand still.
@@ -63,6 +65,8 @@ pub struct BodySpec {
     pub damping_mass_1_s: f64,
     /// Rayleigh damping by stiffness [s].
     pub damping_stiffness_s: f64,
+    /// Velocity at the start [m/s].
+    pub velocity_m_s: Vector3<f64>,
     /// Held parts.
     pub fixes: Vec<FixSpec>,
     /// Time over which displacements of held parts grow to their prescribed values [s].
@@ -424,6 +428,10 @@ pub struct EffectSwitches {
     pub contact: Option<bool>,
     /// Obstacles stop bodies.
     pub obstacles: Option<bool>,
+    /// Bodies touch each other.
+    pub body_collision: Option<bool>,
+    /// Bodies touch themselves.
+    pub self_collision: Option<bool>,
     /// Energies in every report.
     pub energy: Option<bool>,
     /// Estimated discretisation error in every report.

@@ -91,14 +91,6 @@ pub enum Fault {
         /// All values.
         known: Vec<String>,
     },
-    /// Part of the format, but not of this version of the program.
-    #[error("`{found}` is not supported yet; supported now: {}", supported.join(", "))]
-    Unsupported {
-        /// Value that stands there.
-        found: String,
-        /// What can stand there.
-        supported: Vec<String>,
-    },
     /// A table that must hold exactly one of several keys.
     #[error("needs exactly one of {}, found {}", one_of.join(", "), if found.is_empty() { "none".into() } else { found.join(" and ") })]
     Choice {

@@ -84,11 +84,31 @@ pub struct RawWorld {
     /// Simulated time per step [s].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0, "x-next" = "0.005 to 0.04 suits real time"))]
     pub step_s: f64,
+    /// Contact of bodies with each other and with themselves, where `effects` asks for it.
+    pub contact: RawBodyContact,
+}
+
+/// Contact of bodies with each other and with themselves.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawBodyContact {
+    /// Coefficient of dry friction.
+    #[schemars(range(min = 0.0, max = 10.0), extend("x-next" = "moist tissue on tissue has about 0.1"))]
+    pub friction: f64,
+    /// Stiffness, in multiples of Young's modulus over the size of an element.
+    #[schemars(range(min = 0.1, max = 1000.0), extend("x-next" = "2 to 20; what is stiffer sinks in less"))]
+    pub stiffness: f64,
+}
+
+impl Default for RawBodyContact {
+    fn default() -> Self {
+        Self { friction: 0.1, stiffness: 10.0 }
+    }
 }
 
 impl Default for RawWorld {
     fn default() -> Self {
-        Self { gravity_m_s2: [0.0; 3], step_s: 0.02 }
+        Self { gravity_m_s2: [0.0; 3], step_s: 0.02, contact: RawBodyContact::default() }
     }
 }
 
@@ -133,6 +153,9 @@ pub struct RawBody {
     /// Rayleigh damping: a mass term and a stiffness term.
     #[serde(default)]
     pub rayleigh: RawRayleigh,
+    /// Velocity at the start [m/s]. Held nodes do not take part in it.
+    #[serde(default)]
+    pub velocity_m_s: Vec3,
     /// Time integration scheme.
     #[serde(default)]
     pub integrator: RawIntegrator,
@@ -672,7 +695,10 @@ pub struct RawEffects {
     /// `false` lets bodies pass through obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub obstacles: Option<bool>,
-    /// Contact of a body with itself. `true` is not supported yet.
+    /// `true` lets bodies touch each other: they are stopped by, slide along and stick to each other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_collision: Option<bool>,
+    /// `true` lets bodies touch themselves, e.g. the two lips of a cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub self_collision: Option<bool>,
     /// `true` adds kinetic and elastic energy to every step report.

@@ -12,6 +12,8 @@ mod adapting;
 
 mod cuts;
 
+mod deform;
+
 mod incision;
 
 mod fill;
@@ -26,7 +28,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 use scindo_physics::body::{BodyError, PcgSettings};
-use scindo_physics::team::{Lead, blocks};
+use scindo_physics::team::Lead;
 
 pub(crate) use stopwatch::processor_seconds;
 pub use undo::{MAX_UNDO, Undone};
@@ -35,6 +37,7 @@ use crate::assemble::{self, BuildOptions, Built};
 use crate::body::BodySize;
 pub use crate::body::{Probe, SimBody, StepCounts};
 use crate::contact::Contacts;
+use crate::contact::pairs::{TouchReport, TouchSettings};
 use crate::contact::rest::RestReport;
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
 use crate::mesh_in::Observer;
@@ -45,6 +48,7 @@ use crate::tool::Tools;
 use crate::tool::obstacle::Obstacle;
 use adapting::ToolPlaces;
 use cuts::{CutContext, Cuts};
+use deform::Groups;
 use fill::Sources;
 use phase_clock::PhaseClock;
 pub use plan::Plan;
@@ -92,6 +96,7 @@ pub struct Simulation {
     tool_places: ToolPlaces,
     cuts: Cuts,
     contacts: Contacts,
+    groups: Groups,
     sleep: Sleep,
     probes: Vec<Probe>,
     plan: Plan,
@@ -149,6 +154,7 @@ impl Simulation {
         if scene.effects.obstacles != Some(false) {
             contacts.set_obstacles(built.obstacles);
         }
+        contacts.set_touch(TouchSettings::of(&scene));
         let report =
             StepReport { bodies: vec![BodyReport::default(); built.bodies.len()], ..StepReport::default() };
         let mut simulation = Self {
@@ -157,6 +163,7 @@ impl Simulation {
             tool_places: ToolPlaces::default(),
             cuts: Cuts::new(&scene.cuts, &built.bodies),
             contacts,
+            groups: Groups::default(),
             sleep: Sleep::new(&built.bodies),
             bodies: built.bodies,
             lead: built.lead,
@@ -221,43 +228,21 @@ impl Simulation {
     }
 
     fn touch(&mut self) {
-        if self.tools.any_active() {
+        if self.tools.any_active() || self.contacts.bodies_touch() {
             for (i, body) in self.bodies.iter_mut().enumerate() {
                 let (shown, positions) = body.surface_now();
-                let epoch = shown.epoch();
-                if let Err(error) = self.contacts.update_surface(i, epoch, shown.surface(), positions) {
+                let (epoch, surface) = (shown.epoch(), (shown.surface(), shown.rest_positions()));
+                if let Err(error) = self.contacts.update_surface(i, epoch, surface, positions) {
                     self.report.tell(Level::Error, "contact-surface", &body.id, error.to_string());
                 }
             }
         }
+        let h = self.scene.step_s;
         self.contacts.detect(&self.tools);
         for (i, body) in self.bodies.iter().enumerate() {
-            self.contacts.rest(i, body, self.scene.step_s, self.scene.gravity_m_s2);
+            self.contacts.rest(i, body, h, self.scene.gravity_m_s2);
         }
-    }
-
-    fn deform(&mut self) {
-        let (when, gravity) = ((self.time_s(), self.scene.step_s), self.scene.gravity_m_s2);
-        let Self { bodies, lead, contacts, report, phase_clock, .. } = self;
-        let step = |i: usize, body: &mut SimBody, report: &mut BodyReport| {
-            let _span = tracing::trace_span!("deform", body = %body.id).entered();
-            phase_clock.start(i);
-            report.solve = body.step(when, gravity, contacts.springs(i));
-            phase_clock.end(i);
-        };
-        // Bodies act on each other through nothing but the springs, which this step finds as they are.
-        if let Some(lead) = lead {
-            let each = (blocks(bodies, 1), blocks(&mut report.bodies, 1));
-            lead.side_by_side(each, |i, (body, report)| step(i, &mut body[0], &mut report[0]));
-        } else {
-            let each = bodies.iter_mut().zip(&mut report.bodies).enumerate();
-            each.for_each(|(i, (body, report))| step(i, body, report));
-        }
-        for (i, body) in bodies.iter_mut().enumerate() {
-            let solve = report.bodies[i].solve;
-            body.has_stepped(&solve, report);
-        }
-        self.sleep.look(self.steps, &mut self.bodies, &mut self.report);
+        self.contacts.meet(&self.bodies, h);
     }
 
     fn react(&mut self) {
@@ -265,6 +250,7 @@ impl Simulation {
             self.contacts.collect(i, body.body.spring_forces());
             self.contacts.settle(i, body);
         }
+        self.contacts.settle_pairs(&self.bodies);
         self.contacts.react(&mut self.tools);
     }
 
@@ -296,6 +282,7 @@ impl Simulation {
             body.body.reset()?;
             body.has_changed_topology();
             body.has_been_reset();
+            body.throw()?;
             self.contacts.forget_motion(i);
         }
         for probe in &mut self.probes {
@@ -460,6 +447,11 @@ impl Simulation {
     /// Contact of body number `body` with all obstacles in the last step.
     pub fn rest_report(&self, body: usize) -> &RestReport {
         self.contacts.rest_report(body)
+    }
+
+    /// Contacts of bodies with each other and with themselves in the last step, one report per pair.
+    pub fn touch_reports(&self) -> &[TouchReport] {
+        self.contacts.pairs().reports()
     }
 
     /// Probes in the order of the scene.

@@ -10,6 +10,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::body::BodySize;
+use crate::contact::pairs::TouchSettings;
 use crate::inputs::Wants;
 use crate::scene::raw::RawCutMethod;
 use crate::scene::{AdaptSpec, BodySpec, CheckedScene};
@@ -28,6 +29,9 @@ const SECONDS_PER_TRIANGLE: f64 = 30e-9;
 
 /// Seconds per surface vertex and obstacle: where the vertex is, and how far away.
 const SECONDS_PER_VERTEX_AND_OBSTACLE: f64 = 15e-9;
+
+/// Seconds per surface vertex that looks for the body itself.
+const SECONDS_PER_SELF_QUERY: f64 = 1e-6;
 
 /// One effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -180,8 +184,24 @@ impl Plan {
                 self.push(&format!("contact {} x {}", tool.id, body.id), on, why, scripted);
             }
         }
-        self.push("self-collision", false, "not supported yet", 0.0);
-        self.push("body-body contact", false, "not supported yet", 0.0);
+        self.touch(scene, sizes);
+    }
+
+    fn touch(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {
+        let touch = TouchSettings::of(scene);
+        let why = |key: Option<bool>, what: &str| match key {
+            Some(on) => format!("effects.{what} = {on}"),
+            None => format!("effects.{what} is not asked for"),
+        };
+        let triangles: usize = sizes.iter().map(|size| size.triangles).sum();
+        let vertices: usize = sizes.iter().map(|size| size.vertices).sum();
+        let seconds = triangles as f64 * SECONDS_PER_TRIANGLE;
+        let itself = touch.is_some_and(|touch| touch.itself);
+        let of_itself = seconds + vertices as f64 * SECONDS_PER_SELF_QUERY;
+        let effects = &scene.effects;
+        self.push("self-collision", itself, why(effects.self_collision, "self_collision"), of_itself);
+        let others = touch.is_some_and(|touch| touch.others);
+        self.push("body-body contact", others, why(effects.body_collision, "body_collision"), seconds);
     }
 
     fn obstacles(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {

@@ -1,9 +1,9 @@
-//! Obstacles.
+//! Obstacles, and bodies that touch bodies.
 
 use nalgebra::Vector3;
 
-use super::super::checked::{ObstacleSpec, Solid};
-use super::super::raw::RawObstacle;
+use super::super::checked::{BodySpec, ObstacleSpec, Solid};
+use super::super::raw::{RawIntegrator, RawObstacle};
 use super::Check;
 
 impl Check<'_> {
@@ -13,6 +13,32 @@ impl Check<'_> {
         let solid = self.solid(&at, obstacle);
         let RawObstacle { id, friction, stiffness, .. } = obstacle;
         ObstacleSpec { id: id.clone(), solid, friction: *friction, stiffness: *stiffness }
+    }
+
+    /// Bodies that touch are solved together, which needs steps by linear solves.
+    pub(super) fn touch(&mut self, bodies: &[BodySpec]) {
+        let effects = &self.raw.effects;
+        let wanted = [("body_collision", effects.body_collision), ("self_collision", effects.self_collision)];
+        for (effect, _) in wanted.into_iter().filter(|(_, on)| *on == Some(true)) {
+            for body in bodies {
+                let mechanics = &body.mechanics;
+                let why =
+                    if mechanics.integrator.is_explicit() || mechanics.integrator == RawIntegrator::Static {
+                        Some("an implicit integrator of motion")
+                    } else if body.octree.is_some_and(|octree| octree.simulate_level > 0) {
+                        Some("octree.simulate_level = 0")
+                    } else {
+                        mechanics.why_general().map(|_| "steps by linear solves in single precision")
+                    };
+                let Some(needed) = why else { continue };
+                let what = format!("bodies that touch need {needed}, which body `{}` does not have", body.id);
+                let next = match mechanics.why_general() {
+                    Some(why) => format!("change it ({why}), or remove the effect"),
+                    None => "change it, or remove the effect".into(),
+                };
+                self.conflict(format!("effects.{effect}"), what, &next);
+            }
+        }
     }
 
     fn solid(&mut self, at: &str, obstacle: &RawObstacle) -> Solid {

@@ -1,0 +1,473 @@
+//! Bodies on bodies, and bodies on themselves.
+//!
+//! A surface vertex that may meet a triangle in a step gets a one-sided spring with friction between the two. All
+//! bodies that such springs connect are solved as one system, so both sides are implicit and exchange momentum
+//! exactly. A vertex remembers the place on the triangle where it sticks. Bodies that are out of reach of each other
+//! have no springs and cost a comparison of boxes.
+//!
+//! # A body with itself
+//! Every point of a body lies behind some of its faces, so depth alone says nothing. A contact has to begin outside,
+//! or between the two lips of one cut, and is followed from there. Triangles count only where they face the vertex.
+
+use nalgebra::Vector3;
+use scindo_collision::ClosestPoint;
+use scindo_physics::body::{Body, PairSpring, SpringKind};
+
+use super::surface::ContactSurface;
+use crate::body::SimBody;
+use crate::scene::CheckedScene;
+
+/// Distance at which a vertex gets a spring beyond its path in the step, in cells of the body.
+const MARGIN_CELLS: f64 = 0.1;
+/// Depth up to which a vertex is still found, in cells.
+const DEEPEST_CELLS: f64 = 1.0;
+/// Depth at which contact of a body with itself may begin, in cells.
+const BORN_CELLS: f64 = 1e-5;
+/// The same between two lips of one cut.
+const BORN_LIP_CELLS: f64 = 0.25;
+/// Time in which a depth that a contact began with is pushed out [s].
+const EASE_S: f64 = 0.1;
+/// Stiffness across the normal relative to that along it.
+const TANGENTIAL: f64 = 0.5;
+/// A triangle faces a vertex if their normals have at most this scalar product.
+const FACING: f64 = -0.2;
+
+/// How bodies touch each other and themselves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TouchSettings {
+    /// Whether bodies touch each other.
+    pub others: bool,
+    /// Whether bodies touch themselves.
+    pub itself: bool,
+    /// Coefficient of dry friction μ.
+    pub friction: f64,
+    /// Stiffness of the contact in multiples of E/h.
+    pub stiffness: f64,
+}
+
+impl TouchSettings {
+    /// Those of a scene; `None` if its bodies touch no bodies.
+    pub fn of(scene: &CheckedScene) -> Option<Self> {
+        let others = scene.effects.body_collision == Some(true) && scene.bodies.len() > 1;
+        let itself = scene.effects.self_collision == Some(true);
+        let [friction, stiffness] = scene.body_contact;
+        (others || itself).then_some(Self { others, itself, friction, stiffness })
+    }
+}
+
+/// What a vertex remembers of a triangle.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    /// Bodies of vertex and triangle.
+    bodies: [u32; 2],
+    vertex: u32,
+    triangle: u32,
+    barycentric: [f64; 3],
+    /// Relative place where it sticks [m].
+    anchor_m: Vector3<f64>,
+    grip_n: f64,
+    /// Depth that it began with and that is still left to it [m].
+    eased_m: f64,
+    /// Whether it slipped, so that it takes hold of another place.
+    slipped: bool,
+    /// Its spring in the last step.
+    spring: u32,
+}
+
+/// Contact of two bodies in one step, or of a body with itself.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct TouchReport {
+    /// The bodies.
+    pub bodies: [u32; 2],
+    /// Vertices that are pushed.
+    pub contacts: u32,
+    /// Largest depth of a pushed vertex [m].
+    pub deepest_m: f64,
+    /// Sum of the forces on the first body [N].
+    pub force_n: Vector3<f64>,
+    /// Sum of the normal forces [N].
+    pub normal_n: f64,
+}
+
+/// The contacts of all bodies with each other and with themselves.
+#[derive(Debug, Clone, Default)]
+pub struct PairContacts {
+    kept: Vec<Kept>,
+    now: Vec<Kept>,
+    /// The springs of this step, those of a group together, with the numbers of bodies within their group.
+    springs: Vec<PairSpring>,
+    /// The same with their own numbers, in the order of `now`.
+    found: Vec<PairSpring>,
+    /// Where the springs of every contact stand.
+    order: Vec<u32>,
+    /// Per body the first body of its group.
+    group: Vec<u32>,
+    /// Per body the box that its surface passes through in the step, and its largest speed.
+    reach: Vec<([Vector3<f64>; 2], f64)>,
+    epochs: Vec<u32>,
+    /// Per body and vertex: whether it is on a lip, and of which cut.
+    lips: Vec<Vec<u32>>,
+    reports: Vec<TouchReport>,
+    /// Forces of the springs in `springs` [N].
+    forces: Vec<Vector3<f64>>,
+}
+
+/// A vertex and what is near it.
+struct Candidate<'a> {
+    bodies: [usize; 2],
+    vertex: u32,
+    near: &'a ClosestPoint,
+}
+
+impl PairContacts {
+    /// Forgets all contacts.
+    pub fn forget(&mut self) {
+        self.kept.clear();
+        self.now.clear();
+        self.springs.clear();
+        self.found.clear();
+        self.reports.clear();
+        self.group.clear();
+    }
+
+    /// Reports of the last step, one per pair of bodies that touched.
+    pub fn reports(&self) -> &[TouchReport] {
+        &self.reports
+    }
+
+    /// The first body of the group in which body number `body` steps; itself if it touches nothing.
+    pub fn group_of(&self, body: usize) -> usize {
+        self.group.get(body).map_or(body, |&group| group as usize)
+    }
+
+    /// Whether body number `body` may touch another body or itself in this step.
+    pub fn has_company(&self, body: usize) -> bool {
+        !self.range_of(self.group_of(body)).is_empty()
+    }
+
+    /// The springs of the group whose first body is `first`. Their numbers of bodies are those within the group.
+    pub fn springs_of(&self, first: usize) -> &[PairSpring] {
+        let range = self.range_of(first);
+        &self.springs[range]
+    }
+
+    /// Takes the forces of the springs of the group whose first body is `first` [N].
+    pub fn collect(&mut self, first: usize, forces: &[Vector3<f64>]) {
+        let range = self.range_of(first);
+        self.forces.resize(self.springs.len(), Vector3::zeros());
+        if range.len() == forces.len() {
+            self.forces[range].copy_from_slice(forces);
+        }
+    }
+
+    fn range_of(&self, first: usize) -> std::ops::Range<usize> {
+        let group = |i: &u32| self.group_of(self.now[*i as usize].bodies[0] as usize);
+        let start = self.order.partition_point(|i| group(i) < first);
+        start..start + self.order[start..].partition_point(|i| group(i) == first)
+    }
+
+    /// Finds what may touch in a step of `h` seconds.
+    pub fn detect(
+        &mut self,
+        bodies: &[SimBody],
+        surfaces: &[ContactSurface],
+        young_pa: impl Fn(usize) -> f64,
+        (h, settings): (f64, TouchSettings),
+    ) {
+        self.follow(bodies);
+        std::mem::swap(&mut self.kept, &mut self.now);
+        self.now.clear();
+        self.found.clear();
+        self.measure(bodies, h);
+        for a in 0..bodies.len() {
+            for b in 0..bodies.len() {
+                let wanted = if a == b { settings.itself } else { settings.others };
+                if wanted {
+                    self.between([a, b], bodies, surfaces, &young_pa, (h, settings));
+                }
+            }
+        }
+        self.arrange(bodies.len());
+    }
+
+    /// Boxes and speeds of all bodies in the step.
+    fn measure(&mut self, bodies: &[SimBody], h: f64) {
+        self.reach.clear();
+        for body in bodies {
+            let (x, v) = (body.body.positions(), body.body.velocities());
+            let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+            let (bounds, fastest) = x.iter().zip(v).fold((none, 0.0f64), |([low, high], fastest), (x, v)| {
+                let to = x + h * v;
+                ([low.inf(x).inf(&to), high.sup(x).sup(&to)], fastest.max(v.norm()))
+            });
+            self.reach.push((bounds, fastest));
+        }
+    }
+
+    /// Springs of the vertices of body `a` against the triangles of body `b`.
+    fn between(
+        &mut self,
+        [a, b]: [usize; 2],
+        bodies: &[SimBody],
+        surfaces: &[ContactSurface],
+        young_pa: &impl Fn(usize) -> f64,
+        (h, settings): (f64, TouchSettings),
+    ) {
+        let Some(tree) = surfaces[b].whole() else { return };
+        let cell_m = bodies[a].cell_m().min(bodies[b].cell_m());
+        let margin = MARGIN_CELLS * cell_m;
+        let ([low, high], fastest) = self.reach[b];
+        let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
+        let ([own_low, own_high], _) = self.reach[a];
+        if a != b && (0..3).any(|k| own_high[k] < low[k] || own_low[k] > high[k]) {
+            return;
+        }
+        let (body, other) = (&bodies[a].body, &bodies[b].body);
+        let (x, v) = (body.positions(), body.velocities());
+        let surface = body.surface();
+        let stiffness = {
+            let [soft, hard] = [a, b].map(|i| young_pa(i) / bodies[i].cell_m());
+            settings.stiffness * 2.0 * soft * hard / (soft + hard)
+        };
+        let first = self.kept.partition_point(|k| k.bodies < [a as u32, b as u32]);
+        let mut next = first;
+        for (vertex, point) in (0u32..).zip(&surface.vertices) {
+            let from = point.position(x);
+            let inside = |p: &Vector3<f64>| (0..3).all(|k| p[k] >= low[k] && p[k] <= high[k]);
+            let to = from + h * point.position(v);
+            if a != b && !inside(&from) && !inside(&to) {
+                continue;
+            }
+            let approach = h * (fastest + point.position(v).norm());
+            let reach = (margin + approach).max(DEEPEST_CELLS * cell_m);
+            let own = (a == b).then(|| surfaces[a].vertex_normal(vertex)).flatten();
+            let near = match own {
+                None if a == b => continue,
+                None => tree.closest_point(from, reach),
+                Some(normal) => tree.closest_point_where(from, reach, |t| {
+                    let corners = tree.corners(t);
+                    !corners.contains(&vertex) && facing(&tree.area_normal(t), &normal)
+                }),
+            };
+            let Some(near) = near else { continue };
+            if near.signed_distance > margin + approach {
+                continue;
+            }
+            while next < self.kept.len() && self.kept[next].key() < ([a as u32, b as u32], vertex) {
+                next += 1;
+            }
+            let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
+            let candidate = Candidate { bodies: [a, b], vertex, near: &near };
+            let Some(contact) = self.contact(known, &candidate, (surfaces, cell_m), h) else { continue };
+            let corners = tree.corners(contact.triangle).map(|c| other.surface().vertices[c as usize]);
+            let area = surfaces[a].vertex_area(vertex);
+            let kind = Self::kind(&contact, &near, (other, &corners), settings, stiffness * area);
+            self.found.push(PairSpring {
+                bodies: [a as u32, b as u32],
+                point: *point,
+                corners,
+                barycentric: contact.barycentric,
+                kind,
+                stiffness_n_m: stiffness * area,
+                max_force_n: f64::INFINITY,
+            });
+            self.now.push(contact);
+        }
+    }
+
+    /// The contact of a vertex with what is near it; `None` if there is none.
+    fn contact(
+        &self,
+        known: Option<Kept>,
+        candidate: &Candidate<'_>,
+        (surfaces, cell_m): (&[ContactSurface], f64),
+        h: f64,
+    ) -> Option<Kept> {
+        let Candidate { bodies: [a, b], vertex, near, .. } = *candidate;
+        let depth = -near.signed_distance;
+        let spring = self.now.len() as u32;
+        if let Some(known) = known {
+            let eased_m = known.eased_m * (1.0 - h / EASE_S).max(0.0);
+            let slid = known.slipped || known.grip_n == 0.0;
+            let (triangle, barycentric) =
+                if slid { (near.triangle, near.barycentric) } else { (known.triangle, known.barycentric) };
+            return Some(Kept { triangle, barycentric, eased_m, spring, ..known });
+        }
+        if a == b && depth > BORN_CELLS * cell_m {
+            let of = self.lips[a].get(vertex as usize).copied().unwrap_or(0);
+            let lip = of > 0 && surfaces[b].tag(near.triangle) == of;
+            if !lip || depth > BORN_LIP_CELLS * cell_m {
+                return None;
+            }
+        }
+        Some(Kept {
+            bodies: [a as u32, b as u32],
+            vertex,
+            triangle: near.triangle,
+            barycentric: near.barycentric,
+            anchor_m: Vector3::zeros(),
+            grip_n: 0.0,
+            eased_m: depth.max(0.0),
+            slipped: true,
+            spring,
+        })
+    }
+
+    /// Plane and anchor of a contact in the relative position y.
+    fn kind(
+        contact: &Kept,
+        near: &ClosestPoint,
+        (other, corners): (&Body, &[scindo_physics::element::MaterialPoint; 3]),
+        settings: TouchSettings,
+        stiffness_n_m: f64,
+    ) -> SpringKind {
+        let x = other.positions();
+        let place = |w: [f64; 3]| corners.iter().zip(w).map(|(c, w)| w * c.position(x)).sum::<Vector3<f64>>();
+        let held = place(contact.barycentric);
+        // The plane goes through the closest place, which is another one than that where the vertex sticks.
+        let closest = if contact.slipped || contact.grip_n == 0.0 { held } else { near.point };
+        let normal = near.normal;
+        let offset_m = normal.dot(&(closest - held)) - contact.eased_m;
+        match settings.friction > 0.0 {
+            true => SpringKind::Rough {
+                normal,
+                offset_m,
+                anchor_m: contact.anchor_m,
+                friction: settings.friction,
+                tangential_n_m: TANGENTIAL * stiffness_n_m,
+                grip_n: contact.grip_n,
+            },
+            false => SpringKind::OneSided { normal, offset_m },
+        }
+    }
+
+    /// Joins bodies into groups, and arranges the springs by group.
+    fn arrange(&mut self, n: usize) {
+        let Self { group, now, order, springs, found, .. } = self;
+        group.clear();
+        group.extend(0..n as u32);
+        for contact in now.iter() {
+            let [a, b] = contact.bodies.map(|i| root(group, i));
+            let (low, high) = (a.min(b), a.max(b));
+            group[high as usize] = low;
+        }
+        for i in 0..n as u32 {
+            group[i as usize] = root(group, i);
+        }
+        order.clear();
+        order.extend(0..now.len() as u32);
+        order.sort_unstable_by_key(|&i| (group[now[i as usize].bodies[0] as usize], i));
+        springs.clear();
+        springs.extend(order.iter().map(|&i| {
+            let spring = found[i as usize];
+            let local = |body: u32| {
+                let first = group[body as usize];
+                (first..body).filter(|&other| group[other as usize] == first).count() as u32
+            };
+            PairSpring { bodies: spring.bodies.map(local), ..spring }
+        }));
+        for (place, &i) in (0u32..).zip(order.iter()) {
+            now[i as usize].spring = place;
+        }
+    }
+
+    /// Evaluates the last step: what sticks, what slips, and the forces.
+    pub fn settle(&mut self, bodies: &[SimBody]) {
+        self.reports.clear();
+        self.forces.resize(self.springs.len(), Vector3::zeros());
+        let Self { now, found, forces, reports, .. } = self;
+        for (contact, spring) in now.iter_mut().zip(found) {
+            let force = forces[contact.spring as usize];
+            let [a, b] = contact.bodies.map(|i| bodies[i as usize].body.positions());
+            let y = spring.relative([a, b]);
+            let (normal, offset_m) = match spring.kind {
+                SpringKind::Rough { normal, offset_m, .. } | SpringKind::OneSided { normal, offset_m } => {
+                    (normal, offset_m)
+                }
+                SpringKind::Hold { .. } => continue,
+            };
+            let push = force.dot(&normal);
+            contact.slipped = true;
+            contact.anchor_m = Vector3::zeros();
+            contact.grip_n = 0.0;
+            if push <= 0.0 {
+                continue;
+            }
+            if let SpringKind::Rough { anchor_m: before, tangential_n_m, friction, .. } = spring.kind {
+                let across = force - push * normal;
+                let anchor_m = y + across / tangential_n_m;
+                let moved = (anchor_m - before) - normal * normal.dot(&(anchor_m - before));
+                contact.slipped = moved.norm() > 1e-3 * across.norm() / tangential_n_m + 1e-12;
+                // A vertex that slipped takes hold of the place under it, with the friction it has.
+                contact.anchor_m = if contact.slipped { across / tangential_n_m } else { before };
+                contact.grip_n = friction * push;
+            }
+            let of = [contact.bodies[0].min(contact.bodies[1]), contact.bodies[0].max(contact.bodies[1])];
+            let sign = if contact.bodies[0] == of[0] { 1.0 } else { -1.0 };
+            let place = match reports.iter().position(|report| report.bodies == of) {
+                Some(place) => place,
+                None => {
+                    reports.push(TouchReport { bodies: of, ..TouchReport::default() });
+                    reports.len() - 1
+                }
+            };
+            let report = &mut reports[place];
+            report.contacts += 1;
+            report.deepest_m = report.deepest_m.max(offset_m + contact.eased_m - normal.dot(&y));
+            report.force_n += sign * force;
+            report.normal_n += push;
+        }
+        forces.fill(Vector3::zeros());
+    }
+
+    /// Follows the topologies of all bodies. Contacts stay with what is still the same.
+    fn follow(&mut self, bodies: &[SimBody]) {
+        let same = self.epochs.len() == bodies.len()
+            && self.epochs.iter().zip(bodies).all(|(&epoch, body)| epoch == body.epoch());
+        if same {
+            return;
+        }
+        self.epochs.clear();
+        self.epochs.extend(bodies.iter().map(SimBody::epoch));
+        self.lips.clear();
+        for body in bodies {
+            let surface = body.body.surface();
+            let mut lips = vec![0; surface.vertices.len()];
+            for (triangle, &tag) in surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag > 0) {
+                triangle.iter().for_each(|&v| lips[v as usize] = tag);
+            }
+            self.lips.push(lips);
+        }
+        let found = &self.found;
+        let mut each = found.iter();
+        self.now.retain(|contact| {
+            let Some(spring) = each.next() else { return false };
+            let [a, b] = contact.bodies.map(|i| bodies[i as usize].body.surface());
+            let vertex = a.vertices.get(contact.vertex as usize);
+            let corners = b.triangles.get(contact.triangle as usize);
+            let is_corner = |(c, known): (&u32, _)| b.vertices.get(*c as usize) == Some(known);
+            vertex == Some(&spring.point)
+                && corners.is_some_and(|corners| corners.iter().zip(&spring.corners).all(is_corner))
+        });
+    }
+}
+
+impl Kept {
+    fn key(&self) -> ([u32; 2], u32) {
+        (self.bodies, self.vertex)
+    }
+}
+
+/// Whether a triangle with this normal, of any length, faces a vertex with that unit normal.
+fn facing(triangle: &Vector3<f64>, vertex: &Vector3<f64>) -> bool {
+    triangle.dot(vertex) <= FACING * triangle.norm()
+}
+
+/// The first body of the group of body `i`.
+fn root(group: &[u32], i: u32) -> u32 {
+    let mut at = i;
+    while group[at as usize] != at {
+        at = group[at as usize];
+    }
+    at
+}
