@@ -1,5 +1,6 @@
-//! Lists of numbers: union–find, renumbering, and memory that grows ahead of need.
+//! Lists of numbers: union–find, renumbering, lists of different lengths, and memory that grows ahead of need.
 
 pub mod disjoint;
+pub mod jagged;
 pub mod numbering;
 pub mod reserve;

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::follow::{LevelChange, Links, follow_level};
 use super::level::{Level, NONE};
 use super::transfer::Transfer;
+use crate::lists::jagged::Jagged;
 use crate::material::Region;
 use crate::octree::{Lattice, Octree};
 
@@ -25,10 +27,27 @@ pub struct Hierarchy {
     pub(super) steps: Vec<Step>,
     /// Kinds of cells whose matrix is shared.
     pub(super) kinds: Vec<Kind>,
+    numbers: BTreeMap<Kind, u32>,
     /// Per level and cell its kind, or [`NONE`].
     pub(super) kind_of: Vec<Vec<u32>>,
     /// Per level and cell, whether the matrix of its kind is exact with mass, too.
     pub(super) exact: Vec<Vec<bool>>,
+    limits: Limits,
+    /// Whether coarsening ended because a further level would have kept most vertices.
+    stalled: bool,
+}
+
+/// How far cells are merged.
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    /// Number of unknowns that is small enough.
+    coarse_enough: usize,
+    /// Least number of the last level.
+    least: usize,
+    /// Finest cells along the longest side of the lattice.
+    across: u32,
+    /// Whether coarse levels see cuts inside their cells.
+    duplicates: bool,
 }
 
 /// What leads from a level to the next coarser one.
@@ -36,10 +55,8 @@ pub struct Hierarchy {
 pub struct Step {
     /// Coarse cell of every fine cell.
     pub parent: Vec<u32>,
-    /// Entries of `children` of every coarse cell.
-    pub first_child: Vec<u32>,
-    /// Fine cells by coarse cell, ascending.
-    pub children: Vec<u32>,
+    /// Fine cells of every coarse cell, ascending.
+    pub children: Jagged<u32>,
     /// P.
     pub transfer: Transfer,
 }
@@ -59,7 +76,7 @@ impl Step {
     /// Fine cells of coarse cell `id`.
     #[inline]
     pub fn children_of(&self, id: usize) -> &[u32] {
-        &self.children[self.first_child[id] as usize..self.first_child[id + 1] as usize]
+        self.children.get(id)
     }
 }
 
@@ -89,23 +106,21 @@ impl Hierarchy {
         let (finest, mut links) = Level::finest(octree);
         let mut levels = vec![finest];
         let mut steps = Vec::new();
-        let across = largest_extent(octree.lattice());
-        let mut size = 0;
-        let enough = |levels: &[Level]| {
-            levels.len() > least && 3 * levels[levels.len() - 1].n_vertices <= coarse_enough
-        };
-        while !enough(&levels) && 1 << size < across {
+        let limits = Limits { coarse_enough, least, across: largest_extent(octree.lattice()), duplicates };
+        let mut stalled = false;
+        while limits.goes_on(&levels) {
+            let size = levels.len() as u8 - 1;
             let fine = &levels[levels.len() - 1];
             let coarsened = fine.coarsened(&links, size, duplicates);
             let (before, after) = (fine.n_vertices as f64, coarsened.level.n_vertices as f64);
             let larger_wait = fine.cells.iter().any(|cell| cell.level > size);
             if after > STALLED * before && !larger_wait && levels.len() > least {
+                stalled = true;
                 break;
             }
             steps.push(Step::new(fine, &coarsened.level, coarsened.parent));
             levels.push(coarsened.level);
             links = coarsened.links;
-            size += 1;
         }
         let mut hierarchy = Self {
             h: octree.lattice().h,
@@ -113,22 +128,64 @@ impl Hierarchy {
             levels,
             steps,
             kinds: Vec::new(),
+            numbers: BTreeMap::new(),
             kind_of: Vec::new(),
             exact: Vec::new(),
+            limits,
+            stalled,
         };
-        hierarchy.find_kinds();
+        for l in 0..hierarchy.levels.len() {
+            let n = hierarchy.levels[l].cells.len();
+            hierarchy.kind_of.push(vec![NONE; n]);
+            hierarchy.exact.push(vec![false; n]);
+            (0..n).for_each(|id| hierarchy.find_kind(l, id));
+        }
         hierarchy
+    }
+
+    /// Follows a cut of the octree that changed the leaves `changed`, ascending, and left the numbers of all others.
+    /// The levels are those that [`new`](Self::new) makes, with other numbers of coarse cells and vertices. Returns
+    /// what changed on each level.
+    ///
+    /// `None` if all have to be made anew, because the coarsest level has become too large or the coarse levels do
+    /// not see cuts; the hierarchy is then of no more use. Where coarsening stalls, the number of levels stays.
+    pub fn follow(&mut self, octree: &Octree, changed: &[u32]) -> Option<Vec<LevelChange>> {
+        if !self.limits.duplicates {
+            return None;
+        }
+        let mut changes = vec![self.levels[0].follow_leaves(octree, changed)];
+        for (l, step) in self.steps.iter_mut().enumerate() {
+            let (below, above) = self.levels.split_at_mut(l + 1);
+            let (fine, coarse) = (&below[l], &mut above[0]);
+            let links = if l == 0 { Links::Leaves(octree) } else { Links::Cells(&fine.links) };
+            let of_fine = &changes[l];
+            let change = follow_level((fine, links, of_fine), step, coarse, l as u8)?;
+            // A row follows from the fine vertex, its cell, and the parent of that.
+            let below = change.cells.iter().flat_map(|&id| step.children.get(id as usize));
+            let mut rows: Vec<u32> = below.flat_map(|&id| fine.vertices[id as usize]).collect();
+            rows.extend(&of_fine.vertices);
+            rows.sort_unstable();
+            rows.dedup();
+            step.transfer.follow(fine, coarse, &step.parent, &rows);
+            changes.push(change);
+        }
+        if !self.stalled && self.limits.goes_on(&self.levels) {
+            return None;
+        }
+        for (l, change) in changes.iter().enumerate() {
+            let n = self.levels[l].cells.len();
+            self.kind_of[l].resize(n, NONE);
+            self.exact[l].resize(n, false);
+            change.cells.iter().for_each(|&id| self.find_kind(l, id as usize));
+        }
+        Some(changes)
     }
 
     /// Bytes in use.
     pub fn memory(&self) -> usize {
         let levels: usize = self.levels.iter().map(Level::memory).sum();
-        let step = |step: &Step| {
-            size_of_val(&step.parent[..])
-                + size_of_val(&step.first_child[..])
-                + size_of_val(&step.children[..])
-                + step.transfer.memory()
-        };
+        let step =
+            |step: &Step| size_of_val(&step.parent[..]) + step.children.memory() + step.transfer.memory();
         let kinds: usize = self.kind_of.iter().map(|kinds| size_of_val(&kinds[..])).sum();
         let exact: usize = self.exact.iter().map(|exact| size_of_val(&exact[..])).sum();
         levels + self.steps.iter().map(step).sum::<usize>() + kinds + exact
@@ -149,62 +206,55 @@ impl Hierarchy {
         self.levels[0].n_vertices
     }
 
-    /// Finds the cells whose matrix is that of a cube of their size: leaves, and cells of eight such children of
-    /// one material.
-    fn find_kinds(&mut self) {
-        let mut numbers: BTreeMap<Kind, u32> = BTreeMap::new();
-        let mut number = |kind: Kind, kinds: &mut Vec<Kind>| {
-            *numbers.entry(kind).or_insert_with(|| {
+    /// Finds whether the matrix of a cell is that of a cube of its size: that of a leaf, or of a cell of eight such
+    /// children of one material. Children come first.
+    fn find_kind(&mut self, l: usize, id: usize) {
+        let level = &self.levels[l];
+        let cell = &level.cells[id];
+        let own = Kind { material: cell.material, side: cell.level, merged: 0 };
+        let found = if level.leaf[id] != NONE {
+            Some((own, true))
+        } else {
+            let (children, fine) = (self.steps[l - 1].children_of(id), &self.levels[l - 1]);
+            let kind = |child: u32| self.kinds.get(self.kind_of[l - 1][child as usize] as usize).copied();
+            let full = children.len() == 8
+                && children.iter().all(|&c| kind(c).is_some_and(|k| k.material == cell.material));
+            kind(children[0]).filter(|_| full).map(|first| {
+                let exact = children.iter().all(|&c| {
+                    self.exact[l - 1][c as usize] && kind(c) == Some(first) && fine.hanging[c as usize] == 0
+                });
+                (Kind { merged: first.merged + 1, ..own }, exact)
+            })
+        };
+        let kinds = &mut self.kinds;
+        let mut number = |kind: Kind| {
+            *self.numbers.entry(kind).or_insert_with(|| {
                 kinds.push(kind);
                 kinds.len() as u32 - 1
             })
         };
-        for (l, level) in self.levels.iter().enumerate() {
-            let (mut kind_of, mut exact) = (Vec::new(), Vec::new());
-            for (id, cell) in level.cells.iter().enumerate() {
-                let own = Kind { material: cell.material, side: cell.level, merged: 0 };
-                if level.leaf[id] != NONE {
-                    kind_of.push(number(own, &mut self.kinds));
-                    exact.push(true);
-                    continue;
-                }
-                let children = self.steps[l - 1].children_of(id);
-                let (below, fine) = (&self.kind_of[l - 1], &self.levels[l - 1]);
-                let kind = |child: u32| self.kinds.get(below[child as usize] as usize).copied();
-                let full = children.len() == 8
-                    && children.iter().all(|&c| kind(c).is_some_and(|k| k.material == cell.material));
-                let Some(first) = kind(children[0]).filter(|_| full) else {
-                    kind_of.push(NONE);
-                    exact.push(false);
-                    continue;
-                };
-                exact.push(children.iter().all(|&c| {
-                    self.exact[l - 1][c as usize] && kind(c) == Some(first) && fine.hanging[c as usize] == 0
-                }));
-                kind_of.push(number(Kind { merged: first.merged + 1, ..own }, &mut self.kinds));
-            }
-            self.kind_of.push(kind_of);
-            self.exact.push(exact);
-        }
+        self.kind_of[l][id] = found.map_or(NONE, |(kind, _)| number(kind));
+        self.exact[l][id] = found.is_some_and(|(_, exact)| exact);
+    }
+}
+
+impl Limits {
+    /// Whether a coarser level than the last of `levels` is wanted.
+    fn goes_on(&self, levels: &[Level]) -> bool {
+        let coarsest = &levels[levels.len() - 1];
+        let enough = levels.len() > self.least && 3 * coarsest.n_vertices <= self.coarse_enough;
+        !enough && 1 << (levels.len() - 1) < self.across
     }
 }
 
 impl Step {
     fn new(fine: &Level, coarse: &Level, parent: Vec<u32>) -> Self {
-        let n = coarse.cells.len();
-        let mut first_child = vec![0_u32; n + 1];
-        parent.iter().for_each(|&p| first_child[p as usize + 1] += 1);
-        for i in 0..n {
-            first_child[i + 1] += first_child[i];
-        }
-        let mut next = first_child.clone();
-        let mut children = vec![0; parent.len()];
-        for (child, &p) in (0u32..).zip(&parent) {
-            children[next[p as usize] as usize] = child;
-            next[p as usize] += 1;
-        }
+        let by_parent = |visit: &mut dyn FnMut(u32, u32)| {
+            (0u32..).zip(&parent).for_each(|(child, &parent)| visit(parent, child));
+        };
+        let children = Jagged::by_counting(coarse.cells.len(), by_parent, 0);
         let transfer = Transfer::new(fine, coarse, &parent);
-        Self { parent, first_child, children, transfer }
+        Self { parent, children, transfer }
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::lists::disjoint::{find, join};
+use crate::lists::jagged::Jagged;
 use crate::octree::{At, Cell, Octree, parent_corner};
 
 /// No number.
@@ -24,10 +25,11 @@ pub struct Level {
     pub hanging: Vec<u8>,
     /// Number of vertices.
     pub n_vertices: usize,
-    /// Entries of `slots` of every vertex; length n_vertices + 1.
-    pub first_slot: Vec<u32>,
-    /// 8 · cell + corner, by vertex: where it carries a cell.
-    pub slots: Vec<u32>,
+    /// 8 · cell + corner, by vertex: where it carries a cell, ascending.
+    pub slots: Jagged<u32>,
+    /// 8 · cell + direction, by cell: the cells that links lead to. Empty on the finest level, whose links the
+    /// octree knows.
+    pub links: Jagged<u32>,
 }
 
 /// A coarser level, and what it was made of.
@@ -70,8 +72,8 @@ impl Level {
             + size_of_val(&self.leaf[..])
             + size_of_val(&self.vertices[..])
             + size_of_val(&self.hanging[..])
-            + size_of_val(&self.first_slot[..])
-            + size_of_val(&self.slots[..])
+            + self.slots.memory()
+            + self.links.memory()
     }
 
     /// The finest level: the leaves of an octree, with its vertices.
@@ -134,7 +136,19 @@ impl Level {
         let links = in_order(coarse.filter(|&(a, b, _)| a != b), level.cells.len());
         level.number_vertices(&links);
         level.list_slots();
+        level.list_links(&links);
         Coarsened { level, links, parent }
+    }
+
+    fn list_links(&mut self, links: &[Link]) {
+        let by_cell = |visit: &mut dyn FnMut(u32, u32)| {
+            for &(low, high, axis) in links {
+                let d = 2 * u32::from(axis);
+                visit(low, 8 * high + d + 1);
+                visit(high, 8 * low + d);
+            }
+        };
+        self.links = Jagged::by_counting(self.cells.len(), by_cell, 0);
     }
 
     /// Joins corners over linked faces to vertices. Where a larger cell is linked that has the point inside an
@@ -201,33 +215,23 @@ impl Level {
     }
 
     /// The corner of cell `id` at the lattice point `p`.
-    fn corner_at(&self, id: u32, p: At) -> Option<usize> {
+    pub fn corner_at(&self, id: u32, p: At) -> Option<usize> {
         let cell = &self.cells[id as usize];
         (0..8).find(|&k| cell.corner(k) == p)
     }
 
     fn list_slots(&mut self) {
-        let mut first = vec![0; self.n_vertices + 1];
-        for &v in self.vertices.iter().flatten() {
-            first[v as usize + 1] += 1;
-        }
-        for v in 0..self.n_vertices {
-            first[v + 1] += first[v];
-        }
-        let mut next = first.clone();
-        self.slots = vec![0; 8 * self.cells.len()];
-        for (slot, &v) in (0u32..).zip(self.vertices.iter().flatten()) {
-            self.slots[next[v as usize] as usize] = slot;
-            next[v as usize] += 1;
-        }
-        self.first_slot = first;
+        let vertices = &self.vertices;
+        let slots = |visit: &mut dyn FnMut(u32, u32)| {
+            (0u32..).zip(vertices.iter().flatten()).for_each(|(slot, &v)| visit(v, slot));
+        };
+        self.slots = Jagged::by_counting(self.n_vertices, slots, 0);
     }
 
     /// Where vertex `v` carries cells: cell and corner.
     #[inline]
     pub fn slots_of(&self, v: usize) -> impl Iterator<Item = (usize, usize)> {
-        let range = self.first_slot[v] as usize..self.first_slot[v + 1] as usize;
-        self.slots[range].iter().map(|&slot| (slot as usize / 8, slot as usize % 8))
+        self.slots.get(v).iter().map(|&slot| (slot as usize / 8, slot as usize % 8))
     }
 
     /// Lattice point of vertex `c` of cell `id`.

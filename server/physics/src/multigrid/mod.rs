@@ -8,6 +8,7 @@
 //! Dick, Georgii, Westermann 2011, §6 (hierarchy and Galerkin operators on cut octrees); Lottes 2023 (smoother).
 
 mod level;
+mod follow;
 mod hierarchy;
 mod transfer;
 mod dense;
@@ -25,6 +26,7 @@ mod simulated;
 
 pub use coarsest::CoarsestSolve;
 pub use cycle::{LevelReport, Multigrid, MultigridSettings};
+pub use follow::LevelChange;
 pub use galerkin::{CellMaterial, Coefficients};
 pub use hierarchy::Hierarchy;
 pub use precondition::Cycle;

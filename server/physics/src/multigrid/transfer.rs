@@ -4,6 +4,7 @@
 //! these hang, of the vertices that carry the cell. Coarse cells that share a fine vertex agree on it.
 
 use super::level::{Level, NONE, place_in, trilinear};
+use crate::lists::jagged::Jagged;
 use crate::octree::corner_weights;
 use crate::operator::{BLOCK, Padded};
 use crate::team::{Team, blocks};
@@ -11,50 +12,19 @@ use crate::team::{Team, blocks};
 /// P by rows and by columns.
 #[derive(Clone, Debug, Default)]
 pub struct Transfer {
-    rows: Lists,
-    columns: Lists,
+    rows: Jagged<(u32, f32)>,
+    columns: Jagged<(u32, f32)>,
 }
 
-/// Lists of weighted numbers, one after the other.
-#[derive(Clone, Debug, Default)]
-struct Lists {
-    first: Vec<u32>,
-    entries: Vec<(u32, f32)>,
-}
-
-impl Lists {
-    #[inline]
-    fn get(&self, i: usize) -> &[(u32, f32)] {
-        &self.entries[self.first[i] as usize..self.first[i + 1] as usize]
+/// Σ w v of a list.
+#[inline]
+fn sum(list: &[(u32, f32)], v: &[Padded]) -> Padded {
+    let mut sum = [0.0; 4];
+    for &(j, w) in list {
+        let v = v[j as usize];
+        (0..4).for_each(|k| sum[k] += w * v[k]);
     }
-
-    /// Σ w v of list `i`.
-    #[inline]
-    fn sum(&self, i: usize, v: &[Padded]) -> Padded {
-        let mut sum = [0.0; 4];
-        for &(j, w) in self.get(i) {
-            let v = v[j as usize];
-            (0..4).for_each(|k| sum[k] += w * v[k]);
-        }
-        sum
-    }
-
-    fn transposed(&self, n: usize) -> Self {
-        let mut first = vec![0_u32; n + 1];
-        self.entries.iter().for_each(|e| first[e.0 as usize + 1] += 1);
-        for i in 0..n {
-            first[i + 1] += first[i];
-        }
-        let mut next = first.clone();
-        let mut entries = vec![(0, 0.0); self.entries.len()];
-        for i in 0..self.first.len() - 1 {
-            for &(j, w) in self.get(i) {
-                entries[next[j as usize] as usize] = (i as u32, w);
-                next[j as usize] += 1;
-            }
-        }
-        Self { first, entries }
-    }
+    sum
 }
 
 impl Transfer {
@@ -68,22 +38,54 @@ impl Transfer {
                 home[v as usize] = slot;
             }
         }
-        let mut rows = Lists { first: vec![0], entries: Vec::new() };
+        let (mut first, mut entries) = (vec![0], Vec::new());
         for &slot in &home {
             if slot != NONE {
                 let (id, c) = (slot as usize / 8, slot as usize % 8);
-                rows.entries.extend(carriers(fine, coarse, parent[id], (id, c)));
+                entries.extend(carriers(fine, coarse, parent[id], (id, c)));
             }
-            rows.first.push(rows.entries.len() as u32);
+            first.push(entries.len() as u32);
         }
-        let columns = rows.transposed(coarse.n_vertices);
+        let rows = Jagged::new(&first, entries);
+        let by_column = |visit: &mut dyn FnMut(u32, (u32, f32))| {
+            for i in 0..rows.len() {
+                rows.get(i).iter().for_each(|&(j, w)| visit(j, (i as u32, w)));
+            }
+        };
+        let columns = Jagged::by_counting(coarse.n_vertices, by_column, (0, 0.0));
         Self { rows, columns }
+    }
+
+    /// Follows a cut that changed the rows of the fine `vertices`, ascending.
+    pub fn follow(&mut self, fine: &Level, coarse: &Level, parent: &[u32], vertices: &[u32]) {
+        self.rows.grow(fine.n_vertices);
+        self.columns.grow(coarse.n_vertices);
+        let mut edits = Vec::new();
+        for &v in vertices {
+            let stands = |(id, c): &(usize, usize)| fine.hanging[*id] >> c & 1 == 0;
+            let home = fine.slots_of(v as usize).find(stands);
+            let row: Vec<(u32, f32)> =
+                home.map_or_else(Vec::new, |(id, c)| carriers(fine, coarse, parent[id], (id, c)).collect());
+            let known = self.rows.get(v as usize);
+            if row != known {
+                edits.extend(known.iter().map(|&(j, w)| (j, (v, w), false)));
+                edits.extend(row.iter().map(|&(j, w)| (j, (v, w), true)));
+                self.rows.set(v as usize, &row);
+            }
+        }
+        self.columns.edit(&mut edits, |entry| entry.0);
+    }
+
+    /// Fine vertices that rest on coarse vertex `v`, and their weights.
+    #[cfg(test)]
+    pub fn column(&self, v: usize) -> &[(u32, f32)] {
+        self.columns.get(v)
     }
 
     /// Number of fine vertices.
     #[cfg(test)]
     pub fn n_rows(&self) -> usize {
-        self.rows.first.len() - 1
+        self.rows.len()
     }
 
     /// Coarse vertices of fine vertex `v`, and their weights.
@@ -93,15 +95,14 @@ impl Transfer {
 
     /// Bytes in use.
     pub fn memory(&self) -> usize {
-        let of = |lists: &Lists| size_of_val(&lists.first[..]) + size_of_val(&lists.entries[..]);
-        of(&self.rows) + of(&self.columns)
+        self.rows.memory() + self.columns.memory()
     }
 
     /// x += P e.
     pub fn prolong(&self, team: &mut Team, e: &[Padded], x: &mut [Padded]) {
         team.for_blocks(blocks(x, BLOCK), |block, x| {
             for (i, x) in x.iter_mut().enumerate() {
-                let sum = self.rows.sum(block * BLOCK + i, e);
+                let sum = sum(self.rows.get(block * BLOCK + i), e);
                 (0..4).for_each(|k| x[k] += sum[k]);
             }
         });
@@ -111,7 +112,7 @@ impl Transfer {
     pub fn restrict(&self, team: &mut Team, r: &[Padded], b: &mut [Padded]) {
         team.for_blocks(blocks(b, BLOCK), |block, b| {
             for (i, b) in b.iter_mut().enumerate() {
-                *b = self.columns.sum(block * BLOCK + i, r);
+                *b = sum(self.columns.get(block * BLOCK + i), r);
             }
         });
     }

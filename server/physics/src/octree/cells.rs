@@ -218,6 +218,45 @@ impl Octree {
         }
     }
 
+    /// Calls `visit` with every leaf that leaf `id` is linked to, and the direction that leads there.
+    pub fn for_links_of(&self, id: u32, mut visit: impl FnMut(u32, usize)) {
+        let cell = &self.cells[id as usize];
+        for d in (0..6).filter(|d| cell.cut >> d & 1 == 0) {
+            let (axis, up) = (d / 2, d % 2 == 1);
+            let mut beyond = cell.at;
+            beyond[axis] += if up { cell.side() } else { -1 };
+            let near = self.map.leaf(beyond);
+            if near != OUTSIDE && self.cells[near as usize].level >= cell.level {
+                visit(near, d);
+                continue;
+            }
+            // By 2:1 balance at most four smaller ones, of half the side.
+            let half = cell.side() / 2;
+            for quarter in (0..4).filter(|_| half > 0) {
+                let mut at = beyond;
+                at[(axis + 1) % 3] += half * (quarter & 1);
+                at[(axis + 2) % 3] += half * (quarter >> 1);
+                let near = self.map.leaf(at);
+                if near != OUTSIDE {
+                    visit(near, d);
+                }
+            }
+        }
+    }
+
+    /// Which of the leaves `known` before a cut the new leaf `id` was part of. The first part of a divided leaf has
+    /// its number.
+    pub fn whole_of(&self, known: &[Cell], id: u32) -> u32 {
+        let cell = &self.cells[id as usize];
+        let whole = (cell.level + 1..=self.lattice.levels).find_map(|level| {
+            let at = cell.at.map(|c| c >> level << level);
+            let first = self.leaf(at);
+            let whole = known.get(first as usize)?;
+            (whole.level == level && whole.at == at).then_some(first)
+        });
+        whole.unwrap_or(0)
+    }
+
     /// Bytes in use.
     pub fn bytes(&self) -> usize {
         self.map.bytes()

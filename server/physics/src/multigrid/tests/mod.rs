@@ -1,6 +1,7 @@
 //! Tests of multigrid against brute force, stored numbers and known rates.
 
 mod support;
+mod follow;
 mod galerkin;
 mod levels;
 mod rates;

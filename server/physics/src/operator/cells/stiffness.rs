@@ -82,7 +82,7 @@ impl CellStiffness {
             let matrix = CellMatrix::Table(materials.table_of(cells[id as usize].material));
             CellLane { factor: 1.0, ..CellLane::of_leaf(octree, id as usize, matrix) }
         };
-        let source = |id: u32| whole_of(known, octree, id);
+        let source = |id: u32| octree.whole_of(known, id);
         let rotation = |operator: &CellOperator, id: u32| operator.rotation(operator.places()[id as usize]);
         // Rotations of all cells in the chunks that change, by number.
         let mut kept: BTreeMap<u32, Matrix3<f32>> = BTreeMap::new();
@@ -166,18 +166,6 @@ impl CellStiffness {
             self.operator.set_rotations(team, |_| Matrix3::identity());
         }
     }
-}
-
-/// Which of the leaves `known` the new cell `id` was part of. The first part of a divided leaf has its number.
-fn whole_of(known: &[Cell], octree: &Octree, id: u32) -> u32 {
-    let cell = &octree.cells()[id as usize];
-    let whole = (cell.level + 1..=octree.lattice().levels).find_map(|level| {
-        let at = cell.at.map(|c| c >> level << level);
-        let first = octree.leaf(at);
-        let whole = known.get(first as usize)?;
-        (whole.level == level && whole.at == at).then_some(first)
-    });
-    whole.unwrap_or(0)
 }
 
 fn arrange(simd: Simd, octree: &Octree, materials: &Materials) -> (CellOperator, Vec<RestChunk>) {

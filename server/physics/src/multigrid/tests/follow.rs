@@ -1,0 +1,149 @@
+//! Levels that follow random sequences of cuts are those made from scratch, up to numbers of coarse cells and
+//! vertices.
+
+use std::collections::BTreeSet;
+
+use super::support::{cube, cut_at, noise};
+use crate::multigrid::Hierarchy;
+use crate::multigrid::level::NONE;
+use crate::octree::{LinkKey, Octree};
+
+/// Cells of coarse levels, by level: `pairs[l][id]` is the number in the second hierarchy.
+pub struct Pairs {
+    pub cells: Vec<Vec<u32>>,
+    pub vertices: Vec<Vec<u32>>,
+}
+
+/// Finds which cells and vertices of two hierarchies of one octree are the same, and compares everything else.
+pub fn matched(followed: &Hierarchy, new: &Hierarchy) -> Pairs {
+    let n = followed.n_levels();
+    assert_eq!(n, new.n_levels());
+    let mut pairs = Pairs { cells: Vec::new(), vertices: Vec::new() };
+    for l in 0..n {
+        let (a, b) = (&followed.levels[l], &new.levels[l]);
+        assert_eq!((a.cells.len(), a.n_vertices), (b.cells.len(), b.n_vertices), "level {l}");
+        let mut cells = vec![NONE; a.cells.len()];
+        if l == 0 {
+            cells = (0..a.cells.len() as u32).collect();
+        } else {
+            let below: &Vec<u32> = &pairs.cells[l - 1];
+            for (child, &parent) in followed.steps[l - 1].parent.iter().enumerate() {
+                let other = new.steps[l - 1].parent[below[child] as usize];
+                let known = &mut cells[parent as usize];
+                assert!(*known == NONE || *known == other, "level {l}: cell {parent} is {known} and {other}");
+                *known = other;
+            }
+        }
+        assert_eq!(cells.iter().collect::<BTreeSet<_>>().len(), cells.len(), "level {l}");
+        let mut vertices = vec![NONE; a.n_vertices];
+        for (id, &other) in cells.iter().enumerate() {
+            let (x, y) = (id, other as usize);
+            assert_eq!((a.cells[x], a.hanging[x]), (b.cells[y], b.hanging[y]), "level {l}, cell {id}");
+            assert_eq!(a.leaf[x], b.leaf[y]);
+            for c in 0..8 {
+                let (v, w) = (a.vertices[x][c], b.vertices[y][c]);
+                let known = &mut vertices[v as usize];
+                assert!(*known == NONE || *known == w, "level {l}: vertex {v} is {known} and {w}");
+                *known = w;
+            }
+            let kind = |h: &Hierarchy, id: usize| h.kinds.get(h.kind_of[l][id] as usize).copied();
+            assert_eq!(kind(followed, x), kind(new, y), "level {l}, cell {id}");
+            assert_eq!(followed.exact[l][x], new.exact[l][y]);
+            if l > 0 {
+                let children: BTreeSet<u32> = followed.steps[l - 1]
+                    .children_of(x)
+                    .iter()
+                    .map(|&child| pairs.cells[l - 1][child as usize])
+                    .collect();
+                assert!(children.iter().eq(new.steps[l - 1].children_of(y)), "level {l}, cell {id}");
+                let links = |list: &[u32], of: &dyn Fn(u32) -> u32| -> BTreeSet<u32> {
+                    list.iter().map(|link| 8 * of(link / 8) + link % 8).collect()
+                };
+                let mapped = links(a.links.get(x), &|id| cells[id as usize]);
+                assert_eq!(mapped, links(b.links.get(y), &|id| id), "level {l}, cell {id}");
+            }
+        }
+        assert_eq!(vertices.iter().collect::<BTreeSet<_>>().len(), vertices.len(), "level {l}");
+        assert!(!vertices.contains(&NONE), "level {l}: a vertex carries nothing");
+        if l == 0 {
+            assert!((0..).zip(&vertices).all(|(v, w)| v == *w));
+        }
+        for (v, &w) in vertices.iter().enumerate() {
+            let slot = |(id, c): (usize, usize)| (cells[id] as usize, c);
+            let slots: BTreeSet<_> = a.slots_of(v).map(slot).collect();
+            assert!(slots.into_iter().eq(b.slots_of(w as usize)), "level {l}, vertex {v}");
+            assert!(a.slots.get(v).is_sorted());
+        }
+        pairs.cells.push(cells);
+        pairs.vertices.push(vertices);
+    }
+    for l in 0..n - 1 {
+        let (a, b) = (&followed.steps[l].transfer, &new.steps[l].transfer);
+        let (fine, coarse) = (&pairs.vertices[l], &pairs.vertices[l + 1]);
+        let same = |a: &[(u32, f32)], b: &[(u32, f32)], number: &[u32]| {
+            let sorted = |list: Vec<(u32, f32)>| {
+                let mut list = list;
+                list.sort_unstable_by_key(|entry| entry.0);
+                list
+            };
+            sorted(a.iter().map(|&(j, w)| (number[j as usize], w)).collect()) == sorted(b.to_vec())
+        };
+        for (v, &w) in fine.iter().enumerate() {
+            assert!(same(a.row(v), b.row(w as usize), coarse), "level {l}, row {v}");
+        }
+        for (v, &w) in coarse.iter().enumerate() {
+            assert!(same(a.column(v), b.column(w as usize), fine), "level {l}, column {v}");
+        }
+    }
+    pairs
+}
+
+/// Random links of a body, some of them along planes, so that parts come apart.
+pub fn random_links(octree: &Octree, round: usize, seed: usize) -> Vec<LinkKey> {
+    let n = octree.lattice().size.map(|n| n as i32);
+    let pick = |k: usize, n: i32| ((noise(k, seed + 100 * round) + 1.0) / 2.0 * f64::from(n)) as i32;
+    let axis = pick(0, 3) as usize;
+    let plane = pick(1, n[axis] - 1);
+    let (low, size) = ([pick(2, n[0]), pick(3, n[1]), pick(4, n[2])], pick(5, 6) + 1);
+    let mut links = Vec::new();
+    for i in 0..size {
+        for j in 0..size {
+            let mut at = low;
+            at[axis] = plane;
+            at[(axis + 1) % 3] = (low[(axis + 1) % 3] + i) % n[(axis + 1) % 3];
+            at[(axis + 2) % 3] = (low[(axis + 2) % 3] + j) % n[(axis + 2) % 3];
+            links.push((at, axis as u8));
+        }
+    }
+    links.push(([pick(6, n[0] - 1), pick(7, n[1]), pick(8, n[2])], 0));
+    links
+}
+
+pub fn cut_links(octree: &mut Octree, links: &[LinkKey]) -> Vec<u32> {
+    let cuts: Vec<_> = links.iter().map(|&(at, axis)| cut_at(at, axis)).collect();
+    octree.cut(&cuts).cells
+}
+
+#[test]
+fn levels_that_follow_cuts_are_those_made_anew() {
+    for (seed, (cells, levels)) in [(8, 0), (13, 2), (16, 3), (16, 0), (24, 2)].into_iter().enumerate() {
+        let mut octree = cube(cells, levels);
+        let mut followed = Hierarchy::with(&octree, 100, true);
+        let rounds = if cells == 8 { 60 } else { 25 };
+        let mut made_anew = 0;
+        for round in 0..rounds {
+            let links = random_links(&octree, round, seed);
+            let changed = cut_links(&mut octree, &links);
+            let new = Hierarchy::with(&octree, 100, true);
+            match followed.follow(&octree, &changed) {
+                Some(changes) => assert_eq!(changes[0].cells, changed),
+                None => {
+                    made_anew += 1;
+                    followed = new.clone();
+                }
+            }
+            matched(&followed, &new);
+        }
+        assert!(made_anew <= 2, "{made_anew} of {rounds}");
+    }
+}
