@@ -68,6 +68,8 @@ struct Kept {
     grip_n: f64,
     /// Depth that it began with and that is still left to it [m].
     eased_m: f64,
+    /// Depth before the step [m].
+    depth_m: f64,
     /// Whether it slipped, so that it takes hold of another place.
     slipped: bool,
     /// Its spring in the last step.
@@ -238,8 +240,18 @@ impl PairContacts {
             if a != b && !inside(&from) && !inside(&to) {
                 continue;
             }
+            while next < self.kept.len() && self.kept[next].key() < ([a as u32, b as u32], vertex) {
+                next += 1;
+            }
+            let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
             let approach = h * (fastest + point.position(v).norm());
-            let reach = (margin + approach).max(DEEPEST_CELLS * cell_m);
+            let near_m = margin + approach;
+            // Whatever is deep inside has been followed from the surface, or overlaps from the start.
+            let reach = match known {
+                Some(known) => near_m + known.depth_m.max(0.0),
+                None if a == b => near_m.min(DEEPEST_CELLS * cell_m),
+                None => near_m.max(DEEPEST_CELLS * cell_m),
+            };
             let own = (a == b).then(|| surfaces[a].vertex_normal(vertex)).flatten();
             let near = match own {
                 None if a == b => continue,
@@ -250,13 +262,9 @@ impl PairContacts {
                 }),
             };
             let Some(near) = near else { continue };
-            if near.signed_distance > margin + approach {
+            if near.signed_distance > near_m {
                 continue;
             }
-            while next < self.kept.len() && self.kept[next].key() < ([a as u32, b as u32], vertex) {
-                next += 1;
-            }
-            let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
             let candidate = Candidate { bodies: [a, b], vertex, near: &near };
             let Some(contact) = self.contact(known, &candidate, (surfaces, cell_m), h) else { continue };
             let corners = tree.corners(contact.triangle).map(|c| other.surface().vertices[c as usize]);
@@ -291,7 +299,7 @@ impl PairContacts {
             let slid = known.slipped || known.grip_n == 0.0;
             let (triangle, barycentric) =
                 if slid { (near.triangle, near.barycentric) } else { (known.triangle, known.barycentric) };
-            return Some(Kept { triangle, barycentric, eased_m, spring, ..known });
+            return Some(Kept { triangle, barycentric, eased_m, depth_m: depth, spring, ..known });
         }
         if a == b && depth > BORN_CELLS * cell_m {
             let of = self.lips[a].get(vertex as usize).copied().unwrap_or(0);
@@ -308,6 +316,7 @@ impl PairContacts {
             anchor_m: Vector3::zeros(),
             grip_n: 0.0,
             eased_m: depth.max(0.0),
+            depth_m: depth,
             slipped: true,
             spring,
         })
