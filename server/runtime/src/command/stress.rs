@@ -20,7 +20,8 @@ pub fn stress(args: &StressArgs) -> Result<ExitCode, RuntimeError> {
     }
     let stop = Arc::new(AtomicBool::new(false));
     listen(&stop)?;
-    let settings = Settings { cases: args.cases.clone(), threads: usize::from(args.threads), stop };
+    let settings =
+        Settings { cases: args.cases.clone(), long: args.long, threads: usize::from(args.threads), stop };
     let bar = bar(args.json);
     let report = stress::run(&settings, &mut |progress| show(&bar, "", &progress))?;
     let table = match args.mutations {

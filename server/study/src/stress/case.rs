@@ -82,6 +82,8 @@ impl CaseReport {
 pub struct Setting {
     /// Parts taken out of the method: none, except in a mutation check.
     pub ablation: Ablation,
+    /// Whether cases that have a long form take it.
+    pub long: bool,
 }
 
 impl Setting {

@@ -89,7 +89,7 @@ impl Mutation {
             Self::HangingWeights => Ablation { hanging_weights: true, ..none },
             Self::StaleVertices => Ablation { stale_vertices: true, ..none },
         };
-        Setting { ablation }
+        Setting { ablation, long: false }
     }
 }
 

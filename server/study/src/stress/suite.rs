@@ -19,6 +19,8 @@ use crate::bench::store::Origin;
 pub struct Settings {
     /// Names or numbers of cases; empty for all.
     pub cases: Vec<String>,
+    /// Whether cases that have a long form take it.
+    pub long: bool,
     /// Number of cases run in parallel; 0 for one per hardware thread.
     pub threads: usize,
     /// Raised from elsewhere to end after the cases that are under way.
@@ -108,7 +110,7 @@ pub fn select(names: &[String]) -> Result<Vec<&'static Case>, StressError> {
 pub fn run(settings: &Settings, progress: &mut dyn FnMut(Progress<'_>)) -> Result<SuiteReport, StressError> {
     let cases = select(&settings.cases)?;
     let started = Instant::now();
-    let done = run_cases(&cases, &Setting::default(), settings, progress);
+    let done = run_cases(&cases, &Setting { long: settings.long, ..Setting::default() }, settings, progress);
     let interrupted = done.len() < cases.len();
     let (cases, case_seconds) = done.into_iter().unzip();
     Ok(SuiteReport {

@@ -7,11 +7,13 @@
 //!
 //! # A body with itself
 //! Every point of a body lies behind some of its faces, so depth alone says nothing. A contact has to begin outside,
-//! or between the two lips of one cut, and is followed from there. Triangles count only where they face the vertex.
+//! or between the two lips of one cut, and is followed from there. Triangles count only where they face the vertex,
+//! and where the material between them and the vertex is not in one piece.
 
 use nalgebra::Vector3;
 use scindo_collision::ClosestPoint;
 use scindo_physics::body::{Body, PairSpring, SpringKind};
+use scindo_physics::element::MaterialPoint;
 
 use super::surface::ContactSurface;
 use crate::body::SimBody;
@@ -68,7 +70,7 @@ struct Kept {
     grip_n: f64,
     /// Depth that it began with and that is still left to it [m].
     eased_m: f64,
-    /// Depth before the step [m].
+    /// Depth at the end of the last step, below the plane of that step [m].
     depth_m: f64,
     /// Whether it slipped, so that it takes hold of another place.
     slipped: bool,
@@ -258,7 +260,9 @@ impl PairContacts {
                 None => tree.closest_point(from, reach),
                 Some(normal) => tree.closest_point_where(from, reach, |t| {
                     let corners = tree.corners(t);
-                    !corners.contains(&vertex) && facing(&tree.area_normal(t), &normal)
+                    !corners.contains(&vertex)
+                        && facing(&tree.area_normal(t), &normal)
+                        && !corners.iter().any(|&c| joined(point, &surface.vertices[c as usize]))
                 }),
             };
             let Some(near) = near else { continue };
@@ -266,7 +270,9 @@ impl PairContacts {
                 continue;
             }
             let candidate = Candidate { bodies: [a, b], vertex, near: &near };
-            let Some(contact) = self.contact(known, &candidate, (surfaces, cell_m), h) else { continue };
+            let Some(contact) = self.contact(known, &candidate, surfaces, (cell_m, near_m), h) else {
+                continue;
+            };
             let corners = tree.corners(contact.triangle).map(|c| other.surface().vertices[c as usize]);
             let area = surfaces[a].vertex_area(vertex);
             let kind = Self::kind(&contact, &near, (other, &corners), settings, stiffness * area);
@@ -288,18 +294,25 @@ impl PairContacts {
         &self,
         known: Option<Kept>,
         candidate: &Candidate<'_>,
-        (surfaces, cell_m): (&[ContactSurface], f64),
+        surfaces: &[ContactSurface],
+        (cell_m, near_m): (f64, f64),
         h: f64,
     ) -> Option<Kept> {
         let Candidate { bodies: [a, b], vertex, near, .. } = *candidate;
         let depth = -near.signed_distance;
         let spring = self.now.len() as u32;
+        // What jumps deeper than the surfaces have moved is another place of the body, not the one it touched.
+        if known.is_some_and(|known| a == b && depth > known.depth_m.max(0.0) + near_m) {
+            return None;
+        }
         if let Some(known) = known {
-            let eased_m = known.eased_m * (1.0 - h / EASE_S).max(0.0);
+            // Another plane than that of the last step must not push more: it would put in energy.
+            let jump = depth.max(0.0) - known.depth_m.max(0.0);
+            let eased_m = known.eased_m * (1.0 - h / EASE_S).max(0.0) + jump.max(0.0);
             let slid = known.slipped || known.grip_n == 0.0;
             let (triangle, barycentric) =
                 if slid { (near.triangle, near.barycentric) } else { (known.triangle, known.barycentric) };
-            return Some(Kept { triangle, barycentric, eased_m, depth_m: depth, spring, ..known });
+            return Some(Kept { triangle, barycentric, eased_m, spring, ..known });
         }
         if a == b && depth > BORN_CELLS * cell_m {
             let of = self.lips[a].get(vertex as usize).copied().unwrap_or(0);
@@ -326,7 +339,7 @@ impl PairContacts {
     fn kind(
         contact: &Kept,
         near: &ClosestPoint,
-        (other, corners): (&Body, &[scindo_physics::element::MaterialPoint; 3]),
+        (other, corners): (&Body, &[MaterialPoint; 3]),
         settings: TouchSettings,
         stiffness_n_m: f64,
     ) -> SpringKind {
@@ -396,6 +409,7 @@ impl PairContacts {
                 SpringKind::Hold { .. } => continue,
             };
             let push = force.dot(&normal);
+            contact.depth_m = offset_m + contact.eased_m - normal.dot(&y);
             contact.slipped = true;
             contact.anchor_m = Vector3::zeros();
             contact.grip_n = 0.0;
@@ -422,7 +436,7 @@ impl PairContacts {
             };
             let report = &mut reports[place];
             report.contacts += 1;
-            report.deepest_m = report.deepest_m.max(offset_m + contact.eased_m - normal.dot(&y));
+            report.deepest_m = report.deepest_m.max(contact.depth_m);
             report.force_n += sign * force;
             report.normal_n += push;
         }
@@ -470,6 +484,11 @@ impl Kept {
 /// Whether a triangle with this normal, of any length, faces a vertex with that unit normal.
 fn facing(triangle: &Vector3<f64>, vertex: &Vector3<f64>) -> bool {
     triangle.dot(vertex) <= FACING * triangle.norm()
+}
+
+/// Whether two points are carried by a common node: the material between them is in one piece, however thin it is.
+fn joined(a: &MaterialPoint, b: &MaterialPoint) -> bool {
+    a.copies().iter().any(|copy| b.copies().contains(copy))
 }
 
 /// The first body of the group of body `i`.

@@ -39,17 +39,6 @@ pub const WALL: Case = Case {
     ..NOT_YET
 };
 
-/// Case 28.
-pub const LIPS: Case = Case {
-    number: Some(28),
-    name: "lips-in-contact",
-    title: "The lips of a cut are pressed together",
-    set_up: "A cut is made and then pressed shut 1000 times. Needs self-contact.",
-    rule: "Energy does not grow from jitter; penetration stays below 0.05 h.",
-    source: "Teschner 2004, Heidelberger 2004",
-    ..NOT_YET
-};
-
 /// Case 30.
 pub const SOAK: Case = Case {
     number: Some(30),

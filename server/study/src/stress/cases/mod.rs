@@ -16,6 +16,7 @@ mod sliver;
 mod spin;
 mod stiff;
 mod support;
+mod touch;
 
 use super::case::Case;
 
@@ -48,7 +49,7 @@ pub const ALL: &[Case] = &[
     later::PACKETS,
     input::CASE,
     later::WALL,
-    later::LIPS,
+    touch::LIPS,
     multigrid::BLADES,
     later::SOAK,
     later::OVERLOAD,
@@ -60,4 +61,9 @@ pub const ALL: &[Case] = &[
     cells::GROWTH,
     cells::ADAPTING,
     multigrid::PATCH,
+    touch::INCLINE,
+    touch::HIPPO,
+    touch::NEEDLE,
+    touch::WEDGED,
+    touch::PRESSED,
 ];
