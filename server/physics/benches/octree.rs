@@ -3,8 +3,8 @@
 //! The model is the cube of Dick, Georgii and Westermann 2011, 80 finest cells across with four levels of coarser
 //! ones. First a grid of 22 blades cuts it to half its depth, then a blade goes through it in small advances. Times
 //! are those of everything that the next step needs, and of its parts. Last come the parts of the same increment on
-//! bodies of two sizes: what only depends on the cut takes the same time on both. Figures are the best of several
-//! rounds.
+//! bodies of two sizes, and the same advances of a blade through bodies of three: what only depends on the cut takes
+//! the same time on all of them. Figures are the best of several rounds.
 
 #![allow(clippy::disallowed_methods, clippy::unwrap_used)] // a bench reads the clock
 
@@ -51,6 +51,55 @@ fn main() {
         let settings = OctreeSettings { cells, levels: 0 };
         increment(Octree::fill(&shape, settings, &|_| 0).unwrap(), rounds);
     }
+    for cells in if quick { [12, 16, 20] } else { [34, 58, 74] } {
+        let h = 1.0 / f64::from(cells);
+        let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
+        let settings = OctreeSettings { cells, levels: 0 };
+        same_advances(Octree::fill(&shape, settings, &|_| 0).unwrap(), h, rounds.min(2));
+    }
+}
+
+/// A blade eight cells wide that advances by half a cell at a time into the middle of a body with cells of side `h`:
+/// the cut, and the next step beside one before which nothing was cut.
+fn same_advances(uncut: Octree, h: f64, rounds: usize) {
+    let solver = PcgSettings { iterations: 10, tolerance: 1e-3 };
+    let settings = BodySettings { solver, method: Method::MgPcg, ..BodySettings::default() };
+    let (mut opened, mut after, mut plain) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..rounds {
+        let mut body = Body::of_space(Box::new(OctreeSpace::new(uncut.clone())), SOFT, settings).unwrap();
+        let timed = |body: &mut Body| {
+            let start = Instant::now();
+            body.step(0.01, Vector3::zeros(), &[]);
+            start.elapsed().as_secs_f64() * 1e3
+        };
+        timed(&mut body);
+        for k in 0..20 {
+            plain.push(timed(&mut body));
+            let z = 1.0 + h - 0.5 * h * f64::from(k);
+            let segment = [Vector3::new(0.51, 0.5, z), Vector3::new(0.51, 0.5 + 8.0 * h, z)];
+            let start = Instant::now();
+            let report = body.cut(&BladeSweep { segments: vec![segment] }, 1).unwrap();
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            let next = timed(&mut body);
+            if report.faces_opened > 0 {
+                opened.push(ms);
+                after.push(next);
+            }
+        }
+    }
+    let at = |times: &mut Vec<f64>, share: f64| {
+        times.sort_by(f64::total_cmp);
+        times[((times.len() - 1) as f64 * share) as usize]
+    };
+    println!(
+        "an advance of a blade 8 cells wide that opens links, {} cells, MgPcg: median {:.2} ms, 90 % below {:.2} ms; \
+         the next step {:.1} ms, others {:.1} ms",
+        uncut.cells().len(),
+        at(&mut opened, 0.5),
+        at(&mut opened, 0.9),
+        at(&mut after, 0.5),
+        at(&mut plain, 0.5),
+    );
 }
 
 /// The parts of one increment of the same size on bodies of finest cells: a strip of links is cut that is two cells

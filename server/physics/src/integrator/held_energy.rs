@@ -32,7 +32,7 @@ impl HeldEnergy {
     pub fn follow(&mut self, space: &dyn Space, elastic: &dyn Stiffness) {
         self.pieces.clear();
         let Some(tets) = space.tets() else { return };
-        self.pieces.extend(tets.pieces().iter().zip(elastic.places()).map(|(piece, place)| {
+        self.pieces.extend(tets.pieces().iter().zip(elastic.places().iter()).map(|(piece, &place)| {
             let e = piece.element as usize;
             let [_, gradients @ ..] = tets.mesh().gradients(e);
             HeldPiece {

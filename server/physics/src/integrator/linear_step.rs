@@ -27,6 +27,7 @@ use super::step_solver::ActiveSprings;
 use crate::lists::reserve::resize_reserving;
 use crate::material::Rayleigh;
 use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport, Multigrid};
+use crate::octree::Octree;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
     Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded, unpadded,
@@ -151,14 +152,24 @@ impl LinearStep {
         self.searched = None;
     }
 
-    /// Sets the levels of the present topology, whose stiffness is `elastic`, and which of them is simulated, or the
-    /// coarsest one if there are fewer.
-    pub fn set_hierarchy(&mut self, hierarchy: Option<Hierarchy>, elastic: &dyn Stiffness, simulate: usize) {
+    /// Lets the levels follow a cut of `octree` that changed the leaves `changed`, ascending. Returns `false` if they
+    /// have to be [made anew](Self::set_hierarchy).
+    pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+        match (&mut self.grid, &mut self.simulated) {
+            (Some(grid), _) => grid.follow_cut(octree, changed),
+            (None, Some(level)) => level.follow_cut(octree, changed),
+            (None, None) => false,
+        }
+    }
+
+    /// Sets the levels of the present topology, and which of them is simulated, or the coarsest one if there are
+    /// fewer.
+    pub fn set_hierarchy(&mut self, hierarchy: Option<Hierarchy>, simulate: usize) {
         (self.grid, self.simulated) = (None, None);
         let Some(hierarchy) = hierarchy else { return };
         match simulate.min(hierarchy.n_levels() - 1) {
-            0 => self.grid = Some(Box::new(StepGrid::new(hierarchy, elastic))),
-            level => self.simulated = Some(Box::new(SimulatedLevel::new(hierarchy, elastic, level))),
+            0 => self.grid = Some(Box::new(StepGrid::new(hierarchy))),
+            level => self.simulated = Some(Box::new(SimulatedLevel::new(hierarchy, level))),
         }
     }
 

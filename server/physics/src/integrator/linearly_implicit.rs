@@ -18,6 +18,7 @@ use crate::element::Points;
 use crate::lists::reserve::refill;
 use crate::material::Material;
 use crate::multigrid::{CoarsestSolve, LevelReport};
+use crate::octree::OctreeSpace;
 use crate::operator::Stiffness;
 use crate::solver::{Method, PcgSettings};
 use crate::space::Space;
@@ -60,6 +61,8 @@ pub struct LinearlyImplicit {
     /// For the energy balance of Newmark's method.
     held: HeldEnergy,
     weightless: Vec<Weightless>,
+    /// Whether the topology was cut, and nothing else, since the levels were brought up to date.
+    cut: bool,
 }
 
 /// A copy without mass, and the copies of its piece that carry it along.
@@ -94,6 +97,7 @@ impl LinearlyImplicit {
             step: LinearStep::new(at_start),
             held: HeldEnergy::default(),
             weightless: Vec::new(),
+            cut: false,
         }
     }
 
@@ -160,6 +164,18 @@ impl LinearlyImplicit {
     /// Stopping criteria of its linear solves.
     pub fn solver(&self) -> PcgSettings {
         self.pcg
+    }
+
+    /// Brings the levels of multigrid up to date, or makes them anew where they cannot follow.
+    fn follow_levels(&mut self, space: &dyn Space) {
+        let cut = std::mem::take(&mut self.cut);
+        let follows = cut && self.method.is_multigrid();
+        let cut = space.octree().and_then(OctreeSpace::last_cut).filter(|_| follows);
+        if cut.is_some_and(|(octree, changed)| self.step.follow_cut(octree, changed)) {
+            return;
+        }
+        let hierarchy = if self.method.is_multigrid() { space.hierarchy(self.simulate_level) } else { None };
+        self.step.set_hierarchy(hierarchy, self.simulate_level);
     }
 
     /// Moves copies without mass along with the rest of their piece: no force would move them.
@@ -285,6 +301,7 @@ impl StepSolver for LinearlyImplicit {
 
     fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
         space.follow_stiffness(&mut *self.stiffness);
+        self.cut = true;
         Ok(())
     }
 
@@ -295,6 +312,7 @@ impl StepSolver for LinearlyImplicit {
             self.stiffness = stiffness;
         }
         self.stiffness.set_choice(choice);
+        self.cut = false;
         Ok(())
     }
 
@@ -307,8 +325,7 @@ impl StepSolver for LinearlyImplicit {
         }
         self.step.set_stiff_modes(space.stiff_modes());
         self.step.set_method(self.method);
-        let hierarchy = if self.method.is_multigrid() { space.hierarchy(self.simulate_level) } else { None };
-        self.step.set_hierarchy(hierarchy, &*self.stiffness, self.simulate_level);
+        self.follow_levels(space);
     }
 
     fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) {

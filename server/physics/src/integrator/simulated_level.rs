@@ -13,10 +13,12 @@ use nalgebra::Vector3;
 
 use super::step_grid::set_coefficients;
 use super::step_inputs::{LinearInputs, StepInputs};
+use crate::lists::reserve::resize_reserving;
 use crate::multigrid::{Coefficients, Composite, Hierarchy, Multigrid, MultigridSettings};
+use crate::octree::Octree;
 use crate::operator::{
-    BLOCK, FixedCopy, LinearOperator, Padded, Place, Preconditioner, Spring, Stiffness, block_of, filter,
-    padded, rows, unpadded,
+    BLOCK, FixedCopy, LinearOperator, Padded, Preconditioner, Spring, Stiffness, block_of, filter, padded,
+    rows, unpadded,
 };
 use crate::solver::{LinearReport, Method, Pcg, PcgSettings, StopReason};
 use crate::team::{Team, blocks};
@@ -32,7 +34,6 @@ const MASS_ITERATIONS: u32 = 60;
 #[derive(Debug)]
 pub struct SimulatedLevel {
     composite: Composite,
-    places: Vec<Place>,
     coefficients: Coefficients,
     version: Option<u64>,
     pcg: Pcg,
@@ -51,8 +52,8 @@ pub struct SimulatedLevel {
 }
 
 impl SimulatedLevel {
-    /// Level `level` of `hierarchy`, whose finest cells have the stiffness `elastic`.
-    pub fn new(hierarchy: Hierarchy, elastic: &dyn Stiffness, level: usize) -> Self {
+    /// Level `level` of `hierarchy`.
+    pub fn new(hierarchy: Hierarchy, level: usize) -> Self {
         let n_fine = hierarchy.n_vertices();
         let composite = Composite::new(hierarchy, MultigridSettings::default(), level);
         let n = composite.n_vertices();
@@ -61,7 +62,6 @@ impl SimulatedLevel {
         let zeros = || vec![[0.0; 4]; n];
         Self {
             composite,
-            places: elastic.places(),
             coefficients: Coefficients { materials: Vec::new(), scale: 0.0, mass_factor: 0.0 },
             version: None,
             pcg,
@@ -81,15 +81,32 @@ impl SimulatedLevel {
         self.composite.multigrid()
     }
 
+    /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
+    pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+        self.version = None;
+        if !self.composite.follow(octree, changed) {
+            return false;
+        }
+        let n = self.composite.n_vertices();
+        self.pcg.resize(n);
+        for v in [&mut self.b, &mut self.x, &mut self.z, &mut self.p, &mut self.q, &mut self.u] {
+            resize_reserving(v, n, [0.0; 4]);
+        }
+        self.partial.resize(n.div_ceil(BLOCK), 0.0);
+        self.fine.iter_mut().for_each(|v| resize_reserving(v, octree.n_vertices(), [0.0; 4]));
+        true
+    }
+
     /// Follows the stiffness as it was last updated.
     pub fn follow(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
-        let Self { composite, places, coefficients, version, .. } = self;
+        let Self { composite, coefficients, version, .. } = self;
         set_coefficients(coefficients, composite.multigrid().hierarchy(), inputs);
         let (fixed, now) = (inputs.step.fixed, Some(elastic.version()));
         if *version == now && composite.multigrid().is_made_for(coefficients, fixed) {
             return;
         }
         *version = now;
+        let places = elastic.places();
         composite.update(team, (coefficients, fixed), &|cell| elastic.rotation(places[cell as usize]));
     }
 

@@ -3,7 +3,8 @@
 use super::step_inputs::LinearInputs;
 use crate::material::Material;
 use crate::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
-use crate::operator::{Block6, Inverse3, LinearOperator, Place, Spring, Stiffness, invert};
+use crate::octree::Octree;
+use crate::operator::{Block6, Inverse3, LinearOperator, Spring, Stiffness, invert};
 use crate::team::Team;
 
 /// Springs stiffer than this times the body at their point are left to block-Jacobi. Only the finest level has
@@ -14,8 +15,6 @@ const STIFFEST_SPRING: f64 = 1.0;
 #[derive(Debug)]
 pub struct StepGrid {
     multigrid: Multigrid,
-    /// Where the stiffness keeps every cell.
-    places: Vec<Place>,
     coefficients: Coefficients,
     /// Version of the stiffness at the last update.
     version: Option<u64>,
@@ -26,12 +25,11 @@ pub struct StepGrid {
 }
 
 impl StepGrid {
-    /// Multigrid for the cells of `hierarchy`, whose stiffness is `elastic`.
-    pub fn new(hierarchy: Hierarchy, elastic: &dyn Stiffness) -> Self {
+    /// Multigrid for the cells of `hierarchy`.
+    pub fn new(hierarchy: Hierarchy) -> Self {
         let none = Coefficients { materials: Vec::new(), scale: 0.0, mass_factor: 0.0 };
         Self {
             multigrid: Multigrid::new(hierarchy, MultigridSettings::default()),
-            places: elastic.places(),
             coefficients: none,
             version: None,
             largest: 0.0,
@@ -44,9 +42,15 @@ impl StepGrid {
         &self.multigrid
     }
 
+    /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
+    pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+        self.version = None;
+        self.multigrid.follow(octree, changed)
+    }
+
     /// Follows the stiffness as it was last updated.
     pub fn follow(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
-        let Self { multigrid, places, coefficients, version, .. } = self;
+        let Self { multigrid, coefficients, version, .. } = self;
         set_coefficients(coefficients, multigrid.hierarchy(), inputs);
         let fixed = inputs.step.fixed;
         let now = Some(elastic.version());
@@ -54,6 +58,7 @@ impl StepGrid {
             return;
         }
         *version = now;
+        let places = elastic.places();
         multigrid.update(team, (coefficients, fixed), &|cell| elastic.rotation(places[cell as usize]));
     }
 

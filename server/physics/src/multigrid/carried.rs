@@ -24,16 +24,31 @@ impl Carried {
     pub fn update(&mut self, hierarchy: &Hierarchy, matrix: impl Fn(usize, usize) -> Dense) {
         self.matrices.clear();
         self.number.clear();
+        for l in 0..hierarchy.steps.len() {
+            self.add(hierarchy, l, 0..hierarchy.levels[l].cells.len(), &matrix);
+        }
+    }
+
+    /// Adds the matrices of these cells of level `l`, if they are not known.
+    pub fn add(
+        &mut self,
+        hierarchy: &Hierarchy,
+        l: usize,
+        cells: impl Iterator<Item = usize>,
+        matrix: impl Fn(usize, usize) -> Dense,
+    ) {
+        let Some(step) = hierarchy.steps.get(l) else { return };
+        let (fine, coarse) = (&hierarchy.levels[l], &hierarchy.levels[l + 1]);
         self.number.resize(hierarchy.kinds.len() * OCTANTS * HANGING, NONE);
-        for (l, step) in hierarchy.steps.iter().enumerate() {
-            let (fine, coarse) = (&hierarchy.levels[l], &hierarchy.levels[l + 1]);
-            for (id, &kind) in hierarchy.kind_of[l].iter().enumerate().filter(|(_, kind)| **kind != NONE) {
-                let parent = &coarse.cells[step.parent[id] as usize];
-                let number = &mut self.number[slot(kind, &fine.cells[id], fine.hanging[id])];
-                if *number == NONE && fine.cells[id].level != parent.level {
-                    *number = self.matrices.len() as u32;
-                    self.matrices.push(matrix(l, id).carried(&corners_in(fine, id, parent)));
-                }
+        for id in cells {
+            let (kind, parent) = (hierarchy.kind_of[l][id], &coarse.cells[step.parent[id] as usize]);
+            if kind == NONE || fine.cells[id].level == parent.level {
+                continue;
+            }
+            let number = &mut self.number[slot(kind, &fine.cells[id], fine.hanging[id])];
+            if *number == NONE {
+                *number = self.matrices.len() as u32;
+                self.matrices.push(matrix(l, id).carried(&corners_in(fine, id, parent)));
             }
         }
     }

@@ -8,6 +8,8 @@ use super::hierarchy::Hierarchy;
 use super::kernel::LevelKernel;
 use super::smoother::{Smoother, Smoothing, chebyshev, gauss_seidel};
 use crate::element::Simd;
+use crate::lists::reserve::resize_reserving;
+use crate::octree::Octree;
 use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, block_of, filter, rows};
 use crate::team::{Team, blocks};
 
@@ -70,8 +72,8 @@ pub struct Multigrid {
 /// have scratch for restriction and prolongation alone.
 #[derive(Clone, Debug, Default)]
 pub struct Vectors {
-    inverse: Vec<Inverse3>,
-    largest: f64,
+    pub(super) inverse: Vec<Inverse3>,
+    pub(super) largest: f64,
     pub(super) x: Vec<Padded>,
     pub(super) b: Vec<Padded>,
     r: Vec<Padded>,
@@ -123,6 +125,42 @@ impl Multigrid {
         }
     }
 
+    /// Follows a cut of `octree` that changed the leaves `changed`, ascending, and left the numbers of all others; an
+    /// [update](Self::update) comes next. Returns `false` if the levels have to be made anew, and this is then of
+    /// no more use.
+    pub fn follow(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+        let Some(changes) = self.hierarchy.follow(octree, changed) else { return false };
+        self.galerkin.follow(&self.hierarchy, &changes);
+        let first = self.first;
+        for (l, (change, vectors)) in changes.iter().zip(&mut self.levels).enumerate() {
+            let n = self.hierarchy.levels[l].n_vertices;
+            let Vectors { inverse, x, b, r, d, q, kernel, .. } = vectors;
+            for (vector, used) in [
+                (x, l > 0 && l != first),
+                (b, l > 0 && l != first),
+                (r, l >= first),
+                (d, l >= first),
+                (q, l >= first),
+            ] {
+                if used {
+                    resize_reserving(vector, n, [0.0; 4]);
+                }
+            }
+            if l > first {
+                resize_reserving(inverse, n, Inverse3::default());
+            }
+            if let Some(kernel) = kernel {
+                kernel.follow_cut(change);
+            }
+        }
+        if changes.last().is_some_and(|change| change.moved) {
+            self.coarsest = Coarsest::new(&self.hierarchy);
+        }
+        self.partial.resize(self.hierarchy.levels[first].n_vertices.div_ceil(BLOCK), 0.0);
+        self.estimate = true;
+        true
+    }
+
     /// Brings the coarse operators up to date with the constants, the prescribed directions and the rotation of
     /// every leaf. What has not changed is kept. [`estimate_eigenvalues`](Self::estimate_eigenvalues) comes next.
     pub fn update(
@@ -133,7 +171,7 @@ impl Multigrid {
     ) {
         let Self { settings, hierarchy, galerkin, coarsest, levels, first, .. } = self;
         let tolerance = settings.same_rotation_rad;
-        let [anew, any] = galerkin.update(team, hierarchy, (with, fixed), rotation, tolerance);
+        let updated = galerkin.update(team, hierarchy, (with, fixed), rotation, tolerance);
         self.fixed.clear();
         if *first == 0 {
             self.fixed.extend_from_slice(fixed);
@@ -143,13 +181,13 @@ impl Multigrid {
         }
         for l in (*first).max(1)..levels.len() {
             let Vectors { kernel: Some(kernel), inverse, .. } = &mut levels[l] else { continue };
-            kernel.follow(team, &hierarchy.levels[l], (galerkin, l, anew));
+            kernel.follow(team, &hierarchy.levels[l], (galerkin, l, updated.constants));
             if l > *first {
                 kernel.invert_diagonal(team, &galerkin.levels[l].mass, inverse);
             }
         }
-        coarsest.update(hierarchy, galerkin, any, tolerance);
-        self.estimate |= anew;
+        coarsest.update(hierarchy, galerkin, updated.matrices, tolerance);
+        self.estimate |= updated.constants || updated.released;
     }
 
     /// Whether the last update had these constants and prescribed directions.

@@ -27,7 +27,7 @@ const SAME: f32 = 2e-6;
 /// Stored cells per unit of work.
 const STORED_BLOCK: usize = 8;
 
-type Rotation = UnitQuaternion<f32>;
+pub(super) type Rotation = UnitQuaternion<f32>;
 
 /// Constants of the material of cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,10 +64,10 @@ pub struct Stored {
     /// The cell, or [`NONE`] if the place is free.
     pub cell: u32,
     /// Whether it has to be computed again.
-    stale: bool,
+    pub(super) stale: bool,
     /// Rotations of the children in the frame of the cell when it was computed. Where cells at one place are
     /// duplicates, there may be more than eight.
-    relative: Vec<Rotation>,
+    pub(super) relative: Vec<Rotation>,
     /// Over the vertices that carry the cell, in its frame.
     pub matrix: Packed,
 }
@@ -84,9 +84,22 @@ pub struct LevelMatrices {
     /// Lumped mass of the leaves with shared matrices times its factor, by vertex [kg].
     pub mass: Vec<f32>,
     /// Whether prescribed vertices are below the cell, and whether some of them in some directions only.
-    holds: Vec<[bool; 2]>,
+    pub(super) holds: Vec<[bool; 2]>,
     /// Whether the matrix in the frame of the cell changed in this update.
     pub changed: Vec<bool>,
+    /// Cells that a cut or other prescribed directions changed since the last update.
+    pub(super) touched: Vec<u32>,
+}
+
+/// What an update of the operators changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Updated {
+    /// The constants; all matrices are new then.
+    pub constants: bool,
+    /// Some matrix, in the frame of its cell.
+    pub matrices: bool,
+    /// Directions are free that were prescribed.
+    pub released: bool,
 }
 
 /// The matrices of all levels.
@@ -96,12 +109,12 @@ pub struct Galerkin {
     /// Matrix of every kind of cell; for leaves without mass.
     pub shared: Vec<Dense>,
     /// The same in the corners of a parent.
-    carried: Carried,
+    pub(super) carried: Carried,
     /// Mass [kg] times its factor of an eighth of a leaf of every kind.
-    eighth: Vec<f32>,
+    pub(super) eighth: Vec<f32>,
     /// Prescribed directions of every vertex of the finest level, one bit each.
     pub(super) fixed: Vec<u8>,
-    coefficients: Option<Coefficients>,
+    pub(super) coefficients: Option<Coefficients>,
     pub(super) known_fixed: Vec<(u32, [bool; 3])>,
     /// The level that is solved on, and its prescribed directions if it is not the finest one.
     pub(super) first: usize,
@@ -130,8 +143,7 @@ impl Galerkin {
 
     /// Brings all matrices up to date. `rotation` gives that of a leaf of the octree; merged cells count as cubes
     /// if the rotations of their children differ by at most `tolerance` [rad] from the mean, and stored ones are
-    /// computed again when these turned by more than that relative to each other. Returns whether the constants,
-    /// the prescribed directions or any stored matrix changed.
+    /// computed again when these turned by more than that relative to each other.
     pub fn update(
         &mut self,
         team: &mut Team,
@@ -139,18 +151,22 @@ impl Galerkin {
         (with, fixed): (&Coefficients, &[FixedCopy]),
         rotation: &(dyn Fn(u32) -> Matrix3<f32> + Sync),
         tolerance: f64,
-    ) -> [bool; 2] {
-        let anew = !self.is_made_for(with, fixed);
+    ) -> Updated {
+        let anew = self.coefficients.as_ref() != Some(with);
+        let mut released = false;
         if anew {
             self.known_fixed.clear();
             self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.axes)));
             self.mark_held(hierarchy);
             self.set_coefficients(hierarchy, with);
+        } else if !self.is_made_for(with, fixed) {
+            released = self.hold(hierarchy, fixed);
         }
         let tolerance = (tolerance as f32).max(SAME);
         let exact = tolerance == SAME;
         let finest = &mut self.levels[0];
         finest.changed.fill(anew);
+        finest.mark_touched();
         let leaves = &hierarchy.levels[0].leaf;
         team.for_blocks(blocks(&mut finest.frame, BLOCK), |block, frames| {
             for (i, frame) in frames.iter_mut().enumerate() {
@@ -162,7 +178,7 @@ impl Galerkin {
         for l in 1..self.levels.len() {
             any |= self.update_level(team, hierarchy, l, (tolerance, exact, anew));
         }
-        [anew, any]
+        Updated { constants: anew, matrices: any, released }
     }
 
     /// Whether the last update had these constants and prescribed directions.
@@ -174,15 +190,9 @@ impl Galerkin {
     /// Notes which cells have prescribed vertices below them.
     fn mark_held(&mut self, hierarchy: &Hierarchy) {
         self.fixed.fill(0);
-        for &(copy, axes) in &self.known_fixed {
-            if let Some(fixed) = self.fixed.get_mut(copy as usize) {
-                *fixed = (0..3).fold(0, |bits, k| bits | u8::from(axes[k]) << k);
-            }
-        }
-        self.hold_coarse(hierarchy);
+        self.enter_fixed(hierarchy);
         for (holds, vertices) in self.levels[0].holds.iter_mut().zip(&hierarchy.levels[0].vertices) {
-            let fixed = vertices.map(|v| self.fixed[v as usize]);
-            *holds = [fixed.iter().any(|&f| f != 0), fixed.iter().any(|&f| f != 0 && f != 7)];
+            *holds = held(&self.fixed, vertices);
         }
         for l in 1..self.levels.len() {
             let (below, level) = self.levels.split_at_mut(l);
@@ -194,21 +204,21 @@ impl Galerkin {
         }
     }
 
+    /// Enters the prescribed directions in the bits of vertices, where those of all others are 0.
+    pub(super) fn enter_fixed(&mut self, hierarchy: &Hierarchy) {
+        for &(copy, axes) in &self.known_fixed {
+            if let Some(fixed) = self.fixed.get_mut(copy as usize) {
+                *fixed = (0..3).fold(0, |bits, k| bits | u8::from(axes[k]) << k);
+            }
+        }
+        self.hold_coarse(hierarchy);
+    }
+
     /// Computes shared matrices and lumped masses.
     fn set_coefficients(&mut self, hierarchy: &Hierarchy, with: &Coefficients) {
-        let of = |number: u16| with.materials.get(usize::from(number)).or(with.materials.first());
         self.shared.clear();
         self.eighth.clear();
-        for kind in &hierarchy.kinds {
-            let none = CellMaterial { lame: Lame { mu: 0.0, lambda: 0.0 }, density_kg_m3: 0.0 };
-            let material = of(kind.material).unwrap_or(&none);
-            let side = f64::from(1_u32 << kind.side) * hierarchy.h;
-            let mass = with.mass_factor * material.density_kg_m3 * side.powi(3);
-            let K = unit_stiffness(material.lame);
-            let M = (kind.merged > 0).then(|| table::merged_mass(kind.merged));
-            self.shared.push(table::cube(&K, with.scale * side, M.as_ref(), mass));
-            self.eighth.push((mass / 8.0) as f32);
-        }
+        self.add_kinds(hierarchy, with);
         let (shared, eighth) = (&self.shared, &self.eighth);
         self.carried.update(hierarchy, |l, id| {
             let kind = hierarchy.kind_of[l][id] as usize;
@@ -240,6 +250,21 @@ impl Galerkin {
         }
     }
 
+    /// Computes shared matrices of the kinds that have none yet.
+    pub(super) fn add_kinds(&mut self, hierarchy: &Hierarchy, with: &Coefficients) {
+        let of = |number: u16| with.materials.get(usize::from(number)).or(with.materials.first());
+        for kind in &hierarchy.kinds[self.shared.len()..] {
+            let none = CellMaterial { lame: Lame { mu: 0.0, lambda: 0.0 }, density_kg_m3: 0.0 };
+            let material = of(kind.material).unwrap_or(&none);
+            let side = f64::from(1_u32 << kind.side) * hierarchy.h;
+            let mass = with.mass_factor * material.density_kg_m3 * side.powi(3);
+            let K = unit_stiffness(material.lame);
+            let M = (kind.merged > 0).then(|| table::merged_mass(kind.merged));
+            self.shared.push(table::cube(&K, with.scale * side, M.as_ref(), mass));
+            self.eighth.push((mass / 8.0) as f32);
+        }
+    }
+
     fn update_level(
         &mut self,
         team: &mut Team,
@@ -251,7 +276,7 @@ impl Galerkin {
         let (fine, level) = (&below[l - 1], &mut level[0]);
         let step = &hierarchy.steps[l - 1];
         let (kinds, exactness) = (&hierarchy.kind_of[l], &hierarchy.exact[l]);
-        let LevelMatrices { frame, matrix, stored, free, holds, changed, .. } = level;
+        let LevelMatrices { frame, matrix, stored, free, holds, changed, touched, .. } = level;
         // Frames, and which cells are cubes.
         let cubes = (blocks(frame, BLOCK), blocks(changed, BLOCK));
         team.for_blocks(cubes, |block, (frames, cubes)| {
@@ -294,6 +319,8 @@ impl Galerkin {
                 _ => {}
             }
         }
+        let mut any = !touched.is_empty();
+        touched.drain(..).for_each(|id| changed[id as usize] = true);
         let held = match l {
             1 => &self.fixed[..],
             _ if l == self.first + 1 => &self.held_bits[..],
@@ -307,7 +334,6 @@ impl Galerkin {
                 context.refresh(stored, &frame[stored.cell as usize], (tolerance, anew));
             }
         });
-        let mut any = false;
         for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
             changed[stored.cell as usize] |= stored.stale;
             any |= stored.stale;
@@ -347,6 +373,19 @@ impl Galerkin {
     #[cfg(test)]
     pub fn fixed(&self, v: u32) -> u8 {
         self.fixed[v as usize]
+    }
+}
+
+/// Whether directions of any of these vertices are prescribed, and whether some of a vertex are and others not.
+pub(super) fn held(fixed: &[u8], vertices: &[u32; 8]) -> [bool; 2] {
+    let fixed = vertices.map(|v| fixed[v as usize]);
+    [fixed.iter().any(|&f| f != 0), fixed.iter().any(|&f| f != 0 && f != 7)]
+}
+
+impl LevelMatrices {
+    /// Marks the cells that were touched since the last update as changed.
+    fn mark_touched(&mut self) {
+        self.touched.drain(..).for_each(|id| self.changed[id as usize] = true);
     }
 }
 
@@ -451,7 +490,7 @@ fn cell_matrix(
 
 /// The matrix of a cell of a kind over the vertices that carry it, with an `eighth` of the mass of a leaf at every
 /// corner.
-fn shared_matrix(level: &Level, id: usize, of_kind: &Dense, eighth: f32) -> Dense {
+pub(super) fn shared_matrix(level: &Level, id: usize, of_kind: &Dense, eighth: f32) -> Dense {
     let mut A = *of_kind;
     if level.leaf[id] == NONE {
         return A;

@@ -3,6 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::dense::at;
+use super::follow::LevelChange;
 use super::galerkin::{CellMatrix, Galerkin, LevelMatrices};
 use super::level::Level;
 use crate::element::Simd;
@@ -20,9 +21,12 @@ const DIAGONAL: [usize; 3] = [0, 4, 6];
 pub struct LevelKernel {
     operator: CellOperator,
     lanes: Vec<CellLane>,
-    order: Vec<u32>,
     /// Cells that were arranged anew in this update.
     moved: Vec<bool>,
+    /// Of cells that cuts added since the last update, the ones they were part of; their numbers come last.
+    origin: Vec<u32>,
+    /// Whether a cut changed cells since the last update.
+    cut: bool,
     /// Whether no matrix was given yet.
     fresh: bool,
 }
@@ -34,19 +38,28 @@ impl LevelKernel {
             (0..level.cells.len()).map(|id| lane(level, id, matrices.matrix[id])).collect();
         let order = morton_order(&level.cells);
         let operator = CellOperator::new(simd, &[], &lanes, &order, level.n_vertices);
-        Self { operator, moved: vec![false; lanes.len()], lanes, order, fresh: true }
+        Self { operator, moved: vec![false; lanes.len()], lanes, origin: Vec::new(), cut: false, fresh: true }
+    }
+
+    /// Takes note of a cut, which the next update follows.
+    pub fn follow_cut(&mut self, change: &LevelChange) {
+        self.origin.extend_from_slice(&change.origin);
+        self.cut |= !change.cells.is_empty();
     }
 
     /// Follows an update of the matrices of level `l`; `anew` if those of the kinds changed.
     pub fn follow(&mut self, team: &mut Team, level: &Level, (galerkin, l, anew): (&Galerkin, usize, bool)) {
-        if anew {
+        if anew || self.operator.n_tables() != galerkin.shared.len() {
             let table = |shared: &super::dense::Dense| SectorTable::of_matrix(&shared.wide()).0;
             self.operator.set_tables(&galerkin.shared.iter().map(table).collect::<Vec<_>>());
         }
         let matrices = &galerkin.levels[l];
-        let Self { operator, lanes, order, moved, fresh } = self;
-        let mut any = false;
-        for (id, (known, moved)) in lanes.iter_mut().zip(moved.iter_mut()).enumerate() {
+        let Self { operator, lanes, moved, origin, cut, fresh } = self;
+        let known = lanes.len();
+        lanes.extend((known..level.cells.len()).map(|id| lane(level, id, matrices.matrix[id])));
+        moved.resize(lanes.len(), true);
+        let mut any = known < lanes.len();
+        for (id, (known, moved)) in lanes.iter_mut().zip(moved.iter_mut()).enumerate().take(known) {
             let now = lane(level, id, matrices.matrix[id]);
             *moved = *known != now;
             if *moved {
@@ -54,14 +67,28 @@ impl LevelKernel {
             }
         }
         // All cells of a chunk that is arranged anew lose their matrices.
+        let cut = std::mem::take(cut);
         if any {
-            operator.rearrange(team, lanes, order, |id| moved[id as usize]);
-            for members in order.chunks(CellOperator::CHUNK_CELLS) {
-                if members.iter().any(|&id| moved[id as usize]) {
-                    members.iter().for_each(|&id| moved[id as usize] = true);
-                }
+            let renewed = if cut {
+                moved[known..].fill(true);
+                let changed: Vec<u32> =
+                    (0u32..).zip(&*moved).filter(|(_, moved)| **moved).map(|(id, _)| id).collect();
+                let source = |mut id: u32| {
+                    while let Some(new) = (id as usize).checked_sub(known) {
+                        id = origin[new];
+                    }
+                    id
+                };
+                let sizes = [lanes.len(), level.n_vertices];
+                operator.follow(&changed, sizes, &|id| lanes[id as usize], &source)
+            } else {
+                operator.rearrange(team, lanes, |id| moved[id as usize])
+            };
+            for chunk in renewed {
+                operator.members(chunk).for_each(|id| moved[id as usize] = true);
             }
         }
+        origin.clear();
         let rotation =
             |id: u32| -> Matrix3<f32> { matrices.frame[id as usize].to_rotation_matrix().into_inner() };
         operator.set_rotations(team, rotation);
@@ -87,8 +114,7 @@ impl LevelKernel {
     /// Bytes in use: all but stored matrices, and these.
     pub fn memory(&self) -> [usize; 2] {
         let [operator, stored] = self.operator.memory();
-        let lists =
-            size_of_val(&self.lanes[..]) + size_of_val(&self.order[..]) + size_of_val(&self.moved[..]);
+        let lists = size_of_val(&self.lanes[..]) + size_of_val(&self.moved[..]);
         [operator + lists, stored]
     }
 

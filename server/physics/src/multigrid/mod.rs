@@ -15,6 +15,7 @@ mod dense;
 mod table;
 mod carried;
 mod galerkin;
+mod touched;
 mod operator;
 mod kernel;
 mod smoother;

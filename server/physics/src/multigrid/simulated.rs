@@ -18,6 +18,7 @@ use super::kernel::LevelKernel;
 use super::level::NONE;
 use super::precondition::Cycle;
 use super::restricted::RestrictedSprings;
+use crate::octree::Octree;
 use crate::operator::{
     BlockJacobi, FixedCopy, LinearOperator, Padded, Preconditioner, Spring, filter, invert,
 };
@@ -141,6 +142,19 @@ impl Composite {
     /// Its prescribed vertices; their positions are not used.
     pub fn held(&self) -> &[FixedCopy] {
         &self.held
+    }
+
+    /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
+    pub fn follow(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+        let first = self.multigrid.first;
+        self.multigrid.levels[first].kernel = self.kernel.take();
+        let follows = self.multigrid.follow(octree, changed);
+        self.kernel = self.multigrid.levels[first].kernel.take();
+        self.jacobi.resize(self.multigrid.hierarchy.levels[first].n_vertices);
+        // Their vertices are found again with the next solve.
+        self.springs.clear();
+        self.sprung.clear();
+        follows
     }
 
     /// Brings all operators up to date, as [`Multigrid::update`] does.

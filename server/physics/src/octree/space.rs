@@ -81,6 +81,12 @@ impl OctreeSpace {
         &self.octree
     }
 
+    /// The octree and the leaves that the last change of it changed, ascending, if that was a cut: all others have
+    /// their numbers from before.
+    pub fn last_cut(&self) -> Option<(&Octree, &[u32])> {
+        self.only_cut.then_some((&self.octree, &self.changed[..]))
+    }
+
     fn renew(&mut self) {
         self.volumes = self.octree.vertex_volumes();
         self.surface = OctreeSurface::build(&self.octree);

@@ -241,9 +241,62 @@ impl Gather {
             }
         }
         self.further.sort_unstable();
+        self.find_blocks(n_copies);
+    }
+
+    /// Finds where the further rows of every block begin.
+    fn find_blocks(&mut self, n_copies: usize) {
         let before = |b: usize| self.further.partition_point(|&(copy, _)| (copy as usize) < b * BLOCK) as u32;
         self.first_further.clear();
         self.first_further.extend((0..=n_copies.div_ceil(BLOCK)).map(before));
+    }
+
+    /// Number of rows of a chunk.
+    pub fn room(&self, chunk: usize) -> usize {
+        (self.first_row[chunk + 1] - self.first_row[chunk]) as usize
+    }
+
+    /// Adds a chunk without copies and with `room` rows behind all others.
+    pub fn add_chunk(&mut self, room: usize) {
+        self.first_row.push((self.n_rows() + room) as u32);
+    }
+
+    /// Replaces the copies of some chunks; each is given with its copies `before`, none for those that had no copies,
+    /// and those it has `now`. The rest keeps its rows.
+    pub fn replace<'a>(
+        &mut self,
+        before: impl Iterator<Item = (usize, &'a [u32])>,
+        now: impl Iterator<Item = (usize, &'a [u32])>,
+        n_copies: usize,
+    ) {
+        resize_reserving(&mut self.pairs, n_copies, [0; 2]);
+        // Rows by copy, with those that go away marked.
+        let first = &self.first_row;
+        let rows = |(chunk, copies): (usize, &'a [u32])| copies.iter().copied().zip(first[chunk]..);
+        let mut changed: Vec<(u32, u32, bool)> =
+            before.flat_map(rows).map(|(copy, row)| (copy, row, false)).collect();
+        changed.extend(now.flat_map(rows).map(|(copy, row)| (copy, row, true)));
+        changed.sort_unstable();
+        let (mut further, mut list) = (Vec::new(), Vec::new());
+        let mut kept = 0;
+        for changed in changed.chunk_by(|a, b| a.0 == b.0) {
+            let copy = changed[0].0;
+            let begin = kept + self.further[kept..].partition_point(|f| f.0 < copy);
+            let end = begin + self.further[begin..].partition_point(|f| f.0 == copy);
+            further.extend_from_slice(&self.further[kept..begin]);
+            list.clear();
+            let known =
+                self.pairs[copy as usize].into_iter().chain(self.further[begin..end].iter().map(|f| f.1));
+            let stays = |row: &u32| *row != 0 && changed.iter().all(|c| c.1 != *row);
+            list.extend(known.filter(stays).chain(changed.iter().filter(|c| c.2).map(|c| c.1)));
+            list.sort_unstable();
+            self.pairs[copy as usize] = [0, 1].map(|i| list.get(i).copied().unwrap_or(0));
+            further.extend(list.iter().skip(2).map(|&row| (copy, row)));
+            kept = end;
+        }
+        further.extend_from_slice(&self.further[kept..]);
+        self.further = further;
+        self.find_blocks(n_copies);
     }
 
     /// Whether the rows of every chunk still suffice for its copies and the waste bin.

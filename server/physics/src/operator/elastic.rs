@@ -1,5 +1,7 @@
 //! K̂, the stiffness of all pieces: by the tets with rotated gradients, or assembled.
 
+use std::borrow::Cow;
+
 use nalgebra::{Matrix3, Vector3};
 
 use super::chunk::{Chunk, NewLane};
@@ -237,7 +239,7 @@ impl Elastic {
 
     /// Rotation of every piece at the last update.
     pub fn rotations(&self) -> Vec<Matrix3<f32>> {
-        self.places().into_iter().map(|place| self.rotation(place)).collect()
+        self.places().iter().map(|&place| self.rotation(place)).collect()
     }
 
     /// Number of pieces.
@@ -342,7 +344,7 @@ impl Stiffness for Elastic {
         self.choice
     }
 
-    fn places(&self) -> Vec<Place> {
+    fn places(&self) -> Cow<'_, [Place]> {
         let mut places = vec![Place::default(); self.n_pieces()];
         for (chunk, c) in (0u32..).zip(&self.chunks) {
             for (p, batch, lane) in c.lanes() {
@@ -353,7 +355,7 @@ impl Stiffness for Elastic {
         for (p, &carrier) in self.shared_lanes.of_piece().iter().enumerate() {
             places[p] = places[carrier as usize];
         }
-        places
+        Cow::Owned(places)
     }
 
     #[inline(always)]

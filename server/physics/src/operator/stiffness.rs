@@ -1,6 +1,7 @@
 //! What a step asks of the stiffness of a discretisation.
 
 use std::any::Any;
+use std::borrow::Cow;
 use std::fmt::Debug;
 
 use nalgebra::{Matrix3, Vector3};
@@ -92,7 +93,7 @@ pub trait Stiffness: Any + Debug + Send + Sync {
     fn choice(&self) -> OperatorChoice;
 
     /// Where every piece is kept, until the next cut.
-    fn places(&self) -> Vec<Place>;
+    fn places(&self) -> Cow<'_, [Place]>;
 
     /// Rotation of one piece at the last update.
     fn rotation(&self, place: Place) -> Matrix3<f32>;

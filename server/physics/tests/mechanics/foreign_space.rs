@@ -1,6 +1,7 @@
 //! A discretisation and its stiffness from another crate make a body as those of this crate do.
 
 use std::any::Any;
+use std::borrow::Cow;
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_physics::assembly::{ElementKind, Model, ModelError, Volumetric};
@@ -167,7 +168,7 @@ impl Stiffness for Kernel {
         self.elastic.choice()
     }
 
-    fn places(&self) -> Vec<Place> {
+    fn places(&self) -> Cow<'_, [Place]> {
         (0..self.places.len() as u32).map(|lane| Place { chunk: 7, batch: 7, lane }).collect()
     }
 
@@ -349,13 +350,13 @@ impl Space for Lattice {
 
     fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
         let elastic = self.tets.stiffness(portable)?;
-        Some(Box::new(Kernel { places: elastic.places(), elastic }))
+        Some(Box::new(Kernel { places: elastic.places().into_owned(), elastic }))
     }
 
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {
         let kernel = (stiffness as &mut dyn Any).downcast_mut::<Kernel>().unwrap();
         self.tets.follow_stiffness(&mut *kernel.elastic);
-        kernel.places = kernel.elastic.places();
+        kernel.places = kernel.elastic.places().into_owned();
     }
 
     fn stiff_modes(&self) -> Option<StiffModes> {

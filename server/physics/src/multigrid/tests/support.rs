@@ -195,6 +195,10 @@ impl Fine {
         Self { hierarchy, galerkin, products, fixed: exact.fixed.clone(), springs: Vec::new(), jacobi }
     }
 
+    pub fn fixed(&self) -> &[FixedCopy] {
+        &self.fixed
+    }
+
     pub fn inverses(&mut self) -> Vec<Inverse3> {
         self.jacobi.inverses_mut().to_vec()
     }

@@ -50,7 +50,7 @@ pub struct BatchLanes {
 }
 
 /// A run of cells in batches.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct CellChunk {
     /// Vertex of every local number, ascending.
     pub vertices: Vec<u32>,

@@ -16,6 +16,7 @@ use super::lane::CellLane;
 use super::sectors::SectorTable;
 use super::stored::STORED;
 use crate::element::Simd;
+use crate::lists::reserve::resize_reserving;
 use crate::octree::Cell;
 use crate::team::{Team, blocks, ranges};
 
@@ -41,9 +42,6 @@ pub struct CellOperator {
 }
 
 impl CellOperator {
-    /// Cells per chunk, in the order given to [`new`](Self::new).
-    pub const CHUNK_CELLS: usize = CHUNK_CELLS;
-
     /// Arranges `cells` for the kernels, their rotations I and their stored matrices 0. `order` lists all of them
     /// so that near ones are near, see [`morton_order`].
     pub fn new(
@@ -106,31 +104,28 @@ impl CellOperator {
     }
 
     /// Takes other tables, matrices and hanging slots for the cells that `changed` names; their vertices stay.
-    /// `order` is that of [`new`](Self::new). Chunks of such cells forget rotations and stored matrices.
+    /// Returns which chunks were arranged anew: these forget rotations and stored matrices.
     pub fn rearrange(
         &mut self,
         team: &mut Team,
         cells: &[CellLane],
-        order: &[u32],
         changed: impl Fn(u32) -> bool + Sync,
-    ) {
+    ) -> Vec<usize> {
+        let is_changed = |chunk: &CellChunk| chunk.places().any(|(cell, ..)| changed(cell));
+        let renewed: Vec<usize> = (0..self.chunks.len()).filter(|&k| is_changed(&self.chunks[k])).collect();
         team.for_blocks(blocks(&mut self.chunks, 1), |k, chunk| {
-            let members = &order[k * CHUNK_CELLS..order.len().min((k + 1) * CHUNK_CELLS)];
-            if members.iter().any(|&id| changed(id)) {
-                chunk[0] = CellChunk::new(members, &|id| cells[id as usize]);
+            if renewed.binary_search(&k).is_ok() {
+                chunk[0] = CellChunk::new(&members(&chunk[0]), &|id| cells[id as usize]);
             }
         });
-        for (k, members) in order.chunks(CHUNK_CELLS).enumerate() {
-            if members.iter().any(|&id| changed(id)) {
-                self.find_places(k);
-            }
-        }
+        renewed.iter().for_each(|&k| self.find_places(k));
+        renewed
     }
 
     /// Follows a cut after which there are `n_cells` cells on `n_vertices` vertices. The cells in `changed`, ascending,
     /// are new or have other vertices or hanging slots; `lane` gives what each of them and of their neighbours in
-    /// a chunk is now, and `source` an earlier cell near a new one. Returns which chunks were arranged anew: these
-    /// forget factors, rotations and stored matrices.
+    /// a chunk is now, and `source` an earlier cell near a new one. Returns which chunks were arranged anew,
+    /// ascending: these forget factors, rotations and stored matrices.
     pub fn follow(
         &mut self,
         changed: &[u32],
@@ -139,42 +134,62 @@ impl CellOperator {
         source: &dyn Fn(u32) -> u32,
     ) -> Vec<usize> {
         let known = self.places.len();
-        let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let mut of_chunk: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for &id in changed {
             let new = id as usize >= known;
             let chunk = self.places[if new { source(id) } else { id } as usize].chunk;
-            let held = members
-                .entry(chunk)
-                .or_insert_with(|| self.chunks[chunk as usize].places().map(|(cell, ..)| cell).collect());
+            let held = of_chunk.entry(chunk).or_insert_with(|| members(&self.chunks[chunk as usize]));
             if new {
                 held.push(id);
             }
         }
-        self.places.resize(n_cells, Place::default());
-        let mut renewed = Vec::with_capacity(members.len());
-        for (chunk, mut members) in members {
+        resize_reserving(&mut self.places, n_cells, Place::default());
+        let mut left = Vec::with_capacity(of_chunk.len());
+        let mut arranged = Vec::with_capacity(of_chunk.len());
+        for (chunk, mut members) in of_chunk {
             members.sort_unstable();
-            // A chunk that has grown is divided; its later parts come last.
+            left.push((chunk as usize, std::mem::take(&mut self.chunks[chunk as usize])));
+            // A chunk that has grown is divided.
             let size = if members.len() > 2 * CHUNK_CELLS { CHUNK_CELLS } else { members.len() };
-            for (part, members) in members.chunks(size).enumerate() {
-                let arranged = CellChunk::new(members, lane);
-                let at = if part == 0 { chunk as usize } else { self.chunks.len() };
-                if part == 0 {
-                    self.chunks[at] = arranged
-                } else {
-                    self.chunks.push(arranged)
+            arranged.extend(members.chunks(size).map(|members| CellChunk::new(members, lane)));
+        }
+        // Each goes where it has room for its sums, and else behind all others.
+        let mut free: Vec<usize> =
+            (0..self.chunks.len()).filter(|&k| self.chunks[k].vertices.is_empty()).collect();
+        let mut renewed: Vec<usize> = left.iter().map(|(chunk, _)| *chunk).collect();
+        for chunk in arranged {
+            let room = |&k: &usize| self.gather.room(k) >= chunk.vertices.len();
+            let at = match free.iter().position(room) {
+                Some(found) => free.remove(found),
+                None => {
+                    self.gather.add_chunk(chunk.vertices.len() + chunk.vertices.len() / 8);
+                    self.chunks.push(CellChunk::default());
+                    self.chunks.len() - 1
                 }
-                renewed.push(at);
-            }
+            };
+            self.chunks[at] = chunk;
+            renewed.push(at);
         }
-        for &chunk in &renewed {
-            self.find_places(chunk);
-        }
-        self.gather = Gather::without_room(self.chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
-        let rows = self.gather.n_rows();
-        (self.sums, self.diagonals) = (vec![[0.0; 4]; rows], vec![[0.0; 8]; rows]);
         renewed.sort_unstable();
+        renewed.dedup();
+        renewed.iter().for_each(|&chunk| self.find_places(chunk));
+        let before = left.iter().map(|(chunk, left)| (*chunk, &left.vertices[..]));
+        let now = renewed.iter().map(|&chunk| (chunk, &self.chunks[chunk].vertices[..]));
+        self.gather.replace(before, now, n_vertices);
+        let rows = self.gather.n_rows();
+        resize_reserving(&mut self.sums, rows, [0.0; 4]);
+        resize_reserving(&mut self.diagonals, rows, [0.0; 8]);
         renewed
+    }
+
+    /// The cells of a chunk.
+    pub fn members(&self, chunk: usize) -> impl Iterator<Item = u32> {
+        self.chunks[chunk].places().map(|(cell, ..)| cell)
+    }
+
+    /// Number of tables.
+    pub fn n_tables(&self) -> usize {
+        self.tables.len()
     }
 
     /// First half of the diagonal blocks.
@@ -281,6 +296,13 @@ impl LinearOperator for CellOperator {
             operator.add_products(block, y);
         });
     }
+}
+
+/// The cells of a chunk, ascending.
+fn members(chunk: &CellChunk) -> Vec<u32> {
+    let mut members: Vec<u32> = chunk.places().map(|(cell, ..)| cell).collect();
+    members.sort_unstable();
+    members
 }
 
 /// Numbers of the cells along Morton's curve.

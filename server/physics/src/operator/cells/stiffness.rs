@@ -1,5 +1,6 @@
 //! s K̂ of an octree.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
@@ -262,8 +263,8 @@ impl Stiffness for CellStiffness {
         OperatorChoice::MatrixFree
     }
 
-    fn places(&self) -> Vec<Place> {
-        self.operator.places().to_vec()
+    fn places(&self) -> Cow<'_, [Place]> {
+        Cow::Borrowed(self.operator.places())
     }
 
     #[inline(always)]

@@ -179,7 +179,8 @@ impl Dense<'_> {
 }
 
 fn dense<'a>(octree: &'a Octree, stiffness: &CellStiffness) -> Dense<'a> {
-    let rotations = stiffness.places().into_iter().map(|p| stiffness.rotation(p).map(f64::from)).collect();
+    let rotations =
+        stiffness.places().iter().copied().map(|p| stiffness.rotation(p).map(f64::from)).collect();
     Dense { octree, rotations }
 }
 
@@ -250,7 +251,7 @@ fn rotations_are_polar_and_inverted_cells_are_counted() {
             let Updated { stiffness, inverted, .. } =
                 updated(Simd::detect(), 1, &octree, Law::Corotational, &positions);
             let mut expected = 0;
-            for (id, place) in stiffness.places().into_iter().enumerate() {
+            for (id, place) in stiffness.places().iter().copied().enumerate() {
                 let (cell, W) =
                     (&octree.cells()[id], corner_weights(&octree.cells()[id], octree.hanging()[id]));
                 let mut F = Matrix3::zeros();
@@ -416,11 +417,11 @@ fn the_stiffness_follows_a_cut_and_cells_keep_their_rotations() {
     let mut team = Team::new(1).unwrap();
     let x = deformed(&octree, 0.1, 0.0);
     let mut stiffness = updated(Simd::detect(), 1, &octree, Law::Corotational, &x).stiffness;
-    let before: Vec<_> = stiffness.places().into_iter().map(|p| stiffness.rotation(p)).collect();
+    let before: Vec<_> = stiffness.places().iter().copied().map(|p| stiffness.rotation(p)).collect();
     let cells = octree.cells().to_vec();
     assert!(octree.cut(&links(&octree)).divided > 0);
     stiffness.follow(&octree);
-    for (id, place) in stiffness.places().into_iter().enumerate() {
+    for (id, place) in stiffness.places().iter().copied().enumerate() {
         let cell = &octree.cells()[id];
         let holds = |old: &crate::octree::Cell| {
             (0..3).all(|k| (old.at[k]..old.at[k] + old.side()).contains(&cell.at[k]))
@@ -441,7 +442,7 @@ fn the_stiffness_follows_a_cut_and_cells_keep_their_rotations() {
     let first = read(&stiffness, x.len());
     stiffness.update(&mut team, &with(Law::Linear), &x);
     assert_eq!((stiffness.version(), read(&stiffness, x.len())), (version, first));
-    assert!(stiffness.places().into_iter().all(|p| stiffness.rotation(p) == Matrix3::identity()));
+    assert!(stiffness.places().iter().copied().all(|p| stiffness.rotation(p) == Matrix3::identity()));
 }
 
 #[test]
