@@ -83,6 +83,12 @@ pub const MAX_REPORT_BYTES: usize = 256 * 1024;
 /// Most bodies of a session.
 pub const MAX_BODIES: usize = 256;
 
+/// Most obstacles of a session.
+pub const MAX_OBSTACLES: usize = 64;
+
+/// Most triangles of all obstacles of a session together; those of larger surfaces are not sent.
+pub const MAX_OBSTACLE_TRIANGLES: usize = 8192;
+
 /// Most tools of a session.
 pub const MAX_TOOLS: usize = 64;
 

@@ -5,12 +5,14 @@ use prost::Name as _;
 use super::field::{Checked, In};
 use crate::codec::{CountLimit, DecodeError, WireMessage};
 use crate::limits::{
-    MAX_BODIES, MAX_COORDINATE_M, MAX_LAYERS, MAX_PARAMS, MAX_PROBES, MAX_REPORT_BYTES, MAX_REPORT_ENTRIES,
-    MAX_RPC_STEPS, MAX_SCENES, MAX_SMALL_BYTES, MAX_TOOLS, QUATERNION_TOLERANCE,
+    MAX_BODIES, MAX_COORDINATE_M, MAX_LAYERS, MAX_OBSTACLE_TRIANGLES, MAX_OBSTACLES, MAX_PARAMS, MAX_PROBES,
+    MAX_REPORT_BYTES, MAX_REPORT_ENTRIES, MAX_RPC_STEPS, MAX_SCENES, MAX_SMALL_BYTES, MAX_TOOLS,
+    POSITION_BYTES, QUATERNION_TOLERANCE, TRIANGLE_BYTES,
 };
 use crate::messages::{
-    BodyLook, Event, LoadRequest, Measures, ParamsReply, PauseRequest, Plan, ResetRequest, RpcReply,
-    ScenesReply, SchemaReply, SessionInfo, SetRequest, Stats, StepRequest, UndoRequest, event, param,
+    BodyLook, Event, LoadRequest, Measures, ObstacleInfo, ParamsReply, PauseRequest, Plan, ResetRequest,
+    RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest, Stats, StepRequest, UndoRequest, event,
+    obstacle_info, param,
 };
 
 const fn count(tag: u32, field: &'static str, allowed: usize) -> CountLimit {
@@ -19,7 +21,11 @@ const fn count(tag: u32, field: &'static str, allowed: usize) -> CountLimit {
 
 impl WireMessage for SessionInfo {
     const MAX_BYTES: usize = MAX_REPORT_BYTES;
-    const MAX_COUNTS: &'static [CountLimit] = &[count(5, "bodies", MAX_BODIES), count(6, "tools", MAX_TOOLS)];
+    const MAX_COUNTS: &'static [CountLimit] = &[
+        count(5, "bodies", MAX_BODIES),
+        count(6, "tools", MAX_TOOLS),
+        count(10, "obstacles", MAX_OBSTACLES),
+    ];
 
     fn check(&self) -> Result<(), DecodeError> {
         let at = In(Self::NAME);
@@ -39,7 +45,33 @@ impl WireMessage for SessionInfo {
             at.optional_id("tools.owner", &tool.owner)?;
             tool.shape.as_ref().map_or(Ok(()), |s| at.shape(s))?;
         }
-        Ok(())
+        self.obstacles.iter().try_for_each(|obstacle| check_obstacle(at, obstacle))
+    }
+}
+
+fn check_obstacle(at: In, obstacle: &ObstacleInfo) -> Checked {
+    at.id("obstacles.id", &obstacle.id)?;
+    let place = |name, v| at.optional_vec3(name, v, MAX_COORDINATE_M);
+    match &obstacle.shape {
+        Some(obstacle_info::Shape::HalfSpace(half)) => {
+            place("obstacles.half_space.point_m", &half.point_m)?;
+            at.optional_vec3("obstacles.half_space.normal", &half.normal, 1.0 + QUATERNION_TOLERANCE)
+        }
+        Some(obstacle_info::Shape::Box(block)) => {
+            place("obstacles.box.min_m", &block.min_m)?;
+            place("obstacles.box.max_m", &block.max_m)
+        }
+        Some(obstacle_info::Shape::Capsule(capsule)) => {
+            place("obstacles.capsule.from_m", &capsule.from_m)?;
+            place("obstacles.capsule.to_m", &capsule.to_m)?;
+            at.positive("obstacles.capsule.radius_m", capsule.radius_m, MAX_COORDINATE_M)
+        }
+        Some(obstacle_info::Shape::Surface(surface)) => {
+            let most = MAX_OBSTACLE_TRIANGLES;
+            at.at_most("obstacles.surface.triangles", surface.triangles.len(), most * TRIANGLE_BYTES)?;
+            at.at_most("obstacles.surface.positions", surface.positions.len(), most * POSITION_BYTES)
+        }
+        None => Ok(()),
     }
 }
 

@@ -158,6 +158,16 @@ impl SurfaceBvh {
         self.positions.len()
     }
 
+    /// Present position of every vertex [m].
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions
+    }
+
+    /// Vertices of all triangles, counter-clockwise seen from outside.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
     /// Vertices of triangle `index`, counter-clockwise seen from outside.
     pub fn corners(&self, index: u32) -> [u32; 3] {
         self.triangles[index as usize]

@@ -5,3 +5,5 @@ pub mod session;
 pub mod orders;
 
 pub mod convert;
+
+pub mod obstacle;

@@ -4,6 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
+/// Most obstacles of a scene.
+pub const MAX_OBSTACLES: usize = 64;
+
 /// Most tools of a simulation, those of the scene and those brought by clients.
 pub const MAX_TOOLS: usize = 64;
 

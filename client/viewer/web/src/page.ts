@@ -11,6 +11,7 @@ import { Colours } from "./colours";
 import { Curves } from "./curves";
 import { Gizmo } from "./gizmo";
 import { Help } from "./help";
+import { Obstacles } from "./obstacles";
 import { Overlays } from "./overlays";
 import { Params } from "./params";
 import { Probes } from "./probes";
@@ -39,6 +40,7 @@ class Page {
   private readonly colours: Colours;
   private readonly curves = new Curves();
   private readonly overlays: Overlays;
+  private readonly obstacles: Obstacles;
   private readonly probes: Probes;
   private readonly gizmo: Gizmo;
 
@@ -47,6 +49,7 @@ class Page {
     this.hand = new Hand(canvas, this.stage, this.session, this.relay);
     this.colours = new Colours(this.session, () => this.view.ask());
     this.overlays = new Overlays(this.stage, this.session);
+    this.obstacles = new Obstacles(this.stage);
     this.probes = new Probes(this.stage);
     this.gizmo = new Gizmo(this.stage);
     const { colours, overlays, probes, curves, gizmo } = this;
@@ -127,6 +130,7 @@ class Page {
     for (const body of this.session.bodies.values()) body.upload();
     this.colours.advance();
     this.stage.frameBodies(this.session.bodies.values());
+    this.obstacles.place();
     for (const tool of this.session.tools.values()) tool.place(this.stage);
     this.overlays.place();
     this.probes.place();
@@ -153,6 +157,7 @@ class Page {
     }
     if (![...this.session.bodies.keys()].some((id) => ids.includes(id))) this.stage.forget();
     info.bodies.forEach((body) => this.takeLook(body));
+    this.obstacles.take(info.obstacles);
     this.stage.invalidate();
   }
 

@@ -18,6 +18,7 @@ use scindo_world::tool::SCRIPT;
 
 use crate::error::RuntimeError;
 use crate::wire::convert::{to_param, to_shape, to_vec3};
+use crate::wire::obstacle::to_obstacles;
 
 /// A simulation that records its results and counts its failures.
 pub struct Engine {
@@ -68,6 +69,7 @@ impl Engine {
             bodies: self.sim.bodies().iter().zip(&scene.bodies).map(body_info).collect(),
             tools: tools.collect(),
             up: Some(to_vec3(&up(&scene.gravity_m_s2))),
+            obstacles: to_obstacles(self.sim.obstacles()),
             ..SessionInfo::default()
         }
     }

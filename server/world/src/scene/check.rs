@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Unit, Vector3};
 
-use crate::inputs::{MAX_TOOLS, ToolMode, ToolShape};
+use crate::inputs::{MAX_OBSTACLES, MAX_TOOLS, ToolMode, ToolShape};
 use crate::mesh_in::Organ;
 
 use super::checked::*;
@@ -60,6 +60,10 @@ impl Check<'_> {
         if raw.tool.len() > MAX_TOOLS {
             let what = format!("{} tools, allowed: at most {MAX_TOOLS}", raw.tool.len());
             self.conflict("tool".into(), what, "remove some");
+        }
+        if raw.obstacle.len() > MAX_OBSTACLES {
+            let what = format!("{} obstacles, allowed: at most {MAX_OBSTACLES}", raw.obstacle.len());
+            self.conflict("obstacle".into(), what, "join some of them to one surface");
         }
         self.cuttable();
         let bodies: Vec<BodySpec> = raw.body.iter().map(|body| self.body(body)).collect();
