@@ -12,6 +12,7 @@
 //! the predictor it never does. K̂ rotates with the material, so β does not damp rigid motion.
 
 mod equilibrium;
+mod spring_terms;
 pub mod together;
 
 use nalgebra::Vector3;
@@ -465,55 +466,6 @@ impl LinearStep {
         }
     }
 
-    /// Adds the springs to the operator and to the preconditioner.
-    fn complete_operator(&mut self, elastic: &mut dyn Stiffness, inputs: &LinearInputs<'_>) {
-        self.terms.clear();
-        self.terms.extend(self.springs.springs.iter().flat_map(|s| s.terms(inputs.s())));
-        let axes_of = |copy: u32| {
-            let found = inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy);
-            found.map_or([false; 3], |f| inputs.step.fixed[f].axes)
-        };
-        // Springs of the last pass leave the preconditioner.
-        for &copy in &self.sprung {
-            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
-        }
-        self.sprung.clear();
-        match &mut self.stiff {
-            None => {
-                let all = self.terms.iter().chain(&self.shared);
-                self.sprung.extend(all.flat_map(|term| term.point.copies()));
-            }
-            // A spring also acts on the copies relative to which its own are moved.
-            Some(stiff) => {
-                for term in self.terms.iter().chain(&self.shared) {
-                    term.expand(self.preconditioner.substitution(), &mut stiff.row);
-                    self.sprung.extend(stiff.row.iter().map(|r| r.0));
-                }
-            }
-        }
-        // `diagonal` itself stays without springs: they are in it only while the blocks are inverted.
-        self.bare.clear();
-        self.bare.extend(self.sprung.iter().map(|&copy| self.diagonal[copy as usize]));
-        if let Some(stiff) = &mut self.stiff {
-            for term in self.terms.iter().chain(&self.shared) {
-                term.expand(self.preconditioner.substitution(), &mut stiff.row);
-                stiff
-                    .row
-                    .iter()
-                    .for_each(|&(copy, w)| term.add_to_block(w as f32, &mut self.diagonal[copy as usize]));
-            }
-        } else {
-            system(elastic, &self.terms, inputs).add_springs(&mut self.diagonal);
-            system(elastic, &self.shared, inputs).add_springs(&mut self.diagonal);
-        }
-        for &copy in &self.sprung {
-            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
-        }
-        for (&copy, bare) in self.sprung.iter().zip(&self.bare) {
-            self.diagonal[copy as usize] = *bare;
-        }
-    }
-
     /// Brings the levels of multigrid up to date with the operator.
     fn complete_grid(
         &mut self,
@@ -719,18 +671,6 @@ impl LinearStep {
             descent.memory.end(delta);
         }
         report
-    }
-
-    fn springs_changed(&mut self, inputs: &LinearInputs<'_>, pass: usize) -> bool {
-        if pass + 1 == SPRING_PASSES {
-            return false;
-        }
-        let mut changed = false;
-        for s in 0..self.springs.springs.len() {
-            let point = self.point_of(&self.springs.springs[s], inputs);
-            changed |= self.springs.springs[s].choose_mode(point);
-        }
-        changed
     }
 
     /// Moves the predictor to x⁺ = x̂ + δ. Returns whether all of it is finite.

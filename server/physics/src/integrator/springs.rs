@@ -153,6 +153,8 @@ pub struct SpringResponse {
 
 /// After so many choices of a mode in a step, slipping is no longer searched with Newton's method.
 const NEWTON_CHOICES: u8 = 4;
+/// Change of a force that calls for another solve, relative to the largest force of all springs.
+const NOTABLE_FORCE: f64 = 1e-3;
 /// Change of a friction force, relative to its bound, that does not count as a change of mode.
 const SAME_FRICTION: f64 = 1e-3;
 
@@ -307,6 +309,13 @@ impl SpringLaw {
             _ => {}
         }
         self.mode != before
+    }
+
+    /// Whether another mode at `point`, where a solve has ended, would change the force by a notable part of the
+    /// largest force `scale` [N] of all springs.
+    pub fn would_change(&self, point: Vector3<f64>, scale: f64) -> bool {
+        let mut next = *self;
+        next.choose_mode(point) && (next.force(point) - self.force(point)).norm() > NOTABLE_FORCE * scale
     }
 
     /// k n nᵀ, k I, or k n nᵀ + k_t (I − n nᵀ) [N/m] while the spring is linear, else without its constant part.

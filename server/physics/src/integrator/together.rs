@@ -241,17 +241,23 @@ impl Together {
         curvature
     }
 
-    /// Lets all springs change their modes; returns whether one did.
+    /// Lets springs change their modes where that matters; returns whether it does.
     fn changed(&mut self, members: Members<'_, '_>) -> bool {
         let mut changed = false;
         for member in members.iter_mut() {
             changed |= member.step.own_springs_changed(&member.inputs);
         }
+        let forces = self.pairs.iter().map(|pair| pair.law.force(relative(pair, members)).norm());
+        let scale = forces.fold(0.0, f64::max);
+        let mut would = self.pairs.iter().map(|pair| pair.law.would_change(relative(pair, members), scale));
+        if !changed && !would.any(|would| would) {
+            return false;
+        }
         for pair in &mut self.pairs {
             let y = relative(pair, members);
-            changed |= pair.law.choose_mode(y);
+            pair.law.choose_mode(y);
         }
-        changed
+        true
     }
 
     /// Writes the force of every spring on its point, in the order given; 0 for those that were left out.

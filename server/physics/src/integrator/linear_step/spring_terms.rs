@@ -1,0 +1,75 @@
+//! Springs in the operator of a step, and the modes in which a solve takes them.
+
+use super::{LinearStep, SPRING_PASSES, system};
+use crate::integrator::springs::ActiveSpring;
+use crate::integrator::step_inputs::LinearInputs;
+use crate::operator::Stiffness;
+
+impl LinearStep {
+    /// Adds the springs to the operator and to the preconditioner.
+    pub(super) fn complete_operator(&mut self, elastic: &mut dyn Stiffness, inputs: &LinearInputs<'_>) {
+        self.terms.clear();
+        self.terms.extend(self.springs.springs.iter().flat_map(|s| s.terms(inputs.s())));
+        let axes_of = |copy: u32| {
+            let found = inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy);
+            found.map_or([false; 3], |f| inputs.step.fixed[f].axes)
+        };
+        // Springs of the last pass leave the preconditioner.
+        for &copy in &self.sprung {
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
+        }
+        self.sprung.clear();
+        match &mut self.stiff {
+            None => {
+                let all = self.terms.iter().chain(&self.shared);
+                self.sprung.extend(all.flat_map(|term| term.point.copies()));
+            }
+            // A spring also acts on the copies relative to which its own are moved.
+            Some(stiff) => {
+                for term in self.terms.iter().chain(&self.shared) {
+                    term.expand(self.preconditioner.substitution(), &mut stiff.row);
+                    self.sprung.extend(stiff.row.iter().map(|r| r.0));
+                }
+            }
+        }
+        // `diagonal` itself stays without springs: they are in it only while the blocks are inverted.
+        self.bare.clear();
+        self.bare.extend(self.sprung.iter().map(|&copy| self.diagonal[copy as usize]));
+        if let Some(stiff) = &mut self.stiff {
+            for term in self.terms.iter().chain(&self.shared) {
+                term.expand(self.preconditioner.substitution(), &mut stiff.row);
+                stiff
+                    .row
+                    .iter()
+                    .for_each(|&(copy, w)| term.add_to_block(w as f32, &mut self.diagonal[copy as usize]));
+            }
+        } else {
+            system(elastic, &self.terms, inputs).add_springs(&mut self.diagonal);
+            system(elastic, &self.shared, inputs).add_springs(&mut self.diagonal);
+        }
+        for &copy in &self.sprung {
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
+        }
+        for (&copy, bare) in self.sprung.iter().zip(&self.bare) {
+            self.diagonal[copy as usize] = *bare;
+        }
+    }
+
+    /// Lets springs change their modes where that matters; returns whether it does.
+    pub(super) fn springs_changed(&mut self, inputs: &LinearInputs<'_>, pass: usize) -> bool {
+        if pass + 1 == SPRING_PASSES {
+            return false;
+        }
+        let point = |spring: &ActiveSpring| self.point_of(spring, inputs);
+        let springs = self.springs.springs.iter();
+        let scale = springs.map(|s| s.law().force(point(s)).norm()).fold(0.0, f64::max);
+        if !self.springs.springs.iter().any(|s| s.law().would_change(point(s), scale)) {
+            return false; // and the forces stay those of the solve
+        }
+        for s in 0..self.springs.springs.len() {
+            let point = self.point_of(&self.springs.springs[s], inputs);
+            self.springs.springs[s].choose_mode(point);
+        }
+        true
+    }
+}
