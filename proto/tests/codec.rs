@@ -187,7 +187,21 @@ fn session_info() -> impl Strategy<Value = SessionInfo> {
         shape: Some(shape),
         cuts,
     });
-    (vec(body, 0..5), vec(tool, 0..5), ".{0,30}").prop_map(|(bodies, tools, scene_name)| SessionInfo {
+    let obstacle = (id(), metres(), 0u32..4).prop_map(|(id, at, kind)| {
+        use obstacle_info as wire;
+        let shape = match kind {
+            0 => wire::Shape::HalfSpace(wire::HalfSpace { point_m: Some(at), normal: None }),
+            1 => wire::Shape::Box(wire::Box { min_m: None, max_m: Some(at) }),
+            2 => wire::Shape::Capsule(wire::Capsule { from_m: Some(at), to_m: None, radius_m: 0.01 }),
+            _ => wire::Shape::Surface(wire::Surface {
+                positions: vec![0; 36].into(),
+                triangles: vec![0; 12].into(),
+            }),
+        };
+        ObstacleInfo { id, shape: Some(shape) }
+    });
+    let lists = (vec(body, 0..5), vec(tool, 0..5), vec(obstacle, 0..5), ".{0,30}");
+    lists.prop_map(|(bodies, tools, obstacles, scene_name)| SessionInfo {
         server_version: "0.1.0".into(),
         wire_version: 1,
         scene_name,
@@ -197,6 +211,7 @@ fn session_info() -> impl Strategy<Value = SessionInfo> {
         scene_seq: 3,
         scene: "kidney".into(),
         up: Some(Vec3 { x: 0.0, y: 1.0, z: 0.0 }),
+        obstacles,
     })
 }
 
