@@ -2,10 +2,11 @@
 
 use nalgebra::Matrix3;
 
+use super::bounds::LeafBounds;
 use super::coarsest::{Coarsest, CoarsestSolve};
 use super::galerkin::{CellMatrix, Coefficients, Galerkin};
 use super::hierarchy::Hierarchy;
-use super::kernel::LevelKernel;
+use super::kernel::{LevelKernel, noise};
 use super::smoother::{Smoother, Smoothing, chebyshev, gauss_seidel};
 use crate::element::Simd;
 use crate::lists::reserve::resize_reserving;
@@ -15,6 +16,8 @@ use crate::team::{Team, blocks};
 
 /// Power iterations for the largest eigenvalue of D⁻¹A.
 const POWER_ITERATIONS: u32 = 10;
+/// The same around a cut, where they cost less and may have to find a vector of few vertices.
+const LOCAL_ITERATIONS: u32 = 30;
 /// They estimate it from below; the smoother must not see a larger one.
 const SAFETY: f64 = 1.1;
 
@@ -65,6 +68,9 @@ pub struct Multigrid {
     fixed: Vec<FixedCopy>,
     /// Whether λ has to be estimated anew.
     estimate: bool,
+    /// Cells by level that cuts changed since λ was estimated.
+    cut: Vec<Vec<u32>>,
+    leaf_bounds: LeafBounds,
     partial: Vec<f64>,
 }
 
@@ -120,6 +126,8 @@ impl Multigrid {
             first,
             fixed: Vec::new(),
             estimate: true,
+            cut: vec![Vec::new(); hierarchy.levels.len()],
+            leaf_bounds: LeafBounds::default(),
             partial: vec![0.0; hierarchy.levels[first].n_vertices.div_ceil(BLOCK)],
             hierarchy,
         }
@@ -157,7 +165,7 @@ impl Multigrid {
             self.coarsest = Coarsest::new(&self.hierarchy);
         }
         self.partial.resize(self.hierarchy.levels[first].n_vertices.div_ceil(BLOCK), 0.0);
-        self.estimate = true;
+        changes.into_iter().zip(&mut self.cut).for_each(|(change, cut)| cut.extend(change.cells));
         true
     }
 
@@ -195,9 +203,10 @@ impl Multigrid {
         self.galerkin.is_made_for(with, fixed)
     }
 
-    /// Estimates the largest eigenvalue of D⁻¹A of every level by power iteration, if constants or prescribed
-    /// directions changed since the last time. `A` is the operator of the finest level and `inverse` has the
-    /// inverses of its diagonal blocks.
+    /// Estimates the largest eigenvalue of D⁻¹A of every level by power iteration, if constants changed or prescribed
+    /// directions were released since the last time. `A` is the operator of the finest level and `inverse` has the
+    /// inverses of its diagonal blocks. After cuts the estimates [rise](Self::raise_eigenvalues) where that is
+    /// necessary.
     pub fn estimate_eigenvalues(
         &mut self,
         team: &mut Team,
@@ -205,56 +214,97 @@ impl Multigrid {
         inverse: &[Inverse3],
     ) {
         if std::mem::take(&mut self.estimate) {
-            self.power_iterations(team, A, inverse);
+            self.cut.iter_mut().for_each(Vec::clear);
+            self.leaf_bounds.clear();
+            for l in self.first..self.levels.len() {
+                self.power_iterations(team, (&mut *A, inverse), l, POWER_ITERATIONS);
+            }
+        } else if self.cut.iter().any(|cut| !cut.is_empty()) {
+            self.raise_eigenvalues(team, A, inverse);
         }
     }
 
-    /// Power iterations on every level, from the same vector each time.
-    fn power_iterations(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
-        let Self { galerkin, levels, fixed, partial, first, .. } = self;
-        let first = *first;
-        for (l, level) in levels.iter_mut().enumerate().skip(first) {
-            let Vectors { inverse: own, largest, r, d, q, kernel, .. } = level;
-            let inverse = if l == first { inverse } else { &own[..] };
-            for (v, d) in (0_u32..).zip(d.iter_mut()) {
-                let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
-                *d =
-                    [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 });
-            }
-            if l == first {
-                filter(fixed, d);
-            }
-            let partial = &mut partial[..d.len().div_ceil(BLOCK)];
-            let mut estimate: f64 = 0.0;
-            for _ in 0..POWER_ITERATIONS {
-                match kernel {
-                    Some(kernel) => kernel.apply(team, &galerkin.levels[l].mass, d, q),
-                    None => A.apply(team, d, q),
+    /// Raises the estimates after cuts, so that the smoother sees no larger eigenvalues.
+    ///
+    /// On the finest level a [bound](super::bounds) holds however the body is cut. On coarse levels a cut changes the
+    /// equations of the vertices of touched cells alone, and A and D are sums over cells that stay the same elsewhere.
+    /// An eigenvalue above those before belongs to a vector around these vertices, and power iterations there find it
+    /// as surely as those on all vertices: from below, with the same safety factor. An eigenvalue that is missed does
+    /// little harm: the smoother of degree 2 diminishes all vectors up to 1.25 times the given eigenvalue.
+    fn raise_eigenvalues(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
+        for l in self.first..self.levels.len() {
+            let mut cells = std::mem::take(&mut self.cut[l]);
+            cells.sort_unstable();
+            cells.dedup();
+            let known = self.levels[l].largest;
+            if l == 0 {
+                if let Some(with) = self.galerkin.coefficients() {
+                    let bound = self.leaf_bounds.largest(&self.hierarchy.levels[0], &cells, with);
+                    self.levels[0].largest = known.max(bound);
                 }
-                // With q = A d and z = D⁻¹ q: λ ≈ qᵀz / qᵀd.
-                let (known, product) = (&*d, &*q);
-                team.for_blocks((blocks(r, BLOCK), blocks(partial, 1)), |block, (z, partial)| {
-                    let q = block_of(product, block);
-                    for (z, (q, M)) in z.iter_mut().zip(q.iter().zip(block_of(inverse, block))) {
-                        *z = M.times(q);
-                    }
-                    partial[0] = rows::dot(block_of(known, block), q);
-                });
-                let dq: f64 = partial.iter().sum();
-                let z = &*r;
-                team.for_blocks(blocks(partial, 1), |block, partial| {
-                    partial[0] = rows::dot(block_of(product, block), block_of(z, block));
-                });
-                let qz: f64 = partial.iter().sum();
-                if !(dq > 0.0 && qz.is_finite()) {
-                    break;
-                }
-                estimate = estimate.max(qz / dq);
-                let scale = (1.0 / qz.sqrt()) as f32;
-                d.iter_mut().zip(&*r).for_each(|(d, z)| *d = z.map(|z| scale * z));
+            } else if l == self.first {
+                self.power_iterations(team, (&mut *A, inverse), l, POWER_ITERATIONS);
+                self.levels[l].largest = known.max(self.levels[l].largest);
+            } else if let Vectors { kernel: Some(kernel), inverse, largest, .. } = &mut self.levels[l] {
+                let level = &self.hierarchy.levels[l];
+                let mut near: Vec<u32> = cells.iter().flat_map(|&id| level.vertices[id as usize]).collect();
+                near.sort_unstable();
+                near.dedup();
+                let around = near.iter().flat_map(|&v| level.slots_of(v as usize)).map(|(id, _)| id as u32);
+                let mass = &self.galerkin.levels[l].mass;
+                let found = kernel.largest_near((around, &near), (mass, inverse), LOCAL_ITERATIONS);
+                *largest = known.max(SAFETY * found);
             }
-            *largest = if estimate > 0.0 { SAFETY * estimate } else { 1.0 };
+            cells.clear();
+            self.cut[l] = cells;
         }
+    }
+
+    /// Power iterations on level `l`, from the same vector each time.
+    fn power_iterations(
+        &mut self,
+        team: &mut Team,
+        (A, inverse): (&mut dyn LinearOperator, &[Inverse3]),
+        l: usize,
+        iterations: u32,
+    ) {
+        let Self { galerkin, levels, fixed, partial, first, .. } = self;
+        let Vectors { inverse: own, largest, r, d, q, kernel, .. } = &mut levels[l];
+        let inverse = if l == *first { inverse } else { &own[..] };
+        (0_u32..).zip(d.iter_mut()).for_each(|(v, d)| *d = noise(v));
+        if l == *first {
+            filter(fixed, d);
+        }
+        let partial = &mut partial[..d.len().div_ceil(BLOCK)];
+        let mut estimate: f64 = 0.0;
+        for _ in 0..iterations {
+            match kernel {
+                Some(kernel) => kernel.apply(team, &galerkin.levels[l].mass, d, q),
+                None => A.apply(team, d, q),
+            }
+            // With q = A d and z = D⁻¹ q: λ ≈ qᵀz / qᵀd.
+            let (known, product) = (&*d, &*q);
+            team.for_blocks((blocks(r, BLOCK), blocks(partial, 1)), |block, (z, partial)| {
+                let q = block_of(product, block);
+                for (z, (q, M)) in z.iter_mut().zip(q.iter().zip(block_of(inverse, block))) {
+                    *z = M.times(q);
+                }
+                partial[0] = rows::dot(block_of(known, block), q);
+            });
+            let dq: f64 = partial.iter().sum();
+            let z = &*r;
+            team.for_blocks(blocks(partial, 1), |block, partial| {
+                partial[0] = rows::dot(block_of(product, block), block_of(z, block));
+            });
+            let qz: f64 = partial.iter().sum();
+            if !(dq > 0.0 && qz.is_finite()) {
+                break;
+            }
+            estimate = estimate.max(qz / dq);
+            let scale = (1.0 / qz.sqrt()) as f32;
+            d.iter_mut().zip(&*r).for_each(|(d, z)| *d = z.map(|z| scale * z));
+        }
+        *largest = if estimate > 0.0 { SAFETY * estimate } else { 1.0 };
     }
 
     /// z = V r: one cycle on A z = r from z = 0. `inverse` has the inverse diagonal blocks of A.
@@ -392,6 +442,20 @@ impl Multigrid {
                 chebyshev(team, &mut multiply, (inverse, largest), degree, (v, false));
             }
         }
+    }
+
+    /// The largest eigenvalue of level `l` by many power iterations; the estimate stays.
+    #[cfg(test)]
+    pub(super) fn true_eigenvalue(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        inverse: &[Inverse3],
+        l: usize,
+    ) -> f64 {
+        let known = self.levels[l].largest;
+        self.power_iterations(team, (A, inverse), l, 300);
+        std::mem::replace(&mut self.levels[l].largest, known) / SAFETY
     }
 
     /// Figures of every level, from the finest on, and how the coarsest one is solved.

@@ -181,6 +181,11 @@ impl Galerkin {
         Updated { constants: anew, matrices: any, released }
     }
 
+    /// The constants of the last update.
+    pub fn coefficients(&self) -> Option<&Coefficients> {
+        self.coefficients.as_ref()
+    }
+
     /// Whether the last update had these constants and prescribed directions.
     pub fn is_made_for(&self, with: &Coefficients, fixed: &[FixedCopy]) -> bool {
         self.coefficients.as_ref() == Some(with)

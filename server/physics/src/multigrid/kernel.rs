@@ -10,7 +10,7 @@ use crate::element::Simd;
 use crate::operator::cells::{
     CellLane, CellMatrix as LaneMatrix, CellOperator, SectorTable, morton_order, slot_corners, slot_hanging,
 };
-use crate::operator::{BLOCK, Inverse3, Padded, block_of, invert};
+use crate::operator::{BLOCK, Inverse3, Padded, block_of, invert, rows};
 use crate::team::{Team, blocks};
 
 /// Places of xx, yy, zz in a block.
@@ -136,6 +136,39 @@ impl LevelKernel {
         });
     }
 
+    /// A bound from below of the largest eigenvalue of D⁻¹A by power iterations on the vertices `near`, ascending, with
+    /// all others held: the operator of these `cells` around them has changed. `inverse` is D⁻¹.
+    pub fn largest_near(
+        &mut self,
+        (cells, near): (impl Iterator<Item = u32>, &[u32]),
+        (mass, inverse): (&[f32], &[Inverse3]),
+        iterations: u32,
+    ) -> f64 {
+        let mut chunks: Vec<u32> = cells.map(|id| self.operator.places()[id as usize].chunk).collect();
+        chunks.sort_unstable();
+        chunks.dedup();
+        let mut x: Vec<Padded> = near.iter().map(|&v| noise(v)).collect();
+        let mut y = Vec::with_capacity(x.len());
+        let mut estimate: f64 = 0.0;
+        for _ in 0..iterations {
+            self.operator.multiply_part((&chunks, near), &x, &mut y);
+            let (mut xy, mut yz) = (0.0, 0.0);
+            for ((x, y), &v) in x.iter_mut().zip(&mut y).zip(near) {
+                (0..4).for_each(|k| y[k] += mass[v as usize] * x[k]);
+                xy += rows::dot(std::slice::from_ref(x), std::slice::from_ref(y));
+                *x = inverse[v as usize].times(y);
+                yz += rows::dot(std::slice::from_ref(x), std::slice::from_ref(y));
+            }
+            if !(xy > 0.0 && yz.is_finite()) {
+                break;
+            }
+            estimate = estimate.max(yz / xy);
+            let scale = (1.0 / yz.sqrt()) as f32;
+            x.iter_mut().flatten().for_each(|x| *x *= scale);
+        }
+        estimate
+    }
+
     /// y = A x, with the lumped `mass` of every vertex.
     pub fn apply(&mut self, team: &mut Team, mass: &[f32], x: &[Padded], y: &mut [Padded]) {
         self.operator.multiply(team, x);
@@ -147,6 +180,12 @@ impl LevelKernel {
             operator.add_products(block, y);
         });
     }
+}
+
+/// Numbers between −1 and 1 that depend on a vertex: where power iterations start.
+pub fn noise(v: u32) -> Padded {
+    let number = |k: u32| (v.wrapping_mul(3).wrapping_add(k)).wrapping_mul(2_654_435_761) >> 8;
+    [0, 1, 2, 3].map(|k| if k < 3 { number(k) as f32 / (1 << 23) as f32 - 1.0 } else { 0.0 })
 }
 
 fn lane(level: &Level, id: usize, matrix: CellMatrix) -> CellLane {

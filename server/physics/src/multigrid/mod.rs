@@ -19,6 +19,7 @@ mod touched;
 mod operator;
 mod kernel;
 mod smoother;
+mod bounds;
 mod coarsest;
 mod cycle;
 mod precondition;

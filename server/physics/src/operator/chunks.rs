@@ -326,6 +326,18 @@ impl Gather {
         }
     }
 
+    /// The sums of one copy.
+    pub fn at<const N: usize>(&self, copy: u32, rows: &[[f32; N]]) -> [f32; N] {
+        let [a, b] = self.pairs[copy as usize];
+        let mut sum = rows[a as usize];
+        let begin = self.further.partition_point(|f| f.0 < copy);
+        let further = self.further[begin..].iter().take_while(|f| f.0 == copy).map(|f| f.1);
+        for row in further.chain([b]) {
+            sum.iter_mut().zip(&rows[row as usize]).for_each(|(sum, part)| *sum += part);
+        }
+        sum
+    }
+
     /// The first two rows of every copy of block number `block`; row 0 where there are fewer.
     #[inline(always)]
     pub fn pairs(&self, block: usize) -> &[[u32; 2]] {

@@ -254,3 +254,37 @@ fn operators_that_follow_cuts_are_those_made_anew() {
         }
     }
 }
+
+/// After many cuts no eigenvalue is larger than the smoother takes for the largest, on any level.
+#[test]
+fn eigenvalues_after_cuts_are_below_the_bounds() {
+    let mut team = Team::new(1).unwrap();
+    for poisson in [0.0, 0.3, 0.45] {
+        let with = coefficients(poisson, 1e3);
+        let mut octree = cube(16, 2);
+        let mut followed = Multigrid::new(Hierarchy::with(&octree, 300, true), MultigridSettings::default());
+        let mut rose = 0;
+        for round in 0..16 {
+            let exact = Exact::new(&octree, &with, &[]);
+            let mut fine = Fine::new(&mut team, &exact, &with);
+            let inverse = fine.inverses();
+            followed.update(&mut team, (&with, &[]), &|id| exact.rotation(id));
+            let before: Vec<f64> = followed.levels.iter().map(|level| level.largest).collect();
+            followed.estimate_eigenvalues(&mut team, &mut fine, &inverse);
+            let given: Vec<f64> = followed.levels.iter().map(|level| level.largest).collect();
+            rose += usize::from(round > 0 && before.iter().zip(&given).any(|(a, b)| b > a));
+            for (l, given) in given.iter().enumerate() {
+                let largest = followed.true_eigenvalue(&mut team, &mut fine, &inverse, l);
+                assert!(largest <= *given, "{poisson}, round {round}, level {l}: {largest} above {given}");
+                assert!(
+                    *given < 2.0 * largest,
+                    "{poisson}, round {round}, level {l}: {largest} below {given}"
+                );
+            }
+            let links = random_links(&octree, round, 7);
+            let changed = cut_links(&mut octree, &links);
+            assert!(followed.follow(&octree, &changed));
+        }
+        assert!(rose > 0);
+    }
+}

@@ -231,6 +231,24 @@ impl CellOperator {
         });
     }
 
+    /// A x at `vertices`, where x is 0 at all others: only the `chunks` of the cells around them are applied. Writes
+    /// the products in the order of the vertices.
+    pub fn multiply_part(&mut self, (chunks, vertices): (&[u32], &[u32]), x: &[Padded], y: &mut Vec<Padded>) {
+        let Self { simd, tables, chunks: all, gather, sums, .. } = self;
+        for &k in chunks {
+            let chunk = &mut all[k as usize];
+            let CellChunk { x: local, vertices: held, .. } = chunk;
+            let mut known = 0;
+            for (local, vertex) in local.iter_mut().zip(&*held) {
+                known += vertices[known..].partition_point(|v| v < vertex);
+                *local = if vertices.get(known) == Some(vertex) { x[known] } else { [0.0; 4] };
+            }
+            chunk.apply(*simd, tables, &mut sums[gather.first_row[k as usize] as usize..]);
+        }
+        y.clear();
+        y.extend(vertices.iter().map(|&v| gather.at(v, sums)));
+    }
+
     /// Second half: the product at the vertices of block number `block`, added to `y`.
     #[inline(always)]
     pub fn add_products(&self, block: usize, y: &mut [Padded]) {
