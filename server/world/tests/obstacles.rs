@@ -191,3 +191,19 @@ fn without_obstacles_nothing_changes() {
         assert!((v - Vector3::new(0.0, 0.0, -0.981)).norm() < 1e-9, "{v}");
     }
 }
+
+#[test]
+fn what_begins_in_an_obstacle_is_told_and_what_lies_on_one_is_no_loose_body() {
+    assert_eq!(start(BLOCK).warnings(), &[] as &[String]);
+    let inside = start(&BLOCK.replace("point_m = [0, 0, 0]", "point_m = [0, 0, 0.03]"));
+    assert!(inside.warnings()[0].contains("begins inside the obstacle `floor`"), "{:?}", inside.warnings());
+    let beside = start(
+        &BLOCK.replace("normal = [0, 0, 1]", "normal = [1, 0, 0]").replace("point_m = [0,", "point_m = [-1,"),
+    );
+    assert!(beside.warnings()[0].contains("nothing holds the body"), "{:?}", beside.warnings());
+    let other = BLOCK[BLOCK.find("[[body]]").unwrap()..BLOCK.find("[[obstacle]]").unwrap()]
+        .replace("\"block\"", "\"twin\"");
+    let twins = format!("{BLOCK}{other}").replace("world =", "effects = { body_collision = true }\nworld =");
+    let twins = start(&twins.replacen("min_m = [-0.05", "min_m = [-0.03", 1));
+    assert!(twins.warnings().iter().any(|w| w.contains("begins inside `")), "{:?}", twins.warnings());
+}

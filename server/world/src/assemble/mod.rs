@@ -87,7 +87,7 @@ pub fn build(
     if builder.findings.is_empty() {
         let mut warnings = builder.warnings;
         warnings.extend(builder.doubts.into_iter().map(|(at, doubt)| format!("{at}: {doubt}")));
-        warnings.extend(doubts::of(checked, &mut bodies));
+        warnings.extend(doubts::of(checked, &mut bodies, &obstacles));
         Ok(Built { bodies, lead, obstacles, probes, warnings })
     } else {
         // A body of the wrong size is why regions and probes miss it.

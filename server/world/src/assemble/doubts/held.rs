@@ -14,8 +14,18 @@ const LISTED: usize = 4;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Says which parts of `body` hang on nothing, and which parts no element joins to the others.
-pub fn doubts(scene: &CheckedScene, spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
+/// `carried` tells whether something that the body touches may stop its fall.
+pub fn doubts(
+    scene: &CheckedScene,
+    (spec, carried): (&BodySpec, bool),
+    body: &SimBody,
+    doubts: &mut Vec<String>,
+) {
     let (at, parts) = (format!("body.{}", spec.id), body.body.parts());
+    let carried = carried && spec.mechanics.integrator != RawIntegrator::Static;
+    if carried && parts.any_free() {
+        return;
+    }
     if parts.free.iter().all(|&free| free) {
         let (consequence, fix) = (consequence(scene, spec), suggestion(scene));
         let what = if spec.fixes.is_empty() { "it has no `fix`" } else { "its `fix` holds no part of it" };

@@ -11,23 +11,28 @@ mod meshes;
 
 mod tools;
 
+mod touch;
+
 mod world;
 
 use crate::body::{SimBody, bounds};
 use crate::scene::CheckedScene;
+use crate::tool::obstacle::Obstacle;
 
 pub use cuts::after_the_end;
 
 /// All doubts, in the order of the scene.
-pub(crate) fn of(scene: &CheckedScene, bodies: &mut [SimBody]) -> Vec<String> {
+pub(crate) fn of(scene: &CheckedScene, bodies: &mut [SimBody], obstacles: &[Obstacle]) -> Vec<String> {
     let mut doubts = Vec::new();
     world::doubts(scene, bodies, &mut doubts);
     for (spec, body) in scene.bodies.iter().zip(&*bodies) {
         meshes::doubts(spec, body, &mut doubts);
-        held::doubts(scene, spec, body, &mut doubts);
+        let carried = touch::may_be_carried(scene, body, obstacles);
+        held::doubts(scene, (spec, carried), body, &mut doubts);
     }
     cuts::doubts(&scene.cuts, bodies, &mut doubts);
     tools::doubts(&scene.tools, bodies, &mut doubts);
+    touch::doubts(scene, (bodies, obstacles), &mut doubts);
     doubts
 }
 

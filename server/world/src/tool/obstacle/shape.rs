@@ -93,11 +93,15 @@ impl Shape {
             at = from + (to - from) * (gone / way);
             place = self.nearest(at, way + margin)?;
             if place.distance <= tolerance {
-                break;
+                return Some((at, place));
             }
         }
-        // A path that nears the surface at a flat angle is near it after so many steps.
-        Some((at, place))
+        // A path at a flat angle is near the surface after so many steps, or its end tells.
+        if place.distance <= margin {
+            Some((at, place))
+        } else {
+            self.nearest(to, margin).map(|place| (to, place))
+        }
     }
 }
 
