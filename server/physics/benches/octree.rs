@@ -46,6 +46,7 @@ fn main() {
         best(rounds, || Octree::fill(&shape, settings, &|_| 0).unwrap())
     );
     grid(&uncut, rounds);
+    whole_cut(&uncut, rounds);
     advances(uncut, rounds);
     for cells in if quick { [8, 16] } else { [34, 58] } {
         let settings = OctreeSettings { cells, levels: 0 };
@@ -57,6 +58,44 @@ fn main() {
         let settings = OctreeSettings { cells, levels: 0 };
         same_advances(Octree::fill(&shape, settings, &|_| 0).unwrap(), h, rounds.min(2));
     }
+}
+
+/// A blade that goes through a body to half its depth at once, with everything that the next step needs: the cut, and
+/// the next step beside one before. The body is held at its base and hangs under its weight.
+fn whole_cut(uncut: &Octree, rounds: usize) {
+    let solver = PcgSettings { iterations: 4, tolerance: 0.0 };
+    let settings = BodySettings { solver, method: Method::MgPcg, ..BodySettings::default() };
+    let mut times = [f64::INFINITY; 3];
+    let mut pieces = (0, 0);
+    for _ in 0..rounds {
+        let mut body = Body::of_space(Box::new(OctreeSpace::new(uncut.clone())), SOFT, settings).unwrap();
+        let held: Vec<u32> = (0..).zip(uncut.points()).filter(|(_, p)| p[2] == 0).map(|(v, _)| v).collect();
+        body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+        let timed = |run: &mut dyn FnMut()| {
+            let start = Instant::now();
+            run();
+            start.elapsed().as_secs_f64() * 1e3
+        };
+        let step = |body: &mut Body| {
+            timed(&mut || {
+                body.step(0.01, Vector3::new(0.0, 0.0, -1.0), &[]);
+            })
+        };
+        step(&mut body);
+        let plain = step(&mut body);
+        let known = body.n_elements();
+        let cut = timed(&mut || {
+            body.cut(&blade(0, 0.37, 1.1, 0.5), 1).unwrap();
+        });
+        let next = step(&mut body);
+        pieces = (known, body.n_elements());
+        times.iter_mut().zip([plain, cut, next]).for_each(|(best, ms)| *best = best.min(ms));
+    }
+    let [plain, cut, next] = times;
+    println!(
+        "a whole cut, {} -> {} cells, MgPcg: {cut:.1} ms, the next step {next:.1} ms, the one before {plain:.1} ms",
+        pieces.0, pieces.1
+    );
 }
 
 /// A blade eight cells wide that advances by half a cell at a time into the middle of a body with cells of side `h`:
