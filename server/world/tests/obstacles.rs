@@ -9,6 +9,7 @@ use scindo_allocations::{Counting, allocations};
 use scindo_physics::body::Outcome;
 use scindo_world::assemble::BuildOptions;
 use scindo_world::inputs::Inputs;
+use scindo_world::results::Results;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 
@@ -206,4 +207,27 @@ fn what_begins_in_an_obstacle_is_told_and_what_lies_on_one_is_no_loose_body() {
     let twins = format!("{BLOCK}{other}").replace("world =", "effects = { body_collision = true }\nworld =");
     let twins = start(&twins.replacen("min_m = [-0.05", "min_m = [-0.03", 1));
     assert!(twins.warnings().iter().any(|w| w.contains("begins inside `")), "{:?}", twins.warnings());
+}
+
+#[test]
+fn forces_of_contact_are_written_step_by_step() {
+    let directory = std::env::temp_dir().join(format!("scindo-contacts-{}", std::process::id()));
+    let scene = Scene::from_toml(BLOCK).unwrap();
+    let mut sim = start(BLOCK);
+    let mut results = Results::begin(&directory, &scene, &sim).unwrap();
+    for _ in 0..100 {
+        sim.step(&Inputs::default());
+        results.record(&sim).unwrap();
+    }
+    results.finish(&sim, "done").unwrap();
+    let text = std::fs::read_to_string(directory.join("contacts.csv")).unwrap();
+    let header = "step,time_s,kind,on,by,contacts,deepest_m,fx_n,fy_n,fz_n,normal_n";
+    assert_eq!(text.lines().next(), Some(header));
+    let last: Vec<&str> = text.lines().last().unwrap().split(',').collect();
+    assert_eq!((last[0], &last[2..5]), ("100", &["obstacle", "block", "floor"][..]));
+    let weight = 9.81 * sim.bodies()[0].body.total_mass();
+    assert!((last[9].parse::<f64>().unwrap() / weight - 1.0).abs() < 0.01, "{last:?} {weight}");
+    // It falls for the first steps.
+    assert!(text.lines().count() < 100);
+    std::fs::remove_dir_all(&directory).unwrap();
 }

@@ -130,6 +130,11 @@ impl Contacts {
         &self.bodies[body].resting.report
     }
 
+    /// The same with each obstacle; empty before the first step.
+    pub fn rest_reports(&self, body: usize) -> &[RestReport] {
+        &self.bodies[body].resting.each
+    }
+
     /// Adds the springs of what a body may meet of the obstacles in a step of `h` seconds under `gravity` [m/s²],
     /// after [`detect`](Self::detect).
     pub fn rest(&mut self, number: usize, body: &SimBody, h: f64, gravity: Vector3<f64>) {

@@ -48,6 +48,16 @@ pub struct RestReport {
     pub normal_n: f64,
 }
 
+impl RestReport {
+    /// Adds a vertex at this depth [m] with its force and the part of it along the normal [N].
+    fn add(&mut self, depth: f64, force: &Vector3<f64>, push: f64) {
+        self.contacts += 1;
+        self.deepest_m = self.deepest_m.max(depth);
+        self.force_n += force;
+        self.normal_n += push;
+    }
+}
+
 /// The contacts of one body with all obstacles.
 #[derive(Debug, Clone, Default)]
 pub struct Resting {
@@ -60,8 +70,10 @@ pub struct Resting {
     now: Vec<Kept>,
     /// The springs of this step.
     springs: Vec<PointSpring>,
-    /// Report of the last step.
+    /// Report of the last step, with all obstacles together.
     pub report: RestReport,
+    /// The same with each obstacle.
+    pub each: Vec<RestReport>,
 }
 
 impl Resting {
@@ -71,6 +83,7 @@ impl Resting {
         self.now.clear();
         self.springs.clear();
         self.report = RestReport::default();
+        self.each.clear();
     }
 
     /// Finds what may touch in a step of `h` seconds under `gravity` [m/s²]. `young_pa` is Young's modulus of the
@@ -82,6 +95,7 @@ impl Resting {
         (young_pa, cell_m): (f64, f64),
     ) {
         self.follow(body);
+        self.each.resize(obstacles.len(), RestReport::default());
         std::mem::swap(&mut self.kept, &mut self.now);
         self.now.clear();
         self.springs.clear();
@@ -138,8 +152,9 @@ impl Resting {
     /// the elements.
     pub fn collect(&mut self, body: &Body, forces: &[Vector3<f64>], cell_m: f64) {
         self.report = RestReport::default();
+        self.each.fill(RestReport::default());
         let x = body.positions();
-        let (springs, report) = (&self.springs, &mut self.report);
+        let (springs, report, reports) = (&self.springs, &mut self.report, &mut self.each);
         let mut each = springs.iter().zip(forces);
         self.now.retain_mut(|contact| {
             let Some((spring, force)) = each.next() else { return false };
@@ -163,10 +178,10 @@ impl Resting {
             if contact.late >= PATIENCE || contact.lift_m > 0.0 {
                 contact.lift_m = (contact.lift_m + depth).max(0.0);
             }
-            report.contacts += 1;
-            report.deepest_m = report.deepest_m.max(depth);
-            report.force_n += force;
-            report.normal_n += push;
+            report.add(depth, force, push);
+            if let Some(report) = reports.get_mut(contact.obstacle as usize) {
+                report.add(depth, force, push);
+            }
             true
         });
     }

@@ -10,6 +10,8 @@ mod summary;
 
 mod fields;
 
+mod forces;
+
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
@@ -25,6 +27,7 @@ use crate::format::vtu;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
 use fields::{write_blocks, write_fields};
+use forces::Forces;
 use summary::Running;
 
 /// How long recorded probes may stay in memory.
@@ -57,6 +60,7 @@ pub struct Results {
     directory: PathBuf,
     scene: Value,
     probes: csv::Writer<BufWriter<File>>,
+    forces: Option<Forces>,
     flushed: Instant,
     running: Running,
     series_steps: u64,
@@ -76,6 +80,7 @@ impl Results {
             directory: directory.to_owned(),
             scene: scene.to_json(),
             probes: csv::Writer::from_writer(BufWriter::new(file)),
+            forces: Forces::begin(directory, simulation)?,
             flushed: Instant::now(),
             running: Running::default(),
             series_steps: u64::from(scene.checked().series_steps),
@@ -95,11 +100,13 @@ impl Results {
     pub fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
         self.running.add(simulation);
         self.record_probes(simulation)?;
+        self.forces.as_mut().map_or(Ok(()), |forces| forces.record(simulation))?;
         if self.series_steps > 0 && simulation.steps().is_multiple_of(self.series_steps) {
             self.record_fields(simulation)?;
         }
         if self.flushed.elapsed() > FLUSH_EVERY {
             self.probes.flush().map_err(at(&self.directory.join("probes.csv")))?;
+            self.forces.as_mut().map_or(Ok(()), Forces::flush)?;
             self.flushed = Instant::now();
         }
         Ok(())
@@ -111,6 +118,7 @@ impl Results {
     /// What the disk says.
     pub fn finish(&mut self, simulation: &Simulation, status: &str) -> Result<Summary, ResultsError> {
         self.probes.flush().map_err(at(&self.directory.join("probes.csv")))?;
+        self.forces.as_mut().map_or(Ok(()), Forces::flush)?;
         write_blocks(&self.directory, "final", simulation)
             .map_err(|(path, source)| ResultsError::Fields { path, source })?;
         if self.series_steps > 0 {

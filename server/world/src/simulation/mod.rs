@@ -449,6 +449,11 @@ impl Simulation {
         self.contacts.rest_report(body)
     }
 
+    /// The same with each obstacle, in their order; empty before the first step.
+    pub fn rest_reports(&self, body: usize) -> &[RestReport] {
+        self.contacts.rest_reports(body)
+    }
+
     /// Contacts of bodies with each other and with themselves in the last step, one report per pair.
     pub fn touch_reports(&self) -> &[TouchReport] {
         self.contacts.pairs().reports()
