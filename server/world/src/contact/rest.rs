@@ -101,10 +101,15 @@ impl Resting {
         self.springs.clear();
         let margin = MARGIN_CELLS * cell_m + gravity.norm() * h * h;
         let (x, v) = (body.positions(), body.velocities());
+        // No vertex comes farther than this in the step.
+        let reach = margin + h * v.iter().map(|v| v.norm_squared()).fold(0.0, f64::max).sqrt();
         let mut kept = self.kept.iter().peekable();
         for (index, vertex) in (0u32..).zip(&body.surface().vertices) {
-            let (from, speed) = (vertex.position(x), vertex.position(v));
-            let to = from + h * speed;
+            let from = vertex.position(x);
+            if !obstacles.iter().any(|obstacle| obstacle.shape.nearest(from, reach).is_some()) {
+                continue;
+            }
+            let to = from + h * vertex.position(v);
             for (number, obstacle) in (0u32..).zip(obstacles) {
                 let Some((seen_from, place)) = obstacle.shape.meet(from, to, margin) else { continue };
                 let normal = place.normal;
