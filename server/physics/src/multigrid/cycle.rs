@@ -16,7 +16,7 @@ use crate::team::{Team, blocks};
 
 /// Power iterations for the largest eigenvalue of D⁻¹A.
 const POWER_ITERATIONS: u32 = 10;
-/// The same around a cut, where they cost less and may have to find a vector of few vertices.
+/// The same after a cut: they may have to find a vector of few vertices.
 const LOCAL_ITERATIONS: u32 = 30;
 /// They estimate it from below; the smoother must not see a larger one.
 const SAFETY: f64 = 1.1;
@@ -232,8 +232,11 @@ impl Multigrid {
     /// as surely as those on all vertices: from below, with the same safety factor. An eigenvalue that is missed does
     /// little harm: the smoother of degree 2 diminishes all vectors up to 1.25 times the given eigenvalue.
     fn raise_eigenvalues(&mut self, team: &mut Team, A: &mut dyn LinearOperator, inverse: &[Inverse3]) {
-        for l in self.first..self.levels.len() {
+        for l in 0..self.levels.len() {
             let mut cells = std::mem::take(&mut self.cut[l]);
+            if l < self.first {
+                continue;
+            }
             cells.sort_unstable();
             cells.dedup();
             let known = self.levels[l].largest;
@@ -250,13 +253,17 @@ impl Multigrid {
                 let mut near: Vec<u32> = cells.iter().flat_map(|&id| level.vertices[id as usize]).collect();
                 near.sort_unstable();
                 near.dedup();
+                // Where much was cut, products with the whole operator cost less.
+                if 2 * near.len() > level.n_vertices {
+                    self.power_iterations(team, (&mut *A, &[]), l, LOCAL_ITERATIONS);
+                    self.levels[l].largest = known.max(self.levels[l].largest);
+                    continue;
+                }
                 let around = near.iter().flat_map(|&v| level.slots_of(v as usize)).map(|(id, _)| id as u32);
                 let mass = &self.galerkin.levels[l].mass;
                 let found = kernel.largest_near((around, &near), (mass, inverse), LOCAL_ITERATIONS);
                 *largest = known.max(SAFETY * found);
             }
-            cells.clear();
-            self.cut[l] = cells;
         }
     }
 

@@ -48,6 +48,59 @@ impl Links<'_> {
     }
 }
 
+/// Cells as they were before.
+#[derive(Debug)]
+struct History {
+    /// Entry of `earlier` by cell, or [`NONE`]; new cells have none.
+    number: Vec<u32>,
+    earlier: Vec<(u32, Earlier)>,
+}
+
+impl History {
+    /// No history of `n` cells.
+    fn new(n: usize) -> Self {
+        Self { number: vec![NONE; n], earlier: Vec::new() }
+    }
+
+    fn get(&self, id: u32) -> Option<&Earlier> {
+        let number = *self.number.get(id as usize)?;
+        self.earlier.get(number as usize).map(|(_, earlier)| earlier)
+    }
+
+    /// Keeps the state of a cell, unless there is one.
+    fn keep(&mut self, id: u32, now: Earlier) {
+        if let Some(number) = self.number.get_mut(id as usize).filter(|number| **number == NONE) {
+            *number = self.earlier.len() as u32;
+            self.earlier.push((id, now));
+        }
+    }
+}
+
+/// One bit per number.
+#[derive(Debug)]
+struct Bits(Vec<u64>);
+
+impl Bits {
+    fn new(n: usize) -> Self {
+        Self(vec![0; n.div_ceil(64)])
+    }
+
+    fn has(&self, i: u32) -> bool {
+        self.0.get(i as usize / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
+    }
+
+    /// Returns whether the number was not there.
+    fn insert(&mut self, i: u32) -> bool {
+        if self.0.len() <= i as usize / 64 {
+            self.0.resize(i as usize / 64 + 1, 0);
+        }
+        let (word, bit) = (&mut self.0[i as usize / 64], 1 << (i % 64));
+        let new = *word & bit == 0;
+        *word |= bit;
+        new
+    }
+}
+
 /// A cell as it was before.
 #[derive(Clone, Copy, Debug)]
 struct Earlier {
@@ -68,12 +121,12 @@ impl LevelChange {
         level: &mut Level,
         (cells, known): (Vec<u32>, usize),
         origin: Vec<u32>,
-        earlier: &BTreeMap<u32, Earlier>,
+        history: &History,
     ) -> Self {
         let (mut vertices, mut edits) = (Vec::new(), Vec::new());
         for &id in &cells {
             let now = level.vertices[id as usize];
-            let before = earlier.get(&id).map_or(now, |earlier| earlier.vertices);
+            let before = history.get(id).map_or(now, |earlier| earlier.vertices);
             vertices.extend(now);
             for c in 0..8 {
                 let slot = 8 * id + c as u32;
@@ -99,19 +152,17 @@ impl Level {
         let known = self.cells.len();
         let new = changed.iter().filter(|&&id| id as usize >= known);
         let origin = new.map(|&id| octree.whole_of(&self.cells, id)).collect();
-        let mut earlier = BTreeMap::new();
+        let mut history = History::new(known);
         self.grow(octree.cells().len());
         self.n_vertices = octree.n_vertices();
         for &id in changed {
             let at = id as usize;
-            if at < known {
-                earlier.insert(id, self.now(id));
-            }
+            history.keep(id, self.now(id));
             self.cells[at] = Cell { cut: 0, ..octree.cells()[at] };
             self.leaf[at] = id;
             (self.vertices[at], self.hanging[at]) = (octree.vertices()[at], octree.hanging()[at]);
         }
-        LevelChange::new(self, (changed.to_vec(), known), origin, &earlier)
+        LevelChange::new(self, (changed.to_vec(), known), origin, &history)
     }
 
     /// Adds places for cells until there are `n`.
@@ -127,11 +178,12 @@ impl Level {
         Earlier { cell: self.cells[id], vertices: self.vertices[id], hanging: self.hanging[id] }
     }
 
-    /// The corners that are one point of the material with corner `slot`, as 8 · cell + corner, and the larger cell
-    /// on which they hang, or [`NONE`].
-    fn class_of(&self, slot: u32) -> (Vec<u32>, u32) {
-        let (mut members, mut hangs_on) = (vec![slot], NONE);
-        let mut next = 0;
+    /// Finds the corners that are one point of the material with corner `slot`, as 8 · cell + corner. Returns the
+    /// larger cell on which they hang, or [`NONE`].
+    fn class_of(&self, slot: u32, members: &mut Vec<u32>) -> u32 {
+        members.clear();
+        members.push(slot);
+        let (mut hangs_on, mut next) = (NONE, 0);
         while let Some(&slot) = members.get(next) {
             next += 1;
             let (id, c) = (slot / 8, (slot % 8) as usize);
@@ -151,7 +203,7 @@ impl Level {
                 }
             }
         }
-        (members, hangs_on)
+        hangs_on
     }
 }
 
@@ -164,16 +216,16 @@ pub fn follow_level(
     size: u8,
 ) -> Option<LevelChange> {
     let known = coarse.cells.len();
-    let mut follow = Follow { coarse, known, origin: Vec::new(), earlier: BTreeMap::new() };
+    let mut follow = Follow { coarse, known, origin: Vec::new(), history: History::new(known) };
     let renewed = follow.regroup((fine, links, change), step, size)?;
     let relinked = follow.relink(&renewed, links, step);
     follow.renumber(&relinked)?;
-    let Follow { coarse, origin, earlier, .. } = follow;
+    let Follow { coarse, origin, history, .. } = follow;
     let mut cells = relinked;
-    cells.extend(earlier.keys());
+    cells.extend(history.earlier.iter().map(|(id, _)| id));
     cells.sort_unstable();
     cells.dedup();
-    Some(LevelChange::new(coarse, (cells, known), origin, &earlier))
+    Some(LevelChange::new(coarse, (cells, known), origin, &history))
 }
 
 /// A coarse level on its way.
@@ -184,7 +236,7 @@ struct Follow<'a> {
     /// Of every new cell the one it was part of.
     origin: Vec<u32>,
     /// States of cells before.
-    earlier: BTreeMap<u32, Earlier>,
+    history: History,
 }
 
 impl Follow<'_> {
@@ -196,7 +248,7 @@ impl Follow<'_> {
         step: &mut Step,
         size: u8,
     ) -> Option<Vec<u32>> {
-        let Self { coarse, known, origin, earlier } = self;
+        let Self { coarse, known, origin, history } = self;
         let mut renewed: Vec<u32> =
             change.cells.iter().map(|&id| step.parent[change.before(id) as usize]).collect();
         renewed.sort_unstable();
@@ -208,7 +260,7 @@ impl Follow<'_> {
         let parent_before: Vec<u32> =
             members.iter().map(|&id| step.parent[change.before(id) as usize]).collect();
         for &id in &renewed {
-            earlier.insert(id, coarse.now(id));
+            history.keep(id, coarse.now(id));
         }
 
         // Links inside a block of cells that merge connect them.
@@ -304,25 +356,30 @@ impl Follow<'_> {
     /// was part of, if no other class did before it.
     fn renumber(&mut self, relinked: &[u32]) -> Option<()> {
         // Numbers that must stay in use.
-        let mut owed = BTreeSet::new();
+        let mut owed = Bits::new(self.coarse.n_vertices);
         for &id in relinked.iter().filter(|id| (**id as usize) < self.known) {
             let Earlier { vertices, hanging, .. } = self.coarse.now(id);
-            owed.extend((0..8).filter(|c| hanging >> c & 1 == 0).map(|c| vertices[c]));
+            (0..8).filter(|c| hanging >> c & 1 == 0).for_each(|c| {
+                owed.insert(vertices[c]);
+            });
         }
-        let (mut done, mut taken): (BTreeSet<u32>, BTreeSet<u32>) = Default::default();
-        let mut hanging: Vec<(u32, u32)> = Vec::new();
+        let mut done = Bits::new(8 * self.coarse.cells.len());
+        let mut taken = Bits::new(self.coarse.n_vertices);
+        let (mut members, mut hanging) = (Vec::new(), Vec::<(u32, u32)>::new());
         for slot in relinked.iter().flat_map(|id| 8 * id..8 * id + 8) {
-            if done.contains(&slot) {
+            if done.has(slot) {
                 continue;
             }
-            let (members, hangs_on) = self.coarse.class_of(slot);
-            done.extend(&members);
+            let hangs_on = self.coarse.class_of(slot, &mut members);
+            members.iter().for_each(|&slot| {
+                done.insert(slot);
+            });
             if hangs_on != NONE {
                 hanging.extend(members.iter().map(|&slot| (slot, hangs_on)));
                 continue;
             }
             let known = members.iter().filter_map(|&slot| self.vertex_before(slot));
-            let vertex = known.filter(|v| !taken.contains(v)).min().unwrap_or_else(|| {
+            let vertex = known.filter(|&v| !taken.has(v)).min().unwrap_or_else(|| {
                 self.coarse.n_vertices += 1;
                 self.coarse.n_vertices as u32 - 1
             });
@@ -331,24 +388,27 @@ impl Follow<'_> {
         }
 
         // Corners hang on vertices of larger cells, which may have other numbers now.
-        let changed: BTreeSet<u32> = relinked.iter().chain(self.earlier.keys()).copied().collect();
+        let changed = self.history.earlier.iter().map(|(id, _)| *id);
+        let mut changed: Vec<u32> = changed.chain(relinked.iter().copied()).collect();
+        changed.sort_unstable();
+        changed.dedup();
         for id in changed {
             let level = self.coarse.cells[id as usize].level;
-            let links = self.coarse.links.get(id as usize);
-            let smaller: Vec<u32> = links
-                .iter()
-                .copied()
-                .filter(|near| self.coarse.cells[*near as usize / 8].level < level)
-                .collect();
-            for link in smaller {
+            for &link in self.coarse.links.get(id as usize) {
                 let (near, d) = (link / 8, link as usize % 8);
+                if self.coarse.cells[near as usize].level >= level || self.coarse.hanging[near as usize] == 0
+                {
+                    continue;
+                }
                 let beside = (0..8).filter(|c| c >> (d / 2) & 1 != d % 2);
                 for c in beside.filter(|c| self.coarse.hanging[near as usize] >> c & 1 == 1) {
                     let slot = 8 * near + c as u32;
-                    if !done.contains(&slot) {
-                        let (members, hangs_on) = self.coarse.class_of(slot);
-                        done.extend(&members);
-                        hanging.extend(members.iter().map(|&slot| (slot, hangs_on)));
+                    if !done.has(slot) {
+                        let hangs_on = self.coarse.class_of(slot, &mut members);
+                        for &slot in &members {
+                            done.insert(slot);
+                            hanging.push((slot, hangs_on));
+                        }
                     }
                 }
             }
@@ -359,14 +419,14 @@ impl Follow<'_> {
             let k = self.coarse.corner_at(big, q)?;
             self.enter(slot, self.coarse.vertices[big as usize][k], true);
         }
-        owed.is_subset(&taken).then_some(())
+        owed.0.iter().zip(&taken.0).all(|(owed, taken)| owed & !taken == 0).then_some(())
     }
 
     /// The vertex that carried corner `slot` before, if it did not hang.
     fn vertex_before(&self, slot: u32) -> Option<u32> {
         let (id, c) = (slot / 8, (slot % 8) as usize);
         let whole = (id as usize).checked_sub(self.known).map_or(id, |new| self.origin[new]);
-        let Some(earlier) = self.earlier.get(&whole) else {
+        let Some(earlier) = self.history.get(whole) else {
             let Earlier { vertices, hanging, .. } = self.coarse.now(id);
             return (hanging >> c & 1 == 0).then_some(vertices[c]);
         };
@@ -383,9 +443,7 @@ impl Follow<'_> {
         if now.vertices[c] == vertex && (now.hanging & bit != 0) == hangs {
             return;
         }
-        if (id as usize) < self.known {
-            self.earlier.entry(id).or_insert(now);
-        }
+        self.history.keep(id, now);
         self.coarse.vertices[id as usize][c] = vertex;
         self.coarse.hanging[id as usize] = if hangs { now.hanging | bit } else { now.hanging & !bit };
     }

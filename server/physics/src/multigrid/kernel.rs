@@ -144,14 +144,12 @@ impl LevelKernel {
         (mass, inverse): (&[f32], &[Inverse3]),
         iterations: u32,
     ) -> f64 {
-        let mut chunks: Vec<u32> = cells.map(|id| self.operator.places()[id as usize].chunk).collect();
-        chunks.sort_unstable();
-        chunks.dedup();
+        let patch = self.operator.patch(cells, near);
         let mut x: Vec<Padded> = near.iter().map(|&v| noise(v)).collect();
-        let mut y = Vec::with_capacity(x.len());
+        let mut y = x.clone();
         let mut estimate: f64 = 0.0;
         for _ in 0..iterations {
-            self.operator.multiply_part((&chunks, near), &x, &mut y);
+            self.operator.multiply_patch(&patch, &x, &mut y);
             let (mut xy, mut yz) = (0.0, 0.0);
             for ((x, y), &v) in x.iter_mut().zip(&mut y).zip(near) {
                 (0..4).for_each(|k| y[k] += mass[v as usize] * x[k]);

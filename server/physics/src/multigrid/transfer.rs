@@ -60,12 +60,12 @@ impl Transfer {
     pub fn follow(&mut self, fine: &Level, coarse: &Level, parent: &[u32], vertices: &[u32]) {
         self.rows.grow(fine.n_vertices);
         self.columns.grow(coarse.n_vertices);
-        let mut edits = Vec::new();
+        let (mut edits, mut row) = (Vec::new(), Vec::new());
         for &v in vertices {
             let stands = |(id, c): &(usize, usize)| fine.hanging[*id] >> c & 1 == 0;
             let home = fine.slots_of(v as usize).find(stands);
-            let row: Vec<(u32, f32)> =
-                home.map_or_else(Vec::new, |(id, c)| carriers(fine, coarse, parent[id], (id, c)).collect());
+            row.clear();
+            row.extend(home.into_iter().flat_map(|(id, c)| carriers(fine, coarse, parent[id], (id, c))));
             let known = self.rows.get(v as usize);
             if row != known {
                 edits.extend(known.iter().map(|&(j, w)| (j, (v, w), false)));

@@ -326,16 +326,12 @@ impl Gather {
         }
     }
 
-    /// The sums of one copy.
-    pub fn at<const N: usize>(&self, copy: u32, rows: &[[f32; N]]) -> [f32; N] {
-        let [a, b] = self.pairs[copy as usize];
-        let mut sum = rows[a as usize];
-        let begin = self.further.partition_point(|f| f.0 < copy);
-        let further = self.further[begin..].iter().take_while(|f| f.0 == copy).map(|f| f.1);
-        for row in further.chain([b]) {
-            sum.iter_mut().zip(&rows[row as usize]).for_each(|(sum, part)| *sum += part);
-        }
-        sum
+    /// Adds the rows of `copy` to `out`. `further` is 0 at first, and is kept from one call to the next with a higher
+    /// number.
+    pub fn rows_of(&self, copy: u32, further: &mut usize, out: &mut Vec<u32>) {
+        out.extend(self.pairs[copy as usize].into_iter().filter(|row| *row != 0));
+        *further += self.further[*further..].partition_point(|f| f.0 < copy);
+        out.extend(self.further[*further..].iter().take_while(|f| f.0 == copy).map(|f| f.1));
     }
 
     /// The first two rows of every copy of block number `block`; row 0 where there are fewer.

@@ -1,6 +1,7 @@
 //! The cells of one octree, or of one level above it, as a linear operator.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use nalgebra::Matrix3;
 
@@ -24,6 +25,9 @@ use crate::team::{Team, blocks, ranges};
 /// several threads.
 const CHUNK_CELLS: usize = 512;
 
+/// Where a cut arranges more than this part of the chunks anew, all rows are listed again.
+const MANY: usize = 4;
+
 /// Σ Wᵀ A W over cells with matrices A, in single precision.
 ///
 /// Everything is computed in two halves, each a pass over all threads: sums of the chunks, then what the
@@ -39,6 +43,19 @@ pub struct CellOperator {
     /// Likewise, diagonal blocks.
     pub(super) diagonals: Vec<Block6>,
     places: Vec<Place>,
+}
+
+/// Some vertices, and what products with their rows and columns need.
+#[derive(Clone, Debug, Default)]
+pub struct Patch {
+    /// Chunks around the vertices, and their entries of `locals`.
+    chunks: Vec<(usize, Range<usize>)>,
+    /// Local number in the chunk, and number in the patch.
+    locals: Vec<(u32, u32)>,
+    /// Rows of sums of the vertices, one after the other.
+    rows: Vec<u32>,
+    /// Entries of `rows` of every vertex.
+    first_row: Vec<usize>,
 }
 
 impl CellOperator {
@@ -57,8 +74,9 @@ impl CellOperator {
             .collect();
         let gather = Gather::without_room(chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
         let places = vec![Place::default(); cells.len()];
-        let sums = vec![[0.0; 4]; gather.n_rows()];
-        let diagonals = vec![[0.0; 8]; gather.n_rows()];
+        let (mut sums, mut diagonals) = (Vec::new(), Vec::new());
+        resize_reserving(&mut sums, gather.n_rows(), [0.0; 4]);
+        resize_reserving(&mut diagonals, gather.n_rows(), [0.0; 8]);
         let mut operator = Self { simd, tables: Vec::new(), chunks, gather, sums, diagonals, places };
         (0..operator.chunks.len()).for_each(|chunk| operator.find_places(chunk));
         operator.set_tables(tables);
@@ -173,9 +191,13 @@ impl CellOperator {
         renewed.sort_unstable();
         renewed.dedup();
         renewed.iter().for_each(|&chunk| self.find_places(chunk));
-        let before = left.iter().map(|(chunk, left)| (*chunk, &left.vertices[..]));
-        let now = renewed.iter().map(|&chunk| (chunk, &self.chunks[chunk].vertices[..]));
-        self.gather.replace(before, now, n_vertices);
+        if MANY * renewed.len() > self.chunks.len() {
+            self.gather.arrange(self.chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
+        } else {
+            let before = left.iter().map(|(chunk, left)| (*chunk, &left.vertices[..]));
+            let now = renewed.iter().map(|&chunk| (chunk, &self.chunks[chunk].vertices[..]));
+            self.gather.replace(before, now, n_vertices);
+        }
         let rows = self.gather.n_rows();
         resize_reserving(&mut self.sums, rows, [0.0; 4]);
         resize_reserving(&mut self.diagonals, rows, [0.0; 8]);
@@ -231,22 +253,48 @@ impl CellOperator {
         });
     }
 
-    /// A x at `vertices`, where x is 0 at all others: only the `chunks` of the cells around them are applied. Writes
-    /// the products in the order of the vertices.
-    pub fn multiply_part(&mut self, (chunks, vertices): (&[u32], &[u32]), x: &[Padded], y: &mut Vec<Padded>) {
-        let Self { simd, tables, chunks: all, gather, sums, .. } = self;
-        for &k in chunks {
-            let chunk = &mut all[k as usize];
-            let CellChunk { x: local, vertices: held, .. } = chunk;
+    /// The part of the operator around `vertices`, ascending: the rows and columns of these. `cells` are all around
+    /// them.
+    pub fn patch(&self, cells: impl Iterator<Item = u32>, vertices: &[u32]) -> Patch {
+        let mut taken = vec![false; self.chunks.len()];
+        cells.for_each(|id| taken[self.places[id as usize].chunk as usize] = true);
+        let mut patch = Patch { first_row: vec![0], ..Patch::default() };
+        let mut further = 0;
+        for chunk in (0..self.chunks.len()).filter(|&chunk| taken[chunk]) {
+            let begin = patch.locals.len();
             let mut known = 0;
-            for (local, vertex) in local.iter_mut().zip(&*held) {
+            for (local, vertex) in (0u32..).zip(&self.chunks[chunk].vertices) {
                 known += vertices[known..].partition_point(|v| v < vertex);
-                *local = if vertices.get(known) == Some(vertex) { x[known] } else { [0.0; 4] };
+                if vertices.get(known) == Some(vertex) {
+                    patch.locals.push((local, known as u32));
+                }
             }
-            chunk.apply(*simd, tables, &mut sums[gather.first_row[k as usize] as usize..]);
+            patch.chunks.push((chunk, begin..patch.locals.len()));
         }
-        y.clear();
-        y.extend(vertices.iter().map(|&v| gather.at(v, sums)));
+        for &vertex in vertices {
+            self.gather.rows_of(vertex, &mut further, &mut patch.rows);
+            patch.first_row.push(patch.rows.len());
+        }
+        patch
+    }
+
+    /// y = A x on a patch, in the order of its vertices.
+    pub fn multiply_patch(&mut self, patch: &Patch, x: &[Padded], y: &mut [Padded]) {
+        let Self { simd, tables, chunks, gather, sums, .. } = self;
+        for (chunk, locals) in &patch.chunks {
+            let held = &mut chunks[*chunk];
+            held.x.fill([0.0; 4]);
+            for &(local, i) in &patch.locals[locals.clone()] {
+                held.x[local as usize] = x[i as usize];
+            }
+            held.apply(*simd, tables, &mut sums[gather.first_row[*chunk] as usize..]);
+        }
+        for (y, ends) in y.iter_mut().zip(patch.first_row.windows(2)) {
+            *y = [0.0; 4];
+            for &row in &patch.rows[ends[0]..ends[1]] {
+                y.iter_mut().zip(&sums[row as usize]).for_each(|(y, part)| *y += part);
+            }
+        }
     }
 
     /// Second half: the product at the vertices of block number `block`, added to `y`.

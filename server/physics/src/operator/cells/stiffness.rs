@@ -1,7 +1,6 @@
 //! s K̂ of an octree.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -84,28 +83,27 @@ impl CellStiffness {
             CellLane { factor: 1.0, ..CellLane::of_leaf(octree, id as usize, matrix) }
         };
         let source = |id: u32| octree.whole_of(known, id);
-        let rotation = |operator: &CellOperator, id: u32| operator.rotation(operator.places()[id as usize]);
-        // Rotations of all cells in the chunks that change, by number.
-        let mut kept: BTreeMap<u32, Matrix3<f32>> = BTreeMap::new();
+        // Rotations of all cells in the chunks that change.
+        let mut kept = Kept { number: vec![NONE; cells.len()], rotations: Vec::new() };
         for &id in changed {
             let old = if (id as usize) < known.len() { id } else { source(id) };
-            let chunk = operator.places()[old as usize].chunk as usize;
-            let first = operator.chunks[chunk].places().next();
-            if first.is_some_and(|(cell, ..)| !kept.contains_key(&cell)) {
-                for (cell, ..) in operator.chunks[chunk].places() {
-                    kept.insert(cell, rotation(operator, cell));
+            let chunk = &operator.chunks[operator.places()[old as usize].chunk as usize];
+            let first = chunk.places().next();
+            if first.is_some_and(|(cell, ..)| kept.number[cell as usize] == NONE) {
+                for (cell, batch, lane) in chunk.places() {
+                    kept.add(cell, chunk.rotation(batch, lane));
                 }
             }
         }
         for &id in changed.iter().filter(|&&id| id as usize >= known.len()) {
-            kept.insert(id, kept.get(&source(id)).copied().unwrap_or_else(Matrix3::identity));
+            kept.add(id, kept.get(source(id)));
         }
         let renewed = operator.follow(changed, [cells.len(), octree.n_vertices()], &lane, &source);
         let h = octree.lattice().h;
         let side = |id: u32| f64::from(cells[id as usize].side()) * h;
         for chunk in renewed {
             let arranged = &mut operator.chunks[chunk];
-            arranged.set_rotations(&|id| kept.get(&id).copied().unwrap_or_else(Matrix3::identity));
+            arranged.set_rotations(&|id| kept.get(id));
             let arranged = RestChunk::new(arranged, |v| octree.rest_position(v), side);
             if chunk < rest.len() { rest[chunk] = arranged } else { rest.push(arranged) }
         }
@@ -166,6 +164,29 @@ impl CellStiffness {
         if !with.law.rotates() {
             self.operator.set_rotations(team, |_| Matrix3::identity());
         }
+    }
+}
+
+/// No number.
+const NONE: u32 = u32::MAX;
+
+/// Rotations of some cells.
+struct Kept {
+    /// Entry of `rotations` by cell, or [`NONE`].
+    number: Vec<u32>,
+    rotations: Vec<Matrix3<f32>>,
+}
+
+impl Kept {
+    fn add(&mut self, cell: u32, R: Matrix3<f32>) {
+        self.number[cell as usize] = self.rotations.len() as u32;
+        self.rotations.push(R);
+    }
+
+    /// I for a cell that is not known.
+    fn get(&self, cell: u32) -> Matrix3<f32> {
+        let number = self.number[cell as usize] as usize;
+        self.rotations.get(number).copied().unwrap_or_else(Matrix3::identity)
     }
 }
 
