@@ -236,7 +236,7 @@ pub struct StressArgs {
     /// Print the cases instead of running them.
     #[arg(long)]
     pub list: bool,
-    /// Run the long form of cases that have one, such as 1000 cycles in place of 50.
+    /// Run the long form of cases that have one, such as 1000 cycles in place of 12.
     #[arg(long)]
     pub long: bool,
     /// Disable parts of the method in turn and check that the cases fail. Takes about five times as long.
