@@ -124,6 +124,28 @@ fn motion_is_that_of_other_solvers_through_cuts_and_springs() {
     }
 }
 
+/// A blade that advances by half a cell before each step, past held vertices and through coarse leaves.
+#[test]
+fn motion_is_that_of_other_solvers_while_a_blade_advances() {
+    for law in [Law::Linear, Law::Corotational] {
+        let run = |method| {
+            let mut body = cube(16, 2, law, with(method, Scheme::ImplicitEuler, 1e-5));
+            let (mut links, mut iterations) = (0, 0);
+            for k in 0..12 {
+                let z = 1.05 - f64::from(k) / 32.0;
+                let edge = [Vector3::new(-0.1, 0.47, z), Vector3::new(0.6, 0.52, z)];
+                links += body.cut(&BladeSweep { segments: vec![edge] }, 1).unwrap().faces_opened;
+                iterations += advance(&mut body, 0.01, &[]).iterations;
+            }
+            assert!(links > 40);
+            (moved(&body), iterations)
+        };
+        let [pcg, mg_pcg] = [Method::Pcg, Method::MgPcg].map(run);
+        assert!(difference(&mg_pcg.0, &pcg.0) < 1e-3, "{law:?}: {:e}", difference(&mg_pcg.0, &pcg.0));
+        assert!(mg_pcg.1 <= 12 * 8, "{law:?}: {} iterations, {} of PCG", mg_pcg.1, pcg.1);
+    }
+}
+
 #[test]
 fn steps_with_multigrid_have_the_same_bits_for_any_number_of_threads() {
     let run = |threads, method| {

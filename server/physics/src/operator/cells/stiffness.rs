@@ -35,6 +35,8 @@ pub struct CellStiffness {
     materials: Materials,
     /// Parameters of the last update.
     made_with: Option<ElasticUpdate>,
+    /// Whether a cut arranged cells anew since then.
+    cut: bool,
     version: u64,
 }
 
@@ -45,7 +47,7 @@ impl CellStiffness {
         let materials = Materials::new(materials);
         let (operator, rest) = arrange(simd, octree, &materials);
         let (cells, h) = (octree.cells().to_vec(), octree.lattice().h);
-        Self { operator, rest, cells, h, materials, made_with: None, version: 0 }
+        Self { operator, rest, cells, h, materials, made_with: None, cut: false, version: 0 }
     }
 
     /// Bytes in use.
@@ -77,7 +79,7 @@ impl CellStiffness {
     /// Only the chunks of these cells are arranged anew.
     pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) {
         let cells = octree.cells();
-        let Self { operator, rest, cells: known, materials, .. } = self;
+        let Self { operator, rest, cells: known, materials, made_with, .. } = self;
         let lane = |id: u32| {
             let matrix = CellMatrix::Table(materials.table_of(cells[id as usize].material));
             CellLane { factor: 1.0, ..CellLane::of_leaf(octree, id as usize, matrix) }
@@ -105,7 +107,15 @@ impl CellStiffness {
             let arranged = &mut operator.chunks[chunk];
             arranged.set_rotations(&|id| kept.get(id));
             let arranged = RestChunk::new(arranged, |v| octree.rest_position(v), side);
-            if chunk < rest.len() { rest[chunk] = arranged } else { rest.push(arranged) }
+            if chunk < rest.len() {
+                rest[chunk] = arranged
+            } else {
+                rest.push(arranged)
+            }
+            if let Some(with) = made_with {
+                let factor = |id: u32| materials.factor(&cells[id as usize], h, with);
+                operator.chunks[chunk].set_factors(&factor);
+            }
         }
         for &id in changed {
             match known.get_mut(id as usize) {
@@ -113,8 +123,7 @@ impl CellStiffness {
                 None => known.push(cells[id as usize]),
             }
         }
-        // New cells need their factors.
-        self.made_with = None;
+        self.cut = true;
     }
 
     /// For every cell the earlier one that it was part of, or whose place it begins at.
@@ -157,10 +166,7 @@ impl CellStiffness {
     fn set(&mut self, team: &mut Team, with: &ElasticUpdate) {
         self.operator.set_tables(&self.materials.tables(with.lame));
         let (cells, h, materials) = (&self.cells, self.h, &self.materials);
-        self.operator.set_factors(team, |id| {
-            let cell = &cells[id as usize];
-            (materials.lame(cell.material, with.lame).mu * f64::from(cell.side()) * h * with.scale) as f32
-        });
+        self.operator.set_factors(team, |id| materials.factor(&cells[id as usize], h, with));
         if !with.law.rotates() {
             self.operator.set_rotations(team, |_| Matrix3::identity());
         }
@@ -221,6 +227,7 @@ impl Stiffness for CellStiffness {
             self.set(team, with);
             self.made_with = Some(*with);
         }
+        let same = same && !std::mem::take(&mut self.cut);
         self.version += u64::from(rotates || !same);
         let CellOperator { simd, tables, chunks, gather, sums, diagonals, .. } = &mut self.operator;
         let (simd, with) = (*simd, (&tables[..], with.scale as f32));
@@ -328,6 +335,11 @@ impl Materials {
     fn table_of(&self, material: u16) -> u16 {
         let region = usize::from(material).checked_sub(1).and_then(|r| self.table.get(r));
         region.copied().unwrap_or(self.ratios.len() as u16)
+    }
+
+    /// Factor of the table of a cell, with finest cells of side `h` [m].
+    fn factor(&self, cell: &Cell, h: f64, with: &ElasticUpdate) -> f32 {
+        (self.lame(cell.material, with.lame).mu * f64::from(cell.side()) * h * with.scale) as f32
     }
 
     fn lame(&self, material: u16, other: Lame) -> Lame {
