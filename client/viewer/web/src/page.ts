@@ -30,6 +30,8 @@ class Page {
   private readonly session: Session = {
     bodies: new Map(), tools: new Map(), toolId: "", clientId: "", readOnly: false, operator: false, paused: false,
   };
+  /** Bodies of earlier scenes that the present one does not have. */
+  private readonly gone = new Set<string>();
   private readonly relay = new Relay((message, bytes) => this.receive(message, bytes), (open) => this.panel.showConnection(open));
   private readonly stage: Stage;
   private readonly panel = new Panel(this.relay);
@@ -84,10 +86,12 @@ class Page {
       case "info": this.takeInfo(message.value); break;
       case "plan": this.panel.showPlan(message.value); break;
       case "topology":
+        if (!this.belongs(message.value.bodyId)) break;
         this.bodyOf(message.value.bodyId).setTopology(message.value);
         this.bar.refresh();
         break;
       case "frame":
+        if (!this.belongs(message.value.bodyId)) break;
         if (this.bodyOf(message.value.bodyId).setFrame(message.value)) this.stage.invalidate();
         this.panel.countFrame(message.value, bytes);
         break;
@@ -149,11 +153,13 @@ class Page {
     if (this.view.isOpen) this.params.ask();
     this.stage.setUp(info.up);
     const ids = info.bodies.map((body) => body.id);
+    ids.forEach((id) => this.gone.delete(id));
     for (const [id, body] of this.session.bodies) {
       if (ids.includes(id)) continue;
       this.overlays.undress(body);
       body.dispose();
       this.session.bodies.delete(id);
+      this.gone.add(id);
     }
     if (![...this.session.bodies.keys()].some((id) => ids.includes(id))) this.stage.forget();
     info.bodies.forEach((body) => this.takeLook(body));
@@ -164,6 +170,11 @@ class Page {
   private takeLook({ id, look }: BodyInfo): void {
     const layers = look?.layers.map(({ depthM, colour }) => ({ depthM, colour })) ?? [];
     this.bodyOf(id).setLook({ colour: look?.colour, opacity: look?.opacity ?? 1, layers });
+  }
+
+  /** Whether a body may belong to the scene. A late message may still speak of the scene before it. */
+  private belongs(id: string): boolean {
+    return !this.gone.has(id);
   }
 
   private bodyOf(id: string): BodySurface {
