@@ -25,3 +25,10 @@ pub(crate) fn aabb_of(points: impl IntoIterator<Item = [f32; 3]>) -> Aabb {
     }
     Aabb::new(mins, maxs)
 }
+
+/// Whether two boxes are no farther apart than `margin` [m] along every axis.
+pub(crate) fn boxes_within(a: &Aabb, b: &Aabb, margin: f64) -> bool {
+    // Rounding must not separate boxes that touch, so the differences are taken in `f64`, where they are exact.
+    let gap = |low: f32, high: f32| f64::from(low) - f64::from(high);
+    (0..3).all(|axis| gap(a.mins[axis], b.maxs[axis]) <= margin && gap(b.mins[axis], a.maxs[axis]) <= margin)
+}

@@ -4,13 +4,15 @@
 //! parry3d). It is built once per topology and refitted in place whenever the surface moved. It answers three
 //! queries for a rigid tool: the closest point and its side, the triangles near a capsule, and the first
 //! impact of a moving capsule on the moving surface. Spheres, probes and blades are all capsules: a core
-//! segment and a radius.
+//! segment and a radius. Two queries serve contact between surfaces: the pairs of triangles that are near each
+//! other, of one surface with itself and of two surfaces.
 //!
 //! The crate knows surfaces and capsules, but no bodies, tissue or forces. Positions are in metres. The tree
 //! stores `f32`, the format in which surfaces arrive. Distances are computed in `f64`, because the lips of a
 //! cut contain triangles so thin that single precision has no normal for them.
 //!
-//! Order of the modules: conversions, distances between two primitives, the tree, proximity queries, impacts.
+//! Order of the modules: conversions, distances between two primitives, the tree, proximity queries, impacts, pairs
+//! of triangles.
 
 mod convert;
 mod distance;
@@ -18,6 +20,7 @@ mod surface_bvh;
 mod closest;
 mod winding;
 mod sweep;
+mod pairs;
 
 pub use closest::{ClosestPoint, NearTriangle};
 pub use distance::{

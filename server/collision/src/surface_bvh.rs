@@ -2,6 +2,7 @@
 
 use crate::convert::{aabb_of, from_parry, widen};
 use nalgebra::Vector3;
+use parry3d::bounding_volume::Aabb;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
 /// Why a surface was refused.
@@ -67,6 +68,8 @@ pub struct SurfaceBvh {
     previous: Vec<[f32; 3]>,
     star_offsets: Vec<u32>,
     star: Vec<u32>,
+    /// Box of each triangle, before the last refit and at present.
+    boxes: Vec<Aabb>,
     tree: Bvh,
     /// Leaves in the order of the tree's memory. Refitting in this order is fast, since it walks the memory
     /// forward.
@@ -104,6 +107,7 @@ impl SurfaceBvh {
             positions,
             star_offsets,
             star,
+            boxes,
             tree,
             order,
             kept_vertices,
@@ -142,6 +146,7 @@ impl SurfaceBvh {
             let corners = [self.positions[a], self.positions[b], self.positions[c]];
             let before = [self.previous[a], self.previous[b], self.previous[c]];
             let aabb = aabb_of(corners.into_iter().chain(before));
+            self.boxes[leaf as usize] = aabb;
             // No margin: the leaf takes the box as it is. Every leaf exists since `new`.
             let _ = self.tree.update_partially_if_present(aabb, leaf, 0.0);
         }
@@ -201,6 +206,11 @@ impl SurfaceBvh {
     pub(crate) fn star(&self, vertex: u32) -> &[u32] {
         let v = vertex as usize;
         &self.star[self.star_offsets[v] as usize..self.star_offsets[v + 1] as usize]
+    }
+
+    /// Box of each triangle, before the last refit and at present.
+    pub(crate) fn boxes(&self) -> &[Aabb] {
+        &self.boxes
     }
 
     /// The tree. Its leaf `i` is triangle `i`.
