@@ -1,12 +1,13 @@
 //! Proximity queries: the closest point of a surface, and all triangles near a capsule.
 
 use crate::Capsule;
+use crate::broad::BroadPhase;
+use crate::broad::probe::NearSegment;
 use crate::distance::{
     SegmentTriangle, barycentric_point, closest_point_on_triangle, closest_segment_triangle,
 };
-use crate::surface_bvh::{SurfaceBvh, node_bounds};
+use crate::surface_bvh::SurfaceBvh;
 use nalgebra::Vector3;
-use parry3d::partitioning::{BvhLeafCost, TraversalAction};
 
 type V = Vector3<f64>;
 
@@ -39,20 +40,9 @@ pub struct NearTriangle {
     pub distance: f64,
 }
 
-/// A candidate of a leaf, with its squared distance as cost.
-struct Candidate<T> {
-    cost: f32,
-    value: T,
-}
-
-impl<T> BvhLeafCost for Candidate<T> {
-    fn cost(&self) -> f32 {
-        self.cost
-    }
-}
-
 impl SurfaceBvh {
-    /// The point of the surface closest to `p` [m], no farther than `reach` [m].
+    /// The point of the surface closest to `p` [m], no farther than `reach` [m]. Of triangles that are equally
+    /// close it names the first.
     pub fn closest_point(&self, p: V, reach: f64) -> Option<ClosestPoint> {
         self.closest_point_where(p, reach, |_| true)
     }
@@ -64,21 +54,14 @@ impl SurfaceBvh {
         reach: f64,
         accept: impl Fn(u32) -> bool,
     ) -> Option<ClosestPoint> {
-        let limit = square_limit(reach);
-        let found = self.tree().find_best(
-            limit,
-            |node, _| box_distance_squared(&node_bounds(node), [p, p]) as f32,
-            |leaf, _| {
-                if !accept(leaf) {
-                    return None;
-                }
-                let triangle = self.triangle(leaf);
+        let distance = |t: u32| {
+            accept(t).then(|| {
+                let triangle = self.triangle(t);
                 let w = closest_point_on_triangle(p, &triangle);
-                let cost = (barycentric_point(&triangle, w) - p).norm_squared() as f32;
-                Some(Candidate { cost, value: w })
-            },
-        );
-        let (triangle, Candidate { value: w, .. }) = found?;
+                ((barycentric_point(&triangle, w) - p).norm_squared(), w)
+            })
+        };
+        let (triangle, w) = self.nearest([p, p], reach, distance)?;
         let point = barycentric_point(&self.triangle(triangle), w);
         let normal = self.normal_at(triangle, w);
         let distance = (p - point).norm();
@@ -87,37 +70,52 @@ impl SurfaceBvh {
         Some(ClosestPoint { triangle, barycentric: w, point, normal, signed_distance })
     }
 
-    /// The triangle closest to the core of `capsule`, no farther from it than radius + `reach` [m].
+    /// The triangle closest to the core of `capsule`, no farther from it than radius + `reach` [m]. Of triangles
+    /// that are equally close it names the first.
     pub fn closest_triangle(&self, capsule: &Capsule, reach: f64) -> Option<NearTriangle> {
-        let found = self.tree().find_best(
-            square_limit(capsule.radius + reach),
-            |node, _| box_distance_squared(&node_bounds(node), capsule.core) as f32,
-            |leaf, _| {
-                let value = closest_segment_triangle(capsule.core, &self.triangle(leaf));
-                Some(Candidate { cost: value.distance_squared as f32, value })
-            },
-        );
-        let (triangle, Candidate { value: closest, .. }) = found?;
+        let distance = |t: u32| {
+            let closest = closest_segment_triangle(capsule.core, &self.triangle(t));
+            Some((closest.distance_squared, closest))
+        };
+        let (triangle, closest) = self.nearest(capsule.core, capsule.radius + reach, distance)?;
         Some(NearTriangle { triangle, closest, distance: closest.distance_squared.sqrt() })
     }
 
-    /// Visits every triangle no farther from the surface of `capsule` than `reach` [m]. The order is the same
-    /// in every run.
+    /// The triangle with the smallest squared distance [m²] of all within `reach` [m] of a segment, and what was
+    /// found with the distance.
+    fn nearest<T>(
+        &self,
+        core: [V; 2],
+        reach: f64,
+        distance: impl Fn(u32) -> Option<(f64, T)>,
+    ) -> Option<(u32, T)> {
+        // The limit is rounded up, so that what is exactly within reach is found.
+        let limit = (reach * reach * 1.000_001).min(f64::MAX);
+        let mut best: Option<(f64, u32, T)> = None;
+        self.index().search(self.boxes(), &NearSegment::<true>(core), limit, |t, now| {
+            let Some((squared, value)) = distance(t) else { return };
+            let better = best
+                .as_ref()
+                .is_none_or(|(least, first, _)| squared < *least || squared == *least && t < *first);
+            if squared <= limit && better {
+                best = Some((squared, t, value));
+                *now = now.min(squared);
+            }
+        });
+        best.map(|(_, t, value)| (t, value))
+    }
+
+    /// Visits every triangle no farther from the surface of `capsule` than `reach` [m], once each. The order is
+    /// the same in every run.
     pub fn triangles_near(&self, capsule: &Capsule, reach: f64, mut visit: impl FnMut(NearTriangle)) {
         let limit = capsule.radius + reach;
-        let limit_squared = limit * limit;
-        self.tree().traverse(|node| {
-            if box_distance_squared(&node_bounds(node), capsule.core) > limit_squared {
-                return TraversalAction::Prune;
+        let squared = limit * limit;
+        self.index().search(self.boxes(), &NearSegment::<false>(capsule.core), squared, |triangle, _| {
+            let closest = closest_segment_triangle(capsule.core, &self.triangle(triangle));
+            if closest.distance_squared <= squared {
+                let distance = closest.distance_squared.sqrt();
+                visit(NearTriangle { triangle, closest, distance });
             }
-            if let Some(triangle) = node.leaf_data() {
-                let closest = closest_segment_triangle(capsule.core, &self.triangle(triangle));
-                if closest.distance_squared <= limit_squared {
-                    let distance = closest.distance_squared.sqrt();
-                    visit(NearTriangle { triangle, closest, distance });
-                }
-            }
-            TraversalAction::Continue
         });
     }
 
@@ -152,41 +150,22 @@ impl SurfaceBvh {
     }
 
     fn edge_normal(&self, i: u32, j: u32) -> V {
-        self.star(i)
-            .iter()
-            .filter(|&&t| self.corners(t).contains(&j))
-            .filter_map(|&t| unit(self.area_normal(t)))
-            .sum()
+        self.star(i).filter(|&t| self.corners(t).contains(&j)).filter_map(|t| unit(self.area_normal(t))).sum()
     }
 
     /// Normal of a vertex: those of its triangles, weighted by their angles there. Its length says nothing.
     pub fn vertex_normal(&self, v: u32) -> V {
-        let weighted = |&t: &u32| {
+        let weighted = |t: u32| {
             let corners = self.corners(t);
             let at = corners.iter().position(|&c| c == v)?;
             let p = self.triangle(t);
             let (e, f) = (p[(at + 1) % 3] - p[at], p[(at + 2) % 3] - p[at]);
             Some(unit(e.cross(&f))? * e.angle(&f))
         };
-        self.star(v).iter().filter_map(weighted).sum()
+        self.star(v).filter_map(weighted).sum()
     }
 }
 
 fn unit(v: V) -> Option<V> {
     v.try_normalize(f64::MIN_POSITIVE.sqrt())
-}
-
-fn square_limit(reach: f64) -> f32 {
-    ((reach * reach * 1.000_001) as f32).min(f32::MAX)
-}
-
-/// Lower bound of the squared distance between a box and a segment [m²].
-fn box_distance_squared([lower, upper]: &[V; 2], segment: [V; 2]) -> f64 {
-    let (from, to) = (segment[0].inf(&segment[1]), segment[0].sup(&segment[1]));
-    let apart = (lower - to).sup(&(from - upper)).sup(&V::zeros());
-    let middle = (segment[0] + segment[1]) * 0.5;
-    let off = (lower - middle).sup(&(middle - upper)).sup(&V::zeros());
-    let half_length = (segment[1] - segment[0]).norm() * 0.5;
-    let ball = (off.norm() - half_length).max(0.0);
-    apart.norm_squared().max(ball * ball)
 }

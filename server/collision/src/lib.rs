@@ -1,27 +1,31 @@
 //! Broad and narrow phase over deforming surfaces.
 //!
-//! A [`SurfaceBvh`] holds the triangles of one closed surface in a bounding volume hierarchy (that of
-//! parry3d). It is built once per topology and refitted in place whenever the surface moved. It answers three
-//! queries for a rigid tool: the closest point and its side, the triangles near a capsule, and the first
+//! A [`SurfaceBvh`] holds the triangles of one closed surface, arranged by one of the [methods](Method) of
+//! broad phase: a tree of boxes, an octree, a tree of spheres, a spatial hash, or the hierarchy of parry3d. It is refitted in place whenever
+//! the surface moved, and after a cut only the changed triangles are arranged anew. It answers three queries for a
+//! rigid tool: the closest point and its side, the triangles near a capsule, and the first
 //! impact of a moving capsule on the moving surface. Spheres, probes and blades are all capsules: a core
 //! segment and a radius. Two queries serve contact between surfaces: the pairs of triangles that are near each
 //! other, of one surface with itself and of two surfaces.
 //!
-//! The crate knows surfaces and capsules, but no bodies, tissue or forces. Positions are in metres. The tree
-//! stores `f32`, the format in which surfaces arrive. Distances are computed in `f64`, because the lips of a
-//! cut contain triangles so thin that single precision has no normal for them.
+//! The crate knows surfaces and capsules, but no bodies, tissue or forces. Positions are in metres. Boxes are
+//! `f32`, the format in which surfaces arrive. Distances are computed in `f64`, because the lips of a cut contain
+//! triangles so thin that single precision has no normal for them.
 //!
-//! Order of the modules: conversions, distances between two primitives, the tree, proximity queries, impacts, pairs
-//! of triangles.
+//! Order of the modules: conversions, distances between two primitives, methods of broad phase, the surface,
+//! proximity queries, impacts, pairs of triangles.
 
 mod convert;
 mod distance;
+mod broad;
+mod stars;
 mod surface_bvh;
 mod closest;
 mod winding;
 mod sweep;
 mod pairs;
 
+pub use broad::Method;
 pub use closest::{ClosestPoint, NearTriangle};
 pub use distance::{
     SegmentTriangle, barycentric_point, closest_point_on_segment, closest_point_on_triangle,

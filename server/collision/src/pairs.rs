@@ -3,10 +3,10 @@
 //! The boxes of the triangles decide, and these cover the motion of the last refit. A pair that meets anywhere
 //! along straight paths between the two states is therefore always among the pairs, also with margin zero.
 
-use crate::convert::boxes_within;
+use crate::broad::BroadPhase;
+use crate::broad::aabb::{Aabb, round_up};
+use crate::broad::probe::NearBox;
 use crate::surface_bvh::SurfaceBvh;
-use parry3d::bounding_volume::Aabb;
-use parry3d::partitioning::TraversalAction;
 
 impl SurfaceBvh {
     /// Pairs of triangles of this surface whose boxes are no farther apart than `margin` [m] along every axis.
@@ -30,13 +30,12 @@ impl SurfaceBvh {
     /// ```
     pub fn self_pairs(&self, margin: f64, pairs: &mut Vec<[u32; 2]>) {
         pairs.clear();
-        for first in 0..self.triangle_count() as u32 {
-            self.near_box(&self.boxes()[first as usize], margin, |second| {
-                if first < second && !self.share_vertex(first, second) {
-                    pairs.push([first, second]);
-                }
-            });
-        }
+        let boxes = self.boxes();
+        self.index().pairs(boxes, round_up(margin), |a, b| {
+            if !self.share_vertex(a, b) && boxes[a as usize].within_exactly(&boxes[b as usize], margin) {
+                pairs.push([a.min(b), a.max(b)]);
+            }
+        });
         pairs.sort_unstable();
     }
 
@@ -69,7 +68,7 @@ impl SurfaceBvh {
         // The search runs in the larger surface, once per triangle of the smaller one that can reach it.
         let swap = self.triangle_count() > other.triangle_count();
         let (few, many) = if swap { (other, self) } else { (self, other) };
-        few.near_box(&many.tree().root_aabb(), margin, |a| {
+        few.near_box(many.bounding_box(), margin, |a| {
             many.near_box(&few.boxes()[a as usize], margin, |b| {
                 pairs.push(if swap { [b, a] } else { [a, b] });
             });
@@ -79,14 +78,11 @@ impl SurfaceBvh {
 
     /// Visits every triangle whose box is no farther than `margin` [m] from `aabb` along every axis.
     fn near_box(&self, aabb: &Aabb, margin: f64, mut visit: impl FnMut(u32)) {
-        self.tree().traverse(|node| {
-            if !boxes_within(&node.aabb(), aabb, margin) {
-                return TraversalAction::Prune;
-            }
-            if let Some(triangle) = node.leaf_data() {
+        let boxes = self.boxes();
+        self.index().search(boxes, &NearBox(*aabb, round_up(margin)), 0.0, |triangle, _| {
+            if aabb.within_exactly(&boxes[triangle as usize], margin) {
                 visit(triangle);
             }
-            TraversalAction::Continue
         });
     }
 

@@ -1,9 +1,11 @@
-//! The tree over the triangles of one surface: built once per topology, refitted after every motion.
+//! The triangles of one surface, arranged for queries: refitted after every motion, and changed where a cut
+//! changed them.
 
-use crate::convert::{aabb_of, from_parry, widen};
+use crate::broad::aabb::{Aabb, lower, upper};
+use crate::broad::{BroadPhase, Index, Method, WORN};
+use crate::convert::widen;
+use crate::stars::Stars;
 use nalgebra::Vector3;
-use parry3d::bounding_volume::Aabb;
-use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
 /// Why a surface was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -23,8 +25,8 @@ pub enum SurfaceError {
     },
     /// A refit has another number of vertices, so the topology has changed.
     #[error(
-        "refit with {found} vertices on a surface of {expected}; after a change of topology build \
-         a new tree"
+        "refit with {found} vertices on a surface of {expected}; give \
+         the triangles too after a change of topology"
     )]
     VertexCount {
         /// Vertices given.
@@ -34,11 +36,11 @@ pub enum SurfaceError {
     },
 }
 
-/// Bounding volume hierarchy over the triangles of one closed surface.
+/// The triangles of one closed surface, arranged by a [method of broad phase](Method).
 ///
-/// It holds the surface twice: before the last [`refit`](Self::refit) and at present. Every leaf box covers
-/// both, so the same tree serves swept queries on the motion in between. Triangles are counter-clockwise seen
-/// from outside.
+/// It holds the surface twice: before the last [`refit`](Self::refit) and at present. The box of every triangle
+/// covers both, so the same arrangement serves swept queries on the motion in between. Triangles are
+/// counter-clockwise seen from outside.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -66,57 +68,69 @@ pub struct SurfaceBvh {
     triangles: Vec<[u32; 3]>,
     positions: Vec<[f32; 3]>,
     previous: Vec<[f32; 3]>,
-    star_offsets: Vec<u32>,
-    star: Vec<u32>,
-    /// Box of each triangle, before the last refit and at present.
+    stars: Stars,
+    /// Box of each vertex and of each triangle, before the last refit and at present.
+    paths: Vec<Aabb>,
     boxes: Vec<Aabb>,
-    tree: Bvh,
-    /// Leaves in the order of the tree's memory. Refitting in this order is fast, since it walks the memory
-    /// forward.
-    order: Vec<u32>,
+    bounds: Aabb,
+    index: Index,
+    /// Triangles of the last change of topology.
+    removed: Vec<u32>,
+    inserted: Vec<u32>,
     kept_vertices: u64,
+    rebuilds: u64,
 }
 
+/// A surface of which more than one triangle in this number changed is arranged anew.
+const REBUILT_SHARE: usize = 4;
+
 impl SurfaceBvh {
-    /// Builds the tree. `positions` are in metres; a non-finite one is replaced by the origin and counted.
+    /// Arranges a surface by the default method. `positions` are in metres; a non-finite one is replaced by the
+    /// origin and counted.
     ///
     /// # Errors
     /// If a triangle names a vertex that does not exist.
     pub fn new(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<Self, SurfaceError> {
-        for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= positions.len()) {
-                let vertices = positions.len();
-                return Err(SurfaceError::VertexOutOfRange { triangle, vertex, vertices });
-            }
-        }
-        let mut kept_vertices = 0;
-        let mut positions = positions.to_vec();
-        for p in &mut positions {
-            if !p.iter().all(|x| x.is_finite()) {
-                *p = [0.0; 3];
-                kept_vertices += 1;
-            }
-        }
-        let boxes: Vec<_> = triangles.iter().map(|t| aabb_of(t.map(|v| positions[v as usize]))).collect();
-        let (star_offsets, star) = stars(positions.len(), triangles);
-        let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-        let order = tree.leaves(|_| true).collect();
-        Ok(Self {
-            triangles: triangles.to_vec(),
-            previous: positions.clone(),
-            positions,
-            star_offsets,
-            star,
-            boxes,
-            tree,
-            order,
-            kept_vertices,
-        })
+        Self::with_method(Method::default(), positions, triangles)
     }
 
-    /// Moves the surface to `positions` [m] and refits the tree in place. The positions so far become the
+    /// Like [`new`](Self::new), with a method of choice. Queries give the same results with every method.
+    ///
+    /// # Errors
+    /// If a triangle names a vertex that does not exist.
+    pub fn with_method(
+        method: Method,
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+    ) -> Result<Self, SurfaceError> {
+        check(positions.len(), triangles)?;
+        let mut surface = Self {
+            triangles: triangles.to_vec(),
+            previous: Vec::new(),
+            positions: positions.to_vec(),
+            stars: Stars::new(positions.len(), triangles),
+            paths: Vec::new(),
+            boxes: Vec::new(),
+            bounds: Aabb::EMPTY,
+            index: Index::new(method, &[]),
+            removed: Vec::new(),
+            inserted: Vec::new(),
+            kept_vertices: 0,
+            rebuilds: 0,
+        };
+        surface.keep_finite();
+        surface.previous.clone_from(&surface.positions);
+        surface.update_boxes();
+        surface.index.rebuild(&surface.boxes);
+        Ok(surface)
+    }
+
+    /// Moves the surface to `positions` [m] and refits it in place. The positions so far become the
     /// [previous](Self::previous_triangle) ones. A non-finite vertex keeps its position and is counted. The
     /// cost is linear in the number of triangles, without allocation.
+    ///
+    /// A surface that has deformed so much that queries take far longer is arranged anew, which takes as long
+    /// as some ten refits.
     ///
     /// # Errors
     /// If the number of vertices changed. The surface is not changed then.
@@ -134,23 +148,137 @@ impl SurfaceBvh {
         Ok(())
     }
 
+    /// Takes over a changed topology, as after a cut, at the given positions [m]. It forgets the last motion. A
+    /// non-finite position is replaced by the origin and counted. Returns the number of triangles that changed.
+    ///
+    /// Triangles are compared by their number, so those that a cut did not touch should keep it. What did not
+    /// change is only refitted. If more than a quarter changed, the surface is arranged anew.
+    ///
+    /// # Errors
+    /// If a triangle names a vertex that does not exist. The surface is not changed then.
+    ///
+    /// ```
+    /// use scindo_collision::SurfaceBvh;
+    ///
+    /// let mut positions = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    /// let mut triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    /// let mut surface = SurfaceBvh::new(&positions, &triangles)?;
+    ///
+    /// // The last triangle is divided into three.
+    /// positions.push([0.4, 0.4, 0.4]);
+    /// triangles[3] = [1, 2, 4];
+    /// triangles.extend([[2, 3, 4], [3, 1, 4]]);
+    /// assert_eq!(surface.change_topology(&positions, &triangles)?, 3);
+    /// assert_eq!(surface.triangle_count(), 6);
+    /// # Ok::<(), scindo_collision::SurfaceError>(())
+    /// ```
+    pub fn change_topology(
+        &mut self,
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+    ) -> Result<usize, SurfaceError> {
+        check(positions.len(), triangles)?;
+        let (before, now) = (self.triangles.len(), triangles.len());
+        let both = before.min(now);
+        let differs = |t: &u32| self.triangles[*t as usize] != triangles[*t as usize];
+        self.inserted.clear();
+        self.inserted.extend((0..both as u32).filter(differs));
+        self.removed.clone_from(&self.inserted);
+        self.removed.extend(both as u32..before as u32);
+        self.inserted.extend(both as u32..now as u32);
+        let changed = self.inserted.len().max(self.removed.len());
+        let anew = changed * REBUILT_SHARE > now;
+
+        self.positions.clear();
+        self.positions.extend_from_slice(positions);
+        self.keep_finite();
+        self.previous.clone_from(&self.positions);
+        if anew {
+            self.triangles.clear();
+            self.triangles.extend_from_slice(triangles);
+            self.stars = Stars::new(positions.len(), triangles);
+            self.update_boxes();
+            self.rebuild();
+            return Ok(changed);
+        }
+        for &t in &self.removed {
+            self.stars.remove(t, self.triangles[t as usize]);
+        }
+        self.stars.resize(positions.len(), now);
+        self.triangles.resize(now, [0; 3]);
+        for &t in &self.inserted {
+            self.triangles[t as usize] = triangles[t as usize];
+            self.stars.insert(t, triangles[t as usize]);
+        }
+        self.update_boxes();
+        self.index.replace(&self.removed, &self.inserted, &self.boxes);
+        self.refit_index();
+        Ok(changed)
+    }
+
     /// Forgets the last motion, e.g. after a reset: swept queries see a surface at rest.
     pub fn forget_motion(&mut self) {
         self.previous.copy_from_slice(&self.positions);
         self.refit_boxes();
     }
 
+    /// Arranges the surface anew, in the memory that it has.
+    pub fn rebuild(&mut self) {
+        self.index.rebuild(&self.boxes);
+        self.rebuilds += 1;
+    }
+
     fn refit_boxes(&mut self) {
-        for &leaf in &self.order {
-            let [a, b, c] = self.triangles[leaf as usize].map(|v| v as usize);
-            let corners = [self.positions[a], self.positions[b], self.positions[c]];
-            let before = [self.previous[a], self.previous[b], self.previous[c]];
-            let aabb = aabb_of(corners.into_iter().chain(before));
-            self.boxes[leaf as usize] = aabb;
-            // No margin: the leaf takes the box as it is. Every leaf exists since `new`.
-            let _ = self.tree.update_partially_if_present(aabb, leaf, 0.0);
+        self.update_boxes();
+        self.refit_index();
+    }
+
+    fn refit_index(&mut self) {
+        self.index.refit(&self.boxes);
+        if self.index.quality() > WORN {
+            self.rebuild();
         }
-        self.tree.refit_without_opt();
+    }
+
+    /// Replaces vertices that are not finite by the origin.
+    fn keep_finite(&mut self) {
+        for p in &mut self.positions {
+            if !p.iter().all(|x| x.is_finite()) {
+                *p = [0.0; 3];
+                self.kept_vertices += 1;
+            }
+        }
+    }
+
+    /// Boxes of vertices and triangles, before the last refit and at present.
+    fn update_boxes(&mut self) {
+        let path = |(&a, &b): (&[f32; 3], &[f32; 3])| Aabb { min: lower(a, b), max: upper(a, b) };
+        self.paths.clear();
+        self.paths.extend(self.positions.iter().zip(&self.previous).map(path));
+        self.boxes.clear();
+        let paths = &self.paths;
+        self.boxes.extend(self.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(|v| &paths[v as usize]);
+            a.merged(b).merged(c)
+        }));
+        self.bounds = self.boxes.iter().fold(Aabb::EMPTY, |sum, aabb| sum.merged(aabb));
+    }
+
+    /// The method of broad phase.
+    pub fn method(&self) -> Method {
+        self.index.method()
+    }
+
+    /// How much more work a query takes than on a fresh arrangement, as far as bounding volumes tell: the areas
+    /// of all volumes over those of the triangles' boxes, compared to the same after the last build. Above 1.5 the surface
+    /// is arranged anew. Always 1 for the spatial hash.
+    pub fn quality(&self) -> f64 {
+        self.index.quality()
+    }
+
+    /// How often the surface was arranged anew since it was made.
+    pub fn rebuilds(&self) -> u64 {
+        self.rebuilds
     }
 
     /// Number of triangles.
@@ -191,10 +319,7 @@ impl SurfaceBvh {
     /// Lower and upper corner of a box around the surface, at present and before the last refit [m]; `None`
     /// without triangles.
     pub fn bounds(&self) -> Option<[Vector3<f64>; 2]> {
-        (!self.triangles.is_empty()).then(|| {
-            let aabb = self.tree.root_aabb();
-            [from_parry(aabb.mins), from_parry(aabb.maxs)]
-        })
+        (!self.triangles.is_empty()).then(|| self.bounds.corners())
     }
 
     /// Number of non-finite vertex positions refused so far.
@@ -202,10 +327,9 @@ impl SurfaceBvh {
         self.kept_vertices
     }
 
-    /// Triangles around vertex `vertex`.
-    pub(crate) fn star(&self, vertex: u32) -> &[u32] {
-        let v = vertex as usize;
-        &self.star[self.star_offsets[v] as usize..self.star_offsets[v + 1] as usize]
+    /// Triangles around vertex `vertex`, ascending.
+    pub(crate) fn star(&self, vertex: u32) -> impl Iterator<Item = u32> {
+        self.stars.around(vertex)
     }
 
     /// Box of each triangle, before the last refit and at present.
@@ -213,33 +337,23 @@ impl SurfaceBvh {
         &self.boxes
     }
 
-    /// The tree. Its leaf `i` is triangle `i`.
-    pub(crate) fn tree(&self) -> &Bvh {
-        &self.tree
+    /// Box around all triangles, before the last refit and at present.
+    pub(crate) fn bounding_box(&self) -> &Aabb {
+        &self.bounds
+    }
+
+    /// The arrangement of the [boxes](Self::boxes).
+    pub(crate) fn index(&self) -> &Index {
+        &self.index
     }
 }
 
-/// Lower and upper corner of a node [m].
-pub(crate) fn node_bounds(node: &BvhNode) -> [Vector3<f64>; 2] {
-    [from_parry(node.mins()), from_parry(node.maxs())]
-}
-
-/// Triangles around each vertex, in compressed rows.
-fn stars(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
-    let mut offsets = vec![0u32; vertices + 1];
-    for &v in triangles.iter().flatten() {
-        offsets[v as usize + 1] += 1;
-    }
-    for i in 0..vertices {
-        offsets[i + 1] += offsets[i];
-    }
-    let mut next = offsets.clone();
-    let mut star = vec![0; triangles.len() * 3];
-    for (t, corners) in (0u32..).zip(triangles) {
-        for &v in corners {
-            star[next[v as usize] as usize] = t;
-            next[v as usize] += 1;
+/// Whether all triangles name vertices that exist.
+fn check(vertices: usize, triangles: &[[u32; 3]]) -> Result<(), SurfaceError> {
+    for (triangle, corners) in triangles.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
+            return Err(SurfaceError::VertexOutOfRange { triangle, vertex, vertices });
         }
     }
-    (offsets, star)
+    Ok(())
 }

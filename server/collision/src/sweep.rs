@@ -10,10 +10,13 @@
 //! directional speed bound as in Zhang et al., Continuous collision detection for articulated
 //! models using Taylor models and temporal culling (2007).
 
+use crate::broad::BroadPhase;
+use crate::broad::aabb::Aabb;
+use crate::broad::ball::Ball;
+use crate::broad::probe::Probe;
 use crate::distance::{SegmentTriangle, closest_segment_triangle};
-use crate::surface_bvh::{SurfaceBvh, node_bounds};
+use crate::surface_bvh::SurfaceBvh;
 use nalgebra::Vector3;
-use parry3d::partitioning::TraversalAction;
 
 type V = Vector3<f64>;
 
@@ -105,26 +108,20 @@ impl SurfaceBvh {
         motion: &CapsuleMotion,
         triangle_motion: impl Fn(u32) -> TriangleMotion,
     ) -> Option<Impact> {
-        let path = Path::of(motion);
         let mut first: Option<Impact> = None;
-        self.tree().traverse(|node| {
-            let limit = first.map_or(1.0, |impact| impact.time);
-            if !path.meets(&node_bounds(node), limit) {
-                return TraversalAction::Prune;
+        self.index().search(self.boxes(), &Path::of(motion), 1.0, |triangle, limit| {
+            let Some(found) = impact(motion, triangle, &triangle_motion(triangle), *limit) else { return };
+            let earlier = |best: &Impact| (found.time, triangle) < (best.time, best.triangle);
+            if first.as_ref().is_none_or(earlier) {
+                *limit = limit.min(found.time);
+                first = Some(found);
             }
-            if let Some(triangle) = node.leaf_data()
-                && let Some(impact) = impact(motion, triangle, &triangle_motion(triangle), limit)
-                && first.is_none_or(|earlier| impact.time < earlier.time)
-            {
-                first = Some(impact);
-            }
-            TraversalAction::Continue
         });
         first
     }
 }
 
-/// A box around the capsule that moves along a line. The tree is searched with it.
+/// A box around the capsule that moves along a line. The triangles are searched with it.
 struct Path {
     from: V,
     along: V,
@@ -142,16 +139,21 @@ impl Path {
             half: half(motion.start).sup(&half(motion.end)) + margin,
         }
     }
+}
 
-    /// Whether the box touches `bounds` before time `limit`.
-    fn meets(&self, [lower, upper]: &[V; 2], limit: f64) -> bool {
-        let (mut enter, mut leave) = (0.0f64, limit);
+impl Probe for Path {
+    const NEAREST: bool = true;
+
+    /// Time at which the moving box touches `aabb`.
+    fn to_box(&self, aabb: &Aabb) -> f64 {
+        let [lower, upper] = aabb.corners();
+        let (mut enter, mut leave) = (0.0f64, 1.0f64);
         for axis in 0..3 {
             let (low, high) = (lower[axis] - self.half[axis], upper[axis] + self.half[axis]);
             let (x, v) = (self.from[axis], self.along[axis]);
             if v == 0.0 {
                 if x < low || x > high {
-                    return false;
+                    return f64::INFINITY;
                 }
                 continue;
             }
@@ -159,7 +161,20 @@ impl Path {
             enter = enter.max(t0.min(t1));
             leave = leave.min(t0.max(t1));
         }
-        enter <= leave
+        if enter <= leave { enter } else { f64::INFINITY }
+    }
+
+    fn to_ball(&self, ball: &Ball) -> f64 {
+        self.to_box(&ball.aabb())
+    }
+
+    fn region(&self, limit: f64) -> [V; 2] {
+        let to = self.from + self.along * limit.min(1.0);
+        [self.from.inf(&to) - self.half, self.from.sup(&to) + self.half]
+    }
+
+    fn limit_at(&self, distance: f64) -> f64 {
+        distance / self.along.norm()
     }
 }
 

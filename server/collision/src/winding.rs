@@ -1,13 +1,11 @@
 //! Inside or outside, from the signed crossings along a ray.
 
-use crate::surface_bvh::{SurfaceBvh, node_bounds};
+use crate::broad::BroadPhase;
+use crate::broad::probe::RayAlongX;
+use crate::surface_bvh::SurfaceBvh;
 use nalgebra::Vector3;
-use parry3d::partitioning::TraversalAction;
 
 type V = Vector3<f64>;
-
-/// The ray runs along +x, so the plane across it is (y, z) without any rotation.
-const ALONG: usize = 0;
 
 impl SurfaceBvh {
     /// Whether `p` [m] lies inside the body enclosed by the surface.
@@ -18,16 +16,9 @@ impl SurfaceBvh {
     /// one of its two triangles.
     pub fn contains(&self, p: V) -> bool {
         let mut winding = 0i32;
-        self.tree().traverse(|node| {
-            let [lower, upper] = node_bounds(node);
-            let beside = (0..3).any(|axis| axis != ALONG && (p[axis] < lower[axis] || p[axis] > upper[axis]));
-            if beside || p[ALONG] > upper[ALONG] {
-                return TraversalAction::Prune;
-            }
-            if let Some(triangle) = node.leaf_data() {
-                winding += self.crossing(p, triangle);
-            }
-            TraversalAction::Continue
+        // The ray runs along +x, so the plane across it is (y, z) without any rotation.
+        self.index().search(self.boxes(), &RayAlongX(p), 0.0, |triangle, _| {
+            winding += self.crossing(p, triangle);
         });
         winding > 0
     }
