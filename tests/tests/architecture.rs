@@ -10,7 +10,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("scindo-physics", BTreeSet::new()),
         ("scindo-collision", BTreeSet::new()),
         ("scindo-world", BTreeSet::from(["scindo-physics", "scindo-collision"])),
-        ("scindo-study", BTreeSet::from(["scindo-world", "scindo-physics"])),
+        ("scindo-study", BTreeSet::from(["scindo-world", "scindo-physics", "scindo-collision"])),
         (
             "scindo",
             BTreeSet::from(["scindo-world", "scindo-study", "scindo-proto", "scindo-view", "scindo-program"]),

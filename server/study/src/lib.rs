@@ -39,9 +39,9 @@ pub mod page;
 
 pub mod study;
 
-// Measurements of octree cells and multigrid.
+// Measurements of parts of the program: octree cells, multigrid, collision.
 #[allow(non_snake_case)] // the symbols of the field: A, X, K
-pub mod cells;
+pub mod experiment;
 
 // The other study: what breaks codes that deform and cut.
 #[allow(non_snake_case)] // the symbols of the field: X, K, M

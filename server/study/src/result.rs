@@ -6,9 +6,9 @@ use crate::advice::recommend::Recommendation;
 use crate::advice::sources::Sources;
 use crate::bench::store::Origin;
 use crate::case::Case;
-use crate::cells::CellsResult;
 use crate::design::Configuration;
 use crate::distance::Errors;
+use crate::experiment::ExperimentResult;
 use crate::reference::Reference;
 use crate::trial::Trial;
 
@@ -59,7 +59,7 @@ pub struct StudyResult {
     /// One result per case.
     pub cases: Vec<CaseResult>,
     /// One result per experiment.
-    pub cells: Vec<CellsResult>,
+    pub experiments: Vec<ExperimentResult>,
     /// Build and machine of the study.
     pub origin: Origin,
     /// Number of points taken over from an earlier study.
@@ -93,8 +93,8 @@ impl StudyResult {
     /// Whether every case gave at least one result, and every experiment was made.
     pub fn has_results(&self) -> bool {
         let counts = self.cases.iter().map(CaseResult::counts);
-        let made = self.cells.iter().all(|result| result.trouble.is_none());
-        let any = !self.cases.is_empty() || !self.cells.is_empty();
+        let made = self.experiments.iter().all(|result| result.trouble.is_none());
+        let any = !self.cases.is_empty() || !self.experiments.is_empty();
         any && made && counts.into_iter().all(|counts| counts.points > counts.failures)
     }
 }

@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
+use scindo_collision::Method;
 
 pub use crate::body::SurfaceTopology;
 use crate::body::{AdaptCounts, StepCounts};
@@ -50,6 +51,8 @@ pub struct Snapshot {
     pub step: u64,
     /// Simulated time [s].
     pub time_s: f64,
+    /// How the triangles of surfaces are to be arranged.
+    pub broad_phase: Method,
     /// Bodies in the order of the scene.
     pub bodies: Vec<BodySnapshot>,
     /// Tools of the scene, then those brought by clients.

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use scindo_study::cells::CellsResult;
 use scindo_study::design::axes::Factor;
-use scindo_study::words::{percent, short};
+use scindo_study::experiment::ExperimentResult;
+use scindo_study::words::percent;
 use scindo_study::{CaseResult, Settings, StudyResult};
 use serde_json::json;
 
@@ -115,7 +115,7 @@ fn print(args: &AccuracyArgs, study: &StudyResult) {
     for result in &study.cases {
         print_case(result);
     }
-    study.cells.iter().for_each(print_experiment);
+    study.experiments.iter().for_each(print_experiment);
     let directory = args.out.display();
     let how = if study.interrupted { "interrupted; the same command resumes from here" } else { "done" };
     say!("{how}: {:.0} s, {} runs reused", study.seconds, study.resumed);
@@ -161,7 +161,7 @@ fn print_case(result: &CaseResult) {
     }
 }
 
-fn print_experiment(result: &CellsResult) {
+fn print_experiment(result: &ExperimentResult) {
     say!("{}", result.title);
     if let Some(trouble) = &result.trouble {
         say!("  no result: {trouble}");
@@ -173,8 +173,9 @@ fn print_experiment(result: &CellsResult) {
         say!("  {}", table.title);
         for row in &table.rows {
             let values = table.columns.iter().zip(&row.values);
-            let words =
-                values.filter_map(|(column, value)| Some(format!("{} {}", column.name, short((*value)?))));
+            let words = values.filter_map(|(column, value)| {
+                Some(format!("{} {}", column.name, column.unit.show((*value)?)))
+            });
             say!("    {:36} {}", row.name, words.collect::<Vec<_>>().join(", "));
         }
     }
@@ -201,6 +202,6 @@ fn as_json(args: &AccuracyArgs, study: &StudyResult) -> serde_json::Value {
         "seconds": study.seconds,
         "interrupted": study.interrupted,
         "cases": study.cases.iter().map(case).collect::<Vec<_>>(),
-        "experiments": study.cells.iter().map(CellsResult::to_json).collect::<Vec<_>>(),
+        "experiments": study.experiments.iter().map(ExperimentResult::to_json).collect::<Vec<_>>(),
     })
 }

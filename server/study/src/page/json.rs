@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::cells::CellsResult;
 use crate::design::axes::Factor;
+use crate::experiment::ExperimentResult;
 use crate::result::{CaseResult, Outcome, StudyResult};
 
 /// Contents of `study.json`.
@@ -15,7 +15,7 @@ pub fn study(study: &StudyResult) -> Value {
         "interrupted": study.interrupted,
         "resumed_runs": study.resumed,
         "cases": study.cases.iter().map(case).collect::<Vec<_>>(),
-        "experiments": study.cells.iter().map(CellsResult::to_json).collect::<Vec<_>>(),
+        "experiments": study.experiments.iter().map(ExperimentResult::to_json).collect::<Vec<_>>(),
     })
 }
 

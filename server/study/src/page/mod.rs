@@ -5,7 +5,7 @@ pub(crate) mod html;
 
 mod case;
 
-mod cells;
+mod experiment;
 
 mod json;
 
@@ -60,8 +60,8 @@ fn html(study: &StudyResult) -> String {
     for result in &study.cases {
         out += &case::section(result);
     }
-    for result in &study.cells {
-        out += &cells::section(result);
+    for result in &study.experiments {
+        out += &experiment::section(result);
     }
     out += &text::method(study);
     out += "</main>\n</body>\n</html>\n";

@@ -14,9 +14,9 @@ use crate::bench::Bench;
 use crate::bench::progress::Progress;
 use crate::bench::store::{Origin, Store};
 use crate::case::{self, Case, Wishes};
-use crate::cells::{self, CellsBench};
 use crate::design::axes::{Factor, block};
 use crate::design::narrow;
+use crate::experiment::{self, ExperimentBench};
 use crate::page::table::Table;
 use crate::result::StudyResult;
 use crate::settings::{SCENE_S, Settings};
@@ -28,7 +28,7 @@ pub enum StudyError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A name is neither a case nor a file.
-    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting; experiments: {}; groups of them: dick, cells (all)", case::NAMES.join(", "), cells::NAMES.join(", "))]
+    #[error("`{name}` is neither a scene file nor a case; cases: {}; groups of them: bar, cutting; experiments: {}; groups of them: dick, cells", case::NAMES.join(", "), experiment::NAMES.join(", "))]
     UnknownCase {
         /// The name that was given.
         name: String,
@@ -113,7 +113,7 @@ pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<Study
     let resumed = bench.store.resumed;
     let mut result = StudyResult {
         cases: Vec::new(),
-        cells: Vec::new(),
+        experiments: Vec::new(),
         origin,
         resumed,
         seconds: 0.0,
@@ -143,7 +143,9 @@ pub fn run(settings: &Settings, tell: &mut dyn FnMut(&Progress)) -> Result<Study
             result.interrupted = true;
             break;
         }
-        result.cells.push(cells::study(name, &mut CellsBench::new(name, settings, &mut *tell)));
+        result
+            .experiments
+            .push(experiment::study(name, &mut ExperimentBench::new(name, settings, &mut *tell)));
         result.seconds = started.elapsed().as_secs_f64();
         result.load[1] = load();
         result.interrupted = settings.stop.load(Ordering::Relaxed);
@@ -194,10 +196,10 @@ fn open(settings: &Settings) -> Result<Vec<Case>, StudyError> {
 
 /// The experiments that a name stands for: one, a group, or none if it is a case or a scene.
 fn experiment(name: &str) -> &'static [&'static str] {
-    match cells::NAMES.iter().position(|known| *known == name) {
-        Some(i) => &cells::NAMES[i..=i],
-        None if name == "cells" => &cells::NAMES,
-        None if name == "dick" => &cells::NAMES[..cells::PAPERS],
+    match experiment::NAMES.iter().position(|known| *known == name) {
+        Some(i) => &experiment::NAMES[i..=i],
+        None if name == "cells" => &experiment::NAMES[..experiment::CELLS],
+        None if name == "dick" => &experiment::NAMES[..experiment::PAPERS],
         None => &[],
     }
 }

@@ -22,7 +22,7 @@ pub mod rest;
 pub mod pairs;
 
 use nalgebra::Vector3;
-use scindo_collision::SurfaceError;
+use scindo_collision::{Method, SurfaceError};
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::Surface;
 use scindo_physics::element::MaterialPoint;
@@ -69,6 +69,7 @@ struct Sums {
 /// All contacts between tools and bodies in a step.
 #[derive(Debug, Clone, Default)]
 pub struct Contacts {
+    broad_phase: Method,
     surfaces: Vec<ContactSurface>,
     bodies: Vec<BodyContacts>,
     /// One hand per tool, in the order of the tools.
@@ -81,6 +82,11 @@ pub struct Contacts {
 }
 
 impl Contacts {
+    /// Contacts without bodies, which find triangles by `broad_phase`.
+    pub fn new(broad_phase: Method) -> Self {
+        Self { broad_phase, ..Self::default() }
+    }
+
     /// Lets bodies touch each other, themselves, or both.
     pub fn set_touch(&mut self, touch: Option<TouchSettings>) {
         self.touch = touch;
@@ -150,7 +156,7 @@ impl Contacts {
     /// Registers the next body, in the order of the scene. `young_pa` is its Young's modulus [Pa], and `on`
     /// whether tools touch it.
     pub fn add_body(&mut self, young_pa: f64, on: bool) {
-        let mut surface = ContactSurface::default();
+        let mut surface = ContactSurface::new(self.broad_phase);
         surface.switch(on);
         self.surfaces.push(surface);
         self.bodies.push(BodyContacts {

@@ -1,13 +1,14 @@
-//! The surface of one body for contact: one tree per topology, refitted after every motion.
+//! The surface of one body for contact: refitted after every motion, and changed where a cut changed it.
 
 use nalgebra::Vector3;
-use scindo_collision::{SurfaceBvh, SurfaceError};
+use scindo_collision::{Method, SurfaceBvh, SurfaceError};
 use scindo_physics::cut::Surface;
 
 /// The surface of one body. It is empty until its first update.
 #[derive(Debug, Clone, Default)]
 pub struct ContactSurface {
     tree: Option<SurfaceBvh>,
+    method: Method,
     epoch: u32,
     off: bool,
     /// Per triangle the incision it is a lip of, and per vertex its area [m²]; only where bodies touch bodies.
@@ -16,8 +17,20 @@ pub struct ContactSurface {
 }
 
 impl ContactSurface {
-    /// Moves the surface to `positions` [m]. It refits in place within an epoch, and builds a new tree when
-    /// the epoch differs. Returns whether it built one.
+    /// An empty surface whose triangles are to be arranged by `method`.
+    pub fn new(method: Method) -> Self {
+        Self { method, ..Self::default() }
+    }
+
+    /// Arranges the triangles by another method from the next update on.
+    pub fn arrange_by(&mut self, method: Method) {
+        if self.method != method {
+            (self.method, self.tree) = (method, None);
+        }
+    }
+
+    /// Moves the surface to `positions` [m]. It refits in place within an epoch, and takes over the triangles
+    /// when the epoch differs. Returns whether it did that.
     ///
     /// # Errors
     /// If triangles and positions do not belong together. The surface is not changed then.
@@ -29,8 +42,13 @@ impl ContactSurface {
     ) -> Result<bool, SurfaceError> {
         match &mut self.tree {
             Some(tree) if self.epoch == epoch => tree.refit(positions).map(|()| false),
-            _ => {
-                self.tree = Some(SurfaceBvh::new(positions, triangles)?);
+            Some(tree) => {
+                tree.change_topology(positions, triangles)?;
+                self.epoch = epoch;
+                Ok(true)
+            }
+            None => {
+                self.tree = Some(SurfaceBvh::with_method(self.method, positions, triangles)?);
                 self.epoch = epoch;
                 Ok(true)
             }

@@ -11,6 +11,7 @@ mod octree;
 use std::collections::BTreeSet;
 
 use nalgebra::{Unit, Vector3};
+use scindo_collision::Method;
 
 use crate::inputs::{MAX_OBSTACLES, MAX_TOOLS, ToolMode, ToolShape};
 use crate::mesh_in::Organ;
@@ -74,6 +75,7 @@ impl Check<'_> {
             gravity_m_s2: Vector3::from(raw.world.gravity_m_s2),
             step_s: raw.world.step_s,
             body_contact: [raw.world.contact.friction, raw.world.contact.stiffness],
+            broad_phase: broad_phase(raw.world.contact.broad_phase),
             bodies,
             obstacles: raw.obstacle.iter().map(|obstacle| self.obstacle(obstacle)).collect(),
             cuts: raw.cut.iter().enumerate().map(|(i, cut)| self.cut(i, cut)).collect(),
@@ -457,6 +459,16 @@ fn geometry(shape: &RawShape) -> ToolShape {
             let (radius_m, length_m) = capsule.as_ref().map_or((0.0, 0.0), |c| (c.radius_m, c.length_m));
             ToolShape::Capsule { radius_m, length_m }
         }
+    }
+}
+
+fn broad_phase(method: RawBroadPhase) -> Method {
+    match method {
+        RawBroadPhase::AabbTree => Method::AabbTree,
+        RawBroadPhase::Octree => Method::Octree,
+        RawBroadPhase::SphereTree => Method::SphereTree,
+        RawBroadPhase::SpatialHash => Method::SpatialHash,
+        RawBroadPhase::ParryBvh => Method::ParryBvh,
     }
 }
 

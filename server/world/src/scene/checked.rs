@@ -1,6 +1,7 @@
 //! A scene as ready objects: names resolved to indices, words to types, lists to vectors.
 
 use nalgebra::{Unit, Vector3};
+use scindo_collision::Method;
 use scindo_physics::octree::AdaptSettings;
 
 use super::mechanics::Mechanics;
@@ -20,6 +21,8 @@ pub struct CheckedScene {
     pub step_s: f64,
     /// Friction μ of bodies on bodies, and stiffness of their contact in multiples of E/h.
     pub body_contact: [f64; 2],
+    /// How the triangles of surfaces are arranged.
+    pub broad_phase: Method,
     /// Soft bodies.
     pub bodies: Vec<BodySpec>,
     /// Rigid things that stand still.

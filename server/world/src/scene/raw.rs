@@ -5,6 +5,8 @@
 //! cannot drift apart. Ranges stand beside the keys as JSON Schema keywords; `x-next` says what
 //! to do when a value lies outside. Every unit is SI and stands in the key.
 
+mod contact;
+
 mod look;
 
 mod mechanics;
@@ -13,6 +15,7 @@ mod obstacle;
 
 mod octree;
 
+pub use contact::*;
 pub use look::*;
 pub use mechanics::*;
 pub use obstacle::*;
@@ -84,26 +87,9 @@ pub struct RawWorld {
     /// Simulated time per step [s].
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0, "x-next" = "0.005 to 0.04 suits real time"))]
     pub step_s: f64,
-    /// Contact of bodies with each other and with themselves, where `effects` asks for it.
+    /// Contact of bodies with each other and with themselves, where `effects` asks for it, and how contact is
+    /// detected.
     pub contact: RawBodyContact,
-}
-
-/// Contact of bodies with each other and with themselves.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RawBodyContact {
-    /// Coefficient of dry friction.
-    #[schemars(range(min = 0.0, max = 10.0), extend("x-next" = "moist tissue on tissue has about 0.1"))]
-    pub friction: f64,
-    /// Stiffness, in multiples of Young's modulus over the size of an element.
-    #[schemars(range(min = 0.1, max = 1000.0), extend("x-next" = "2 to 20; what is stiffer sinks in less"))]
-    pub stiffness: f64,
-}
-
-impl Default for RawBodyContact {
-    fn default() -> Self {
-        Self { friction: 0.1, stiffness: 10.0 }
-    }
 }
 
 impl Default for RawWorld {

@@ -147,7 +147,7 @@ impl Simulation {
         let sizes: Vec<BodySize> = built.bodies.iter().map(SimBody::size).collect();
         let plan = Plan::new(&scene, &sizes);
         settle(&mut scene, &built.bodies);
-        let mut contacts = Contacts::default();
+        let mut contacts = Contacts::new(scene.broad_phase);
         for body in &scene.bodies {
             contacts.add_body(body.young_pa, scene.effects.contact != Some(false));
         }
@@ -348,6 +348,7 @@ impl Simulation {
     /// Fills a snapshot of the present state: surfaces only as `wants` says.
     pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
         (snapshot.step, snapshot.time_s) = (self.steps, self.time_s());
+        snapshot.broad_phase = self.scene.broad_phase;
         let Self { bodies, report, tools, contacts, probes, .. } = self;
         Sources { bodies, report, tools, contacts, probes }.fill(wants, snapshot);
     }

@@ -8,9 +8,9 @@ use scindo_physics::octree::{At, CutLink, Octree, OctreeSpace};
 use scindo_physics::space::Space;
 
 use super::support::{V, plane};
-use crate::cells::model::{Grid, cube};
-use crate::cells::solve::{Solver, Until, decay, rate, run};
-use crate::cells::system::{MATERIAL, Problem, System};
+use crate::experiment::model::{Grid, cube};
+use crate::experiment::solve::{Solver, Until, decay, rate, run};
+use crate::experiment::system::{MATERIAL, Problem, System};
 use crate::random::Random;
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::chart::{Chart, Line};

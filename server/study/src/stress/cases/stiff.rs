@@ -1,8 +1,8 @@
 //! Cases 21, 22 and 23: a stiffness ratio of a million, near incompressibility, ruined meshes.
 
 use super::support::{DOWN, L, SOFT, V, block, clamp_left, cube, nodes};
-use crate::cells::solve;
-use crate::cells::system::{MATERIAL, Problem, System};
+use crate::experiment::solve;
+use crate::experiment::system::{MATERIAL, Problem, System};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::chart::{Chart, Line};
 use crate::stress::evidence::Evidence;

@@ -107,6 +107,7 @@ impl ContactModels {
         self.taken_s = Some(now_s);
         (self.step, self.time_s) = (snapshot.step, snapshot.time_s);
         self.surfaces.resize_with(snapshot.bodies.len(), ContactSurface::default);
+        self.surfaces.iter_mut().for_each(|surface| surface.arrange_by(snapshot.broad_phase));
         self.velocities.resize_with(snapshot.bodies.len(), Vec::new);
         for (body, seen) in snapshot.bodies.iter().enumerate() {
             if seen.positions.is_empty() {

@@ -9,7 +9,7 @@ use super::printed::{self, Printed};
 use super::shape::Placed;
 use super::solve::{Solver, Until, run};
 use super::system::{Problem, System, smoothers};
-use super::{CellsBench, CellsResult, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 
 /// Most iterations of conjugate gradients.
 const PATIENCE: usize = 6_000;
@@ -28,8 +28,8 @@ struct Entry {
 ///
 /// # Errors
 /// A surface that cannot be read, or the user ended the study.
-pub fn tables(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
-    let mut result = CellsResult {
+pub fn tables(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
         name: "dick-tables",
         title: "Cutting octree cells: tables 1 and 2".into(),
         about: "Bodies are cut at rest and make their first step, from displacements of 0, on one thread. A step \
@@ -38,7 +38,7 @@ pub fn tables(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
             the stiffness number s = E Δt²/(ρ h²) of each model is the one with which three cycles with the \
             paper's smoother, V(1,1) with SOR and ω = 1.7, reduce the error as printed."
             .into(),
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     let solid = read(bench, &mut result)?;
     let solid = solid.as_ref().map(|solid| Placed::new(solid));
@@ -128,7 +128,7 @@ impl Tables {
     }
 }
 
-fn read(bench: &CellsBench<'_>, result: &mut CellsResult) -> Result<Option<SolidSurface>, Trouble> {
+fn read(bench: &ExperimentBench<'_>, result: &mut ExperimentResult) -> Result<Option<SolidSurface>, Trouble> {
     let Some(path) = bench.surface() else { return Ok(None) };
     let MeshFile::Surface(surface) = read_mesh(path)? else {
         return Err(format!("{} is not a surface", path.display()).into());
@@ -194,14 +194,6 @@ fn measure(entry: &Entry, tables: &mut Tables) -> Result<(), Trouble> {
         let (mut multigrid, seconds) = system.multigrid(smoother);
         let course = run(&mut system, Solver::of(&mut multigrid, in_gradients), &exact, three);
         let multigrid_s = seconds.coarse + course.points[2].0;
-        eprintln!(
-            "SPLIT {name} op {operator_s:.4} levels {:.4} coarse {:.4} eig {:.4} cycles {:.4} {:?}",
-            seconds.levels,
-            seconds.coarse,
-            seconds.eigenvalues,
-            course.points[2].0,
-            multigrid.report()
-        );
         drop(multigrid);
         let until = Until { iterations: PATIENCE, error: course.error(3), seconds: multigrid_s };
         let gradients = run(&mut system, Solver::Jacobi, &exact, until);

@@ -9,7 +9,7 @@ use scindo_physics::solver::Method;
 use super::model::{CUBE, Grid, Model, layered_cube};
 use super::printed::{LAYERED, LAYERED_S};
 use super::system::MATERIAL;
-use super::{CellsBench, CellsResult, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 use crate::stress::view;
 
 /// Lowest and highest point of the soft layer [m], of a cube of 1 m.
@@ -32,8 +32,8 @@ const SMALL: u32 = 32;
 ///
 /// # Errors
 /// A cut that is refused, or the user ended the study.
-pub fn layer(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
-    let mut result = CellsResult {
+pub fn layer(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
         name: "dick-layer",
         title: "A soft layer under stiff rods: figure 14".into(),
         about: format!(
@@ -43,7 +43,7 @@ pub fn layer(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
              cuts, is shown beside it.",
             YOUNG_PA[0], YOUNG_PA[1]
         ),
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     let mut table = Table::new(
         "Rods on a soft layer",

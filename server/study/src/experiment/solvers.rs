@@ -4,7 +4,7 @@ use super::model::{CUBE, Grid, Model, animal, cube};
 use super::solve::{Course, FLOOR, Solver, Until, cholesky, run};
 use super::system::{Problem, System, norm, smoothers};
 use super::tables::{S_BUNNY_2, S_BUNNY_3, S_CUBE};
-use super::{CellsBench, CellsResult, Plots, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit};
 use crate::page::plot::{Mark, Plot};
 use crate::stress::chart::{Chart, Line};
 use scindo_physics::multigrid::Smoother;
@@ -30,8 +30,8 @@ const NAMES: [&str; 6] =
 ///
 /// # Errors
 /// The user ended the study.
-pub fn solvers(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
-    let mut result = CellsResult {
+pub fn solvers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
         name: "dick-solvers",
         title: "Solvers on cut cells: figure 12".into(),
         about: "The first step after the cut from displacements of 0, on one thread. Times include what a solver \
@@ -44,7 +44,7 @@ pub fn solvers(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
              swept backward once)"
                 .into(),
         ],
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     let mut table = Table::new(
         "Time to an error",
@@ -88,7 +88,7 @@ pub fn solvers(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
 }
 
 /// The ratio of the times of conjugate gradients with block-Jacobi and with multigrid, from much mass to little.
-fn over_stiffness(bench: &mut CellsBench<'_>, result: &mut CellsResult) -> Result<(), Trouble> {
+fn over_stiffness(bench: &mut ExperimentBench<'_>, result: &mut ExperimentResult) -> Result<(), Trouble> {
     let mut table = Table::new(
         "From much mass to little",
         "Seconds until ‖e‖/‖e₀‖ has fallen so far, with and without multigrid inside conjugate gradients, and how \

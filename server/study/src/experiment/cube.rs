@@ -7,7 +7,7 @@ use super::model::{self, Grid, Model, ROTATION_DEG, grid_of_blades};
 use super::refine::refine;
 use super::solve::cholesky;
 use super::system::{MATERIAL, Problem, System};
-use super::{CellsBench, CellsResult, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 use scindo_physics::material::Material;
 use scindo_physics::multigrid::Smoother;
 
@@ -35,8 +35,8 @@ const POISSON: ([f64; 3], u32) = ([0.3, 0.45, 0.49], 32);
 ///
 /// # Errors
 /// The user ended the study.
-pub fn cubes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
-    let mut result = CellsResult {
+pub fn cubes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
         name: "cells-cube",
         title: "A cube of cells to a millionth".into(),
         about: "Linear equilibria on one thread until the residual in double precision is a millionth of the \
@@ -46,7 +46,7 @@ pub fn cubes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
         notes: vec![
             "on this kind of machine SOFA needs 17.9 s for one step of 64,000 hexahedra to 1e-3".into(),
         ],
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     result.tables.push(of_stored(bench)?);
     result.tables.push(iterations(bench)?);
@@ -54,7 +54,7 @@ pub fn cubes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
 }
 
 /// The clamped cube by all solvers.
-fn of_stored(bench: &mut CellsBench<'_>) -> Result<Table, Trouble> {
+fn of_stored(bench: &mut ExperimentBench<'_>) -> Result<Table, Trouble> {
     let across = if bench.is_quick() { STORED_ACROSS / 2 } else { STORED_ACROSS };
     let mut table = Table::new(
         &format!("{across}³ cells under their weight"),
@@ -138,7 +138,7 @@ pub fn off(system: &System, across: u32, u: &[V]) -> Result<f64, Trouble> {
 }
 
 /// Iterations of conjugate gradients with multigrid.
-fn iterations(bench: &mut CellsBench<'_>) -> Result<Table, Trouble> {
+fn iterations(bench: &mut ExperimentBench<'_>) -> Result<Table, Trouble> {
     let mut table = Table::new(
         "Iterations of conjugate gradients with multigrid",
         "From 16³ to 64³ cells, uncut and cut to half depth by a grid of blades along faces of cells and turned; and \

@@ -1,9 +1,11 @@
 //! Counts, rates and iterations on small bodies. Times are never tested.
 
+use scindo_collision::Method;
 use scindo_physics::material::Material;
 use scindo_physics::octree::Shape;
 use scindo_physics::space::Space;
 
+use super::collision;
 use super::model::{CUBE, Grid, animal, cube, layered_cube};
 use super::printed::{BUNNY_2, BUNNY_3, CUBE as PRINTED, LAYERED};
 use super::refine::refine;
@@ -132,6 +134,24 @@ fn solids_are_placed_at_the_origin() {
     let bounds = placed.bounds().map(<[f64; 3]>::from);
     assert_eq!(bounds, [[0.0; 3], [1.0, 0.5, 0.25]]);
     assert!(placed.contains(&[0.5, 0.4, 0.2].into()) && !placed.contains(&[0.5, 0.6, 0.2].into()));
+}
+
+/// Every method does all work of the experiment, and a cut in the surface leaves no method behind.
+#[test]
+fn collision_is_measured_with_every_method() {
+    let surface = collision::dented(12);
+    assert_eq!(surface.1.len(), 12 * 12 * 12);
+    let mut edges = std::collections::BTreeMap::new();
+    for [a, b, c] in &surface.1 {
+        for (a, b) in [(a, b), (b, c), (c, a)] {
+            *edges.entry((a.min(b), a.max(b))).or_insert(0) += if a < b { 1 } else { -1 };
+        }
+    }
+    assert!(edges.values().all(|sum| *sum == 0), "closed and turned one way");
+    for method in Method::ALL {
+        let times = collision::measure(method, &surface).unwrap();
+        assert!(times.iter().all(|s| s.is_finite() && *s >= 0.0) && times[0] > 0.0, "{method:?}: {times:?}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use scindo_world::scene::Scene;
 
-use super::{CellsBench, CellsResult, Plots, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit};
 use crate::page::plot::{Failure, Mark, Plot};
 use crate::reference::richardson::extrapolate;
 use crate::trial::{self, Limits, Protocol, Trial};
@@ -69,8 +69,8 @@ type Run = (usize, Trial);
 ///
 /// # Errors
 /// The user ended the study, or the limit is not known.
-pub fn elements(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
-    let mut result = CellsResult {
+pub fn elements(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
         name: "cells-elements",
         title: "Tetrahedra and octree cells at equal error".into(),
         about: "A cube held at one face bends under its weight, linear and static, on one thread: whole, and cut \
@@ -78,7 +78,7 @@ pub fn elements(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
             of the displacements of five points, relative to the limit of uniform cells over their finest three \
             sizes. Times are those of a solution to 1e-6, set-up apart."
             .into(),
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     let mut table = Table::new(
         "Time at equal error",
@@ -141,7 +141,7 @@ pub fn elements(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
 
 /// Runs of all kinds, coarse to fine.
 fn runs(
-    bench: &mut CellsBench<'_>,
+    bench: &mut ExperimentBench<'_>,
     scene: &Scene,
     is_cut: bool,
     name: &str,

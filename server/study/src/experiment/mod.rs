@@ -1,9 +1,10 @@
-//! Experiments on octree cells and multigrid: those of Dick, Georgii, Westermann 2011, at their sizes.
+//! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes, and on methods
+//! of collision detection.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
 //! and [`refine`] run solvers on it. Every experiment has a module of its own and gives a
-//! [`CellsResult`]: tables, plots and pictures. [`printed`] has the figures of the paper.
+//! [`ExperimentResult`]: tables, plots and pictures. [`printed`] has the figures of the paper.
 //!
 //! # Source
 //! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
@@ -40,17 +41,19 @@ mod elements;
 
 mod levels;
 
-pub use bench::CellsBench;
-pub use result::{CellsResult, Column, Picture, Plots, Row, Table, Unit};
+mod collision;
+
+pub use bench::ExperimentBench;
+pub use result::{Column, ExperimentResult, Picture, Plots, Row, Table, Unit};
 
 /// Why an experiment could not be made.
 pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 
 /// An experiment.
-pub type Experiment = fn(&mut CellsBench<'_>) -> Result<CellsResult, Trouble>;
+pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 8] = [
+pub const NAMES: [&str; 9] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -59,9 +62,12 @@ pub const NAMES: [&str; 8] = [
     "cells-cube",
     "cells-elements",
     "cells-levels",
+    "collision",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
+/// How many of them are about octree cells.
+pub const CELLS: usize = 8;
 
 /// The experiment `name`.
 fn find(name: &str) -> Option<Experiment> {
@@ -74,21 +80,22 @@ fn find(name: &str) -> Option<Experiment> {
         "cells-cube" => Some(cube::cubes),
         "cells-elements" => Some(elements::elements),
         "cells-levels" => Some(levels::levels),
+        "collision" => Some(collision::collision),
         _ => None,
     }
 }
 
 /// Makes the experiment `name`. What keeps it from being made is part of the result.
-pub fn study(name: &'static str, bench: &mut CellsBench<'_>) -> CellsResult {
+pub fn study(name: &'static str, bench: &mut ExperimentBench<'_>) -> ExperimentResult {
     let made = match find(name) {
         Some(experiment) => experiment(bench),
         None => Err("there is no such experiment".into()),
     };
-    let failed = |trouble: Trouble| CellsResult {
+    let failed = |trouble: Trouble| ExperimentResult {
         name,
         title: name.to_owned(),
         trouble: Some(trouble.to_string()),
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     made.unwrap_or_else(failed)
 }

@@ -1,13 +1,12 @@
-//! The section of an experiment on octree cells: tables, plots, pictures.
+//! The section of an experiment: tables, plots, pictures.
 
 use std::fmt::Write as _;
 
-use super::html::{escape, prose, time};
-use crate::cells::{CellsResult, Row, Table, Unit};
-use crate::stress::evidence::short;
+use super::html::{escape, prose};
+use crate::experiment::{ExperimentResult, Row, Table};
 
 /// The whole section as HTML.
-pub fn section(result: &CellsResult) -> String {
+pub fn section(result: &ExperimentResult) -> String {
     let mut out = format!(
         "<section id=\"{0}\">\n<h2>{1}</h2>\n<p>{2}</p>\n",
         result.name,
@@ -62,46 +61,8 @@ fn line(table: &Table, row: &Row) -> String {
         let _ = write!(
             out,
             "<td class=\"number\">{}</td>",
-            value.map_or("–".to_owned(), |value| number(value, column.unit))
+            value.map_or("–".to_owned(), |value| column.unit.show(value))
         );
     }
     out + "</tr>\n"
-}
-
-/// A number for people.
-fn number(value: f64, unit: Unit) -> String {
-    match unit {
-        _ if !value.is_finite() => "–".to_owned(),
-        Unit::Count => thousands(value.round() as u64),
-        Unit::Seconds if value < 1e-4 => format!("{:.3} µs", 1e6 * value),
-        Unit::Seconds => time(1e3 * value),
-        Unit::Number => short(value),
-        Unit::Times => format!("{} ×", short(value)),
-    }
-}
-
-/// A whole number with its thousands apart.
-fn thousands(n: u64) -> String {
-    let digits = n.to_string();
-    let mut out = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_have_units() {
-        assert_eq!(number(203_503.0, Unit::Count), "203,503");
-        assert_eq!(number(1.5e-6, Unit::Seconds), "1.500 µs");
-        assert_eq!(number(2.42, Unit::Seconds), "2.42 s");
-        assert_eq!(number(f64::NAN, Unit::Times), "–");
-    }
 }

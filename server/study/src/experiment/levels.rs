@@ -8,7 +8,7 @@ use scindo_physics::solver::Method;
 
 use super::model::{Grid, Model, cube};
 use super::system::MATERIAL;
-use super::{CellsBench, CellsResult, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 use crate::stress::view;
 
 /// Finest cells across, and levels of coarsening.
@@ -26,9 +26,9 @@ const STEPS: u32 = 15;
 ///
 /// # Errors
 /// A cut that is refused, or the user ended the study.
-pub fn levels(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
+pub fn levels(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
     let (across, coarsening) = if bench.is_quick() { QUICK } else { SIZE };
-    let mut result = CellsResult {
+    let mut result = ExperimentResult {
         name: "cells-levels",
         title: "Simulating a coarse level: composite elements".into(),
         about: format!(
@@ -37,7 +37,7 @@ pub fn levels(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
              wide (Nesme et al. 2009; Wu, Dick, Westermann 2011); vertices, cuts and surface stay those of the finest \
              cells. {STEPS} steps of 20 ms by conjugate gradients with multigrid to 1e-3, on one thread."
         ),
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     let mut table = Table::new(
         "Accuracy against time",

@@ -8,7 +8,7 @@ use super::printed::RATES;
 use super::solve::{decay, rate};
 use super::system::{Problem, System, smoothers};
 use super::tables::S_CUBE;
-use super::{CellsBench, CellsResult, Plots, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit};
 use crate::stress::chart::{Chart, Line};
 
 /// Cycles of a run, and those between which the rate is taken.
@@ -21,15 +21,15 @@ const MASSES: [f64; 3] = [1e5, 1e4, 1e3];
 ///
 /// # Errors
 /// The user ended the study.
-pub fn convergence(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
-    let mut result = CellsResult {
+pub fn convergence(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
         name: "dick-convergence",
         title: "Convergence of multigrid on cut cells: figure 10".into(),
         about: "The first step of a cube, uncut and cut to half depth, with a force that fans its rods out; and of \
             the animal with three cuts, from much mass to none. Errors are those of the iteration of cycles \
             e ← e − V A e, from the error of displacements 0."
             .into(),
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     let mut rates = Table::new(
         "Rates",

@@ -2,8 +2,10 @@
 
 use serde_json::{Value, json};
 
+use crate::page::html::time;
 use crate::page::plot::Plot;
 use crate::stress::chart::Chart;
+use crate::stress::evidence::short;
 pub use crate::stress::view::Picture;
 
 /// How a number is shown.
@@ -29,6 +31,31 @@ impl Unit {
             Self::Times => "times",
         }
     }
+
+    /// A number for people.
+    pub fn show(self, value: f64) -> String {
+        match self {
+            _ if !value.is_finite() => "–".to_owned(),
+            Self::Count => thousands(value.round() as u64),
+            Self::Seconds if value < 1e-4 => format!("{} µs", short(1e6 * value)),
+            Self::Seconds => time(1e3 * value),
+            Self::Number => short(value),
+            Self::Times => format!("{} ×", short(value)),
+        }
+    }
+}
+
+/// A whole number with its thousands apart.
+fn thousands(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
 }
 
 /// A column of a table.
@@ -99,7 +126,7 @@ pub struct Plots {
 
 /// The result of an experiment.
 #[derive(Clone, Debug, Default)]
-pub struct CellsResult {
+pub struct ExperimentResult {
     /// Its name on the command line.
     pub name: &'static str,
     /// Heading.
@@ -118,7 +145,7 @@ pub struct CellsResult {
     pub trouble: Option<String>,
 }
 
-impl CellsResult {
+impl ExperimentResult {
     /// The result for programs.
     pub fn to_json(&self) -> Value {
         let table = |table: &Table| {
@@ -154,5 +181,18 @@ impl CellsResult {
             "charts": self.plots.iter().flat_map(|p| &p.charts).map(lines).collect::<Vec<_>>(),
             "plots": self.plots.iter().flat_map(|p| &p.plots).map(marks).collect::<Vec<_>>(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_units() {
+        assert_eq!(Unit::Count.show(203_503.0), "203,503");
+        assert_eq!(Unit::Seconds.show(1.5e-6), "1.5 µs");
+        assert_eq!(Unit::Seconds.show(2.42), "2.42 s");
+        assert_eq!(Unit::Times.show(f64::NAN), "–");
     }
 }

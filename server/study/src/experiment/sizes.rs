@@ -4,7 +4,7 @@ use super::model::{Grid, cube};
 use super::solve::{Solver, Until, run};
 use super::system::{Problem, System, smoothers};
 use super::tables::S_CUBE;
-use super::{CellsBench, CellsResult, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 
 /// Finest cells across, and levels.
 const SIZES: [(u32, u8); 4] = [(24, 3), (48, 4), (80, 4), (120, 3)];
@@ -15,15 +15,15 @@ const UNIFORM: u32 = 80;
 ///
 /// # Errors
 /// The user ended the study.
-pub fn sizes(bench: &mut CellsBench<'_>) -> Result<CellsResult, Trouble> {
-    let mut result = CellsResult {
+pub fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
         name: "dick-sizes",
         title: "Time per cell, and what adaptivity saves".into(),
         about: "The cube with rotated blades, from few cells to many, with the default smoother on one thread: a \
             step is rotations, operators of all levels, and three cycles. Uniform grids have the finest cells \
             everywhere and the same cuts."
             .into(),
-        ..CellsResult::default()
+        ..ExperimentResult::default()
     };
     let mut table = Table::new(
         "Steps of cubes",

@@ -8,13 +8,13 @@ use crate::bench::progress::Progress;
 use crate::settings::Settings;
 
 /// The surroundings of an experiment.
-pub struct CellsBench<'a> {
+pub struct ExperimentBench<'a> {
     settings: &'a Settings,
     tell: &'a mut dyn FnMut(&Progress),
     progress: Progress,
 }
 
-impl<'a> CellsBench<'a> {
+impl<'a> ExperimentBench<'a> {
     /// A bench for the experiment `name`.
     pub fn new(name: &str, settings: &'a Settings, tell: &'a mut dyn FnMut(&Progress)) -> Self {
         let progress =
