@@ -60,7 +60,7 @@ fn steady_contact_does_not_allocate() {
     };
     let specs = [spec("rod", ROD), spec("ball", BALL), spec("grip", BALL)];
     let modes = [ToolMode::Touch, ToolMode::Touch, ToolMode::Grab];
-    let mut tools = Tools::new(&specs);
+    let mut tools = Tools::new(&specs, false);
     let mut contacts = Contacts::default();
     contacts.add_body(1e4, true);
     let mut inputs: Vec<ToolInput> = specs

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 
 use super::Body;
 use crate::cut::{Components, Flaws, Solid, Surface};
+use crate::element::MaterialPoint;
 use crate::space::{RestPoint, Tets, VisitPiece};
 
 impl Body {
@@ -73,6 +74,35 @@ impl Body {
     /// to the side that it belongs to. `None` outside the body.
     pub fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint> {
         self.space.locate(point, side)
+    }
+
+    /// Finds the material points that are at `points` [m] now: each in the element in which it lies deepest, `None`
+    /// outside the body. While a [cut is under way](Self::is_being_cut) nothing is found.
+    ///
+    /// ```
+    /// # use nalgebra::Vector3;
+    /// # use scindo_physics::body::{Body, BodySettings};
+    /// # use scindo_physics::material::{Law, Material, Rayleigh};
+    /// # use scindo_physics::mesh::{BoxPattern, box_mesh};
+    /// # let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(0.1), [2; 3], BoxPattern::Tet6);
+    /// # let (law, rayleigh) = (Law::Corotational, Rayleigh::default());
+    /// # let material = Material { young_pa: 1e4, poisson: 0.4, density_kg_m3: 1e3, rayleigh, law };
+    /// # let mut body = Body::new(mesh, material, BodySettings::default())?;
+    /// let mut found = Vec::new();
+    /// body.material_at(&[Vector3::repeat(0.04), Vector3::repeat(0.2)], &mut found);
+    /// let inside = found[0].expect("in the block");
+    /// assert!((inside.position(body.positions()) - Vector3::repeat(0.04)).norm() < 1e-12);
+    /// assert!(found[1].is_none());
+    /// # Ok::<(), scindo_physics::body::BodyError>(())
+    /// ```
+    pub fn material_at(&mut self, points: &[Vector3<f64>], found: &mut Vec<Option<MaterialPoint>>) {
+        found.clear();
+        if self.is_being_cut() {
+            found.resize(points.len(), None);
+        } else {
+            self.space.material_at(&self.state.x, points, found);
+            found.resize(points.len(), None);
+        }
     }
 
     /// Nodes and shape functions (Σ = 1) that carry a material point now. If cuts have replaced the mesh since

@@ -181,6 +181,11 @@ impl CutMesh {
         (&self.detector.near, self.detector.examined)
     }
 
+    /// The pieces of the last search.
+    pub(crate) fn candidates(&self) -> &[u32] {
+        &self.detector.near
+    }
+
     /// Remembers a blade position by the material around it at the positions `x` [m] of the copies.
     pub(crate) fn front(&mut self, segment: &[Vector3<f64>; 2], x: &[Vector3<f64>]) -> Front {
         self.pieces_near(x, &[segment[0].inf(&segment[1]), segment[0].sup(&segment[1])]);

@@ -13,15 +13,16 @@ use super::surface::OctreeSurface;
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutReport, Flaws, Front, IncisionMark, NewCopy, Solid, Surface,
-    Surroundings, Work, sweep_triangles, swept_area,
+    Surroundings, Work, sweep_from_behind, swept_area,
 };
-use crate::element::{Point, Points, Simd};
+use crate::element::{MaterialPoint, Point, Points, Simd};
 use crate::material::{Lame, Material, Region};
 use crate::mesh::MeshError;
 use crate::multigrid::Hierarchy;
 use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::space::deepest::{Bounds, deepest_of};
 use crate::space::{RestPoint, Space, VisitPiece};
 
 /// Most leaves that cuts by clients may make of one.
@@ -36,6 +37,9 @@ const TETS_OF_CUBE: [[u32; 4]; 6] =
 const TRIANGLE_BYTES: usize = 100;
 /// Distance, in finest cells, by which a point is moved towards its side before its cell is looked up.
 const SIDE_STEP: f64 = 1e-6;
+/// Distance, in finest cells, by which a sweep begins behind the last one of its incision. A link between two centres is
+/// straight and no line of the material, so it may pass the front where the body deforms.
+const BEHIND: f64 = 0.25;
 
 /// An octree that is cut, with everything that a body asks of it.
 #[derive(Clone, Debug)]
@@ -161,7 +165,8 @@ impl OctreeSpace {
         if found >= limit {
             return Err(CutError::Full { what: "cells", found, limit });
         }
-        let triangles = sweep_triangles(self.fronts.get(&incision), blade, x);
+        let triangles =
+            sweep_from_behind(self.fronts.get(&incision), blade, x, BEHIND * self.octree.lattice().h);
         let swept = swept_box(&triangles);
         let leaves = self.octree.leaves_near(x, &swept);
         let cuts = self.octree.crossed_links_in(&leaves, x, &triangles, incision);
@@ -313,6 +318,19 @@ impl Space for OctreeSpace {
         let towards_m = side.map_or(Vector3::zeros(), step);
         let (element, _) = self.octree.locate(&(point + towards_m)).or_else(|| self.octree.locate(&point))?;
         Some(RestPoint { rest_m: point, towards_m, element })
+    }
+
+    fn material_at(
+        &mut self,
+        x: &[Vector3<f64>],
+        points: &[Vector3<f64>],
+        found: &mut Vec<Option<MaterialPoint>>,
+    ) {
+        found.clear();
+        let Some(bounds) = Bounds::of(points) else { return };
+        let near = self.octree.leaves_near(x, &bounds);
+        let tets: Vec<[u32; 4]> = near.into_iter().flat_map(|id| self.tets_of(id)).collect();
+        found.extend(points.iter().map(|point| deepest_of(tets.iter().copied(), x, point, |_, _| true)));
     }
 
     fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)> {

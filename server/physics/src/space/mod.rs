@@ -3,6 +3,7 @@
 //! A [`Space`] divides the material into elements, cuts it, and shows its surface. Above it stand the
 //! stiffness, the solvers, the integrators and the body, which do not know what the elements are.
 
+pub(crate) mod deepest;
 mod element;
 mod hexahedra;
 mod linear_tets;
@@ -21,7 +22,7 @@ use nalgebra::Vector3;
 
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMark, Solid, Surface, Work};
-use crate::element::Points;
+use crate::element::{MaterialPoint, Points};
 use crate::material::Material;
 use crate::mesh::MeshError;
 use crate::multigrid::Hierarchy;
@@ -142,6 +143,15 @@ pub trait Space: Points + Send {
     /// Finds a material point by its rest position [m]. If it lies on a cut or between elements, `side` points
     /// to the side that it belongs to. `None` outside the body.
     fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint>;
+
+    /// Finds the material points at `points` [m] with the copies at `x` [m]: each in the piece in which it lies
+    /// deepest, `None` outside the body. Not to be called while a cut is under way.
+    fn material_at(
+        &mut self,
+        x: &[Vector3<f64>],
+        points: &[Vector3<f64>],
+        found: &mut Vec<Option<MaterialPoint>>,
+    );
 
     /// Nodes and shape functions (Σ = 1) that carry a material point in the present cut state.
     fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)>;

@@ -3,15 +3,16 @@
 use std::any::Any;
 use std::sync::Arc;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
+use super::deepest::{self, Bounds, deepest_of};
 use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space, VisitPiece};
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
     BladeSweep, Components, CutError, CutLimits, CutMesh, CutReport, Flaws, IncisionMark, Piece, Solid,
     Surface, SweepUnderWay, Work, swept_area,
 };
-use crate::element::{Point, Points, Simd};
+use crate::element::{MaterialPoint, Point, Points, Simd};
 use crate::material::Material;
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
 use crate::multigrid::Hierarchy;
@@ -238,6 +239,24 @@ impl Space for Tets {
         Some(RestPoint { rest_m: point, towards_m, element: element as u32 })
     }
 
+    fn material_at(
+        &mut self,
+        x: &[Vector3<f64>],
+        points: &[Vector3<f64>],
+        found: &mut Vec<Option<MaterialPoint>>,
+    ) {
+        found.clear();
+        let Some(bounds) = Bounds::of(points) else { return };
+        self.cut.pieces_near(x, &bounds);
+        let (cut, near) = (&self.cut, self.cut.candidates());
+        found.extend(points.iter().map(|point| {
+            deepest_of(near.iter().map(|&p| cut.pieces()[p as usize].copies), x, point, |k, inside| {
+                let piece = near[k];
+                cut.piece_at(cut.pieces()[piece as usize].element, inside) == piece
+            })
+        }));
+    }
+
     fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)> {
         let corners = self.cut.mesh().corners(point.element as usize);
         let lookup = barycentric(&corners, point.rest_m + point.towards_m);
@@ -416,10 +435,7 @@ fn depth(mesh: &TetMesh, point: Vector3<f64>, e: usize) -> f64 {
 }
 
 fn barycentric(x: &[Vector3<f64>; 4], point: Vector3<f64>) -> [f64; 4] {
-    let edges = Matrix3::from_columns(&[x[1] - x[0], x[2] - x[0], x[3] - x[0]]);
-    let inner =
-        edges.try_inverse().map_or(Vector3::repeat(f64::NEG_INFINITY), |inverse| inverse * (point - x[0]));
-    [1.0 - inner.sum(), inner.x, inner.y, inner.z]
+    deepest::barycentric(x, &point).unwrap_or([f64::NEG_INFINITY; 4])
 }
 
 #[cfg(test)]

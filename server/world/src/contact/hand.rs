@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Vector3};
 
 use crate::contact::compliance::Compliance;
+use crate::contact::edge::{Edge, EdgeReport};
 use crate::contact::grab::Grip;
 use crate::contact::press::Press;
 use crate::contact::proxy::Proxy;
@@ -19,6 +20,8 @@ pub struct Hand {
     hand_overs: u64,
     jumps: u64,
     proxy: Proxy,
+    /// The edge of a blade that cuts with force.
+    pub(super) edge: Option<Box<Edge>>,
     press: Press,
     grip: Grip,
     /// Body that it touched last, and the compliance of its tissue; `None` before the first contact.
@@ -33,6 +36,7 @@ impl Hand {
             hand_overs: 0,
             jumps: 0,
             proxy: Proxy::default(),
+            edge: None,
             press: Press::new(),
             grip: Grip::new(),
             compliance: None,
@@ -47,6 +51,16 @@ impl Hand {
     /// The pose to which the tissue restricts the tool.
     pub fn proxy_pose(&self) -> &Isometry3<f64> {
         self.proxy.pose()
+    }
+
+    /// What the edge of a blade that cuts with force has done; `None` for other tools.
+    pub fn edge(&self) -> Option<EdgeReport> {
+        self.edge.as_ref().map(|edge| edge.report())
+    }
+
+    /// Puts the proxy where the edge of a blade has got to.
+    pub(super) fn seat(&mut self, pose: &Isometry3<f64>) {
+        self.proxy.release(pose);
     }
 
     /// Where and how the tool presses.
@@ -77,6 +91,7 @@ impl Hand {
         self.proxy.release(pose);
         self.press.release();
         self.grip.open();
+        self.edge = None;
     }
 
     /// Follows the tool to its present pose, and finds what it touches or holds there.
@@ -87,6 +102,7 @@ impl Hand {
         }
         if self.jumps != tool.jumps() {
             self.jumps = tool.jumps();
+            self.edge = None;
             self.proxy.release(&tool.pose);
         }
         if tool.mode != ToolMode::Grab {
@@ -97,7 +113,10 @@ impl Hand {
             self.proxy.follow(tool.shape, &tool.pose, surfaces);
             self.press.update(tool.shape, self.proxy.pose(), &tool.pose, surfaces);
         } else {
-            self.proxy.release(&tool.pose);
+            // The edge of a blade that cuts with force has a place of its own.
+            if self.edge.is_none() {
+                self.proxy.release(&tool.pose);
+            }
             self.press.release();
             if tool.mode == ToolMode::Grab {
                 self.grip.hold(&tool.pose, core_radius(tool.shape), surfaces);

@@ -17,11 +17,12 @@ pub mod press;
 pub mod spring;
 pub mod grab;
 pub mod compliance;
+pub mod edge;
 pub mod hand;
 pub mod rest;
 pub mod pairs;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Translation3, Vector3};
 use scindo_collision::{Method, SurfaceError};
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::Surface;
@@ -78,6 +79,8 @@ pub struct Contacts {
     obstacles: Vec<Obstacle>,
     /// How bodies touch bodies; `None` if they do not.
     touch: Option<TouchSettings>,
+    /// Toughness of every body [J/m²]; empty: blades cut without force.
+    toughness: Vec<f64>,
     pairs: PairContacts,
 }
 
@@ -90,6 +93,45 @@ impl Contacts {
     /// Lets bodies touch each other, themselves, or both.
     pub fn set_touch(&mut self, touch: Option<TouchSettings>) {
         self.touch = touch;
+    }
+
+    /// Lets blades press on bodies of these toughnesses [J/m²] until these give way.
+    pub fn set_toughness(&mut self, toughness: Vec<f64>) {
+        self.toughness = toughness;
+    }
+
+    /// Presses the edges of cutting blades on what they meet, after [`detect`](Self::detect).
+    pub fn press_edges(&mut self, tools: &Tools, solids: &mut [SimBody]) {
+        if self.toughness.is_empty() {
+            return;
+        }
+        let Self { surfaces, bodies, hands, toughness, .. } = self;
+        for ((index, tool), hand) in (0u32..).zip(tools.iter()).zip(hands) {
+            if !tool.cuts() {
+                hand.edge = None;
+                continue;
+            }
+            let edge = hand.edge.get_or_insert_default();
+            edge.follow(tool, surfaces, solids, toughness, |body, spring| {
+                bodies[body].springs.push(spring);
+                bodies[body].behind.push((index, 0.0));
+            });
+        }
+    }
+
+    /// Lets the edges go on where they were pressed enough, after the solve of a step.
+    pub fn settle_edges(&mut self, tools: &mut Tools, solids: &[SimBody]) {
+        if self.toughness.is_empty() {
+            return;
+        }
+        for (tool, hand) in tools.iter_mut().zip(&mut self.hands) {
+            let Some(edge) = &mut hand.edge else { continue };
+            edge.settle(solids, &mut tool.pressed);
+            if let Some(line) = tool.pressed.at() {
+                let tip = Translation3::from(line[0]);
+                hand.seat(&Isometry3::from_parts(tip, tool.pose.rotation));
+            }
+        }
     }
 
     /// Whether bodies touch bodies.

@@ -50,7 +50,7 @@ impl Table {
         };
         let mut contacts = Contacts::default();
         contacts.add_body(8e3, true);
-        Self { body, tools: Tools::new(&[spec]), contacts, positions: Vec::new(), steps: 0 }
+        Self { body, tools: Tools::new(&[spec], false), contacts, positions: Vec::new(), steps: 0 }
     }
 
     /// Makes one whole step and returns the force on the tool.

@@ -45,7 +45,7 @@ impl Bench {
         let mut contacts = Contacts::default();
         contacts.add_body(1e4, true);
         let body = CutMesh::new(mesh).unwrap();
-        let tools = Tools::new(&[spec]);
+        let tools = Tools::new(&[spec], false);
         Self { body, x, positions: Vec::new(), tools, contacts, owner: Arc::from("test"), time_s: 0.0 }
     }
 

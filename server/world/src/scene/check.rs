@@ -118,6 +118,7 @@ impl Check<'_> {
             density_kg_m3: body.density_kg_m3,
             damping_mass_1_s: body.rayleigh.mass_1_s,
             damping_stiffness_s: body.rayleigh.stiffness_s,
+            toughness_j_m2: body.cutting.toughness_j_m2.unwrap_or(0.0),
             velocity_m_s: Vector3::from(body.velocity_m_s),
             fixes: self.fixes(&at, &body.fix),
             displacement_over_s: body.displacement_over_s,
@@ -428,8 +429,17 @@ impl Check<'_> {
                 "write element = \"tet4\" or remove the effect",
             );
         }
+        if raw.cutting_force == Some(true) && self.raw.body.iter().all(|b| b.cutting.toughness_j_m2.is_none())
+        {
+            self.conflict(
+                "effects.cutting_force".into(),
+                "found true, but no body has a toughness",
+                "give a body cutting.toughness_j_m2, or remove the effect",
+            );
+        }
         EffectSwitches {
             cutting: raw.cutting,
+            cutting_force: raw.cutting_force,
             contact: raw.contact,
             obstacles: raw.obstacles,
             body_collision: raw.body_collision,

@@ -68,6 +68,8 @@ pub struct BodySpec {
     pub damping_mass_1_s: f64,
     /// Rayleigh damping by stiffness [s].
     pub damping_stiffness_s: f64,
+    /// Fracture toughness [J/m²]; 0: none.
+    pub toughness_j_m2: f64,
     /// Velocity at the start [m/s].
     pub velocity_m_s: Vector3<f64>,
     /// Held parts.
@@ -427,6 +429,8 @@ pub struct PathPoint {
 pub struct EffectSwitches {
     /// Cuts by tools and clients.
     pub cutting: Option<bool>,
+    /// Blades need force to cut.
+    pub cutting_force: Option<bool>,
     /// Tools push bodies.
     pub contact: Option<bool>,
     /// Obstacles stop bodies.

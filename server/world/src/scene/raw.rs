@@ -510,6 +510,11 @@ pub struct RawCutting {
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs
     /// the method `snap`.
     pub loose: RawLoose,
+    /// Fracture toughness [J/m²]: a blade cuts only where the load on its edge exceeds this much per metre [N/m], and
+    /// deforms the body before it does. Without it a blade passes through the body without force.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "liver has about 100, skin about 2500"))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub toughness_j_m2: Option<f64>,
 }
 
 impl RawBody {
@@ -675,6 +680,9 @@ pub struct RawEffects {
     /// `false` refuses cuts by tools and clients.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cutting: Option<bool>,
+    /// `false` lets blades cut without force, also where a body has a toughness.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cutting_force: Option<bool>,
     /// `false` lets tools pass through bodies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<bool>,

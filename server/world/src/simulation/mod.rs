@@ -37,6 +37,7 @@ use crate::assemble::{self, BuildOptions, Built};
 use crate::body::BodySize;
 pub use crate::body::{Probe, SimBody, StepCounts};
 use crate::contact::Contacts;
+use crate::contact::edge::EdgeReport;
 use crate::contact::pairs::{TouchReport, TouchSettings};
 use crate::contact::rest::RestReport;
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
@@ -155,11 +156,15 @@ impl Simulation {
             contacts.set_obstacles(built.obstacles);
         }
         contacts.set_touch(TouchSettings::of(&scene));
+        let by_force = plan.is_on("cutting force");
+        if by_force {
+            contacts.set_toughness(scene.bodies.iter().map(|body| body.toughness_j_m2).collect());
+        }
         let report =
             StepReport { bodies: vec![BodyReport::default(); built.bodies.len()], ..StepReport::default() };
         let mut simulation = Self {
             plan,
-            tools: Tools::new(&scene.tools),
+            tools: Tools::new(&scene.tools, by_force),
             tool_places: ToolPlaces::default(),
             cuts: Cuts::new(&scene.cuts, &built.bodies),
             contacts,
@@ -239,6 +244,7 @@ impl Simulation {
         }
         let h = self.scene.step_s;
         self.contacts.detect(&self.tools);
+        self.contacts.press_edges(&self.tools, &mut self.bodies);
         for (i, body) in self.bodies.iter().enumerate() {
             self.contacts.rest(i, body, h, self.scene.gravity_m_s2);
         }
@@ -251,6 +257,7 @@ impl Simulation {
             self.contacts.settle(i, body);
         }
         self.contacts.settle_pairs(&self.bodies);
+        self.contacts.settle_edges(&mut self.tools, &self.bodies);
         self.contacts.react(&mut self.tools);
     }
 
@@ -453,6 +460,11 @@ impl Simulation {
     /// The same with each obstacle, in their order; empty before the first step.
     pub fn rest_reports(&self, body: usize) -> &[RestReport] {
         self.contacts.rest_reports(body)
+    }
+
+    /// What the edge of tool number `tool` has done since it began to cut with force; `None` for other tools.
+    pub fn edge_report(&self, tool: usize) -> Option<EdgeReport> {
+        self.contacts.hand(tool)?.edge()
     }
 
     /// Contacts of bodies with each other and with themselves in the last step, one report per pair.

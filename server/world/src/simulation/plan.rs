@@ -155,6 +155,18 @@ impl Plan {
         let seconds: f64 = sizes.iter().map(|size| size.elements as f64 * SECONDS_PER_ELEMENT_CUT).sum();
         let always = if blades > 0 { seconds } else { 0.0 };
         self.push("cutting", allowed, why, always);
+        let tough = scene.bodies.iter().filter(|body| body.toughness_j_m2 > 0.0).count();
+        let forced = tough > 0 && allowed && scene.effects.cutting_force != Some(false);
+        let why = match (tough, allowed, forced) {
+            (0, ..) => "no body has cutting.toughness_j_m2".into(),
+            (_, false, _) => "effects.cutting = false".into(),
+            (_, true, false) => "effects.cutting_force = false".into(),
+            _ => format!(
+                "{} with cutting.toughness_j_m2; costs time only while a blade cuts",
+                count(tough, "body")
+            ),
+        };
+        self.push("cutting force", forced, why, 0.0);
     }
 
     fn adaptation(&mut self, scene: &CheckedScene) {

@@ -62,6 +62,69 @@ impl BladeEdge {
     }
 }
 
+/// The edge of a blade that cuts with force: where it has got to, as contact finds after every step.
+///
+/// Its sweeps have one position each. They begin where the material has carried the last one of the incision, or, for
+/// the first, where the edge met the tissue.
+#[derive(Debug, Clone, Default)]
+pub struct PressedEdge {
+    incision: Option<u32>,
+    /// Where the edge was before it met the tissue, until the first sweep.
+    began: Option<[Vector3<f64>; 2]>,
+    at: Option<[Vector3<f64>; 2]>,
+    /// The way of the foremost part since the last sweep [m].
+    moved_m: f64,
+    left: bool,
+}
+
+impl PressedEdge {
+    /// The edge [tip, heel] [m] meets tissue on the way from this place.
+    pub fn enter(&mut self, before: [Vector3<f64>; 2]) {
+        *self = Self { began: Some(before), ..Self::default() };
+    }
+
+    /// The edge after a step in which its foremost part went on by `by_m` [m].
+    pub fn advance(&mut self, edge: [Vector3<f64>; 2], by_m: f64) {
+        self.at = Some(edge);
+        self.moved_m += by_m;
+    }
+
+    /// Where the edge is; `None` while it is in no tissue.
+    pub fn at(&self) -> Option<&[Vector3<f64>; 2]> {
+        self.at.as_ref().filter(|_| !self.left)
+    }
+
+    /// The edge is in no tissue any more.
+    pub fn leave(&mut self) {
+        self.left = true;
+    }
+
+    /// The sweep to cut and its incision number: once the edge went on by `least_m` [m], and when the incision ends
+    /// because the blade left the tissue or does not cut any more (`cuts`).
+    pub fn take(
+        &mut self,
+        cuts: bool,
+        least_m: f64,
+        numbers: &mut IncisionNumbers,
+    ) -> Option<(BladeSweep, u32)> {
+        let ends = self.left || !cuts;
+        let least_m = if ends { LEAST_MOVE_M } else { least_m };
+        let found = match self.at {
+            Some(edge) if self.moved_m >= least_m => {
+                self.moved_m = 0.0;
+                let incision = *self.incision.get_or_insert_with(|| numbers.fresh());
+                let segments = self.began.take().into_iter().chain([edge]).collect();
+                Some((BladeSweep { segments }, incision))
+            }
+            _ => None,
+        };
+        if ends {
+            *self = Self::default();
+        }
+        found
+    }
+}
+
 impl Cutting {
     fn sweep(&mut self, least_m: f64) -> Option<(BladeSweep, u32)> {
         let moved = |i: usize| (self.now[i] - self.last[i]).norm();
@@ -78,6 +141,30 @@ impl Cutting {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pressed_edge_sweeps_from_the_skin_to_where_it_left() {
+        let edge = |x: f64| [Vector3::new(x, 0.0, 0.0), Vector3::new(x, 0.0, 0.04)];
+        let mut numbers = IncisionNumbers::default();
+        let mut blade = PressedEdge::default();
+        let mut take = |blade: &mut PressedEdge, cuts| {
+            blade.take(cuts, 0.001, &mut numbers).map(|(sweep, number)| (sweep.segments, number))
+        };
+        assert_eq!(take(&mut blade, true), None);
+        blade.enter(edge(-0.001));
+        blade.advance(edge(0.0), 0.0);
+        assert_eq!(take(&mut blade, true), None, "it only presses");
+        blade.advance(edge(0.0012), 0.0012);
+        assert_eq!(take(&mut blade, true), Some((vec![edge(-0.001), edge(0.0012)], 1)));
+        blade.advance(edge(0.0017), 0.0005);
+        assert_eq!(take(&mut blade, true), None);
+        blade.leave();
+        assert_eq!(take(&mut blade, true), Some((vec![edge(0.0017)], 1)), "the rest");
+        assert_eq!(take(&mut blade, false), None);
+        blade.enter(edge(0.1));
+        blade.advance(edge(0.102), 0.002);
+        assert_eq!(take(&mut blade, false), Some((vec![edge(0.1), edge(0.102)], 2)), "another incision");
+    }
 
     #[test]
     fn an_incision_is_connected_and_keeps_its_number() {

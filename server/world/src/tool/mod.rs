@@ -17,7 +17,7 @@ use scindo_physics::cut::BladeSweep;
 
 use crate::inputs::{MAX_TOOLS, ToolInput, ToolMode, ToolShape};
 use crate::scene::checked::ToolSpec;
-use blade::{BladeEdge, IncisionNumbers};
+use blade::{BladeEdge, IncisionNumbers, PressedEdge};
 use script::Script;
 
 /// Owner name of a tool that a script moves.
@@ -51,6 +51,8 @@ pub struct Tool {
     /// The client's clock at that sample [ns].
     pub client_time_ns: u64,
     edge: BladeEdge,
+    /// Its edge where it cuts with force.
+    pub(crate) pressed: PressedEdge,
     script: Option<Script>,
     round: u64,
     declared: bool,
@@ -74,6 +76,7 @@ impl Tool {
             seq: 0,
             client_time_ns: 0,
             edge: BladeEdge::default(),
+            pressed: PressedEdge::default(),
             script: None,
             round: 0,
             declared: false,
@@ -124,6 +127,7 @@ pub struct Tools {
     /// Number of tools created so far.
     made: u64,
     numbers: IncisionNumbers,
+    by_force: bool,
     script: Arc<str>,
     nobody: Arc<str>,
     refused: u64,
@@ -131,8 +135,9 @@ pub struct Tools {
 }
 
 impl Tools {
-    /// The tools of a scene, with nobody holding them.
-    pub fn new(specs: &[ToolSpec]) -> Self {
+    /// The tools of a scene, with nobody holding them. Blades that cut `by_force` sweep what their edges passed, and not
+    /// what the hand did.
+    pub fn new(specs: &[ToolSpec], by_force: bool) -> Self {
         let declared = (0..).zip(specs).map(|(number, spec)| {
             let mut tool = Tool::new(number, &spec.id, spec.shape, (spec.stiffness_n_m, spec.max_force_n));
             tool.script = Script::new(&spec.path, spec.repeat_s);
@@ -143,6 +148,7 @@ impl Tools {
             tools: declared.collect(),
             made: specs.len() as u64,
             numbers: IncisionNumbers::default(),
+            by_force,
             script: Arc::from(SCRIPT),
             nobody: Arc::from(""),
             refused: 0,
@@ -213,6 +219,7 @@ impl Tools {
                         tool.round = scripted.round;
                         tool.jumps += 1;
                         tool.edge = BladeEdge::default();
+                        tool.pressed = PressedEdge::default();
                     }
                     tool.mode = scripted.mode;
                 }
@@ -257,6 +264,9 @@ impl Tools {
     /// has moved less than `least_m` [m]. Must be called once per step for every tool.
     pub fn take_sweep(&mut self, index: usize, least_m: f64) -> Option<(BladeSweep, u32)> {
         let tool = &mut self.tools[index];
+        if self.by_force {
+            return tool.pressed.take(tool.cuts(), least_m, &mut self.numbers);
+        }
         let edge = tool.cuts().then(|| geometry::core(tool.shape, &tool.pose));
         tool.edge.advance(edge, least_m, &mut self.numbers)
     }
@@ -267,6 +277,7 @@ impl Tools {
         self.tools.retain(|tool| tool.declared);
         for tool in &mut self.tools {
             tool.edge = BladeEdge::default();
+            tool.pressed = PressedEdge::default();
             tool.owner = Arc::clone(&self.nobody);
             tool.mode = ToolMode::Hover;
             tool.force_n = Vector3::zeros();

@@ -39,7 +39,7 @@ fn sample(id: &str, x: f64, shape: Option<ToolShape>) -> ToolInput {
 
 #[test]
 fn a_script_gives_way_to_a_hand_and_takes_over_again() {
-    let mut tools = Tools::new(&[scripted()]);
+    let mut tools = Tools::new(&[scripted()], false);
     tools.advance(0.25, &[]);
     let tool = tools.iter().next().unwrap();
     assert_eq!((&*tool.owner, tool.mode), ("script", ToolMode::Cut));
@@ -59,7 +59,7 @@ fn a_script_gives_way_to_a_hand_and_takes_over_again() {
 
 #[test]
 fn a_new_round_of_a_script_is_a_new_incision() {
-    let mut tools = Tools::new(&[scripted()]);
+    let mut tools = Tools::new(&[scripted()], false);
     let mut incisions = Vec::new();
     for step in 0..20 {
         tools.advance(0.1 * f64::from(step) + 0.05, &[]);
@@ -76,7 +76,7 @@ fn a_new_round_of_a_script_is_a_new_incision() {
 
 #[test]
 fn guests_come_with_a_shape_while_there_is_room_and_leave_when_they_fall_silent() {
-    let mut tools = Tools::new(&[scripted()]);
+    let mut tools = Tools::new(&[scripted()], false);
     let shape = Some(ToolShape::Sphere { radius_m: 0.01 });
     tools.advance(0.0, &[sample("finger", 1.0, shape), sample("ghost", 1.0, None)]);
     assert_eq!(tools.len(), 2, "a guest without a shape is refused");

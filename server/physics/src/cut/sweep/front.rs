@@ -155,12 +155,22 @@ impl Row {
 
 /// Triangles of a sweep that continues `front`, overreach included.
 pub fn sweep_triangles(front: Option<&Front>, blade: &BladeSweep, x: &[Vector3<f64>]) -> Vec<SweepTriangle> {
+    sweep_from_behind(front, blade, x, 0.0)
+}
+
+/// The same, beginning `back_m` [m] behind the front.
+pub fn sweep_from_behind(
+    front: Option<&Front>,
+    blade: &BladeSweep,
+    x: &[Vector3<f64>],
+    back_m: f64,
+) -> Vec<SweepTriangle> {
     let mut rows: Vec<Row> = Vec::with_capacity(blade.segments.len() + 1);
     rows.extend(front.map(|f| f.now(x)));
     rows.extend(blade.segments.iter().map(Row::straight));
     rows.dedup();
     let drawn = rows.clone();
-    overreach(&mut rows);
+    overreach(&mut rows, if front.is_some() { back_m } else { 0.0 });
     let mut triangles = Vec::with_capacity(2 * rows.iter().map(|r| r.s.len()).sum::<usize>());
     for (pair, drawn) in rows.windows(2).zip(drawn.windows(2)) {
         let [quads, drawn] = [pair, drawn].map(quads);
@@ -181,20 +191,21 @@ fn quads(pair: &[Row]) -> Vec<[Vector3<f64>; 4]> {
     (1..from.len()).map(|k| [from[k - 1], from[k], to[k], to[k - 1]]).collect()
 }
 
-/// Widens every row at both ends, and extends the sweep before its first row and beyond its last.
-fn overreach(rows: &mut [Row]) {
+/// Widens every row at both ends, and extends the sweep before its first row, by at least `back_m` [m], and beyond its
+/// last.
+fn overreach(rows: &mut [Row], back_m: f64) {
     let length = |r: &Row| (r.ends()[1] - r.ends()[0]).norm();
     let reach = OVERREACH * rows.iter().map(length).fold(0.0, f64::max);
     let n = rows.len();
     if n < 2 {
         return;
     }
-    let push = |row: &Row, away: &Row| -> Vec<Vector3<f64>> {
+    let push = |row: &Row, away: &Row, reach: f64| -> Vec<Vector3<f64>> {
         let away = away.at_places_of(row);
         row.points.iter().zip(&away).map(|(p, q)| p + unit(p - q) * reach).collect()
     };
-    let first = push(&rows[0], &rows[1]);
-    let last = push(&rows[n - 1], &rows[n - 2]);
+    let first = push(&rows[0], &rows[1], reach.max(back_m));
+    let last = push(&rows[n - 1], &rows[n - 2], reach);
     rows[0].points = first;
     rows[n - 1].points = last;
     for row in rows {
