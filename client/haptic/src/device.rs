@@ -18,6 +18,8 @@ pub enum ToolMode {
     Grab,
     /// The blade cuts along its path.
     Cut,
+    /// The tool presses, and cuts the skin that it is drawn over as deep as it is pressed.
+    Scalpel,
 }
 
 /// State of the device at one tick, in world axes.

@@ -192,6 +192,7 @@ fn wire_sample(sample: &PoseSample, shape: ToolShape) -> ToolSample {
         ToolMode::Touch => tool_sample::Mode::Touch,
         ToolMode::Grab => tool_sample::Mode::Grab,
         ToolMode::Cut => tool_sample::Mode::Cut,
+        ToolMode::Scalpel => tool_sample::Mode::Scalpel,
     };
     ToolSample {
         pose: Some(Pose { position_m: Some(vec3(&state.position_m)), qx, qy, qz, qw }),

@@ -52,6 +52,8 @@ pub enum ToolMode {
     Grab,
     /// A blade that cuts along its path.
     Cut,
+    /// Pushes what it meets, and cuts the skin that it is drawn over as deep as it is pressed.
+    Scalpel,
 }
 
 /// The newest sample of a tool held by a client. A step reads one per held tool; a tool without

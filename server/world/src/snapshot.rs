@@ -131,6 +131,8 @@ pub struct ToolSnapshot {
     pub contact_stiffness_n_m: f64,
     /// Largest force [N].
     pub max_force_n: f64,
+    /// Force at which a blade that cuts with force goes on [N]; 0 for other tools.
+    pub resistance_n: f64,
     /// Middle of the tissue in its grip [m]; none when it holds nothing.
     pub held_m: Option<Vector3<f64>>,
     /// Sequence number of the newest sample used.

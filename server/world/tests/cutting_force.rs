@@ -222,3 +222,64 @@ fn a_reset_repeats_the_cut_and_undo_takes_it_back() {
     sim.step(&Inputs::default());
     assert!(sim.bodies()[0].body.positions().iter().all(|x| x.iter().all(|x| x.is_finite())));
 }
+
+/// A ball of 3 mm is pressed on the skin and drawn over it.
+#[test]
+fn a_scalpel_cuts_as_deep_as_it_is_pressed() {
+    let wound = |pressed: f64, toughness: &str| {
+        let low = 0.043 - pressed;
+        let text = format!(
+            r#"
+            schema = 1
+            [world]
+            gravity_m_s2 = [0, 0, 0]
+            step_s = 0.005
+            [[body]]
+            id = "flesh"
+            mesh = {{ box = {{ min_m = [0, 0, 0], max_m = [0.05, 0.06, 0.04], cells = [10, 12, 20] }} }}
+            young_pa = 2e4
+            poisson = 0.4
+            density_kg_m3 = 1000
+            rayleigh = {{ stiffness_s = 0.005 }}
+            {toughness}
+            [[body.fix]]
+            where = {{ slab = {{ axis = "z", from = 0, to = 0.001 }} }}
+            [[tool]]
+            id = "scalpel"
+            shape = {{ sphere = {{ radius_m = 0.003 }} }}
+            stiffness_n_m = 100
+            path = [
+                {{ at_s = 0.0, tip_m = [0.026, 0.015, 0.045], mode = "scalpel" }},
+                {{ at_s = 0.2, tip_m = [0.026, 0.015, {low:?}], mode = "scalpel" }},
+                {{ at_s = 0.6, tip_m = [0.026, 0.045, {low:?}], mode = "scalpel" }},
+                {{ at_s = 0.7, tip_m = [0.026, 0.045, 0.045], mode = "hover" }},
+            ]
+            "#
+        );
+        let mut sim = start(&text);
+        let mut force = 0.0f64;
+        for _ in 0..140 {
+            sim.step(&Inputs::default());
+            force = force.max(sim.tools().iter().next().unwrap().force_n.z);
+        }
+        let body = &sim.bodies()[0].body;
+        let surface = body.element_surface();
+        let lips = surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag > 0);
+        let lowest =
+            lips.flat_map(|(t, _)| t.map(|v| surface.vertices[v as usize].position(body.rest_positions()).z));
+        (force, 0.04 - lowest.fold(0.04, f64::min))
+    };
+    let wounds = [0.005, 0.012, 0.02, 0.03].map(|pressed| wound(pressed, ""));
+    for pair in wounds.windows(2) {
+        let [(weak, shallow), (strong, deep)] = [pair[0], pair[1]];
+        assert!(weak < strong && shallow <= deep, "{wounds:?}");
+    }
+    // Where the flesh is not squeezed much, the depth is that of the hand, to an element.
+    for (force, depth) in &wounds[..2] {
+        assert!((depth - force / 100.0).abs() < 0.0025, "{wounds:?}");
+    }
+    let depth = wounds[3].1;
+    assert!(wounds[0].1 < 0.2 * depth, "{wounds:?}");
+    let (_, tough) = wound(0.03, "cutting = { toughness_j_m2 = 100 }");
+    assert!(tough < depth, "{tough} with toughness, {depth} without");
+}

@@ -240,6 +240,7 @@ enum RawMode {
     Touch,
     Grab,
     Cut,
+    Scalpel,
 }
 
 #[derive(Deserialize)]
@@ -288,6 +289,7 @@ fn mode(raw: RawMode) -> ToolMode {
         RawMode::Touch => ToolMode::Touch,
         RawMode::Grab => ToolMode::Grab,
         RawMode::Cut => ToolMode::Cut,
+        RawMode::Scalpel => ToolMode::Scalpel,
     }
 }
 

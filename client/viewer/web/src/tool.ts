@@ -114,7 +114,7 @@ export class ToolVisual {
 }
 
 export function modeName(mode: ToolSample_Mode): string {
-  return ["", "hover", "touch", "grab", "cut"][mode] ?? "";
+  return ["", "hover", "touch", "grab", "cut", "scalpel"][mode] ?? "";
 }
 
 /** Meshes of a shape in tool axes: tip at the origin, shaft along +z. */

@@ -94,6 +94,7 @@ pub fn to_mode(mode: ToolMode) -> tool_sample::Mode {
         ToolMode::Touch => tool_sample::Mode::Touch,
         ToolMode::Grab => tool_sample::Mode::Grab,
         ToolMode::Cut => tool_sample::Mode::Cut,
+        ToolMode::Scalpel => tool_sample::Mode::Scalpel,
     }
 }
 
@@ -103,6 +104,7 @@ pub fn from_mode(mode: tool_sample::Mode) -> ToolMode {
         tool_sample::Mode::Touch => ToolMode::Touch,
         tool_sample::Mode::Grab => ToolMode::Grab,
         tool_sample::Mode::Cut => ToolMode::Cut,
+        tool_sample::Mode::Scalpel => ToolMode::Scalpel,
         tool_sample::Mode::Hover | tool_sample::Mode::Unspecified => ToolMode::Hover,
     }
 }

@@ -5,7 +5,8 @@
 //! hand pulls the front along by a one-sided spring k in the direction n from the front to the hand, so the tissue
 //! yields before the blade. The spring transmits at most J ℓ cos φ, where J is the toughness [J/m² = N/m], ℓ the
 //! length of the part, and φ the angle between n and the plane across the edge: a blade that slices needs less force.
-//! (The toughness is that of the area at rest: J grows with what the edge has passed at rest over what it passed.) What the hand does beyond that is an advance of the front by s through the material,
+//! (The toughness is that of the area at rest: J grows with what the edge has passed at rest over what it passed.)
+//! What the hand does beyond that is an advance of the front by s through the material,
 //!
 //! ```text
 //! s = max(0, e − J ℓ cos φ / k)        e: extension after the solve of the step
@@ -66,6 +67,8 @@ pub struct Edge {
 pub struct EdgeReport {
     /// Parts of the edge that are in tissue, over all parts.
     pub inside: f64,
+    /// Parts that are pressed, over all parts.
+    pub loaded: f64,
     /// Force with which the edge presses now [N].
     pub load_n: f64,
     /// Force at which it goes on [N].
@@ -100,8 +103,10 @@ struct Load {
     /// Place of the hand along the normal [m].
     hand_m: f64,
     stiffness_n_m: f64,
-    /// Force at which the front goes on [N]; infinite where the tool is too weak for it.
+    /// Force at which the front goes on [N].
     resistance_n: f64,
+    /// Whether the tool is too weak for that.
+    too_weak: bool,
     /// cos φ.
     across: f64,
 }
@@ -170,12 +175,12 @@ impl Edge {
             let normal = way / distance;
             let across = normal.cross(&along).norm();
             let resistance_n = toughness[front.body] * length_m * each * across * growth;
-            let too_weak = resistance_n > most_n;
             front.load = Some(Load {
                 normal,
                 hand_m: normal.dot(&hand),
                 stiffness_n_m,
-                resistance_n: if too_weak { f64::INFINITY } else { resistance_n },
+                resistance_n,
+                too_weak: resistance_n > most_n,
                 across,
             });
             let kind = SpringKind::OneSided { normal, offset_m: normal.dot(&(hand - front.offset_m)) };
@@ -319,14 +324,19 @@ impl Edge {
         let length_m = (edge[1] - edge[0]).norm() / n;
         let was_inside = self.report.inside > 0.0;
         let (mut inside, mut most) = (0, 0.0f64);
-        (self.report.load_n, self.report.resistance_n) = (0.0, 0.0);
+        (self.report.load_n, self.report.resistance_n, self.report.loaded) = (0.0, 0.0, 0.0);
         for front in self.parts.iter_mut().flatten() {
             inside += 1;
             let Some(load) = &front.load else { continue };
             let place = front.place(bodies[front.body].body.positions());
             let extension = (load.hand_m - load.normal.dot(&place)).max(0.0);
-            let s = (extension - load.resistance_n / load.stiffness_n_m).max(0.0);
+            let s = if load.too_weak {
+                0.0
+            } else {
+                (extension - load.resistance_n / load.stiffness_n_m).max(0.0)
+            };
             self.report.load_n += (load.stiffness_n_m * extension).min(load.resistance_n);
+            self.report.loaded += 1.0 / n;
             self.report.resistance_n += load.resistance_n;
             if s > 0.0 {
                 self.passed_m2 += length_m * s * load.across;

@@ -18,6 +18,7 @@ pub mod spring;
 pub mod grab;
 pub mod compliance;
 pub mod edge;
+mod scalpel;
 pub mod hand;
 pub mod rest;
 pub mod pairs;
@@ -29,7 +30,7 @@ use scindo_physics::cut::Surface;
 use scindo_physics::element::MaterialPoint;
 
 use crate::body::SimBody;
-use crate::inputs::MAX_TOOLS;
+use crate::inputs::{MAX_TOOLS, ToolMode};
 use crate::tool::geometry::core_radius;
 use crate::tool::obstacle::Obstacle;
 use crate::tool::{Tool, Tools};
@@ -130,6 +131,20 @@ impl Contacts {
             if let Some(line) = tool.pressed.at() {
                 let tip = Translation3::from(line[0]);
                 hand.seat(&Isometry3::from_parts(tip, tool.pose.rotation));
+            }
+        }
+    }
+
+    /// Lets scalpels cut the skin that they are drawn over as deep as they are pressed, after the reactions of a step.
+    pub fn draw_scalpels(&self, tools: &mut Tools) {
+        for (tool, hand) in tools.iter_mut().zip(&self.hands) {
+            if tool.mode != ToolMode::Scalpel {
+                continue;
+            }
+            let toughness = |body: usize| self.toughness.get(body).copied().unwrap_or(0.0);
+            match scalpel::segment(tool, hand.press(), toughness) {
+                Some(edge) => tool.pressed.draw(edge),
+                None => tool.pressed.leave(),
             }
         }
     }

@@ -398,7 +398,7 @@ impl Check<'_> {
         if point.mode == RawMode::Cut && tool.shape.blade.is_none() {
             self.conflict(format!("{at}.mode"), "only a blade can cut", "give the tool the shape of a blade");
         }
-        if point.mode == RawMode::Cut && self.raw.effects.cutting == Some(false) {
+        if matches!(point.mode, RawMode::Cut | RawMode::Scalpel) && self.raw.effects.cutting == Some(false) {
             let next = "remove the mode or effects.cutting";
             self.conflict(format!("{at}.mode"), "effects.cutting = false, but the tool cuts", next);
         }
@@ -411,6 +411,7 @@ impl Check<'_> {
                 RawMode::Touch => ToolMode::Touch,
                 RawMode::Grab => ToolMode::Grab,
                 RawMode::Cut => ToolMode::Cut,
+                RawMode::Scalpel => ToolMode::Scalpel,
             },
         }
     }

@@ -671,6 +671,9 @@ pub enum RawMode {
     Grab,
     /// A blade that cuts along its path.
     Cut,
+    /// Pushes what it meets, and cuts the skin that it is drawn over as deep as it is pressed: by the force over the
+    /// tool's stiffness. A toughness of the body, times the tool's width, is taken off the force.
+    Scalpel,
 }
 
 /// Effects switched on or off explicitly. An effect without an entry is on if the rest of the scene needs it.

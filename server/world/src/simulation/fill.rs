@@ -114,6 +114,11 @@ fn fill_tool(out: &mut ToolSnapshot, tool: &Tool, hand: Option<&Hand>) {
     out.contact_stiffness_n_m =
         hand.map_or(tool.stiffness_n_m, |hand| hand.in_series_with(tool.stiffness_n_m));
     out.max_force_n = tool.max_force_n;
+    let edge = hand.and_then(Hand::edge).unwrap_or_default();
+    out.resistance_n = edge.resistance_n;
+    if edge.loaded > 0.0 {
+        out.contact_stiffness_n_m = tool.stiffness_n_m * edge.loaded;
+    }
     out.held_m = hand.and_then(Hand::held_point);
     out.seq = tool.seq;
     out.client_time_ns = tool.client_time_ns;

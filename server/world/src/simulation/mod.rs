@@ -259,6 +259,7 @@ impl Simulation {
         self.contacts.settle_pairs(&self.bodies);
         self.contacts.settle_edges(&mut self.tools, &self.bodies);
         self.contacts.react(&mut self.tools);
+        self.contacts.draw_scalpels(&mut self.tools);
     }
 
     fn measure(&mut self) {

@@ -83,6 +83,16 @@ impl PressedEdge {
         *self = Self { began: Some(before), ..Self::default() };
     }
 
+    /// The cut of a scalpel [tip below the skin, above it] [m] after a step.
+    pub fn draw(&mut self, edge: [Vector3<f64>; 2]) {
+        let Some(before) = self.at().copied() else {
+            self.enter(edge);
+            return self.advance(edge, 0.0);
+        };
+        let by_m = (0..2).map(|i| (edge[i] - before[i]).norm()).fold(0.0, f64::max);
+        self.advance(edge, by_m);
+    }
+
     /// The edge after a step in which its foremost part went on by `by_m` [m].
     pub fn advance(&mut self, edge: [Vector3<f64>; 2], by_m: f64) {
         self.at = Some(edge);

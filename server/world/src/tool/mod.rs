@@ -109,7 +109,7 @@ impl Tool {
 
     /// Whether the tool pushes tissue now.
     pub fn touches(&self) -> bool {
-        !self.cuts() && matches!(self.mode, ToolMode::Touch | ToolMode::Cut)
+        !self.cuts() && matches!(self.mode, ToolMode::Touch | ToolMode::Cut | ToolMode::Scalpel)
     }
 
     fn hand_over(&mut self, owner: &Arc<str>) {
@@ -264,8 +264,9 @@ impl Tools {
     /// has moved less than `least_m` [m]. Must be called once per step for every tool.
     pub fn take_sweep(&mut self, index: usize, least_m: f64) -> Option<(BladeSweep, u32)> {
         let tool = &mut self.tools[index];
-        if self.by_force {
-            return tool.pressed.take(tool.cuts(), least_m, &mut self.numbers);
+        let draws = tool.mode == ToolMode::Scalpel;
+        if self.by_force || draws || tool.pressed.at().is_some() {
+            return tool.pressed.take(tool.cuts() || draws, least_m, &mut self.numbers);
         }
         let edge = tool.cuts().then(|| geometry::core(tool.shape, &tool.pose));
         tool.edge.advance(edge, least_m, &mut self.numbers)

@@ -227,9 +227,9 @@ impl ToolModel {
             }
             ToolMode::Cut if matches!(query.shape, ToolShape::Blade { .. }) => {
                 self.proxy.release(&query.pose);
-                now.mode = ContactMode::Cutting;
+                self.cut(query, &anchor);
             }
-            ToolMode::Touch | ToolMode::Cut => self.touch(query, &anchor, frame),
+            ToolMode::Touch | ToolMode::Cut | ToolMode::Scalpel => self.touch(query, &anchor, frame),
         }
         self.features.carry_over(&self.before, &mut self.now);
     }
@@ -278,6 +278,31 @@ impl ToolModel {
         self.now.mode = ContactMode::Contact;
         self.now.body = Some(place.body);
         self.now.epoch = frame.surfaces[place.body].epoch();
+    }
+
+    /// Adds the resistance of the tissue to a blade: a plane across the load, whose force rises up to that at which the
+    /// edge goes on. The hand then works against a constant force, which it does not get back.
+    fn cut(&mut self, query: &ToolQuery, anchor: &Anchor) {
+        self.now.mode = ContactMode::Cutting;
+        let Some(seen) = self.seen.as_ref().filter(|seen| seen.resistance_n > 0.0) else { return };
+        let Some(normal) = anchor.force.try_normalize(1e-6) else { return };
+        let tip = query.pose.translation.vector;
+        let moved = normal.dot(&(tip - anchor.pose.translation.vector));
+        let most = seen.resistance_n.min(anchor.max_force);
+        let force = (anchor.force.norm() - anchor.series * moved).min(most);
+        self.now.max_force_n = most;
+        self.now.planes.push(ContactPlane {
+            point_m: tip,
+            normal,
+            gap_m: -force / anchor.series.max(f64::MIN_POSITIVE),
+            force_n: force * normal,
+            stiffness_n_m: anchor.series,
+            tangential_stiffness_n_m: 0.0,
+            damping_ns_m: damping(anchor.series),
+            surface_velocity_m_s: Vector3::zeros(),
+            patch_radius_m: 0.0,
+            feature_id: 0,
+        });
     }
 
     /// Adds the pull of held tissue, along all axes.

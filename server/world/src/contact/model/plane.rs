@@ -45,7 +45,7 @@ pub enum ContactMode {
     Free,
     /// Planes act on the tool.
     Contact,
-    /// The blade cuts, and no plane resists it.
+    /// The blade cuts. A plane resists it where the tissue has a toughness.
     Cutting,
     /// The tool holds tissue.
     Hold,

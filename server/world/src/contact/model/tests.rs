@@ -225,3 +225,30 @@ fn held_tissue_pulls_back() {
     assert_eq!(model.mode, ContactMode::Hold);
     assert!((model.force_at(V::z() * 1e-3) - V::z() * -0.5).norm() < 1e-6);
 }
+
+/// A blade that cuts with force: the plane resists by what the hand moves on, up to the force at which it cuts.
+#[test]
+fn the_resistance_of_a_cut_is_bounded_and_given_back_by_no_one() {
+    let mut tissue = Tissue::new(1000.0);
+    tissue.step(V::zeros(), 0.02);
+    let blade = ToolShape::Blade { length_m: 0.03, thickness_m: 0.001 };
+    let tool = &mut tissue.snapshot.tools[0];
+    (tool.shape, tool.mode, tool.force_n) = (blade, ToolMode::Cut, V::new(0.0, 0.0, 2.0));
+    (tool.contact_stiffness_n_m, tool.resistance_n) = (1000.0, 3.0);
+    let ask = |snapshot: &Snapshot, z: f64| {
+        let mut models = ContactModels::default();
+        models.take(snapshot, 0.0);
+        let asked = ToolQuery { shape: blade, ..query(V::new(0.0, 0.0, z), V::zeros(), ToolMode::Cut) };
+        models.evaluate(&asked, 0.0).clone()
+    };
+    for (z, expected) in [(0.0, 2.0), (-0.0005, 2.5), (-0.002, 3.0), (0.001, 1.0), (0.003, 0.0)] {
+        let model = ask(&tissue.snapshot, z);
+        assert_eq!(model.mode, ContactMode::Cutting);
+        assert_eq!(model.max_force_n, 3.0);
+        // Without the plane that hides the change from no contact to this one.
+        let force = model.planes[0].force_at(V::zeros());
+        assert!((force - V::new(0.0, 0.0, expected)).norm() < 1e-12, "{force:?} at {z}");
+    }
+    tissue.snapshot.tools[0].resistance_n = 0.0;
+    assert!(ask(&tissue.snapshot, 0.0).planes.is_empty(), "a free blade");
+}

@@ -236,7 +236,9 @@ impl Check<'_> {
         }
         let Some(body) = raw.body.iter().find(whole) else { return };
         for tool in &raw.tool {
-            if let Some(i) = tool.path.iter().position(|point| point.mode == RawMode::Cut) {
+            if let Some(i) =
+                tool.path.iter().position(|point| matches!(point.mode, RawMode::Cut | RawMode::Scalpel))
+            {
                 let what = format!(
                     "a blade cuts every body it meets, but body `{}` is of {} elements; allowed: tet4, octree",
                     body.id,
