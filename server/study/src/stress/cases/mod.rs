@@ -1,6 +1,7 @@
 //! The list of hard cases, in order.
 
 mod flaws;
+mod blade;
 mod branches;
 mod cells;
 mod critical_step;
@@ -66,4 +67,5 @@ pub const ALL: &[Case] = &[
     touch::NEEDLE,
     touch::WEDGED,
     touch::PRESSED,
+    blade::PRESSED,
 ];

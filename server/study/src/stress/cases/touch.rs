@@ -101,12 +101,12 @@ pub const PRESSED: Case = Case {
     run: Some(pressed),
 };
 
-const WORLD: &str = "schema = 1\nworld = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }\n";
+pub(super) const WORLD: &str = "schema = 1\nworld = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }\n";
 const FLOOR: &str =
     "[[obstacle]]\nid = \"floor\"\nhalf_space = { point_m = [0, 0, 0], normal = [0, 0, 1] }\n";
 
 /// A box-shaped body.
-fn block(id: &str, min: [f64; 3], max: [f64; 3], cells: [usize; 3], lines: &str) -> String {
+pub(super) fn block(id: &str, min: [f64; 3], max: [f64; 3], cells: [usize; 3], lines: &str) -> String {
     format!(
         "[[body]]\nid = \"{id}\"\nmesh = {{ box = {{ min_m = {min:?}, max_m = {max:?}, cells = {cells:?} }} }}\n\
          young_pa = 2e4\npoisson = 0.4\ndensity_kg_m3 = 1000\nrayleigh = {{ stiffness_s = 0.005 }}\n{lines}\n"
@@ -114,8 +114,8 @@ fn block(id: &str, min: [f64; 3], max: [f64; 3], cells: [usize; 3], lines: &str)
 }
 
 /// A scene that is stepped, with what every case of contact must keep.
-struct Run {
-    sim: Simulation,
+pub(super) struct Run {
+    pub(super) sim: Simulation,
     not_whole: usize,
     not_finite: usize,
     /// Largest depth in another body, in the body itself, or in an obstacle, in cells.
@@ -125,7 +125,7 @@ struct Run {
 }
 
 impl Run {
-    fn new(text: &str) -> Result<Self, Trouble> {
+    pub(super) fn new(text: &str) -> Result<Self, Trouble> {
         let sim = Simulation::new(&Scene::from_toml(text)?, Path::new(""))?;
         Ok(Self { sim, not_whole: 0, not_finite: 0, deepest: 0.0, kinetic: Vec::new(), depth: Vec::new() })
     }
@@ -148,11 +148,11 @@ impl Run {
         self.depth.push([time, deepest]);
     }
 
-    fn steps(&mut self, n: usize) {
+    pub(super) fn steps(&mut self, n: usize) {
         (0..n).for_each(|_| self.step());
     }
 
-    fn kinetic_energy(&self) -> f64 {
+    pub(super) fn kinetic_energy(&self) -> f64 {
         self.sim.bodies().iter().map(|body| body.body.kinetic_energy()).sum()
     }
 
@@ -161,7 +161,7 @@ impl Run {
     }
 
     /// Adds what every case tells.
-    fn tell(self, name: &str, depth: f64, evidence: &mut Evidence) {
+    pub(super) fn tell(self, name: &str, depth: f64, evidence: &mut Evidence) {
         let of = |what: &str| if name.is_empty() { what.to_owned() } else { format!("{what}, {name}") };
         evidence.exactly(of("steps held, refused or divided"), self.not_whole, 0);
         evidence.exactly(of("bodies with numbers that are not finite"), self.not_finite, 0);
