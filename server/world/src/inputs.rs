@@ -10,6 +10,9 @@ pub const MAX_OBSTACLES: usize = 64;
 /// Most tools of a simulation, those of the scene and those brought by clients.
 pub const MAX_TOOLS: usize = 64;
 
+/// Most poses of a blade between two steps.
+pub const MAX_PASSED: usize = 64;
+
 /// Geometry of a rigid tool in its own axes: tip in the origin, shaft along +z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ToolShape {
@@ -66,6 +69,8 @@ pub struct ToolInput {
     pub owner: Arc<str>,
     /// Tool axes to world axes; the translation is the tip [m].
     pub pose: Isometry3<f64>,
+    /// Poses of a cutting blade since the last step, before `pose`, oldest first; at most [`MAX_PASSED`].
+    pub passed: Vec<Isometry3<f64>>,
     /// Velocity of the tip [m/s].
     pub velocity_m_s: Vector3<f64>,
     /// What the hand does.

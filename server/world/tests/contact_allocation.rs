@@ -70,6 +70,7 @@ fn steady_contact_does_not_allocate() {
             id: Arc::from(spec.id.as_str()),
             owner: Arc::from("test"),
             pose: Isometry3::identity(),
+            passed: Vec::new(),
             velocity_m_s: V::zeros(),
             mode,
             shape: None,

@@ -120,10 +120,10 @@ impl Inbox {
         self.counters.count(code, 1)
     }
 
-    /// Moves the inputs of the next step into `inputs`: the newest poses, and all cuts since the last step.
+    /// Moves the inputs of the next step into `inputs`: the newest poses, those that blades have passed
+    /// in between, and all cuts since the last step.
     pub fn take(&mut self, inputs: &mut Inputs) {
-        inputs.tools.clear();
-        inputs.tools.extend(self.owners.held().cloned());
+        self.owners.take(&mut inputs.tools);
         self.cuts.take(&mut inputs.cuts);
     }
 

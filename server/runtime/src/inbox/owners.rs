@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use scindo_proto::messages::{DeviceCapability, ToolSample};
-use scindo_world::inputs::{MAX_TOOLS, ToolInput};
+use scindo_world::inputs::{MAX_PASSED, MAX_TOOLS, ToolInput, ToolMode};
 
 use super::counters::ToolFigures;
 use super::early::{EarlyPoses, PATIENCE};
@@ -44,6 +44,8 @@ pub enum Change {
 #[derive(Debug, Clone)]
 struct Held {
     input: ToolInput,
+    /// Whether a step has taken its pose.
+    taken: bool,
     poses: u64,
     /// Age of the contact model that its device last used [ms].
     contact_age_ms: f32,
@@ -60,6 +62,18 @@ impl Held {
         }
         self.this_second.1 += 1;
         self.this_second.1 <= MAX_POSE_RATE
+    }
+
+    /// Keeps the poses of a blade that cuts until a step takes them.
+    fn pass(&mut self, before: ToolInput) {
+        let cuts = before.mode == ToolMode::Cut && self.input.mode == ToolMode::Cut;
+        let known = std::mem::take(&mut self.taken);
+        if cuts {
+            self.input.passed = before.passed;
+            if !known && self.input.passed.len() < MAX_PASSED {
+                self.input.passed.push(before.pose);
+            }
+        }
     }
 
     /// Whether `sample` is newer than the newest known pose. A client that takes its tool again counts from
@@ -154,7 +168,8 @@ impl Owners {
             ));
         }
         let (id, owner) = (held.input.id.clone(), held.input.owner.clone());
-        held.input = to_tool_input(sample, id, owner);
+        let before = std::mem::replace(&mut held.input, to_tool_input(sample, id, owner));
+        held.pass(before);
         held.poses += 1;
         held.contact_age_ms = sample.contact_age_ms;
         Ok(None)
@@ -204,7 +219,8 @@ impl Owners {
         let owner: Arc<str> = Arc::from(sample.client_id.as_str());
         let input = to_tool_input(sample, id.clone(), owner.clone());
         let contact_age_ms = sample.contact_age_ms;
-        let held = Held { input, poses: 1, contact_age_ms, this_second: (now, 1), capability: None };
+        let held =
+            Held { input, taken: false, poses: 1, contact_age_ms, this_second: (now, 1), capability: None };
         self.held.insert(id.clone(), held);
         Ok(Change::Taken { tool: id, owner })
     }
@@ -230,6 +246,17 @@ impl Owners {
 
     pub fn held(&self) -> impl Iterator<Item = &ToolInput> {
         self.held.values().map(|held| &held.input)
+    }
+
+    /// Moves what the clients hold into `tools`, for a step.
+    pub fn take(&mut self, tools: &mut Vec<ToolInput>) {
+        tools.clear();
+        for held in self.held.values_mut() {
+            let mut input = held.input.clone();
+            input.passed = std::mem::take(&mut held.input.passed);
+            held.taken = true;
+            tools.push(input);
+        }
     }
 
     pub fn capability_of(&self, tool: &str) -> Option<&DeviceCapability> {

@@ -238,3 +238,37 @@ fn a_client_that_comes_back_goes_on_with_its_numbers() {
     inbox.client_came("a", start());
     assert!(matches!(inbox.pose("scalpel", &sample("a", "scalpel", 8), start()), Ok(Some(_))));
 }
+
+/// A step gets every pose of a blade that cuts since the last one, and of other tools the newest alone.
+#[test]
+fn a_step_gets_all_places_of_a_cutting_blade() {
+    use scindo_proto::messages::tool_sample::Mode;
+    let mut inbox = visited();
+    let mut send = |inbox: &mut Inbox, seq: u64, mode: Mode| {
+        let mut sample = sample("a", "scalpel", seq);
+        sample.pose = Some(Pose {
+            position_m: Some(Vec3 { x: seq as f64, y: 0.0, z: 0.0 }),
+            qw: 1.0,
+            ..Pose::default()
+        });
+        sample.mode = mode.into();
+        inbox.pose("scalpel", &sample, start()).unwrap();
+    };
+    let mut inputs = Inputs::default();
+    let mut take = |inbox: &mut Inbox| {
+        inbox.take(&mut inputs);
+        let tool = &inputs.tools[0];
+        let places = tool.passed.iter().chain([&tool.pose]);
+        places.map(|pose| pose.translation.vector.x).collect::<Vec<_>>()
+    };
+    (1..=3).for_each(|seq| send(&mut inbox, seq, Mode::Cut));
+    assert_eq!(take(&mut inbox), [1.0, 2.0, 3.0]);
+    assert_eq!(take(&mut inbox), [3.0], "nothing came");
+    (4..=5).for_each(|seq| send(&mut inbox, seq, Mode::Cut));
+    assert_eq!(take(&mut inbox), [4.0, 5.0]);
+    (6..=8).for_each(|seq| send(&mut inbox, seq, Mode::Touch));
+    assert_eq!(take(&mut inbox), [8.0]);
+    (9..=200).for_each(|seq| send(&mut inbox, seq, Mode::Cut));
+    let places = take(&mut inbox);
+    assert!(places.len() <= scindo_world::inputs::MAX_PASSED + 1 && places.last() == Some(&200.0), "bounded");
+}

@@ -115,6 +115,7 @@ pub fn to_tool_input(sample: &wire::ToolSample, id: Arc<str>, owner: Arc<str>) -
         id,
         owner,
         pose: sample.pose.as_ref().map_or_else(Isometry3::identity, from_pose),
+        passed: Vec::new(),
         velocity_m_s: from_vec3(sample.velocity_m_s),
         mode: from_mode(sample.mode()),
         shape: sample.shape.as_ref().and_then(from_shape),

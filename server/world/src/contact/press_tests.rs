@@ -60,6 +60,7 @@ impl Table {
             id: Arc::from("probe"),
             owner: Arc::from("test"),
             pose,
+            passed: Vec::new(),
             velocity_m_s: V::zeros(),
             mode,
             shape: None,

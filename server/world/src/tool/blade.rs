@@ -1,7 +1,7 @@
 //! The surface that the edge of a cutting blade sweeps.
 
 use nalgebra::Vector3;
-use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::{BladeSweep, MAX_SEGMENTS};
 
 /// Shortest move that is still cut at the end of an incision [m].
 const LEAST_MOVE_M: f64 = 1e-6;
@@ -30,26 +30,36 @@ pub struct BladeEdge {
 struct Cutting {
     incision: u32,
     last: [Vector3<f64>; 2],
+    /// Places between the last sweep and now.
+    passed: Vec<[Vector3<f64>; 2]>,
     now: [Vector3<f64>; 2],
 }
 
 impl BladeEdge {
-    /// Feeds the edge [tip, heel] of this step [m], or `None` if the blade does not cut. Returns the sweep to
+    /// Feeds the edge [tip, heel] of this step [m], or `None` if the blade does not cut, and the places that it `passed`
+    /// since the last step. Returns the sweep to
     /// cut and its incision number once the edge has moved by `least_m` [m], or when the incision ends. The
     /// number stays the same until the blade stops cutting.
     pub fn advance(
         &mut self,
         edge: Option<[Vector3<f64>; 2]>,
+        passed: impl IntoIterator<Item = [Vector3<f64>; 2]>,
         least_m: f64,
         numbers: &mut IncisionNumbers,
     ) -> Option<(BladeSweep, u32)> {
         match (&mut self.cutting, edge) {
             (None, None) => None,
             (None, Some(edge)) => {
-                self.cutting = Some(Cutting { incision: numbers.fresh(), last: edge, now: edge });
+                self.cutting =
+                    Some(Cutting { incision: numbers.fresh(), last: edge, passed: Vec::new(), now: edge });
                 None
             }
             (Some(cutting), Some(edge)) => {
+                let mut passed = passed.into_iter().peekable();
+                if passed.peek().is_some() && cutting.now != cutting.last {
+                    cutting.pass(cutting.now);
+                }
+                passed.for_each(|edge| cutting.pass(edge));
                 cutting.now = edge;
                 cutting.sweep(least_m)
             }
@@ -136,12 +146,21 @@ impl PressedEdge {
 }
 
 impl Cutting {
+    fn pass(&mut self, edge: [Vector3<f64>; 2]) {
+        if self.passed.len() < MAX_SEGMENTS - 2 {
+            self.passed.push(edge);
+        }
+    }
+
     fn sweep(&mut self, least_m: f64) -> Option<(BladeSweep, u32)> {
-        let moved = |i: usize| (self.now[i] - self.last[i]).norm();
-        if moved(0).max(moved(1)) < least_m {
+        let moved =
+            |edge: &[Vector3<f64>; 2]| (0..2).map(|i| (edge[i] - self.last[i]).norm()).fold(0.0, f64::max);
+        if self.passed.iter().chain([&self.now]).map(moved).fold(0.0, f64::max) < least_m {
             return None;
         }
-        let segments = vec![self.last, self.now];
+        let mut segments = vec![self.last];
+        segments.append(&mut self.passed);
+        segments.push(self.now);
         self.last = self.now;
         Some((BladeSweep { segments }, self.incision))
     }
@@ -181,16 +200,20 @@ mod tests {
         let edge = |x: f64| Some([Vector3::new(x, 0.0, 0.0), Vector3::new(x, 0.0, 0.04)]);
         let mut numbers = IncisionNumbers::default();
         let mut blade = BladeEdge::default();
-        assert!(blade.advance(edge(0.0), 0.001, &mut numbers).is_none());
-        assert!(blade.advance(edge(0.0005), 0.001, &mut numbers).is_none());
-        let (first, number) = blade.advance(edge(0.0012), 0.001, &mut numbers).unwrap();
+        assert!(blade.advance(edge(0.0), [], 0.001, &mut numbers).is_none());
+        assert!(blade.advance(edge(0.0005), [], 0.001, &mut numbers).is_none());
+        let (first, number) = blade.advance(edge(0.0012), [], 0.001, &mut numbers).unwrap();
         assert_eq!(first.segments, [edge(0.0).unwrap(), edge(0.0012).unwrap()]);
-        assert!(blade.advance(edge(0.0015), 0.001, &mut numbers).is_none());
-        let (rest, same) = blade.advance(None, 0.001, &mut numbers).unwrap();
+        assert!(blade.advance(edge(0.0015), [], 0.001, &mut numbers).is_none());
+        let (rest, same) = blade.advance(None, [], 0.001, &mut numbers).unwrap();
         assert_eq!(rest.segments, [edge(0.0012).unwrap(), edge(0.0015).unwrap()]);
         assert_eq!((number, same), (1, 1));
-        assert!(blade.advance(None, 0.001, &mut numbers).is_none());
-        blade.advance(edge(0.1), 0.001, &mut numbers);
-        assert_eq!(blade.advance(edge(0.2), 0.001, &mut numbers).unwrap().1, 2);
+        assert!(blade.advance(None, [], 0.001, &mut numbers).is_none());
+        blade.advance(edge(0.1), [], 0.001, &mut numbers);
+        assert_eq!(blade.advance(edge(0.2), [], 0.001, &mut numbers).unwrap().1, 2);
+        // What happened between two steps counts, also where the blade is back at its place.
+        let between = [0.21, 0.22].map(|x| edge(x).unwrap());
+        let (sweep, _) = blade.advance(edge(0.2), between, 0.001, &mut numbers).unwrap();
+        assert_eq!(sweep.segments, [0.2, 0.21, 0.22, 0.2].map(|x| edge(x).unwrap()));
     }
 }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Vector3};
 use scindo_physics::cut::BladeSweep;
 
-use crate::inputs::{MAX_TOOLS, ToolInput, ToolMode, ToolShape};
+use crate::inputs::{MAX_PASSED, MAX_TOOLS, ToolInput, ToolMode, ToolShape};
 use crate::scene::checked::ToolSpec;
 use blade::{BladeEdge, IncisionNumbers, PressedEdge};
 use script::Script;
@@ -51,6 +51,8 @@ pub struct Tool {
     /// The client's clock at that sample [ns].
     pub client_time_ns: u64,
     edge: BladeEdge,
+    /// Poses of a cutting blade since the last step.
+    passed: Vec<Isometry3<f64>>,
     /// Its edge where it cuts with force.
     pub(crate) pressed: PressedEdge,
     script: Option<Script>,
@@ -76,6 +78,7 @@ impl Tool {
             seq: 0,
             client_time_ns: 0,
             edge: BladeEdge::default(),
+            passed: Vec::new(),
             pressed: PressedEdge::default(),
             script: None,
             round: 0,
@@ -252,6 +255,11 @@ impl Tools {
         if let (false, Some(shape)) = (tool.declared, sample.shape) {
             tool.shape = shape;
         }
+        tool.passed.clear();
+        if tool.owner == sample.owner {
+            let passed = sample.passed.iter().take(MAX_PASSED).filter(|pose| geometry::is_sane(pose));
+            tool.passed.extend(passed);
+        }
         tool.pose = sample.pose;
         tool.hand_over(&sample.owner);
         tool.velocity_m_s = sample.velocity_m_s;
@@ -269,7 +277,9 @@ impl Tools {
             return tool.pressed.take(tool.cuts() || draws, least_m, &mut self.numbers);
         }
         let edge = tool.cuts().then(|| geometry::core(tool.shape, &tool.pose));
-        tool.edge.advance(edge, least_m, &mut self.numbers)
+        let shape = tool.shape;
+        let passed = tool.passed.drain(..).map(|pose| geometry::core(shape, &pose));
+        tool.edge.advance(edge, passed, least_m, &mut self.numbers)
     }
 
     /// Returns to the start of the scene: guests leave, and nobody holds a tool. Incision numbers keep

@@ -29,6 +29,7 @@ fn sample(id: &str, x: f64, shape: Option<ToolShape>) -> ToolInput {
         id: Arc::from(id),
         owner: Arc::from("someone"),
         pose: Isometry3::translation(x, 0.0, 0.0),
+        passed: Vec::new(),
         velocity_m_s: Vector3::x(),
         mode: ToolMode::Touch,
         shape,

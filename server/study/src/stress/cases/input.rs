@@ -264,6 +264,7 @@ fn of_clients(tally: &mut Tally) -> Result<(), Trouble> {
             id: Arc::from("probe"),
             owner: Arc::from("client"),
             pose,
+            passed: Vec::new(),
             velocity_m_s: V::repeat(bad),
             mode,
             shape: Some(ToolShape::Sphere { radius_m: 0.01 }),
