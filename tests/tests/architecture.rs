@@ -13,7 +13,15 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("scindo-study", BTreeSet::from(["scindo-world", "scindo-physics", "scindo-collision"])),
         (
             "scindo",
-            BTreeSet::from(["scindo-world", "scindo-study", "scindo-proto", "scindo-view", "scindo-program"]),
+            // It knows the haptic client for `scindo haptics`, which holds the client against the world.
+            BTreeSet::from([
+                "scindo-world",
+                "scindo-study",
+                "scindo-proto",
+                "scindo-view",
+                "scindo-haptic",
+                "scindo-program",
+            ]),
         ),
         ("scindo-client", BTreeSet::from(["scindo-proto"])),
         ("scindo-view", BTreeSet::from(["scindo-proto", "scindo-client", "scindo-program"])),

@@ -26,6 +26,8 @@ mod study_progress;
 
 pub mod stress;
 
+pub mod haptics;
+
 /// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -38,6 +40,7 @@ pub fn main() -> ExitCode {
         Some(Command::Mesh(args)) => args.json,
         Some(Command::Accuracy(args)) => args.json,
         Some(Command::Stress(args)) => args.json,
+        Some(Command::Haptics(args)) => args.json,
         Some(Command::Manual(_)) => false,
     };
     let outcome = match cli.command {
@@ -48,6 +51,7 @@ pub fn main() -> ExitCode {
         Some(Command::Mesh(args)) => mesh::mesh(&args),
         Some(Command::Accuracy(args)) => accuracy::accuracy(&args),
         Some(Command::Stress(args)) => stress::stress(&args),
+        Some(Command::Haptics(args)) => haptics::haptics(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };
     match outcome {

@@ -161,7 +161,8 @@ fn open_line(config: &ContactConfig, tool: &str) -> Option<Line> {
     Some(Line { publisher, wanted, seq: 0 })
 }
 
-fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> HapticContact {
+/// The message of a model, computed for `input`.
+pub(crate) fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> HapticContact {
     let mode = match model.mode {
         ContactMode::Free => haptic_contact::Mode::Free,
         ContactMode::Contact => haptic_contact::Mode::Contact,

@@ -11,6 +11,7 @@
 //! * [`publish`]: the publication thread, and the threads that answer late joiners.
 //! * [`rpc`]: questions and orders.
 //! * [`server`]: starts and ends all of these.
+//! * [`haptics`]: what a hand feels over a link, against the truth; an experiment on virtual time.
 //!
 //! | thread | does | waits for |
 //! |---|---|---|
@@ -44,3 +45,5 @@ pub mod rpc;
 pub mod watchdog;
 
 pub mod server;
+
+pub mod haptics;

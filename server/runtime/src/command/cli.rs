@@ -40,6 +40,8 @@ pub enum Command {
     Accuracy(AccuracyArgs),
     /// Run hard cases for deformation and cutting, and write a page of their results.
     Stress(StressArgs),
+    /// Measure what a hand feels over a link, against the same tissue solved at 1 kHz, and write a page.
+    Haptics(HapticsArgs),
     /// Completions and man pages.
     #[command(flatten)]
     Manual(Manual),
@@ -248,6 +250,23 @@ pub struct StressArgs {
     pub out: PathBuf,
     /// Number of cases that run in parallel; 0 is one per hardware thread. Results do not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
+    pub threads: u16,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `scindo haptics`.
+#[derive(Debug, Args)]
+pub struct HapticsArgs {
+    /// Use only one hand and three delays; takes seconds.
+    #[arg(long)]
+    pub quick: bool,
+    /// Directory for index.html and haptics.json.
+    #[arg(long, value_name = "DIR", default_value = "haptics")]
+    pub out: PathBuf,
+    /// Number of cells that run in parallel. Results do not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub threads: u16,
     /// Report as JSON.
     #[arg(long)]

@@ -1,0 +1,54 @@
+//! `scindo haptics` measures what the hand feels, by hand, delay and loss.
+
+use std::fs;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::accuracy::{bar, listen};
+use super::cli::HapticsArgs;
+use super::say::say;
+use crate::error::RuntimeError;
+use crate::haptics::{page, table};
+
+/// Runs the table and writes the page. Ctrl-C ends it after the cells that are under way.
+pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, RuntimeError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    listen(&stop)?;
+    let cells = table::cells(args.quick);
+    let bar = bar(args.json);
+    bar.set_length(cells.len() as u64);
+    let trials = table::run(&cells, usize::from(args.threads), &stop, &|done, trial| {
+        bar.set_position(done as u64);
+        bar.set_message(format!("{}, {} ms", trial.cell.hand.name, trial.cell.delay_ms));
+    })?;
+    bar.finish_and_clear();
+    let interrupted = stop.load(Ordering::Relaxed);
+    let report = page::json(&trials);
+    let put = |name: &str, text: &str| {
+        let (path, draft) = (args.out.join(name), args.out.join(format!("{name}.part")));
+        let written = fs::create_dir_all(&args.out)
+            .and_then(|()| fs::write(&draft, text))
+            .and_then(|()| fs::rename(&draft, &path));
+        written.map_err(|error| RuntimeError::System {
+            what: format!("writing {}", path.display()),
+            reason: format!("{error}; choose another directory with --out"),
+        })
+    };
+    put("index.html", &page::html(&trials))?;
+    put("haptics.json", &format!("{report:#}\n"))?;
+    let failed = trials.iter().filter(|trial| !trial.failures().is_empty()).count();
+    if args.json {
+        say!("{report}");
+    } else {
+        trials.iter().for_each(|trial| say!("{}", page::text(trial)));
+        say!(
+            "{} cells, {failed} out of bounds{}",
+            trials.len(),
+            if interrupted { "; interrupted" } else { "" }
+        );
+        say!("  page     {}/index.html", args.out.display());
+        say!("  figures  {}/haptics.json", args.out.display());
+    }
+    Ok(if failed > 0 || interrupted { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
