@@ -28,6 +28,8 @@ pub mod stress;
 
 pub mod haptics;
 
+pub mod effects;
+
 /// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -41,6 +43,7 @@ pub fn main() -> ExitCode {
         Some(Command::Accuracy(args)) => args.json,
         Some(Command::Stress(args)) => args.json,
         Some(Command::Haptics(args)) => args.json,
+        Some(Command::Effects(args)) => args.json,
         Some(Command::Manual(_)) => false,
     };
     let outcome = match cli.command {
@@ -52,6 +55,7 @@ pub fn main() -> ExitCode {
         Some(Command::Accuracy(args)) => accuracy::accuracy(&args),
         Some(Command::Stress(args)) => stress::stress(&args),
         Some(Command::Haptics(args)) => haptics::haptics(&args),
+        Some(Command::Effects(args)) => effects::effects(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };
     match outcome {

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use scindo_proto::KeyError;
 use scindo_study::StudyError;
+use scindo_study::effects::EffectsError;
 use scindo_study::stress::StressError;
 use scindo_world::format::MeshInError;
 use scindo_world::results::ResultsError;
@@ -31,6 +32,9 @@ pub enum RuntimeError {
     /// A stress case does not exist, or its page cannot be written.
     #[error(transparent)]
     Stress(#[from] StressError),
+    /// The effects of a scene cannot be measured.
+    #[error(transparent)]
+    Effects(#[from] EffectsError),
     /// An option of the command line cannot be used.
     #[error("{option} '{value}': {reason}. {next}")]
     Option {
@@ -97,7 +101,8 @@ impl RuntimeError {
         match self {
             Self::Study(StudyError::Io { .. }) => ExitCode::from(1),
             Self::Stress(StressError::Io { .. }) => ExitCode::from(1),
-            Self::Study(_) | Self::Stress(_) => ExitCode::from(2),
+            Self::Effects(EffectsError::Body(_)) => ExitCode::from(1),
+            Self::Study(_) | Self::Stress(_) | Self::Effects(_) => ExitCode::from(2),
             Self::Scene(_) | Self::Mesh(_) | Self::Option { .. } | Self::Key(_) => ExitCode::from(2),
             _ => ExitCode::from(1),
         }
@@ -106,9 +111,12 @@ impl RuntimeError {
     /// Stable name of the error in `--json` output.
     pub fn code(&self) -> &'static str {
         match self {
-            Self::Scene(_) | Self::Study(StudyError::Scene(_)) => "scene",
+            Self::Scene(_) | Self::Study(StudyError::Scene(_)) | Self::Effects(EffectsError::Scene(_)) => {
+                "scene"
+            }
             Self::Study(_) => "study",
             Self::Stress(_) => "stress",
+            Self::Effects(_) => "effects",
             Self::Option { .. } => "option",
             Self::Key(_) => "key",
             Self::Listen { .. } => "listen",

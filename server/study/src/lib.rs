@@ -43,6 +43,9 @@ pub mod study;
 #[allow(non_snake_case)] // the symbols of the field: A, X, K
 pub mod experiment;
 
+// What each effect of a scene costs.
+pub mod effects;
+
 // The other study: what breaks codes that deform and cut.
 #[allow(non_snake_case)] // the symbols of the field: X, K, M
 pub mod stress;

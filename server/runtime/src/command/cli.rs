@@ -42,6 +42,8 @@ pub enum Command {
     Stress(StressArgs),
     /// Measure what a hand feels over a link, against the same tissue solved at 1 kHz, and write a page.
     Haptics(HapticsArgs),
+    /// Measure what each effect of a scene costs by stepping the scene with it and without it.
+    Effects(EffectsArgs),
     /// Completions and man pages.
     #[command(flatten)]
     Manual(Manual),
@@ -268,6 +270,23 @@ pub struct HapticsArgs {
     /// Number of cells that run in parallel. Results do not depend on it.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub threads: u16,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `scindo effects`.
+#[derive(Debug, Args)]
+pub struct EffectsArgs {
+    /// Scene file, TOML or JSON.
+    pub scene: PathBuf,
+    /// Steps from the start of the scene, made anew for each effect.
+    #[arg(long, value_name = "N", default_value_t = 100,
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(scindo_study::effects::MOST_STEPS)))]
+    pub steps: u32,
+    /// Override a key of the scene, such as body.liver.young_pa=5e3. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
     /// Report as JSON.
     #[arg(long)]
     pub json: bool,

@@ -20,6 +20,8 @@ mod fill;
 
 mod sleep;
 
+mod twin;
+
 mod undo;
 
 use std::path::Path;
