@@ -26,7 +26,7 @@ fn pressed(_: &Setting) -> Result<Evidence, Trouble> {
     let mut evidence = Evidence::default();
     let through = |seconds: f64| vec![(0.0, 0.051, -0.03, 0.042), (seconds, 0.051, -0.03, -0.012)];
     let shake = |x: f64, y: f64, z: f64| {
-        let swing = |i: usize| if i % 2 == 0 { 1.0 } else { -1.0 };
+        let swing = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         let mut path = vec![(0.0, 0.051, -0.03, 0.042), (0.5, 0.051, -0.03, 0.02)];
         path.extend((0..10).map(|i| {
             let by = 0.01 * swing(i);
