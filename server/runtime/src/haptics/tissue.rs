@@ -81,6 +81,7 @@ pub fn tool_input(
         id: Arc::from(TOOL),
         owner: Arc::from("hand"),
         pose: Isometry3::from_parts(position_m.into(), nalgebra::UnitQuaternion::identity()),
+        passed: Vec::new(),
         velocity_m_s,
         mode,
         shape: Some(SHAPE),

@@ -244,7 +244,7 @@ fn a_client_that_comes_back_goes_on_with_its_numbers() {
 fn a_step_gets_all_places_of_a_cutting_blade() {
     use scindo_proto::messages::tool_sample::Mode;
     let mut inbox = visited();
-    let mut send = |inbox: &mut Inbox, seq: u64, mode: Mode| {
+    let send = |inbox: &mut Inbox, seq: u64, mode: Mode| {
         let mut sample = sample("a", "scalpel", seq);
         sample.pose = Some(Pose {
             position_m: Some(Vec3 { x: seq as f64, y: 0.0, z: 0.0 }),
