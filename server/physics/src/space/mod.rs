@@ -145,13 +145,17 @@ pub trait Space: Points + Send {
     fn locate(&self, point: Vector3<f64>, side: Option<Vector3<f64>>) -> Option<RestPoint>;
 
     /// Finds the material points at `points` [m] with the copies at `x` [m]: each in the piece in which it lies
-    /// deepest, `None` outside the body. Not to be called while a cut is under way.
+    /// deepest, `None` outside the body. Not to be called while a cut is under way. Spaces that cannot be cut find
+    /// nothing.
     fn material_at(
         &mut self,
-        x: &[Vector3<f64>],
+        _x: &[Vector3<f64>],
         points: &[Vector3<f64>],
         found: &mut Vec<Option<MaterialPoint>>,
-    );
+    ) {
+        found.clear();
+        found.resize(points.len(), None);
+    }
 
     /// Nodes and shape functions (Σ = 1) that carry a material point in the present cut state.
     fn carriers(&self, point: &RestPoint) -> Vec<(u32, f64)>;
