@@ -118,6 +118,8 @@ pub struct Wants {
     pub stress: Vec<bool>,
     /// Positions of probes and energies in the snapshot.
     pub measures: bool,
+    /// Forces of contact in the snapshot.
+    pub forces: bool,
 }
 
 impl Wants {
@@ -126,7 +128,7 @@ impl Wants {
         self.surface.clone_from(&other.surface);
         self.stress.clone_from(&other.stress);
         (self.contact, self.energy) = (other.contact, other.energy);
-        self.measures = other.measures;
+        (self.measures, self.forces) = (other.measures, other.forces);
     }
 }
 

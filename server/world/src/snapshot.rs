@@ -4,6 +4,8 @@
 //! only when the number of surface vertices grows. Topology is shared behind an `Arc` and
 //! changes only with a body's epoch. No snapshot holds a non-finite number.
 
+pub mod forces;
+
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
@@ -59,6 +61,8 @@ pub struct Snapshot {
     pub tools: Vec<ToolSnapshot>,
     /// Positions of the probes [m], in the order of the scene; empty when nobody asked.
     pub probes: Vec<Vector3<f64>>,
+    /// Forces of contact; empty when nobody asked.
+    pub forces: forces::Forces,
 }
 
 /// One body.

@@ -22,6 +22,7 @@ mod scalpel;
 pub mod hand;
 pub mod rest;
 pub mod pairs;
+pub mod forces;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 use scindo_collision::{Method, SurfaceError};

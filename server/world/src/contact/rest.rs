@@ -35,6 +35,17 @@ struct Kept {
     spring: u32,
 }
 
+/// A vertex that was pushed by an obstacle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pushed {
+    /// The obstacle, by its place in the scene.
+    pub obstacle: u32,
+    /// Its spring.
+    pub spring: u32,
+    /// How far the plane of the spring is lifted [m].
+    pub lift_m: f64,
+}
+
 /// Contact of a body with all obstacles in one step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RestReport {
@@ -151,6 +162,12 @@ impl Resting {
     /// The springs of this step, in the order in which [`collect`](Self::collect) takes their forces.
     pub fn springs(&self) -> &[PointSpring] {
         &self.springs
+    }
+
+    /// What was pushed in the last step, by ascending spring.
+    pub fn pushed(&self) -> impl Iterator<Item = Pushed> + Clone {
+        let pushed = |c: &Kept| Pushed { obstacle: c.obstacle, spring: c.spring, lift_m: c.lift_m };
+        self.now.iter().map(pushed)
     }
 
     /// Takes the force of every spring from the solve [N], and keeps the contacts that exist. `cell_m` is the size of

@@ -1,5 +1,6 @@
 //! Bodies deform: side by side, or together where they touch.
 
+use nalgebra::Vector3;
 use scindo_physics::body::{Body, Group, PointSpring, SolveReport};
 use scindo_physics::team::blocks;
 use smallvec::SmallVec;
@@ -60,6 +61,11 @@ impl Simulation {
 }
 
 impl Groups {
+    /// Forces of the pair springs of the last step that the group whose first body is `first` made together [N].
+    pub fn forces_of(&self, first: usize) -> &[Vector3<f64>] {
+        self.0.get(first).map(Group::forces).unwrap_or_default()
+    }
+
     /// The group whose first body is number `first`.
     fn of(&mut self, first: usize) -> &mut Group {
         if self.0.len() <= first {
@@ -74,7 +80,7 @@ fn together(
     (group, first): (&mut Group, usize),
     bodies: &mut [SimBody],
     contacts: &Contacts,
-    ((time_s, h), gravity): ((f64, f64), nalgebra::Vector3<f64>),
+    ((time_s, h), gravity): ((f64, f64), Vector3<f64>),
     reports: &mut [BodyReport],
 ) {
     let _span = tracing::trace_span!("deform together", body = %bodies[first].id).entered();

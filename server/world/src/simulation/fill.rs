@@ -2,6 +2,7 @@
 
 use scindo_physics::body::Body;
 
+use super::deform::Groups;
 use crate::body::{Probe, SimBody};
 use crate::contact::Contacts;
 use crate::contact::hand::Hand;
@@ -17,6 +18,7 @@ pub(crate) struct Sources<'a> {
     pub tools: &'a Tools,
     pub contacts: &'a Contacts,
     pub probes: &'a [Probe],
+    pub groups: &'a Groups,
 }
 
 impl Sources<'_> {
@@ -38,6 +40,11 @@ impl Sources<'_> {
         if wants.measures {
             let position = |probe: &Probe| probe.position(self.bodies[probe.body].body.positions());
             out.probes.extend(self.probes.iter().map(position));
+        }
+        out.forces.clear();
+        if wants.forces {
+            let together = |first: usize| self.groups.forces_of(first);
+            self.contacts.forces_into(self.bodies, together, &mut out.forces);
         }
         out.tools.resize_with(self.tools.len(), ToolSnapshot::default);
         for (i, (tool, out)) in self.tools.iter().zip(&mut out.tools).enumerate() {

@@ -359,8 +359,8 @@ impl Simulation {
     pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
         (snapshot.step, snapshot.time_s) = (self.steps, self.time_s());
         snapshot.broad_phase = self.scene.broad_phase;
-        let Self { bodies, report, tools, contacts, probes, .. } = self;
-        Sources { bodies, report, tools, contacts, probes }.fill(wants, snapshot);
+        let Self { bodies, report, tools, contacts, probes, groups, .. } = self;
+        Sources { bodies, report, tools, contacts, probes, groups }.fill(wants, snapshot);
     }
 
     /// Changes one value of the scene while it runs: a [`LiveKey`], within its range.

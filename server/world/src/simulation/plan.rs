@@ -94,6 +94,7 @@ impl Plan {
             "surface publication" => surface,
             "surface stress" => wants.stress.contains(&true),
             "haptic contact" => wants.contact,
+            "force publication" => wants.forces,
             "energies" => wants.energy || wants.measures,
             _ => false,
         };
@@ -240,6 +241,8 @@ impl Plan {
         self.push("surface publication", false, why, vertices as f64 * SECONDS_PER_VERTEX);
         let why = "on demand: von Mises stress on the surface, while a client subscribes";
         self.push("surface stress", false, why, elements * SECONDS_PER_ELEMENT);
+        let why = "on demand: total and points of every contact, while a client subscribes";
+        self.push("force publication", false, why, 0.0);
         let rate = scene.publish.contact_hz;
         let why = format!("on demand: {rate} Hz beside the step, while a haptic client is connected");
         self.push("haptic contact", false, why, 0.0);
