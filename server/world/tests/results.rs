@@ -113,3 +113,45 @@ fn an_unwritable_directory_is_named() {
     let error = Results::begin(Path::new("/proc/nowhere/out"), &scene, &sim).unwrap_err().to_string();
     assert!(error.contains("/proc/nowhere/out") && error.contains("writable"), "{error}");
 }
+
+#[test]
+fn the_summary_tells_who_touched_whom() {
+    let scene = format!(
+        "{SCENE}[[obstacle]]\nid = \"floor\"\nhalf_space = {{ point_m = [0, 0, 0], normal = [0, 0, 1] }}\n"
+    );
+    let scene = Scene::from_toml(
+        &scene
+            .replace("id = \"loose\"", "id = \"loose\"\nrayleigh = { mass_1_s = 20.0, stiffness_s = 0.01 }"),
+    )
+    .unwrap();
+    let mut sim = Simulation::new(&scene, Path::new("")).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let mut results = Results::begin(directory.path(), &scene, &sim).unwrap();
+    for _ in 0..150 {
+        sim.step(&Inputs::default());
+        results.record(&sim).unwrap();
+    }
+    results.finish(&sim, "done").unwrap();
+    let text = std::fs::read_to_string(directory.path().join("summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let contacts = summary["contacts"].as_array().unwrap();
+    let of = |body: &str| contacts.iter().find(|contact| contact["on"] == body).unwrap();
+    let loose = of("loose");
+    assert_eq!((&loose["kind"], &loose["by"]), (&"obstacle".into(), &"floor".into()));
+    let weight = 9.81 * 1e-3 * 1000.0;
+    let carried = loose["force_n"][2].as_f64().unwrap();
+    assert!((carried / weight - 1.0).abs() < 0.02, "{carried} of {weight}");
+    assert!(loose["largest_force_n"].as_f64().unwrap() >= carried);
+    assert!(loose["largest_depth_m"].as_f64().unwrap() >= loose["deepest_m"].as_f64().unwrap());
+    // The table has a row for each step of the contact; the last one is what the summary calls the end.
+    let rows: Vec<csv::StringRecord> = csv::Reader::from_path(directory.path().join("contacts.csv"))
+        .unwrap()
+        .records()
+        .map(Result::unwrap)
+        .filter(|row| &row[3] == "loose")
+        .collect();
+    assert_eq!(rows.len() as u64, loose["steps"].as_u64().unwrap());
+    let last = rows.last().unwrap();
+    assert_eq!((&last[0], last[9].parse::<f64>().unwrap()), ("150", carried));
+    assert_eq!(last[5].parse::<u64>().unwrap(), loose["contacts"].as_u64().unwrap());
+}

@@ -17,14 +17,60 @@ pub struct Forces {
 }
 
 /// What pushes, what is pushed, how many vertices are, how deep, and with what force.
-struct Row<'a> {
-    kind: &'a str,
-    on: &'a str,
-    by: &'a str,
-    contacts: u32,
-    deepest_m: f64,
-    force_n: Vector3<f64>,
-    normal_n: f64,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<'a> {
+    /// `tool`, `obstacle`, `body` or `itself`.
+    pub kind: &'static str,
+    /// The tool or body that is pushed.
+    pub on: &'a str,
+    /// What pushes it; empty for a tool.
+    pub by: &'a str,
+    pub contacts: u32,
+    pub deepest_m: f64,
+    pub force_n: Vector3<f64>,
+    pub normal_n: f64,
+}
+
+/// Hands everything that pushed something in the last step to `take`.
+///
+/// # Errors
+/// Those of `take`.
+pub(super) fn each_contact<E>(
+    simulation: &Simulation,
+    mut take: impl FnMut(&Row<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let name = |body: usize| &*simulation.bodies()[body].id;
+    for tool in simulation.tools().iter().filter(|tool| tool.force_n != Vector3::zeros()) {
+        let (force_n, normal_n) = (tool.force_n, tool.force_n.norm());
+        take(&Row { kind: "tool", on: &tool.id, by: "", contacts: 0, deepest_m: 0.0, force_n, normal_n })?;
+    }
+    for body in 0..simulation.bodies().len() {
+        let each = simulation.rest_reports(body).iter().zip(simulation.obstacles());
+        for (report, obstacle) in each.filter(|(report, _)| report.contacts > 0) {
+            take(&Row {
+                kind: "obstacle",
+                on: name(body),
+                by: &obstacle.id,
+                contacts: report.contacts,
+                deepest_m: report.deepest_m,
+                force_n: report.force_n,
+                normal_n: report.normal_n,
+            })?;
+        }
+    }
+    for report in simulation.touch_reports() {
+        let [on, by] = report.bodies.map(|body| name(body as usize));
+        take(&Row {
+            kind: if on == by { "itself" } else { "body" },
+            on,
+            by,
+            contacts: report.contacts,
+            deepest_m: report.deepest_m,
+            force_n: report.force_n,
+            normal_n: report.normal_n,
+        })?;
+    }
+    Ok(())
 }
 
 impl Forces {
@@ -67,48 +113,7 @@ impl Forces {
     /// # Errors
     /// What the disk says.
     pub fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
-        let name = |body: usize| &*simulation.bodies()[body].id;
-        for tool in simulation.tools().iter().filter(|tool| tool.force_n != Vector3::zeros()) {
-            let (force_n, normal_n) = (tool.force_n, tool.force_n.norm());
-            let (on, by) = (&*tool.id, "");
-            self.write(
-                simulation,
-                &Row { kind: "tool", on, by, contacts: 0, deepest_m: 0.0, force_n, normal_n },
-            )?;
-        }
-        for body in 0..simulation.bodies().len() {
-            let each = simulation.rest_reports(body).iter().zip(simulation.obstacles());
-            for (report, obstacle) in each.filter(|(report, _)| report.contacts > 0) {
-                self.write(
-                    simulation,
-                    &Row {
-                        kind: "obstacle",
-                        on: name(body),
-                        by: &obstacle.id,
-                        contacts: report.contacts,
-                        deepest_m: report.deepest_m,
-                        force_n: report.force_n,
-                        normal_n: report.normal_n,
-                    },
-                )?;
-            }
-        }
-        for report in simulation.touch_reports() {
-            let [on, by] = report.bodies.map(|body| name(body as usize));
-            self.write(
-                simulation,
-                &Row {
-                    kind: if on == by { "itself" } else { "body" },
-                    on,
-                    by,
-                    contacts: report.contacts,
-                    deepest_m: report.deepest_m,
-                    force_n: report.force_n,
-                    normal_n: report.normal_n,
-                },
-            )?;
-        }
-        Ok(())
+        each_contact(simulation, |row| self.write(simulation, row))
     }
 
     /// Writes what is in memory.

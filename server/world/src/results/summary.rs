@@ -1,9 +1,12 @@
 //! `summary.json`: what a run did, in figures.
 
+use std::convert::Infallible;
+
 use scindo_physics::estimate::MeshError;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::forces::{Row, each_contact};
 use super::machine::Machine;
 use crate::body::{AdaptCounts, Probe, SimBody};
 use crate::report::{Event, Level, StepReport};
@@ -35,6 +38,8 @@ pub struct Summary {
     pub bodies: Vec<BodySummary>,
     /// Final positions of the probes.
     pub probes: Vec<ProbeSummary>,
+    /// Everything that touched anything during the run.
+    pub contacts: Vec<ContactSummary>,
     /// Cuts that changed a body.
     pub cuts_applied: u64,
     /// Samples of tools that were refused.
@@ -216,6 +221,31 @@ pub struct ProbeSummary {
     pub displacement_m: [f64; 3],
 }
 
+/// Contact of two things over the run, of the kinds that `contacts.csv` lists.
+#[derive(Debug, Clone, Serialize)]
+pub struct ContactSummary {
+    /// `tool`, `obstacle`, `body` or `itself`.
+    pub kind: &'static str,
+    /// The tool or body that is pushed.
+    pub on: String,
+    /// What pushes it; empty for a tool.
+    pub by: String,
+    /// Steps in which they touched.
+    pub steps: u64,
+    /// Pushed vertices at the end; 0 if they do not touch then.
+    pub contacts: u32,
+    /// Force at the end [N].
+    pub force_n: [f64; 3],
+    /// Sum of the normal forces at the end [N].
+    pub normal_n: f64,
+    /// Largest depth of a vertex at the end [m].
+    pub deepest_m: f64,
+    /// Largest depth of the run [m].
+    pub largest_depth_m: f64,
+    /// Largest force of the run [N].
+    pub largest_force_n: f64,
+}
+
 /// An event.
 #[derive(Debug, Clone, Serialize)]
 pub struct EventSummary {
@@ -231,6 +261,33 @@ pub struct EventSummary {
     pub message: String,
 }
 
+impl ContactSummary {
+    fn new(row: &Row<'_>) -> Self {
+        Self {
+            kind: row.kind,
+            on: row.on.to_owned(),
+            by: row.by.to_owned(),
+            steps: 0,
+            contacts: 0,
+            force_n: [0.0; 3],
+            normal_n: 0.0,
+            deepest_m: 0.0,
+            largest_depth_m: 0.0,
+            largest_force_n: 0.0,
+        }
+    }
+
+    fn add(&mut self, row: &Row<'_>) {
+        self.steps += 1;
+        self.contacts = row.contacts;
+        self.force_n = row.force_n.into();
+        self.normal_n = row.normal_n;
+        self.deepest_m = row.deepest_m;
+        self.largest_depth_m = self.largest_depth_m.max(row.deepest_m);
+        self.largest_force_n = self.largest_force_n.max(row.force_n.norm());
+    }
+}
+
 /// Collects over the steps of a run.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Running {
@@ -239,6 +296,7 @@ pub(crate) struct Running {
     /// Per body, over the run [m].
     largest_displacement_m: Vec<f64>,
     solvers: Vec<(SolverSummary, u64)>,
+    contacts: Vec<ContactSummary>,
     events: Vec<EventSummary>,
     event_count: u64,
 }
@@ -252,6 +310,23 @@ impl Running {
         for (largest, body) in self.largest_displacement_m.iter_mut().zip(simulation.bodies()) {
             *largest = largest.max(body.displacement_m());
         }
+        self.add_contacts(simulation);
+    }
+
+    fn add_contacts(&mut self, simulation: &Simulation) {
+        for known in &mut self.contacts {
+            (known.contacts, known.force_n, known.normal_n, known.deepest_m) = (0, [0.0; 3], 0.0, 0.0);
+        }
+        let Ok(()) = each_contact::<Infallible>(simulation, |row| {
+            let is_it =
+                |known: &ContactSummary| known.kind == row.kind && known.on == row.on && known.by == row.by;
+            let place = self.contacts.iter().position(is_it).unwrap_or_else(|| {
+                self.contacts.push(ContactSummary::new(row));
+                self.contacts.len() - 1
+            });
+            self.contacts[place].add(row);
+            Ok(())
+        });
     }
 
     fn add_report(&mut self, report: &StepReport) {
@@ -303,6 +378,7 @@ impl Running {
             timing: self.timing(simulation),
             bodies: simulation.bodies().iter().enumerate().map(body).collect(),
             probes: simulation.probes().iter().map(|probe| probe_summary(probe, simulation)).collect(),
+            contacts: self.contacts.clone(),
             cuts_applied: simulation.cuts_applied(),
             refused_tool_samples: simulation.tools().refused_samples(),
             events: self.events.clone(),
