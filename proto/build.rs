@@ -4,11 +4,12 @@ use std::{env, error::Error, fs, path::PathBuf};
 
 use prost::Message as _;
 
-const FILES: [&str; 6] = [
+const FILES: [&str; 7] = [
     "scindo/v1/common.proto",
     "scindo/v1/tool.proto",
     "scindo/v1/cut.proto",
     "scindo/v1/surface.proto",
+    "scindo/v1/force.proto",
     "scindo/v1/server.proto",
     "scindo/v1/viewer.proto",
 ];

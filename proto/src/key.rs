@@ -9,6 +9,7 @@
 //! | `body/<id>/surface/keyframe` | `SurfaceKeyframe` | query |
 //! | `body/<id>/surface/field/<name>` | `SurfaceField` | server → subscribers |
 //! | `measures` | `Measures` | server → subscribers |
+//! | `forces` | `Forces` | server → subscribers |
 //! | `tool/<id>/pose` | `ToolSample` | client → server |
 //! | `tool/<id>/cut` | `CutCommand` | client → server |
 //! | `tool/<id>/cut_ack` | `CutAck` | server → client |
@@ -197,6 +198,8 @@ pub enum Topic {
     SurfaceField(Chunk, Chunk),
     /// Probes and energies.
     Measures,
+    /// Forces of contact.
+    Forces,
     /// Pose of a tool in a client's hand.
     ToolPose(Chunk),
     /// A cut command of a tool.
@@ -230,6 +233,7 @@ impl Topic {
             Self::SurfaceKeyframe(id) => format!("body/{id}/surface/keyframe"),
             Self::SurfaceField(id, name) => format!("body/{id}/surface/field/{name}"),
             Self::Measures => "measures".to_owned(),
+            Self::Forces => "forces".to_owned(),
             Self::ToolPose(id) => format!("tool/{id}/pose"),
             Self::ToolCut(id) => format!("tool/{id}/cut"),
             Self::ToolCutAck(id) => format!("tool/{id}/cut_ack"),
@@ -259,6 +263,7 @@ impl Topic {
                 Self::SurfaceField(body(id)?, Chunk::new("field name", name)?)
             }
             ["measures"] => Self::Measures,
+            ["forces"] => Self::Forces,
             ["tool", id, "pose"] => Self::ToolPose(tool(id)?),
             ["tool", id, "cut"] => Self::ToolCut(tool(id)?),
             ["tool", id, "cut_ack"] => Self::ToolCutAck(tool(id)?),

@@ -50,6 +50,12 @@ pub const MAX_FIELD_BYTES: usize = MAX_VERTICES as usize * VALUE_BYTES + HEADER_
 /// Most probes whose positions are published. Further ones are recorded but not shown.
 pub const MAX_PROBES: usize = 256;
 
+/// Most pairs in a message of forces.
+pub const MAX_FORCE_PAIRS: usize = 64;
+
+/// Most points of contact of a pair in a message of forces.
+pub const MAX_FORCE_POINTS: usize = 32;
+
 /// Most layers of tissue that a body may be drawn with.
 pub const MAX_LAYERS: usize = 8;
 

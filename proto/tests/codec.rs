@@ -4,6 +4,7 @@
 
 use bytes::Bytes;
 use proptest::{collection::vec, prelude::*};
+use scindo_proto::limits::{MAX_FORCE_PAIRS, MAX_FORCE_POINTS};
 use scindo_proto::messages::*;
 use scindo_proto::{
     DecodeError, KeySpace, Role, Topic, Verb, WireMessage, decode, decode_as, encode, encoding,
@@ -319,6 +320,23 @@ proptest! {
     }
 
     #[test]
+    fn forces_round_trip(
+        id in id(), kind in 0..5_i32, force in metres(), points in 0..=MAX_FORCE_POINTS, depth in 0.0..0.1_f32,
+    ) {
+        let point = ForcePoint {
+            point_m: Some(Vec3f { x: 0.1, y: -0.2, z: 0.3 }), normal: Some(Vec3f { x: 0.6, y: 0.0, z: -0.8 }),
+            depth_m: depth, normal_n: 2.0 * depth, tangential_n: Some(Vec3f { x: 0.0, y: depth, z: 0.0 }),
+        };
+        let pair = ForcePair {
+            kind, on: id.clone(), by: id, contacts: 40, deepest_m: 0.1, force_n: Some(force), normal_n: 3.0,
+            points: vec![point; points],
+        };
+        let forces = |pairs| Forces { seq: 1, sim_step: 2, sim_time_s: 0.1, publish_unix_ns: 3, pairs };
+        survives(&forces(vec![pair.clone(); MAX_FORCE_PAIRS]))?;
+        survives(&forces(Vec::new()))?;
+    }
+
+    #[test]
     fn small_messages_round_trip(
         id in id(), text in ".{0,40}", error in error(), number in 1..1000_u32, level in 0..4_i32,
     ) {
@@ -377,6 +395,7 @@ proptest! {
         let _ = decode::<SurfaceKeyframe>(bytes.clone());
         let _ = decode::<SurfaceField>(bytes.clone());
         let _ = decode::<Measures>(bytes.clone());
+        let _ = decode::<Forces>(bytes.clone());
         let _ = decode::<SessionInfo>(bytes.clone());
         let _ = decode::<Stats>(bytes.clone());
         let _ = decode::<Event>(bytes.clone());
@@ -443,6 +462,46 @@ fn non_finite_numbers_are_refused() {
         };
         assert_eq!(refusal(&frame).code(), "non-finite");
     }
+}
+
+#[test]
+fn forces_are_refused_with_what_and_where() {
+    type Change = fn(&mut ForcePair);
+    let point = ForcePoint {
+        point_m: Some(Vec3f::default()),
+        normal: Some(Vec3f { x: 0.0, y: 0.0, z: 1.0 }),
+        tangential_n: Some(Vec3f::default()),
+        ..ForcePoint::default()
+    };
+    let pair = ForcePair {
+        kind: force_pair::Kind::Obstacle.into(),
+        on: "block".into(),
+        by: "floor".into(),
+        force_n: Some(Vec3::default()),
+        points: vec![point],
+        ..ForcePair::default()
+    };
+    let with = |change: Change| {
+        let mut pair = pair.clone();
+        change(&mut pair);
+        Forces { pairs: vec![pair], ..Forces::default() }
+    };
+    decode::<Forces>(encode(&with(|_| ()))).unwrap();
+    let cases: [(Change, &str); 7] = [
+        (|pair| pair.kind = 9, "pairs.kind"),
+        (|pair| pair.by = "no floor".into(), "pairs.by"),
+        (|pair| pair.force_n = None, "pairs.force_n is missing"),
+        (|pair| pair.normal_n = f64::NAN, "pairs.normal_n"),
+        (|pair| pair.points = vec![pair.points[0]; MAX_FORCE_POINTS + 1], "pairs.points"),
+        (|pair| pair.points[0].normal = Some(Vec3f::default()), "pairs.points.normal is norm 0"),
+        (|pair| pair.points[0].depth_m = f32::INFINITY, "pairs.points.depth_m"),
+    ];
+    for (change, words) in cases {
+        let refused = refusal(&with(change)).to_string();
+        assert!(refused.contains(words), "{refused}: {words}");
+    }
+    let many = Forces { pairs: vec![pair; MAX_FORCE_PAIRS + 1], ..Forces::default() };
+    assert!(matches!(refusal(&many), DecodeError::TooLarge { field: "pairs", .. }));
 }
 
 #[test]
@@ -548,6 +607,7 @@ fn keys_round_trip_and_foreign_ones_are_refused() {
         Topic::SurfaceKeyframe(id()),
         Topic::SurfaceField(id(), id()),
         Topic::Measures,
+        Topic::Forces,
         Topic::ToolPose(id()),
         Topic::ToolCut(id()),
         Topic::ToolCutAck(id()),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use scindo_proto::messages::{Event, Measures, Plan, Stats, SurfaceField, ToolState};
+use scindo_proto::messages::{Event, Forces, Measures, Plan, Stats, SurfaceField, ToolState};
 use scindo_proto::{Chunk, Topic, WireMessage};
 use tokio::sync::{mpsc, watch};
 use zenoh::pubsub::Subscriber;
@@ -96,6 +96,11 @@ impl Link {
     /// Positions of the probes, and energies. The server computes them while this subscription exists.
     pub async fn measures(&self) -> Result<Latest<Measures>, LinkError> {
         self.latest(Topic::Measures).await
+    }
+
+    /// Forces of contact: what touches each body, and where. The server gathers them while this subscription exists.
+    pub async fn forces(&self) -> Result<Latest<Forces>, LinkError> {
+        self.latest(Topic::Forces).await
     }
 
     /// Events of the server, from now on.

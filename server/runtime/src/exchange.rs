@@ -49,6 +49,8 @@ pub struct Exchange {
     stress_wanted: Vec<AtomicBool>,
     /// Whether somebody subscribes to probes and energies.
     measures_wanted: AtomicBool,
+    /// Whether somebody subscribes to forces of contact.
+    forces_wanted: AtomicBool,
     /// Per body: epoch of its newest snapshot.
     epochs: Vec<AtomicU32>,
     /// Whether a keyframe query waits for an answer.
@@ -106,6 +108,7 @@ impl Exchange {
             surface_wanted: (0..bodies).map(|_| AtomicBool::new(false)).collect(),
             stress_wanted: (0..bodies).map(|_| AtomicBool::new(false)).collect(),
             measures_wanted: AtomicBool::new(false),
+            forces_wanted: AtomicBool::new(false),
             epochs: (0..bodies).map(|_| AtomicU32::new(0)).collect(),
             keyframe_wanted: AtomicBool::new(false),
             contact_wanted: AtomicBool::new(false),
@@ -166,6 +169,11 @@ impl Exchange {
         self.measures_wanted.store(wanted, Ordering::Relaxed);
     }
 
+    /// Records whether somebody subscribes to forces of contact.
+    pub fn want_forces(&self, wanted: bool) {
+        self.forces_wanted.store(wanted, Ordering::Relaxed);
+    }
+
     /// Records the epoch of body `index`.
     pub fn set_epoch(&self, index: usize, epoch: u32) {
         if let Some(held) = self.epochs.get(index) {
@@ -202,6 +210,7 @@ impl Exchange {
         wants.stress.clear();
         wants.stress.extend(self.stress_wanted.iter().map(|flag| flag.load(Ordering::Relaxed)));
         wants.measures = self.measures_wanted.load(Ordering::Relaxed);
+        wants.forces = self.forces_wanted.load(Ordering::Relaxed);
         wants.contact = self.contact_wanted.load(Ordering::Relaxed);
     }
 

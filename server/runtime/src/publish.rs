@@ -74,6 +74,8 @@ pub struct Published {
     pub bodies: Vec<String>,
     /// Probes, in scene order.
     pub probes: Vec<ProbeName>,
+    /// Ids of the obstacles, in scene order.
+    pub obstacles: Vec<String>,
     /// Simulated time per step [s].
     pub step_s: f64,
     /// The first plan; later ones arrive through [`Sources::outgoing`].
@@ -138,7 +140,7 @@ impl PublishThread {
             haptic: sessions.haptic.clone(),
             bodies: bodies.collect::<Result<_, _>>()?,
             tools: BTreeMap::new(),
-            on_demand: OnDemand::declare(keys, bulk, exchange, &what.bodies, what.probes)?,
+            on_demand: OnDemand::declare(keys, bulk, exchange, &what.bodies, (what.probes, what.obstacles))?,
             stats: report(Topic::Stats, encoding::<Stats>())?,
             events: report(Topic::Event, encoding::<Event>())?,
             plan: report(Topic::Plan, encoding::<Plan>())?,

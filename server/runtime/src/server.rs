@@ -116,6 +116,7 @@ impl Server {
             let what = Published {
                 bodies: ids,
                 probes: probe_names(&engine),
+                obstacles: info.obstacles.iter().map(|obstacle| obstacle.id.clone()).collect(),
                 step_s: info.step_s,
                 plan,
                 rates: (config.surface_hz, config.stats_hz),

@@ -7,3 +7,5 @@ pub mod orders;
 pub mod convert;
 
 pub mod obstacle;
+
+pub mod forces;

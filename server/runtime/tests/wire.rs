@@ -11,13 +11,14 @@ use scindo::wire::session::{NetworkConfig, Sessions};
 use scindo_client::messages::{
     BladeSegment, CutCommand, HapticContact, Pose, SurfaceFrame, ToolSample, ToolShape, Vec3,
     cut_ack::Outcome,
-    haptic_contact,
+    force_pair, haptic_contact,
     tool_sample::Mode,
     tool_shape::{Kind, Sphere},
 };
 use scindo_client::{Link, LinkConfig, LinkError, Role};
 use scindo_proto::{Chunk, Topic, encode, encoding};
 use scindo_tests::{PATIENCE, free_pair};
+use scindo_world::inputs::Wants;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use zenoh::qos::CongestionControl;
@@ -371,7 +372,7 @@ async fn a_haptic_client_feels_the_body_and_costs_nothing_when_it_is_gone() {
         assert!(median_ms < 10.0, "a contact every {median_ms} ms");
     }
     until("nobody wants contact any more", || {
-        let mut wants = scindo_world::inputs::Wants::default();
+        let mut wants = Wants::default();
         running.server().exchange().wants_into(&mut wants);
         !wants.contact && wants.surface.iter().all(|wanted| !wanted)
     })
@@ -391,6 +392,41 @@ async fn surfaces_are_built_only_while_somebody_watches() {
     until("the subscription is noticed", wanted).await;
     drop(mirror);
     until("its end is noticed", || !wanted()).await;
+    running.end();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn forces_are_gathered_only_while_somebody_subscribes() {
+    let mut running = Running::start();
+    let hand = running.link(Role::Haptic, "hand").await;
+    let mut probe = hand.tool("probe").await.unwrap();
+    let is_wanted = || {
+        let mut wants = Wants::default();
+        running.server().exchange().wants_into(&mut wants);
+        wants.forces
+    };
+    assert!(!is_wanted());
+    let mut forces = hand.forces().await.unwrap();
+    until("forces are wanted", is_wanted).await;
+    // Lowers the ball from above the block, which is held below, to 4 mm below its top.
+    let mut height = 0.035_f64;
+    let pressed = async {
+        loop {
+            height = (height - 1e-3).max(0.021);
+            probe.poses.send(at(0.04, 0.02, height)).unwrap();
+            let seen = forces.next().await.unwrap();
+            if let Some(pair) = seen.pairs.first().filter(|pair| !pair.points.is_empty()) {
+                return pair.clone();
+            }
+        }
+    };
+    let pair = tokio::time::timeout(PATIENCE, pressed).await.unwrap();
+    assert_eq!((pair.kind(), &*pair.on, &*pair.by), (force_pair::Kind::Tool, "block", "probe"));
+    assert!(pair.force_n.unwrap().z < 0.0 && pair.normal_n > 0.0 && pair.contacts > 0, "{pair:?}");
+    let point = &pair.points[0];
+    assert!(point.normal.unwrap().z < -0.5 && point.point_m.unwrap().z > 0.0, "{point:?}");
+    drop(forces);
+    until("nobody wants forces", || !is_wanted()).await;
     running.end();
 }
 

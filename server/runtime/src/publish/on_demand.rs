@@ -1,10 +1,10 @@
-//! Topics that are published only while somebody subscribes: stress on surfaces, probes and energies. A
-//! subscriber raises a flag, and the next snapshot of the simulation holds what is flagged.
+//! Topics that are published only while somebody subscribes: stress on surfaces, probes and energies, forces of
+//! contact. A subscriber raises a flag, and the next snapshot of the simulation holds what is flagged.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use scindo_proto::messages::{Measures, SurfaceField};
+use scindo_proto::messages::{Forces, Measures, SurfaceField};
 use scindo_proto::{Chunk, KeySpace, Topic, encode, encoding};
 use scindo_world::snapshot::Snapshot;
 use zenoh::pubsub::Publisher;
@@ -14,8 +14,10 @@ use zenoh::{Session, Wait as _};
 use crate::error::{RuntimeError, words};
 use crate::exchange::Exchange;
 use crate::wire::convert::{ProbeName, STRESS, to_measures, to_stress};
+use crate::wire::forces::to_forces;
 
-/// Shortest time between two messages of a topic: colours and curves need a lower rate than motion.
+/// Shortest time between two messages of a topic: colours and curves need a lower rate than motion. Forces are
+/// published with every frame.
 const PERIOD: Duration = Duration::from_millis(50);
 
 /// Publishers of the topics.
@@ -24,6 +26,10 @@ pub struct OnDemand {
     stress: Vec<(Publisher<'static>, u64)>,
     measures: (Publisher<'static>, u64),
     probes: Vec<ProbeName>,
+    forces: (Publisher<'static>, u64),
+    obstacles: Vec<String>,
+    /// Step of the forces that were published last.
+    forces_step: Option<u64>,
     next: Instant,
 }
 
@@ -34,7 +40,7 @@ impl OnDemand {
         bulk: &Session,
         exchange: &Arc<Exchange>,
         bodies: &[String],
-        probes: Vec<ProbeName>,
+        (probes, obstacles): (Vec<ProbeName>, Vec<String>),
     ) -> Result<Self, RuntimeError> {
         let stress = bodies.iter().enumerate().map(|(index, id)| {
             let topic = Topic::SurfaceField(Chunk::new("body id", id)?, Chunk::new("field name", STRESS)?);
@@ -46,11 +52,23 @@ impl OnDemand {
         let watcher = exchange.clone();
         let asked = move |wanted| watcher.want_measures(wanted);
         let measures = declare(bulk, keys.key(&Topic::Measures), encoding::<Measures>(), asked)?;
-        Ok(Self { stress, measures: (measures, 0), probes, next: Instant::now() })
+        let watcher = exchange.clone();
+        let asked = move |wanted| watcher.want_forces(wanted);
+        let forces = declare(bulk, keys.key(&Topic::Forces), encoding::<Forces>(), asked)?;
+        Ok(Self {
+            stress,
+            measures: (measures, 0),
+            probes,
+            forces: (forces, 0),
+            obstacles,
+            forces_step: None,
+            next: Instant::now(),
+        })
     }
 
     /// Publishes the flagged parts of the snapshot. There are none while nobody subscribes.
     pub fn publish(&mut self, snapshot: &Snapshot) {
+        self.publish_forces(snapshot);
         if Instant::now() < self.next {
             return;
         }
@@ -64,6 +82,19 @@ impl OnDemand {
         if !snapshot.probes.is_empty() || snapshot.bodies.iter().any(|body| body.energy.is_some()) {
             self.measures.1 += 1;
             put(&self.measures.0, encode(&to_measures(snapshot, &self.probes, self.measures.1)));
+        }
+    }
+}
+
+impl OnDemand {
+    /// Publishes the forces of a step once.
+    fn publish_forces(&mut self, snapshot: &Snapshot) {
+        if !snapshot.forces.asked {
+            self.forces_step = None;
+        } else if self.forces_step != Some(snapshot.step) {
+            self.forces_step = Some(snapshot.step);
+            self.forces.1 += 1;
+            put(&self.forces.0, encode(&to_forces(snapshot, &self.obstacles, self.forces.1)));
         }
     }
 }
