@@ -78,13 +78,14 @@ async function coloursByQuantity(page) {
 }
 
 async function overlaysAndCurves(page) {
-  for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip"]) await page.check(`#${id}`);
+  for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip", "show-forces"]) await page.check(`#${id}`);
   await until(page, "the probe has a name and a way", MINUTE, () => [...document.querySelectorAll("#labels div")].some((label) => /^tip · moved /.test(label.textContent)));
-  await until(page, "forces, energies and times are drawn", MINUTE, () => window.scindo.curves().slice(0, 3).every((count) => count > 10));
+  await until(page, "forces, energies and times are drawn", MINUTE, () => window.scindo.curves().slice(0, 4).every((count) => count > 10));
+  await until(page, "contact forces have arrows and a row", MINUTE, () => window.scindo.forces().arrows > 0 && /finger on shelf/.test(document.getElementById("forces").textContent));
   await picture(page, "views-3-overlays.png");
   await page.click("#clip-flip");
-  for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip"]) await page.uncheck(`#${id}`);
-  await until(page, "what is hidden is not measured", MINUTE, () => !window.scindo.effectIsOn("energies"));
+  for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip", "show-forces"]) await page.uncheck(`#${id}`);
+  await until(page, "what is hidden is not measured", MINUTE, () => !window.scindo.effectIsOn("energies") && !window.scindo.effectIsOn("force publication"));
   await page.keyboard.press("v");
 }
 

@@ -21,8 +21,8 @@ const MAX_WAITING: usize = 256;
 /// Number of past events that late joiners receive.
 const MAX_EVENTS: usize = 7;
 
-/// Most state slots: link, info, plan, stats and measures, and those of bodies and tools.
-const MAX_SLOTS: usize = 5 + 3 * MAX_BODIES + 2 * MAX_TOOLS;
+/// Most state slots: link, info, plan, stats, measures and forces, and those of bodies and tools.
+const MAX_SLOTS: usize = 6 + 3 * MAX_BODIES + 2 * MAX_TOOLS;
 
 /// Topics that browsers watch. The viewer subscribes to nothing else.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -33,6 +33,8 @@ pub struct Watched {
     pub stress: bool,
     /// Probes and energies.
     pub measures: bool,
+    /// Forces of contact.
+    pub forces: bool,
 }
 
 /// When all seats are taken, a browser that has been silent for this long loses its seat to a new one.
@@ -136,7 +138,12 @@ impl Hub {
         let is_scene = |slot: &Slot| {
             matches!(
                 slot,
-                Slot::Tool(_) | Slot::Topology(_) | Slot::Frame(_) | Slot::Field(_) | Slot::Measures
+                Slot::Tool(_)
+                    | Slot::Topology(_)
+                    | Slot::Frame(_)
+                    | Slot::Field(_)
+                    | Slot::Measures
+                    | Slot::Forces
             )
         };
         self.lock().slots.retain(|slot, _| !is_scene(slot));
@@ -239,7 +246,7 @@ impl Hub {
             return;
         }
         // State that others already asked for is available at once.
-        let on_demand = |slot: &Slot| matches!(slot, Slot::Field(_) | Slot::Measures);
+        let on_demand = |slot: &Slot| matches!(slot, Slot::Field(_) | Slot::Measures | Slot::Forces);
         for (slot, bytes) in slots.iter().filter(|(slot, _)| on_demand(slot) && browser.takes(slot)) {
             browser.outbox.put(slot.clone(), bytes.clone());
         }
@@ -252,6 +259,7 @@ impl Hub {
             scene: !shared.browsers.is_empty(),
             stress: asks(|asks| asks.stress),
             measures: asks(|asks| asks.measures),
+            forces: asks(|asks| asks.forces),
         };
         self.watched.send_if_modified(|held| std::mem::replace(held, watched) != watched);
     }
@@ -271,11 +279,12 @@ impl Hub {
 }
 
 impl Browser {
-    /// Whether the browser receives this state. Fields and measures are sent only on request.
+    /// Whether the browser receives this state. Fields, measures and forces are sent only on request.
     fn takes(&self, slot: &Slot) -> bool {
         match slot {
             Slot::Field(_) => self.asks.stress,
             Slot::Measures => self.asks.measures,
+            Slot::Forces => self.asks.forces,
             _ => true,
         }
     }
@@ -312,6 +321,7 @@ fn slot_of(message: &Down) -> Option<Slot> {
         Down::Frame(frame) => Slot::Frame(frame.body_id.clone()),
         Down::Field(field) => Slot::Field(field.body_id.clone()),
         Down::Measures(_) => Slot::Measures,
+        Down::Forces(_) => Slot::Forces,
         Down::Hello(_) | Down::Event(_) | Down::Pong(_) | Down::Rpc(_) | Down::ToolGone(_) => {
             return None;
         }

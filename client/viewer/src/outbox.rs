@@ -27,6 +27,8 @@ pub enum Slot {
     Tool(String),
     /// Probes and energies.
     Measures,
+    /// Forces of contact.
+    Forces,
     /// Triangles of one body.
     Topology(String),
     /// Stress on the surface of one body.

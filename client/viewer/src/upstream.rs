@@ -116,6 +116,7 @@ struct Followed {
     scene: Option<JoinSet<()>>,
     stress: Option<JoinSet<()>>,
     measures: Option<JoinSet<()>>,
+    forces: Option<JoinSet<()>>,
 }
 
 /// Adjusts the followed topics to the present server and to what browsers watch.
@@ -154,6 +155,13 @@ async fn refresh(hub: &Arc<Hub>, link: &Link, place: &str, followed: &mut Follow
         let mut tasks = JoinSet::new();
         tasks.spawn(pass_on(Arc::clone(hub), link.measures().await?, Down::Measures));
         followed.measures = Some(tasks);
+    }
+    if !watched.forces {
+        followed.forces = None;
+    } else if followed.forces.is_none() {
+        let mut tasks = JoinSet::new();
+        tasks.spawn(pass_on(Arc::clone(hub), link.forces().await?, Down::Forces));
+        followed.forces = Some(tasks);
     }
     Ok(())
 }

@@ -10,8 +10,8 @@ use prost::Message as _;
 use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::viewer_up::Message as FromPage;
 use scindo_proto::messages::{
-    Pose, Stats, SurfaceField, SurfaceFrame, SurfaceTopology, ToolSample, Vec3, ViewerDown, ViewerFrameAck,
-    ViewerPing, ViewerUp, ViewerWatch,
+    Forces, Pose, Stats, SurfaceField, SurfaceFrame, SurfaceTopology, ToolSample, Vec3, ViewerDown,
+    ViewerFrameAck, ViewerPing, ViewerUp, ViewerWatch,
 };
 use scindo_tests::PATIENCE;
 use scindo_view::hub::{Hub, Up};
@@ -174,7 +174,7 @@ async fn browsers_are_counted_and_limited() {
     timeout(PATIENCE, watched.wait_for(|watched| !watched.scene)).await.unwrap().unwrap();
 }
 
-/// Stress and measures go to the pages that asked, and are asked of the server only while one does.
+/// Stress, measures and forces go to the pages that asked, and are asked of the server only while one does.
 #[tokio::test]
 async fn fields_go_only_to_pages_that_ask() {
     let (address, hub, _up) = start(WebConfig::default()).await;
@@ -182,20 +182,25 @@ async fn fields_go_only_to_pages_that_ask() {
     next(&mut asks).await;
     next(&mut does_not).await;
     let mut watched = hub.watched();
-    assert!(!watched.borrow().stress && !watched.borrow().measures);
-    send(&mut asks, FromPage::Watch(ViewerWatch { stress: true, measures: true })).await;
-    timeout(PATIENCE, watched.wait_for(|watched| watched.stress && watched.measures)).await.unwrap().unwrap();
+    assert!(!watched.borrow().stress && !watched.borrow().measures && !watched.borrow().forces);
+    send(&mut asks, FromPage::Watch(ViewerWatch { stress: true, measures: true, forces: true })).await;
+    timeout(PATIENCE, watched.wait_for(|watched| watched.stress && watched.measures && watched.forces))
+        .await
+        .unwrap()
+        .unwrap();
     hub.publish(Down::Field(SurfaceField { body_id: "liver".into(), ..Default::default() }));
+    hub.publish(Down::Forces(Forces { seq: 3, ..Default::default() }));
     hub.publish(Down::Stats(Stats { seq: 7, ..Default::default() }));
-    let both = [next(&mut asks).await, next(&mut asks).await];
-    assert!(both.iter().any(|message| matches!(message, Some(Down::Field(_)))), "{both:?}");
+    let all = [next(&mut asks).await, next(&mut asks).await, next(&mut asks).await];
+    assert!(all.iter().any(|message| matches!(message, Some(Down::Field(_)))), "{all:?}");
+    assert!(all.iter().any(|message| matches!(message, Some(Down::Forces(_)))), "{all:?}");
     assert!(matches!(next(&mut does_not).await, Some(Down::Stats(stats)) if stats.seq == 7));
     // One that asks later is sent what is there.
-    send(&mut does_not, FromPage::Watch(ViewerWatch { stress: true, measures: false })).await;
+    send(&mut does_not, FromPage::Watch(ViewerWatch { stress: true, measures: false, forces: false })).await;
     assert!(matches!(next(&mut does_not).await, Some(Down::Field(_))));
     send(&mut does_not, FromPage::Watch(ViewerWatch::default())).await;
     drop(asks);
-    timeout(PATIENCE, watched.wait_for(|watched| !watched.stress && !watched.measures))
+    timeout(PATIENCE, watched.wait_for(|watched| !watched.stress && !watched.measures && !watched.forces))
         .await
         .unwrap()
         .unwrap();

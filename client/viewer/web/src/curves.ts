@@ -1,12 +1,14 @@
-// Curves over simulated time: force per tool, energies, time per step, age of the contact that hands feel.
+// Curves over simulated time: force per tool and body, energies, time per step, age of the contact that hands feel.
 // Nothing is stored while the curves are hidden.
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import type { Forces } from "../gen/scindo/v1/force_pb";
 import type { Measures, Stats } from "../gen/scindo/v1/server_pb";
 import type { ToolState } from "../gen/scindo/v1/tool_pb";
 import { engineering } from "./units";
 import { ink, onTheme } from "./theme";
+import { totals } from "./forces";
 
 const COLOURS = ["#e58a7b", "#4f9ae0", "#5fb878", "#c98bdb", "#d9a441", "#3fb5b0"];
 /** Most points of a curve; older ones are dropped. */
@@ -17,8 +19,10 @@ const REFRESH_MS = 250;
 export class Curves {
   on = false;
   private readonly box = document.getElementById("curves")!;
-  private charts: Record<"force" | "energy" | "step" | "age", Chart> | null = null;
+  private charts: Record<"force" | "contact" | "energy" | "step" | "age", Chart> | null = null;
   private readonly forces = new Map<string, number>();
+  /** Bodies that something has touched. */
+  private readonly touched = new Set<string>();
   private timer = 0;
 
   constructor() {
@@ -37,7 +41,7 @@ export class Curves {
     }
     const chart = (name: string, unit: string, none: string) => new Chart(this.box, name, unit, none);
     this.charts = {
-      force: chart("force on tools", "N", "no tool yet"), energy: chart("energies", "J", "no data yet"),
+      force: chart("force on tools", "N", "no tool yet"), contact: chart("force on bodies", "N", "no data yet"), energy: chart("energies", "J", "no data yet"),
       step: chart("time per step", "s", "no data yet"), age: chart("age of contact", "s", "no haptic device"),
     };
     this.timer = window.setInterval(() => Object.values(this.charts!).forEach((chart) => chart.draw()), REFRESH_MS);
@@ -47,6 +51,7 @@ export class Curves {
   restart(): void {
     if (!this.on) return;
     this.forces.clear();
+    this.touched.clear();
     this.show(false);
     this.show(true);
   }
@@ -56,6 +61,15 @@ export class Curves {
     const f = state.forceN;
     this.forces.set(state.toolId, Math.hypot(f?.x ?? 0, f?.y ?? 0, f?.z ?? 0));
     this.charts.force.add(state.simTimeS, this.forces);
+  }
+
+  /** The size of all contact forces on each body together. A body that nothing touches has none. */
+  contacts({ simTimeS, pairs }: Forces): void {
+    if (!this.charts) return;
+    const sums = totals(pairs);
+    for (const id of this.touched) if (!sums.has(id)) sums.set(id, [0, 0, 0]);
+    for (const id of sums.keys()) this.touched.add(id);
+    this.charts.contact.add(simTimeS, new Map([...sums].map(([id, f]) => [id, Math.hypot(...f)])));
   }
 
   toolGone(id: string): void {

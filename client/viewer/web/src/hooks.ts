@@ -3,6 +3,7 @@
 import { Vector3 } from "three";
 import { boundsOf, type Stage } from "./stage";
 import type { Curves } from "./curves";
+import type { Forces } from "./forces";
 import type { Hand, HandMode } from "./hand";
 import type { Panel } from "./panel";
 import type { Relay } from "./relay";
@@ -10,7 +11,7 @@ import type { Session } from "./session";
 
 type Triple = [number, number, number];
 
-export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: Hand, panel: Panel, curves: Curves): void {
+export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: Hand, panel: Panel, curves: Curves, forces: Forces): void {
   const bodies = () => [...session.bodies.values()];
   const hooks = {
     /** Counters since the page opened. */
@@ -91,6 +92,8 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     }),
     /** Number of points of each curve while the curves are shown. */
     curves: () => curves.counts,
+    /** Contact forces while their arrows are shown: pairs and arrows. */
+    forces: () => forces.shown,
     /** Changes a live parameter; key and value are as in a scene. */
     set: (key: string, value: string) => relay.call({ case: "set", value: { key, value } }),
     hand: (mode: HandMode) => hand.choose(mode),

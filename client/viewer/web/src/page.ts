@@ -9,6 +9,7 @@ import { Panel } from "./panel";
 import { Bar } from "./bar";
 import { Colours } from "./colours";
 import { Curves } from "./curves";
+import { Forces } from "./forces";
 import { Gizmo } from "./gizmo";
 import { Help } from "./help";
 import { Obstacles } from "./obstacles";
@@ -41,6 +42,7 @@ class Page {
   private readonly params = new Params(this.relay, this.session);
   private readonly colours: Colours;
   private readonly curves = new Curves();
+  private readonly forces: Forces;
   private readonly overlays: Overlays;
   private readonly obstacles: Obstacles;
   private readonly probes: Probes;
@@ -53,16 +55,17 @@ class Page {
     this.overlays = new Overlays(this.stage, this.session);
     this.obstacles = new Obstacles(this.stage);
     this.probes = new Probes(this.stage);
+    this.forces = new Forces(this.stage);
     this.gizmo = new Gizmo(this.stage);
-    const { colours, overlays, probes, curves, gizmo } = this;
-    this.view = new View(this.stage, this.relay, { colours, overlays, probes, curves, gizmo });
+    const { colours, overlays, probes, curves, forces, gizmo } = this;
+    this.view = new View(this.stage, this.relay, { colours, overlays, probes, curves, forces, gizmo });
     this.bar = new Bar(this.stage, this.session, this.relay, this.hand, this.view, new Help());
     this.view.onOpen = () => this.params.ask();
     this.stage.onPicture = () => this.gizmo.place();
   }
 
   run(): void {
-    exposeHooks(this.session, this.stage, this.relay, this.hand, this.panel, this.curves);
+    exposeHooks(this.session, this.stage, this.relay, this.hand, this.panel, this.curves, this.forces);
     requestAnimationFrame((now) => this.frame(now));
     this.relay.open();
   }
@@ -103,6 +106,10 @@ class Page {
         this.probes.take(message.value);
         this.curves.measures(message.value);
         break;
+      case "forces":
+        this.forces.take(message.value);
+        this.curves.contacts(message.value);
+        break;
       case "tool":
         this.toolOf(message.value.toolId).update(message.value);
         this.curves.tool(message.value);
@@ -138,6 +145,7 @@ class Page {
     for (const tool of this.session.tools.values()) tool.place(this.stage);
     this.overlays.place();
     this.probes.place();
+    this.forces.place();
     this.hand.place();
     this.stage.render();
     this.panel.countPicture(now);
@@ -148,6 +156,7 @@ class Page {
     const tools = info.tools.map((tool) => tool.id);
     [...this.session.tools.keys()].filter((id) => !tools.includes(id)).forEach((id) => this.forgetTool(id));
     this.curves.restart();
+    this.forces.restart();
     this.panel.showInfo(info);
     this.params.setScene(info.scene);
     if (this.view.isOpen) this.params.ask();

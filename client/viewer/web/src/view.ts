@@ -2,6 +2,7 @@
 
 import type { Colours, ColourMode } from "./colours";
 import type { Curves } from "./curves";
+import type { Forces } from "./forces";
 import type { Gizmo } from "./gizmo";
 import type { Overlays } from "./overlays";
 import type { Probes } from "./probes";
@@ -17,9 +18,9 @@ export class View {
   constructor(
     private readonly stage: Stage,
     private readonly relay: Relay,
-    private readonly parts: { colours: Colours; overlays: Overlays; probes: Probes; curves: Curves; gizmo: Gizmo },
+    private readonly parts: { colours: Colours; overlays: Overlays; probes: Probes; curves: Curves; forces: Forces; gizmo: Gizmo },
   ) {
-    const { colours, overlays, probes, curves, gizmo } = parts;
+    const { colours, overlays, probes, curves, forces, gizmo } = parts;
     const select = this.at<HTMLSelectElement>("colour");
     select.onchange = () => {
       colours.choose(select.value as ColourMode);
@@ -31,6 +32,7 @@ export class View {
     this.box("show-held", (on) => overlays.showHeld(on));
     this.box("show-probes", (on) => probes.show(on));
     this.box("show-curves", (on) => curves.show(on));
+    this.box("show-forces", (on) => forces.show(on));
     this.box("show-axes", (on) => gizmo.show(on));
     this.box("show-clip", (on) => {
       this.at("clip-row").hidden = !on;
@@ -61,11 +63,11 @@ export class View {
 
   /** Tells the relay which topics this page shows beside surfaces, if that changed or `anew` is set. */
   ask(anew = false): void {
-    const { colours, probes, curves } = this.parts;
-    const watch = { stress: colours.mode === "stress", measures: probes.on || curves.on };
+    const { colours, probes, curves, forces } = this.parts;
+    const watch = { stress: colours.mode === "stress", measures: probes.on || curves.on, forces: forces.on || curves.on };
     const words = JSON.stringify(watch);
     if (!anew && words === this.asked) return;
-    if (anew && !watch.stress && !watch.measures) return;
+    if (anew && !watch.stress && !watch.measures && !watch.forces) return;
     this.asked = words;
     this.relay.send({ case: "watch", value: watch });
   }
