@@ -15,7 +15,7 @@ import time
 import numpy as np
 import zenoh
 
-from wire import cut_pb2, server_pb2, surface_pb2, tool_pb2
+from wire import cut_pb2, force_pb2, server_pb2, surface_pb2, tool_pb2
 
 CLIENT = "python-test"
 # Only a server that hangs makes anything take this long, however busy the machine is [s].
@@ -61,6 +61,10 @@ class Session:
             received.put(decode(sample, message_type))
 
         return self.zenoh.declare_subscriber(self.key(topic), on_sample), received
+
+    def forces(self):
+        """The forces of contact, newest last: `session.forces()[1].get().pairs`."""
+        return self.subscribe("forces", force_pb2.Forces)
 
     def put(self, topic, message, payload=None):
         self.zenoh.put(
@@ -196,6 +200,34 @@ def cut_twice(session, body, tool):
     return first.elements_cut, after, len(points_after)
 
 
+def feel(session, body, tool):
+    """Lowers a tool into the middle of the top until the server reports the force, and adds its points up."""
+    _, points, _, _ = surface(session, body)
+    low, high = points.min(axis=0).astype(float), points.max(axis=0).astype(float)
+    subscription, forces = session.forces()
+    sample = tool_pb2.ToolSample(client_id=CLIENT, tool_id=tool, mode=tool_pb2.ToolSample.MODE_TOUCH)
+    sample.pose.qw = 1.0
+    end, height, pair = time.monotonic() + PATIENCE, high[2] + 0.02, None
+    while pair is None and time.monotonic() < end:
+        height = max(height - 5e-4, high[2] - 0.002)
+        sample.seq += 1
+        sample.client_time_ns = time.time_ns()
+        at = (0.25 * low[0] + 0.75 * high[0], 0.5 * (low[1] + high[1]), height)
+        sample.pose.position_m.x, sample.pose.position_m.y, sample.pose.position_m.z = at
+        session.put(f"tool/{tool}/pose", sample)
+        pairs = forces.get(timeout=PATIENCE).pairs
+        pair = next((p for p in pairs if (p.on, p.by) == (body, tool) and p.normal_n > 0.01), None)
+    subscription.undeclare()
+    check(pair is not None, f"{tool} presses on {body} within {PATIENCE:.0f} s")
+    check(pair.kind == force_pb2.ForcePair.KIND_TOOL and pair.force_n.z < 0.0, f"it pushes downwards: {pair}")
+    vector = lambda v: np.array([v.x, v.y, v.z])
+    total = sum(p.normal_n * vector(p.normal) + vector(p.tangential_n) for p in pair.points)
+    if len(pair.points) == pair.contacts:
+        size = np.linalg.norm(vector(pair.force_n))
+        check(np.linalg.norm(total - vector(pair.force_n)) < 1e-4 * size, f"the points add up: {total} {pair.force_n}")
+    return np.linalg.norm(vector(pair.force_n))
+
+
 def refused(stats):
     return {counter.name: counter.count for counter in stats.refused}
 
@@ -274,6 +306,7 @@ def main():
     print(f"refused and counted: {bad_input(session, body, tool)}")
     watch_frames(session, body, epoch, vertices, 20)
     print("frames go on")
+    print(f"{tool} is felt: {feel(session, body, tool):.2f} N")
     token.undeclare()
     session.zenoh.close()
     exit_now(0)

@@ -41,6 +41,9 @@ def main():
     run = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=120, check=True)
     lines = run.stdout.splitlines()
     assert lines and lines[0].startswith("scene "), f"the scene first: {lines[:1]}"
+    forces = [line for line in lines if line.startswith("forces [N]: [")]
+    assert len(forces) == 1, f"the forces once: {forces}"
+    lines.remove(forces[0])
     frames = [re.fullmatch(r" *([\d.]+) s: (\d+) points, centre \[.*\]", line) for line in lines[1:]]
     assert len(frames) >= 3 and all(frames), f"frames: {lines[1:6]}"
     times = [float(frame[1]) for frame in frames]

@@ -16,6 +16,7 @@ if protoc.main(["protoc", f"-I{_PROTO}", f"--python_out={_OUT.name}", *_files]) 
 sys.path.insert(0, _OUT.name)
 
 cut_pb2 = importlib.import_module("scindo.v1.cut_pb2")
+force_pb2 = importlib.import_module("scindo.v1.force_pb2")
 server_pb2 = importlib.import_module("scindo.v1.server_pb2")
 surface_pb2 = importlib.import_module("scindo.v1.surface_pb2")
 tool_pb2 = importlib.import_module("scindo.v1.tool_pb2")
