@@ -1,6 +1,6 @@
 //! Springs between two material points: of two bodies, or of one.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use smallvec::SmallVec;
 
 use super::springs::{SpringKind, SpringLaw};
@@ -55,6 +55,8 @@ pub struct ActivePair {
     pub carriers: SmallVec<[Carrier; 16]>,
     /// Body and node with the largest weight on each side, which tell the parts.
     pub main: [(u32, u32); 2],
+    /// y with the present positions [m].
+    pub y: Vector3<f64>,
     /// Force, stiffness and mode by y.
     pub law: SpringLaw,
 }
@@ -82,6 +84,65 @@ impl ActivePair {
         let exists = |c: &Carrier| (c.copy as usize) < nodes(c.body) && c.weight.is_finite();
         let heaviest = spring.barycentric.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
         let main = [(a, spring.point.main_copy()), (b, spring.corners[heaviest].main_copy())];
-        carriers.iter().all(exists).then_some(Self { carriers, main, law })
+        carriers.iter().all(exists).then_some(Self { carriers, main, y: Vector3::zeros(), law })
+    }
+}
+
+/// The products of pair springs with vectors, arranged for one linear solve. Springs without stiffness are left out.
+#[derive(Clone, Debug, Default)]
+pub struct PairTerms {
+    terms: Vec<PairTerm>,
+    /// Nodes and weights of all terms, one after another.
+    carriers: Vec<(u32, f64)>,
+}
+
+/// s k J Jᵀ of one spring.
+#[derive(Clone, Copy, Debug)]
+struct PairTerm {
+    bodies: [u32; 2],
+    /// Where the carriers on the first body end, and those on the second.
+    ends: [u32; 2],
+    /// s k.
+    stiffness: Matrix3<f64>,
+}
+
+/// A term as a product needs it.
+#[derive(Clone, Copy, Debug)]
+pub struct PairProduct<'a> {
+    /// s k.
+    pub stiffness: &'a Matrix3<f64>,
+    /// J: the two bodies, with their nodes and weights. A spring within one body has all of them on the first side.
+    pub sides: [(u32, &'a [(u32, f64)]); 2],
+}
+
+impl PairTerms {
+    /// Takes the springs in their present modes, with the factor `s` of each body's stiffness.
+    pub fn arrange(&mut self, pairs: &[ActivePair], s: impl Fn(u32) -> f64) {
+        self.terms.clear();
+        self.carriers.clear();
+        for pair in pairs {
+            let [a, b] = pair.main.map(|(body, _)| body);
+            let stiffness = s(a) * pair.law.stiffness();
+            if stiffness == Matrix3::zeros() {
+                continue;
+            }
+            self.carriers.extend(pair.carriers.iter().map(|c| (c.copy, c.weight)));
+            let end = self.carriers.len();
+            // The carriers on the first body come first.
+            let second = pair.carriers.iter().filter(|c| c.body != a).count();
+            let ends = [(end - second) as u32, end as u32];
+            self.terms.push(PairTerm { bodies: [a, b], ends, stiffness });
+        }
+    }
+
+    /// All terms, in the order of the springs.
+    pub fn iter(&self) -> impl Iterator<Item = PairProduct<'_>> {
+        let mut start = 0;
+        self.terms.iter().map(move |PairTerm { bodies, ends: [middle, end], stiffness }| {
+            let (middle, end) = (*middle as usize, *end as usize);
+            let sides = [&self.carriers[start..middle], &self.carriers[middle..end]];
+            start = end;
+            PairProduct { stiffness, sides: [(bodies[0], sides[0]), (bodies[1], sides[1])] }
+        })
     }
 }

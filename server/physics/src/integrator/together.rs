@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use super::linear_step::LinearStep;
 use super::linear_step::together::Own;
-use super::pair_springs::{ActivePair, PairSpring};
+use super::pair_springs::{ActivePair, PairProduct, PairSpring, PairTerms};
 use super::state::State;
 use super::step_inputs::LinearInputs;
 use crate::element::MaterialPoint;
@@ -46,6 +46,7 @@ pub struct Member<'a> {
 #[derive(Debug, Default)]
 pub struct Together {
     pairs: Vec<ActivePair>,
+    terms: PairTerms,
     /// Which of the springs given these are.
     accepted: Vec<bool>,
     shared: Vec<Spring>,
@@ -85,17 +86,22 @@ impl Together {
         let mut reference = 0.0;
         for pass in 0..PASSES {
             self.complete(members);
-            self.translations.balance(members, &self.pairs);
+            if self.translations.balance(members, &self.pairs) {
+                place(&mut self.pairs, members);
+            }
             let rz = self.residual(members, pass, &mut reference);
             let solve = self.solve(members, (rz, reference, settings));
             let iterations = report.solve.iterations + solve.iterations;
             report.solve = LinearReport { iterations, ..solve };
-            self.translations.balance(members, &self.pairs);
+            place(&mut self.pairs, members);
+            if self.translations.balance(members, &self.pairs) {
+                place(&mut self.pairs, members);
+            }
             if solve.stop == StopReason::NonFinite || pass + 1 == PASSES || !self.changed(members) {
                 break;
             }
         }
-        self.write(members, pair_forces);
+        self.write(pair_forces);
         report.finite = report.solve.stop != StopReason::NonFinite;
         // No body moves unless all can.
         report.finite &= members.iter().all(|member| member.step.is_finite_together(&member.inputs));
@@ -114,8 +120,8 @@ impl Together {
             let nodes = |body: u32| members[body as usize].state.x.len();
             let mut active = if in_group { ActivePair::usable(spring, nodes) } else { None };
             if let Some(pair) = &mut active {
-                let y = relative(pair, members);
-                pair.law.begin(y);
+                pair.y = relative(pair, members);
+                pair.law.begin(pair.y);
             }
             self.accepted.push(active.is_some());
             self.pairs.extend(active);
@@ -124,6 +130,7 @@ impl Together {
 
     /// Completes the operators of all members, with the diagonal parts of the springs between them.
     fn complete(&mut self, members: Members<'_, '_>) {
+        self.terms.arrange(&self.pairs, |body| members[body as usize].inputs.s());
         for (number, member) in (0u32..).zip(members.iter_mut()) {
             self.shared.clear();
             let s = member.inputs.s();
@@ -147,7 +154,7 @@ impl Together {
             loads += step.residual_together(&mut own, pass).powi(2);
         }
         for pair in &self.pairs {
-            let force = pair.law.force(relative(pair, members));
+            let force = pair.law.force(pair.y);
             for carrier in &pair.carriers {
                 let member = &mut members[carrier.body as usize];
                 let s = member.inputs.s();
@@ -222,20 +229,23 @@ impl Together {
     /// Adds s k J Jᵀ p of the springs between members to q; returns their part of pᵀA p.
     fn multiply(&self, members: Members<'_, '_>) -> f64 {
         let mut curvature = 0.0;
-        for pair in &self.pairs {
-            let mut y = [0.0f64; 3];
-            for carrier in &pair.carriers {
-                let (p, _) = members[carrier.body as usize].step.direction_together();
-                let p = &p[carrier.copy as usize];
-                (0..3).for_each(|k| y[k] += carrier.weight * f64::from(p[k]));
+        for PairProduct { stiffness, sides } in self.terms.iter() {
+            let mut y = Vector3::zeros();
+            for (body, side) in sides {
+                let (p, _) = members[body as usize].step.direction_together();
+                for &(copy, weight) in side {
+                    let [p0, p1, p2, _] = p[copy as usize].map(f64::from);
+                    y += weight * Vector3::new(p0, p1, p2);
+                }
             }
-            let s = members[pair.main[0].0 as usize].inputs.s();
-            let f = s * (pair.law.stiffness() * Vector3::from(y));
-            curvature += f.dot(&Vector3::from(y));
-            for carrier in &pair.carriers {
-                let (_, q) = members[carrier.body as usize].step.direction_together();
-                let q = &mut q[carrier.copy as usize];
-                (0..3).for_each(|k| q[k] += (carrier.weight * f[k]) as f32);
+            let f = stiffness * y;
+            curvature += f.dot(&y);
+            for (body, side) in sides {
+                let (_, q) = members[body as usize].step.direction_together();
+                for &(copy, weight) in side {
+                    let q = &mut q[copy as usize];
+                    (0..3).for_each(|k| q[k] += (weight * f[k]) as f32);
+                }
             }
         }
         curvature
@@ -247,26 +257,24 @@ impl Together {
         for member in members.iter_mut() {
             changed |= member.step.own_springs_changed(&member.inputs);
         }
-        let forces = self.pairs.iter().map(|pair| pair.law.force(relative(pair, members)).norm());
-        let scale = forces.fold(0.0, f64::max);
-        let mut would = self.pairs.iter().map(|pair| pair.law.would_change(relative(pair, members), scale));
+        let scale = self.pairs.iter().map(|pair| pair.law.force(pair.y).norm()).fold(0.0, f64::max);
+        let mut would = self.pairs.iter().map(|pair| pair.law.would_change(pair.y, scale));
         if !changed && !would.any(|would| would) {
             return false;
         }
         for pair in &mut self.pairs {
-            let y = relative(pair, members);
-            pair.law.choose_mode(y);
+            pair.law.choose_mode(pair.y);
         }
         true
     }
 
     /// Writes the force of every spring on its point, in the order given; 0 for those that were left out.
-    fn write(&self, members: Members<'_, '_>, pair_forces: &mut Vec<Vector3<f64>>) {
+    fn write(&self, pair_forces: &mut Vec<Vector3<f64>>) {
         pair_forces.clear();
         let mut active = self.pairs.iter();
         pair_forces.extend(self.accepted.iter().map(|&accepted| {
             let pair = if accepted { active.next() } else { None };
-            pair.map_or_else(Vector3::zeros, |pair| pair.law.force(relative(pair, members)))
+            pair.map_or_else(Vector3::zeros, |pair| pair.law.force(pair.y))
         }));
     }
 }
@@ -277,6 +285,11 @@ impl<'b> Member<'b> {
         let Self { step, team, elastic, state, inputs, .. } = self;
         (step, Own { team, elastic: &mut **elastic, state, inputs })
     }
+}
+
+/// Writes y of all pairs with the present δ.
+fn place(pairs: &mut [ActivePair], members: &[Member<'_>]) {
+    pairs.iter_mut().for_each(|pair| pair.y = relative(pair, members));
 }
 
 /// y of a pair with the present δ [m].

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Member, relative};
+use super::Member;
 use crate::integrator::pair_springs::ActivePair;
 
 /// Relative residual at which the translations are found.
@@ -28,12 +28,13 @@ pub struct SharedTranslations {
 }
 
 impl SharedTranslations {
-    /// Moves every free part to where its momentum is balanced with the present δ and modes of springs.
-    pub fn balance(&mut self, members: &mut [Member<'_>], pairs: &[ActivePair]) {
-        self.gather(members, pairs);
-        if !self.free.contains(&true) {
-            return;
+    /// Moves every free part to where its momentum is balanced with the present δ, places and modes of springs.
+    /// Returns whether any part is free.
+    pub fn balance(&mut self, members: &mut [Member<'_>], pairs: &[ActivePair]) -> bool {
+        if !members.iter().any(|member| member.inputs.step.parts.any_free()) {
+            return false;
         }
+        self.gather(members, pairs);
         self.solve();
         for (member, first) in members.iter_mut().zip(&self.first) {
             let parts = member.inputs.step.parts.len();
@@ -41,6 +42,7 @@ impl SharedTranslations {
                 member.step.shift_part(part, &self.t[first + part]);
             }
         }
+        true
     }
 
     fn gather(&mut self, members: &mut [Member<'_>], pairs: &[ActivePair]) {
@@ -74,7 +76,7 @@ impl SharedTranslations {
             };
             let [a, c] = pair.main.map(part);
             let s = members[pair.main[0].0 as usize].inputs.s();
-            let f = s * pair.law.force(relative(pair, members));
+            let f = s * pair.law.force(pair.y);
             self.b[a] += f;
             self.b[c] -= f;
             if a != c && (self.free[a] || self.free[c]) {
