@@ -11,6 +11,8 @@ pub struct Ablation {
     pub exact_predicates: bool,
     /// The fast path linearises at the positions of the last step instead of the inertial predictor.
     pub predictor: bool,
+    /// The fast path bounds friction by the normal force of the last step instead of that at the end of this one.
+    pub lagged_friction: bool,
     /// Newton's method takes every full step, even if the potential rises.
     pub line_search: bool,
     /// Coarse levels of multigrid do not see cuts inside their cells. Cases apply this themselves.

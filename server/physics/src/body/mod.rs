@@ -422,6 +422,20 @@ impl Body {
         Ok(())
     }
 
+    /// Takes parts of the method out of a body that has just been made, for a check that their lack is noticed. Parts
+    /// that act when the body is made stay.
+    ///
+    /// # Errors
+    /// A solver that cannot be made.
+    #[doc(hidden)]
+    pub fn ablate(&mut self, ablation: Ablation) -> Result<(), BodyError> {
+        self.settings.ablation = ablation;
+        let solver = step_solver(&*self.space, &self.material, &self.settings)?;
+        self.dynamics = Dynamics::new(self.settings.scheme, self.material.law, solver)?;
+        self.follow_topology();
+        Ok(())
+    }
+
     /// Returns the body to its start: uncut, undeformed, at rest. Constraints and loads stay, and the
     /// epoch rises. A cut under way is dropped.
     pub fn reset(&mut self) -> Result<(), BodyError> {
@@ -464,7 +478,8 @@ fn step_solver(
         return Ok(Box::new(ModelSolver::of_space(space, *material, settings.volumetric, dynamics)?));
     };
     stiffness.set_choice(settings.operator(law, space.n_pieces()));
-    let (solver, at_start) = (settings.step_solver(law), settings.ablation.predictor);
+    let (solver, ablation) = (settings.step_solver(law), settings.ablation);
+    let ablated = (ablation.predictor, ablation.lagged_friction);
     let stiffness = (stiffness, settings.portable);
-    Ok(Box::new(LinearlyImplicit::new((scheme, *material), solver, stiffness, at_start)))
+    Ok(Box::new(LinearlyImplicit::new((scheme, *material), solver, stiffness, ablated)))
 }

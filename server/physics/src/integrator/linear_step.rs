@@ -51,6 +51,8 @@ const LOAD_FLOOR: f64 = 0.01;
 pub struct LinearStep {
     /// Linearise at the positions of the last step; only a mutation test sets it.
     at_start: bool,
+    /// Take the bound of friction from the last step; only a mutation test sets it.
+    lagged: bool,
     predicted: Vec<Vector3<f64>>,
     f_int: Vec<Padded>,
     damping: Vec<Padded>,
@@ -117,8 +119,8 @@ const SPRING_ROW: usize = 64;
 impl LinearStep {
     /// An integrator without history. `at_start` linearises at the positions of the last step; only a
     /// mutation test sets it.
-    pub fn new(at_start: bool) -> Self {
-        Self { at_start, ..Self::default() }
+    pub fn new(at_start: bool, lagged: bool) -> Self {
+        Self { at_start, lagged, ..Self::default() }
     }
 
     /// Makes room for `n` copies.
@@ -211,6 +213,9 @@ impl LinearStep {
         }
         self.predict(team, state, inputs);
         self.springs.begin(&inputs.step, &self.predicted);
+        if self.lagged {
+            self.springs.springs.iter_mut().for_each(ActiveSpring::lag);
+        }
         if inputs.descends() {
             self.choose_modes(inputs);
         }

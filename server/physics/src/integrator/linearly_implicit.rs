@@ -75,12 +75,12 @@ struct Weightless {
 
 impl LinearlyImplicit {
     /// Steps with `stiffness`, which was made for `portable` instructions or not. `at_start` linearises at
-    /// the positions of the last step; only a mutation test sets it.
+    /// the positions of the last step, and `lagged` takes friction from the last step; only mutation tests set them.
     pub fn new(
         (scheme, material): (Scheme, Material),
         settings: SolverSettings,
         (stiffness, portable): (Box<dyn Stiffness>, bool),
-        at_start: bool,
+        (at_start, lagged): (bool, bool),
     ) -> Self {
         let (solves, pcg) = settings.linear;
         Self {
@@ -94,7 +94,7 @@ impl LinearlyImplicit {
             stiffness,
             portable,
             mass_f32: Vec::new(),
-            step: LinearStep::new(at_start),
+            step: LinearStep::new(at_start, lagged),
             held: HeldEnergy::default(),
             weightless: Vec::new(),
             cut: false,

@@ -170,6 +170,8 @@ pub struct SpringLaw {
     grip_n: f64,
     /// How often a mode was chosen in this step.
     choices: u8,
+    /// Whether the bound of friction stays that of the last step.
+    lagged: bool,
 }
 
 impl SpringLaw {
@@ -189,7 +191,15 @@ impl SpringLaw {
             }
         };
         let usable = usable && (0.0..=1e15).contains(&stiffness_n_m) && max_force_n >= 0.0;
-        usable.then_some(Self { kind, stiffness_n_m, max_force_n, mode: Mode::Linear, grip_n, choices: 0 })
+        usable.then_some(Self {
+            kind,
+            stiffness_n_m,
+            max_force_n,
+            mode: Mode::Linear,
+            grip_n,
+            choices: 0,
+            lagged: false,
+        })
     }
 
     /// Begins a step with the point at `point`: off without contact, linear otherwise. Friction begins with the
@@ -289,7 +299,9 @@ impl SpringLaw {
         let before = self.mode;
         self.choices = self.choices.saturating_add(1);
         // A spring that closes was not part of the solve. Its depth says nothing about its force.
-        self.grip_n = if before == Mode::Off { 0.0 } else { self.bound(point) };
+        if !self.lagged {
+            self.grip_n = if before == Mode::Off { 0.0 } else { self.bound(point) };
+        }
         let (k, cap) = (self.stiffness_n_m, self.max_force_n);
         self.mode = match self.pull(point) {
             None => Mode::Off,
@@ -453,6 +465,11 @@ impl ActiveSpring {
     /// Force, stiffness and mode by the position of the point.
     pub fn law(&self) -> &SpringLaw {
         &self.law
+    }
+
+    /// Keeps the bound of friction of the last step; only for a mutation test.
+    pub fn lag(&mut self) {
+        self.law.lagged = true;
     }
 
     /// See [`SpringLaw::choose_mode`].
