@@ -76,9 +76,13 @@ pub fn nearest(tool: &Capsule, surfaces: &[ContactSurface], reach: f64) -> Optio
     found.min_by(|a, b| a.gap.total_cmp(&b.gap))
 }
 
-/// The place a proxy touches, if it touches one.
-pub fn touched(proxy: &Capsule, surfaces: &[ContactSurface]) -> Option<Nearest> {
-    nearest(proxy, surfaces, (MARGIN_RADII * proxy.radius).max(LEAST_MARGIN_M))
+/// The place a proxy touches, if it touches one. A proxy that is kept from the device has met something, even if the
+/// surface has given way a little since.
+pub fn touched((proxy, device): (&Capsule, &Capsule), surfaces: &[ContactSurface]) -> Option<Nearest> {
+    let away = |i: usize| (proxy.core[i] - device.core[i]).norm();
+    let is_kept = away(0).max(away(1)) > CLEAR_OFFSET_M;
+    let margin = (MARGIN_RADII * proxy.radius).max(LEAST_MARGIN_M);
+    nearest(proxy, surfaces, if is_kept { margin.max(proxy.radius) } else { margin })
 }
 
 /// Unit direction in which the touched tissue pushes back the tool.
@@ -159,7 +163,7 @@ impl Press {
         surfaces: &[ContactSurface],
     ) {
         let (at_proxy, at_device) = (capsule(shape, proxy), capsule(shape, device));
-        let Some(place) = touched(&at_proxy, surfaces) else { return self.release() };
+        let Some(place) = touched((&at_proxy, &at_device), surfaces) else { return self.release() };
         let target = push_direction(&place, &at_proxy, &at_device);
         let fresh = self.direction.is_none();
         let direction = turned(self.direction, target);

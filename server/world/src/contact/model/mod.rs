@@ -263,7 +263,7 @@ impl ToolModel {
         let ahead = (query.velocity_m_s.norm() * AHEAD_S).clamp(LEAST_AHEAD_M, MOST_AHEAD_M);
         let at_proxy = capsule(query.shape, self.proxy.pose());
         let at_device = capsule(query.shape, &query.pose);
-        let place = match touched(&at_proxy, frame.surfaces) {
+        let place = match touched((&at_proxy, &at_device), frame.surfaces) {
             Some(place) => {
                 let target = push_direction(&place, &at_proxy, &at_device);
                 // The model presses in the direction of the step, unless the contact requires a turn.
