@@ -54,20 +54,37 @@ impl SurfaceBvh {
         reach: f64,
         accept: impl Fn(u32) -> bool,
     ) -> Option<ClosestPoint> {
-        let distance = |t: u32| {
-            accept(t).then(|| {
-                let triangle = self.triangle(t);
-                let w = closest_point_on_triangle(p, &triangle);
-                ((barycentric_point(&triangle, w) - p).norm_squared(), w)
-            })
-        };
-        let (triangle, w) = self.nearest([p, p], reach, distance)?;
+        let (triangle, w) = self.nearest([p, p], reach, |t| accept(t).then(|| self.closest_on(t, p)))?;
+        Some(self.closest(p, triangle, w))
+    }
+
+    /// The point closest to `p` [m] on these triangles, no farther than `reach` [m]: as
+    /// [`closest_point_where`](Self::closest_point_where) accepts them, without a search.
+    pub fn closest_point_among(
+        &self,
+        p: V,
+        reach: f64,
+        triangles: impl Iterator<Item = u32>,
+    ) -> Option<ClosestPoint> {
+        let each = triangles.map(|t| (t, self.closest_on(t, p))).filter(|(_, (d, _))| *d <= limit(reach));
+        let (triangle, (_, w)) = each.min_by(|(t, (d, _)), (u, (e, _))| d.total_cmp(e).then(t.cmp(u)))?;
+        Some(self.closest(p, triangle, w))
+    }
+
+    /// Squared distance [m²] from `p` to a triangle, and the barycentric coordinates of the closest point.
+    fn closest_on(&self, t: u32, p: V) -> (f64, [f64; 3]) {
+        let triangle = self.triangle(t);
+        let w = closest_point_on_triangle(p, &triangle);
+        ((barycentric_point(&triangle, w) - p).norm_squared(), w)
+    }
+
+    fn closest(&self, p: V, triangle: u32, w: [f64; 3]) -> ClosestPoint {
         let point = barycentric_point(&self.triangle(triangle), w);
         let normal = self.normal_at(triangle, w);
         let distance = (p - point).norm();
         let inside = (p - point).dot(&normal) < 0.0;
         let signed_distance = if inside { -distance } else { distance };
-        Some(ClosestPoint { triangle, barycentric: w, point, normal, signed_distance })
+        ClosestPoint { triangle, barycentric: w, point, normal, signed_distance }
     }
 
     /// The triangle closest to the core of `capsule`, no farther from it than radius + `reach` [m]. Of triangles
@@ -89,8 +106,7 @@ impl SurfaceBvh {
         reach: f64,
         distance: impl Fn(u32) -> Option<(f64, T)>,
     ) -> Option<(u32, T)> {
-        // The limit is rounded up, so that what is exactly within reach is found.
-        let limit = (reach * reach * 1.000_001).min(f64::MAX);
+        let limit = limit(reach);
         let mut best: Option<(f64, u32, T)> = None;
         self.index().search(self.boxes(), &NearSegment::<true>(core), limit, |t, now| {
             let Some((squared, value)) = distance(t) else { return };
@@ -154,7 +170,7 @@ impl SurfaceBvh {
     }
 
     /// Normal of a vertex: those of its triangles, weighted by their angles there. Its length says nothing.
-    pub fn vertex_normal(&self, v: u32) -> V {
+    fn vertex_normal(&self, v: u32) -> V {
         let weighted = |t: u32| {
             let corners = self.corners(t);
             let at = corners.iter().position(|&c| c == v)?;
@@ -164,6 +180,11 @@ impl SurfaceBvh {
         };
         self.star(v).filter_map(weighted).sum()
     }
+}
+
+/// The largest squared distance within `reach`. It is rounded up, so that what is exactly within reach is found.
+fn limit(reach: f64) -> f64 {
+    (reach * reach * 1.000_001).min(f64::MAX)
 }
 
 fn unit(v: V) -> Option<V> {

@@ -126,9 +126,13 @@ impl SimThread {
                 self.wait_still();
                 continue;
             }
+            let start = Instant::now();
             self.read_inputs();
             self.advance();
             self.hand_over();
+            if !self.pace.fast && self.owed.is_none() {
+                self.engine.govern(start.elapsed());
+            }
             self.report();
             self.keep_pace();
         }

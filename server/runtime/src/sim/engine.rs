@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use nalgebra::Vector3;
 use scindo_proto::limits::{HEADER_BYTES, MAX_PARAMS, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES};
@@ -110,6 +111,11 @@ impl Engine {
             tracing::error!(%error, "results cannot be written; they end at this step");
             self.failure = Some(error);
         }
+    }
+
+    /// Takes note of how long the last step took.
+    pub fn govern(&mut self, took: Duration) {
+        self.sim.govern(took.as_secs_f64());
     }
 
     /// Installs `flag`: once it is raised, the current step ends early.

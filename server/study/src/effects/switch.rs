@@ -42,6 +42,8 @@ pub(super) fn switch(name: &str, scene: &CheckedScene) -> Switch {
         "cutting" => one("effects.cutting=false"),
         "adaptation" => adaptation(scene),
         "self-collision" => one("effects.self_collision=false"),
+        "governor" => Switch::None("it only acts in real time, which measurements do not keep"),
+        "sleep" => one("effects.sleep=false"),
         "body-body contact" => one("effects.body_collision=false"),
         "obstacles" => one("effects.obstacles=false"),
         "probes" => one("probe=[]"),

@@ -84,6 +84,17 @@ pub struct Contacts {
     /// Toughness of every body [J/m²]; empty: blades cut without force.
     toughness: Vec<f64>,
     pairs: PairContacts,
+    ablation: ContactAblation,
+}
+
+/// Parts of contact that are taken out, for a check that their lack is noticed.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ContactAblation {
+    /// A body meets also those of its triangles that its vertices are joined to.
+    pub exclusion: bool,
+    /// Tools jump from pose to pose instead of sweeping the way between them.
+    pub continuous: bool,
 }
 
 impl Contacts {
@@ -150,6 +161,13 @@ impl Contacts {
         }
     }
 
+    /// Takes parts of contact out.
+    #[doc(hidden)]
+    pub fn ablate(&mut self, ablation: ContactAblation) {
+        self.ablation = ablation;
+        self.pairs.meet_the_joined(ablation.exclusion);
+    }
+
     /// Whether bodies touch bodies.
     pub fn bodies_touch(&self) -> bool {
         self.touch.is_some()
@@ -166,16 +184,17 @@ impl Contacts {
     }
 
     /// Finds what bodies may meet of each other and of themselves in a step of `h` seconds.
-    pub fn meet(&mut self, bodies: &[SimBody], h: f64) {
+    /// Bodies that sleep, if `asleep` names any, stay as they are with each other.
+    pub fn meet(&mut self, bodies: &[SimBody], asleep: &[bool], h: f64) {
         let Some(touch) = self.touch else { return };
         let Self { pairs, surfaces, bodies: own, .. } = self;
-        pairs.detect(bodies, surfaces, |i| own[i].young_pa, (h, touch));
+        pairs.detect((bodies, asleep), surfaces, |i| own[i].young_pa, (h, touch));
     }
 
     /// Evaluates what bodies did to each other in the last step.
-    pub fn settle_pairs(&mut self, bodies: &[SimBody]) {
+    pub fn settle_pairs(&mut self, bodies: &[SimBody], asleep: &[bool]) {
         if self.touch.is_some() {
-            self.pairs.settle(bodies);
+            self.pairs.settle(bodies, asleep);
         }
     }
 
@@ -255,6 +274,11 @@ impl Contacts {
         Ok(())
     }
 
+    /// Whether a tool or an edge acts on `body` in this step.
+    pub fn is_touched(&self, body: usize) -> bool {
+        !self.bodies[body].behind.is_empty()
+    }
+
     /// Forgets the last motion of `body`, e.g. after a reset.
     pub fn forget_motion(&mut self, body: usize) {
         self.surfaces[body].forget_motion();
@@ -285,6 +309,9 @@ impl Contacts {
         self.keep_up_with(tools);
         let Self { surfaces, bodies, hands, .. } = self;
         for ((index, tool), hand) in (0u32..).zip(tools.iter()).zip(hands) {
+            if self.ablation.continuous {
+                hand.jump(&tool.pose);
+            }
             hand.follow(tool, surfaces);
             press(index, tool, hand, surfaces, bodies);
             pull(index, tool, hand, surfaces, bodies);

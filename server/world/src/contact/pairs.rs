@@ -10,6 +10,8 @@
 //! or between the two lips of one cut, and is followed from there. Triangles count only where they face the vertex,
 //! and where the material between them and the vertex is not in one piece.
 
+mod own;
+
 use nalgebra::Vector3;
 use scindo_collision::ClosestPoint;
 use scindo_physics::body::{Body, PairSpring, SpringKind};
@@ -18,6 +20,7 @@ use scindo_physics::element::MaterialPoint;
 use super::surface::ContactSurface;
 use crate::body::SimBody;
 use crate::scene::CheckedScene;
+use own::OwnSurface;
 
 /// Distance at which a vertex gets a spring beyond its path in the step, in cells of the body.
 const MARGIN_CELLS: f64 = 0.1;
@@ -31,8 +34,6 @@ const BORN_LIP_CELLS: f64 = 0.25;
 const EASE_S: f64 = 0.1;
 /// Stiffness across the normal relative to that along it.
 const TANGENTIAL: f64 = 0.5;
-/// A triangle faces a vertex if their normals have at most this scalar product.
-const FACING: f64 = -0.2;
 
 /// How bodies touch each other and themselves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,6 +69,8 @@ struct Kept {
     /// Relative place where it sticks [m].
     anchor_m: Vector3<f64>,
     grip_n: f64,
+    /// Force on the vertex in the last step [N].
+    force_n: Vector3<f64>,
     /// Depth that it began with and that is still left to it [m].
     eased_m: f64,
     /// Depth at the end of the last step, below the plane of that step [m].
@@ -102,6 +105,8 @@ pub struct PairContacts {
     springs: Vec<PairSpring>,
     /// The same with their own numbers, in the order of `now`.
     found: Vec<PairSpring>,
+    /// Those of the last step.
+    known: Vec<PairSpring>,
     /// Where the springs of every contact stand.
     order: Vec<u32>,
     /// Per body the first body of its group.
@@ -114,6 +119,10 @@ pub struct PairContacts {
     reports: Vec<TouchReport>,
     /// Forces of the springs in `springs` [N].
     forces: Vec<Vector3<f64>>,
+    /// Vertices meet also what they are joined to; only for a mutation test.
+    meets_joined: bool,
+    /// Per body what it knows about itself; empty where bodies do not touch themselves.
+    own: Vec<OwnSurface>,
 }
 
 /// A vertex and what is near it.
@@ -130,8 +139,14 @@ impl PairContacts {
         self.now.clear();
         self.springs.clear();
         self.found.clear();
+        self.known.clear();
         self.reports.clear();
         self.group.clear();
+    }
+
+    /// Lets vertices meet also what they are joined to; only for a mutation test.
+    pub fn meet_the_joined(&mut self, on: bool) {
+        self.meets_joined = on;
     }
 
     /// Reports of the last step, one per pair of bodies that touched.
@@ -173,20 +188,24 @@ impl PairContacts {
     /// Finds what may touch in a step of `h` seconds.
     pub fn detect(
         &mut self,
-        bodies: &[SimBody],
+        (bodies, asleep): (&[SimBody], &[bool]),
         surfaces: &[ContactSurface],
         young_pa: impl Fn(usize) -> f64,
         (h, settings): (f64, TouchSettings),
     ) {
-        self.follow(bodies);
+        let same = self.follow(bodies);
+        self.know_themselves(surfaces, settings.itself, same);
         std::mem::swap(&mut self.kept, &mut self.now);
+        std::mem::swap(&mut self.known, &mut self.found);
         self.now.clear();
         self.found.clear();
         self.measure(bodies, h);
         for a in 0..bodies.len() {
             for b in 0..bodies.len() {
                 let wanted = if a == b { settings.itself } else { settings.others };
-                if wanted {
+                if wanted && sleeps(asleep, a) && sleeps(asleep, b) {
+                    self.keep([a as u32, b as u32]);
+                } else if wanted {
                     self.between([a, b], bodies, surfaces, &young_pa, (h, settings));
                 }
             }
@@ -194,16 +213,29 @@ impl PairContacts {
         self.arrange(bodies.len());
     }
 
-    /// Boxes and speeds of all bodies in the step.
+    /// Follows the motion of the surfaces that may touch themselves.
+    fn know_themselves(&mut self, surfaces: &[ContactSurface], wanted: bool, same: bool) {
+        self.own.resize_with(if wanted { surfaces.len() } else { 0 }, OwnSurface::default);
+        for (own, surface) in self.own.iter_mut().zip(surfaces) {
+            if let Some(tree) = surface.whole() {
+                own.update(tree, same);
+            }
+        }
+    }
+
+    /// Boxes and speeds of the surfaces of all bodies in the step.
     fn measure(&mut self, bodies: &[SimBody], h: f64) {
         self.reach.clear();
         for body in bodies {
             let (x, v) = (body.body.positions(), body.body.velocities());
             let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
-            let (bounds, fastest) = x.iter().zip(v).fold((none, 0.0f64), |([low, high], fastest), (x, v)| {
-                let to = x + h * v;
-                ([low.inf(x).inf(&to), high.sup(x).sup(&to)], fastest.max(v.norm()))
-            });
+            let (mut bounds, mut fastest) = (none, 0.0f64);
+            for vertex in &body.body.surface().vertices {
+                let (from, v) = (vertex.position(x), vertex.position(v));
+                let to = from + h * v;
+                bounds = [bounds[0].inf(&from).inf(&to), bounds[1].sup(&from).sup(&to)];
+                fastest = fastest.max(v.norm());
+            }
             self.reach.push((bounds, fastest));
         }
     }
@@ -254,16 +286,17 @@ impl PairContacts {
                 None if a == b => near_m.min(DEEPEST_CELLS * cell_m),
                 None => near_m.max(DEEPEST_CELLS * cell_m),
             };
-            let own = (a == b).then(|| surfaces[a].vertex_normal(vertex)).flatten();
-            let near = match own {
-                None if a == b => continue,
-                None => tree.closest_point(from, reach),
-                Some(normal) => tree.closest_point_where(from, reach, |t| {
+            let near = if a == b {
+                let (own, meets_joined) = (&mut self.own[a], self.meets_joined);
+                let joined = |t: u32| {
                     let corners = tree.corners(t);
-                    !corners.contains(&vertex)
-                        && facing(&tree.area_normal(t), &normal)
-                        && !corners.iter().any(|&c| joined(point, &surface.vertices[c as usize]))
-                }),
+                    corners.contains(&vertex)
+                        || !meets_joined
+                            && corners.iter().any(|&c| joined(point, &surface.vertices[c as usize]))
+                };
+                own.closest((vertex, from), (reach, cell_m), tree, joined)
+            } else {
+                tree.closest_point(from, reach)
             };
             let Some(near) = near else { continue };
             if near.signed_distance > near_m {
@@ -287,6 +320,14 @@ impl PairContacts {
             });
             self.now.push(contact);
         }
+    }
+
+    /// Contacts of two bodies that sleep stay as they are.
+    fn keep(&mut self, bodies: [u32; 2]) {
+        let start = self.kept.partition_point(|contact| contact.bodies < bodies);
+        let end = start + self.kept[start..].partition_point(|contact| contact.bodies == bodies);
+        self.now.extend_from_slice(&self.kept[start..end]);
+        self.found.extend_from_slice(&self.known[start..end]);
     }
 
     /// The contact of a vertex with what is near it; `None` if there is none.
@@ -328,6 +369,7 @@ impl PairContacts {
             barycentric: near.barycentric,
             anchor_m: Vector3::zeros(),
             grip_n: 0.0,
+            force_n: Vector3::zeros(),
             eased_m: depth.max(0.0),
             depth_m: depth,
             slipped: true,
@@ -393,62 +435,35 @@ impl PairContacts {
         }
     }
 
-    /// Evaluates the last step: what sticks, what slips, and the forces.
-    pub fn settle(&mut self, bodies: &[SimBody]) {
+    /// Evaluates the last step: what sticks, what slips, and the forces. Contacts of bodies that sleep stay as they are.
+    pub fn settle(&mut self, bodies: &[SimBody], asleep: &[bool]) {
         self.reports.clear();
         self.forces.resize(self.springs.len(), Vector3::zeros());
         let Self { now, found, forces, reports, .. } = self;
         for (contact, spring) in now.iter_mut().zip(found) {
-            let force = forces[contact.spring as usize];
-            let [a, b] = contact.bodies.map(|i| bodies[i as usize].body.positions());
-            let y = spring.relative([a, b]);
-            let (normal, offset_m) = match spring.kind {
-                SpringKind::Rough { normal, offset_m, .. } | SpringKind::OneSided { normal, offset_m } => {
-                    (normal, offset_m)
-                }
-                SpringKind::Hold { .. } => continue,
-            };
-            let push = force.dot(&normal);
-            contact.depth_m = offset_m + contact.eased_m - normal.dot(&y);
-            contact.slipped = true;
-            contact.anchor_m = Vector3::zeros();
-            contact.grip_n = 0.0;
-            if push <= 0.0 {
+            let (SpringKind::Rough { normal, .. } | SpringKind::OneSided { normal, .. }) = spring.kind else {
                 continue;
-            }
-            if let SpringKind::Rough { anchor_m: before, tangential_n_m, friction, .. } = spring.kind {
-                let across = force - push * normal;
-                let anchor_m = y + across / tangential_n_m;
-                let moved = (anchor_m - before) - normal * normal.dot(&(anchor_m - before));
-                contact.slipped = moved.norm() > 1e-3 * across.norm() / tangential_n_m + 1e-12;
-                // A vertex that slipped takes hold of the place under it, with the friction it has.
-                contact.anchor_m = if contact.slipped { across / tangential_n_m } else { before };
-                contact.grip_n = friction * push;
-            }
-            let of = [contact.bodies[0].min(contact.bodies[1]), contact.bodies[0].max(contact.bodies[1])];
-            let sign = if contact.bodies[0] == of[0] { 1.0 } else { -1.0 };
-            let place = match reports.iter().position(|report| report.bodies == of) {
-                Some(place) => place,
-                None => {
-                    reports.push(TouchReport { bodies: of, ..TouchReport::default() });
-                    reports.len() - 1
-                }
             };
-            let report = &mut reports[place];
-            report.contacts += 1;
-            report.deepest_m = report.deepest_m.max(contact.depth_m);
-            report.force_n += sign * force;
-            report.normal_n += push;
+            if !sleeps(asleep, contact.bodies[0] as usize) {
+                contact.force_n = forces[contact.spring as usize];
+                let x = contact.bodies.map(|i| bodies[i as usize].body.positions());
+                contact.settle(spring, spring.relative(x));
+            }
+            let push = contact.force_n.dot(&normal);
+            if push > 0.0 {
+                report(reports, contact, push);
+            }
         }
         forces.fill(Vector3::zeros());
     }
 
     /// Follows the topologies of all bodies. Contacts stay with what is still the same.
-    fn follow(&mut self, bodies: &[SimBody]) {
+    /// Returns whether nothing is new.
+    fn follow(&mut self, bodies: &[SimBody]) -> bool {
         let same = self.epochs.len() == bodies.len()
             && self.epochs.iter().zip(bodies).all(|(&epoch, body)| epoch == body.epoch());
         if same {
-            return;
+            return true;
         }
         self.epochs.clear();
         self.epochs.extend(bodies.iter().map(SimBody::epoch));
@@ -461,29 +476,81 @@ impl PairContacts {
             }
             self.lips.push(lips);
         }
-        let found = &self.found;
-        let mut each = found.iter();
-        self.now.retain(|contact| {
-            let Some(spring) = each.next() else { return false };
+        let is_still = |contact: &Kept, spring: &PairSpring| {
             let [a, b] = contact.bodies.map(|i| bodies[i as usize].body.surface());
             let vertex = a.vertices.get(contact.vertex as usize);
             let corners = b.triangles.get(contact.triangle as usize);
             let is_corner = |(c, known): (&u32, _)| b.vertices.get(*c as usize) == Some(known);
             vertex == Some(&spring.point)
                 && corners.is_some_and(|corners| corners.iter().zip(&spring.corners).all(is_corner))
-        });
+        };
+        let Self { now, found, .. } = self;
+        let mut left = 0;
+        for i in 0..now.len() {
+            if is_still(&now[i], &found[i]) {
+                (now[left], found[left]) = (now[i], found[i]);
+                left += 1;
+            }
+        }
+        now.truncate(left);
+        found.truncate(left);
+        false
     }
 }
 
 impl Kept {
+    /// Evaluates a step in which the spring gave `force_n` and left the vertex at the relative place `y`.
+    fn settle(&mut self, spring: &PairSpring, y: Vector3<f64>) {
+        let (SpringKind::Rough { normal, offset_m, .. } | SpringKind::OneSided { normal, offset_m }) =
+            spring.kind
+        else {
+            return;
+        };
+        let push = self.force_n.dot(&normal);
+        self.depth_m = offset_m + self.eased_m - normal.dot(&y);
+        self.slipped = true;
+        self.anchor_m = Vector3::zeros();
+        self.grip_n = 0.0;
+        if push <= 0.0 {
+            return;
+        }
+        if let SpringKind::Rough { anchor_m: before, tangential_n_m, friction, .. } = spring.kind {
+            let across = self.force_n - push * normal;
+            let anchor_m = y + across / tangential_n_m;
+            let moved = (anchor_m - before) - normal * normal.dot(&(anchor_m - before));
+            self.slipped = moved.norm() > 1e-3 * across.norm() / tangential_n_m + 1e-12;
+            // A vertex that slipped takes hold of the place under it, with the friction it has.
+            self.anchor_m = if self.slipped { across / tangential_n_m } else { before };
+            self.grip_n = friction * push;
+        }
+    }
+
     fn key(&self) -> ([u32; 2], u32) {
         (self.bodies, self.vertex)
     }
 }
 
-/// Whether a triangle with this normal, of any length, faces a vertex with that unit normal.
-fn facing(triangle: &Vector3<f64>, vertex: &Vector3<f64>) -> bool {
-    triangle.dot(vertex) <= FACING * triangle.norm()
+/// Adds a contact with the normal force `push` [N] to the report of its bodies.
+fn report(reports: &mut Vec<TouchReport>, contact: &Kept, push: f64) {
+    let [a, b] = contact.bodies;
+    let of = [a.min(b), a.max(b)];
+    let place = match reports.iter().position(|report| report.bodies == of) {
+        Some(place) => place,
+        None => {
+            reports.push(TouchReport { bodies: of, ..TouchReport::default() });
+            reports.len() - 1
+        }
+    };
+    let report = &mut reports[place];
+    report.contacts += 1;
+    report.deepest_m = report.deepest_m.max(contact.depth_m);
+    report.force_n += if a == of[0] { 1.0 } else { -1.0 } * contact.force_n;
+    report.normal_n += push;
+}
+
+/// Whether body number `i` sleeps; `asleep` is empty where none does.
+fn sleeps(asleep: &[bool], i: usize) -> bool {
+    asleep.get(i).copied().unwrap_or(false)
 }
 
 /// Whether two points are carried by a common node: the material between them is in one piece, however thin it is.

@@ -77,11 +77,6 @@ impl ContactSurface {
         self.areas.get(vertex as usize).copied().unwrap_or(0.0)
     }
 
-    /// Unit normal of a vertex; `None` without a tree or where it has none.
-    pub fn vertex_normal(&self, vertex: u32) -> Option<Vector3<f64>> {
-        self.tree.as_ref()?.vertex_normal(vertex).try_normalize(f64::MIN_POSITIVE)
-    }
-
     /// Includes the body in contact or excludes it.
     pub fn switch(&mut self, on: bool) {
         self.off = !on;

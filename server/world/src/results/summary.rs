@@ -10,6 +10,7 @@ use super::forces::{Row, each_contact};
 use super::machine::Machine;
 use crate::body::{AdaptCounts, Probe, SimBody};
 use crate::report::{Event, Level, StepReport};
+use crate::simulation::governor::GovernorReport;
 use crate::simulation::{Plan, Simulation};
 
 /// Most events that a summary lists; the rest is counted.
@@ -75,6 +76,9 @@ pub struct Timing {
     pub processor_mean_ms: f64,
     /// Simulated over computed time.
     pub real_time_factor: f64,
+    /// What the governor gave up, where the scene has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub governor: Option<GovernorReport>,
     /// Mean per stage.
     pub stages: Vec<StageSummary>,
     /// Mean per phase of the stage `deform`, over all bodies; empty if they were not measured.
@@ -408,6 +412,7 @@ impl Running {
             max_ms: f64::from(max),
             processor_mean_ms: 1e3 * self.processor_s / n,
             real_time_factor: simulation.step_s() * 1e3 / mean_ms.max(1e-9),
+            governor: simulation.governor_report(),
             stages: total.iter().map(mean).collect(),
             phases: if phases.total() > 0.0 { phases.iter().map(mean).collect() } else { Vec::new() },
         }

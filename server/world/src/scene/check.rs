@@ -445,6 +445,8 @@ impl Check<'_> {
             obstacles: raw.obstacles,
             body_collision: raw.body_collision,
             self_collision: raw.self_collision,
+            sleep: raw.sleep,
+            governor: raw.governor,
             energy: raw.energy,
             error_estimate: raw.error_estimate,
         }

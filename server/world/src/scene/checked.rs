@@ -439,6 +439,10 @@ pub struct EffectSwitches {
     pub body_collision: Option<bool>,
     /// Bodies touch themselves.
     pub self_collision: Option<bool>,
+    /// Bodies at rest sleep.
+    pub sleep: Option<bool>,
+    /// Late steps give up accuracy.
+    pub governor: Option<bool>,
     /// Energies in every report.
     pub energy: Option<bool>,
     /// Estimated discretisation error in every report.

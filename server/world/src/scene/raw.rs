@@ -698,6 +698,14 @@ pub struct RawEffects {
     /// `true` lets bodies touch themselves, e.g. the two lips of a cut.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub self_collision: Option<bool>,
+    /// `true` lets bodies sleep that have come to rest, until something touches them. Bodies that sleep are not
+    /// stepped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sleep: Option<bool>,
+    /// `true` lets a scene that runs in real time give up accuracy when its steps are late: first the estimate of the
+    /// error, then tolerances of linear solves up to 1e-2. What is still late runs in slow motion, and says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub governor: Option<bool>,
     /// `true` adds kinetic and elastic energy to every step report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub energy: Option<bool>,

@@ -22,9 +22,9 @@ impl Simulation {
     /// are one system each, solved by all threads.
     pub(super) fn deform(&mut self) {
         let (when, gravity) = ((self.time_s(), self.scene.step_s), self.scene.gravity_m_s2);
-        let Self { bodies, lead, contacts, groups, report, phase_clock, .. } = self;
+        let Self { bodies, lead, contacts, groups, report, phase_clock, dormant, .. } = self;
         let step = |i: usize, body: &mut SimBody, report: &mut BodyReport| {
-            if contacts.pairs().has_company(i) {
+            if dormant.is_asleep(i) || contacts.pairs().has_company(i) {
                 return;
             }
             let _span = tracing::trace_span!("deform", body = %body.id).entered();
@@ -43,7 +43,9 @@ impl Simulation {
         }
         if contacts.bodies_touch() {
             for first in 0..bodies.len() {
-                if contacts.pairs().group_of(first) == first && contacts.pairs().has_company(first) {
+                let pairs = contacts.pairs();
+                let is_group = pairs.group_of(first) == first && pairs.has_company(first);
+                if is_group && !dormant.is_asleep(first) {
                     phase_clock.start(first);
                     let group = groups.of(first);
                     together((group, first), bodies, contacts, (when, gravity), &mut report.bodies);
@@ -52,10 +54,12 @@ impl Simulation {
                 }
             }
         }
-        for (i, body) in bodies.iter_mut().enumerate() {
+        for (i, body) in bodies.iter_mut().enumerate().filter(|(i, _)| !dormant.is_asleep(*i)) {
             let solve = report.bodies[i].solve;
             body.has_stepped(&solve, report);
         }
+        let reports = &mut self.report.bodies;
+        dormant.settle(when, bodies, contacts, reports);
         self.sleep.look(self.steps, &mut self.bodies, &mut self.report);
     }
 }

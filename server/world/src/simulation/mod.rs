@@ -13,10 +13,12 @@ mod adapting;
 mod cuts;
 
 mod deform;
+mod dormant;
 
 mod incision;
 
 mod fill;
+pub mod governor;
 
 mod sleep;
 
@@ -29,7 +31,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{BodyError, PcgSettings};
+use scindo_physics::body::{Ablation, BodyError, PcgSettings};
 use scindo_physics::team::Lead;
 
 pub(crate) use stopwatch::processor_seconds;
@@ -38,10 +40,10 @@ pub use undo::{MAX_UNDO, Undone};
 use crate::assemble::{self, BuildOptions, Built};
 use crate::body::BodySize;
 pub use crate::body::{Probe, SimBody, StepCounts};
-use crate::contact::Contacts;
 use crate::contact::edge::EdgeReport;
 use crate::contact::pairs::{TouchReport, TouchSettings};
 use crate::contact::rest::RestReport;
+use crate::contact::{ContactAblation, Contacts};
 use crate::inputs::{CutOutcome, CutRequest, Inputs, Wants};
 use crate::mesh_in::Observer;
 pub use crate::report::{BodyReport, Energy, Event, Level, PhaseSeconds, Stage, StageSeconds, StepReport};
@@ -52,7 +54,9 @@ use crate::tool::obstacle::Obstacle;
 use adapting::ToolPlaces;
 use cuts::{CutContext, Cuts};
 use deform::Groups;
+use dormant::Dormant;
 use fill::Sources;
+use governor::{Governor, GovernorReport};
 use phase_clock::PhaseClock;
 pub use plan::Plan;
 use sleep::Sleep;
@@ -101,6 +105,8 @@ pub struct Simulation {
     contacts: Contacts,
     groups: Groups,
     sleep: Sleep,
+    dormant: Dormant,
+    governor: Governor,
     probes: Vec<Probe>,
     plan: Plan,
     warnings: Vec<String>,
@@ -172,6 +178,8 @@ impl Simulation {
             contacts,
             groups: Groups::default(),
             sleep: Sleep::new(&built.bodies),
+            governor: Governor::new(scene.effects.governor == Some(true)),
+            dormant: Dormant::new(built.bodies.len(), scene.effects.sleep == Some(true)),
             bodies: built.bodies,
             lead: built.lead,
             probes: built.probes,
@@ -215,6 +223,8 @@ impl Simulation {
         self.steps += 1;
         self.wants.take(&inputs.wants);
         self.report.begin(self.steps, self.time_s());
+        let Self { governor, scene, bodies, report, .. } = self;
+        report.events.extend(governor.decide(scene, bodies));
     }
 
     fn cut(&mut self, requests: &[CutRequest]) {
@@ -235,8 +245,12 @@ impl Simulation {
     }
 
     fn touch(&mut self) {
+        self.dormant.follow(&self.bodies);
         if self.tools.any_active() || self.contacts.bodies_touch() {
             for (i, body) in self.bodies.iter_mut().enumerate() {
+                if self.dormant.is_asleep(i) {
+                    continue;
+                }
                 let (shown, positions) = body.surface_now();
                 let (epoch, surface) = (shown.epoch(), (shown.surface(), shown.rest_positions()));
                 if let Err(error) = self.contacts.update_surface(i, epoch, surface, positions) {
@@ -247,18 +261,20 @@ impl Simulation {
         let h = self.scene.step_s;
         self.contacts.detect(&self.tools);
         self.contacts.press_edges(&self.tools, &mut self.bodies);
-        for (i, body) in self.bodies.iter().enumerate() {
+        self.dormant.disturb(&self.contacts);
+        self.contacts.meet(&self.bodies, self.dormant.asleep(), h);
+        self.dormant.join(&self.contacts);
+        for (i, body) in self.bodies.iter().enumerate().filter(|(i, _)| !self.dormant.is_asleep(*i)) {
             self.contacts.rest(i, body, h, self.scene.gravity_m_s2);
         }
-        self.contacts.meet(&self.bodies, h);
     }
 
     fn react(&mut self) {
-        for (i, body) in self.bodies.iter().enumerate() {
+        for (i, body) in self.bodies.iter().enumerate().filter(|(i, _)| !self.dormant.is_asleep(*i)) {
             self.contacts.collect(i, body.body.spring_forces());
             self.contacts.settle(i, body);
         }
-        self.contacts.settle_pairs(&self.bodies);
+        self.contacts.settle_pairs(&self.bodies, self.dormant.asleep());
         self.contacts.settle_edges(&mut self.tools, &self.bodies);
         self.contacts.react(&mut self.tools);
         self.contacts.draw_scalpels(&mut self.tools);
@@ -266,8 +282,12 @@ impl Simulation {
 
     fn measure(&mut self) {
         let energy = self.wants.energy || self.scene.effects.energy == Some(true);
-        let estimate = self.scene.effects.error_estimate == Some(true);
-        for (body, report) in self.bodies.iter_mut().zip(&mut self.report.bodies) {
+        let estimate = self.scene.effects.error_estimate == Some(true) && !self.governor.drops_estimate();
+        let each = self.bodies.iter_mut().zip(&mut self.report.bodies).enumerate();
+        for (i, (body, report)) in each {
+            if self.dormant.is_asleep(i) && report.energy.is_some() == energy {
+                continue;
+            }
             report.energy = energy.then(|| body.energy());
             report.mesh_error = if estimate { body.mesh_error() } else { None };
         }
@@ -300,6 +320,7 @@ impl Simulation {
         }
         self.tools.reset();
         self.contacts.reset(&self.tools);
+        self.dormant.wake_all();
         self.cuts.reset();
         self.steps = 0;
         self.total = StageSeconds::default();
@@ -315,6 +336,7 @@ impl Simulation {
     pub fn undo(&mut self) -> Result<Undone, String> {
         let undone = self.cuts.undo(&mut self.bodies)?;
         for &body in &undone.bodies {
+            self.dormant.wake(body);
             self.contacts.forget_motion(body);
         }
         for probe in &mut self.probes {
@@ -349,6 +371,16 @@ impl Simulation {
         self.phase_clock.set(on, self.bodies.iter_mut().map(|body| &mut body.body));
     }
 
+    /// Takes parts of the method out of a simulation that has just been made, for a check that their lack is noticed.
+    ///
+    /// # Errors
+    /// A solver that cannot be made.
+    #[doc(hidden)]
+    pub fn ablate(&mut self, ablation: Ablation, contact: ContactAblation) -> Result<(), BodyError> {
+        self.contacts.ablate(contact);
+        self.bodies.iter_mut().try_for_each(|body| body.body.ablate(ablation))
+    }
+
     /// A step under way ends as soon as `flag` is raised: bodies that have not moved yet stay as they were.
     /// Without it a step takes as long as its solvers do.
     pub fn set_stop_flag(&mut self, flag: &Arc<AtomicBool>) {
@@ -376,12 +408,21 @@ impl Simulation {
         if let LiveKey::Body(index, _) = live {
             self.change_body(index, &changed.checked().bodies[index])?;
         }
+        self.dormant.wake_all();
         self.scene = changed.checked().clone();
         settle(&mut self.scene, &self.bodies);
         self.source = changed;
         let sizes: Vec<BodySize> = self.bodies.iter().map(SimBody::size).collect();
         self.plan = Plan::new(&self.scene, &sizes);
+        self.governor.apply(&self.scene, &mut self.bodies);
         Ok(())
+    }
+
+    /// Takes note that the last step, with all that belongs to it, took `seconds` of real time: from the next step on,
+    /// a scene with a governor gives up accuracy where it is late, and takes it back where it is not. The report of
+    /// that step tells.
+    pub fn govern(&mut self, seconds: f64) {
+        self.governor.take(seconds);
     }
 
     fn change_body(&mut self, index: usize, spec: &BodySpec) -> Result<(), String> {
@@ -473,6 +514,16 @@ impl Simulation {
     /// Contacts of bodies with each other and with themselves in the last step, one report per pair.
     pub fn touch_reports(&self) -> &[TouchReport] {
         self.contacts.pairs().reports()
+    }
+
+    /// Whether body number `body` has come to rest and sleeps.
+    pub fn is_asleep(&self, body: usize) -> bool {
+        self.dormant.is_asleep(body)
+    }
+
+    /// What the governor has given up, and for how long; `None` if the scene has none.
+    pub fn governor_report(&self) -> Option<GovernorReport> {
+        self.governor.report()
     }
 
     /// Probes in the order of the scene.

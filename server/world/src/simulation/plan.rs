@@ -215,6 +215,8 @@ impl Plan {
         self.push("self-collision", itself, why(effects.self_collision, "self_collision"), of_itself);
         let others = touch.is_some_and(|touch| touch.others);
         self.push("body-body contact", others, why(effects.body_collision, "body_collision"), seconds);
+        self.push("sleep", effects.sleep == Some(true), why(effects.sleep, "sleep"), 0.0);
+        self.push("governor", effects.governor == Some(true), why(effects.governor, "governor"), 0.0);
     }
 
     fn obstacles(&mut self, scene: &CheckedScene, sizes: &[BodySize]) {

@@ -1,0 +1,177 @@
+//! A surface that looks for itself: which of its triangles a vertex can meet.
+//!
+//! Every vertex keeps a list of what is near it, and the distance beyond which nothing else was. No distance shrinks
+//! by more than both sides move, so the list is good until they have moved by what is left of that distance.
+//!
+//! # Source
+//! Verlet, Computer "experiments" on classical fluids I (1967): lists of neighbours.
+
+use nalgebra::Vector3;
+use scindo_collision::{Capsule, ClosestPoint, SurfaceBvh};
+use smallvec::SmallVec;
+
+/// A triangle faces a vertex if their normals have at most this scalar product.
+const FACING: f64 = -0.2;
+/// Most triangles in the list of a vertex.
+const MOST: usize = 24;
+/// How far vertices look around, so that they need not look again soon, in cells.
+const LOOKOUT_CELLS: f64 = 0.5;
+/// Rounding of positions to single precision, in cells.
+const ROUNDING_CELLS: f64 = 1e-4;
+
+/// What one body knows about itself.
+#[derive(Debug, Clone, Default)]
+pub struct OwnSurface {
+    /// Unit normals of triangles and vertices; zero where there is none.
+    triangles: Vec<Vector3<f64>>,
+    vertices: Vec<Vector3<f64>>,
+    /// Positions of the vertices at the last update [m].
+    positions: Vec<[f32; 3]>,
+    /// Per vertex the triangles near it to which it is not joined, with their distances when they were listed [m].
+    lists: Vec<SmallVec<[(f64, u32); MOST]>>,
+    /// Per vertex a lower bound of the distance to all others [m].
+    known_m: Vec<f64>,
+}
+
+impl OwnSurface {
+    /// Follows a motion of the surface. `same` tells whether vertices and triangles are still those of the last
+    /// update.
+    pub fn update(&mut self, tree: &SurfaceBvh, same: bool) {
+        self.follow(tree, same);
+        let Self { triangles, vertices, .. } = self;
+        triangles.clear();
+        vertices.clear();
+        vertices.resize(tree.positions().len(), Vector3::zeros());
+        triangles.extend((0..tree.triangle_count() as u32).map(|t| {
+            let normal = tree.area_normal(t);
+            tree.corners(t).iter().for_each(|&v| vertices[v as usize] += normal);
+            unit(&normal)
+        }));
+        vertices.iter_mut().for_each(|normal| *normal = unit(normal));
+    }
+
+    /// No distance has shrunk by more than both sides have moved.
+    fn follow(&mut self, tree: &SurfaceBvh, same: bool) {
+        let Self { positions, lists, known_m, .. } = self;
+        let now = tree.positions();
+        if same && positions.len() == now.len() {
+            let moved = |(now, before): (&[f32; 3], &[f32; 3])| (point(now) - point(before)).norm();
+            let each = || now.iter().zip(positions.iter()).map(moved);
+            let farthest = each().fold(0.0, f64::max);
+            known_m.iter_mut().zip(each()).for_each(|(known, own)| *known -= farthest + own);
+        } else {
+            known_m.clear();
+            known_m.resize(now.len(), 0.0);
+            lists.resize_with(now.len(), SmallVec::new);
+        }
+        positions.clear();
+        positions.extend_from_slice(now);
+    }
+
+    /// Whether triangle `t` faces a vertex.
+    pub fn faces(&self, t: u32, vertex: u32) -> bool {
+        let [triangle, vertex] = [&self.triangles[t as usize], &self.vertices[vertex as usize]];
+        triangle.dot(vertex) <= FACING
+    }
+
+    /// The closest of the triangles that face a vertex at `from` [m], of those no farther than `reach` [m] that it is
+    /// not joined to.
+    pub fn closest(
+        &mut self,
+        (vertex, from): (u32, Vector3<f64>),
+        (reach, cell_m): (f64, f64),
+        tree: &SurfaceBvh,
+        joined: impl Fn(u32) -> bool,
+    ) -> Option<ClosestPoint> {
+        let (v, needed) = (vertex as usize, reach + ROUNDING_CELLS * cell_m);
+        if self.known_m[v] <= needed {
+            let lookout = (LOOKOUT_CELLS * cell_m).max(1.5 * needed);
+            self.known_m[v] = look_around(&mut self.lists[v], from, lookout, tree, &joined);
+        }
+        if self.known_m[v] > needed {
+            let facing = self.lists[v].iter().map(|&(_, t)| t).filter(|&t| self.faces(t, vertex));
+            return tree.closest_point_among(from, reach, facing);
+        }
+        tree.closest_point_where(from, reach, |t| self.faces(t, vertex) && !joined(t))
+    }
+}
+
+/// Lists the triangles nearest to a point, no farther than `lookout` [m], by their distance. Returns the distance up
+/// to which the list is complete [m].
+fn look_around(
+    list: &mut SmallVec<[(f64, u32); MOST]>,
+    from: Vector3<f64>,
+    lookout: f64,
+    tree: &SurfaceBvh,
+    joined: &impl Fn(u32) -> bool,
+) -> f64 {
+    let mut complete_m = lookout;
+    list.clear();
+    tree.triangles_near(&Capsule { core: [from; 2], radius: 0.0 }, lookout, |near| {
+        if near.distance >= complete_m || joined(near.triangle) {
+            return;
+        }
+        if let Some(&(farthest, _)) = list.get(MOST - 1) {
+            complete_m = farthest.max(near.distance);
+            if near.distance >= farthest {
+                return;
+            }
+            list.pop();
+        }
+        let place = list.partition_point(|(distance, _)| *distance < near.distance);
+        list.insert(place, (near.distance, near.triangle));
+    });
+    list.retain(|(distance, _)| *distance < complete_m);
+    complete_m
+}
+
+fn point(p: &[f32; 3]) -> Vector3<f64> {
+    Vector3::from(p.map(f64::from))
+}
+
+fn unit(normal: &Vector3<f64>) -> Vector3<f64> {
+    normal.try_normalize(f64::MIN_POSITIVE).unwrap_or_default()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// A strip of 2 × 40 triangles, folded in the middle by `angle` [rad].
+    fn strip(angle: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+        let (half, size) = (20, 0.01f32);
+        let place = |i: i32, y: f32| {
+            let (before, after) = (i.min(half) as f32, (i - half).max(0) as f32);
+            [size * (before + after * angle.cos()), y, size * after * angle.sin()]
+        };
+        let points = (0..=2 * half).flat_map(|i| [place(i, 0.0), place(i, size)]).collect();
+        let of = |t: u32| if t.is_multiple_of(2) { [t, t + 2, t + 1] } else { [t, t + 1, t + 2] };
+        (points, (0..4 * half as u32).map(of).collect())
+    }
+
+    #[test]
+    fn lists_hold_what_is_near() {
+        let (points, triangles) = strip(0.0);
+        let mut tree = SurfaceBvh::new(&points, &triangles).unwrap();
+        let mut own = OwnSurface::default();
+        let (mut listed, mut met) = (0, 0);
+        for step in 0..3000 {
+            // Folded shut and opened again, with a jerk in between.
+            let angle = 3.1 * (0.0015 * step as f32).sin().abs() + if step % 500 == 7 { 0.3 } else { 0.0 };
+            tree.refit(&strip(angle).0).unwrap();
+            own.update(&tree, step > 0);
+            for v in 0..points.len() as u32 {
+                let (from, reach) = (point(&tree.positions()[v as usize]), 0.002);
+                let joined = |t: u32| tree.corners(t).contains(&v);
+                listed += usize::from(own.known_m[v as usize] > 1.1 * reach);
+                let found = own.closest((v, from), (reach, 0.01), &tree, joined);
+                let truth = tree.closest_point_where(from, reach, |t| own.faces(t, v) && !joined(t));
+                assert_eq!(found, truth, "step {step}, vertex {v}");
+                met += usize::from(truth.is_some());
+            }
+        }
+        assert!(met > 20, "the halves meet: {met}");
+        assert!(listed > 1500 * points.len(), "most lists are still good: {listed}");
+    }
+}
