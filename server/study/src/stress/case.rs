@@ -5,6 +5,13 @@ use scindo_physics::cut::CutMesh;
 use scindo_physics::material::Material;
 use scindo_physics::mesh::{MeshError, TetMesh};
 
+use std::path::Path;
+
+use scindo_world::assemble::BuildOptions;
+use scindo_world::contact::ContactAblation;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+
 use super::evidence::Evidence;
 
 /// An error that stops a case before its end.
@@ -82,11 +89,26 @@ impl CaseReport {
 pub struct Setting {
     /// Parts taken out of the method: none, except in a mutation check.
     pub ablation: Ablation,
+    /// The same of contact.
+    pub contact: ContactAblation,
     /// Whether cases that have a long form take it.
     pub long: bool,
 }
 
 impl Setting {
+    /// Starts a scene, stepped by so many threads.
+    ///
+    /// # Errors
+    /// The scene has a mistake, or cannot be built.
+    pub fn scene(&self, text: &str, threads: usize) -> Result<Simulation, Trouble> {
+        let options = BuildOptions { threads, portable: false };
+        let mut simulation = Simulation::with_options(&Scene::from_toml(text)?, Path::new(""), options)?;
+        if (self.ablation, self.contact) != Default::default() {
+            simulation.ablate(self.ablation, self.contact)?;
+        }
+        Ok(simulation)
+    }
+
     /// Builds a body on the fast path with this tolerance and at most this many iterations.
     ///
     /// # Errors

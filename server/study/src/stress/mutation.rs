@@ -1,6 +1,7 @@
 //! Checks that the cases can fail: parts of the method are taken out, and some case must notice.
 
 use scindo_physics::body::Ablation;
+use scindo_world::contact::ContactAblation;
 
 use super::case::{CaseReport, Setting, Status};
 use super::suite::{Progress, Settings, StressError, run_cases, select};
@@ -22,11 +23,17 @@ pub enum Mutation {
     HangingWeights,
     /// Vertices of hanging corners that follow a cut.
     StaleVertices,
+    /// Triangles that a vertex is joined to are no contacts.
+    Exclusion,
+    /// Friction by the normal force at the end of the step.
+    Friction,
+    /// Sweeps of tools between their poses.
+    Continuous,
 }
 
 impl Mutation {
     /// All mutations, in the order of the table.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 10] = [
         Self::PieceMasses,
         Self::ExactPredicates,
         Self::Predictor,
@@ -34,6 +41,9 @@ impl Mutation {
         Self::Duplicates,
         Self::HangingWeights,
         Self::StaleVertices,
+        Self::Exclusion,
+        Self::Friction,
+        Self::Continuous,
     ];
 
     /// Stable name for programs.
@@ -46,6 +56,9 @@ impl Mutation {
             Self::Duplicates => "duplicates",
             Self::HangingWeights => "hanging-weights",
             Self::StaleVertices => "stale-vertices",
+            Self::Exclusion => "exclusion",
+            Self::Friction => "friction",
+            Self::Continuous => "continuous",
         }
     }
 
@@ -61,6 +74,9 @@ impl Mutation {
             Self::Duplicates => "coarse levels of multigrid do not see cuts inside their cells",
             Self::HangingWeights => "hanging corners count as the vertices that stand in for them",
             Self::StaleVertices => "hanging corners keep the vertices that they had before a cut",
+            Self::Exclusion => "a body meets also the triangles that its vertices are joined to",
+            Self::Friction => "friction is bounded by the normal force of the step before",
+            Self::Continuous => "tools jump from pose to pose",
         }
     }
 
@@ -74,6 +90,9 @@ impl Mutation {
             Self::Duplicates => &["blade-grid"],
             Self::HangingWeights => &["cells-patch"],
             Self::StaleVertices => &["cells-patch"],
+            Self::Exclusion => &["lips-in-contact"],
+            Self::Friction => &["incline"],
+            Self::Continuous => &["tool-jab"],
         }
     }
 
@@ -88,8 +107,12 @@ impl Mutation {
             Self::Duplicates => Ablation { duplicates: true, ..none },
             Self::HangingWeights => Ablation { hanging_weights: true, ..none },
             Self::StaleVertices => Ablation { stale_vertices: true, ..none },
+            Self::Friction => Ablation { lagged_friction: true, ..none },
+            Self::Exclusion | Self::Continuous => none,
         };
-        Setting { ablation, long: false }
+        let contact =
+            ContactAblation { exclusion: self == Self::Exclusion, continuous: self == Self::Continuous };
+        Setting { ablation, contact, long: false }
     }
 }
 

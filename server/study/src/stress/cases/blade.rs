@@ -22,7 +22,7 @@ pub const PRESSED: Case = Case {
 
 const TOUGHNESS_J_M2: f64 = 60.0;
 
-fn pressed(_: &Setting) -> Result<Evidence, Trouble> {
+fn pressed(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut evidence = Evidence::default();
     let through = |seconds: f64| vec![(0.0, 0.051, -0.03, 0.042), (seconds, 0.051, -0.03, -0.012)];
     let shake = |x: f64, y: f64, z: f64| {
@@ -43,7 +43,7 @@ fn pressed(_: &Setting) -> Result<Evidence, Trouble> {
         ("octree, pressed by 800 N/m", 800.0, through(1.0), "element = \"octree\"", Some(0.12)),
     ];
     for (name, stiffness, path, element, bound) in trials {
-        let mut run = Run::new(&scene(stiffness, &path, element))?;
+        let mut run = Run::new(&scene(stiffness, &path, element), setting)?;
         run.steps(300);
         let body = &run.sim.bodies()[0].body;
         if let Some(bound) = bound {

@@ -6,14 +6,18 @@ mod branches;
 mod cells;
 mod critical_step;
 mod falling;
+mod crowd;
 mod far;
 mod growth;
 mod input;
+mod jab;
 mod later;
 mod multigrid;
+mod overload;
 mod on_mesh;
 mod ruined;
 mod sliver;
+mod soak;
 mod spin;
 mod stiff;
 mod support;
@@ -46,14 +50,14 @@ pub const ALL: &[Case] = &[
     stiff::LAYERS,
     stiff::INCOMPRESSIBLE,
     stiff::NEEDLES,
-    later::JAB,
+    jab::CASE,
     later::PACKETS,
     input::CASE,
     later::WALL,
     touch::LIPS,
     multigrid::BLADES,
-    later::SOAK,
-    later::OVERLOAD,
+    soak::CASE,
+    overload::CASE,
     far::CASE,
     critical_step::CASE,
     cells::ALIGNED,
@@ -68,4 +72,5 @@ pub const ALL: &[Case] = &[
     touch::WEDGED,
     touch::PRESSED,
     blade::PRESSED,
+    crowd::CASE,
 ];

@@ -1,11 +1,8 @@
 //! Cases of contact: bodies on obstacles, on each other and on themselves. Each is a whole scene.
 
-use std::path::Path;
-
 use nalgebra::Vector3;
 use scindo_physics::body::Outcome;
 use scindo_world::inputs::Inputs;
-use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 
 use crate::stress::case::{Case, Setting, Trouble};
@@ -125,8 +122,8 @@ pub(super) struct Run {
 }
 
 impl Run {
-    pub(super) fn new(text: &str) -> Result<Self, Trouble> {
-        let sim = Simulation::new(&Scene::from_toml(text)?, Path::new(""))?;
+    pub(super) fn new(text: &str, setting: &Setting) -> Result<Self, Trouble> {
+        let sim = setting.scene(text, 1)?;
         Ok(Self { sim, not_whole: 0, not_finite: 0, deepest: 0.0, kinetic: Vec::new(), depth: Vec::new() })
     }
 
@@ -216,7 +213,7 @@ fn wound(itself: bool) -> String {
 fn lips(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut evidence = Evidence::default();
     let cycles = if setting.long { 1000 } else { 12 };
-    let mut run = Run::new(&wound(true))?;
+    let mut run = Run::new(&wound(true), setting)?;
     // Energies at the open end of every cycle.
     let mut open = Vec::with_capacity(cycles);
     for _ in 0..cycles {
@@ -232,7 +229,7 @@ fn lips(setting: &Setting) -> Result<Evidence, Trouble> {
     evidence.exactly("defects of the surface", defects, 0);
     run.tell("", 0.05, &mut evidence);
     // The same without contact.
-    let mut free = Run::new(&wound(false))?;
+    let mut free = Run::new(&wound(false), setting)?;
     free.steps(30);
     evidence.at_least("overlap of the lips without self-contact", overlap(&free.sim), 0.3, "h");
     Ok(evidence)
@@ -267,7 +264,7 @@ fn incline(setting: &Setting) -> Result<Evidence, Trouble> {
         let world = WORLD.replace("[0, 0, -9.81]", &format!("[{x}, 0, {z}]"));
         let floor = FLOOR.replace("[0, 0, 1] }", "[0, 0, 1] }\nfriction = 0.5");
         let body = block("block", [0.0; 3], [0.1, 0.1, 0.06], [5, 5, 3], "");
-        let mut run = Run::new(&[&*world, &body, &floor].concat())?;
+        let mut run = Run::new(&[&*world, &body, &floor].concat(), setting)?;
         run.steps(400);
         let before = run.sim.bodies()[0].body.centre_of_mass();
         let speed = run.sim.bodies()[0].body.momentum().x;
@@ -294,13 +291,13 @@ fn incline(setting: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-fn needle(_: &Setting) -> Result<Evidence, Trouble> {
+fn needle(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut evidence = Evidence::default();
     let skin = "skin = { divisions = 8 }";
     let body = block("block", [-0.03, -0.03, 0.33], [0.03, 0.03, 0.39], [4, 4, 4], skin);
     let needle =
         "[[obstacle]]\nid = \"needle\"\ncapsule = { ends_m = [[0, 0, 0], [0, 0, 0.02]], radius_m = 0.002 }\n";
-    let mut run = Run::new(&[WORLD, &body, FLOOR, needle].concat())?;
+    let mut run = Run::new(&[WORLD, &body, FLOOR, needle].concat(), setting)?;
     let weight = 9.81 * run.sim.bodies()[0].body.total_mass();
     let mut hit = 0.0f64;
     for _ in 0..300 {
@@ -315,13 +312,13 @@ fn needle(_: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-fn hippo(_: &Setting) -> Result<Evidence, Trouble> {
+fn hippo(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut evidence = Evidence::default();
     let world = WORLD.replace("step_s = 0.01", "step_s = 0.04");
     let body = "[[body]]\nid = \"hippo\"\nlaw = \"linear\"\nyoung_pa = 1e5\npoisson = 0.33\ndensity_kg_m3 = 1000\n\
                 mesh = { box = { min_m = [0, 0, 0.5], max_m = [2.0, 1.0, 1.3], cells = [26, 16, 10], pattern = \"tet5\" } }\n\
                 solver = { iterations = 10 }\n";
-    let mut run = Run::new(&[&*world, body, FLOOR].concat())?;
+    let mut run = Run::new(&[&*world, body, FLOOR].concat(), setting)?;
     let mut lowest = f64::INFINITY;
     for _ in 0..125 {
         run.step();
@@ -334,7 +331,7 @@ fn hippo(_: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-fn wedged(_: &Setting) -> Result<Evidence, Trouble> {
+fn wedged(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut evidence = Evidence::default();
     let effects = "effects = { body_collision = true }\n";
     let wall = |id: &str, x: f64, towards: i32| {
@@ -348,7 +345,7 @@ fn wedged(_: &Setting) -> Result<Evidence, Trouble> {
     ]
     .concat();
     let trough = [wall("west", 0.003, 1), wall("east", 0.117, -1)].concat();
-    let mut run = Run::new(&[WORLD, effects, &blocks, FLOOR, &trough].concat())?;
+    let mut run = Run::new(&[WORLD, effects, &blocks, FLOOR, &trough].concat(), setting)?;
     run.steps(400);
     evidence.at_most("kinetic energy at the end, trough", run.kinetic_energy(), 1e-6, "J");
     run.tell("trough", 0.2, &mut evidence);
@@ -357,7 +354,7 @@ fn wedged(_: &Setting) -> Result<Evidence, Trouble> {
                  [[obstacle]]\nid = \"right\"\ncapsule = { ends_m = [[0.0125, -1, -0.01], [0.0125, 1, -0.01]], radius_m = 0.01 }\n";
     let load = "[[body.load]]\nwhere = { slab = { axis = \"z\", from = 0, to = 1 } }\nforce_n = [0, 0, -3]";
     let body = block("pushed", [-0.03, -0.03, 0.001], [0.03, 0.03, 0.061], [8, 8, 8], load);
-    let mut run = Run::new(&[WORLD, &body, posts].concat())?;
+    let mut run = Run::new(&[WORLD, &body, posts].concat(), setting)?;
     run.steps(400);
     evidence.at_most("kinetic energy at the end, gap", run.kinetic_energy(), 1e-6, "J");
     let centre = run.sim.bodies()[0].body.centre_of_mass();
@@ -366,7 +363,7 @@ fn wedged(_: &Setting) -> Result<Evidence, Trouble> {
     Ok(evidence)
 }
 
-fn pressed(_: &Setting) -> Result<Evidence, Trouble> {
+fn pressed(setting: &Setting) -> Result<Evidence, Trouble> {
     let mut evidence = Evidence::default();
     let wall = |id: &str, x: f64, towards: i32| {
         format!(
@@ -391,7 +388,7 @@ fn pressed(_: &Setting) -> Result<Evidence, Trouble> {
     let once = cut(0.5, -0.02, 0.08);
     let twice = cut(0.5, -0.02, 0.02) + &cut(1.0, -0.02, 0.08);
     for (name, cuts, depth) in [("one cut", once, 0.05), ("cut again", twice, 1.0)] {
-        let mut run = Run::new(&[&*block, &cuts].concat())?;
+        let mut run = Run::new(&[&*block, &cuts].concat(), setting)?;
         run.steps(300);
         let body = &run.sim.bodies()[0].body;
         evidence.at_least(format!("parts at the end, {name}"), body.parts().len() as f64, 2.0, "");
