@@ -74,7 +74,7 @@ impl Mutation {
             Self::Duplicates => "coarse levels of multigrid do not see cuts inside their cells",
             Self::HangingWeights => "hanging corners count as the vertices that stand in for them",
             Self::StaleVertices => "hanging corners keep the vertices that they had before a cut",
-            Self::Exclusion => "a body meets also the triangles that its vertices are joined to",
+            Self::Exclusion => "a body meets all of its triangles, those beside a vertex included",
             Self::Friction => "friction is bounded by the normal force of the step before",
             Self::Continuous => "tools jump from pose to pose",
         }

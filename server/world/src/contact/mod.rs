@@ -91,7 +91,7 @@ pub struct Contacts {
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ContactAblation {
-    /// A body meets also those of its triangles that its vertices are joined to.
+    /// A body meets all of its triangles, also those that its vertices are joined to and those that do not face them.
     pub exclusion: bool,
     /// Tools jump from pose to pose instead of sweeping the way between them.
     pub continuous: bool,

@@ -217,6 +217,7 @@ impl PairContacts {
     fn know_themselves(&mut self, surfaces: &[ContactSurface], wanted: bool, same: bool) {
         self.own.resize_with(if wanted { surfaces.len() } else { 0 }, OwnSurface::default);
         for (own, surface) in self.own.iter_mut().zip(surfaces) {
+            own.meet_the_joined(self.meets_joined);
             if let Some(tree) = surface.whole() {
                 own.update(tree, same);
             }

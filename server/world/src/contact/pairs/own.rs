@@ -29,11 +29,18 @@ pub struct OwnSurface {
     positions: Vec<[f32; 3]>,
     /// Per vertex the triangles near it to which it is not joined, with their distances when they were listed [m].
     lists: Vec<SmallVec<[(f64, u32); MOST]>>,
+    /// All triangles count as facing; only for a mutation test.
+    meets_joined: bool,
     /// Per vertex a lower bound of the distance to all others [m].
     known_m: Vec<f64>,
 }
 
 impl OwnSurface {
+    /// Lets vertices meet all triangles; only for a mutation test.
+    pub fn meet_the_joined(&mut self, on: bool) {
+        self.meets_joined = on;
+    }
+
     /// Follows a motion of the surface. `same` tells whether vertices and triangles are still those of the last
     /// update.
     pub fn update(&mut self, tree: &SurfaceBvh, same: bool) {
@@ -70,6 +77,9 @@ impl OwnSurface {
 
     /// Whether triangle `t` faces a vertex.
     pub fn faces(&self, t: u32, vertex: u32) -> bool {
+        if self.meets_joined {
+            return true;
+        }
         let [triangle, vertex] = [&self.triangles[t as usize], &self.vertices[vertex as usize]];
         triangle.dot(vertex) <= FACING
     }
