@@ -116,6 +116,11 @@ pub const MAX_COORDINATE_M: f64 = 1.0e4;
 /// Largest velocity [m/s]; a hand stays below 10.
 pub const MAX_VELOCITY_M_S: f64 = 1.0e3;
 
+/// Largest force of the grip of forceps [N].
+pub const MAX_GRIP_N: f64 = 1e4;
+/// Largest coefficient of dry friction.
+pub const MAX_FRICTION: f64 = 10.0;
+
 /// Largest dimension of a tool [m].
 pub const MAX_TOOL_M: f64 = 10.0;
 

@@ -39,16 +39,33 @@ fn shape() -> impl Strategy<Value = ToolShape> {
         size.clone().prop_map(|radius_m| Kind::Sphere(Sphere { radius_m })),
         (size.clone(), size.clone())
             .prop_map(|(radius_m, length_m)| Kind::Capsule(Capsule { radius_m, length_m })),
-        (size.clone(), size).prop_map(|(length_m, thickness_m)| Kind::Blade(Blade { length_m, thickness_m })),
+        (size.clone(), size.clone())
+            .prop_map(|(length_m, thickness_m)| Kind::Blade(Blade { length_m, thickness_m })),
+        [size.clone(), size.clone(), size.clone(), 0.0..1e4, 0.0..10.0].prop_map(
+            |[radius_m, length_m, opening_m, grip_force_n, friction]| {
+                Kind::Forceps(Forceps { radius_m, length_m, opening_m, grip_force_n, friction })
+            }
+        ),
+        [size.clone(), size.clone(), size.clone(), size.clone()].prop_map(
+            |[radius_m, length_m, width_m, height_m]| {
+                Kind::Retractor(Retractor { radius_m, length_m, width_m, height_m })
+            }
+        ),
+        [size.clone(), size.clone(), size.clone(), size].prop_map(
+            |[radius_m, length_m, reach_m, point_m]| {
+                Kind::Hook(Hook { radius_m, length_m, reach_m, point_m })
+            }
+        ),
     ];
     kind.prop_map(|kind| ToolShape { kind: Some(kind) })
 }
 
 fn tool_sample() -> impl Strategy<Value = ToolSample> {
     let header = (any::<u64>(), any::<u64>(), id(), id(), 0..5_i32);
-    let rest = (pose(), metres(), proptest::option::of(shape()), 0.0..9.0_f32);
-    (header, rest).prop_map(|((seq, time, client_id, tool_id, mode), (pose, velocity, shape, age))| {
-        ToolSample {
+    let closed = proptest::option::of(0.0..=1.0_f32);
+    let rest = (pose(), metres(), proptest::option::of(shape()), 0.0..9.0_f32, closed);
+    (header, rest).prop_map(
+        |((seq, time, client_id, tool_id, mode), (pose, velocity, shape, age, closed))| ToolSample {
             seq,
             client_time_ns: time,
             client_id,
@@ -62,8 +79,9 @@ fn tool_sample() -> impl Strategy<Value = ToolSample> {
             contact_age_ms: age,
             passivity_energy_j: -1.5,
             fault_flags: 3,
-        }
-    })
+            closed,
+        },
+    )
 }
 
 fn cut_command() -> impl Strategy<Value = CutCommand> {
@@ -300,6 +318,7 @@ proptest! {
             seq: 4, sim_step: 5, sim_time_s: 0.5, publish_unix_ns: 6, tool_id: id.clone(),
             shape: Some(shape), pose: Some(pose), proxy_pose: Some(pose), mode: 2,
             force_n: Some(force), owner: id, max_force_n: 8.0, held_point_m: Some(force),
+            closed: 0.25,
         })?;
     }
 
@@ -643,5 +662,20 @@ fn schema_names_every_message() {
     let text = String::from_utf8_lossy(scindo_proto::FILE_DESCRIPTOR_SET);
     for name in ["HapticContact", "CutCommand", "SurfaceKeyframe", "Stats"] {
         assert!(text.contains(name));
+    }
+}
+
+#[test]
+fn jaws_close_between_open_and_closed() {
+    for closed in [-0.1, 1.1, f32::NAN] {
+        let refused = refusal(&ToolSample { closed: Some(closed), ..a_sample() });
+        assert!(refused.to_string().contains("closed"), "{refused}");
+    }
+    for [opening_m, friction] in [[0.0, 0.5], [0.01, -0.1], [0.01, 11.0], [f64::NAN, 0.5]] {
+        let kind =
+            tool_shape::Forceps { radius_m: 0.001, length_m: 0.1, opening_m, grip_force_n: 1.0, friction };
+        let shape = Some(ToolShape { kind: Some(tool_shape::Kind::Forceps(kind)) });
+        let refused = refusal(&ToolSample { shape, ..a_sample() });
+        assert!(refused.to_string().contains("shape.forceps"), "{refused}");
     }
 }

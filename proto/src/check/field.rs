@@ -2,7 +2,10 @@
 
 use crate::codec::DecodeError;
 use crate::key::is_chunk;
-use crate::limits::{MAX_COORDINATE_M, MAX_ID_BYTES, MAX_TEXT_BYTES, MAX_TOOL_M, QUATERNION_TOLERANCE};
+use crate::limits::{
+    MAX_COORDINATE_M, MAX_FRICTION, MAX_GRIP_N, MAX_ID_BYTES, MAX_TEXT_BYTES, MAX_TOOL_M,
+    QUATERNION_TOLERANCE,
+};
 use crate::messages::{Error, Pose, ToolShape, Vec3, Vec3f, tool_shape::Kind};
 
 /// Name of the message under check, which every error states.
@@ -129,6 +132,25 @@ impl In {
             Kind::Blade(b) => {
                 size("shape.blade.length_m", b.length_m)?;
                 self.positive("shape.blade.thickness_m", b.thickness_m, MAX_TOOL_M)
+            }
+            Kind::Forceps(f) => {
+                size("shape.forceps.radius_m", f.radius_m)?;
+                size("shape.forceps.length_m", f.length_m)?;
+                size("shape.forceps.opening_m", f.opening_m)?;
+                self.positive("shape.forceps.grip_force_n", f.grip_force_n, MAX_GRIP_N)?;
+                self.positive("shape.forceps.friction", f.friction, MAX_FRICTION)
+            }
+            Kind::Retractor(r) => {
+                size("shape.retractor.radius_m", r.radius_m)?;
+                size("shape.retractor.length_m", r.length_m)?;
+                size("shape.retractor.width_m", r.width_m)?;
+                size("shape.retractor.height_m", r.height_m)
+            }
+            Kind::Hook(h) => {
+                size("shape.hook.radius_m", h.radius_m)?;
+                size("shape.hook.length_m", h.length_m)?;
+                size("shape.hook.reach_m", h.reach_m)?;
+                size("shape.hook.point_m", h.point_m)
             }
         }
     }

@@ -27,6 +27,7 @@ impl WireMessage for ToolSample {
         at.known::<tool_sample::Mode>("mode", self.mode)?;
         at.finite("contact_age_ms", f64::from(self.contact_age_ms))?;
         at.finite("passivity_energy_j", self.passivity_energy_j)?;
+        self.closed.map_or(Ok(()), |closed| at.positive("closed", f64::from(closed), 1.0))?;
         self.shape.as_ref().map_or(Ok(()), |shape| at.shape(shape))
     }
 }
@@ -90,6 +91,7 @@ impl WireMessage for ToolState {
         at.optional_vec3("force_n", &self.force_n, MAX_FORCE_N)?;
         at.positive("max_force_n", f64::from(self.max_force_n), MAX_FORCE_N)?;
         at.optional_vec3("held_point_m", &self.held_point_m, MAX_COORDINATE_M)?;
+        at.positive("closed", f64::from(self.closed), 1.0)?;
         self.shape.as_ref().map_or(Ok(()), |shape| at.shape(shape))
     }
 }

@@ -35,6 +35,41 @@ pub enum ToolShape {
         /// Length of the axis [m].
         length_m: f64,
     },
+    /// Two jaws that hinge at (0, 0, `length_m`) and open along x, with the tip midway between their ends.
+    Forceps {
+        /// Radius of a jaw [m].
+        radius_m: f64,
+        /// Length of a jaw, from its end to the hinge [m].
+        length_m: f64,
+        /// Distance between the inner faces of the open jaws at their ends [m].
+        opening_m: f64,
+        /// Largest force with which each jaw squeezes [N].
+        grip_force_n: f64,
+        /// Coefficient of dry friction μ between jaw and tissue.
+        friction: f64,
+    },
+    /// A shaft along +z with two bars across it, along x: one at the tip and one above it.
+    Retractor {
+        /// Radius of bars and shaft [m].
+        radius_m: f64,
+        /// Length of the shaft [m].
+        length_m: f64,
+        /// Length of the bars [m].
+        width_m: f64,
+        /// Distance of the bars [m].
+        height_m: f64,
+    },
+    /// A shaft along +z whose end is bent towards +x, and up again at its point.
+    Hook {
+        /// Radius of the rod [m].
+        radius_m: f64,
+        /// Length of the shaft [m].
+        length_m: f64,
+        /// Distance of the point from the shaft [m].
+        reach_m: f64,
+        /// Length of the point [m].
+        point_m: f64,
+    },
 }
 
 impl Default for ToolShape {
@@ -51,7 +86,7 @@ pub enum ToolMode {
     Hover,
     /// Pushes what it meets.
     Touch,
-    /// Holds the tissue nearest to the tip when the mode began.
+    /// Holds the tissue nearest to the tip when the mode began; forceps hold what is between their jaws.
     Grab,
     /// A blade that cuts along its path.
     Cut,
@@ -75,6 +110,8 @@ pub struct ToolInput {
     pub velocity_m_s: Vector3<f64>,
     /// What the hand does.
     pub mode: ToolMode,
+    /// How far the hand closes the jaws of forceps, 0 to 1; none: they close to grab, and are open else.
+    pub closed: Option<f64>,
     /// Geometry of a tool that the scene does not declare.
     pub shape: Option<ToolShape>,
     /// Sequence number of the sample.

@@ -127,6 +127,8 @@ pub struct ToolSnapshot {
     pub velocity_m_s: Vector3<f64>,
     /// What the hand does.
     pub mode: ToolMode,
+    /// How far the jaws of forceps are closed, 0 to 1; tissue between them keeps them apart.
+    pub closed: f64,
     /// Force of the tissue on the tool from the step's solve [N].
     pub force_n: Vector3<f64>,
     /// Stiffness of the spring between hand and tissue [N/m].

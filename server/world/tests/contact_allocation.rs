@@ -23,6 +23,14 @@ static ALLOCATOR: Counting = Counting;
 
 const ROD: ToolShape = ToolShape::Capsule { radius_m: 0.003, length_m: 0.03 };
 const BALL: ToolShape = ToolShape::Sphere { radius_m: 0.004 };
+const JAWS: ToolShape = ToolShape::Forceps {
+    radius_m: 0.002,
+    length_m: 0.05,
+    opening_m: 0.008,
+    grip_force_n: 1.0,
+    friction: 0.5,
+};
+const HOOK: ToolShape = ToolShape::Hook { radius_m: 0.002, length_m: 0.05, reach_m: 0.01, point_m: 0.006 };
 
 /// Where tool `i` is in round `round`: pressed in and moving along.
 fn pose(i: usize, round: usize) -> Isometry3<f64> {
@@ -58,8 +66,9 @@ fn steady_contact_does_not_allocate() {
         path: Vec::new(),
         repeat_s: None,
     };
-    let specs = [spec("rod", ROD), spec("ball", BALL), spec("grip", BALL)];
-    let modes = [ToolMode::Touch, ToolMode::Touch, ToolMode::Grab];
+    let specs =
+        [spec("rod", ROD), spec("ball", BALL), spec("grip", BALL), spec("jaws", JAWS), spec("hook", HOOK)];
+    let modes = [ToolMode::Touch, ToolMode::Touch, ToolMode::Grab, ToolMode::Grab, ToolMode::Touch];
     let mut tools = Tools::new(&specs, false);
     let mut contacts = Contacts::default();
     contacts.add_body(1e4, true);
@@ -73,6 +82,7 @@ fn steady_contact_does_not_allocate() {
             passed: Vec::new(),
             velocity_m_s: V::zeros(),
             mode,
+            closed: None,
             shape: None,
             seq: 1,
             client_time_ns: 0,
@@ -151,11 +161,11 @@ fn steady_contact_does_not_allocate() {
     }
     let rounds = rounds.len() as f64;
     println!(
-        "{} triangles, 3 tools: detection {:.3} ms per step, snapshot {:.3} ms, model {:.4} ms",
+        "{} triangles, 5 tools: detection {:.3} ms per step, snapshot {:.3} ms, model {:.4} ms",
         surface.triangles.len(),
         1e3 * in_step / rounds,
         1e3 * in_take / rounds,
-        1e3 * in_models / rounds / 12.0,
+        1e3 * in_models / rounds / 20.0,
     );
     assert!(springs > 100 && planes > 100, "{springs} {planes}");
     assert_eq!(steady, 0);

@@ -45,15 +45,15 @@ export class ToolVisual {
     this.state = state;
     const f = state.forceN;
     this.force.set(f?.x ?? 0, f?.y ?? 0, f?.z ?? 0);
-    const key = JSON.stringify(state.shape?.kind ?? null);
+    const key = JSON.stringify([state.shape?.kind ?? null, Math.round(200 * state.closed)]);
     if (key === this.shapeKey || !state.shape) return;
     this.shapeKey = key;
     this.solid.clear();
     this.ghost.clear();
     // The page's own blade points at the viewer, and its handle would hide the cut.
     const shaft = !(this.own && state.shape.kind.case === "blade");
-    this.solid.add(...parts(state.shape, this.own ? HAND : STEEL, shaft));
-    this.ghost.add(...parts(state.shape, GHOST, false));
+    this.solid.add(...parts(state.shape, this.own ? HAND : STEEL, shaft, state.closed));
+    this.ghost.add(...parts(state.shape, GHOST, false, state.closed));
   }
 
   /** Moves solid, ghost, arrow and label to the newest state. */
@@ -117,8 +117,8 @@ export function modeName(mode: ToolSample_Mode): string {
   return ["", "hover", "touch", "grab", "cut", "scalpel"][mode] ?? "";
 }
 
-/** Meshes of a shape in tool axes: tip at the origin, shaft along +z. */
-export function parts(shape: ToolShape, material: Material, shaft: boolean): Mesh[] {
+/** Meshes of a shape in tool axes: tip at the origin, shaft along +z. The jaws of forceps are `closed` from 0 to 1. */
+export function parts(shape: ToolShape, material: Material, shaft: boolean, closed = 0): Mesh[] {
   const kind = shape.kind;
   switch (kind.case) {
     case "sphere": {
@@ -138,8 +138,34 @@ export function parts(shape: ToolShape, material: Material, shaft: boolean): Mes
       const edge = new Mesh(bladeGeometry(l), material);
       return shaft ? solid([edge, rod(0.055 * l, l * 1.02, 2.6 * l, material)]) : [edge];
     }
+    case "forceps": {
+      const { radiusM: r, lengthM: l, openingM } = kind.value;
+      const apart = 0.5 * openingM * (1 - closed) + r;
+      const jaws = [apart, -apart].map((x) => capsule([x, 0, 0], [Math.sign(x) * r, 0, l], r, material));
+      return shaft ? solid([...jaws, rod(1.8 * r, l, 1.6 * l, material)]) : jaws;
+    }
+    case "retractor": {
+      const { radiusM: r, lengthM: l, widthM: w, heightM: h } = kind.value;
+      const bars = [0, h].map((z) => capsule([-w / 2, 0, z], [w / 2, 0, z], r, material));
+      return solid([...bars, capsule([0, 0, 0], [0, 0, l], r, material)]);
+    }
+    case "hook": {
+      const { radiusM: r, lengthM: l, reachM: x, pointM: z } = kind.value;
+      const ends: [Triple, Triple][] = [[[0, 0, 0], [0, 0, l]], [[0, 0, 0], [x, 0, 0]], [[x, 0, 0], [x, 0, z]]];
+      return solid(ends.map(([from, to]) => capsule(from, to, r, material)));
+    }
     default: return [];
   }
+}
+
+type Triple = [number, number, number];
+
+function capsule(from: Triple, to: Triple, radius: number, material: Material): Mesh {
+  const a = new Vector3(...from), along = new Vector3(...to).sub(a);
+  const mesh = new Mesh(new CapsuleGeometry(radius, along.length(), 8, 20), material);
+  mesh.position.copy(a).addScaledVector(along, 0.5);
+  mesh.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), along.normalize());
+  return mesh;
 }
 
 function solid(meshes: Mesh[]): Mesh[] {

@@ -84,6 +84,7 @@ pub fn tool_input(
         passed: Vec::new(),
         velocity_m_s,
         mode,
+        closed: None,
         shape: Some(SHAPE),
         seq,
         client_time_ns,

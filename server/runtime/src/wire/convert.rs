@@ -74,6 +74,16 @@ pub fn to_shape(shape: &ToolShape) -> wire::ToolShape {
         ToolShape::Blade { length_m, thickness_m } => {
             tool_shape::Kind::Blade(tool_shape::Blade { length_m, thickness_m })
         }
+        ToolShape::Forceps { radius_m, length_m, opening_m, grip_force_n, friction } => {
+            let forceps = tool_shape::Forceps { radius_m, length_m, opening_m, grip_force_n, friction };
+            tool_shape::Kind::Forceps(forceps)
+        }
+        ToolShape::Retractor { radius_m, length_m, width_m, height_m } => {
+            tool_shape::Kind::Retractor(tool_shape::Retractor { radius_m, length_m, width_m, height_m })
+        }
+        ToolShape::Hook { radius_m, length_m, reach_m, point_m } => {
+            tool_shape::Kind::Hook(tool_shape::Hook { radius_m, length_m, reach_m, point_m })
+        }
     };
     wire::ToolShape { kind: Some(kind) }
 }
@@ -84,6 +94,25 @@ pub fn from_shape(shape: &wire::ToolShape) -> Option<ToolShape> {
         tool_shape::Kind::Sphere(s) => ToolShape::Sphere { radius_m: s.radius_m },
         tool_shape::Kind::Capsule(c) => ToolShape::Capsule { radius_m: c.radius_m, length_m: c.length_m },
         tool_shape::Kind::Blade(b) => ToolShape::Blade { length_m: b.length_m, thickness_m: b.thickness_m },
+        tool_shape::Kind::Forceps(f) => ToolShape::Forceps {
+            radius_m: f.radius_m,
+            length_m: f.length_m,
+            opening_m: f.opening_m,
+            grip_force_n: f.grip_force_n,
+            friction: f.friction,
+        },
+        tool_shape::Kind::Retractor(r) => ToolShape::Retractor {
+            radius_m: r.radius_m,
+            length_m: r.length_m,
+            width_m: r.width_m,
+            height_m: r.height_m,
+        },
+        tool_shape::Kind::Hook(h) => ToolShape::Hook {
+            radius_m: h.radius_m,
+            length_m: h.length_m,
+            reach_m: h.reach_m,
+            point_m: h.point_m,
+        },
     })
 }
 
@@ -118,6 +147,7 @@ pub fn to_tool_input(sample: &wire::ToolSample, id: Arc<str>, owner: Arc<str>) -
         passed: Vec::new(),
         velocity_m_s: from_vec3(sample.velocity_m_s),
         mode: from_mode(sample.mode()),
+        closed: sample.closed.map(f64::from),
         shape: sample.shape.as_ref().and_then(from_shape),
         seq: sample.seq,
         client_time_ns: sample.client_time_ns,
@@ -253,5 +283,6 @@ pub fn to_tool_state(snapshot: &Snapshot, tool: &ToolSnapshot, seq: u64) -> wire
         owner: tool.owner.to_string(),
         max_force_n: tool.max_force_n as f32,
         held_point_m: tool.held_m.as_ref().map(to_vec3),
+        closed: tool.closed as f32,
     }
 }

@@ -1,16 +1,24 @@
 //! The contact of one tool: where tissue lets it be, where it presses, and what it holds.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Translation3, Vector3};
 
 use crate::contact::compliance::Compliance;
 use crate::contact::edge::{Edge, EdgeReport};
 use crate::contact::grab::Grip;
+use crate::contact::jaws::Jaws;
 use crate::contact::press::Press;
 use crate::contact::proxy::Proxy;
 use crate::contact::surface::ContactSurface;
-use crate::inputs::ToolMode;
-use crate::tool::Tool;
+use crate::inputs::{ToolMode, ToolShape};
 use crate::tool::geometry::core_radius;
+use crate::tool::{Tool, compound};
+
+/// Where one capsule of a compound tool may be, and where it presses.
+#[derive(Debug, Clone)]
+struct Limb {
+    proxy: Proxy,
+    press: Press,
+}
 
 /// The contact state of one tool, kept from step to step.
 #[derive(Debug, Clone)]
@@ -23,7 +31,11 @@ pub struct Hand {
     /// The edge of a blade that cuts with force.
     pub(super) edge: Option<Box<Edge>>,
     press: Press,
+    /// The capsules of a compound tool, instead of `press`.
+    limbs: Vec<Limb>,
     grip: Grip,
+    /// The grip of forceps.
+    pub(super) jaws: Option<Box<Jaws>>,
     /// Body that it touched last, and the compliance of its tissue; `None` before the first contact.
     compliance: Option<(usize, Compliance)>,
 }
@@ -38,7 +50,9 @@ impl Hand {
             proxy: Proxy::default(),
             edge: None,
             press: Press::new(),
+            limbs: Vec::new(),
             grip: Grip::new(),
+            jaws: None,
             compliance: None,
         }
     }
@@ -63,9 +77,22 @@ impl Hand {
         self.proxy.release(pose);
     }
 
-    /// Where and how the tool presses.
+    /// Where and how the tool presses; a compound tool presses with its [`limbs`](Self::limbs).
     pub fn press(&self) -> &Press {
         &self.press
+    }
+
+    /// Where and how the capsules of a compound tool press; none for other tools.
+    pub fn limbs(&self) -> impl ExactSizeIterator<Item = &Press> {
+        self.limbs.iter().map(|limb| &limb.press)
+    }
+
+    /// How far the jaws of forceps are closed, 0 to 1.
+    pub fn closed(&self, tool: &Tool) -> f64 {
+        match (tool.shape, self.jaws.as_ref().and_then(|jaws| jaws.gap_m())) {
+            (ToolShape::Forceps { opening_m, .. }, Some(gap_m)) => (1.0 - gap_m / opening_m).clamp(0.0, 1.0),
+            _ => tool.closed,
+        }
     }
 
     /// The tissue that the tool holds.
@@ -75,6 +102,9 @@ impl Hand {
 
     /// Centroid of the tissue in its grip [m]; `None` if it holds nothing.
     pub fn held_point(&self) -> Option<Vector3<f64>> {
+        if let Some(jaws) = &self.jaws {
+            return jaws.held_point();
+        }
         let held = self.grip.held().1;
         let sum: Vector3<f64> = held.iter().map(|held| held.point).sum();
         (!held.is_empty()).then(|| sum / held.len() as f64)
@@ -90,7 +120,9 @@ impl Hand {
     pub fn let_go(&mut self, pose: &Isometry3<f64>) {
         self.proxy.release(pose);
         self.press.release();
+        self.release_limbs();
         self.grip.open();
+        self.open_jaws();
         self.edge = None;
     }
 
@@ -108,12 +140,17 @@ impl Hand {
         if self.jumps != tool.jumps() {
             self.jumps = tool.jumps();
             self.edge = None;
+            self.release_limbs();
+            self.open_jaws();
             self.proxy.release(&tool.pose);
         }
         if tool.mode != ToolMode::Grab {
             self.grip.open();
+            self.open_jaws();
         }
-        if tool.touches() {
+        if tool.touches() && compound::count(tool.shape) > 0 {
+            self.follow_with_limbs(tool, surfaces);
+        } else if tool.touches() {
             self.proxy.ride(tool.shape, surfaces);
             self.proxy.follow(tool.shape, &tool.pose, surfaces);
             self.press.update(tool.shape, self.proxy.pose(), &tool.pose, surfaces);
@@ -123,10 +160,46 @@ impl Hand {
                 self.proxy.release(&tool.pose);
             }
             self.press.release();
-            if tool.mode == ToolMode::Grab {
+            self.release_limbs();
+            if tool.mode == ToolMode::Grab && matches!(tool.shape, ToolShape::Forceps { .. }) {
+                self.jaws.get_or_insert_default().follow(tool, surfaces);
+            } else if tool.mode == ToolMode::Grab {
                 self.grip.hold(&tool.pose, core_radius(tool.shape), surfaces);
             }
         }
+    }
+
+    fn open_jaws(&mut self) {
+        if let Some(jaws) = &mut self.jaws {
+            jaws.open();
+        }
+    }
+
+    fn release_limbs(&mut self) {
+        for limb in &mut self.limbs {
+            limb.proxy.release(&Isometry3::identity());
+            limb.press.release();
+        }
+    }
+
+    /// Follows with every capsule of a compound tool by itself. The proxy of the whole is displaced by the mean of those
+    /// that touch.
+    fn follow_with_limbs(&mut self, tool: &Tool, surfaces: &[ContactSurface]) {
+        self.press.release();
+        let count = compound::count(tool.shape);
+        self.limbs.resize_with(count, || Limb { proxy: Proxy::default(), press: Press::new() });
+        let (mut aside, mut touching) = (Vector3::zeros(), 0.0);
+        for (limb, part) in self.limbs.iter_mut().zip(compound::parts(tool.shape, tool.gap_m())) {
+            let device = tool.pose * part.pose;
+            limb.proxy.ride(part.shape, surfaces);
+            limb.proxy.follow(part.shape, &device, surfaces);
+            limb.press.update(part.shape, limb.proxy.pose(), &device, surfaces);
+            if limb.press.normal().is_some() {
+                aside += limb.proxy.pose().translation.vector - device.translation.vector;
+                touching += 1.0;
+            }
+        }
+        self.proxy.release(&(Translation3::from(aside / f64::max(touching, 1.0)) * tool.pose));
     }
 
     /// Records contact with `body` of Young's modulus `young_pa` [Pa] under a patch of `radius_m` [m]. If

@@ -16,6 +16,7 @@ pub mod proxy;
 pub mod press;
 pub mod spring;
 pub mod grab;
+pub mod jaws;
 pub mod compliance;
 pub mod edge;
 mod scalpel;
@@ -37,7 +38,7 @@ use crate::tool::obstacle::Obstacle;
 use crate::tool::{Tool, Tools};
 use hand::Hand;
 use pairs::{PairContacts, TouchSettings};
-use press::{Bearing, MAX_POINTS};
+use press::{Bearing, MAX_POINTS, Press};
 use rest::{RestReport, Resting};
 use spring::material_points;
 use surface::ContactSurface;
@@ -315,6 +316,9 @@ impl Contacts {
             hand.follow(tool, surfaces);
             press(index, tool, hand, surfaces, bodies);
             pull(index, tool, hand, surfaces, bodies);
+            if let Some(jaws) = &mut hand.jaws {
+                jaws.squeeze(index, tool, surfaces, bodies);
+            }
         }
     }
 
@@ -343,6 +347,10 @@ impl Contacts {
     /// Records the force of each spring of a tool on `body` from the solve [N]; springs of obstacles come after
     /// them.
     pub fn collect(&mut self, body: usize, forces: &[Vector3<f64>]) {
+        self.hands
+            .iter_mut()
+            .filter_map(|hand| hand.jaws.as_mut())
+            .for_each(|jaws| jaws.collect(body, forces));
         let body = &self.bodies[body];
         for ((spring, &(tool, depth)), force) in body.springs.iter().zip(&body.behind).zip(forces) {
             let tool = tool as usize;
@@ -366,6 +374,9 @@ impl Contacts {
         self.sums.resize(tools.len(), Sums::default());
         for ((tool, hand), sums) in tools.iter_mut().zip(&mut self.hands).zip(&self.sums) {
             tool.force_n = -sums.force;
+            if let Some(jaws) = &mut hand.jaws {
+                jaws.settle(tool);
+            }
             let Some(compliance) = hand.compliance() else { continue };
             if sums.stiffness > 0.0 && sums.normal_force < 0.95 * tool.max_force_n {
                 let (before, after) = (sums.before / sums.stiffness, sums.after / sums.stiffness);
@@ -383,17 +394,32 @@ impl Contacts {
     }
 }
 
-/// Adds the one-sided springs of a tool that presses.
+/// Adds the one-sided springs of a tool that presses. The capsules of a compound share its stiffness and largest force.
 fn press(index: u32, tool: &Tool, hand: &mut Hand, surfaces: &[ContactSurface], bodies: &mut [BodyContacts]) {
-    let Some(normal) = hand.press().normal() else { return };
+    let spring = (tool.stiffness_n_m, tool.max_force_n);
     if let Some(body) = hand.press().bearings().first().map(|bearing| bearing.body) {
         hand.meet(body, bodies[body].young_pa, core_radius(tool.shape));
     }
-    for bearing in hand.press().bearings() {
+    bear(index, spring, hand.press(), surfaces, bodies);
+    let each = 1.0 / hand.limbs().len().max(1) as f64;
+    for limb in hand.limbs() {
+        bear(index, (spring.0 * each, spring.1 * each), limb, surfaces, bodies);
+    }
+}
+
+/// Adds springs of this stiffness [N/m] and largest force [N] where a capsule bears on tissue.
+fn bear(
+    index: u32,
+    spring: (f64, f64),
+    press: &Press,
+    surfaces: &[ContactSurface],
+    bodies: &mut [BodyContacts],
+) {
+    let Some(normal) = press.normal() else { return };
+    for bearing in press.bearings() {
         let body = &mut bodies[bearing.body];
         let Some(tree) = surfaces[bearing.body].tree() else { continue };
         let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
-        let spring = (tool.stiffness_n_m, tool.max_force_n);
         // The spring pushes from the tool into the tissue.
         body.press(index, spring, -normal, bearing, place);
     }

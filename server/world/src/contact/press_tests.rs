@@ -63,6 +63,7 @@ impl Table {
             passed: Vec::new(),
             velocity_m_s: V::zeros(),
             mode,
+            closed: None,
             shape: None,
             seq: u64::from(self.steps),
             client_time_ns: 0,

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use nalgebra::{Unit, Vector3};
 use scindo_collision::Method;
 
-use crate::inputs::{MAX_OBSTACLES, MAX_TOOLS, ToolMode, ToolShape};
+use crate::inputs::{MAX_OBSTACLES, MAX_TOOLS, ToolMode};
 use crate::mesh_in::Organ;
 
 use super::checked::*;
@@ -385,7 +385,7 @@ impl Check<'_> {
         }
         ToolSpec {
             id: tool.id.clone(),
-            shape: geometry(&tool.shape),
+            shape: tool.shape.geometry(),
             stiffness_n_m: tool.stiffness_n_m,
             max_force_n: tool.max_force_n,
             path,
@@ -402,10 +402,18 @@ impl Check<'_> {
             let next = "remove the mode or effects.cutting";
             self.conflict(format!("{at}.mode"), "effects.cutting = false, but the tool cuts", next);
         }
+        let toward = self.direction(&format!("{at}.toward"), point.toward);
+        let across = point.across.map(|across| self.direction(&format!("{at}.across"), across));
+        if across.is_some_and(|across| across.cross(&toward).norm() < 1e-3) {
+            let what =
+                format!("{:?} is along the shaft, {:?}", point.across.unwrap_or_default(), point.toward);
+            self.conflict(format!("{at}.across"), what, "give a vector across `toward`");
+        }
         PathPoint {
             at_s: point.at_s,
             tip_m: Vector3::from(point.tip_m),
-            toward: self.direction(&format!("{at}.toward"), point.toward),
+            toward,
+            across,
             mode: match point.mode {
                 RawMode::Hover => ToolMode::Hover,
                 RawMode::Touch => ToolMode::Touch,
@@ -459,19 +467,6 @@ fn split(pattern: RawPattern) -> CellSplit {
         RawPattern::Tet6 => CellSplit::Six,
         RawPattern::Oct6 => CellSplit::Octahedral,
         RawPattern::Hex => CellSplit::Hex,
-    }
-}
-
-fn geometry(shape: &RawShape) -> ToolShape {
-    match shape {
-        RawShape { blade: Some(b), .. } => {
-            ToolShape::Blade { length_m: b.length_m, thickness_m: b.thickness_m }
-        }
-        RawShape { sphere: Some(s), .. } => ToolShape::Sphere { radius_m: s.radius_m },
-        RawShape { capsule, .. } => {
-            let (radius_m, length_m) = capsule.as_ref().map_or((0.0, 0.0), |c| (c.radius_m, c.length_m));
-            ToolShape::Capsule { radius_m, length_m }
-        }
     }
 }
 

@@ -420,6 +420,8 @@ pub struct PathPoint {
     pub tip_m: Vector3<f64>,
     /// From the tip along the shaft.
     pub toward: Unit<Vector3<f64>>,
+    /// The tool's x axis, as far as it is across the shaft; none: any.
+    pub across: Option<Unit<Vector3<f64>>>,
     /// What the tool does from here on.
     pub mode: ToolMode,
 }

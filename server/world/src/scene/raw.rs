@@ -14,12 +14,14 @@ mod mechanics;
 mod obstacle;
 
 mod octree;
+mod tool;
 
 pub use contact::*;
 pub use look::*;
 pub use mechanics::*;
 pub use obstacle::*;
 pub use octree::*;
+pub use tool::*;
 
 use schemars::JsonSchema;
 use scindo_physics::material::Material;
@@ -561,7 +563,7 @@ pub struct RawTool {
     /// Name, unique among tools; becomes part of network keys.
     #[schemars(regex(pattern = r"^[a-z0-9_-]+$"), length(min = 1, max = 64))]
     pub id: String,
-    /// Shape of the tool: exactly one of `blade`, `sphere`, `capsule`.
+    /// Shape of the tool: exactly one of `blade`, `sphere`, `capsule`, `forceps`, `retractor`, `hook`.
     pub shape: RawShape,
     /// Stiffness of the virtual coupling between hand and tissue [N/m].
     #[serde(default = "tool_stiffness")]
@@ -588,55 +590,6 @@ fn tool_force() -> f64 {
     8.0
 }
 
-/// Geometry of a tool, with its tip at the origin and its shaft along +z: exactly one key.
-#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = [{"required": ["blade"]}, {"required": ["sphere"]}, {"required": ["capsule"]}]))]
-pub struct RawShape {
-    /// A blade with a straight cutting edge from tip to heel.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blade: Option<RawBlade>,
-    /// A sphere.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sphere: Option<RawSphere>,
-    /// A cylinder with hemispherical ends.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub capsule: Option<RawCapsule>,
-}
-
-/// A blade.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RawBlade {
-    /// Length of the cutting edge [m].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a scalpel has about 0.04 m"))]
-    pub length_m: f64,
-    /// Thickness of the blade [m].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0, "x-next" = "a scalpel has about 0.0005 m"))]
-    pub thickness_m: f64,
-}
-
-/// A sphere.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RawSphere {
-    /// Radius [m].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a fingertip has about 0.008 m"))]
-    pub radius_m: f64,
-}
-
-/// A cylinder with hemispherical ends.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RawCapsule {
-    /// Radius [m].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a probe has about 0.002 m"))]
-    pub radius_m: f64,
-    /// Length of the axis between the centres of the two hemispheres [m].
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0, "x-next" = "a probe has about 0.1 m"))]
-    pub length_m: f64,
-}
-
 /// One pose of a scripted tool.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -649,6 +602,9 @@ pub struct RawPathPoint {
     /// Direction from the tip along the shaft. It may have any length except zero.
     #[serde(default = "upwards")]
     pub toward: Vec3,
+    /// Direction in which jaws open, the bars of a retractor lie or a hook points; only its part across the shaft counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub across: Option<Vec3>,
     /// What the tool does from this time on.
     #[serde(default)]
     pub mode: RawMode,
@@ -667,7 +623,7 @@ pub enum RawMode {
     /// Pushes what it meets.
     #[default]
     Touch,
-    /// Holds the tissue nearest to the tip.
+    /// Holds the tissue nearest to the tip. Forceps close, and hold what is between their jaws.
     Grab,
     /// A blade that cuts along its path.
     Cut,

@@ -116,6 +116,7 @@ fn fill_tool(out: &mut ToolSnapshot, tool: &Tool, hand: Option<&Hand>) {
     out.proxy = hand.map_or(tool.pose, |hand| *hand.proxy_pose());
     out.velocity_m_s = tool.velocity_m_s;
     out.mode = tool.mode;
+    out.closed = hand.map_or(tool.closed, |hand| hand.closed(tool));
     out.force_n = tool.force_n;
     out.stiffness_n_m = tool.stiffness_n_m;
     out.contact_stiffness_n_m =

@@ -1,4 +1,4 @@
-//! The geometry of a tool: every shape is a core segment with a radius.
+//! The geometry of a tool: a core segment with a radius. That of a [compound](super::compound) is its shaft.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use scindo_collision::Capsule;
@@ -9,14 +9,22 @@ use crate::inputs::ToolShape;
 pub fn core_length(shape: ToolShape) -> f64 {
     match shape {
         ToolShape::Sphere { .. } => 0.0,
-        ToolShape::Capsule { length_m, .. } | ToolShape::Blade { length_m, .. } => length_m,
+        ToolShape::Capsule { length_m, .. }
+        | ToolShape::Blade { length_m, .. }
+        | ToolShape::Forceps { length_m, .. }
+        | ToolShape::Retractor { length_m, .. }
+        | ToolShape::Hook { length_m, .. } => length_m,
     }
 }
 
 /// Radius around the core [m]; half the thickness of a blade.
 pub fn core_radius(shape: ToolShape) -> f64 {
     match shape {
-        ToolShape::Sphere { radius_m } | ToolShape::Capsule { radius_m, .. } => radius_m,
+        ToolShape::Sphere { radius_m }
+        | ToolShape::Capsule { radius_m, .. }
+        | ToolShape::Forceps { radius_m, .. }
+        | ToolShape::Retractor { radius_m, .. }
+        | ToolShape::Hook { radius_m, .. } => radius_m,
         ToolShape::Blade { thickness_m, .. } => 0.5 * thickness_m,
     }
 }

@@ -6,6 +6,7 @@
 //! 3. Contact: surfaces, proxies, springs. After the solve it writes the reactions to [`Tool::force_n`].
 
 pub mod blade;
+pub mod compound;
 pub mod geometry;
 pub mod obstacle;
 pub mod script;
@@ -25,6 +26,9 @@ pub const SCRIPT: &str = "script";
 /// Spring of a tool that a client declared [N/m], and its largest force [N].
 const GUEST_SPRING: (f64, f64) = (800.0, 8.0);
 
+/// Jaws go from open to closed in this time [s].
+const CLOSING_S: f64 = 0.25;
+
 /// One rigid tool and its state in this step.
 #[derive(Debug, Clone)]
 pub struct Tool {
@@ -40,6 +44,9 @@ pub struct Tool {
     pub velocity_m_s: Vector3<f64>,
     /// Touch, grab, cut or hover, as the hand or the script requests.
     pub mode: ToolMode,
+    /// How far the jaws of forceps are closed, 0 to 1, if nothing is between them.
+    pub closed: f64,
+    closing: f64,
     /// Stiffness of the spring between hand and tissue [N/m].
     pub stiffness_n_m: f64,
     /// Largest force of that spring [N].
@@ -72,6 +79,8 @@ impl Tool {
             pose: Isometry3::identity(),
             velocity_m_s: Vector3::zeros(),
             mode: ToolMode::Hover,
+            closed: 0.0,
+            closing: 0.0,
             stiffness_n_m,
             max_force_n,
             force_n: Vector3::zeros(),
@@ -113,6 +122,20 @@ impl Tool {
     /// Whether the tool pushes tissue now.
     pub fn touches(&self) -> bool {
         !self.cuts() && matches!(self.mode, ToolMode::Touch | ToolMode::Cut | ToolMode::Scalpel)
+    }
+
+    /// Distance [m] of the inner faces of forceps at the ends of the jaws if nothing is between them; 0 for others.
+    pub fn gap_m(&self) -> f64 {
+        match self.shape {
+            ToolShape::Forceps { opening_m, .. } => opening_m * (1.0 - self.closed),
+            _ => 0.0,
+        }
+    }
+
+    /// Moves the jaws for `elapsed` seconds to where the hand or the script wants them.
+    fn close(&mut self, elapsed: f64) {
+        let most = (elapsed / CLOSING_S).clamp(0.0, 1.0);
+        self.closed += (self.closing - self.closed).clamp(-most, most);
     }
 
     fn hand_over(&mut self, owner: &Arc<str>) {
@@ -225,19 +248,24 @@ impl Tools {
                         tool.pressed = PressedEdge::default();
                     }
                     tool.mode = scripted.mode;
+                    tool.closing = closing(scripted.mode);
                 }
                 None => {
                     tool.hand_over(&self.nobody);
                     tool.mode = ToolMode::Hover;
                     tool.velocity_m_s = Vector3::zeros();
+                    tool.closing = 0.0;
                 }
             }
         }
+        self.tools.iter_mut().for_each(|tool| tool.close(elapsed));
     }
 
     fn take_sample(&mut self, sample: &ToolInput) {
         let speed = sample.velocity_m_s;
-        let sane = geometry::is_sane(&sample.pose) && speed.iter().all(|v| v.is_finite());
+        let closed = sample.closed.unwrap_or(closing(sample.mode));
+        let sane =
+            geometry::is_sane(&sample.pose) && speed.iter().all(|v| v.is_finite()) && closed.is_finite();
         let known = self.tools.iter().position(|tool| tool.id == sample.id);
         let index = match (sane, known, sample.shape) {
             (true, Some(index), _) => index,
@@ -264,6 +292,7 @@ impl Tools {
         tool.hand_over(&sample.owner);
         tool.velocity_m_s = sample.velocity_m_s;
         tool.mode = sample.mode;
+        tool.closing = closed.clamp(0.0, 1.0);
         tool.seq = sample.seq;
         tool.client_time_ns = sample.client_time_ns;
     }
@@ -291,11 +320,17 @@ impl Tools {
             tool.pressed = PressedEdge::default();
             tool.owner = Arc::clone(&self.nobody);
             tool.mode = ToolMode::Hover;
+            (tool.closed, tool.closing) = (0.0, 0.0);
             tool.force_n = Vector3::zeros();
             tool.round = 0;
         }
         self.time_s = None;
     }
+}
+
+/// How far a hand closes jaws that says nothing about them.
+fn closing(mode: ToolMode) -> f64 {
+    f64::from(u8::from(mode == ToolMode::Grab))
 }
 
 #[cfg(test)]

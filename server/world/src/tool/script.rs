@@ -45,18 +45,24 @@ impl Script {
         };
         let next = self.path.partition_point(|key| key.at_s <= time_s);
         if next == 0 {
-            return posed(self.path[0].tip_m, self.path[0].toward.into_inner(), ToolMode::Hover, round);
+            let first = &self.path[0];
+            return posed(first.tip_m, rotation(first), ToolMode::Hover, round);
         }
         let from = &self.path[next - 1];
         let Some(to) = self.path.get(next) else {
-            return posed(from.tip_m, from.toward.into_inner(), from.mode, round);
+            return posed(from.tip_m, rotation(from), from.mode, round);
         };
         let span = to.at_s - from.at_s;
         let s = ((time_s - from.at_s) / span).clamp(0.0, 1.0);
         let (m0, m1) = (self.slope(next - 1) * span, self.slope(next) * span);
         let tip = hermite(from.tip_m, m0, to.tip_m, m1, s);
-        let toward = from.toward.slerp(&to.toward, s).into_inner();
-        posed(tip, toward, from.mode, round)
+        let turned = if from.across.is_some() || to.across.is_some() {
+            let (from, to) = (rotation(from), rotation(to));
+            from.try_slerp(&to, s, 1e-9).unwrap_or(to)
+        } else {
+            shaft_along(from.toward.slerp(&to.toward, s).into_inner())
+        };
+        posed(tip, turned, from.mode, round)
     }
 
     /// Velocity of the tip at keyframe `i` [m/s]; zero at both ends.
@@ -82,13 +88,23 @@ fn hermite(p0: Vector3<f64>, m0: Vector3<f64>, p1: Vector3<f64>, m1: Vector3<f64
     p0 * (2.0 * s3 - 3.0 * s2 + 1.0) + m0 * (s3 - 2.0 * s2 + s) + p1 * (3.0 * s2 - 2.0 * s3) + m1 * (s3 - s2)
 }
 
-fn posed(tip: Vector3<f64>, toward: Vector3<f64>, mode: ToolMode, round: u64) -> ScriptedPose {
-    // For a direction opposite to +z any half turn across the shaft is right: tools are rotationally
-    // symmetric about their shaft.
-    let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &toward)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
-    let pose = Isometry3::from_parts(Translation3::from(tip), rotation);
-    ScriptedPose { pose, mode, round }
+fn posed(tip: Vector3<f64>, rotation: UnitQuaternion<f64>, mode: ToolMode, round: u64) -> ScriptedPose {
+    ScriptedPose { pose: Isometry3::from_parts(Translation3::from(tip), rotation), mode, round }
+}
+
+/// Orientation at a keyframe.
+fn rotation(key: &PathPoint) -> UnitQuaternion<f64> {
+    let Some(across) = key.across else { return shaft_along(key.toward.into_inner()) };
+    // z is exact, and x as near to `across` as it can be.
+    let y = key.toward.cross(&across);
+    UnitQuaternion::face_towards(&key.toward, &y)
+}
+
+/// An orientation with the shaft along `toward`. For a direction opposite to +z any half turn across the shaft is
+/// right: most tools are rotationally symmetric about their shaft.
+fn shaft_along(toward: Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), &toward)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }
 
 #[cfg(test)]
@@ -99,7 +115,7 @@ mod tests {
 
     fn key(at_s: f64, tip: [f64; 3], toward: [f64; 3], mode: ToolMode) -> PathPoint {
         let toward = Unit::new_normalize(Vector3::from(toward));
-        PathPoint { at_s, tip_m: Vector3::from(tip), toward, mode }
+        PathPoint { at_s, tip_m: Vector3::from(tip), toward, across: None, mode }
     }
 
     #[test]
@@ -137,5 +153,23 @@ mod tests {
         let script = Script::new(&path, Some(2.0)).unwrap();
         assert_eq!(script.at(0.5).pose, script.at(2.5).pose);
         assert_eq!((script.at(0.5).round, script.at(2.5).round), (0, 1));
+    }
+
+    #[test]
+    fn the_jaws_open_across_the_shaft_as_the_keyframes_say() {
+        let across = |at_s, toward, across: [f64; 3]| {
+            let across = Some(Unit::new_normalize(Vector3::from(across)));
+            PathPoint { across, ..key(at_s, [0.0; 3], toward, ToolMode::Touch) }
+        };
+        let path =
+            [across(0.0, [0.0, 0.0, 2.0], [0.0, 1.0, 0.4]), across(1.0, [1.0, 0.0, 0.0], [0.0, 3.0, 0.0])];
+        let script = Script::new(&path, None).unwrap();
+        for (at_s, shaft) in [(0.0, Vector3::z()), (1.0, Vector3::x())] {
+            let rotation = script.at(at_s).pose.rotation;
+            assert!((rotation * Vector3::z() - shaft).norm() < 1e-9);
+            assert!((rotation * Vector3::x() - Vector3::y()).norm() < 1e-9);
+        }
+        let midway = script.at(0.5).pose.rotation * Vector3::x();
+        assert!((midway - Vector3::y()).norm() < 1e-9, "{midway}");
     }
 }

@@ -12,6 +12,7 @@ fn scripted() -> ToolSpec {
         at_s,
         tip_m: Vector3::new(at_s, 0.0, 0.0),
         toward: Unit::new_normalize(Vector3::z()),
+        across: None,
         mode,
     };
     ToolSpec {
@@ -32,6 +33,7 @@ fn sample(id: &str, x: f64, shape: Option<ToolShape>) -> ToolInput {
         passed: Vec::new(),
         velocity_m_s: Vector3::x(),
         mode: ToolMode::Touch,
+        closed: None,
         shape,
         seq: 7,
         client_time_ns: 3,

@@ -267,6 +267,7 @@ fn of_clients(tally: &mut Tally) -> Result<(), Trouble> {
             passed: Vec::new(),
             velocity_m_s: V::repeat(bad),
             mode,
+            closed: None,
             shape: Some(ToolShape::Sphere { radius_m: 0.01 }),
             seq: 1,
             client_time_ns: 0,

@@ -31,6 +31,9 @@ fn size(at: &str, tool: &ToolSpec, longest_m: f64, doubts: &mut Vec<String>) {
         ToolShape::Sphere { radius_m } => ("sphere.radius_m", radius_m, longest_m),
         ToolShape::Capsule { radius_m, .. } => ("capsule.radius_m", radius_m, longest_m),
         ToolShape::Blade { length_m, .. } => ("blade.length_m", length_m, BLADE * longest_m),
+        ToolShape::Forceps { opening_m, .. } => ("forceps.opening_m", opening_m, longest_m),
+        ToolShape::Retractor { radius_m, .. } => ("retractor.radius_m", radius_m, longest_m),
+        ToolShape::Hook { radius_m, .. } => ("hook.radius_m", radius_m, longest_m),
     };
     if size_m > allowed_m {
         doubts.push(format!(
@@ -51,6 +54,9 @@ fn reach(at: &str, tool: &ToolSpec, bodies: &[SimBody], doubts: &mut Vec<String>
         ToolShape::Sphere { radius_m } => (radius_m, 0.0),
         ToolShape::Capsule { radius_m, length_m } => (radius_m, length_m),
         ToolShape::Blade { length_m, thickness_m } => (thickness_m, length_m),
+        ToolShape::Forceps { radius_m, length_m, opening_m, .. } => (radius_m + 0.5 * opening_m, length_m),
+        ToolShape::Retractor { radius_m, length_m, width_m, .. } => (radius_m + 0.5 * width_m, length_m),
+        ToolShape::Hook { radius_m, length_m, reach_m, .. } => (radius_m + reach_m, length_m),
     };
     let boxes: Vec<_> = bodies.iter().map(|body| bounds(body.body.positions())).collect();
     let mut nearest_m = f64::INFINITY;
