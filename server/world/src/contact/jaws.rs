@@ -6,7 +6,8 @@
 //! dragged along the jaw: the tissue slips.
 //!
 //! The jaws are coupled by their hinge. They yield together until each squeezes with no more than the force of the grip,
-//! and close together where it is less. A load from the side therefore meets both jaws, and does not open them.
+//! and close together where it is less. A load from the side therefore meets both jaws, and does not open them, up to
+//! a bound.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use scindo_collision::barycentric_point;
@@ -23,8 +24,11 @@ type V = Vector3<f64>;
 
 /// Places on a face: along the jaw in shares of its length, and across it in radii.
 const PLACES: [[f64; 2]; 6] = [[0.0, -0.5], [0.0, 0.5], [0.12, -0.5], [0.12, 0.5], [0.24, -0.5], [0.24, 0.5]];
-/// Stiffness of the spring of one place in multiples of that of the tool.
-const STIFFNESS: f64 = 1.0 / 3.0;
+/// Stiffness of the spring of one place in multiples of that of the tool. Together they are stiffer than the hand, so
+/// that the gap of the jaws is that of the tissue.
+const STIFFNESS: f64 = 1.0;
+/// Largest force of a jaw under a load from the side, in multiples of that of the grip; shared by its points.
+const SIDE_LOAD: f64 = 4.0;
 /// Distance of tissue before a face at which it is taken, in radii.
 const NEAR: f64 = 0.2;
 /// Depth of tissue behind a face up to which it is taken, in radii ...
@@ -192,7 +196,7 @@ impl Jaws {
         for jaw in 0..2 {
             let face = Face::new(&forceps, gap_m, jaw, &tool.pose);
             let count = self.held[jaw].iter().flatten().count() as f64;
-            let most = (forceps.grip + tool.max_force_n) / count.max(1.0);
+            let most = (SIDE_LOAD * forceps.grip).min(tool.max_force_n) / count.max(1.0);
             for held in self.held[jaw].iter_mut().flatten() {
                 let Some(tree) = surfaces[held.body].tree() else { continue };
                 let BodyContacts { vertices, springs, behind, .. } = &mut bodies[held.body];
