@@ -271,3 +271,37 @@ fn a_shape_of_forceps_needs_all_its_lengths() {
     let shape = ToolShape::Hook { radius_m: 0.001, length_m: 0.1, reach_m: 0.01, point_m: 0.01 };
     assert_eq!(scindo_world::tool::compound::count(shape), 3);
 }
+
+#[test]
+fn two_hands_raise_a_flap() {
+    let text = include_str!("../scenes/two-hands.toml");
+    let mut sim = Simulation::new(&Scene::from_toml(text).unwrap(), Path::new("")).unwrap();
+    let wants = Wants { measures: true, ..Wants::default() };
+    let (mut shot, mut pull, mut load) = (Snapshot::default(), 0.0_f64, 0.0_f64);
+    let mut after = |sim: &mut Simulation, until_s: f64| {
+        while shot.time_s < until_s {
+            sim.step(&Inputs::default());
+            sim.snapshot_into(&wants, &mut shot);
+            let [forceps, scalpel] = &shot.tools[..] else { panic!("two tools") };
+            pull = pull.max(-forceps.force_n.z);
+            load = load.max(-scalpel.force_n.x);
+        }
+        (shot.probes[0], sim.bodies()[0].body.n_copies(), shot.tools[0].clone(), pull, load)
+    };
+    let (low, copies, open, ..) = after(&mut sim, 0.5);
+    assert_eq!((open.held_m, open.closed), (None, 0.0));
+    let (high, same, forceps, pull, _) = after(&mut sim, 4.0);
+    assert!(high.z - low.z > 0.011, "the flap is lifted: {low} {high}");
+    assert!(forceps.held_m.is_some() && pull > 0.5, "{pull}");
+    assert!((0.5..0.9).contains(&forceps.closed), "the flap keeps the jaws apart: {}", forceps.closed);
+    assert_eq!(same, copies, "the scalpel only begins");
+    let (still, more, forceps, _, load) = after(&mut sim, 9.0);
+    assert!(load > 1.5 && more > copies + 80, "the scalpel goes on by force: {load} N, {more} copies");
+    assert!((still - high).norm() < 2e-3 && forceps.held_m.is_some(), "the forceps hold on: {high} {still}");
+    assert!(-forceps.force_n.z < 0.5 * pull, "a longer flap pulls less: {} of {pull}", forceps.force_n);
+    // What was cut closes again between the jaws, which hold on.
+    sim.undo().unwrap();
+    assert_eq!(sim.bodies()[0].body.n_copies(), copies);
+    let (_, _, forceps, ..) = after(&mut sim, 10.0);
+    assert!(forceps.held_m.is_some());
+}
