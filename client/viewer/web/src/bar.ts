@@ -9,12 +9,13 @@ import type { View } from "./view";
 import { length } from "./units";
 
 const HINTS: Record<HandMode, string> = {
-  orbit: "drag to turn the view · wheel: zoom · Poke, Grab and Cut touch the tissue · ? shows all keys",
+  orbit: "drag to turn the view · wheel: zoom · Poke, Grab, Cut and Forceps touch the tissue · ? shows all keys",
   poke: "drag on the tissue to press it · wheel: depth · to turn the view: Shift, right button, or drag beside it",
   grab: "drag the tissue to pull it · wheel: push and pull · to turn the view: Shift, right button, or drag beside it",
+  forceps: "press to close the jaws on the tissue, drag to pull it · K: keep them closed · wheel: depth",
   cut: "draw the cut on the tissue · wheel: depth · to turn the view: Shift, right button, or drag beside it",
 };
-const KEYS: Record<string, HandMode> = { "1": "poke", "2": "grab", "3": "cut", c: "cut", o: "orbit", "0": "orbit", escape: "orbit" };
+const KEYS: Record<string, HandMode> = { "1": "poke", "2": "grab", "3": "cut", c: "cut", "4": "forceps", o: "orbit", "0": "orbit", escape: "orbit" };
 const CAMERAS: Record<string, Preset> = { "5": "front", "6": "right", "7": "top", "8": "corner" };
 /** A second click on Reset must follow within this time. */
 const SURE_MS = 5000;
@@ -28,6 +29,7 @@ export class Bar {
   private readonly reset = document.getElementById("reset") as HTMLButtonElement;
   private readonly undo = document.getElementById("undo") as HTMLButtonElement;
   private readonly range = document.getElementById("depth-range") as HTMLInputElement;
+  private readonly jaws = document.getElementById("jaws") as HTMLButtonElement;
   private asked = 0;
 
   constructor(
@@ -53,6 +55,7 @@ export class Bar {
     document.getElementById("toggle")!.onclick = () => this.toggle();
     document.getElementById("view-toggle")!.onclick = () => this.view.toggle();
     document.getElementById("help-toggle")!.onclick = () => this.help.toggle();
+    this.jaws.onclick = () => this.hand.keepClosed(!this.hand.keepsClosed);
     this.range.oninput = () => this.hand.setDepth(Number(this.range.value));
     document.addEventListener("keydown", (e) => this.onKey(e));
     if (innerWidth <= NARROW) this.toggle();
@@ -66,6 +69,9 @@ export class Bar {
       button.setAttribute("aria-checked", String(button.dataset["hand"] === this.hand.mode));
       if (button.dataset["hand"] !== "orbit") button.disabled = this.session.readOnly;
     }
+    this.jaws.hidden = this.hand.mode !== "forceps";
+    this.jaws.setAttribute("aria-pressed", String(this.hand.keepsClosed));
+    this.jaws.querySelector("span")!.textContent = this.hand.keepsClosed ? "Open" : "Keep closed";
     const { value, min, max } = this.hand.depthRange;
     this.range.min = String(min);
     this.range.max = String(max);
@@ -127,6 +133,7 @@ export class Bar {
     else if (key === ".") this.step.click();
     else if (key === "r") this.reset.click();
     else if (key === "u") this.undo.click();
+    else if (key === "k" && !this.jaws.hidden) this.jaws.click();
     else if (key === "f") this.fit();
     else if (key === "h") this.toggle();
     else if (key === "v") this.view.toggle();

@@ -1,4 +1,5 @@
-// The mouse as a hand: it hovers over the tissue, presses, holds and cuts it.
+// The mouse as a hand: it hovers over the tissue, presses, holds and cuts it. Forceps close while the button is down.
+// Jaws that are kept closed hold on without it, and the next drag moves them.
 //
 // A press defines a plane through the touched point, parallel to the picture. Poke and grab move in that
 // plane, so that yielding tissue does not pull the tool along. A blade follows the skin under the cursor and
@@ -14,7 +15,7 @@ import type { Relay } from "./relay";
 import type { Stage } from "./stage";
 import type { Session } from "./session";
 
-export type HandMode = "orbit" | "poke" | "grab" | "cut";
+export type HandMode = "orbit" | "poke" | "grab" | "cut" | "forceps";
 
 /** Period of samples while the tool moves [ms]. At rest, a tenth of that rate keeps the tool alive. */
 const SAMPLE_MS = 14;
@@ -24,6 +25,8 @@ const PRESS_MS = 140;
 /** Probe radius and blade length as fractions of the scene's radius. */
 const PROBE = 0.055;
 const BLADE = 0.9;
+/** Radius, length and opening of the jaws as fractions of the scene's radius; force [N] and friction of the grip. */
+const JAWS = { radius: 0.016, length: 0.6, opening: 0.1, gripForceN: 2, friction: 0.8 };
 const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.32, depthWrite: false });
 const RING = new MeshBasicMaterial({ color: 0xd7ecff, transparent: true, opacity: 0.9, depthTest: false, toneMapped: false });
 
@@ -35,13 +38,15 @@ interface Press {
   since: number;
   /** Distance of the skin last seen under a blade, along the line of sight [m]. */
   reach: number;
+  /** From the cursor to the tip of a tool that already held tissue when it was pressed [m]. */
+  offset: Vector3 | null;
 }
 
 export class Hand {
   mode: HandMode = "orbit";
   /** Called when mode or depth change. */
   onChange: () => void = () => {};
-  private readonly depth: Record<HandMode, number> = { orbit: 0, poke: 0.12, grab: 0, cut: 0.22 };
+  private readonly depth: Record<HandMode, number> = { orbit: 0, poke: 0.12, grab: 0, cut: 0.22, forceps: 0.04 };
   private readonly cursor = new Group();
   private readonly ring = new Mesh(new TorusGeometry(1, 0.07, 8, 40), RING);
   private readonly caster = new Raycaster();
@@ -50,6 +55,7 @@ export class Hand {
   private pointerId = -1;
   private press: Press | null = null;
   private held = false;
+  private kept = false;
   private readonly tip = new Vector3();
   private readonly axis = new Vector3(0, 0, 1);
   private readonly quaternion = new Quaternion();
@@ -74,7 +80,7 @@ export class Hand {
     canvas.addEventListener("pointermove", (e) => this.onMove(e), capture);
     canvas.addEventListener("pointerup", (e) => this.onUp(e), capture);
     canvas.addEventListener("pointercancel", (e) => this.onUp(e), capture);
-    canvas.addEventListener("pointerleave", () => { if (!this.press) this.leave(); });
+    canvas.addEventListener("pointerleave", () => { if (!this.press && !this.kept) this.leave(); });
     canvas.addEventListener("wheel", (e) => this.onWheel(e), { capture: true, passive: false });
     canvas.addEventListener("contextmenu", (e) => e.preventDefault());
   }
@@ -96,7 +102,20 @@ export class Hand {
 
   /** Depth range as fractions of the scene's radius. A grab may also pull towards the viewer. */
   get depthRange(): { value: number; min: number; max: number } {
-    return { value: this.depth[this.mode], min: this.mode === "grab" ? -0.6 : 0, max: this.mode === "cut" ? 0.7 : 0.6 };
+    const pulls = this.mode === "grab" || this.mode === "forceps";
+    return { value: this.depth[this.mode], min: pulls ? -0.6 : 0, max: this.mode === "cut" ? 0.7 : 0.6 };
+  }
+
+  /** Whether the jaws of the forceps stay closed without the button. */
+  get keepsClosed(): boolean {
+    return this.kept;
+  }
+
+  /** Keeps the jaws of the forceps closed, or opens them again. */
+  keepClosed(kept: boolean): void {
+    this.kept = kept && this.mode === "forceps" && this.held;
+    this.moved = true;
+    this.onChange();
   }
 
   setDepth(part: number): void {
@@ -109,7 +128,7 @@ export class Hand {
   /** Puts the tool away, so that the server releases it. */
   drop(): void {
     this.press = null;
-    this.held = false;
+    this.held = this.kept = false;
     this.stage.controls.enabled = true;
     if (this.live) this.relay.send({ case: "release", value: {} });
     this.live = false;
@@ -120,15 +139,16 @@ export class Hand {
   advance(now: number): void {
     if (this.mode === "orbit" || this.session.readOnly) return;
     if (this.press) this.follow(now);
-    else if (this.inside && this.moved) this.hover();
-    const due = this.moved || this.press ? SAMPLE_MS : REST_MS;
+    else if (this.inside && this.moved && !this.kept) this.hover();
+    const due = (this.moved && !this.kept) || this.press ? SAMPLE_MS : REST_MS;
     if (this.held && now - this.lastSent >= due) this.sendSample(now);
   }
 
   /** Moves the cursor to where the tool is held. */
   place(): void {
-    this.cursor.visible = this.held;
-    if (!this.held) return;
+    // What the jaws hold apart is drawn as the server tells.
+    this.cursor.visible = this.held && !(this.mode === "forceps" && this.live && (this.press !== null || this.kept));
+    if (!this.cursor.visible) return;
     const shape = this.shape();
     const key = `${this.mode}${this.stage.radius}`;
     if (key !== this.shapeKey) {
@@ -159,19 +179,26 @@ export class Hand {
     }
     if (this.mode === "orbit" || this.session.readOnly || e.button !== 0 || e.shiftKey) return;
     const hit = this.hit();
-    if (!hit) return;
+    if (!hit && !this.kept) return;
     this.stage.controls.enabled = false;
     this.pointerId = e.pointerId;
     this.canvas.setPointerCapture(e.pointerId);
-    const sight = this.caster.ray.direction;
-    const inward = hit.normal.clone().negate().lerp(sight, this.mode === "poke" ? 0.35 : 1).normalize();
-    this.press = {
-      anchor: hit.point.clone(),
-      plane: new Plane().setFromNormalAndCoplanarPoint(this.stage.camera.getWorldDirection(new Vector3()), hit.point),
-      inward,
-      since: performance.now(),
-      reach: hit.distance,
-    };
+    const ray = this.caster.ray, facing = this.stage.camera.getWorldDirection(new Vector3());
+    if (this.kept || !hit) {
+      const plane = new Plane().setFromNormalAndCoplanarPoint(facing, this.tip);
+      const offset = this.tip.clone().sub(ray.intersectPlane(plane, new Vector3()) ?? this.tip);
+      this.press = { anchor: this.tip.clone(), plane, inward: this.axis.clone().negate(), since: -Infinity, reach: 0, offset };
+    } else {
+      const along = { orbit: 1, poke: 0.35, grab: 1, cut: 1, forceps: 0.35 }[this.mode];
+      this.press = {
+        anchor: hit.point.clone(),
+        plane: new Plane().setFromNormalAndCoplanarPoint(facing, hit.point),
+        inward: hit.normal.clone().negate().lerp(ray.direction, along).normalize(),
+        since: performance.now(),
+        reach: hit.distance,
+        offset: null,
+      };
+    }
     this.held = true;
     this.follow(performance.now());
     this.sendSample(performance.now());
@@ -206,7 +233,7 @@ export class Hand {
     this.press = null;
     this.stage.controls.enabled = true;
     if (this.held) {
-      this.hover();
+      if (!this.kept) this.hover();
       this.sendSample(performance.now());
     }
   }
@@ -261,7 +288,8 @@ export class Hand {
     } else {
       const point = ray.intersectPlane(press.plane, new Vector3()) ?? press.anchor.clone();
       const back = this.mode === "poke" ? PROBE * this.stage.radius : 0;
-      point.addScaledVector(press.inward, depth - back);
+      if (press.offset) point.add(press.offset);
+      else point.addScaledVector(press.inward, depth - back);
       this.moveTo(point, press.inward.clone().negate());
     }
     this.moved = false;
@@ -279,6 +307,11 @@ export class Hand {
 
   private shape(): ToolShape {
     const r = this.stage.radius;
+    if (this.mode === "forceps") {
+      const { radius, length, opening, gripForceN, friction } = JAWS;
+      const value = { radiusM: radius * r, lengthM: length * r, openingM: opening * r, gripForceN, friction };
+      return create(ToolShapeSchema, { kind: { case: "forceps", value } });
+    }
     return create(ToolShapeSchema, {
       kind: this.mode === "cut"
         ? { case: "blade", value: { lengthM: BLADE * r, thicknessM: 0.004 * r } }
@@ -287,8 +320,8 @@ export class Hand {
   }
 
   private sampleMode(): ToolSample_Mode {
-    if (!this.press) return ToolSample_Mode.HOVER;
-    if (this.mode === "grab") return ToolSample_Mode.GRAB;
+    if (!this.press && !this.kept) return ToolSample_Mode.HOVER;
+    if (this.mode === "grab" || this.mode === "forceps") return ToolSample_Mode.GRAB;
     return this.mode === "cut" ? ToolSample_Mode.CUT : ToolSample_Mode.TOUCH;
   }
 

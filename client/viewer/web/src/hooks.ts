@@ -58,6 +58,7 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
       mode: tool.state?.mode ?? 0,
       owner: tool.state?.owner ?? "",
       forceN: tool.force.toArray() as Triple,
+      closed: tool.state?.closed ?? 0,
       isLimited: tool.isLimited,
       held: tool.heldPoint?.toArray() ?? null,
       position: [tool.object.children[0].position.x, tool.object.children[0].position.y, tool.object.children[0].position.z] as Triple,
@@ -98,6 +99,7 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     set: (key: string, value: string) => relay.call({ case: "set", value: { key, value } }),
     hand: (mode: HandMode) => hand.choose(mode),
     depth: (part: number) => hand.setDepth(part),
+    keepClosed: (kept: boolean) => hand.keepClosed(kept),
   };
   Object.assign(window, { scindo: hooks });
 }
