@@ -12,7 +12,7 @@ const HINTS: Record<HandMode, string> = {
   orbit: "drag to turn the view · wheel: zoom · Poke, Grab, Cut and Forceps touch the tissue · ? shows all keys",
   poke: "drag on the tissue to press it · wheel: depth · to turn the view: Shift, right button, or drag beside it",
   grab: "drag the tissue to pull it · wheel: push and pull · to turn the view: Shift, right button, or drag beside it",
-  forceps: "press to close the jaws on the tissue, drag to pull it · K: keep them closed · wheel: depth",
+  forceps: "press to close the jaws on the tissue, drag to pull it · K: keep them closed · J: turn them · wheel: depth",
   cut: "draw the cut on the tissue · wheel: depth · to turn the view: Shift, right button, or drag beside it",
 };
 const KEYS: Record<string, HandMode> = { "1": "poke", "2": "grab", "3": "cut", c: "cut", "4": "forceps", o: "orbit", "0": "orbit", escape: "orbit" };
@@ -134,6 +134,7 @@ export class Bar {
     else if (key === "r") this.reset.click();
     else if (key === "u") this.undo.click();
     else if (key === "k" && !this.jaws.hidden) this.jaws.click();
+    else if (key === "j") this.hand.turn();
     else if (key === "f") this.fit();
     else if (key === "h") this.toggle();
     else if (key === "v") this.view.toggle();

@@ -26,7 +26,7 @@ const PRESS_MS = 140;
 const PROBE = 0.055;
 const BLADE = 0.9;
 /** Radius, length and opening of the jaws as fractions of the scene's radius; force [N] and friction of the grip. */
-const JAWS = { radius: 0.016, length: 0.6, opening: 0.1, gripForceN: 2, friction: 0.8 };
+const JAWS = { radius: 0.024, length: 0.6, opening: 0.15, gripForceN: 1, friction: 0.8 };
 const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.32, depthWrite: false });
 const RING = new MeshBasicMaterial({ color: 0xd7ecff, transparent: true, opacity: 0.9, depthTest: false, toneMapped: false });
 
@@ -56,6 +56,7 @@ export class Hand {
   private press: Press | null = null;
   private held = false;
   private kept = false;
+  private roll = 0;
   private readonly tip = new Vector3();
   private readonly axis = new Vector3(0, 0, 1);
   private readonly quaternion = new Quaternion();
@@ -116,6 +117,15 @@ export class Hand {
     this.kept = kept && this.mode === "forceps" && this.held;
     this.moved = true;
     this.onChange();
+  }
+
+  /** Turns the forceps about their shaft by an eighth. */
+  turn(): void {
+    if (this.mode !== "forceps") return;
+    this.roll += Math.PI / 4;
+    if (this.held) this.moveTo(this.tip, this.axis);
+    this.moved = true;
+    this.stage.invalidate();
   }
 
   setDepth(part: number): void {
@@ -302,6 +312,7 @@ export class Hand {
     const side = this.stage.camera.up.clone().cross(this.axis);
     if (side.lengthSq() < 1e-6) side.set(1, 0, 0).cross(this.axis);
     side.normalize();
+    if (this.mode === "forceps") side.applyAxisAngle(this.axis, this.roll);
     this.quaternion.setFromRotationMatrix(new Matrix4().makeBasis(side, this.axis.clone().cross(side), this.axis));
   }
 

@@ -9,7 +9,7 @@ const SECTIONS: [string, [string, string][]][] = [
   ["Touch", [
     ["O or Esc", "turn the view, put the tool away"], ["1", "poke: press the tissue"], ["2", "grab: hold and pull it"],
     ["3 or C", "cut along the drag"], ["4", "forceps: the jaws close on the tissue while you press"],
-    ["K", "keep the jaws closed, and open them again"], ["Shift", "hold it to turn the view with any tool"],
+    ["K", "keep the jaws closed, and open them again"], ["J", "turn the forceps about their shaft"], ["Shift", "hold it to turn the view with any tool"],
   ]],
   ["Time", [["Space", "pause or resume"], [".", "make one step while paused"], ["R", "return to the start; asks first if there are cuts"]]],
   ["Colours", [

@@ -99,6 +99,7 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     set: (key: string, value: string) => relay.call({ case: "set", value: { key, value } }),
     hand: (mode: HandMode) => hand.choose(mode),
     depth: (part: number) => hand.setDepth(part),
+    turn: () => hand.turn(),
     keepClosed: (kept: boolean) => hand.keepClosed(kept),
   };
   Object.assign(window, { scindo: hooks });
