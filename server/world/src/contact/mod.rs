@@ -5,7 +5,7 @@
 //! 2. [`Contacts::detect`]: proxies move, and touched points become springs.
 //! 3. Per body, the integrator's solve with [`Contacts::springs`].
 //! 4. Per body, [`Contacts::collect`] with the force of every spring from that solve.
-//! 5. [`Contacts::react`]: each tool receives exactly minus the sum of its springs' forces.
+//! 5. [`Contacts::react`]: each tool receives exactly minus the sum of its springs' forces, and [jaws] yield or close.
 //!
 //! Tissue force and reaction come from the same solve and therefore balance to rounding. Nothing here
 //! allocates while topologies and tools stay the same.
