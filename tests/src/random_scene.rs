@@ -229,10 +229,18 @@ fn cut(rng: &mut Rng, body: &Body, end_s: f64, toml: &mut String) {
 fn tool(rng: &mut Rng, index: u32, body: &Body, end_s: f64, toml: &mut String) {
     let size = body.diagonal() * uniform(rng, 0.02, 0.2);
     let blade = rng.u32(0..4) == 0;
-    let shape = match (blade, rng.bool()) {
+    let rod = format!("radius_m = {:e}, length_m = {:e}", 0.3 * size, 4.0 * size);
+    let shape = match (blade, rng.u32(0..5)) {
         (true, _) => format!("blade = {{ length_m = {:e}, thickness_m = {:e} }}", 4.0 * size, 0.02 * size),
-        (false, true) => format!("sphere = {{ radius_m = {size:e} }}"),
-        (false, false) => format!("capsule = {{ radius_m = {size:e}, length_m = {:e} }}", 4.0 * size),
+        (false, 0) => format!("sphere = {{ radius_m = {size:e} }}"),
+        (false, 1) => format!("capsule = {{ radius_m = {size:e}, length_m = {:e} }}", 4.0 * size),
+        (false, 2) => {
+            let grip_n = logarithmic(rng, 1e-3, 1.0) * body.young_pa * size * size;
+            let grip = format!("grip_force_n = {:e}, friction = {:e}", grip_n.clamp(1e-6, 1e4), rng.f64());
+            format!("forceps = {{ {rod}, opening_m = {size:e}, {grip} }}")
+        }
+        (false, 3) => format!("retractor = {{ {rod}, width_m = {:e}, height_m = {size:e} }}", 2.0 * size),
+        (false, _) => format!("hook = {{ {rod}, reach_m = {size:e}, point_m = {size:e} }}"),
     };
     let _ = writeln!(toml, "[[tool]]\nid = \"t{index}\"\nshape = {{ {shape} }}");
     let stiffness = logarithmic(rng, 0.01, 10.0) * body.young_pa * body.diagonal();
