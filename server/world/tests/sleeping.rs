@@ -87,6 +87,7 @@ fn finger(deep: f64) -> Inputs {
         passed: Vec::new(),
         velocity_m_s: Vector3::zeros(),
         mode: ToolMode::Touch,
+        closed: None,
         shape: Some(ToolShape::Sphere { radius_m: 0.008 }),
         seq: 1,
         client_time_ns: 0,

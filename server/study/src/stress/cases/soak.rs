@@ -134,6 +134,7 @@ fn tool(tip: Vector3<f64>, mode: ToolMode) -> ToolInput {
         passed: Vec::new(),
         velocity_m_s: Vector3::zeros(),
         mode,
+        closed: None,
         shape: Some(ToolShape::Sphere { radius_m: 0.006 }),
         seq: 1,
         client_time_ns: 0,
