@@ -68,6 +68,9 @@ pub const MAX_POSE_BYTES: usize = 1024;
 /// Largest contact message [bytes]: one datagram, one zenoh batch, no fragmentation.
 pub const MAX_CONTACT_BYTES: usize = 1024;
 
+/// Longest time in which the force of held still tissue relaxes [s].
+pub const MAX_RELAXATION_S: f64 = 1.0e3;
+
 /// Most contact planes of a message: seven with the longest ids fill [`MAX_CONTACT_BYTES`].
 pub const MAX_CONTACTS: usize = 7;
 

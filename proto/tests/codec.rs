@@ -131,6 +131,9 @@ fn haptic_contact() -> impl Strategy<Value = HapticContact> {
             validity_ms: 50.0,
             max_force_n: 8.0,
             max_stiffness_n_m: 900.0,
+            instant_stiffness_n_m: 600.0,
+            relaxed_stiffness_n_m: 250.0,
+            relaxation_s: 0.01,
         },
     )
 }

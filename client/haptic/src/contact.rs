@@ -2,4 +2,8 @@
 
 pub mod model;
 
+pub mod history;
+
+pub mod relaxation;
+
 pub mod law;

@@ -120,6 +120,8 @@ pub struct LoopReport {
     pub lateness_ms: Quantiles,
     /// Duration of ticks [ms].
     pub duration_ms: Quantiles,
+    /// Age of the pose behind the contact model in use, on the client's own clock [ms].
+    pub model_age_ms: Quantiles,
     /// Largest force [N].
     pub max_force_n: f64,
     /// Largest change of force between two ticks [N], except cuts at device faults.

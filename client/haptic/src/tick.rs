@@ -13,7 +13,7 @@ use crate::safety::flag;
 use crate::safety::limiter::Limiter;
 use crate::safety::passivity::Passivity;
 use crate::safety::watchdog::{DeviceGuard, Permit, Watchdog};
-use crate::statistics::LoopReport;
+use crate::statistics::{Histogram, LoopReport};
 use crate::virtual_coupling::VirtualCoupling;
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -75,6 +75,7 @@ pub struct HapticTick {
     passivity: Passivity,
     limiter: Limiter,
     last_force_n: Vector3<f64>,
+    ages: Histogram,
     report: LoopReport,
 }
 
@@ -93,6 +94,7 @@ impl HapticTick {
             passivity: Passivity::new(MAX_INJECTED_DAMPING * capability.damping_ns_m),
             limiter: Limiter::new(limits.max_force_n.min(capability.max_force_n), limits.slew_n_s),
             last_force_n: Vector3::zeros(),
+            ages: Histogram::default(),
             report: LoopReport::default(),
         }
     }
@@ -146,6 +148,9 @@ impl HapticTick {
             energy_j: self.passivity.energy_j(),
             flags: output.flags | if time.elapsed_s > 1.5 * PERIOD_S { flag::MISSED } else { 0 },
         };
+        if let Some(used_ns) = model.used_ns {
+            self.ages.record(time.now_ns.saturating_sub(used_ns));
+        }
         self.publish(&state, &row, time.now_ns);
         self.account(&row);
         output
@@ -205,12 +210,12 @@ impl HapticTick {
 
     /// Figures of all ticks so far. The loop adds its own figures.
     pub fn report(&self) -> LoopReport {
-        self.report.clone()
+        LoopReport { model_age_ms: self.ages.quantiles_ms(), ..self.report.clone() }
     }
 
     /// Closes the queues, so that their threads can end.
     pub fn close(self) -> LoopReport {
-        self.report
+        self.report()
     }
 }
 

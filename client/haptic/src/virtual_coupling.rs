@@ -60,7 +60,7 @@ impl VirtualCoupling {
         elastic_n: f64,
     ) -> Vector3<f64> {
         let (mut force, mut total) = (Vector3::zeros(), 0.0);
-        for load in loads.iter().filter(|load| load.at(p) > 0.0) {
+        for load in loads.iter().filter(|load| load.acts(p)) {
             let approach = load.normal.dot(&(state.velocity_m_s - load.surface_velocity_m_s));
             force -= load.damping_ns_m * approach * load.normal;
             total += load.damping_ns_m;
@@ -84,7 +84,7 @@ fn balance(device_m: &Vector3<f64>, k_vc: f64, loads: &PlaneLoads) -> Vector3<f6
     for _ in 0..MAX_ROUNDS {
         let mut gradient = k_vc * (device_m - p);
         let mut hessian = Matrix3::identity() * k_vc;
-        for load in loads.iter().filter(|load| load.at(&p) > 0.0) {
+        for load in loads.iter().filter(|load| load.acts(&p)) {
             gradient += load.at(&p) * load.normal;
             hessian += load.stiffness_n_m * load.normal * load.normal.transpose();
         }

@@ -6,8 +6,8 @@ use super::field::{Checked, In};
 use crate::codec::{CountLimit, DecodeError, WireMessage};
 use crate::limits::{
     MAX_BODIES, MAX_CONTACT_BYTES, MAX_CONTACTS, MAX_COORDINATE_M, MAX_CUT_BYTES, MAX_FORCE_N,
-    MAX_POSE_BYTES, MAX_SMALL_BYTES, MAX_SWEEP_SEGMENTS, MAX_VELOCITY_M_S, MIN_SWEEP_SEGMENTS,
-    NORMAL_TOLERANCE,
+    MAX_POSE_BYTES, MAX_RELAXATION_S, MAX_SMALL_BYTES, MAX_SWEEP_SEGMENTS, MAX_VELOCITY_M_S,
+    MIN_SWEEP_SEGMENTS, NORMAL_TOLERANCE,
 };
 use crate::messages::{
     BladeSegment, Contact, CutAck, CutCommand, DeviceCapability, HapticContact, ToolSample, ToolState,
@@ -128,6 +128,9 @@ impl WireMessage for HapticContact {
         at.positive("validity_ms", f64::from(self.validity_ms), f64::MAX)?;
         at.positive("max_force_n", f64::from(self.max_force_n), MAX_FORCE_N)?;
         at.positive("max_stiffness_n_m", f64::from(self.max_stiffness_n_m), f64::MAX)?;
+        at.positive("instant_stiffness_n_m", f64::from(self.instant_stiffness_n_m), f64::MAX)?;
+        at.positive("relaxed_stiffness_n_m", f64::from(self.relaxed_stiffness_n_m), f64::MAX)?;
+        at.positive("relaxation_s", f64::from(self.relaxation_s), MAX_RELAXATION_S)?;
         self.contacts.iter().try_for_each(|c| contact(at, c))
     }
 }

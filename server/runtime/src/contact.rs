@@ -169,6 +169,8 @@ pub(crate) fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> H
         ContactMode::Cutting => haptic_contact::Mode::Cutting,
         ContactMode::Hold => haptic_contact::Mode::Hold,
     };
+    // All planes of a model touch the same tissue.
+    let relaxing = model.planes.iter().find(|plane| plane.relaxed_stiffness_n_m > 0.0);
     HapticContact {
         seq,
         sim_step: model.step,
@@ -186,6 +188,9 @@ pub(crate) fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> H
         validity_ms: (1e3 * model.validity_s) as f32,
         max_force_n: model.max_force_n as f32,
         max_stiffness_n_m: model.max_stiffness_n_m as f32,
+        instant_stiffness_n_m: relaxing.map_or(0.0, |plane| plane.instant_stiffness_n_m as f32),
+        relaxed_stiffness_n_m: relaxing.map_or(0.0, |plane| plane.relaxed_stiffness_n_m as f32),
+        relaxation_s: relaxing.map_or(0.0, |plane| plane.relaxation_s as f32),
     }
 }
 

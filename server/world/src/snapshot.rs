@@ -53,6 +53,8 @@ pub struct Snapshot {
     pub step: u64,
     /// Simulated time [s].
     pub time_s: f64,
+    /// Length of the step [s].
+    pub step_s: f64,
     /// How the triangles of surfaces are to be arranged.
     pub broad_phase: Method,
     /// Bodies in the order of the scene.
@@ -106,6 +108,10 @@ pub struct BodySnapshot {
     pub copies: u32,
     /// What adaptations of the cells did since the start or the last reset; zeros where they are not adapted.
     pub adapted: AdaptCounts,
+    /// Young's modulus of the body [Pa].
+    pub young_pa: f64,
+    /// Viscosity β of Rayleigh damping [s].
+    pub viscosity_s: f64,
     /// Volume at rest [m³].
     pub rest_volume_m3: f64,
 }
@@ -133,6 +139,8 @@ pub struct ToolSnapshot {
     pub force_n: Vector3<f64>,
     /// Stiffness of the spring between hand and tissue [N/m].
     pub stiffness_n_m: f64,
+    /// Body that it touched last, and the compliance of its tissue in a step [m/N]; none before a first touch.
+    pub tissue: Option<(usize, f64)>,
     /// Hand and tissue in series [N/m], for predictions about `pose`; 0: not known.
     pub contact_stiffness_n_m: f64,
     /// Largest force [N].

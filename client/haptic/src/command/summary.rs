@@ -48,6 +48,11 @@ impl std::fmt::Display for Summary {
             "pose to contact      p50 {:.2} ms, p99 {:.2} ms, max {:.0} ms   ({} poses sent)",
             n.round_trip_ms.p50, n.round_trip_ms.p99, n.round_trip_ms.max, n.poses_sent
         )?;
+        writeln!(
+            f,
+            "pose behind the felt model   age p50 {:.2} ms, p99 {:.2} ms, max {:.0} ms",
+            l.model_age_ms.p50, l.model_age_ms.p99, l.model_age_ms.max
+        )?;
         write!(
             f,
             "force     max {:.2} N (limit {} N), largest step {:.4} N = {:.1} N/s (limit {} N/s), touched {:.1} s, device faults {}",

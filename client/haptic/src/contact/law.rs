@@ -8,10 +8,16 @@
 //! horizon): the surface moves on while the message ages, but not without limit; w: one within the trusted
 //! radius of the plane, falling to zero beyond.
 //!
+//! If the message names the stiffness that is left when the tissue has followed, the force answers the whole
+//! way of the tip since the pose used ([`relaxation`](super::relaxation)). Held tissue pulls back along three axes,
+//! each on both sides.
+//!
 //! # Source
 //! The message `scindo.v1.Contact` (`proto/scindo/v1/tool.proto`).
 
+use super::history::TipHistory;
 use super::model::{ContactModel, ContactPlane};
+use super::relaxation::Response;
 use crate::constants::{EXTRAPOLATION_STEPS, MAX_EXTRAPOLATION_S, PATCH_FADE};
 use nalgebra::Vector3;
 use scindo_proto::limits::MAX_CONTACTS;
@@ -29,12 +35,20 @@ pub struct PlaneLoad {
     pub damping_ns_m: f64,
     /// Velocity of the surface [m/s].
     pub surface_velocity_m_s: Vector3<f64>,
+    /// Whether it also pulls: the tissue is held.
+    pub two_sided: bool,
 }
 
 impl PlaneLoad {
-    /// Load with the tip at `p` [N]; it never pulls.
+    /// Load with the tip at `p` [N]; it pulls only if it has two sides.
     pub fn at(&self, p: &Vector3<f64>) -> f64 {
-        (self.offset_n - self.stiffness_n_m * self.normal.dot(p)).max(0.0)
+        let load = self.offset_n - self.stiffness_n_m * self.normal.dot(p);
+        if self.two_sided { load } else { load.max(0.0) }
+    }
+
+    /// Whether it acts with the tip at `p`.
+    pub fn acts(&self, p: &Vector3<f64>) -> bool {
+        self.two_sided || self.at(p) > 0.0
     }
 }
 
@@ -62,44 +76,67 @@ impl PlaneLoads {
     }
 }
 
-/// Evaluates models. It remembers the length of a simulation step, which sets the horizon.
-#[derive(Debug, Clone, Copy)]
+/// Evaluates models. It remembers the length of a simulation step, which sets the horizon, and the way of the
+/// tip.
+#[derive(Debug, Clone)]
 pub struct ContactLaw {
     horizon_s: f64,
     last_step: (u64, f64),
+    history: TipHistory,
 }
 
 impl Default for ContactLaw {
     fn default() -> Self {
-        Self { horizon_s: MAX_EXTRAPOLATION_S, last_step: (0, 0.0) }
+        Self { horizon_s: MAX_EXTRAPOLATION_S, last_step: (0, 0.0), history: TipHistory::default() }
     }
 }
 
 impl ContactLaw {
-    /// Loads on a tip near `tip_m` at loop time `now_ns`.
+    /// Loads on a tip near `tip_m` at loop time `now_ns`. Must be called once per tick.
     pub fn loads(&mut self, model: &ContactModel, tip_m: &Vector3<f64>, now_ns: u64) -> PlaneLoads {
         self.observe_step(model);
         let age_s = (model.age_ns(now_ns) as f64 * 1e-9).min(self.horizon_s);
-        let empty = PlaneLoad {
-            normal: Vector3::z(),
-            offset_n: 0.0,
-            stiffness_n_m: 0.0,
-            damping_ns_m: 0.0,
-            surface_velocity_m_s: Vector3::zeros(),
-        };
-        let mut out = PlaneLoads { loads: [empty; MAX_CONTACTS], count: model.plane_count };
-        for (load, plane) in out.loads.iter_mut().zip(model.planes()) {
-            let reference = model.tip_used_m + plane.surface_velocity_m_s * age_s;
-            let weight = patch_weight(plane, &(tip_m - plane.surface_velocity_m_s * age_s));
-            *load = PlaneLoad {
-                normal: plane.normal,
-                offset_n: weight * (plane.force_n + plane.stiffness_n_m * plane.normal.dot(&reference)),
-                stiffness_n_m: weight * plane.stiffness_n_m,
-                damping_ns_m: weight * plane.damping_ns_m,
-                surface_velocity_m_s: plane.surface_velocity_m_s,
-            };
+        let mut out = PlaneLoads { loads: [NO_LOAD; MAX_CONTACTS], count: 0 };
+        for plane in model.planes() {
+            for plane in axes(plane, model.holds).into_iter().flatten() {
+                if let Some(slot) = out.loads.get_mut(out.count) {
+                    *slot = self.load(&plane, model, tip_m, age_s);
+                    out.count += 1;
+                }
+            }
         }
+        self.history.record(now_ns, *tip_m);
         out
+    }
+
+    fn load(
+        &self,
+        plane: &ContactPlane,
+        model: &ContactModel,
+        tip_m: &Vector3<f64>,
+        age_s: f64,
+    ) -> PlaneLoad {
+        let n = plane.normal;
+        let moved = plane.surface_velocity_m_s * age_s;
+        let weight = patch_weight(plane, &(tip_m - moved));
+        let two_sided = model.holds && plane.stiffness_n_m > 0.0;
+        let answer = match model.used_ns {
+            Some(used_ns) if plane.relaxed_stiffness_n_m > 0.0 => {
+                Response::along(plane, (&(model.tip_used_m + moved), used_ns), two_sided, &self.history)
+            }
+            _ => Response {
+                offset_n: plane.force_n + plane.stiffness_n_m * n.dot(&(model.tip_used_m + moved)),
+                stiffness_n_m: plane.stiffness_n_m,
+            },
+        };
+        PlaneLoad {
+            normal: n,
+            offset_n: weight * answer.offset_n,
+            stiffness_n_m: weight * answer.stiffness_n_m,
+            damping_ns_m: weight * plane.damping_ns_m,
+            surface_velocity_m_s: plane.surface_velocity_m_s,
+            two_sided,
+        }
     }
 
     /// Updates the horizon to 1.5 simulation steps, once messages show the length of a step.
@@ -116,6 +153,36 @@ impl ContactLaw {
         }
         self.last_step = (model.sim_step, model.sim_time_s);
     }
+}
+
+/// A load that does nothing.
+const NO_LOAD: PlaneLoad = PlaneLoad {
+    normal: Vector3::new(0.0, 0.0, 1.0),
+    offset_n: 0.0,
+    stiffness_n_m: 0.0,
+    damping_ns_m: 0.0,
+    surface_velocity_m_s: Vector3::new(0.0, 0.0, 0.0),
+    two_sided: false,
+};
+
+/// The plane itself, and the two axes across it if it holds.
+fn axes(plane: &ContactPlane, holds: bool) -> [Option<ContactPlane>; 3] {
+    if !holds || plane.tangential_stiffness_n_m <= 0.0 {
+        return [Some(*plane), None, None];
+    }
+    let n = plane.normal;
+    let side = Vector3::ith(n.iamin(), 1.0);
+    let first = (side - n * n.dot(&side)).normalize();
+    let share = plane.tangential_stiffness_n_m / plane.stiffness_n_m.max(f64::MIN_POSITIVE);
+    let across = |normal: Vector3<f64>| ContactPlane {
+        normal,
+        force_n: plane.tangential_n.dot(&normal),
+        stiffness_n_m: plane.tangential_stiffness_n_m,
+        instant_stiffness_n_m: share * plane.instant_stiffness_n_m,
+        relaxed_stiffness_n_m: share * plane.relaxed_stiffness_n_m,
+        ..*plane
+    };
+    [Some(*plane), Some(across(first)), Some(across(n.cross(&first)))]
 }
 
 /// One within the trusted radius, falling linearly to zero over another half radius.
@@ -149,6 +216,25 @@ mod tests {
         assert!((loads.force_at(&Vector3::zeros()).z - 1.0).abs() < 1e-12);
         assert!((loads.force_at(&Vector3::new(0.3, 0.0, -0.001)).z - 1.2).abs() < 1e-12);
         assert_eq!(loads.force_at(&Vector3::new(0.0, 0.0, 0.006)), Vector3::zeros());
+    }
+
+    #[test]
+    fn held_tissue_pulls_back_in_every_direction() {
+        let held = ContactPlane {
+            force_n: 0.5,
+            tangential_n: Vector3::x() * 0.1,
+            tangential_stiffness_n_m: 100.0,
+            ..plane()
+        };
+        let model = ContactModel { holds: true, ..model(&[held]) };
+        let force = |tip: Vector3<f64>| ContactLaw::default().loads(&model, &tip, 0).force_at(&tip);
+        let rest = force(Vector3::zeros());
+        assert!((rest - Vector3::new(0.1, 0.0, 0.5)).norm() < 1e-12, "{rest}");
+        for tip in [Vector3::x(), Vector3::y(), Vector3::z(), -Vector3::x(), -Vector3::y(), -Vector3::z()] {
+            let back = force(tip * 0.01) - rest;
+            let k = if tip.z == 0.0 { 100.0 } else { 200.0 };
+            assert!((back + k * 0.01 * tip).norm() < 1e-12, "{tip} {back}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use crate::constants::{DEFAULT_VALIDITY_NS, LOST_NS, MAX_VALIDITY_NS};
 use crate::statistics::{LinkReport, RoundTrips};
 use nalgebra::Vector3;
-use scindo_proto::limits::MAX_CONTACTS;
+use scindo_proto::limits::{MAX_CONTACTS, MAX_RELAXATION_S};
 use scindo_proto::messages::{Contact, HapticContact, Vec3, Vec3f, haptic_contact};
 
 /// Largest plausible force of one plane [N].
@@ -29,6 +29,16 @@ pub struct ContactPlane {
     pub force_n: f64,
     /// Decrease of that force per metre along the normal [N/m].
     pub stiffness_n_m: f64,
+    /// The same at once, before the tissue moves [N/m]; zero if the server does not know.
+    pub instant_stiffness_n_m: f64,
+    /// The same after the tissue has followed [N/m]; zero if the server does not know.
+    pub relaxed_stiffness_n_m: f64,
+    /// Time in which the force falls from the one to the other [s].
+    pub relaxation_s: f64,
+    /// Decrease of the force per metre across the normal, of tissue that is held [N/m].
+    pub tangential_stiffness_n_m: f64,
+    /// Force across the normal, of tissue that is held [N].
+    pub tangential_n: Vector3<f64>,
     /// Damping along the normal, against the relative velocity [N·s/m].
     pub damping_ns_m: f64,
     /// Velocity of the surface [m/s].
@@ -44,6 +54,11 @@ impl ContactPlane {
         normal: Vector3::new(0.0, 0.0, 1.0),
         force_n: 0.0,
         stiffness_n_m: 0.0,
+        instant_stiffness_n_m: 0.0,
+        relaxed_stiffness_n_m: 0.0,
+        relaxation_s: 0.0,
+        tangential_stiffness_n_m: 0.0,
+        tangential_n: Vector3::new(0.0, 0.0, 0.0),
         damping_ns_m: 0.0,
         surface_velocity_m_s: Vector3::new(0.0, 0.0, 0.0),
         patch_radius_m: 0.0,
@@ -65,6 +80,10 @@ pub struct ContactModel {
     pub received_ns: u64,
     /// Tip for which the model was computed [m].
     pub tip_used_m: Vector3<f64>,
+    /// Loop clock when the tip was there [ns]; `None` if the message names none of this client's poses.
+    pub used_ns: Option<u64>,
+    /// Whether the tool holds the tissue, so that it pulls back in all directions.
+    pub holds: bool,
     /// The planes; only the first `plane_count` are valid.
     pub planes: [ContactPlane; MAX_CONTACTS],
     /// Number of valid planes.
@@ -86,6 +105,8 @@ impl ContactModel {
         sim_time_s: 0.0,
         received_ns: 0,
         tip_used_m: Vector3::new(0.0, 0.0, 0.0),
+        used_ns: None,
+        holds: false,
         planes: [ContactPlane::NONE; MAX_CONTACTS],
         plane_count: 0,
         validity_ns: 0,
@@ -115,6 +136,11 @@ impl ContactModel {
         }
         let pose =
             message.tool_pose_used.as_ref().and_then(|p| vector(p.position_m.as_ref(), MAX_COORDINATE));
+        let relaxation = [
+            within(message.instant_stiffness_n_m, MAX_PLANE_STIFFNESS_N_M)?,
+            within(message.relaxed_stiffness_n_m, MAX_PLANE_STIFFNESS_N_M)?,
+            within(message.relaxation_s, MAX_RELAXATION_S)?,
+        ];
         let free = message.mode() == haptic_contact::Mode::Free || message.contacts.is_empty();
         let mut model = Self {
             seq: message.seq,
@@ -123,20 +149,21 @@ impl ContactModel {
             sim_time_s: message.sim_time_s,
             received_ns,
             tip_used_m: if free { pose.unwrap_or_default() } else { pose? },
+            holds: message.mode() == haptic_contact::Mode::Hold,
             validity_ns: validity_ns(message.validity_ms)?,
             max_force_n: advice(message.max_force_n)?,
             max_stiffness_n_m: advice(message.max_stiffness_n_m)?,
             ..Self::NONE
         };
         for (slot, contact) in model.planes.iter_mut().zip(&message.contacts) {
-            *slot = parse_plane(contact)?;
+            *slot = parse_plane(contact, relaxation)?;
         }
         model.plane_count = message.contacts.len();
         Some(model)
     }
 }
 
-fn parse_plane(contact: &Contact) -> Option<ContactPlane> {
+fn parse_plane(contact: &Contact, [instant, relaxed, relaxation_s]: [f64; 3]) -> Option<ContactPlane> {
     let normal = vector_f32(contact.normal.as_ref(), 2.0)?;
     let length = normal.norm();
     let normal = ((length - 1.0).abs() < 1e-2).then(|| normal / length)?;
@@ -146,6 +173,11 @@ fn parse_plane(contact: &Contact) -> Option<ContactPlane> {
         normal,
         force_n: force.dot(&normal),
         stiffness_n_m: within(contact.stiffness_n_m, MAX_PLANE_STIFFNESS_N_M)?,
+        instant_stiffness_n_m: instant,
+        relaxed_stiffness_n_m: relaxed,
+        relaxation_s,
+        tangential_stiffness_n_m: within(contact.tangential_stiffness_n_m, MAX_PLANE_STIFFNESS_N_M)?,
+        tangential_n: force - normal * force.dot(&normal),
         damping_ns_m: within(contact.damping_ns_m, MAX_PLANE_DAMPING_NS_M)?,
         surface_velocity_m_s: match &contact.surface_velocity_m_s {
             None => Vector3::zeros(),
@@ -225,10 +257,13 @@ impl ContactInbox {
     /// Takes one message. It arrived at `now_ns` of the loop clock and at `client_ns` of the clock that
     /// stamps poses (`tool_client_time_ns`).
     pub fn accept(&mut self, message: &HapticContact, now_ns: u64, client_ns: u64) {
-        let Some(model) = ContactModel::parse(message, now_ns) else {
+        let Some(mut model) = ContactModel::parse(message, now_ns) else {
             self.counts.contacts_refused += 1;
             return;
         };
+        // Both clocks are the client's own, so the age needs no synchronisation.
+        let age_ns = client_ns.checked_sub(message.tool_client_time_ns);
+        model.used_ns = age_ns.filter(|_| message.tool_seq_used > 0).and_then(|age| now_ns.checked_sub(age));
         if !self.in_order(message, now_ns) {
             self.counts.contacts_late += 1;
             return;
@@ -320,7 +355,10 @@ mod tests {
     fn garbage_is_refused_and_leaves_the_last_model() {
         let (mut inbox, mut slot) = inbox();
         accept(&mut inbox, &contact(1, 1.0, 300.0), 0);
-        let spoil: [fn(&mut HapticContact); 9] = [
+        let spoil: [fn(&mut HapticContact); 12] = [
+            |m| m.relaxed_stiffness_n_m = f32::NAN,
+            |m| m.instant_stiffness_n_m = -1.0,
+            |m| m.relaxation_s = f32::INFINITY,
             |m| m.seq = 0,
             |m| m.validity_ms = f32::NAN,
             |m| m.max_force_n = -1.0,
@@ -336,7 +374,7 @@ mod tests {
             spoil(&mut message);
             accept(&mut inbox, &message, 1);
         }
-        assert_eq!(inbox.report().contacts_refused, 9);
+        assert_eq!(inbox.report().contacts_refused, 12);
         assert_eq!(slot.read().seq, 1);
     }
 

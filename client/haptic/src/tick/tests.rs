@@ -140,6 +140,7 @@ fn garbage() -> impl Strategy<Value = HapticContact> {
             damping_ns_m: damping as f32,
             surface_velocity_m_s: Some(velocity),
             patch_radius_m,
+            tangential_stiffness_n_m: (damping * 1e3) as f32,
             ..Contact::default()
         },
     );
@@ -147,6 +148,8 @@ fn garbage() -> impl Strategy<Value = HapticContact> {
         |(seq, contacts, validity, max_force, epoch, used)| HapticContact {
             epoch,
             contacts,
+            relaxed_stiffness_n_m: validity as f32,
+            relaxation_s: max_force as f32,
             validity_ms: (validity * 20.0) as f32,
             max_force_n: max_force as f32,
             tool_pose_used: Some(Pose { position_m: Some(used), qw: 1.0, ..Pose::default() }),

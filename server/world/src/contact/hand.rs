@@ -116,6 +116,11 @@ impl Hand {
         self.compliance.map_or(stiffness_n_m, |(_, compliance)| compliance.in_series_with(stiffness_n_m))
     }
 
+    /// Body that it touched last, and the compliance of its tissue in a step [m/N]; `None` before the first contact.
+    pub fn tissue(&self) -> Option<(usize, f64)> {
+        self.compliance.map(|(body, compliance)| (body, compliance.value()))
+    }
+
     /// Releases everything, with the tool at `pose`.
     pub fn let_go(&mut self, pose: &Isometry3<f64>) {
         self.proxy.release(pose);
@@ -204,9 +209,9 @@ impl Hand {
 
     /// Records contact with `body` of Young's modulus `young_pa` [Pa] under a patch of `radius_m` [m]. If
     /// another body was touched last, the compliance starts from a first guess.
-    pub fn meet(&mut self, body: usize, young_pa: f64, radius_m: f64) {
+    pub fn meet(&mut self, body: usize, (young_pa, viscous): (f64, f64), radius_m: f64) {
         if self.compliance.is_none_or(|(known, _)| known != body) {
-            self.compliance = Some((body, Compliance::new(young_pa, radius_m)));
+            self.compliance = Some((body, Compliance::new(young_pa, radius_m, viscous)));
         }
     }
 

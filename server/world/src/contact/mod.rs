@@ -50,6 +50,8 @@ const SPRING_CAPACITY: usize = MAX_TOOLS * MAX_POINTS * 3;
 #[derive(Debug, Clone)]
 struct BodyContacts {
     young_pa: f64,
+    /// b = β/h: viscosity over the length of a step.
+    viscous: f64,
     vertices: Vec<MaterialPoint>,
     springs: Vec<PointSpring>,
     /// Per spring of a tool its tool, and its depth before the solve [m]. The springs of obstacles come after
@@ -239,6 +241,7 @@ impl Contacts {
         self.surfaces.push(surface);
         self.bodies.push(BodyContacts {
             young_pa,
+            viscous: 0.0,
             vertices: Vec::new(),
             springs: Vec::with_capacity(SPRING_CAPACITY),
             behind: Vec::with_capacity(SPRING_CAPACITY),
@@ -246,6 +249,18 @@ impl Contacts {
         });
         self.hands.reserve(MAX_TOOLS);
         self.sums.reserve(MAX_TOOLS);
+    }
+
+    /// Young's modulus of `body` [Pa].
+    pub fn young_pa(&self, body: usize) -> f64 {
+        self.bodies[body].young_pa
+    }
+
+    /// Sets b = β/h of `body`: its viscosity over the length of a step. The hands discard the compliance they have
+    /// learned.
+    pub fn set_viscosity(&mut self, body: usize, viscous: f64) {
+        self.bodies[body].viscous = viscous;
+        self.hands.iter_mut().for_each(Hand::forget_compliance);
     }
 
     /// Changes the Young's modulus of `body` [Pa]. The hands discard the compliance they have learned.
@@ -380,7 +395,9 @@ impl Contacts {
             let Some(compliance) = hand.compliance() else { continue };
             if sums.stiffness > 0.0 && sums.normal_force < 0.95 * tool.max_force_n {
                 let (before, after) = (sums.before / sums.stiffness, sums.after / sums.stiffness);
-                compliance.learn(before, after, sums.normal_force);
+                let normal = (-sums.force).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+                let place = (tool.pose.translation.vector, normal);
+                compliance.learn([before, after], sums.normal_force, place);
             } else {
                 compliance.release();
             }
@@ -398,7 +415,8 @@ impl Contacts {
 fn press(index: u32, tool: &Tool, hand: &mut Hand, surfaces: &[ContactSurface], bodies: &mut [BodyContacts]) {
     let spring = (tool.stiffness_n_m, tool.max_force_n);
     if let Some(body) = hand.press().bearings().first().map(|bearing| bearing.body) {
-        hand.meet(body, bodies[body].young_pa, core_radius(tool.shape));
+        let of = &bodies[body];
+        hand.meet(body, (of.young_pa, of.viscous), core_radius(tool.shape));
     }
     bear(index, spring, hand.press(), surfaces, bodies);
     let each = 1.0 / hand.limbs().len().max(1) as f64;

@@ -34,6 +34,8 @@ impl Sources<'_> {
                 out.topology = body.topology();
                 body.surface_stress(&mut out.stress);
             }
+            out.young_pa = self.contacts.young_pa(i);
+            out.viscosity_s = body.body.material().rayleigh.stiffness_s;
             out.energy = wants.measures.then(|| report.energy.unwrap_or_else(|| body.energy()));
         }
         out.probes.clear();
@@ -121,6 +123,7 @@ fn fill_tool(out: &mut ToolSnapshot, tool: &Tool, hand: Option<&Hand>) {
     out.stiffness_n_m = tool.stiffness_n_m;
     out.contact_stiffness_n_m =
         hand.map_or(tool.stiffness_n_m, |hand| hand.in_series_with(tool.stiffness_n_m));
+    out.tissue = hand.and_then(Hand::tissue);
     out.max_force_n = tool.max_force_n;
     let edge = hand.and_then(Hand::edge).unwrap_or_default();
     out.resistance_n = edge.resistance_n;

@@ -160,6 +160,9 @@ impl Simulation {
         for body in &scene.bodies {
             contacts.add_body(body.young_pa, scene.effects.contact != Some(false));
         }
+        for (i, body) in scene.bodies.iter().enumerate() {
+            contacts.set_viscosity(i, body.damping_stiffness_s / scene.step_s);
+        }
         if scene.effects.obstacles != Some(false) {
             contacts.set_obstacles(built.obstacles);
         }
@@ -391,6 +394,7 @@ impl Simulation {
     pub fn snapshot_into(&mut self, wants: &Wants, snapshot: &mut Snapshot) {
         (snapshot.step, snapshot.time_s) = (self.steps, self.time_s());
         snapshot.broad_phase = self.scene.broad_phase;
+        snapshot.step_s = self.step_s();
         let Self { bodies, report, tools, contacts, probes, groups, .. } = self;
         Sources { bodies, report, tools, contacts, probes, groups }.fill(wants, snapshot);
     }
@@ -428,6 +432,7 @@ impl Simulation {
     fn change_body(&mut self, index: usize, spec: &BodySpec) -> Result<(), String> {
         let body = &mut self.bodies[index].body;
         let stiffness = body.material().young_pa;
+        let viscosity = body.material().rayleigh.stiffness_s;
         let known = body.settings().solver;
         let iterations = spec.mechanics.iterations.unwrap_or(known.iterations);
         let solver = PcgSettings { iterations, tolerance: spec.mechanics.tolerance };
@@ -435,6 +440,9 @@ impl Simulation {
             body.set_solver(solver).map_err(|error| error.to_string())?;
         }
         body.set_constants(assemble::constants(spec)).map_err(|error| error.to_string())?;
+        if viscosity != spec.damping_stiffness_s {
+            self.contacts.set_viscosity(index, spec.damping_stiffness_s / self.scene.step_s);
+        }
         if stiffness != spec.young_pa {
             self.contacts.set_stiffness(index, spec.young_pa);
         }

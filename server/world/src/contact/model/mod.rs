@@ -17,6 +17,7 @@
 //! step in force ([`continuity`]).
 
 pub mod plane;
+pub mod answer;
 pub mod continuity;
 
 use std::sync::Arc;
@@ -29,6 +30,7 @@ use crate::contact::surface::ContactSurface;
 use crate::inputs::{ToolMode, ToolShape};
 use crate::snapshot::{Snapshot, ToolSnapshot};
 use crate::tool::geometry::{capsule, is_sane};
+use answer::{Answer, Tissue};
 use continuity::{FeatureNumbers, limit_step};
 pub use plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact};
 use scindo_collision::Capsule;
@@ -43,8 +45,9 @@ const HORIZON: f64 = 1.5;
 const INTERVAL_S: (f64, f64) = (1e-3, 0.1);
 /// Bounds of the time for which a model is valid [s].
 const VALIDITY_S: (f64, f64) = (0.03, 0.2);
-/// Planes are sent this long before the tool reaches them [s], and at least within this distance [m].
-const AHEAD_S: f64 = 0.02;
+/// Planes are sent this long before the tool reaches them [s], and at least within this distance [m]. It covers
+/// the delay at which a client still renders force well.
+const AHEAD_S: f64 = 0.15;
 const LEAST_AHEAD_M: f64 = 0.002;
 const MOST_AHEAD_M: f64 = 0.02;
 /// Damping per stiffness [s], and its bound [N·s/m], which is well below what desktop devices absorb.
@@ -74,6 +77,8 @@ pub struct ContactModels {
     surfaces: Vec<ContactSurface>,
     velocities: Vec<Vec<[f32; 3]>>,
     tools: Vec<ToolModel>,
+    /// What is known about each body's material before it is touched.
+    materials: Vec<Tissue>,
     step: u64,
     time_s: f64,
     taken_s: Option<f64>,
@@ -109,6 +114,13 @@ impl ContactModels {
         self.surfaces.resize_with(snapshot.bodies.len(), ContactSurface::default);
         self.surfaces.iter_mut().for_each(|surface| surface.arrange_by(snapshot.broad_phase));
         self.velocities.resize_with(snapshot.bodies.len(), Vec::new);
+        self.materials.clear();
+        self.materials.extend(snapshot.bodies.iter().map(|body| Tissue {
+            learned: None,
+            young_pa: body.young_pa,
+            viscosity_s: body.viscosity_s,
+            step_s: snapshot.step_s,
+        }));
         for (body, seen) in snapshot.bodies.iter().enumerate() {
             if seen.positions.is_empty() {
                 continue;
@@ -143,6 +155,7 @@ impl ContactModels {
         let frame = Frame {
             surfaces: &self.surfaces,
             velocities: &self.velocities,
+            materials: &self.materials,
             ahead_s: since_snapshot.min(HORIZON * self.interval_s),
             validity_s: (HORIZON * self.interval_s).clamp(VALIDITY_S.0, VALIDITY_S.1),
             step: self.step,
@@ -186,6 +199,7 @@ impl ContactModels {
 struct Frame<'a> {
     surfaces: &'a [ContactSurface],
     velocities: &'a [Vec<[f32; 3]>],
+    materials: &'a [Tissue],
     /// Time for which the surfaces are extrapolated [s].
     ahead_s: f64,
     validity_s: f64,
@@ -203,6 +217,19 @@ struct Anchor {
     hand: f64,
     series: f64,
     max_force: f64,
+    /// Body that the tool touched last, and the compliance of its tissue in a step [m/N].
+    tissue: Option<(usize, f64)>,
+}
+
+impl Anchor {
+    /// How hand and tissue of `body` answer in series. Where nothing is known the old answer stays.
+    fn answer(&self, body: usize, radius_m: f64, frame: &Frame<'_>) -> Answer {
+        let same = |&(touched, compliance): &(usize, f64)| (touched == body).then_some(compliance);
+        let learned = self.tissue.as_ref().and_then(same);
+        let known = frame.materials.get(body).map(|material| Tissue { learned, ..*material });
+        let answer = known.and_then(|tissue| Answer::new(self.hand, radius_m, &tissue));
+        answer.unwrap_or(Answer { in_step: self.series, at_once: 0.0, relaxed: 0.0, relaxation_s: 0.0 })
+    }
 }
 
 impl ToolModel {
@@ -243,6 +270,7 @@ impl ToolModel {
                 hand: 0.0,
                 series: 0.0,
                 max_force: 0.0,
+                tissue: None,
             };
         };
         let known = seen.contact_stiffness_n_m > 0.0;
@@ -254,6 +282,7 @@ impl ToolModel {
             hand: seen.stiffness_n_m,
             series: if known { seen.contact_stiffness_n_m } else { 0.5 * seen.stiffness_n_m },
             max_force: seen.max_force_n,
+            tissue: seen.tissue,
         }
     }
 
@@ -297,6 +326,9 @@ impl ToolModel {
             gap_m: -force / anchor.series.max(f64::MIN_POSITIVE),
             force_n: force * normal,
             stiffness_n_m: anchor.series,
+            instant_stiffness_n_m: 0.0,
+            relaxed_stiffness_n_m: 0.0,
+            relaxation_s: 0.0,
             tangential_stiffness_n_m: 0.0,
             damping_ns_m: damping(anchor.series),
             surface_velocity_m_s: Vector3::zeros(),
@@ -320,6 +352,9 @@ impl ToolModel {
             gap_m: 0.0,
             force_n: force,
             stiffness_n_m: anchor.series,
+            instant_stiffness_n_m: 0.0,
+            relaxed_stiffness_n_m: 0.0,
+            relaxation_s: 0.0,
             tangential_stiffness_n_m: anchor.series,
             damping_ns_m: damping(anchor.series),
             surface_velocity_m_s: Vector3::zeros(),
@@ -342,6 +377,7 @@ fn plane_of(
     frame: &Frame<'_>,
 ) -> ContactPlane {
     let normal = place.normal;
+    let answer = anchor.answer(place.body, at_device.radius, frame);
     let device = at_device.core_point(place.parameter);
     let before = capsule(query.shape, &anchor.pose).core_point(place.parameter);
     let force_before = anchor.force.dot(&normal);
@@ -350,16 +386,16 @@ fn plane_of(
     // it must not be extrapolated too.
     let mut by_itself = surface_velocity(place, frame);
     if pressed && anchor.hand > 0.0 {
-        let yielding = 1.0 - anchor.series / anchor.hand;
+        let yielding = 1.0 - answer.in_step / anchor.hand;
         by_itself -= normal * normal.dot(&anchor.velocity) * yielding;
     }
     let shift = by_itself * frame.ahead_s;
     let depth = at_device.radius - normal.dot(&(device - place.point - shift));
     // A contact continues the force of the last solve. A new one starts from its depth.
     let force = if pressed {
-        force_before + anchor.series * normal.dot(&(before - device + shift))
+        force_before + answer.in_step * normal.dot(&(before - device + shift))
     } else {
-        anchor.series * depth
+        answer.in_step * depth
     };
     let point = place.point + shift;
     let tip = query.pose.translation.vector - point;
@@ -369,9 +405,12 @@ fn plane_of(
         normal,
         gap_m: -depth,
         force_n: normal * force.min(anchor.max_force),
-        stiffness_n_m: anchor.series,
+        stiffness_n_m: answer.in_step,
+        instant_stiffness_n_m: answer.at_once,
+        relaxed_stiffness_n_m: answer.relaxed,
+        relaxation_s: answer.relaxation_s,
         tangential_stiffness_n_m: 0.0,
-        damping_ns_m: damping(anchor.series),
+        damping_ns_m: damping(answer.in_step),
         surface_velocity_m_s: by_itself,
         // Clients measure from the tip, which may be far from the contact of a shaft.
         patch_radius_m: aside + (2.0 * at_device.radius).max(LEAST_PATCH_M),

@@ -25,6 +25,12 @@ pub struct ContactPlane {
     pub force_n: Vector3<f64>,
     /// Loss of force per metre along the normal [N/m].
     pub stiffness_n_m: f64,
+    /// The same at once, before the tissue moves [N/m]; zero if it is not known.
+    pub instant_stiffness_n_m: f64,
+    /// The same after the tissue has followed the tool [N/m]; zero if it is not known.
+    pub relaxed_stiffness_n_m: f64,
+    /// Time in which the force falls from the one to the other [s].
+    pub relaxation_s: f64,
     /// Restoring force per metre across the normal [N/m].
     pub tangential_stiffness_n_m: f64,
     /// Force against relative velocity along the normal [N·s/m].
