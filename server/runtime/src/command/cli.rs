@@ -264,7 +264,7 @@ pub struct HapticsArgs {
     /// Use only one hand and three delays; takes seconds.
     #[arg(long)]
     pub quick: bool,
-    /// Directory for index.html and haptics.json.
+    /// Directory for index.html, haptics.json and ticks.csv.
     #[arg(long, value_name = "DIR", default_value = "haptics")]
     pub out: PathBuf,
     /// Number of cells that run in parallel. Results do not depend on it.

@@ -37,6 +37,7 @@ pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, RuntimeError> {
     };
     put("index.html", &page::html(&trials))?;
     put("haptics.json", &format!("{report:#}\n"))?;
+    put("ticks.csv", &page::ticks(&trials))?;
     let failed = trials.iter().filter(|trial| !trial.failures().is_empty()).count();
     if args.json {
         say!("{report}");
@@ -49,6 +50,7 @@ pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, RuntimeError> {
         );
         say!("  page     {}/index.html", args.out.display());
         say!("  figures  {}/haptics.json", args.out.display());
+        say!("  ticks    {}/ticks.csv", args.out.display());
     }
     Ok(if failed > 0 || interrupted { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }

@@ -46,6 +46,24 @@ pub fn json(trials: &[Trial]) -> Value {
     json!({ "cells": trials.iter().map(cell).collect::<Vec<_>>() })
 }
 
+/// Every tick of the cells without loss, as CSV.
+pub fn ticks(trials: &[Trial]) -> String {
+    let mut out = String::from(
+        "hand,round_trip_ms,time_s,x_m,y_m,z_m,felt_x_n,felt_y_n,felt_z_n,true_x_n,true_y_n,true_z_n,age_ms\n",
+    );
+    for trial in trials.iter().filter(|trial| trial.cell.loss == 0.0) {
+        for s in &trial.samples {
+            let _ = write!(out, "{},{},{:.3}", trial.cell.hand.name, trial.cell.delay_ms, s.time_s);
+            let [p, felt, truth] = [s.tip_m, s.felt_n, s.truth_n];
+            let metres = p.iter().map(|x| format!(",{x:.6}"));
+            let newtons = felt.iter().chain(truth.iter()).map(|f| format!(",{f:.4}"));
+            metres.chain(newtons).for_each(|column| out += &column);
+            let _ = writeln!(out, ",{:.1}", s.age_ms);
+        }
+    }
+    out
+}
+
 /// The page, self-contained.
 pub fn html(trials: &[Trial]) -> String {
     let failed = trials.iter().filter(|trial| !trial.failures().is_empty()).count();

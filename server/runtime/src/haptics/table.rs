@@ -67,17 +67,19 @@ pub fn run(
 mod tests {
     use super::*;
 
+    /// The promise of the table, for one hand: errors, steps, energy and limit cycles stay within their bounds.
     #[test]
-    fn a_cell_gives_the_same_figures_on_one_thread_and_on_two() {
+    fn a_pen_feels_the_truth_at_every_delay_that_is_promised() {
         let stop = AtomicBool::new(false);
-        let chosen: Vec<Cell> = cells(true).into_iter().filter(|cell| cell.delay_ms == 20).collect();
-        let figures = |threads| {
-            let trials = run(&chosen, threads, &stop, &|_, _| {}).unwrap();
-            trials.iter().map(|trial| trial.figures).collect::<Vec<_>>()
-        };
-        let one = figures(1);
-        assert_eq!(one, figures(2));
-        assert!(one.iter().all(|f| f.peak_n > 0.3), "the hand must press: {one:?}");
+        let chosen = cells(true);
+        let trials = run(&chosen, 2, &stop, &|_, _| {}).unwrap();
+        for trial in &trials {
+            let (cell, figures) = (trial.cell, trial.figures);
+            assert!(trial.failures().is_empty(), "{cell:?} {figures:?}");
+            assert!(figures.peak_n > 0.3, "the hand must press: {figures:?}");
+        }
+        let one = run(&chosen[2..3], 1, &stop, &|_, _| {}).unwrap();
+        assert_eq!(one[0].figures, trials[2].figures, "threads change nothing");
     }
 
     #[test]

@@ -10,20 +10,21 @@ use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
 
 /// Height of the top of the tissue [m].
-pub const TOP_M: f64 = 0.03;
+pub const TOP_M: f64 = 0.02;
 /// The tip of the tool.
 pub const SHAPE: ToolShape = ToolShape::Sphere { radius_m: 0.005 };
 /// Its name.
 pub const TOOL: &str = "probe";
 
-/// A pad of soft tissue, glued to a table.
+/// A pad of soft tissue, glued to a table. Its cells are finer than the tip: otherwise the hand feels the facets of the
+/// dent, which no message can foretell.
 const SCENE: &str = r#"
 schema = 1
 name = "pad"
 world = { gravity_m_s2 = [0, 0, 0], step_s = STEP }
 [[body]]
 id = "pad"
-mesh = { box = { min_m = [-0.04, -0.04, 0], max_m = [0.04, 0.04, 0.03], cells = [10, 10, 5] } }
+mesh = { box = { min_m = [-0.03, -0.03, 0], max_m = [0.03, 0.03, 0.02], cells = [15, 15, 5] } }
 law = "corotational"
 young_pa = 3e4
 poisson = 0.4
