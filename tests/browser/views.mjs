@@ -81,7 +81,7 @@ async function overlaysAndCurves(page) {
   for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip", "show-forces"]) await page.check(`#${id}`);
   await until(page, "the probe has a name and a way", MINUTE, () => [...document.querySelectorAll("#labels div")].some((label) => /^tip · moved /.test(label.textContent)));
   await until(page, "forces, energies and times are drawn", MINUTE, () => window.scindo.curves().slice(0, 4).every((count) => count > 10));
-  await until(page, "contact forces have arrows and a row", MINUTE, () => window.scindo.forces().arrows > 0 && /finger on shelf/.test(document.getElementById("forces").textContent));
+  await until(page, "contact forces have arrows and a row", MINUTE, () => window.scindo.forces().arrows > 0 && /finger on cube/.test(document.getElementById("forces").textContent));
   await picture(page, "views-3-overlays.png");
   await page.click("#clip-flip");
   for (const id of ["show-mesh", "show-held", "show-probes", "show-curves", "show-clip", "show-forces"]) await page.uncheck(`#${id}`);
