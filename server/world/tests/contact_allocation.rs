@@ -140,7 +140,7 @@ fn steady_contact_does_not_allocate() {
         let start = Instant::now();
         tools.advance(0.02 * round as f64, &inputs);
         contacts.update_surface(0, body.epoch(), (surface, &rest), positions).unwrap();
-        contacts.detect(&tools);
+        contacts.detect(&tools, 0.02);
         contacts.collect(0, &forces[..contacts.springs(0).len()]);
         contacts.react(&mut tools);
         in_step += start.elapsed().as_secs_f64();

@@ -136,8 +136,8 @@ impl Hand {
         self.proxy.release(pose);
     }
 
-    /// Follows the tool to its present pose, and finds what it touches or holds there.
-    pub fn follow(&mut self, tool: &Tool, surfaces: &[ContactSurface]) {
+    /// Follows the tool to its present pose in a step of `h` seconds, and finds what it touches or holds there.
+    pub fn follow(&mut self, tool: &Tool, surfaces: &[ContactSurface], h: f64) {
         if self.hand_overs != tool.hand_overs() {
             self.hand_overs = tool.hand_overs();
             self.let_go(&tool.pose);
@@ -154,11 +154,11 @@ impl Hand {
             self.open_jaws();
         }
         if tool.touches() && compound::count(tool.shape) > 0 {
-            self.follow_with_limbs(tool, surfaces);
+            self.follow_with_limbs(tool, surfaces, h);
         } else if tool.touches() {
             self.proxy.ride(tool.shape, surfaces);
             self.proxy.follow(tool.shape, &tool.pose, surfaces);
-            self.press.update(tool.shape, self.proxy.pose(), &tool.pose, surfaces);
+            self.press.update(tool.shape, (self.proxy.pose(), &tool.pose), surfaces, h);
         } else {
             // The edge of a blade that cuts with force has a place of its own.
             if self.edge.is_none() {
@@ -189,7 +189,7 @@ impl Hand {
 
     /// Follows with every capsule of a compound tool by itself. The proxy of the whole is displaced by the mean of those
     /// that touch.
-    fn follow_with_limbs(&mut self, tool: &Tool, surfaces: &[ContactSurface]) {
+    fn follow_with_limbs(&mut self, tool: &Tool, surfaces: &[ContactSurface], h: f64) {
         self.press.release();
         let count = compound::count(tool.shape);
         self.limbs.resize_with(count, || Limb { proxy: Proxy::default(), press: Press::new() });
@@ -198,7 +198,7 @@ impl Hand {
             let device = tool.pose * part.pose;
             limb.proxy.ride(part.shape, surfaces);
             limb.proxy.follow(part.shape, &device, surfaces);
-            limb.press.update(part.shape, limb.proxy.pose(), &device, surfaces);
+            limb.press.update(part.shape, (limb.proxy.pose(), &device), surfaces, h);
             if limb.press.normal().is_some() {
                 aside += limb.proxy.pose().translation.vector - device.translation.vector;
                 touching += 1.0;

@@ -316,8 +316,8 @@ impl Contacts {
         self.hands.get(index)
     }
 
-    /// Moves every proxy, and converts what is touched or held to springs.
-    pub fn detect(&mut self, tools: &Tools) {
+    /// Moves every proxy, and converts what is touched or held to springs for a step of `h` seconds.
+    pub fn detect(&mut self, tools: &Tools, h: f64) {
         for body in &mut self.bodies {
             body.springs.clear();
             body.behind.clear();
@@ -328,7 +328,7 @@ impl Contacts {
             if self.ablation.continuous {
                 hand.jump(&tool.pose);
             }
-            hand.follow(tool, surfaces);
+            hand.follow(tool, surfaces, h);
             press(index, tool, hand, surfaces, bodies);
             pull(index, tool, hand, surfaces, bodies);
             if let Some(jaws) = &mut hand.jaws {

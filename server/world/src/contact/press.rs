@@ -25,12 +25,12 @@ const CLEAR_OFFSET_M: f64 = 5e-5;
 /// Cosine of the half angle of the cone within which the direction is kept, like dry friction of 0.18. While
 /// the hand is still, a proxy on the facets of a dent wanders by as much.
 const STICK_COSINE: f64 = 0.984;
-/// Weight of the present step in the running direction. It is small because the facets of a dent turn the
+/// Time in which the direction follows [s], and the most that it does in a step. The facets of a dent turn the
 /// line from device to proxy back and forth from step to step.
-const TURN: f64 = 0.1;
-/// Weight of the present step in the running shares. Shares that followed at once would oscillate: a point
-/// that bears more sinks the tissue under it, and then bears less.
-const FOLLOW: f64 = 0.3;
+const TURN: Following = Following { time_s: 0.095, most: 0.1 };
+/// The same of the shares. Shares that followed at once would oscillate: a point that bears more sinks the
+/// tissue under it, and then bears less.
+const FOLLOW: Following = Following { time_s: 0.028, most: 0.3 };
 /// Share below which a point is omitted.
 const LEAST_SHARE: f64 = 1e-3;
 /// Number of points on a ball's ring, and the ring's radius in ball radii.
@@ -83,6 +83,19 @@ pub fn touched((proxy, device): (&Capsule, &Capsule), surfaces: &[ContactSurface
     let is_kept = away(0).max(away(1)) > CLEAR_OFFSET_M;
     let margin = (MARGIN_RADII * proxy.radius).max(LEAST_MARGIN_M);
     nearest(proxy, surfaces, if is_kept { margin.max(proxy.radius) } else { margin })
+}
+
+/// How a running value follows the present one, so that it takes the same time at any length of step.
+struct Following {
+    time_s: f64,
+    most: f64,
+}
+
+impl Following {
+    /// Weight of a step of `h` seconds.
+    fn weight(&self, h: f64) -> f64 {
+        (1.0 - (-h / self.time_s).exp()).min(self.most)
+    }
 }
 
 /// Unit direction in which the touched tissue pushes back the tool.
@@ -154,19 +167,19 @@ impl Press {
         self.bearings.clear();
     }
 
-    /// Finds the bearing points at the present poses of proxy and device.
+    /// Finds the bearing points at the present poses of proxy and device, in a step of `h` seconds.
     pub fn update(
         &mut self,
         shape: ToolShape,
-        proxy: &Isometry3<f64>,
-        device: &Isometry3<f64>,
+        (proxy, device): (&Isometry3<f64>, &Isometry3<f64>),
         surfaces: &[ContactSurface],
+        h: f64,
     ) {
         let (at_proxy, at_device) = (capsule(shape, proxy), capsule(shape, device));
         let Some(place) = touched((&at_proxy, &at_device), surfaces) else { return self.release() };
         let target = push_direction(&place, &at_proxy, &at_device);
         let fresh = self.direction.is_none();
-        let direction = turned(self.direction, target);
+        let direction = turned(self.direction, target, TURN.weight(h));
         self.direction = Some(direction);
         self.bearings.clear();
         let mut depths = [0.0; MAX_POINTS];
@@ -177,7 +190,7 @@ impl Press {
             depths[i] = hit.map_or(0.0, |bearing: Bearing| bearing.depth.max(0.0));
             hits[i] = hit;
         }
-        self.follow_shares(&depths, fresh);
+        self.follow_shares(&depths, if fresh { 1.0 } else { FOLLOW.weight(h) });
         for (hit, share) in hits.iter().zip(self.shares) {
             if let (Some(bearing), true) = (hit, share > LEAST_SHARE) {
                 self.bearings.push(Bearing { share, ..*bearing });
@@ -185,25 +198,24 @@ impl Press {
         }
     }
 
-    /// Moves the shares towards the proportions of the depths.
-    fn follow_shares(&mut self, depths: &[f64; MAX_POINTS], fresh: bool) {
+    /// Moves the shares towards the proportions of the depths by this weight.
+    fn follow_shares(&mut self, depths: &[f64; MAX_POINTS], weight: f64) {
         let sum: f64 = depths.iter().sum();
         if sum <= 0.0 {
             return;
         }
-        let follow = if fresh { 1.0 } else { FOLLOW };
         for (share, depth) in self.shares.iter_mut().zip(depths) {
-            *share += follow * (depth / sum - *share);
+            *share += weight * (depth / sum - *share);
         }
     }
 }
 
-/// Turns the direction towards `target` by its weight, and carries its frame along without twist.
-fn turned(before: Option<Direction>, target: Vector3<f64>) -> Direction {
+/// Turns the direction towards `target` by this weight, and carries its frame along without twist.
+fn turned(before: Option<Direction>, target: Vector3<f64>, weight: f64) -> Direction {
     let normal = match before {
         Some(before) => {
             let goal = held_direction(before.normal, target);
-            before.normal.lerp(&goal, TURN).try_normalize(1e-3).unwrap_or(goal)
+            before.normal.lerp(&goal, weight).try_normalize(1e-3).unwrap_or(goal)
         }
         None => target,
     };

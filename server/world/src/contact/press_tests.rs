@@ -76,7 +76,7 @@ impl Table {
         let body = &self.body;
         let surface = (body.surface(), body.rest_positions());
         self.contacts.update_surface(0, body.epoch(), surface, &self.positions).unwrap();
-        self.contacts.detect(&self.tools);
+        self.contacts.detect(&self.tools, STEP_S);
         self.body.step(STEP_S, V::zeros(), self.contacts.springs(0));
         self.contacts.collect(0, self.body.spring_forces());
         self.contacts.react(&mut self.tools);

@@ -74,7 +74,7 @@ impl Bench {
         let places = surface.vertices.iter().map(|v| v.position(&self.x));
         self.positions.extend(places.map(|p| [p.x as f32, p.y as f32, p.z as f32]));
         self.contacts.update_surface(0, self.body.epoch(), (surface, &self.x), &self.positions).unwrap();
-        self.contacts.detect(&self.tools);
+        self.contacts.detect(&self.tools, 0.005);
         self.tools.iter().next().unwrap()
     }
 
@@ -169,10 +169,10 @@ fn hands_stay_with_their_tools_when_a_guest_leaves() {
         (0..bench.tools.len()).map(|i| bench.contacts.hand(i).unwrap().proxy_pose().translation.x).collect()
     };
     bench.tools.advance(0.005, &[guest("a", 0.01), guest("b", 0.02), guest("c", 0.03)]);
-    bench.contacts.detect(&bench.tools);
+    bench.contacts.detect(&bench.tools, 0.005);
     assert_eq!(proxies(&bench), [0.0, 0.01, 0.02, 0.03]);
     bench.tools.advance(0.01, &[guest("b", 0.02), guest("c", 0.03), guest("d", 0.04)]);
-    bench.contacts.detect(&bench.tools);
+    bench.contacts.detect(&bench.tools, 0.005);
     assert_eq!(proxies(&bench), [0.0, 0.02, 0.03, 0.04]);
 }
 

@@ -262,7 +262,7 @@ impl Simulation {
             }
         }
         let h = self.scene.step_s;
-        self.contacts.detect(&self.tools);
+        self.contacts.detect(&self.tools, h);
         self.contacts.press_edges(&self.tools, &mut self.bodies);
         self.dormant.disturb(&self.contacts);
         self.contacts.meet(&self.bodies, self.dormant.asleep(), h);
