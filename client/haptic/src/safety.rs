@@ -1,8 +1,10 @@
 //! The safety stage: when force is allowed, how much of it, and how fast it may change.
 //!
-//! Order: [`watchdog`] (device faults, freshness, engagement) → [`passivity`] (energy) → [`limiter`] (slew
-//! and clamp). The limiter is last, so that no later stage can undo it. The passivity observer integrates the
+//! Order: [`tank`] (energy of new models) → [`watchdog`] (device faults, freshness, engagement) → [`passivity`]
+//! (energy of the output) → [`limiter`] (slew and clamp). The limiter is last, so that no later stage can undo it. The passivity observer integrates the
 //! force that was really sent.
+
+pub mod tank;
 
 pub mod watchdog;
 
@@ -34,6 +36,9 @@ pub mod flag {
     pub const MISSED: u32 = 1 << 9;
     /// The device did not answer.
     pub const GONE: u32 = 1 << 10;
+
+    /// The force was held back by the energy tank.
+    pub const UNPAID: u32 = 1 << 11;
 
     /// Faults of the device: the force is cut to zero at once.
     pub const DEVICE_FAULTS: u32 = NOT_FINITE | JUMP | OVER_SPEED | GONE;

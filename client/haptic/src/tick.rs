@@ -12,6 +12,7 @@ use crate::log::row::LogRow;
 use crate::safety::flag;
 use crate::safety::limiter::Limiter;
 use crate::safety::passivity::Passivity;
+use crate::safety::tank::EnergyTank;
 use crate::safety::watchdog::{DeviceGuard, Permit, Watchdog};
 use crate::statistics::{Histogram, LoopReport};
 use crate::virtual_coupling::VirtualCoupling;
@@ -71,6 +72,7 @@ pub struct HapticTick {
     law: ContactLaw,
     coupling: VirtualCoupling,
     blend: Blend,
+    tank: EnergyTank,
     watchdog: Watchdog,
     passivity: Passivity,
     limiter: Limiter,
@@ -90,6 +92,7 @@ impl HapticTick {
             law: ContactLaw::default(),
             coupling: VirtualCoupling::new(&capability),
             blend: Blend::default(),
+            tank: EnergyTank::default(),
             watchdog: Watchdog::default(),
             passivity: Passivity::new(MAX_INJECTED_DAMPING * capability.damping_ns_m),
             limiter: Limiter::new(limits.max_force_n.min(capability.max_force_n), limits.slew_n_s),
@@ -97,6 +100,12 @@ impl HapticTick {
             ages: Histogram::default(),
             report: LoopReport::default(),
         }
+    }
+
+    /// Lets models inject any energy; only for a mutation test.
+    #[doc(hidden)]
+    pub fn open_tank(&mut self) {
+        self.tank.open();
     }
 
     /// One tick: device → contact → force of the tissue → safety → device, pose, log. It takes no lock,
@@ -130,10 +139,14 @@ impl HapticTick {
 
         let loads = self.law.loads(&model, &state.position_m, time.now_ns);
         let tissue_n = self.coupling.force(&state, &loads, model.max_stiffness_n_m);
-        let felt_n = self.blend.apply(tissue_n, &model, time.now_ns);
+        let blended_n = self.blend.apply(tissue_n, &model, time.now_ns);
+        let charge = self.coupling.charge(&blended_n, &state.position_m, &loads);
+        let (felt_n, is_paid) = self.tank.pay(blended_n, state.position_m, &charge);
 
         let permit = self.watchdog.judge(&model, &felt_n, alive, faults, time.now_ns);
         let output = self.release(&permit, felt_n, &state.velocity_m_s, model.max_force_n);
+        let output = TickOutput { flags: output.flags | if is_paid { 0 } else { flag::UNPAID }, ..output };
+        self.tank.observe(&output.force_n, &charge);
         self.device.write(output.force_n);
 
         let row = LogRow {

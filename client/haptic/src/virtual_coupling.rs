@@ -17,6 +17,7 @@
 use crate::constants::{PERIOD_S, VIRTUAL_DAMPING_SHARE};
 use crate::contact::law::PlaneLoads;
 use crate::device::{Capability, DeviceState};
+use crate::safety::tank::Charge;
 use nalgebra::{Matrix3, Vector3};
 
 /// Most rounds of the search for the loaded planes; there are at most eight planes.
@@ -48,6 +49,13 @@ impl VirtualCoupling {
         };
         let elastic = loads.force_at(&proxy);
         elastic + self.damping(state, loads, &proxy, elastic.norm())
+    }
+
+    /// What `force_n` costs an energy tank with the tip at `p`.
+    pub fn charge(&self, force_n: &Vector3<f64>, p: &Vector3<f64>, loads: &PlaneLoads) -> Charge {
+        let along = force_n.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vector3::z);
+        let stiffness_n_m = loads.stiffness_along(p, &along).min(self.stiffness_limit_n_m);
+        Charge { stiffness_n_m, tissue_w: loads.tissue_power(p) }
     }
 
     /// −Σ b n n·(v − v_s) over the planes that load the tip, limited to the damping that the device can

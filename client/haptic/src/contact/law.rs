@@ -70,6 +70,18 @@ impl PlaneLoads {
         self.iter().map(|load| load.at(p) * load.normal).sum()
     }
 
+    /// Stiffness along the unit vector `along` with the tip at `p` [N/m].
+    pub fn stiffness_along(&self, p: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
+        let share = |load: &PlaneLoad| load.stiffness_n_m * load.normal.dot(along).powi(2);
+        self.iter().filter(|load| load.acts(p)).map(share).sum()
+    }
+
+    /// Power with which the surfaces that load the tip at `p` push it by their own motion [W].
+    pub fn tissue_power(&self, p: &Vector3<f64>) -> f64 {
+        let pushes = |load: &PlaneLoad| load.at(p) * load.normal.dot(&load.surface_velocity_m_s);
+        self.iter().filter(|load| load.acts(p)).map(pushes).sum()
+    }
+
     /// Upper bound of the stiffness in any direction: the trace of Σ k n nᵀ [N/m].
     pub fn stiffness_bound(&self) -> f64 {
         self.iter().map(|load| load.stiffness_n_m).sum()

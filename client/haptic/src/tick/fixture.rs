@@ -120,6 +120,23 @@ impl Rig {
         (0..ms).map(one).collect()
     }
 
+    /// Presses down to `depth_m` [m] at 20 mm/s, as a hand would, and waits. The hand pays for the force.
+    pub fn press(&mut self, depth_m: f64, message: &dyn Fn(u64) -> HapticContact) -> Vec<TickOutput> {
+        let mut outputs = Vec::new();
+        let ticks = (depth_m / 2e-5).ceil().max(1.0);
+        for i in 1..=ticks as usize {
+            let z = -depth_m * i as f64 / ticks;
+            self.device.place(Vector3::new(0.0, 0.0, z), Vector3::zeros());
+            if i % 5 == 1 {
+                self.seq += 1;
+                self.inbox.accept(&message(self.seq), self.now_ns, 0);
+            }
+            outputs.push(self.step());
+        }
+        outputs.extend(self.run(100, Some(message)));
+        outputs
+    }
+
     /// A rig that is engaged at full gain, without force.
     pub fn engaged(limits: Limits) -> Self {
         let mut rig = Self::new(limits);
