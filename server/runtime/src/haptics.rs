@@ -26,4 +26,6 @@ pub mod trial;
 
 pub mod table;
 
+pub mod cases;
+
 pub mod page;

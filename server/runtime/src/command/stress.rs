@@ -12,6 +12,7 @@ use super::accuracy::{bar, listen};
 use super::cli::StressArgs;
 use super::say::say;
 use crate::error::RuntimeError;
+use crate::haptics::cases::CASES;
 
 /// Runs the cases and writes the page. Ctrl-C ends it after the cases that are under way.
 pub fn stress(args: &StressArgs) -> Result<ExitCode, RuntimeError> {
@@ -20,8 +21,13 @@ pub fn stress(args: &StressArgs) -> Result<ExitCode, RuntimeError> {
     }
     let stop = Arc::new(AtomicBool::new(false));
     listen(&stop)?;
-    let settings =
-        Settings { cases: args.cases.clone(), long: args.long, threads: usize::from(args.threads), stop };
+    let settings = Settings {
+        cases: args.cases.clone(),
+        more: CASES,
+        long: args.long,
+        threads: usize::from(args.threads),
+        stop,
+    };
     let bar = bar(args.json);
     let report = stress::run(&settings, &mut |progress| show(&bar, "", &progress))?;
     let table = match args.mutations {
@@ -41,10 +47,9 @@ pub fn stress(args: &StressArgs) -> Result<ExitCode, RuntimeError> {
 }
 
 fn list(args: &StressArgs) -> Result<ExitCode, RuntimeError> {
-    for case in stress::select(&args.cases)? {
+    for case in stress::select(&args.cases, CASES)? {
         let number = case.number.map_or(String::new(), |number| number.to_string());
-        let later = if case.run.is_some() { "" } else { " (not yet)" };
-        say!("{number:>3}  {:16} {}{later}", case.name, case.title);
+        say!("{number:>3}  {:16} {}", case.name, case.title);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -71,10 +76,9 @@ fn print(args: &StressArgs, report: &SuiteReport, table: Option<&[Row]>) {
         }
     }
     say!(
-        "{} passed, {} failed, {} not yet, in {:.0} s{}",
+        "{} passed, {} failed, in {:.0} s{}",
         report.count(Status::Passed),
         report.count(Status::Failed),
-        report.count(Status::NotYet),
         report.seconds,
         if report.interrupted { "; interrupted" } else { "" }
     );
@@ -101,7 +105,6 @@ fn as_json(args: &StressArgs, report: &SuiteReport, table: Option<&[Row]>) -> se
         "interrupted": report.interrupted,
         "passed": report.count(Status::Passed),
         "failed": report.count(Status::Failed),
-        "not_yet": report.count(Status::NotYet),
         "cases": cases.collect::<Vec<_>>(),
         "mutations": table.map(|rows| rows.iter().map(|row| json!({
             "mutation": row.mutation.name(),

@@ -18,11 +18,13 @@ const SUBSTEPS: usize = 10;
 /// Step of the encoder at the tip [m]; a Touch resolves 55 µm, an Inverse3 about 10 µm.
 const ENCODER_M: f64 = 20e-6;
 /// Time constant of the amplifier [s].
-const AMPLIFIER_S: f64 = 1e-3;
+pub const AMPLIFIER_S: f64 = 1e-3;
 /// Weight of the newest difference in the velocity, a low pass of about 40 Hz.
 const VELOCITY_WEIGHT: f64 = 0.2;
-/// Moving mass of the device [kg], and its damping [N·s/m].
-const DEVICE: (f64, f64) = (0.05, 3.0);
+/// Moving mass of the device [kg].
+const MASS_KG: f64 = 0.05;
+/// Its damping [N·s/m].
+pub const DAMPING_NS_M: f64 = 3.0;
 
 /// Impedance of a hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,8 +109,8 @@ impl Body {
         let grip =
             hand.stiffness_n_m * (to - self.position_m) + hand.damping_ns_m * (speed - self.velocity_m_s);
         self.given_n += (self.commanded_n - self.given_n) * (1.0 - (-dt / AMPLIFIER_S).exp());
-        let force = grip - DEVICE.1 * self.velocity_m_s + self.given_n;
-        self.velocity_m_s += force * (dt / (hand.mass_kg + DEVICE.0));
+        let force = grip - DAMPING_NS_M * self.velocity_m_s + self.given_n;
+        self.velocity_m_s += force * (dt / (hand.mass_kg + MASS_KG));
         self.position_m += self.velocity_m_s * dt;
         self.work_j += self.given_n.dot(&self.velocity_m_s) * dt;
         self.time_s += dt;

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Vector3;
 use scindo_haptic::contact::model::{ContactInbox, contact_slot};
 use scindo_haptic::device::ToolMode as DeviceMode;
+use scindo_haptic::statistics::LoopReport;
 use scindo_haptic::tick::{HapticTick, Limits, Ports, TickTime};
 use scindo_proto::messages::HapticContact;
 use scindo_world::contact::model::{ContactModels, ToolQuery};
@@ -32,8 +33,10 @@ const STILL_S: [f64; 2] = [1.3, 1.5];
 const DEPTH_M: f64 = 0.004;
 const CLEARANCE_M: f64 = 0.010;
 const SLIDE_M: f64 = 0.010;
+/// From press to press of a hand that presses again and again [ms].
+pub(super) const PERIOD_OF_PRESSES_MS: usize = 1200;
 /// Limits of the client, its defaults.
-const LIMITS: Limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
+pub(super) const LIMITS: Limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };
 
 /// What a cell of the table varies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,7 +98,8 @@ struct Session {
     up: Line<ToolInput>,
     down: Line<HapticContact>,
     server: Server,
-    truth: Tissue,
+    /// The same tissue solved every millisecond, where the truth is wanted.
+    truth: Option<Tissue>,
     poses: u64,
     age_ms: f64,
 }
@@ -110,6 +114,13 @@ struct Server {
 }
 
 impl Server {
+    /// Only the newest pose counts.
+    fn receive(&mut self, pose: ToolInput) {
+        if self.newest.as_ref().is_none_or(|newest| pose.seq > newest.seq) {
+            self.newest = Some(pose);
+        }
+    }
+
     /// One millisecond: steps and evaluates where they are due. A message if there is one.
     fn run(&mut self, ms: u64) -> Option<HapticContact> {
         let now_s = ms as f64 * 1e-3;
@@ -134,18 +145,20 @@ impl Server {
 }
 
 impl Session {
-    fn new(cell: &Cell) -> Result<Self, SceneError> {
-        let (device, probe) = BenchDevice::new(cell.hand, path, |_| DeviceMode::Touch);
+    fn new(
+        (hand, path): (Hand, fn(f64) -> Vector3<f64>),
+        (up, down): (Line<ToolInput>, Line<HapticContact>),
+    ) -> Result<Self, SceneError> {
+        let (device, probe) = BenchDevice::new(hand, path, |_| DeviceMode::Touch);
         let (slot, contacts) = contact_slot();
         let server_alive = Arc::new(AtomicBool::new(true));
         let ports = Ports { contacts, server_alive, poses: None, log: None, meter: None };
-        let half_ns = cell.delay_ms * MS / 2;
         Ok(Self {
             tick: HapticTick::new(Box::new(device), LIMITS, ports),
             probe,
             inbox: ContactInbox::new(slot),
-            up: Line::new(half_ns, cell.loss, 1),
-            down: Line::new(half_ns, cell.loss, 2),
+            up,
+            down,
             server: Server {
                 tissue: Tissue::new(STEP_MS as f64 * 1e-3)?,
                 models: ContactModels::default(),
@@ -153,7 +166,7 @@ impl Session {
                 newest: None,
                 messages: 0,
             },
-            truth: Tissue::new(1e-3)?,
+            truth: None,
             poses: 0,
             age_ms: f64::NAN,
         })
@@ -170,10 +183,12 @@ impl Session {
         self.poses += 1;
         let measured = (body.measured_m, body.measured_m_s);
         let pose = tool_input(measured, ToolMode::Touch, self.poses, now_ns);
-        self.truth.step(Some(&pose));
+        if let Some(truth) = &mut self.truth {
+            truth.step(Some(&pose));
+        }
         self.up.send(pose, now_ns);
         while let Some(pose) = self.up.receive(now_ns) {
-            self.server.newest = Some(pose);
+            self.server.receive(pose);
         }
         if let Some(message) = self.server.run(ms) {
             self.down.send(message, now_ns);
@@ -182,7 +197,7 @@ impl Session {
             time_s: now_ns as f64 * 1e-9,
             tip_m: body.position_m,
             felt_n: output.force_n,
-            truth_n: self.truth.force_n(),
+            truth_n: self.truth.as_ref().map_or_else(Vector3::zeros, Tissue::force_n),
             work_j: body.work_j,
             age_ms: self.age_ms,
         }
@@ -194,8 +209,37 @@ impl Session {
 /// # Errors
 /// If the tissue cannot be built.
 pub fn run(cell: Cell) -> Result<Trial, SceneError> {
-    let mut session = Session::new(&cell)?;
+    let half_ns = cell.delay_ms * MS / 2;
+    let lines = (Line::new(half_ns, cell.loss, 1), Line::new(half_ns, cell.loss, 2));
+    let mut session = Session::new((cell.hand, path), lines)?;
+    session.truth = Some(Tissue::new(1e-3)?);
     let samples: Vec<Sample> = (1..=LENGTH_MS).map(|ms| session.millisecond(ms)).collect();
     let figures = Figures::of(&samples, cell.allowed().unwrap_or(0.15), STILL_S);
     Ok(Trial { cell, figures, samples })
+}
+
+/// Where a hand wants to be that presses for half a second, again and again.
+fn presses(t: f64) -> Vector3<f64> {
+    let in_period = t % (PERIOD_OF_PRESSES_MS as f64 * 1e-3);
+    let s = ((0.3 - (in_period - 0.8).abs()) / 0.1).clamp(0.0, 1.0);
+    let down = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    Vector3::new(0.0, 0.001, TOP_M + 0.005 + CLEARANCE_M - (CLEARANCE_M + DEPTH_M) * down)
+}
+
+/// Lets `hand` press several times over two directions of a link, with or without the client's energy tank. Every tick,
+/// without the truth, and the client's own figures.
+///
+/// # Errors
+/// If the tissue cannot be built.
+pub fn press_over(
+    hand: Hand,
+    lines: (Line<ToolInput>, Line<HapticContact>),
+    open_tank: bool,
+) -> Result<(Vec<Sample>, LoopReport), SceneError> {
+    let mut session = Session::new((hand, presses), lines)?;
+    if open_tank {
+        session.tick.open_tank();
+    }
+    let samples = (1..=2 * LENGTH_MS).map(|ms| session.millisecond(ms)).collect();
+    Ok((samples, session.tick.report()))
 }

@@ -20,7 +20,6 @@ pub fn suite(report: &SuiteReport, table: Option<&[Row]>) -> Value {
         },
         "passed": report.count(Status::Passed),
         "failed": report.count(Status::Failed),
-        "not_yet": report.count(Status::NotYet),
         "cases": report.cases.iter().map(case).collect::<Vec<_>>(),
         "mutations": table.map(|rows| rows.iter().map(row).collect::<Vec<_>>()),
     })

@@ -29,11 +29,13 @@ pub enum Mutation {
     Friction,
     /// Sweeps of tools between their poses.
     Continuous,
+    /// The energy tank of haptic clients.
+    Tank,
 }
 
 impl Mutation {
     /// All mutations, in the order of the table.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::PieceMasses,
         Self::ExactPredicates,
         Self::Predictor,
@@ -44,6 +46,7 @@ impl Mutation {
         Self::Exclusion,
         Self::Friction,
         Self::Continuous,
+        Self::Tank,
     ];
 
     /// Stable name for programs.
@@ -59,6 +62,7 @@ impl Mutation {
             Self::Exclusion => "exclusion",
             Self::Friction => "friction",
             Self::Continuous => "continuous",
+            Self::Tank => "tank",
         }
     }
 
@@ -77,6 +81,7 @@ impl Mutation {
             Self::Exclusion => "a body meets all of its triangles, those beside a vertex included",
             Self::Friction => "friction is bounded by the normal force of the step before",
             Self::Continuous => "tools jump from pose to pose",
+            Self::Tank => "haptic clients take over any energy that a new contact model brings",
         }
     }
 
@@ -93,6 +98,7 @@ impl Mutation {
             Self::Exclusion => &["lips-in-contact"],
             Self::Friction => &["incline"],
             Self::Continuous => &["tool-jab"],
+            Self::Tank => &["haptic-wall"],
         }
     }
 
@@ -108,11 +114,11 @@ impl Mutation {
             Self::HangingWeights => Ablation { hanging_weights: true, ..none },
             Self::StaleVertices => Ablation { stale_vertices: true, ..none },
             Self::Friction => Ablation { lagged_friction: true, ..none },
-            Self::Exclusion | Self::Continuous => none,
+            Self::Exclusion | Self::Continuous | Self::Tank => none,
         };
         let contact =
             ContactAblation { exclusion: self == Self::Exclusion, continuous: self == Self::Continuous };
-        Setting { ablation, contact, long: false }
+        Setting { ablation, contact, open_tank: self == Self::Tank, long: false }
     }
 }
 
@@ -149,7 +155,7 @@ impl Row {
 /// # Errors
 /// A name that no case has.
 pub fn table(settings: &Settings, progress: &mut dyn FnMut(Progress<'_>)) -> Result<Vec<Row>, StressError> {
-    let cases: Vec<_> = select(&settings.cases)?.into_iter().filter(|case| case.run.is_some()).collect();
+    let cases = select(&settings.cases, settings.more)?;
     let row = |mutation: Mutation| {
         let reports = run_cases(&cases, &mutation.setting(), settings, progress);
         let failed = reports.iter().filter(|(report, _)| report.status == Status::Failed);

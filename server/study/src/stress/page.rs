@@ -13,7 +13,7 @@ use crate::page::style;
 /// Style of status marks, chart lines and case cards.
 const STYLE: &str = "
 .state { display: inline-block; min-width: 66px; padding: 1px 9px; border-radius: 10px; font-size: 13px; font-weight: 600; text-align: center; color: #fff; }
-.state.passed { background: #1f7a4d; } .state.failed { background: #b3261e; } .state.not-yet { background: #7a8491; }
+.state.passed { background: #1f7a4d; } .state.failed { background: #b3261e; }
 .whole, p code { white-space: nowrap; }
 table.glance td:nth-child(3) { white-space: normal; min-width: 30ch; }
 table.glance td:nth-child(4) { white-space: normal; color: var(--soft); }
@@ -53,10 +53,9 @@ pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
 fn opening(report: &SuiteReport) -> String {
     let machine = &report.origin.machine;
     let mut out = format!(
-        "<header>\n<h1>Hard cases</h1>\n<p class=\"lead\">{} passed, {} failed, {} not yet · scindo {} · commit {} · {}</p>\n",
+        "<header>\n<h1>Hard cases</h1>\n<p class=\"lead\">{} passed, {} failed · scindo {} · commit {} · {}</p>\n",
         report.count(Status::Passed),
         report.count(Status::Failed),
-        report.count(Status::NotYet),
         escape(&report.origin.version),
         escape(&report.origin.commit),
         escape(&machine.processor)
@@ -69,13 +68,12 @@ fn opening(report: &SuiteReport) -> String {
             case has a rule that it passes or fails. Cases marked <strong>C</strong> also keep the common rule: \
             everything is finite; mass is constant to 1e-12; the momentum of free parts is balanced to 1e-6; \
             energy never exceeds that of the start plus the work done by more than one percent; and every step \
-            that is held, refused or divided is reported. Cases of features that are not implemented are listed \
-            as <em>not yet</em>.</p>\n</header>\n";
+            that is held, refused or divided is reported.</p>\n</header>\n";
     out
 }
 
 fn state(status: Status) -> String {
-    format!("<span class=\"state {}\">{}</span>", status.name().replace(' ', "-"), status.name())
+    format!("<span class=\"state {0}\">{0}</span>", status.name())
 }
 
 fn number(report: &CaseReport) -> String {
@@ -86,7 +84,6 @@ fn glance(report: &SuiteReport) -> String {
     let mut out = "<div class=\"scroll\"><table class=\"glance\">\n<thead><tr><th class=\"number\">no.</th><th></th><th>case</th><th>closest to its bound, or why it failed</th></tr></thead>\n<tbody>\n".to_owned();
     for case in &report.cases {
         let told = match case.status {
-            Status::NotYet => waits_for(case.case.set_up).to_owned(),
             Status::Failed => case.failures().into_iter().next().unwrap_or_default(),
             Status::Passed => closest(&case.evidence.figures).map_or(String::new(), Figure::words),
         };
@@ -111,11 +108,6 @@ fn whole(text: &str) -> String {
         if word.contains("e-") { format!("<span class=\"whole\">{escaped}</span>") } else { escaped }
     };
     text.split(' ').map(word).collect::<Vec<_>>().join(" ")
-}
-
-/// The last sentence of a set-up that cannot be run yet: it names the missing part.
-fn waits_for(set_up: &str) -> &str {
-    set_up.rfind(". ").map_or(set_up, |end| &set_up[end + 2..])
 }
 
 /// The figure that uses most of what its bound allows, preferably one of the case's own rule.

@@ -19,6 +19,8 @@ use crate::bench::store::Origin;
 pub struct Settings {
     /// Names or numbers of cases; empty for all.
     pub cases: Vec<String>,
+    /// Cases of the program beside those of [`cases::ALL`].
+    pub more: &'static [Case],
     /// Whether cases that have a long form take it.
     pub long: bool,
     /// Number of cases run in parallel; 0 for one per hardware thread.
@@ -83,19 +85,20 @@ pub struct Progress<'a> {
     pub status: Status,
 }
 
-/// The cases with these names or numbers; all cases if none is given.
+/// The cases with these names or numbers, of the list and of the program's own; all of them if no name is given.
 ///
 /// # Errors
 /// A name that no case has.
-pub fn select(names: &[String]) -> Result<Vec<&'static Case>, StressError> {
-    let all = cases::ALL;
+pub fn select(names: &[String], more: &'static [Case]) -> Result<Vec<&'static Case>, StressError> {
+    let mut all: Vec<&'static Case> = cases::ALL.iter().chain(more).collect();
+    all.sort_by_key(|case| case.number.unwrap_or(u8::MAX));
     if names.is_empty() {
-        return Ok(all.iter().collect());
+        return Ok(all);
     }
     let find = |name: &String| {
         let same =
             |case: &&Case| case.name == name || case.number.is_some_and(|number| number.to_string() == *name);
-        all.iter().find(same).ok_or_else(|| StressError::NoSuchCase {
+        all.iter().copied().find(same).ok_or_else(|| StressError::NoSuchCase {
             name: name.clone(),
             known: all.iter().map(|case| case.name).collect::<Vec<_>>().join(", "),
         })
@@ -108,7 +111,7 @@ pub fn select(names: &[String]) -> Result<Vec<&'static Case>, StressError> {
 /// # Errors
 /// A name that no case has.
 pub fn run(settings: &Settings, progress: &mut dyn FnMut(Progress<'_>)) -> Result<SuiteReport, StressError> {
-    let cases = select(&settings.cases)?;
+    let cases = select(&settings.cases, settings.more)?;
     let started = Instant::now();
     let done = run_cases(&cases, &Setting { long: settings.long, ..Setting::default() }, settings, progress);
     let interrupted = done.len() < cases.len();
@@ -160,10 +163,7 @@ pub(super) fn run_cases(
 
 /// Runs one case. A panic counts as a failure.
 pub fn run_case(case: &'static Case, setting: &Setting) -> CaseReport {
-    let Some(run) = case.run else {
-        return CaseReport { case, status: Status::NotYet, reason: None, evidence: Evidence::default() };
-    };
-    let outcome = catch_unwind(AssertUnwindSafe(|| run(setting)));
+    let outcome = catch_unwind(AssertUnwindSafe(|| (case.run)(setting)));
     let (evidence, reason) = match outcome {
         Ok(Ok(evidence)) => (evidence, None),
         Ok(Err(error)) => (Evidence::default(), Some(error.to_string())),

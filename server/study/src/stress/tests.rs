@@ -9,14 +9,15 @@ fn every_case_of_the_list_is_there_once() {
     names.sort_unstable();
     names.dedup();
     assert_eq!(names.len(), cases::ALL.len());
-    let later: Vec<u8> =
-        cases::ALL.iter().filter(|case| case.run.is_none()).filter_map(|case| case.number).collect();
-    assert_eq!(later, [25, 27]);
+    // Cases 25 and 27 need a haptic client.
+    let numbers: Vec<u8> = cases::ALL.iter().filter_map(|case| case.number).collect();
+    assert!(numbers.is_sorted());
+    assert_eq!((1..=31).filter(|number| !numbers.contains(number)).collect::<Vec<u8>>(), [25, 27]);
 }
 
 #[test]
 fn cases_are_found_by_name_and_number() {
-    let find = |name: &str| select(&[name.to_owned()]).map(|found| found[0].name);
+    let find = |name: &str| select(&[name.to_owned()], &[]).map(|found| found[0].name);
     assert_eq!(find("8").unwrap(), "free-fall");
     assert_eq!(find("free-fall").unwrap(), "free-fall");
     assert!(find("no-such-case").unwrap_err().to_string().contains("free-fall"));
@@ -38,26 +39,25 @@ fn cases_pass_and_are_the_same_on_every_run() {
     let mut wrong = Vec::new();
     for (report, seconds) in first.cases.iter().zip(&first.case_seconds) {
         println!("{:8} {:16} {seconds:.1} s", report.status.name(), report.case.name);
-        assert_eq!(report.status == Status::NotYet, report.case.run.is_none());
         if report.status == Status::Failed {
             wrong.push(format!("{}: {:#?}", report.case.name, report.failures()));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    let again = run_case(select(&["free-fall".into()]).unwrap()[0], &Setting::default());
+    let again = run_case(select(&["free-fall".into()], &[]).unwrap()[0], &Setting::default());
     let before = first.cases.iter().find(|report| report.case.name == "free-fall").unwrap();
     assert_eq!(json::case(before).to_string(), json::case(&again).to_string());
     let page = std::fs::read_to_string(directory.path().join("index.html")).unwrap();
     assert!(page.contains("free-fall") && !page.contains("MNaN") && !page.contains("LNaN"));
 }
 
-/// Every mutation is noticed by the cases named for it.
+/// Every mutation is noticed by the cases named for it. Those of clients are tested where clients are known.
 #[test]
 fn every_mutation_is_caught_by_its_named_cases() {
     let mut missed = Vec::new();
-    for mutation in Mutation::ALL {
+    for mutation in Mutation::ALL.into_iter().filter(|mutation| *mutation != Mutation::Tank) {
         for name in mutation.named() {
-            let report = run_case(select(&[(*name).to_owned()]).unwrap()[0], &mutation.setting());
+            let report = run_case(select(&[(*name).to_owned()], &[]).unwrap()[0], &mutation.setting());
             println!("without {}: {name} {}: {:?}", mutation.name(), report.status.name(), report.failures());
             if report.status != Status::Failed {
                 missed.push(format!("{} passes without {}", name, mutation.name()));

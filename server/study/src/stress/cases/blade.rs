@@ -17,7 +17,7 @@ pub const PRESSED: Case = Case {
            opened, to 5 % (12 % between cells, whose lips are larger than what the blade swept).",
     source: "Jeřábková 2007, 4.1.3: cutting with force feedback",
     quick: true,
-    run: Some(pressed),
+    run: pressed,
 };
 
 const TOUGHNESS_J_M2: f64 = 60.0;

@@ -22,7 +22,7 @@ pub const HALVED: Case = Case {
            to 1e-12; surface closed.",
     source: "Nienhuys 2003, §3.2.1",
     quick: true,
-    run: Some(halved),
+    run: halved,
 };
 
 /// Case 6.
@@ -36,7 +36,7 @@ pub const RANDOM: Case = Case {
            connected material are those connected by shared copies.",
     source: "Sifakis 2007; Ton-That 2024",
     quick: false,
-    run: Some(random),
+    run: random,
 };
 
 /// Case 9.
@@ -49,7 +49,7 @@ pub const BRANCHES: Case = Case {
     rule: "3, 4, 3 and 4 parts; the surface is closed and 2-manifold; no volume is lost.",
     source: "Jeřábková 2007, Figs. 3.5 and 3.6",
     quick: true,
-    run: Some(branches),
+    run: branches,
 };
 
 /// Case 12.
@@ -62,7 +62,7 @@ pub const MOVING: Case = Case {
     rule: "C. One part and one closed surface until the blade is through, two parts then.",
     source: "Nienhuys 2003, §3.3",
     quick: true,
-    run: Some(moving),
+    run: moving,
 };
 
 /// Case 13.
@@ -78,7 +78,7 @@ pub const CLAMPED: Case = Case {
            place, bit for bit, on both lips.",
     source: "Schoch et al. 2013, §5.2",
     quick: true,
-    run: Some(clamped),
+    run: clamped,
 };
 
 fn halved(setting: &Setting) -> Result<Evidence, Trouble> {

@@ -27,7 +27,7 @@ pub const ALIGNED: Case = Case {
            cut in one layer: as many as cells touch the plane from one side. A shift along faces changes no link.",
     source: "cases 2 to 5; Dick 2011, §4.3",
     quick: true,
-    run: Some(aligned),
+    run: aligned,
 };
 
 /// Cases 6 and 9 on cells.
@@ -42,7 +42,7 @@ pub const BRANCHES: Case = Case {
            and 3 parts.",
     source: "cases 6 and 9; Sifakis 2007",
     quick: true,
-    run: Some(branches),
+    run: branches,
 };
 
 /// Cases 7, 8 and 13 on cells.
@@ -55,7 +55,7 @@ pub const FALLING: Case = Case {
     rule: "C. The momentum of every free fragment is density × volume × g × time to 1e-6.",
     source: "cases 7, 8 and 13",
     quick: true,
-    run: Some(falling),
+    run: falling,
 };
 
 /// Cases 10 to 12 on cells.
@@ -69,7 +69,7 @@ pub const GROWTH: Case = Case {
            cell, vertex or triangle.",
     source: "cases 10, 11 and 12; Nienhuys 2003, §3.3",
     quick: true,
-    run: Some(growing),
+    run: growing,
 };
 
 /// Cells that are divided and joined while the body moves and is cut.
@@ -84,7 +84,7 @@ pub const ADAPTING: Case = Case {
            cells are joined again within four rounds. Energy counts without what adaptation changes and reports.",
     source: "Bangerth 2003, §4; cases 6 and 10",
     quick: true,
-    run: Some(adapting),
+    run: adapting,
 };
 
 /// A cube of 0.1 m as octree cells.

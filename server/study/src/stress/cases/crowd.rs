@@ -20,7 +20,7 @@ pub const CASE: Case = Case {
            have the same bits.",
     source: "own",
     quick: false,
-    run: Some(fifty),
+    run: fifty,
 };
 
 fn fifty(setting: &Setting) -> Result<Evidence, Trouble> {

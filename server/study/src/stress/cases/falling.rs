@@ -21,7 +21,7 @@ pub const FREED_NODE: Case = Case {
            more than a thousandth of its volume in it.",
     source: "Molino, Bao, Fedkiw 2004: virtual nodes with the masses of their pieces",
     quick: true,
-    run: Some(freed_node),
+    run: freed_node,
 };
 
 /// Case 8.
@@ -36,7 +36,7 @@ pub const FRAGMENTS: Case = Case {
            degrees of freedom as in Jeřábková 2007, (3.47): 0.40 to 0.997.)",
     source: "errata of Jeřábková 2007, (3.46) and (3.47)",
     quick: true,
-    run: Some(fragments),
+    run: fragments,
 };
 
 /// A part of a body and the copies that move it.

@@ -22,7 +22,7 @@ pub const GROWTH: Case = Case {
            at every tick.",
     source: "Jeřábková 2007, §4.1.3",
     quick: true,
-    run: Some(growing),
+    run: growing,
 };
 
 /// Case 11.
@@ -35,7 +35,7 @@ pub const AGAIN: Case = Case {
     rule: "No copy, piece, fragment or surface triangle is added after the first sweep.",
     source: "own",
     quick: true,
-    run: Some(again),
+    run: again,
 };
 
 /// Edge of a cell [m].

@@ -16,7 +16,7 @@ pub const CASE: Case = Case {
            before, to 0.1 mm.",
     source: "Jeřábková 2007, §4.1",
     quick: true,
-    run: Some(jab),
+    run: jab,
 };
 
 /// Largest force of the tool [N].

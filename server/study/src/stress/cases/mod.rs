@@ -11,7 +11,6 @@ mod far;
 mod growth;
 mod input;
 mod jab;
-mod later;
 mod multigrid;
 mod overload;
 mod on_mesh;
@@ -25,7 +24,8 @@ mod touch;
 
 use super::case::Case;
 
-/// All cases: first the numbered ones, then those shown beside them.
+/// The cases of a simulation by itself: first the numbered ones, then those shown beside them. A program that
+/// knows more, such as clients, adds its own.
 pub const ALL: &[Case] = &[
     sliver::CASE,
     on_mesh::NODE,
@@ -51,9 +51,7 @@ pub const ALL: &[Case] = &[
     stiff::INCOMPRESSIBLE,
     stiff::NEEDLES,
     jab::CASE,
-    later::PACKETS,
     input::CASE,
-    later::WALL,
     touch::LIPS,
     multigrid::BLADES,
     soak::CASE,

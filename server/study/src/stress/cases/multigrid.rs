@@ -28,7 +28,7 @@ pub const BLADES: Case = Case {
            the error; worse without duplicated coarse cells: at least 1.3 times as many iterations.",
     source: "Dick 2011, Figs. 10 and 11",
     quick: true,
-    run: Some(blades),
+    run: blades,
 };
 
 /// Hanging corners.
@@ -43,7 +43,7 @@ pub const PATCH: Case = Case {
            that were fine before a cut share the same vertices as cells that the cut made fine.",
     source: "Wang 2001; Dick 2011, §6.4",
     quick: true,
-    run: Some(patch),
+    run: patch,
 };
 
 /// Stiffness number of the step.

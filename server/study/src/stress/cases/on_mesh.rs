@@ -23,9 +23,7 @@ pub const NODE: Case = Case {
            was not cut moves to the same positions, to 1e-6 of the edge.",
     source: "Wang 2014; Schoch et al. 2013, the cases \"0\"",
     quick: true,
-    run: Some(|setting| {
-        on_mesh(setting, &[V::new(0.3, -0.7, 0.9), V::new(1.0, 0.0, 0.0), V::new(0.0, 0.0, 1.0)])
-    }),
+    run: |setting| on_mesh(setting, &[V::new(0.3, -0.7, 0.9), V::new(1.0, 0.0, 0.0), V::new(0.0, 0.0, 1.0)]),
 };
 
 /// Case 3.
@@ -40,12 +38,12 @@ pub const EDGE: Case = Case {
     rule: "As the case before; all of the 60 cubes fall into two parts of the right volume.",
     source: "Schoch et al. 2013, Fig. 6",
     quick: true,
-    run: Some(|setting| {
+    run: |setting| {
         let normals = [[1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, -1.0], [2.0, -1.0, -1.0]];
         let mut evidence = on_mesh(setting, &normals.map(V::from))?;
         seams(setting, &mut evidence)?;
         Ok(evidence)
-    }),
+    },
 };
 
 /// Case 4.
@@ -60,7 +58,7 @@ pub const FACE: Case = Case {
            motion is that of the duplicated mesh, to 1e-9 of the edge.",
     source: "Nienhuys 2003, ch. 3",
     quick: true,
-    run: Some(face),
+    run: face,
 };
 
 /// Edge of the cube [m]. Nodes lie at dyadic numbers, so that "exactly" means exactly.

@@ -19,7 +19,7 @@ pub const CASE: Case = Case {
            is reported. When steps are cheap again, everything is taken back.",
     source: "own",
     quick: true,
-    run: Some(overload),
+    run: overload,
 };
 
 /// Length of a step [s].

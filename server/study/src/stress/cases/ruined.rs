@@ -22,7 +22,7 @@ pub const INVERTED: Case = Case {
            1e-2. The law as published has no stress in a mirror image: all 48 elements stay inverted.",
     source: "Irving 2004; Smith 2018",
     quick: true,
-    run: Some(|setting| {
+    run: |setting| {
         let ruins: [(&str, Ruin); 2] = [("x → −x", |_, X| -X), ("mirrored", |_, X| V::new(-X.x, X.y, X.z))];
         let mut evidence = recover(setting, &ruins, [1e-4, 1e-4, 1e-4, 1e-2])?;
         let lame = material(Law::StVenantKirchhoff).lame();
@@ -35,7 +35,7 @@ pub const INVERTED: Case = Case {
             "",
         );
         Ok(evidence)
-    }),
+    },
 };
 
 /// Case 15.
@@ -49,7 +49,7 @@ pub const COLLAPSED: Case = Case {
     rule: "C. The same bounds as for the inverted cube.",
     source: "Smith 2018",
     quick: false,
-    run: Some(|setting| {
+    run: |setting| {
         let ruins: [(&str, Ruin); 4] = [
             ("a point", |_, _| V::zeros()),
             ("noise 1e-12", |i, _| 1e-12 * L * noise(i)),
@@ -57,7 +57,7 @@ pub const COLLAPSED: Case = Case {
             ("a thousandth", |_, X| 1e-3 * X),
         ];
         recover(setting, &ruins, [1e-4, 1e-4, 1e-4, 1e-2])
-    }),
+    },
 };
 
 /// Case 16.
@@ -69,11 +69,11 @@ pub const FLATTENED: Case = Case {
     rule: "C. The same bounds as for the inverted cube.",
     source: "Chen 2024 (vertex block descent)",
     quick: true,
-    run: Some(|setting| {
+    run: |setting| {
         let ruins: [(&str, Ruin); 2] =
             [("flat", |_, X| V::new(X.x, X.y, 0.0)), ("stretched", |_, X| V::new(20.0 * X.x, X.y, X.z))];
         recover(setting, &ruins, [1e-4, 1e-4, 1e-4, 1e-2])
-    }),
+    },
 };
 
 /// Case 17.
@@ -87,7 +87,7 @@ pub const SCRAMBLED: Case = Case {
            on the fast path, which makes one linear solve per step without a line search.",
     source: "Chen 2024",
     quick: false,
-    run: Some(scrambled),
+    run: scrambled,
 };
 
 /// Maps index and rest position of a node to its start position. The cube is centred at the origin.

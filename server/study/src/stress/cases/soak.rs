@@ -24,7 +24,7 @@ pub const CASE: Case = Case {
            second run has the same bits.",
     source: "own",
     quick: false,
-    run: Some(soak),
+    run: soak,
 };
 
 /// Length of a turn [steps].

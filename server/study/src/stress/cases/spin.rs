@@ -23,7 +23,7 @@ pub const STEPS: Case = Case {
            % above; its guard takes over if the cube turns too far in a step, and reports this.",
     source: "no publication; bounds as measured",
     quick: false,
-    run: Some(step_sweep),
+    run: step_sweep,
 };
 
 /// Case 19.
@@ -36,7 +36,7 @@ pub const SPIN: Case = Case {
            20 ms keeps 90 % of the angular momentum.",
     source: "no publication; bounds as measured",
     quick: true,
-    run: Some(free_spin),
+    run: free_spin,
 };
 
 /// Case 20.
@@ -50,7 +50,7 @@ pub const NEWMARK: Case = Case {
            reported.",
     source: "Schoch et al. 2013 (\"jiggling\")",
     quick: true,
-    run: Some(newmark),
+    run: newmark,
 };
 
 fn material(young_pa: f64) -> Material {

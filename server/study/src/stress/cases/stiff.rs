@@ -31,7 +31,7 @@ pub const LAYERS: Case = Case {
            multigrid on octree cells, 16 across, reach 1e-6 of an equilibrium in at most 60 iterations.",
     source: "Dick 2011, Fig. 14",
     quick: false,
-    run: Some(layers),
+    run: layers,
 };
 
 /// Case 22.
@@ -46,7 +46,7 @@ pub const INCOMPRESSIBLE: Case = Case {
            The results of the same elements without the remedy are listed.",
     source: "Smith 2018; Zhu 2010",
     quick: false,
-    run: Some(incompressible),
+    run: incompressible,
 };
 
 /// Case 23.
@@ -61,7 +61,7 @@ pub const NEEDLES: Case = Case {
     rule: "C. At most three times the iterations of the mesh without them.",
     source: "Nienhuys 2003, §3.2.3",
     quick: false,
-    run: Some(needles),
+    run: needles,
 };
 
 /// The elements of one stiffness as a separate mesh, with the index of every node in the whole mesh.

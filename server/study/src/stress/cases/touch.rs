@@ -23,7 +23,7 @@ pub const LIPS: Case = Case {
            lie within 0.05 h of each other. Without self-contact they pass through each other.",
     source: "Teschner 2003; Chen, Diaz, Yuksel 2023: what self-contact of cut bodies has to bear",
     quick: true,
-    run: Some(lips),
+    run: lips,
 };
 
 /// A block on a slope.
@@ -37,7 +37,7 @@ pub const INCLINE: Case = Case {
            1 cm, a quarter of the way that it would slide without friction in the impact. Above, it slides with g (sin θ − μ cos θ) to 2 %.",
     source: "Larionov et al. 2022: lagged friction fails next to the critical angle",
     quick: true,
-    run: Some(incline),
+    run: incline,
 };
 
 /// A body dropped on a needle, and a large one on the floor.
@@ -52,7 +52,7 @@ pub const NEEDLE: Case = Case {
            the weight of the block when it is hit, and at the end the obstacles carry it.",
     source: "own",
     quick: true,
-    run: Some(needle),
+    run: needle,
 };
 
 /// The thesis' own scene of a body on the floor.
@@ -66,7 +66,7 @@ pub const HIPPO: Case = Case {
            prints 7 s for these 5 s, on one core of 2007.)",
     source: "Jeřábková 2007, §5.1",
     quick: true,
-    run: Some(hippo),
+    run: hippo,
 };
 
 /// Two bodies wedged between walls, and one that is pressed through a gap.
@@ -80,7 +80,7 @@ pub const WEDGED: Case = Case {
            0.2 h in anything.",
     source: "own",
     quick: true,
-    run: Some(wedged),
+    run: wedged,
 };
 
 /// A cut that is made while its lips are pressed together.
@@ -95,7 +95,7 @@ pub const PRESSED: Case = Case {
            deeper than 0.05 h in each other; slivers, which are far thinner than that, less than 1 h.",
     source: "own",
     quick: false,
-    run: Some(pressed),
+    run: pressed,
 };
 
 pub(super) const WORLD: &str = "schema = 1\nworld = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }\n";
