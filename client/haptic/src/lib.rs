@@ -10,7 +10,7 @@
 //!   tissue at the present tip.
 //! * [`virtual_coupling`]: stiffness and damping that the device can render passively.
 //! * [`blend`]: force continuity when the model changes.
-//! * [`safety`]: when force is allowed (watchdog, engagement), energy (passivity), clamp and slew.
+//! * [`safety`]: when force is allowed (watchdog, engagement), energy (tank, passivity), clamp and slew.
 //! * [`tick`]: one millisecond, the table of contents of the client.
 //! * [`haptic_loop`]: absolute deadlines, and [`statistics`] of the run.
 //! * [`log`]: every tick as a line of CSV, written by another thread, and the force plot at the end of the

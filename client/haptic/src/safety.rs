@@ -1,8 +1,8 @@
 //! The safety stage: when force is allowed, how much of it, and how fast it may change.
 //!
 //! Order: [`tank`] (energy of new models) → [`watchdog`] (device faults, freshness, engagement) → [`passivity`]
-//! (energy of the output) → [`limiter`] (slew and clamp). The limiter is last, so that no later stage can undo it. The passivity observer integrates the
-//! force that was really sent.
+//! (energy of the output) → [`limiter`] (slew and clamp). The limiter is last, so that no later stage can undo
+//! it. Tank and passivity observer account for the force that was really sent.
 
 pub mod tank;
 
