@@ -15,6 +15,8 @@ pub use crate::body::SurfaceTopology;
 use crate::body::{AdaptCounts, StepCounts};
 use crate::inputs::{ToolMode, ToolShape};
 use crate::report::Energy;
+use crate::tool::compound::{MAX_PARTS, Part};
+use smallvec::SmallVec;
 
 /// The state after one step.
 ///
@@ -116,6 +118,17 @@ pub struct BodySnapshot {
     pub rest_volume_m3: f64,
 }
 
+/// One capsule of a compound tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimbSnapshot {
+    /// The capsule, in the axes of the tool.
+    pub part: Part,
+    /// Where the tissue lets it be.
+    pub proxy: Isometry3<f64>,
+    /// Force of the tissue on it from the step's solve [N].
+    pub force_n: Vector3<f64>,
+}
+
 /// One tool.
 #[derive(Debug, Clone, Default)]
 pub struct ToolSnapshot {
@@ -137,6 +150,8 @@ pub struct ToolSnapshot {
     pub closed: f64,
     /// Force of the tissue on the tool from the step's solve [N].
     pub force_n: Vector3<f64>,
+    /// The capsules of a compound tool that touches; none of others.
+    pub limbs: SmallVec<[LimbSnapshot; MAX_PARTS]>,
     /// Stiffness of the spring between hand and tissue [N/m].
     pub stiffness_n_m: f64,
     /// Body that it touched last, and the compliance of its tissue in a step [m/N]; none before a first touch.

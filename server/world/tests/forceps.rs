@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use scindo_world::assemble::BuildOptions;
+use scindo_world::contact::model::{ContactModels, ToolQuery};
 use scindo_world::inputs::{Inputs, ToolInput, ToolMode, ToolShape, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
@@ -305,4 +306,39 @@ fn two_hands_raise_a_flap() {
     assert_eq!(sim.bodies()[0].body.n_copies(), copies);
     let (_, _, forceps, ..) = after(&mut sim, 10.0);
     assert!(forceps.held_m.is_some());
+}
+
+/// Every jaw that touches is a plane of the local model, and together they are the force of the step.
+#[test]
+fn a_client_feels_each_jaw_that_touches() {
+    let mut table = Table::new(&scene(0.3));
+    let wants = Wants { contact: true, ..Wants::default() };
+    table.inputs.wants = wants.clone();
+    let mut models = ContactModels::default();
+    let mut most = 0;
+    for i in 0..80 {
+        // Open, astride the sheet; then aside, so that one jaw presses its inner face on it.
+        let tip = around() - V::x() * 1.5e-4 * f64::from(i.min(40));
+        let force = table.step(tip, ToolMode::Touch, Some(0.0)).force_n;
+        table.sim.snapshot_into(&wants, &mut table.shot);
+        let (tool, now_s) = (&table.shot.tools[0], f64::from(i) * STEP_S);
+        models.take(&table.shot, now_s);
+        let query = ToolQuery {
+            id: Arc::clone(&tool.id),
+            shape: tool.shape,
+            pose: tool.pose,
+            velocity_m_s: V::zeros(),
+            mode: ToolMode::Touch,
+        };
+        let model = models.evaluate(&query, now_s);
+        let pushing = model.planes.iter().filter(|plane| plane.force_n.norm() > 1e-3).count();
+        most = most.max(pushing);
+        if i == 79 {
+            let felt = model.force_at(tip);
+            assert!(force.x > 0.05, "the jaw at +x presses: {force}");
+            assert!((felt - force).norm() < 0.05 * force.norm(), "{felt} against {force}");
+            assert_eq!(pushing, 1, "the other jaw is in the air");
+        }
+    }
+    assert!(most >= 1);
 }

@@ -33,7 +33,7 @@ impl Contacts {
         let x = body.body.positions();
         for by in 0..self.hands.len() as u32 {
             let each = own.springs.iter().zip(&own.behind).zip(body.body.spring_forces());
-            let own = each.filter(|((_, behind), force)| behind.0 == by && force.norm_squared() > 0.0);
+            let own = each.filter(|((_, behind), force)| behind.tool == by && force.norm_squared() > 0.0);
             let points = own.filter_map(|((spring, _), force)| {
                 Some(point_of(&spring.kind, place(&spring.point, x)?, *force))
             });

@@ -10,6 +10,8 @@ use crate::contact::press::Press;
 use crate::contact::proxy::Proxy;
 use crate::contact::surface::ContactSurface;
 use crate::inputs::{ToolMode, ToolShape};
+use crate::snapshot::LimbSnapshot;
+use crate::tool::compound::MAX_PARTS;
 use crate::tool::geometry::core_radius;
 use crate::tool::{Tool, compound};
 
@@ -18,6 +20,8 @@ use crate::tool::{Tool, compound};
 struct Limb {
     proxy: Proxy,
     press: Press,
+    /// Force of the tissue on it in the last step [N].
+    force_n: Vector3<f64>,
 }
 
 /// The contact state of one tool, kept from step to step.
@@ -85,6 +89,20 @@ impl Hand {
     /// Where and how the capsules of a compound tool press; none for other tools.
     pub fn limbs(&self) -> impl ExactSizeIterator<Item = &Press> {
         self.limbs.iter().map(|limb| &limb.press)
+    }
+
+    /// Takes the forces of the springs of each capsule of a compound tool on tissue [N].
+    pub(super) fn feel(&mut self, on_tissue: &[Vector3<f64>; MAX_PARTS]) {
+        for (limb, force) in self.limbs.iter_mut().zip(on_tissue) {
+            limb.force_n = -force;
+        }
+    }
+
+    /// The capsules of a compound tool that touches, for the local model.
+    pub fn limbs_of(&self, tool: &Tool) -> impl Iterator<Item = LimbSnapshot> {
+        let parts = compound::parts(tool.shape, tool.gap_m()).filter(|_| tool.touches());
+        let limbs = parts.zip(&self.limbs);
+        limbs.map(|(part, limb)| LimbSnapshot { part, proxy: *limb.proxy.pose(), force_n: limb.force_n })
     }
 
     /// How far the jaws of forceps are closed, 0 to 1.
@@ -192,7 +210,11 @@ impl Hand {
     fn follow_with_limbs(&mut self, tool: &Tool, surfaces: &[ContactSurface], h: f64) {
         self.press.release();
         let count = compound::count(tool.shape);
-        self.limbs.resize_with(count, || Limb { proxy: Proxy::default(), press: Press::new() });
+        self.limbs.resize_with(count, || Limb {
+            proxy: Proxy::default(),
+            press: Press::new(),
+            force_n: Vector3::zeros(),
+        });
         let (mut aside, mut touching) = (Vector3::zeros(), 0.0);
         for (limb, part) in self.limbs.iter_mut().zip(compound::parts(tool.shape, tool.gap_m())) {
             let device = tool.pose * part.pose;

@@ -15,7 +15,7 @@ use scindo_physics::body::{PointSpring, SpringKind};
 
 use super::spring::material_points;
 use super::surface::ContactSurface;
-use super::{BodyContacts, corner_of};
+use super::{Behind, BodyContacts, corner_of};
 use crate::inputs::ToolShape;
 use crate::tool::Tool;
 use crate::tool::compound::inner_face;
@@ -222,7 +222,7 @@ impl Jaws {
                         stiffness_n_m: stiffness * share,
                         max_force_n: most * share,
                     });
-                    behind.push((index, depth));
+                    behind.push(Behind { tool: index, limb: 0, depth_m: depth });
                 });
                 held.springs = (first, springs.len() - first);
                 held.stiffness = stiffness;

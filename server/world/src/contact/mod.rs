@@ -33,6 +33,7 @@ use scindo_physics::element::MaterialPoint;
 
 use crate::body::SimBody;
 use crate::inputs::{MAX_TOOLS, ToolMode};
+use crate::tool::compound::MAX_PARTS;
 use crate::tool::geometry::core_radius;
 use crate::tool::obstacle::Obstacle;
 use crate::tool::{Tool, Tools};
@@ -54,17 +55,28 @@ struct BodyContacts {
     viscous: f64,
     vertices: Vec<MaterialPoint>,
     springs: Vec<PointSpring>,
-    /// Per spring of a tool its tool, and its depth before the solve [m]. The springs of obstacles come after
-    /// these.
-    behind: Vec<(u32, f64)>,
+    /// What is behind every spring of a tool. The springs of obstacles come after these.
+    behind: Vec<Behind>,
     /// Contacts with obstacles.
     resting: Resting,
+}
+
+/// What is behind a spring.
+#[derive(Debug, Clone, Copy)]
+struct Behind {
+    tool: u32,
+    /// Number of the capsule of a compound tool; 0 for others.
+    limb: u8,
+    /// Depth before the solve [m].
+    depth_m: f64,
 }
 
 /// Sums over one tool's springs.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     force: Vector3<f64>,
+    /// Its part on each capsule of a compound tool.
+    limbs: [Vector3<f64>; MAX_PARTS],
     normal_force: f64,
     /// Stiffness times depth before and after [N], and stiffness [N/m].
     before: f64,
@@ -130,7 +142,7 @@ impl Contacts {
             let edge = hand.edge.get_or_insert_default();
             edge.follow(tool, surfaces, solids, toughness, |body, spring| {
                 bodies[body].springs.push(spring);
-                bodies[body].behind.push((index, 0.0));
+                bodies[body].behind.push(Behind { tool: index, limb: 0, depth_m: 0.0 });
             });
         }
     }
@@ -367,17 +379,18 @@ impl Contacts {
             .filter_map(|hand| hand.jaws.as_mut())
             .for_each(|jaws| jaws.collect(body, forces));
         let body = &self.bodies[body];
-        for ((spring, &(tool, depth)), force) in body.springs.iter().zip(&body.behind).zip(forces) {
-            let tool = tool as usize;
+        for ((spring, of), force) in body.springs.iter().zip(&body.behind).zip(forces) {
+            let tool = of.tool as usize;
             if self.sums.len() <= tool {
                 self.sums.resize(tool + 1, Sums::default());
             }
             let sums = &mut self.sums[tool];
             sums.force += force;
+            sums.limbs[usize::from(of.limb)] += force;
             if let SpringKind::OneSided { normal, .. } = spring.kind {
                 let along = force.dot(&normal);
                 sums.normal_force += along;
-                sums.before += spring.stiffness_n_m * depth;
+                sums.before += spring.stiffness_n_m * of.depth_m;
                 sums.after += along;
                 sums.stiffness += spring.stiffness_n_m;
             }
@@ -389,6 +402,7 @@ impl Contacts {
         self.sums.resize(tools.len(), Sums::default());
         for ((tool, hand), sums) in tools.iter_mut().zip(&mut self.hands).zip(&self.sums) {
             tool.force_n = -sums.force;
+            hand.feel(&sums.limbs);
             if let Some(jaws) = &mut hand.jaws {
                 jaws.settle(tool);
             }
@@ -418,16 +432,16 @@ fn press(index: u32, tool: &Tool, hand: &mut Hand, surfaces: &[ContactSurface], 
         let of = &bodies[body];
         hand.meet(body, (of.young_pa, of.viscous), core_radius(tool.shape));
     }
-    bear(index, spring, hand.press(), surfaces, bodies);
+    bear((index, 0), spring, hand.press(), surfaces, bodies);
     let each = 1.0 / hand.limbs().len().max(1) as f64;
-    for limb in hand.limbs() {
-        bear(index, (spring.0 * each, spring.1 * each), limb, surfaces, bodies);
+    for (number, limb) in (0u8..).zip(hand.limbs()) {
+        bear((index, number), (spring.0 * each, spring.1 * each), limb, surfaces, bodies);
     }
 }
 
-/// Adds springs of this stiffness [N/m] and largest force [N] where a capsule bears on tissue.
+/// Adds springs of this stiffness [N/m] and largest force [N] where a capsule of a tool bears on tissue.
 fn bear(
-    index: u32,
+    of: (u32, u8),
     spring: (f64, f64),
     press: &Press,
     surfaces: &[ContactSurface],
@@ -439,7 +453,7 @@ fn bear(
         let Some(tree) = surfaces[bearing.body].tree() else { continue };
         let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
         // The spring pushes from the tool into the tissue.
-        body.press(index, spring, -normal, bearing, place);
+        body.press(of, spring, -normal, bearing, place);
     }
 }
 
@@ -471,7 +485,7 @@ fn pull(index: u32, tool: &Tool, hand: &Hand, surfaces: &[ContactSurface], bodie
                 stiffness_n_m: tool.stiffness_n_m * each * share,
                 max_force_n: tool.max_force_n * each * share,
             });
-            behind.push((index, 0.0));
+            behind.push(Behind { tool: index, limb: 0, depth_m: 0.0 });
         });
     }
 }
@@ -479,7 +493,7 @@ fn pull(index: u32, tool: &Tool, hand: &Hand, surfaces: &[ContactSurface], bodie
 impl BodyContacts {
     fn press(
         &mut self,
-        index: u32,
+        (tool, limb): (u32, u8),
         (stiffness, max_force): (f64, f64),
         normal: Vector3<f64>,
         bearing: &Bearing,
@@ -496,7 +510,7 @@ impl BodyContacts {
                 stiffness_n_m: stiffness * share,
                 max_force_n: max_force * share,
             });
-            behind.push((index, bearing.depth));
+            behind.push(Behind { tool, limb, depth_m: bearing.depth });
         });
     }
 }

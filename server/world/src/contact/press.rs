@@ -105,13 +105,19 @@ pub fn push_direction(at: &Nearest, proxy: &Capsule, device: &Capsule) -> Vector
 }
 
 /// Turns the direction `held` so far by no more than needed to have `target` in its cone.
-pub fn held_direction(held: Vector3<f64>, target: Vector3<f64>) -> Vector3<f64> {
+fn held_direction(held: Vector3<f64>, target: Vector3<f64>) -> Vector3<f64> {
     let cosine = held.dot(&target);
     if cosine >= STICK_COSINE {
         return held;
     }
     let Some(aside) = (held - target * cosine).try_normalize(1e-9) else { return target };
     target * STICK_COSINE + aside * (1.0 - STICK_COSINE * STICK_COSINE).sqrt()
+}
+
+/// The direction `held` after it has followed `target` for `h` seconds.
+pub fn followed_direction(held: Vector3<f64>, target: Vector3<f64>, h: f64) -> Vector3<f64> {
+    let goal = held_direction(held, target);
+    held.lerp(&goal, TURN.weight(h)).try_normalize(1e-3).unwrap_or(goal)
 }
 
 /// One point at which a tool presses on tissue.
@@ -179,7 +185,7 @@ impl Press {
         let Some(place) = touched((&at_proxy, &at_device), surfaces) else { return self.release() };
         let target = push_direction(&place, &at_proxy, &at_device);
         let fresh = self.direction.is_none();
-        let direction = turned(self.direction, target, TURN.weight(h));
+        let direction = turned(self.direction, target, h);
         self.direction = Some(direction);
         self.bearings.clear();
         let mut depths = [0.0; MAX_POINTS];
@@ -210,13 +216,10 @@ impl Press {
     }
 }
 
-/// Turns the direction towards `target` by this weight, and carries its frame along without twist.
-fn turned(before: Option<Direction>, target: Vector3<f64>, weight: f64) -> Direction {
+/// Turns the direction towards `target` for `h` seconds, and carries its frame along without twist.
+fn turned(before: Option<Direction>, target: Vector3<f64>, h: f64) -> Direction {
     let normal = match before {
-        Some(before) => {
-            let goal = held_direction(before.normal, target);
-            before.normal.lerp(&goal, weight).try_normalize(1e-3).unwrap_or(goal)
-        }
+        Some(before) => followed_direction(before.normal, target, h),
         None => target,
     };
     let hint = before.map_or_else(|| Vector3::ith(normal.iamin(), 1.0), |before| before.across);

@@ -120,6 +120,8 @@ fn fill_tool(out: &mut ToolSnapshot, tool: &Tool, hand: Option<&Hand>) {
     out.mode = tool.mode;
     out.closed = hand.map_or(tool.closed, |hand| hand.closed(tool));
     out.force_n = tool.force_n;
+    out.limbs.clear();
+    out.limbs.extend(hand.into_iter().flat_map(|hand| hand.limbs_of(tool)));
     out.stiffness_n_m = tool.stiffness_n_m;
     out.contact_stiffness_n_m =
         hand.map_or(tool.stiffness_n_m, |hand| hand.in_series_with(tool.stiffness_n_m));

@@ -6,7 +6,7 @@
 //! 2. [`ContactModels::evaluate`] for every held tool with its newest pose. The result is sent as it is.
 //!
 //! # Force
-//! One plane represents the contact. Its normal n is the line from device to proxy at the newest pose. The
+//! One plane represents the contact, and one each capsule of a compound tool. Its normal n is the line from device to proxy at the newest pose. The
 //! last solve gave the force f₀ for the pose p₀. A change of pose is answered by hand and tissue in series,
 //! k_s:
 //!
@@ -24,11 +24,12 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::contact::press::{Nearest, held_direction, nearest, push_direction, touched};
+use crate::contact::press::{Nearest, followed_direction, nearest, push_direction, touched};
 use crate::contact::proxy::Proxy;
 use crate::contact::surface::ContactSurface;
 use crate::inputs::{ToolMode, ToolShape};
-use crate::snapshot::{Snapshot, ToolSnapshot};
+use crate::snapshot::{LimbSnapshot, Snapshot, ToolSnapshot};
+use crate::tool::compound::MAX_PARTS;
 use crate::tool::geometry::{capsule, is_sane};
 use answer::{Answer, Tissue};
 use continuity::{FeatureNumbers, limit_step};
@@ -94,6 +95,8 @@ struct ToolModel {
     /// The tool in the newest snapshot.
     seen: Option<ToolSnapshot>,
     proxy: Proxy,
+    /// Those of the capsules of a compound tool.
+    limbs: Vec<Proxy>,
     features: FeatureNumbers,
     now: LocalContact,
     before: LocalContact,
@@ -138,6 +141,11 @@ impl ContactModels {
             // The step knows on which side of the tissue the tool is, so its proxy is taken.
             model.proxy.seat(&tool.proxy);
             model.proxy.ride(tool.shape, &self.surfaces);
+            model.limbs.resize_with(tool.limbs.len(), Proxy::default);
+            for (proxy, limb) in model.limbs.iter_mut().zip(&tool.limbs) {
+                proxy.seat(&limb.proxy);
+                proxy.ride(limb.part.shape, &self.surfaces);
+            }
             model.seen = Some(tool.clone());
         }
     }
@@ -185,6 +193,7 @@ impl ContactModels {
                 id: Arc::clone(id),
                 seen: None,
                 proxy: Proxy::default(),
+                limbs: Vec::with_capacity(MAX_PARTS),
                 features: FeatureNumbers::default(),
                 now: LocalContact::default(),
                 before: LocalContact::default(),
@@ -229,6 +238,21 @@ impl Anchor {
         let known = frame.materials.get(body).map(|material| Tissue { learned, ..*material });
         let answer = known.and_then(|tissue| Answer::new(self.hand, radius_m, &tissue));
         answer.unwrap_or(Answer { in_step: self.series, at_once: 0.0, relaxed: 0.0, relaxation_s: 0.0 })
+    }
+}
+
+impl Anchor {
+    /// What it is for a capsule of a compound tool that has this share of its stiffness.
+    fn of_limb(&self, limb: &LimbSnapshot, share: f64) -> Self {
+        Self {
+            pose: self.pose * limb.part.pose,
+            velocity: self.velocity,
+            force: limb.force_n,
+            hand: self.hand * share,
+            series: self.series * share,
+            max_force: self.max_force * share,
+            tissue: self.tissue,
+        }
     }
 }
 
@@ -286,27 +310,28 @@ impl ToolModel {
         }
     }
 
-    /// Adds the plane of a tool that touches tissue or may do so soon.
+    /// Adds the planes of a tool that touches tissue or may do so soon.
     fn touch(&mut self, query: &ToolQuery, anchor: &Anchor, frame: &Frame<'_>) {
-        self.proxy.follow(query.shape, &query.pose, frame.surfaces);
-        let ahead = (query.velocity_m_s.norm() * AHEAD_S).clamp(LEAST_AHEAD_M, MOST_AHEAD_M);
-        let at_proxy = capsule(query.shape, self.proxy.pose());
-        let at_device = capsule(query.shape, &query.pose);
-        let place = match touched((&at_proxy, &at_device), frame.surfaces) {
-            Some(place) => {
-                let target = push_direction(&place, &at_proxy, &at_device);
-                // The model presses in the direction of the step, unless the contact requires a turn.
-                let held = anchor.force.try_normalize(1e-6);
-                let normal = held.map_or(target, |held| held_direction(held, target));
-                Some(Nearest { normal, ..place })
-            }
-            None => nearest(&at_proxy, frame.surfaces, ahead),
+        let Self { seen, proxy, limbs, now, .. } = self;
+        let compound = seen.as_ref().filter(|seen| seen.shape == query.shape && !seen.limbs.is_empty());
+        let Some(seen) = compound else {
+            let found = meet(query, (proxy, anchor), frame);
+            return found.into_iter().for_each(|found| now.add(found, frame));
         };
-        let Some(place) = place else { return };
-        self.now.planes.push(plane_of(&place, &at_device, query, anchor, frame));
-        self.now.mode = ContactMode::Contact;
-        self.now.body = Some(place.body);
-        self.now.epoch = frame.surfaces[place.body].epoch();
+        proxy.release(&query.pose);
+        let share = 1.0 / seen.limbs.len() as f64;
+        for (proxy, limb) in limbs.iter_mut().zip(&seen.limbs) {
+            let own = ToolQuery {
+                id: Arc::clone(&query.id),
+                shape: limb.part.shape,
+                pose: query.pose * limb.part.pose,
+                ..*query
+            };
+            let anchor = anchor.of_limb(limb, share);
+            if let Some((place, plane)) = meet(&own, (proxy, &anchor), frame) {
+                now.add((place, about_the_tip(plane, query)), frame);
+            }
+        }
     }
 
     /// Adds the resistance of the tissue to a blade: a plane across the load, whose force rises up to that at which the
@@ -362,6 +387,48 @@ impl ToolModel {
             feature_id: 0,
         });
     }
+}
+
+impl LocalContact {
+    /// Adds a plane at a surface place.
+    fn add(&mut self, (place, plane): (Nearest, ContactPlane), frame: &Frame<'_>) {
+        self.planes.push(plane);
+        self.mode = ContactMode::Contact;
+        if self.body.is_none() {
+            self.body = Some(place.body);
+            self.epoch = frame.surfaces[place.body].epoch();
+        }
+    }
+}
+
+/// Where a capsule touches tissue or may do so soon, and the plane there.
+fn meet(
+    query: &ToolQuery,
+    (proxy, anchor): (&mut Proxy, &Anchor),
+    frame: &Frame<'_>,
+) -> Option<(Nearest, ContactPlane)> {
+    proxy.follow(query.shape, &query.pose, frame.surfaces);
+    let ahead = (query.velocity_m_s.norm() * AHEAD_S).clamp(LEAST_AHEAD_M, MOST_AHEAD_M);
+    let at_proxy = capsule(query.shape, proxy.pose());
+    let at_device = capsule(query.shape, &query.pose);
+    let place = match touched((&at_proxy, &at_device), frame.surfaces) {
+        Some(place) => {
+            let target = push_direction(&place, &at_proxy, &at_device);
+            // The model presses in the direction of the step, and turns as the next step will.
+            let held = anchor.force.try_normalize(1e-6);
+            let normal = held.map_or(target, |held| followed_direction(held, target, frame.ahead_s));
+            Some(Nearest { normal, ..place })
+        }
+        None => nearest(&at_proxy, frame.surfaces, ahead),
+    }?;
+    Some((place, plane_of(&place, &at_device, query, anchor, frame)))
+}
+
+/// The plane of a limb for clients, who measure from the tip of the tool.
+fn about_the_tip(plane: ContactPlane, query: &ToolQuery) -> ContactPlane {
+    let tip = query.pose.translation.vector - plane.point_m;
+    let aside = (tip - plane.normal * plane.normal.dot(&tip)).norm();
+    ContactPlane { patch_radius_m: plane.patch_radius_m + aside, ..plane }
 }
 
 fn damping(stiffness: f64) -> f64 {
