@@ -33,7 +33,7 @@ fn measure(octree: &Octree, threads: usize) {
     let mut team = Team::new(threads).unwrap();
     let low = (0_u32..).zip(octree.points()).filter(|(_, p)| p[2] == 0);
     let fixed: Vec<FixedCopy> =
-        low.map(|(copy, _)| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] }).collect();
+        low.map(|(copy, _)| FixedCopy { copy, held: [true; 3].into(), position_m: [0.0; 3] }).collect();
     let mut A = CellStiffness::new(Simd::detect(), octree, &[]);
     let x = octree.rest_positions();
     A.update(&mut team, &ElasticUpdate { lame: LAME, law: Law::Linear, scale: 1.0 }, &x);

@@ -241,7 +241,7 @@ fn static_cube(threads: usize) -> Line {
     let fixed: Vec<FixedCopy> = body
         .fixed_nodes()
         .iter()
-        .map(|f| FixedCopy { copy: f.node, axes: f.axes, position_m: [0.0; 3] })
+        .map(|f| FixedCopy { copy: f.node, held: f.held, position_m: [0.0; 3] })
         .collect();
     let with = ElasticUpdate { lame: LINEAR.lame(), law: LINEAR.law, scale: 1.0 };
     let (mut f, mut diagonal) = (vec![[0.0; 4]; n], vec![[0.0; 8]; n]);

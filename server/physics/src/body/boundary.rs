@@ -7,7 +7,7 @@ use crate::cut::NewCopy;
 use crate::element::MaterialPoint;
 use crate::lists::reserve::resize_reserving;
 use crate::octree::{Coarsening, OUTSIDE};
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, Held};
 use crate::snap::SnapNode;
 use crate::snap::node::NEW;
 use crate::space::Space;
@@ -17,9 +17,9 @@ use crate::space::Space;
 pub struct FixedNode {
     /// Index of the node; nodes that the element adds come after those of the mesh.
     pub node: u32,
-    /// Which of x, y, z are prescribed.
-    pub axes: [bool; 3],
-    /// Prescribed displacement from rest [m]; only the components in `axes` are used.
+    /// The prescribed directions.
+    pub held: Held,
+    /// Prescribed displacement from rest [m]; only its part in the directions of `held` is used.
     pub displacement_m: Vector3<f64>,
 }
 
@@ -42,8 +42,8 @@ impl Boundary {
             if any { nodes.iter().map(force).collect() } else { Vec::new() }
         };
         let held = (0u32..).zip(nodes).filter_map(|(node, n)| {
-            let (axes, displacement_m) = n.fixed?;
-            Some(FixedNode { node, axes, displacement_m })
+            let (held, displacement_m) = n.fixed?;
+            Some(FixedNode { node, held, displacement_m })
         });
         Self {
             fixed: held.collect(),
@@ -54,7 +54,7 @@ impl Boundary {
 
     /// Stores constraint and loads of a node with it.
     pub fn onto_node(&self, number: u32, node: &mut SnapNode) {
-        node.fixed = self.fixed_at(number).map(|fixed| (fixed.axes, fixed.displacement_m));
+        node.fixed = self.fixed_at(number).map(|fixed| (fixed.held, fixed.displacement_m));
         let force = |forces: &[Vector3<f64>]| forces.get(number as usize).copied().unwrap_or_default();
         node.point_force = force(&self.point_force);
         node.spread_force = force(&self.spread_force);
@@ -123,7 +123,7 @@ impl Boundary {
         }
         for f in &self.fixed {
             let target = rest[f.node as usize] + share * f.displacement_m;
-            let held = |copy: u32| FixedCopy { copy, axes: f.axes, position_m: target.into() };
+            let held = |copy: u32| FixedCopy { copy, held: f.held, position_m: target.into() };
             fixed.push(held(f.node));
             if divided[f.node as usize] {
                 let copies = space.copies_with_node(f.node).into_iter();
@@ -133,32 +133,32 @@ impl Boundary {
         fixed.sort_unstable_by_key(|f| f.copy);
     }
 
-    /// Holds nodes that refinement put between held ones: along the axes that all of these are held, at the mean
-    /// of their displacements.
+    /// Holds nodes that refinement put between held ones: in the directions that all of these are held, at the
+    /// mean of their displacements.
     pub fn hold_between(&mut self, new: &[NewCopy], node_of_copy: &[u32]) {
         for new in new {
             let Some(between) = &new.between else { continue };
-            if let Some((axes, displacement_m)) = self.between(between, node_of_copy) {
+            if let Some((held, displacement_m)) = self.between(between, node_of_copy) {
                 // New nodes have the highest numbers.
-                self.fixed.push(FixedNode { node: new.copy, axes, displacement_m });
+                self.fixed.push(FixedNode { node: new.copy, held, displacement_m });
             }
         }
     }
 
-    /// The axes along which all carriers of a point are held, and the mean of their displacements; `None` if there
-    /// is no such axis.
-    fn between(&self, point: &MaterialPoint, node_of_copy: &[u32]) -> Option<([bool; 3], Vector3<f64>)> {
-        let (mut axes, mut displacement_m) = ([true; 3], Vector3::zeros());
+    /// The directions in which all carriers of a point are held, and the mean of their displacements; `None` if there
+    /// is no such direction.
+    fn between(&self, point: &MaterialPoint, node_of_copy: &[u32]) -> Option<(Held, Vector3<f64>)> {
+        let (mut shared, mut displacement_m) = (Held::FULLY, Vector3::zeros());
         for (copy, weight) in point.carriers() {
             match self.fixed_at(node_of_copy[copy]) {
                 Some(held) => {
-                    (0..3).for_each(|k| axes[k] &= held.axes[k]);
+                    shared = shared.shared(&held.held);
                     displacement_m += weight * held.displacement_m;
                 }
-                None => axes = [false; 3],
+                None => shared = Held::NOT,
             }
         }
-        axes.contains(&true).then_some((axes, displacement_m))
+        shared.any().then_some((shared, displacement_m))
     }
 
     /// Whether `node`, which lies between others with these `carriers`, has to stay when cells become coarse: it is
@@ -172,10 +172,13 @@ impl Boundary {
         let same = match (held, between) {
             (None, _) => true,
             (Some(_), None) => false,
-            (Some(held), Some((axes, displacement_m))) => (0..3).all(|k| {
-                let apart = held.displacement_m[k] - displacement_m[k];
-                !held.axes[k] || (axes[k] && apart.abs() <= 1e-12 * held.displacement_m[k].abs())
-            }),
+            (Some(held), Some((shared, displacement_m))) => {
+                let near = |e: Vector3<f64>| {
+                    let there = e.dot(&held.displacement_m);
+                    (there - e.dot(&displacement_m)).abs() <= 1e-12 * there.abs()
+                };
+                shared.covers(&held.held) && held.held.directions().all(near)
+            }
         };
         loaded || !same
     }
@@ -238,30 +241,29 @@ impl Boundary {
 }
 
 impl Body {
-    /// Prescribes the displacement from rest [m] of `nodes` along `axes`. A second call for a node adds
-    /// axes and replaces the displacement along those given.
+    /// Prescribes the displacement from rest [m] of `nodes` in the directions `held`, for example `[true; 3]` for
+    /// all axes. A second call for a node adds directions and replaces the displacement along those given.
     pub fn fix(
         &mut self,
         nodes: &[u32],
-        axes: [bool; 3],
+        held: impl Into<Held>,
         displacement_m: Vector3<f64>,
     ) -> Result<(), BodyError> {
+        let held = held.into();
         self.check_nodes(nodes)?;
         check_vector("displacement_m", &displacement_m)?;
         for &node in nodes {
             let at = match self.boundary.fixed.binary_search_by_key(&node, |f| f.node) {
                 Ok(at) => at,
                 Err(at) => {
-                    let none = FixedNode { node, axes: [false; 3], displacement_m: Vector3::zeros() };
+                    let none = FixedNode { node, held: Held::NOT, displacement_m: Vector3::zeros() };
                     self.boundary.fixed.insert(at, none);
                     at
                 }
             };
             let fixed = &mut self.boundary.fixed[at];
-            for axis in (0..3).filter(|&axis| axes[axis]) {
-                fixed.axes[axis] = true;
-                fixed.displacement_m[axis] = displacement_m[axis];
-            }
+            (fixed.held, fixed.displacement_m) =
+                fixed.held.with(&fixed.displacement_m, &held, &displacement_m);
         }
         self.follow_boundary();
         Ok(())
@@ -284,7 +286,7 @@ impl Body {
         self.range.follow(&self.rest, &self.parts, &self.fixed);
     }
 
-    /// Frees `nodes` along all axes.
+    /// Frees `nodes` in all directions.
     pub fn release(&mut self, nodes: &[u32]) {
         self.boundary.fixed.retain(|f| !nodes.contains(&f.node));
         self.follow_boundary();

@@ -133,9 +133,7 @@ impl Body {
         for fixed in self.fixed.iter().filter(|f| nodes.contains(&node_of(f.copy))) {
             let c = fixed.copy as usize;
             let held = f_int[c] - self.weight(c, gravity) - self.load[c];
-            for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
-                sum[axis] += held[axis];
-            }
+            sum += fixed.held.part_of(&held);
         }
         sum
     }

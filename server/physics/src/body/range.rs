@@ -75,7 +75,8 @@ impl Range {
         for f in fixed {
             // Directions that are not prescribed have no known target; their rest position stands in.
             let rest = rest[f.copy as usize];
-            let at = Vector3::from_fn(|k, _| if f.axes[k] { f.position_m[k] } else { rest[k] });
+            let mut at = rest;
+            f.held.place(&mut at, &f.position_m);
             self.boxes[parts.of_copy[f.copy as usize] as usize].add(&at);
         }
         for (size, bounds) in self.size.iter_mut().zip(&self.boxes) {
@@ -124,13 +125,14 @@ impl Range {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::operator::Held;
 
     /// Two edges of 1 m, held at their first ends.
     fn two_edges() -> (Vec<Vector3<f64>>, LooseParts, Range) {
         let rest = vec![Vector3::zeros(), Vector3::x(), Vector3::zeros(), Vector3::y()];
         let parts = LooseParts { of_copy: vec![0, 0, 1, 1], mass: vec![1.0; 2], free: vec![false, true] };
         let mut range = Range::default();
-        range.follow(&rest, &parts, &[FixedCopy { copy: 0, axes: [true; 3], position_m: [0.0; 3] }]);
+        range.follow(&rest, &parts, &[FixedCopy { copy: 0, held: Held::FULLY, position_m: [0.0; 3] }]);
         (rest, parts, range)
     }
 
@@ -154,7 +156,8 @@ mod tests {
     #[test]
     fn what_is_drawn_out_by_its_supports_may_be() {
         let (rest, parts, mut range) = two_edges();
-        let at = |copy, x| FixedCopy { copy, axes: [true, false, false], position_m: [x, 0.0, 0.0] };
+        let at =
+            |copy, x| FixedCopy { copy, held: Held::Axes([true, false, false]), position_m: [x, 0.0, 0.0] };
         range.follow(&rest, &parts, &[at(0, 0.0), at(1, 25.0)]);
         let mut x = rest.clone();
         x[1].x = 25.0;

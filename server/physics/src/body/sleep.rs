@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::Body;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, Held};
 
 impl Body {
     /// Puts a part that is held nowhere to sleep. Every copy of it is held where it is, at rest, until
@@ -21,7 +21,7 @@ impl Body {
             of_copy.filter(|(_, of)| **of as usize == part).map(|(copy, _)| copy).collect();
         for &copy in &copies {
             let position_m = self.state.x[copy as usize].into();
-            self.asleep.push(FixedCopy { copy, axes: [true; 3], position_m });
+            self.asleep.push(FixedCopy { copy, held: Held::FULLY, position_m });
             self.state.v[copy as usize] = Vector3::zeros();
         }
         self.dynamics.still(&copies, &self.state);

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::{Enrichment, Side};
 use crate::assembly::BlockCsr;
 use crate::cut::CutMesh;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, Held};
 
 /// The linear map q = C p between the positions q of the copies of a body and the degrees of freedom
 /// p = [X + u; a] of an enrichment.
@@ -169,7 +169,7 @@ impl EnrichedView {
     /// where a simple constraint does not suffice: where some copies of a node are held and others are not,
     /// unless the held ones are degrees of freedom themselves. Under substitution this is so for all copies,
     /// in the shifted enrichment for the node's own copy, and in that by H for none. This is why shifting
-    /// makes boundary conditions simple.
+    /// makes boundary conditions simple. It is also `None` where a node of the cut is held in an inclined direction.
     pub fn fixed(&self, fixed: &[FixedCopy]) -> Option<Vec<FixedCopy>> {
         let mut out: Vec<FixedCopy> =
             fixed.iter().filter(|f| self.node_of[f.copy as usize].is_none()).copied().collect();
@@ -178,27 +178,33 @@ impl EnrichedView {
             let mut dofs: Vec<FixedCopy> = node
                 .copies
                 .iter()
-                .map(|&copy| FixedCopy { copy, axes: [false; 3], position_m: [0.0; 3] })
+                .map(|&copy| FixedCopy { copy, held: Held::NOT, position_m: [0.0; 3] })
                 .collect();
+            if node.copies.iter().any(|&copy| of(copy).is_some_and(|f| f.held.is_inclined())) {
+                return None;
+            }
+            let axes_of = |f: &FixedCopy| f.held.axes().unwrap_or([false; 3]);
+            let mut axes = vec![[false; 3]; dofs.len()];
             for axis in 0..3 {
                 let held: Vec<Option<f64>> = (node.copies.iter())
-                    .map(|&copy| of(copy).filter(|f| f.axes[axis]).map(|f| f.position_m[axis]))
+                    .map(|&copy| of(copy).filter(|f| axes_of(f)[axis]).map(|f| f.position_m[axis]))
                     .collect();
                 for (i, dof) in dofs.iter_mut().enumerate() {
                     // All copies of the node are held: invert C. If only some are, their row of C must be
                     // that of the identity.
                     if held.iter().all(Option::is_some) {
                         let position = (0..held.len()).map(|j| node.inverse[(i, j)] * held[j].unwrap_or(0.0));
-                        (dof.axes[axis], dof.position_m[axis]) = (true, position.sum());
+                        (axes[i][axis], dof.position_m[axis]) = (true, position.sum());
                     } else if let Some(position) = held[i] {
                         if (0..held.len()).any(|j| node.C[(i, j)] != f64::from(u8::from(i == j))) {
                             return None;
                         }
-                        (dof.axes[axis], dof.position_m[axis]) = (true, position);
+                        (axes[i][axis], dof.position_m[axis]) = (true, position);
                     }
                 }
             }
-            out.extend(dofs.into_iter().filter(|dof| dof.axes.contains(&true)));
+            dofs.iter_mut().zip(axes).for_each(|(dof, axes)| dof.held = axes.into());
+            out.extend(dofs.into_iter().filter(|dof| dof.held.any()));
         }
         out.sort_by_key(|f| f.copy);
         Some(out)
@@ -274,7 +280,11 @@ mod tests {
 
     #[test]
     fn what_is_held_stays_a_prescription_where_it_can() {
-        let held = |copy, x: f64| FixedCopy { copy, axes: [true, false, false], position_m: [x, 0.0, 0.0] };
+        let held = |copy, x: f64| FixedCopy {
+            copy,
+            held: Held::Axes([true, false, false]),
+            position_m: [x, 0.0, 0.0],
+        };
         // Node 0 has the copies 0 and 2.
         let view = |enrichment| EnrichedView::oriented(&[0, 1, 0], enrichment, |_| Side::Right);
         let one = [held(0, 3.0), held(1, 5.0)];

@@ -349,8 +349,8 @@ impl Dynamics {
 
     /// Follows a change of the prescribed directions.
     fn follow_fixed(&mut self, inputs: &StepInputs<'_>) {
-        let axes = |f: &FixedCopy| (f.copy, f.axes);
-        let same = |known: &Vec<FixedCopy>| known.iter().map(axes).eq(inputs.fixed.iter().map(axes));
+        let held = |f: &FixedCopy| (f.copy, f.held);
+        let same = |known: &Vec<FixedCopy>| known.iter().map(held).eq(inputs.fixed.iter().map(held));
         if self.known_fixed.as_ref().is_some_and(same) {
             return;
         }

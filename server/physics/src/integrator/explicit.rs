@@ -55,9 +55,8 @@ impl ModelSolver {
             // Prescribed nodes move at the constant velocity that reaches their target.
             for f in inputs.fixed {
                 let c = f.copy as usize;
-                for k in (0..3).filter(|&k| f.axes[k]) {
-                    state.v[c][k] = (f.position_m[k] - before.x[c][k]) / inputs.h;
-                }
+                f.held.clear(&mut state.v[c]);
+                state.v[c] += f.held.gap(&before.x[c], &f.position_m) / inputs.h;
             }
             for k in 1..=report.substeps {
                 if team.told_to_stop() {
@@ -136,10 +135,8 @@ impl ModelSolver {
         // Set rather than integrated, so that prescribed nodes arrive without rounding.
         for f in inputs.fixed {
             let c = f.copy as usize;
-            for k in (0..3).filter(|&k| f.axes[k]) {
-                let way = f.position_m[k] - before.x[c][k];
-                next.x[c][k] = before.x[c][k] + s * way;
-            }
+            let there = before.x[c] + s * f.held.gap(&before.x[c], &f.position_m);
+            f.held.place(&mut next.x[c], &there.into());
         }
         self.stages = [x, v, a, dx, dv];
     }

@@ -63,8 +63,7 @@ pub fn free_motions(parts: &LooseParts, rest: &[Vector3<f64>], fixed: &[FixedCop
         let part = parts.of_copy[f.copy as usize] as usize;
         let (centre, size) = frames[part];
         let arm = (rest[f.copy as usize] - centre) / size;
-        for axis in (0..3).filter(|&axis| f.axes[axis]) {
-            let e = Vector3::ith(axis, 1.0);
+        for e in f.held.directions() {
             let turn = arm.cross(&e);
             let a = Vector6::new(e.x, e.y, e.z, turn.x, turn.y, turn.z);
             held[part] += a * a.transpose();
@@ -139,8 +138,10 @@ mod tests {
         let rest: Vec<Vector3<f64>> = (0..8)
             .map(|c| Vector3::new([4.0, 6.0][c & 1], [-1.0, 1.0][c >> 1 & 1], [-1.0, 1.0][c >> 2]))
             .collect();
-        let fixed: Vec<FixedCopy> =
-            held.iter().map(|&(copy, axes)| FixedCopy { copy, axes, position_m: [0.0; 3] }).collect();
+        let fixed: Vec<FixedCopy> = held
+            .iter()
+            .map(|&(copy, axes)| FixedCopy { copy, held: axes.into(), position_m: [0.0; 3] })
+            .collect();
         let parts = LooseParts { of_copy: vec![0; 8], mass: vec![1.0], free: vec![held.is_empty()] };
         free_motions(&parts, &rest, &fixed)
     }

@@ -30,8 +30,9 @@ use crate::material::Rayleigh;
 use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport, Multigrid};
 use crate::octree::Octree;
 use crate::operator::{
-    BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, LinearOperator, Padded, Spring, StiffModes,
-    Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded, unpadded,
+    BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, Held, LinearOperator, Padded, Spring,
+    StiffModes, Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
+    unpadded,
 };
 use crate::phase::Phase;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
@@ -64,7 +65,7 @@ pub struct LinearStep {
     /// State for which `diagonal` and `preconditioner` were computed: version of K̂ and mass factor.
     made_for: Option<(u64, f64)>,
     /// Prescribed directions for which they were computed.
-    made_for_fixed: Vec<(u32, [bool; 3])>,
+    made_for_fixed: Vec<(u32, Held)>,
     /// Change of variables for a body with degenerate elements.
     stiff: Option<Box<Stiff>>,
     /// Copies whose entry of the preconditioner contains springs.
@@ -362,9 +363,7 @@ impl LinearStep {
             level.follow_prescribed(team, inputs.step.fixed, &mut self.predicted);
         }
         for fixed in inputs.step.fixed {
-            for axis in (0..3).filter(|&axis| fixed.axes[axis]) {
-                self.predicted[fixed.copy as usize][axis] = fixed.position_m[axis];
-            }
+            fixed.held.place(&mut self.predicted[fixed.copy as usize], &fixed.position_m);
         }
     }
 
@@ -417,18 +416,18 @@ impl LinearStep {
     fn sum_chunks(&mut self, team: &mut Team, elastic: &dyn Stiffness, inputs: &LinearInputs<'_>) {
         let factor = inputs.mass_factor();
         let made_for = Some((elastic.version(), factor));
-        let axes = |f: &FixedCopy| (f.copy, f.axes);
+        let held = |f: &FixedCopy| (f.copy, f.held);
         let f_int = blocks(&mut self.f_int, BLOCK);
         if self.made_for == made_for
-            && inputs.step.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied())
+            && inputs.step.fixed.iter().map(held).eq(self.made_for_fixed.iter().copied())
         {
             team.for_blocks(f_int, |block, f| elastic.forces(block, f));
             return;
         }
         self.made_for = made_for;
-        if !inputs.step.fixed.iter().map(axes).eq(self.made_for_fixed.iter().copied()) {
+        if !inputs.step.fixed.iter().map(held).eq(self.made_for_fixed.iter().copied()) {
             self.made_for_fixed.clear();
-            self.made_for_fixed.extend(inputs.step.fixed.iter().map(axes));
+            self.made_for_fixed.extend(inputs.step.fixed.iter().map(held));
             self.stiff.iter_mut().for_each(|stiff| stiff.stale = true);
         }
         self.sprung.clear();
@@ -448,7 +447,7 @@ impl LinearStep {
         self.substitute(team, elastic, inputs);
         for copy in inputs.step.fixed {
             let c = copy.copy as usize;
-            self.preconditioner.set(c, &self.diagonal[c], copy.axes);
+            self.preconditioner.set(c, &self.diagonal[c], copy.held);
         }
     }
 
@@ -467,7 +466,7 @@ impl LinearStep {
         let mass = (inputs.mass_f32, inputs.mass_factor());
         stiff.composite.update(team, (elastic, &with), mass, &mut self.diagonal);
         for copy in stiff.composite.copies() {
-            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], [false; 3]);
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], Held::NOT);
         }
     }
 
@@ -693,6 +692,10 @@ impl LinearStep {
             }
             partial[0] = f64::from(u8::from(finite));
         });
+        // δ is rounded to single precision, and an inclined direction mixes its components.
+        for fixed in inputs.step.fixed.iter().filter(|fixed| fixed.held.is_inclined()) {
+            fixed.held.place(&mut self.predicted[fixed.copy as usize], &fixed.position_m);
+        }
         !self.partial.contains(&0.0)
     }
 

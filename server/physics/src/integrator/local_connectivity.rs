@@ -95,6 +95,7 @@ mod tests {
     use super::*;
     use crate::cut::{BladeSweep, CutMesh};
     use crate::mesh::{BoxPattern, box_mesh};
+    use crate::operator::Held;
     use crate::space::Tets;
 
     #[test]
@@ -102,7 +103,7 @@ mod tests {
         let mesh = box_mesh(Vector3::zeros(), Vector3::new(6.0, 4.0, 4.0), [6, 4, 4], BoxPattern::Tet6);
         let mut cut = Tets::linear(CutMesh::new(mesh).unwrap());
         let held: Vec<u32> = (0..cut.n_copies() as u32).filter(|c| c % 35 == 3).collect();
-        let hold = |&copy: &u32| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] };
+        let hold = |&copy: &u32| FixedCopy { copy, held: Held::FULLY, position_m: [0.0; 3] };
         let fixed: Vec<FixedCopy> = held.iter().map(hold).collect();
         let mut parts = LooseParts::connected(|visit| cut.for_groups(visit), cut.copy_volumes(), &fixed);
         let mut connectivity = LocalConnectivity::default();

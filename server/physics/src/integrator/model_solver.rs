@@ -160,9 +160,10 @@ impl StepSolver for ModelSolver {
             && inputs.h.is_finite()
             && finite(&inputs.gravity)
             && inputs.load.iter().chain(&state.x).chain(&state.v).all(finite)
-            && inputs.fixed.iter().all(|f| {
-                (f.copy as usize) < n && (0..3).all(|k| !f.axes[k] || f.position_m[k].abs() < FARTHEST)
-            });
+            && inputs
+                .fixed
+                .iter()
+                .all(|f| (f.copy as usize) < n && finite(&f.held.part_of(&f.position_m.into())));
         (!usable).then_some(Notice::BadInput)
     }
 

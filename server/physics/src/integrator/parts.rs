@@ -67,7 +67,7 @@ impl LooseParts {
         }
         self.free.clear();
         self.free.extend(self.mass.iter().map(|&m| m > 0.0));
-        for copy in fixed.iter().filter(|f| f.axes.contains(&true)) {
+        for copy in fixed.iter().filter(|f| f.held.any()) {
             self.free[self.of_copy[copy.copy as usize] as usize] = false;
         }
     }

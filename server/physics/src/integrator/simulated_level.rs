@@ -275,10 +275,7 @@ impl SimulatedLevel {
         fixed: &[FixedCopy],
         predicted: &mut [Vector3<f64>],
     ) {
-        let gap = |f: &FixedCopy| {
-            let x = predicted[f.copy as usize];
-            [0, 1, 2, 3].map(|k| if k < 3 && f.axes[k] { (f.position_m[k] - x[k]) as f32 } else { 0.0 })
-        };
+        let gap = |f: &FixedCopy| padded(&f.held.gap(&predicted[f.copy as usize], &f.position_m));
         if fixed.iter().all(|f| gap(f) == [0.0; 4]) {
             return;
         }

@@ -19,9 +19,7 @@ pub const WEIGHTLESS: f64 = 1e-30;
 /// Sets the prescribed directions of `v` to 0.
 pub(super) fn hold(fixed: &[FixedCopy], v: &mut [Vector3<f64>]) {
     for f in fixed {
-        for axis in (0..3).filter(|&axis| f.axes[axis]) {
-            v[f.copy as usize][axis] = 0.0;
-        }
+        f.held.clear(&mut v[f.copy as usize]);
     }
 }
 

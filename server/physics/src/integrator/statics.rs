@@ -90,8 +90,6 @@ pub fn find_equilibrium(
 /// Sets the prescribed directions of `x` to their positions.
 pub fn prescribe(fixed: &[FixedCopy], x: &mut [Vector3<f64>]) {
     for f in fixed {
-        for axis in (0..3).filter(|&axis| f.axes[axis]) {
-            x[f.copy as usize][axis] = f.position_m[axis];
-        }
+        f.held.place(&mut x[f.copy as usize], &f.position_m);
     }
 }

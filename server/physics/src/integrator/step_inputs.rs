@@ -38,7 +38,7 @@ impl StepInputs<'_> {
     /// Whether prescribed nodes move in a step from `before`, which puts energy in.
     pub fn is_driven(&self, before: &State) -> bool {
         let x = |f: &FixedCopy| before.x[f.copy as usize];
-        self.fixed.iter().any(|f| (0..3).any(|k| f.axes[k] && f.position_m[k] != x(f)[k]))
+        self.fixed.iter().any(|f| f.held.gap(&x(f), &f.position_m) != Vector3::zeros())
     }
 
     /// Number of springs that push or pull with the nodes at `x` [m].

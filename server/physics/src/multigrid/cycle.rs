@@ -184,7 +184,7 @@ impl Multigrid {
         if *first == 0 {
             self.fixed.extend_from_slice(fixed);
         } else {
-            let held = |&(copy, axes)| FixedCopy { copy, axes, position_m: [0.0; 3] };
+            let held = |&(copy, held)| FixedCopy { copy, held, position_m: [0.0; 3] };
             self.fixed.extend(galerkin.held().iter().map(held));
         }
         for l in (*first).max(1)..levels.len() {

@@ -1,7 +1,8 @@
 //! Symmetric 24×24 matrices of single cells.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
+use crate::operator::Held;
 use crate::operator::cells::Matrix24;
 
 /// Entries of a packed matrix: the upper triangle by columns.
@@ -9,6 +10,10 @@ pub const PACKED: usize = 300;
 
 /// A packed symmetric matrix: entry (i, j), i ≤ j, at j (j + 1)/2 + i.
 pub type Packed = [f32; PACKED];
+
+/// Stiffness of a prescribed inclined direction over the largest one of its vertex: far above the rounding of single
+/// precision, far below what slows corrections.
+const HELD_STIFFNESS: f32 = 1e-3;
 
 /// A matrix by columns; row and column 3 c + i belong to vertex c and component i.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,6 +106,25 @@ impl Dense {
         for r in (0..3).filter(|i| fixed >> i & 1 == 1).map(|i| 3 * c + i) {
             self.0[r] = [0.0; 24];
             self.0.iter_mut().for_each(|column| column[r] = 0.0);
+        }
+    }
+
+    /// Filters the prescribed directions of vertex `c`: A ← P A P + s H, with a small stiffness s that keeps the
+    /// block definite whatever single precision makes of P A P. More stiffness only makes corrections smaller.
+    pub fn filter(&mut self, c: usize, held: &Held) {
+        let size = (3 * c..3 * c + 3).map(|r| self.0[r][r]).fold(0.0, f32::max);
+        let (P, H) = (held.filter().map(|p| p as f32), held.projection().map(|h| h as f32));
+        let own = 3 * c..3 * c + 3;
+        for column in &mut self.0 {
+            let v = Vector3::from_fn(|k, _| column[3 * c + k]);
+            column[own.clone()].copy_from_slice((P * v).as_slice());
+        }
+        for r in 0..24 {
+            let v = P * Vector3::from_fn(|k, _| self.0[3 * c + k][r]);
+            (0..3).for_each(|k| self.0[3 * c + k][r] = v[k]);
+        }
+        for (i, j) in own.clone().flat_map(|i| own.clone().map(move |j| (i, j))) {
+            self.0[j][i] += HELD_STIFFNESS * size * H[(i - 3 * c, j - 3 * c)];
         }
     }
 

@@ -19,7 +19,7 @@ use crate::lists::reserve::resize_reserving;
 use crate::material::Lame;
 use crate::octree::{Cell, corner_weights};
 use crate::operator::cells::unit_stiffness;
-use crate::operator::{BLOCK, FixedCopy};
+use crate::operator::{BLOCK, FixedCopy, Held};
 use crate::team::{Team, blocks};
 
 /// Rotations that differ by less [rad] are the same; single precision tells them apart no better.
@@ -112,13 +112,15 @@ pub struct Galerkin {
     pub(super) carried: Carried,
     /// Mass [kg] times its factor of an eighth of a leaf of every kind.
     pub(super) eighth: Vec<f32>,
-    /// Prescribed directions of every vertex of the finest level, one bit each.
+    /// Prescribed directions of every vertex of the finest level: one bit each, or [`INCLINED`] and more.
     pub(super) fixed: Vec<u8>,
+    /// The directions that are not world axes, each once; number [`INCLINED`] stands for the first of them.
+    inclined: Vec<Held>,
     pub(super) coefficients: Option<Coefficients>,
-    pub(super) known_fixed: Vec<(u32, [bool; 3])>,
+    pub(super) known_fixed: Vec<(u32, Held)>,
     /// The level that is solved on, and its prescribed directions if it is not the finest one.
     pub(super) first: usize,
-    pub(super) held: Vec<(u32, [bool; 3])>,
+    pub(super) held: Vec<(u32, Held)>,
     pub(super) held_bits: Vec<u8>,
 }
 
@@ -156,7 +158,7 @@ impl Galerkin {
         let mut released = false;
         if anew {
             self.known_fixed.clear();
-            self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.axes)));
+            self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.held)));
             self.mark_held(hierarchy);
             self.set_coefficients(hierarchy, with);
         } else if !self.is_made_for(with, fixed) {
@@ -189,12 +191,13 @@ impl Galerkin {
     /// Whether the last update had these constants and prescribed directions.
     pub fn is_made_for(&self, with: &Coefficients, fixed: &[FixedCopy]) -> bool {
         self.coefficients.as_ref() == Some(with)
-            && fixed.iter().map(|f| (f.copy, f.axes)).eq(self.known_fixed.iter().copied())
+            && fixed.iter().map(|f| (f.copy, f.held)).eq(self.known_fixed.iter().copied())
     }
 
     /// Notes which cells have prescribed vertices below them.
     fn mark_held(&mut self, hierarchy: &Hierarchy) {
         self.fixed.fill(0);
+        self.inclined.clear();
         self.enter_fixed(hierarchy);
         for (holds, vertices) in self.levels[0].holds.iter_mut().zip(&hierarchy.levels[0].vertices) {
             *holds = held(&self.fixed, vertices);
@@ -211,9 +214,9 @@ impl Galerkin {
 
     /// Enters the prescribed directions in the bits of vertices, where those of all others are 0.
     pub(super) fn enter_fixed(&mut self, hierarchy: &Hierarchy) {
-        for &(copy, axes) in &self.known_fixed {
+        for &(copy, held) in &self.known_fixed {
             if let Some(fixed) = self.fixed.get_mut(copy as usize) {
-                *fixed = (0..3).fold(0, |bits, k| bits | u8::from(axes[k]) << k);
+                *fixed = code(&mut self.inclined, held);
             }
         }
         self.hold_coarse(hierarchy);
@@ -332,7 +335,16 @@ impl Galerkin {
             _ => &[],
         };
         let (shared, carried) = (&self.shared, &self.carried);
-        let context = Context { hierarchy, l, fine, shared, carried, held, eighth: &self.eighth };
+        let context = Context {
+            hierarchy,
+            l,
+            fine,
+            shared,
+            carried,
+            held,
+            inclined: &self.inclined,
+            eighth: &self.eighth,
+        };
         let frame = &*frame;
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
             for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
@@ -370,7 +382,7 @@ impl Galerkin {
     }
 
     /// Vertices with prescribed directions, and which directions these are, on the level that is solved on.
-    pub fn held(&self) -> &[(u32, [bool; 3])] {
+    pub fn held(&self) -> &[(u32, Held)] {
         if self.first == 0 { &self.known_fixed } else { &self.held }
     }
 
@@ -378,6 +390,30 @@ impl Galerkin {
     #[cfg(test)]
     pub fn fixed(&self, v: u32) -> u8 {
         self.fixed[v as usize]
+    }
+}
+
+/// Number of the first entry of `inclined` among the bits of prescribed directions: bits of axes are below it.
+pub(super) const INCLINED: u8 = 8;
+
+/// The number that stands for `held`, which is added to `inclined` if it is new there.
+///
+/// Where a body is held in more different directions than numbers are left, coarse levels leave further vertices to
+/// the smoother: they count as held there in all directions.
+fn code(inclined: &mut Vec<Held>, held: Held) -> u8 {
+    if let Some(axes) = held.axes() {
+        return (0..3).fold(0, |bits, k| bits | u8::from(axes[k]) << k);
+    }
+    let at = inclined.iter().position(|known| *known == held).unwrap_or_else(|| {
+        inclined.push(held);
+        inclined.len() - 1
+    });
+    match u8::try_from(at + usize::from(INCLINED)) {
+        Ok(code) => code,
+        Err(_) => {
+            inclined.truncate(usize::from(u8::MAX - INCLINED) + 1);
+            7
+        }
     }
 }
 
@@ -409,6 +445,7 @@ struct Context<'a> {
     carried: &'a Carried,
     /// Prescribed directions of the fine vertices; empty where they are in the matrices already.
     held: &'a [u8],
+    inclined: &'a [Held],
     eighth: &'a [f32],
 }
 
@@ -448,7 +485,10 @@ impl Context<'_> {
             }
             if !self.held.is_empty() {
                 for (c, &v) in fine.vertices[child].iter().enumerate() {
-                    A.hold(c, self.held[v as usize]);
+                    match self.held[v as usize] {
+                        fixed @ 0..INCLINED => A.hold(c, fixed),
+                        fixed => A.filter(c, &self.inclined[usize::from(fixed - INCLINED)]),
+                    }
                 }
             }
             if merges {

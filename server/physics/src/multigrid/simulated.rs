@@ -12,7 +12,7 @@
 use nalgebra::Matrix3;
 
 use super::cycle::{Multigrid, MultigridSettings};
-use super::galerkin::{Coefficients, Galerkin};
+use super::galerkin::{Coefficients, Galerkin, INCLINED};
 use super::hierarchy::Hierarchy;
 use super::kernel::LevelKernel;
 use super::level::NONE;
@@ -20,7 +20,7 @@ use super::precondition::Cycle;
 use super::restricted::RestrictedSprings;
 use crate::octree::Octree;
 use crate::operator::{
-    BlockJacobi, FixedCopy, LinearOperator, Padded, Preconditioner, Spring, filter, invert,
+    BlockJacobi, FixedCopy, Held, LinearOperator, Padded, Preconditioner, Spring, filter, invert, invert_free,
 };
 use crate::team::Team;
 
@@ -171,7 +171,7 @@ impl Composite {
         let Multigrid { galerkin, hierarchy, .. } = &self.multigrid;
         self.mass.clone_from(&galerkin.levels[first].mass);
         self.held.clear();
-        let held = |&(copy, axes): &(u32, [bool; 3])| FixedCopy { copy, axes, position_m: [0.0; 3] };
+        let held = |&(copy, held): &(u32, Held)| FixedCopy { copy, held, position_m: [0.0; 3] };
         self.held.extend(galerkin.held().iter().map(held));
         let operator = galerkin.operator(&hierarchy.levels[first], first);
         if let Some(kernel) = &mut self.kernel {
@@ -179,7 +179,7 @@ impl Composite {
         }
         for held in &self.held {
             let v = held.copy as usize;
-            self.jacobi.inverses_mut()[v] = invert(&operator.diagonal(v), held.axes);
+            self.jacobi.inverses_mut()[v] = invert_free(&operator.diagonal(v), held.held);
         }
         self.sprung.clear();
     }
@@ -192,7 +192,8 @@ impl Composite {
         for spring in springs {
             restricted.begin(spring);
             for (copy, w) in spring.point.carriers().filter(|(_, w)| *w != 0.0) {
-                let free = [0, 1, 2].map(|k| f32::from(u8::from(galerkin.fixed[copy] >> k & 1 == 0)));
+                let free =
+                    [0, 1, 2].map(|k| f32::from(u8::from(on_axes(galerkin.fixed[copy]) >> k & 1 == 0)));
                 for &(v, p) in row.of(hierarchy, copy as u32, *first) {
                     restricted.add(v, free.map(|free| free * w * p));
                 }
@@ -276,7 +277,8 @@ impl Composite {
         for f in fixed {
             if let Some(v) = self.multigrid.hierarchy.same_vertex(f.copy, self.level()) {
                 let u = given(f);
-                (0..3).filter(|&k| f.axes[k]).for_each(|k| g[v as usize][k] = u[k]);
+                let axes = f.held.axes().unwrap_or([true; 3]);
+                (0..3).filter(|&k| axes[k]).for_each(|k| g[v as usize][k] = u[k]);
             }
         }
     }
@@ -301,6 +303,12 @@ impl RowBuffers {
         }
         &self.row
     }
+}
+
+/// Prescribed axes, one bit each. The level that is solved on knows no inclined directions: such a vertex is held in
+/// all of them.
+fn on_axes(fixed: u8) -> u8 {
+    if fixed < INCLINED { fixed } else { 7 }
 }
 
 impl Hierarchy {
@@ -329,11 +337,11 @@ impl Galerkin {
         for &(copy, _) in &self.known_fixed {
             let same = hierarchy.same_vertex(copy, self.first).unwrap_or(NONE);
             if let Some(bits) = self.held_bits.get_mut(same as usize) {
-                *bits |= self.fixed[copy as usize];
+                *bits |= on_axes(self.fixed[copy as usize]);
             }
         }
         self.held.clear();
         let held = (0u32..).zip(&self.held_bits).filter(|(_, bits)| **bits != 0);
-        self.held.extend(held.map(|(v, bits)| (v, [0, 1, 2].map(|k| bits >> k & 1 == 1))));
+        self.held.extend(held.map(|(v, bits)| (v, Held::Axes([0, 1, 2].map(|k| bits >> k & 1 == 1)))));
     }
 }

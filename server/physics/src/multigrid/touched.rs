@@ -2,7 +2,7 @@
 //! again, by the next update.
 
 use super::follow::LevelChange;
-use super::galerkin::{CellMatrix, Galerkin, LevelMatrices, Rotation, held, shared_matrix};
+use super::galerkin::{CellMatrix, Galerkin, INCLINED, LevelMatrices, Rotation, held, shared_matrix};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use crate::octree::corner_weights;
@@ -51,13 +51,14 @@ impl Galerkin {
             }
         });
         self.known_fixed.clear();
-        self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.axes)));
+        self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.held)));
         self.enter_fixed(hierarchy);
         let mut released = false;
         let mut cells: Vec<u32> = Vec::new();
         for (&v, &before) in vertices.iter().zip(&before) {
             let now = self.bits(v);
-            released |= before & !now != 0;
+            let inclined = before.max(now) >= INCLINED;
+            released |= if inclined { before != now } else { before & !now != 0 };
             if before != now {
                 cells.extend(hierarchy.levels[0].slots_of(v as usize).map(|(id, _)| id as u32));
             }

@@ -92,7 +92,8 @@ impl<'a> Restriction<'a> {
         let mut held = vec![[false; 3]; unknowns.len()];
         for fixed in fixed {
             if let Ok(at) = unknowns.binary_search(&fixed.copy) {
-                held[at] = fixed.axes;
+                // A velocity in an inclined plane stays as it is.
+                held[at] = fixed.held.axes().unwrap_or([true; 3]);
             }
         }
         Self { change, rows, unknowns, mass: mass_before, mass_after, diagonal, held, cluster }

@@ -1,9 +1,11 @@
 //! The inverse of the 3×3 diagonal blocks, one per copy; on degenerate elements in variables in which
 //! they are not stiff.
 
+use nalgebra::Matrix3;
+
 use super::{
-    BLOCK, Block6, FixedCopy, Iterate, LinearOperator, Padded, Preconditioner, Substitution, Sum, block_of,
-    rows,
+    BLOCK, Block6, FixedCopy, Held, Iterate, LinearOperator, Padded, Preconditioner, Substitution, Sum,
+    block_of, rows,
 };
 use crate::lists::reserve::resize_reserving;
 use crate::team::{Team, blocks};
@@ -70,9 +72,9 @@ impl BlockJacobi {
         &mut self.inverse
     }
 
-    /// Inverts the block `diagonal` of one copy; in the directions `fixed` the inverse is 0.
-    pub fn set(&mut self, copy: usize, diagonal: &Block6, fixed: [bool; 3]) {
-        self.inverse[copy] = invert(diagonal, fixed);
+    /// Inverts the block `diagonal` of one copy; in the directions `held` the inverse is 0.
+    pub fn set(&mut self, copy: usize, diagonal: &Block6, held: Held) {
+        self.inverse[copy] = invert_free(diagonal, held);
     }
 
     /// Inverts `diagonal`; in the fixed directions of `fixed` the inverse is 0.
@@ -83,7 +85,7 @@ impl BlockJacobi {
             }
         });
         for copy in fixed {
-            self.inverse[copy.copy as usize] = invert(&diagonal[copy.copy as usize], copy.axes);
+            self.inverse[copy.copy as usize] = invert_free(&diagonal[copy.copy as usize], copy.held);
         }
     }
 
@@ -189,6 +191,23 @@ pub fn invert(block: &Block6, fixed: [bool; 3]) -> Inverse3 {
     Inverse3([[xx, xy, yy, 0.0], [xz, yz, zz, 0.0]])
 }
 
+/// Inverse of a symmetric block in the free directions, 0 in those of `held`: P (P A P + s H)⁻¹ P.
+pub fn invert_free(block: &Block6, held: Held) -> Inverse3 {
+    if let Some(axes) = held.axes() {
+        return invert(block, axes);
+    }
+    let [xx, xy, xz, _, yy, yz, zz, _] = block.map(f64::from);
+    let trace = xx + yy + zz;
+    if !(trace > LEAST_TRACE && trace.is_finite()) {
+        return Inverse3::default();
+    }
+    let A = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) / trace;
+    let definite = held.filter_block(&A, 1.0).cholesky().map(|factor| factor.inverse());
+    let inverse = definite.unwrap_or(Matrix3::identity() * 3.0) / trace;
+    let M = held.filter_block(&inverse, 0.0).map(|m| m as f32);
+    Inverse3([[M.m11, M.m12, M.m22, 0.0], [M.m13, M.m23, M.m33, 0.0]])
+}
+
 /// A symmetric block (xx, xy, xz, yy, yz, zz) without the rows and columns of the fixed directions, which
 /// have this diagonal instead.
 #[inline(always)]
@@ -213,7 +232,6 @@ fn hold<T: Copy + From<u8>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Matrix3;
 
     #[test]
     fn inverts_from_planet_to_sliver_and_respects_fixed_axes() {
@@ -229,6 +247,20 @@ mod tests {
             assert!((columns[1][1] * size - 5.0 / det).abs() < 1e-6);
             assert!((columns[2][1] * size - 0.2 / det).abs() < 1e-6);
         }
+    }
+
+    #[test]
+    fn respects_inclined_directions_at_any_size() {
+        let held = Held::along(nalgebra::Vector3::new(1.0, -2.0, 0.5)).unwrap();
+        let A = Matrix3::new(4.0, 1.0, 0.5, 1.0, 3.0, -0.2, 0.5, -0.2, 5.0);
+        for size in [1e20_f32, 1.0, 1e-25] {
+            let block = [4.0, 1.0, 0.5, 0.0, 3.0, -0.2, 5.0, 0.0].map(|v| v * size);
+            let columns = invert_free(&block, held).columns();
+            let M = Matrix3::from_fn(|i, j| f64::from(columns[j][i] * size));
+            let P = held.filter();
+            assert!((M * P * A * P - P).norm() < 1e-6 && (held.projection() * M).norm() < 1e-6);
+        }
+        assert_eq!(invert_free(&[f32::NAN; 8], held), Inverse3::default());
     }
 
     #[test]

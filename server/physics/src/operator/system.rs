@@ -2,7 +2,7 @@
 //! filtered out.
 
 use super::stiffness::{Direction, Stiffness};
-use super::{Advance, BLOCK, Block6, LinearOperator, Padded, Substitution, block_of};
+use super::{Advance, BLOCK, Block6, Held, LinearOperator, Padded, Substitution, block_of};
 use crate::element::MaterialPoint;
 use crate::team::{Team, blocks};
 
@@ -11,9 +11,9 @@ use crate::team::{Team, blocks};
 pub struct FixedCopy {
     /// Index of the copy.
     pub copy: u32,
-    /// Which of x, y, z are prescribed.
-    pub axes: [bool; 3],
-    /// Prescribed position [m]; only the components in `axes` are used.
+    /// The prescribed directions.
+    pub held: Held,
+    /// Prescribed position [m]; only its part in the directions of `held` is used.
     pub position_m: [f64; 3],
 }
 
@@ -150,10 +150,6 @@ impl Spring {
 /// Sets the prescribed directions of `v` to 0.
 pub fn filter(fixed: &[FixedCopy], v: &mut [Padded]) {
     for copy in fixed {
-        for (v, fixed) in v[copy.copy as usize].iter_mut().zip(copy.axes) {
-            if fixed {
-                *v = 0.0;
-            }
-        }
+        copy.held.clear_padded(&mut v[copy.copy as usize]);
     }
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::operator::Held;
+
 /// Origin of a node that did not exist before the cut.
 pub const NEW: u32 = u32::MAX;
 
@@ -14,9 +16,9 @@ pub struct SnapNode {
     pub x: Vector3<f64>,
     /// Velocity [m/s].
     pub v: Vector3<f64>,
-    /// Axes along which the displacement is prescribed, and the displacement [m]. Such a node is neither
+    /// Directions in which the displacement is prescribed, and the displacement [m]. Such a node is neither
     /// moved nor collapsed. All duplicates of it get the same constraint.
-    pub fixed: Option<([bool; 3], Vector3<f64>)>,
+    pub fixed: Option<(Held, Vector3<f64>)>,
     /// Force on the node itself [N].
     pub point_force: Vector3<f64>,
     /// Force spread over the material around the node [N].

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::constraint::Filter;
 use super::real::{Real, dot};
 use crate::assembly::BlockCsr;
+use crate::operator::Held;
 
 /// M⁻¹: the inverses of the 3×3 diagonal blocks of A, 0 in the prescribed directions.
 ///
@@ -19,16 +20,16 @@ impl<T: Real> DiagonalInverse<T> {
     pub fn update(&mut self, A: &BlockCsr<f64>, filter: &Filter) {
         self.inverse.resize(A.n_rows(), Matrix3::zeros());
         for (i, inverse) in self.inverse.iter_mut().enumerate() {
-            *inverse = rounded(invert(A.diagonal(i), [false; 3]));
+            *inverse = rounded(invert(A.diagonal(i), Held::NOT));
         }
-        for &(copy, axes) in filter.held() {
+        for &(copy, held) in filter.held() {
             let i = copy as usize;
-            self.inverse[i] = rounded(invert(A.diagonal(i), axes));
+            self.inverse[i] = rounded(invert(A.diagonal(i), held));
         }
     }
 
     /// Inverts `block` in place of that of copy `i`, 0 in the directions `held`.
-    pub fn set(&mut self, i: usize, block: Matrix3<f64>, held: [bool; 3]) {
+    pub fn set(&mut self, i: usize, block: Matrix3<f64>, held: Held) {
         self.inverse[i] = rounded(invert(block, held));
     }
 
@@ -66,24 +67,30 @@ pub fn root(s: f64) -> f64 {
 /// Inverse of the free part of a symmetric block, scaled by its size so that blocks of any size keep
 /// their digits. A block that is not positive definite is replaced by its size times the identity:
 /// M must be positive definite whatever A is. A block of zeros, or of nonsense, gives 0.
-fn invert(mut block: Matrix3<f64>, held: [bool; 3]) -> Matrix3<f64> {
+fn invert(mut block: Matrix3<f64>, held: Held) -> Matrix3<f64> {
     let size = block.amax();
     if !(size > f64::MIN_POSITIVE && size.is_finite()) {
         return Matrix3::zeros();
     }
     block /= size;
-    for k in (0..3).filter(|&k| held[k]) {
-        block.row_mut(k).fill(0.0);
-        block.column_mut(k).fill(0.0);
-        block[(k, k)] = 1.0;
+    match held {
+        Held::Axes(axes) => (0..3).filter(|&k| axes[k]).for_each(|k| {
+            block.row_mut(k).fill(0.0);
+            block.column_mut(k).fill(0.0);
+            block[(k, k)] = 1.0;
+        }),
+        _ => block = held.filter_block(&block, 1.0),
     }
     let mut inverse = match block.cholesky() {
         Some(factor) if factor.l_dirty().diagonal().min() > 1e-8 => factor.inverse() / size,
         _ => Matrix3::identity() / size,
     };
-    for k in (0..3).filter(|&k| held[k]) {
-        inverse.row_mut(k).fill(0.0);
-        inverse.column_mut(k).fill(0.0);
+    match held {
+        Held::Axes(axes) => (0..3).filter(|&k| axes[k]).for_each(|k| {
+            inverse.row_mut(k).fill(0.0);
+            inverse.column_mut(k).fill(0.0);
+        }),
+        _ => inverse = held.filter_block(&inverse, 0.0),
     }
     inverse
 }
@@ -96,8 +103,8 @@ mod tests {
     fn inverts_the_free_part_of_blocks_of_any_size() {
         let A = Matrix3::new(4.0, 1.0, 0.5, 1.0, 3.0, -0.2, 0.5, -0.2, 5.0);
         for size in [1e-200, 1e-20, 1.0, 1e20] {
-            assert!((invert(A * size, [false; 3]) * size * A - Matrix3::identity()).norm() < 1e-12);
-            let part = invert(A * size, [false, true, false]) * size;
+            assert!((invert(A * size, Held::NOT) * size * A - Matrix3::identity()).norm() < 1e-12);
+            let part = invert(A * size, Held::Axes([false, true, false])) * size;
             assert_eq!(part.row(1).amax(), 0.0);
             assert!((part[(0, 0)] * (4.0 - 0.05) - 1.0).abs() < 1e-12, "{part}");
         }
@@ -105,10 +112,10 @@ mod tests {
 
     #[test]
     fn is_positive_whatever_the_block() {
-        let indefinite = invert(Matrix3::from_diagonal(&Vector3::new(1.0, -2.0, 1.0)), [false; 3]);
+        let indefinite = invert(Matrix3::from_diagonal(&Vector3::new(1.0, -2.0, 1.0)), Held::NOT);
         assert_eq!(indefinite, Matrix3::identity() / 2.0);
         for nothing in [0.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(invert(Matrix3::repeat(nothing), [false; 3]), Matrix3::zeros());
+            assert_eq!(invert(Matrix3::repeat(nothing), Held::NOT), Matrix3::zeros());
         }
     }
 }

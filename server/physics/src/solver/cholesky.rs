@@ -13,7 +13,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Side};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::constraint::Filter;
 use super::real::Real;
@@ -32,6 +32,8 @@ pub struct Cholesky<T> {
     factor: Vec<T>,
     right: Vec<T>,
     held: Vec<bool>,
+    /// Copies that are held in inclined directions, ascending, with P and with H times the size of their block.
+    inclined: Vec<(u32, Matrix3<f64>, Matrix3<f64>)>,
     scratch: Option<MemBuffer>,
     factored: bool,
 }
@@ -111,16 +113,33 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
         };
         let n = self.right.len();
         self.held.fill(false);
-        for &(copy, axes) in filter.held() {
-            for axis in (0..3).filter(|&axis| axes[axis]) {
-                self.held[3 * copy as usize + axis] = true;
+        self.inclined.clear();
+        for &(copy, held) in filter.held() {
+            match held.axes() {
+                Some(axes) => (0..3)
+                    .filter(|&axis| axes[axis])
+                    .for_each(|axis| self.held[3 * copy as usize + axis] = true),
+                // The held directions get the size of the block, so that no digits of the others are lost.
+                None => {
+                    let size = A.diagonal(copy as usize).amax();
+                    if size > 0.0 {
+                        self.inclined.push((copy, held.filter(), held.projection() * size));
+                    } else {
+                        self.held[3 * copy as usize..][..3].fill(true);
+                    }
+                }
             }
         }
         for column in 0..n {
             for k in self.first[column] as usize..self.first[column + 1] as usize {
                 let Source { block, entry } = self.source[k];
                 let row = self.rows[k] as usize;
-                let value = A.blocks[block as usize][entry as usize];
+                let value = match self.inclined.is_empty() {
+                    true => A.blocks[block as usize][entry as usize],
+                    false => {
+                        filtered(&self.inclined, &A.blocks[block as usize], [column, row, entry as usize])
+                    }
+                };
                 // A copy without mass and stiffness stays where it is.
                 let idle = self.held[row] || self.held[column] || (row == column && value == 0.0);
                 self.values[k] = T::of(if !idle { value } else { f64::from(u8::from(row == column)) });
@@ -161,6 +180,33 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
         for (z, right) in z.iter_mut().zip(self.right.chunks_exact(3)) {
             *z = Vector3::from_fn(|k, _| right[k].wide() * scale);
         }
+    }
+}
+
+/// Entry `entry` of the block between the copies of `column` and `row`, P_i A_ij P_j, and s H_i more on the diagonal.
+fn filtered(
+    inclined: &[(u32, Matrix3<f64>, Matrix3<f64>)],
+    block: &[f64; 9],
+    [column, row, entry]: [usize; 3],
+) -> f64 {
+    let of = |place: usize| {
+        let found = inclined.binary_search_by_key(&((place / 3) as u32), |held| held.0);
+        found.ok().map(|at| &inclined[at])
+    };
+    let (left, right) = (of(column), of(row));
+    if left.is_none() && right.is_none() {
+        return block[entry];
+    }
+    let mut B = Matrix3::from_row_slice(block);
+    if let Some((_, P, _)) = left {
+        B = P * B;
+    }
+    if let Some((_, P, _)) = right {
+        B *= P;
+    }
+    match left {
+        Some((_, _, H)) if column / 3 == row / 3 => (B + H)[(entry / 3, entry % 3)],
+        _ => B[(entry / 3, entry % 3)],
     }
 }
 

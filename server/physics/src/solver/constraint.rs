@@ -2,9 +2,10 @@
 
 use nalgebra::{RealField, Vector3};
 
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, Held};
 
-/// The projection S onto the directions that are free: a diagonal of ones and zeros.
+/// The projection S onto the directions that are free: a block per copy, of ones and zeros
+/// where it is held along world axes.
 ///
 /// A solver works on S A S instead of A, so that the matrix keeps its pattern whatever is held.
 ///
@@ -12,33 +13,39 @@ use crate::operator::FixedCopy;
 /// Baraff, Witkin 1998; the thesis' vector S (Jeřábková 2007, Fig. 4.15).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filter {
-    held: Vec<(u32, [bool; 3])>,
+    held: Vec<(u32, Held)>,
 }
 
 impl Filter {
     /// Sets which directions of which copies are prescribed.
     pub fn set(&mut self, fixed: &[FixedCopy]) {
         self.held.clear();
-        self.held.extend(fixed.iter().map(|f| (f.copy, f.axes)));
+        self.held.extend(fixed.iter().map(|f| (f.copy, f.held)));
     }
 
     /// Sets the copies with prescribed directions, and which directions these are.
-    pub fn set_held(&mut self, held: &[(u32, [bool; 3])]) {
+    pub fn set_held(&mut self, held: &[(u32, Held)]) {
         self.held.clear();
         self.held.extend_from_slice(held);
     }
 
     /// Copies with prescribed directions, and which directions these are.
-    pub fn held(&self) -> &[(u32, [bool; 3])] {
+    pub fn held(&self) -> &[(u32, Held)] {
         &self.held
     }
 
     /// v ← S v.
     pub fn apply<T: RealField + Copy>(&self, v: &mut [Vector3<T>]) {
-        for &(copy, axes) in &self.held {
-            for axis in (0..3).filter(|&axis| axes[axis]) {
-                v[copy as usize][axis] = T::zero();
-            }
+        for &(copy, held) in &self.held {
+            held.clear(&mut v[copy as usize]);
+        }
+    }
+
+    /// v ← S v for the copies that are held along other directions than world axes: there a solver that is exact
+    /// along axes leaves rounding.
+    pub fn apply_inclined<T: RealField + Copy>(&self, v: &mut [Vector3<T>]) {
+        for (copy, held) in self.held.iter().filter(|(_, held)| held.is_inclined()) {
+            held.clear(&mut v[*copy as usize]);
         }
     }
 }

@@ -70,7 +70,7 @@ pub fn natural_frequencies(
     let n = K.n_rows();
     let mut filter = Filter::default();
     filter.set(fixed);
-    let held: usize = fixed.iter().map(|f| f.axes.iter().filter(|held| **held).count()).sum();
+    let held: usize = fixed.iter().map(|f| f.held.count()).sum();
     let free = (3 * n).saturating_sub(held);
     let count = settings.count.min(free);
     // More vectors than frequencies: the extra ones speed up convergence.
@@ -99,6 +99,7 @@ pub fn natural_frequencies(
             M.multiply_by(team, x, y);
             filter.apply(y);
             factor.solve(y, x, 1.0);
+            filter.apply_inclined(x);
         }
         // Y = (K + σM) X̄, so this is K + σM on the span of X̄.
         let projected = gram(&X, &Y);

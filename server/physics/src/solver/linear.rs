@@ -149,6 +149,7 @@ impl LinearSolver {
     /// z = M⁻¹ r, the block-Jacobi step.
     pub fn precondition(&self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
         self.substituted.apply(&self.inverse, r, z);
+        self.tidy(z);
     }
 
     /// Sets the prescribed directions of `v` to 0.
@@ -179,6 +180,11 @@ impl LinearSolver {
             report.residual /= reference;
         }
         report
+    }
+
+    /// Takes rounding in prescribed inclined directions from an increment that [`solve`](Self::solve) found.
+    pub fn tidy(&self, v: &mut [Vector3<f64>]) {
+        self.filter.apply_inclined(v);
     }
 
     fn iterate(
@@ -316,6 +322,7 @@ impl Correction<'_> {
             } else {
                 let before = report.residual;
                 cholesky.solve(self.r, self.z, before);
+                self.filter.apply_inclined(self.z);
                 let energy: f64 = self.r.iter().zip(&*self.z).map(|(r, z)| r.dot(z)).sum();
                 add(x, self.z, 1.0);
                 report.residual = self.residual(team, x);

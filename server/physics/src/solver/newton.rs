@@ -340,6 +340,7 @@ impl Newton {
         if solved.stop == StopReason::NonFinite {
             self.p.fill(Vector3::zeros());
         }
+        self.solver.tidy(&mut self.p);
         definite
     }
 

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::block_jacobi::{DiagonalInverse, root};
 use super::constraint::Filter;
 use crate::assembly::BlockCsr;
-use crate::operator::{StiffModes, Substitution};
+use crate::operator::{Held, StiffModes, Substitution};
 
 /// A substitution T, found anew whenever other copies are held.
 #[derive(Clone, Debug, Default)]
@@ -18,7 +18,7 @@ pub struct Substituted {
     /// Degenerate pieces that keep a stiff motion.
     left: usize,
     /// Prescribed directions for which T was found.
-    made_for: Option<Vec<(u32, [bool; 3])>>,
+    made_for: Option<Vec<(u32, Held)>>,
 }
 
 impl Substituted {
@@ -66,8 +66,8 @@ impl Substituted {
                     }
                 }
             }
-            let axes = held.iter().find(|h| h.0 == copy).map_or([false; 3], |h| h.1);
-            inverse.set(copy as usize, block, axes);
+            let held = held.iter().find(|h| h.0 == copy).map_or(Held::NOT, |h| h.1);
+            inverse.set(copy as usize, block, held);
         }
     }
 

@@ -9,7 +9,7 @@ use super::{
     Precision, StopReason,
 };
 use crate::assembly::BlockCsr;
-use crate::operator::FixedCopy;
+use crate::operator::{FixedCopy, Held};
 use crate::team::Team;
 
 const ALL: [(Method, Precision); 6] = [
@@ -53,9 +53,9 @@ fn grid(n: u32, stiffness: f64, weak: f64) -> BlockCsr<f64> {
 }
 
 fn held(n: u32) -> Vec<FixedCopy> {
-    let all = (0..n * n).map(|c| FixedCopy { copy: n * c, axes: [true; 3], position_m: [0.0; 3] });
+    let all = (0..n * n).map(|c| FixedCopy { copy: n * c, held: Held::FULLY, position_m: [0.0; 3] });
     let mut held: Vec<_> = all.collect();
-    held[3].axes = [true, false, true];
+    held[3].held = Held::Axes([true, false, true]);
     held
 }
 
@@ -95,7 +95,7 @@ fn every_method_in_every_precision_finds_the_same_solution() {
             assert!(report.residual <= 1e-10);
             let worst = x.iter().zip(&exact).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
             assert!(worst < 1e-7 * size, "{how:?}: {worst:e} of {size:e}");
-            assert!(fixed.iter().all(|f| (0..3).all(|k| !f.axes[k] || x[f.copy as usize][k] == 0.0)));
+            assert!(fixed.iter().all(|f| f.held.part_of(&x[f.copy as usize]) == Vector3::zeros()));
         }
     }
 }
@@ -288,7 +288,7 @@ impl Potential for Ring {
 #[test]
 fn newton_descends_to_the_minimum_from_anywhere() {
     let (n, mut team) = (40, Team::new(1).unwrap());
-    let fixed = [FixedCopy { copy: 0, axes: [true; 3], position_m: [1.0, 0.0, 0.0] }];
+    let fixed = [FixedCopy { copy: 0, held: Held::FULLY, position_m: [1.0, 0.0, 0.0] }];
     for curvature in [Curvature::Exact, Curvature::Definite] {
         for (method, precision) in ALL {
             for start in [1e-3, 0.5, 1.0, 300.0] {

@@ -212,7 +212,7 @@ fn held_and_loaded_vertices_follow() {
         adapt(&mut body, &NEAR, FAR);
     }
     let now = body.rest_positions().iter().position(|X| *X == place).unwrap() as u32;
-    assert!(body.fixed_nodes().iter().any(|f| f.node == now && f.axes == [true; 3]));
+    assert!(body.fixed_nodes().iter().any(|f| f.node == now && f.held == [true; 3].into()));
     body.release(&[now]);
     while adapt(&mut body, &NEAR, FAR).has_changed() {}
     let n = body.fixed_nodes().len();

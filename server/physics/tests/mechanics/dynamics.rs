@@ -113,7 +113,11 @@ impl Rig {
 
     fn clamp(&mut self) {
         let at_zero = |(n, x): (usize, &V)| {
-            (x.x == 0.0).then(|| FixedCopy { copy: n as u32, axes: [true; 3], position_m: (*x).into() })
+            (x.x == 0.0).then(|| FixedCopy {
+                copy: n as u32,
+                held: [true; 3].into(),
+                position_m: (*x).into(),
+            })
         };
         self.fixed = self.model.rest().iter().enumerate().filter_map(at_zero).collect();
     }

@@ -29,7 +29,7 @@ fn beam(law: Law) -> (Model, Vec<FixedCopy>) {
     let material = Material { young_pa: 3e5, poisson: 0.35, density_kg_m3: DENSITY, rayleigh, law };
     let model = Model::tet4_cut(&cut, &material, Volumetric::Full).unwrap();
     let clamp = |(copy, X): (u32, &Vector3<f64>)| {
-        (X.z == 0.0).then_some(FixedCopy { copy, axes: [true; 3], position_m: (*X).into() })
+        (X.z == 0.0).then_some(FixedCopy { copy, held: [true; 3].into(), position_m: (*X).into() })
     };
     let fixed = (0..).zip(model.rest()).filter_map(clamp).collect();
     (model, fixed)

@@ -15,6 +15,7 @@ mod foreign_space;
 mod friction;
 mod half_cut_beam;
 mod hex8_cubes;
+mod inclined;
 mod multigrid;
 mod multistep;
 mod octree;

@@ -21,7 +21,7 @@ fn bar() -> (Model, Vec<Vector3<f64>>, Vec<FixedCopy>) {
     let model = Model::tet4(&mesh, &SOFT, Volumetric::Full).unwrap();
     let load = model.lumped_mass(100.0).iter().map(|m| Vector3::new(0.0, -9.81 * m, 0.0)).collect();
     let clamp = |(copy, X): (u32, &Vector3<f64>)| {
-        (X.x == 0.0).then_some(FixedCopy { copy, axes: [true; 3], position_m: (*X).into() })
+        (X.x == 0.0).then_some(FixedCopy { copy, held: [true; 3].into(), position_m: (*X).into() })
     };
     let fixed = (0..).zip(model.rest()).filter_map(clamp).collect();
     (model, load, fixed)

@@ -127,7 +127,7 @@ fn a_reset_keeps_what_was_asked_for_after_the_cut_and_drops_the_pins() {
     expected.sort_unstable();
     assert_eq!(body.fixed_nodes().iter().map(|f| f.node).collect::<Vec<_>>(), expected);
     let found = body.fixed_nodes().iter().find(|f| f.node == pulled).unwrap();
-    assert_eq!((found.axes, found.displacement_m), ([false, true, false], v(0.0, 0.01, 0.0)));
+    assert_eq!((found.held, found.displacement_m), ([false, true, false].into(), v(0.0, 0.01, 0.0)));
     // The load is on a held node: the support carries it.
     let force = body.reaction(&expected, Vector3::zeros());
     assert!(body.step(0.01, Vector3::zeros(), &[]).outcome == Outcome::Advanced && force.norm() < 1.0);

@@ -127,7 +127,7 @@ impl System {
         let fixed: Vec<FixedCopy> = (0_u32..)
             .zip(&rest)
             .filter(|(_, X)| held(X))
-            .map(|(copy, _)| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] })
+            .map(|(copy, _)| FixedCopy { copy, held: [true; 3].into(), position_m: [0.0; 3] })
             .collect();
         let mut b: Vec<V> = mass.iter().zip(&rest).map(|(m, X)| factors[1] * *m * pull(X)).collect();
         hold(&fixed, &mut b);
@@ -290,7 +290,7 @@ impl System {
 /// Sets the prescribed directions of `v` to 0.
 pub fn hold(fixed: &[FixedCopy], v: &mut [V]) {
     for f in fixed {
-        (0..3).filter(|&k| f.axes[k]).for_each(|k| v[f.copy as usize][k] = 0.0);
+        f.held.clear(&mut v[f.copy as usize]);
     }
 }
 

@@ -29,7 +29,7 @@ pub fn held_at_zero(model: &Model, axis: usize) -> Vec<FixedCopy> {
     let at_zero = |(i, x): (usize, &V)| {
         (x[axis].abs() < 1e-12).then(|| FixedCopy {
             copy: i as u32,
-            axes: [true; 3],
+            held: [true; 3].into(),
             position_m: (*x).into(),
         })
     };

@@ -78,7 +78,7 @@ fn errors(beam: &CutMesh) -> Errors {
             let (clamped, middle) = (X.z < 1e-9, X.y > 0.03 - 1e-9);
             (clamped || middle).then(|| FixedCopy {
                 copy,
-                axes: [clamped, true, clamped],
+                held: [clamped, true, clamped].into(),
                 position_m: (*X).into(),
             })
         })
@@ -102,7 +102,7 @@ fn errors(beam: &CutMesh) -> Errors {
     let tip = displacement(beam, &model, &x, at(0.015, 0.03, 0.2)).x;
     let lip = |z: f64| displacement(beam, &model, &x, at(0.0, 0.03, z)).z;
     let opening = lip(CUT + 1e-9) - lip(CUT - 1e-9);
-    let held: usize = fixed.iter().map(|f| f.axes.iter().filter(|held| **held).count()).sum();
+    let held: usize = fixed.iter().map(|f| f.held.count()).sum();
     Errors {
         degrees_of_freedom: 3 * model.n_nodes() - held,
         energy: 1.0 - 2.0 * model.energy(&x) / ENERGY,

@@ -26,7 +26,7 @@ fn modes(model: &Model, density: f64, hold: bool, settings: &EigenSettings) -> R
     model.tangent(model.rest(), Tangent::Exact, &mut K);
     model.consistent_mass(density, &mut M);
     let clamp = |(copy, X): (u32, &Vector3<f64>)| {
-        (hold && X.z < 1e-9).then_some(FixedCopy { copy, axes: [true; 3], position_m: (*X).into() })
+        (hold && X.z < 1e-9).then_some(FixedCopy { copy, held: [true; 3].into(), position_m: (*X).into() })
     };
     let fixed: Vec<_> = (0..).zip(model.rest()).filter_map(clamp).collect();
     natural_frequencies(&mut Team::new(1).unwrap(), (&K, &M), &fixed, settings)

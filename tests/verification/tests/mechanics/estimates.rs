@@ -76,7 +76,7 @@ fn estimated(cells: usize, pattern: BoxPattern, law: Law, poisson: f64) -> (Mesh
     }
     let edge = |X: &Vector3<f64>| X.iter().any(|x| *x < 1e-9 || *x > 1.0 - 1e-9);
     let hold = |(copy, X): (u32, &Vector3<f64>)| {
-        edge(X).then_some(FixedCopy { copy, axes: [true; 3], position_m: (*X).into() })
+        edge(X).then_some(FixedCopy { copy, held: [true; 3].into(), position_m: (*X).into() })
     };
     let fixed: Vec<_> = (0..).zip(&mesh.nodes).filter_map(hold).collect();
     let mut K = model.pattern();

@@ -55,9 +55,9 @@ fn compress(model: &Model, load: f64) -> End {
         .map(|(copy, X)| {
             let clamped = X.z < 1e-9;
             let axes = [clamped || X.x < 1e-9, clamped || X.y < 1e-9, clamped];
-            FixedCopy { copy, axes, position_m: (*X).into() }
+            FixedCopy { copy, held: axes.into(), position_m: (*X).into() }
         })
-        .filter(|f| f.axes != [false; 3])
+        .filter(|f| f.held.any())
         .collect();
     let weight = load * YOUNG / L;
     let load: Vec<Vector3<f64>> =
@@ -145,7 +145,7 @@ fn bend(model: &Model) -> f64 {
         .zip(model.rest())
         .map(|(copy, X)| {
             let clamped = X.x < 1e-9;
-            FixedCopy { copy, axes: [clamped, clamped, true], position_m: (*X).into() }
+            FixedCopy { copy, held: [clamped, clamped, true].into(), position_m: (*X).into() }
         })
         .collect();
     // Total force in proportion to the depth, which differs from mesh to mesh.

@@ -30,7 +30,7 @@ fn bar(law: Law, cells: [usize; 3]) -> Bar {
     let model = Model::tet4(&mesh, &material, Volumetric::Full).unwrap();
     let load = model.lumped_mass(100.0).iter().map(|m| Vector3::new(0.0, -9.81 * m, 0.0)).collect();
     let clamp = |(copy, X): (u32, &Vector3<f64>)| {
-        (X.x < 1e-9).then_some(FixedCopy { copy, axes: [true; 3], position_m: (*X).into() })
+        (X.x < 1e-9).then_some(FixedCopy { copy, held: [true; 3].into(), position_m: (*X).into() })
     };
     let fixed = (0..).zip(model.rest()).filter_map(clamp).collect();
     Bar { model, load, fixed }

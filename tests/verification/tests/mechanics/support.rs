@@ -23,7 +23,7 @@ pub fn material(young_pa: f64, poisson: f64, density_kg_m3: f64, law: Law) -> Ma
 
 /// A node that is held in `axes` at `position_m`.
 pub fn held(node: usize, axes: [bool; 3], position_m: Vector3<f64>) -> FixedCopy {
-    FixedCopy { copy: node as u32, axes, position_m: position_m.into() }
+    FixedCopy { copy: node as u32, held: axes.into(), position_m: position_m.into() }
 }
 
 /// The nodes for which `choose` is true, held in all directions where they are at rest.

@@ -3,20 +3,20 @@
 use super::{LinearStep, SPRING_PASSES, system};
 use crate::integrator::springs::ActiveSpring;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::operator::Stiffness;
+use crate::operator::{Held, Stiffness};
 
 impl LinearStep {
     /// Adds the springs to the operator and to the preconditioner.
     pub(super) fn complete_operator(&mut self, elastic: &mut dyn Stiffness, inputs: &LinearInputs<'_>) {
         self.terms.clear();
         self.terms.extend(self.springs.springs.iter().flat_map(|s| s.terms(inputs.s())));
-        let axes_of = |copy: u32| {
+        let held_of = |copy: u32| {
             let found = inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy);
-            found.map_or([false; 3], |f| inputs.step.fixed[f].axes)
+            found.map_or(Held::NOT, |f| inputs.step.fixed[f].held)
         };
         // Springs of the last pass leave the preconditioner.
         for &copy in &self.sprung {
-            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], held_of(copy));
         }
         self.sprung.clear();
         match &mut self.stiff {
@@ -48,7 +48,7 @@ impl LinearStep {
             system(elastic, &self.shared, inputs).add_springs(&mut self.diagonal);
         }
         for &copy in &self.sprung {
-            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], axes_of(copy));
+            self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], held_of(copy));
         }
         for (&copy, bare) in self.sprung.iter().zip(&self.bare) {
             self.diagonal[copy as usize] = *bare;

@@ -115,7 +115,7 @@ fn operators_are_galerkin_products() {
             .step_by(7)
             .map(|copy| FixedCopy {
                 copy,
-                axes: [copy % 2 == 0, copy % 3 == 0, copy % 5 == 0],
+                held: [copy % 2 == 0, copy % 3 == 0, copy % 5 == 0].into(),
                 position_m: [0.0; 3],
             })
             .collect();

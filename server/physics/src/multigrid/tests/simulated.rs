@@ -40,7 +40,7 @@ fn random(n: usize, held: &[FixedCopy]) -> Vec<Padded> {
 fn partly(octree: &Octree) -> Vec<FixedCopy> {
     let axes = |copy: u32| [2, 3, 5].map(|n| copy.is_multiple_of(n));
     let all = (0..octree.n_vertices() as u32).step_by(7);
-    all.map(|copy| FixedCopy { copy, axes: axes(copy), position_m: [0.0; 3] }).collect()
+    all.map(|copy| FixedCopy { copy, held: axes(copy).into(), position_m: [0.0; 3] }).collect()
 }
 
 #[test]

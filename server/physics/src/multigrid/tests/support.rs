@@ -55,7 +55,7 @@ pub fn blade_grid(octree: &mut Octree, planes: &[i32]) {
 /// The vertices with lattice coordinate 0 along `axis`, held in all directions.
 pub fn clamped(octree: &Octree, axis: usize) -> Vec<FixedCopy> {
     let low = (0_u32..).zip(octree.points()).filter(|(_, p)| p[axis] == 0);
-    low.map(|(copy, _)| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] }).collect()
+    low.map(|(copy, _)| FixedCopy { copy, held: [true; 3].into(), position_m: [0.0; 3] }).collect()
 }
 
 pub fn coefficients(poisson: f64, mass_factor: f64) -> Coefficients {
@@ -117,7 +117,7 @@ impl Exact {
 
     pub fn filter(&self, v: &mut [V3]) {
         for f in &self.fixed {
-            (0..3).filter(|&k| f.axes[k]).for_each(|k| v[f.copy as usize][k] = 0.0);
+            f.held.clear(&mut v[f.copy as usize]);
         }
     }
 

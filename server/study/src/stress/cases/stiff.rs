@@ -117,7 +117,7 @@ fn layers(_: &Setting) -> Result<Evidence, Trouble> {
         let mass = Model::tet4(&mesh, &linear(1e3), Volumetric::Full)?.lumped_mass(1e3);
         let fixed: Vec<FixedCopy> = nodes(&mesh.nodes, |X| X.x == 0.0)
             .into_iter()
-            .map(|copy| FixedCopy { copy, axes: [true; 3], position_m: [0.0; 3] })
+            .map(|copy| FixedCopy { copy, held: [true; 3].into(), position_m: [0.0; 3] })
             .collect();
         let h: f64 = 0.02;
         // (M + h² K) v⁺ = M v + h (M g − K u)
