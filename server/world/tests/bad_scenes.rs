@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use scindo_physics::operator::Held;
 use scindo_world::scene::{CutPath, Fault, Scene};
 
 /// A scene without faults, to be spoilt.
@@ -317,4 +318,44 @@ fn tool_scripts_are_consistent() {
         GOOD.replace("blade = { length_m = 0.04, thickness_m = 0.001 }", "sphere = { radius_m = 0.01 }");
     let text = ball + "path = [{ at_s = 0, tip_m = [0, 0, 0], mode = \"cut\" }]\n";
     assert_says(&Scene::from_toml(&text).unwrap_err().to_string(), &["only a blade can cut"]);
+}
+
+#[test]
+fn inclined_directions_are_directions() {
+    let after = |key: &str| {
+        let fix = "[[body.fix]]\n";
+        message_after(fix, &format!("{fix}{key}\n"))
+    };
+    assert_says(
+        &after("normal = [0, 0, 0]"),
+        &["body.beam.fix.0.normal", "the direction has zero length", "give a direction such as [0, 0, 1]"],
+    );
+    assert_says(&after("rail = [0, nan, 1]"), &["body.beam.fix.0.rail", "NaN", "finite"]);
+    assert_says(&after("normal = [1, 0]"), &["body.beam.fix.0.normal"]);
+    assert_says(
+        &after("normal = [1, 0, 2]\naxes = \"x\""),
+        &["body.beam.fix.0", "found axes and normal", "at most one of axes, normal, rail", "keep one"],
+    );
+    assert_says(&after("norm = [1, 0, 2]"), &["unknown key `norm`", "normal"]);
+    let cells = GOOD
+        .replace("cells = [2, 4, 12], pattern = \"tet5\"", "cells = [3, 6, 20]")
+        .replace("young_pa", "element = \"octree\"\noctree = { levels = 1, simulate_level = 1 }\nyoung_pa")
+        .replace("[[body.fix]]\n", "[[body.fix]]\nrail = [1, 0, 2]\n");
+    let message = Scene::from_toml(&cells).unwrap_err().to_string();
+    assert_says(&message, &["body.beam.fix.0.rail", "simulate_level", "allowed there: axes"]);
+}
+
+#[test]
+fn rollers_and_grooves_hold_what_they_say() {
+    let held = |key: &str| {
+        let fix = "[[body.fix]]\n";
+        let scene = Scene::from_toml(&GOOD.replace(fix, &format!("{fix}{key}\n"))).unwrap();
+        scene.checked().bodies[0].fixes[0].held
+    };
+    assert_eq!(held(""), Held::FULLY);
+    assert_eq!(held("axes = \"xz\""), Held::Axes([true, false, true]));
+    assert_eq!(held("normal = [0, 0, -7]"), Held::Axes([false, false, true]));
+    let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-15);
+    assert!(matches!(held("normal = [3, 0, 4]"), Held::Along(n) if near(n, [0.6, 0.0, 0.8])));
+    assert!(matches!(held("rail = [0, 4, 3]"), Held::Across(t) if near(t, [0.0, 0.8, 0.6])));
 }

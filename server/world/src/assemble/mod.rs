@@ -191,7 +191,7 @@ impl Builder<'_> {
 
     fn fix(&mut self, at: &str, fix: &FixSpec, body: &mut SimBody) {
         let nodes = self.select(at, &fix.region, &body.body);
-        if let Err(error) = body.body.fix(&nodes, fix.axes, fix.displacement_m) {
+        if let Err(error) = body.body.fix(&nodes, fix.held, fix.displacement_m) {
             self.refused(at, &error);
         }
         body.fix_groups.push(nodes);

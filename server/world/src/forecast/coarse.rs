@@ -135,7 +135,7 @@ fn hold_regions(copy: &mut Body, spec: &BodySpec) -> Option<()> {
         return None;
     }
     for (fix, nodes) in spec.fixes.iter().zip(&groups) {
-        copy.fix(nodes, fix.axes, fix.displacement_m).ok()?;
+        copy.fix(nodes, fix.held, fix.displacement_m).ok()?;
     }
     Some(())
 }
@@ -175,14 +175,14 @@ fn hold(copy: &mut Body, fine: &SimBody) -> Option<()> {
     for (node, x) in (0u32..).zip(&nodes) {
         let Some(nearest) = nearest(x, (0..held.len()).map(at)) else { return Some(()) };
         if (at(nearest) - x).norm() <= reach {
-            copy.fix(&[node], held[nearest].axes, held[nearest].displacement_m).ok()?;
+            copy.fix(&[node], held[nearest].held, held[nearest].displacement_m).ok()?;
             any = true;
         }
     }
     if !any {
         for (i, fixed) in held.iter().enumerate() {
             let node = nearest(&at(i), nodes.iter().copied())?;
-            copy.fix(&[node as u32], fixed.axes, fixed.displacement_m).ok()?;
+            copy.fix(&[node as u32], fixed.held, fixed.displacement_m).ok()?;
         }
     }
     Some(())

@@ -1,5 +1,7 @@
 //! From a scene's tree to ready objects: what the schema cannot say is checked here.
 
+mod held;
+
 mod look;
 
 mod mechanics;
@@ -105,6 +107,7 @@ impl Check<'_> {
         let mesh = self.mesh(&format!("{at}.mesh"), body);
         let mechanics = self.mechanics(&at, body, &mesh);
         let octree = self.octree(&at, body, (&mesh, &mechanics));
+        self.inclined(&at, body);
         BodySpec {
             id: body.id.clone(),
             skin: body.skin.as_ref().map(|skin| self.skin(&at, skin, body)),
@@ -240,7 +243,7 @@ impl Check<'_> {
     fn fixes(&mut self, at: &str, fixes: &[RawFix]) -> Vec<FixSpec> {
         let fix = |(i, fix): (usize, &RawFix)| FixSpec {
             region: self.region(&format!("{at}.fix.{i}.where"), &fix.r#where),
-            axes: held_axes(fix.axes),
+            held: self.held(&format!("{at}.fix.{i}"), fix),
             displacement_m: Vector3::from(fix.displacement_m),
         };
         fixes.iter().enumerate().map(fix).collect()
@@ -477,17 +480,5 @@ fn broad_phase(method: RawBroadPhase) -> Method {
         RawBroadPhase::SphereTree => Method::SphereTree,
         RawBroadPhase::SpatialHash => Method::SpatialHash,
         RawBroadPhase::ParryBvh => Method::ParryBvh,
-    }
-}
-
-fn held_axes(axes: RawAxes) -> [bool; 3] {
-    match axes {
-        RawAxes::X => [true, false, false],
-        RawAxes::Y => [false, true, false],
-        RawAxes::Z => [false, false, true],
-        RawAxes::Xy => [true, true, false],
-        RawAxes::Xz => [true, false, true],
-        RawAxes::Yz => [false, true, true],
-        RawAxes::Xyz => [true; 3],
     }
 }

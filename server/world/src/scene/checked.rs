@@ -3,6 +3,7 @@
 use nalgebra::{Unit, Vector3};
 use scindo_collision::Method;
 use scindo_physics::octree::AdaptSettings;
+use scindo_physics::operator::Held;
 
 use super::mechanics::Mechanics;
 use crate::inputs::{ToolMode, ToolShape};
@@ -240,8 +241,8 @@ pub enum CellSplit {
 pub struct FixSpec {
     /// Which.
     pub region: Region,
-    /// Held axes x, y, z.
-    pub axes: [bool; 3],
+    /// Held directions.
+    pub held: Held,
     /// Displacement from rest that is held [m].
     pub displacement_m: Vector3<f64>,
 }

@@ -328,16 +328,21 @@ fn four() -> u32 {
 pub struct RawFix {
     /// Selection of nodes: exactly one of `box`, `sphere`, `half_space`, `slab`.
     pub r#where: RawWhere,
-    /// Axes along which the nodes are held.
-    #[serde(default)]
-    pub axes: RawAxes,
-    /// Prescribed displacement from the rest position [m].
+    /// Axes along which the nodes are held: all three, unless `normal` or `rail` is given.
+    pub axes: Option<RawAxes>,
+    /// In place of `axes`, the nodes are held along this vector only, like rollers on an incline: they move in the
+    /// plane that it is the normal of. It may have any length except zero.
+    pub normal: Option<Vec3>,
+    /// In place of `axes`, the nodes move along this vector only, like rollers in a straight groove. It may have any
+    /// length except zero.
+    pub rail: Option<Vec3>,
+    /// Prescribed displacement from the rest position [m]. Only its part in held directions counts.
     #[serde(default)]
     pub displacement_m: Vec3,
 }
 
 /// World axes that a fix holds.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RawAxes {
     /// x only.
@@ -353,7 +358,6 @@ pub enum RawAxes {
     /// y and z.
     Yz,
     /// All three.
-    #[default]
     Xyz,
 }
 

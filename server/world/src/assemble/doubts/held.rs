@@ -1,5 +1,8 @@
 //! Bodies and parts that nothing holds.
 
+use nalgebra::Vector3;
+use scindo_physics::operator::Held;
+
 use crate::body::SimBody;
 use crate::quantity::{mass, percent};
 use crate::scene::raw::RawIntegrator;
@@ -105,22 +108,32 @@ fn remedy(spec: &BodySpec) -> &'static str {
     }
 }
 
-/// A part that is held, but not along the axis that gravity pulls it along.
+/// A part that is held, but free to move where gravity pulls it.
 fn pulled_along(scene: &CheckedScene, body: &SimBody, at: &str, doubts: &mut Vec<String>) {
     let (g, parts) = (scene.gravity_m_s2, body.body.parts());
-    let mut held = vec![[false; 3]; parts.len()];
+    let (mut held, nothing) = (vec![Held::NOT; parts.len()], Vector3::zeros());
     for fixed in body.body.fixed_nodes() {
         let Some(&part) = parts.of_copy.get(fixed.node as usize) else { continue };
-        (0..3).for_each(|axis| held[part as usize][axis] |= fixed.axes[axis]);
+        let part = &mut held[part as usize];
+        if !part.covers(&fixed.held) {
+            *part = part.with(&nothing, &fixed.held, &nothing).0;
+        }
     }
-    let pulled = |held: &[bool; 3]| {
-        (0..3).find(|&axis| !held[axis] && held.contains(&true) && g[axis].abs() > PULL * g.norm())
+    let pull = |held: &Held| Some(g - held.part_of(&g)).filter(|pull| held.any() && pull.norm() > 0.0);
+    let along = |held: &Held| match held.axes() {
+        Some(_) => {
+            let axis = (0..3).find(|&axis| pull(held).is_some_and(|p| p[axis].abs() > PULL * g.norm()))?;
+            Some((AXES[axis].to_owned(), format!("Add {} to the `axes` of a fix", AXES[axis])))
+        }
+        None => {
+            let way = pull(held).filter(|pull| pull.norm() > PULL * g.norm())?.normalize();
+            let way = format!("[{:.2}, {:.2}, {:.2}]", way.x, way.y, way.z);
+            Some((way, "If it is not meant to, hold it with another [[body.fix]]".to_owned()))
+        }
     };
-    if let Some(axis) = held.iter().find_map(pulled) {
-        let axis = AXES[axis];
+    if let Some((way, next)) = held.iter().find_map(along) {
         doubts.push(format!(
-            "{at}: nothing holds it along {axis}, although gravity pulls it that way; it slides away. Add {axis} \
-            to the `axes` of a fix"
+            "{at}: nothing holds it along {way}, although gravity pulls it that way; it slides away. {next}"
         ));
     }
 }
