@@ -55,6 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
             id: arguments.tool.clone(),
             shape: arguments.shape,
             pose_hz: arguments.pose_hz,
+            deadband: arguments.deadband(),
             capability,
         };
         let (held, ports) = HeldTool::hold(&link, &request, clock).await?;

@@ -80,5 +80,8 @@ pub const MAX_BANKED_ENERGY_J: f64 = 0.1;
 /// Rows of the log that may wait for the writer: 8 s.
 pub const LOG_QUEUE_ROWS: usize = 8192;
 
+/// With a deadband, a pose is sent after this time even if nothing has changed [ns]: a sign of life.
+pub const KEEP_ALIVE_NS: u64 = 50_000_000;
+
 /// Poses that may wait for the sender: 64 ms. Newer poses are dropped when it is full.
 pub const POSE_QUEUE: usize = 64;

@@ -4,6 +4,7 @@
 use crate::clock::LoopClock;
 use crate::constants::{PERIOD_S, POSE_QUEUE};
 use crate::contact::model::{ContactInbox, ContactSlot, contact_slot};
+use crate::deadband::{Deadband, Withholding};
 use crate::device::{Capability, DeviceState, ToolMode};
 use crate::log::row::LogRow;
 use crate::safety::flag;
@@ -40,16 +41,39 @@ pub struct PoseQueue {
     thread: Thread,
     period_ns: u64,
     next_ns: u64,
+    withholding: Option<Withholding>,
+}
+
+/// What became of a pose that was offered to the queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Offered {
+    /// None was due.
+    NotDue,
+    /// It is on its way.
+    Queued,
+    /// One was due, but it was within the deadband of the last one.
+    Withheld,
+    /// The queue was full.
+    Dropped,
 }
 
 impl PoseQueue {
-    /// Queues a pose if one is due. Returns `false` if the queue was full. Never waits: the receiver polls,
-    /// so the channel takes no lock. Waking its thread is one system call.
-    pub fn offer(&mut self, state: &DeviceState, row: &LogRow, now_ns: u64) -> bool {
-        if now_ns < self.next_ns {
-            return true;
+    fn new(sender: Sender<PoseSample>, thread: Thread, pose_hz: f64, deadband: Option<Deadband>) -> Self {
+        let withholding = deadband.map(Withholding::new);
+        Self { sender, thread, period_ns: (1e9 / pose_hz) as u64, next_ns: 0, withholding }
+    }
+
+    /// Queues a pose if one is due and worth sending. Never waits: the receiver polls, so the channel takes no
+    /// lock. Waking its thread is one system call.
+    pub fn offer(&mut self, state: &DeviceState, row: &LogRow, now_ns: u64) -> Offered {
+        let urgent = self.withholding.as_ref().is_some_and(|held| held.is_urgent(state.mode));
+        if now_ns < self.next_ns && !urgent {
+            return Offered::NotDue;
         }
         self.next_ns = now_ns + self.period_ns - (PERIOD_S * 0.5e9) as u64;
+        if self.withholding.as_ref().is_some_and(|held| !held.lets_pass(state, now_ns)) {
+            return Offered::Withheld;
+        }
         let sample = PoseSample {
             state: *state,
             force_n: row.force_n,
@@ -60,7 +84,13 @@ impl PoseQueue {
         };
         let taken = self.sender.try_send(sample).is_ok();
         self.thread.unpark();
-        taken
+        if !taken {
+            return Offered::Dropped;
+        }
+        if let Some(held) = &mut self.withholding {
+            held.sent(state, now_ns);
+        }
+        Offered::Queued
     }
 }
 
@@ -73,6 +103,8 @@ pub struct ToolRequest {
     pub shape: ToolShape,
     /// Poses per second [Hz].
     pub pose_hz: f64,
+    /// Poses within it of the last one sent are withheld; `None` sends all.
+    pub deadband: Option<Deadband>,
     /// Capability of the device that moves the tool.
     pub capability: Capability,
 }
@@ -118,12 +150,7 @@ impl HeldTool {
         let (sender, receiver) = crossbeam_channel::bounded(POSE_QUEUE);
         let sent = Arc::new(AtomicU64::new(0));
         let thread = spawn_sender(held.poses, receiver, tool.shape, sent.clone())?;
-        let poses = PoseQueue {
-            sender,
-            thread: thread.thread().clone(),
-            period_ns: (1e9 / tool.pose_hz) as u64,
-            next_ns: 0,
-        };
+        let poses = PoseQueue::new(sender, thread.thread().clone(), tool.pose_hz, tool.deadband);
         let ports = LoopPorts { contacts, server_alive: follow_presence(link), poses };
         Ok((Self { inbox, sent, sender: thread, _contacts: stream, _cutter: held.cutter }, ports))
     }
@@ -272,6 +299,40 @@ pub async fn connect(config: LinkConfig) -> Result<Link, LinkError> {
 mod tests {
     use super::*;
     use scindo_client::messages::{SessionInfo, ToolInfo};
+
+    const MS: u64 = 1_000_000;
+
+    /// What became of the poses of `states`, one per millisecond, and the times [ms] of those that were queued.
+    fn offered(states: &[DeviceState], deadband: Option<Deadband>) -> (Vec<Offered>, Vec<usize>) {
+        let (sender, receiver) = crossbeam_channel::bounded(states.len());
+        let mut queue = PoseQueue::new(sender, std::thread::current(), 500.0, deadband);
+        let offer = |(ms, state)| queue.offer(state, &LogRow::default(), MS * ms);
+        let all: Vec<Offered> = (0..).zip(states).map(offer).collect();
+        let times: Vec<usize> = (0..all.len()).filter(|&ms| all[ms] == Offered::Queued).collect();
+        assert_eq!(receiver.len(), times.len());
+        (all, times)
+    }
+
+    fn still(mode: ToolMode) -> DeviceState {
+        let (position_m, velocity_m_s) = (Vector3::zeros(), Vector3::zeros());
+        DeviceState { position_m, velocity_m_s, orientation: [0.0, 0.0, 0.0, 1.0], mode }
+    }
+
+    #[test]
+    fn a_still_hand_sends_signs_of_life_and_a_button_passes_at_once() {
+        let band = Some(Deadband { position_m: 1e-4, angle_rad: 0.01 });
+        let mut states = vec![still(ToolMode::Touch); 1000];
+        let (all, times) = offered(&states, band);
+        assert_eq!(times, (0..20).map(|i| 50 * i).collect::<Vec<_>>());
+        assert_eq!(all.iter().filter(|o| **o == Offered::Withheld).count(), 480);
+        states[333..].fill(still(ToolMode::Grab));
+        let (_, times) = offered(&states, band);
+        assert!(times.contains(&333), "between two poses that are due: {times:?}");
+        // Without a deadband every pose that is due goes.
+        let (all, times) = offered(&states, None);
+        assert_eq!(times, (0..500).map(|i| 2 * i).collect::<Vec<_>>());
+        assert!(!all.contains(&Offered::Withheld));
+    }
 
     #[test]
     fn only_tools_that_a_script_moves_are_told_of() {

@@ -136,6 +136,8 @@ pub struct LoopReport {
     pub device_faults: u64,
     /// Lowest energy of the passivity observer [J].
     pub min_energy_j: f64,
+    /// Poses that were due but within the deadband of the last one sent.
+    pub poses_withheld: u64,
     /// Poses dropped because the queue was full.
     pub poses_dropped: u64,
     /// Rows of the log dropped because the queue was full.

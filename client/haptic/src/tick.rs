@@ -5,7 +5,7 @@ use crate::constants::PERIOD_S;
 use crate::contact::law::ContactLaw;
 use crate::contact::model::ContactSlot;
 use crate::device::{DeviceState, HapticDevice};
-use crate::link::PoseQueue;
+use crate::link::{Offered, PoseQueue};
 use crate::live::Meter;
 use crate::log::recorder::LogQueue;
 use crate::log::row::LogRow;
@@ -194,7 +194,11 @@ impl HapticTick {
 
     fn publish(&mut self, state: &DeviceState, row: &LogRow, now_ns: u64) {
         if let Some(poses) = &mut self.ports.poses {
-            self.report.poses_dropped += u64::from(!poses.offer(state, row, now_ns));
+            match poses.offer(state, row, now_ns) {
+                Offered::Dropped => self.report.poses_dropped += 1,
+                Offered::Withheld => self.report.poses_withheld += 1,
+                Offered::NotDue | Offered::Queued => {}
+            }
         }
         if let Some(log) = &mut self.ports.log {
             self.report.log_rows_dropped += u64::from(!log.offer(row));

@@ -9,6 +9,7 @@ use scindo_program::Manual;
 
 use super::error::CommandError;
 use crate::constants::{DEFAULT_MAX_FORCE_N, DEFAULT_SLEW_N_S, RAMP_DOWN_NS};
+use crate::deadband::Deadband;
 use crate::device::Capability;
 use crate::tick::Limits;
 
@@ -95,8 +96,16 @@ pub struct Arguments {
     #[arg(long, value_name = "N_S", default_value_t = DEFAULT_SLEW_N_S)]
     pub slew: f64,
     /// Poses sent per second [Hz].
-    #[arg(long, value_name = "HZ", default_value_t = 500.0)]
+    #[arg(long, value_name = "HZ", visible_alias = "rate", default_value_t = 500.0)]
     pub pose_hz: f64,
+    /// Withhold a pose that lies within this distance of the last one sent [mm], but send one every 50 ms and
+    /// whenever a button changes. The force at the server is then wrong by at most the stiffness of the tissue times
+    /// this distance: 0.1 mm on 500 N/m are 0.05 N. By default, every pose is sent.
+    #[arg(long, value_name = "MM")]
+    pub deadband_mm: Option<f64>,
+    /// Angle of the deadband [degrees]: a pose that is turned further is sent.
+    #[arg(long, value_name = "DEG", requires = "deadband_mm", default_value_t = 0.5)]
+    pub deadband_deg: f64,
     /// Print no figures during the run.
     #[arg(long, short)]
     pub quiet: bool,
@@ -110,6 +119,14 @@ pub struct Arguments {
 pub enum DeviceKind {
     /// A simulated hand that follows a path and feels the force.
     Sim,
+}
+
+impl Arguments {
+    /// The deadband of poses; `None` sends all.
+    pub fn deadband(&self) -> Option<Deadband> {
+        let angle_rad = self.deadband_deg.to_radians();
+        self.deadband_mm.map(|mm| Deadband { position_m: 1e-3 * mm, angle_rad })
+    }
 }
 
 /// Refuses what cannot work, before anything is opened.
@@ -127,6 +144,12 @@ pub fn check(arguments: &Arguments, device: &Capability) -> Result<Limits, Comma
     }
     if !(1.0..=1000.0).contains(pose_hz) {
         return fail("--pose-hz", *pose_hz, "allowed is 1 to 1000".into());
+    }
+    if let Some(mm) = arguments.deadband_mm.filter(|mm| !(0.0..=10.0).contains(mm)) {
+        return fail("--deadband-mm", mm, "allowed is 0 to 10 mm; leave it out to send every pose".into());
+    }
+    if !(0.0..=45.0).contains(&arguments.deadband_deg) {
+        return fail("--deadband-deg", arguments.deadband_deg, "allowed is 0 to 45 degrees".into());
     }
     for (what, value) in [("--depth", *depth), ("--clearance", *clearance)] {
         if !(value > 0.0 && value < 10.0) {
@@ -191,6 +214,19 @@ mod tests {
         let arguments = parse(&[]);
         assert_eq!(check(&arguments, &CAPABILITY).unwrap(), Limits { max_force_n: 2.5, slew_n_s: 50.0 });
         assert_eq!(arguments.direction, -Vector3::z());
+        assert_eq!((arguments.pose_hz, arguments.deadband()), (500.0, None));
+    }
+
+    #[test]
+    fn a_deadband_has_a_distance_and_an_angle() {
+        let arguments = parse(&["--rate=250", "--deadband-mm=0.2"]);
+        assert_eq!(arguments.pose_hz, 250.0);
+        let band = arguments.deadband().unwrap();
+        assert!(band.position_m == 2e-4 && (band.angle_rad - 0.5_f64.to_radians()).abs() < 1e-15);
+        let error = check(&parse(&["--deadband-mm=0.2", "--deadband-deg=90"]), &CAPABILITY).unwrap_err();
+        assert!(error.to_string().contains("0 to 45 degrees"), "{error}");
+        let alone = ["scindo-haptic", "--tool", "probe", "--deadband-deg", "1"];
+        assert!(Cli::try_parse_from(alone).unwrap_err().to_string().contains("--deadband-mm"));
     }
 
     #[test]
@@ -201,6 +237,9 @@ mod tests {
             ["--slew", "1"],
             ["--pose-hz", "5000"],
             ["--seconds", "-1"],
+            ["--rate", "0"],
+            ["--deadband-mm", "-1"],
+            ["--deadband-mm", "nan"],
             ["--depth", "0"],
             ["--direction", "0,0,0"],
             ["--plot", "force.png"],

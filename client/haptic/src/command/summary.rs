@@ -45,8 +45,8 @@ impl std::fmt::Display for Summary {
         )?;
         writeln!(
             f,
-            "pose to contact      p50 {:.2} ms, p99 {:.2} ms, max {:.0} ms   ({} poses sent)",
-            n.round_trip_ms.p50, n.round_trip_ms.p99, n.round_trip_ms.max, n.poses_sent
+            "pose to contact      p50 {:.2} ms, p99 {:.2} ms, max {:.0} ms   ({} poses sent, {} withheld)",
+            n.round_trip_ms.p50, n.round_trip_ms.p99, n.round_trip_ms.max, n.poses_sent, l.poses_withheld
         )?;
         writeln!(
             f,

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 /// State of hand, contact and safety at one tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LogRow {
     /// Loop clock [s].
     pub time_s: f64,
