@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Starts the built-in demonstration on free ports and drives its page; see viewer.mjs. Looks at all views of
-# another scene; see views.mjs. Then makes a quick study
-# of accuracy and looks at its page; see accuracy.mjs.
+# another scene; see views.mjs. Lets two pages hold and cut the same tissue; see hands.mjs. Then makes a quick
+# study of accuracy and looks at its page; see accuracy.mjs.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 bin=${SCINDO_TEST_BIN:-target/debug}/scindo
@@ -30,6 +30,18 @@ for _ in $(seq 1 300); do
   sleep 0.2
 done
 node tests/browser/views.mjs "http://127.0.0.1:$web" "$server"
+kill "$server"; wait "$server" 2>/dev/null || true
+
+web=$(python3 tests/free_port.py)
+zenoh=$(python3 tests/free_port.py)
+"$bin" run tests/browser/hands.toml --listen "tcp/127.0.0.1:$zenoh" --viewer "127.0.0.1:$web" >"$artifacts/hands-server.log" 2>&1 &
+server=$!
+for _ in $(seq 1 300); do
+  (exec 3<>"/dev/tcp/127.0.0.1/$web") 2>/dev/null && break
+  kill -0 "$server" 2>/dev/null || { echo "the server ended:" >&2; tail -20 "$artifacts/hands-server.log" >&2; exit 1; }
+  sleep 0.2
+done
+node tests/browser/hands.mjs "http://127.0.0.1:$web"
 
 rm -rf "$artifacts/accuracy"
 "$bin" accuracy --quick --budget-ms 20 --out "$artifacts/accuracy"
