@@ -5,6 +5,7 @@ use smallvec::SmallVec;
 
 use super::springs::{SpringKind, SpringLaw};
 use crate::element::MaterialPoint;
+use crate::operator::{Padded, padded};
 
 /// A spring between a point and a triangle of points, on two bodies or on one.
 ///
@@ -69,7 +70,8 @@ impl ActivePair {
         let mut carriers: SmallVec<[Carrier; 16]> = SmallVec::new();
         let [a, b] = spring.bodies;
         let mut add = |body: u32, point: &MaterialPoint, share: f64| {
-            for (&copy, w) in point.copies().iter().zip(point.weights()) {
+            // A place on an edge or at a corner of the triangle has no part of its other corners.
+            for (&copy, w) in point.copies().iter().zip(point.weights()).filter(|_| share != 0.0) {
                 let weight = share * w;
                 match carriers.iter_mut().find(|c| (c.body, c.copy) == (body, copy)) {
                     Some(known) => known.weight += weight,
@@ -93,7 +95,7 @@ impl ActivePair {
 pub struct PairTerms {
     terms: Vec<PairTerm>,
     /// Nodes and weights of all terms, one after another.
-    carriers: Vec<(u32, f64)>,
+    carriers: Vec<(u32, f32)>,
 }
 
 /// s k J Jᵀ of one spring.
@@ -102,17 +104,30 @@ struct PairTerm {
     bodies: [u32; 2],
     /// Where the carriers on the first body end, and those on the second.
     ends: [u32; 2],
-    /// s k.
-    stiffness: Matrix3<f64>,
+    /// Columns of s k.
+    stiffness: [Padded; 3],
 }
 
 /// A term as a product needs it.
 #[derive(Clone, Copy, Debug)]
 pub struct PairProduct<'a> {
-    /// s k.
-    pub stiffness: &'a Matrix3<f64>,
-    /// J: the two bodies, with their nodes and weights. A spring within one body has all of them on the first side.
-    pub sides: [(u32, &'a [(u32, f64)]); 2],
+    stiffness: &'a [Padded; 3],
+    sides: [(u32, &'a [(u32, f32)]); 2],
+}
+
+impl<'a> PairProduct<'a> {
+    /// J: the bodies, with their nodes and weights. A spring within one body has one side.
+    #[inline]
+    pub fn sides(&self) -> impl Iterator<Item = (u32, &'a [(u32, f32)])> + use<'a> {
+        self.sides.into_iter().filter(|side| !side.1.is_empty())
+    }
+
+    /// s k y.
+    #[inline]
+    pub fn force(&self, y: &Padded) -> Padded {
+        let [a, b, c] = self.stiffness;
+        std::array::from_fn(|i| a[i] * y[0] + b[i] * y[1] + c[i] * y[2])
+    }
 }
 
 impl PairTerms {
@@ -126,11 +141,12 @@ impl PairTerms {
             if stiffness == Matrix3::zeros() {
                 continue;
             }
-            self.carriers.extend(pair.carriers.iter().map(|c| (c.copy, c.weight)));
+            self.carriers.extend(pair.carriers.iter().map(|c| (c.copy, c.weight as f32)));
             let end = self.carriers.len();
             // The carriers on the first body come first.
             let second = pair.carriers.iter().filter(|c| c.body != a).count();
             let ends = [(end - second) as u32, end as u32];
+            let stiffness = [0, 1, 2].map(|j| padded(&stiffness.column(j).into()));
             self.terms.push(PairTerm { bodies: [a, b], ends, stiffness });
         }
     }
