@@ -219,7 +219,7 @@ impl PairContacts {
         for (own, surface) in self.own.iter_mut().zip(surfaces) {
             own.meet_the_joined(self.meets_joined);
             if let Some(tree) = surface.whole() {
-                own.update(tree, same);
+                own.update(tree, same, |t| surface.tag(t) > 0);
             }
         }
     }
@@ -299,9 +299,12 @@ impl PairContacts {
             } else {
                 tree.closest_point(from, reach)
             };
-            let Some(near) = near else { continue };
+            let Some(mut near) = near else { continue };
             if near.signed_distance > near_m {
                 continue;
+            }
+            if a == b {
+                near.normal = self.own[a].push(&near, from, tree, cell_m);
             }
             let candidate = Candidate { bodies: [a, b], vertex, near: &near };
             let Some(contact) = self.contact(known, &candidate, surfaces, (cell_m, near_m), h) else {

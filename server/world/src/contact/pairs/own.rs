@@ -16,6 +16,11 @@ const FACING: f64 = -0.2;
 const MOST: usize = 24;
 /// How far vertices look around, so that they need not look again soon, in cells.
 const LOOKOUT_CELLS: f64 = 0.5;
+/// An edge of the surface this sharp is the rim of a lip: scalar product of its normal and that of the lip.
+const RIM: f64 = 0.9;
+/// Distance beyond a rim over which the direction of contact turns from the normal of the lip to that of the rim, in
+/// cells.
+const TURN_CELLS: f64 = 0.05;
 /// Rounding of positions to single precision, in cells.
 const ROUNDING_CELLS: f64 = 1e-4;
 
@@ -25,6 +30,8 @@ pub struct OwnSurface {
     /// Unit normals of triangles and vertices; zero where there is none.
     triangles: Vec<Vector3<f64>>,
     vertices: Vec<Vector3<f64>>,
+    /// Unit normals of the vertices over the triangles of lips alone; zero where there is none.
+    lips: Vec<Vector3<f64>>,
     /// Positions of the vertices at the last update [m].
     positions: Vec<[f32; 3]>,
     /// Per vertex the triangles near it to which it is not joined, with their distances when they were listed [m].
@@ -42,19 +49,25 @@ impl OwnSurface {
     }
 
     /// Follows a motion of the surface. `same` tells whether vertices and triangles are still those of the last
-    /// update.
-    pub fn update(&mut self, tree: &SurfaceBvh, same: bool) {
+    /// update, `is_lip` which triangles are of a lip.
+    pub fn update(&mut self, tree: &SurfaceBvh, same: bool, is_lip: impl Fn(u32) -> bool) {
         self.follow(tree, same);
-        let Self { triangles, vertices, .. } = self;
+        let Self { triangles, vertices, lips, .. } = self;
         triangles.clear();
-        vertices.clear();
-        vertices.resize(tree.positions().len(), Vector3::zeros());
+        for normals in [&mut *vertices, &mut *lips] {
+            normals.clear();
+            normals.resize(tree.positions().len(), Vector3::zeros());
+        }
         triangles.extend((0..tree.triangle_count() as u32).map(|t| {
             let normal = tree.area_normal(t);
             tree.corners(t).iter().for_each(|&v| vertices[v as usize] += normal);
+            if is_lip(t) {
+                tree.corners(t).iter().for_each(|&v| lips[v as usize] += normal);
+            }
             unit(&normal)
         }));
         vertices.iter_mut().for_each(|normal| *normal = unit(normal));
+        lips.iter_mut().for_each(|normal| *normal = unit(normal));
     }
 
     /// No distance has shrunk by more than both sides have moved.
@@ -82,6 +95,29 @@ impl OwnSurface {
         }
         let [triangle, vertex] = [&self.triangles[t as usize], &self.vertices[vertex as usize]];
         triangle.dot(vertex) <= FACING
+    }
+
+    /// The direction in which the surface at `near` pushes a vertex at `from` [m].
+    ///
+    /// The normal on the rim of a lip is the mean of the lip's and the skin's. A vertex of the other rim lies opposite
+    /// to it, a few micrometres below or above, and would be pushed in another direction in every step. So a rim
+    /// pushes along the normal of its lip, and turns as the vertex passes beyond it.
+    pub fn push(
+        &self,
+        near: &ClosestPoint,
+        from: Vector3<f64>,
+        tree: &SurfaceBvh,
+        cell_m: f64,
+    ) -> Vector3<f64> {
+        let corners = tree.corners(near.triangle).into_iter().zip(near.barycentric);
+        let lip = unit(&corners.map(|(v, w)| w * self.lips[v as usize]).sum());
+        if lip == Vector3::zeros() || lip.dot(&near.normal) > RIM {
+            return near.normal;
+        }
+        let away = from - near.point;
+        let beyond = (away - lip.dot(&away) * lip).norm() / (TURN_CELLS * cell_m);
+        let normal = lip + beyond.min(1.0) * (near.normal - lip);
+        normal.try_normalize(0.1).unwrap_or(near.normal)
     }
 
     /// The closest of the triangles that face a vertex at `from` [m], of those no farther than `reach` [m] that it is
@@ -170,7 +206,7 @@ mod tests {
             // Folded shut and opened again, with a jerk in between.
             let angle = 3.1 * (0.0015 * step as f32).sin().abs() + if step % 500 == 7 { 0.3 } else { 0.0 };
             tree.refit(&strip(angle).0).unwrap();
-            own.update(&tree, step > 0);
+            own.update(&tree, step > 0, |_| false);
             for v in 0..points.len() as u32 {
                 let (from, reach) = (point(&tree.positions()[v as usize]), 0.002);
                 let joined = |t: u32| tree.corners(t).contains(&v);
