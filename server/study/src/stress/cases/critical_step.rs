@@ -17,7 +17,7 @@ pub const CASE: Case = Case {
            lumping: √(2/3) for every c; copies of the nodes with Menouillard's lumping: 1 for every c.",
     source: "Jeřábková 2007, (3.43) to (3.47); Menouillard 2006",
     quick: true,
-    run: run,
+    run,
 };
 
 const ENRICHMENTS: [(Enrichment, &str, &str); 4] = [

@@ -18,7 +18,7 @@ pub const CASE: Case = Case {
     rule: "C. The two motions differ by at most 1e-4 of the length.",
     source: "own",
     quick: true,
-    run: run,
+    run,
 };
 
 const LENGTH: f64 = 0.3;

@@ -29,7 +29,7 @@ pub const CASE: Case = Case {
            Valid requests are carried out. Every number stays finite.",
     source: "own",
     quick: true,
-    run: run,
+    run,
 };
 
 const BAD: [f64; 4] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300];

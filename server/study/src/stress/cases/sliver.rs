@@ -18,7 +18,7 @@ pub const CASE: Case = Case {
            fastest material.",
     source: "Jeřábková 2007, Fig. 3.9",
     quick: false,
-    run: run,
+    run,
 };
 
 const FRACTIONS: [f64; 5] = [1e-3, 1e-6, 1e-9, 1e-12, 1e-15];
