@@ -208,7 +208,7 @@ mod tests {
         }
         let all = select(&[], CASES).unwrap();
         let numbers: Vec<u8> = all.iter().filter_map(|case| case.number).collect();
-        assert_eq!(numbers, (1..=31).collect::<Vec<u8>>());
+        assert_eq!(numbers, (1..=numbers.len() as u8).collect::<Vec<u8>>());
         assert_eq!(select(&["27".into()], CASES).unwrap()[0].name, "haptic-wall");
     }
 
