@@ -10,15 +10,19 @@
 //! | `body/<id>/surface/field/<name>` | `SurfaceField` | server → subscribers |
 //! | `measures` | `Measures` | server → subscribers |
 //! | `forces` | `Forces` | server → subscribers |
-//! | `tool/<id>/pose` | `ToolSample` | client → server |
-//! | `tool/<id>/cut` | `CutCommand` | client → server |
+//! | `client/<client>/tool/<id>/pose` | `ToolSample` | client → server |
+//! | `client/<client>/tool/<id>/cut` | `CutCommand` | client → server |
+//! | `client/<client>/tool/<id>/capability` | `DeviceCapability` | client → server |
+//! | `client/<client>/live/<role>` | liveliness token | client → server |
 //! | `tool/<id>/cut_ack` | `CutAck` | server → client |
-//! | `tool/<id>/capability` | `DeviceCapability` | client → server |
 //! | `tool/<id>/contact` | `HapticContact` | server → client |
 //! | `tool/<id>/state` | `ToolState` | server → all |
 //! | `stats`, `event`, `plan` | `Stats`, `Event`, `Plan` | server → all |
 //! | `rpc/<verb>` | see [`Verb`] | query |
-//! | `live/<role>/<id>` | liveliness token | all |
+//! | `server/<id>/live` | liveliness token | server → all |
+//!
+//! The id of a client is part of every key that it publishes to, so that the access control of zenoh can
+//! grant each client its own keys. The server refuses a message that names another client than its key does.
 
 use std::fmt;
 
@@ -85,11 +89,9 @@ pub fn is_chunk(text: &str) -> bool {
         && text.bytes().all(|b| matches!(b, b'a'..=b'z' | b'0'..=b'9' | b'_' | b'-'))
 }
 
-/// Kind of participant that a liveliness token stands for.
+/// Kind of client that a liveliness token stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Role {
-    /// The simulation server.
-    Server,
     /// A viewer, perhaps with a mouse tool.
     Viewer,
     /// A haptic client.
@@ -100,12 +102,11 @@ pub enum Role {
 
 impl Role {
     /// Every role.
-    pub const ALL: [Self; 4] = [Self::Server, Self::Viewer, Self::Haptic, Self::Client];
+    pub const ALL: [Self; 3] = [Self::Viewer, Self::Haptic, Self::Client];
 
     /// The chunk that stands for the role in a key.
     pub fn as_str(self) -> &'static str {
         match self {
-            Self::Server => "server",
             Self::Viewer => "viewer",
             Self::Haptic => "haptic",
             Self::Client => "client",
@@ -200,14 +201,14 @@ pub enum Topic {
     Measures,
     /// Forces of contact.
     Forces,
-    /// Pose of a tool in a client's hand.
-    ToolPose(Chunk),
-    /// A cut command of a tool.
-    ToolCut(Chunk),
+    /// Pose of a tool in a client's hand, by client and tool.
+    ToolPose(Chunk, Chunk),
+    /// A cut command, by client and tool.
+    ToolCut(Chunk, Chunk),
     /// The answer to a cut command.
     ToolCutAck(Chunk),
-    /// Capability of the device behind a tool.
-    ToolCapability(Chunk),
+    /// Capability of the device behind a tool, by client and tool.
+    ToolCapability(Chunk, Chunk),
     /// The local contact model of a tool.
     ToolContact(Chunk),
     /// State of a tool, as viewers draw it.
@@ -220,8 +221,10 @@ pub enum Topic {
     Plan,
     /// A question or order to the server.
     Rpc(Verb),
-    /// Liveliness token of a participant.
-    Live(Role, Chunk),
+    /// Liveliness token of a client, by client and role.
+    Live(Chunk, Role),
+    /// Liveliness token of a server.
+    Server(Chunk),
 }
 
 impl Topic {
@@ -234,17 +237,18 @@ impl Topic {
             Self::SurfaceField(id, name) => format!("body/{id}/surface/field/{name}"),
             Self::Measures => "measures".to_owned(),
             Self::Forces => "forces".to_owned(),
-            Self::ToolPose(id) => format!("tool/{id}/pose"),
-            Self::ToolCut(id) => format!("tool/{id}/cut"),
+            Self::ToolPose(client, id) => format!("client/{client}/tool/{id}/pose"),
+            Self::ToolCut(client, id) => format!("client/{client}/tool/{id}/cut"),
             Self::ToolCutAck(id) => format!("tool/{id}/cut_ack"),
-            Self::ToolCapability(id) => format!("tool/{id}/capability"),
+            Self::ToolCapability(client, id) => format!("client/{client}/tool/{id}/capability"),
             Self::ToolContact(id) => format!("tool/{id}/contact"),
             Self::ToolState(id) => format!("tool/{id}/state"),
             Self::Stats => "stats".to_owned(),
             Self::Event => "event".to_owned(),
             Self::Plan => "plan".to_owned(),
             Self::Rpc(verb) => format!("rpc/{}", verb.as_str()),
-            Self::Live(role, id) => format!("live/{}/{id}", role.as_str()),
+            Self::Live(client, role) => format!("client/{client}/live/{}", role.as_str()),
+            Self::Server(id) => format!("server/{id}/live"),
         }
     }
 
@@ -253,6 +257,7 @@ impl Topic {
         let unknown = || KeyError::Unknown { found: suffix.chars().take(4 * MAX_ID_BYTES).collect() };
         let body = |id| Chunk::new("body id", id);
         let tool = |id| Chunk::new("tool id", id);
+        let client = |id| Chunk::new("client id", id);
         // No topic has more than five chunks, so a sixth makes the key unknown.
         let chunks: Vec<&str> = suffix.splitn(7, '/').collect();
         Ok(match chunks.as_slice() {
@@ -264,10 +269,10 @@ impl Topic {
             }
             ["measures"] => Self::Measures,
             ["forces"] => Self::Forces,
-            ["tool", id, "pose"] => Self::ToolPose(tool(id)?),
-            ["tool", id, "cut"] => Self::ToolCut(tool(id)?),
+            ["client", who, "tool", id, "pose"] => Self::ToolPose(client(who)?, tool(id)?),
+            ["client", who, "tool", id, "cut"] => Self::ToolCut(client(who)?, tool(id)?),
+            ["client", who, "tool", id, "capability"] => Self::ToolCapability(client(who)?, tool(id)?),
             ["tool", id, "cut_ack"] => Self::ToolCutAck(tool(id)?),
-            ["tool", id, "capability"] => Self::ToolCapability(tool(id)?),
             ["tool", id, "contact"] => Self::ToolContact(tool(id)?),
             ["tool", id, "state"] => Self::ToolState(tool(id)?),
             ["stats"] => Self::Stats,
@@ -277,10 +282,11 @@ impl Topic {
                 let known = Verb::ALL.into_iter().find(|v| v.as_str() == *verb);
                 Self::Rpc(known.ok_or_else(unknown)?)
             }
-            ["live", role, id] => {
+            ["client", who, "live", role] => {
                 let known = Role::ALL.into_iter().find(|r| r.as_str() == *role);
-                Self::Live(known.ok_or_else(unknown)?, Chunk::new("client id", id)?)
+                Self::Live(client(who)?, known.ok_or_else(unknown)?)
             }
+            ["server", id, "live"] => Self::Server(Chunk::new("server id", id)?),
             _ => return Err(unknown()),
         })
     }
@@ -327,19 +333,19 @@ impl KeySpace {
         format!("{}body/*/surface/keyframe", self.prefix)
     }
 
-    /// Expression for `tool/*/pose`.
+    /// Expression for `client/*/tool/*/pose`.
     pub fn every_tool_pose(&self) -> String {
-        format!("{}tool/*/pose", self.prefix)
+        format!("{}client/*/tool/*/pose", self.prefix)
     }
 
-    /// Expression for `tool/*/cut`.
+    /// Expression for `client/*/tool/*/cut`.
     pub fn every_tool_cut(&self) -> String {
-        format!("{}tool/*/cut", self.prefix)
+        format!("{}client/*/tool/*/cut", self.prefix)
     }
 
-    /// Expression for `tool/*/capability`.
+    /// Expression for `client/*/tool/*/capability`.
     pub fn every_tool_capability(&self) -> String {
-        format!("{}tool/*/capability", self.prefix)
+        format!("{}client/*/tool/*/capability", self.prefix)
     }
 
     /// Expression for `tool/*/state`.
@@ -352,13 +358,18 @@ impl KeySpace {
         format!("{}rpc/*", self.prefix)
     }
 
-    /// Expression for the liveliness tokens of everybody.
-    pub fn every_live(&self) -> String {
-        format!("{}live/*/*", self.prefix)
+    /// Expression for the liveliness tokens of all clients.
+    pub fn every_client(&self) -> String {
+        format!("{}client/*/live/*", self.prefix)
     }
 
-    /// Expression for the liveliness tokens of one role.
-    pub fn every_live_role(&self, role: Role) -> String {
-        format!("{}live/{}/*", self.prefix, role.as_str())
+    /// Expression for the liveliness tokens of all servers.
+    pub fn every_server(&self) -> String {
+        format!("{}server/*/live", self.prefix)
+    }
+
+    /// Expression for all that client `client` publishes and declares.
+    pub fn everything_of(&self, client: &Chunk) -> String {
+        format!("{}client/{client}/**", self.prefix)
     }
 }

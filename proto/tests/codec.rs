@@ -630,28 +630,31 @@ fn keys_round_trip_and_foreign_ones_are_refused() {
         Topic::SurfaceField(id(), id()),
         Topic::Measures,
         Topic::Forces,
-        Topic::ToolPose(id()),
-        Topic::ToolCut(id()),
+        Topic::ToolPose(id(), id()),
+        Topic::ToolCut(id(), id()),
         Topic::ToolCutAck(id()),
-        Topic::ToolCapability(id()),
+        Topic::ToolCapability(id(), id()),
         Topic::ToolContact(id()),
         Topic::ToolState(id()),
         Topic::Stats,
         Topic::Event,
         Topic::Plan,
+        Topic::Server(id()),
     ];
     topics.extend(Verb::ALL.map(Topic::Rpc));
-    topics.extend(Role::ALL.map(|role| Topic::Live(role, id())));
+    topics.extend(Role::ALL.map(|role| Topic::Live(id(), role)));
     for topic in topics {
         assert_eq!(keys.parse(&keys.key(&topic)).unwrap(), topic);
     }
-    assert_eq!(keys.key(&Topic::ToolPose(id())), "lab-1/@v1/main/tool/liver_2/pose");
+    assert_eq!(keys.key(&Topic::ToolPose(id(), id())), "lab-1/@v1/main/client/liver_2/tool/liver_2/pose");
     for bad in [
         "lab-2/@v1/main/stats",
         "lab-1/@v2/main/stats",
-        "lab-1/@v1/main/tool/Liver/pose",
-        "lab-1/@v1/main/tool//pose",
-        "lab-1/@v1/main/tool/a/pose/b",
+        "lab-1/@v1/main/tool/liver/pose",
+        "lab-1/@v1/main/client/a/tool/Liver/pose",
+        "lab-1/@v1/main/client/A/tool/liver/pose",
+        "lab-1/@v1/main/client/a/tool//pose",
+        "lab-1/@v1/main/client/a/tool/a/pose/b",
         "lab-1/@v1/main/rpc/quit",
     ] {
         assert!(keys.parse(bad).is_err(), "{bad}");

@@ -57,7 +57,7 @@ class Attacker:
 
     def __init__(self, endpoint):
         self.session = Session(endpoint, "scindo", "main")
-        self.token = self.session.zenoh.liveliness().declare_token(self.session.key(f"live/client/{CLIENT}"))
+        self.token = self.session.zenoh.liveliness().declare_token(self.session.key(f"client/{CLIENT}/live/client"))
         self.answers = {}
         self.subscription = self.session.zenoh.declare_subscriber(
             self.session.key(f"tool/{TOOL}/cut_ack"), self.on_ack
@@ -76,7 +76,7 @@ class Attacker:
             segment = command.sweep.add()
             segment.tip_m.x, segment.tip_m.y, segment.tip_m.z = tip
             segment.heel_m.x, segment.heel_m.y, segment.heel_m.z = heel
-        self.session.put(f"tool/{TOOL}/cut", command)
+        self.session.put(f"client/{CLIENT}/tool/{TOOL}/cut", command)
         return self.seq
 
     def wait_for(self, numbers):
@@ -216,8 +216,8 @@ def large_messages(endpoint, pid, seconds):
     payload, sent, end = b"\xff" * (1 << 20), 0, time.monotonic() + seconds
     while time.monotonic() < end:
         for session in sessions:
-            session.put(f"tool/{TOOL}/cut", cut_pb2.CutCommand(), payload=payload)
-            session.put(f"tool/{TOOL}/pose", tool_pb2.ToolSample(), payload=payload)
+            session.put(f"client/{CLIENT}/tool/{TOOL}/cut", cut_pb2.CutCommand(), payload=payload)
+            session.put(f"client/{CLIENT}/tool/{TOOL}/pose", tool_pb2.ToolSample(), payload=payload)
             sent += 2
     for session in sessions:
         session.zenoh.close()

@@ -161,7 +161,7 @@ def acknowledgement(session, acks, tool, command):
     """The acknowledgement of a cut, which is sent again until it comes: the server applies it once."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
-        session.put(f"tool/{tool}/cut", command)
+        session.put(f"client/{CLIENT}/tool/{tool}/cut", command)
         try:
             while True:
                 ack = acks.get(timeout=0.5)
@@ -214,7 +214,7 @@ def feel(session, body, tool):
         sample.client_time_ns = time.time_ns()
         at = (0.25 * low[0] + 0.75 * high[0], 0.5 * (low[1] + high[1]), height)
         sample.pose.position_m.x, sample.pose.position_m.y, sample.pose.position_m.z = at
-        session.put(f"tool/{tool}/pose", sample)
+        session.put(f"client/{CLIENT}/tool/{tool}/pose", sample)
         pairs = forces.get(timeout=PATIENCE).pairs
         pair = next((p for p in pairs if (p.on, p.by) == (body, tool) and p.normal_n > 0.01), None)
     subscription.undeclare()
@@ -258,10 +258,10 @@ def bad_input(session, body, tool):
         segment = cut.sweep.add()
         segment.tip_m.SetInParent()
         segment.heel_m.SetInParent()
-    session.put(f"tool/{tool}/pose", pose)
-    session.put(f"tool/{tool}/cut", cut)
-    session.put(f"tool/{tool}/cut", cut, payload=b"\xff" * 200_000)
-    session.put(f"tool/{tool}/pose", pose, payload=b"\x08")
+    session.put(f"client/{CLIENT}/tool/{tool}/pose", pose)
+    session.put(f"client/{CLIENT}/tool/{tool}/cut", cut)
+    session.put(f"client/{CLIENT}/tool/{tool}/cut", cut, payload=b"\xff" * 200_000)
+    session.put(f"client/{CLIENT}/tool/{tool}/pose", pose, payload=b"\x08")
     end = time.monotonic() + PATIENCE
     while True:
         now = next_stats(stats, before.sim_step)
@@ -288,7 +288,7 @@ def main():
     threading.Timer(600, lambda: (print("client.py: 600 s are over", file=sys.stderr), exit_now())).start()
 
     session = Session(args.connect, args.realm, args.session)
-    token = session.zenoh.liveliness().declare_token(session.key(f"live/client/{CLIENT}"))
+    token = session.zenoh.liveliness().declare_token(session.key(f"client/{CLIENT}/live/client"))
     info = session.ask("rpc/info", server_pb2.SessionInfo)
     check(info.wire_version == 1, "wire version 1")
     body = args.body or info.bodies[0].id

@@ -31,12 +31,12 @@ impl Link {
         let token = self
             .haptic()
             .liveliness()
-            .declare_token(self.keys().key(&Topic::Live(self.role(), chunk.clone())))
+            .declare_token(self.keys().key(&Topic::Live(chunk.clone(), self.role())))
             .await
             .map_err(LinkError::zenoh("declare liveliness token"))?;
         let publisher = self
             .haptic()
-            .declare_publisher(self.keys().key(&Topic::ToolPose(chunk)))
+            .declare_publisher(self.keys().key(&Topic::ToolPose(chunk.clone(), chunk)))
             .encoding(Encoding::from(encoding::<ToolSample>()))
             .priority(Priority::RealTime)
             .express(true)

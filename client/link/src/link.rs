@@ -52,7 +52,7 @@ impl Link {
         let (presence, presence_subscriber) = watch_servers(&haptic, &keys).await?;
         let token = haptic
             .liveliness()
-            .declare_token(keys.key(&Topic::Live(config.role, id.clone())))
+            .declare_token(keys.key(&Topic::Live(id.clone(), config.role)))
             .await
             .map_err(LinkError::zenoh("declare liveliness token"))?;
         let shared = Shared {
@@ -77,6 +77,11 @@ impl Link {
     /// Id of this client.
     pub fn id(&self) -> &str {
         self.shared.id.as_str()
+    }
+
+    /// Id of this client, as part of a key.
+    pub(crate) fn chunk(&self) -> Chunk {
+        self.shared.id.clone()
     }
 
     /// Role of this client.
@@ -179,7 +184,7 @@ async fn watch_servers(
     let (sender, receiver) = watch::channel(Presence { servers: 0, generation: 0 });
     let subscriber = session
         .liveliness()
-        .declare_subscriber(keys.every_live_role(Role::Server))
+        .declare_subscriber(keys.every_server())
         .history(true)
         .callback(move |sample| {
             sender.send_modify(|presence| match sample.kind() {

@@ -64,7 +64,7 @@ impl Link {
     async fn pose_sender(&self, tool: &Chunk) -> Result<PoseSender, LinkError> {
         let publisher = self
             .haptic()
-            .declare_publisher(self.keys().key(&Topic::ToolPose(tool.clone())))
+            .declare_publisher(self.keys().key(&Topic::ToolPose(self.chunk(), tool.clone())))
             .encoding(Encoding::from(encoding::<ToolSample>()))
             .priority(Priority::RealTime)
             .express(true)
@@ -251,7 +251,7 @@ impl Cutter {
     /// Sends a finished command, for callers that number their cuts themselves.
     pub async fn send(&self, command: CutCommand) -> Result<CutAck, LinkError> {
         command.check()?;
-        let key = self.link.keys().key(&Topic::ToolCut(self.tool.clone()));
+        let key = self.link.keys().key(&Topic::ToolCut(self.link.chunk(), self.tool.clone()));
         let (sender, mut answer) = oneshot::channel();
         self.waiting.put(command.seq, sender);
         let started = Instant::now();
@@ -270,7 +270,7 @@ impl Cutter {
         capability.client_id = self.link.id().to_owned();
         capability.tool_id = self.tool.as_str().to_owned();
         capability.check()?;
-        let key = self.link.keys().key(&Topic::ToolCapability(self.tool.clone()));
+        let key = self.link.keys().key(&Topic::ToolCapability(self.link.chunk(), self.tool.clone()));
         self.put(&key, encode(&capability), encoding::<DeviceCapability>()).await
     }
 

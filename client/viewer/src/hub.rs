@@ -232,8 +232,8 @@ impl Hub {
         shared.events.iter().for_each(|bytes| outbox.push(bytes.clone()));
         shared.browsers.insert(browser, newcomer);
         self.tell_watched(&shared);
-        let name = self.client_id.strip_prefix("view-").unwrap_or(&self.client_id);
-        Some(Seat { hub: Arc::clone(self), browser, outbox, tool_id: format!("mouse-{name}-{browser}") })
+        let tool_id = format!("{}-mouse-{browser}", self.client_id);
+        Some(Seat { hub: Arc::clone(self), browser, outbox, tool_id })
     }
 
     /// Records which topics a browser shows beside the surfaces.

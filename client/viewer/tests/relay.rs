@@ -90,7 +90,9 @@ async fn a_late_joiner_gets_the_newest_of_everything_in_order() {
     hub.publish(frame(3, 7));
     hub.publish(frame(3, 8));
     let mut browser = join(address).await;
-    assert!(matches!(next(&mut browser).await, Some(Down::Hello(hello)) if hello.tool_id == "mouse-test-1"));
+    assert!(
+        matches!(next(&mut browser).await, Some(Down::Hello(hello)) if hello.tool_id == "view-test-mouse-1")
+    );
     assert!(matches!(next(&mut browser).await, Some(Down::Link(link)) if link.connected));
     assert!(matches!(next(&mut browser).await, Some(Down::Topology(t)) if t.epoch == 3));
     assert!(matches!(next(&mut browser).await, Some(Down::Frame(f)) if f.seq == 8));
@@ -139,11 +141,14 @@ async fn a_browser_speaks_only_for_itself_and_its_tool_ends_with_it() {
     send(&mut browser, sample(f64::NAN)).await;
     send(&mut browser, sample(0.1)).await;
     let Some(Up::Tool(taken)) = up.recv().await else { panic!("a pose") };
-    assert_eq!((taken.client_id.as_str(), taken.tool_id.as_str()), ("mouse-test-1", "mouse-test-1"));
+    assert_eq!(
+        (taken.client_id.as_str(), taken.tool_id.as_str()),
+        ("view-test-mouse-1", "view-test-mouse-1")
+    );
     assert_eq!(taken.pose.unwrap().position_m.unwrap().x, 0.1, "the one that is not finite was refused");
     drop(browser);
     let ended = timeout(PATIENCE, up.recv()).await.unwrap();
-    assert!(matches!(ended, Some(Up::Release { tool_id }) if tool_id == "mouse-test-1"));
+    assert!(matches!(ended, Some(Up::Release { tool_id }) if tool_id == "view-test-mouse-1"));
 }
 
 #[tokio::test]

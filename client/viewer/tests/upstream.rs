@@ -16,7 +16,7 @@ use scindo_proto::messages::{
     SurfaceTopology, ToolSample, ToolShape, Vec3, ViewerDown, ViewerParamsCall, ViewerRpc, ViewerUp,
     tool_sample, tool_shape,
 };
-use scindo_proto::{Chunk, KeySpace, Role, Topic, Verb, WireMessage, decode, encode, encoding};
+use scindo_proto::{Chunk, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
 use scindo_tests::{PATIENCE, free_pair};
 use scindo_view::{ViewConfig, Viewer};
 use tokio::net::TcpStream;
@@ -100,7 +100,7 @@ impl Server {
         answer(&session, Topic::Rpc(Verb::Params), ParamsReply { params: vec![param] });
         let keyframe = SurfaceKeyframe { topology: Some(topology(epoch)), frame: Some(frame(epoch, 1)) };
         answer(&session, Topic::SurfaceKeyframe(body()), keyframe);
-        let token = keys().key(&Topic::Live(Role::Server, Chunk::new("id", "server").unwrap()));
+        let token = keys().key(&Topic::Server(Chunk::new("id", "server").unwrap()));
         std::mem::forget(session.liveliness().declare_token(token).wait().unwrap());
         Self { session, epoch }
     }
@@ -243,12 +243,12 @@ async fn tools_have_an_owner_each_and_calls_are_answered() {
     let server = Server::start(port, 0);
     let address = viewer(port).await;
     let (owners, mut owner_seen) = tokio::sync::mpsc::channel::<(SampleKind, String)>(16);
-    let live = keys().key(&Topic::Live(Role::Viewer, Chunk::new("id", "x").unwrap())).replace("/x", "/*");
-    let watch = server.session.liveliness().declare_subscriber(live).callback(move |sample| {
-        let _ = owners.try_send((sample.kind(), sample.key_expr().to_string()));
-    });
+    let watch =
+        server.session.liveliness().declare_subscriber(keys().every_client()).callback(move |sample| {
+            let _ = owners.try_send((sample.kind(), sample.key_expr().to_string()));
+        });
     let _watch = watch.await.unwrap();
-    let poses = server.session.declare_subscriber("scindo/@v1/main/tool/*/pose").await.unwrap();
+    let poses = server.session.declare_subscriber(keys().every_tool_pose()).await.unwrap();
 
     let mut browser = join(address).await;
     until(&mut browser, "a surface", |m| matches!(m, Down::Frame(_)).then_some(())).await;
@@ -284,12 +284,12 @@ async fn tools_have_an_owner_each_and_calls_are_answered() {
         }
     };
     let pose = timeout(PATIENCE, arrived).await.unwrap();
-    assert!(pose.tool_id.starts_with("mouse-") && pose.client_id == pose.tool_id);
+    assert!(pose.tool_id.contains("-mouse-") && pose.client_id == pose.tool_id);
 
     drop(browser);
     let released = async {
         while let Some((kind, key)) = owner_seen.recv().await {
-            if kind == SampleKind::Delete && key.ends_with(&pose.client_id) {
+            if kind == SampleKind::Delete && key.contains(&format!("/{}/", pose.client_id)) {
                 return;
             }
         }

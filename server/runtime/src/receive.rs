@@ -14,7 +14,7 @@ use zenoh::{Session, Wait as _};
 
 use crate::error::{RuntimeError, words};
 use crate::exchange::Exchange;
-use crate::inbox::{Change, Cut};
+use crate::inbox::{Change, Cut, Sender};
 
 /// Subscriptions of the server. Dropping them ends the input.
 pub struct Receivers {
@@ -33,7 +33,7 @@ impl Receivers {
         let failed = |e: zenoh::Error| RuntimeError::Zenoh { what: "subscribing".into(), reason: words(&e) };
         let tokens = session
             .liveliness()
-            .declare_subscriber(keys.every_live())
+            .declare_subscriber(keys.every_client())
             .history(true)
             .callback(with(keys, exchange, on_token))
             .wait()
@@ -65,7 +65,7 @@ fn with(
 }
 
 fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
-    let Ok(Topic::Live(_, client)) = keys.parse(sample.key_expr().as_str()) else { return };
+    let Ok(Topic::Live(client, _)) = keys.parse(sample.key_expr().as_str()) else { return };
     let now = Instant::now();
     let changes = match sample.kind() {
         SampleKind::Put => exchange.inbox().client_came(client.as_str(), now),
@@ -75,13 +75,14 @@ fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
 }
 
 fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
-    let Ok(Topic::ToolPose(tool)) = keys.parse(sample.key_expr().as_str()) else {
+    let Ok(Topic::ToolPose(client, tool)) = keys.parse(sample.key_expr().as_str()) else {
         return refuse(exchange, "bad-key", "a pose arrived under a key that names no tool");
     };
     match decode::<ToolSample>(sample) {
         Ok(pose) => {
             let now = Instant::now();
-            let outcome = exchange.inbox().pose(tool.as_str(), &pose, now);
+            let sender = Sender { client: client.as_str(), tool: tool.as_str() };
+            let outcome = exchange.inbox().pose(sender, &pose, now);
             match outcome {
                 Ok(None) => {}
                 Ok(Some(change)) => announce(exchange, change),
@@ -93,12 +94,13 @@ fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
 }
 
 fn on_cut(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
-    let Ok(Topic::ToolCut(tool)) = keys.parse(sample.key_expr().as_str()) else {
+    let Ok(Topic::ToolCut(client, tool)) = keys.parse(sample.key_expr().as_str()) else {
         return refuse(exchange, "bad-key", "a cut arrived under a key that names no tool");
     };
     match decode::<CutCommand>(sample) {
         Ok(command) => {
-            let outcome = exchange.inbox().cut(tool.as_str(), &command);
+            let sender = Sender { client: client.as_str(), tool: tool.as_str() };
+            let outcome = exchange.inbox().cut(sender, &command);
             if let Cut::Answer(answer) = outcome {
                 exchange.answer(answer);
             }
@@ -107,9 +109,18 @@ fn on_cut(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     }
 }
 
-fn on_capability(_: &KeySpace, exchange: &Exchange, sample: &Sample) {
+fn on_capability(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
+    let Ok(Topic::ToolCapability(client, tool)) = keys.parse(sample.key_expr().as_str()) else {
+        return refuse(exchange, "bad-key", "a capability arrived under a key that names no tool");
+    };
     match decode::<DeviceCapability>(sample) {
-        Ok(capability) => exchange.inbox().capability(capability),
+        Ok(capability) => {
+            let sender = Sender { client: client.as_str(), tool: tool.as_str() };
+            let outcome = exchange.inbox().capability(sender, capability);
+            if let Err(refusal) = outcome {
+                seldom(exchange, refusal.code, &refusal.message);
+            }
+        }
         Err(error) => refuse(exchange, error.code(), &error.to_string()),
     }
 }

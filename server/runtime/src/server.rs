@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use crossbeam_channel::bounded;
 use scindo_proto::messages::SessionInfo;
-use scindo_proto::{Chunk, KeySpace, Role, Topic};
+use scindo_proto::{Chunk, KeySpace, Topic};
 use scindo_world::body::Probe;
 use scindo_world::snapshot::Snapshot;
 use triple_buffer::{Output, triple_buffer};
@@ -137,7 +137,7 @@ impl Server {
             others.push(spawn("rpc", move || rpc_thread.run())?);
             others.push(spawn("contact", move || contact.run())?);
             let server = Chunk::new("server id", &format!("server-{}", std::process::id()))?;
-            let token = Topic::Live(Role::Server, server);
+            let token = Topic::Server(server);
             let receivers = Receivers::declare(&sessions.haptic, &keys, &exchange, &token)?;
             network = Some(Network { _receivers: receivers, _rpc: rpc, sessions });
         }

@@ -243,7 +243,8 @@ async fn broken_messages_are_refused_and_counted_and_the_server_lives() {
     let mut running = Running::start();
     let link = running.link(Role::Client, "broken").await;
     let mut stats = link.stats().await.unwrap();
-    let key = |topic: fn(Chunk) -> Topic| link.keys().key(&topic(Chunk::new("tool", "probe").unwrap()));
+    let chunk = |id| Chunk::new("id", id).unwrap();
+    let key = |topic: fn(Chunk, Chunk) -> Topic| link.keys().key(&topic(chunk("broken"), chunk("probe")));
     let mut sample = at(f64::NAN, 0.0, 0.0);
     (sample.client_id, sample.tool_id, sample.seq) = ("broken".into(), "probe".into(), 1);
     let put = |key: String, bytes: bytes::Bytes, encoding: String| {

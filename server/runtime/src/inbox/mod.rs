@@ -6,6 +6,8 @@
 //! * Only the newest pose counts. A pose that is not newer than the last is refused.
 //! * A cut is applied once per (client, tool, sequence number). Repetitions get the old answer ([`cut_log`]).
 //!   A cut of a client without a token is refused.
+//! * The id of a client is part of the keys it may publish to. A message that names another client or tool
+//!   than its key does is refused ([`Sender`]).
 //! * Every refusal is counted by reason and changes nothing else ([`counters`]).
 //!
 //! The inbox knows neither zenoh nor clocks. Receiving threads call it with the time; the simulation thread
@@ -40,6 +42,32 @@ pub use owners::{Change, MAX_POSE_RATE};
 pub use refusal::Refusal;
 use refusal::refuse;
 
+/// The client and the tool that the key of a message names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sender<'a> {
+    /// Id of the client that may publish to the key.
+    pub client: &'a str,
+    /// Id of the tool.
+    pub tool: &'a str,
+}
+
+impl Sender<'_> {
+    /// Refuses a message whose content names another client or tool than its key.
+    fn matches(&self, client: &str, tool: &str) -> Result<(), Refusal> {
+        if (self.client, self.tool) == (client, tool) {
+            return Ok(());
+        }
+        Err(refuse(
+            "wrong-key",
+            format!(
+                "a message of client '{client}' for tool '{tool}' arrived under the key of client '{}' and tool '{}'",
+                self.client, self.tool
+            ),
+            "publish to client/<client id>/tool/<tool id>/…",
+        ))
+    }
+}
+
 /// Poses and cuts between the receiving threads and the simulation thread.
 #[derive(Debug, Default)]
 pub struct Inbox {
@@ -64,7 +92,10 @@ impl Inbox {
     /// Registers a liveliness token of `client`. Poses that waited for it count now.
     pub fn client_came(&mut self, client: &str, now: Instant) -> Vec<Change> {
         let early = self.owners.came(client, now);
-        let taken = early.iter().filter_map(|sample| self.pose(&sample.tool_id, sample, now).ok());
+        let taken = early.iter().filter_map(|sample| {
+            let sender = Sender { client, tool: &sample.tool_id };
+            self.pose(sender, sample, now).ok()
+        });
         taken.flatten().collect()
     }
 
@@ -73,37 +104,45 @@ impl Inbox {
         self.owners.went(client, now)
     }
 
-    /// Takes a checked sample that arrived under the key of tool `key_tool`.
+    /// Takes a checked sample that arrived under the key of `sender`.
     ///
     /// # Errors
     /// The reason when the sample is refused.
     pub fn pose(
         &mut self,
-        key_tool: &str,
+        sender: Sender<'_>,
         sample: &ToolSample,
         now: Instant,
     ) -> Result<Option<Change>, Refusal> {
-        let outcome =
-            same_key(key_tool, &sample.tool_id).and_then(|()| self.owners.pose(key_tool, sample, now));
+        let outcome = sender
+            .matches(&sample.client_id, &sample.tool_id)
+            .and_then(|()| self.owners.pose(sender.tool, sample, now));
         if let Err(refusal) = &outcome {
             self.count(refusal.code);
         }
         outcome
     }
 
-    /// Takes a checked cut that arrived under the key of tool `key_tool`.
-    pub fn cut(&mut self, key_tool: &str, command: &CutCommand) -> Cut {
-        if let Some(known) = self.cuts.known(command) {
-            return known;
-        }
-        let accepted = same_key(key_tool, &command.tool_id)
-            .and_then(|()| self.owners.may_cut(key_tool, &command.client_id))
-            .and_then(|()| self.cuts.accept(command, |client| self.owners.is_here(client)));
+    /// Takes a checked cut that arrived under the key of `sender`. A refusal is answered to the client of the
+    /// key, so that nobody can refuse a cut of somebody else.
+    pub fn cut(&mut self, sender: Sender<'_>, command: &CutCommand) -> Cut {
+        let accepted = match sender.matches(&command.client_id, &command.tool_id) {
+            Ok(()) => match self.cuts.known(command) {
+                Some(known) => return known,
+                None => self
+                    .owners
+                    .may_cut(sender.tool, sender.client)
+                    .and_then(|()| self.cuts.accept(command, |client| self.owners.is_here(client))),
+            },
+            Err(refusal) => Err(refusal),
+        };
         match accepted {
             Ok(()) => Cut::Queued,
             Err(refusal) => {
                 self.count(refusal.code);
                 let mut answer = answer(command, cut_ack::Outcome::Refused);
+                sender.client.clone_into(&mut answer.client_id);
+                sender.tool.clone_into(&mut answer.tool_id);
                 answer.error = Some(refusal.into());
                 Cut::Answer(answer)
             }
@@ -111,8 +150,16 @@ impl Inbox {
     }
 
     /// Stores what a device can do. Clients send it once per connection.
-    pub fn capability(&mut self, capability: DeviceCapability) {
-        self.owners.capability(capability);
+    ///
+    /// # Errors
+    /// The reason when the message names another client or tool than its key.
+    pub fn capability(&mut self, sender: Sender<'_>, capability: DeviceCapability) -> Result<(), Refusal> {
+        let outcome = sender.matches(&capability.client_id, &capability.tool_id);
+        match &outcome {
+            Ok(()) => self.owners.capability(capability),
+            Err(refusal) => drop(self.count(refusal.code)),
+        }
+        outcome
     }
 
     /// Counts a refused message and returns the count of its kind.
@@ -171,15 +218,4 @@ impl Inbox {
     pub fn refused(&self) -> &BTreeMap<&'static str, u64> {
         self.counters.refused()
     }
-}
-
-fn same_key(key_tool: &str, tool: &str) -> Result<(), Refusal> {
-    if key_tool == tool {
-        return Ok(());
-    }
-    Err(refuse(
-        "wrong-key",
-        format!("a message for tool '{tool}' arrived under the key of '{key_tool}'"),
-        "publish to tool/<tool id>/…",
-    ))
 }

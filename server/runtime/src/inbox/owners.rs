@@ -276,7 +276,7 @@ fn no_token(client: &str) -> Refusal {
     refuse(
         "no-token",
         format!("client '{client}' has no liveliness token"),
-        "declare live/<role>/<client id> before the first message",
+        "declare client/<client id>/live/<role> before the first message",
     )
 }
 

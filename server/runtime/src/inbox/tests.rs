@@ -42,6 +42,20 @@ fn sample(client: &str, tool: &str, seq: u64) -> ToolSample {
     }
 }
 
+fn of<'a>(client: &'a str, tool: &'a str) -> Sender<'a> {
+    Sender { client, tool }
+}
+
+/// Delivers `sample` under the key of its own client and tool.
+fn pose(inbox: &mut Inbox, sample: &ToolSample, now: Instant) -> Result<Option<Change>, Refusal> {
+    inbox.pose(of(&sample.client_id, &sample.tool_id), sample, now)
+}
+
+/// Delivers `command` under the key of its own client and tool.
+fn cut(inbox: &mut Inbox, command: &CutCommand) -> Cut {
+    inbox.cut(of(&command.client_id, &command.tool_id), command)
+}
+
 fn command(client: &str, seq: u64) -> CutCommand {
     CutCommand {
         client_id: client.into(),
@@ -58,21 +72,15 @@ fn a_tool_belongs_to_the_first_living_client_until_its_token_goes() {
     let mut inbox = inbox();
     inbox.client_came("a", start());
     inbox.client_came("b", start());
-    assert!(matches!(
-        inbox.pose("scalpel", &sample("a", "scalpel", 1), start()),
-        Ok(Some(Change::Taken { .. }))
-    ));
-    assert_eq!(inbox.pose("scalpel", &sample("b", "scalpel", 1), start()).unwrap_err().code, "not-owner");
-    assert_eq!(
-        inbox.pose("scalpel", &sample("a", "scalpel", 1), start()).unwrap_err().code,
-        "stale-sequence"
-    );
-    assert_eq!(inbox.pose("scalpel", &sample("a", "scalpel", 2), start()), Ok(None));
+    assert!(matches!(pose(&mut inbox, &sample("a", "scalpel", 1), start()), Ok(Some(Change::Taken { .. }))));
+    assert_eq!(pose(&mut inbox, &sample("b", "scalpel", 1), start()).unwrap_err().code, "not-owner");
+    assert_eq!(pose(&mut inbox, &sample("a", "scalpel", 1), start()).unwrap_err().code, "stale-sequence");
+    assert_eq!(pose(&mut inbox, &sample("a", "scalpel", 2), start()), Ok(None));
     assert!(inbox.client_went("b", start()).is_empty());
     assert_eq!(inbox.client_went("a", start()).len(), 1);
     assert!(!inbox.anybody_holds());
     inbox.client_came("b", start());
-    assert!(inbox.pose("scalpel", &sample("b", "scalpel", 1), start()).is_ok());
+    assert!(pose(&mut inbox, &sample("b", "scalpel", 1), start()).is_ok());
     assert_eq!(inbox.refused()["not-owner"], 1);
 }
 
@@ -80,7 +88,7 @@ fn a_tool_belongs_to_the_first_living_client_until_its_token_goes() {
 fn a_pose_that_overtook_the_token_counts_when_the_token_comes() {
     let mut inbox = inbox();
     for seq in 1..4 {
-        assert_eq!(inbox.pose("scalpel", &sample("a", "scalpel", seq), start()), Ok(None));
+        assert_eq!(pose(&mut inbox, &sample("a", "scalpel", seq), start()), Ok(None));
     }
     assert!(!inbox.anybody_holds());
     let taken = Change::Taken { tool: "scalpel".into(), owner: "a".into() };
@@ -89,8 +97,8 @@ fn a_pose_that_overtook_the_token_counts_when_the_token_comes() {
     assert_eq!(inbox.client_came("a", start()), []);
     assert_eq!(inbox.refused().len(), 0);
     let late = start() + PATIENCE;
-    assert_eq!(inbox.pose("scalpel", &sample("b", "scalpel", 1), late), Ok(None));
-    let refused = inbox.pose("scalpel", &sample("b", "scalpel", 2), late + PATIENCE);
+    assert_eq!(pose(&mut inbox, &sample("b", "scalpel", 1), late), Ok(None));
+    let refused = pose(&mut inbox, &sample("b", "scalpel", 2), late + PATIENCE);
     assert_eq!(refused.unwrap_err().code, "no-token");
 }
 
@@ -98,13 +106,16 @@ fn a_pose_that_overtook_the_token_counts_when_the_token_comes() {
 fn a_new_tool_needs_a_shape_and_there_are_as_many_as_the_world_takes() {
     let mut inbox = inbox();
     inbox.client_came("a", start());
-    assert_eq!(inbox.pose("probe", &sample("a", "probe", 1), start()).unwrap_err().code, "unknown-tool");
-    assert_eq!(inbox.pose("probe", &sample("a", "other", 1), start()).unwrap_err().code, "wrong-key");
+    assert_eq!(pose(&mut inbox, &sample("a", "probe", 1), start()).unwrap_err().code, "unknown-tool");
+    assert_eq!(
+        inbox.pose(of("a", "probe"), &sample("a", "other", 1), start()).unwrap_err().code,
+        "wrong-key"
+    );
     for i in 0..MAX_TOOLS {
         let id = format!("t{i}");
         let mut sample = sample("a", &id, 1);
         sample.shape = Some(ToolShape::default());
-        assert_eq!(inbox.pose(&id, &sample, start()).is_ok(), i + 1 < MAX_TOOLS);
+        assert_eq!(pose(&mut inbox, &sample, start()).is_ok(), i + 1 < MAX_TOOLS);
     }
     assert_eq!(inbox.refused()["too-many-tools"], 1);
 }
@@ -114,29 +125,29 @@ fn a_flood_of_poses_is_cut_short() {
     let mut inbox = inbox();
     inbox.client_came("a", start());
     for seq in 1..=u64::from(MAX_POSE_RATE) + 50 {
-        let _ = inbox.pose("scalpel", &sample("a", "scalpel", seq), start());
+        let _ = pose(&mut inbox, &sample("a", "scalpel", seq), start());
     }
     assert_eq!(inbox.refused()["too-fast"], 50);
     assert_eq!(figures(&inbox).tools[0].poses, u64::from(MAX_POSE_RATE));
     let later = start() + std::time::Duration::from_secs(1);
-    assert_eq!(inbox.pose("scalpel", &sample("a", "scalpel", 1_000_000), later), Ok(None));
+    assert_eq!(pose(&mut inbox, &sample("a", "scalpel", 1_000_000), later), Ok(None));
 }
 
 #[test]
 fn a_cut_is_applied_once_however_often_it_comes() {
     let mut inbox = visited();
-    assert_eq!(inbox.cut("scalpel", &command("a", 1)), Cut::Queued);
-    assert_eq!(inbox.cut("scalpel", &command("a", 1)), Cut::Waiting);
+    assert_eq!(cut(&mut inbox, &command("a", 1)), Cut::Queued);
+    assert_eq!(cut(&mut inbox, &command("a", 1)), Cut::Waiting);
     let mut inputs = Inputs::default();
     inbox.take(&mut inputs);
     assert_eq!(inputs.cuts.len(), 1);
-    assert_eq!(inbox.cut("scalpel", &command("a", 1)), Cut::Waiting);
+    assert_eq!(cut(&mut inbox, &command("a", 1)), Cut::Waiting);
     let outcome = CutOutcome { request: inputs.cuts[0].request, result: Ok(7) };
     let acks = inbox.finish(&[outcome], &WITH);
     assert_eq!((acks[0].outcome(), acks[0].elements_cut), (cut_ack::Outcome::Applied, 7));
-    let Cut::Answer(again) = inbox.cut("scalpel", &command("a", 1)) else { panic!() };
+    let Cut::Answer(again) = cut(&mut inbox, &command("a", 1)) else { panic!() };
     assert_eq!((again.outcome(), again.elements_cut), (cut_ack::Outcome::Duplicate, 7));
-    assert_eq!(inbox.cut("scalpel", &command("b", 1)), Cut::Queued);
+    assert_eq!(cut(&mut inbox, &command("b", 1)), Cut::Queued);
     inbox.take(&mut inputs);
     assert_eq!(inputs.cuts.len(), 1);
     assert_eq!(figures(&inbox).cuts_applied, 1);
@@ -146,12 +157,12 @@ fn a_cut_is_applied_once_however_often_it_comes() {
 fn forgotten_answers_are_still_duplicates() {
     let mut inbox = visited();
     for seq in 1..=MAX_ANSWERS as u64 + 10 {
-        assert_eq!(inbox.cut("scalpel", &command("a", seq)), Cut::Queued);
+        assert_eq!(cut(&mut inbox, &command("a", seq)), Cut::Queued);
         let mut inputs = Inputs::default();
         inbox.take(&mut inputs);
         inbox.finish(&[CutOutcome { request: inputs.cuts[0].request, result: Ok(0) }], &WITH);
     }
-    let Cut::Answer(old) = inbox.cut("scalpel", &command("a", 1)) else { panic!() };
+    let Cut::Answer(old) = cut(&mut inbox, &command("a", 1)) else { panic!() };
     assert_eq!(old.outcome(), cut_ack::Outcome::Duplicate);
 }
 
@@ -160,16 +171,16 @@ fn refused_cuts_say_why_and_are_counted() {
     let mut inbox = visited();
     let mut foreign = command("a", 1);
     foreign.body_id = "liver".into();
-    let Cut::Answer(ack) = inbox.cut("scalpel", &foreign) else { panic!() };
+    let Cut::Answer(ack) = cut(&mut inbox, &foreign) else { panic!() };
     assert_eq!(ack.outcome(), cut_ack::Outcome::Refused);
     assert_eq!(ack.error.unwrap().code, "unknown-body");
     for seq in 1..=MAX_WAITING_CUTS as u64 {
-        assert_eq!(inbox.cut("scalpel", &command("a", seq)), Cut::Queued);
+        assert_eq!(cut(&mut inbox, &command("a", seq)), Cut::Queued);
     }
-    let Cut::Answer(ack) = inbox.cut("scalpel", &command("a", 999)) else { panic!() };
+    let Cut::Answer(ack) = cut(&mut inbox, &command("a", 999)) else { panic!() };
     assert_eq!(ack.error.unwrap().code, "queue-full");
-    inbox.pose("scalpel", &sample("b", "scalpel", 1), start()).unwrap();
-    let Cut::Answer(ack) = inbox.cut("scalpel", &command("a", 1000)) else { panic!() };
+    pose(&mut inbox, &sample("b", "scalpel", 1), start()).unwrap();
+    let Cut::Answer(ack) = cut(&mut inbox, &command("a", 1000)) else { panic!() };
     assert_eq!(ack.error.unwrap().code, "not-owner");
     assert_eq!(inbox.refused().values().sum::<u64>(), 3);
 }
@@ -177,10 +188,10 @@ fn refused_cuts_say_why_and_are_counted() {
 #[test]
 fn a_cut_of_a_client_without_a_token_is_refused() {
     let mut inbox = inbox();
-    let Cut::Answer(ack) = inbox.cut("scalpel", &command("a", 1)) else { panic!() };
+    let Cut::Answer(ack) = cut(&mut inbox, &command("a", 1)) else { panic!() };
     assert_eq!(ack.error.unwrap().code, "no-token");
     inbox.client_came("a", start());
-    assert_eq!(inbox.cut("scalpel", &command("a", 1)), Cut::Queued);
+    assert_eq!(cut(&mut inbox, &command("a", 1)), Cut::Queued);
 }
 
 #[test]
@@ -188,24 +199,24 @@ fn cuts_that_a_step_has_taken_still_count_as_waiting() {
     let mut inbox = visited();
     let mut inputs = Inputs::default();
     for seq in 1..=MAX_WAITING_CUTS as u64 {
-        assert_eq!(inbox.cut("scalpel", &command("a", seq)), Cut::Queued);
+        assert_eq!(cut(&mut inbox, &command("a", seq)), Cut::Queued);
         inbox.take(&mut inputs);
     }
-    let Cut::Answer(ack) = inbox.cut("scalpel", &command("a", 999)) else { panic!() };
+    let Cut::Answer(ack) = cut(&mut inbox, &command("a", 999)) else { panic!() };
     assert_eq!(ack.error.unwrap().code, "queue-full");
 }
 
 #[test]
 fn what_is_discarded_is_answered_once_and_not_applied_again() {
     let mut inbox = visited();
-    inbox.cut("scalpel", &command("a", 1));
-    inbox.cut("scalpel", &command("b", 1));
+    cut(&mut inbox, &command("a", 1));
+    cut(&mut inbox, &command("b", 1));
     let with = Answering { code: "cut-discarded", ..WITH };
     let answers = inbox.discard("the scene was reset", &with);
     assert_eq!(answers.len(), 2);
     assert!(answers.iter().all(|ack| ack.outcome() == cut_ack::Outcome::Refused));
     assert_eq!(inbox.discard("the scene was reset", &with), []);
-    assert!(matches!(inbox.cut("scalpel", &command("a", 1)), Cut::Answer(ack) if ack == answers[0]));
+    assert!(matches!(cut(&mut inbox, &command("a", 1)), Cut::Answer(ack) if ack == answers[0]));
     let mut inputs = Inputs::default();
     inbox.take(&mut inputs);
     assert!(inputs.cuts.is_empty());
@@ -216,16 +227,16 @@ fn a_late_pose_of_the_old_hand_does_not_keep_the_new_one_from_the_tool() {
     let mouse = |seq, client_time_ns| ToolSample { client_time_ns, ..sample("a", "scalpel", seq) };
     let mut inbox = inbox();
     inbox.client_came("a", start());
-    inbox.pose("scalpel", &mouse(141, 1_000), start()).unwrap();
+    pose(&mut inbox, &mouse(141, 1_000), start()).unwrap();
     inbox.client_went("a", start());
     // The last pose of the old hand arrives after its token went. It does not wait for the next token.
-    assert_eq!(inbox.pose("scalpel", &mouse(142, 1_001), start()).unwrap_err().code, "let-go");
+    assert_eq!(pose(&mut inbox, &mouse(142, 1_001), start()).unwrap_err().code, "let-go");
     assert_eq!(inbox.client_came("a", start()), []);
     // Even if it came later still, the first pose of the new hand is newer by its clock.
-    inbox.pose("scalpel", &mouse(143, 1_002), start()).unwrap();
-    assert_eq!(inbox.pose("scalpel", &mouse(1, 2_000), start()), Ok(None));
-    assert_eq!(inbox.pose("scalpel", &mouse(2, 2_001), start()), Ok(None));
-    assert_eq!(inbox.pose("scalpel", &mouse(1, 2_000), start()).unwrap_err().code, "stale-sequence");
+    pose(&mut inbox, &mouse(143, 1_002), start()).unwrap();
+    assert_eq!(pose(&mut inbox, &mouse(1, 2_000), start()), Ok(None));
+    assert_eq!(pose(&mut inbox, &mouse(2, 2_001), start()), Ok(None));
+    assert_eq!(pose(&mut inbox, &mouse(1, 2_000), start()).unwrap_err().code, "stale-sequence");
     assert_eq!(inbox.held().next().unwrap().seq, 2);
 }
 
@@ -233,10 +244,10 @@ fn a_late_pose_of_the_old_hand_does_not_keep_the_new_one_from_the_tool() {
 fn a_client_that_comes_back_goes_on_with_its_numbers() {
     let mut inbox = inbox();
     inbox.client_came("a", start());
-    inbox.pose("scalpel", &sample("a", "scalpel", 7), start()).unwrap();
+    pose(&mut inbox, &sample("a", "scalpel", 7), start()).unwrap();
     inbox.client_went("a", start());
     inbox.client_came("a", start());
-    assert!(matches!(inbox.pose("scalpel", &sample("a", "scalpel", 8), start()), Ok(Some(_))));
+    assert!(matches!(pose(&mut inbox, &sample("a", "scalpel", 8), start()), Ok(Some(_))));
 }
 
 /// A step gets every pose of a blade that cuts since the last one, and of other tools the newest alone.
@@ -252,7 +263,7 @@ fn a_step_gets_all_places_of_a_cutting_blade() {
             ..Pose::default()
         });
         sample.mode = mode.into();
-        inbox.pose("scalpel", &sample, start()).unwrap();
+        pose(inbox, &sample, start()).unwrap();
     };
     let mut inputs = Inputs::default();
     let mut take = |inbox: &mut Inbox| {
@@ -271,4 +282,34 @@ fn a_step_gets_all_places_of_a_cutting_blade() {
     (9..=200).for_each(|seq| send(&mut inbox, seq, Mode::Cut));
     let places = take(&mut inbox);
     assert!(places.len() <= scindo_world::inputs::MAX_PASSED + 1 && places.last() == Some(&200.0), "bounded");
+}
+
+#[test]
+fn nobody_moves_releases_or_cuts_with_the_tool_of_another() {
+    let mut inbox = visited();
+    pose(&mut inbox, &sample("a", "scalpel", 1), start()).unwrap();
+    // Client b may publish to its own keys alone, whatever the content of its messages says.
+    let forged = inbox.pose(of("b", "scalpel"), &sample("a", "scalpel", 2), start());
+    assert_eq!(forged.unwrap_err().code, "wrong-key");
+    assert_eq!(inbox.held().next().unwrap().seq, 1);
+    assert_eq!(pose(&mut inbox, &sample("b", "scalpel", 1), start()).unwrap_err().code, "not-owner");
+    let Cut::Answer(ack) = cut(&mut inbox, &command("b", 7)) else { panic!() };
+    assert_eq!(ack.error.unwrap().code, "not-owner");
+    // The answer to a forged cut goes to the forger. Client a, who cuts with the same number, is not disturbed.
+    let Cut::Answer(ack) = inbox.cut(of("b", "scalpel"), &command("a", 7)) else { panic!() };
+    assert_eq!((ack.client_id.as_str(), ack.error.unwrap().code.as_str()), ("b", "wrong-key"));
+    assert_eq!(cut(&mut inbox, &command("a", 7)), Cut::Queued);
+    let device = DeviceCapability {
+        client_id: "a".into(),
+        tool_id: "scalpel".into(),
+        max_force_n: 1e3,
+        ..DeviceCapability::default()
+    };
+    assert_eq!(inbox.capability(of("b", "scalpel"), device.clone()).unwrap_err().code, "wrong-key");
+    assert!(inbox.capability_of("scalpel").is_none());
+    inbox.capability(of("a", "scalpel"), device).unwrap();
+    assert!(inbox.capability_of("scalpel").is_some());
+    assert_eq!(inbox.refused()["wrong-key"], 3);
+    inbox.client_went("b", start());
+    assert!(inbox.anybody_holds());
 }

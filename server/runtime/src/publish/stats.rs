@@ -94,7 +94,7 @@ mod tests {
     use scindo_proto::messages::{Pose, ToolSample, Vec3};
 
     use super::*;
-    use crate::inbox::Inbox;
+    use crate::inbox::{Inbox, Sender};
 
     /// Sends pose `seq` of client `a` with the tool `scalpel`.
     fn pose(exchange: &Exchange, seq: u64, contact_age_ms: f32) {
@@ -106,7 +106,8 @@ mod tests {
             pose: Some(Pose { position_m: Some(Vec3::default()), qw: 1.0, ..Pose::default() }),
             ..ToolSample::default()
         };
-        exchange.inbox().pose("scalpel", &sample, Instant::now()).unwrap();
+        let sender = Sender { client: "a", tool: "scalpel" };
+        exchange.inbox().pose(sender, &sample, Instant::now()).unwrap();
     }
 
     #[test]
