@@ -12,8 +12,8 @@ use crate::device::{DeviceState, ToolMode};
 /// most. The velocity belongs to the pose: what its change would carry the tool away before the next sign of life
 /// counts as a distance too, so a hand that stops is told of at once.
 ///
-/// The age of a contact model counts from the pose that was sent. While poses are withheld it therefore grows to 50 ms,
-/// and where tissue relaxes the client answers as it does over such a delay.
+/// While poses are withheld the server keeps the last one, and its tissue relaxes around it. The client reckons with
+/// that ([`contact::relaxation`](crate::contact::relaxation)), so that nothing relaxes twice.
 ///
 /// # Source
 /// Hinterseer, Hirche, Chaudhuri, Steinbach, Buss 2008, *Perception-based data reduction and transmission of haptic

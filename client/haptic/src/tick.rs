@@ -162,7 +162,7 @@ impl HapticTick {
             flags: output.flags | if time.elapsed_s > 1.5 * PERIOD_S { flag::MISSED } else { 0 },
         };
         if let Some(used_ns) = model.used_ns {
-            self.ages.record(time.now_ns.saturating_sub(used_ns));
+            self.ages.record(time.now_ns.saturating_sub(used_ns + model.held_ns));
         }
         self.publish(&state, &row, time.now_ns);
         self.account(&row);

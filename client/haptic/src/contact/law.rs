@@ -17,7 +17,7 @@
 
 use super::history::TipHistory;
 use super::model::{ContactModel, ContactPlane};
-use super::relaxation::Response;
+use super::relaxation::{Response, Used};
 use crate::constants::{EXTRAPOLATION_STEPS, MAX_EXTRAPOLATION_S, PATCH_FADE};
 use nalgebra::Vector3;
 use scindo_proto::limits::MAX_CONTACTS;
@@ -133,8 +133,9 @@ impl ContactLaw {
         let weight = patch_weight(plane, &(tip_m - moved));
         let two_sided = model.holds && plane.stiffness_n_m > 0.0;
         let answer = match model.used_ns {
-            Some(used_ns) if plane.relaxed_stiffness_n_m > 0.0 => {
-                Response::along(plane, (&(model.tip_used_m + moved), used_ns), two_sided, &self.history)
+            Some(at_ns) if plane.relaxed_stiffness_n_m > 0.0 => {
+                let used = Used { tip_m: model.tip_used_m + moved, at_ns, held_ns: model.held_ns };
+                Response::along(plane, &used, two_sided, &self.history)
             }
             _ => Response {
                 offset_n: plane.force_n + plane.stiffness_n_m * n.dot(&(model.tip_used_m + moved)),

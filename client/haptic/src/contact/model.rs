@@ -82,6 +82,8 @@ pub struct ContactModel {
     pub tip_used_m: Vector3<f64>,
     /// Loop clock when the tip was there [ns]; `None` if the message names none of this client's poses.
     pub used_ns: Option<u64>,
+    /// How long the server has kept the tip there before it sent the message, since no newer pose came [ns].
+    pub held_ns: u64,
     /// Whether the tool holds the tissue, so that it pulls back in all directions.
     pub holds: bool,
     /// The planes; only the first `plane_count` are valid.
@@ -106,6 +108,7 @@ impl ContactModel {
         received_ns: 0,
         tip_used_m: Vector3::new(0.0, 0.0, 0.0),
         used_ns: None,
+        held_ns: 0,
         holds: false,
         planes: [ContactPlane::NONE; MAX_CONTACTS],
         plane_count: 0,
@@ -234,6 +237,8 @@ pub struct ContactInbox {
     last_publish_unix_ns: u64,
     last_received_ns: u64,
     last_tool_seq: u64,
+    /// When the first message for the pose `last_tool_seq` arrived [ns].
+    tool_seq_since_ns: u64,
     first_received_ns: u64,
     counts: LinkReport,
     round_trips: RoundTrips,
@@ -248,6 +253,7 @@ impl ContactInbox {
             last_publish_unix_ns: 0,
             last_received_ns: 0,
             last_tool_seq: 0,
+            tool_seq_since_ns: 0,
             first_received_ns: 0,
             counts: LinkReport::default(),
             round_trips: RoundTrips::default(),
@@ -269,6 +275,9 @@ impl ContactInbox {
             return;
         }
         self.count(message, now_ns, client_ns);
+        if message.tool_seq_used == self.last_tool_seq {
+            model.held_ns = now_ns.saturating_sub(self.tool_seq_since_ns);
+        }
         self.slot.write(model);
     }
 
@@ -303,6 +312,7 @@ impl ContactInbox {
         self.last_received_ns = now_ns;
         if message.tool_seq_used > self.last_tool_seq {
             self.last_tool_seq = message.tool_seq_used;
+            self.tool_seq_since_ns = now_ns;
             self.round_trips.record(client_ns.saturating_sub(message.tool_client_time_ns));
         }
     }
@@ -395,13 +405,17 @@ mod tests {
     }
 
     #[test]
-    fn round_trip_is_counted_once_per_pose() {
-        let (mut inbox, _slot) = inbox();
-        for (seq, tool_seq, now_ms) in [(1, 7, 2), (2, 7, 6), (3, 8, 10)] {
+    fn round_trip_is_counted_once_per_pose_and_the_server_holds_a_pose_that_none_follows() {
+        let (mut inbox, mut slot) = inbox();
+        for (seq, tool_seq, sent_ms, now_ms, held_ms) in
+            [(1, 7, 0, 2, 0), (2, 7, 0, 6, 4), (3, 8, 8, 10, 0), (4, 7, 0, 11, 0)]
+        {
             let mut message = free(seq);
             message.tool_seq_used = tool_seq;
-            message.tool_client_time_ns = (now_ms - 2) * 1_000_000;
+            message.tool_client_time_ns = sent_ms * 1_000_000;
             accept(&mut inbox, &message, now_ms * 1_000_000);
+            let model = slot.read();
+            assert_eq!((model.used_ns, model.held_ns), (Some(sent_ms * 1_000_000), held_ms * 1_000_000));
         }
         let quantiles = inbox.report().round_trip_ms;
         assert_eq!(quantiles.count, 2);

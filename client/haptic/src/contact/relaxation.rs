@@ -8,6 +8,8 @@
 //!
 //! An old model is thus answered with k∞ for what lies far back: rendering k₀ over a delay makes the force too large
 //! (Schuwerk et al. 2015). d and q follow from the client's own record of its tip, so the measured age enters exactly.
+//! Where no newer pose reached the server, it has kept the tip in place for a time h until it sent the message, and its
+//! tissue has relaxed meanwhile: q(t₀) is then q at the pose used times exp(−h/τ).
 //! Between two ticks d is straight, so that q₂ = q₁ e + (1 − e) (τ/T) Δd, e = exp(−T/τ). Depth starts at the surface,
 //! where the force is zero: d(t₀) = f₀ / k∞.
 
@@ -15,6 +17,17 @@ use super::history::TipHistory;
 use super::model::ContactPlane;
 use crate::constants::PERIOD_S;
 use nalgebra::Vector3;
+
+/// The pose for which the server computed a force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Used {
+    /// Tip [m].
+    pub tip_m: Vector3<f64>,
+    /// Loop clock when the tip was there [ns].
+    pub at_ns: u64,
+    /// How long the server has kept it there [ns].
+    pub held_ns: u64,
+}
 
 /// Force along one axis as a function of the tip p now: offset − stiffness n·p.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,14 +39,10 @@ pub struct Response {
 }
 
 impl Response {
-    /// The response of `plane`, whose forces hold for a tip at `used_m` at `used_ns`, after the ticks of
-    /// `history`. A plane without two sides is not touched above the surface.
-    pub fn along(
-        plane: &ContactPlane,
-        (used_m, used_ns): (&Vector3<f64>, u64),
-        two_sided: bool,
-        history: &TipHistory,
-    ) -> Self {
+    /// The response of `plane` after the ticks of `history`. A plane without two sides is not touched above the
+    /// surface.
+    pub fn along(plane: &ContactPlane, used: &Used, two_sided: bool, history: &TipHistory) -> Self {
+        let used_m = &used.tip_m;
         let relaxed = plane.relaxed_stiffness_n_m;
         let transient = (plane.instant_stiffness_n_m - relaxed).max(0.0);
         let ticks = plane.relaxation_s / PERIOD_S;
@@ -52,11 +61,14 @@ impl Response {
             let now = touched(&past.tip_m);
             q = q * decay + ramp * (now - d.unwrap_or(now));
             d = Some(now);
-            if past.at_ns <= used_ns {
+            if past.at_ns <= used.at_ns {
                 (d_used, q_used) = (now, q);
             }
         }
         let d = d.unwrap_or(d_used);
+        if plane.relaxation_s > 0.0 {
+            q_used *= (-(used.held_ns as f64) * 1e-9 / plane.relaxation_s).exp();
+        }
         let force = if two_sided { plane.force_n } else { plane.force_n.max(0.0) };
         let at_origin = depth(&Vector3::zeros());
         let offset_n = force
@@ -87,13 +99,17 @@ mod tests {
         ContactPlane { force_n, ..PLANE }
     }
 
+    fn used(tip_m: Vector3<f64>, at_ns: u64) -> Used {
+        Used { tip_m, at_ns, held_ns: 0 }
+    }
+
     /// Force after the tip was at the origin for 200 ms, then 1 mm deeper for `ms`.
     fn after(ms: u64, force_n: f64, step_m: f64) -> f64 {
         let mut history = TipHistory::default();
         let tip = |t: u64| Vector3::new(0.0, 0.0, if t < 200 { 0.0 } else { step_m });
         (0..200 + ms).for_each(|t| history.record(t * 1_000_000, tip(t)));
-        let used = (&Vector3::zeros(), 199_000_000);
-        Response::along(&plane(force_n), used, false, &history).at(&Vector3::z(), &tip(200))
+        let used = used(Vector3::zeros(), 199_000_000);
+        Response::along(&plane(force_n), &used, false, &history).at(&Vector3::z(), &tip(200))
     }
 
     #[test]
@@ -109,8 +125,8 @@ mod tests {
     #[test]
     fn tissue_without_viscosity_answers_as_it_is() {
         let elastic = ContactPlane { instant_stiffness_n_m: 100.0, relaxation_s: 0.0, ..plane(0.5) };
-        let used = (&Vector3::zeros(), 0);
-        let response = Response::along(&elastic, used, false, &TipHistory::default());
+        let used = used(Vector3::zeros(), 0);
+        let response = Response::along(&elastic, &used, false, &TipHistory::default());
         assert_eq!(response.stiffness_n_m, 100.0);
         assert!((response.at(&Vector3::z(), &Vector3::new(0.0, 0.0, -0.001)) - 0.6).abs() < 1e-12);
     }
@@ -140,12 +156,29 @@ mod tests {
                     let used = t - age;
                     let used_tip = tip(used);
                     let model = plane(force[used as usize]);
-                    let response = Response::along(&model, (&used_tip, used * 1_000_000), true, &history);
+                    let pose = self::used(used_tip, used * 1_000_000);
+                    let response = Response::along(&model, &pose, true, &history);
                     let felt = response.at(&Vector3::z(), &tip(t));
                     assert!((felt - force[t as usize]).abs() < 1e-3, "{t} {age}: {felt}");
                 }
             }
             history.record(t * 1_000_000, tip(t));
         }
+    }
+
+    #[test]
+    fn a_pose_that_no_other_follows_relaxes_on_the_server_too() {
+        // A step of 1 mm, and then a hand so still that the client sends no other pose for 30 ms. Messages
+        // with less and less force go on coming.
+        let tip = |t: u64| Vector3::new(0.0, 0.0, if t < 200 { 0.0 } else { -1e-3 });
+        let mut history = TipHistory::default();
+        (0..230u64).for_each(|t| history.record(t * 1_000_000, tip(t)));
+        let truth = |ms: f64| 0.1 + 0.2 * 10.0 * (1.0 - f64::exp(-0.1)) * (-ms / 10.0).exp();
+        let felt = |held_ns| {
+            let used = Used { tip_m: tip(200), at_ns: 200_000_000, held_ns };
+            Response::along(&plane(truth(30.0)), &used, true, &history).at(&Vector3::z(), &tip(230))
+        };
+        assert!((felt(30_000_000) - truth(30.0)).abs() < 1e-9, "{} {}", felt(30_000_000), truth(30.0));
+        assert!(felt(0) < 0.7 * truth(30.0), "relaxed twice: {}", felt(0));
     }
 }
