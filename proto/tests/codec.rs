@@ -80,6 +80,7 @@ fn tool_sample() -> impl Strategy<Value = ToolSample> {
             passivity_energy_j: -1.5,
             fault_flags: 3,
             closed,
+            round_trip_ms: age,
         },
     )
 }
@@ -108,6 +109,7 @@ fn contact() -> impl Strategy<Value = Contact> {
             surface_velocity_m_s: Some(force),
             patch_radius_m: 0.01,
             feature_id,
+            friction: damping * 1e-3,
         },
     )
 }
@@ -124,6 +126,7 @@ fn haptic_contact() -> impl Strategy<Value = HapticContact> {
             tool_client_time_ns: client,
             epoch,
             body_id: tool_id.clone(),
+            client_id: tool_id.clone(),
             tool_id,
             tool_pose_used: Some(pose),
             mode,
@@ -273,6 +276,7 @@ fn stats() -> impl Strategy<Value = Stats> {
             pose_rate_hz: x,
             force_n: x,
             contact_age_ms: x,
+            pose_age_ms: 12.5,
         }],
         refused: vec![Counter { name: "non-finite".into(), count: d.into() }],
         cuts_applied: a.into(),

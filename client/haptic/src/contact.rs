@@ -6,4 +6,6 @@ pub mod history;
 
 pub mod relaxation;
 
+pub mod friction;
+
 pub mod law;

@@ -31,6 +31,7 @@ struct PoseSample {
     force_n: Vector3<f64>,
     contact_seq: u64,
     contact_age_ms: f64,
+    round_trip_ms: f64,
     energy_j: f64,
     flags: u32,
 }
@@ -79,6 +80,7 @@ impl PoseQueue {
             force_n: row.force_n,
             contact_seq: row.contact_seq,
             contact_age_ms: row.contact_age_ms,
+            round_trip_ms: row.round_trip_ms,
             energy_j: row.energy_j,
             flags: row.flags,
         };
@@ -136,7 +138,7 @@ impl HeldTool {
         clock: LoopClock,
     ) -> Result<(Self, LoopPorts), LinkError> {
         let (slot, contacts) = contact_slot();
-        let inbox = Arc::new(Mutex::new(ContactInbox::new(slot)));
+        let inbox = Arc::new(Mutex::new(ContactInbox::new(slot, link.id())));
         let shared = inbox.clone();
         // zenoh's receiving thread, the live figures and the final report lock it. The loop reads the slot.
         let stream = link
@@ -229,6 +231,7 @@ fn wire_sample(sample: &PoseSample, shape: ToolShape) -> ToolSample {
         applied_force_n: Some(vec3(&sample.force_n)),
         last_contact_seq_used: sample.contact_seq,
         contact_age_ms: sample.contact_age_ms as f32,
+        round_trip_ms: sample.round_trip_ms as f32,
         passivity_energy_j: sample.energy_j,
         fault_flags: sample.flags & flag::FAULTS,
         ..ToolSample::default()

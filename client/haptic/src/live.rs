@@ -172,6 +172,7 @@ mod tests {
             force_n: Vector3::new(0.0, 0.0, force_n),
             contact_seq: 1,
             contact_age_ms,
+            round_trip_ms: 0.0,
             epoch: 1,
             energy_j: 0.0,
             flags,

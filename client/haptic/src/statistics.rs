@@ -95,6 +95,8 @@ pub struct LinkReport {
     pub contacts_late: u64,
     /// Messages that could not be used.
     pub contacts_refused: u64,
+    /// Messages for the client that held the tool meanwhile.
+    pub contacts_of_others: u64,
     /// Number of streams: the first one, and another for each restart of the server.
     pub contact_streams: u64,
     /// Longest time between two messages [ms].

@@ -85,12 +85,13 @@ impl HapticTick {
     /// Creates the state at rest, without force.
     pub fn new(device: Box<dyn HapticDevice>, limits: Limits, ports: Ports) -> Self {
         let capability = device.capability();
+        let coupling = VirtualCoupling::new(&capability);
         Self {
             device,
             guard: DeviceGuard::default(),
             ports,
-            law: ContactLaw::default(),
-            coupling: VirtualCoupling::new(&capability),
+            law: ContactLaw::new(coupling.stiffness_limit_n_m),
+            coupling,
             blend: Blend::default(),
             tank: EnergyTank::default(),
             watchdog: Watchdog::default(),
@@ -156,6 +157,7 @@ impl HapticTick {
             tissue_n,
             force_n: output.force_n,
             contact_seq: model.seq,
+            round_trip_ms: model.round_trip_ns as f64 * 1e-6,
             contact_age_ms: (model.age_ns(time.now_ns) as f64 * 1e-6).min(1e6),
             epoch: model.epoch,
             energy_j: self.passivity.energy_j(),

@@ -48,7 +48,7 @@ impl VirtualCoupling {
             Some(k_vc) => balance(&state.position_m, k_vc, loads),
         };
         let elastic = loads.force_at(&proxy);
-        elastic + self.damping(state, loads, &proxy, elastic.norm())
+        elastic + self.damping(state, loads, &proxy, elastic.norm()) + loads.friction_at(&proxy)
     }
 
     /// What `force_n` costs an energy tank with the tip at `p`.

@@ -112,6 +112,7 @@ impl WireMessage for Stats {
             at.finite("tools.pose_rate_hz", f64::from(tool.pose_rate_hz))?;
             at.finite("tools.force_n", f64::from(tool.force_n))?;
             at.finite("tools.contact_age_ms", f64::from(tool.contact_age_ms))?;
+            at.positive("tools.pose_age_ms", f64::from(tool.pose_age_ms), f64::MAX)?;
         }
         self.refused.iter().try_for_each(|counter| at.text("refused.name", &counter.name))
     }

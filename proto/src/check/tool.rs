@@ -5,7 +5,7 @@ use prost::Name as _;
 use super::field::{Checked, In};
 use crate::codec::{CountLimit, DecodeError, WireMessage};
 use crate::limits::{
-    MAX_BODIES, MAX_CONTACT_BYTES, MAX_CONTACTS, MAX_COORDINATE_M, MAX_CUT_BYTES, MAX_FORCE_N,
+    MAX_BODIES, MAX_CONTACT_BYTES, MAX_CONTACTS, MAX_COORDINATE_M, MAX_CUT_BYTES, MAX_FORCE_N, MAX_FRICTION,
     MAX_POSE_BYTES, MAX_RELAXATION_S, MAX_SMALL_BYTES, MAX_SWEEP_SEGMENTS, MAX_VELOCITY_M_S,
     MIN_SWEEP_SEGMENTS, NORMAL_TOLERANCE,
 };
@@ -26,6 +26,7 @@ impl WireMessage for ToolSample {
         at.optional_vec3("applied_force_n", &self.applied_force_n, MAX_FORCE_N)?;
         at.known::<tool_sample::Mode>("mode", self.mode)?;
         at.finite("contact_age_ms", f64::from(self.contact_age_ms))?;
+        at.positive("round_trip_ms", f64::from(self.round_trip_ms), f64::MAX)?;
         at.finite("passivity_energy_j", self.passivity_energy_j)?;
         self.closed.map_or(Ok(()), |closed| at.positive("closed", f64::from(closed), 1.0))?;
         self.shape.as_ref().map_or(Ok(()), |shape| at.shape(shape))
@@ -121,6 +122,7 @@ impl WireMessage for HapticContact {
         let at = In(Self::NAME);
         at.id("tool_id", &self.tool_id)?;
         at.optional_id("body_id", &self.body_id)?;
+        at.optional_id("client_id", &self.client_id)?;
         at.finite("sim_time_s", self.sim_time_s)?;
         at.pose(at.present("tool_pose_used", &self.tool_pose_used)?)?;
         at.known::<haptic_contact::Mode>("mode", self.mode)?;
@@ -160,5 +162,5 @@ fn contact(at: In, c: &Contact) -> Checked {
     ] {
         at.positive(field, f64::from(value), f64::MAX)?;
     }
-    Ok(())
+    at.positive("contacts.friction", f64::from(c.friction), MAX_FRICTION)
 }

@@ -127,6 +127,8 @@ pub struct LimbSnapshot {
     pub proxy: Isometry3<f64>,
     /// Force of the tissue on it from the step's solve [N].
     pub force_n: Vector3<f64>,
+    /// The part of it that is friction [N].
+    pub friction_n: Vector3<f64>,
 }
 
 /// One tool.
@@ -150,6 +152,10 @@ pub struct ToolSnapshot {
     pub closed: f64,
     /// Force of the tissue on the tool from the step's solve [N].
     pub force_n: Vector3<f64>,
+    /// The part of it that is friction under a tool that presses [N].
+    pub friction_n: Vector3<f64>,
+    /// Coefficient of that friction.
+    pub friction: f64,
     /// The capsules of a compound tool that touches; none of others.
     pub limbs: SmallVec<[LimbSnapshot; MAX_PARTS]>,
     /// Stiffness of the spring between hand and tissue [N/m].

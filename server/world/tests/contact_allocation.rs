@@ -63,6 +63,7 @@ fn steady_contact_does_not_allocate() {
         shape,
         stiffness_n_m: 500.0,
         max_force_n: 5.0,
+        friction: 0.0,
         path: Vec::new(),
         repeat_s: None,
     };
@@ -107,6 +108,7 @@ fn steady_contact_does_not_allocate() {
             mode,
             stiffness_n_m: 500.0,
             max_force_n: 5.0,
+            friction: 0.0,
             ..Default::default()
         });
     }

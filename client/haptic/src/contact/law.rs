@@ -10,11 +10,13 @@
 //!
 //! If the message names the stiffness that is left when the tissue has followed, the force answers the whole
 //! way of the tip since the pose used ([`relaxation`](super::relaxation)). Held tissue pulls back along three axes,
-//! each on both sides.
+//! each on both sides. Where the plane names a coefficient of friction the tissue sticks and slips across the normal
+//! ([`friction`](super::friction)).
 //!
 //! # Source
 //! The message `scindo.v1.Contact` (`proto/scindo/v1/tool.proto`).
 
+use super::friction::{Start, friction};
 use super::history::TipHistory;
 use super::model::{ContactModel, ContactPlane};
 use super::relaxation::{Response, Used};
@@ -37,6 +39,10 @@ pub struct PlaneLoad {
     pub surface_velocity_m_s: Vector3<f64>,
     /// Whether it also pulls: the tissue is held.
     pub two_sided: bool,
+    /// Coefficient of dry friction.
+    pub friction: f64,
+    /// Friction across the normal with the tip where it is [N].
+    pub friction_n: Vector3<f64>,
 }
 
 impl PlaneLoad {
@@ -70,6 +76,12 @@ impl PlaneLoads {
         self.iter().map(|load| load.at(p) * load.normal).sum()
     }
 
+    /// Sum of the friction [N] under the loads with the tip at `p`.
+    pub fn friction_at(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        let share = |load: &PlaneLoad| load.friction_n.cap_magnitude(load.friction * load.at(p).max(0.0));
+        self.iter().filter(|load| load.friction > 0.0).map(share).sum()
+    }
+
     /// Stiffness along the unit vector `along` with the tip at `p` [N/m].
     pub fn stiffness_along(&self, p: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
         let share = |load: &PlaneLoad| load.stiffness_n_m * load.normal.dot(along).powi(2);
@@ -95,15 +107,23 @@ pub struct ContactLaw {
     horizon_s: f64,
     last_step: (u64, f64),
     history: TipHistory,
+    /// Stiffness across a plane that the device can render [N/m].
+    stiffest_n_m: f64,
 }
 
 impl Default for ContactLaw {
     fn default() -> Self {
-        Self { horizon_s: MAX_EXTRAPOLATION_S, last_step: (0, 0.0), history: TipHistory::default() }
+        Self::new(f64::INFINITY)
     }
 }
 
 impl ContactLaw {
+    /// A law for a device that renders this stiffness at most [N/m].
+    pub fn new(stiffest_n_m: f64) -> Self {
+        let history = TipHistory::default();
+        Self { horizon_s: MAX_EXTRAPOLATION_S, last_step: (0, 0.0), history, stiffest_n_m }
+    }
+
     /// Loads on a tip near `tip_m` at loop time `now_ns`. Must be called once per tick.
     pub fn loads(&mut self, model: &ContactModel, tip_m: &Vector3<f64>, now_ns: u64) -> PlaneLoads {
         self.observe_step(model);
@@ -142,14 +162,22 @@ impl ContactLaw {
                 stiffness_n_m: plane.stiffness_n_m,
             },
         };
-        PlaneLoad {
+        let mut load = PlaneLoad {
             normal: n,
             offset_n: weight * answer.offset_n,
             stiffness_n_m: weight * answer.stiffness_n_m,
             damping_ns_m: weight * plane.damping_ns_m,
             surface_velocity_m_s: plane.surface_velocity_m_s,
             two_sided,
+            friction: if two_sided { 0.0 } else { plane.friction },
+            friction_n: Vector3::zeros(),
+        };
+        if load.friction > 0.0 {
+            let start = Start { tip_m: model.tip_used_m, at_ns: model.used_ns };
+            let stiffest = self.stiffest_n_m.min(model.max_stiffness_n_m);
+            load.friction_n = friction(plane, &load, stiffest, &start, &self.history, tip_m);
         }
+        load
     }
 
     /// Updates the horizon to 1.5 simulation steps, once messages show the length of a step.
@@ -176,6 +204,8 @@ const NO_LOAD: PlaneLoad = PlaneLoad {
     damping_ns_m: 0.0,
     surface_velocity_m_s: Vector3::new(0.0, 0.0, 0.0),
     two_sided: false,
+    friction: 0.0,
+    friction_n: Vector3::new(0.0, 0.0, 0.0),
 };
 
 /// The plane itself, and the two axes across it if it holds.

@@ -6,7 +6,7 @@
 use crate::constants::{DEFAULT_VALIDITY_NS, LOST_NS, MAX_VALIDITY_NS};
 use crate::statistics::{LinkReport, RoundTrips};
 use nalgebra::Vector3;
-use scindo_proto::limits::{MAX_CONTACTS, MAX_RELAXATION_S};
+use scindo_proto::limits::{MAX_CONTACTS, MAX_FRICTION, MAX_RELAXATION_S};
 use scindo_proto::messages::{Contact, HapticContact, Vec3, Vec3f, haptic_contact};
 
 /// Largest plausible force of one plane [N].
@@ -35,9 +35,11 @@ pub struct ContactPlane {
     pub relaxed_stiffness_n_m: f64,
     /// Time in which the force falls from the one to the other [s].
     pub relaxation_s: f64,
-    /// Decrease of the force per metre across the normal, of tissue that is held [N/m].
+    /// Decrease of the force per metre across the normal, of tissue that sticks or is held [N/m].
     pub tangential_stiffness_n_m: f64,
-    /// Force across the normal, of tissue that is held [N].
+    /// Coefficient of dry friction; zero: none, or tissue that is held.
+    pub friction: f64,
+    /// Force across the normal, of friction or of tissue that is held [N].
     pub tangential_n: Vector3<f64>,
     /// Damping along the normal, against the relative velocity [N·s/m].
     pub damping_ns_m: f64,
@@ -58,6 +60,7 @@ impl ContactPlane {
         relaxed_stiffness_n_m: 0.0,
         relaxation_s: 0.0,
         tangential_stiffness_n_m: 0.0,
+        friction: 0.0,
         tangential_n: Vector3::new(0.0, 0.0, 0.0),
         damping_ns_m: 0.0,
         surface_velocity_m_s: Vector3::new(0.0, 0.0, 0.0),
@@ -84,6 +87,8 @@ pub struct ContactModel {
     pub used_ns: Option<u64>,
     /// How long the server has kept the tip there before it sent the message, since no newer pose came [ns].
     pub held_ns: u64,
+    /// Newest time from a pose to its contact [ns]; zero if none is known.
+    pub round_trip_ns: u64,
     /// Whether the tool holds the tissue, so that it pulls back in all directions.
     pub holds: bool,
     /// The planes; only the first `plane_count` are valid.
@@ -109,6 +114,7 @@ impl ContactModel {
         tip_used_m: Vector3::new(0.0, 0.0, 0.0),
         used_ns: None,
         held_ns: 0,
+        round_trip_ns: 0,
         holds: false,
         planes: [ContactPlane::NONE; MAX_CONTACTS],
         plane_count: 0,
@@ -180,6 +186,7 @@ fn parse_plane(contact: &Contact, [instant, relaxed, relaxation_s]: [f64; 3]) ->
         relaxed_stiffness_n_m: relaxed,
         relaxation_s,
         tangential_stiffness_n_m: within(contact.tangential_stiffness_n_m, MAX_PLANE_STIFFNESS_N_M)?,
+        friction: within(contact.friction, MAX_FRICTION)?,
         tangential_n: force - normal * force.dot(&normal),
         damping_ns_m: within(contact.damping_ns_m, MAX_PLANE_DAMPING_NS_M)?,
         surface_velocity_m_s: match &contact.surface_velocity_m_s {
@@ -233,27 +240,32 @@ pub fn contact_slot() -> (triple_buffer::Input<ContactModel>, ContactSlot) {
 /// Network side of the slot; its only writer.
 pub struct ContactInbox {
     slot: triple_buffer::Input<ContactModel>,
+    /// Id of this client.
+    client_id: String,
     last_seq: u64,
     last_publish_unix_ns: u64,
     last_received_ns: u64,
     last_tool_seq: u64,
     /// When the first message for the pose `last_tool_seq` arrived [ns].
     tool_seq_since_ns: u64,
+    round_trip_ns: u64,
     first_received_ns: u64,
     counts: LinkReport,
     round_trips: RoundTrips,
 }
 
 impl ContactInbox {
-    /// Creates an inbox that writes into `slot`.
-    pub fn new(slot: triple_buffer::Input<ContactModel>) -> Self {
+    /// Creates an inbox that writes the contacts of client `client_id` into `slot`.
+    pub fn new(slot: triple_buffer::Input<ContactModel>, client_id: &str) -> Self {
         Self {
             slot,
+            client_id: client_id.to_owned(),
             last_seq: 0,
             last_publish_unix_ns: 0,
             last_received_ns: 0,
             last_tool_seq: 0,
             tool_seq_since_ns: 0,
+            round_trip_ns: 0,
             first_received_ns: 0,
             counts: LinkReport::default(),
             round_trips: RoundTrips::default(),
@@ -263,6 +275,11 @@ impl ContactInbox {
     /// Takes one message. It arrived at `now_ns` of the loop clock and at `client_ns` of the clock that
     /// stamps poses (`tool_client_time_ns`).
     pub fn accept(&mut self, message: &HapticContact, now_ns: u64, client_ns: u64) {
+        // Whoever waits for a tool hears what its holder feels.
+        if message.client_id != self.client_id {
+            self.counts.contacts_of_others += 1;
+            return;
+        }
         let Some(mut model) = ContactModel::parse(message, now_ns) else {
             self.counts.contacts_refused += 1;
             return;
@@ -278,6 +295,7 @@ impl ContactInbox {
         if message.tool_seq_used == self.last_tool_seq {
             model.held_ns = now_ns.saturating_sub(self.tool_seq_since_ns);
         }
+        model.round_trip_ns = self.round_trip_ns;
         self.slot.write(model);
     }
 
@@ -313,7 +331,8 @@ impl ContactInbox {
         if message.tool_seq_used > self.last_tool_seq {
             self.last_tool_seq = message.tool_seq_used;
             self.tool_seq_since_ns = now_ns;
-            self.round_trips.record(client_ns.saturating_sub(message.tool_client_time_ns));
+            self.round_trip_ns = client_ns.saturating_sub(message.tool_client_time_ns);
+            self.round_trips.record(self.round_trip_ns);
         }
     }
 
@@ -341,7 +360,7 @@ mod tests {
 
     fn inbox() -> (ContactInbox, ContactSlot) {
         let (input, output) = contact_slot();
-        (ContactInbox::new(input), output)
+        (ContactInbox::new(input, ""), output)
     }
 
     fn accept(inbox: &mut ContactInbox, message: &HapticContact, now_ns: u64) {
@@ -365,7 +384,9 @@ mod tests {
     fn garbage_is_refused_and_leaves_the_last_model() {
         let (mut inbox, mut slot) = inbox();
         accept(&mut inbox, &contact(1, 1.0, 300.0), 0);
-        let spoil: [fn(&mut HapticContact); 12] = [
+        let spoil: [fn(&mut HapticContact); 14] = [
+            |m| m.contacts[0].friction = f32::NAN,
+            |m| m.contacts[0].friction = 11.0,
             |m| m.relaxed_stiffness_n_m = f32::NAN,
             |m| m.instant_stiffness_n_m = -1.0,
             |m| m.relaxation_s = f32::INFINITY,
@@ -384,8 +405,16 @@ mod tests {
             spoil(&mut message);
             accept(&mut inbox, &message, 1);
         }
-        assert_eq!(inbox.report().contacts_refused, 12);
+        assert_eq!(inbox.report().contacts_refused, 14);
         assert_eq!(slot.read().seq, 1);
+    }
+
+    #[test]
+    fn what_the_holder_of_the_tool_feels_is_not_rendered_by_others() {
+        let (mut inbox, mut slot) = inbox();
+        accept(&mut inbox, &contact(1, 1.0, 300.0), 0);
+        accept(&mut inbox, &HapticContact { client_id: "other".into(), ..contact(2, 2.0, 300.0) }, 1);
+        assert_eq!((slot.read().seq, inbox.report().contacts_of_others), (1, 1));
     }
 
     #[test]

@@ -216,6 +216,7 @@ mod tests {
             force_n: Vector3::z() * force,
             contact_seq: tick,
             contact_age_ms: if tick < 100 { 1e6 } else { 2.0 },
+            round_trip_ms: 0.0,
             epoch: 1,
             energy_j: 0.0,
             flags: if tick < 100 { flag::STALE } else { 0 },

@@ -102,6 +102,7 @@ mod tests {
             force_n: Vector3::z(),
             contact_seq: seq,
             contact_age_ms: 1.5,
+            round_trip_ms: 0.0,
             epoch: 2,
             energy_j: 0.0,
             flags: 3,

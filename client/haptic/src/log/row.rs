@@ -19,6 +19,8 @@ pub struct LogRow {
     pub contact_seq: u64,
     /// Age of that message [ms].
     pub contact_age_ms: f64,
+    /// Newest time from a pose to its contact [ms]; zero if none is known.
+    pub round_trip_ms: f64,
     /// Epoch of the topology of that message.
     pub epoch: u32,
     /// Energy of the passivity observer [J].

@@ -100,7 +100,7 @@ impl Rig {
         let (input, contacts) = contact_slot();
         let ports = Ports { contacts, server_alive: alive.clone(), poses: None, log: None, meter: None };
         let tick = HapticTick::new(Box::new(device.clone()), limits, ports);
-        Self { device, inbox: ContactInbox::new(input), alive, tick, now_ns: MS, seq: 0 }
+        Self { device, inbox: ContactInbox::new(input, ""), alive, tick, now_ns: MS, seq: 0 }
     }
 
     pub fn step(&mut self) -> TickOutput {

@@ -23,6 +23,7 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
       unmatched: bodies().reduce((sum, body) => sum + body.unmatched, 0),
     }),
     rates: () => ({ surfaceHz: panel.surfaceRate.value, fps: panel.pictureRate.value, latencyMs: panel.latency.value }),
+    feltToDrawnMs: () => Object.fromEntries((panel.stats?.tools ?? []).map((tool) => [tool.toolId, panel.feltToDrawnMs(tool)])),
     bodies: () => bodies().map((body) => ({
       id: body.id,
       epoch: body.epoch,

@@ -2,7 +2,7 @@
 
 import type { Relay } from "./relay";
 import type { ViewerHello, ViewerLink, ViewerRpcReply } from "../gen/scindo/v1/viewer_pb";
-import type { BodyStats, Event, Plan, SessionInfo, Stats } from "../gen/scindo/v1/server_pb";
+import type { BodyStats, Event, Plan, SessionInfo, Stats, ToolStats } from "../gen/scindo/v1/server_pb";
 import type { SurfaceFrame } from "../gen/scindo/v1/surface_pb";
 import { element, setRows, setText, type Row } from "./dom";
 import { Log } from "./log";
@@ -172,10 +172,17 @@ export class Panel {
     const rows: Row[] = stats.tools.map((tool) => {
       const rate = tool.contactRateHz > 0 ? ` · ${short(tool.contactRateHz)} Hz` : "";
       const age = tool.contactAgeMs > 0 ? ` · ${short(tool.contactAgeMs)} ms old` : "";
+      const drawn = this.feltToDrawnMs(tool);
+      const seen = Number.isFinite(drawn) ? ` · drawn ${short(drawn)} ms later` : "";
       const name = tool.owner && tool.owner !== tool.toolId ? `${tool.toolId} · ${tool.owner}` : tool.toolId;
-      return [name, `${short(tool.forceN)} N${rate}${age}`, "", "force, contact models per second, and their age in the haptic device"];
+      return [name, `${short(tool.forceN)} N${rate}${age}${seen}`, "", "force, contact models per second, their age in the haptic device, and time from the hand at a pose, where it is felt, to the picture of it"];
     });
     setRows(this.at("tools"), rows.length > 0 ? rows : [["none", ""]]);
+  }
+
+  /** Time from the moment at which a hand was at a pose to the picture that shows it [ms]. NaN: not known. */
+  feltToDrawnMs(tool: ToolStats): number {
+    return tool.poseAgeMs > 0 ? tool.poseAgeMs + Math.max(0, this.latency.value) : NaN;
   }
 
   private refreshStream(stats: Stats | null): void {

@@ -154,7 +154,7 @@ fn against_wall(stiffness_n_m: f64, open_tank: bool) -> Vec<WallTick> {
     if open_tank {
         tick.open_tank();
     }
-    let mut inbox = ContactInbox::new(slot);
+    let mut inbox = ContactInbox::new(slot, "");
     let mut poses: VecDeque<Vector3<f64>> = VecDeque::new();
     let one = |ms: u64| {
         let now_ns = ms * MS;

@@ -15,6 +15,8 @@ pub const TOP_M: f64 = 0.02;
 pub const SHAPE: ToolShape = ToolShape::Sphere { radius_m: 0.005 };
 /// Its name.
 pub const TOOL: &str = "probe";
+/// Name of the client that holds it.
+pub const OWNER: &str = "hand";
 
 /// A pad of soft tissue, glued to a table. Its cells are finer than the tip: otherwise the hand feels the facets of the
 /// dent, which no message can foretell.
@@ -80,7 +82,7 @@ pub fn tool_input(
 ) -> ToolInput {
     ToolInput {
         id: Arc::from(TOOL),
-        owner: Arc::from("hand"),
+        owner: Arc::from(OWNER),
         pose: Isometry3::from_parts(position_m.into(), nalgebra::UnitQuaternion::identity()),
         passed: Vec::new(),
         velocity_m_s,

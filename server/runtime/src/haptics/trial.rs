@@ -156,7 +156,7 @@ impl Session {
         Ok(Self {
             tick: HapticTick::new(Box::new(device), LIMITS, ports),
             probe,
-            inbox: ContactInbox::new(slot),
+            inbox: ContactInbox::new(slot, super::tissue::OWNER),
             up,
             down,
             server: Server {

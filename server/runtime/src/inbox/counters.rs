@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::one_way::OneWay;
+
 /// Messages refused so far, by reason.
 #[derive(Debug, Default)]
 pub(super) struct Counters {
@@ -32,6 +34,8 @@ pub struct ToolFigures {
     pub poses: u64,
     /// Age of the contact model that its device last used [ms].
     pub contact_age_ms: f32,
+    /// The way of its poses.
+    pub one_way: OneWay,
 }
 
 /// A copy of all figures. It is filled under the lock of the inbox and read after the lock is released.

@@ -16,6 +16,9 @@ pub const MAX_WAITING_CUTS: usize = 64;
 /// Most pairs of client and tool whose cuts are remembered.
 const MAX_LOGS: usize = 256;
 
+/// Most tools of one client whose cuts are remembered, so that no client takes the places of others.
+const MAX_TOOLS_OF_ONE: usize = 16;
+
 /// Answers remembered per client and tool. A client repeats a cut for seconds. Only after this many others is
 /// it answered "duplicate" without details.
 pub(super) const MAX_ANSWERS: usize = 256;
@@ -29,6 +32,8 @@ pub enum Cut {
     Waiting,
     /// It is a repetition of one that has its answer.
     Answer(CutAck),
+    /// It names another client or tool than its key, so it is not known whom to answer.
+    Stray(Refusal),
 }
 
 /// The part of an answer that does not depend on the cut.
@@ -51,6 +56,19 @@ struct ToolLog {
     answers: BTreeMap<u64, CutAck>,
     /// Every cut up to this number was applied or refused, and its answer is forgotten.
     forgotten_up_to: u64,
+}
+
+impl ToolLog {
+    /// Keeps an answer for repetitions, and forgets the oldest if there are too many.
+    fn store(&mut self, answer: CutAck) {
+        self.waiting.remove(&answer.seq);
+        self.answers.insert(answer.seq, answer);
+        while self.answers.len() > MAX_ANSWERS {
+            if let Some((seq, _)) = self.answers.pop_first() {
+                self.forgotten_up_to = self.forgotten_up_to.max(seq);
+            }
+        }
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -100,14 +118,10 @@ impl CutLog {
             return Err(refuse(
                 "queue-full",
                 format!("{MAX_WAITING_CUTS} cuts are waiting already"),
-                "send it again when some of them have been answered",
+                "send it again with a new number when some of them have been answered",
             ));
         }
-        let whose = (command.client_id.clone(), command.tool_id.clone());
-        if !self.logs.contains_key(&whose) && self.logs.len() >= MAX_LOGS {
-            self.forget_departed(is_here)?;
-        }
-        self.logs.entry(whose).or_default().waiting.insert(command.seq);
+        self.log_of(&command.client_id, &command.tool_id, is_here)?.waiting.insert(command.seq);
         self.next_request += 1;
         let segments = command.sweep.iter();
         self.queue.push_back(CutRequest {
@@ -122,6 +136,40 @@ impl CutLog {
             Ticket { client: command.client_id.clone(), tool: command.tool_id.clone(), seq: command.seq };
         self.tickets.insert(self.next_request, ticket);
         Ok(())
+    }
+
+    /// Remembers the answer to a command that was refused before it was queued. Where there is no place for it, a copy
+    /// that arrives later is judged anew.
+    pub fn remember(&mut self, answer: &CutAck, is_here: impl Fn(&str) -> bool) {
+        if let Ok(log) = self.log_of(&answer.client_id, &answer.tool_id, is_here) {
+            log.store(answer.clone());
+        }
+    }
+
+    /// The log of a client and a tool. If the logs are full, it drops those of clients that have left.
+    fn log_of(
+        &mut self,
+        client: &str,
+        tool: &str,
+        is_here: impl Fn(&str) -> bool,
+    ) -> Result<&mut ToolLog, Refusal> {
+        let whose = (client.to_owned(), tool.to_owned());
+        if !self.logs.contains_key(&whose) {
+            if self.logs.len() >= MAX_LOGS {
+                self.forget_departed(is_here)?;
+            }
+            let own = self.logs.keys().filter(|(owner, _)| owner == client).count();
+            if own >= MAX_TOOLS_OF_ONE {
+                return Err(refuse(
+                    "too-many-tools",
+                    format!(
+                        "client '{client}' has cut with {own} tools; at most {MAX_TOOLS_OF_ONE} are tracked"
+                    ),
+                    "use fewer tool ids",
+                ));
+            }
+        }
+        Ok(self.logs.entry(whose).or_default())
     }
 
     fn unknown_body(&self, id: &str) -> Refusal {
@@ -167,13 +215,7 @@ impl CutLog {
             let Some(ticket) = self.tickets.remove(&outcome.request) else { continue };
             let answer = self.answer_of(&ticket, outcome, with);
             let log = self.logs.entry((ticket.client, ticket.tool)).or_default();
-            log.waiting.remove(&ticket.seq);
-            log.answers.insert(ticket.seq, answer.clone());
-            while log.answers.len() > MAX_ANSWERS {
-                if let Some((seq, _)) = log.answers.pop_first() {
-                    log.forgotten_up_to = log.forgotten_up_to.max(seq);
-                }
-            }
+            log.store(answer.clone());
             answers.push(answer);
         }
         answers

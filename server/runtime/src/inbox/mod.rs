@@ -21,6 +21,8 @@ pub mod cut_log;
 
 pub mod counters;
 
+pub mod one_way;
+
 mod refusal;
 
 #[cfg(test)]
@@ -37,8 +39,8 @@ use scindo_world::inputs::{CutOutcome, Inputs, ToolInput};
 use counters::{Counters, Figures};
 pub use cut_log::{Answering, Cut};
 use cut_log::{CutLog, answer};
-use owners::Owners;
 pub use owners::{Change, MAX_POSE_RATE};
+use owners::{NO_TOKEN, Owners};
 pub use refusal::Refusal;
 use refusal::refuse;
 
@@ -123,27 +125,32 @@ impl Inbox {
         outcome
     }
 
-    /// Takes a checked cut that arrived under the key of `sender`. A refusal is answered to the client of the
-    /// key, so that nobody can refuse a cut of somebody else.
+    /// Takes a checked cut that arrived under the key of `sender`. One that names another client or tool is not
+    /// answered, so that nobody can refuse a cut of somebody else.
     pub fn cut(&mut self, sender: Sender<'_>, command: &CutCommand) -> Cut {
-        let accepted = match sender.matches(&command.client_id, &command.tool_id) {
-            Ok(()) => match self.cuts.known(command) {
-                Some(known) => return known,
-                None => self
-                    .owners
-                    .may_cut(sender.tool, sender.client)
-                    .and_then(|()| self.cuts.accept(command, |client| self.owners.is_here(client))),
-            },
-            Err(refusal) => Err(refusal),
-        };
+        if let Err(refusal) = sender.matches(&command.client_id, &command.tool_id) {
+            self.count(refusal.code);
+            return Cut::Stray(refusal);
+        }
+        if let Some(known) = self.cuts.known(command) {
+            return known;
+        }
+        let accepted = self
+            .owners
+            .may_cut(sender.tool, sender.client)
+            .and_then(|()| self.cuts.accept(command, |client| self.owners.is_here(client)));
         match accepted {
             Ok(()) => Cut::Queued,
             Err(refusal) => {
                 self.count(refusal.code);
+                let code = refusal.code;
                 let mut answer = answer(command, cut_ack::Outcome::Refused);
-                sender.client.clone_into(&mut answer.client_id);
-                sender.tool.clone_into(&mut answer.tool_id);
                 answer.error = Some(refusal.into());
+                // A client without a token sends its cut again. Any other refusal is final: a copy that arrives later
+                // must not be made.
+                if code != NO_TOKEN {
+                    self.cuts.remember(&answer, |client| self.owners.is_here(client));
+                }
                 Cut::Answer(answer)
             }
         }

@@ -9,8 +9,12 @@ use scindo_world::inputs::{MAX_PASSED, MAX_TOOLS, ToolInput, ToolMode};
 
 use super::counters::ToolFigures;
 use super::early::{EarlyPoses, PATIENCE};
+use super::one_way::OneWay;
 use super::refusal::{Refusal, refuse};
 use crate::wire::convert::to_tool_input;
+
+/// Reason of a refusal for clients without a token. They declare it and try again.
+pub(super) const NO_TOKEN: &str = "no-token";
 
 /// Poses accepted per second and tool: twice what a 1 kHz device sends.
 pub const MAX_POSE_RATE: u32 = 2000;
@@ -49,6 +53,8 @@ struct Held {
     poses: u64,
     /// Age of the contact model that its device last used [ms].
     contact_age_ms: f32,
+    /// How long its poses are on the way.
+    one_way: OneWay,
     /// Start of the current second, and poses since then.
     this_second: (Instant, u32),
     capability: Option<DeviceCapability>,
@@ -172,6 +178,7 @@ impl Owners {
         held.pass(before);
         held.poses += 1;
         held.contact_age_ms = sample.contact_age_ms;
+        held.one_way.arrived(sample, now);
         Ok(None)
     }
 
@@ -219,8 +226,17 @@ impl Owners {
         let owner: Arc<str> = Arc::from(sample.client_id.as_str());
         let input = to_tool_input(sample, id.clone(), owner.clone());
         let contact_age_ms = sample.contact_age_ms;
-        let held =
-            Held { input, taken: false, poses: 1, contact_age_ms, this_second: (now, 1), capability: None };
+        let mut one_way = OneWay::new(now);
+        one_way.arrived(sample, now);
+        let held = Held {
+            input,
+            taken: false,
+            poses: 1,
+            contact_age_ms,
+            one_way,
+            this_second: (now, 1),
+            capability: None,
+        };
         self.held.insert(id.clone(), held);
         Ok(Change::Taken { tool: id, owner })
     }
@@ -264,17 +280,18 @@ impl Owners {
     }
 
     pub fn figures(&self) -> impl Iterator<Item = ToolFigures> {
-        self.held.iter().map(|(tool, &Held { poses, contact_age_ms, .. })| ToolFigures {
+        self.held.iter().map(|(tool, &Held { poses, contact_age_ms, one_way, .. })| ToolFigures {
             tool: tool.clone(),
             poses,
             contact_age_ms,
+            one_way,
         })
     }
 }
 
 fn no_token(client: &str) -> Refusal {
     refuse(
-        "no-token",
+        NO_TOKEN,
         format!("client '{client}' has no liveliness token"),
         "declare client/<client id>/live/<role> before the first message",
     )

@@ -169,7 +169,7 @@ fn forgotten_answers_are_still_duplicates() {
 #[test]
 fn refused_cuts_say_why_and_are_counted() {
     let mut inbox = visited();
-    let mut foreign = command("a", 1);
+    let mut foreign = command("a", 5000);
     foreign.body_id = "liver".into();
     let Cut::Answer(ack) = cut(&mut inbox, &foreign) else { panic!() };
     assert_eq!(ack.outcome(), cut_ack::Outcome::Refused);
@@ -295,9 +295,9 @@ fn nobody_moves_releases_or_cuts_with_the_tool_of_another() {
     assert_eq!(pose(&mut inbox, &sample("b", "scalpel", 1), start()).unwrap_err().code, "not-owner");
     let Cut::Answer(ack) = cut(&mut inbox, &command("b", 7)) else { panic!() };
     assert_eq!(ack.error.unwrap().code, "not-owner");
-    // The answer to a forged cut goes to the forger. Client a, who cuts with the same number, is not disturbed.
-    let Cut::Answer(ack) = inbox.cut(of("b", "scalpel"), &command("a", 7)) else { panic!() };
-    assert_eq!((ack.client_id.as_str(), ack.error.unwrap().code.as_str()), ("b", "wrong-key"));
+    // A forged cut has no answer. Client a, who cuts with the same number, is not disturbed.
+    let Cut::Stray(refusal) = inbox.cut(of("b", "scalpel"), &command("a", 7)) else { panic!() };
+    assert_eq!(refusal.code, "wrong-key");
     assert_eq!(cut(&mut inbox, &command("a", 7)), Cut::Queued);
     let device = DeviceCapability {
         client_id: "a".into(),
@@ -312,4 +312,32 @@ fn nobody_moves_releases_or_cuts_with_the_tool_of_another() {
     assert_eq!(inbox.refused()["wrong-key"], 3);
     inbox.client_went("b", start());
     assert!(inbox.anybody_holds());
+}
+
+#[test]
+fn a_refusal_is_final_although_the_reason_may_have_gone() {
+    let mut inbox = visited();
+    pose(&mut inbox, &sample("a", "scalpel", 1), start()).unwrap();
+    let Cut::Answer(refused) = cut(&mut inbox, &command("b", 7)) else { panic!() };
+    assert_eq!(refused.error.clone().unwrap().code, "not-owner");
+    // Client a leaves. A copy of the cut that was under way arrives now.
+    inbox.client_went("a", start());
+    assert_eq!(cut(&mut inbox, &command("b", 7)), Cut::Answer(refused));
+    assert_eq!(cut(&mut inbox, &command("b", 8)), Cut::Queued);
+}
+
+#[test]
+fn one_client_does_not_take_the_places_of_others() {
+    let mut inbox = visited();
+    let with = |client: &str, tool: usize| CutCommand { tool_id: format!("t{tool}"), ..command(client, 1) };
+    let codes: Vec<Option<String>> = (0..20)
+        .map(|tool| match cut(&mut inbox, &with("a", tool)) {
+            Cut::Queued => None,
+            Cut::Answer(ack) => Some(ack.error.unwrap().code),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    assert_eq!(codes.iter().filter(|code| code.is_none()).count(), 16);
+    assert!(codes.into_iter().flatten().all(|code| code == "too-many-tools"));
+    assert_eq!(cut(&mut inbox, &with("b", 1)), Cut::Queued);
 }

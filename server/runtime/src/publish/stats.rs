@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Instant;
 
 use scindo_proto::messages::{BodyStats, Counter, ToolStats};
 use scindo_world::snapshot::{BodySnapshot, ToolSnapshot};
@@ -50,6 +51,7 @@ impl Told {
     /// Converts one tool for the report.
     pub fn tool_stats(&self, tool: &ToolSnapshot, rates: &Rates) -> ToolStats {
         let held = self.figures.tools.iter().find(|held| held.tool == tool.id);
+        let shown = held.and_then(|held| held.one_way.since(tool.client_time_ns, Instant::now()));
         ToolStats {
             tool_id: tool.id.to_string(),
             owner: tool.owner.to_string(),
@@ -57,6 +59,7 @@ impl Told {
             pose_rate_hz: self.poses.get(&tool.id).map_or(0.0, |&(_, hz)| hz as f32),
             force_n: tool.force_n.norm() as f32,
             contact_age_ms: held.map_or(0.0, |held| held.contact_age_ms),
+            pose_age_ms: shown.map_or(0.0, |shown| 1e3 * shown.as_secs_f32()),
         }
     }
 }
@@ -88,8 +91,6 @@ pub fn body_stats(body: &BodySnapshot) -> BodyStats {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use std::time::Instant;
-
     use crossbeam_channel::bounded;
     use scindo_proto::messages::{Pose, ToolSample, Vec3};
 

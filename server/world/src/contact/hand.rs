@@ -8,6 +8,7 @@ use crate::contact::grab::Grip;
 use crate::contact::jaws::Jaws;
 use crate::contact::press::Press;
 use crate::contact::proxy::Proxy;
+use crate::contact::rub::Rub;
 use crate::contact::surface::ContactSurface;
 use crate::inputs::{ToolMode, ToolShape};
 use crate::snapshot::LimbSnapshot;
@@ -22,6 +23,8 @@ struct Limb {
     press: Press,
     /// Force of the tissue on it in the last step [N].
     force_n: Vector3<f64>,
+    /// The part of it that is friction [N].
+    friction_n: Vector3<f64>,
 }
 
 /// The contact state of one tool, kept from step to step.
@@ -98,11 +101,36 @@ impl Hand {
         }
     }
 
+    /// Friction under a capsule of a compound tool, or under the tool itself.
+    pub(super) fn rub_mut(&mut self, limb: u8) -> &mut Rub {
+        match self.limbs.get_mut(usize::from(limb)) {
+            Some(limb) => limb.press.rub_mut(),
+            None => self.press.rub_mut(),
+        }
+    }
+
+    /// Takes over the friction of the solve of a step, and returns the force on the tool [N].
+    pub(super) fn settle_rub(&mut self, friction: f64) -> Vector3<f64> {
+        self.press.rub_mut().settle(friction);
+        let mut on_tissue = self.press.rub().force_n();
+        for limb in &mut self.limbs {
+            limb.press.rub_mut().settle(friction);
+            limb.friction_n = -limb.press.rub().force_n();
+            on_tissue -= limb.friction_n;
+        }
+        -on_tissue
+    }
+
     /// The capsules of a compound tool that touches, for the local model.
     pub fn limbs_of(&self, tool: &Tool) -> impl Iterator<Item = LimbSnapshot> {
         let parts = compound::parts(tool.shape, tool.gap_m()).filter(|_| tool.touches());
         let limbs = parts.zip(&self.limbs);
-        limbs.map(|(part, limb)| LimbSnapshot { part, proxy: *limb.proxy.pose(), force_n: limb.force_n })
+        limbs.map(|(part, limb)| LimbSnapshot {
+            part,
+            proxy: *limb.proxy.pose(),
+            force_n: limb.force_n,
+            friction_n: limb.friction_n,
+        })
     }
 
     /// How far the jaws of forceps are closed, 0 to 1.
@@ -166,6 +194,7 @@ impl Hand {
             self.release_limbs();
             self.open_jaws();
             self.proxy.release(&tool.pose);
+            self.press.slip();
         }
         if tool.mode != ToolMode::Grab {
             self.grip.open();
@@ -177,6 +206,9 @@ impl Hand {
             self.proxy.ride(tool.shape, surfaces);
             self.proxy.follow(tool.shape, &tool.pose, surfaces);
             self.press.update(tool.shape, (self.proxy.pose(), &tool.pose), surfaces, h);
+            if tool.friction > 0.0 {
+                self.press.drag(tool.shape, &tool.pose);
+            }
         } else {
             // The edge of a blade that cuts with force has a place of its own.
             if self.edge.is_none() {
@@ -214,6 +246,7 @@ impl Hand {
             proxy: Proxy::default(),
             press: Press::new(),
             force_n: Vector3::zeros(),
+            friction_n: Vector3::zeros(),
         });
         let (mut aside, mut touching) = (Vector3::zeros(), 0.0);
         for (limb, part) in self.limbs.iter_mut().zip(compound::parts(tool.shape, tool.gap_m())) {
@@ -221,6 +254,9 @@ impl Hand {
             limb.proxy.ride(part.shape, surfaces);
             limb.proxy.follow(part.shape, &device, surfaces);
             limb.press.update(part.shape, (limb.proxy.pose(), &device), surfaces, h);
+            if tool.friction > 0.0 {
+                limb.press.drag(part.shape, &device);
+            }
             if limb.press.normal().is_some() {
                 aside += limb.proxy.pose().translation.vector - device.translation.vector;
                 touching += 1.0;

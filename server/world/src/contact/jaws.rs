@@ -222,7 +222,7 @@ impl Jaws {
                         stiffness_n_m: stiffness * share,
                         max_force_n: most * share,
                     });
-                    behind.push(Behind { tool: index, limb: 0, depth_m: depth });
+                    behind.push(Behind { tool: index, limb: 0, depth_m: depth, rubs: None });
                 });
                 held.springs = (first, springs.len() - first);
                 held.stiffness = stiffness;

@@ -14,6 +14,7 @@ pub mod model;
 pub mod surface;
 pub mod proxy;
 pub mod press;
+pub mod rub;
 pub mod spring;
 pub mod grab;
 pub mod jaws;
@@ -41,6 +42,7 @@ use hand::Hand;
 use pairs::{PairContacts, TouchSettings};
 use press::{Bearing, MAX_POINTS, Press};
 use rest::{RestReport, Resting};
+use rub::Roughness;
 use spring::material_points;
 use surface::ContactSurface;
 
@@ -69,6 +71,8 @@ struct Behind {
     limb: u8,
     /// Depth before the solve [m].
     depth_m: f64,
+    /// Point of the stencil with which the tool rubs; `None` without friction.
+    rubs: Option<u8>,
 }
 
 /// Sums over one tool's springs.
@@ -142,7 +146,7 @@ impl Contacts {
             let edge = hand.edge.get_or_insert_default();
             edge.follow(tool, surfaces, solids, toughness, |body, spring| {
                 bodies[body].springs.push(spring);
-                bodies[body].behind.push(Behind { tool: index, limb: 0, depth_m: 0.0 });
+                bodies[body].behind.push(Behind { tool: index, limb: 0, depth_m: 0.0, rubs: None });
             });
         }
     }
@@ -387,7 +391,15 @@ impl Contacts {
             let sums = &mut self.sums[tool];
             sums.force += force;
             sums.limbs[usize::from(of.limb)] += force;
-            if let SpringKind::OneSided { normal, .. } = spring.kind {
+            let normal = match (spring.kind, of.rubs) {
+                (SpringKind::OneSided { normal, .. }, _) => Some(normal),
+                (SpringKind::Rough { normal, .. }, Some(point)) => {
+                    self.hands[tool].rub_mut(of.limb).add(point, force, &normal, spring.stiffness_n_m);
+                    Some(normal)
+                }
+                _ => None,
+            };
+            if let Some(normal) = normal {
                 let along = force.dot(&normal);
                 sums.normal_force += along;
                 sums.before += spring.stiffness_n_m * of.depth_m;
@@ -403,13 +415,16 @@ impl Contacts {
         for ((tool, hand), sums) in tools.iter_mut().zip(&mut self.hands).zip(&self.sums) {
             tool.force_n = -sums.force;
             hand.feel(&sums.limbs);
+            if tool.friction > 0.0 {
+                tool.friction_n = hand.settle_rub(tool.friction);
+            }
             if let Some(jaws) = &mut hand.jaws {
                 jaws.settle(tool);
             }
             let Some(compliance) = hand.compliance() else { continue };
             if sums.stiffness > 0.0 && sums.normal_force < 0.95 * tool.max_force_n {
                 let (before, after) = (sums.before / sums.stiffness, sums.after / sums.stiffness);
-                let normal = (-sums.force).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+                let normal = (tool.force_n - tool.friction_n).try_normalize(1e-9).unwrap_or_else(Vector3::z);
                 let place = (tool.pose.translation.vector, normal);
                 compliance.learn([before, after], sums.normal_force, place);
             } else {
@@ -432,17 +447,18 @@ fn press(index: u32, tool: &Tool, hand: &mut Hand, surfaces: &[ContactSurface], 
         let of = &bodies[body];
         hand.meet(body, (of.young_pa, of.viscous), core_radius(tool.shape));
     }
-    bear((index, 0), spring, hand.press(), surfaces, bodies);
+    bear((index, 0), (spring, tool.friction), hand.press(), surfaces, bodies);
     let each = 1.0 / hand.limbs().len().max(1) as f64;
     for (number, limb) in (0u8..).zip(hand.limbs()) {
-        bear((index, number), (spring.0 * each, spring.1 * each), limb, surfaces, bodies);
+        let spring = (spring.0 * each, spring.1 * each);
+        bear((index, number), (spring, tool.friction), limb, surfaces, bodies);
     }
 }
 
-/// Adds springs of this stiffness [N/m] and largest force [N] where a capsule of a tool bears on tissue.
+/// Adds springs of this stiffness [N/m], largest force [N] and friction where a capsule of a tool bears on tissue.
 fn bear(
     of: (u32, u8),
-    spring: (f64, f64),
+    (spring, friction): ((f64, f64), f64),
     press: &Press,
     surfaces: &[ContactSurface],
     bodies: &mut [BodyContacts],
@@ -453,7 +469,8 @@ fn bear(
         let Some(tree) = surfaces[bearing.body].tree() else { continue };
         let place = (tree.corners(bearing.triangle), tree.triangle(bearing.triangle));
         // The spring pushes from the tool into the tissue.
-        body.press(of, spring, -normal, bearing, place);
+        let rough = (friction > 0.0).then(|| press.rub().roughness(friction, bearing.number));
+        body.press(of, (spring, rough), -normal, bearing, place);
     }
 }
 
@@ -485,7 +502,7 @@ fn pull(index: u32, tool: &Tool, hand: &Hand, surfaces: &[ContactSurface], bodie
                 stiffness_n_m: tool.stiffness_n_m * each * share,
                 max_force_n: tool.max_force_n * each * share,
             });
-            behind.push(Behind { tool: index, limb: 0, depth_m: 0.0 });
+            behind.push(Behind { tool: index, limb: 0, depth_m: 0.0, rubs: None });
         });
     }
 }
@@ -494,7 +511,7 @@ impl BodyContacts {
     fn press(
         &mut self,
         (tool, limb): (u32, u8),
-        (stiffness, max_force): (f64, f64),
+        ((stiffness, max_force), rough): ((f64, f64), Option<Roughness>),
         normal: Vector3<f64>,
         bearing: &Bearing,
         (corners, triangle): ([u32; 3], [Vector3<f64>; 3]),
@@ -504,13 +521,25 @@ impl BodyContacts {
         material_points(corners, bearing.barycentric, |vertex, share| {
             let at = if share == 1.0 { bearing.point } else { triangle[corner_of(&vertex, corners)] };
             let share = share * bearing.share;
+            let offset_m = bearing.depth + normal.dot(&at);
+            let kind = match rough {
+                None => SpringKind::OneSided { normal, offset_m },
+                Some(rough) => SpringKind::Rough {
+                    normal,
+                    offset_m,
+                    anchor_m: at + rough.stretch_m,
+                    friction: rough.friction,
+                    tangential_n_m: stiffness * share,
+                    grip_n: rough.grip_n * share,
+                },
+            };
             springs.push(PointSpring {
                 point: vertex,
-                kind: SpringKind::OneSided { normal, offset_m: bearing.depth + normal.dot(&at) },
+                kind,
                 stiffness_n_m: stiffness * share,
                 max_force_n: max_force * share,
             });
-            behind.push(Behind { tool, limb, depth_m: bearing.depth });
+            behind.push(Behind { tool, limb, depth_m: bearing.depth, rubs: rough.map(|rough| rough.point) });
         });
     }
 }

@@ -9,6 +9,7 @@
 use nalgebra::{Isometry3, Vector3};
 use scindo_collision::{Capsule, CapsuleMotion};
 
+use crate::contact::rub::Rub;
 use crate::contact::surface::ContactSurface;
 use crate::inputs::ToolShape;
 use crate::tool::geometry::{capsule, core_length};
@@ -135,6 +136,8 @@ pub struct Bearing {
     pub depth: f64,
     /// Share of the tool's stiffness; all shares sum to at most 1.
     pub share: f64,
+    /// Number of the point in the stencil.
+    pub number: u8,
 }
 
 /// The pressing of one tool, smoothed over the steps.
@@ -143,6 +146,9 @@ pub struct Press {
     direction: Option<Direction>,
     shares: [f64; MAX_POINTS],
     bearings: Vec<Bearing>,
+    /// Position of the nearest place along the core, 0..=1.
+    parameter: f64,
+    rub: Rub,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -171,6 +177,29 @@ impl Press {
     pub fn release(&mut self) {
         self.direction = None;
         self.bearings.clear();
+        self.slip();
+    }
+
+    /// Lets the tissue slip off a tool that is elsewhere without having moved there.
+    pub fn slip(&mut self) {
+        self.rub = Rub::default();
+    }
+
+    /// Lets friction follow the hand to `device`, after [`update`](Self::update).
+    pub fn drag(&mut self, shape: ToolShape, device: &Isometry3<f64>) {
+        if let Some(Direction { normal, .. }) = &self.direction {
+            self.rub.follow(shape, device, self.parameter, normal);
+        }
+    }
+
+    /// Friction with the tissue.
+    pub fn rub(&self) -> &Rub {
+        &self.rub
+    }
+
+    /// The same, to hand over what a solve found.
+    pub(super) fn rub_mut(&mut self) -> &mut Rub {
+        &mut self.rub
     }
 
     /// Finds the bearing points at the present poses of proxy and device, in a step of `h` seconds.
@@ -187,6 +216,7 @@ impl Press {
         let fresh = self.direction.is_none();
         let direction = turned(self.direction, target, h);
         self.direction = Some(direction);
+        self.parameter = place.parameter;
         self.bearings.clear();
         let mut depths = [0.0; MAX_POINTS];
         let mut hits = [None; MAX_POINTS];
@@ -197,9 +227,9 @@ impl Press {
             hits[i] = hit;
         }
         self.follow_shares(&depths, if fresh { 1.0 } else { FOLLOW.weight(h) });
-        for (hit, share) in hits.iter().zip(self.shares) {
+        for (number, (hit, share)) in (0u8..).zip(hits.iter().zip(self.shares)) {
             if let (Some(bearing), true) = (hit, share > LEAST_SHARE) {
-                self.bearings.push(Bearing { share, ..*bearing });
+                self.bearings.push(Bearing { share, number, ..*bearing });
             }
         }
     }
@@ -289,5 +319,6 @@ fn cast(
         point: impact.point,
         depth: normal.dot(&(impact.point - lowest)),
         share: 0.0,
+        number: 0,
     })
 }

@@ -45,6 +45,7 @@ impl Table {
             shape,
             stiffness_n_m: 400.0,
             max_force_n: 3.0,
+            friction: 0.0,
             path: Vec::new(),
             repeat_s: None,
         };

@@ -39,6 +39,7 @@ impl Bench {
             shape,
             stiffness_n_m: 500.0,
             max_force_n: 5.0,
+            friction: 0.0,
             path: Vec::new(),
             repeat_s: None,
         };

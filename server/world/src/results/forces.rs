@@ -41,7 +41,7 @@ pub(super) fn each_contact<E>(
 ) -> Result<(), E> {
     let name = |body: usize| &*simulation.bodies()[body].id;
     for tool in simulation.tools().iter().filter(|tool| tool.force_n != Vector3::zeros()) {
-        let (force_n, normal_n) = (tool.force_n, tool.force_n.norm());
+        let (force_n, normal_n) = (tool.force_n, (tool.force_n - tool.friction_n).norm());
         take(&Row { kind: "tool", on: &tool.id, by: "", contacts: 0, deepest_m: 0.0, force_n, normal_n })?;
     }
     for body in 0..simulation.bodies().len() {

@@ -391,6 +391,7 @@ impl Check<'_> {
             shape: tool.shape.geometry(),
             stiffness_n_m: tool.stiffness_n_m,
             max_force_n: tool.max_force_n,
+            friction: tool.friction,
             path,
             repeat_s: tool.repeat_s,
         }

@@ -399,6 +399,8 @@ pub struct ToolSpec {
     pub stiffness_n_m: f64,
     /// Largest force [N].
     pub max_force_n: f64,
+    /// Coefficient of dry friction between it and the tissue on which it presses.
+    pub friction: f64,
     /// Script, by rising time; empty: moved by a client.
     pub path: Vec<PathPoint>,
     /// The script starts again after this time [s].

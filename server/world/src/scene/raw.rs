@@ -577,6 +577,10 @@ pub struct RawTool {
     #[serde(default = "tool_force")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e4, "x-next" = "desktop devices give 3 to 20 N"))]
     pub max_force_n: f64,
+    /// Coefficient of dry friction between it and the tissue on which it presses; 0: it slides freely.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 10.0, "x-next" = "0.05 is wet tissue, 0.5 a dry fingertip on skin"))]
+    pub friction: f64,
     /// Poses over time, interpolated linearly. Without a path, a client moves the tool.
     #[serde(default)]
     pub path: Vec<RawPathPoint>,

@@ -119,7 +119,7 @@ fn fill_tool(out: &mut ToolSnapshot, tool: &Tool, hand: Option<&Hand>) {
     out.velocity_m_s = tool.velocity_m_s;
     out.mode = tool.mode;
     out.closed = hand.map_or(tool.closed, |hand| hand.closed(tool));
-    out.force_n = tool.force_n;
+    (out.force_n, out.friction_n, out.friction) = (tool.force_n, tool.friction_n, tool.friction);
     out.limbs.clear();
     out.limbs.extend(hand.into_iter().flat_map(|hand| hand.limbs_of(tool)));
     out.stiffness_n_m = tool.stiffness_n_m;

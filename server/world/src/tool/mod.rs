@@ -51,8 +51,12 @@ pub struct Tool {
     pub stiffness_n_m: f64,
     /// Largest force of that spring [N].
     pub max_force_n: f64,
+    /// Coefficient of dry friction μ between it and the tissue on which it presses.
+    pub friction: f64,
     /// Force of the tissue on the tool from the last solve [N].
     pub force_n: Vector3<f64>,
+    /// The part of it that is friction under a tool that presses [N].
+    pub friction_n: Vector3<f64>,
     /// Sequence number of the newest sample used; set by the client.
     pub seq: u64,
     /// The client's clock at that sample [ns].
@@ -83,7 +87,9 @@ impl Tool {
             closing: 0.0,
             stiffness_n_m,
             max_force_n,
+            friction: 0.0,
             force_n: Vector3::zeros(),
+            friction_n: Vector3::zeros(),
             seq: 0,
             client_time_ns: 0,
             edge: BladeEdge::default(),
@@ -166,6 +172,7 @@ impl Tools {
     pub fn new(specs: &[ToolSpec], by_force: bool) -> Self {
         let declared = (0..).zip(specs).map(|(number, spec)| {
             let mut tool = Tool::new(number, &spec.id, spec.shape, (spec.stiffness_n_m, spec.max_force_n));
+            tool.friction = spec.friction;
             tool.script = Script::new(&spec.path, spec.repeat_s);
             tool.declared = true;
             tool
@@ -321,7 +328,7 @@ impl Tools {
             tool.owner = Arc::clone(&self.nobody);
             tool.mode = ToolMode::Hover;
             (tool.closed, tool.closing) = (0.0, 0.0);
-            tool.force_n = Vector3::zeros();
+            (tool.force_n, tool.friction_n) = (Vector3::zeros(), Vector3::zeros());
             tool.round = 0;
         }
         self.time_s = None;

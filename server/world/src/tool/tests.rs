@@ -20,6 +20,7 @@ fn scripted() -> ToolSpec {
         shape: BLADE,
         stiffness_n_m: 800.0,
         max_force_n: 8.0,
+        friction: 0.0,
         path: vec![key(0.0, ToolMode::Cut), key(1.0, ToolMode::Cut)],
         repeat_s: Some(1.0),
     }

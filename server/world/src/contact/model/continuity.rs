@@ -65,6 +65,7 @@ pub fn limit_step(old: &LocalContact, new: &mut LocalContact, limit_n: f64) {
         relaxed_stiffness_n_m: 0.0,
         relaxation_s: 0.0,
         tangential_stiffness_n_m: 0.0,
+        friction: 0.0,
         damping_ns_m: 0.0,
         surface_velocity_m_s: Vector3::zeros(),
         patch_radius_m: 0.0,

@@ -220,8 +220,11 @@ struct Frame<'a> {
 struct Anchor {
     pose: Isometry3<f64>,
     velocity: Vector3<f64>,
-    /// Contact force on the tool [N]; zero if it did not touch.
+    /// Contact force on the tool without friction [N]; zero if it did not touch.
     force: Vector3<f64>,
+    /// Friction on it [N], and its coefficient.
+    rubbed: Vector3<f64>,
+    friction: f64,
     /// Stiffness of the hand alone, and of hand and tissue in series [N/m].
     hand: f64,
     series: f64,
@@ -247,7 +250,9 @@ impl Anchor {
         Self {
             pose: self.pose * limb.part.pose,
             velocity: self.velocity,
-            force: limb.force_n,
+            force: limb.force_n - limb.friction_n,
+            rubbed: limb.friction_n,
+            friction: self.friction,
             hand: self.hand * share,
             series: self.series * share,
             max_force: self.max_force * share,
@@ -291,6 +296,8 @@ impl ToolModel {
                 pose: query.pose,
                 velocity: Vector3::zeros(),
                 force: Vector3::zeros(),
+                rubbed: Vector3::zeros(),
+                friction: 0.0,
                 hand: 0.0,
                 series: 0.0,
                 max_force: 0.0,
@@ -302,7 +309,9 @@ impl ToolModel {
         Anchor {
             pose: seen.pose,
             velocity: seen.velocity_m_s,
-            force: if same { seen.force_n } else { Vector3::zeros() },
+            force: if same { seen.force_n - seen.friction_n } else { Vector3::zeros() },
+            rubbed: if same { seen.friction_n } else { Vector3::zeros() },
+            friction: seen.friction,
             hand: seen.stiffness_n_m,
             series: if known { seen.contact_stiffness_n_m } else { 0.5 * seen.stiffness_n_m },
             max_force: seen.max_force_n,
@@ -355,6 +364,7 @@ impl ToolModel {
             relaxed_stiffness_n_m: 0.0,
             relaxation_s: 0.0,
             tangential_stiffness_n_m: 0.0,
+            friction: 0.0,
             damping_ns_m: damping(anchor.series),
             surface_velocity_m_s: Vector3::zeros(),
             patch_radius_m: 0.0,
@@ -381,6 +391,7 @@ impl ToolModel {
             relaxed_stiffness_n_m: 0.0,
             relaxation_s: 0.0,
             tangential_stiffness_n_m: anchor.series,
+            friction: 0.0,
             damping_ns_m: damping(anchor.series),
             surface_velocity_m_s: Vector3::zeros(),
             patch_radius_m: 0.0,
@@ -464,6 +475,8 @@ fn plane_of(
     } else {
         answer.in_step * depth
     };
+    let along = force.min(anchor.max_force);
+    let (across, tangential) = rub(anchor, &normal, (answer.in_step, along), before - device + shift);
     let point = place.point + shift;
     let tip = query.pose.translation.vector - point;
     let aside = (tip - normal * normal.dot(&tip)).norm();
@@ -471,18 +484,41 @@ fn plane_of(
         point_m: point,
         normal,
         gap_m: -depth,
-        force_n: normal * force.min(anchor.max_force),
+        force_n: normal * along + across,
         stiffness_n_m: answer.in_step,
         instant_stiffness_n_m: answer.at_once,
         relaxed_stiffness_n_m: answer.relaxed,
         relaxation_s: answer.relaxation_s,
-        tangential_stiffness_n_m: 0.0,
+        tangential_stiffness_n_m: tangential,
+        friction: anchor.friction,
         damping_ns_m: damping(answer.in_step),
         surface_velocity_m_s: by_itself,
         // Clients measure from the tip, which may be far from the contact of a shaft.
         patch_radius_m: aside + (2.0 * at_device.radius).max(LEAST_PATCH_M),
         feature_id: 0,
     }
+}
+
+/// Compliance of tissue across a contact in multiples of that along it: (2 − ν) / (2 (1 − ν)) of a circle with ν = ½
+/// (Mindlin 1949, *Compliance of elastic bodies in contact*).
+const ACROSS: f64 = 1.5;
+
+/// Friction [N] at the newest pose, and its stiffness [N/m], under a tool that went `back` [m] since the last step.
+/// `along` are the stiffness within a step and the force along the normal.
+fn rub(
+    anchor: &Anchor,
+    normal: &Vector3<f64>,
+    (in_step, along): (f64, f64),
+    back: Vector3<f64>,
+) -> (Vector3<f64>, f64) {
+    if anchor.friction <= 0.0 || anchor.hand <= 0.0 || in_step <= 0.0 {
+        return (Vector3::zeros(), 0.0);
+    }
+    let tissue = (1.0 / in_step - 1.0 / anchor.hand).max(0.0);
+    let stiffness = 1.0 / (1.0 / anchor.hand + ACROSS * tissue);
+    let force = anchor.rubbed + stiffness * back;
+    let across = (force - normal * normal.dot(&force)).cap_magnitude(anchor.friction * along.max(0.0));
+    (across, stiffness)
 }
 
 /// Velocity of the touched surface point [m/s]; zero if it is not known.

@@ -9,7 +9,8 @@ pub const MAX_CONTACTS: usize = 8;
 pub const BLEND_FEATURE: u64 = u64::MAX;
 
 /// One contact plane. The force on the tool with its tip at p is
-/// n · max(0, force·n − stiffness (p − tip used)·n).
+/// n · max(0, force·n − stiffness (p − tip used)·n), and with friction μ across n the force
+/// (I − n nᵀ) (force − tangential stiffness (p − tip used)), at most μ times that along n.
 ///
 /// Before contact `force_n`·n is negative, −stiffness · gap. The client's force therefore starts from zero in
 /// the very tick in which the tip crosses the plane.
@@ -33,6 +34,9 @@ pub struct ContactPlane {
     pub relaxation_s: f64,
     /// Restoring force per metre across the normal [N/m].
     pub tangential_stiffness_n_m: f64,
+    /// Coefficient of dry friction: the force across the normal is at most this times that along it. 0: a free slide,
+    /// or tissue that is held.
+    pub friction: f64,
     /// Force against relative velocity along the normal [N·s/m].
     pub damping_ns_m: f64,
     /// Velocity of the surface without the push of the tool [m/s].
@@ -111,6 +115,11 @@ impl ContactPlane {
     /// Force on the tool [N] after its tip moved by `moved` [m] from the pose used.
     pub fn force_at(&self, moved: Vector3<f64>) -> Vector3<f64> {
         let n = &self.normal;
-        n * (self.force_n.dot(n) - self.stiffness_n_m * moved.dot(n)).max(0.0)
+        let load = (self.force_n.dot(n) - self.stiffness_n_m * moved.dot(n)).max(0.0);
+        if self.friction <= 0.0 {
+            return n * load;
+        }
+        let back = self.force_n - self.tangential_stiffness_n_m * moved;
+        n * load + (back - n * n.dot(&back)).cap_magnitude(self.friction * load)
     }
 }
