@@ -28,6 +28,8 @@ pub mod stress;
 
 pub mod haptics;
 
+pub mod reliability;
+
 pub mod effects;
 
 /// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
@@ -43,6 +45,7 @@ pub fn main() -> ExitCode {
         Some(Command::Accuracy(args)) => args.json,
         Some(Command::Stress(args)) => args.json,
         Some(Command::Haptics(args)) => args.json,
+        Some(Command::Reliability(args)) => args.json,
         Some(Command::Effects(args)) => args.json,
         Some(Command::Manual(_)) => false,
     };
@@ -55,6 +58,7 @@ pub fn main() -> ExitCode {
         Some(Command::Accuracy(args)) => accuracy::accuracy(&args),
         Some(Command::Stress(args)) => stress::stress(&args),
         Some(Command::Haptics(args)) => haptics::haptics(&args),
+        Some(Command::Reliability(args)) => reliability::reliability(&args),
         Some(Command::Effects(args)) => effects::effects(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };

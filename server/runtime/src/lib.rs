@@ -46,4 +46,8 @@ pub mod watchdog;
 
 pub mod server;
 
+pub mod chance;
+
 pub mod haptics;
+
+pub mod reliability;

@@ -44,16 +44,46 @@ impl Receivers {
         };
         let subscribers = vec![
             tokens,
-            subscribe(keys.every_tool_pose(), on_pose)?,
-            subscribe(keys.every_tool_cut(), on_cut)?,
-            subscribe(keys.every_tool_capability(), on_capability)?,
+            subscribe(keys.every_tool_pose(), pose)?,
+            subscribe(keys.every_tool_cut(), cut)?,
+            subscribe(keys.every_tool_capability(), capability)?,
         ];
         let token = session.liveliness().declare_token(keys.key(server)).wait().map_err(failed)?;
         Ok(Self { _subscribers: subscribers, _token: token })
     }
 }
 
-type OnSample = fn(&KeySpace, &Exchange, &Sample);
+/// A message from the network, before it is copied or decoded.
+pub trait Arrival {
+    /// Key to which it was published.
+    fn key(&self) -> &str;
+    /// What the sender says its content is.
+    fn encoding(&self) -> String;
+    /// Length of the content [bytes].
+    fn length(&self) -> usize;
+    /// A copy of the content.
+    fn content(&self) -> Bytes;
+}
+
+impl Arrival for Sample {
+    fn key(&self) -> &str {
+        self.key_expr().as_str()
+    }
+
+    fn encoding(&self) -> String {
+        Sample::encoding(self).to_string()
+    }
+
+    fn length(&self) -> usize {
+        self.payload().len()
+    }
+
+    fn content(&self) -> Bytes {
+        Bytes::from(self.payload().to_bytes().into_owned())
+    }
+}
+
+type OnSample = fn(&KeySpace, &Exchange, &Sample, Instant);
 
 fn with(
     keys: &KeySpace,
@@ -61,26 +91,31 @@ fn with(
     on_sample: OnSample,
 ) -> impl Fn(Sample) + Send + Sync + 'static {
     let (keys, exchange) = (keys.clone(), exchange.clone());
-    move |sample| on_sample(&keys, &exchange, &sample)
+    move |sample| on_sample(&keys, &exchange, &sample, Instant::now())
 }
 
-fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
-    let Ok(Topic::Live(client, _)) = keys.parse(sample.key_expr().as_str()) else { return };
-    let now = Instant::now();
-    let changes = match sample.kind() {
-        SampleKind::Put => exchange.inbox().client_came(client.as_str(), now),
-        SampleKind::Delete => exchange.inbox().client_went(client.as_str(), now),
+fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample, now: Instant) {
+    token(keys, exchange, sample.key_expr().as_str(), sample.kind() == SampleKind::Put, now);
+}
+
+/// A liveliness token came to be or ceased to be at `now`.
+pub fn token(keys: &KeySpace, exchange: &Exchange, key: &str, is_there: bool, now: Instant) {
+    let Ok(Topic::Live(client, _)) = keys.parse(key) else { return };
+    let changes = if is_there {
+        exchange.inbox().client_came(client.as_str(), now)
+    } else {
+        exchange.inbox().client_went(client.as_str(), now)
     };
     changes.into_iter().for_each(|change| announce(exchange, change));
 }
 
-fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
-    let Ok(Topic::ToolPose(client, tool)) = keys.parse(sample.key_expr().as_str()) else {
+/// A pose arrived at `now`.
+pub fn pose<A: Arrival>(keys: &KeySpace, exchange: &Exchange, sample: &A, now: Instant) {
+    let Ok(Topic::ToolPose(client, tool)) = keys.parse(sample.key()) else {
         return refuse(exchange, "bad-key", "a pose arrived under a key that names no tool");
     };
-    match decode::<ToolSample>(sample) {
+    match decode::<ToolSample, A>(sample) {
         Ok(pose) => {
-            let now = Instant::now();
             let sender = Sender { client: client.as_str(), tool: tool.as_str() };
             let outcome = exchange.inbox().pose(sender, &pose, now);
             match outcome {
@@ -93,27 +128,31 @@ fn on_pose(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     }
 }
 
-fn on_cut(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
-    let Ok(Topic::ToolCut(client, tool)) = keys.parse(sample.key_expr().as_str()) else {
+/// A cut arrived.
+pub fn cut<A: Arrival>(keys: &KeySpace, exchange: &Exchange, sample: &A, _now: Instant) {
+    let Ok(Topic::ToolCut(client, tool)) = keys.parse(sample.key()) else {
         return refuse(exchange, "bad-key", "a cut arrived under a key that names no tool");
     };
-    match decode::<CutCommand>(sample) {
+    match decode::<CutCommand, A>(sample) {
         Ok(command) => {
             let sender = Sender { client: client.as_str(), tool: tool.as_str() };
             let outcome = exchange.inbox().cut(sender, &command);
-            if let Cut::Answer(answer) = outcome {
-                exchange.answer(answer);
+            match outcome {
+                Cut::Answer(answer) => exchange.answer(answer),
+                Cut::Stray(refusal) => seldom(exchange, refusal.code, &refusal.message),
+                Cut::Queued | Cut::Waiting => {}
             }
         }
         Err(error) => refuse(exchange, error.code(), &error.to_string()),
     }
 }
 
-fn on_capability(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
-    let Ok(Topic::ToolCapability(client, tool)) = keys.parse(sample.key_expr().as_str()) else {
+/// The capability of a device arrived.
+pub fn capability<A: Arrival>(keys: &KeySpace, exchange: &Exchange, sample: &A, _now: Instant) {
+    let Ok(Topic::ToolCapability(client, tool)) = keys.parse(sample.key()) else {
         return refuse(exchange, "bad-key", "a capability arrived under a key that names no tool");
     };
-    match decode::<DeviceCapability>(sample) {
+    match decode::<DeviceCapability, A>(sample) {
         Ok(capability) => {
             let sender = Sender { client: client.as_str(), tool: tool.as_str() };
             let outcome = exchange.inbox().capability(sender, capability);
@@ -125,15 +164,14 @@ fn on_capability(keys: &KeySpace, exchange: &Exchange, sample: &Sample) {
     }
 }
 
-/// Decodes the message of a sample. An oversized one is refused before it is copied.
-pub fn decode<M: WireMessage>(sample: &Sample) -> Result<M, DecodeError> {
-    let found = sample.payload().len();
+/// Decodes a message. An oversized one is refused before it is copied.
+pub fn decode<M: WireMessage, A: Arrival>(sample: &A) -> Result<M, DecodeError> {
+    let found = sample.length();
     if found > M::MAX_BYTES {
         let field = "payload bytes";
         return Err(DecodeError::TooLarge { message: M::NAME, field, found, allowed: M::MAX_BYTES });
     }
-    let payload = Bytes::from(sample.payload().to_bytes().into_owned());
-    decode_as(&sample.encoding().to_string(), payload)
+    decode_as(&sample.encoding(), sample.content())
 }
 
 fn announce(exchange: &Exchange, change: Change) {

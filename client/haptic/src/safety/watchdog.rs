@@ -7,7 +7,8 @@
 //!     │ gain is zero                                    ▼ or the server's token is gone
 //!     └──────────────────────────────────────────── Ramping (damping held, spring to zero)
 //! ```
-//! A device fault leads from any state to Waiting, with zero force at once.
+//! A device fault leads from any state to Waiting, with zero force at once. So does a silence that is too long for a
+//! ramp, which happens when the client itself has stood still.
 
 use super::flag;
 use crate::constants::{
@@ -128,24 +129,18 @@ impl Watchdog {
         if silent_ns > LOST_NS {
             flags |= flag::LOST;
         }
-        self.advance(model, force_n, fresh, device_faults != 0, now_ns);
+        let cut = device_faults != 0 || silent_ns > SILENT_ZERO_NS;
+        self.advance(model, force_n, fresh, cut, now_ns);
         let mut permit = self.permit(now_ns);
         permit.flags |= flags;
-        permit.cut = device_faults != 0;
+        permit.cut = cut;
         permit
     }
 
-    fn advance(
-        &mut self,
-        model: &ContactModel,
-        force_n: &Vector3<f64>,
-        fresh: bool,
-        fault: bool,
-        now_ns: u64,
-    ) {
+    fn advance(&mut self, model: &ContactModel, force_n: &Vector3<f64>, fresh: bool, cut: bool, now_ns: u64) {
         let gain = self.permit(now_ns).gain;
         self.engagement = match self.engagement {
-            _ if fault => Engagement::Waiting { free_since_ns: None },
+            _ if cut => Engagement::Waiting { free_since_ns: None },
             Engagement::Waiting { .. } if !fresh || force_n.norm() > FREE_FORCE_N => {
                 Engagement::Waiting { free_since_ns: None }
             }
@@ -225,6 +220,18 @@ mod tests {
         let model =
             ContactModel { seq: 1, received_ns: last_ms * MS, validity_ns: 50 * MS, ..ContactModel::NONE };
         watchdog.judge(&model, &Vector3::new(0.0, 0.0, 1.0), true, 0, now_ms * MS)
+    }
+
+    #[test]
+    fn a_client_that_stood_still_wakes_up_without_force() {
+        let mut watchdog = Watchdog::default();
+        run(&mut watchdog, 0, 1000, 0.0);
+        assert_eq!(run(&mut watchdog, 1001, 1500, 1.0).gain, 1.0);
+        let woken = silence(&mut watchdog, 1500, 1900);
+        assert!(woken.cut && woken.gain == 0.0, "{woken:?}");
+        // A contact that comes now finds it in the tissue.
+        let pressed = run(&mut watchdog, 1901, 2500, 1.0);
+        assert!(!pressed.cut && pressed.gain == 0.0, "{pressed:?}");
     }
 
     #[test]

@@ -42,6 +42,8 @@ pub enum Command {
     Stress(StressArgs),
     /// Measure what a hand feels over a link, against the same tissue solved at 1 kHz, and write a page.
     Haptics(HapticsArgs),
+    /// Try to break the promises of server and haptic client in a simulated network, and print the promises.
+    Reliability(ReliabilityArgs),
     /// Measure what each effect of a scene costs by stepping the scene with it and without it.
     Effects(EffectsArgs),
     /// Completions and man pages.
@@ -273,6 +275,37 @@ pub struct HapticsArgs {
     /// Report as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// `scindo reliability`.
+#[derive(Debug, Args)]
+pub struct ReliabilityArgs {
+    /// Number of seeds; each is four simulated seconds of two hands, a liar and a server. By default 1000, or as many
+    /// as fit into --minutes.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    pub seeds: Option<u64>,
+    /// Time after which no seed begins any more [minutes].
+    #[arg(long, value_name = "T", value_parser = minutes)]
+    pub minutes: Option<f64>,
+    /// First seed. A seed repeats itself on every machine of one kind, on any number of threads.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub first: u64,
+    /// Also take out one safeguard after the other, and show that the rules notice it.
+    #[arg(long)]
+    pub mutants: bool,
+    /// Number of seeds that run in parallel.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub threads: u16,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(minutes) if minutes > 0.0 && minutes <= 1e5 => Ok(minutes),
+        _ => Err("expected minutes above 0 and at most 100000, such as 0.5".to_owned()),
+    }
 }
 
 /// `scindo effects`.

@@ -2,6 +2,8 @@
 
 use std::collections::VecDeque;
 
+use crate::chance::Chance;
+
 /// What else a bad network does to messages.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Faults {
@@ -19,14 +21,20 @@ pub struct Line<T> {
     delay_ns: u64,
     loss: f64,
     faults: Faults,
-    chance: u64,
+    chance: Chance,
     under_way: VecDeque<(u64, T)>,
 }
 
 impl<T: Clone> Line<T> {
     /// A line with a delay [ns] that loses the share `loss` of its messages.
     pub fn new(delay_ns: u64, loss: f64, seed: u64) -> Self {
-        Self { delay_ns, loss, faults: Faults::default(), chance: seed, under_way: VecDeque::new() }
+        Self {
+            delay_ns,
+            loss,
+            faults: Faults::default(),
+            chance: Chance::new(seed),
+            under_way: VecDeque::new(),
+        }
     }
 
     /// The same line with faults.
@@ -38,14 +46,14 @@ impl<T: Clone> Line<T> {
     pub fn send(&mut self, message: T, now_ns: u64) {
         let Faults { gaps_ns, late, twice } = self.faults;
         let silent = gaps_ns.is_some_and(|(period, length)| now_ns % period >= period - length);
-        if self.uniform() < self.loss || silent {
+        if self.chance.uniform() < self.loss || silent {
             return;
         }
         let due = now_ns + self.delay_ns;
-        if twice > 0.0 && self.uniform() < twice {
+        if twice > 0.0 && self.chance.uniform() < twice {
             self.queue(due + self.delay_ns, message.clone());
         }
-        let stays_out = late.0 > 0.0 && self.uniform() < late.0;
+        let stays_out = late.0 > 0.0 && self.chance.uniform() < late.0;
         self.queue(due + if stays_out { late.1 } else { 0 }, message);
     }
 
@@ -61,15 +69,6 @@ impl<T: Clone> Line<T> {
             return None;
         }
         self.under_way.pop_front().map(|(_, message)| message)
-    }
-
-    /// SplitMix64, uniform in [0, 1).
-    fn uniform(&mut self) -> f64 {
-        self.chance = self.chance.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.chance;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 

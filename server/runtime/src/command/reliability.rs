@@ -1,0 +1,57 @@
+//! `scindo reliability` runs the simulator of the network and prints what scindo promises and what was tried.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::accuracy::{bar, listen};
+use super::cli::ReliabilityArgs;
+use super::say::say;
+use crate::error::RuntimeError;
+use crate::reliability::campaign::{self, Extent, Totals};
+use crate::reliability::episode::EpisodeError;
+use crate::reliability::guarantees::{GUARANTEES, Noticed, text};
+use crate::reliability::table::Mutant;
+
+/// Seeds with which each safeguard is taken out.
+const MUTANT_SEEDS: u64 = 100;
+
+/// Runs the campaign. Ctrl-C ends it after the seeds that are under way.
+pub fn reliability(args: &ReliabilityArgs) -> Result<ExitCode, RuntimeError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    listen(&stop)?;
+    let failed = |error: EpisodeError| RuntimeError::System {
+        what: "setting up an episode".to_owned(),
+        reason: error.to_string(),
+    };
+    let time = args.minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes));
+    let seeds = args.seeds.or(if time.is_some() { None } else { Some(1000) });
+    let extent = Extent { first: args.first, seeds, time, threads: usize::from(args.threads) };
+    let bar = bar(args.json);
+    bar.set_length(seeds.unwrap_or(0));
+    let totals = campaign::run(&extent, None, &stop, &|done| bar.set_position(done)).map_err(failed)?;
+    let mut mutants = Vec::new();
+    if args.mutants {
+        let some = Extent { first: 1, seeds: Some(MUTANT_SEEDS), time: None, ..extent };
+        for mutant in Mutant::ALL {
+            bar.set_message(format!("{mutant:?}"));
+            let Totals { seeds, violations, .. } =
+                campaign::run(&some, Some(mutant), &stop, &|_| ()).map_err(failed)?;
+            mutants.push(Noticed { mutant, seeds, violations });
+        }
+    }
+    bar.finish_and_clear();
+    let interrupted = stop.load(Ordering::Relaxed);
+    if args.json {
+        let report = serde_json::json!({
+            "interrupted": interrupted, "totals": totals, "mutants": mutants, "guarantees": GUARANTEES,
+        });
+        say!("{report}");
+    } else {
+        say!("{}", text(&totals, &mutants).trim_end());
+    }
+    let unnoticed = mutants.iter().any(|noticed| noticed.violations == 0);
+    let ok = totals.violations == 0 && !unnoticed && !interrupted;
+    Ok(if ok { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}

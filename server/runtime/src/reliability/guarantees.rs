@@ -1,0 +1,156 @@
+//! What scindo promises to a laboratory, and what holds each promise.
+
+use serde::Serialize;
+
+use super::campaign::Totals;
+use super::table::Mutant;
+
+/// A promise.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Guarantee {
+    /// Its number.
+    pub number: &'static str,
+    /// What is promised.
+    pub promise: &'static str,
+    /// What tries to break it.
+    pub tried_by: &'static str,
+    /// Whether the simulator of the network tries it.
+    pub simulated: bool,
+}
+
+/// All promises.
+pub const GUARANTEES: [Guarantee; 13] = [
+    Guarantee {
+        number: "G1",
+        promise: "No input from the network crashes, blocks or corrupts the server",
+        tried_by: "simulator (spoiled messages, lies); `proto/tests/codec.rs`; `tests/run hostile`",
+        simulated: true,
+    },
+    Guarantee {
+        number: "G2",
+        promise: "A cut is made exactly once, or refused with a reason, whatever the network does",
+        tried_by: "simulator (all faults); `server/runtime/tests/wire.rs`",
+        simulated: true,
+    },
+    Guarantee {
+        number: "G3",
+        promise: "A tool has one owner at a time and stands where that owner has put it; it is free when the owner is gone",
+        tried_by: "simulator (partitions, restarts, lies); `server/runtime/src/inbox/tests.rs`",
+        simulated: true,
+    },
+    Guarantee {
+        number: "G4",
+        promise: "The force on a hand is finite, within its limits of size and slew, and zero 200 ms after silence",
+        tried_by: "simulator (spoiled contacts, freezes, jumps of clocks); `client/haptic/src/tick/tests.rs`",
+        simulated: true,
+    },
+    Guarantee {
+        number: "G5",
+        promise: "A hand gets at most 2 mJ more than it has stored",
+        tried_by: "`scindo haptics`; `scindo stress --case haptic-wall --case packet-loss`",
+        simulated: false,
+    },
+    Guarantee {
+        number: "G6",
+        promise: "The same input gives the same bits on any number of threads",
+        tried_by: "`server/world/tests/side_by_side.rs`, and a test per effect",
+        simulated: false,
+    },
+    Guarantee {
+        number: "G7",
+        promise: "A step that diverges is rolled back, and nothing that is not finite leaves the server",
+        tried_by: "`scindo stress`; `tests/tests/random_scenes.rs`",
+        simulated: false,
+    },
+    Guarantee {
+        number: "G8",
+        promise: "Memory and time stay bounded under abuse",
+        tried_by: "`tests/run hostile`",
+        simulated: false,
+    },
+    Guarantee {
+        number: "G9",
+        promise: "When faults stop, everybody can work again within two seconds",
+        tried_by: "simulator (second part of every episode); `tests/run haptic` (killed clients and servers)",
+        simulated: true,
+    },
+    Guarantee {
+        number: "G10",
+        promise: "A session lasts",
+        tried_by: "no soak of hours has been run yet",
+        simulated: false,
+    },
+    Guarantee {
+        number: "G11",
+        promise: "Another version of the wire is refused politely",
+        tried_by: "`proto/tests/codec.rs`; keys carry the version",
+        simulated: false,
+    },
+    Guarantee {
+        number: "G12",
+        promise: "Access control does what its table says",
+        tried_by: "`server/runtime/src/wire/orders.rs`; `server/runtime/tests`",
+        simulated: false,
+    },
+    Guarantee {
+        number: "G13",
+        promise: "No dependency has a known vulnerability without a written reason",
+        tried_by: "`tests/run deny`",
+        simulated: false,
+    },
+];
+
+/// A safeguard that was taken out, and the seeds that noticed it.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Noticed {
+    /// What was taken out.
+    pub mutant: Mutant,
+    /// Seeds that were run.
+    pub seeds: u64,
+    /// Seeds that broke a rule.
+    pub violations: u64,
+}
+
+/// The table for people, with the figures of a campaign.
+pub fn text(totals: &Totals, mutants: &[Noticed]) -> String {
+    let mut out = String::new();
+    let hits = &totals.hits;
+    let mut line = |text: String| {
+        out.push_str(&text);
+        out.push('\n');
+    };
+    line(format!(
+        "{} seeds: {} messages, {} ticks of hands ({} of them felt something), {} cuts made, {} messages refused",
+        totals.seeds, totals.messages, totals.ticks, totals.touched, totals.cuts, totals.refused
+    ));
+    line(format!(
+        "faults: {} lost, {} repeated, {} overtaken, {} spoiled, {} cut off, {} freezes, {} jumps of clocks, \
+         {} restarts, {} lies",
+        hits.lost,
+        hits.repeated,
+        hits.overtaken,
+        hits.spoiled,
+        hits.partitioned,
+        hits.freezes,
+        hits.jumps,
+        hits.restarts,
+        hits.lies
+    ));
+    line(format!("broken rules: {}", totals.violations));
+    for (seed, violation) in &totals.broken {
+        line(format!("  seed {seed} (scindo reliability --first {seed} --seeds 1): {violation}"));
+    }
+    for noticed in mutants {
+        let Noticed { mutant, seeds, violations } = noticed;
+        line(format!("without a safeguard ({mutant:?}): noticed by {violations} of {seeds} seeds"));
+    }
+    for Guarantee { number, promise, tried_by, simulated } in GUARANTEES {
+        let found = match (simulated, totals.violations) {
+            (true, 0) => "held",
+            (true, _) => "see above",
+            (false, _) => "not run here",
+        };
+        line(format!("{number:<4} {promise}. {found}. Tried by {tried_by}"));
+    }
+    out
+}

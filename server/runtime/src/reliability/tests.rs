@@ -1,0 +1,54 @@
+//! Some seconds of the campaign, and that each safeguard is missed.
+
+use std::sync::atomic::AtomicBool;
+
+use super::campaign::{Extent, run};
+use super::episode;
+use super::table::Mutant;
+
+const SOME: Extent = Extent { first: 1, seeds: Some(60), time: None, threads: 2 };
+
+#[test]
+fn no_rule_is_broken_and_every_fault_is_tried() {
+    let totals = run(&SOME, None, &AtomicBool::new(false), &|_| ()).unwrap();
+    assert_eq!(totals.broken, []);
+    assert_eq!(totals.seeds, 60);
+    let hits = totals.hits;
+    for (class, count) in [
+        ("lost", hits.lost),
+        ("repeated", hits.repeated),
+        ("overtaken", hits.overtaken),
+        ("spoiled", hits.spoiled),
+        ("partitioned", hits.partitioned),
+        ("freezes", hits.freezes),
+        ("jumps", hits.jumps),
+        ("restarts", hits.restarts),
+        ("lies", hits.lies),
+    ] {
+        assert!(count > 10, "{class}: {count}");
+    }
+    assert!(totals.cuts > 300 && totals.touched > 10_000 && totals.refused > 1000, "{totals:?}");
+}
+
+#[test]
+fn a_seed_repeats_itself_on_any_number_of_threads() {
+    let once = episode::run(77, None).unwrap();
+    assert_eq!(
+        serde_json::to_string(&once).unwrap(),
+        serde_json::to_string(&episode::run(77, None).unwrap()).unwrap()
+    );
+    let few = Extent { seeds: Some(6), ..SOME };
+    let of = |threads| {
+        let totals = run(&Extent { threads, ..few }, None, &AtomicBool::new(false), &|_| ()).unwrap();
+        serde_json::to_string(&totals).unwrap()
+    };
+    assert_eq!(of(1), of(3));
+}
+
+#[test]
+fn every_safeguard_that_is_taken_out_is_missed() {
+    for mutant in Mutant::ALL {
+        let totals = run(&SOME, Some(mutant), &AtomicBool::new(false), &|_| ()).unwrap();
+        assert!(totals.violations > 0, "{mutant:?} goes unnoticed");
+    }
+}
