@@ -57,6 +57,9 @@ pub enum KeyError {
     },
 }
 
+/// Stands in the id of a page's mouse between the id of its viewer and the number of the page.
+pub const MOUSE: &str = "-mouse-";
+
 /// One validated part of a key: `[a-z0-9_-]+`, at most [`MAX_ID_BYTES`] long.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Chunk(String);
@@ -368,8 +371,19 @@ impl KeySpace {
         format!("{}server/*/live", self.prefix)
     }
 
-    /// Expression for all that client `client` publishes and declares.
-    pub fn everything_of(&self, client: &Chunk) -> String {
-        format!("{}client/{client}/**", self.prefix)
+    /// Expressions for the liveliness tokens of `client`, and of the mice of its pages.
+    pub fn tokens_of(&self, client: &Chunk) -> Vec<String> {
+        self.own_and_mice(client, "live/*")
+    }
+
+    /// Expressions for all that `client` publishes with tools, and the mice of its pages do.
+    pub fn tools_of(&self, client: &Chunk) -> Vec<String> {
+        self.own_and_mice(client, "tool/*/*")
+    }
+
+    /// Pages behind a viewer are clients of their own, named after it: see [`MOUSE`].
+    fn own_and_mice(&self, client: &Chunk, rest: &str) -> Vec<String> {
+        let Self { prefix } = self;
+        vec![format!("{prefix}client/{client}/{rest}"), format!("{prefix}client/{client}{MOUSE}$*/{rest}")]
     }
 }

@@ -22,7 +22,7 @@ mod check;
 pub mod codec;
 
 pub use codec::{DecodeError, WireMessage, decode, decode_as, encode, encoding};
-pub use key::{Chunk, KeyError, KeySpace, Role, Topic, Verb};
+pub use key::{Chunk, KeyError, KeySpace, MOUSE, Role, Topic, Verb};
 
 /// Version of the wire: the `@v1` chunk of every key and `SessionInfo::wire_version`.
 pub const WIRE_VERSION: u32 = 1;

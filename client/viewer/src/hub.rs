@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use prost::Message as _;
+use scindo_proto::MOUSE;
 use scindo_proto::limits::{MAX_BODIES, MAX_TOOLS};
 use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::{ToolSample, ViewerDown, ViewerLink, ViewerRpc, ViewerRpcReply, ViewerWatch};
@@ -232,7 +233,7 @@ impl Hub {
         shared.events.iter().for_each(|bytes| outbox.push(bytes.clone()));
         shared.browsers.insert(browser, newcomer);
         self.tell_watched(&shared);
-        let tool_id = format!("{}-mouse-{browser}", self.client_id);
+        let tool_id = format!("{}{MOUSE}{browser}", self.client_id);
         Some(Seat { hub: Arc::clone(self), browser, outbox, tool_id })
     }
 

@@ -26,6 +26,9 @@ struct Args {
     /// Session within the realm
     #[arg(long, default_value = "main")]
     session: String,
+    /// Id of this viewer on the network; the tools of its pages are named after it. By default a random one
+    #[arg(long)]
+    id: Option<String>,
     /// Zenoh configuration to start from (TLS, users, routers)
     #[arg(long, value_name = "FILE")]
     zenoh: Option<PathBuf>,
@@ -99,6 +102,9 @@ fn config(args: Args) -> ViewConfig {
     config.link.realm = args.realm;
     config.link.session = args.session;
     config.link.zenoh_file = args.zenoh;
+    if let Some(id) = args.id {
+        config.link.id = id;
+    }
     config.web.allow_origins = args.allow_origin;
     config.web.max_browsers = args.max_browsers;
     config.web.operators = args.operators;

@@ -32,6 +32,8 @@ pub mod reliability;
 
 pub mod effects;
 
+pub mod certs;
+
 /// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -46,6 +48,7 @@ pub fn main() -> ExitCode {
         Some(Command::Stress(args)) => args.json,
         Some(Command::Haptics(args)) => args.json,
         Some(Command::Reliability(args)) => args.json,
+        Some(Command::Certs(args)) => args.json,
         Some(Command::Effects(args)) => args.json,
         Some(Command::Manual(_)) => false,
     };
@@ -59,6 +62,7 @@ pub fn main() -> ExitCode {
         Some(Command::Stress(args)) => stress::stress(&args),
         Some(Command::Haptics(args)) => haptics::haptics(&args),
         Some(Command::Reliability(args)) => reliability::reliability(&args),
+        Some(Command::Certs(args)) => certs::certs(&args),
         Some(Command::Effects(args)) => effects::effects(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };

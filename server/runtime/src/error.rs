@@ -85,6 +85,9 @@ pub enum RuntimeError {
         /// The system's message.
         reason: String,
     },
+    /// A laboratory cannot be as asked.
+    #[error("{0}")]
+    Lab(String),
     /// A thread of the server panicked.
     #[error(
         "thread '{thread}' panicked. This is a defect of scindo; the message of the panic is printed above"
@@ -103,7 +106,9 @@ impl RuntimeError {
             Self::Stress(StressError::Io { .. }) => ExitCode::from(1),
             Self::Effects(EffectsError::Body(_)) => ExitCode::from(1),
             Self::Study(_) | Self::Stress(_) | Self::Effects(_) => ExitCode::from(2),
-            Self::Scene(_) | Self::Mesh(_) | Self::Option { .. } | Self::Key(_) => ExitCode::from(2),
+            Self::Scene(_) | Self::Mesh(_) | Self::Option { .. } | Self::Key(_) | Self::Lab(_) => {
+                ExitCode::from(2)
+            }
             _ => ExitCode::from(1),
         }
     }
@@ -119,6 +124,7 @@ impl RuntimeError {
             Self::Effects(_) => "effects",
             Self::Option { .. } => "option",
             Self::Key(_) => "key",
+            Self::Lab(_) => "lab",
             Self::Listen { .. } => "listen",
             Self::Zenoh { .. } => "zenoh",
             Self::Viewer { .. } => "viewer",

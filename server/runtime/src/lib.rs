@@ -30,6 +30,8 @@ pub mod wire;
 
 pub mod inbox;
 
+pub mod lab;
+
 pub mod receive;
 
 pub mod exchange;

@@ -46,6 +46,8 @@ pub enum Command {
     Reliability(ReliabilityArgs),
     /// Measure what each effect of a scene costs by stepping the scene with it and without it.
     Effects(EffectsArgs),
+    /// Set up a laboratory with certificates, and admit clients to it.
+    Certs(CertsArgs),
     /// Completions and man pages.
     #[command(flatten)]
     Manual(Manual),
@@ -293,6 +295,9 @@ pub struct ReliabilityArgs {
     /// Also take out one safeguard after the other, and show that the rules notice it.
     #[arg(long)]
     pub mutants: bool,
+    /// Also write the promises and the figures as a page in Markdown.
+    #[arg(long, value_name = "FILE")]
+    pub write: Option<PathBuf>,
     /// Number of seeds that run in parallel.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub threads: u16,
@@ -306,6 +311,34 @@ fn minutes(text: &str) -> Result<f64, String> {
         Ok(minutes) if minutes > 0.0 && minutes <= 1e5 => Ok(minutes),
         _ => Err("expected minutes above 0 and at most 100000, such as 0.5".to_owned()),
     }
+}
+
+/// `scindo certs`.
+#[derive(Debug, Args)]
+pub struct CertsArgs {
+    /// Folder of the laboratory.
+    pub dir: PathBuf,
+    /// Name of a new laboratory.
+    #[arg(long, value_name = "NAME")]
+    pub lab: Option<String>,
+    /// Host name or address at which clients reach the server of a new laboratory. May be repeated.
+    #[arg(long, value_name = "HOST")]
+    pub server: Vec<String>,
+    /// Client to admit: its id and viewer, haptic, operator or teacher. May be repeated.
+    #[arg(long, value_name = "ID=ROLE", value_parser = crate::lab::roles::parse_client)]
+    pub client: Vec<(String, crate::lab::roles::LabRole)>,
+    /// Days for which new certificates are valid.
+    #[arg(long, value_name = "N", default_value_t = 365, value_parser = clap::value_parser!(u32).range(1..=3650))]
+    pub days: u32,
+    /// First chunk of every network key of a new laboratory.
+    #[arg(long, default_value = "scindo")]
+    pub realm: String,
+    /// Session within the realm.
+    #[arg(long, default_value = "main")]
+    pub session: String,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `scindo effects`.

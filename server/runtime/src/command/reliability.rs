@@ -11,7 +11,7 @@ use super::say::say;
 use crate::error::RuntimeError;
 use crate::reliability::campaign::{self, Extent, Totals};
 use crate::reliability::episode::EpisodeError;
-use crate::reliability::guarantees::{GUARANTEES, Noticed, text};
+use crate::reliability::guarantees::{GUARANTEES, Noticed, markdown, text};
 use crate::reliability::table::Mutant;
 
 /// Seeds with which each safeguard is taken out.
@@ -43,6 +43,12 @@ pub fn reliability(args: &ReliabilityArgs) -> Result<ExitCode, RuntimeError> {
     }
     bar.finish_and_clear();
     let interrupted = stop.load(Ordering::Relaxed);
+    if let Some(path) = &args.write {
+        std::fs::write(path, markdown(&totals, &mutants)).map_err(|error| RuntimeError::System {
+            what: format!("writing {}", path.display()),
+            reason: format!("{error}; choose another file with --write"),
+        })?;
+    }
     if args.json {
         let report = serde_json::json!({
             "interrupted": interrupted, "totals": totals, "mutants": mutants, "guarantees": GUARANTEES,

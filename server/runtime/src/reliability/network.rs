@@ -69,6 +69,21 @@ pub struct Hits {
 }
 
 impl Hits {
+    /// Faults by class, with their names.
+    pub fn classes(&self) -> [(&'static str, u64); 9] {
+        [
+            ("messages lost", self.lost),
+            ("messages repeated", self.repeated),
+            ("messages overtaken", self.overtaken),
+            ("messages spoiled", self.spoiled),
+            ("messages on a link that was down", self.partitioned),
+            ("freezes", self.freezes),
+            ("jumps of clocks", self.jumps),
+            ("restarts of clients", self.restarts),
+            ("lies", self.lies),
+        ]
+    }
+
     /// Adds those of another episode.
     pub fn add(&mut self, other: &Self) {
         let Self { sent, lost, repeated, overtaken, spoiled, partitioned, freezes, jumps, restarts, lies } =

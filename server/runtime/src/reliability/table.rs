@@ -64,6 +64,16 @@ pub enum Mutant {
 impl Mutant {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::NoDeduplication, Self::NoOwnership, Self::NoValidity, Self::NoWatchdog];
+
+    /// What is taken out.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoDeduplication => "de-duplication of cuts",
+            Self::NoOwnership => "ownership of tools",
+            Self::NoValidity => "validity of contacts",
+            Self::NoWatchdog => "the watchdog of the haptic client",
+        }
+    }
 }
 
 /// The server.

@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::campaign::{Extent, run};
 use super::episode;
+use super::guarantees::{GUARANTEES, row};
 use super::table::Mutant;
 
 const SOME: Extent = Extent { first: 1, seeds: Some(60), time: None, threads: 2 };
@@ -13,18 +14,7 @@ fn no_rule_is_broken_and_every_fault_is_tried() {
     let totals = run(&SOME, None, &AtomicBool::new(false), &|_| ()).unwrap();
     assert_eq!(totals.broken, []);
     assert_eq!(totals.seeds, 60);
-    let hits = totals.hits;
-    for (class, count) in [
-        ("lost", hits.lost),
-        ("repeated", hits.repeated),
-        ("overtaken", hits.overtaken),
-        ("spoiled", hits.spoiled),
-        ("partitioned", hits.partitioned),
-        ("freezes", hits.freezes),
-        ("jumps", hits.jumps),
-        ("restarts", hits.restarts),
-        ("lies", hits.lies),
-    ] {
+    for (class, count) in totals.hits.classes() {
         assert!(count > 10, "{class}: {count}");
     }
     assert!(totals.cuts > 300 && totals.touched > 10_000 && totals.refused > 1000, "{totals:?}");
@@ -50,5 +40,17 @@ fn every_safeguard_that_is_taken_out_is_missed() {
     for mutant in Mutant::ALL {
         let totals = run(&SOME, Some(mutant), &AtomicBool::new(false), &|_| ()).unwrap();
         assert!(totals.violations > 0, "{mutant:?} goes unnoticed");
+    }
+}
+
+#[test]
+fn the_page_of_promises_is_that_of_the_program() {
+    let page = include_str!("../../../../deploy/RELIABILITY.md");
+    for guarantee in GUARANTEES {
+        let row = row(&guarantee);
+        assert!(
+            page.contains(&row),
+            "missing in deploy/RELIABILITY.md, see `scindo reliability --write`: {row}"
+        );
     }
 }
