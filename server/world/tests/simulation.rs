@@ -5,9 +5,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use scindo_world::assemble::BuildOptions;
-use scindo_world::inputs::{CutRequest, Inputs, Wants};
+use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolMode, Wants};
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
@@ -114,6 +114,43 @@ fn reset_repeats_the_run_and_raises_the_epoch() {
     run(&mut sim, 20);
     assert_eq!(first, sim.bodies()[0].body.positions());
     assert!(sim.bodies()[0].epoch() > epoch);
+}
+
+#[test]
+fn reset_repeats_a_touch() {
+    // A ball reaches the side of a beam at rest, ten micrometres away, and then presses on it.
+    let still = BEAM.replace("[9.81, 0, 0]", "[0, 0, 0]");
+    let with_finger = format!(
+        "{still}[[tool]]\nid = \"finger\"\nshape = {{ sphere = {{ radius_m = 0.005 }} }}\nstiffness_n_m = 300"
+    );
+    let touch = |sim: &mut Simulation, away_m: f64| {
+        for step in 0..10_u32 {
+            let x = 0.03 + 0.00501 + away_m - 5e-4 * f64::from(step);
+            let tool = ToolInput {
+                id: Arc::from("finger"),
+                owner: Arc::from("hand"),
+                pose: Isometry3::translation(x, 0.03, 0.1),
+                passed: Vec::new(),
+                velocity_m_s: Vector3::zeros(),
+                mode: ToolMode::Touch,
+                closed: None,
+                shape: None,
+                seq: 1,
+                client_time_ns: 0,
+            };
+            sim.step(&Inputs { tools: vec![tool], ..Inputs::default() });
+        }
+        sim.bodies()[0].body.positions().to_vec()
+    };
+    let mut sim = simulation(&with_finger);
+    let first = touch(&mut sim, 0.0);
+    assert_ne!(first, touch(&mut simulation(&with_finger), 0.1), "the finger touches");
+    for _ in 0..3 {
+        // The finger leaves the tissue before the scene starts again.
+        touch(&mut sim, 0.1);
+        sim.reset().unwrap();
+        assert_eq!(first, touch(&mut sim, 0.0));
+    }
 }
 
 #[test]

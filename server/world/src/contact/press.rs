@@ -176,6 +176,7 @@ impl Press {
     /// Releases the tissue that the tool pressed on.
     pub fn release(&mut self) {
         self.direction = None;
+        self.shares = [0.0; MAX_POINTS];
         self.bearings.clear();
         self.slip();
     }
@@ -213,7 +214,6 @@ impl Press {
         let (at_proxy, at_device) = (capsule(shape, proxy), capsule(shape, device));
         let Some(place) = touched((&at_proxy, &at_device), surfaces) else { return self.release() };
         let target = push_direction(&place, &at_proxy, &at_device);
-        let fresh = self.direction.is_none();
         let direction = turned(self.direction, target, h);
         self.direction = Some(direction);
         self.parameter = place.parameter;
@@ -226,6 +226,8 @@ impl Press {
             depths[i] = hit.map_or(0.0, |bearing: Bearing| bearing.depth.max(0.0));
             hits[i] = hit;
         }
+        // A touch may begin without depth. The first depths of it count as they are, or they would mix with nothing.
+        let fresh = self.shares == [0.0; MAX_POINTS];
         self.follow_shares(&depths, if fresh { 1.0 } else { FOLLOW.weight(h) });
         for (number, (hit, share)) in (0u8..).zip(hits.iter().zip(self.shares)) {
             if let (Some(bearing), true) = (hit, share > LEAST_SHARE) {
