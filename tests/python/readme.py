@@ -1,55 +1,81 @@
-"""Runs the Python of README.md as it stands against a server, with nothing but the packages that it names.
+"""Runs the Python of the two READMEs as it stands, with nothing but the package.
 
-    python tests/python/readme.py tcp/127.0.0.1:7447
+SCINDO_BIN=target/debug python tests/python/readme.py
 """
 
 import ast
+import os
 import pathlib
 import re
 import subprocess
 import sys
-import time
+import tempfile
 
-from client import Session
+import scindo
 
-README = pathlib.Path(__file__).resolve().parents[2] / "README.md"
-NAMED = {"zenoh", "numpy", "google"}
-
-
-def wait_for_the_server(endpoint):
-    """A reader of README.md has a server that runs; here it was started a moment ago."""
-    session, end = Session(endpoint, "scindo", "main"), time.monotonic() + 60
-    while not list(session.zenoh.get(session.key("rpc/schema"), timeout=2.0)):
-        assert time.monotonic() < end, "no server answers"
-        time.sleep(0.1)
-    session.zenoh.close()
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+NAMED = {"scindo", "numpy"}
 
 
-def main():
-    wait_for_the_server(sys.argv[1])
-    blocks = re.findall(r"^```python\n(.*?)^```$", README.read_text(), re.MULTILINE | re.DOTALL)
-    assert len(blocks) == 1, f"one block of Python in README.md: {len(blocks)}"
+def blocks(file, language):
+    """Blocks of code of one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", file.read_text(), re.MULTILINE | re.DOTALL)
+
+
+def run(code, folder, **more):
+    """Lines that the code prints, if it imports only what it may."""
     imports = set()
-    for node in ast.walk(ast.parse(blocks[0])):
+    for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.Import):
             imports |= {name.name.split(".")[0] for name in node.names}
         elif isinstance(node, ast.ImportFrom):
             imports.add(node.module.split(".")[0])
     foreign = imports - NAMED - set(sys.stdlib_module_names)
-    assert not foreign, f"packages that README.md does not name: {foreign}"
-    command = [sys.executable, "-c", blocks[0], *sys.argv[1:]]
-    run = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=120, check=True)
-    lines = run.stdout.splitlines()
-    assert lines and lines[0].startswith("scene "), f"the scene first: {lines[:1]}"
-    forces = [line for line in lines if line.startswith("forces [N]: [")]
-    assert len(forces) == 1, f"the forces once: {forces}"
-    lines.remove(forces[0])
-    frames = [re.fullmatch(r" *([\d.]+) s: (\d+) points, centre \[.*\]", line) for line in lines[1:]]
-    assert len(frames) >= 3 and all(frames), f"frames: {lines[1:6]}"
-    times = [float(frame[1]) for frame in frames]
-    assert times == sorted(times) and times[-1] > times[0], f"time goes on: {times}"
-    print(f"README.md: {len(blocks[0].splitlines())} lines of Python saw {len(frames)} frames of {frames[0][2]} points")
+    assert not foreign, f"packages that the README does not name: {foreign}"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, cwd=folder, env={**os.environ, **more}, stdout=subprocess.PIPE, text=True, timeout=300, check=True
+    )
+    return done.stdout.splitlines()
+
+
+def shapes(line):
+    """The two shapes that a line ends with: points and triangles."""
+    points, triangles = re.search(r"\((\d+), 3\) \((\d+), 3\)$", line).groups()
+    return int(points), int(triangles)
+
+
+def newtons(line):
+    """The force of a tool in a line on forces."""
+    return float(re.search(r"finger on \w+: ([\d.e-]+) N", line)[1])
+
+
+def main_readme(folder):
+    """The scene of the README, served, touched and run."""
+    (scene,) = [text for text in blocks(ROOT / "README.md", "toml") if "# liver.toml" in text]
+    (folder / "liver.toml").write_text(scene)
+    (code,) = blocks(ROOT / "README.md", "python")
+    first, forces, last = run(code, folder)
+    points, triangles = shapes(first)
+    assert triangles == 2 * points - 4 > 500, f"a closed surface: {first}"
+    assert newtons(forces) > 0.01, forces
+    status, count, _, stress = re.fullmatch(r"(\w+) \((\d+), (3)\) ([\d.]+)", last).groups()
+    assert status == "done" and int(count) > 300 and float(stress) > 1.0, last
+    return code
+
+
+def package_readme(folder):
+    """The lines of the package's README against a server of the demonstration's kind."""
+    (code,) = blocks(ROOT / "client/python/README.md", "python")
+    with scindo.serve(ROOT / "tests/python/scene.toml") as server:
+        first, forces, cut = run(code, folder, SCINDO_CONNECT=server.endpoint)
+    assert first.startswith("block block ") and shapes(first)[0] > 100, first
+    assert newtons(forces) > 0.01, forces
+    assert int(re.search(r"elements=(\d+)", cut)[1]) > 0, cut
+    return code
 
 
 if __name__ == "__main__":
-    main()
+    for test in (main_readme, package_readme):
+        with tempfile.TemporaryDirectory() as folder:
+            print(f"{test.__name__}: {len(test(pathlib.Path(folder)).splitlines())} lines of Python run")
