@@ -13,7 +13,7 @@ finish() {
 trap finish EXIT
 fail() { echo "package: $*" >&2; exit 1; }
 
-deploy/package --quick --programs "$bin" --out "$scratch/out"
+PYTHON=${SCINDO_TEST_PYTHON:-python3} deploy/package --quick --programs "$bin" --out "$scratch/out"
 tarball=$(echo "$scratch"/out/*.tar.gz) deb=$(echo "$scratch"/out/*.deb)
 mkdir "$scratch/tree" "$scratch/deb"
 tar -xzf "$tarball" -C "$scratch/tree" --strip-components 1
@@ -27,6 +27,8 @@ for root in "$scratch/tree" "$scratch/deb/usr"; do
     lib/systemd/system/scindo.service; do
     [ -s "$root/$file" ] || fail "$file is missing below $root"
   done
+  wheel=$(echo "$root"/share/scindo/scindo-*-py3-none-any.whl)
+  python3 -m zipfile -t "$wheel" >/dev/null || fail "no wheel of the Python package below $root"
   zcat "$root/share/man/man1/scindo-run.1.gz" | grep -q viewer || fail "the man page of run does not tell of --viewer"
   [ -z "$(find "$root" -name '*.rs' -o -name node_modules)" ] || fail "sources are inside"
 done
