@@ -1,7 +1,7 @@
 """Reads the results of `scindo run … --out DIR` with independent readers, and draws them.
 
-Checks that summary.json, probes.csv, final.vtu and final-surface.vtp are complete and finite, that meshio
-and pyvista read the same grid, that displacements lead from rest to current positions, that the stress is
+Checks that summary.json, probes.csv, final.vtu and final-surface.vtp are complete and finite, that meshio,
+pyvista and the Python package read the same grid, that displacements lead from rest to current positions, that the stress is
 one symmetric tensor, that the surface is closed, and that a picture shows both lips of a cut.
 
     python tests/python/results.py DIR [--picture FILE.png] [--no-lips]
@@ -20,7 +20,9 @@ import numpy as np
 
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import pyvista  # noqa: E402  (reads the variable above)
+import wire  # noqa: E402, F401  (so that the package is found)
 from PIL import Image  # noqa: E402
+from scindo.results import Results  # noqa: E402
 
 PROBE_HEADER = ["step", "time_s", "id", "x_m", "y_m", "z_m", "ux_m", "uy_m", "uz_m"]
 SKIN_COLOUR, BACKGROUND = (198, 150, 135), (255, 255, 255)
@@ -102,6 +104,14 @@ def read_grid(folder, summary):
     check(np.array_equal(grid.points, other.points), "pyvista and meshio see the same positions")
     check(grid.n_cells == sum(len(block.data) for block in other.cells), "and the same number of cells")
     check({block.type for block in other.cells} == {"tetra"}, "tetrahedra only")
+    own = Results.read(folder)
+    check(np.array_equal(own.points, grid.points), "the package sees the same positions")
+    check(np.array_equal(own.solid.cells, other.cells[0].data), "and the same tetrahedra")
+    check(set(own.solid.cell_data) == set(grid.cell_data), f"and the same fields: {list(own.solid.cell_data)}")
+    for name, values in own.solid.cell_data.items():
+        check(np.array_equal(values, grid.cell_data[name]), f"and the same {name}")
+    surface = pyvista.read(str(folder / "final-surface.vtp"))
+    check(np.array_equal(own.surface.cells, surface.regular_faces), "and the same triangles")
     check_fields(grid, {"body", "element", "piece", "volume_fraction", "von_mises_pa", "cauchy_stress_pa"})
     check_stress(grid)
     fraction = grid.cell_data["volume_fraction"]
