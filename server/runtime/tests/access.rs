@@ -400,8 +400,7 @@ async fn a_second_client_cannot_move_release_or_cut_with_the_tool_of_another() {
     let mut tool = hand.tool("probe").await.unwrap();
     let holds = || {
         let inbox = running.server.as_ref().unwrap().exchange().inbox();
-        let held = inbox.held().next().map(|input| (input.owner.to_string(), input.pose.translation.x));
-        held
+        inbox.held().next().map(|input| (input.owner.to_string(), input.pose.translation.x))
     };
     let started = Instant::now();
     while holds().is_none() {
