@@ -71,8 +71,8 @@ pub const MAX_CONTACT_BYTES: usize = 1024;
 /// Longest time in which the force of held still tissue relaxes [s].
 pub const MAX_RELAXATION_S: f64 = 1.0e3;
 
-/// Most contact planes of a message: seven with the longest ids fill [`MAX_CONTACT_BYTES`].
-pub const MAX_CONTACTS: usize = 7;
+/// Most contact planes of a message: six with the longest ids fill [`MAX_CONTACT_BYTES`].
+pub const MAX_CONTACTS: usize = 6;
 
 /// Fewest blade segments of a cut: two span a surface.
 pub const MIN_SWEEP_SEGMENTS: usize = 2;

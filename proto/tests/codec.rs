@@ -116,7 +116,7 @@ fn contact() -> impl Strategy<Value = Contact> {
 
 fn haptic_contact() -> impl Strategy<Value = HapticContact> {
     let header = (any::<[u64; 5]>(), any::<u32>());
-    (header, id(), pose(), vec(contact(), 0..=7), 0..5_i32).prop_map(
+    (header, id(), pose(), vec(contact(), 0..=6), 0..5_i32).prop_map(
         |(([seq, step, now, used, client], epoch), tool_id, pose, contacts, mode)| HapticContact {
             seq,
             sim_step: step,

@@ -11,7 +11,9 @@
 //! * [`publish`]: the publication thread, and the threads that answer late joiners.
 //! * [`rpc`]: questions and orders.
 //! * [`server`]: starts and ends all of these.
+//! * [`lab`]: laboratories with certificates, and what each role may do.
 //! * [`haptics`]: what a hand feels over a link, against the truth; an experiment on virtual time.
+//! * [`reliability`]: all of this in a simulated network with faults, from a seed ([`chance`]).
 //!
 //! | thread | does | waits for |
 //! |---|---|---|

@@ -2,8 +2,11 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-/// Most planes of one model.
-pub const MAX_CONTACTS: usize = 8;
+use crate::tool::compound::MAX_PARTS;
+
+/// Most planes of one model: those of the capsules of a tool, and one that hides a change of model.
+pub const MAX_CONTACTS: usize = 6;
+const _: () = assert!(MAX_CONTACTS > MAX_PARTS);
 
 /// Feature number of the plane that hides a change of model; see [`super::continuity`].
 pub const BLEND_FEATURE: u64 = u64::MAX;
