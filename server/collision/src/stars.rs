@@ -4,7 +4,7 @@
 const NONE: u32 = u32::MAX;
 
 /// A list of corners per vertex, in ascending order. Corner k of triangle t is 3t + k.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Stars {
     /// First corner at each vertex.
     first: Vec<u32>,

@@ -63,7 +63,7 @@ pub enum SurfaceError {
 /// assert_eq!(surface.closest_point(below, 1.0), None);
 /// # Ok::<(), scindo_collision::SurfaceError>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct SurfaceBvh {
     triangles: Vec<[u32; 3]>,
     positions: Vec<[f32; 3]>,

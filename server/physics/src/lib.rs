@@ -16,6 +16,7 @@
 #![allow(non_snake_case)] // the symbols of the field: F, R, P, K, M
 #![allow(clippy::needless_range_loop)] // i, j, k are tensor indices and lanes
 
+mod saved;
 pub mod mesh;
 pub mod material;
 pub mod element;

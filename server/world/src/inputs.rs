@@ -14,7 +14,7 @@ pub const MAX_TOOLS: usize = 64;
 pub const MAX_PASSED: usize = 64;
 
 /// Geometry of a rigid tool in its own axes: tip in the origin, shaft along +z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum ToolShape {
     /// Cutting edge from the tip (origin) to the heel (0, 0, `length_m`).
     Blade {
@@ -79,7 +79,7 @@ impl Default for ToolShape {
 }
 
 /// What a hand does with a tool.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum ToolMode {
     /// Exists, touches nothing.
     #[default]

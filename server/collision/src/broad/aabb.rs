@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 /// An axis-aligned box, with its lower and upper corner [m].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Aabb {
     /// Lower corner.
     pub min: [f32; 3],

@@ -3,7 +3,7 @@
 use super::aabb::{Aabb, round_up};
 
 /// A sphere around everything that it bounds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Ball {
     /// Centre [m].
     pub centre: [f32; 3],

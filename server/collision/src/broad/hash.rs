@@ -21,7 +21,7 @@ const GRIDS: usize = 101;
 const BITS: i32 = 20;
 
 /// A cell: its grid, and its coordinates there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 struct Cell {
     grid: i32,
     at: [i32; 3],
@@ -39,7 +39,7 @@ impl Cell {
 }
 
 /// A spatial hash.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct SpatialHash {
     /// First triangle of each bucket.
     heads: Vec<u32>,

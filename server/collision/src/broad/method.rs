@@ -10,7 +10,7 @@ use super::split::{Halves, Octants};
 use super::tree::Tree;
 
 /// A method of broad phase. All give the same results; they differ in time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Method {
     /// Binary tree of axis-aligned boxes.
     #[default]
@@ -43,7 +43,7 @@ impl Method {
 }
 
 /// The arrangement of one surface by the method that was chosen.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Index {
     AabbTree(Tree<Aabb, Halves>),
     Octree(Tree<Aabb, Octants>),

@@ -8,7 +8,7 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhLeafCost, BvhNode, Travers
 use std::cell::RefCell;
 
 /// Binary tree of boxes of parry3d. Its leaf `i` is triangle `i`.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct ParryBvh {
     tree: Bvh,
     /// Leaves in the order of the tree's memory. Refitting in this order is fast, since it walks the memory

@@ -91,7 +91,7 @@ impl Bound for Ball {
 }
 
 /// A node: its volume, and where its children or triangles begin.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Node<B> {
     /// Around everything below.
     pub bound: B,
@@ -104,7 +104,7 @@ pub(crate) struct Node<B> {
 }
 
 /// A tree of bounding volumes `B`, split by `S`. Node 0 is the root.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Tree<B, S> {
     pub(super) nodes: Vec<Node<B>>,
     pub(super) parents: Vec<u32>,
@@ -120,6 +120,7 @@ pub(crate) struct Tree<B, S> {
     built_spread: f64,
     /// Number of nodes after the last build.
     built_nodes: usize,
+    #[serde(skip)]
     split: PhantomData<S>,
 }
 

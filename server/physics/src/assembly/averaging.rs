@@ -20,7 +20,7 @@ use crate::material::Lame;
 const STIFFEST: f64 = 25.0;
 
 /// Incidence of pieces around copies, and of copies around copies.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct NodeAverage {
     /// Share κ of the volumetric energy that stays with the elements, 0 … 1.
     pub kept: f64,

@@ -10,7 +10,7 @@ const ROWS: usize = 256;
 /// A square sparse matrix of 3×3 blocks, one block row per node.
 ///
 /// The columns of a row are sorted, and every row stores its diagonal block.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BlockCsr<T> {
     /// Block row i is `first[i]..first[i + 1]`; length n_rows + 1.
     pub first: Vec<u32>,

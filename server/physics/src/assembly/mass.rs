@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{BlockCsr, ElementKind, Model};
 
 /// ∫ N_a N_b dV of the elements, upper triangles packed by rows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) enum Products {
     /// Products per unit volume, the same for every element.
     Scaled(Vec<f64>),

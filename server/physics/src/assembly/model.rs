@@ -11,7 +11,7 @@ use crate::element::{Point, Points, Spring, deformation_gradient};
 use crate::material::{Lame, Law, Region};
 
 /// Finite element of a model, and the points at which its energy is integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ElementKind {
     /// Linear tetrahedron, one point.
     #[default]
@@ -55,7 +55,7 @@ impl ElementKind {
 }
 
 /// How the volumetric part λ/2 θ² of the energy is integrated: remedies against locking near ν = ½.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Volumetric {
     /// At the same points as the rest of the energy.
     #[default]
@@ -73,7 +73,7 @@ pub enum Volumetric {
 }
 
 /// A discretised elastic body in double precision.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Model {
     pub(super) kind: ElementKind,
     pub(super) volumetric: Volumetric,

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SMatrix};
 use crate::material::{Lame, Law, Matrix9, Split, StVenantKirchhoff, Tangent};
 
 /// A law with its constants.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct PointLaw {
     pub law: Law,
     pub lame: Lame,

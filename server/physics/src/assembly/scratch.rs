@@ -5,11 +5,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use nalgebra::{Matrix3, Vector3};
 
 /// The buffers of a model; a clone of the model starts with empty ones.
-#[derive(Debug, Default)]
-pub(super) struct Scratch(Mutex<Buffers>);
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+pub(super) struct Scratch(#[serde(skip)] Mutex<Buffers>);
 
 /// Intermediate results of node averaging, and those of the parallel passes in `work`.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Buffers {
     pub(super) theta: Vec<f64>,
     pub(super) theta_bar: Vec<f64>,
@@ -19,7 +19,7 @@ pub(super) struct Buffers {
 }
 
 /// Contributions of elements, before the nodes gather them.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Work {
     pub(super) energies: Vec<f64>,
     pub(super) forces: Vec<Vector3<f64>>,

@@ -3,7 +3,7 @@
 //! Only the mutation check of the stability suite sets this; no key of a scene does.
 
 /// Which parts are switched off; none by default.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Ablation {
     /// The copies of a node share its mass evenly instead of carrying that of their pieces.
     pub piece_masses: bool,

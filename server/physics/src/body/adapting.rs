@@ -12,7 +12,7 @@ use crate::octree::{
 };
 
 /// What an adaptation changed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AdaptReport {
     /// Leaves that were divided, for 2:1 balance too.
     pub divided: usize,

@@ -13,7 +13,7 @@ use crate::snap::node::NEW;
 use crate::space::Space;
 
 /// A node whose displacement is prescribed in some directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FixedNode {
     /// Index of the node; nodes that the element adds come after those of the mesh.
     pub node: u32,
@@ -24,7 +24,7 @@ pub struct FixedNode {
 }
 
 /// Constraints and loads as requested; cuts do not change them.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Boundary {
     /// At most one entry per node, ascending.
     fixed: Vec<FixedNode>,

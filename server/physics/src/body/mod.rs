@@ -94,8 +94,9 @@ pub struct Constants {
 /// assert!(body.centre_of_mass().z < before.z);
 /// # Ok::<(), scindo_physics::body::BodyError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Body {
+    #[serde(with = "crate::space::saved_space")]
     space: Box<dyn Space>,
     /// Rest position of every node [m]: copies first, then the nodes that the element adds.
     rest: Vec<Vector3<f64>>,
@@ -116,6 +117,7 @@ pub struct Body {
     connectivity: LocalConnectivity,
     range: Range,
     dynamics: Dynamics,
+    #[serde(skip, default = "Team::alone")]
     team: Team,
     spring_forces: Vec<Vector3<f64>>,
     /// How often coarsening has given vertices new numbers.
@@ -280,6 +282,12 @@ impl Body {
         }
         self.settings.threads = team.threads();
         self.team = team;
+    }
+
+    /// Works from now on with the threads of `other`, which gets others in exchange.
+    pub fn take_team_of(&mut self, other: &mut Body) {
+        std::mem::swap(&mut self.team, &mut other.team);
+        self.settings.threads = self.team.threads();
     }
 
     /// Force on the body [N] of every spring of the last step, in the order given, from the same solve.

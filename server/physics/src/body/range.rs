@@ -16,7 +16,7 @@ const MOST_STRETCH: f64 = 10.0;
 const LEAST_SIZE: f64 = 0.1;
 
 /// Reference sizes of the connected parts of a body.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Range {
     /// Of every part: the diagonal of its box at rest, or of its prescribed positions if larger [m].
     size: Vec<f64>,
@@ -32,7 +32,7 @@ pub(super) struct Beyond {
     pub size_m: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Bounds {
     low: Vector3<f64>,
     high: Vector3<f64>,

@@ -19,7 +19,7 @@ use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettin
 /// let quadratic = BodySettings { element: ElementKind::Tet10, ..fast };
 /// assert_eq!(quadratic.why_general(Law::Corotational), Some("element tet10"));
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BodySettings {
     /// When the solver of a step stops. On the fast path this is the linear solve; on the general path it
     /// is Newton's method and each of its linear solves.
@@ -66,7 +66,7 @@ pub struct BodySettings {
 }
 
 /// The arithmetic of a step. State and sums are always in double precision.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Arithmetic {
     /// Forces and solver in single precision: the fast path. Relative residuals below some 1e-6 are those
     /// of the solver's recurrence and not true ones.

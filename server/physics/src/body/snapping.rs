@@ -10,7 +10,7 @@ use crate::snap::{Nodes, SnapCut, SnapNode, SnapReport, Snapper};
 use crate::space::Tets;
 
 /// How cuts are made.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum CuttingMethod {
     /// Pieces and copies inside the elements ([`crate::cut`]).
     #[default]
@@ -20,7 +20,7 @@ pub enum CuttingMethod {
 }
 
 /// What happens to a part that a cut leaves without any held node; for [`CuttingMethod::Snap`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum LooseRule {
     /// It becomes a free body.
     #[default]
@@ -30,7 +30,7 @@ pub enum LooseRule {
 }
 
 /// State of a body that is cut along faces.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct SnapState {
     snapper: Snapper,
     start: Start,
@@ -42,14 +42,14 @@ pub(super) struct SnapState {
 }
 
 /// A cut along faces that was begun.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct FaceCut {
     pub blade: BladeSweep,
     pub incision: u32,
 }
 
 /// The body before its first cut.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Start {
     mesh: TetMesh,
     /// Set by the first cut; later requests are added to it.

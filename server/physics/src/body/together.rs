@@ -46,7 +46,7 @@ const USUAL: usize = 64;
 /// assert!((left.momentum() + right.momentum()).norm() < 1e-12);
 /// # Ok::<(), scindo_physics::body::BodyError>(())
 /// ```
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Group {
     together: Together,
     forces: Vec<Vector3<f64>>,

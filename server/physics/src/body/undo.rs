@@ -17,8 +17,9 @@ use crate::mesh::TetMesh;
 use crate::space::Space;
 
 /// The topology of a body at some time: mesh, pieces, copies and skin, without positions.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct BodyTopology {
+    #[serde(with = "crate::space::saved_space")]
     space: Box<dyn Space>,
     boundary: Boundary,
     snap: Option<Box<SnapState>>,

@@ -31,7 +31,7 @@ use super::topology::runs::Runs;
 const SEPARATION: usize = 20;
 
 /// A sweep that is taken in parts, between [`CutMesh::begin_sweep`] and [`CutMesh::complete`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct SweepUnderWay {
     triangles: Vec<SweepTriangle>,
     incision: u32,
@@ -51,7 +51,7 @@ impl SweepUnderWay {
 /// Copies 0..n_nodes are the nodes of the rest mesh; further ones are appended and never removed. Material is
 /// connected only through faces. A rest mesh whose parts meet only in a node or an edge therefore gets extra
 /// copies from the start.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct CutMesh {
     mesh: TetMesh,
     runs: Runs,

@@ -16,7 +16,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 pub const LANES: usize = 8;
 
 /// Eight `f32`, one per element of a batch.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[repr(C, align(32))]
 pub struct Lanes(
     /// The eight numbers.
@@ -33,6 +33,25 @@ pub enum Simd {
     Baseline,
     /// AVX2 with fused multiply-add.
     Avx2,
+}
+
+/// A state that was computed with instructions that this machine lacks cannot go on with the same bits.
+impl<'de> serde::Deserialize<'de> for Simd {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        match bool::deserialize(from)? {
+            false => Ok(Self::Baseline),
+            true if Self::detect() == Self::Avx2 => Ok(Self::Avx2),
+            true => Err(serde::de::Error::custom(
+                "the state was computed with AVX2, which this machine lacks; continue on one that has it",
+            )),
+        }
+    }
+}
+
+impl serde::Serialize for Simd {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        (*self == Self::Avx2).serialize(to)
+    }
 }
 
 impl Simd {

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 pub const MOST_CARRIERS: usize = 8;
 
 /// A point bound to the material: x = Σ weights · x\[copies\], over at most [`MOST_CARRIERS`] copies.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct MaterialPoint<T = f64> {
     copies: [u32; MOST_CARRIERS],
     weights: [T; MOST_CARRIERS],

@@ -8,7 +8,7 @@ use crate::material::Tangent;
 const NO_DIRECTION: f64 = 1e-12;
 
 /// A linear spring along the line between two nodes: ψ = k/2 (l − L)² \[J\].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spring {
     /// First node.
     pub a: u32,

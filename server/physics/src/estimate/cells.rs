@@ -16,7 +16,7 @@ use crate::material::Material;
 use crate::octree::{Octree, corner_weights};
 
 /// Recovers stress from cells. It reuses its memory from call to call.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct CellRecovery {
     /// Mean stress [Pa] of every cell and its present volume [m³].
     mean: Vec<(Matrix3<f64>, f64)>,

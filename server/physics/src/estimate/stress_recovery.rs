@@ -14,7 +14,7 @@ use super::tets::Tets;
 use crate::material::{Lame, Law};
 
 /// Estimate of the discretisation error.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct MeshError {
     /// η = √Σ η_e² [√J]: estimate of ‖u − u_h‖_E, where ‖e‖²_E = ∫ σ(e) : C⁻¹ : σ(e).
     pub eta: f64,
@@ -27,7 +27,7 @@ pub struct MeshError {
 }
 
 /// Recovers stress. It reuses its memory from call to call.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct StressRecovery {
     stress: Vec<Matrix3<f64>>,
     recovered: Vec<Matrix3<f64>>,

@@ -5,7 +5,7 @@ use super::spin::SpinGuard;
 use super::state::State;
 
 /// History and guards of a motion.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Course {
     /// States, accelerations and energy of earlier steps.
     pub multistep: Multistep,

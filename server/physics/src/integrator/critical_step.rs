@@ -24,7 +24,7 @@ const CONVERGED: f64 = 1e-12;
 const CALM: usize = 8;
 
 /// Buffers of the iteration, one entry per node.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PowerIteration {
     /// Present and previous direction, M-orthonormal.
     q: Vec<Vector3<f64>>,

@@ -37,7 +37,7 @@ pub struct Start<'a> {
 }
 
 /// What a search needs to remember from solve to solve.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Descent {
     trial: Vec<Vector3<f64>>,
     /// Largest |Π| met [J].

@@ -42,11 +42,12 @@ pub enum DynamicsError {
 }
 
 /// Integrates the motion of one body; owns all memory that a step needs.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Dynamics {
     scheme: Scheme,
     law: Law,
     course: Course,
+    #[serde(with = "super::step_solver::saved_solver")]
     solver: Box<dyn StepSolver>,
     /// Rigid motions of held parts that the constraints leave free; found for equilibria only.
     free_motions: Vec<FreeMotion>,

@@ -14,7 +14,7 @@ use crate::operator::FixedCopy;
 const NULL: f64 = 1e-12;
 
 /// A rigid motion of a part of a body that no prescribed direction resists.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FreeMotion {
     /// Index of the part in [`LooseParts`].
     pub part: u32,

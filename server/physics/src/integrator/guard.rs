@@ -1,7 +1,7 @@
 //! Signs that a time integration scheme fails: energy from nowhere, and large turns.
 
 /// Energy balance of H = kinetic + elastic + loads and springs, which a step conserves.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Ledger {
     /// H at the start of the run, plus what changes of loads and springs have put in since [J].
     reference: Option<f64>,

@@ -10,14 +10,14 @@ use crate::space::Space;
 use crate::team::{Team, blocks};
 
 /// What the energy of the pieces of a body is computed from; empty until it is needed.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct HeldEnergy {
     pieces: Vec<HeldPiece>,
     /// Sum of each block of pieces [J].
     partial: Vec<f64>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct HeldPiece {
     copies: [u32; 4],
     place: Place,

@@ -9,7 +9,7 @@ use crate::cut::NewCopy;
 use crate::octree::Restriction;
 
 /// The last two states.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct History {
     /// State before the last step; `last` is the one that the last step left.
     pub before: State,

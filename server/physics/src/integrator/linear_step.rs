@@ -48,7 +48,7 @@ const SPRING_PASSES: usize = 8;
 const LOAD_FLOOR: f64 = 0.01;
 
 /// The scratch vectors of a step, one entry per copy.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct LinearStep {
     /// Linearise at the positions of the last step; only a mutation test sets it.
     at_start: bool,
@@ -101,7 +101,7 @@ pub struct LinearStep {
 }
 
 /// The change of variables that keeps degenerate elements from costing iterations.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct Stiff {
     modes: StiffModes,
     /// Blocks of the preconditioner that the substitution changes.

@@ -44,7 +44,7 @@ const MOST_SPIN_HALVINGS: u32 = 4;
 const GAIN: f64 = 1e-6;
 
 /// Stiffness and buffers of steps by linear solves.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct LinearlyImplicit {
     scheme: Scheme,
     material: Material,
@@ -53,6 +53,7 @@ pub struct LinearlyImplicit {
     method: Method,
     simulate_level: usize,
     relaxes: bool,
+    #[serde(with = "crate::operator::saved_stiffness")]
     stiffness: Box<dyn Stiffness>,
     /// Whether the stiffness uses only instructions that every machine has.
     portable: bool,
@@ -66,7 +67,7 @@ pub struct LinearlyImplicit {
 }
 
 /// A copy without mass, and the copies of its piece that carry it along.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Weightless {
     copy: u32,
     /// Copies of the same piece; those with mass count.

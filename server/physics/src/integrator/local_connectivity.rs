@@ -13,7 +13,7 @@ use crate::operator::FixedCopy;
 use crate::space::Space;
 
 /// Buffers of the local search.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct LocalConnectivity {
     numbering: Numbering,
     /// Copies on the changed pieces, and on the elements around copies that others were split from.

@@ -8,7 +8,7 @@ use crate::solver::{LinearSettings, LinearSolver, Method, Precision};
 use crate::team::Team;
 
 /// Mass matrix M [kg].
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Mass {
     /// Lumped masses [kg], one per node; they form M if there is no matrix.
     pub lumped: Vec<f64>,

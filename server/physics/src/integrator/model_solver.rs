@@ -33,7 +33,7 @@ use crate::team::Team;
 const FARTHEST: f64 = 1e15;
 
 /// A discrete model with all memory that its steps need.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct ModelSolver {
     pub(super) model: Model,
     pub(super) material: Material,

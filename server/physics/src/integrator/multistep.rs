@@ -28,7 +28,7 @@ pub enum Adapted<'a> {
 }
 
 /// History of a scheme; empty for implicit Euler by one linear solve, which needs none.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Multistep {
     scheme: Scheme,
     history: History,

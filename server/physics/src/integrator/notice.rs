@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::free_motion::FreeMotion;
 
 /// Something that a step did differently from what was requested, and why.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Notice {
     /// A length, gravity, load, position or velocity among the inputs is unusable.
     BadInput,

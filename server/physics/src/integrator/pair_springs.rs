@@ -12,7 +12,7 @@ use crate::operator::{Padded, padded};
 /// Its law is that of a [`PointSpring`](super::PointSpring) in the relative position y = x_a − Σ w_i x_i: the plane,
 /// the target and the anchor of its kind are places of y. The force acts on the point, and its opposite on the
 /// triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PairSpring {
     /// Number of the point's body in the group, and of the triangle's.
     pub bodies: [u32; 2],
@@ -39,7 +39,7 @@ impl PairSpring {
 }
 
 /// One node that carries a pair spring, with its weight in y.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Carrier {
     /// Number of its body in the group.
     pub body: u32,
@@ -50,7 +50,7 @@ pub struct Carrier {
 }
 
 /// A pair spring in the course of one step.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct ActivePair {
     /// Nodes that carry it, each once.
     pub carriers: SmallVec<[Carrier; 16]>,
@@ -91,7 +91,7 @@ impl ActivePair {
 }
 
 /// The products of pair springs with vectors, arranged for one linear solve. Springs without stiffness are left out.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct PairTerms {
     terms: Vec<PairTerm>,
     /// Nodes and weights of all terms, one after another.
@@ -99,7 +99,7 @@ pub struct PairTerms {
 }
 
 /// s k J Jᵀ of one spring.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct PairTerm {
     bodies: [u32; 2],
     /// Where the carriers on the first body end, and those on the second.

@@ -12,7 +12,7 @@ use crate::lists::reserve::resize_reserving;
 use crate::operator::FixedCopy;
 
 /// Connected parts of a body, by copy.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LooseParts {
     /// Part of every copy.
     pub of_copy: Vec<u32>,
@@ -89,7 +89,7 @@ impl LooseParts {
 }
 
 /// The three translation equations S t = b of every part.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Translations {
     /// Translation of every part so far [m].
     pub shift: Vec<Vector3<f64>>,

@@ -18,7 +18,7 @@ const PAIRS: usize = 6;
 const LEAST_COSINE: f64 = 1e-6;
 
 /// A step and the change of the residual r = −g along it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Pair {
     s: Vec<Padded>,
     y: Vec<Padded>,
@@ -29,7 +29,7 @@ struct Pair {
 }
 
 /// The last pairs.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct QuasiNewton {
     pairs: [Pair; PAIRS],
     /// Number of pairs in use; the newest is at `next − 1`, modulo [`PAIRS`].

@@ -32,7 +32,7 @@ pub struct RelaxationReport {
 }
 
 /// Static relaxation with its iterate; nothing is allocated unless the number of nodes changes.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Relaxation {
     /// Stop at √(gᵀM⁻¹g) ≤ tolerance · reference.
     pub tolerance: f64,

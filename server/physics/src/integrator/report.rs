@@ -5,7 +5,7 @@ use super::scheme::Scheme;
 use crate::solver::StopReason;
 
 /// Result of one step of a body.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SolveReport {
     /// The scheme used; it differs from the chosen one if a guard replaced it.
     pub scheme: Scheme,
@@ -57,7 +57,7 @@ impl SolveReport {
 }
 
 /// How a step ended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Outcome {
     /// The body advanced by the whole step.
     #[default]

@@ -3,7 +3,7 @@
 use super::DynamicsError;
 
 /// A time integration scheme. h is the step, a = M⁻¹ (f_ext − f_int − D v).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Scheme {
     /// No inertia: every step ends in equilibrium with the loads, at rest.
     Static,
@@ -81,7 +81,7 @@ impl Scheme {
 }
 
 /// How mass is distributed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum MassKind {
     /// One number per node.
     #[default]

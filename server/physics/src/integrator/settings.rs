@@ -4,7 +4,7 @@ use super::scheme::{MassKind, Scheme};
 use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
 
 /// Settings of a [`ModelSolver`](super::ModelSolver).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct DynamicsSettings {
     /// Time integration scheme.
     pub scheme: Scheme,

@@ -31,7 +31,7 @@ const MASS_TOLERANCE: f64 = 1e-6;
 const MASS_ITERATIONS: u32 = 60;
 
 /// The simulated level, and what it was brought up to date with.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct SimulatedLevel {
     composite: Composite,
     coefficients: Coefficients,

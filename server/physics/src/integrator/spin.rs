@@ -6,7 +6,7 @@ use super::parts::LooseParts;
 use super::state::State;
 
 /// Measures how fast connected parts turn, and slows free ones.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct SpinGuard {
     parts: Vec<Spin>,
     /// Smallest radius of gyration of a free part at rest about any of its axes [m]; infinite if none is
@@ -14,7 +14,7 @@ pub struct SpinGuard {
     least_radius: f64,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Spin {
     mass: f64,
     /// Σ m x, Σ m v.

@@ -33,7 +33,7 @@ use crate::operator::Spring;
 /// assert!(force.z > 0.0 && force.norm() <= 2.0);
 /// # Ok::<(), scindo_physics::body::BodyError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PointSpring {
     /// The point; its carriers are all of one piece.
     pub point: MaterialPoint,
@@ -46,7 +46,7 @@ pub struct PointSpring {
 }
 
 /// Direction and rest position of a [`PointSpring`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum SpringKind {
     /// f = k · max(0, offset − n·x_p) n: keeps the point on the side n points to.
     OneSided {
@@ -97,7 +97,7 @@ impl PointSpring {
 }
 
 /// Mode of a spring, fixed within one linear solve.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 enum Mode {
     Off,
     Linear,
@@ -110,7 +110,7 @@ enum Mode {
 /// Friction at its bound, linearised. Across the direction t of slipping it turns with the point. Along t it is
 /// constant (Newton's method) or, where that has not settled, a spring to the anchor that gives the bound where it was
 /// linearised: such a spring never pushes a point past its anchor.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Slip {
     /// Force [N] where it was linearised, along t.
     force: Vector3<f64>,
@@ -159,7 +159,7 @@ const NOTABLE_FORCE: f64 = 1e-3;
 const SAME_FRICTION: f64 = 1e-3;
 
 /// The law of a spring in the course of one step: force and stiffness by the position of its point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct SpringLaw {
     kind: SpringKind,
     /// k [N/m].
@@ -433,7 +433,7 @@ fn is_finite(v: &Vector3<f64>) -> bool {
 }
 
 /// A spring in the course of one step.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct ActiveSpring {
     point: MaterialPoint,
     law: SpringLaw,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::operator::FixedCopy;
 
 /// Positions and velocities that a body keeps from step to step, one entry per copy.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Positions [m].
     pub x: Vec<Vector3<f64>>,

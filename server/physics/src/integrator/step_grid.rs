@@ -12,7 +12,7 @@ use crate::team::Team;
 const STIFFEST_SPRING: f64 = 1.0;
 
 /// Multigrid, and what it was brought up to date with.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct StepGrid {
     multigrid: Multigrid,
     coefficients: Coefficients,

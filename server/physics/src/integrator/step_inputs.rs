@@ -205,7 +205,7 @@ impl LinearInputs<'_> {
 }
 
 /// The loads of a step, to be compared with those of the next.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct KnownLoads {
     material: Option<Material>,
     gravity: Vector3<f64>,

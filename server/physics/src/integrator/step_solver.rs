@@ -1,11 +1,13 @@
 //! The ways to solve the equations of a step, behind one interface.
 
+use std::any::Any;
 use std::fmt::Debug;
 
 use nalgebra::Vector3;
 
 use super::course::Course;
 use super::linearly_implicit::LinearlyImplicit;
+use super::model_solver::ModelSolver;
 use super::notice::Notice;
 use super::report::SolveReport;
 use super::scheme::Scheme;
@@ -17,13 +19,16 @@ use crate::element::Points;
 use crate::material::Material;
 use crate::multigrid::{CoarsestSolve, LevelReport};
 use crate::operator::{FixedCopy, Stiffness};
+use crate::saved::saved_as;
 use crate::solver::{Method, NewtonSettings, PcgSettings};
 use crate::space::Space;
 use crate::team::Team;
 
+saved_as!(saved_solver, Box, StepSolver, Linear(LinearlyImplicit), Model(ModelSolver));
+
 /// Solves the equations of one step, from the state before it. What all ways have in common (history,
 /// guards, energy balance, report) is in [`Dynamics`](super::Dynamics).
-pub trait StepSolver: Debug + Send {
+pub trait StepSolver: Any + Debug + Send {
     /// Moves `state` by the step with `scheme`, and writes spring forces and report. If the result is not
     /// finite the outcome is `Held`, and `state` may be anything.
     fn attempt(
@@ -143,7 +148,7 @@ pub struct SolverSettings {
 }
 
 /// The springs of a step that can be used.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct ActiveSprings {
     /// Usable springs.
     pub springs: Vec<ActiveSpring>,

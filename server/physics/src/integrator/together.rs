@@ -48,7 +48,7 @@ pub struct Member<'a> {
 }
 
 /// Memory of steps that are solved together, reused from step to step.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Together {
     pairs: Vec<ActivePair>,
     terms: PairTerms,

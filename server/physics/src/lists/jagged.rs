@@ -4,7 +4,7 @@ use super::reserve::reserve_half_again;
 
 /// Lists by number. One that has grown moves to the end of the vector and leaves a gap; gaps are closed when they
 /// take up more than a half.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Jagged<T> {
     /// Begin and end of every list.
     ranges: Vec<[u32; 2]>,

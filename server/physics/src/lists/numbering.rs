@@ -3,7 +3,7 @@
 use crate::lists::reserve::resize_reserving;
 
 /// Position of every item in a list. It is never cleared: a position is valid if the list has the item there.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Numbering {
     place: Vec<u32>,
 }

@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use super::{Corotational, Lame, Linear, Matrix9, NeoHookean, StVenantKirchhoff};
 
 /// The constitutive laws to choose from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Law {
     /// Small strains and small rotations: cheapest, and wrong as soon as the body rotates.
     Linear,

@@ -52,7 +52,7 @@ pub type Matrix9 = nalgebra::SMatrix<f64, 9, 9>;
 /// assert!(incompressible.check().is_err());
 /// # Ok::<(), scindo_physics::material::MaterialError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Material {
     /// Young's modulus E [Pa], within [`Material::YOUNG_PA`].
     pub young_pa: f64,
@@ -68,7 +68,7 @@ pub struct Material {
 
 /// Elastic constants and density of a region that differs from the rest of its body. Law and damping are those of
 /// the body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Region {
     /// Young's modulus E [Pa], within [`Material::YOUNG_PA`].
     pub young_pa: f64,
@@ -88,7 +88,7 @@ impl Region {
 
 /// Coefficients of Rayleigh damping D = α M + β K̂. K̂ rotates with the material, so β does not damp rigid
 /// motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rayleigh {
     /// α [1/s], ≥ 0: drag of the surroundings.
     pub mass_1_s: f64,
@@ -97,7 +97,7 @@ pub struct Rayleigh {
 }
 
 /// Lamé constants of an isotropic material.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Lame {
     /// μ [Pa], the shear modulus.
     pub mu: f64,

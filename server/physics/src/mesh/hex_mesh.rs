@@ -6,7 +6,7 @@ use super::{DEGENERATE_VOLUME, MeshError, TetMesh, box_mesh::split_cells};
 use crate::element::hex8;
 
 /// Trilinear hexahedra in their rest configuration.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct HexMesh {
     /// Rest positions [m], length n_nodes.
     pub nodes: Vec<Vector3<f64>>,

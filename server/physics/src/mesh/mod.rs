@@ -45,7 +45,7 @@ pub const TET_FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 
 /// assert!(turned_inside_out.check().is_err());
 /// # Ok::<(), scindo_physics::mesh::MeshError>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TetMesh {
     /// Rest positions [m], length n_nodes.
     pub nodes: Vec<Vector3<f64>>,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{TET_EDGES, TetMesh};
 
 /// Straight-sided ten-node tetrahedra in their rest configuration.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tet10Mesh {
     /// Rest positions [m]: first the nodes of the linear mesh, then the midpoints of its edges.
     pub nodes: Vec<Vector3<f64>>,

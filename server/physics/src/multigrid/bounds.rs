@@ -18,7 +18,7 @@ use crate::operator::cells::{slot_hanging, unit_stiffness};
 type Matrix24 = SMatrix<f64, 24, 24>;
 
 /// The largest eigenvalue of a leaf by its material and by which of its corners hang, for those that occurred.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct LeafBounds {
     known: BTreeMap<(u16, u8), f64>,
     largest: f64,

@@ -11,7 +11,7 @@ const OCTANTS: usize = 8;
 const HANGING: usize = 256;
 
 /// One matrix for every kind, octant and combination of hanging corners that children have.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Carried {
     /// Number of the matrix by kind, octant and hanging corners, or [`NONE`].
     number: Vec<u32>,

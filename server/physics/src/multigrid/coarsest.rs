@@ -25,7 +25,7 @@ pub enum CoarsestSolve {
 const SWEEPS: u32 = 24;
 
 /// The matrix of the coarsest level and its factors.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Coarsest {
     matrix: BlockCsr<f64>,
     cholesky: Cholesky<f64>,
@@ -37,6 +37,7 @@ pub struct Coarsest {
     r: Vec<Vector3<f64>>,
     z: Vec<Vector3<f64>>,
     /// Positions of the 64 blocks of every cell.
+    #[serde(with = "crate::saved::arrays")]
     places: Vec<[u32; 64]>,
 }
 

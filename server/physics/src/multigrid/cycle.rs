@@ -22,7 +22,7 @@ const LOCAL_ITERATIONS: u32 = 30;
 const SAFETY: f64 = 1.1;
 
 /// Settings of the cycles.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct MultigridSettings {
     /// Smoother, before and after each correction.
     pub smoother: Smoother,
@@ -55,7 +55,7 @@ pub struct LevelReport {
 /// Multigrid for one body: hierarchy, operators and vectors.
 ///
 /// Nothing is allocated between cuts, unless more cells need a matrix of their own.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Multigrid {
     settings: MultigridSettings,
     pub(super) hierarchy: Hierarchy,
@@ -76,7 +76,7 @@ pub struct Multigrid {
 
 /// Vectors of one level, one entry per vertex. The level that is solved on has its solution outside; finer ones
 /// have scratch for restriction and prolongation alone.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Vectors {
     pub(super) inverse: Vec<Inverse3>,
     pub(super) largest: f64,

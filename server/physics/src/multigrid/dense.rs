@@ -16,7 +16,7 @@ pub type Packed = [f32; PACKED];
 const HELD_STIFFNESS: f32 = 1e-3;
 
 /// A matrix by columns; row and column 3 c + i belong to vertex c and component i.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Dense(pub [[f32; 24]; 24]);
 
 impl Default for Dense {

@@ -30,7 +30,7 @@ const STORED_BLOCK: usize = 8;
 pub(super) type Rotation = UnitQuaternion<f32>;
 
 /// Constants of the material of cells.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CellMaterial {
     /// Lamé parameters [Pa].
     pub lame: Lame,
@@ -39,7 +39,7 @@ pub struct CellMaterial {
 }
 
 /// The constants of A = `mass_factor` M + `scale` K̂.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Coefficients {
     /// By number of the material; cells of further numbers have those of number 0, the body.
     pub materials: Vec<CellMaterial>,
@@ -50,7 +50,7 @@ pub struct Coefficients {
 }
 
 /// The matrix of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum CellMatrix {
     /// That of its kind.
     Shared(u32),
@@ -59,7 +59,7 @@ pub enum CellMatrix {
 }
 
 /// A matrix that belongs to one cell.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Stored {
     /// The cell, or [`NONE`] if the place is free.
     pub cell: u32,
@@ -69,11 +69,12 @@ pub struct Stored {
     /// duplicates, there may be more than eight.
     pub(super) relative: Vec<Rotation>,
     /// Over the vertices that carry the cell, in its frame.
+    #[serde(with = "crate::saved::array")]
     pub matrix: Packed,
 }
 
 /// The matrices of one level.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct LevelMatrices {
     /// Frame of every cell: its rotation, or the mean one of its children; I where vertices are prescribed in
     /// some directions only.
@@ -103,7 +104,7 @@ pub struct Updated {
 }
 
 /// The matrices of all levels.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Galerkin {
     pub levels: Vec<LevelMatrices>,
     /// Matrix of every kind of cell; for leaves without mass.

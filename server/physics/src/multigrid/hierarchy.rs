@@ -15,7 +15,7 @@ pub const COARSE_ENOUGH: usize = 3_000;
 const STALLED: f64 = 0.9;
 
 /// Cells, vertices and transfers of all levels; no numbers of materials or shapes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hierarchy {
     /// Side of a finest cell [m].
     pub(super) h: f64,
@@ -38,7 +38,7 @@ pub struct Hierarchy {
 }
 
 /// How far cells are merged.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Limits {
     /// Number of unknowns that is small enough.
     coarse_enough: usize,
@@ -51,7 +51,7 @@ struct Limits {
 }
 
 /// What leads from a level to the next coarser one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Step {
     /// Coarse cell of every fine cell.
     pub parent: Vec<u32>,
@@ -62,7 +62,7 @@ pub struct Step {
 }
 
 /// Cubes with the same matrix up to their rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct Kind {
     /// Number of the material.
     pub material: u16,

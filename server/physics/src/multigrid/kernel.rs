@@ -17,7 +17,7 @@ use crate::team::{Team, blocks};
 const DIAGONAL: [usize; 3] = [0, 4, 6];
 
 /// The cells of a level, arranged for the kernels.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct LevelKernel {
     operator: CellOperator,
     lanes: Vec<CellLane>,

@@ -13,7 +13,7 @@ pub const NONE: u32 = u32::MAX;
 pub type Link = (u32, u32, u8);
 
 /// The cells of one level, and the vertices they rest on.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Level {
     /// Cells; several may be at one position. `cut` is not used.
     pub cells: Vec<Cell>,

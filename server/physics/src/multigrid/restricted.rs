@@ -3,14 +3,14 @@
 use crate::operator::{Block6, Inverse3, Padded, Spring};
 
 /// Springs by the vertices of a level. Prescribed directions make the weights of x, y and z differ.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct RestrictedSprings {
     springs: Vec<Restricted>,
     /// Vertices and weights of all springs, one after the other.
     entries: Vec<(u32, [f32; 3])>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Restricted {
     /// First of its entries.
     first: usize,

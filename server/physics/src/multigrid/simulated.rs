@@ -28,7 +28,7 @@ use crate::team::Team;
 const STIFFEST_SPRING: f64 = 1.0;
 
 /// The simulated level of a body: its operator, springs, prescribed directions and preconditioners.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Composite {
     multigrid: Multigrid,
     /// The operator of the level.
@@ -48,7 +48,7 @@ pub struct Composite {
 }
 
 /// Buffers in which rows of the composed prolongation are made.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct RowBuffers {
     row: Vec<(u32, f32)>,
     next: Vec<(u32, f32)>,

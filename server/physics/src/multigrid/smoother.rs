@@ -13,7 +13,7 @@ use crate::team::{Team, blocks};
 pub type Multiply<'a> = dyn FnMut(&mut Team, &[Padded], &mut [Padded]) + 'a;
 
 /// How a cycle smooths, before and after the correction by the coarser level.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Smoother {
     /// Chebyshev polynomial of the fourth kind in D⁻¹A, D the 3×3 diagonal blocks, of this degree: 1 … 4.
     /// Symmetric, and the same on any number of threads.

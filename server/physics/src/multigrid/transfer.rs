@@ -10,7 +10,7 @@ use crate::operator::{BLOCK, Padded};
 use crate::team::{Team, blocks};
 
 /// P by rows and by columns.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Transfer {
     rows: Jagged<(u32, f32)>,
     columns: Jagged<(u32, f32)>,

@@ -17,7 +17,7 @@ use super::lattice::At;
 /// Where interior leaves are fine. A criterion that is `None` is off; without any, nothing changes.
 ///
 /// Both values of a criterion: where leaves begin to be divided, and where they begin to be joined again.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AdaptSettings {
     /// Distance of a tool from the box around the deformed leaf [m]: below the first it is divided, above the
     /// second joined. The first is smaller.

@@ -18,7 +18,7 @@ use crate::material::Region;
 pub const DIRECTIONS: [At; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
 
 /// A leaf of the octree: one finite element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Cell {
     /// Low corner, in sides of finest cells.
     pub at: At,
@@ -56,7 +56,7 @@ impl Cell {
 }
 
 /// Where a link is cut. Fractions count from the lower end, which is the centre of the lower cell.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CutLink {
     /// Fraction of the way from the lower to the upper centre of the cut nearest to the lower one, and of
     /// that nearest to the upper one.
@@ -74,7 +74,7 @@ pub type LinkKey = (At, u8);
 ///
 /// Vertices are numbered; they are the copies of [`Space`](crate::space::Space). Those of the uncut body come
 /// first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Octree {
     pub(super) lattice: Lattice,
     pub(super) map: LeafMap,

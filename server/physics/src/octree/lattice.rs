@@ -16,7 +16,7 @@ const BRICK_CELLS: usize = 1 << (3 * BRICK);
 const WHOLE: u32 = 1 << 31;
 
 /// Place and size of the finest cells.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Lattice {
     /// Position of lattice point (0, 0, 0) [m].
     pub origin: Vector3<f64>,
@@ -51,12 +51,13 @@ impl Lattice {
 }
 
 /// The leaf that covers each finest cell, in bricks of 8³.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct LeafMap {
     size: [u32; 3],
     bricks_along: [usize; 3],
     /// Per brick [`OUTSIDE`], the only leaf with [`WHOLE`], or the number of its entries in `leaves`.
     bricks: Vec<u32>,
+    #[serde(with = "crate::saved::arrays")]
     leaves: Vec<[u32; BRICK_CELLS]>,
     /// Entries of `leaves` that no brick uses, since one leaf covers it again.
     free: Vec<u32>,

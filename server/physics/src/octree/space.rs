@@ -42,7 +42,7 @@ const SIDE_STEP: f64 = 1e-6;
 const BEHIND: f64 = 0.25;
 
 /// An octree that is cut, with everything that a body asks of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct OctreeSpace {
     pub(super) octree: Octree,
     /// The uncut state.

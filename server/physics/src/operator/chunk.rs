@@ -13,7 +13,7 @@ use crate::lists::numbering::Numbering;
 use crate::lists::reserve::resize_reserving;
 use crate::mesh::TetMesh;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Chunk {
     /// Region of its elements.
     pub region: usize,

@@ -167,7 +167,7 @@ impl Packing {
 
 /// Rows of the chunks' sums of every copy, in chunk order, within one vector for all chunks. Row 0 of
 /// that vector is always 0.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Gather {
     /// First row of every chunk's own sums, and the end. A chunk has rows for its copies, for the waste
     /// bin and for copies that cuts add.

@@ -12,14 +12,14 @@ use crate::team::{Team, blocks};
 const UNIT: usize = 16;
 
 /// The blocks, and the terms they are summed from.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct CompositeDiagonal {
     copies: Vec<Copy>,
     terms: Vec<Term>,
     blocks: Vec<Block6>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Copy {
     copy: u32,
     /// Its part of `terms`.
@@ -29,7 +29,7 @@ struct Copy {
 }
 
 /// Contribution of one piece to one block.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Term {
     place: Place,
     /// √(w V) times the gradient in the new variables, at rest.

@@ -16,7 +16,7 @@ use crate::element::{Ids, LANES, Lanes, Simd, Vector8};
 const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Eight pairs of copies.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 struct EdgeBatch {
     /// s K_ab, row by row [kg in a step].
@@ -26,7 +26,7 @@ struct EdgeBatch {
 }
 
 /// s K̂ of one chunk, assembled. Local numbers are below those of the [`Batches`] it is made from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct EdgeBlocks {
     batches: Vec<EdgeBatch>,
     /// For every batch of tets, pair of corners and lane: 8 · batch + lane of the pair here, or

@@ -22,7 +22,7 @@ use crate::team::{Team, blocks, ranges};
 const MOST_LANES: usize = 8192;
 
 /// How K̂ is applied.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum OperatorChoice {
     /// Assembled if the stiffness stays the same from step to step (the linear law), by the tets if it
     /// rotates with the material.
@@ -35,7 +35,7 @@ pub enum OperatorChoice {
 }
 
 /// s K̂ of a body; also its internal forces and the diagonal blocks of s K̂.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct Elastic {
     simd: Simd,
     /// Which pieces have a lane, and what it integrates.
@@ -365,7 +365,7 @@ impl Stiffness for Elastic {
 }
 
 /// Marks of the pieces that a cut concerns; none between cuts.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Marks {
     /// Carriers whose lanes are to be amended.
     amended: Vec<bool>,

@@ -17,7 +17,7 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 ///
 /// # Source
 /// Baraff, Witkin 1998, *Large steps in cloth simulation*, §5.1 and §5.3.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Held {
     /// Along some of x, y, z. Such components are set, not projected, so they have no rounding.
     Axes([bool; 3]),

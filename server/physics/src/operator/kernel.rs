@@ -16,7 +16,7 @@ use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar
 use crate::mesh::TetMesh;
 
 /// Data that one application streams, per batch of eight pieces.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 struct Batch {
     /// Rotated gradients √(2μ w V s) R g_k, k = 1, 2, 3, with s the factor of K̂ in the operator;
@@ -27,7 +27,7 @@ struct Batch {
 }
 
 /// Data that only an update needs, per batch.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub struct RestBatch {
     /// Rest gradients g_1, g_2, g_3 [1/m].
@@ -78,7 +78,7 @@ impl RestBatch {
 pub type Block6 = [f32; 8];
 
 /// Constants of one update.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Coefficients {
     /// μ [Pa].
     pub mu: f32,
@@ -101,7 +101,7 @@ pub struct Locals<'a> {
 }
 
 /// The batches of one chunk. Their local numbers are checked once, here.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Batches {
     live: Vec<Batch>,
     rest: Vec<RestBatch>,

@@ -29,10 +29,14 @@ pub use stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
 pub use substitution::{Substitutable, Substitution};
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 
+use crate::saved::saved_as;
 use crate::team::{Team, blocks};
+use cells::CellStiffness;
 
 /// A vector of three components with an unused fourth (always 0), so that one copy is one register.
 pub type Padded = [f32; 4];
+
+saved_as!(saved_stiffness, Box, Stiffness, Tets(Elastic), Cells(CellStiffness));
 
 /// Copies per block of the vector loops: the unit of work and of summation.
 pub const BLOCK: usize = 256;

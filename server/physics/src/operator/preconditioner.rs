@@ -15,7 +15,7 @@ use crate::team::{Team, blocks};
 /// It makes the solver insensitive to the size of pieces: mass and stiffness of a sliver of 1e-15 of an
 /// element are equally small. With a substitution T the blocks are those of TᵀA T, and the preconditioner
 /// is T M⁻¹ Tᵀ; residuals are kept as Tᵀr.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct BlockJacobi {
     inverse: Vec<Inverse3>,
     substitution: Substitution,
@@ -23,7 +23,7 @@ pub struct BlockJacobi {
 
 /// The inverse of one symmetric 3×3 block in 32 bytes, which a step streams through once per iteration:
 /// rows (xx, xy, yy, 0) and (xz, yz, zz, 0), so that a shuffle of the two is a column.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Inverse3(pub [Padded; 2]);
 
 impl Inverse3 {

@@ -9,7 +9,7 @@ use crate::cut::Piece;
 use crate::lists::numbering::Numbering;
 
 /// Assignment of pieces to lanes. The *carrier* of a piece is the piece whose lane integrates it.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct SharedLanes {
     /// For every piece its carrier: the first piece of its element with the same copies.
     of_piece: Vec<u32>,
@@ -25,7 +25,7 @@ pub struct SharedLanes {
 }
 
 /// The pieces of one lane, merged into one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Merged {
     /// The carrier, with the sum of the fractions.
     pub piece: Piece,

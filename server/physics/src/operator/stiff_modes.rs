@@ -36,7 +36,7 @@ pub fn degenerate_elements(mesh: &TetMesh) -> Vec<u32> {
 }
 
 /// A piece on a copy of a degenerate element.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct NearPiece {
     /// Index of the piece.
     pub piece: u32,
@@ -51,7 +51,7 @@ pub struct NearPiece {
 }
 
 /// The pieces of degenerate elements, and all that share a copy with them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct StiffModes {
     near: Vec<NearPiece>,
     /// Which of them are of degenerate elements, the stiffest first.

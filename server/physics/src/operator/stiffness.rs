@@ -12,7 +12,7 @@ use crate::material::{Lame, Law};
 use crate::team::{Team, blocks};
 
 /// Parameters of an update.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct ElasticUpdate {
     /// Lamé parameters [Pa].
     pub lame: Lame,
@@ -24,7 +24,7 @@ pub struct ElasticUpdate {
 
 /// Where a stiffness keeps a piece; valid until the next cut. Only the stiffness that gave a place interprets
 /// its numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Place {
     /// Chunk: the unit of work of one thread.
     pub chunk: u32,

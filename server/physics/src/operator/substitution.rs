@@ -52,7 +52,7 @@ impl Substitutable for f64 {
 }
 
 /// T, as a product of steps u_a = û_a + Σ λ_b û_b; empty where nothing is substituted.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Substitution {
     /// Copy a of every step, and the end of its entries in `leaders`.
     steps: Vec<(u32, u32)>,

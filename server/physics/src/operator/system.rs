@@ -7,7 +7,7 @@ use crate::element::MaterialPoint;
 use crate::team::{Team, blocks};
 
 /// A copy whose displacement is prescribed in some directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FixedCopy {
     /// Index of the copy.
     pub copy: u32,
@@ -18,7 +18,7 @@ pub struct FixedCopy {
 }
 
 /// Stiffness along `direction` between a material point and the world, or in all directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spring {
     /// The point.
     pub point: MaterialPoint<f32>,

@@ -4,7 +4,7 @@ use crate::cut::topology::fragments::{Fragments, NONE};
 use crate::mesh::{TET_FACES, TetMesh};
 
 /// One boundary face of the uncut mesh.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct BaseFace {
     /// Element it belongs to.
     pub element: u32,
@@ -19,7 +19,7 @@ pub struct BaseFace {
 }
 
 /// All boundary faces of the uncut mesh.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Base {
     /// The faces.
     pub faces: Vec<BaseFace>,

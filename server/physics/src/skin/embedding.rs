@@ -15,7 +15,7 @@ const MAX_DIVISIONS: usize = 32;
 const MAX_TRIANGLES: usize = 4_000_000;
 
 /// Resolution of a skin, and how cuts divide it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SkinSettings {
     /// Parts of each edge of the boundary: n² skin triangles per boundary face.
     pub divisions: usize,
@@ -65,7 +65,7 @@ pub enum SkinError {
 }
 
 /// A skin, and the surface that it makes together with the lips.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Skin {
     settings: SkinSettings,
     base: Base,

@@ -11,7 +11,7 @@ use crate::mesh::TET_FACES;
 pub type Face = (u32, u8);
 
 /// The origin of a corner of a surface triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Corner {
     /// A skin point.
     Skin(u32),
@@ -22,7 +22,7 @@ pub enum Corner {
 }
 
 /// One edge of the cut curve: where a lip meets the boundary of the uncut mesh.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Border {
     /// Fragment below the skin next to the border.
     pub below: u32,
@@ -35,7 +35,7 @@ pub struct Border {
 }
 
 /// The triangles of one lip face.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Lip {
     /// Numbers of its surface triangles.
     pub triangles: Vec<u32>,

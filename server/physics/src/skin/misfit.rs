@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 /// Why skin and lips could not be joined. It cannot happen on a conforming cut curve.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Misfit {
     /// Two parts of the cut curve run along one edge of the skin.
     #[error("two parts of the cut curve run along one edge of the skin")]

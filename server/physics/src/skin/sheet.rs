@@ -12,7 +12,7 @@ use crate::cut::topology::fragments::{FragmentVertex, NONE};
 pub type SkinShape<'a> = dyn FnMut(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;
 
 /// A vertex of the skin.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Point {
     /// Where it lies on the boundary of the uncut mesh.
     pub at: FragmentVertex,
@@ -26,7 +26,7 @@ pub struct Point {
 pub type Claim = (u32, [u64; 3]);
 
 /// A closed triangulation; half-edge 3·t + k runs from corner k to the next of triangle t.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Sheet {
     /// The points.
     pub points: Vec<Point>,

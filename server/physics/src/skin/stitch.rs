@@ -40,14 +40,14 @@ pub struct Change<'a> {
 }
 
 /// The skin triangle or lip to which a surface triangle belongs.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 enum Owner {
     Skin(u32),
     Lip(Face),
 }
 
 /// The joined surface: its connectivity, and the origin of its triangles.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct SkinJoin {
     joined: Joined,
     parts: Parts,
@@ -57,7 +57,7 @@ pub struct SkinJoin {
 }
 
 /// The origin of every surface triangle, and the surface triangles of skin and lips.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Parts {
     owner: Vec<Owner>,
     corners: Vec<[Corner; 3]>,

@@ -10,7 +10,7 @@ use super::complex::Complex;
 pub type EdgeKey = [u32; 2];
 
 /// Where a sweep crosses an edge. It is a point of the material and moves with it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Crossing {
     /// Parameter along the edge, from its lower node.
     pub t: f64,
@@ -25,7 +25,7 @@ pub struct Crossing {
 const HALVED: f64 = 1e-9;
 
 /// The record of one incision.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Memory {
     /// Crossings of edges neither end of which lies on the cut surface.
     pub crossings: BTreeMap<EdgeKey, Crossing>,

@@ -15,7 +15,7 @@ use crate::cut::{BladeSweep, CutError, CutMesh, ElementsAround, Front, sweep_bou
 use crate::mesh::TetMesh;
 
 /// Counts of what one cut did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SnapReport {
     /// Faces selected by this sweep.
     pub faces: usize,
@@ -55,7 +55,7 @@ pub struct SnapCut {
 }
 
 /// Cuts one body along its faces, and remembers unfinished incisions.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Snapper {
     memories: BTreeMap<u32, Memory>,
     fronts: BTreeMap<u32, Front>,

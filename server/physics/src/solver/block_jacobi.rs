@@ -10,7 +10,8 @@ use crate::operator::Held;
 /// M⁻¹: the inverses of the 3×3 diagonal blocks of A, 0 in the prescribed directions.
 ///
 /// The norm √(rᵀM⁻¹r) weighs every copy by its own stiffness, so that slivers count.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
+#[serde(bound(serialize = "T: Real + serde::Serialize", deserialize = "T: Real + serde::Deserialize<'de>"))]
 pub struct DiagonalInverse<T> {
     inverse: Vec<Matrix3<T>>,
 }

@@ -20,8 +20,10 @@ use super::real::Real;
 use crate::assembly::BlockCsr;
 
 /// Symbolic and numeric factorisation of one matrix, with all memory it needs.
-#[derive(Default)]
+#[derive(Default, serde::Serialize)]
 pub struct Cholesky<T> {
+    /// Follows from the pattern of A.
+    #[serde(skip)]
     symbolic: Option<SymbolicCholesky<u32>>,
     /// The upper triangle of A by columns: start of every column, row of every entry.
     first: Vec<u32>,
@@ -34,24 +36,58 @@ pub struct Cholesky<T> {
     held: Vec<bool>,
     /// Copies that are held in inclined directions, ascending, with P and with H times the size of their block.
     inclined: Vec<(u32, Matrix3<f64>, Matrix3<f64>)>,
+    #[serde(skip)]
     scratch: Option<MemBuffer>,
     factored: bool,
 }
 
 /// Entry `entry` of block `block`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Source {
     block: u32,
     entry: u8,
 }
 
 /// Why a factorisation failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Failure {
     /// The pivot of this displacement (3 · copy + axis) is not positive.
     Pivot(u32),
     /// There is not enough memory for the factors, or the matrix is too large for its indices.
     Memory,
+}
+
+/// The entries of a saved factorisation; the analysis follows from the pattern.
+#[derive(serde::Deserialize)]
+struct Saved<T> {
+    first: Vec<u32>,
+    rows: Vec<u32>,
+    source: Vec<Source>,
+    values: Vec<T>,
+    factor: Vec<T>,
+    right: Vec<T>,
+    held: Vec<bool>,
+    inclined: Vec<(u32, Matrix3<f64>, Matrix3<f64>)>,
+    factored: bool,
+}
+
+impl<'de, T: Real + faer::traits::ComplexField + serde::Deserialize<'de>> serde::Deserialize<'de>
+    for Cholesky<T>
+{
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let Saved { first, rows, source, values, factor, right, held, inclined, factored } =
+            Saved::deserialize(from)?;
+        let (symbolic, scratch) = (None, None);
+        let mut read =
+            Self { symbolic, first, rows, source, values, factor, right, held, inclined, scratch, factored };
+        if !read.first.is_empty() {
+            let analysed = read.analyse_pattern();
+            if analysed.is_err() || read.symbolic.as_ref().is_none_or(|s| s.len_val() != read.factor.len()) {
+                return Err(serde::de::Error::custom("a factorisation that does not fit its pattern"));
+            }
+        }
+        Ok(read)
+    }
 }
 
 impl<T> std::fmt::Debug for Cholesky<T> {
@@ -86,6 +122,20 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
                 self.first.push(u32::try_from(self.rows.len()).map_err(|_| Failure::Memory)?);
             }
         }
+        self.analyse_pattern()?;
+        let Some(symbolic) = &self.symbolic else { return Err(Failure::Memory) };
+        self.factor.clear();
+        self.factor.try_reserve_exact(symbolic.len_val()).map_err(|_| Failure::Memory)?;
+        self.factor.resize(symbolic.len_val(), T::default());
+        self.values.resize(self.rows.len(), T::default());
+        self.right.resize(n, T::default());
+        self.held.resize(n, false);
+        Ok(())
+    }
+
+    /// The order of elimination, the pattern of L, and all memory for them.
+    fn analyse_pattern(&mut self) -> Result<(), Failure> {
+        let n = self.first.len().saturating_sub(1);
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.first, None, &self.rows);
         let symbolic =
             factorize_symbolic_cholesky(pattern, Side::Upper, Default::default(), Default::default())
@@ -95,12 +145,6 @@ impl<T: Real + faer::traits::ComplexField> Cholesky<T> {
             .factorize_numeric_llt_scratch::<T>(Par::Seq, Default::default())
             .or(symbolic.solve_in_place_scratch::<T>(1, Par::Seq));
         self.scratch = Some(MemBuffer::try_new(need).map_err(|_| Failure::Memory)?);
-        self.factor.clear();
-        self.factor.try_reserve_exact(symbolic.len_val()).map_err(|_| Failure::Memory)?;
-        self.factor.resize(symbolic.len_val(), T::default());
-        self.values.resize(self.rows.len(), T::default());
-        self.right.resize(n, T::default());
-        self.held.resize(n, false);
         self.symbolic = Some(symbolic);
         Ok(())
     }

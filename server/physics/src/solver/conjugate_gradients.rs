@@ -56,7 +56,8 @@ pub struct Stop {
 }
 
 /// Scratch vectors, one entry per copy; reused from solve to solve.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
+#[serde(bound(serialize = "T: Real + serde::Serialize", deserialize = "T: Real + serde::Deserialize<'de>"))]
 pub struct ConjugateGradients<T> {
     r: Vec<Vector3<T>>,
     z: Vec<Vector3<T>>,

@@ -11,7 +11,7 @@ use crate::operator::{FixedCopy, Held};
 ///
 /// # Source
 /// Baraff, Witkin 1998; the thesis' vector S (Jeřábková 2007, Fig. 4.15).
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Filter {
     held: Vec<(u32, Held)>,
 }

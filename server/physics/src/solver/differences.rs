@@ -10,7 +10,7 @@ use crate::assembly::BlockCsr;
 /// A stiffness has row sums of zero, and neighbours move almost alike: rounding then errs relative to
 /// the *strain* and not to the displacement. Applied plainly, rounding of A stiffens the softest
 /// modes, and the iteration has to be corrected every ten iterations or so.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Differences {
     matrix: BlockCsr<f32>,
     row_sums: Vec<[f32; 9]>,

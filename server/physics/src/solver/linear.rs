@@ -17,7 +17,7 @@ use crate::operator::{BLOCK, FixedCopy, StiffModes};
 use crate::team::{Team, blocks};
 
 /// How A x = b is solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Method {
     /// Conjugate gradients with only the constraint filter: the thesis' modified CG.
     Cg,
@@ -35,7 +35,7 @@ pub enum Method {
 }
 
 /// The precision of the work inside a linear solve.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Precision {
     /// Residuals and solution in double, everything else in single precision: as accurate as `Double`
     /// at half the memory traffic.
@@ -46,7 +46,7 @@ pub enum Precision {
 }
 
 /// Method, precision and stopping criteria of a linear solve.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LinearSettings {
     /// Method of the solve; may be changed between solves.
     pub method: Method,
@@ -75,7 +75,7 @@ impl Default for LinearSettings {
 const MOST_CORRECTIONS: u32 = 20;
 
 /// Solves linear systems again and again; nothing is allocated unless the pattern changes.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct LinearSolver {
     /// Settings; may be changed between solves.
     pub settings: LinearSettings,
@@ -91,7 +91,7 @@ pub struct LinearSolver {
 }
 
 /// Data of single-precision iterations.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Single {
     matrix: Differences,
     inverse: DiagonalInverse<f32>,
@@ -100,7 +100,8 @@ struct Single {
 }
 
 /// A factorisation, and the pattern and matrix it belongs to.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+#[serde(bound(deserialize = "T: Real + faer::traits::ComplexField + serde::Deserialize<'de>"))]
 struct Factors<T> {
     cholesky: Cholesky<T>,
     first: Vec<u32>,

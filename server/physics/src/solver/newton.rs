@@ -52,7 +52,7 @@ pub trait Potential {
 }
 
 /// Which Hessian Newton's method uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Curvature {
     /// The second derivative. A step at which it turns out indefinite is made with `Definite`.
     Exact,
@@ -62,7 +62,7 @@ pub enum Curvature {
 }
 
 /// Settings of Newton's method.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NewtonSettings {
     /// Largest number of Newton steps.
     pub steps: u32,
@@ -127,7 +127,7 @@ pub struct NewtonReport {
 }
 
 /// Newton's method with all its memory; reused from solve to solve without allocation.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Newton {
     /// Settings; may be changed between solves.
     pub settings: NewtonSettings,

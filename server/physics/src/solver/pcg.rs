@@ -10,7 +10,7 @@ use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Precondit
 use crate::team::{Team, blocks};
 
 /// Stopping criteria of a solve.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PcgSettings {
     /// Largest number of iterations, each one application of A.
     pub iterations: u32,
@@ -19,7 +19,7 @@ pub struct PcgSettings {
 }
 
 /// Scratch vectors of the solver, one entry per copy; reused from solve to solve.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Pcg {
     /// On input the residual b − A x of the start. On output that of the result, by recurrence, in the
     /// variables of the preconditioner.

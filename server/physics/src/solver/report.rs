@@ -1,7 +1,7 @@
 //! What every solver reports.
 
 /// Why a solver stopped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum StopReason {
     /// The residual fell below the tolerance.
     #[default]

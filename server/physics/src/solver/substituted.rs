@@ -11,7 +11,7 @@ use crate::assembly::BlockCsr;
 use crate::operator::{Held, StiffModes, Substitution};
 
 /// A substitution T, found anew whenever other copies are held.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Substituted {
     modes: Option<Arc<StiffModes>>,
     T: Substitution,

@@ -1,6 +1,7 @@
 //! What an element adds to the tetrahedra of surface and contact: more nodes, other shape functions, other
 //! faces.
 
+use std::any::Any;
 use std::fmt::Debug;
 
 use nalgebra::Vector3;
@@ -13,7 +14,7 @@ use crate::mesh::TetMesh;
 use crate::octree::Octree;
 
 /// A finite element on the nodes of a tet mesh, with the data it needs beside that.
-pub trait Element: Debug + Send + Sync {
+pub trait Element: Any + Debug + Send + Sync {
     /// The element's kind.
     fn kind(&self) -> ElementKind;
 

@@ -15,7 +15,7 @@ use crate::octree::Octree;
 const TETS_PER_HEX: usize = 6;
 
 /// Hexahedra with these nodes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hexahedra(pub HexMesh);
 
 impl Element for Hexahedra {

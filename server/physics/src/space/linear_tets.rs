@@ -10,7 +10,7 @@ use crate::material::Material;
 use crate::mesh::TetMesh;
 
 /// Linear tetrahedra.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct LinearTets;
 
 impl Element for LinearTets {

@@ -18,6 +18,9 @@ pub use quadratic_tets::QuadraticTets;
 pub use rest_point::RestPoint;
 pub use tets::Tets;
 
+use std::any::Any;
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
@@ -28,7 +31,11 @@ use crate::mesh::MeshError;
 use crate::multigrid::Hierarchy;
 use crate::octree::OctreeSpace;
 use crate::operator::{StiffModes, Stiffness};
+use crate::saved::saved_as;
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+
+saved_as!(saved_space, Box, Space, Tets(Tets), Octree(OctreeSpace));
+saved_as!(saved_element, Arc, Element, Linear(LinearTets), Quadratic(QuadraticTets), Hexahedra(Hexahedra));
 
 /// What is called for a piece: with its element, its copies, and ∫ N_a dV [m³] over it for each of them.
 pub type VisitPiece<'a> = dyn FnMut(usize, &[u32], &[f64]) + 'a;
@@ -40,7 +47,7 @@ pub type VisitPiece<'a> = dyn FnMut(usize, &[u32], &[f64]) + 'a;
 /// of the uncut body; further ones are appended, and a reset removes them. Coarsening of an
 /// [octree](Self::octree_mut), and nothing else, removes some of the further ones, and the others close up. Copies
 /// come before the nodes that elements of higher order add.
-pub trait Space: Points + Send {
+pub trait Space: Any + Points + Send {
     /// The finite element.
     fn kind(&self) -> ElementKind;
 

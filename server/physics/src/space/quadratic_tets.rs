@@ -10,7 +10,7 @@ use crate::material::Material;
 use crate::mesh::{TET_EDGES, Tet10Mesh, TetMesh};
 
 /// Quadratic tetrahedra with these nodes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct QuadraticTets(pub Tet10Mesh);
 
 impl Element for QuadraticTets {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 /// A material point, as the [`Space`](super::Space) that located it finds it again after cuts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RestPoint {
     /// Its rest position [m].
     pub rest_m: Vector3<f64>,

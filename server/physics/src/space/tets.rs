@@ -34,9 +34,10 @@ const PIECE_BYTES: usize = 2000;
 const TRIANGLE_BYTES: usize = 400;
 
 /// Linear or quadratic tetrahedra, or hexahedra that are divided into tetrahedra. Only linear ones are cut.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Tets {
     cut: CutMesh,
+    #[serde(with = "super::saved_element")]
     element: Arc<dyn Element>,
     skin: Option<Skin>,
     /// A cut that was begun, and the positions it began with [m].

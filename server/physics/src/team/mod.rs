@@ -68,6 +68,11 @@ impl Team {
         })
     }
 
+    /// A team of the caller alone.
+    pub fn alone() -> Self {
+        Self { threads: Arc::new(Threads::alone()), gate: 0, stop: None, marks: Marks::default() }
+    }
+
     /// A team for each of the `sizes`, all on the same `threads` threads (the caller's included), and the lead
     /// under which they work side by side. A size is the work of a team relative to the others.
     pub fn sharing(threads: usize, sizes: &[usize]) -> std::io::Result<(Lead, Vec<Self>)> {

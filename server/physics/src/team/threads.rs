@@ -44,18 +44,27 @@ impl Threads {
     /// `sizes`. Members are at home where their share of the sizes is.
     pub fn new(members: usize, sizes: &[usize]) -> std::io::Result<Self> {
         let members = members.max(1);
-        let shared = Arc::new(Shared {
-            gates: (0..=sizes.len()).map(|_| Gate::new(members)).collect(),
-            home: (0..members).map(|member| home(member, members, sizes)).collect(),
-            stop: AtomicBool::new(false),
-        });
-        let mut threads = Self { shared, members: Vec::new() };
+        let mut threads = Self::room(members, sizes);
         for member in 1..members {
             let shared = Arc::clone(&threads.shared);
             let thread = std::thread::Builder::new().name(format!("physics-{member}"));
             threads.members.push(thread.spawn(move || shared.serve(member))?);
         }
         Ok(threads)
+    }
+
+    /// No thread but the caller's.
+    pub fn alone() -> Self {
+        Self::room(1, &[])
+    }
+
+    fn room(members: usize, sizes: &[usize]) -> Self {
+        let shared = Arc::new(Shared {
+            gates: (0..=sizes.len()).map(|_| Gate::new(members)).collect(),
+            home: (0..members).map(|member| home(member, members, sizes)).collect(),
+            stop: AtomicBool::new(false),
+        });
+        Self { shared, members: Vec::new() }
     }
 
     /// Number of members, the caller included.

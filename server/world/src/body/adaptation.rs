@@ -8,7 +8,7 @@ use super::region;
 use crate::scene::checked::{AdaptSpec, Region};
 
 /// What adaptations did since the start or the last reset.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct AdaptCounts {
     /// Steps that began with other cells than the step before ended with.
     pub changes: u64,
@@ -21,7 +21,7 @@ pub struct AdaptCounts {
 }
 
 /// Settings, memory and counts of one body.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Adaptation {
     spec: AdaptSpec,
     /// Where the body is held, one region per `fix` of the scene.

@@ -15,7 +15,7 @@ const CALM: u64 = 50;
 const MOSTLY: f64 = 0.5;
 
 /// Steps of one body, counted by what went wrong in them. One step may count in several fields.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StepCounts {
     /// Steps requested.
     pub steps: u64,
@@ -119,7 +119,7 @@ fn refusal(notice: Option<Notice>) -> String {
 }
 
 /// A trouble from its first step until it is over.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Spell {
     /// Steps with the trouble since it began. 0: there is none.
     steps: u64,
@@ -130,7 +130,7 @@ struct Spell {
 }
 
 /// Observes the steps of one body.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Watch {
     /// Counts since the start or the last reset.
     pub counts: StepCounts,

@@ -10,7 +10,6 @@ pub mod region;
 
 mod shown;
 
-use std::mem::Discriminant;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -29,7 +28,7 @@ pub use shown::SurfaceTopology;
 pub(crate) use shown::von_mises;
 
 /// A deformable body with its name and its groups of held nodes.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct SimBody {
     /// Name in the scene, events and messages.
     pub id: Arc<str>,
@@ -40,6 +39,7 @@ pub struct SimBody {
     /// The same groups before the first cut that changed the mesh.
     fix_groups_uncut: Option<Vec<Vec<u32>>>,
     /// Faults found and repaired in its mesh file. `None` for a body without a file.
+    #[serde(skip)]
     pub health: Option<MeshHealth>,
     /// Volume at rest [m³].
     pub rest_volume_m3: f64,
@@ -52,14 +52,26 @@ pub struct SimBody {
     /// How its cells are adapted; none: they are not.
     adaptation: Option<Box<Adaptation>>,
     watch: Watch,
-    /// The kind of notice reported for the last step, so that it is not repeated.
-    pub(crate) noticed: Option<Discriminant<Notice>>,
+    /// The last notice that was reported, so that its kind is not repeated.
+    pub(crate) noticed: Option<Notice>,
     recovery: StressRecovery,
+    /// What is added to the epoch that others see, so that it rises when an earlier state is restored.
+    #[serde(skip)]
+    epochs_before: u32,
+    #[serde(skip)]
     topology: Option<Arc<SurfaceTopology>>,
+    #[serde(skip)]
     surface: Vec<[f32; 3]>,
+    #[serde(skip, default = "yes")]
     surface_is_old: bool,
+    #[serde(skip)]
     marks: Vec<IncisionMark>,
+    #[serde(skip, default = "yes")]
     marks_are_old: bool,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// Sizes of a body that determine its costs.
@@ -94,6 +106,7 @@ impl SimBody {
             watch: Watch::default(),
             noticed: None,
             recovery: StressRecovery::default(),
+            epochs_before: 0,
             topology: None,
             surface: Vec::new(),
             surface_is_old: true,
@@ -168,6 +181,16 @@ impl SimBody {
     /// cells, and with every reset.
     pub fn epoch(&self) -> u32 {
         self.body.epoch()
+    }
+
+    /// The epoch that viewers and clients see: it rises with the epoch, and whenever an earlier state is restored.
+    pub fn shown_epoch(&self) -> u32 {
+        self.body.epoch().wrapping_add(self.epochs_before)
+    }
+
+    /// Lets the epoch that others see go on after that of `other`, in whose place this body steps.
+    pub(crate) fn follow_epoch_of(&mut self, other: &Self) {
+        self.epochs_before = other.shown_epoch().wrapping_add(1).wrapping_sub(self.body.epoch());
     }
 
     /// The sizes that determine its costs.
@@ -346,8 +369,9 @@ impl SimBody {
 
     /// Triangles of the present epoch, computed at the first call in an epoch.
     pub fn topology(&mut self) -> Arc<SurfaceTopology> {
-        let body = &self.body;
-        self.topology.get_or_insert_with(|| Arc::new(shown::topology(body))).clone()
+        let (body, epoch) = (&self.body, self.shown_epoch());
+        let topology = || Arc::new(SurfaceTopology { epoch, ..shown::topology(body) });
+        self.topology.get_or_insert_with(topology).clone()
     }
 }
 

@@ -8,7 +8,7 @@ use scindo_physics::body::Body;
 use scindo_physics::space::RestPoint;
 
 /// A material point that is recorded.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Probe {
     /// Name in the scene and in the records.
     pub id: String,

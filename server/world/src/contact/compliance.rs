@@ -25,7 +25,7 @@ const LIMIT: f64 = 20.0;
 const PUNCH: f64 = 5.0 / 3.0;
 
 /// Running estimate of the compliance under one tool in a step [m/N].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Compliance {
     guess: f64,
     estimate: f64,

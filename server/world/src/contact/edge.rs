@@ -44,7 +44,7 @@ const MOST_GROWTH: f64 = 2.0;
 const ENOUGH: usize = 3;
 
 /// The edge of one cutting blade.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Edge {
     /// From the tip to the heel, all of one length.
     parts: Vec<Option<Front>>,
@@ -63,7 +63,7 @@ pub struct Edge {
 }
 
 /// What an edge has done since it began to cut.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct EdgeReport {
     /// Parts of the edge that are in tissue, over all parts.
     pub inside: f64,
@@ -80,7 +80,7 @@ pub struct EdgeReport {
 }
 
 /// Where a part of the edge has got to.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Front {
     body: usize,
     epoch: u32,
@@ -97,7 +97,7 @@ struct Front {
 }
 
 /// The spring of a front in this step.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Load {
     normal: V,
     /// Place of the hand along the normal [m].

@@ -11,7 +11,7 @@ pub const MAX_HELD: usize = 7;
 const REACH_M: f64 = 0.004;
 
 /// One surface point in the grip.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Held {
     /// Triangle of the body's surface.
     pub triangle: u32,
@@ -24,7 +24,7 @@ pub struct Held {
 }
 
 /// The tissue that one tool holds.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Grip {
     body: usize,
     epoch: u32,

@@ -17,7 +17,7 @@ use crate::tool::geometry::core_radius;
 use crate::tool::{Tool, compound};
 
 /// Where one capsule of a compound tool may be, and where it presses.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Limb {
     proxy: Proxy,
     press: Press,
@@ -28,7 +28,7 @@ struct Limb {
 }
 
 /// The contact state of one tool, kept from step to step.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Hand {
     /// Number of the tool; see [`Tool::number`].
     tool: u64,

@@ -47,7 +47,7 @@ const CLOSE: f64 = 0.05;
 const AT_BOUND: f64 = 0.999;
 
 /// A surface point at one place of a face.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Held {
     body: usize,
     epoch: u32,
@@ -76,7 +76,7 @@ impl Held {
 }
 
 /// The grip of one pair of forceps.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Jaws {
     /// Distance of the faces at their ends [m]; `None` while they do not grip.
     gap_m: Option<f64>,

@@ -50,7 +50,7 @@ use surface::ContactSurface;
 const SPRING_CAPACITY: usize = MAX_TOOLS * MAX_POINTS * 3;
 
 /// Springs on one body, and the tools they belong to.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct BodyContacts {
     young_pa: f64,
     /// b = β/h: viscosity over the length of a step.
@@ -64,7 +64,7 @@ struct BodyContacts {
 }
 
 /// What is behind a spring.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Behind {
     tool: u32,
     /// Number of the capsule of a compound tool; 0 for others.
@@ -76,7 +76,7 @@ struct Behind {
 }
 
 /// Sums over one tool's springs.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Sums {
     force: Vector3<f64>,
     /// Its part on each capsule of a compound tool.
@@ -89,7 +89,7 @@ struct Sums {
 }
 
 /// All contacts between tools and bodies in a step.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Contacts {
     broad_phase: Method,
     surfaces: Vec<ContactSurface>,
@@ -97,6 +97,7 @@ pub struct Contacts {
     /// One hand per tool, in the order of the tools.
     hands: Vec<Hand>,
     sums: Vec<Sums>,
+    #[serde(skip)]
     obstacles: Vec<Obstacle>,
     /// How bodies touch bodies; `None` if they do not.
     touch: Option<TouchSettings>,
@@ -108,7 +109,7 @@ pub struct Contacts {
 
 /// Parts of contact that are taken out, for a check that their lack is noticed.
 #[doc(hidden)]
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ContactAblation {
     /// A body meets all of its triangles, also those that its vertices are joined to and those that do not face them.
     pub exclusion: bool,
@@ -220,6 +221,11 @@ impl Contacts {
     /// Puts up the obstacles of the scene.
     pub fn set_obstacles(&mut self, obstacles: Vec<Obstacle>) {
         self.obstacles = obstacles;
+    }
+
+    /// Takes over the obstacles of `other`, which belongs to the same scene.
+    pub(crate) fn take_obstacles_of(&mut self, other: &mut Self) {
+        self.obstacles = std::mem::take(&mut other.obstacles);
     }
 
     /// The obstacles of the scene.

@@ -36,7 +36,7 @@ const EASE_S: f64 = 0.1;
 const TANGENTIAL: f64 = 0.5;
 
 /// How bodies touch each other and themselves.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TouchSettings {
     /// Whether bodies touch each other.
     pub others: bool,
@@ -59,7 +59,7 @@ impl TouchSettings {
 }
 
 /// What a vertex remembers of a triangle.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Kept {
     /// Bodies of vertex and triangle.
     bodies: [u32; 2],
@@ -82,7 +82,7 @@ struct Kept {
 }
 
 /// Contact of two bodies in one step, or of a body with itself.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct TouchReport {
     /// The bodies.
     pub bodies: [u32; 2],
@@ -97,7 +97,7 @@ pub struct TouchReport {
 }
 
 /// The contacts of all bodies with each other and with themselves.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct PairContacts {
     kept: Vec<Kept>,
     now: Vec<Kept>,

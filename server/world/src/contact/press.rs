@@ -122,7 +122,7 @@ pub fn followed_direction(held: Vector3<f64>, target: Vector3<f64>, h: f64) -> V
 }
 
 /// One point at which a tool presses on tissue.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Bearing {
     /// Index of the body.
     pub body: usize,
@@ -141,7 +141,7 @@ pub struct Bearing {
 }
 
 /// The pressing of one tool, smoothed over the steps.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Press {
     direction: Option<Direction>,
     shares: [f64; MAX_POINTS],
@@ -151,7 +151,7 @@ pub struct Press {
     rub: Rub,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Direction {
     normal: Vector3<f64>,
     across: Vector3<f64>,

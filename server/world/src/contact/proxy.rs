@@ -38,7 +38,7 @@ struct Touched {
 }
 
 /// Pose of a tool that never enters a body.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Proxy {
     pose: Isometry3<f64>,
     engaged: bool,

@@ -20,7 +20,7 @@ const PATIENCE: u8 = 3;
 const TANGENTIAL: f64 = 0.5;
 
 /// What a vertex remembers of its contact with an obstacle.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Kept {
     vertex: u32,
     obstacle: u32,
@@ -47,7 +47,7 @@ pub struct Pushed {
 }
 
 /// Contact of a body with all obstacles in one step.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RestReport {
     /// Vertices that are pushed.
     pub contacts: u32,
@@ -70,7 +70,7 @@ impl RestReport {
 }
 
 /// The contacts of one body with all obstacles.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Resting {
     epoch: Option<u32>,
     /// Area of every surface vertex at rest [m²].

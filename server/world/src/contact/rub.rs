@@ -13,7 +13,7 @@ use crate::inputs::ToolShape;
 use crate::tool::geometry::capsule;
 
 /// Friction under one capsule of a tool, kept from step to step.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub struct Rub {
     points: [RubPoint; MAX_POINTS],
     /// Where the hand held the tool in the last step; `None` before a first touch.
@@ -21,7 +21,7 @@ pub struct Rub {
 }
 
 /// Friction at one point of the stencil.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct RubPoint {
     /// s [m].
     stretch_m: Vector3<f64>,
@@ -32,7 +32,7 @@ struct RubPoint {
 }
 
 /// Sums over the springs at one point.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Sums {
     /// Force on the tissue across the normal [N].
     across_n: Vector3<f64>,

@@ -5,7 +5,7 @@ use scindo_collision::{Method, SurfaceBvh, SurfaceError};
 use scindo_physics::cut::Surface;
 
 /// The surface of one body. It is empty until its first update.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct ContactSurface {
     tree: Option<SurfaceBvh>,
     method: Method,

@@ -4,7 +4,7 @@ mod phases;
 
 mod stages;
 
-use std::mem::{Discriminant, discriminant};
+use std::mem::discriminant;
 use std::sync::Arc;
 
 use scindo_physics::body::{AdaptReport, Notice, Outcome, SolveReport};
@@ -36,7 +36,7 @@ pub struct StepReport {
 }
 
 /// How a body's step went.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BodyReport {
     /// Solver and outcome.
     pub solve: SolveReport,
@@ -49,7 +49,7 @@ pub struct BodyReport {
 }
 
 /// Energy of a body.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Energy {
     /// ½ Σ m v² [J].
     pub kinetic_j: f64,
@@ -91,15 +91,9 @@ impl StepReport {
 
     /// Tells what a step did differently from what was asked for, when it begins. `known` is what was told
     /// of the last step.
-    pub(crate) fn tell_of_solve(
-        &mut self,
-        body: &Arc<str>,
-        solve: &SolveReport,
-        known: &mut Option<Discriminant<Notice>>,
-    ) {
-        let notice = solve.notice.as_ref().map(discriminant);
-        let begins = notice != *known;
-        *known = notice;
+    pub(crate) fn tell_of_solve(&mut self, body: &Arc<str>, solve: &SolveReport, known: &mut Option<Notice>) {
+        let begins = solve.notice.as_ref().map(discriminant) != known.as_ref().map(discriminant);
+        *known = solve.notice;
         if solve.outcome == Outcome::Interrupted {
             let message = "the step was interrupted by a command; the body is as before the step".into();
             self.tell(Level::Warning, "step-interrupted", body, message);

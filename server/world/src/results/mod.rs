@@ -20,13 +20,15 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use thiserror::Error;
 
+pub use crate::format::vtu::save_pvd as save_series;
+pub use fields::write_fields;
 pub use machine::Machine;
 pub use summary::{BodySummary, Summary, Timing};
 
 use crate::format::vtu;
 use crate::scene::Scene;
 use crate::simulation::Simulation;
-use fields::{write_blocks, write_fields};
+use fields::write_blocks;
 use forces::Forces;
 use summary::Running;
 

@@ -97,7 +97,7 @@ pub struct OctreeSpec {
 }
 
 /// When cells of an octree are divided and joined between steps.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AdaptSpec {
     /// Where cells are fine.
     pub settings: AdaptSettings,
@@ -268,7 +268,7 @@ pub enum Share {
 }
 
 /// A region of rest space that selects nodes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Region {
     /// An axis-aligned box, faces included.
     Box {
@@ -303,7 +303,7 @@ pub enum Region {
 }
 
 /// Where a cut goes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum CutPath {
     /// Successive blade segments [tip, heel] [m].
     Sweep(Vec<[Vector3<f64>; 2]>),
@@ -415,7 +415,7 @@ impl ToolSpec {
 }
 
 /// One pose of a script.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PathPoint {
     /// When [s].
     pub at_s: f64,

@@ -113,6 +113,14 @@ impl Scene {
         Self::from_tree("scene".into(), PathBuf::new(), Node::from_json(text), &[])
     }
 
+    /// Reads a scene from JSON text as if it stood in `file`; paths in it are relative to `base_dir`.
+    ///
+    /// # Errors
+    /// Everything that is wrong with the scene.
+    pub fn from_json_in(text: &str, file: &str, base_dir: &Path) -> Result<Self, SceneError> {
+        Self::from_tree(file.into(), base_dir.into(), Node::from_json(text), &[])
+    }
+
     /// The built-in demonstration: an organ-like body under tension that is pressed, then cut.
     ///
     /// # Errors

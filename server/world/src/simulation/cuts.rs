@@ -52,7 +52,7 @@ pub(crate) struct CutContext<'a> {
 }
 
 /// Pending cuts and what connects them.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Cuts {
     /// By rising time.
     schedule: Vec<Scheduled>,
@@ -70,7 +70,7 @@ pub(crate) struct Cuts {
 }
 
 /// What a scheduled cut was to open.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Swept {
     /// Index of the body.
     pub body: usize,
@@ -81,7 +81,7 @@ pub(crate) struct Swept {
 }
 
 /// A cut in the queue.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Job {
     blade: BladeSweep,
     incision: u32,
@@ -94,14 +94,14 @@ struct Job {
     request: Option<u64>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Scheduled {
     at_s: f64,
     body: usize,
     blade: CutPath,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct RequestEnd {
     tool: Arc<str>,
     edge: [Vector3<f64>; 2],

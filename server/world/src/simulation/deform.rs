@@ -14,7 +14,7 @@ use crate::report::BodyReport;
 const USUAL: usize = 64;
 
 /// Memory of the groups of bodies that touch: one for the first body of each.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Groups(Vec<Group>);
 
 impl Simulation {

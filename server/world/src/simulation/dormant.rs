@@ -14,7 +14,7 @@ const QUIET_CELLS_S: f64 = 2e-3;
 const QUIET_S: f64 = 0.5;
 
 /// Which bodies sleep.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Dormant {
     /// Per body; empty if the scene lets none sleep.
     asleep: Vec<bool>,

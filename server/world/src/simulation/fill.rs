@@ -65,7 +65,7 @@ fn fill_body(
     if out.id != body.id {
         out.id = body.id.clone();
     }
-    out.epoch = body.epoch();
+    out.epoch = body.shown_epoch();
     out.iterations = report.solve.iterations;
     out.residual = if report.solve.residual.is_finite() { report.solve.residual } else { f64::MAX };
     out.tolerance = report.solve.tolerance;

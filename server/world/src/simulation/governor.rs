@@ -60,7 +60,7 @@ impl Rung {
 }
 
 /// What the governor did in a run.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, serde::Deserialize)]
 pub struct GovernorReport {
     /// Steps as the scene asks.
     pub whole_steps: u64,
@@ -75,7 +75,7 @@ pub struct GovernorReport {
 }
 
 /// State of the governor of a scene.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Governor {
     on: bool,
     rung: usize,

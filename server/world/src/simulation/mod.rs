@@ -24,6 +24,8 @@ mod sleep;
 
 mod twin;
 
+mod checkpoint;
+
 mod undo;
 
 use std::path::Path;
@@ -31,7 +33,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
-use scindo_physics::body::{Ablation, BodyError, PcgSettings};
+use scindo_physics::body::{Ablation, BodyError, Outcome, PcgSettings};
 use scindo_physics::team::Lead;
 
 pub(crate) use stopwatch::processor_seconds;
@@ -52,6 +54,7 @@ use crate::snapshot::Snapshot;
 use crate::tool::Tools;
 use crate::tool::obstacle::Obstacle;
 use adapting::ToolPlaces;
+pub use checkpoint::CheckpointError;
 use cuts::{CutContext, Cuts};
 use deform::Groups;
 use dormant::Dormant;
@@ -465,7 +468,7 @@ impl Simulation {
     }
 
     /// The scene as it was read.
-    pub(crate) fn source(&self) -> &Scene {
+    pub fn source(&self) -> &Scene {
         &self.source
     }
 
@@ -560,6 +563,11 @@ impl Simulation {
     /// do. See [`SimBody::failure`].
     pub fn failures(&self) -> Vec<String> {
         self.bodies.iter().filter_map(SimBody::failure).collect()
+    }
+
+    /// Whether the last step ended early for the [stop flag](Self::set_stop_flag): its result depends on the time.
+    pub fn was_broken_off(&self) -> bool {
+        self.report.bodies.iter().any(|body| body.solve.outcome == Outcome::Interrupted)
     }
 
     /// Report of the last step.

@@ -12,7 +12,7 @@ const EVERY: u64 = 25;
 const FAR: f64 = 5.0;
 
 /// What the scene takes up, where something in it is held.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Sleep {
     /// Corners of the box around all bodies at rest [m]; none where nothing is held: then falling is what
     /// the scene is about.

@@ -15,7 +15,7 @@ pub const MAX_UNDO: usize = 8;
 const MAX_BYTES: usize = 512 << 20;
 
 /// A body from before an incision.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct Kept {
     body: usize,
     incision: u32,
@@ -26,7 +26,7 @@ struct Kept {
 }
 
 /// The last incisions, oldest first.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct History {
     kept: VecDeque<Kept>,
     /// An incision was forgotten for lack of room.

@@ -7,7 +7,7 @@ use scindo_physics::cut::{BladeSweep, MAX_SEGMENTS};
 const LEAST_MOVE_M: f64 = 1e-6;
 
 /// Source of incision numbers, shared by everything that cuts. 0 means skin and is never issued.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct IncisionNumbers {
     last: u32,
 }
@@ -21,12 +21,12 @@ impl IncisionNumbers {
 }
 
 /// The edge of one blade, and what it has swept since its last cut.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct BladeEdge {
     cutting: Option<Cutting>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Cutting {
     incision: u32,
     last: [Vector3<f64>; 2],
@@ -76,7 +76,7 @@ impl BladeEdge {
 ///
 /// Its sweeps have one position each. They begin where the material has carried the last one of the incision, or, for
 /// the first, where the edge met the tissue.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct PressedEdge {
     incision: Option<u32>,
     /// Where the edge was before it met the tissue, until the first sweep.

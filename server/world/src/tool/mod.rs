@@ -30,7 +30,7 @@ const GUEST_SPRING: (f64, f64) = (800.0, 8.0);
 const CLOSING_S: f64 = 0.25;
 
 /// One rigid tool and its state in this step.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Tool {
     /// Name, unique in the simulation.
     pub id: Arc<str>,
@@ -153,7 +153,7 @@ impl Tool {
 }
 
 /// All tools: first those of the scene, then those of clients.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Tools {
     tools: Vec<Tool>,
     /// Number of tools created so far.

@@ -24,7 +24,7 @@ pub struct ScriptedPose {
 }
 
 /// Keyframes by ascending time.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Script {
     path: Vec<PathPoint>,
     repeat_s: Option<f64>,

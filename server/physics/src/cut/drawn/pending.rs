@@ -25,7 +25,7 @@ pub struct PendingFace {
 }
 
 /// Pairs of incision and fragment where the incision may be pending.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Pending {
     of: BTreeSet<(u32, u32)>,
 }

@@ -30,7 +30,7 @@ const MOST: usize = 256;
 /// Barycentric coordinates on a face, Σ = 1.
 pub type Place = Vector3<f64>;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Line {
     ends: [Place; 2],
     /// Bound on its distance from the path of the blade, which grows as the line is extended.
@@ -38,7 +38,7 @@ struct Line {
 }
 
 /// The lines that one incision has drawn on a face. There may be none yet.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Drawing {
     incision: u32,
     /// Number shared by the parts of a face that this incision itself has bisected.
@@ -75,7 +75,7 @@ pub struct Bisection {
 }
 
 /// All lines on boundary faces, keyed by 4·fragment + slot.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Traces {
     of_face: BTreeMap<u32, Vec<Drawing>>,
     kin: u32,

@@ -8,7 +8,7 @@ use super::surface::Surface;
 use crate::element::MaterialPoint;
 
 /// The edges to divide, each identified by the smaller of its two half-edges.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct DoubledEdges {
     edges: BTreeSet<u32>,
 }

@@ -24,7 +24,7 @@ pub trait Place {
 }
 
 /// Triangles by number. Half-edge 3·triangle + k runs from corner k to the next.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Joined {
     /// Opposite of each half-edge, or [`NONE`] while it is open.
     twin: Vec<u32>,

@@ -13,7 +13,7 @@ use crate::cut::topology::pieces::PieceTable;
 use crate::cut::topology::slot::slot_of;
 
 /// Closed triangle surface of a body, counter-clockwise seen from outside.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Surface {
     /// Vertex ids.
     pub triangles: Vec<[u32; 3]>,

@@ -41,7 +41,7 @@ pub struct Change<'a> {
 }
 
 /// The boundary faces of the fragments and their adjacency.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct SurfaceBuilder {
     /// Boundary faces as 4·fragment + slot of the opposite vertex; triangle f of the surface is face f.
     faces: Vec<u32>,

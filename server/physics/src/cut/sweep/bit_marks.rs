@@ -4,7 +4,7 @@ use crate::lists::reserve::reserved;
 
 /// Up to eight kinds of marks per item, one bit each. One byte per item keeps the marks of a whole body in
 /// the cache. Clearing costs as much as setting did.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct BitMarks {
     of: Vec<u8>,
     marked: Vec<u32>,
@@ -49,7 +49,7 @@ impl BitMarks {
 }
 
 /// Sorts numbers by setting one bit for each, without comparing any.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Ascending {
     bits: Vec<u64>,
 }

@@ -33,7 +33,7 @@ pub const MAX_SEGMENTS: usize = 1024;
 /// assert!((body.total_mass() - mass).abs() < 1e-12); // kg
 /// # Ok::<(), scindo_physics::body::BodyError>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BladeSweep {
     /// Successive blade positions `[tip, heel]` [m], world coordinates, deformed configuration.
     pub segments: Vec<[Vector3<f64>; 2]>,
@@ -57,7 +57,7 @@ impl BladeSweep {
 }
 
 /// What a sweep did to the topology.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CutReport {
     /// Copies appended, in ascending order of their id.
     pub new_copies: Vec<NewCopy>,

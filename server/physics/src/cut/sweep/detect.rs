@@ -23,7 +23,7 @@ const TOUCHED: u8 = 1;
 const CANDIDATES_PER_FRAGMENT: usize = 16;
 
 /// Progress of the search for the crossings of a sweep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Place {
     triangle: usize,
     candidate: usize,
@@ -57,7 +57,7 @@ impl Deformed<'_> {
 }
 
 /// Result of the detection, the fragments to examine, and its scratch arrays.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Detector {
     /// Fragments that the sweep touches, ascending.
     pub touched: Vec<u32>,

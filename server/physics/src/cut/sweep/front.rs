@@ -25,7 +25,7 @@ const MAX_POINTS: usize = 256;
 const OVERREACH: f64 = 1e-6;
 
 /// One remembered point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct FrontPoint {
     /// Position along the blade: 0 at the tip, 1 at the heel.
     s: f64,
@@ -34,7 +34,7 @@ struct FrontPoint {
 }
 
 /// A material point, and where it was.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct Anchor {
     point: MaterialPoint,
     /// Its position when it was remembered [m].
@@ -60,7 +60,7 @@ pub struct Surroundings<'a> {
 }
 
 /// The remembered front of one incision.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Front {
     segment: [Vector3<f64>; 2],
     points: Vec<FrontPoint>,

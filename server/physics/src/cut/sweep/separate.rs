@@ -29,7 +29,7 @@ const CROSSED: u8 = 4;
 const CHANGED: u8 = 8;
 
 /// Work list and result of a separation.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Separator {
     /// Elements with a face opened by this sweep, ascending.
     pub elements: Vec<u32>,

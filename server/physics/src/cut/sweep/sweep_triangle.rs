@@ -14,7 +14,7 @@ use crate::cut::drawn::traces::part_inside;
 const ROUNDING: f64 = 1e-12;
 
 /// A triangle in the deformed configuration [m], with its bounds.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct SweepTriangle {
     /// Corners [m].
     pub corners: [Vector3<f64>; 3],

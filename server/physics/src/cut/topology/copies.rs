@@ -17,7 +17,7 @@ use super::pieces::PieceTable;
 use super::slot::slot_of;
 
 /// A node copy made by a cut.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NewCopy {
     /// Id of the new copy.
     pub copy: u32,
@@ -40,7 +40,7 @@ impl NewCopy {
 }
 
 /// The copies of all nodes, and the elements around every node.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct CopyTable {
     /// Mesh node of each copy. Copies 0..n_nodes are the nodes themselves.
     pub node: Vec<u32>,
@@ -59,7 +59,7 @@ pub struct CopyTable {
 }
 
 /// A component of the pieces around one node.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Around {
     /// Range of its pieces in `members`.
     members: std::ops::Range<usize>,

@@ -46,7 +46,7 @@ pub fn edge_key(a: u32, b: u32) -> u64 {
 }
 
 /// Crossings of edges that are not separated yet.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Crossings {
     by_edge: HashMap<u64, OfEdge, BuildHasherDefault<EdgeHasher>>,
     /// Per vertex whether an edge at it was ever crossed; vertices beyond the end have none. Most vertices in
@@ -55,7 +55,7 @@ pub struct Crossings {
 }
 
 /// The crossings of one edge: incision, and parameter from the vertex with the smaller id.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct OfEdge {
     first: (u32, f64),
     /// All crossings but the first. Hardly any edge has them.

@@ -1,7 +1,7 @@
 //! The elements around every node of a mesh.
 
 /// For every node the elements that have it as a corner, ascending.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct ElementsAround {
     /// The elements around node n are [start[n], start[n + 1]) of `elements`.
     start: Vec<u32>,

@@ -23,7 +23,7 @@ pub const NONE: u32 = u32::MAX;
 pub const MAX_FRAGMENTS_PER_ELEMENT: u16 = 256;
 
 /// A point of the material: Σ weights · nodes, where all nodes belong to one element.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FragmentVertex {
     /// Mesh nodes; [`NONE`] in unused slots, which come last.
     pub nodes: [u32; 4],
@@ -59,7 +59,7 @@ impl FragmentVertex {
 }
 
 /// All fragments of a body, structure of arrays.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Fragments {
     /// Vertices, the first n_nodes at the mesh nodes.
     pub vertices: Vec<FragmentVertex>,
@@ -94,7 +94,7 @@ pub struct Fragments {
 }
 
 /// The two fragments that the bisection of an edge made of one.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Halves {
     /// The half at end `a` of the edge. It keeps the id of the fragment that was split.
     pub old: u32,

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 /// Table of distinct sets. A set is identified by its index here.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct IncisionSets {
     sets: Vec<Vec<u32>>,
     /// Per set its member if it has exactly one, else 0, which is no incision.

@@ -10,7 +10,7 @@ use super::slot::slot_of;
 ///
 /// A linear tet has a constant deformation gradient per piece, so its energy, force and stiffness
 /// are those of the whole element on the piece's own copies, times `fraction`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Piece {
     /// Element of the rest mesh.
     pub element: u32,
@@ -21,7 +21,7 @@ pub struct Piece {
 }
 
 /// All pieces. Piece e < n_elements is the first of element e; cuts append the others.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct PieceTable {
     /// The pieces by id. No id ever changes.
     pub pieces: Vec<Piece>,

@@ -7,7 +7,7 @@ use crate::mesh::TetMesh;
 const ELEMENTS: usize = 64;
 
 /// The nodes of every run, each once.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Runs {
     n_elements: usize,
     nodes: Vec<u32>,

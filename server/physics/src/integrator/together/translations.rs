@@ -9,7 +9,7 @@ use crate::integrator::pair_springs::ActivePair;
 const TOLERANCE: f64 = 1e-14;
 
 /// The translation equations of the free parts of a group: their masses and springs, and the springs between them.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct SharedTranslations {
     /// Number of the first part of every member, and of the last one's end.
     first: Vec<usize>,

@@ -40,7 +40,7 @@ const NONE: u32 = u32::MAX;
 ///
 /// Quads are never removed: a cut link stays cut, and its ends are never divided. The triangles of quad q are 2q
 /// and 2q + 1. They keep their numbers, new ones follow; numbers of vertices may change.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct OctreeSurface {
     surface: Surface,
     /// Face of every quad: 6·leaf + direction.

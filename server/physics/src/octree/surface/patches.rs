@@ -18,7 +18,7 @@ pub struct Vertices<'a> {
 }
 
 /// Quads by number. Half-edge 4·quad + k runs from corner k to the next.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Patches {
     /// Opposite of each half-edge, or [`NONE`] while it is open.
     twin: Vec<u32>,

@@ -18,7 +18,7 @@ const REACH: f64 = 1.0;
 const SWEEPS: usize = 20;
 
 /// Where a link is cut on one of its sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Crossing {
     /// Distance from the centre of the cell, in sides of finest cells.
     pub distance: f64,

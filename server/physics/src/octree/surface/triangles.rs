@@ -18,7 +18,7 @@ const NEARER: f64 = 0.01;
 
 /// Edges to divide, by name: 5·face + k for edge k of a quad, k = 4 for its diagonal. Of the two names of an edge
 /// the smaller counts.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Doubled {
     edges: BTreeSet<u32>,
     around: Vec<(u32, u32)>,

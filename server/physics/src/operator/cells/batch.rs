@@ -7,7 +7,7 @@ use super::sectors::SectorTable;
 use crate::element::{Ids, LANES, Lanes, Mat3, Simd, Vector8};
 
 /// Eight cells with one table.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub struct SectorBatch {
     /// √c R̂ with the factor c of the cell; 0 in unused lanes.
@@ -25,7 +25,7 @@ const AHEAD: usize = 2;
 pub type HangingWeights = [Lanes; 6];
 
 /// A table as the kernel reads it: every entry in all lanes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct TableLanes(pub [[Lanes; 6]; 8]);
 
 impl TableLanes {

@@ -11,7 +11,7 @@ use super::stored::{StoredBatch, stored_entry};
 use crate::element::{Ids, LANES, Lanes, Simd, Vector8};
 
 /// Diagonal blocks (xx, xy, xz, yy, yz, zz) of a table in the frame of a cell, by the set of hanging slots.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct BlockTable(Vec<[[f32; 6]; 8]>);
 
 impl BlockTable {

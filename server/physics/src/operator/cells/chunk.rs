@@ -19,7 +19,7 @@ use super::stored::{self, STORED, StoredBatch};
 use crate::element::{LANES, Lanes, Simd};
 
 /// A table in the forms that the loops read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Table {
     /// For products.
     pub lanes: TableLanes,
@@ -28,7 +28,7 @@ pub struct Table {
 }
 
 /// Batches with the same table, or stored ones; with or without hanging slots.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Group {
     /// Table or stored.
     pub matrix: CellMatrix,
@@ -39,7 +39,7 @@ pub struct Group {
 }
 
 /// What the lanes of a batch hold.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct BatchLanes {
     /// Number of every cell, [`NO_PIECE`] in unused lanes.
     pub cells: [u32; LANES],
@@ -50,7 +50,7 @@ pub struct BatchLanes {
 }
 
 /// A run of cells in batches.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct CellChunk {
     /// Vertex of every local number, ascending.
     pub vertices: Vec<u32>,

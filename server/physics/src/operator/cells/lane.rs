@@ -8,7 +8,7 @@ use crate::octree::Octree;
 pub const HANGING_SLOTS: [usize; 6] = [1, 2, 4, 3, 5, 6];
 
 /// The matrix of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum CellMatrix {
     /// c R S Rᵀ with S the table of this number, c the factor and R the rotation of the cell.
     Table(u16),
@@ -18,7 +18,7 @@ pub enum CellMatrix {
 }
 
 /// A cell to be given a lane. Its matrix A enters the operator as Wᵀ A W with the weights W of hanging corners.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CellLane {
     /// The vertices that carry the cell, by slot: slot j is corner j ⊕ octant.
     pub vertices: [u32; 8],

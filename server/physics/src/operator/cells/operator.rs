@@ -32,7 +32,7 @@ const MANY: usize = 4;
 ///
 /// Everything is computed in two halves, each a pass over all threads: sums of the chunks, then what the
 /// vertices gather of them in blocks of 256. The division depends on the cells only.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct CellOperator {
     pub(super) simd: Simd,
     pub(super) tables: Vec<Table>,

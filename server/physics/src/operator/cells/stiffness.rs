@@ -25,7 +25,7 @@ use crate::team::{Team, blocks, ranges};
 /// # Source
 /// Dick, Georgii, Westermann 2011, §5; Georgii, Westermann 2008 (the rotation that minimises the distance of
 /// the whole cell; for a cube it is that of the deformation gradient at the centre).
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct CellStiffness {
     operator: CellOperator,
     rest: Vec<RestChunk>,
@@ -309,7 +309,7 @@ impl LinearOperator for CellStiffness {
 
 /// Parameters by number of region, from 1; region 0 has those of the body. Regions with the same λ/μ have one
 /// table.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct Materials {
     lame: Vec<Lame>,
     /// Table of each of them.

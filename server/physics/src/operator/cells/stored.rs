@@ -16,10 +16,11 @@ pub const fn stored_entry(r: usize, s: usize) -> usize {
 }
 
 /// Eight cells with their matrices interleaved: 1.2 kB per cell.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub struct StoredBatch {
     /// Upper triangles; 0 in unused lanes.
+    #[serde(with = "crate::saved::array")]
     pub entries: [Lanes; STORED],
     /// Rotation of every cell.
     pub rotation: Mat3<Lanes>,

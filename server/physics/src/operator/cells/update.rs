@@ -15,7 +15,7 @@ use super::lane::{CellMatrix, handedness};
 use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
 
 /// What only an update needs of a chunk.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct RestChunk {
     /// Positions of the last update [m], by local number.
     positions: Vec<[f64; 4]>,
@@ -33,7 +33,7 @@ impl RestChunk {
 }
 
 /// Sides of eight cells.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 struct RestBatch {
     /// 4 δ times the side [m], δ the handedness of the octant: minus the only components of the rest state in
     /// the coordinates of the kernel. 0 in unused lanes.

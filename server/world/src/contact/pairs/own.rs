@@ -25,7 +25,7 @@ const TURN_CELLS: f64 = 0.05;
 const ROUNDING_CELLS: f64 = 1e-4;
 
 /// What one body knows about itself.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct OwnSurface {
     /// Unit normals of triangles and vertices; zero where there is none.
     triangles: Vec<Vector3<f64>>,
