@@ -4,7 +4,7 @@ use std::{env, error::Error, fs, path::PathBuf};
 
 use prost::Message as _;
 
-const FILES: [&str; 7] = [
+const FILES: [&str; 8] = [
     "scindo/v1/common.proto",
     "scindo/v1/tool.proto",
     "scindo/v1/cut.proto",
@@ -12,6 +12,7 @@ const FILES: [&str; 7] = [
     "scindo/v1/force.proto",
     "scindo/v1/server.proto",
     "scindo/v1/viewer.proto",
+    "scindo/v1/record.proto",
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {

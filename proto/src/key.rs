@@ -118,7 +118,7 @@ impl Role {
 }
 
 /// Questions and orders under `rpc/`. Requests and replies: `PauseRequest`, `StepRequest`, `ResetRequest`,
-/// `SetRequest`, `UndoRequest`, `LoadRequest` → `RpcReply`; `info` → `SessionInfo`; `params` → `ParamsReply`;
+/// `SetRequest`, `UndoRequest`, `LoadRequest`, `SnapshotRequest`, `RestoreRequest` → `RpcReply`; `info` → `SessionInfo`; `params` → `ParamsReply`;
 /// `scenes` → `ScenesReply`; `schema` → `SchemaReply`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verb {

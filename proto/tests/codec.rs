@@ -388,6 +388,8 @@ proptest! {
         survives(&ResetRequest {})?;
         survives(&SetRequest { key: "world.gravity_m_s2".into(), value: text.clone() })?;
         survives(&UndoRequest {})?;
+        survives(&SnapshotRequest { name: "before-2".into() })?;
+        survives(&RestoreRequest { name: "before-2".into() })?;
         survives(&LoadRequest { name: text.clone() })?;
         survives(&ScenesReply { scenes: vec![SceneEntry {
             name: "kidney".into(), description: text.clone(),

@@ -71,4 +71,5 @@ finish
 server=
 
 echo "-- results on disk"
+timeout 600 "$python" tests/python/recording.py "$bin/scindo" "$keep/recording"
 timeout 1500 "$python" tests/python/models.py "$bin/scindo" "$models" "$keep" --steps "$steps"

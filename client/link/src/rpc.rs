@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use scindo_proto::messages::{
-    Error, LoadRequest, ParamsReply, PauseRequest, ResetRequest, RpcReply, ScenesReply, SchemaReply,
-    SessionInfo, SetRequest, StepRequest, UndoRequest,
+    Error, LoadRequest, ParamsReply, PauseRequest, ResetRequest, RestoreRequest, RpcReply, ScenesReply,
+    SchemaReply, SessionInfo, SetRequest, SnapshotRequest, StepRequest, UndoRequest,
 };
 use scindo_proto::{Topic, Verb, WireMessage, encode, encoding};
 use zenoh::query::ConsolidationMode;
@@ -58,6 +58,16 @@ impl Link {
     /// Takes the last cut back.
     pub async fn undo(&self) -> Result<RpcReply, LinkError> {
         self.order(Verb::Undo, &UndoRequest {}).await
+    }
+
+    /// Lets the server keep the present state under a name: 1 to 64 of a-z, 0-9, - and _.
+    pub async fn snapshot(&self, name: &str) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Snapshot, &SnapshotRequest { name: name.to_owned() }).await
+    }
+
+    /// Goes back to a state that [`Self::snapshot`] kept, with its cuts.
+    pub async fn restore(&self, name: &str) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Restore, &RestoreRequest { name: name.to_owned() }).await
     }
 
     /// The scenes that [`Self::load`] accepts.

@@ -11,8 +11,8 @@ use crate::limits::{
 };
 use crate::messages::{
     BodyLook, Event, LoadRequest, Measures, ObstacleInfo, ParamsReply, PauseRequest, Plan, ResetRequest,
-    RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest, Stats, StepRequest, UndoRequest, event,
-    obstacle_info, param,
+    RestoreRequest, RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest, SnapshotRequest, Stats,
+    StepRequest, UndoRequest, event, obstacle_info, param,
 };
 
 const fn count(tag: u32, field: &'static str, allowed: usize) -> CountLimit {
@@ -228,6 +228,22 @@ impl WireMessage for UndoRequest {
 
     fn check(&self) -> Checked {
         Ok(())
+    }
+}
+
+impl WireMessage for SnapshotRequest {
+    const MAX_BYTES: usize = MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        In(Self::NAME).id("name", &self.name)
+    }
+}
+
+impl WireMessage for RestoreRequest {
+    const MAX_BYTES: usize = MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        In(Self::NAME).id("name", &self.name)
     }
 }
 

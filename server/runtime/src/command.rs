@@ -16,6 +16,10 @@ pub mod progress;
 
 pub mod run;
 
+pub mod replay;
+
+pub mod export;
+
 pub mod check;
 
 pub mod mesh;
@@ -42,6 +46,8 @@ pub fn main() -> ExitCode {
         None => cli.demonstration.json,
         Some(Command::Run(args)) => args.serve.json,
         Some(Command::Demo(args)) => args.serve.json,
+        Some(Command::Replay(args)) => args.json,
+        Some(Command::Export(args)) => args.json,
         Some(Command::Check(args)) => args.json,
         Some(Command::Mesh(args)) => args.json,
         Some(Command::Accuracy(args)) => args.json,
@@ -56,6 +62,8 @@ pub fn main() -> ExitCode {
         None => run::demonstration(&cli.demonstration),
         Some(Command::Run(args)) => run::scene(&args),
         Some(Command::Demo(args)) => run::demo(&args),
+        Some(Command::Replay(args)) => replay::replay(&args),
+        Some(Command::Export(args)) => export::export(&args),
         Some(Command::Check(args)) => check::check(&args),
         Some(Command::Mesh(args)) => mesh::mesh(&args),
         Some(Command::Accuracy(args)) => accuracy::accuracy(&args),

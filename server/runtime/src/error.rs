@@ -77,6 +77,38 @@ pub enum RuntimeError {
         /// The system's message.
         reason: String,
     },
+    /// A recording cannot be written.
+    #[error("cannot record into {file}: {reason}. Choose another file with --record; it must not exist yet")]
+    Recording {
+        /// The file.
+        file: String,
+        /// What went wrong.
+        reason: String,
+    },
+    /// A file is no recording.
+    #[error(
+        "{file} is no recording that can be read: {reason}. Give a file that `scindo run --record` wrote"
+    )]
+    NoRecording {
+        /// The file.
+        file: String,
+        /// What went wrong.
+        reason: String,
+    },
+    /// A recording cannot be computed again.
+    #[error("the recording cannot be computed again: {reason}")]
+    Replay {
+        /// What went wrong.
+        reason: String,
+    },
+    /// An exported file cannot be written.
+    #[error("cannot write {file}: {reason}. Check that the directory exists and is writable")]
+    Export {
+        /// The file.
+        file: String,
+        /// What went wrong.
+        reason: String,
+    },
     /// The system refused a thread or a signal handler.
     #[error("{what}: {reason}")]
     System {
@@ -109,6 +141,7 @@ impl RuntimeError {
             Self::Scene(_) | Self::Mesh(_) | Self::Option { .. } | Self::Key(_) | Self::Lab(_) => {
                 ExitCode::from(2)
             }
+            Self::NoRecording { .. } => ExitCode::from(2),
             _ => ExitCode::from(1),
         }
     }
@@ -131,6 +164,10 @@ impl RuntimeError {
             Self::Mesh(_) => "mesh",
             Self::Unwritten(_) => "unwritten",
             Self::Results(_) => "results",
+            Self::Recording { .. } => "recording",
+            Self::NoRecording { .. } => "no-recording",
+            Self::Replay { .. } => "replay",
+            Self::Export { .. } => "export",
             Self::System { .. } => "system",
             Self::Died { .. } => "died",
         }

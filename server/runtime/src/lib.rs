@@ -12,6 +12,7 @@
 //! * [`rpc`]: questions and orders.
 //! * [`server`]: starts and ends all of these.
 //! * [`lab`]: laboratories with certificates, and what each role may do.
+//! * [`record`]: recordings of all of this, and their replay.
 //! * [`haptics`]: what a hand feels over a link, against the truth; an experiment on virtual time.
 //! * [`reliability`]: all of this in a simulated network with faults, from a seed ([`chance`]).
 //!
@@ -21,6 +22,7 @@
 //! | `contact` | local contact model per held tool | its period; sleeps while nobody holds a tool |
 //! | `publish` | surfaces, tools, answers, events, statistics | its period, or something to send |
 //! | `rpc` | one question after the other | the simulation, at most 1.7 s |
+//! | `record` | writes the recording, if there is one | something to write |
 //! | `watchdog` | breaks off steps that keep orders waiting; ends a process that does not end | its period |
 //! | zenoh's own | decode, check, store in the inbox | nothing |
 
@@ -51,6 +53,8 @@ pub mod watchdog;
 pub mod server;
 
 pub mod chance;
+
+pub mod record;
 
 pub mod haptics;
 

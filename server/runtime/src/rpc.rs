@@ -10,8 +10,8 @@ use bytes::Bytes;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use prost::Message as _;
 use scindo_proto::messages::{
-    Error, LoadRequest, PauseRequest, ResetRequest, RpcReply, SchemaReply, SessionInfo, SetRequest,
-    StepRequest, UndoRequest,
+    Error, LoadRequest, PauseRequest, ResetRequest, RestoreRequest, RpcReply, SchemaReply, SessionInfo,
+    SetRequest, SnapshotRequest, StepRequest, UndoRequest,
 };
 use scindo_proto::{FILE_DESCRIPTOR_SET, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
 use scindo_world::inputs::{ToolInput, ToolShape};
@@ -82,11 +82,13 @@ impl RpcThread {
                 Ok(request) => reply(query, &self.load(&request.name)),
                 Err(e) => refuse(query, error(e.code(), e.to_string(), "see rpc/schema")),
             },
-            Verb::Snapshot | Verb::Restore => {
-                let message = format!("rpc/{} is not supported yet", verb.as_str());
-                refuse(query, error("not-supported", message, "start a server with the scene instead"));
-            }
-            Verb::Pause | Verb::Step | Verb::Reset | Verb::Undo | Verb::Set => match order(verb, payload) {
+            Verb::Pause
+            | Verb::Step
+            | Verb::Reset
+            | Verb::Undo
+            | Verb::Set
+            | Verb::Snapshot
+            | Verb::Restore => match order(verb, payload) {
                 Ok(order) => reply(query, &self.carry_out(order)),
                 Err(error) => refuse(query, error),
             },
@@ -156,6 +158,8 @@ fn order(verb: Verb, payload: Bytes) -> Result<Order, Error> {
             let SetRequest { key, value } = decode(payload).map_err(read)?;
             Order::Set { key, value }
         }
+        Verb::Snapshot => Order::Snapshot(decode::<SnapshotRequest>(payload).map_err(read)?.name),
+        Verb::Restore => Order::Restore(decode::<RestoreRequest>(payload).map_err(read)?.name),
         _ => {
             decode::<ResetRequest>(payload).map_err(read)?;
             Order::Reset

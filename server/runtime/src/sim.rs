@@ -2,6 +2,8 @@
 
 pub mod engine;
 
+pub mod snapshots;
+
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -41,6 +43,10 @@ pub enum Order {
     Reset,
     /// Take the last cut back.
     Undo,
+    /// Keep the present state under this name.
+    Snapshot(String),
+    /// Go back to the state with this name.
+    Restore(String),
     /// Change a parameter of the scene.
     Set {
         /// Key, as in the scene file.
@@ -188,6 +194,8 @@ impl SimThread {
             }
             Order::Reset => self.reset(),
             Order::Undo => self.undo(),
+            Order::Snapshot(name) => self.snapshot(&name),
+            Order::Restore(name) => self.restore(&name),
             Order::Set { key, value } => self.set(&key, &value),
         };
         // The client may have given up waiting.
@@ -234,6 +242,35 @@ impl SimThread {
         })?;
         self.announce_plan();
         self.exchange.event(Level::Info, "cut-undone", message.clone());
+        self.hand_over();
+        Ok(message)
+    }
+
+    fn snapshot(&mut self, name: &str) -> Result<String, Refusal> {
+        let message = self.engine.snapshot(name).map_err(|message| Refusal {
+            code: "cannot-snapshot",
+            message,
+            hint: "a snapshot is a name of 1 to 64 of a-z 0-9 - _; 16 of them and 1 GiB are kept",
+        })?;
+        self.exchange.event(Level::Info, "snapshot", message.clone());
+        Ok(message)
+    }
+
+    /// Goes back to a state that was kept. Cuts that wait now belong to the time after it and are answered.
+    fn restore(&mut self, name: &str) -> Result<String, Refusal> {
+        let refusal = |message| Refusal {
+            code: "cannot-restore",
+            message,
+            hint: "rpc/snapshot keeps the present state under a name",
+        };
+        if !self.engine.has_snapshot(name) {
+            return self.engine.restore(name).map_err(refusal);
+        }
+        self.discard_cuts("an earlier state was restored before the cut was made");
+        let message = self.engine.restore(name).map_err(refusal)?;
+        self.exchange.set_params(self.engine.params());
+        self.announce_plan();
+        self.exchange.event(Level::Info, "restored", message.clone());
         self.hand_over();
         Ok(message)
     }
@@ -309,6 +346,10 @@ impl SimThread {
         if Instant::now() >= self.next_plan {
             self.next_plan = Instant::now() + PLAN_PERIOD;
             self.announce_plan();
+        }
+        if let Some(reason) = self.engine.take_recording_failure() {
+            let message = format!("the recording ends at this step, the simulation goes on: {reason}");
+            self.exchange.event(Level::Error, "recording-ended", message);
         }
         let report = self.engine.report();
         self.exchange.meter.step(report.seconds.iter());

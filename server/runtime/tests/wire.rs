@@ -559,6 +559,39 @@ async fn a_cut_that_was_taken_back_is_still_a_duplicate() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_state_that_was_kept_comes_back_with_its_cuts_and_its_tools() {
+    let mut running = Running::start();
+    let link = running.link(Role::Client, "script").await;
+    let mut mirror = link.mirror("block").await.unwrap();
+    let first = mirror.next().await.unwrap().topology.clone();
+    let tool = link.tool("scalpel").await.unwrap();
+    let nothing = link.restore("uncut").await.unwrap_err();
+    assert!(matches!(&nothing, LinkError::Refused { code, .. } if code == "cannot-restore"), "{nothing}");
+    let bad = link.snapshot("Un cut").await.unwrap_err();
+    assert!(!bad.to_string().is_empty());
+    link.snapshot("uncut").await.unwrap();
+    assert_eq!(tool.cutter.send(cut_of_script()).await.unwrap().outcome(), Outcome::Applied);
+    let whole = first.triangle_count;
+    until("the cut is shown", || mirror.latest().is_some_and(|s| s.topology.triangle_count > whole)).await;
+    let cut = mirror.latest().unwrap().topology.clone();
+    link.snapshot("cut").await.unwrap();
+
+    link.restore("uncut").await.unwrap();
+    until("it is whole again", || mirror.latest().is_some_and(|s| s.topology.triangle_count == whole)).await;
+    let epoch = mirror.latest().unwrap().topology.epoch;
+    assert!(epoch > cut.epoch, "epochs rise: {epoch} after {}", cut.epoch);
+    link.restore("cut").await.unwrap();
+    let same = cut.triangle_count;
+    until("it is cut again", || mirror.latest().is_some_and(|s| s.topology.triangle_count == same)).await;
+    assert!(mirror.latest().unwrap().topology.epoch > epoch);
+    // What the restored state knows of the cut: it can be taken back.
+    link.undo().await.unwrap();
+    until("the cut is undone", || mirror.latest().is_some_and(|s| s.topology.triangle_count == whole)).await;
+    let engine = running.end();
+    assert!(engine.failures().is_empty(), "{:?}", engine.failures());
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_server_that_runs_one_scene_loads_no_other() {
     let mut running = Running::start();
     let link = running.link(Role::Client, "operator").await;

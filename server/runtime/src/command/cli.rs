@@ -31,6 +31,10 @@ pub enum Command {
     Run(Box<RunArgs>),
     /// Run a scene that comes with the program and serve the page at http://127.0.0.1:8080.
     Demo(Box<DemoArgs>),
+    /// Compute a recording again, and compare it bit for bit.
+    Replay(ReplayArgs),
+    /// Write a recording as VTK series, glTF or CSV.
+    Export(ExportArgs),
     /// Check a scene for errors and doubtful values, and forecast convergence, motion and time per step.
     Check(CheckArgs),
     /// Make a tetrahedral mesh from a surface or volume file.
@@ -57,10 +61,59 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// Scene file, TOML or JSON.
-    pub scene: PathBuf,
+    #[arg(required_unless_present = "resume")]
+    pub scene: Option<PathBuf>,
+    /// Go on from the last checkpoint of a recording instead, with its scene.
+    #[arg(long, value_name = "FILE.mcap", conflicts_with_all = ["scene", "set"])]
+    pub resume: Option<PathBuf>,
     #[command(flatten)]
     /// How it is served.
     pub serve: ServeArgs,
+}
+
+/// `scindo replay`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// Recording.
+    pub file: PathBuf,
+    /// Compare the state after every step with the recorded one; exit code 1 if one differs.
+    #[arg(long)]
+    pub verify: bool,
+    /// Begin at the newest checkpoint before this much simulated time of the recording [s].
+    #[arg(long, value_name = "S")]
+    pub from: Option<f64>,
+    /// Threads per step; results do not depend on their number.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub threads: u16,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `scindo export`.
+#[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("to").required(true).multiple(true).args(["vtu", "gltf", "csv"])))]
+pub struct ExportArgs {
+    /// Recording.
+    pub file: PathBuf,
+    /// Write the material and the surface of all bodies as a ParaView series into this directory.
+    #[arg(long, value_name = "DIR")]
+    pub vtu: Option<PathBuf>,
+    /// Write the surfaces as a glTF scene that moves, in at most 50 key frames.
+    #[arg(long, value_name = "FILE.glb")]
+    pub gltf: Option<PathBuf>,
+    /// Write poses of tools and forces on them, one line per step and tool.
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
+    /// Simulated time from one frame of --vtu to the next [s].
+    #[arg(long, value_name = "S", default_value_t = 0.1)]
+    pub every: f64,
+    /// Threads per step; results do not depend on their number.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub threads: u16,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `scindo demo`.
@@ -92,9 +145,15 @@ pub struct ServeArgs {
     /// Write summary.json, probes.csv and final.vtm into this directory.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Record everything into a file (not supported yet).
+    /// Record inputs, events, forces, hashes and checkpoints into a new file, for `scindo replay` and `export`.
     #[arg(long, value_name = "FILE.mcap")]
     pub record: Option<PathBuf>,
+    /// Time between two checkpoints of a recording [s]; large scenes take longer.
+    #[arg(long, value_name = "S", default_value_t = 1.0, requires = "record")]
+    pub checkpoint_s: f64,
+    /// Record the surfaces of all bodies as well, in every step.
+    #[arg(long, requires = "record")]
+    pub record_surfaces: bool,
     /// First chunk of every network key; one per laboratory.
     #[arg(long, default_value = "scindo")]
     pub realm: String,

@@ -21,6 +21,8 @@ use super::cli::{DemoArgs, RunArgs, ServeArgs};
 use super::progress::{Progress, Share};
 use super::say::say;
 use crate::error::RuntimeError;
+use crate::record::recorder::RecordSettings;
+use crate::record::replay::newest;
 use crate::rpc::catalogue::Catalogue;
 use crate::server::{Server, ServerConfig};
 use crate::sim::Pace;
@@ -66,13 +68,22 @@ pub fn demo(args: &DemoArgs) -> Result<ExitCode, RuntimeError> {
 fn shipped(shipped: ShippedScene, args: &ServeArgs) -> Result<ExitCode, RuntimeError> {
     let scene = shipped.read(&args.set)?;
     let viewer = args.viewer.or_else(|| DEMONSTRATION_VIEWER.parse().ok());
-    serve((shipped.name, &scene), args, viewer)
+    serve((shipped.name, &scene), args, viewer, None)
 }
 
 /// Runs a scene file.
 pub fn scene(args: &RunArgs) -> Result<ExitCode, RuntimeError> {
-    let scene = Scene::load_with(&args.scene, &args.serve.set)?;
-    serve((scene.name(), &scene), &args.serve, args.serve.viewer)
+    let (scene, state) = match (&args.scene, &args.resume) {
+        (_, Some(recording)) => {
+            let (scene, step, state) = newest(recording)?;
+            tracing::info!("goes on after step {step} of {}", recording.display());
+            (scene, Some(state))
+        }
+        (Some(scene), None) => (Scene::load_with(scene, &args.serve.set)?, None),
+        // The command line asks for one of the two.
+        (None, None) => return demonstration(&args.serve),
+    };
+    serve((scene.name(), &scene), &args.serve, args.serve.viewer, state.as_deref())
 }
 
 /// Builds the scene, starts the server, waits and writes results. Repeats for every scene that a client
@@ -81,10 +92,14 @@ fn serve(
     (name, scene): (&str, &Scene),
     args: &ServeArgs,
     viewer: Option<SocketAddr>,
+    state: Option<&[u8]>,
 ) -> Result<ExitCode, RuntimeError> {
     let keys = KeySpace::new(&args.realm, &args.session)?;
     let pace = pace(args, scene.checked().step_s)?;
-    let mut engine = build(scene, args)?;
+    let mut engine = build(scene, args, state)?;
+    if let Some(settings) = record_settings(args)? {
+        engine.record(settings)?;
+    }
     let foreground = foreground()?;
     let network = network(args, &keys, &engine)?;
     let mut sessions =
@@ -136,19 +151,15 @@ fn serve(
 
 /// Scenes that clients may change to. It is empty for a run that is asked for as a whole.
 fn catalogue((name, scene): (&str, &Scene), args: &ServeArgs) -> Catalogue {
-    let whole = args.out.is_some() || args.steps.is_some() || args.seconds.is_some() || args.fast;
+    let whole = args.record.is_some()
+        || args.out.is_some()
+        || args.steps.is_some()
+        || args.seconds.is_some()
+        || args.fast;
     if whole { Catalogue::default() } else { Catalogue::beside(name, scene) }
 }
 
 fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
-    if let Some(path) = &args.record {
-        return Err(RuntimeError::Option {
-            option: "--record",
-            value: path.display().to_string(),
-            reason: "recording is not supported yet".to_owned(),
-            next: "Leave it out; --out DIR writes summary, probes and fields".to_owned(),
-        });
-    }
     let steps = match args.seconds {
         None => args.steps,
         Some(seconds) if seconds.is_finite() && seconds > 0.0 => Some((seconds / step_s).ceil() as u64),
@@ -164,11 +175,27 @@ fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
     Ok(Pace { fast: args.fast, steps })
 }
 
-fn build(scene: &Scene, args: &ServeArgs) -> Result<Engine, RuntimeError> {
+fn record_settings(args: &ServeArgs) -> Result<Option<RecordSettings>, RuntimeError> {
+    let Some(file) = &args.record else { return Ok(None) };
+    let checkpoint = Duration::try_from_secs_f64(args.checkpoint_s).ok().filter(|s| !s.is_zero());
+    let checkpoint = checkpoint.ok_or_else(|| RuntimeError::Option {
+        option: "--checkpoint-s",
+        value: args.checkpoint_s.to_string(),
+        reason: "a time between two checkpoints must be positive".to_owned(),
+        next: "Leave it out for one second".to_owned(),
+    })?;
+    let (file, surfaces, threads) = (file.clone(), args.record_surfaces, u32::from(args.threads));
+    Ok(Some(RecordSettings { file, checkpoint, surfaces, patient: args.fast, threads }))
+}
+
+fn build(scene: &Scene, args: &ServeArgs, state: Option<&[u8]>) -> Result<Engine, RuntimeError> {
     let options = BuildOptions { threads: usize::from(args.threads), ..BuildOptions::default() };
     let progress = Share::begin(args.json);
     let mut simulation = Simulation::observed(scene, scene.base_dir(), options, &|at| progress.meshing(at))?;
     progress.end();
+    if let Some(state) = state {
+        simulation.restore(state).map_err(|error| RuntimeError::Replay { reason: error.to_string() })?;
+    }
     if args.json || args.out.is_some() {
         simulation.measure_phases(true);
     }
@@ -306,7 +333,7 @@ async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig) -> Resul
                 if building.is_none() && let Some((name, scene)) = config.catalogue.asked_for() {
                     let args = args.clone();
                     building = Some(tokio::task::spawn_blocking(move || {
-                        Ok(Next { name, engine: build(&scene?, &args)? })
+                        Ok(Next { name, engine: build(&scene?, &args, None)? })
                     }));
                 }
             }

@@ -7,7 +7,8 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use scindo_proto::limits::{HEADER_BYTES, MAX_PARAMS, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES};
 use scindo_proto::messages::{
-    BodyInfo, BodyLook, Effect, LookLayer, ParamsReply, Plan, SessionInfo, ToolInfo,
+    BodyInfo, BodyLook, Effect, LookLayer, ParamsReply, Plan, SessionInfo, SetRequest, ToolInfo,
+    recorded_order,
 };
 use scindo_proto::{Chunk, WIRE_VERSION};
 use scindo_world::inputs::{CutOutcome, Inputs, Wants};
@@ -17,7 +18,9 @@ use scindo_world::simulation::{SimBody, Simulation, StepReport};
 use scindo_world::snapshot::Snapshot;
 use scindo_world::tool::SCRIPT;
 
+use super::snapshots::{self, Snapshots};
 use crate::error::RuntimeError;
+use crate::record::recorder::{RecordSettings, Recorder};
 use crate::wire::convert::{to_param, to_shape, to_vec3};
 use crate::wire::obstacle::to_obstacles;
 
@@ -29,6 +32,8 @@ pub struct Engine {
     panics: u64,
     /// First failure to write results. Later steps are not recorded.
     failure: Option<ResultsError>,
+    recorder: Option<Recorder>,
+    snapshots: Snapshots,
 }
 
 impl Engine {
@@ -40,7 +45,28 @@ impl Engine {
         for tool in &sim.scene().tools {
             Chunk::new("tool id", &tool.id)?;
         }
-        Ok(Self { sim, results, panics: 0, failure: None })
+        let (recorder, snapshots) = (None, Snapshots::default());
+        Ok(Self { sim, results, panics: 0, failure: None, recorder, snapshots })
+    }
+
+    /// Records everything from now on.
+    ///
+    /// # Errors
+    /// The file exists, or cannot be created.
+    pub fn record(&mut self, settings: RecordSettings) -> Result<(), RuntimeError> {
+        self.recorder = Some(Recorder::begin(settings, &self.sim)?);
+        Ok(())
+    }
+
+    /// Why the recording ended before the simulation, told once.
+    pub fn take_recording_failure(&mut self) -> Option<String> {
+        self.recorder.as_mut()?.take_failure()
+    }
+
+    fn note(&mut self, order: impl FnOnce() -> recorded_order::Order) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.order(order());
+        }
     }
 
     /// Read access to the simulation.
@@ -105,6 +131,9 @@ impl Engine {
     /// Makes one step and records it.
     pub fn step(&mut self, inputs: &Inputs) {
         self.sim.step(inputs);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.step(inputs, &mut self.sim);
+        }
         if let Some(results) = self.results.as_mut().filter(|_| self.failure.is_none())
             && let Err(error) = results.record(&self.sim)
         {
@@ -115,7 +144,11 @@ impl Engine {
 
     /// Takes note of how long the last step took.
     pub fn govern(&mut self, took: Duration) {
-        self.sim.govern(took.as_secs_f64());
+        let seconds = took.as_secs_f64();
+        self.sim.govern(seconds);
+        if self.sim.governor_report().is_some() {
+            self.note(|| recorded_order::Order::GovernS(seconds));
+        }
     }
 
     /// Installs `flag`: once it is raised, the current step ends early.
@@ -125,6 +158,7 @@ impl Engine {
 
     /// Discards cuts that wait or are under way. Their outcomes give `reason`.
     pub fn discard_cuts(&mut self, reason: &str) -> Vec<CutOutcome> {
+        self.note(|| recorded_order::Order::Discard(reason.to_owned()));
         self.sim.discard_cuts(reason)
     }
 
@@ -133,6 +167,9 @@ impl Engine {
     /// # Errors
     /// The disk failed, now or in an earlier step.
     pub fn finish(&mut self, status: &str) -> Result<(), RuntimeError> {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.end()?;
+        }
         if let Some(error) = self.failure.take() {
             return Err(error.into());
         }
@@ -154,6 +191,9 @@ impl Engine {
     /// Counts a panicked step. That is a defect of the program, and a reset does not excuse it.
     pub fn count_panic(&mut self) {
         self.panics += 1;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.jump("a step panicked");
+        }
     }
 
     /// Report of the last step.
@@ -171,7 +211,12 @@ impl Engine {
     /// # Errors
     /// The reason why a body cannot be built again, in words.
     pub fn reset(&mut self) -> Result<(), String> {
-        self.sim.reset().map_err(|error| error.to_string())
+        self.sim.reset().map_err(|error| error.to_string())?;
+        self.note(|| recorded_order::Order::Reset(true));
+        if let Some(recorder) = &mut self.recorder {
+            recorder.catch_up(&self.sim);
+        }
+        Ok(())
     }
 
     /// Takes the last cut back and returns its description.
@@ -180,6 +225,7 @@ impl Engine {
     /// There is no cut to take back.
     pub fn undo(&mut self) -> Result<String, String> {
         let undone = self.sim.undo()?;
+        self.note(|| recorded_order::Order::Undo(true));
         let ids: Vec<&str> = undone.bodies.iter().map(|&body| &*self.sim.bodies()[body].id).collect();
         Ok(format!("{}: incision {} was undone", ids.join(", "), undone.incision))
     }
@@ -189,7 +235,43 @@ impl Engine {
     /// # Errors
     /// What is wrong with key or value, in words.
     pub fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        self.sim.set(key, value)
+        self.sim.set(key, value)?;
+        let request = SetRequest { key: key.to_owned(), value: value.to_owned() };
+        self.note(|| recorded_order::Order::Set(request));
+        Ok(())
+    }
+
+    /// Keeps the present state as `name`.
+    ///
+    /// # Errors
+    /// A name that is not allowed, no room, or a state that cannot be written.
+    pub fn snapshot(&mut self, name: &str) -> Result<String, String> {
+        snapshots::check(name)?;
+        let state = self.sim.checkpoint().map_err(|error| error.to_string())?;
+        let bytes = state.len();
+        self.snapshots.keep(name, state)?;
+        self.note(|| recorded_order::Order::Snapshot(name.to_owned()));
+        Ok(format!("kept step {} as {name}, {} KiB", self.sim.steps(), bytes.div_ceil(1 << 10)))
+    }
+
+    /// Whether a state is kept as `name`.
+    pub fn has_snapshot(&self, name: &str) -> bool {
+        self.snapshots.get(name).is_ok()
+    }
+
+    /// Goes back to the state that was kept as `name`. Epochs keep rising.
+    ///
+    /// # Errors
+    /// There is none, or it does not belong to this scene. Nothing has changed then.
+    pub fn restore(&mut self, name: &str) -> Result<String, String> {
+        let state = self.snapshots.get(name)?;
+        self.sim.restore(state).map_err(|error| error.to_string())?;
+        self.note(|| recorded_order::Order::Restore(name.to_owned()));
+        if let Some(recorder) = &mut self.recorder {
+            recorder.must_follow();
+            recorder.catch_up(&self.sim);
+        }
+        Ok(format!("back at step {}, as it was kept as {name}", self.sim.steps()))
     }
 }
 
@@ -213,7 +295,7 @@ fn body_info((body, spec): (&SimBody, &BodySpec)) -> BodyInfo {
     let (min, max) = positions.iter().fold((first, first), |(min, max), x| (min.inf(x), max.sup(x)));
     BodyInfo {
         id: body.id.to_string(),
-        epoch: body.epoch(),
+        epoch: body.shown_epoch(),
         elements: body.body.n_elements() as u32,
         nodes: body.body.n_nodes() as u32,
         min_m: Some(to_vec3(&min)),

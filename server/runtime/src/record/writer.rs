@@ -1,0 +1,163 @@
+//! The thread that writes a recording: a bounded queue in, an MCAP file out, flushed every second.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions, Writer};
+use scindo_proto::FILE_DESCRIPTOR_SET;
+
+use crate::error::RuntimeError;
+
+/// Topics and the messages on them, in the order of their channels.
+pub const TOPICS: [(&str, &str); 8] = [
+    ("record/scene", "scindo.v1.RecordedScene"),
+    ("record/step", "scindo.v1.RecordedStep"),
+    ("record/order", "scindo.v1.RecordedOrder"),
+    ("record/checkpoint", "scindo.v1.RecordedCheckpoint"),
+    ("record/event", "scindo.v1.RecordedEvent"),
+    ("record/stats", "scindo.v1.RecordedStats"),
+    ("record/forces", "scindo.v1.RecordedForces"),
+    ("record/surface", "scindo.v1.RecordedSurface"),
+];
+
+/// Messages and bytes that may wait to be written. A disk that is slower than this ends the recording.
+const WAITING: usize = 65_536;
+const WAITING_BYTES: usize = 1 << 30;
+/// The file is complete up to what was handed over this long ago.
+const FLUSH: Duration = Duration::from_millis(500);
+
+/// A message on its way into the file.
+pub struct Item {
+    /// Number of its topic in [`TOPICS`].
+    pub topic: usize,
+    /// When it was made [ns since 1970].
+    pub unix_ns: u64,
+    /// Encoded message.
+    pub bytes: Vec<u8>,
+}
+
+/// The thread and the way to it.
+pub struct WriterThread {
+    queue: Option<Sender<Item>>,
+    waiting: Arc<AtomicUsize>,
+    thread: Option<JoinHandle<Result<(), String>>>,
+    path: PathBuf,
+}
+
+impl WriterThread {
+    /// Creates the file, which must not exist yet, and starts the thread.
+    ///
+    /// # Errors
+    /// The file exists, or cannot be created.
+    pub fn begin(path: &Path) -> Result<Self, RuntimeError> {
+        let failed = |reason: String| RuntimeError::Recording { file: path.display().to_string(), reason };
+        let file = File::create_new(path).map_err(|e| failed(e.to_string()))?;
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Zstd))
+            .compression_level(1)
+            .compression_threads(1)
+            .library(concat!("scindo ", env!("CARGO_PKG_VERSION")));
+        let mut writer = options.create(BufWriter::new(file)).map_err(|e| failed(e.to_string()))?;
+        for (topic, name) in TOPICS {
+            let schema = writer.add_schema(name, "protobuf", FILE_DESCRIPTOR_SET);
+            schema
+                .and_then(|schema| writer.add_channel(schema, topic, "protobuf", &BTreeMap::new()))
+                .map_err(|e| failed(e.to_string()))?;
+        }
+        let (queue, items) = bounded(WAITING);
+        let waiting = Arc::new(AtomicUsize::new(0));
+        let count = Arc::clone(&waiting);
+        let thread = std::thread::Builder::new()
+            .name("record".to_owned())
+            .spawn(move || write(writer, &items, &count))
+            .map_err(|e| failed(e.to_string()))?;
+        Ok(Self { queue: Some(queue), waiting, thread: Some(thread), path: path.to_owned() })
+    }
+
+    /// Hands a message over. `patient` waits for the disk; otherwise a full queue is an error.
+    ///
+    /// # Errors
+    /// Why the recording ends here.
+    pub fn send(&mut self, item: Item, patient: bool) -> Result<(), String> {
+        let Some(queue) = &self.queue else { return Err("it has ended".to_owned()) };
+        let bytes = item.bytes.len();
+        let waiting = self.waiting.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        let sent = match patient {
+            true => queue.send(item).is_ok(),
+            false if waiting > WAITING_BYTES => false,
+            false => queue.try_send(item).is_ok(),
+        };
+        if sent {
+            return Ok(());
+        }
+        let written = self.close();
+        Err(written
+            .err()
+            .unwrap_or_else(|| "the disk is too slow; messages waited until there was no room".into()))
+    }
+
+    /// Writes what waits, and the end of the file.
+    ///
+    /// # Errors
+    /// What the disk says.
+    pub fn end(&mut self) -> Result<(), RuntimeError> {
+        let file = self.path.display().to_string();
+        self.close().map_err(|reason| RuntimeError::Recording { file, reason })
+    }
+
+    fn close(&mut self) -> Result<(), String> {
+        self.queue = None;
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(written)) => written,
+            Some(Err(_)) => Err("the thread that writes has panicked".to_owned()),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for WriterThread {
+    fn drop(&mut self) {
+        if let Err(reason) = self.close() {
+            tracing::error!(file = %self.path.display(), "recording: {reason}");
+        }
+    }
+}
+
+fn write(
+    mut writer: Writer<BufWriter<File>>,
+    items: &Receiver<Item>,
+    waiting: &AtomicUsize,
+) -> Result<(), String> {
+    let words = |error: mcap::McapError| error.to_string();
+    let (mut sequence, mut last_ns) = (0u32, 0);
+    let mut due = Instant::now() + FLUSH;
+    loop {
+        match items.recv_deadline(due) {
+            Ok(Item { topic, unix_ns, bytes }) => {
+                // Readers order by time, which a clock that is set back must not change.
+                last_ns = unix_ns.max(last_ns + 1);
+                sequence = sequence.wrapping_add(1);
+                let (log_time, publish_time) = (last_ns, unix_ns);
+                let header = MessageHeader { channel_id: topic as u16, sequence, log_time, publish_time };
+                writer.write_to_known_channel(&header, &bytes).map_err(words)?;
+                waiting.fetch_sub(bytes.len(), Ordering::Relaxed);
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+        if Instant::now() >= due {
+            writer.flush().map_err(words)?;
+            due = Instant::now() + FLUSH;
+        }
+    }
+    writer.finish().map_err(words)?;
+    Ok(())
+}
