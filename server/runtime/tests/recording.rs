@@ -62,7 +62,7 @@ fn inputs(step: u64) -> Inputs {
         request: step,
         tool: Arc::from("knife"),
         body: None,
-        segments: vec![edge(-0.03), edge(0.0), edge(0.03)],
+        segments: vec![edge(-0.008), edge(0.0), edge(0.008)],
     };
     let cuts = if step.is_multiple_of(2) { vec![cut] } else { Vec::new() };
     Inputs { tools: vec![tool], cuts, ..Inputs::default() }
@@ -102,7 +102,7 @@ fn record(file: &Path, steps: u64) -> u64 {
     }
     cuts += engine.simulation().cuts_applied();
     engine.finish("done").unwrap();
-    assert!(engine.take_recording_failure().is_none());
+    assert_eq!(engine.take_recording_failure(), None);
     cuts
 }
 

@@ -35,7 +35,7 @@ mesh = { box = { min_m = [0, 0, 0], max_m = [0.08, 0.04, 0.02], cells = [8, 4, 2
 young_pa = 5e4
 poisson = 0.4
 density_kg_m3 = 1000
-solver = { iterations = 20, tolerance = 1e-4 }
+solver = { iterations = 60, tolerance = 1e-4 }
 [[body.fix]]
 where = { box = { min_m = [-1, -1, -1e-6], max_m = [1, 1, 1e-6] } }
 [[tool]]

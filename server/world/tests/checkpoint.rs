@@ -112,7 +112,7 @@ fn press_and_cut(step: u64) -> Inputs {
         request: step,
         tool: Arc::from("knife"),
         body: None,
-        segments: vec![edge(-0.03), edge(0.0), edge(0.03)],
+        segments: vec![edge(-0.008), edge(0.0), edge(0.008)],
     };
     Inputs {
         tools: vec![ball],

@@ -66,9 +66,10 @@ impl WriterThread {
             .compression_threads(1)
             .library(concat!("scindo ", env!("CARGO_PKG_VERSION")));
         let mut writer = options.create(BufWriter::new(file)).map_err(|e| failed(e.to_string()))?;
-        for (topic, name) in TOPICS {
+        let mut channels = [0; TOPICS.len()];
+        for (channel, (topic, name)) in channels.iter_mut().zip(TOPICS) {
             let schema = writer.add_schema(name, "protobuf", FILE_DESCRIPTOR_SET);
-            schema
+            *channel = schema
                 .and_then(|schema| writer.add_channel(schema, topic, "protobuf", &BTreeMap::new()))
                 .map_err(|e| failed(e.to_string()))?;
         }
@@ -77,7 +78,7 @@ impl WriterThread {
         let count = Arc::clone(&waiting);
         let thread = std::thread::Builder::new()
             .name("record".to_owned())
-            .spawn(move || write(writer, &items, &count))
+            .spawn(move || write(writer, channels, &items, &count))
             .map_err(|e| failed(e.to_string()))?;
         Ok(Self { queue: Some(queue), waiting, thread: Some(thread), path: path.to_owned() })
     }
@@ -133,6 +134,7 @@ impl Drop for WriterThread {
 
 fn write(
     mut writer: Writer<BufWriter<File>>,
+    channels: [u16; TOPICS.len()],
     items: &Receiver<Item>,
     waiting: &AtomicUsize,
 ) -> Result<(), String> {
@@ -146,7 +148,7 @@ fn write(
                 last_ns = unix_ns.max(last_ns + 1);
                 sequence = sequence.wrapping_add(1);
                 let (log_time, publish_time) = (last_ns, unix_ns);
-                let header = MessageHeader { channel_id: topic as u16, sequence, log_time, publish_time };
+                let header = MessageHeader { channel_id: channels[topic], sequence, log_time, publish_time };
                 writer.write_to_known_channel(&header, &bytes).map_err(words)?;
                 waiting.fetch_sub(bytes.len(), Ordering::Relaxed);
             }
