@@ -18,7 +18,7 @@ macro_rules! saved_as {
             enum Written<'a> { $($kind(&'a $type)),+ }
 
             #[derive(Deserialize)]
-            enum Read { $($kind($type)),+ }
+            enum Read { $($kind(Box<$type>)),+ }
 
             pub fn serialize<S: Serializer>(object: &$pointer<dyn $object>, to: S) -> Result<S::Ok, S::Error> {
                 let any: &dyn Any = &**object;
@@ -29,7 +29,7 @@ macro_rules! saved_as {
             }
 
             pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<$pointer<dyn $object>, D::Error> {
-                Ok(match Read::deserialize(from)? { $(Read::$kind(known) => $pointer::new(known)),+ })
+                Ok(match Read::deserialize(from)? { $(Read::$kind(known) => $pointer::new(*known)),+ })
             }
         }
     };
@@ -42,7 +42,7 @@ pub(crate) mod arrays {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     pub fn serialize<S: Serializer, T: Serialize, const N: usize>(
-        arrays: &Vec<[T; N]>,
+        arrays: &[[T; N]],
         to: S,
     ) -> Result<S::Ok, S::Error> {
         arrays.as_flattened().serialize(to)

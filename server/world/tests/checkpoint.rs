@@ -103,7 +103,7 @@ fn press_and_cut(step: u64) -> Inputs {
     // Slits along x and y in turn, at places that fill the top evenly.
     let n = (step / 2) as f64;
     let (x, y) = (0.2 * (n * 0.618_034).fract(), 0.1 * (n * 0.754_878).fract());
-    let along = if step % 4 == 0 { Vector3::x() } else { Vector3::y() };
+    let along = if step.is_multiple_of(4) { Vector3::x() } else { Vector3::y() };
     let edge = |s: f64| {
         let place = Vector3::new(x, y, 0.0) + along * s;
         [place + Vector3::z() * 0.06, place + Vector3::z() * 0.12]
@@ -116,7 +116,7 @@ fn press_and_cut(step: u64) -> Inputs {
     };
     Inputs {
         tools: vec![ball],
-        cuts: if step % 2 == 0 { vec![cut] } else { Vec::new() },
+        cuts: if step.is_multiple_of(2) { vec![cut] } else { Vec::new() },
         ..Inputs::default()
     }
 }

@@ -127,7 +127,7 @@ impl Recorder {
             residual: report.bodies.iter().map(|body| body.solve.residual).collect(),
         };
         self.send(STATS, &stats);
-        if simulation.tools().len() > 0 {
+        if !simulation.tools().is_empty() {
             let tools = simulation.tools().iter().map(inputs::to_force).collect();
             self.send(FORCES, &RecordedForces { number, time_s: simulation.time_s(), tools });
         }
