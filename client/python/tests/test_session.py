@@ -219,6 +219,26 @@ class Orders(WithServer):
         self.session.resume()
         until(lambda: body.surface.step > 2507, "it runs on")
 
+    def test_a_kept_state_comes_back_with_its_cuts(self):
+        self.session.pause()
+        body = self.session.body("block")
+        self.session.reset()
+        self.session.step(3)
+        self.session.snapshot("whole")
+        whole = len(body.wait(timeout=PATIENCE).triangles)
+        pending = self.session.begin_cut(ACROSS)
+        self.session.step(2)
+        epoch = pending.result(PATIENCE).epochs["block"]
+        self.assertGreater(len(body.wait(epoch=epoch, timeout=PATIENCE).triangles), whole)
+        self.session.restore("whole")
+        until(lambda: body.surface.step == 3, "back at step 3")
+        self.assertEqual(len(body.wait(epoch=epoch + 1, timeout=PATIENCE).triangles), whole)
+        with self.refused("cannot-restore"):
+            self.session.restore("wohle")
+        with self.refused("out-of-range"):
+            self.session.snapshot("Not a name")
+        self.session.resume()
+
     def test_another_scene(self):
         self.assertIn("kidney", self.session.scenes)
         with self.refused("unknown-scene"):

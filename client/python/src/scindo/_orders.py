@@ -1,4 +1,4 @@
-"""Orders to the server: pause, step, reset, set, undo, load."""
+"""Orders to the server: pause, step, reset, set, undo, snapshot, restore, load."""
 
 from __future__ import annotations
 
@@ -59,6 +59,20 @@ class Orders:
     def undo(self) -> None:
         """Takes the last cut back. The server keeps the last eight."""
         self._order("undo", server_pb2.UndoRequest())
+
+    def snapshot(self, name: str) -> None:
+        """Keeps the present state as ``name`` (1 to 64 of a-z, 0-9, - and _) in the memory of the server, in place
+        of an earlier state of this name. The server keeps 16 of them, and forgets them when it ends or loads another
+        scene.
+
+        Raises:
+            Refused: the name is not valid, or there is no room.
+        """
+        self._order("snapshot", server_pb2.SnapshotRequest(name=name))
+
+    def restore(self, name: str) -> None:
+        """Goes back to a state that ``snapshot`` kept, with its cuts and its time. Epochs keep rising."""
+        self._order("restore", server_pb2.RestoreRequest(name=name))
 
     def set(self, key: str, value: Union[str, float, bool, Vector]) -> None:
         """Changes one of ``params``, such as ``session.set("body.liver.young_pa", 5e3)``."""
