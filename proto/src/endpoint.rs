@@ -22,7 +22,7 @@ mod tests {
     #[test]
     fn the_bulk_endpoint_is_one_port_above() {
         assert_eq!(bulk_endpoint("tcp/127.0.0.1:7447").as_deref(), Some("tcp/127.0.0.1:7448"));
-        assert_eq!(bulk_endpoint("tls/[::1]:9?prio=1-7").as_deref(), Some("tls/[::1]:10?prio=1-7"));
+        assert_eq!(bulk_endpoint("quic/[::1]:9?prio=1-7").as_deref(), Some("quic/[::1]:10?prio=1-7"));
         assert_eq!(bulk_endpoint("tcp/127.0.0.1:0"), None);
         assert_eq!(bulk_endpoint("tcp/127.0.0.1:65535"), None);
         assert_eq!(bulk_endpoint("unixsock-stream//tmp/scindo"), None);

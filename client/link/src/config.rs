@@ -23,7 +23,7 @@ pub struct LinkConfig {
     pub id: String,
     /// Time after which [`crate::Link::connect`] gives up.
     pub timeout: Duration,
-    /// A zenoh configuration (JSON5) to start from, for TLS, users and routers. If [`Self::connect`] is
+    /// A zenoh configuration (JSON5) to start from, for certificates, users and routers. If [`Self::connect`] is
     /// empty, its connect endpoints serve both sessions.
     pub zenoh_file: Option<PathBuf>,
 }

@@ -38,6 +38,8 @@ pub mod effects;
 
 pub mod certs;
 
+pub mod router;
+
 /// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -56,7 +58,7 @@ pub fn main() -> ExitCode {
         Some(Command::Reliability(args)) => args.json,
         Some(Command::Certs(args)) => args.json,
         Some(Command::Effects(args)) => args.json,
-        Some(Command::Manual(_)) => false,
+        Some(Command::Router(_) | Command::Manual(_)) => false,
     };
     let outcome = match cli.command {
         None => run::demonstration(&cli.demonstration),
@@ -71,6 +73,7 @@ pub fn main() -> ExitCode {
         Some(Command::Haptics(args)) => haptics::haptics(&args),
         Some(Command::Reliability(args)) => reliability::reliability(&args),
         Some(Command::Certs(args)) => certs::certs(&args),
+        Some(Command::Router(args)) => router::route(&args),
         Some(Command::Effects(args)) => effects::effects(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };

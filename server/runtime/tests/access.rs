@@ -1,4 +1,4 @@
-//! Access control of a laboratory with certificates: every role, key and verb is tried by a real client over TLS
+//! Access control of a laboratory with certificates: every role, key and verb is tried by a real client over QUIC
 //! against a real server.
 
 #![allow(clippy::unwrap_used)]
@@ -145,7 +145,7 @@ impl Running {
         for (id, role) in CLIENTS {
             folder.admit(id, role, YEAR).unwrap();
         }
-        let endpoint = format!("tls/localhost:{}", free_pair());
+        let endpoint = format!("quic/localhost:{}", free_pair());
         let network = NetworkConfig {
             listen: vec![endpoint.clone()],
             zenoh_file: Some(folder.path().join("server.json5")),
@@ -391,6 +391,29 @@ fn sample(client: &str, seq: u64, x: f64) -> ToolSample {
         mode: tool_sample::Mode::Touch.into(),
         ..ToolSample::default()
     }
+}
+
+/// Poses and contacts cross on an encrypted link all the time. zenoh's TLS link does not bear this.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_hand_keeps_its_link() {
+    let running = Running::start();
+    let gone = Arc::new(Mutex::new(0));
+    let count = Arc::clone(&gone);
+    let watch = running
+        .session
+        .liveliness()
+        .declare_subscriber(format!("{PREFIX}client/**"))
+        .callback(move |sample| *count.lock().unwrap() += i32::from(sample.kind() == SampleKind::Delete));
+    let _watch = watch.wait().unwrap();
+    let hand = running.link("hand").await;
+    let mut tool = hand.tool("probe").await.unwrap();
+    let mut every = tokio::time::interval(Duration::from_millis(1));
+    for seq in 0..10_000 {
+        every.tick().await;
+        tool.poses.send(sample("hand", seq, 0.01)).unwrap();
+    }
+    assert!(tool.contacts.received() > 1000, "{} contacts", tool.contacts.received());
+    assert_eq!(*gone.lock().unwrap(), 0, "the link was lost");
 }
 
 #[tokio::test(flavor = "multi_thread")]

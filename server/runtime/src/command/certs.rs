@@ -1,4 +1,5 @@
-//! `scindo certs` sets up a laboratory with certificates, and admits clients to it.
+//! `scindo certs` sets up a laboratory with certificates, and admits clients to it; or a house of laboratories, and
+//! admits guests.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
@@ -8,11 +9,16 @@ use super::cli::CertsArgs;
 use super::say::say;
 use crate::error::RuntimeError;
 use crate::lab::folder::{Folder, Lab, LabError};
-use crate::lab::roles::SERVER;
+use crate::lab::house::House;
+use crate::lab::roles::{ROUTER, SERVER};
 
 /// Makes what is missing, and prints how to use it.
 pub fn certs(args: &CertsArgs) -> Result<ExitCode, RuntimeError> {
     let life = Duration::from_secs(86_400 * u64::from(args.days));
+    let house = House::open(&args.dir)?;
+    if house.is_some() || args.house.is_some() || !args.guest.is_empty() {
+        return certs_of_house(args, house, life);
+    }
     let mut folder = match Folder::open(&args.dir)? {
         None => Folder::create(&args.dir, wanted(args)?, life)?,
         Some(folder) => {
@@ -29,16 +35,75 @@ pub fn certs(args: &CertsArgs) -> Result<ExitCode, RuntimeError> {
         return Ok(ExitCode::SUCCESS);
     }
     say!("laboratory '{}' in {path}", lab.lab);
-    say!("  server   scindo run SCENE --zenoh {path}/{SERVER}.json5 --listen tls/0.0.0.0:7447");
-    let host = lab.server.first().map_or("HOST", String::as_str);
+    let house = folder.house()?;
+    let router = house.as_ref().and_then(|house| house.residents().router.first());
+    let (link, realm) = match router {
+        Some(host) => (format!("--connect quic/{host}:7447"), format!(" --realm {}", lab.realm)),
+        None => ("--listen quic/0.0.0.0:7447".to_owned(), String::new()),
+    };
+    say!("  server   scindo run SCENE --zenoh {path}/{SERVER}.json5{realm} {link}");
+    let host = router.or(lab.server.first()).map_or("HOST", String::as_str);
     for (id, role) in &lab.clients {
         let program = if role.touches() { "scindo-haptic" } else { "scindo-view" };
-        say!("  {role:<8} {program} --zenoh {path}/{id}.json5 --id {id} --connect tls/{host}:7447");
+        say!("  {role:<8} {program} --zenoh {path}/{id}.json5 --id {id}{realm} --connect quic/{host}:7447");
     }
     say!(
-        "Give each client its own three files and ca.pem, and keep ca.key off line. Start the server anew after"
+        "Give each client its own three files and ca.pem, and keep ca.key off line. After a client was added,"
     );
-    say!("a client was added.");
+    say!("start the server anew{}.", if router.is_some() { ", and the router of the house" } else { "" });
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The same for a house.
+fn certs_of_house(args: &CertsArgs, house: Option<House>, life: Duration) -> Result<ExitCode, RuntimeError> {
+    let wrong = |reason: &str, next: &str| RuntimeError::Option {
+        option: "DIR",
+        value: args.dir.display().to_string(),
+        reason: reason.to_owned(),
+        next: next.to_owned(),
+    };
+    let mut house = match (house, &args.house) {
+        (Some(house), None) => house,
+        (Some(house), Some(name)) if *name == house.residents().house && args.router.is_empty() => house,
+        (Some(_), Some(_)) => {
+            return Err(wrong(
+                "there is a house already",
+                "Leave --house and --router out, or take an empty folder",
+            ));
+        }
+        (None, Some(_)) if args.router.is_empty() => {
+            return Err(wrong("a new house needs the names of its router", "Add --router HOST"));
+        }
+        (None, Some(name)) => House::create(&args.dir, name, &args.router, life)?,
+        (None, None) => {
+            return Err(wrong("there is no house", "Set one up with --house NAME --router HOST"));
+        }
+    };
+    for (id, realms) in &args.guest {
+        house.welcome(id, realms, life)?;
+    }
+    let (residents, path) = (house.residents(), house.path().display());
+    if args.json {
+        let labs = house.labs()?;
+        say!("{}", serde_json::json!({ "folder": house.path(), "house": residents, "labs": labs }));
+        return Ok(ExitCode::SUCCESS);
+    }
+    say!("house '{}' in {path}", residents.house);
+    say!("  router   scindo router --zenoh {path}/{ROUTER}.json5 --listen quic/0.0.0.0:7447");
+    for lab in house.labs()? {
+        say!("  lab      '{}', realm {}, {} clients", lab.lab, lab.realm, lab.clients.len());
+    }
+    let host = residents.router.first().map_or("HOST", String::as_str);
+    for (id, realms) in &residents.guests {
+        for realm in realms {
+            say!(
+                "  guest    scindo-view --zenoh {path}/{id}.json5 --id {id} --realm {realm} --connect quic/{host}:7447"
+            );
+        }
+    }
+    say!(
+        "Add a laboratory: scindo certs {path}/NAME --lab NAME --client ID=ROLE. Start the router anew afterwards."
+    );
     Ok(ExitCode::SUCCESS)
 }
 
@@ -51,7 +116,12 @@ fn wanted(args: &CertsArgs) -> Result<Lab, RuntimeError> {
             next: "Set one up with --lab NAME --server HOST".to_owned(),
         });
     };
-    let (realm, session) = (args.realm.clone(), args.session.clone());
+    let realm = match (&args.realm, House::around(&args.dir)?) {
+        (Some(realm), _) => realm.clone(),
+        (None, Some(_)) => lab.clone(),
+        (None, None) => "scindo".to_owned(),
+    };
+    let session = args.session.clone();
     Ok(Lab { lab, realm, session, server: args.server.clone(), clients: BTreeMap::new() })
 }
 

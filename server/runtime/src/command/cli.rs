@@ -52,6 +52,8 @@ pub enum Command {
     Effects(EffectsArgs),
     /// Set up a laboratory with certificates, and admit clients to it.
     Certs(CertsArgs),
+    /// Pass messages on between servers and clients: one door for several laboratories, or for many viewers.
+    Router(RouterArgs),
     /// Completions and man pages.
     #[command(flatten)]
     Manual(Manual),
@@ -167,7 +169,7 @@ pub struct ServeArgs {
     /// Zenoh router to connect to.
     #[arg(long, value_name = "ENDPOINT")]
     pub connect: Vec<String>,
-    /// Zenoh configuration file to start from, for TLS, users and access control.
+    /// Zenoh configuration file to start from, for certificates, users and access control.
     #[arg(long, value_name = "FILE.json5")]
     pub zenoh: Option<PathBuf>,
     /// Threads per step; results do not depend on their number.
@@ -372,11 +374,40 @@ fn minutes(text: &str) -> Result<f64, String> {
     }
 }
 
+/// `scindo router`.
+#[derive(Debug, Args)]
+pub struct RouterArgs {
+    /// Zenoh configuration file, such as the `router.json5` that `scindo certs` makes for a house.
+    #[arg(long, value_name = "FILE.json5")]
+    pub zenoh: Option<PathBuf>,
+    /// Address at which servers, clients and other routers connect. May be repeated.
+    #[arg(long, value_name = "ENDPOINT", required = true)]
+    pub listen: Vec<String>,
+    /// Server or router to connect to. May be repeated.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub connect: Vec<String>,
+    /// Longest message that is passed on [MiB]; surfaces are the longest.
+    #[arg(long, value_name = "MIB", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub longest_message: u32,
+    /// Most connections at a time.
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub connections: u32,
+}
+
 /// `scindo certs`.
 #[derive(Debug, Args)]
 pub struct CertsArgs {
-    /// Folder of the laboratory.
+    /// Folder of the laboratory. In the folder of a house, the laboratory belongs to the house.
     pub dir: PathBuf,
+    /// Set up a house instead, which joins laboratories by a router: its name.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["lab", "server", "client"])]
+    pub house: Option<String>,
+    /// Host name or address at which the router of a new house is reached. May be repeated.
+    #[arg(long, value_name = "HOST", requires = "house")]
+    pub router: Vec<String>,
+    /// Guest of a house, who watches several laboratories: its id and their realms. May be repeated.
+    #[arg(long, value_name = "ID=REALM,…", value_parser = crate::lab::roles::parse_guest, conflicts_with_all = ["lab", "server", "client"])]
+    pub guest: Vec<(String, std::collections::BTreeSet<String>)>,
     /// Name of a new laboratory.
     #[arg(long, value_name = "NAME")]
     pub lab: Option<String>,
@@ -389,9 +420,9 @@ pub struct CertsArgs {
     /// Days for which new certificates are valid.
     #[arg(long, value_name = "N", default_value_t = 365, value_parser = clap::value_parser!(u32).range(1..=3650))]
     pub days: u32,
-    /// First chunk of every network key of a new laboratory.
-    #[arg(long, default_value = "scindo")]
-    pub realm: String,
+    /// First chunk of every network key of a new laboratory [default: scindo; in a house the name of the laboratory].
+    #[arg(long)]
+    pub realm: Option<String>,
     /// Session within the realm.
     #[arg(long, default_value = "main")]
     pub session: String,

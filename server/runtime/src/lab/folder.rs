@@ -3,25 +3,26 @@
 //! ```text
 //! lab.json              who belongs to the laboratory
 //! ca.pem, ca.key        its own certificate; the key signs others, keep it off line
-//! server.pem, .key, server.json5     scindo run SCENE --zenoh server.json5 --listen tls/0.0.0.0:7447
-//! ID.pem, ID.key, ID.json5           scindo-haptic --zenoh ID.json5 --id ID --connect tls/HOST:7447
+//! server.pem, .key, server.json5     scindo run SCENE --zenoh server.json5 --listen quic/0.0.0.0:7447
+//! ID.pem, ID.key, ID.json5           scindo-haptic --zenoh ID.json5 --id ID --connect quic/HOST:7447
 //! ```
+//!
+//! In the folder of a [house](super::house), the house signs, and has `ca.key`.
 
 use std::collections::BTreeMap;
-use std::fs::{self, OpenOptions};
-use std::io::{self, Write as _};
-use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use scindo_proto::{Chunk, KeyError, KeySpace};
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
-use thiserror::Error;
+use serde_json::json;
 
+pub use super::files::LabError;
+use super::files::{make, of_client, of_server, put, put_new, put_papers, read_json, read_papers, wrong};
+use super::house::House;
 use super::issue::{Holder, Papers, authority, issue};
-use super::roles::{LabRole, SERVER};
-use super::rules::access_control;
+use super::roles::{LabRole, ROUTER, SERVER};
+use super::rules::{Seats, access_control};
 
 /// Who belongs to a laboratory, as `lab.json` keeps it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,45 +33,33 @@ pub struct Lab {
     pub realm: String,
     /// Session within the realm.
     pub session: String,
-    /// Host names and addresses of the server.
+    /// Host names and addresses of the server. In a house there may be none: clients then come through its router.
     pub server: Vec<String>,
     /// Clients by id.
     pub clients: BTreeMap<String, LabRole>,
 }
 
-/// Why a laboratory cannot be set up.
-#[derive(Debug, Error)]
-pub enum LabError {
-    /// A file.
-    #[error("{path}: {source}", path = .path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The system's message.
-        source: io::Error,
-    },
-    /// `lab.json` cannot be read.
-    #[error("{path}: {reason}. Restore it, or set the laboratory up in an empty folder", path = .path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A request that contradicts the folder.
-    #[error("{0}")]
-    Request(String),
-    /// Cryptography.
-    #[error("certificate of '{name}': {reason}")]
-    Certificate {
-        /// Common name.
-        name: String,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A name that cannot stand in a key.
-    #[error(transparent)]
-    Key(#[from] KeyError),
+impl Lab {
+    /// Its keys.
+    ///
+    /// # Errors
+    /// If realm or session cannot stand in a key.
+    pub fn keys(&self) -> Result<KeySpace, KeyError> {
+        KeySpace::new(&self.realm, &self.session)
+    }
+
+    /// Common name of the server's certificate in a house: no two laboratories have the same.
+    pub fn server_name(&self) -> String {
+        format!("{SERVER}-{}", self.realm)
+    }
+
+    /// Its clients as rules need them.
+    ///
+    /// # Errors
+    /// If an id cannot stand in a key.
+    pub fn chunks(&self) -> Result<Vec<(Chunk, LabRole)>, KeyError> {
+        self.clients.iter().map(|(id, role)| Ok((Chunk::new("client id", id)?, *role))).collect()
+    }
 }
 
 /// The folder of a laboratory.
@@ -91,12 +80,13 @@ impl Folder {
         if !file.exists() {
             return Ok(None);
         }
-        let text = read(&file)?;
-        let unreadable =
-            |error: serde_json::Error| LabError::Unreadable { path: file, reason: error.to_string() };
-        let lab: Lab = serde_json::from_str(&text).map_err(unreadable)?;
-        let path = path.to_owned();
-        let authority = Papers { certificate: read(&path.join("ca.pem"))?, key: read(&path.join("ca.key"))? };
+        let lab: Lab = read_json(file)?;
+        let path = make(path)?;
+        let house = House::around(&path)?;
+        let authority = match &house {
+            Some(house) => house.authority().clone(),
+            None => read_papers(&path, "ca")?,
+        };
         Ok(Some(Self { path, lab, authority }))
     }
 
@@ -105,21 +95,29 @@ impl Folder {
     /// # Errors
     /// If it exists, a name is wrong, or a file cannot be written.
     pub fn create(path: &Path, lab: Lab, life: Duration) -> Result<Self, LabError> {
-        KeySpace::new(&lab.realm, &lab.session)?;
-        if lab.server.is_empty() {
+        lab.keys()?;
+        let house = House::around(path)?;
+        if lab.server.is_empty() && house.is_none() {
             return Err(LabError::Request(
                 "a new laboratory needs the names and addresses of its server: --server HOST".into(),
             ));
         }
-        fs::create_dir_all(path).map_err(|source| LabError::Io { path: path.to_owned(), source })?;
-        // Configurations name their files by the whole path, so that programs find them from anywhere.
-        let path = path.canonicalize().map_err(|source| LabError::Io { path: path.to_owned(), source })?;
-        let authority = authority(&lab.lab, life).map_err(wrong(&lab.lab))?;
-        let of_server =
-            issue(&authority, SERVER, Holder::Server(&lab.server), life).map_err(wrong(SERVER))?;
+        if let Some(house) = &house {
+            house.has_room_for(&lab)?;
+        }
+        let path = make(path)?;
+        let (authority, name) = match &house {
+            Some(house) => (house.authority().clone(), lab.server_name()),
+            None => (authority(&lab.lab, life).map_err(wrong(&lab.lab))?, SERVER.to_owned()),
+        };
+        let of_server = issue(&authority, &name, Holder::Server(&lab.server), life).map_err(wrong(&name))?;
+        if house.is_some() {
+            put_new(&path, "ca.pem", &authority.certificate, 0o644)?;
+        } else {
+            put_papers(&path, "ca", &authority)?;
+        }
+        put_papers(&path, SERVER, &of_server)?;
         let folder = Self { path, lab: Lab { clients: BTreeMap::new(), ..lab }, authority };
-        folder.put_papers("ca", &folder.authority)?;
-        folder.put_papers(SERVER, &of_server)?;
         folder.put_lists()?;
         Ok(folder)
     }
@@ -137,9 +135,12 @@ impl Folder {
             )));
         }
         Chunk::new("client id", id)?;
+        if let Some(house) = self.house()? {
+            house.is_free(id)?;
+        }
         let papers = issue(&self.authority, id, Holder::Client, life).map_err(wrong(id))?;
-        self.put_papers(id, &papers)?;
-        self.put(&format!("{id}.json5"), &of_client(&self.path, id))?;
+        put_papers(&self.path, id, &papers)?;
+        put(&self.path, &format!("{id}.json5"), &of_client(&self.path, id))?;
         self.lab.clients.insert(id.to_owned(), role);
         self.put_lists()
     }
@@ -154,89 +155,33 @@ impl Folder {
         &self.path
     }
 
+    /// The house it is in, if any, as its files are now.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    pub fn house(&self) -> Result<Option<House>, LabError> {
+        House::around(&self.path)
+    }
+
     /// Writes the lists that change when a client is admitted.
     fn put_lists(&self) -> Result<(), LabError> {
-        let keys = KeySpace::new(&self.lab.realm, &self.lab.session)?;
-        let ids = self.lab.clients.iter().map(|(id, role)| Ok((Chunk::new("client id", id)?, *role)));
-        let ids: Vec<(Chunk, LabRole)> = ids.collect::<Result<_, KeyError>>()?;
-        let rules = access_control(&keys, ids.iter().map(|(id, role)| (id, *role)));
-        self.put("server.json5", &of_server(&self.path, rules))?;
-        self.put("lab.json", &json!(self.lab))
+        let house = self.house()?;
+        let trusted = match house {
+            // The router has held its clients to their rights already.
+            Some(_) => vec![self.lab.server_name(), ROUTER.to_owned()],
+            None => vec![SERVER.to_owned()],
+        };
+        let seats = Seats { keys: self.lab.keys()?, trusted, clients: self.lab.chunks()? };
+        put(&self.path, "server.json5", &of_server(&self.path, SERVER, access_control(&seats)))?;
+        put(&self.path, "lab.json", &json!(self.lab))?;
+        house.as_ref().map_or(Ok(()), House::put_router)
     }
-
-    fn put(&self, name: &str, content: &Value) -> Result<(), LabError> {
-        let path = self.path.join(name);
-        let draft = self.path.join(format!("{name}.part"));
-        let written = fs::write(&draft, format!("{content:#}\n")).and_then(|()| fs::rename(&draft, &path));
-        written.map_err(|source| LabError::Io { path, source })
-    }
-
-    /// Writes a certificate and its key, which nobody else may read. Neither may exist.
-    fn put_papers(&self, name: &str, papers: &Papers) -> Result<(), LabError> {
-        for (end, text, mode) in [("key", &papers.key, 0o600), ("pem", &papers.certificate, 0o644)] {
-            let path = self.path.join(format!("{name}.{end}"));
-            let file = OpenOptions::new().write(true).create_new(true).mode(mode).open(&path);
-            file.and_then(|mut file| file.write_all(text.as_bytes()))
-                .map_err(|source| LabError::Io { path, source })?;
-        }
-        Ok(())
-    }
-}
-
-fn read(path: &Path) -> Result<String, LabError> {
-    fs::read_to_string(path).map_err(|source| LabError::Io { path: path.to_owned(), source })
-}
-
-fn wrong(name: &str) -> impl FnOnce(rcgen::Error) -> LabError {
-    let name = name.to_owned();
-    move |error| LabError::Certificate { name, reason: error.to_string() }
-}
-
-/// Files of a TLS link, both directions.
-fn tls(path: &Path, name: &str) -> Value {
-    let file = |name: String| path.join(name).display().to_string();
-    json!({
-        "root_ca_certificate": file("ca.pem".into()),
-        "listen_certificate": file(format!("{name}.pem")),
-        "listen_private_key": file(format!("{name}.key")),
-        "connect_certificate": file(format!("{name}.pem")),
-        "connect_private_key": file(format!("{name}.key")),
-        "enable_mtls": true,
-        "verify_name_on_connect": true,
-        "close_link_on_expiration": true,
-    })
-}
-
-/// What all sessions of a laboratory share: no discovery, and no memory shared with others on the machine, which
-/// access control does not see.
-fn quiet(path: &Path, name: &str) -> Value {
-    json!({
-        "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false }, "delay": 50 },
-        "transport": {
-            "link": { "protocols": ["tls"], "tls": tls(path, name), "tx": { "lease": 2000, "keep_alive": 4 } },
-            "shared_memory": { "enabled": false },
-        },
-    })
-}
-
-fn of_server(path: &Path, rules: Value) -> Value {
-    let mut config = quiet(path, SERVER);
-    config["mode"] = json!("router");
-    config["access_control"] = rules;
-    config
-}
-
-fn of_client(path: &Path, id: &str) -> Value {
-    let mut config = quiet(path, id);
-    config["mode"] = json!("client");
-    config["connect"] =
-        json!({ "retry": { "period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2 } });
-    config
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use std::fs;
     use std::os::unix::fs::PermissionsExt as _;
 
     use super::*;

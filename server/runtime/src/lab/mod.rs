@@ -10,3 +10,7 @@ pub mod rules;
 pub mod issue;
 
 pub mod folder;
+
+pub mod files;
+
+pub mod house;

@@ -1,5 +1,6 @@
 //! What a client of a laboratory may do.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use scindo_proto::Chunk;
@@ -71,8 +72,26 @@ pub fn parse_client(text: &str) -> Result<(String, LabRole), String> {
     Ok((id.to_owned(), role))
 }
 
+/// Parses `ID=REALM,REALM…`: a guest of a house, and the laboratories that it watches.
+///
+/// # Errors
+/// What is wrong, and what is allowed.
+pub fn parse_guest(text: &str) -> Result<(String, BTreeSet<String>), String> {
+    let (id, realms) =
+        text.split_once('=').ok_or("expected ID=REALM,REALM such as beamer=anatomy,surgery")?;
+    let (id, _) = parse_client(&format!("{id}=viewer"))?;
+    let realms: BTreeSet<String> = realms.split(',').map(str::to_owned).collect();
+    if realms.iter().any(String::is_empty) {
+        return Err("expected the realms that the guest watches, such as beamer=anatomy,surgery".to_owned());
+    }
+    Ok((id, realms))
+}
+
 /// Common name of the server's own certificate.
 pub const SERVER: &str = "server";
+
+/// Common name of the router of a house.
+pub const ROUTER: &str = "router";
 
 #[cfg(test)]
 mod tests {

@@ -1,64 +1,131 @@
-//! The access control of a laboratory, for the sessions of its server.
+//! The access control of a laboratory, for the sessions of its server, and of a router that joins laboratories.
 //!
 //! Clients hear everything that the server says. What comes from a client is denied unless a rule allows it: to
 //! subscribe and to ask questions for everybody; to publish under its own id for those who touch; orders for those who
 //! may give them. Nobody but the server publishes surfaces, contacts and reports, or answers questions.
+//!
+//! A router holds each laboratory to its own realm, servers included.
+
+use std::collections::BTreeMap;
 
 use scindo_proto::{Chunk, KeySpace, Topic, Verb};
 use serde_json::{Value, json};
 
-use super::roles::{LabRole, SERVER};
+use super::roles::LabRole;
 
-/// Rules for `clients` by id.
-pub fn access_control<'a>(keys: &KeySpace, clients: impl IntoIterator<Item = (&'a Chunk, LabRole)>) -> Value {
+const EVERY_MESSAGE: [&str; 9] = [
+    "put",
+    "delete",
+    "query",
+    "reply",
+    "declare_subscriber",
+    "declare_queryable",
+    "liveliness_token",
+    "liveliness_query",
+    "declare_liveliness_subscriber",
+];
+const WATCHING: [&str; 3] = ["declare_subscriber", "liveliness_query", "declare_liveliness_subscriber"];
+
+/// Who may speak in one session.
+#[derive(Debug, Clone)]
+pub struct Seats {
+    /// Its keys.
+    pub keys: KeySpace,
+    /// Common names that may say everything: its server, and a router with rules of its own.
+    pub trusted: Vec<String>,
+    /// Clients by id.
+    pub clients: Vec<(Chunk, LabRole)>,
+}
+
+/// Rules for the server of one laboratory.
+pub fn access_control(seats: &Seats) -> Value {
     // `**` does not match a chunk that begins with @.
-    let everything = vec!["**".to_owned(), keys.every_key()];
-    let rpc = |orders: bool| -> Vec<String> {
-        let verbs = Verb::ALL.into_iter().filter(|verb| verb.is_order() == orders);
-        verbs.map(|verb| keys.key(&Topic::Rpc(verb))).collect()
-    };
-    let asked = [rpc(false), vec![keys.every_keyframe()]].concat();
-    let every_message = [
-        "put",
-        "delete",
-        "query",
-        "reply",
-        "declare_subscriber",
-        "declare_queryable",
-        "liveliness_token",
-        "liveliness_query",
-        "declare_liveliness_subscriber",
-    ];
-    let rule = |id: String, flows: &[&str], messages: &[&str], keys: Vec<String>| json!({ "id": id, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": keys });
-    let watching = ["declare_subscriber", "liveliness_query", "declare_liveliness_subscriber"];
-    let mut rules = vec![
-        rule("all".into(), &["ingress", "egress"], &every_message, everything.clone()),
-        rule("hear".into(), &["egress"], &every_message, everything.clone()),
-        rule("watch".into(), &["ingress"], &watching, everything),
-        rule("ask".into(), &["ingress"], &["query"], asked),
-        rule("order".into(), &["ingress"], &["query"], rpc(true)),
-    ];
-    let mut subjects = vec![json!({ "id": SERVER, "cert_common_names": [SERVER] })];
-    let mut policies = vec![json!({ "rules": ["all"], "subjects": [SERVER] })];
-    for (client, role) in clients {
-        let id = client.as_str();
-        rules.push(rule(format!("be-{id}"), &["ingress"], &["liveliness_token"], keys.tokens_of(client)));
-        let mut allowed = vec!["hear".to_owned(), "watch".into(), "ask".into(), format!("be-{id}")];
-        if role.touches() {
-            rules.push(rule(format!("touch-{id}"), &["ingress"], &["put"], keys.tools_of(client)));
-            allowed.push(format!("touch-{id}"));
-        }
-        if role.orders() {
-            allowed.push("order".into());
-        }
-        subjects.push(json!({ "id": id, "cert_common_names": [id] }));
-        policies.push(json!({ "rules": allowed, "subjects": [id] }));
+    let everything = vec!["**".to_owned(), seats.keys.every_key()];
+    let mut rules = Rules::default();
+    rules.admit(seats, &everything);
+    rules.finish()
+}
+
+/// Rules for a router between laboratories: nobody hears or says anything outside of a realm in which he has a seat.
+pub fn router_access_control(labs: &[Seats]) -> Value {
+    let mut rules = Rules::default();
+    for seats in labs {
+        rules.admit(seats, &[seats.keys.every_key()]);
     }
-    json!({
-        "enabled": true,
-        "default_permission": "deny",
-        "rules": rules,
-        "subjects": subjects,
-        "policies": policies,
-    })
+    rules.finish()
+}
+
+/// Rules, and which of them hold for whom.
+#[derive(Default)]
+struct Rules {
+    rules: Vec<Value>,
+    allowed: BTreeMap<String, Vec<String>>,
+}
+
+impl Rules {
+    fn admit(&mut self, seats: &Seats, everything: &[String]) {
+        let keys = &seats.keys;
+        let rpc = |orders: bool| -> Vec<String> {
+            let verbs = Verb::ALL.into_iter().filter(|verb| verb.is_order() == orders);
+            verbs.map(|verb| keys.key(&Topic::Rpc(verb))).collect()
+        };
+        let both = ["ingress", "egress"];
+        let all = self.rule(keys, "all", &both, &EVERY_MESSAGE, everything.to_vec());
+        let hear = self.rule(keys, "hear", &["egress"], &EVERY_MESSAGE, everything.to_vec());
+        let watch = self.rule(keys, "watch", &["ingress"], &WATCHING, everything.to_vec());
+        let asked = [rpc(false), vec![keys.every_keyframe()]].concat();
+        let ask = self.rule(keys, "ask", &["ingress"], &["query"], asked);
+        let order = self.rule(keys, "order", &["ingress"], &["query"], rpc(true));
+        for name in &seats.trusted {
+            self.allow(name, [all.clone()]);
+        }
+        for (client, role) in &seats.clients {
+            let id = client.as_str();
+            let tokens = keys.tokens_of(client);
+            let be = self.rule(keys, &format!("be-{id}"), &["ingress"], &["liveliness_token"], tokens);
+            self.allow(id, [hear.clone(), watch.clone(), ask.clone(), be]);
+            if role.touches() {
+                let tools = keys.tools_of(client);
+                let touch = self.rule(keys, &format!("touch-{id}"), &["ingress"], &["put"], tools);
+                self.allow(id, [touch]);
+            }
+            if role.orders() {
+                self.allow(id, [order.clone()]);
+            }
+        }
+    }
+
+    /// Adds a rule; its id.
+    fn rule(
+        &mut self,
+        keys: &KeySpace,
+        name: &str,
+        flows: &[&str],
+        messages: &[&str],
+        on: Vec<String>,
+    ) -> String {
+        let id = format!("{}{name}", keys.every_key().trim_end_matches("**"));
+        let rule =
+            json!({ "id": id, "permission": "allow", "flows": flows, "messages": messages, "key_exprs": on });
+        self.rules.push(rule);
+        id
+    }
+
+    fn allow<const N: usize>(&mut self, subject: &str, rules: [String; N]) {
+        self.allowed.entry(subject.to_owned()).or_default().extend(rules);
+    }
+
+    fn finish(self) -> Value {
+        let subjects: Vec<Value> =
+            self.allowed.keys().map(|name| json!({ "id": name, "cert_common_names": [name] })).collect();
+        let policies: Vec<Value> =
+            self.allowed.iter().map(|(name, rules)| json!({ "rules": rules, "subjects": [name] })).collect();
+        json!({
+            "enabled": true,
+            "default_permission": "deny",
+            "rules": self.rules,
+            "subjects": subjects,
+            "policies": policies,
+        })
+    }
 }

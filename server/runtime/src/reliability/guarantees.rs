@@ -89,7 +89,7 @@ pub const GUARANTEES: [Guarantee; 13] = [
     Guarantee {
         number: "G12",
         promise: "Access control does what its table says",
-        tried_by: "`server/runtime/tests/access.rs`: 792 cells of role, key and verb, each by a real client over TLS",
+        tried_by: "`server/runtime/tests/access.rs`: 792 cells of role, key and verb, each by a real client with a certificate",
         simulated: false,
     },
     Guarantee {

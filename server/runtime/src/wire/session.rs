@@ -19,7 +19,7 @@ pub struct NetworkConfig {
     pub listen: Vec<String>,
     /// Routers to connect to.
     pub connect: Vec<String>,
-    /// A zenoh configuration (JSON5) to start from: TLS, users, access control.
+    /// A zenoh configuration (JSON5) to start from: certificates, users, access control.
     pub zenoh_file: Option<PathBuf>,
     /// Access control of zenoh, used if the file has none of its own.
     pub access_control: Option<serde_json::Value>,
@@ -32,16 +32,18 @@ pub struct NetworkConfig {
 /// and reliability.
 const LONGEST_MESSAGE: usize = 256 * 1024;
 
+/// Most connections of a server.
+const CONNECTIONS: u32 = 256;
+
 /// Surfaces grow when they are cut. A message longer than this multiple of the longest present one is not
 /// relayed.
 const SURFACES_GROW: usize = 8;
 
 /// Limits that hold unless the zenoh file sets others.
-const LIMITS: [(&str, &str); 5] = [
+const LIMITS: [(&str, &str); 4] = [
     // A connection that stays silent is closed after this time [ms]. At most so many may be pending.
     ("transport/unicast/accept_timeout", "1000"),
     ("transport/unicast/accept_pending", "256"),
-    ("transport/unicast/max_sessions", "256"),
     // The link to a client that reads nothing is closed when a message that must not be lost has waited this
     // long [µs]. A frame for a slow client is dropped when it has waited this long [µs].
     ("transport/link/tx/queue/congestion_control/block/wait_before_close", "1000000"),
@@ -69,13 +71,30 @@ fn endpoints_of(config: &zenoh::Config) -> Vec<String> {
     serde_json::from_str(&endpoints).unwrap_or_default()
 }
 
-fn load(path: &Path) -> Result<zenoh::Config, RuntimeError> {
+/// Reads a zenoh configuration file.
+pub(crate) fn load(path: &Path) -> Result<zenoh::Config, RuntimeError> {
     zenoh::Config::from_file(path).map_err(|e| RuntimeError::Option {
         option: "--zenoh",
         value: path.display().to_string(),
         reason: words(&e),
         next: "See the example deploy/open-lab.json5".to_owned(),
     })
+}
+
+/// What a session takes from others.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    /// Longest message that it reassembles [bytes].
+    longest_message: usize,
+    /// Most connections.
+    connections: u32,
+}
+
+impl Bounds {
+    /// Those of a server.
+    fn of_server(longest_message: usize) -> Self {
+        Self { longest_message, connections: CONNECTIONS }
+    }
 }
 
 /// The open sessions of a server.
@@ -95,11 +114,26 @@ impl Sessions {
         let relay: Vec<String> = network.listen.iter().filter_map(|e| local(e)).take(1).collect();
         let mode = if network.listen.is_empty() { "peer" } else { "router" };
         let relayed = LONGEST_MESSAGE.max(SURFACES_GROW * network.longest_surface);
-        let haptic = open(network, (mode, relayed), &network.listen, &network.connect)?;
+        let haptic = open(network, (mode, Bounds::of_server(relayed)), &network.listen, &network.connect)?;
         let bulk_connect = if relay.is_empty() { &network.connect } else { &relay };
-        let bulk = open(network, ("peer", LONGEST_MESSAGE), &bulk_listen, bulk_connect)?;
+        let bulk = open(network, ("peer", Bounds::of_server(LONGEST_MESSAGE)), &bulk_listen, bulk_connect)?;
         Ok(Self { haptic, bulk })
     }
+}
+
+/// A session that only passes messages on, of at most `longest_message` bytes, between at most `connections` others.
+///
+/// # Errors
+/// If an endpoint is taken or the configuration is wrong.
+pub fn router(
+    network: &NetworkConfig,
+    longest_message: usize,
+    connections: u32,
+) -> Result<Session, RuntimeError> {
+    network.listen.iter().try_for_each(|endpoint| check("--listen", endpoint))?;
+    network.connect.iter().try_for_each(|endpoint| check("--connect", endpoint))?;
+    let bounds = Bounds { longest_message, connections };
+    open(network, ("router", bounds), &network.listen, &network.connect)
 }
 
 /// Checks the form of an endpoint, so that a typing mistake is not reported as a network failure.
@@ -112,7 +146,18 @@ fn check(option: &'static str, endpoint: &str) -> Result<(), RuntimeError> {
             .to_owned(),
     };
     let (protocol, address) = endpoint.split_once('/').ok_or_else(|| wrong("no protocol"))?;
-    if !matches!(protocol, "tcp" | "tls") {
+    if protocol == "tls" {
+        return Err(RuntimeError::Option {
+            option,
+            value: endpoint.to_owned(),
+            reason:
+                "zenoh reads and writes a TLS link from two threads at once, which breaks it under two-way \
+                     traffic (eclipse-zenoh/zenoh, issue 2557)"
+                    .to_owned(),
+            next: "Write quic/HOST:PORT: the same certificates and encryption, over UDP".to_owned(),
+        });
+    }
+    if !matches!(protocol, "tcp" | "quic") {
         return Ok(());
     }
     let address = address.split(['?', '#']).next().unwrap_or(address);
@@ -125,7 +170,7 @@ fn check(option: &'static str, endpoint: &str) -> Result<(), RuntimeError> {
 
 fn open(
     network: &NetworkConfig,
-    (mode, longest_message): (&str, usize),
+    (mode, bounds): (&str, Bounds),
     listen: &[String],
     connect: &[String],
 ) -> Result<Session, RuntimeError> {
@@ -136,7 +181,8 @@ fn open(
     };
     let mut settings = vec![("mode", format!("{mode:?}"))];
     let from_file = network.zenoh_file.is_some();
-    if !from_file || !listen.is_empty() {
+    // zenoh's own default listens at any port, over plain TCP.
+    if !from_file || !listen.is_empty() || endpoints_of(&config).is_empty() {
         settings.push(("listen/endpoints", list(listen)));
     }
     if !from_file || !connect.is_empty() {
@@ -156,7 +202,7 @@ fn open(
             .map(|(key, value)| (key, value.to_owned())),
         );
     }
-    settings.extend(limits(&config, longest_message));
+    settings.extend(limits(&config, bounds));
     if let Some(rules) = network.access_control.as_ref().filter(|_| !controls_access(&config)) {
         settings.push(("access_control", rules.to_string()));
     }
@@ -174,10 +220,15 @@ fn open(
 }
 
 /// Those of our limits that the configuration does not set itself.
-fn limits(config: &zenoh::Config, longest_message: usize) -> Vec<(&'static str, String)> {
+fn limits(config: &zenoh::Config, bounds: Bounds) -> Vec<(&'static str, String)> {
     let plain = zenoh::Config::default();
     let ours = LIMITS.map(|(key, value)| (key, value.to_owned()));
-    let all = ours.into_iter().chain([("transport/link/rx/max_message_size", longest_message.to_string())]);
+    let Bounds { longest_message, connections } = bounds;
+    let own = [
+        ("transport/link/rx/max_message_size", longest_message.to_string()),
+        ("transport/unicast/max_sessions", connections.to_string()),
+    ];
+    let all = ours.into_iter().chain(own);
     all.filter(|(key, _)| config.get_json(key).ok() == plain.get_json(key).ok()).collect()
 }
 
@@ -209,12 +260,26 @@ mod tests {
     use super::*;
 
     #[test]
+    fn endpoints_are_checked() {
+        for (endpoint, says) in [
+            ("tls/localhost:7447", "quic/HOST:PORT"),
+            ("quic/localhost", "no port"),
+            ("tcp/localhost:65535", "no port above it"),
+            ("localhost:7447", "no protocol"),
+        ] {
+            let error = check("--listen", endpoint).unwrap_err().to_string();
+            assert!(error.contains(says), "{endpoint}: {error}");
+        }
+        assert!(check("--listen", "quic/[::1]:7447").is_ok());
+    }
+
+    #[test]
     fn limits_are_set_unless_the_file_sets_them() {
         let mut config = zenoh::Config::default();
         config.insert_json5("transport/unicast/max_sessions", "7").unwrap();
-        let set = limits(&config, 1000);
+        let set = limits(&config, Bounds { longest_message: 1000, connections: 9 });
         assert!(!set.iter().any(|(key, _)| key.ends_with("max_sessions")), "{set:?}");
-        assert_eq!(set.len(), LIMITS.len());
+        assert_eq!(set.len(), LIMITS.len() + 1);
         for (key, value) in set {
             config.insert_json5(key, &value).unwrap();
             assert_eq!(config.get_json(key).unwrap(), value);
