@@ -40,6 +40,8 @@ pub mod certs;
 
 pub mod router;
 
+pub mod doctor;
+
 /// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -57,6 +59,7 @@ pub fn main() -> ExitCode {
         Some(Command::Haptics(args)) => args.json,
         Some(Command::Reliability(args)) => args.json,
         Some(Command::Certs(args)) => args.json,
+        Some(Command::Doctor(args)) => args.json,
         Some(Command::Effects(args)) => args.json,
         Some(Command::Router(_) | Command::Manual(_)) => false,
     };
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
         Some(Command::Reliability(args)) => reliability::reliability(&args),
         Some(Command::Certs(args)) => certs::certs(&args),
         Some(Command::Router(args)) => router::route(&args),
+        Some(Command::Doctor(args)) => doctor::doctor(&args),
         Some(Command::Effects(args)) => effects::effects(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };

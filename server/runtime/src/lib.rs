@@ -12,6 +12,7 @@
 //! * [`rpc`]: questions and orders.
 //! * [`server`]: starts and ends all of these.
 //! * [`lab`]: laboratories with certificates, and what each role may do.
+//! * [`doctor`]: what works on a machine, and what does not.
 //! * [`record`]: recordings of all of this, and their replay.
 //! * [`haptics`]: what a hand feels over a link, against the truth; an experiment on virtual time.
 //! * [`reliability`]: all of this in a simulated network with faults, from a seed ([`chance`]).
@@ -35,6 +36,8 @@ pub mod wire;
 pub mod inbox;
 
 pub mod lab;
+
+pub mod doctor;
 
 pub mod receive;
 

@@ -54,6 +54,8 @@ pub enum Command {
     Certs(CertsArgs),
     /// Pass messages on between servers and clients: one door for several laboratories, or for many viewers.
     Router(RouterArgs),
+    /// Say what works on this machine and what does not: network, certificates, devices, limits, room.
+    Doctor(DoctorArgs),
     /// Completions and man pages.
     #[command(flatten)]
     Manual(Manual),
@@ -426,6 +428,29 @@ pub struct CertsArgs {
     /// Session within the realm.
     #[arg(long, default_value = "main")]
     pub session: String,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `scindo doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Zenoh configuration file of a server or client; its certificates and keys are looked at.
+    #[arg(long, value_name = "FILE.json5")]
+    pub zenoh: Option<PathBuf>,
+    /// Address at which a server would listen. May be repeated [default: as `scindo run` has it].
+    #[arg(long, value_name = "ENDPOINT")]
+    pub listen: Vec<String>,
+    /// Router or server that should answer. May be repeated.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub connect: Vec<String>,
+    /// Address at which a page would be served: PORT, HOST or HOST:PORT.
+    #[arg(long, value_name = "ADDRESS", value_parser = scindo_view::listen_address)]
+    pub viewer: Option<SocketAddr>,
+    /// Folder for recordings, whose free room is looked at.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub record: PathBuf,
     /// Report as JSON.
     #[arg(long)]
     pub json: bool,
