@@ -7,6 +7,7 @@
 //! * [`endpoint`]: the endpoint of a client's second connection.
 //! * [`limits`]: limits on sizes, counts and values; each constant with its reason.
 //! * [`check`]: conditions that a decoded message must meet before it is used.
+//! * [`name`]: names of people.
 //! * [`codec`]: bytes ↔ messages; sizes and counts are checked before anything is allocated.
 
 pub mod messages;
@@ -18,6 +19,8 @@ pub mod endpoint;
 pub mod limits;
 
 mod check;
+
+pub mod name;
 
 pub mod codec;
 

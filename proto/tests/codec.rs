@@ -81,6 +81,7 @@ fn tool_sample() -> impl Strategy<Value = ToolSample> {
             fault_flags: 3,
             closed,
             round_trip_ms: age,
+            name: "Änne O'Neill".into(),
         },
     )
 }
@@ -277,12 +278,15 @@ fn stats() -> impl Strategy<Value = Stats> {
             force_n: x,
             contact_age_ms: x,
             pose_age_ms: 12.5,
+            name: "Anna".into(),
         }],
         refused: vec![Counter { name: "non-finite".into(), count: d.into() }],
         cuts_applied: a.into(),
         surface_subscribers: b,
         haptic_clients: c,
         paused: d % 2 == 0,
+        clients: vec![ClientStats { client_id: "seven".into(), role: "viewer".into() }],
+        client_count: 70,
     })
 }
 

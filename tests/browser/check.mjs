@@ -9,7 +9,7 @@ import path from "node:path";
 import { fileURLToPath } from "node:url";
 
 const here = path.dirname(fileURLToPath(import.meta.url));
-const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
+export const modules = process.env.SCINDO_TEST_NODE_MODULES ?? path.join(here, "node_modules");
 
 export const { chromium } = createRequire(path.join(modules, "anchor.js"))("playwright-core");
 export const artifacts = process.env.SCINDO_TEST_ARTIFACTS ?? path.join(here, "../artifacts");

@@ -94,6 +94,8 @@ async function holdsTheLip(page) {
   await until(page, "the server knows the forceps", MINUTE, () => window.scindo.tools().some((tool) => tool.own));
   await picture(page, "hands-1-open.png");
   await page.mouse.down();
+  // A machine that draws no picture for a while: the jaws wait for the hand to arrive.
+  await page.evaluate(() => { for (const start = performance.now(); performance.now() < start + 700;); });
   await simulated(page, 0.8);
   await until(page, "the jaws hold tissue", SLOWEST, () => {
     const tool = window.scindo.tools().find((tool) => tool.own);

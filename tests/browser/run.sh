@@ -1,47 +1,46 @@
 #!/usr/bin/env bash
-# Starts the built-in demonstration on free ports and drives its page; see viewer.mjs. Looks at all views of
-# another scene; see views.mjs. Lets two pages hold and cut the same tissue; see hands.mjs. Then makes a quick
-# study of accuracy and looks at its page; see accuracy.mjs.
+# Drives the page in a browser, one script after another; each says in its head what it does. Starts the server
+# that a script works on, on free ports.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 bin=${SCINDO_TEST_BIN:-target/debug}/scindo
 artifacts=${SCINDO_TEST_ARTIFACTS:-$PWD/tests/artifacts}
 mkdir -p "$artifacts"
-web=$(python3 tests/free_port.py)
-zenoh=$(python3 tests/free_port.py)
-"$bin" --listen "tcp/127.0.0.1:$zenoh" --viewer "127.0.0.1:$web" >"$artifacts/browser-server.log" 2>&1 &
-server=$!
-trap 'kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true' EXIT
-for _ in $(seq 1 300); do
-  (exec 3<>"/dev/tcp/127.0.0.1/$web") 2>/dev/null && break
-  kill -0 "$server" 2>/dev/null || { echo "the server ended:" >&2; tail -20 "$artifacts/browser-server.log" >&2; exit 1; }
-  sleep 0.2
-done
-node tests/browser/viewer.mjs "http://127.0.0.1:$web"
-kill "$server"; wait "$server" 2>/dev/null || true
+server=
+trap 'stop' EXIT
+stop() { [ -z "$server" ] || { kill "$server" 2>/dev/null || true; wait "$server" 2>/dev/null || true; server=; }; }
 
-web=$(python3 tests/free_port.py)
-zenoh=$(python3 tests/free_port.py)
-"$bin" run tests/browser/views.toml --listen "tcp/127.0.0.1:$zenoh" --viewer "127.0.0.1:$web" >"$artifacts/views-server.log" 2>&1 &
-server=$!
-for _ in $(seq 1 300); do
-  (exec 3<>"/dev/tcp/127.0.0.1/$web") 2>/dev/null && break
-  kill -0 "$server" 2>/dev/null || { echo "the server ended:" >&2; tail -20 "$artifacts/views-server.log" >&2; exit 1; }
-  sleep 0.2
-done
-node tests/browser/views.mjs "http://127.0.0.1:$web" "$server"
-kill "$server"; wait "$server" 2>/dev/null || true
+# serve NAME [ARGUMENT…]: starts scindo with a page; sets `url` and `server`.
+serve() {
+  local name=$1 web zenoh; shift
+  web=$(python3 tests/free_port.py)
+  zenoh=$(python3 tests/free_port.py)
+  "$bin" "$@" --listen "tcp/127.0.0.1:$zenoh" --viewer "127.0.0.1:$web" >"$artifacts/$name-server.log" 2>&1 &
+  server=$!
+  url="http://127.0.0.1:$web"
+  for _ in $(seq 1 300); do
+    (exec 3<>"/dev/tcp/127.0.0.1/$web") 2>/dev/null && return
+    kill -0 "$server" 2>/dev/null || { echo "the server ended:" >&2; tail -20 "$artifacts/$name-server.log" >&2; exit 1; }
+    sleep 0.2
+  done
+}
 
-web=$(python3 tests/free_port.py)
-zenoh=$(python3 tests/free_port.py)
-"$bin" run tests/browser/hands.toml --listen "tcp/127.0.0.1:$zenoh" --viewer "127.0.0.1:$web" >"$artifacts/hands-server.log" 2>&1 &
-server=$!
-for _ in $(seq 1 300); do
-  (exec 3<>"/dev/tcp/127.0.0.1/$web") 2>/dev/null && break
-  kill -0 "$server" 2>/dev/null || { echo "the server ended:" >&2; tail -20 "$artifacts/hands-server.log" >&2; exit 1; }
-  sleep 0.2
-done
-node tests/browser/hands.mjs "http://127.0.0.1:$web"
+serve browser
+node tests/browser/viewer.mjs "$url"
+stop
+serve views run tests/browser/views.toml
+node tests/browser/views.mjs "$url" "$server"
+stop
+serve hands run tests/browser/hands.toml
+node tests/browser/hands.mjs "$url"
+stop
+serve headset run tests/browser/people.toml
+node tests/browser/headset.mjs "$url"
+stop
+
+rm -f "$artifacts"/people-*.log
+node tests/browser/people.mjs "$(dirname "$bin")" tests/browser/people.toml \
+  "$(python3 tests/free_port.py)" "$(python3 tests/free_port.py)"
 
 rm -rf "$artifacts/accuracy"
 "$bin" accuracy --quick --budget-ms 20 --out "$artifacts/accuracy"

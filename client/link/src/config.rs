@@ -21,6 +21,8 @@ pub struct LinkConfig {
     pub role: Role,
     /// Id of this client, unique in the session: `[a-z0-9_-]{1,64}`. It owns the client's tools.
     pub id: String,
+    /// Name of the person, which others see beside the tool: at most 32 characters; empty: none.
+    pub person: String,
     /// Time after which [`crate::Link::connect`] gives up.
     pub timeout: Duration,
     /// A zenoh configuration (JSON5) to start from, for certificates, users and routers. If [`Self::connect`] is
@@ -37,6 +39,7 @@ impl LinkConfig {
             connect: vec![DEFAULT_ENDPOINT.to_owned()],
             role,
             id: id.to_owned(),
+            person: String::new(),
             timeout: Duration::from_secs(5),
             zenoh_file: None,
         }

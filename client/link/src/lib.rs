@@ -45,6 +45,6 @@ pub use error::LinkError;
 pub use guest::GuestTool;
 pub use link::{Link, Presence};
 pub use mirror::{BodyMirror, Surface};
-pub use scindo_proto::{Role, messages};
+pub use scindo_proto::{Role, messages, name};
 pub use tool::{ContactReader, ContactStream, Cutter, PoseSender, ReceivedContact, ToolLink};
 pub use watch::{EventStream, Latest, ToolStates};

@@ -34,6 +34,7 @@ pub struct Link {
 struct Shared {
     keys: KeySpace,
     id: Chunk,
+    person: String,
     role: Role,
     presence: watch::Receiver<Presence>,
     refused: Arc<AtomicU64>,
@@ -58,6 +59,7 @@ impl Link {
         let shared = Shared {
             keys,
             id,
+            person: config.person,
             role: config.role,
             presence,
             refused: Arc::default(),
@@ -77,6 +79,11 @@ impl Link {
     /// Id of this client.
     pub fn id(&self) -> &str {
         self.shared.id.as_str()
+    }
+
+    /// Name of the person at this client; empty if none was given.
+    pub fn person(&self) -> &str {
+        &self.shared.person
     }
 
     /// Id of this client, as part of a key.

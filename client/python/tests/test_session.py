@@ -193,6 +193,20 @@ class Cutting(WithServer):
         self.assertGreater(pending.result(PATIENCE).elements, 50)
 
 
+class People(WithServer):
+    def test_others_read_who_holds_a_tool(self):
+        with self.enterContext2(self.server.connect(timeout=PATIENCE, client="anna", person="Änne O'Neill")) as other:
+            other.tool("finger").move((0.0, 0.0, 0.2))
+            until(lambda: "finger" in self.session.stats(wait=True).holders, "the name came")
+            stats = self.session.stats(wait=True)
+            self.assertEqual(stats.holders["finger"], "Änne O'Neill")
+            self.assertEqual(stats.clients["anna"], "client")
+        for bad in ["x" * 33, "a\nb"]:
+            with self.assertRaises(scindo.InvalidValue):
+                self.server.connect(timeout=PATIENCE, person=bad)
+        until(lambda: "anna" not in self.session.stats(wait=True).clients, "who left is not listed")
+
+
 class Orders(WithServer):
     def test_pause_step_reset_set(self):
         with self.refused("not-paused"):

@@ -324,6 +324,7 @@ impl Feed {
             surface_subscribers: 1,
             haptic_clients: 0,
             paused: self.paused,
+            ..Default::default()
         }
     }
 }

@@ -11,7 +11,9 @@ use prost::Message as _;
 use scindo_proto::MOUSE;
 use scindo_proto::limits::{MAX_BODIES, MAX_TOOLS};
 use scindo_proto::messages::viewer_down::Message as Down;
-use scindo_proto::messages::{ToolSample, ViewerDown, ViewerLink, ViewerRpc, ViewerRpcReply, ViewerWatch};
+use scindo_proto::messages::{
+    ToolSample, ViewerDown, ViewerLink, ViewerPeople, ViewerPerson, ViewerRpc, ViewerRpcReply, ViewerWatch,
+};
 use tokio::sync::{mpsc, watch};
 
 use crate::outbox::{Outbox, Slot};
@@ -22,8 +24,8 @@ const MAX_WAITING: usize = 256;
 /// Number of past events that late joiners receive.
 const MAX_EVENTS: usize = 7;
 
-/// Most state slots: link, info, plan, stats, measures and forces, and those of bodies and tools.
-const MAX_SLOTS: usize = 6 + 3 * MAX_BODIES + 2 * MAX_TOOLS;
+/// Most state slots: link, people, info, plan, stats, measures and forces, and those of bodies and tools.
+const MAX_SLOTS: usize = 7 + 3 * MAX_BODIES + 2 * MAX_TOOLS;
 
 /// Topics that browsers watch. The viewer subscribes to nothing else.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -83,6 +85,8 @@ struct Shared {
 struct Browser {
     outbox: Arc<Outbox>,
     asks: ViewerWatch,
+    /// Who looks at it, once it was introduced.
+    person: Option<ViewerPerson>,
 }
 
 impl Shared {
@@ -107,6 +111,8 @@ pub struct Seat {
     pub outbox: Arc<Outbox>,
     /// Id of its mouse tool on the server.
     pub tool_id: String,
+    /// Id of its second tool, for the left hand of somebody in a headset.
+    pub left_id: String,
 }
 
 impl Hub {
@@ -194,7 +200,7 @@ impl Hub {
             shared.connected = connected;
             if !connected {
                 // Browsers keep showing the last state under a notice. New browsers wait.
-                shared.slots.clear();
+                shared.slots.retain(|slot, _| *slot == Slot::People);
             }
         }
         self.publish(Down::Link(ViewerLink { connected, detail: detail.to_owned() }));
@@ -227,14 +233,15 @@ impl Hub {
         }
         let browser = self.next_browser.fetch_add(1, Ordering::Relaxed);
         let outbox = Arc::new(Outbox::default());
-        let newcomer = Browser { outbox: Arc::clone(&outbox), asks: ViewerWatch::default() };
+        let newcomer = Browser { outbox: Arc::clone(&outbox), asks: ViewerWatch::default(), person: None };
         let slots = shared.slots.iter().filter(|(slot, _)| newcomer.takes(slot));
         slots.for_each(|(slot, bytes)| outbox.put(slot.clone(), bytes.clone()));
         shared.events.iter().for_each(|bytes| outbox.push(bytes.clone()));
         shared.browsers.insert(browser, newcomer);
         self.tell_watched(&shared);
         let tool_id = format!("{}{MOUSE}{browser}", self.client_id);
-        Some(Seat { hub: Arc::clone(self), browser, outbox, tool_id })
+        let left_id = format!("{tool_id}-left");
+        Some(Seat { hub: Arc::clone(self), browser, outbox, tool_id, left_id })
     }
 
     /// Records which topics a browser shows beside the surfaces.
@@ -252,6 +259,24 @@ impl Hub {
             browser.outbox.put(slot.clone(), bytes.clone());
         }
         self.tell_watched(&shared);
+    }
+
+    /// Tells every browser who looks at browser number `browser`.
+    pub fn introduce(&self, browser: u64, person: ViewerPerson) {
+        {
+            let mut shared = self.lock();
+            let Some(known) = shared.browsers.get_mut(&browser) else { return };
+            if known.person.as_ref() == Some(&person) {
+                return;
+            }
+            known.person = Some(person);
+        }
+        self.tell_people();
+    }
+
+    fn tell_people(&self) {
+        let people = self.lock().browsers.values().filter_map(|browser| browser.person.clone()).collect();
+        self.publish(Down::People(ViewerPeople { people }));
     }
 
     fn tell_watched(&self, shared: &Shared) {
@@ -299,9 +324,12 @@ impl Drop for Seat {
             shared.browsers.remove(&self.browser);
             self.hub.tell_watched(&shared);
         }
+        self.hub.tell_people();
         // If the channel is full, the server's watch on poses ends the tool.
-        if self.hub.up.try_send(Up::Release { tool_id: self.tool_id.clone() }).is_err() {
-            tracing::warn!(tool = self.tool_id, "could not release the tool of a browser that left");
+        for tool_id in [&self.tool_id, &self.left_id] {
+            if self.hub.up.try_send(Up::Release { tool_id: tool_id.clone() }).is_err() {
+                tracing::warn!(tool = tool_id, "could not release the tool of a browser that left");
+            }
         }
     }
 }
@@ -314,6 +342,7 @@ pub fn encode(message: &Down) -> Bytes {
 fn slot_of(message: &Down) -> Option<Slot> {
     Some(match message {
         Down::Link(_) => Slot::Link,
+        Down::People(_) => Slot::People,
         Down::Info(_) => Slot::Info,
         Down::Plan(_) => Slot::Plan,
         Down::Stats(_) => Slot::Stats,

@@ -29,7 +29,7 @@ struct Args {
     /// Id of this viewer on the network; the tools of its pages are named after it. By default a random one
     #[arg(long)]
     id: Option<String>,
-    /// Zenoh configuration to start from (TLS, users, routers)
+    /// Zenoh configuration to start from (certificates, users, routers)
     #[arg(long, value_name = "FILE")]
     zenoh: Option<PathBuf>,
     /// Pages of another origin that may connect, for example http://lab:8080; may be given several times

@@ -17,6 +17,8 @@ use tokio::sync::Notify;
 pub enum Slot {
     /// Whether a server is connected.
     Link,
+    /// Who looks at pages of this relay.
+    People,
     /// Scene, bodies and tools of the session.
     Info,
     /// Active and inactive effects.

@@ -11,8 +11,9 @@ use scindo_proto::codec::WireMessage;
 use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::viewer_up::Message as FromPage;
 use scindo_proto::messages::{
-    Error, RpcReply, ViewerHello, ViewerPing, ViewerPong, ViewerRpcReply, ViewerUp,
+    Error, RpcReply, ViewerHello, ViewerPerson, ViewerPing, ViewerPong, ViewerRpcReply, ViewerUp,
 };
+use scindo_proto::name::{NAMES, check_name};
 use tokio::time::{Instant, interval_at};
 
 use crate::door::PING;
@@ -20,6 +21,9 @@ use crate::hub::{Hub, Seat, Up, encode};
 
 /// Largest message that a page may send [bytes]. A pose takes about 300.
 pub const MAX_UP_BYTES: usize = 64 * 1024;
+
+/// What a page calls its second tool.
+const LEFT: &str = "left";
 
 /// After this many malformed messages in a row the page is disconnected.
 const MAX_MALFORMED: u32 = 16;
@@ -64,11 +68,13 @@ pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: Strin
             }
         }
     };
+    hub.introduce(seat.browser, person(&seat, rights, ""));
     let receive = async {
         let mut malformed = 0;
+        let mut name = String::new();
         while let Some(Ok(message)) = stream.next().await {
             match message {
-                Message::Binary(bytes) => match take(bytes, &hub, &seat, rights).await {
+                Message::Binary(bytes) => match take(bytes, &hub, &seat, rights, &mut name).await {
                     Ok(()) => malformed = 0,
                     Err(reason) => {
                         malformed += 1;
@@ -86,8 +92,8 @@ pub async fn serve(socket: WebSocket, hub: Arc<Hub>, seat: Seat, upstream: Strin
     tokio::select! { () = send => {}, () = receive => {} }
 }
 
-/// Handles one message of the page. The ids are those of the seat and replace what the page claims.
-async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, rights: Rights) -> Result<(), String> {
+/// Handles one message of the page. The ids are those of the seat, whatever the page claims.
+async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, rights: Rights, name: &mut String) -> Result<(), String> {
     let up = ViewerUp::decode(bytes).map_err(|error| error.to_string())?;
     let message = up.message.ok_or("empty message")?;
     seat.outbox.heard();
@@ -95,10 +101,18 @@ async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, rights: Rights) -> Result<()
         FromPage::Ping(ping) => seat.outbox.push(encode(&Down::Pong(pong(ping, hub, seat)))),
         FromPage::FrameAck(ack) => seat.outbox.acknowledge(ack.frames),
         FromPage::Watch(asks) => hub.ask(seat.browser, asks),
+        FromPage::Name(chosen) => {
+            let chosen = chosen.name.trim();
+            check_name(chosen).map_err(|found| format!("the name '{found}' is not allowed, only {NAMES}"))?;
+            chosen.clone_into(name);
+            hub.introduce(seat.browser, person(seat, rights, name));
+        }
         _ if rights.read_only => return Err("this viewer only watches".to_owned()),
         FromPage::Tool(mut sample) => {
-            sample.client_id.clone_from(&seat.tool_id);
-            sample.tool_id.clone_from(&seat.tool_id);
+            let id = if sample.tool_id == LEFT { &seat.left_id } else { &seat.tool_id };
+            sample.client_id.clone_from(id);
+            sample.tool_id.clone_from(id);
+            sample.name.clone_from(name);
             sample.check().map_err(|error| error.to_string())?;
             hub.send_up(Up::Tool(Box::new(sample))).await;
         }
@@ -107,9 +121,17 @@ async fn take(bytes: Bytes, hub: &Hub, seat: &Seat, rights: Rights) -> Result<()
             hub.answer(seat.browser, ViewerRpcReply { call_id, reply, ..ViewerRpcReply::default() });
         }
         FromPage::Rpc(call) => hub.send_up(Up::Rpc { browser: seat.browser, call }).await,
-        FromPage::Release(_) => hub.send_up(Up::Release { tool_id: seat.tool_id.clone() }).await,
+        FromPage::Release(of) => {
+            let tool_id = if of.left { &seat.left_id } else { &seat.tool_id };
+            hub.send_up(Up::Release { tool_id: tool_id.clone() }).await;
+        }
     }
     Ok(())
+}
+
+fn person(seat: &Seat, rights: Rights, name: &str) -> ViewerPerson {
+    let (tool_id, name) = (seat.tool_id.clone(), name.to_owned());
+    ViewerPerson { tool_id, name, read_only: rights.read_only, operator: rights.operator }
 }
 
 fn not_an_operator() -> RpcReply {

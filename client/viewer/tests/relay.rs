@@ -11,7 +11,7 @@ use scindo_proto::messages::viewer_down::Message as Down;
 use scindo_proto::messages::viewer_up::Message as FromPage;
 use scindo_proto::messages::{
     Forces, Pose, Stats, SurfaceField, SurfaceFrame, SurfaceTopology, ToolSample, Vec3, ViewerDown,
-    ViewerFrameAck, ViewerPing, ViewerUp, ViewerWatch,
+    ViewerFrameAck, ViewerName, ViewerPerson, ViewerPing, ViewerUp, ViewerWatch,
 };
 use scindo_tests::PATIENCE;
 use scindo_view::hub::{Hub, Up};
@@ -46,7 +46,17 @@ async fn join(address: SocketAddr) -> Browser {
     open(address, &format!("http://{address}")).await.unwrap()
 }
 
+/// The next message that is not about who is there: that comes whenever somebody joins or leaves.
 async fn next(browser: &mut Browser) -> Option<Down> {
+    loop {
+        match any(browser).await? {
+            Down::People(_) => {}
+            message => return Some(message),
+        }
+    }
+}
+
+async fn any(browser: &mut Browser) -> Option<Down> {
     loop {
         match timeout(PATIENCE, browser.next()).await.unwrap()? {
             Ok(Message::Binary(bytes)) => return ViewerDown::decode(bytes).unwrap().message,
@@ -78,6 +88,29 @@ fn sample(x: f64) -> FromPage {
         mode: 1,
         ..Default::default()
     })
+}
+
+#[tokio::test]
+async fn everybody_hears_who_is_there() {
+    let (address, _hub, _up) = start(WebConfig::default()).await;
+    let mut first = join(address).await;
+    let people = async |browser: &mut Browser| loop {
+        match any(browser).await {
+            Some(Down::People(people)) => break people.people,
+            Some(_) => {}
+            None => panic!("the link ended"),
+        }
+    };
+    let ids = |people: &[ViewerPerson]| people.iter().map(|p| p.tool_id.clone()).collect::<Vec<_>>();
+    assert_eq!(ids(&people(&mut first).await), ["view-test-mouse-1"]);
+    let mut second = join(address).await;
+    assert_eq!(ids(&people(&mut first).await), ["view-test-mouse-1", "view-test-mouse-2"]);
+    assert_eq!(people(&mut second).await.len(), 2);
+    send(&mut second, FromPage::Name(ViewerName { name: "Eva".into() })).await;
+    let named = people(&mut first).await;
+    assert_eq!(named[1].name, "Eva");
+    drop(second);
+    assert_eq!(ids(&people(&mut first).await), ["view-test-mouse-1"]);
 }
 
 #[tokio::test]

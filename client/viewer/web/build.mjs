@@ -37,8 +37,11 @@ async function bundle() {
   rmSync(dist, { recursive: true, force: true });
   mkdirSync(dist, { recursive: true });
   await build({
-    entryPoints: [path.join(here, "src/main.ts")],
-    outfile: path.join(dist, "viewer.js"),
+    entryPoints: { viewer: path.join(here, "src/main.ts") },
+    outdir: dist,
+    // What few people need, such as the headset, is loaded when it is asked for.
+    splitting: true,
+    chunkNames: "[name]-[hash]",
     bundle: true,
     minify: true,
     format: "esm",

@@ -7,6 +7,7 @@ use crate::limits::{
     QUATERNION_TOLERANCE,
 };
 use crate::messages::{Error, Pose, ToolShape, Vec3, Vec3f, tool_shape::Kind};
+use crate::name::{NAMES, check_name};
 
 /// Name of the message under check, which every error states.
 #[derive(Clone, Copy)]
@@ -52,6 +53,11 @@ impl In {
             return Ok(());
         }
         self.id(field, id)
+    }
+
+    /// Name of a person, or none: one line that others may read.
+    pub(super) fn name(self, field: &'static str, name: &str) -> Checked {
+        check_name(name).map_err(|found| self.range(field, format!("'{found}'"), NAMES))
     }
 
     pub(super) fn text(self, field: &'static str, text: &str) -> Checked {

@@ -88,6 +88,7 @@ impl WireMessage for Stats {
         count(8, "bodies", MAX_BODIES),
         count(9, "tools", MAX_TOOLS),
         count(10, "refused", MAX_REPORT_ENTRIES),
+        count(15, "clients", MAX_REPORT_ENTRIES),
     ];
 
     fn check(&self) -> Result<(), DecodeError> {
@@ -113,6 +114,11 @@ impl WireMessage for Stats {
             at.finite("tools.force_n", f64::from(tool.force_n))?;
             at.finite("tools.contact_age_ms", f64::from(tool.contact_age_ms))?;
             at.positive("tools.pose_age_ms", f64::from(tool.pose_age_ms), f64::MAX)?;
+            at.name("tools.name", &tool.name)?;
+        }
+        for client in &self.clients {
+            at.id("clients.client_id", &client.client_id)?;
+            at.text("clients.role", &client.role)?;
         }
         self.refused.iter().try_for_each(|counter| at.text("refused.name", &counter.name))
     }

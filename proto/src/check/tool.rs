@@ -29,6 +29,7 @@ impl WireMessage for ToolSample {
         at.positive("round_trip_ms", f64::from(self.round_trip_ms), f64::MAX)?;
         at.finite("passivity_energy_j", self.passivity_energy_j)?;
         self.closed.map_or(Ok(()), |closed| at.positive("closed", f64::from(closed), 1.0))?;
+        at.name("name", &self.name)?;
         self.shape.as_ref().map_or(Ok(()), |shape| at.shape(shape))
     }
 }

@@ -308,6 +308,7 @@ impl PublishThread {
         let rates = self.exchange.meter.read();
         self.told.read(&self.exchange, rates.seconds);
         let (told, snapshot) = (&self.told, self.sources.snapshots.output_buffer());
+        let (clients, client_count) = told.clients();
         Stats {
             seq: self.reports,
             sim_step: snapshot.step,
@@ -328,6 +329,8 @@ impl PublishThread {
                 as u32,
             haptic_clients: told.held(),
             paused: self.exchange.paused.load(Ordering::Relaxed),
+            clients,
+            client_count,
         }
     }
 

@@ -100,9 +100,12 @@ fn on_token(keys: &KeySpace, exchange: &Exchange, sample: &Sample, now: Instant)
 
 /// A liveliness token came to be or ceased to be at `now`.
 pub fn token(keys: &KeySpace, exchange: &Exchange, key: &str, is_there: bool, now: Instant) {
-    let Ok(Topic::Live(client, _)) = keys.parse(key) else { return };
+    let Ok(Topic::Live(client, role)) = keys.parse(key) else { return };
     let changes = if is_there {
-        exchange.inbox().client_came(client.as_str(), now)
+        let mut inbox = exchange.inbox();
+        let changes = inbox.client_came(client.as_str(), now);
+        inbox.client_is(client.as_str(), role);
+        changes
     } else {
         exchange.inbox().client_went(client.as_str(), now)
     };

@@ -111,6 +111,10 @@ class Stats:
     refused: Dict[str, int]
     #: Mean time of each stage of a step [ms].
     stages_ms: Dict[str, float]
+    #: Clients that are present, and what they are: ``viewer``, ``haptic`` or ``client``; at most 64 of them.
+    clients: Dict[str, str]
+    #: Names of the people who hold tools, by tool.
+    holders: Dict[str, str]
 
 
 def to_info(m: server_pb2.SessionInfo) -> SessionInfo:
@@ -153,4 +157,6 @@ def to_stats(m: server_pb2.Stats) -> Stats:
         m.cuts_applied,
         {c.name: c.count for c in m.refused},
         {s.name: s.milliseconds for s in m.stages},
+        {c.client_id: c.role for c in m.clients},
+        {t.tool_id: t.name for t in m.tools if t.name},
     )

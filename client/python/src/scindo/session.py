@@ -16,7 +16,7 @@ from ._newest import Newest
 from ._orders import Orders
 from .body import Body
 from .cut import CutResult, Cutter, PendingCut, Sweep, check_sweep
-from .errors import Refused, TimedOut, unknown
+from .errors import InvalidValue, Refused, TimedOut, unknown
 from .forces import Forces
 from .info import Event, Measures, SessionInfo, Stats, to_event, to_info, to_measures, to_stats
 from .keys import EVENT, FORCES, MEASURES, STATS, Keys, chunk
@@ -26,6 +26,8 @@ from .v1 import force_pb2, server_pb2
 T = TypeVar("T")
 M = TypeVar("M", bound=Message)
 
+#: Longest name of a person.
+MAX_PERSON = 32
 #: Version of the wire that this package speaks.
 WIRE_VERSION = 1
 #: Most events that a session keeps.
@@ -40,6 +42,7 @@ def connect(
     session: str = "main",
     *,
     client: Optional[str] = None,
+    person: str = "",
     timeout: float = 5.0,
     zenoh_config: Optional[str] = None,
 ) -> Session:
@@ -51,8 +54,9 @@ def connect(
         realm: first part of every key, one per laboratory.
         session: the session within the realm.
         client: name of this program, unique in the session; by default made of the names of machine and process.
+        person: your name, at most 32 characters, which others see beside the tools that you hold.
         timeout: longest wait for an answer [s].
-        zenoh_config: a zenoh configuration file (JSON5) to start from, for TLS, users and routers.
+        zenoh_config: a zenoh configuration file (JSON5) to start from, for certificates, users and routers.
 
     Raises:
         Unreachable: nobody listens at the endpoint.
@@ -60,10 +64,12 @@ def connect(
     """
     name = client or _client_name()
     chunk("client", name)
+    if len(person) > MAX_PERSON or not person.isprintable():
+        raise InvalidValue(f"person = {person!r}", hint=f"Give at most {MAX_PERSON} characters in one line")
     default = None if zenoh_config else os.environ.get("SCINDO_CONNECT")
     link = Link(endpoint or default, Keys(realm, session), timeout, zenoh_config)
     try:
-        return Session(link, name)
+        return Session(link, name, person)
     except BaseException:
         link.close()
         raise
@@ -75,10 +81,12 @@ class Session(Orders):
     Its methods may be called from any thread. It does not survive ``os.fork``: connect in each process.
     """
 
-    def __init__(self, link: Link, client: str) -> None:
+    def __init__(self, link: Link, client: str, person: str = "") -> None:
         self.link = link
         #: Name of this program in the session.
         self.id = client
+        #: Name of the person, which others see beside the tools that this program holds.
+        self.person = person
         self._lock = threading.RLock()
         self._bodies: Dict[str, Body] = {}
         self._tools: Dict[str, Tool] = {}

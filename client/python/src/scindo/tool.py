@@ -108,7 +108,7 @@ class Tool:
             InvalidValue: a value that the server would refuse.
             Refused: another client holds the tool (``not-owner``), or there is none of this name (``unknown-tool``).
         """
-        sample = tool_pb2.ToolSample(client_id=self._session.id, tool_id=self.id)
+        sample = tool_pb2.ToolSample(client_id=self._session.id, tool_id=self.id, name=self._session.person)
         if mode not in MODES:
             raise InvalidValue(f"mode = {mode!r} of tool '{self.id}'", hint=f"Use one of {', '.join(MODES)}")
         sample.mode = MODES[mode]

@@ -119,6 +119,7 @@ export class Bar {
 
   private onKey(e: KeyboardEvent): void {
     if (e.ctrlKey || e.metaKey || e.altKey) return;
+    if (e.target instanceof HTMLInputElement && e.target.type === "text") return;
     if (e.target instanceof HTMLSelectElement || (e.target instanceof HTMLInputElement && e.target.type === "range" && e.key.startsWith("Arrow"))) return;
     const key = e.key.toLowerCase();
     if (e.key === "?" || (key === "escape" && this.help.isOpen)) {

@@ -5,28 +5,22 @@
 // plane, so that yielding tissue does not pull the tool along. A blade follows the skin under the cursor and
 // points along the line of sight, so the cut runs where the user draws it.
 
-import { create } from "@bufbuild/protobuf";
 import { Group, Matrix4, Mesh, MeshBasicMaterial, Plane, Quaternion, Raycaster, TorusGeometry, Vector2, Vector3 } from "three";
-import { PoseSchema, Vec3Schema } from "../gen/scindo/v1/common_pb";
-import { ToolSample_Mode, ToolSampleSchema, ToolShapeSchema, type ToolShape } from "../gen/scindo/v1/tool_pb";
+import { ToolSample_Mode, type ToolShape } from "../gen/scindo/v1/tool_pb";
+import { PROBE, sampleOf, shapeOf, type Grip } from "./grip";
 import { parts } from "./tool";
 import { pick, type Hit } from "./pick";
 import type { Relay } from "./relay";
 import type { Stage } from "./stage";
 import type { Session } from "./session";
 
-export type HandMode = "orbit" | "poke" | "grab" | "cut" | "forceps";
+export type HandMode = "orbit" | Grip;
 
 /** Period of samples while the tool moves [ms]. At rest, a tenth of that rate keeps the tool alive. */
 const SAMPLE_MS = 14;
 const REST_MS = 120;
 /** A press enters the tissue over this time [ms], as a hand does. */
 const PRESS_MS = 140;
-/** Probe radius and blade length as fractions of the scene's radius. */
-const PROBE = 0.055;
-const BLADE = 0.9;
-/** Radius, length and opening of the jaws as fractions of the scene's radius; force [N] and friction of the grip. */
-const JAWS = { radius: 0.024, length: 0.6, opening: 0.15, gripForceN: 1, friction: 0.8 };
 const GHOST = new MeshBasicMaterial({ color: 0x9fd0ff, transparent: true, opacity: 0.32, depthWrite: false });
 const RING = new MeshBasicMaterial({ color: 0xd7ecff, transparent: true, opacity: 0.9, depthTest: false, toneMapped: false });
 
@@ -40,6 +34,8 @@ interface Press {
   reach: number;
   /** From the cursor to the tip of a tool that already held tissue when it was pressed [m]. */
   offset: Vector3 | null;
+  /** Whether the tool has been sent from its full depth. */
+  entered: boolean;
 }
 
 export class Hand {
@@ -197,7 +193,7 @@ export class Hand {
     if (this.kept || !hit) {
       const plane = new Plane().setFromNormalAndCoplanarPoint(facing, this.tip);
       const offset = this.tip.clone().sub(ray.intersectPlane(plane, new Vector3()) ?? this.tip);
-      this.press = { anchor: this.tip.clone(), plane, inward: this.axis.clone().negate(), since: -Infinity, reach: 0, offset };
+      this.press = { anchor: this.tip.clone(), plane, inward: this.axis.clone().negate(), since: -Infinity, reach: 0, offset, entered: true };
     } else {
       const along = { orbit: 1, poke: 0.35, grab: 1, cut: 1, forceps: 0.35 }[this.mode];
       this.press = {
@@ -207,6 +203,7 @@ export class Hand {
         since: performance.now(),
         reach: hit.distance,
         offset: null,
+        entered: false,
       };
     }
     this.held = true;
@@ -317,23 +314,18 @@ export class Hand {
   }
 
   private shape(): ToolShape {
-    const r = this.stage.radius;
-    if (this.mode === "forceps") {
-      const { radius, length, opening, gripForceN, friction } = JAWS;
-      const value = { radiusM: radius * r, lengthM: length * r, openingM: opening * r, gripForceN, friction };
-      return create(ToolShapeSchema, { kind: { case: "forceps", value } });
-    }
-    return create(ToolShapeSchema, {
-      kind: this.mode === "cut"
-        ? { case: "blade", value: { lengthM: BLADE * r, thicknessM: 0.004 * r } }
-        : { case: "sphere", value: { radiusM: PROBE * r } },
-    });
+    return shapeOf(this.mode === "orbit" ? "poke" : this.mode, this.stage.radius);
   }
 
   private sampleMode(): ToolSample_Mode {
     if (!this.press && !this.kept) return ToolSample_Mode.HOVER;
     if (this.mode === "grab" || this.mode === "forceps") return ToolSample_Mode.GRAB;
     return this.mode === "cut" ? ToolSample_Mode.CUT : ToolSample_Mode.TOUCH;
+  }
+
+  /** Jaws stay open on their way into the tissue, however few pictures the page draws: closed, they would glide off. */
+  private jaws(): { closed?: number } {
+    return this.mode === "forceps" && this.press && !this.press.entered ? { closed: 0 } : {};
   }
 
   private sendSample(now: number): void {
@@ -343,21 +335,10 @@ export class Hand {
     this.lastTip.copy(this.tip);
     this.lastSent = now;
     this.seq += 1n;
-    const { tip, velocity, quaternion } = this;
-    const sent = this.relay.send({
-      case: "tool",
-      value: create(ToolSampleSchema, {
-        seq: this.seq,
-        clientTimeNs: BigInt(Math.round(now * 1e3)) * 1000n,
-        pose: create(PoseSchema, {
-          positionM: create(Vec3Schema, { x: tip.x, y: tip.y, z: tip.z }),
-          qx: quaternion.x, qy: quaternion.y, qz: quaternion.z, qw: quaternion.w,
-        }),
-        velocityMS: create(Vec3Schema, { x: velocity.x, y: velocity.y, z: velocity.z }),
-        mode: this.sampleMode(),
-        shape: this.shape(),
-      }),
-    });
+    const { seq, tip, velocity, quaternion: turn } = this;
+    const value = sampleOf({ seq, now, tip, turn, velocity, mode: this.sampleMode(), shape: this.shape(), ...this.jaws() });
+    if (this.press && now - this.press.since >= PRESS_MS) this.press.entered = true;
+    const sent = this.relay.send({ case: "tool", value });
     this.live ||= sent;
   }
 }

@@ -20,7 +20,7 @@ const SECTIONS: [string, [string, string][]][] = [
     ["real time", "simulated seconds per second; 1 is real time"], ["latency", "age of the picture when it is drawn"],
     ["residual", "relative residual of the solver after a step; red above the tolerance"],
   ]],
-  ["Address", [["?up=y", "axis that points up (x, y, z); the default follows gravity"], ["?quality=full", "never lower the resolution"]]],
+  ["Address", [["?up=y", "axis that points up (x, y, z); the default follows gravity"], ["?quality=full", "never lower the resolution"], ["?name=Anna", "your name, which the others see"]]],
 ];
 
 export class Help {

@@ -5,13 +5,15 @@ import { boundsOf, type Stage } from "./stage";
 import type { Curves } from "./curves";
 import type { Forces } from "./forces";
 import type { Hand, HandMode } from "./hand";
+import type { Headset } from "./headset";
 import type { Panel } from "./panel";
+import type { People } from "./people";
 import type { Relay } from "./relay";
 import type { Session } from "./session";
 
 type Triple = [number, number, number];
 
-export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: Hand, panel: Panel, curves: Curves, forces: Forces): void {
+export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: Hand, panel: Panel, curves: Curves, forces: Forces, people: People, headset: Headset): void {
   const bodies = () => [...session.bodies.values()];
   const hooks = {
     /** Counters since the page opened. */
@@ -55,12 +57,13 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     },
     tools: () => [...session.tools.values()].map((tool) => ({
       id: tool.id,
-      own: tool.id === session.toolId,
+      own: tool.own,
       mode: tool.state?.mode ?? 0,
       owner: tool.state?.owner ?? "",
       forceN: tool.force.toArray() as Triple,
       closed: tool.state?.closed ?? 0,
       isLimited: tool.isLimited,
+      holder: tool.holder,
       held: tool.heldPoint?.toArray() ?? null,
       position: [tool.object.children[0].position.x, tool.object.children[0].position.y, tool.object.children[0].position.z] as Triple,
     })),
@@ -96,6 +99,13 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
     curves: () => curves.counts,
     /** Contact forces while their arrows are shown: pairs and arrows. */
     forces: () => forces.shown,
+    /** What the headset shows, or null outside of it. */
+    headset: () => headset.room && {
+      pictures: headset.room.pictures,
+      hands: headset.room.controllers.map(({ left, grip, tip, pulses }) => ({ left, grip, pulses, tip: tip.toArray() as Triple })),
+    },
+    /** Who is here, as the page lists them. */
+    people: () => people.list,
     /** Changes a live parameter; key and value are as in a scene. */
     set: (key: string, value: string) => relay.call({ case: "set", value: { key, value } }),
     hand: (mode: HandMode) => hand.choose(mode),

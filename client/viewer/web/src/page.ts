@@ -11,10 +11,12 @@ import { Colours } from "./colours";
 import { Curves } from "./curves";
 import { Forces } from "./forces";
 import { Gizmo } from "./gizmo";
+import { Headset } from "./headset";
 import { Help } from "./help";
 import { Obstacles } from "./obstacles";
 import { Overlays } from "./overlays";
 import { Params } from "./params";
+import { People } from "./people";
 import { Probes } from "./probes";
 import { View } from "./view";
 import { exposeHooks } from "./hooks";
@@ -40,6 +42,7 @@ class Page {
   private readonly bar: Bar;
   private readonly view: View;
   private readonly params = new Params(this.relay, this.session);
+  private readonly people = new People(this.session, this.relay);
   private readonly colours: Colours;
   private readonly curves = new Curves();
   private readonly forces: Forces;
@@ -47,6 +50,7 @@ class Page {
   private readonly obstacles: Obstacles;
   private readonly probes: Probes;
   private readonly gizmo: Gizmo;
+  private readonly headset: Headset;
 
   constructor(canvas: HTMLCanvasElement) {
     this.stage = new Stage(canvas);
@@ -60,12 +64,15 @@ class Page {
     const { colours, overlays, probes, curves, forces, gizmo } = this;
     this.view = new View(this.stage, this.relay, { colours, overlays, probes, curves, forces, gizmo });
     this.bar = new Bar(this.stage, this.session, this.relay, this.hand, this.view, new Help());
+    const place = () => this.place();
+    this.headset = new Headset({ session: this.session, stage: this.stage, relay: this.relay, place }, (words) => this.panel.log.line(words, "error"));
     this.view.onOpen = () => this.params.ask();
+    this.people.onChange = () => this.nameTools();
     this.stage.onPicture = () => this.gizmo.place();
   }
 
   run(): void {
-    exposeHooks(this.session, this.stage, this.relay, this.hand, this.panel, this.curves, this.forces);
+    exposeHooks(this.session, this.stage, this.relay, this.hand, this.panel, this.curves, this.forces, this.people, this.headset);
     requestAnimationFrame((now) => this.frame(now));
     this.relay.open();
   }
@@ -81,7 +88,9 @@ class Page {
         this.panel.showHello(message.value);
         this.bar.refresh();
         this.view.ask(true);
+        this.people.tell();
         break;
+      case "people": this.people.setPages(message.value.people); break;
       case "link":
         if (!message.value.connected) this.hand.drop();
         this.panel.showLink(message.value);
@@ -112,6 +121,7 @@ class Page {
         break;
       case "tool":
         this.toolOf(message.value.toolId).update(message.value);
+        this.nameTool(this.toolOf(message.value.toolId));
         this.curves.tool(message.value);
         this.stage.invalidate();
         break;
@@ -121,6 +131,7 @@ class Page {
         this.panel.showStats(message.value);
         this.colours.setStats(message.value);
         this.curves.stats(message.value);
+        this.people.setStats(message.value);
         this.bar.refresh();
         break;
       case "event": this.panel.event(message.value); break;
@@ -135,9 +146,19 @@ class Page {
   /** Draws one picture: surfaces to the GPU, tools in place, camera, render. */
   private frame(now: number): void {
     requestAnimationFrame((next) => this.frame(next));
+    // The headset draws its own pictures.
+    if (this.headset.isOn) return;
     this.hand.advance(now);
     this.stage.advance();
     if (!this.stage.takeDirty()) return;
+    this.place();
+    this.hand.place();
+    this.stage.render();
+    this.panel.countPicture(now);
+  }
+
+  /** Brings everything in the picture to its newest state. */
+  private place(): void {
     for (const body of this.session.bodies.values()) body.upload();
     this.colours.advance();
     this.stage.frameBodies(this.session.bodies.values());
@@ -146,9 +167,6 @@ class Page {
     this.overlays.place();
     this.probes.place();
     this.forces.place();
-    this.hand.place();
-    this.stage.render();
-    this.panel.countPicture(now);
   }
 
   /** Takes over a scene, new or restarted. Bodies and tools that it does not have are removed. */
@@ -201,11 +219,21 @@ class Page {
   private toolOf(id: string): ToolVisual {
     let tool = this.session.tools.get(id);
     if (!tool) {
-      tool = new ToolVisual(id, id === this.session.toolId);
+      tool = new ToolVisual(id, id === this.session.toolId || id === `${this.session.toolId}-left`);
       this.session.tools.set(id, tool);
       this.stage.scene.add(tool.object);
     }
     return tool;
+  }
+
+  private nameTools(): void {
+    this.session.tools.forEach((tool) => this.nameTool(tool));
+    this.stage.invalidate();
+  }
+
+  private nameTool(tool: ToolVisual): void {
+    const holder = tool.state?.owner ? this.people.holderOf(tool.state.owner) : null;
+    tool.setHolder(holder?.name || holder?.id || "", holder?.colour ?? "");
   }
 
   private forgetTool(id: string): void {

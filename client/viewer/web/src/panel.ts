@@ -169,13 +169,17 @@ export class Panel {
   }
 
   private refreshTools(stats: Stats): void {
-    const rows: Row[] = stats.tools.map((tool) => {
-      const rate = tool.contactRateHz > 0 ? ` · ${short(tool.contactRateHz)} Hz` : "";
-      const age = tool.contactAgeMs > 0 ? ` · ${short(tool.contactAgeMs)} ms old` : "";
+    const rows: Row[] = stats.tools.flatMap((tool) => {
       const drawn = this.feltToDrawnMs(tool);
-      const seen = Number.isFinite(drawn) ? ` · drawn ${short(drawn)} ms later` : "";
-      const name = tool.owner && tool.owner !== tool.toolId ? `${tool.toolId} · ${tool.owner}` : tool.toolId;
-      return [name, `${short(tool.forceN)} N${rate}${age}${seen}`, "", "force, contact models per second, their age in the haptic device, and time from the hand at a pose, where it is felt, to the picture of it"];
+      const felt = [
+        tool.contactRateHz > 0 ? `${short(tool.contactRateHz)} Hz` : "",
+        tool.contactAgeMs > 0 ? `${short(tool.contactAgeMs)} ms old` : "",
+        Number.isFinite(drawn) ? `drawn ${short(drawn)} ms later` : "",
+      ].filter(Boolean).join(" · ");
+      const holder = tool.name || (tool.owner !== tool.toolId ? tool.owner : "");
+      const force: Row = [holder ? `${tool.toolId} · ${holder}` : tool.toolId, `${short(tool.forceN)} N`, "", "force of the tissue on the tool"];
+      const rest: Row = ["", felt, "words", "contact models per second, their age in the haptic device, and time from the hand at a pose, where it is felt, to the picture of it"];
+      return felt ? [force, rest] : [force];
     });
     setRows(this.at("tools"), rows.length > 0 ? rows : [["none", ""]]);
   }

@@ -32,13 +32,31 @@ export class ToolVisual {
   private readonly arrow = arrow();
   private readonly leash = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)), LEASH);
   private readonly label = document.createElement("div");
+  private readonly tag = document.createElement("div");
   private shapeKey = "";
+  /** Who else holds the tool; empty: nobody, or this page. */
+  holder = "";
+  private colour = "";
 
-  constructor(readonly id: string, private readonly own: boolean) {
+  constructor(readonly id: string, readonly own: boolean) {
     this.object.add(this.solid, this.ghost, this.arrow, this.leash);
     this.leash.frustumCulled = this.leash.visible = false;
     this.leash.renderOrder = 5;
-    document.getElementById("labels")!.append(this.label);
+    this.tag.className = "holder";
+    this.tag.hidden = true;
+    document.getElementById("labels")!.append(this.label, this.tag);
+  }
+
+  /** Names and colours the tool of somebody else. */
+  setHolder(name: string, colour: string): void {
+    if (name === this.holder && colour === this.colour) return;
+    this.holder = name;
+    this.tag.textContent = name;
+    this.tag.style.setProperty("--of", colour || "transparent");
+    if (colour === this.colour) return;
+    this.colour = colour;
+    this.shapeKey = "";
+    if (this.state) this.update(this.state);
   }
 
   update(state: ToolState): void {
@@ -52,7 +70,7 @@ export class ToolVisual {
     this.ghost.clear();
     // The page's own blade points at the viewer, and its handle would hide the cut.
     const shaft = !(this.own && state.shape.kind.case === "blade");
-    this.solid.add(...parts(state.shape, this.own ? HAND : STEEL, shaft, state.closed));
+    this.solid.add(...parts(state.shape, this.own ? HAND : this.colour ? tinted(this.colour) : STEEL, shaft, state.closed));
     this.ghost.add(...parts(state.shape, GHOST, false, state.closed));
   }
 
@@ -65,6 +83,7 @@ export class ToolVisual {
     const apart = this.solid.position.distanceTo(this.ghost.position);
     this.ghost.visible = apart > 0.004 * stage.radius;
     this.placeLeash(state);
+    this.placeTag(stage);
     const newtons = this.force.length();
     this.arrow.visible = newtons > QUIET_N;
     this.label.hidden = newtons <= QUIET_N;
@@ -96,6 +115,12 @@ export class ToolVisual {
     return at ? new Vector3(at.x, at.y, at.z) : null;
   }
 
+  private placeTag(stage: Stage): void {
+    const at = this.holder ? stage.project(this.solid.position) : null;
+    this.tag.hidden = !at?.visible;
+    if (at?.visible) this.tag.style.transform = `translate(${(at.x + 10).toFixed(0)}px, ${(at.y + 8).toFixed(0)}px)`;
+  }
+
   private placeLeash(state: ToolState): void {
     const to = this.heldPoint, from = state.pose?.positionM;
     this.leash.visible = to !== null && from !== undefined;
@@ -110,7 +135,20 @@ export class ToolVisual {
     this.object.removeFromParent();
     this.leash.geometry.dispose();
     this.label.remove();
+    this.tag.remove();
   }
+}
+
+const tints = new Map<string, MeshStandardMaterial>();
+
+/** Steel in the colour of a person. */
+function tinted(colour: string): MeshStandardMaterial {
+  let material = tints.get(colour);
+  if (!material) {
+    material = new MeshStandardMaterial({ color: colour, roughness: 0.4, metalness: 0.15 });
+    tints.set(colour, material);
+  }
+  return material;
 }
 
 export function modeName(mode: ToolSample_Mode): string {

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use scindo_proto::Role;
+
 use super::one_way::OneWay;
 
 /// Messages refused so far, by reason.
@@ -25,11 +27,16 @@ impl Counters {
     }
 }
 
+/// Most clients that a report names.
+pub const MOST_CLIENTS: usize = 64;
+
 /// Figures of a tool that a client holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToolFigures {
     /// Id of the tool.
     pub tool: Arc<str>,
+    /// Name of the person who holds it; empty if none was given.
+    pub name: Arc<str>,
     /// Poses accepted since it was taken.
     pub poses: u64,
     /// Age of the contact model that its device last used [ms].
@@ -47,4 +54,8 @@ pub struct Figures {
     pub refused: Vec<(&'static str, u64)>,
     /// Cuts from clients applied so far.
     pub cuts_applied: u64,
+    /// The first [`MOST_CLIENTS`] clients by their ids, and what they are.
+    pub clients: Vec<(String, Role)>,
+    /// Number of all clients.
+    pub client_count: usize,
 }

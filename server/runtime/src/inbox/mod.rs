@@ -33,10 +33,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
+use scindo_proto::Role;
 use scindo_proto::messages::{CutAck, CutCommand, DeviceCapability, ToolSample, cut_ack};
 use scindo_world::inputs::{CutOutcome, Inputs, ToolInput};
 
-use counters::{Counters, Figures};
+use counters::{Counters, Figures, MOST_CLIENTS};
 pub use cut_log::{Answering, Cut};
 use cut_log::{CutLog, answer};
 pub use owners::{Change, MAX_POSE_RATE};
@@ -99,6 +100,11 @@ impl Inbox {
             self.pose(sender, sample, now).ok()
         });
         taken.flatten().collect()
+    }
+
+    /// Notes what a client with a token says that it is.
+    pub fn client_is(&mut self, client: &str, role: Role) {
+        self.owners.is_a(client, role);
     }
 
     /// Removes a liveliness token of `client`. With the last one its tools are released.
@@ -219,6 +225,10 @@ impl Inbox {
         figures.refused.clear();
         figures.refused.extend(self.refused().iter().map(|(&code, &count)| (code, count)));
         figures.cuts_applied = self.cuts.applied();
+        let clients = self.owners.clients();
+        figures.client_count = clients.len();
+        figures.clients.clear();
+        figures.clients.extend(clients.take(MOST_CLIENTS).map(|(id, role)| (id.to_owned(), role)));
     }
 
     /// Messages refused so far, by reason.

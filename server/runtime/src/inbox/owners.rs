@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use scindo_proto::Role;
 use scindo_proto::messages::{DeviceCapability, ToolSample};
 use scindo_world::inputs::{MAX_PASSED, MAX_TOOLS, ToolInput, ToolMode};
 
@@ -58,6 +59,8 @@ struct Held {
     /// Start of the current second, and poses since then.
     this_second: (Instant, u32),
     capability: Option<DeviceCapability>,
+    /// Name of the person; empty if none was given.
+    name: Arc<str>,
 }
 
 impl Held {
@@ -102,6 +105,8 @@ pub(super) struct Owners {
     scene_tools: BTreeSet<Arc<str>>,
     /// Number of tokens per client.
     here: BTreeMap<String, usize>,
+    /// What the newest token of a client says that it is.
+    roles: BTreeMap<String, Role>,
     early: EarlyPoses,
     held: BTreeMap<Arc<str>, Held>,
     /// By client and tool, kept while late poses may still arrive.
@@ -129,6 +134,7 @@ impl Owners {
             return Vec::new();
         }
         self.here.remove(client);
+        self.roles.remove(client);
         self.let_go.retain(|_, last| now.duration_since(last.at) < PATIENCE);
         let lost = self.held.extract_if(.., |_, held| &*held.input.owner == client);
         let mut changes = Vec::new();
@@ -137,6 +143,18 @@ impl Owners {
             changes.push(Change::Released { tool, owner: held.input.owner });
         }
         changes
+    }
+
+    /// Notes what a client that is here says that it is.
+    pub fn is_a(&mut self, client: &str, role: Role) {
+        if self.here.contains_key(client) {
+            self.roles.insert(client.to_owned(), role);
+        }
+    }
+
+    /// Clients that are here and what they are, in the order of their ids.
+    pub fn clients(&self) -> impl ExactSizeIterator<Item = (&str, Role)> {
+        self.here.keys().map(|id| (&**id, self.roles.get(id).copied().unwrap_or(Role::Client)))
     }
 
     pub fn is_here(&self, client: &str) -> bool {
@@ -179,6 +197,9 @@ impl Owners {
         held.poses += 1;
         held.contact_age_ms = sample.contact_age_ms;
         held.one_way.arrived(sample, now);
+        if *held.name != *sample.name {
+            held.name = Arc::from(&*sample.name);
+        }
         Ok(None)
     }
 
@@ -236,6 +257,7 @@ impl Owners {
             one_way,
             this_second: (now, 1),
             capability: None,
+            name: Arc::from(&*sample.name),
         };
         self.held.insert(id.clone(), held);
         Ok(Change::Taken { tool: id, owner })
@@ -280,8 +302,9 @@ impl Owners {
     }
 
     pub fn figures(&self) -> impl Iterator<Item = ToolFigures> {
-        self.held.iter().map(|(tool, &Held { poses, contact_age_ms, one_way, .. })| ToolFigures {
+        self.held.iter().map(|(tool, &Held { poses, contact_age_ms, one_way, ref name, .. })| ToolFigures {
             tool: tool.clone(),
+            name: name.clone(),
             poses,
             contact_age_ms,
             one_way,

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use scindo_proto::messages::{BodyStats, Counter, ToolStats};
+use scindo_proto::Role;
+use scindo_proto::messages::{BodyStats, ClientStats, Counter, ToolStats};
 use scindo_world::snapshot::{BodySnapshot, ToolSnapshot};
 
 use crate::exchange::Exchange;
@@ -42,6 +43,15 @@ impl Told {
         self.figures.tools.len() as u32
     }
 
+    /// The clients that are present, as many as a report names, and the number of all.
+    pub fn clients(&self) -> (Vec<ClientStats>, u32) {
+        let to_stats = |(id, role): &(String, Role)| ClientStats {
+            client_id: id.clone(),
+            role: role.as_str().to_owned(),
+        };
+        (self.figures.clients.iter().map(to_stats).collect(), self.figures.client_count as u32)
+    }
+
     /// Counts of refused messages and of losses, by name.
     pub fn refused(&self, exchange: &Exchange) -> Vec<Counter> {
         let all = self.figures.refused.iter().copied().chain(exchange.losses());
@@ -60,6 +70,7 @@ impl Told {
             force_n: tool.force_n.norm() as f32,
             contact_age_ms: held.map_or(0.0, |held| held.contact_age_ms),
             pose_age_ms: shown.map_or(0.0, |shown| 1e3 * shown.as_secs_f32()),
+            name: held.map_or_else(String::new, |held| held.name.to_string()),
         }
     }
 }

@@ -126,7 +126,7 @@ class ToolInfo(_message.Message):
     def __init__(self, id: _Optional[str] = ..., shape: _Optional[_Union[_tool_pb2.ToolShape, _Mapping[str, object]]] = ..., owner: _Optional[str] = ..., cuts: _Optional[bool] = ...) -> None: ...
 
 class Stats(_message.Message):
-    __slots__ = ("seq", "sim_step", "sim_time_s", "publish_unix_ns", "step_rate_hz", "real_time_factor", "stages", "bodies", "tools", "refused", "cuts_applied", "surface_subscribers", "haptic_clients", "paused")
+    __slots__ = ("seq", "sim_step", "sim_time_s", "publish_unix_ns", "step_rate_hz", "real_time_factor", "stages", "bodies", "tools", "refused", "cuts_applied", "surface_subscribers", "haptic_clients", "paused", "clients", "client_count")
     SEQ_FIELD_NUMBER: _ClassVar[int]
     SIM_STEP_FIELD_NUMBER: _ClassVar[int]
     SIM_TIME_S_FIELD_NUMBER: _ClassVar[int]
@@ -141,6 +141,8 @@ class Stats(_message.Message):
     SURFACE_SUBSCRIBERS_FIELD_NUMBER: _ClassVar[int]
     HAPTIC_CLIENTS_FIELD_NUMBER: _ClassVar[int]
     PAUSED_FIELD_NUMBER: _ClassVar[int]
+    CLIENTS_FIELD_NUMBER: _ClassVar[int]
+    CLIENT_COUNT_FIELD_NUMBER: _ClassVar[int]
     seq: int
     sim_step: int
     sim_time_s: float
@@ -155,7 +157,17 @@ class Stats(_message.Message):
     surface_subscribers: int
     haptic_clients: int
     paused: bool
-    def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., step_rate_hz: _Optional[float] = ..., real_time_factor: _Optional[float] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping[str, object]]]] = ..., bodies: _Optional[_Iterable[_Union[BodyStats, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolStats, _Mapping[str, object]]]] = ..., refused: _Optional[_Iterable[_Union[Counter, _Mapping[str, object]]]] = ..., cuts_applied: _Optional[int] = ..., surface_subscribers: _Optional[int] = ..., haptic_clients: _Optional[int] = ..., paused: _Optional[bool] = ...) -> None: ...
+    clients: _containers.RepeatedCompositeFieldContainer[ClientStats]
+    client_count: int
+    def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., step_rate_hz: _Optional[float] = ..., real_time_factor: _Optional[float] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping[str, object]]]] = ..., bodies: _Optional[_Iterable[_Union[BodyStats, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolStats, _Mapping[str, object]]]] = ..., refused: _Optional[_Iterable[_Union[Counter, _Mapping[str, object]]]] = ..., cuts_applied: _Optional[int] = ..., surface_subscribers: _Optional[int] = ..., haptic_clients: _Optional[int] = ..., paused: _Optional[bool] = ..., clients: _Optional[_Iterable[_Union[ClientStats, _Mapping[str, object]]]] = ..., client_count: _Optional[int] = ...) -> None: ...
+
+class ClientStats(_message.Message):
+    __slots__ = ("client_id", "role")
+    CLIENT_ID_FIELD_NUMBER: _ClassVar[int]
+    ROLE_FIELD_NUMBER: _ClassVar[int]
+    client_id: str
+    role: str
+    def __init__(self, client_id: _Optional[str] = ..., role: _Optional[str] = ...) -> None: ...
 
 class StageTime(_message.Message):
     __slots__ = ("name", "milliseconds")
@@ -206,7 +218,7 @@ class BodyStats(_message.Message):
     def __init__(self, body_id: _Optional[str] = ..., iterations: _Optional[int] = ..., residual: _Optional[float] = ..., elements: _Optional[int] = ..., pieces: _Optional[int] = ..., copies: _Optional[int] = ..., epoch: _Optional[int] = ..., volume_m3: _Optional[float] = ..., tolerance: _Optional[float] = ..., unconverged_steps: _Optional[int] = ..., refused_steps: _Optional[int] = ..., divided_steps: _Optional[int] = ..., rolled_back_steps: _Optional[int] = ..., inverted: _Optional[int] = ..., fixed_iterations: _Optional[bool] = ..., unconverged: _Optional[bool] = ..., divided_cells: _Optional[int] = ..., joined_cells: _Optional[int] = ...) -> None: ...
 
 class ToolStats(_message.Message):
-    __slots__ = ("tool_id", "owner", "contact_rate_hz", "pose_rate_hz", "force_n", "contact_age_ms", "pose_age_ms")
+    __slots__ = ("tool_id", "owner", "contact_rate_hz", "pose_rate_hz", "force_n", "contact_age_ms", "pose_age_ms", "name")
     TOOL_ID_FIELD_NUMBER: _ClassVar[int]
     OWNER_FIELD_NUMBER: _ClassVar[int]
     CONTACT_RATE_HZ_FIELD_NUMBER: _ClassVar[int]
@@ -214,6 +226,7 @@ class ToolStats(_message.Message):
     FORCE_N_FIELD_NUMBER: _ClassVar[int]
     CONTACT_AGE_MS_FIELD_NUMBER: _ClassVar[int]
     POSE_AGE_MS_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
     tool_id: str
     owner: str
     contact_rate_hz: float
@@ -221,7 +234,8 @@ class ToolStats(_message.Message):
     force_n: float
     contact_age_ms: float
     pose_age_ms: float
-    def __init__(self, tool_id: _Optional[str] = ..., owner: _Optional[str] = ..., contact_rate_hz: _Optional[float] = ..., pose_rate_hz: _Optional[float] = ..., force_n: _Optional[float] = ..., contact_age_ms: _Optional[float] = ..., pose_age_ms: _Optional[float] = ...) -> None: ...
+    name: str
+    def __init__(self, tool_id: _Optional[str] = ..., owner: _Optional[str] = ..., contact_rate_hz: _Optional[float] = ..., pose_rate_hz: _Optional[float] = ..., force_n: _Optional[float] = ..., contact_age_ms: _Optional[float] = ..., pose_age_ms: _Optional[float] = ..., name: _Optional[str] = ...) -> None: ...
 
 class Counter(_message.Message):
     __slots__ = ("name", "count")

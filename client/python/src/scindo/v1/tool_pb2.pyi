@@ -79,7 +79,7 @@ class ToolShape(_message.Message):
     def __init__(self, sphere: _Optional[_Union[ToolShape.Sphere, _Mapping[str, object]]] = ..., capsule: _Optional[_Union[ToolShape.Capsule, _Mapping[str, object]]] = ..., blade: _Optional[_Union[ToolShape.Blade, _Mapping[str, object]]] = ..., forceps: _Optional[_Union[ToolShape.Forceps, _Mapping[str, object]]] = ..., retractor: _Optional[_Union[ToolShape.Retractor, _Mapping[str, object]]] = ..., hook: _Optional[_Union[ToolShape.Hook, _Mapping[str, object]]] = ...) -> None: ...
 
 class ToolSample(_message.Message):
-    __slots__ = ("seq", "client_time_ns", "client_id", "tool_id", "pose", "velocity_m_s", "mode", "shape", "applied_force_n", "last_contact_seq_used", "contact_age_ms", "passivity_energy_j", "fault_flags", "closed", "round_trip_ms")
+    __slots__ = ("seq", "client_time_ns", "client_id", "tool_id", "pose", "velocity_m_s", "mode", "shape", "applied_force_n", "last_contact_seq_used", "contact_age_ms", "passivity_energy_j", "fault_flags", "closed", "round_trip_ms", "name")
     class Mode(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         MODE_UNSPECIFIED: _ClassVar[ToolSample.Mode]
@@ -109,6 +109,7 @@ class ToolSample(_message.Message):
     FAULT_FLAGS_FIELD_NUMBER: _ClassVar[int]
     CLOSED_FIELD_NUMBER: _ClassVar[int]
     ROUND_TRIP_MS_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
     seq: int
     client_time_ns: int
     client_id: str
@@ -124,7 +125,8 @@ class ToolSample(_message.Message):
     fault_flags: int
     closed: float
     round_trip_ms: float
-    def __init__(self, seq: _Optional[int] = ..., client_time_ns: _Optional[int] = ..., client_id: _Optional[str] = ..., tool_id: _Optional[str] = ..., pose: _Optional[_Union[_common_pb2.Pose, _Mapping[str, object]]] = ..., velocity_m_s: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., mode: _Optional[_Union[ToolSample.Mode, str]] = ..., shape: _Optional[_Union[ToolShape, _Mapping[str, object]]] = ..., applied_force_n: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., last_contact_seq_used: _Optional[int] = ..., contact_age_ms: _Optional[float] = ..., passivity_energy_j: _Optional[float] = ..., fault_flags: _Optional[int] = ..., closed: _Optional[float] = ..., round_trip_ms: _Optional[float] = ...) -> None: ...
+    name: str
+    def __init__(self, seq: _Optional[int] = ..., client_time_ns: _Optional[int] = ..., client_id: _Optional[str] = ..., tool_id: _Optional[str] = ..., pose: _Optional[_Union[_common_pb2.Pose, _Mapping[str, object]]] = ..., velocity_m_s: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., mode: _Optional[_Union[ToolSample.Mode, str]] = ..., shape: _Optional[_Union[ToolShape, _Mapping[str, object]]] = ..., applied_force_n: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., last_contact_seq_used: _Optional[int] = ..., contact_age_ms: _Optional[float] = ..., passivity_energy_j: _Optional[float] = ..., fault_flags: _Optional[int] = ..., closed: _Optional[float] = ..., round_trip_ms: _Optional[float] = ..., name: _Optional[str] = ...) -> None: ...
 
 class DeviceCapability(_message.Message):
     __slots__ = ("client_id", "tool_id", "model", "max_force_n", "max_continuous_force_n", "max_stiffness_n_m", "workspace_radius_m", "loop_rate_hz")

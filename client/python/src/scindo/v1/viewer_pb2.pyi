@@ -2,15 +2,16 @@ from scindo.v1 import force_pb2 as _force_pb2
 from scindo.v1 import server_pb2 as _server_pb2
 from scindo.v1 import surface_pb2 as _surface_pb2
 from scindo.v1 import tool_pb2 as _tool_pb2
+from google.protobuf.internal import containers as _containers
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
-from collections.abc import Mapping as _Mapping
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
 from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ViewerDown(_message.Message):
-    __slots__ = ("hello", "link", "info", "plan", "topology", "frame", "tool", "stats", "event", "pong", "rpc", "tool_gone", "field", "measures", "forces")
+    __slots__ = ("hello", "link", "info", "plan", "topology", "frame", "tool", "stats", "event", "pong", "rpc", "tool_gone", "field", "measures", "forces", "people")
     HELLO_FIELD_NUMBER: _ClassVar[int]
     LINK_FIELD_NUMBER: _ClassVar[int]
     INFO_FIELD_NUMBER: _ClassVar[int]
@@ -26,6 +27,7 @@ class ViewerDown(_message.Message):
     FIELD_FIELD_NUMBER: _ClassVar[int]
     MEASURES_FIELD_NUMBER: _ClassVar[int]
     FORCES_FIELD_NUMBER: _ClassVar[int]
+    PEOPLE_FIELD_NUMBER: _ClassVar[int]
     hello: ViewerHello
     link: ViewerLink
     info: _server_pb2.SessionInfo
@@ -41,23 +43,26 @@ class ViewerDown(_message.Message):
     field: _surface_pb2.SurfaceField
     measures: _server_pb2.Measures
     forces: _force_pb2.Forces
-    def __init__(self, hello: _Optional[_Union[ViewerHello, _Mapping[str, object]]] = ..., link: _Optional[_Union[ViewerLink, _Mapping[str, object]]] = ..., info: _Optional[_Union[_server_pb2.SessionInfo, _Mapping[str, object]]] = ..., plan: _Optional[_Union[_server_pb2.Plan, _Mapping[str, object]]] = ..., topology: _Optional[_Union[_surface_pb2.SurfaceTopology, _Mapping[str, object]]] = ..., frame: _Optional[_Union[_surface_pb2.SurfaceFrame, _Mapping[str, object]]] = ..., tool: _Optional[_Union[_tool_pb2.ToolState, _Mapping[str, object]]] = ..., stats: _Optional[_Union[_server_pb2.Stats, _Mapping[str, object]]] = ..., event: _Optional[_Union[_server_pb2.Event, _Mapping[str, object]]] = ..., pong: _Optional[_Union[ViewerPong, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpcReply, _Mapping[str, object]]] = ..., tool_gone: _Optional[_Union[ViewerToolGone, _Mapping[str, object]]] = ..., field: _Optional[_Union[_surface_pb2.SurfaceField, _Mapping[str, object]]] = ..., measures: _Optional[_Union[_server_pb2.Measures, _Mapping[str, object]]] = ..., forces: _Optional[_Union[_force_pb2.Forces, _Mapping[str, object]]] = ...) -> None: ...
+    people: ViewerPeople
+    def __init__(self, hello: _Optional[_Union[ViewerHello, _Mapping[str, object]]] = ..., link: _Optional[_Union[ViewerLink, _Mapping[str, object]]] = ..., info: _Optional[_Union[_server_pb2.SessionInfo, _Mapping[str, object]]] = ..., plan: _Optional[_Union[_server_pb2.Plan, _Mapping[str, object]]] = ..., topology: _Optional[_Union[_surface_pb2.SurfaceTopology, _Mapping[str, object]]] = ..., frame: _Optional[_Union[_surface_pb2.SurfaceFrame, _Mapping[str, object]]] = ..., tool: _Optional[_Union[_tool_pb2.ToolState, _Mapping[str, object]]] = ..., stats: _Optional[_Union[_server_pb2.Stats, _Mapping[str, object]]] = ..., event: _Optional[_Union[_server_pb2.Event, _Mapping[str, object]]] = ..., pong: _Optional[_Union[ViewerPong, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpcReply, _Mapping[str, object]]] = ..., tool_gone: _Optional[_Union[ViewerToolGone, _Mapping[str, object]]] = ..., field: _Optional[_Union[_surface_pb2.SurfaceField, _Mapping[str, object]]] = ..., measures: _Optional[_Union[_server_pb2.Measures, _Mapping[str, object]]] = ..., forces: _Optional[_Union[_force_pb2.Forces, _Mapping[str, object]]] = ..., people: _Optional[_Union[ViewerPeople, _Mapping[str, object]]] = ...) -> None: ...
 
 class ViewerUp(_message.Message):
-    __slots__ = ("tool", "rpc", "ping", "frame_ack", "release", "watch")
+    __slots__ = ("tool", "rpc", "ping", "frame_ack", "release", "watch", "name")
     TOOL_FIELD_NUMBER: _ClassVar[int]
     RPC_FIELD_NUMBER: _ClassVar[int]
     PING_FIELD_NUMBER: _ClassVar[int]
     FRAME_ACK_FIELD_NUMBER: _ClassVar[int]
     RELEASE_FIELD_NUMBER: _ClassVar[int]
     WATCH_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
     tool: _tool_pb2.ToolSample
     rpc: ViewerRpc
     ping: ViewerPing
     frame_ack: ViewerFrameAck
     release: ViewerToolRelease
     watch: ViewerWatch
-    def __init__(self, tool: _Optional[_Union[_tool_pb2.ToolSample, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpc, _Mapping[str, object]]] = ..., ping: _Optional[_Union[ViewerPing, _Mapping[str, object]]] = ..., frame_ack: _Optional[_Union[ViewerFrameAck, _Mapping[str, object]]] = ..., release: _Optional[_Union[ViewerToolRelease, _Mapping[str, object]]] = ..., watch: _Optional[_Union[ViewerWatch, _Mapping[str, object]]] = ...) -> None: ...
+    name: ViewerName
+    def __init__(self, tool: _Optional[_Union[_tool_pb2.ToolSample, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpc, _Mapping[str, object]]] = ..., ping: _Optional[_Union[ViewerPing, _Mapping[str, object]]] = ..., frame_ack: _Optional[_Union[ViewerFrameAck, _Mapping[str, object]]] = ..., release: _Optional[_Union[ViewerToolRelease, _Mapping[str, object]]] = ..., watch: _Optional[_Union[ViewerWatch, _Mapping[str, object]]] = ..., name: _Optional[_Union[ViewerName, _Mapping[str, object]]] = ...) -> None: ...
 
 class ViewerHello(_message.Message):
     __slots__ = ("viewer_version", "client_id", "tool_id", "upstream", "read_only", "operator")
@@ -90,8 +95,34 @@ class ViewerToolGone(_message.Message):
     def __init__(self, tool_id: _Optional[str] = ...) -> None: ...
 
 class ViewerToolRelease(_message.Message):
-    __slots__ = ()
-    def __init__(self) -> None: ...
+    __slots__ = ("left",)
+    LEFT_FIELD_NUMBER: _ClassVar[int]
+    left: bool
+    def __init__(self, left: _Optional[bool] = ...) -> None: ...
+
+class ViewerName(_message.Message):
+    __slots__ = ("name",)
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    def __init__(self, name: _Optional[str] = ...) -> None: ...
+
+class ViewerPeople(_message.Message):
+    __slots__ = ("people",)
+    PEOPLE_FIELD_NUMBER: _ClassVar[int]
+    people: _containers.RepeatedCompositeFieldContainer[ViewerPerson]
+    def __init__(self, people: _Optional[_Iterable[_Union[ViewerPerson, _Mapping[str, object]]]] = ...) -> None: ...
+
+class ViewerPerson(_message.Message):
+    __slots__ = ("tool_id", "name", "read_only", "operator")
+    TOOL_ID_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    READ_ONLY_FIELD_NUMBER: _ClassVar[int]
+    OPERATOR_FIELD_NUMBER: _ClassVar[int]
+    tool_id: str
+    name: str
+    read_only: bool
+    operator: bool
+    def __init__(self, tool_id: _Optional[str] = ..., name: _Optional[str] = ..., read_only: _Optional[bool] = ..., operator: _Optional[bool] = ...) -> None: ...
 
 class ViewerWatch(_message.Message):
     __slots__ = ("stress", "measures", "forces")
