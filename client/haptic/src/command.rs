@@ -8,8 +8,9 @@ mod summary;
 
 use crate::clock::LoopClock;
 use crate::device::HapticDevice;
+use crate::device::haply::HaplyDevice;
 use crate::device::path::{Path, Touch};
-use crate::device::simulated::{Hand, SimulatedDevice};
+use crate::device::simulated::{self, Hand, SimulatedDevice};
 use crate::haptic_loop;
 use crate::link::{self, HeldTool, ToolRequest};
 use crate::live::{Live, Meter};
@@ -17,6 +18,7 @@ use crate::log::force_plot::{self, Trace};
 use crate::log::recorder::{LogQueue, Recorder};
 use crate::statistics::LoopReport;
 use crate::tick::{HapticTick, Ports};
+use nalgebra::Vector3;
 use scindo_client::{Link, LinkConfig, Role};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,10 +32,7 @@ use arguments::check;
 
 /// Runs the client until its time is over, or until Ctrl-C or SIGTERM.
 pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
-    let mut device = match arguments.device {
-        DeviceKind::Sim => SimulatedDevice::at_rest(Hand::default()),
-    };
-    let capability = device.capability();
+    let capability = arguments.device.capability().unwrap_or(simulated::CAPABILITY);
     let limits = check(arguments, &capability)?;
     let file_path = path_of_file(arguments)?;
     let (log, recorder) = recorder(arguments)?;
@@ -44,24 +43,20 @@ pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
         .build()
         .map_err(|source| CommandError::Io { what: "start the network threads".into(), source })?;
     let clock = LoopClock::default();
-    let (link, held, ports, path) = runtime.block_on(async {
+    let (link, held, ports, device) = runtime.block_on(async {
         let link = link::connect(link_config(arguments)).await?;
-        link::tell_of_script(&link, &arguments.tool).await?;
-        let path = match file_path {
-            Some(path) => path,
-            None => built_in_path(arguments, &link).await?,
-        };
+        link::tell_of_script(&link, arguments.tool()).await?;
+        let device = device(arguments, &link, file_path).await?;
         let request = ToolRequest {
-            id: arguments.tool.clone(),
+            id: arguments.tool().to_owned(),
             shape: arguments.shape,
             pose_hz: arguments.pose_hz,
             deadband: arguments.deadband(),
             capability,
         };
         let (held, ports) = HeldTool::hold(&link, &request, clock).await?;
-        Ok::<_, CommandError>((link, held, ports, path))
+        Ok::<_, CommandError>((link, held, ports, device))
     })?;
-    device.follow(path);
     let meter = Arc::new(Meter::default());
     let ports = Ports {
         contacts: ports.contacts,
@@ -70,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
         log,
         meter: Some(meter.clone()),
     };
-    let tick = HapticTick::new(Box::new(device), limits, ports);
+    let tick = HapticTick::new(device, limits, ports);
     let live = (!arguments.quiet).then(|| Live::start(meter, held.contact_count())).transpose();
     let live = live.map_err(|source| CommandError::Io { what: "start the live figures".into(), source })?;
     let loop_ = run_loop(tick, clock, stop_on_signal(&runtime), arguments.seconds);
@@ -83,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
         return Err(no_contact(arguments, loop_.seconds, report.contacts_refused));
     }
     Ok(Summary {
-        tool: arguments.tool.clone(),
+        tool: arguments.tool().to_owned(),
         device: capability.model,
         force_limit_n: limits.max_force_n,
         slew_limit_n_s: limits.slew_n_s,
@@ -91,6 +86,30 @@ pub fn run(arguments: &Arguments) -> Result<Summary, CommandError> {
         link: report,
         log_rows,
     })
+}
+
+/// Opens the device of the command line.
+async fn device(
+    arguments: &Arguments,
+    link: &Link,
+    file_path: Option<Path>,
+) -> Result<Box<dyn HapticDevice>, CommandError> {
+    if let DeviceKind::Haply(address) = &arguments.device {
+        let Touch { point_m, direction, clearance_m, .. } = touch(arguments, link).await?;
+        let up = link.info().await?.up.map_or(Vector3::z(), |up| Vector3::new(up.x, up.y, up.z));
+        let start_m = point_m - clearance_m * direction;
+        let device = HaplyDevice::start(address.clone(), start_m, &up)
+            .map_err(|source| CommandError::Io { what: "start the exchange with Haply".into(), source })?;
+        return Ok(Box::new(device));
+    }
+    let path = match file_path {
+        Some(path) => path,
+        None => {
+            let touch = touch(arguments, link).await?;
+            if arguments.path == "circle" { Path::circle(&touch) } else { Path::press(&touch) }
+        }
+    };
+    Ok(Box::new(SimulatedDevice::new(path, Hand::default())))
 }
 
 /// Creates the output files. A file that cannot be written is refused before the tool is held.
@@ -134,7 +153,7 @@ fn no_contact(arguments: &Arguments, seconds: f64, refused: u64) -> CommandError
         }
         _ => "messages arrived but could not be read; check that both programs have the same version",
     };
-    CommandError::NoContact { tool: arguments.tool.clone(), seconds, hint }
+    CommandError::NoContact { tool: arguments.tool().to_owned(), seconds, hint }
 }
 
 fn run_loop(
@@ -179,6 +198,7 @@ fn link_config(arguments: &Arguments) -> LinkConfig {
     let mut config = LinkConfig::new(Role::Haptic, &id);
     config.realm.clone_from(&arguments.realm);
     config.session.clone_from(&arguments.session);
+    config.person.clone_from(&arguments.name);
     config.zenoh_file.clone_from(&arguments.zenoh);
     if !arguments.connect.is_empty() || arguments.zenoh.is_some() {
         config.connect.clone_from(&arguments.connect);
@@ -194,7 +214,8 @@ fn path_of_file(arguments: &Arguments) -> Result<Option<Path>, CommandError> {
     }
 }
 
-async fn built_in_path(arguments: &Arguments, link: &Link) -> Result<Path, CommandError> {
+/// What `press` and `circle` touch, and above which a real hand starts.
+async fn touch(arguments: &Arguments, link: &Link) -> Result<Touch, CommandError> {
     let direction = arguments.direction.normalize();
     let point_m = match arguments.target {
         Some(point) => point,
@@ -208,20 +229,18 @@ async fn built_in_path(arguments: &Arguments, link: &Link) -> Result<Path, Comma
             found.ok_or_else(missing)?.1
         }
     };
-    let touch = Touch { point_m, direction, depth_m: arguments.depth, clearance_m: arguments.clearance };
-    Ok(if arguments.path == "circle" { Path::circle(&touch) } else { Path::press(&touch) })
+    Ok(Touch { point_m, direction, depth_m: arguments.depth, clearance_m: arguments.clearance })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
 
     #[test]
     fn a_built_in_path_needs_no_file_and_a_missing_file_is_named() {
         let parse = |more: &[&str]| {
             let words = ["scindo-haptic", "--tool", "probe"];
-            Cli::try_parse_from(words.iter().chain(more)).unwrap().arguments.unwrap()
+            Cli::read(words.iter().chain(more)).unwrap().arguments.unwrap()
         };
         assert!(path_of_file(&parse(&[])).unwrap().is_none());
         assert!(link_config(&parse(&[])).id.starts_with("haptic-"));

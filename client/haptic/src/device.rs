@@ -4,6 +4,10 @@ pub mod path;
 
 pub mod simulated;
 
+pub mod haply;
+
+pub mod list;
+
 use nalgebra::Vector3;
 
 /// Action of the hand with the tool.

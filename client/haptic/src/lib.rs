@@ -5,7 +5,8 @@
 //! the model but never sits inside the stiff loop.
 //!
 //! # Layout, in the order of the data
-//! * [`device`]: measures the hand; the simulated device and the path that its hand follows.
+//! * [`device`]: measures the hand; the simulated device and the path that its hand follows; Haply
+//!   Inverse3; a list of what is there.
 //! * [`contact`]: the newest message, parsed, ordered and handed over without a lock, and the force of the
 //!   tissue at the present tip.
 //! * [`virtual_coupling`]: stiffness and damping that the device can render passively.

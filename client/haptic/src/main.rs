@@ -1,39 +1,46 @@
 //! `scindo-haptic`: parses arguments, runs the client, prints the summary and sets the exit code.
 
-use clap::{CommandFactory, Parser};
-use scindo_haptic::command::{Arguments, Cli, run};
+use scindo_haptic::command::{Arguments, Cli, DeviceKind, run};
+use scindo_haptic::device::list::DeviceList;
+use serde::Serialize;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::read(std::env::args_os()).unwrap_or_else(|error| error.exit());
     scindo_program::start_log("warn,scindo_haptic=info");
     match (cli.manual, cli.arguments) {
         (Some(manual), _) => match manual.run::<Cli>() {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => fail(&error, 1),
         },
-        (None, Some(arguments)) => touch(&arguments),
-        (None, None) => {
-            eprintln!("{}", Cli::command().render_usage());
-            ExitCode::from(2)
+        (None, Some(arguments)) if arguments.device == DeviceKind::List => {
+            print(&DeviceList::look(&arguments.haply), arguments.json)
         }
+        (None, Some(arguments)) => touch(&arguments),
+        // `read` has refused it.
+        (None, None) => ExitCode::from(2),
     }
 }
 
 fn touch(arguments: &Arguments) -> ExitCode {
     match run(arguments) {
-        Ok(summary) if arguments.json => match serde_json::to_string_pretty(&summary) {
-            Ok(json) => {
-                println!("{json}");
-                ExitCode::SUCCESS
-            }
-            Err(error) => fail(&error, 1),
-        },
-        Ok(summary) => {
-            println!("{summary}");
+        Ok(summary) => print(&summary, arguments.json),
+        Err(error) => fail(&error, error.exit_code()),
+    }
+}
+
+/// Prints a result for people or for programs.
+fn print<R: Serialize + std::fmt::Display>(result: &R, as_json: bool) -> ExitCode {
+    if !as_json {
+        println!("{result}");
+        return ExitCode::SUCCESS;
+    }
+    match serde_json::to_string_pretty(result) {
+        Ok(json) => {
+            println!("{json}");
             ExitCode::SUCCESS
         }
-        Err(error) => fail(&error, error.exit_code()),
+        Err(error) => fail(&error, 1),
     }
 }
 

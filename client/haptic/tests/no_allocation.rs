@@ -5,6 +5,8 @@
 use nalgebra::Vector3;
 use scindo_allocations::{Counting, allocations};
 use scindo_haptic::contact::model::{ContactModel, contact_slot};
+use scindo_haptic::device::HapticDevice as _;
+use scindo_haptic::device::haply::{HaplyAddress, HaplyDevice};
 use scindo_haptic::device::path::{Path, Touch};
 use scindo_haptic::device::simulated::{Hand, SimulatedDevice};
 use scindo_haptic::log::recorder::Recorder;
@@ -12,6 +14,12 @@ use scindo_haptic::tick::{HapticTick, Limits, Ports, TickTime};
 use scindo_proto::messages::{Contact, HapticContact, Pose, Vec3, Vec3f, haptic_contact};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+/// The service that Haply's device talks to in tests.
+#[path = "../src/device/haply/fake.rs"]
+#[allow(dead_code)]
+mod fake;
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
@@ -66,4 +74,24 @@ fn a_tick_allocates_nothing() {
     std::fs::remove_file(file).unwrap();
     assert!(largest_n > 0.3, "the hand must have touched: {largest_n} N");
     assert_eq!(allocated, 0);
+}
+
+#[test]
+fn a_haply_device_is_read_and_written_without_allocation() {
+    let service = fake::FakeService::start(fake::Version::New);
+    let address = HaplyAddress { address: service.address.clone(), id: None };
+    let mut device = HaplyDevice::start(address, Vector3::zeros(), &Vector3::y()).unwrap();
+    let (end, mut reads, mut allocated) = (Instant::now() + Duration::from_secs(20), 0, 0);
+    while reads < 500 && Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(1));
+        let before = allocations();
+        let state = device.read(1e-3);
+        device.write(Vector3::z());
+        allocated += allocations() - before;
+        reads += u64::from(state.is_ok());
+    }
+    assert_eq!((reads, allocated), (500, 0));
+    // Up in the scene is y there and z here, so z there is -y here.
+    let seen = service.seen();
+    assert!((seen.force_n[1] + 1.0).abs() < 1e-9 && seen.messages > 10, "{seen:?}");
 }

@@ -18,6 +18,7 @@
 //! * [`mirror`]: a body's surface, kept complete across cuts and lost messages.
 //! * [`watch`]: tool states, statistics, events, the plan.
 //! * [`tool`]: poses up, contacts down, cuts acknowledged.
+//! * [`shape`]: shapes of tools as words.
 //! * [`guest`]: tools held for others, such as browsers behind a viewer.
 //! * [`rpc`]: questions and orders with an answer.
 //!
@@ -36,6 +37,8 @@ pub mod watch;
 
 pub mod tool;
 
+pub mod shape;
+
 pub mod guest;
 
 pub mod rpc;
@@ -46,5 +49,6 @@ pub use guest::GuestTool;
 pub use link::{Link, Presence};
 pub use mirror::{BodyMirror, Surface};
 pub use scindo_proto::{Role, messages, name};
+pub use shape::parse_shape;
 pub use tool::{ContactReader, ContactStream, Cutter, PoseSender, ReceivedContact, ToolLink};
 pub use watch::{EventStream, Latest, ToolStates};

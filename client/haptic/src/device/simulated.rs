@@ -58,11 +58,6 @@ impl SimulatedDevice {
         Self::new(Path::still(Vector3::zeros()), hand)
     }
 
-    /// Starts `path` anew, at rest on its first point.
-    pub fn follow(&mut self, path: Path) {
-        *self = Self::new(path, self.hand);
-    }
-
     /// Creates a device at rest on the first point of `path`.
     pub fn new(path: Path, hand: Hand) -> Self {
         let position_m = path.at(0.0).position_m;
