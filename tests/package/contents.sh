@@ -20,9 +20,9 @@ tar -xzf "$tarball" -C "$scratch/tree" --strip-components 1
 dpkg-deb -x "$deb" "$scratch/deb"
 
 for root in "$scratch/tree" "$scratch/deb/usr"; do
-  for file in bin/scindo bin/scindo-view bin/scindo-haptic share/man/man1/scindo.1.gz share/man/man1/scindo-run.1.gz \
-    share/man/man1/scindo-view.1.gz share/man/man1/scindo-haptic.1.gz share/bash-completion/completions/scindo-haptic \
-    share/zsh/site-functions/_scindo share/fish/vendor_completions.d/scindo-view.fish share/scindo/scenes/KEYS.md \
+  for file in bin/{scindo,scindo-view,scindo-haptic,scindo-igtl} share/man/man1/scindo{,-run,-view,-haptic,-igtl}.1.gz \
+    share/bash-completion/completions/scindo-haptic share/zsh/site-functions/_scindo \
+    share/fish/vendor_completions.d/scindo-view.fish share/scindo/scenes/KEYS.md \
     share/scindo/scenes/first-cut.toml share/scindo/proto/scindo/v1/server.proto share/doc/scindo/LICENSE-MIT \
     lib/systemd/system/scindo.service; do
     [ -s "$root/$file" ] || fail "$file is missing below $root"

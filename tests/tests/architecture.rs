@@ -26,6 +26,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("scindo-client", BTreeSet::from(["scindo-proto"])),
         ("scindo-view", BTreeSet::from(["scindo-proto", "scindo-client", "scindo-program"])),
         ("scindo-haptic", BTreeSet::from(["scindo-proto", "scindo-client", "scindo-program"])),
+        ("scindo-igtl", BTreeSet::from(["scindo-proto", "scindo-client", "scindo-program"])),
         ("scindo-program", BTreeSet::new()),
         ("scindo-tests", BTreeSet::new()),
         ("scindo-allocations", BTreeSet::new()),

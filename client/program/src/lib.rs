@@ -1,4 +1,4 @@
-//! What `scindo`, `scindo-view` and `scindo-haptic` share: the log, shell completions and man pages.
+//! What `scindo`, `scindo-view`, `scindo-haptic` and `scindo-igtl` share: the log, shell completions and man pages.
 
 mod seldom;
 
