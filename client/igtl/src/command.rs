@@ -17,7 +17,7 @@ use crate::send::SendSettings;
 
 /// Show bodies to 3D Slicer and other OpenIGTLink peers, and let their trackers move tools.
 #[derive(Debug, Parser)]
-#[command(name = "scindo-igtl", version, args_conflicts_with_subcommands = true)]
+#[command(name = "scindo-igtl", version = scindo_program::VERSION, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// What describes the program instead of running it.
     #[command(subcommand)]

@@ -10,7 +10,7 @@ use scindo_view::{Operators, ViewConfig, Viewer, page_is_built};
 
 /// Shows a running scindo session in a browser.
 #[derive(Debug, Parser)]
-#[command(name = "scindo-view", version, args_conflicts_with_subcommands = true)]
+#[command(name = "scindo-view", version = scindo_program::VERSION, args_conflicts_with_subcommands = true)]
 struct Args {
     #[command(subcommand)]
     manual: Option<Manual>,

@@ -22,7 +22,7 @@ use crate::tick::Limits;
 #[derive(Debug, Parser)]
 #[command(
     name = "scindo-haptic",
-    version,
+    version = scindo_program::VERSION,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true
 )]

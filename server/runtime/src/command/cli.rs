@@ -14,7 +14,7 @@ use crate::wire::orders::Operators;
 /// Without a command, it runs the built-in demonstration at http://127.0.0.1:8080. Exit codes: 0 success, 1
 /// failure, 2 bad input.
 #[derive(Debug, Parser)]
-#[command(name = "scindo", version, args_conflicts_with_subcommands = true)]
+#[command(name = "scindo", version = scindo_program::VERSION, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     /// Command to run. Without one, the demonstration runs.
     #[command(subcommand)]
