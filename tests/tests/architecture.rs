@@ -20,6 +20,8 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
                 "scindo-proto",
                 "scindo-view",
                 "scindo-haptic",
+                // For `scindo top`, which looks at a server as any client does.
+                "scindo-client",
                 "scindo-program",
             ]),
         ),

@@ -37,6 +37,7 @@ use tokio::sync::mpsc;
 
 use crate::hub::{Hub, Up};
 
+pub use door::Door;
 pub use listen::listen_address;
 pub use server::{Operators, WebConfig, WebServer};
 

@@ -42,6 +42,8 @@ pub mod router;
 
 pub mod doctor;
 
+pub mod top;
+
 /// Parses the command line, runs the command and maps its outcome to an exit code. Nothing else does.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -60,6 +62,7 @@ pub fn main() -> ExitCode {
         Some(Command::Reliability(args)) => args.json,
         Some(Command::Certs(args)) => args.json,
         Some(Command::Doctor(args)) => args.json,
+        Some(Command::Top(args)) => args.json,
         Some(Command::Effects(args)) => args.json,
         Some(Command::Router(_) | Command::Manual(_)) => false,
     };
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
         Some(Command::Certs(args)) => certs::certs(&args),
         Some(Command::Router(args)) => router::route(&args),
         Some(Command::Doctor(args)) => doctor::doctor(&args),
+        Some(Command::Top(args)) => top::top(&args),
         Some(Command::Effects(args)) => effects::effects(&args),
         Some(Command::Manual(manual)) => describe(&manual),
     };

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use scindo_client::LinkError;
 use scindo_proto::KeyError;
 use scindo_study::StudyError;
 use scindo_study::effects::EffectsError;
@@ -72,6 +73,17 @@ pub enum RuntimeError {
     /// The browser viewer cannot start.
     #[error("viewer at {address}: {reason}. Choose another address with --viewer HOST:PORT")]
     Viewer {
+        /// The address that was tried.
+        address: String,
+        /// The system's message.
+        reason: String,
+    },
+    /// A server that is looked at does not answer as it should.
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    /// The figures for a monitor cannot be served.
+    #[error("cannot serve metrics at {address}: {reason}. Choose another address with --metrics")]
+    Metrics {
         /// The address that was tried.
         address: String,
         /// The system's message.
@@ -161,6 +173,8 @@ impl RuntimeError {
             Self::Listen { .. } => "listen",
             Self::Zenoh { .. } => "zenoh",
             Self::Viewer { .. } => "viewer",
+            Self::Link(_) => "link",
+            Self::Metrics { .. } => "metrics",
             Self::Mesh(_) => "mesh",
             Self::Unwritten(_) => "unwritten",
             Self::Results(_) => "results",

@@ -4,7 +4,7 @@ pub mod meter;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::Sender;
@@ -13,6 +13,7 @@ use scindo_world::inputs::Wants;
 use scindo_world::simulation::Level;
 
 use crate::inbox::Inbox;
+use crate::metrics::Metrics;
 use crate::wire::convert::unix_ns;
 use meter::Meter;
 
@@ -43,6 +44,8 @@ pub struct Exchange {
     inbox: Mutex<Inbox>,
     /// Rates and costs since the last report.
     pub meter: Meter,
+    /// Figures for a monitor, if the server has one.
+    pub metrics: OnceLock<Arc<Metrics>>,
     /// Per body: whether somebody subscribes to its surface.
     surface_wanted: Vec<AtomicBool>,
     /// Per body: whether somebody subscribes to its stress.
@@ -105,6 +108,7 @@ impl Exchange {
         Arc::new(Self {
             inbox: Mutex::new(inbox),
             meter: Meter::default(),
+            metrics: OnceLock::new(),
             surface_wanted: (0..bodies).map(|_| AtomicBool::new(false)).collect(),
             stress_wanted: (0..bodies).map(|_| AtomicBool::new(false)).collect(),
             measures_wanted: AtomicBool::new(false),

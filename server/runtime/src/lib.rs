@@ -10,9 +10,11 @@
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
 //! * [`publish`]: the publication thread, and the threads that answer late joiners.
 //! * [`rpc`]: questions and orders.
+//! * [`metrics`]: figures for a monitor of the laboratory.
 //! * [`server`]: starts and ends all of these.
 //! * [`lab`]: laboratories with certificates, and what each role may do.
 //! * [`doctor`]: what works on a machine, and what does not.
+//! * [`top`]: the screen of `scindo top`.
 //! * [`record`]: recordings of all of this, and their replay.
 //! * [`haptics`]: what a hand feels over a link, against the truth; an experiment on virtual time.
 //! * [`reliability`]: all of this in a simulated network with faults, from a seed ([`chance`]).
@@ -53,7 +55,11 @@ pub mod rpc;
 
 pub mod watchdog;
 
+pub mod metrics;
+
 pub mod server;
+
+pub mod top;
 
 pub mod chance;
 

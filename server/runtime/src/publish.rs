@@ -300,6 +300,9 @@ impl PublishThread {
         }
         self.next_stats = Instant::now() + self.stats_period;
         let stats = self.gather_stats();
+        if let Some(metrics) = self.exchange.metrics.get() {
+            metrics.report(&stats);
+        }
         put(&self.stats, &stats);
     }
 

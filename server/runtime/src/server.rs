@@ -17,6 +17,7 @@ use crate::contact::{ContactConfig, ContactThread};
 use crate::error::{RuntimeError, words};
 use crate::exchange::{ANSWERS, Exchange, OUTGOING};
 use crate::inbox::Inbox;
+use crate::metrics::Metrics;
 use crate::publish::{PublishThread, Published, Sources};
 use crate::receive::Receivers;
 use crate::rpc::catalogue::Catalogue;
@@ -51,6 +52,8 @@ pub struct ServerConfig {
     pub scene: String,
     /// Number of scenes that ran before this one.
     pub scene_seq: u32,
+    /// Figures for a monitor, if somebody asked for them.
+    pub metrics: Option<Arc<Metrics>>,
     /// Whether orders are taken at all. Who may send them is settled where the sessions are opened.
     pub takes_orders: bool,
     /// Called with the reason when threads do not end after they were told to. A program ends itself here.
@@ -69,6 +72,7 @@ impl Default for ServerConfig {
             catalogue: Arc::default(),
             scene: String::new(),
             scene_seq: 0,
+            metrics: None,
             takes_orders: true,
             give_up: |reason| tracing::error!("{reason}"),
         }
@@ -104,6 +108,10 @@ impl Server {
         let (outgoing, outgoing_rx) = bounded(OUTGOING);
         let (answers, answers_rx) = bounded(ANSWERS);
         let exchange = Exchange::new(inbox(&info), info.bodies.len(), (outgoing, answers));
+        if let Some(metrics) = &config.metrics {
+            // Nobody else has this exchange yet.
+            let _ = exchange.metrics.set(metrics.clone());
+        }
         let (to_publish, published) = triple_buffer(&Snapshot::default());
         let (to_contact, contact) = triple_buffer(&Snapshot::default());
         let (commands, commands_rx) = bounded::<Command>(WAITING_ORDERS);

@@ -353,6 +353,9 @@ impl SimThread {
         }
         let report = self.engine.report();
         self.exchange.meter.step(report.seconds.iter());
+        if let Some(metrics) = self.exchange.metrics.get() {
+            metrics.step(report.seconds.iter());
+        }
         for event in &report.events {
             let body = event.body.as_deref().map_or(String::new(), |id| format!("{id}: "));
             self.exchange.event(event.level, event.name, format!("{body}{}", event.message));

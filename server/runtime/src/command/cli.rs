@@ -56,6 +56,8 @@ pub enum Command {
     Router(RouterArgs),
     /// Say what works on this machine and what does not: network, certificates, devices, limits, room.
     Doctor(DoctorArgs),
+    /// Show what a running server does: time of a step, bodies, tools, clients, refused messages.
+    Top(TopArgs),
     /// Completions and man pages.
     #[command(flatten)]
     Manual(Manual),
@@ -180,6 +182,9 @@ pub struct ServeArgs {
     /// Serve the browser page at this address: PORT, HOST or HOST:PORT. 8080 is 127.0.0.1:8080.
     #[arg(long, value_name = "ADDRESS", value_parser = scindo_view::listen_address)]
     pub viewer: Option<SocketAddr>,
+    /// Serve figures for Prometheus at this address, below /metrics: PORT, HOST or HOST:PORT. 9464 is 127.0.0.1:9464.
+    #[arg(long, value_name = "ADDRESS", value_parser = scindo_view::listen_address)]
+    pub metrics: Option<SocketAddr>,
     /// Who may pause, step, reset and change parameters, over the network and in pages. All clients may watch
     /// and touch.
     #[arg(long, value_enum, value_name = "WHO", default_value = "loopback")]
@@ -452,6 +457,32 @@ pub struct DoctorArgs {
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub record: PathBuf,
     /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `scindo top`.
+#[derive(Debug, Args)]
+pub struct TopArgs {
+    /// Server or router. May be repeated: they are tried in turn [default: tcp/127.0.0.1:7447].
+    #[arg(long, value_name = "ENDPOINT")]
+    pub connect: Vec<String>,
+    /// First chunk of every network key; one per laboratory.
+    #[arg(long, default_value = "scindo")]
+    pub realm: String,
+    /// Session within the realm.
+    #[arg(long, default_value = "main")]
+    pub session: String,
+    /// Name of this client, as its certificate has it [default: top and a number].
+    #[arg(long)]
+    pub id: Option<String>,
+    /// Zenoh configuration file to start from, with the certificate of this client.
+    #[arg(long, value_name = "FILE.json5")]
+    pub zenoh: Option<PathBuf>,
+    /// Print one report and end; no terminal is needed.
+    #[arg(long)]
+    pub once: bool,
+    /// Print every report as JSON, one object per line.
     #[arg(long)]
     pub json: bool,
 }

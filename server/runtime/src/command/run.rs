@@ -21,6 +21,7 @@ use super::cli::{DemoArgs, RunArgs, ServeArgs};
 use super::progress::{Progress, Share};
 use super::say::say;
 use crate::error::RuntimeError;
+use crate::metrics::{self, Metrics};
 use crate::record::recorder::RecordSettings;
 use crate::record::replay::newest;
 use crate::rpc::catalogue::Catalogue;
@@ -105,6 +106,7 @@ fn serve(
     let mut sessions =
         open_sessions(&network, args.listen.is_empty() && viewer.is_none() && pace.steps.is_some())?;
     let viewer = viewer.map(|address| start_viewer(&foreground, address, (args, &network))).transpose()?;
+    let metrics = args.metrics.map(|address| start_metrics(&foreground, address)).transpose()?;
     let listen: &[String] = if sessions.is_some() { &network.listen } else { &[] };
     let rates = scene.checked().publish;
     let mut config = ServerConfig {
@@ -117,6 +119,7 @@ fn serve(
         catalogue: Arc::new(catalogue((name, scene), args)),
         scene: name.to_owned(),
         scene_seq: 0,
+        metrics: metrics.clone().map(|(_, metrics)| metrics),
         takes_orders: args.operators != Operators::None,
         give_up,
     };
@@ -125,7 +128,7 @@ fn serve(
         let server = Server::start(engine, sessions, &config)?;
         if config.scene_seq == 0 {
             // Callers may wait for these lines, so they are written once the server answers.
-            announce(scene, args, listen, viewer);
+            announce(scene, args, listen, (viewer, metrics.as_ref().map(|&(address, _)| address)));
         }
         let ended = foreground.block_on(wait(&server, args, &config))?;
         let steps = server.steps();
@@ -269,13 +272,29 @@ fn start_viewer(
     Ok(bound)
 }
 
-fn announce(scene: &Scene, args: &ServeArgs, listen: &[String], viewer: Option<SocketAddr>) {
+/// Starts the page of figures, where it was asked for.
+fn start_metrics(
+    foreground: &Runtime,
+    address: SocketAddr,
+) -> Result<(SocketAddr, Arc<Metrics>), RuntimeError> {
+    let metrics = Arc::<Metrics>::default();
+    Ok((metrics::serve::start(foreground, address, metrics.clone())?, metrics))
+}
+
+fn announce(
+    scene: &Scene,
+    args: &ServeArgs,
+    listen: &[String],
+    (viewer, metrics): (Option<SocketAddr>, Option<SocketAddr>),
+) {
     let surfaces: Vec<String> = listen.iter().filter_map(|e| bulk_endpoint(e)).collect();
     let page = viewer.map(|address| format!("http://{address}"));
+    let metrics = metrics.map(|address| format!("http://{address}/metrics"));
     if args.json {
         let report = json!({ "started": {
             "scene": scene.name(), "listen": listen, "surfaces": surfaces,
             "realm": args.realm, "session": args.session, "viewer": page,
+            "metrics": metrics,
         }});
         say!("{report}");
         return;
@@ -286,6 +305,9 @@ fn announce(scene: &Scene, args: &ServeArgs, listen: &[String], viewer: Option<S
     }
     if let Some(page) = page {
         say!("  viewer   {page}");
+    }
+    if let Some(metrics) = metrics {
+        say!("  metrics  {metrics}");
     }
 }
 
