@@ -28,6 +28,7 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::WIRE_VERSION;
 use crate::limits::MAX_ID_BYTES;
 
 /// Reason why a key or a part of it is refused.
@@ -295,6 +296,9 @@ impl Topic {
     }
 }
 
+/// Later versions of the wire whose clients are told that they are not understood.
+pub const FUTURE: u32 = 8;
+
 /// The keys of one session of one realm.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeySpace {
@@ -307,7 +311,7 @@ impl KeySpace {
     pub fn new(realm: &str, session: &str) -> Result<Self, KeyError> {
         let realm = Chunk::new("realm", realm)?;
         let session = Chunk::new("session", session)?;
-        Ok(Self { prefix: format!("{realm}/@v1/{session}/") })
+        Ok(Self { prefix: format!("{realm}/@v{WIRE_VERSION}/{session}/") })
     }
 
     /// The full key of a topic.
@@ -359,6 +363,15 @@ impl KeySpace {
     /// Expression for `rpc/*`.
     pub fn every_rpc(&self) -> String {
         format!("{}rpc/*", self.prefix)
+    }
+
+    /// Expressions for `rpc/*` of clients that speak another version of the wire, and that version: all earlier ones
+    /// and the next [`FUTURE`].
+    pub fn every_foreign_rpc(&self) -> Vec<(u32, String)> {
+        let own = format!("/@v{WIRE_VERSION}/");
+        let others = (0..=WIRE_VERSION + FUTURE).filter(|&version| version != WIRE_VERSION);
+        let key = |version| self.every_rpc().replacen(&own, &format!("/@v{version}/"), 1);
+        others.map(|version| (version, key(version))).collect()
     }
 
     /// Expression for the liveliness tokens of all clients.

@@ -272,6 +272,10 @@ class Connections(WithServer):
             self.server.connect(client="A B")
         with mock.patch("scindo.session.WIRE_VERSION", 2), self.refused("wire-version"):
             self.server.connect()
+        # A client whose keys are of another version as well: the server itself says what is wrong.
+        for version in (0, 2):
+            with mock.patch("scindo.keys.WIRE_VERSION", version), self.refused("wire-version"):
+                self.server.connect()
         with self.assertRaisesRegex(scindo.InvalidValue, "no-such.json5"):
             scindo.connect(zenoh_config="no-such.json5")
 

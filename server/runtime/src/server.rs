@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use crossbeam_channel::bounded;
 use scindo_proto::messages::SessionInfo;
-use scindo_proto::{Chunk, KeySpace, Topic};
+use scindo_proto::{Chunk, KeySpace, Topic, WIRE_VERSION};
 use scindo_world::body::Probe;
 use scindo_world::snapshot::Snapshot;
 use triple_buffer::{Output, triple_buffer};
@@ -91,6 +91,7 @@ pub struct Server {
 struct Network {
     _receivers: Receivers,
     _rpc: Queryable<()>,
+    _foreign: Vec<Queryable<()>>,
     sessions: Sessions,
 }
 
@@ -147,7 +148,8 @@ impl Server {
             let server = Chunk::new("server id", &format!("server-{}", std::process::id()))?;
             let token = Topic::Server(server);
             let receivers = Receivers::declare(&sessions.haptic, &keys, &exchange, &token)?;
-            network = Some(Network { _receivers: receivers, _rpc: rpc, sessions });
+            let foreign = refuse_foreign(&keys, &sessions)?;
+            network = Some(Network { _receivers: receivers, _rpc: rpc, _foreign: foreign, sessions });
         }
         let sim =
             SimThread::new(engine, exchange.clone(), commands_rx, (to_publish, to_contact), config.pace);
@@ -199,10 +201,11 @@ impl Server {
                 .map_err(|_| RuntimeError::Died { thread: name })
                 .inspect_err(|_| self.exchange.close())?;
         }
-        let sessions = self.network.map(|Network { _receivers: receivers, _rpc: rpc, sessions }| {
-            drop((receivers, rpc));
-            sessions
-        });
+        let sessions =
+            self.network.map(|Network { _receivers: receivers, _rpc: rpc, _foreign: foreign, sessions }| {
+                drop((receivers, rpc, foreign));
+                sessions
+            });
         self.exchange.close();
         // Its result no longer matters.
         let _ = self.watchdog.join();
@@ -266,6 +269,27 @@ fn declare_rpc(
         .wait()
         .map_err(|e| RuntimeError::Zenoh { what: "declaring rpc".to_owned(), reason: words(&e) })?;
     Ok((receiver, queryable))
+}
+
+/// Tells clients of another version of the wire that they are not understood, at whatever they ask first.
+fn refuse_foreign(keys: &KeySpace, sessions: &Sessions) -> Result<Vec<Queryable<()>>, RuntimeError> {
+    let refuse = |(version, key): (u32, String)| {
+        let error = scindo_proto::messages::Error {
+            code: "wire-version".to_owned(),
+            message: format!(
+                "this server is scindo {} and speaks version {WIRE_VERSION} of the wire, the client version {version}",
+                env!("CARGO_PKG_VERSION")
+            ),
+            hint: "install the programs of one release on both sides".to_owned(),
+        };
+        sessions
+            .bulk
+            .declare_queryable(key)
+            .callback(move |query| rpc::refuse(&query, error.clone()))
+            .wait()
+            .map_err(|e| RuntimeError::Zenoh { what: "declaring rpc".to_owned(), reason: words(&e) })
+    };
+    keys.every_foreign_rpc().into_iter().map(refuse).collect()
 }
 
 fn spawn<T: Send + 'static>(

@@ -600,3 +600,27 @@ async fn a_server_that_runs_one_scene_loads_no_other() {
     assert!(matches!(&refused, LinkError::Refused { code, .. } if code == "not-supported"), "{refused}");
     running.end();
 }
+
+/// A client of the release before or after this one asks under keys of its own, and gets one readable sentence.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_of_another_version_is_told_so_at_once() {
+    let mut running = Running::start();
+    let link = running.link(Role::Viewer, "bystander").await;
+    for version in [0, 2, 9] {
+        for verb in ["info", "pause"] {
+            let started = Instant::now();
+            let replies = link.bulk().get(format!("scindo/@v{version}/main/rpc/{verb}")).await.unwrap();
+            let reply = replies.recv_async().await.expect("an answer");
+            let refusal = reply.result().expect_err("a refusal");
+            let error: scindo_client::messages::Error =
+                prost::Message::decode(&*refusal.payload().to_bytes()).unwrap();
+            assert_eq!(error.code, "wire-version");
+            let says = format!("speaks version 1 of the wire, the client version {version}");
+            assert!(error.message.contains(&says) && !error.hint.is_empty(), "{error:?}");
+            assert!(started.elapsed() < PATIENCE);
+            assert!(replies.recv_async().await.is_err(), "one message");
+        }
+    }
+    assert_eq!(link.info().await.unwrap().wire_version, 1);
+    running.end();
+}

@@ -9,6 +9,8 @@ import re
 
 from .errors import InvalidValue
 
+#: Version of the wire that this package speaks.
+WIRE_VERSION = 1
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 MAX_ID_BYTES = 64
 MEASURES, FORCES, STATS, EVENT, PLAN = "measures", "forces", "stats", "event", "plan"
@@ -30,7 +32,7 @@ class Keys:
     """Keys of one session of one realm."""
 
     def __init__(self, realm: str, session: str) -> None:
-        self._prefix = f"{chunk('realm', realm)}/@v1/{chunk('session', session)}/"
+        self._prefix = f"{chunk('realm', realm)}/@v{WIRE_VERSION}/{chunk('session', session)}/"
 
     def topic(self, name: str) -> str:
         """One of ``measures``, ``forces``, ``stats``, ``event``, ``plan``."""

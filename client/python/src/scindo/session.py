@@ -19,7 +19,7 @@ from .cut import CutResult, Cutter, PendingCut, Sweep, check_sweep
 from .errors import InvalidValue, Refused, TimedOut, unknown
 from .forces import Forces
 from .info import Event, Measures, SessionInfo, Stats, to_event, to_info, to_measures, to_stats
-from .keys import EVENT, FORCES, MEASURES, STATS, Keys, chunk
+from .keys import EVENT, FORCES, MEASURES, STATS, WIRE_VERSION, Keys, chunk
 from .tool import Tool, to_shape
 from .v1 import force_pb2, server_pb2
 
@@ -28,8 +28,6 @@ M = TypeVar("M", bound=Message)
 
 #: Longest name of a person.
 MAX_PERSON = 32
-#: Version of the wire that this package speaks.
-WIRE_VERSION = 1
 #: Most events that a session keeps.
 MAX_EVENTS = 1000
 # The next message may tell of a step that is over, and the one after it of a step that has begun.

@@ -40,7 +40,7 @@ pub struct Seats {
 /// Rules for the server of one laboratory.
 pub fn access_control(seats: &Seats) -> Value {
     // `**` does not match a chunk that begins with @.
-    let everything = vec!["**".to_owned(), seats.keys.every_key()];
+    let everything = [vec!["**".to_owned(), seats.keys.every_key()], foreign(&seats.keys)].concat();
     let mut rules = Rules::default();
     rules.admit(seats, &everything);
     rules.finish()
@@ -50,9 +50,14 @@ pub fn access_control(seats: &Seats) -> Value {
 pub fn router_access_control(labs: &[Seats]) -> Value {
     let mut rules = Rules::default();
     for seats in labs {
-        rules.admit(seats, &[seats.keys.every_key()]);
+        rules.admit(seats, &[vec![seats.keys.every_key()], foreign(&seats.keys)].concat());
     }
     rules.finish()
+}
+
+/// What clients of another version of the wire ask; the server only tells them so.
+fn foreign(keys: &KeySpace) -> Vec<String> {
+    keys.every_foreign_rpc().into_iter().map(|(_, key)| key).collect()
 }
 
 /// Rules, and which of them hold for whom.
@@ -73,7 +78,7 @@ impl Rules {
         let all = self.rule(keys, "all", &both, &EVERY_MESSAGE, everything.to_vec());
         let hear = self.rule(keys, "hear", &["egress"], &EVERY_MESSAGE, everything.to_vec());
         let watch = self.rule(keys, "watch", &["ingress"], &WATCHING, everything.to_vec());
-        let asked = [rpc(false), vec![keys.every_keyframe()]].concat();
+        let asked = [rpc(false), vec![keys.every_keyframe()], foreign(keys)].concat();
         let ask = self.rule(keys, "ask", &["ingress"], &["query"], asked);
         let order = self.rule(keys, "order", &["ingress"], &["query"], rpc(true));
         for name in &seats.trusted {

@@ -39,11 +39,11 @@ impl Operators {
             return None;
         }
         // `**` does not match a chunk that begins with @.
-        let session = keys.every_key();
-        let everything = ["**".to_owned(), session];
+        let foreign: Vec<String> = keys.every_foreign_rpc().into_iter().map(|(_, key)| key).collect();
+        let everything = [vec!["**".to_owned(), keys.every_key()], foreign.clone()].concat();
         let questions: Vec<String> =
             Verb::ALL.into_iter().filter(|verb| !verb.is_order()).map(|v| keys.key(&Topic::Rpc(v))).collect();
-        let asked = [questions, vec![keys.every_keyframe()]].concat();
+        let asked = [questions, vec![keys.every_keyframe()], foreign].concat();
         let messages = [
             "put",
             "delete",
