@@ -40,6 +40,14 @@ unit=$scratch/deb/usr/lib/systemd/system/scindo.service
 for path in $(sed -n 's/^ExecStart=//p' "$unit" | tr ' ' '\n' | grep ^/); do
   [ -e "$scratch/deb$path" ] || fail "the unit names $path, which the package does not bring"
 done
+# systemd understands every line of the unit, and finds it well shut in: 10 is wide open, 2.2 was without its last lines.
+if command -v systemd-analyze >/dev/null; then
+  sed "s|^ExecStart=/usr/bin/scindo|ExecStart=$(realpath "$scratch/deb/usr/bin/scindo")|" "$unit" >"$scratch/scindo.service"
+  systemd-analyze verify "$scratch/scindo.service" || fail "systemd does not understand the unit"
+  systemd-analyze security --offline=yes --threshold=20 --no-pager "$scratch/scindo.service" >"$scratch/security" ||
+    { tail -3 "$scratch/security" >&2; fail "the unit is open wider than 2.0"; }
+  grep -i overall "$scratch/security"
+fi
 [ "$(dpkg-deb -f "$deb" Version)" = "$("$bin/scindo" --version | cut -d' ' -f2)" ] || fail "version of the .deb"
 "$scratch/deb/usr/bin/scindo" check "$scratch/deb/etc/scindo/scene.toml" >/dev/null || fail "the scene of the unit"
 bash -n "$scratch/tree/share/bash-completion/completions/scindo" || fail "completions for bash"
