@@ -22,6 +22,7 @@ await run(async () => {
   await overlaysAndCurves(page);
   await saysWhatDoesNotConverge(page);
   await keysAndButtons(page);
+  await worksByKeyboardAlone(page);
   await nothingOverlaps(page);
   await saysThatItIsStalled(page);
   await changesWhatTheSlidersSay(page);
@@ -120,6 +121,44 @@ async function keysAndButtons(page) {
   const before = await page.evaluate(() => window.scindo.stats().simTimeS);
   await page.click("#reset");
   await until(page, "the second click resets", MINUTE, (before) => window.scindo.stats().simTimeS < before, before);
+}
+
+/** Finds the tool, takes it over the tissue, presses and lifts it, and turns the view, without a mouse. */
+async function worksByKeyboardAlone(page) {
+  await page.keyboard.press("f");
+  await page.evaluate(() => document.activeElement?.blur());
+  const focused = () => page.evaluate(() => document.activeElement?.dataset["hand"] ?? document.activeElement?.id);
+  for (let i = 0; i < 60 && (await focused()) !== "poke"; i++) await page.keyboard.press("Tab");
+  hold((await focused()) === "poke", "Tab reaches Poke");
+  await page.keyboard.press("Enter");
+  hold(await page.evaluate(() => document.querySelector('button[data-hand="poke"]').getAttribute("aria-checked") === "true"), "Enter chooses it");
+  await page.evaluate(() => document.activeElement.blur());
+  const own = () => window.scindo.tools().find((tool) => tool.own);
+  await page.keyboard.press("ArrowRight");
+  await until(page, "an arrow key brings the tool to the tissue", MINUTE, own);
+  await page.keyboard.press("Enter");
+  await until(page, "Enter presses it", MINUTE, () => window.scindo.contactForceN() > 0);
+  await page.keyboard.press("PageDown");
+  await picture(page, "views-5-keyboard.png");
+  await page.keyboard.press("Enter");
+  await until(page, "and lifts it", MINUTE, () => window.scindo.contactForceN() === 0);
+  await page.keyboard.press("Escape");
+  await until(page, "Escape puts it away", MINUTE, () => !window.scindo.tools().some((tool) => tool.own));
+  const camera = () => page.evaluate(() => window.scindo.cameraState());
+  const away = ({ position, target }) => Math.hypot(...position.map((x, i) => x - target[i]));
+  const from = await camera();
+  await page.keyboard.press("ArrowLeft");
+  await page.keyboard.press("ArrowUp");
+  const turned = await camera();
+  const moved = Math.hypot(...turned.position.map((x, i) => x - from.position[i])) / away(from);
+  hold(Math.abs(moved - 0.085) < 0.03 && Math.abs(away(turned) / away(from) - 1) < 0.01, `arrow keys turn the view (${moved.toFixed(3)} rad)`);
+  await page.keyboard.press("+");
+  const near = away(await camera()) / away(turned);
+  hold(Math.abs(near - 1 / 1.12) < 0.01, `+ comes nearer (${near.toFixed(3)})`);
+  const unnamed = await page.evaluate(() => [...document.querySelectorAll("button, input, select, summary")].filter((e) => e.checkVisibility()
+    && !(e.textContent.trim() || e.getAttribute("aria-label") || e.labels?.length > 0 || e.title)).map((e) => e.outerHTML));
+  hold(unnamed.length === 0, `every control has a name ${unnamed}`);
+  await page.keyboard.press("f");
 }
 
 /** Nothing lies over anything else, at three sizes, with and without numbers and tray, in light and dark. */

@@ -17,6 +17,9 @@ const HINTS: Record<HandMode, string> = {
 };
 const KEYS: Record<string, HandMode> = { "1": "poke", "2": "grab", "3": "cut", c: "cut", "4": "forceps", o: "orbit", "0": "orbit", escape: "orbit" };
 const CAMERAS: Record<string, Preset> = { "5": "front", "6": "right", "7": "top", "8": "corner" };
+/** Steps of the arrow keys: across the picture (0 to 1 is half of it), and angles of the view [rad]. */
+const ARROWS: Record<string, [number, number]> = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, 1], arrowdown: [0, -1] };
+const STEP = 0.02, ANGLE = 0.06, ZOOM = 1.12, DEPTH = 0.02;
 /** A second click on Reset must follow within this time. */
 const SURE_MS = 5000;
 /** Below this window width [px] the numbers are hidden at first. */
@@ -58,6 +61,10 @@ export class Bar {
     this.jaws.onclick = () => this.hand.keepClosed(!this.hand.keepsClosed);
     this.range.oninput = () => this.hand.setDepth(Number(this.range.value));
     document.addEventListener("keydown", (e) => this.onKey(e));
+    // A button that the mouse has pressed gives the keyboard back; one that the keyboard has reached keeps it.
+    document.addEventListener("click", (e) => {
+      if (e.detail > 0 && e.target instanceof Element) e.target.closest<HTMLElement>("button, summary")?.blur();
+    });
     if (innerWidth <= NARROW) this.toggle();
     document.body.dataset["hand"] = "orbit";
     hand.onChange = () => this.refresh();
@@ -122,6 +129,7 @@ export class Bar {
     if (e.target instanceof HTMLInputElement && e.target.type === "text") return;
     if (e.target instanceof HTMLSelectElement || (e.target instanceof HTMLInputElement && e.target.type === "range" && e.key.startsWith("Arrow"))) return;
     const key = e.key.toLowerCase();
+    if ((key === " " || key === "enter") && e.target instanceof Element && e.target.closest("button, summary, input:not([type=range])")) return;
     if (e.key === "?" || (key === "escape" && this.help.isOpen)) {
       this.help.toggle();
       return;
@@ -130,6 +138,13 @@ export class Bar {
     if (mode) {
       if (mode === "orbit" || !this.session.readOnly) this.hand.choose(mode);
     } else if (preset && preset in PRESETS) this.fit(preset);
+    else if (ARROWS[key]) this.onArrow(...ARROWS[key], e.shiftKey);
+    else if (key === "+" || key === "=") this.stage.zoomBy(1 / ZOOM);
+    else if (key === "-") this.stage.zoomBy(ZOOM);
+    else if (key === "enter" && this.hand.mode !== "orbit") this.hand.togglePress();
+    else if ((key === "pagedown" || key === "pageup") && this.hand.mode !== "orbit") {
+      this.hand.setDepth(this.hand.depthRange.value + (key === "pagedown" ? DEPTH : -DEPTH));
+    }
     else if (key === " ") this.pause.click();
     else if (key === ".") this.step.click();
     else if (key === "r") this.reset.click();
@@ -142,6 +157,12 @@ export class Bar {
     else if (key === "p") this.view.savePicture();
     else return;
     e.preventDefault();
+  }
+
+  /** Without a tool, or with Shift, the arrow keys turn the view, else they move the tool. */
+  private onArrow(across: number, up: number, shift: boolean): void {
+    if (this.hand.mode === "orbit" || shift) this.stage.turnBy(-ANGLE * across, ANGLE * up);
+    else this.hand.steer(STEP * across, STEP * up);
   }
 
   private toggle(): void {

@@ -1,4 +1,4 @@
-// The mouse as a hand: it hovers over the tissue, presses, holds and cuts it. Forceps close while the button is down.
+// The mouse, a finger or the keyboard as a hand: it hovers over the tissue, presses, holds and cuts it. Forceps close while the button is down.
 // Jaws that are kept closed hold on without it, and the next drag moves them.
 //
 // A press defines a plane through the touched point, parallel to the picture. Poke and grab move in that
@@ -9,7 +9,7 @@ import { Group, Matrix4, Mesh, MeshBasicMaterial, Plane, Quaternion, Raycaster, 
 import { ToolSample_Mode, type ToolShape } from "../gen/scindo/v1/tool_pb";
 import { PROBE, sampleOf, shapeOf, type Grip } from "./grip";
 import { parts } from "./tool";
-import { pick, type Hit } from "./pick";
+import { nearest, pick, type Hit } from "./pick";
 import type { Relay } from "./relay";
 import type { Stage } from "./stage";
 import type { Session } from "./session";
@@ -183,12 +183,38 @@ export class Hand {
       this.endPress(); // a second finger turns the view
       return;
     }
-    if (this.mode === "orbit" || this.session.readOnly || e.button !== 0 || e.shiftKey) return;
-    const hit = this.hit();
-    if (!hit && !this.kept) return;
-    this.stage.controls.enabled = false;
+    if (e.button !== 0 || e.shiftKey || !this.begin()) return;
     this.pointerId = e.pointerId;
     this.canvas.setPointerCapture(e.pointerId);
+  }
+
+  /** Moves the tool across the picture, by parts of half its width and height. It appears in the middle of the bodies. */
+  steer(across: number, up: number): void {
+    if (this.mode === "orbit" || this.session.readOnly) return;
+    if (this.held) this.pointer.set(clamp(this.pointer.x + across), clamp(this.pointer.y + up));
+    else {
+      const middle = this.stage.center.clone().project(this.stage.camera);
+      this.pointer.set(middle.x, middle.y);
+      if (!this.hit()) this.pointer.copy(nearest(this.pointer, this.stage.camera, this.session.bodies.values()) ?? this.pointer);
+    }
+    this.inside = true;
+    this.moved = true;
+    this.stage.invalidate();
+  }
+
+  /** Presses the tool where it is, or lifts it. */
+  togglePress(): void {
+    if (this.press) this.endPress();
+    else if (this.held) this.begin();
+    else this.steer(0, 0);
+  }
+
+  /** Begins a press under the pointer. False where there is nothing to press, or nothing to press it with. */
+  private begin(): boolean {
+    if (this.mode === "orbit" || this.session.readOnly) return false;
+    const hit = this.hit();
+    if (!hit && !this.kept) return false;
+    this.stage.controls.enabled = false;
     const ray = this.caster.ray, facing = this.stage.camera.getWorldDirection(new Vector3());
     if (this.kept || !hit) {
       const plane = new Plane().setFromNormalAndCoplanarPoint(facing, this.tip);
@@ -209,6 +235,7 @@ export class Hand {
     this.held = true;
     this.follow(performance.now());
     this.sendSample(performance.now());
+    return true;
   }
 
   private onMove(e: PointerEvent): void {
@@ -341,4 +368,9 @@ export class Hand {
     const sent = this.relay.send({ case: "tool", value });
     this.live ||= sent;
   }
+}
+
+/** Keeps a coordinate within the picture. */
+function clamp(part: number): number {
+  return Math.min(1, Math.max(-1, part));
 }

@@ -3,13 +3,14 @@
 const SECTIONS: [string, [string, string][]][] = [
   ["Look", [
     ["drag", "turn the view; with the right button, move it"], ["wheel", "zoom; over tissue with a tool, set the depth"],
-    ["F", "bring held bodies into view"], ["5 6 7 8", "view from the front, the right, above, the corner"],
+    ["← → ↑ ↓", "turn the view; + and − zoom"], ["F", "bring held bodies into view"], ["5 6 7 8", "view from the front, the right, above, the corner"],
     ["V", "show colours, mesh, probes, curves"], ["H", "show or hide the numbers"], ["P", "save the picture"],
   ]],
   ["Touch", [
     ["O or Esc", "turn the view, put the tool away"], ["1", "poke: press the tissue"], ["2", "grab: hold and pull it"],
     ["3 or C", "cut along the drag"], ["4", "forceps: the jaws close on the tissue while you press"],
-    ["K", "keep the jaws closed, and open them again"], ["J", "turn the forceps about their shaft"], ["Shift", "hold it to turn the view with any tool"],
+    ["K", "keep the jaws closed, and open them again"], ["J", "turn the forceps about their shaft"], ["Shift", "hold it to turn the view with any tool, by mouse or arrow keys"],
+    ["← → ↑ ↓", "move the tool over the tissue"], ["Enter", "press the tool, and lift it again"], ["PageDown or PageUp", "press deeper, less deep"],
   ]],
   ["Time", [["Space", "pause or resume"], [".", "make one step while paused"], ["R", "return to the start; asks first if there are cuts"]]],
   ["Colours", [
@@ -25,6 +26,9 @@ const SECTIONS: [string, [string, string][]][] = [
 
 export class Help {
   private readonly box = document.getElementById("help")!;
+  private readonly card: HTMLElement;
+  /** What had the keyboard before the list was opened. */
+  private before: HTMLElement | null = null;
 
   constructor() {
     const card = document.createElement("div");
@@ -48,6 +52,9 @@ export class Help {
       columns.append(section);
     }
     card.append(title, columns);
+    // Focus lets the keyboard scroll it.
+    card.tabIndex = -1;
+    this.card = card;
     this.box.append(card);
     this.box.onclick = () => this.toggle(false);
   }
@@ -57,6 +64,10 @@ export class Help {
   }
 
   toggle(open = !this.isOpen): void {
+    if (open === this.isOpen) return;
+    if (open) this.before = document.activeElement instanceof HTMLElement ? document.activeElement : null;
     this.box.hidden = !open;
+    if (open) this.card.focus();
+    else this.before?.focus();
   }
 }

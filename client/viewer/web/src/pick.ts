@@ -1,6 +1,6 @@
 // Intersection of a ray with the surfaces: plain Möller-Trumbore over the arrays that were drawn.
 
-import { Vector3, type Ray } from "three";
+import { Triangle, Vector2, Vector3, type Camera, type Ray } from "three";
 import type { BodySurface } from "./body";
 
 export interface Hit {
@@ -22,6 +22,27 @@ export function pick(ray: Ray, bodies: Iterable<BodySurface>): Hit | null {
     if (hit) best = hit;
   }
   return best;
+}
+
+/** The point of the picture nearest to `wanted` where a surface is seen, both from −1 to 1; null if none is in view. */
+export function nearest(wanted: Vector2, camera: Camera, bodies: Iterable<BodySurface>): Vector2 | null {
+  const best = new Vector2(), triangle = new Triangle(), middle = new Vector3(), normal = new Vector3();
+  let distance = Infinity;
+  for (const { render, positions } of bodies) {
+    if (!render) continue;
+    const at = (corner: number, to: Vector3) => to.fromArray(positions, 3 * render.source[render.index[corner]]);
+    for (let c = 0; c < render.index.length; c += 3) {
+      triangle.set(at(c, triangle.a), at(c + 1, triangle.b), at(c + 2, triangle.c));
+      triangle.getMidpoint(middle);
+      if (triangle.getNormal(normal).dot(camera.position) <= normal.dot(middle)) continue;
+      const { x, y, z } = middle.project(camera);
+      const away = Math.hypot(x - wanted.x, y - wanted.y);
+      if (away >= distance || Math.abs(x) > 1 || Math.abs(y) > 1 || Math.abs(z) > 1) continue;
+      distance = away;
+      best.set(x, y);
+    }
+  }
+  return distance < Infinity ? best : null;
 }
 
 function pickBody(ray: Ray, body: BodySurface, nearer: number): Hit | null {

@@ -171,6 +171,27 @@ export class Stage {
     return Math.max(distance, 0.2 * this.radius);
   }
 
+  /** Turns the view about its centre: `across` about the axis up, `over` towards it [rad]. */
+  turnBy(across: number, over: number): void {
+    const way = this.camera.position.clone().sub(this.controls.target), up = this.camera.up;
+    const polar = way.angleTo(up), wanted = Math.min(Math.PI - 0.02, Math.max(0.02, polar - over));
+    way.applyAxisAngle(up.clone().cross(way).normalize(), wanted - polar).applyAxisAngle(up, across);
+    this.lookFrom(way);
+  }
+
+  /** Multiplies the distance of the camera. */
+  zoomBy(factor: number): void {
+    const { minDistance, maxDistance, target } = this.controls;
+    this.lookFrom(this.camera.position.clone().sub(target).multiplyScalar(factor).clampLength(minDistance, maxDistance));
+  }
+
+  private lookFrom(way: Vector3): void {
+    this.release();
+    this.camera.position.copy(this.controls.target).add(way);
+    this.controls.update();
+    this.invalidate();
+  }
+
   /** Projects a world point to page pixels, and tells whether it lies before the camera. */
   project(point: Vector3): { x: number; y: number; visible: boolean } {
     const p = point.clone().project(this.camera);
