@@ -4,7 +4,9 @@
 //   node views.mjs URL PID      PID: the server, to be stopped and continued
 //
 // The environment: check.mjs.
-import { LAUNCH, MINUTE, chromium, hold, picture, run, until, watch } from "./check.mjs";
+import { readFileSync } from "node:fs";
+import path from "node:path";
+import { LAUNCH, MINUTE, artifacts, chromium, hold, picture, run, until, watch } from "./check.mjs";
 
 const [, , url, server] = process.argv;
 const SIZES = [[1440, 900], [800, 600], [390, 780]];
@@ -116,11 +118,32 @@ async function keysAndButtons(page) {
   const download = page.waitForEvent("download", { timeout: MINUTE });
   await page.keyboard.press("p");
   hold(/^scindo-views-.*\.png$/.test((await download).suggestedFilename()), "the picture is saved");
+  await savesTheSurface(page);
   await page.click("#reset");
   hold(await page.evaluate(() => document.getElementById("reset").classList.contains("sure")), "Reset asks before cuts are lost");
   const before = await page.evaluate(() => window.scindo.stats().simTimeS);
   await page.click("#reset");
   await until(page, "the second click resets", MINUTE, (before) => window.scindo.stats().simTimeS < before, before);
+}
+
+/** The file is binary glTF with a mesh per body, as large as the bodies on the screen. */
+async function savesTheSurface(page) {
+  const shut = !(await page.isVisible("#tray"));
+  if (shut) await page.click("#view-toggle");
+  const download = page.waitForEvent("download", { timeout: MINUTE });
+  await page.click("#save-surface");
+  const file = await download, bodies = await page.evaluate(() => window.scindo.bodies());
+  await file.saveAs(path.join(artifacts, "views-surface.glb"));
+  if (shut) await page.click("#view-toggle");
+  hold(/^scindo-views-.*\.glb$/.test(file.suggestedFilename()), "the surface is saved");
+  const bytes = readFileSync(path.join(artifacts, "views-surface.glb"));
+  hold(bytes.toString("latin1", 0, 4) === "glTF" && bytes.readUInt32LE(8) === bytes.length, "it is a whole binary glTF");
+  const { meshes, accessors } = JSON.parse(bytes.toString("utf8", 20, 20 + bytes.readUInt32LE(12)));
+  const triangles = meshes.map((mesh) => mesh.primitives.reduce((sum, { indices }) => sum + accessors[indices].count / 3, 0));
+  hold(triangles.join() === bodies.map((body) => body.triangles).join(), `a mesh per body with its triangles (${triangles})`);
+  const corner = (of) => meshes.map((mesh) => accessors[mesh.primitives[0].attributes.POSITION][of]);
+  const within = (a, b) => a.every((x, i) => Math.abs(x - b[i]) < 0.02);
+  hold(bodies.every((body, i) => within(corner("min")[i], body.min) && within(corner("max")[i], body.max)), "and its size in metres");
 }
 
 /** Finds the tool, takes it over the tissue, presses and lifts it, and turns the view, without a mouse. */

@@ -62,7 +62,7 @@ class Page {
     this.forces = new Forces(this.stage);
     this.gizmo = new Gizmo(this.stage);
     const { colours, overlays, probes, curves, forces, gizmo } = this;
-    this.view = new View(this.stage, this.relay, { colours, overlays, probes, curves, forces, gizmo });
+    this.view = new View(this.stage, this.session, this.relay, { colours, overlays, probes, curves, forces, gizmo });
     this.bar = new Bar(this.stage, this.session, this.relay, this.hand, this.view, new Help());
     const place = () => this.place();
     this.headset = new Headset({ session: this.session, stage: this.stage, relay: this.relay, place }, (words) => this.panel.log.line(words, "error"));

@@ -7,6 +7,8 @@ import type { Gizmo } from "./gizmo";
 import type { Overlays } from "./overlays";
 import type { Probes } from "./probes";
 import type { Relay } from "./relay";
+import { glb, offer } from "./save";
+import type { Session } from "./session";
 import type { Insets, Stage } from "./stage";
 
 export class View {
@@ -17,6 +19,7 @@ export class View {
 
   constructor(
     private readonly stage: Stage,
+    private readonly session: Session,
     private readonly relay: Relay,
     private readonly parts: { colours: Colours; overlays: Overlays; probes: Probes; curves: Curves; forces: Forces; gizmo: Gizmo },
   ) {
@@ -46,6 +49,7 @@ export class View {
     range.oninput = () => overlays.setPart(Number(range.value));
     this.at("clip-flip").onclick = () => overlays.flipPlane();
     this.at("shot").onclick = () => this.savePicture();
+    this.at("save-surface").onclick = () => void this.saveSurface();
     stage.insets = () => this.insets();
   }
 
@@ -76,14 +80,12 @@ export class View {
   savePicture(): void {
     this.stage.render();
     this.at<HTMLCanvasElement>("view").toBlob((blob) => {
-      if (!blob) return;
-      const link = document.createElement("a");
-      link.href = URL.createObjectURL(blob);
-      const name = (this.at("scene").textContent || "scene").replace(/[^a-z0-9]+/gi, "-");
-      link.download = `scindo-${name}-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.png`;
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+      if (blob) offer(blob, "png");
     }, "image/png");
+  }
+
+  private async saveSurface(): Promise<void> {
+    offer(await glb(this.session.bodies.values()), "glb");
   }
 
   private box(id: string, set: (on: boolean) => void): void {
