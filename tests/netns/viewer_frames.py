@@ -83,9 +83,10 @@ def main(host, port, seconds):
         kind = down.WhichOneof("message")
         if kind == "topology":
             epochs[down.topology.body_id] = (down.topology.epoch, down.topology.vertex_count)
-        elif kind == "frame":
-            expected = (down.frame.epoch, down.frame.vertex_count)
-            if epochs.get(down.frame.body_id) != expected:
+        elif kind in ("frame", "coarse_frame"):
+            frame = down.frame if kind == "frame" else down.coarse_frame.frame
+            expected = (frame.epoch, frame.vertex_count)
+            if epochs.get(frame.body_id) != expected:
                 raise AssertionError(f"a frame of {expected} without its topology: {epochs}")
             frames, started = frames + 1, started or time.monotonic()
             ack = viewer_pb2.ViewerUp()

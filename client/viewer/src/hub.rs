@@ -349,6 +349,7 @@ fn slot_of(message: &Down) -> Option<Slot> {
         Down::Tool(state) => Slot::Tool(state.tool_id.clone()),
         Down::Topology(topology) => Slot::Topology(topology.body_id.clone()),
         Down::Frame(frame) => Slot::Frame(frame.body_id.clone()),
+        Down::CoarseFrame(coarse) => Slot::Frame(coarse.frame.as_ref()?.body_id.clone()),
         Down::Field(field) => Slot::Field(field.body_id.clone()),
         Down::Measures(_) => Slot::Measures,
         Down::Forces(_) => Slot::Forces,

@@ -27,6 +27,8 @@ pub mod server;
 
 mod upstream;
 
+pub mod coarse;
+
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::net::SocketAddr;
 use std::sync::Arc;

@@ -17,6 +17,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
+use crate::coarse::for_page;
 use crate::hub::{Hub, Up};
 
 /// Pause between two attempts to reach a server.
@@ -206,7 +207,7 @@ async fn follow_body(hub: Arc<Hub>, mut mirror: BodyMirror) {
             hub.publish(Down::Topology((*surface.topology).clone()));
             shown = Some(Arc::clone(&surface.topology));
         }
-        hub.publish(Down::Frame(surface.frame.clone()));
+        hub.publish(for_page(surface.frame.clone()));
     }
 }
 

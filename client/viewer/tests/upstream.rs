@@ -62,6 +62,18 @@ fn frame(epoch: u32, step: u64) -> SurfaceFrame {
     }
 }
 
+/// The frame in a message for pages, whatever its precision.
+fn shown(message: Down) -> Option<SurfaceFrame> {
+    match message {
+        Down::Frame(frame) => Some(frame),
+        Down::CoarseFrame(coarse) => {
+            assert_eq!(coarse.positions.len(), 6 * 3, "three vertices of 16 bits");
+            coarse.frame
+        }
+        _ => None,
+    }
+}
+
 /// A server that shows one triangle, at epoch `epoch`.
 struct Server {
     session: zenoh::Session,
@@ -197,12 +209,12 @@ async fn a_browser_sees_the_server_come_go_and_come_back() {
     })
     .await;
     until(&mut browser, "the keyframe", |m| {
-        matches!(m, Down::Frame(f) if f.epoch == 4 && f.sim_step == 1).then_some(())
+        shown(m).is_some_and(|f| f.epoch == 4 && f.sim_step == 1).then_some(())
     })
     .await;
     server.becomes_watched(true).await;
     server.send_frame(9);
-    until(&mut browser, "a frame", |m| matches!(m, Down::Frame(f) if f.sim_step == 9).then_some(())).await;
+    until(&mut browser, "a frame", |m| shown(m).is_some_and(|f| f.sim_step == 9).then_some(())).await;
 
     server.session.close().await.unwrap();
     until(&mut browser, "word that it left", |m| {
@@ -214,7 +226,7 @@ async fn a_browser_sees_the_server_come_go_and_come_back() {
         matches!(m, Down::Info(info) if info.scene_name == "scene 0").then_some(())
     })
     .await;
-    until(&mut browser, "its keyframe", |m| matches!(m, Down::Frame(f) if f.epoch == 0).then_some(())).await;
+    until(&mut browser, "its keyframe", |m| shown(m).is_some_and(|f| f.epoch == 0).then_some(())).await;
     drop(again);
 }
 
@@ -229,12 +241,12 @@ async fn nothing_is_subscribed_while_no_browser_watches() {
     sleep(Duration::from_secs(1)).await;
     assert!(!server.is_watched().await);
     let mut browser = join(address).await;
-    until(&mut browser, "a surface", |m| matches!(m, Down::Frame(_)).then_some(())).await;
+    until(&mut browser, "a surface", |m| shown(m).is_some().then_some(())).await;
     server.becomes_watched(true).await;
     drop(browser);
     server.becomes_watched(false).await;
     let mut late = join(address).await;
-    until(&mut late, "a surface again", |m| matches!(m, Down::Frame(_)).then_some(())).await;
+    until(&mut late, "a surface again", |m| shown(m).is_some().then_some(())).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -251,7 +263,7 @@ async fn tools_have_an_owner_each_and_calls_are_answered() {
     let poses = server.session.declare_subscriber(keys().every_tool_pose()).await.unwrap();
 
     let mut browser = join(address).await;
-    until(&mut browser, "a surface", |m| matches!(m, Down::Frame(_)).then_some(())).await;
+    until(&mut browser, "a surface", |m| shown(m).is_some().then_some(())).await;
     send(
         &mut browser,
         FromPage::Rpc(ViewerRpc { call_id: 7, call: Some(Call::Pause(PauseRequest { paused: true })) }),

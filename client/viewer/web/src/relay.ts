@@ -2,6 +2,7 @@
 
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { ViewerDownSchema, ViewerUpSchema, type ViewerDown } from "../gen/scindo/v1/viewer_pb";
+import { fine } from "./coarse";
 import type { MessageInitShape } from "@bufbuild/protobuf";
 
 type UpInit = NonNullable<MessageInitShape<typeof ViewerUpSchema>["message"]>;
@@ -86,8 +87,9 @@ export class Relay {
       return;
     }
     if (down.message.case === "pong") this.setClock(down.message.value);
-    this.receive(down.message, bytes.length);
-    if (down.message.case === "frame") {
+    const isFrame = down.message.case === "frame" || down.message.case === "coarseFrame";
+    this.receive(down.message.case === "coarseFrame" ? { case: "frame", value: fine(down.message.value) } : down.message, bytes.length);
+    if (isFrame) {
       this.frames += 1;
       this.send({ case: "frameAck", value: { frames: BigInt(this.frames) } });
     }

@@ -11,7 +11,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ViewerDown(_message.Message):
-    __slots__ = ("hello", "link", "info", "plan", "topology", "frame", "tool", "stats", "event", "pong", "rpc", "tool_gone", "field", "measures", "forces", "people")
+    __slots__ = ("hello", "link", "info", "plan", "topology", "frame", "tool", "stats", "event", "pong", "rpc", "tool_gone", "field", "measures", "forces", "people", "coarse_frame")
     HELLO_FIELD_NUMBER: _ClassVar[int]
     LINK_FIELD_NUMBER: _ClassVar[int]
     INFO_FIELD_NUMBER: _ClassVar[int]
@@ -28,6 +28,7 @@ class ViewerDown(_message.Message):
     MEASURES_FIELD_NUMBER: _ClassVar[int]
     FORCES_FIELD_NUMBER: _ClassVar[int]
     PEOPLE_FIELD_NUMBER: _ClassVar[int]
+    COARSE_FRAME_FIELD_NUMBER: _ClassVar[int]
     hello: ViewerHello
     link: ViewerLink
     info: _server_pb2.SessionInfo
@@ -44,7 +45,28 @@ class ViewerDown(_message.Message):
     measures: _server_pb2.Measures
     forces: _force_pb2.Forces
     people: ViewerPeople
-    def __init__(self, hello: _Optional[_Union[ViewerHello, _Mapping[str, object]]] = ..., link: _Optional[_Union[ViewerLink, _Mapping[str, object]]] = ..., info: _Optional[_Union[_server_pb2.SessionInfo, _Mapping[str, object]]] = ..., plan: _Optional[_Union[_server_pb2.Plan, _Mapping[str, object]]] = ..., topology: _Optional[_Union[_surface_pb2.SurfaceTopology, _Mapping[str, object]]] = ..., frame: _Optional[_Union[_surface_pb2.SurfaceFrame, _Mapping[str, object]]] = ..., tool: _Optional[_Union[_tool_pb2.ToolState, _Mapping[str, object]]] = ..., stats: _Optional[_Union[_server_pb2.Stats, _Mapping[str, object]]] = ..., event: _Optional[_Union[_server_pb2.Event, _Mapping[str, object]]] = ..., pong: _Optional[_Union[ViewerPong, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpcReply, _Mapping[str, object]]] = ..., tool_gone: _Optional[_Union[ViewerToolGone, _Mapping[str, object]]] = ..., field: _Optional[_Union[_surface_pb2.SurfaceField, _Mapping[str, object]]] = ..., measures: _Optional[_Union[_server_pb2.Measures, _Mapping[str, object]]] = ..., forces: _Optional[_Union[_force_pb2.Forces, _Mapping[str, object]]] = ..., people: _Optional[_Union[ViewerPeople, _Mapping[str, object]]] = ...) -> None: ...
+    coarse_frame: ViewerFrame
+    def __init__(self, hello: _Optional[_Union[ViewerHello, _Mapping[str, object]]] = ..., link: _Optional[_Union[ViewerLink, _Mapping[str, object]]] = ..., info: _Optional[_Union[_server_pb2.SessionInfo, _Mapping[str, object]]] = ..., plan: _Optional[_Union[_server_pb2.Plan, _Mapping[str, object]]] = ..., topology: _Optional[_Union[_surface_pb2.SurfaceTopology, _Mapping[str, object]]] = ..., frame: _Optional[_Union[_surface_pb2.SurfaceFrame, _Mapping[str, object]]] = ..., tool: _Optional[_Union[_tool_pb2.ToolState, _Mapping[str, object]]] = ..., stats: _Optional[_Union[_server_pb2.Stats, _Mapping[str, object]]] = ..., event: _Optional[_Union[_server_pb2.Event, _Mapping[str, object]]] = ..., pong: _Optional[_Union[ViewerPong, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpcReply, _Mapping[str, object]]] = ..., tool_gone: _Optional[_Union[ViewerToolGone, _Mapping[str, object]]] = ..., field: _Optional[_Union[_surface_pb2.SurfaceField, _Mapping[str, object]]] = ..., measures: _Optional[_Union[_server_pb2.Measures, _Mapping[str, object]]] = ..., forces: _Optional[_Union[_force_pb2.Forces, _Mapping[str, object]]] = ..., people: _Optional[_Union[ViewerPeople, _Mapping[str, object]]] = ..., coarse_frame: _Optional[_Union[ViewerFrame, _Mapping[str, object]]] = ...) -> None: ...
+
+class ViewerFrame(_message.Message):
+    __slots__ = ("frame", "min_x", "min_y", "min_z", "size_x", "size_y", "size_z", "positions")
+    FRAME_FIELD_NUMBER: _ClassVar[int]
+    MIN_X_FIELD_NUMBER: _ClassVar[int]
+    MIN_Y_FIELD_NUMBER: _ClassVar[int]
+    MIN_Z_FIELD_NUMBER: _ClassVar[int]
+    SIZE_X_FIELD_NUMBER: _ClassVar[int]
+    SIZE_Y_FIELD_NUMBER: _ClassVar[int]
+    SIZE_Z_FIELD_NUMBER: _ClassVar[int]
+    POSITIONS_FIELD_NUMBER: _ClassVar[int]
+    frame: _surface_pb2.SurfaceFrame
+    min_x: float
+    min_y: float
+    min_z: float
+    size_x: float
+    size_y: float
+    size_z: float
+    positions: bytes
+    def __init__(self, frame: _Optional[_Union[_surface_pb2.SurfaceFrame, _Mapping[str, object]]] = ..., min_x: _Optional[float] = ..., min_y: _Optional[float] = ..., min_z: _Optional[float] = ..., size_x: _Optional[float] = ..., size_y: _Optional[float] = ..., size_z: _Optional[float] = ..., positions: _Optional[bytes] = ...) -> None: ...
 
 class ViewerUp(_message.Message):
     __slots__ = ("tool", "rpc", "ping", "frame_ack", "release", "watch", "name")
