@@ -1,5 +1,5 @@
-//! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes, and on methods
-//! of collision detection.
+//! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes, on methods of
+//! collision detection, and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -8,6 +8,7 @@
 //!
 //! # Source
 //! Dick, Georgii, Westermann 2011: A hexahedral multigrid approach for simulating cuts in deformable objects.
+//! Jeřábková 2007: Interactive cutting of finite elements based deformable objects in virtual environments.
 
 pub mod printed;
 
@@ -43,6 +44,8 @@ mod levels;
 
 mod collision;
 
+mod threads;
+
 pub use bench::ExperimentBench;
 pub use result::{Column, ExperimentResult, Picture, Plots, Row, Table, Unit};
 
@@ -53,7 +56,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 9] = [
+pub const NAMES: [&str; 10] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -63,6 +66,7 @@ pub const NAMES: [&str; 9] = [
     "cells-elements",
     "cells-levels",
     "collision",
+    "threads",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -81,6 +85,7 @@ fn find(name: &str) -> Option<Experiment> {
         "cells-elements" => Some(elements::elements),
         "cells-levels" => Some(levels::levels),
         "collision" => Some(collision::collision),
+        "threads" => Some(threads::threads),
         _ => None,
     }
 }

@@ -19,6 +19,8 @@ pub enum Unit {
     Number,
     /// A factor.
     Times,
+    /// A part of a whole.
+    Share,
 }
 
 impl Unit {
@@ -27,7 +29,7 @@ impl Unit {
         match self {
             Self::Count => "count",
             Self::Seconds => "s",
-            Self::Number => "1",
+            Self::Number | Self::Share => "1",
             Self::Times => "times",
         }
     }
@@ -41,6 +43,7 @@ impl Unit {
             Self::Seconds => time(1e3 * value),
             Self::Number => short(value),
             Self::Times => format!("{} ×", short(value)),
+            Self::Share => format!("{:.0} %", 100.0 * value),
         }
     }
 }
@@ -194,5 +197,6 @@ mod tests {
         assert_eq!(Unit::Seconds.show(1.5e-6), "1.5 µs");
         assert_eq!(Unit::Seconds.show(2.42), "2.42 s");
         assert_eq!(Unit::Times.show(f64::NAN), "–");
+        assert_eq!(Unit::Share.show(0.58), "58 %");
     }
 }
