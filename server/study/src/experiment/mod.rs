@@ -1,5 +1,5 @@
-//! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes, on methods of
-//! collision detection, and on threads.
+//! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes; on methods of
+//! collision detection; on relaxation (Nienhuys 2003); and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -46,6 +46,8 @@ mod collision;
 
 mod threads;
 
+mod nienhuys;
+
 pub use bench::ExperimentBench;
 pub use result::{Column, ExperimentResult, Picture, Plots, Row, Table, Unit};
 
@@ -56,7 +58,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 10] = [
+pub const NAMES: [&str; 11] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -67,6 +69,7 @@ pub const NAMES: [&str; 10] = [
     "cells-levels",
     "collision",
     "threads",
+    "nienhuys",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -86,6 +89,7 @@ fn find(name: &str) -> Option<Experiment> {
         "cells-levels" => Some(levels::levels),
         "collision" => Some(collision::collision),
         "threads" => Some(threads::threads),
+        "nienhuys" => Some(nienhuys::nienhuys),
         _ => None,
     }
 }
