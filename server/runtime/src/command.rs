@@ -36,6 +36,8 @@ pub mod reliability;
 
 pub mod effects;
 
+pub mod book;
+
 pub mod certs;
 
 pub mod router;
@@ -60,6 +62,7 @@ pub fn main() -> ExitCode {
         Some(Command::Stress(args)) => args.json,
         Some(Command::Haptics(args)) => args.json,
         Some(Command::Reliability(args)) => args.json,
+        Some(Command::Book(args)) => args.json,
         Some(Command::Certs(args)) => args.json,
         Some(Command::Doctor(args)) => args.json,
         Some(Command::Top(args)) => args.json,
@@ -78,6 +81,7 @@ pub fn main() -> ExitCode {
         Some(Command::Stress(args)) => stress::stress(&args),
         Some(Command::Haptics(args)) => haptics::haptics(&args),
         Some(Command::Reliability(args)) => reliability::reliability(&args),
+        Some(Command::Book(args)) => book::book(&args),
         Some(Command::Certs(args)) => certs::certs(&args),
         Some(Command::Router(args)) => router::route(&args),
         Some(Command::Doctor(args)) => doctor::doctor(&args),

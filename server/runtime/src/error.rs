@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use scindo_client::LinkError;
 use scindo_proto::KeyError;
 use scindo_study::StudyError;
+use scindo_study::book::BookError;
 use scindo_study::effects::EffectsError;
 use scindo_study::stress::StressError;
 use scindo_world::format::MeshInError;
@@ -36,6 +37,9 @@ pub enum RuntimeError {
     /// The effects of a scene cannot be measured.
     #[error(transparent)]
     Effects(#[from] EffectsError),
+    /// The pages of the book cannot be written.
+    #[error(transparent)]
+    Book(#[from] BookError),
     /// An option of the command line cannot be used.
     #[error("{option} '{value}': {reason}. {next}")]
     Option {
@@ -184,6 +188,7 @@ impl RuntimeError {
             Self::Export { .. } => "export",
             Self::System { .. } => "system",
             Self::Died { .. } => "died",
+            Self::Book(_) => "book",
         }
     }
 }

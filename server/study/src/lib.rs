@@ -50,6 +50,9 @@ pub mod effects;
 #[allow(non_snake_case)] // the symbols of the field: X, K, M
 pub mod stress;
 
+// What all of them found, beside the numbers that papers print.
+pub mod book;
+
 pub use bench::progress::Progress;
 pub use result::{CaseResult, Outcome, StudyResult};
 pub use settings::Settings;

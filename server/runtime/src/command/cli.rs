@@ -50,6 +50,9 @@ pub enum Command {
     Reliability(ReliabilityArgs),
     /// Measure what each effect of a scene costs by stepping the scene with it and without it.
     Effects(EffectsArgs),
+    /// Run all studies and write one site: every number that the papers print beside the one measured here, hard
+    /// cases, what a hand feels, what effects cost.
+    Book(BookArgs),
     /// Set up a laboratory with certificates, and admit clients to it.
     Certs(CertsArgs),
     /// Pass messages on between servers and clients: one door for several laboratories, or for many viewers.
@@ -325,6 +328,26 @@ pub struct StressArgs {
     /// Number of cases that run in parallel; 0 is one per hardware thread. Results do not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub threads: u16,
+    /// Report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `scindo book`.
+#[derive(Debug, Args)]
+pub struct BookArgs {
+    /// Use small bodies and short runs; takes about ten minutes on two cores, the whole book hours.
+    #[arg(long)]
+    pub quick: bool,
+    /// Directory of the site, whose first page is index.html. Parts that are finished in it are taken over.
+    #[arg(long, value_name = "DIR", default_value = "book")]
+    pub out: PathBuf,
+    /// Run only these parts, and write the pages with what is there. May be repeated; `--list` names all.
+    #[arg(long = "part", value_name = "NAME")]
+    pub parts: Vec<String>,
+    /// Print the parts instead of running them.
+    #[arg(long)]
+    pub list: bool,
     /// Report as JSON.
     #[arg(long)]
     pub json: bool,

@@ -1,14 +1,18 @@
 //! `scindo haptics` measures what the hand feels, by hand, delay and loss.
 
 use std::fs;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde_json::Value;
 
 use super::accuracy::{bar, listen};
 use super::cli::HapticsArgs;
 use super::say::say;
 use crate::error::RuntimeError;
+use crate::haptics::trial::Trial;
 use crate::haptics::{page, table};
 
 /// Runs the table and writes the page. Ctrl-C ends it after the cells that are under way.
@@ -24,20 +28,7 @@ pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, RuntimeError> {
     })?;
     bar.finish_and_clear();
     let interrupted = stop.load(Ordering::Relaxed);
-    let report = page::json(&trials);
-    let put = |name: &str, text: &str| {
-        let (path, draft) = (args.out.join(name), args.out.join(format!("{name}.part")));
-        let written = fs::create_dir_all(&args.out)
-            .and_then(|()| fs::write(&draft, text))
-            .and_then(|()| fs::rename(&draft, &path));
-        written.map_err(|error| RuntimeError::System {
-            what: format!("writing {}", path.display()),
-            reason: format!("{error}; choose another directory with --out"),
-        })
-    };
-    put("index.html", &page::html(&trials))?;
-    put("haptics.json", &format!("{report:#}\n"))?;
-    put("ticks.csv", &page::ticks(&trials))?;
+    let report = write(&args.out, &trials)?;
     let failed = trials.iter().filter(|trial| !trial.failures().is_empty()).count();
     if args.json {
         say!("{report}");
@@ -53,4 +44,25 @@ pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, RuntimeError> {
         say!("  ticks    {}/ticks.csv", args.out.display());
     }
     Ok(if failed > 0 || interrupted { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// Writes the page, the report and the ticks into `directory`, and returns the report.
+pub(super) fn write(directory: &Path, trials: &[Trial]) -> Result<Value, RuntimeError> {
+    let report = page::json(trials);
+    put(directory, "index.html", &page::html(trials))?;
+    put(directory, "haptics.json", &format!("{report:#}\n"))?;
+    put(directory, "ticks.csv", &page::ticks(trials))?;
+    Ok(report)
+}
+
+/// Writes a file completely or not at all.
+pub(super) fn put(directory: &Path, name: &str, text: &str) -> Result<(), RuntimeError> {
+    let (path, draft) = (directory.join(name), directory.join(format!("{name}.part")));
+    let written = fs::create_dir_all(directory)
+        .and_then(|()| fs::write(&draft, text))
+        .and_then(|()| fs::rename(&draft, &path));
+    written.map_err(|error| RuntimeError::System {
+        what: format!("writing {}", path.display()),
+        reason: format!("{error}; choose another directory with --out"),
+    })
 }
