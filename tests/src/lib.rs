@@ -3,6 +3,8 @@
 
 pub mod random_scene;
 
+pub mod relay;
+
 use std::io;
 use std::net::TcpListener;
 use std::path::PathBuf;
