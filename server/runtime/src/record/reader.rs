@@ -16,6 +16,9 @@ use scindo_proto::messages::{
 use super::writer::TOPICS;
 use crate::error::RuntimeError;
 
+/// Most bytes that are read at a time.
+const READ: usize = 1 << 20;
+
 /// Longest record of a file [byte]: a checkpoint of the largest scenes.
 const LONGEST: usize = 4 << 30;
 
@@ -62,7 +65,7 @@ impl Recording {
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(LONGEST);
         Ok(Self {
-            file: BufReader::with_capacity(1 << 20, file),
+            file: BufReader::with_capacity(READ, file),
             path: name,
             reader: LinearReader::new_with_options(options),
             channels: HashMap::new(),
@@ -96,15 +99,18 @@ impl Recording {
                 break;
             };
             match event {
-                Ok(LinearReadEvent::ReadRequest(n)) => match self.file.read(self.reader.insert(n)) {
-                    Ok(read) => {
-                        self.reader.notify_read(read);
-                        if read == 0 {
-                            self.end_early("it ends in the middle, as that of a server that was killed");
+                // Memory grows with what the file has, not with what a broken length claims.
+                Ok(LinearReadEvent::ReadRequest(n)) => {
+                    match self.file.read(self.reader.insert(n.min(READ))) {
+                        Ok(read) => {
+                            self.reader.notify_read(read);
+                            if read == 0 {
+                                self.end_early("it ends in the middle, as that of a server that was killed");
+                            }
                         }
+                        Err(error) => return Err(self.foreign(error.to_string())),
                     }
-                    Err(error) => return Err(self.foreign(error.to_string())),
-                },
+                }
                 Ok(LinearReadEvent::Record { data, opcode }) => {
                     let record = match mcap::parse_record(opcode, data) {
                         Ok(record) => record,
