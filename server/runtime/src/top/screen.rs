@@ -64,7 +64,8 @@ fn draw_head(frame: &mut Frame<'_>, area: Rect, view: &View, (stats, now): (&Sta
 }
 
 fn draw_stages(frame: &mut Frame<'_>, area: Rect, view: &View, stats: &Stats) {
-    let whole: f32 = stats.stages.iter().map(|stage| stage.milliseconds).sum();
+    // The sum of nothing would be -0.
+    let whole = stats.stages.iter().fold(0.0, |sum: f32, stage| sum + stage.milliseconds);
     let step_ms = 1e3 * view.info.step_s;
     let largest = stats.stages.iter().map(|stage| stage.milliseconds).fold(f32::MIN_POSITIVE, f32::max);
     let lines = stats.stages.iter().map(|stage| {
