@@ -33,6 +33,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("scindo-tests", BTreeSet::new()),
         ("scindo-allocations", BTreeSet::new()),
         ("scindo-verification", BTreeSet::new()),
+        ("scindo-fuzz", BTreeSet::new()),
     ])
 }
 

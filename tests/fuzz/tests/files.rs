@@ -1,0 +1,166 @@
+//! Files: scenes, meshes in every format, recordings.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use scindo::record::reader::Recording;
+use scindo::record::recorder::RecordSettings;
+use scindo::sim::engine::Engine;
+use scindo_fuzz::attack;
+use scindo_world::format::read_mesh_bytes;
+use scindo_world::inputs::Inputs;
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+
+/// Recipes per target in an ordinary run of the tests.
+const RECIPES: usize = 10_000;
+
+/// Recipes of targets that write a file for each.
+const FILES: usize = 50;
+
+fn scenes() -> Vec<Vec<u8>> {
+    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../server/world/scenes"));
+    let mut files: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.retain(|file| file.extension().is_some_and(|end| end == "toml"));
+    files.sort_unstable();
+    assert!(!files.is_empty(), "no scenes");
+    files.iter().map(|file| fs::read(file).unwrap()).collect()
+}
+
+/// A scene is taken or refused with words; nothing is built.
+#[test]
+fn scene_toml() {
+    attack!(scenes(), RECIPES, |bytes: &[u8]| {
+        let Ok(text) = std::str::from_utf8(bytes) else { return };
+        if let Err(error) = Scene::from_toml(text) {
+            assert!(!error.to_string().trim().is_empty());
+        }
+    });
+}
+
+#[test]
+fn scene_json() {
+    let block = r#"{"schema":1,"name":"a","world":{"step_s":0.01},"body":[{"id":"b","young_pa":5e4,"poisson":0.4,
+        "density_kg_m3":1000,"mesh":{"box":{"min_m":[0,0,0],"max_m":[1,1,1],"cells":[1,1,1]}}}]}"#;
+    attack!(vec![block.as_bytes().to_vec()], RECIPES, |bytes: &[u8]| {
+        let Ok(text) = std::str::from_utf8(bytes) else { return };
+        if let Err(error) = Scene::from_json(text) {
+            assert!(!error.to_string().trim().is_empty());
+        }
+    });
+}
+
+/// What a reader takes has finite points and no node that is not there.
+fn read(file: &str) -> impl Fn(&[u8]) + use<'_> {
+    move |bytes: &[u8]| match read_mesh_bytes(file, bytes) {
+        Ok(mesh) => assert!(mesh.points().iter().all(|p| p.iter().all(|x| x.is_finite()))),
+        Err(error) => assert!(!error.to_string().trim().is_empty()),
+    }
+}
+
+const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nf 1 2 3\nf 1//1 2//1 4//1\nf -1 -2 -3\n";
+
+#[test]
+fn obj() {
+    attack!(vec![OBJ.as_bytes().to_vec()], RECIPES, read("a.obj"));
+}
+
+#[test]
+fn stl() {
+    let text = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n\
+                endfacet\nendsolid a\n";
+    let mut binary = vec![0u8; 80];
+    binary.extend(2u32.to_le_bytes());
+    binary.extend([0u8; 100]);
+    attack!(vec![text.as_bytes().to_vec(), binary], RECIPES, read("a.stl"));
+}
+
+#[test]
+fn ply() {
+    let header = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        )
+    };
+    let text = header("ascii") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let mut binary = header("binary_little_endian").into_bytes();
+    binary.extend([0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()));
+    binary.push(3);
+    binary.extend([0i32, 1, 2].iter().flat_map(|i| i.to_le_bytes()));
+    attack!(vec![text.into_bytes(), binary], RECIPES, read("a.ply"));
+}
+
+#[test]
+fn gmsh() {
+    let old = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n\
+               $Elements\n1\n1 4 2 0 1 1 2 3 4\n$EndElements\n";
+    let new = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n\
+               0 0 1\n$EndNodes\n$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n";
+    attack!(vec![old.as_bytes().to_vec(), new.as_bytes().to_vec()], RECIPES, read("a.msh"));
+}
+
+#[test]
+fn vtk() {
+    let text = "# vtk DataFile Version 3.0\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0 1 0 0 0 1 0 \
+                0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+    let poly = "# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n\
+                POLYGONS 1 4\n3 0 1 2\n";
+    attack!(vec![text.as_bytes().to_vec(), poly.as_bytes().to_vec()], RECIPES, read("a.vtk"));
+}
+
+#[test]
+fn vtu() {
+    let text = r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">
+<UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="1"><Points>
+<DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 2 3</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">4</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>"#;
+    attack!(vec![text.as_bytes().to_vec()], RECIPES, read("a.vtu"));
+}
+
+const SCENE: &str = r#"
+schema = 1
+name = "recorded"
+world = { gravity_m_s2 = [0, 0, -9.81], step_s = 0.01 }
+[[body]]
+id = "block"
+mesh = { box = { min_m = [0, 0, 0], max_m = [0.2, 0.1, 0.1], cells = [2, 1, 1] } }
+young_pa = 2e4
+poisson = 0.4
+density_kg_m3 = 1000
+fix = [{ where = { slab = { axis = "z", from = 0, to = 0 } } }]
+"#;
+
+fn recorded(folder: &Path) -> Vec<u8> {
+    let file = folder.join("seed.mcap");
+    let scene = Scene::from_toml(SCENE).unwrap();
+    let mut engine = Engine::new(Simulation::new(&scene, Path::new("")).unwrap(), None).unwrap();
+    let checkpoint = Duration::from_millis(20);
+    let settings =
+        RecordSettings { file: file.clone(), checkpoint, surfaces: false, patient: true, threads: 1 };
+    engine.record(settings).unwrap();
+    for _ in 0..4 {
+        engine.step(&Inputs::default());
+    }
+    engine.finish("done").unwrap();
+    fs::read(file).unwrap()
+}
+
+/// A recording is read to its end, to its first broken record, or refused with words.
+#[test]
+fn recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let seed = recorded(folder.path());
+    let file = folder.path().join("a.mcap");
+    attack!(vec![seed], FILES, |bytes: &[u8]| {
+        fs::write(&file, bytes).unwrap();
+        let Ok(mut recording) = Recording::open(&file) else { return };
+        let _ = recording.scene();
+        while let Ok(Some(_)) = recording.next_message() {}
+    });
+}
