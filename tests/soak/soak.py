@@ -44,6 +44,8 @@ LOST_S = 1.0
 # A slope over less time than this says nothing [s].
 LONG_S = 1200
 SLOPE_KIB_PER_HOUR = 1024
+# A server answers within this time of its start [s]; to resume it reads the whole recording.
+PATIENCE_S = 300
 # Longest record of a recording. A chunk that was being written when the server was killed tells no length.
 LONGEST = 1 << 30
 # Memory that a short run may need beyond its start, for bodies that are cut [KiB].
@@ -176,7 +178,7 @@ def start(programs, endpoint, recording, *what):
     log = f"{recording.stem}.log"
     arguments = [*what, "--listen", endpoint, "--record", recording, "--checkpoint-s", 2]
     process = programs.start("scindo", "run", *arguments, log=log)
-    end = time.monotonic() + 60
+    end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         check(process.poll() is None, f"the server runs; see {programs.out / log}")
         try:
@@ -184,7 +186,7 @@ def start(programs, endpoint, recording, *what):
                 return process
         except scindo.ScindoError:
             time.sleep(0.2)
-    raise AssertionError(f"the server answers within 60 s; see {programs.out / log}")
+    raise AssertionError(f"the server answers within {PATIENCE_S} s; see {programs.out / log}")
 
 
 def replay(programs, recording):
