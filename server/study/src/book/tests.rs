@@ -34,8 +34,7 @@ fn every_printed_number_has_a_source_or_a_reason() {
                         assert!(cases::ALL.iter().any(|known| known.name == *case), "{name}: {case}");
                     }
                     Some([part, _, _, _]) => {
-                        let is_there = parts.contains(*part) && experiment::NAMES.contains(part);
-                        assert!(is_there || number.open.is_some(), "{name}: {part}");
+                        assert!(parts.contains(*part) && experiment::NAMES.contains(part), "{name}: {part}");
                     }
                     Some(other) => panic!("{name}: {other:?}"),
                 }
