@@ -10,7 +10,7 @@ const SECTIONS: [string, [string, string][]][] = [
     ["O or Esc", "turn the view, put the tool away"], ["1", "poke: press the tissue"], ["2", "grab: hold and pull it"],
     ["3 or C", "cut along the drag"], ["4", "forceps: the jaws close on the tissue while you press"],
     ["K", "keep the jaws closed, and open them again"], ["J", "turn the forceps about their shaft"], ["Shift", "hold it to turn the view with any tool, by mouse or arrow keys"],
-    ["← → ↑ ↓", "move the tool over the tissue"], ["Enter", "press the tool, and lift it again"], ["PageDown or PageUp", "press deeper, less deep"],
+    ["← → ↑ ↓", "move the tool over the tissue"], ["Enter", "press the tool, and lift it again"], ["PgDn PgUp", "press deeper, less deep"],
   ]],
   ["Time", [["Space", "pause or resume"], [".", "make one step while paused"], ["R", "return to the start; asks first if there are cuts"]]],
   ["Colours", [
