@@ -20,8 +20,9 @@ pub fn for_page(frame: SurfaceFrame) -> Down {
     let per_metre = size.map(|size| if size > 0.0 { STEPS / f64::from(size) } else { 0.0 });
     let mut positions = Vec::with_capacity(frame.positions.len() / 2);
     for vertex in vertices(&frame.positions) {
-        for axis in 0..3 {
-            let value = (f64::from(vertex[axis]) - f64::from(min[axis])) * per_metre[axis];
+        let values: [f64; 3] =
+            std::array::from_fn(|axis| (f64::from(vertex[axis]) - f64::from(min[axis])) * per_metre[axis]);
+        for value in values {
             // A cast saturates, so rounding can never leave the range.
             positions.extend_from_slice(&(value.round() as u16).to_le_bytes());
         }
@@ -44,10 +45,8 @@ fn box_of(positions: &[u8]) -> Option<([f32; 3], [f32; 3])> {
     let first = all.next()?;
     let (mut min, mut max) = (first, first);
     for vertex in all {
-        for axis in 0..3 {
-            min[axis] = min[axis].min(vertex[axis]);
-            max[axis] = max[axis].max(vertex[axis]);
-        }
+        min = std::array::from_fn(|axis| min[axis].min(vertex[axis]));
+        max = std::array::from_fn(|axis| max[axis].max(vertex[axis]));
     }
     Some((min, std::array::from_fn(|axis| max[axis] - min[axis])))
 }
