@@ -13,8 +13,11 @@
 //! ```
 //!
 //! which opens the area ℓ s cos φ and takes the work J ℓ s cos φ. So the work of the hand is that of the toughness,
-//! besides what the tissue stores. The swept surface is that of the fronts, not of the hand. A blade that is drawn back
-//! feels nothing until it reaches its fronts again.
+//! besides what the tissue stores. The swept surface is that of the fronts, not of the hand.
+//!
+//! A blade that is drawn back feels nothing within the slit that it made. Where it leaves the slit, beyond the end at
+//! which it began or to a side, its fronts turn and are pressed there. Only the motion across the edge makes a slit:
+//! a blade that is stabbed in along its own length has none, and is pressed to whichever side it goes next.
 //!
 //! # Source
 //! Jeřábková 2007, 4.1.3 and fig. 4.8a (force feedback while cutting). Atkins, Xu, Jeronimidis 2004: Cutting, by
@@ -40,6 +43,12 @@ const MOST_PARTS: usize = 128;
 const AHEAD: f64 = 1e-3;
 /// Area at rest over area now up to which the toughness counts for the one at rest.
 const MOST_GROWTH: f64 = 2.0;
+/// cos φ below which a front slides along the edge without a slit, and that from which on a slit is open to the skin.
+const LEAST_ACROSS: f64 = 0.1;
+const MOSTLY_ACROSS: f64 = 0.5;
+/// A hand is beside a slit from this many cells on, and so much more for each metre that it is behind the front.
+const BESIDE_CELLS: f64 = 0.25;
+const BESIDE_SLOPE: f64 = 0.5;
 /// Parts from which on an edge may turn against that of the hand.
 const ENOUGH: usize = 3;
 
@@ -87,8 +96,12 @@ struct Front {
     point: MaterialPoint,
     /// From the material point to the front [m].
     offset_m: V,
-    /// Unit direction in which it went last; 0 while it has none.
+    /// Unit direction across the edge in which it went last; 0 while it has none.
     ahead: V,
+    /// Length of the slit behind it [m]; none: it is open to the skin.
+    slit_m: Option<f64>,
+    /// Whether it went to another end of its slit since its material was last found.
+    turned: bool,
     /// Whether it has left its material point.
     moved: bool,
     /// Its place at rest [m], when it was last found.
@@ -115,6 +128,53 @@ impl Front {
     fn place(&self, x: &[V]) -> V {
         self.point.position(x) + self.offset_m
     }
+
+    /// Whether a hand `way` before it presses on it, on an edge of direction `along`. If the hand has left the slit
+    /// behind the front by more than `slack_m` to a side, or beyond its end, then the front turns: it goes to where
+    /// that was, and is pressed in the next step.
+    fn is_before(&mut self, way: V, along: &V, slack_m: f64) -> bool {
+        let Some(ahead) = across(&self.ahead, along).try_normalize(LEAST_ACROSS) else {
+            return way.norm() > 1e-9;
+        };
+        let way = across(&way, along);
+        let gone_m = way.dot(&ahead);
+        if gone_m > 0.0 {
+            return true;
+        }
+        let end_m = self.slit_m.map_or(gone_m, |slit_m| gone_m.max(-slit_m));
+        let side = way - gone_m * ahead;
+        let beside = side.norm() > slack_m - BESIDE_SLOPE * end_m;
+        if beside || gone_m < end_m {
+            (self.moved, self.turned) = (true, true);
+            self.offset_m += end_m * ahead;
+            if beside {
+                (self.ahead, self.slit_m) = (side.normalize(), Some(0.0));
+            } else {
+                self.ahead = -ahead;
+            }
+        }
+        false
+    }
+
+    /// Goes on by `by`, on an edge of direction `along`.
+    fn go(&mut self, by: V, along: &V) {
+        self.offset_m += by;
+        self.moved = true;
+        let aside = across(&by, along);
+        if aside.norm() > LEAST_ACROSS * by.norm() {
+            self.slit_m = match self.slit_m {
+                Some(slit_m) if self.ahead.dot(&aside) > 0.0 => Some(slit_m + aside.norm()),
+                Some(_) => Some(aside.norm()),
+                None => None,
+            };
+            self.ahead = aside.normalize();
+        }
+    }
+}
+
+/// The part of `v` that is perpendicular to an edge of direction `along`.
+fn across(v: &V, along: &V) -> V {
+    v - along * along.dot(v)
 }
 
 impl Edge {
@@ -162,10 +222,7 @@ impl Edge {
             let hand = place(&edge, middle(i, n));
             let way = hand - front.place(body.body.positions());
             front.load = None;
-            if front.ahead == V::zeros() {
-                front.ahead = way.try_normalize(1e-9).unwrap_or_default();
-            }
-            if way.dot(&front.ahead) <= 0.0 {
+            if !front.is_before(way, &along, BESIDE_CELLS * body.cell_m()) {
                 if lifted(hand, front, &surfaces[front.body], body) {
                     *part = None;
                 }
@@ -223,19 +280,23 @@ impl Edge {
                 match found {
                     Some(point) => {
                         let rest_m = point.position(body.body.rest_positions());
-                        if front.moved {
+                        if front.moved && !front.turned {
                             self.report.area_m2 += (rest_m - front.rest_m).cross(&along).norm();
                         }
                         front.rest_m = rest_m;
                         let at = front.place(body.body.positions());
                         front.offset_m = at - point.position(body.body.positions());
-                        (front.point, front.epoch, front.moved) = (*point, epoch, false);
+                        (front.point, front.epoch) = (*point, epoch);
+                        (front.moved, front.turned) = (false, false);
                     }
                     // Between the lips of a cut, and not out of the body: it keeps to the material that it had.
                     None if surfaces[number].whole().is_some_and(|tree| tree.contains(*at)) => {
                         front.moved = true
                     }
-                    None => (self.parts[i], self.through) = (None, true),
+                    None => {
+                        self.through |= front.ahead != V::zeros() && !front.turned;
+                        self.parts[i] = None;
+                    }
                 }
             }
         }
@@ -278,6 +339,7 @@ impl Edge {
             self.points.clear();
             let ahead_m = AHEAD * body.cell_m();
             let n = self.parts.len();
+            let along = (now[1] - now[0]).try_normalize(0.0).unwrap_or_default();
             for i in (0..n).filter(|&i| self.parts[i].is_none()) {
                 let (from, to) = (place(&before, middle(i, n)), place(&now, middle(i, n)));
                 let ray = CapsuleMotion { start: [from; 2], end: [to; 2], radius: 0.0 };
@@ -297,15 +359,19 @@ impl Edge {
             body.body.material_at(&self.points, &mut self.found);
             for (&i, found) in self.which.iter().zip(&self.found) {
                 let Some(point) = found else { continue };
-                // Unknown where the blade begins in tissue, until it moves.
+                // Unknown where the blade begins in tissue or is stabbed in, until it goes aside.
                 let way = place(&now, middle(i, n)) - place(&before, middle(i, n));
-                let ahead = way.try_normalize(1e-12).unwrap_or_default();
+                let aside = across(&way, &along);
+                let open = aside.norm() > MOSTLY_ACROSS * way.norm().max(1e-12);
+                let ahead = if open { aside.normalize() } else { V::zeros() };
                 self.parts[i] = Some(Front {
                     body: number,
                     epoch: body.epoch(),
                     point: *point,
                     offset_m: V::zeros(),
                     ahead,
+                    slit_m: (!open).then_some(0.0),
+                    turned: false,
                     moved: false,
                     rest_m: point.position(body.body.rest_positions()),
                     load: None,
@@ -322,6 +388,7 @@ impl Edge {
         }
         let n = self.parts.len().max(1) as f64;
         let length_m = (edge[1] - edge[0]).norm() / n;
+        let along = (edge[1] - edge[0]).try_normalize(0.0).unwrap_or_default();
         let was_inside = self.report.inside > 0.0;
         let (mut inside, mut most) = (0, 0.0f64);
         (self.report.load_n, self.report.resistance_n, self.report.loaded) = (0.0, 0.0, 0.0);
@@ -341,8 +408,7 @@ impl Edge {
             if s > 0.0 {
                 self.passed_m2 += length_m * s * load.across;
                 self.report.work_j += load.resistance_n * s;
-                front.offset_m += s * load.normal;
-                (front.ahead, front.moved) = (load.normal, true);
+                front.go(s * load.normal, &along);
                 most = most.max(s);
             }
         }
