@@ -154,6 +154,10 @@ pub const LEAST_REFERENCE: f64 = 1e-3;
 const INSTEAD_OF_FACTORS: u32 = 500;
 /// Steps without a halving of the residual after which it counts as rounding.
 const FUTILE_STEPS: u32 = 3;
+/// A full step that cuts the residual to at most this part of it changes the Hessian little on its way, so that
+/// the preconditioner of its start may judge its end. A step that cut it less may have entered softer material,
+/// where the same forces count for more.
+const SAME_HESSIAN: f64 = 0.25;
 /// Halvings of a gradient step, whose length has no natural scale.
 const GRADIENT_HALVINGS: u32 = 40;
 
@@ -213,7 +217,8 @@ impl Newton {
         let mut phi = report.potential;
         let mut largest = phi.abs();
         let mut floor = Floor::default();
-        let mut moved = false;
+        // Residual before the last step, if that was a full one.
+        let mut full_step_from = None;
         loop {
             report.potential = phi;
             if !phi.is_finite() || !self.g.iter().all(|g| g.norm_squared().is_finite()) {
@@ -224,8 +229,11 @@ impl Newton {
                 report.stop = StopReason::Interrupted;
                 return report;
             }
-            // After the first step, the previous preconditioner tells whether a new Hessian is needed at all.
-            if moved && self.measure(potential, &mut report, &mut first) {
+            // After a full step, the previous preconditioner tells whether a new Hessian is needed at all.
+            if let Some(before) = full_step_from.take()
+                && self.measure(potential, &mut report, &mut first)
+                && report.residual <= SAME_HESSIAN * before
+            {
                 return report;
             }
             team.begin(Phase::Operator);
@@ -251,7 +259,7 @@ impl Newton {
             }
             team.begin(Phase::Search);
             let slope = dot(&self.g, &self.p);
-            let halvings = self.settings.halvings;
+            let (halvings, gradient_steps) = (self.settings.halvings, report.gradient_steps);
             let mut next = self.search(team, potential, (x, phi), (slope, largest, halvings), &mut report);
             // A shortened step leaves the rest of the right-hand side.
             let t =
@@ -284,7 +292,8 @@ impl Newton {
             std::mem::swap(&mut self.g, &mut self.trial_g);
             report.steps += 1;
             curvature = self.settings.curvature;
-            moved = true;
+            let full = report.backtracks == backtracks && report.gradient_steps == gradient_steps;
+            full_step_from = full.then_some(before);
         }
     }
 
