@@ -4,7 +4,6 @@
 use nalgebra::Vector3;
 
 use super::course::Course;
-use super::held_energy::HeldEnergy;
 use super::linear_step::LinearStep;
 use super::notice::Notice;
 use super::report::{Outcome, SolveReport};
@@ -19,7 +18,7 @@ use crate::lists::reserve::refill;
 use crate::material::Material;
 use crate::multigrid::{CoarsestSolve, LevelReport};
 use crate::octree::OctreeSpace;
-use crate::operator::Stiffness;
+use crate::operator::{ElasticUpdate, Stiffness};
 use crate::solver::{Method, PcgSettings};
 use crate::space::Space;
 use crate::team::Team;
@@ -59,8 +58,6 @@ pub struct LinearlyImplicit {
     portable: bool,
     mass_f32: Vec<f32>,
     step: LinearStep,
-    /// For the energy balance of Newmark's method.
-    held: HeldEnergy,
     weightless: Vec<Weightless>,
     /// Whether the topology was cut, and nothing else, since the levels were brought up to date.
     cut: bool,
@@ -96,7 +93,6 @@ impl LinearlyImplicit {
             portable,
             mass_f32: Vec::new(),
             step: LinearStep::new(at_start, lagged),
-            held: HeldEnergy::default(),
             weightless: Vec::new(),
             cut: false,
         }
@@ -283,10 +279,9 @@ impl StepSolver for LinearlyImplicit {
     }
 
     fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], points: &dyn Points) -> f64 {
-        if self.held.is_empty() {
-            return points.energy(&self.material, x);
-        }
-        self.held.at(team, &*self.stiffness, x, &self.material)
+        let material = &self.material;
+        let with = ElasticUpdate { lame: material.lame(), law: material.law, scale: 1.0 };
+        self.stiffness.energy(team, &with, x).unwrap_or_else(|| points.energy(material, x))
     }
 
     fn set_material(&mut self, material: Material) {
@@ -321,9 +316,6 @@ impl StepSolver for LinearlyImplicit {
         refill(&mut self.mass_f32, mass.iter().map(|&m| m as f32));
         self.weightless = find_weightless(space, mass);
         self.step.resize(mass.len());
-        if self.scheme.is_newmark() {
-            self.held.follow(space, &*self.stiffness);
-        }
         self.step.set_stiff_modes(space.stiff_modes());
         self.step.set_method(self.method);
         self.follow_levels(space);

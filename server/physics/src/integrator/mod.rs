@@ -26,7 +26,6 @@ mod descent;
 mod quasi_newton;
 mod linear_step;
 mod together;
-mod held_energy;
 mod model_solver;
 mod fully_implicit;
 mod potential;

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::chunks::{NO_PIECE, pack, plan_chunk};
 use super::edges::EdgeBlocks;
-use super::kernel::{Batches, Block6, Coefficients, Locals, RestBatch};
+use super::kernel::{Batches, Block6, Coefficients, EnergyCoefficients, Locals, RestBatch};
 use super::shared_lanes::Merged;
 use super::{Padded, padded};
 use crate::element::{LANES, Simd};
@@ -27,7 +27,7 @@ pub struct Chunk {
     positions: Vec<[f64; 4]>,
     /// Vector that the stiffness is applied to, by local number.
     pub x: Vec<Padded>,
-    /// Rest positions [m], for laws without rotation.
+    /// Rest positions [m].
     rest: Vec<Vector3<f64>>,
     /// The assembled stiffness, if it is in use.
     edges: Option<EdgeBlocks>,
@@ -35,6 +35,8 @@ pub struct Chunk {
     unassembled: Vec<[usize; 2]>,
     /// Pieces with det F ≤ 0 at the last update.
     pub inverted: usize,
+    /// Energy [J] when it was last asked for.
+    pub energy: f64,
     /// Whether the chunk was planned or amended since the last update.
     pub stale: bool,
     /// First row of its sums among those of all chunks.
@@ -82,6 +84,7 @@ impl Chunk {
             positions,
             x,
             inverted: 0,
+            energy: 0.0,
             stale: true,
             first_row: 0,
         }
@@ -246,6 +249,16 @@ impl Chunk {
         let mut locals = Locals { x: &self.positions, f, blocks: diagonal };
         self.inverted = self.batches.update(simd, c, &mut locals);
         self.stale = false;
+    }
+
+    /// Computes the energy with the rotations of the last update.
+    pub fn find_energy(&mut self, simd: Simd, c: EnergyCoefficients, positions: &[Vector3<f64>]) {
+        let held = self.copies.iter().zip(&self.rest);
+        for (local, (&copy, rest)) in self.positions.iter_mut().zip(held) {
+            let u = positions[copy as usize] - rest;
+            *local = [u.x, u.y, u.z, 0.0];
+        }
+        self.energy = self.batches.energy(simd, c, &self.positions);
     }
 }
 

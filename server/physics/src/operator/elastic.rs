@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::chunk::{Chunk, NewLane};
 use super::chunks::{Gather, NO_PIECE, region_of_elements};
-use super::kernel::{Block6, Coefficients};
+use super::kernel::{Block6, Coefficients, EnergyCoefficients};
 use super::rows::{self, Sum, gather_direction};
 use super::shared_lanes::{LaneChanges, SharedLanes};
 use super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
@@ -283,6 +283,13 @@ impl Stiffness for Elastic {
             });
         }
         self.chunks.iter().map(|chunk| chunk.inverted).sum()
+    }
+
+    fn energy(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> Option<f64> {
+        let (simd, Coefficients { mu, lambda, rotates, .. }) = (self.simd, coefficients(with));
+        let c = EnergyCoefficients { mu, lambda, rotates };
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].find_energy(simd, c, positions));
+        Some(self.chunks.iter().map(|chunk| chunk.energy).sum())
     }
 
     #[inline(always)]

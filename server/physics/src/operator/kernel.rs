@@ -90,6 +90,17 @@ pub struct Coefficients {
     pub rotates: bool,
 }
 
+/// Constants of an energy.
+#[derive(Clone, Copy, Debug)]
+pub struct EnergyCoefficients {
+    /// μ [Pa].
+    pub mu: f32,
+    /// λ [Pa].
+    pub lambda: f32,
+    /// Whether pieces rotate (corotational) or keep R = I (linear).
+    pub rotates: bool,
+}
+
 /// Vectors of one chunk, one entry per local number and one for the waste bin.
 pub struct Locals<'a> {
     /// Current positions [m] in double precision.
@@ -210,6 +221,18 @@ impl Batches {
             // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
             Simd::Avx2 => unsafe { avx2::update(c, rest, live, locals) },
             _ => update_with::<Lanes>(c, rest, live, locals),
+        }
+    }
+
+    /// Elastic energy [J] at the displacements `u` [m], one per local number, with the rotations of the last
+    /// update.
+    pub fn energy(&self, simd: Simd, c: EnergyCoefficients, u: &[[f64; 4]]) -> f64 {
+        assert!(u.len() == self.n_locals);
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
+            Simd::Avx2 => unsafe { avx2::energy(c, &self.rest, &self.live, u) },
+            _ => energy_with::<Lanes>(c, &self.rest, &self.live, u),
         }
     }
 }
@@ -343,6 +366,57 @@ fn update_with<V: Vector8>(
     inverted
 }
 
+/// Σ w V (μ |D|² + λ/2 (R : D)²), where D = F − R, or sym(F) − I without rotations. F is I plus the gradient of
+/// the displacement, so that the error of D is relative to D where little turns.
+#[inline(always)]
+fn energy_with<V: Vector8>(c: EnergyCoefficients, rest: &[RestBatch], live: &[Batch], u: &[[f64; 4]]) -> f64 {
+    let (one, half) = (V::splat(1.0), V::splat(0.5));
+    let (mu, half_lambda) = (V::splat(c.mu), V::splat(0.5 * c.lambda));
+    let mut sums = [0.0; LANES];
+    for (rest, live) in rest.iter().zip(live) {
+        let g: [[V; 3]; 3] = [load(&rest.g[0]), load(&rest.g[1]), load(&rest.g[2])];
+        let nodes = &live.nodes;
+        // SAFETY: local numbers are below the length of local vectors, checked by `Batches`.
+        let e: [[V; 3]; 3] = unsafe {
+            [
+                V::gather_edges(u, &nodes[0], &nodes[1]),
+                V::gather_edges(u, &nodes[0], &nodes[2]),
+                V::gather_edges(u, &nodes[0], &nodes[3]),
+            ]
+        };
+        let mut D = sum_of_outer_products(&e, &g);
+        let (square, trace);
+        if c.rotates {
+            let (mut sum, mut along) = (V::splat(0.0), V::splat(0.0));
+            for i in 0..3 {
+                for j in 0..3 {
+                    let R = V::load(&rest.rotation[3 * i + j]);
+                    let unit = if i == j { one - R } else { -R };
+                    D[i][j] = D[i][j] + unit;
+                    sum = D[i][j].mul_add(D[i][j], sum);
+                    along = D[i][j].mul_add(R, along);
+                }
+            }
+            (square, trace) = (sum, along);
+        } else {
+            let [xy, xz, yz] = [D[0][1] + D[1][0], D[0][2] + D[2][0], D[1][2] + D[2][1]];
+            let shear = half * xy.mul_add(xy, xz.mul_add(xz, yz * yz));
+            square = D[0][0].mul_add(D[0][0], D[1][1].mul_add(D[1][1], D[2][2].mul_add(D[2][2], shear)));
+            trace = D[0][0] + D[1][1] + D[2][2];
+        }
+        let energy = V::load(&rest.volume) * mu.mul_add(square, half_lambda * trace * trace);
+        let energy = energy.store();
+        for lane in 0..LANES {
+            sums[lane] += f64::from(energy.0[lane]);
+        }
+    }
+    let mut total = 0.0;
+    for sum in sums {
+        total += sum;
+    }
+    total
+}
+
 /// Updates the rotation of every used lane; returns how many have det F ≤ 0.
 #[inline(always)]
 fn rotate<V: Vector8>(F: &[[V; 3]; 3], rest: &mut RestBatch) -> usize {
@@ -437,7 +511,7 @@ fn scatter_block<V: Vector8>(blocks: &mut [Block6], ids: &Ids, g: &[V; 3], ratio
 mod avx2 {
     //! The same loops compiled for AVX2 and FMA.
 
-    use super::{Batch, Coefficients, Locals, Padded, RestBatch};
+    use super::{Batch, Coefficients, EnergyCoefficients, Locals, Padded, RestBatch};
     use crate::element::avx2::Register;
 
     #[target_feature(enable = "avx2,fma")]
@@ -453,5 +527,10 @@ mod avx2 {
         locals: &mut Locals<'_>,
     ) -> usize {
         super::update_with::<Register>(c, rest, live, locals)
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn energy(c: EnergyCoefficients, rest: &[RestBatch], live: &[Batch], u: &[[f64; 4]]) -> f64 {
+        super::energy_with::<Register>(c, rest, live, u)
     }
 }

@@ -56,6 +56,18 @@ pub trait Stiffness: Any + Debug + Send + Sync {
     /// Returns the number of inverted elements.
     fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize;
 
+    /// Elastic energy [J] at `positions` [m] with the rotations of the last update, to single precision; `None` if
+    /// this stiffness does not compute it. Where the rotations are not those of `positions`, it is slightly too
+    /// large. The factor of `with` has no influence.
+    fn energy(
+        &mut self,
+        _team: &mut Team,
+        _with: &ElasticUpdate,
+        _positions: &[Vector3<f64>],
+    ) -> Option<f64> {
+        None
+    }
+
     /// Second half: internal forces [N] on the copies of block number `block`.
     fn forces(&self, block: usize, f: &mut [Padded]);
 

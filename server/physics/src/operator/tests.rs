@@ -87,6 +87,40 @@ fn forces_agree_with_double_precision_also_where_tets_are_inverted() {
 }
 
 #[test]
+fn the_energy_agrees_with_double_precision_wherever_the_body_is() {
+    let (mesh, pieces) = mesh();
+    for law in [Law::Corotational, Law::Linear] {
+        for (strained, far) in [(1.0, 0.0), (1.0, 1e4), (1e-6, 0.0), (1e-6, 1e4)] {
+            let x: Vec<Vector3<f64>> = deformed(&mesh, 0.1, 0.0)
+                .iter()
+                .zip(&mesh.nodes)
+                .map(|(x, X)| X + strained * (x - X) + Vector3::new(far, 0.0, 0.0))
+                .collect();
+            let energy = |piece: &Piece| {
+                let e = piece.element as usize;
+                let F = deformation_gradient(&piece.copies.map(|c| x[c as usize]), &mesh.gradients(e));
+                mesh.volume(e) * law.energy(&F, LAME)
+            };
+            let exact: f64 = pieces.iter().map(energy).sum();
+            // Rotations are known to 6e-8, and positions far away to 2e-12 m.
+            let bound = match (strained < 1.0, law.rotates()) {
+                (true, true) => 5e-3,
+                (true, false) if far > 0.0 => 1e-3,
+                _ => 2e-6,
+            };
+            for simd in [Simd::Baseline, Simd::detect()] {
+                let mut elastic = updated(simd, OperatorChoice::Auto, law, &x, 1e-4).elastic;
+                let with = ElasticUpdate { lame: LAME, law, scale: 1.0 };
+                let found = [1, 3].map(|n| elastic.energy(&mut Team::new(n).unwrap(), &with, &x).unwrap());
+                assert_eq!(found[0], found[1], "threads");
+                let error = (found[0] / exact - 1.0).abs();
+                assert!(error < bound, "{law:?} {simd:?} {strained} at {far} m: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
 fn assembled_and_matrix_free_stiffness_are_the_same_map() {
     let (mesh, _) = mesh();
     let x = deformed(&mesh, 0.6, 0.0);

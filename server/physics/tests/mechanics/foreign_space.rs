@@ -97,9 +97,9 @@ fn a_space_without_tetrahedra_answers_what_any_body_is_asked() {
     assert!(own.locate(Vector3::new(0.02, 0.31, 0.05), None).is_none());
 }
 
-/// The energy balance of Newmark's method asks the stiffness for the rotation of every piece.
+/// The energy balance of Newmark's method asks the stiffness for the energy.
 #[test]
-fn a_foreign_stiffness_gives_the_rotations_of_its_own_places() {
+fn a_foreign_stiffness_balances_the_energy_of_newmarks_method() {
     assert_same_motion(Law::Corotational, Scheme::Newmark { beta: 0.25, gamma: 0.5 }, true, true);
 }
 
@@ -130,6 +130,10 @@ struct Kernel {
 impl Stiffness for Kernel {
     fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize {
         self.elastic.update(team, with, positions)
+    }
+
+    fn energy(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> Option<f64> {
+        self.elastic.energy(team, with, positions)
     }
 
     fn forces(&self, block: usize, f: &mut [Padded]) {
