@@ -12,7 +12,8 @@ use super::scanner::Scanner;
 /// Reads the positions and faces of all objects and groups in the file. Materials are ignored.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
-    let mut cursor = Cursor::new(bytes);
+    let positions = without_normals(bytes);
+    let mut cursor = Cursor::new(&*positions);
     let (models, _) =
         tobj::load_obj_buf(&mut cursor, &options, |_| Ok(Default::default())).map_err(|error| {
             let mut scanner = Scanner::new(file, bytes);
@@ -47,4 +48,37 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     }
     let n = vertices.len();
     cells.finish(file, vertices, zero_based(n))
+}
+
+/// The file with its normals and texture coordinates commented out; all places stay. Nobody reads them, and tobj panics
+/// on a face that refers to one that cannot be.
+fn without_normals(bytes: &[u8]) -> Vec<u8> {
+    let mut out = bytes.to_vec();
+    for line in out.split_mut(|&byte| byte == b'\n') {
+        // tobj refuses a line that is not UTF-8.
+        let Ok(text) = std::str::from_utf8(line) else { continue };
+        let rest = text.trim_start();
+        if matches!(rest.split_whitespace().next(), Some("vn" | "vt")) {
+            let at = text.len() - rest.len();
+            line[at..at + 2].copy_from_slice(b"# ");
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    /// The indices of normals and texture coordinates are so large that arithmetic with them overflows.
+    #[test]
+    fn normals_that_cannot_be_do_no_harm() {
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n \u{a0}vt 0 0\n\
+                    f 1/-9223372036854775808/-9223372036854775808 2//9223372036854775807 3//4\n";
+        let mesh = read("a.obj", text.as_bytes()).unwrap();
+        assert!(format!("{mesh:?}").contains("[0, 1, 2]"), "{mesh:?}");
+        let wrong = read("a.obj", b"vn 0 0 1\nv 0 0 0\nf 1//1 2//1 x\n").unwrap_err().to_string();
+        assert!(wrong.contains("line 3"), "{wrong}");
+    }
 }
