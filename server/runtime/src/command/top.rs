@@ -75,11 +75,13 @@ async fn lines(args: &TopArgs, newest: &mut Latest<Stats>, view: &View) -> Resul
     if let Some(stats) = &view.stats {
         say!("{}", report::json(stats));
     }
-    while !args.once {
+    if args.once {
+        return Ok(ExitCode::SUCCESS);
+    }
+    loop {
         let stats = newest.next().await?;
         say!("{}", report::json(&stats));
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// One screen as plain text.

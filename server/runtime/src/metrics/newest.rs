@@ -43,8 +43,10 @@ const BODY: [Column<BodyStats>; 6] = [
     ("body_inverted_elements", "Elements that are inverted at present", |b| b.inverted.into()),
 ];
 
+type Kind = (&'static str, fn(&BodyStats) -> u64);
+
 /// Kinds of steps that did not go as asked, by their label.
-const STEPS: [(&str, fn(&BodyStats) -> u64); 4] = [
+const STEPS: [Kind; 4] = [
     ("unconverged", |b| b.unconverged_steps),
     ("refused", |b| b.refused_steps),
     ("divided", |b| b.divided_steps),
