@@ -63,8 +63,9 @@ async fn main() -> Result<(), LinkError> {
                 let Ok(surface) = tokio::time::timeout(left, mirror.next()).await else { break };
                 let frame = &surface?.frame;
                 received.frames += 1;
-                received.repeated += u64::from(frame.seq <= newest);
-                newest = newest.max(frame.seq);
+                // Not by number: a keyframe has that of the last frame, though it may be newer.
+                received.repeated += u64::from(frame.publish_unix_ns <= newest);
+                newest = newest.max(frame.publish_unix_ns);
                 received.bytes += (frame.positions.len() + frame.marks.len()) as u64;
                 received.vertices = frame.vertex_count;
                 received.longest_gap = received.longest_gap.max(last.elapsed());
