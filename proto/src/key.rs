@@ -119,8 +119,9 @@ impl Role {
 }
 
 /// Questions and orders under `rpc/`. Requests and replies: `PauseRequest`, `StepRequest`, `ResetRequest`,
-/// `SetRequest`, `UndoRequest`, `LoadRequest`, `SnapshotRequest`, `RestoreRequest` → `RpcReply`; `info` → `SessionInfo`; `params` → `ParamsReply`;
-/// `scenes` → `ScenesReply`; `schema` → `SchemaReply`.
+/// `SetRequest`, `UndoRequest`, `LoadRequest`, `SnapshotRequest`, `RestoreRequest`, `RecordRequest` → `RpcReply`;
+/// `info` → `SessionInfo`; `params` → `ParamsReply`; `scenes` → `ScenesReply`; `schema` → `SchemaReply`; `state` →
+/// `StateReply`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verb {
     /// Describe the scene, its bodies and its tools.
@@ -145,13 +146,17 @@ pub enum Verb {
     Snapshot,
     /// Go back to a kept state.
     Restore,
+    /// Begin or end a recording.
+    Record,
+    /// Return the present state as a file.
+    State,
     /// Return the descriptors of the messages.
     Schema,
 }
 
 impl Verb {
     /// Every verb.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Info,
         Self::Load,
         Self::Reset,
@@ -163,10 +168,13 @@ impl Verb {
         Self::Scenes,
         Self::Snapshot,
         Self::Restore,
+        Self::Record,
+        Self::State,
         Self::Schema,
     ];
 
-    /// Whether the verb changes what everybody sees. Anybody may ask the others, which are questions.
+    /// Whether the verb changes what everybody sees, or takes time from the simulation. Anybody may ask the others,
+    /// which are questions.
     pub fn is_order(self) -> bool {
         !matches!(self, Self::Info | Self::Schema | Self::Params | Self::Scenes)
     }
@@ -185,6 +193,8 @@ impl Verb {
             Self::Scenes => "scenes",
             Self::Snapshot => "snapshot",
             Self::Restore => "restore",
+            Self::Record => "record",
+            Self::State => "state",
             Self::Schema => "schema",
         }
     }

@@ -89,6 +89,9 @@ pub const MAX_SMALL_BYTES: usize = 16 * 1024;
 /// Largest report: statistics, plan, session information, schema [bytes].
 pub const MAX_REPORT_BYTES: usize = 256 * 1024;
 
+/// Largest file that `rpc/state` answers with [bytes].
+pub const MAX_STATE_BYTES: usize = 64 * 1024 * 1024;
+
 /// Most bodies of a session.
 pub const MAX_BODIES: usize = 256;
 

@@ -238,6 +238,7 @@ fn session_info() -> impl Strategy<Value = SessionInfo> {
         scene: "kidney".into(),
         up: Some(Vec3 { x: 0.0, y: 1.0, z: 0.0 }),
         obstacles,
+        records: true,
     })
 }
 
@@ -287,6 +288,11 @@ fn stats() -> impl Strategy<Value = Stats> {
         paused: d % 2 == 0,
         clients: vec![ClientStats { client_id: "seven".into(), role: "viewer".into() }],
         client_count: 70,
+        recording: Some(RecordingStats {
+            file: "kidney.mcap".into(),
+            seconds: f64::from(x),
+            bytes: a.into(),
+        }),
     })
 }
 
@@ -394,6 +400,8 @@ proptest! {
         survives(&UndoRequest {})?;
         survives(&SnapshotRequest { name: "before-2".into() })?;
         survives(&RestoreRequest { name: "before-2".into() })?;
+        survives(&RecordRequest { on: true })?;
+        survives(&StateReply { name: "kidney.mcap".into(), file: vec![137; 300].into() })?;
         survives(&LoadRequest { name: text.clone() })?;
         survives(&ScenesReply { scenes: vec![SceneEntry {
             name: "kidney".into(), description: text.clone(),

@@ -30,7 +30,13 @@ as_user=(setpriv --reuid "$user" --regid "$user" --clear-groups --no-new-privs /
 become_in_root "${as_user[@]}" "${entry[@]}" "${command[@]}" &
 started=$!
 python3 tests/package/fetch.py http://127.0.0.1:8080
-in_root "${as_user[@]}" "${health[@]}" | python3 -c 'import json, sys; print("health:", *json.load(sys.stdin)["bodies"])'
+# As a builder of containers does it: again until the server answers, a minute at most.
+for _ in $(seq 1 20); do
+  if in_root "${as_user[@]}" "${health[@]}" >"$root/health.json"; then healthy=1; break; fi
+  sleep 3
+done
+[ -n "${healthy:-}" ] || { echo "container.sh: not healthy after a minute: $(cat "$root/health.json")" >&2; exit 1; }
+python3 -c 'import json, sys; print("health:", *json.load(open(sys.argv[1]))["bodies"])' "$root/health.json"
 kill -TERM "$started"
 wait "$started" && echo "container: the steps of deploy/Containerfile hold on $suite"
 started=

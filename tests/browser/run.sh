@@ -28,8 +28,9 @@ serve() {
 serve browser
 node tests/browser/viewer.mjs "$url"
 stop
-serve views run tests/browser/views.toml
-node tests/browser/views.mjs "$url" "$server"
+rm -rf "$artifacts/views-recordings"
+serve views run tests/browser/views.toml --recordings "$artifacts/views-recordings"
+node tests/browser/views.mjs "$url" "$server" "$bin" "$artifacts/views-recordings"
 stop
 serve hands run tests/browser/hands.toml
 node tests/browser/hands.mjs "$url"

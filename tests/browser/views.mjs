@@ -1,14 +1,15 @@
 // Holds the views of the page: upright, in view, colours, overlays, curves, layout at three sizes, words when nothing
-// comes. Looks at a running views.toml.
+// comes; and records. Looks at a running views.toml.
 //
-//   node views.mjs URL PID      PID: the server, to be stopped and continued
+//   node views.mjs URL PID PROGRAM FOLDER      PID: the server, to be stopped and continued; FOLDER: its recordings
 //
 // The environment: check.mjs.
-import { readFileSync } from "node:fs";
+import { spawnSync } from "node:child_process";
+import { readFileSync, readdirSync } from "node:fs";
 import path from "node:path";
 import { LAUNCH, MINUTE, artifacts, chromium, hold, picture, run, until, watch } from "./check.mjs";
 
-const [, , url, server] = process.argv;
+const [, , url, server, program, recordings] = process.argv;
 const SIZES = [[1440, 900], [800, 600], [390, 780]];
 
 const browser = await chromium.launch(LAUNCH);
@@ -119,6 +120,7 @@ async function keysAndButtons(page) {
   await page.keyboard.press("p");
   hold(/^scindo-views-.*\.png$/.test((await download).suggestedFilename()), "the picture is saved");
   await savesTheSurface(page);
+  await recordsAndSavesTheState(page);
   await page.click("#reset");
   hold(await page.evaluate(() => document.getElementById("reset").classList.contains("sure")), "Reset asks before cuts are lost");
   const before = await page.evaluate(() => window.scindo.stats().simTimeS);
@@ -144,6 +146,29 @@ async function savesTheSurface(page) {
   const corner = (of) => meshes.map((mesh) => accessors[mesh.primitives[0].attributes.POSITION][of]);
   const within = (a, b) => a.every((x, i) => Math.abs(x - b[i]) < 0.02);
   hold(bodies.every((body, i) => within(corner("min")[i], body.min) && within(corner("max")[i], body.max)), "and its size in metres");
+}
+
+/** A recording begins and ends by the button, and the state comes as a file; both are recordings that scindo reads. */
+async function recordsAndSavesTheState(page) {
+  await page.click("#record");
+  await until(page, "a recording is shown to everybody", MINUTE, () => !document.getElementById("recording").hidden);
+  await until(page, "its time passes", MINUTE, () => !/^0:0[01]$/.test(document.getElementById("recording").textContent));
+  await page.screenshot({ path: path.join(artifacts, "views-recording.png") });
+  await page.click("#record");
+  await until(page, "the recording ends", MINUTE, () => document.getElementById("recording").hidden);
+  const shut = !(await page.isVisible("#tray"));
+  if (shut) await page.click("#view-toggle");
+  const download = page.waitForEvent("download", { timeout: MINUTE });
+  await page.click("#save-state");
+  const file = await download, state = path.join(artifacts, "views-state.mcap");
+  await file.saveAs(state);
+  if (shut) await page.click("#view-toggle");
+  hold(/^scindo-views-.*\.mcap$/.test(file.suggestedFilename()), "the state is saved");
+  const [recording] = readdirSync(recordings);
+  for (const mcap of [path.join(recordings, recording), state]) {
+    const replay = spawnSync(program, ["replay", mcap, "--verify"], { encoding: "utf8" });
+    hold(replay.status === 0, `it is computed again to the bit: ${path.basename(mcap)}${replay.status ? replay.stderr : ""}`);
+  }
 }
 
 /** Finds the tool, takes it over the tissue, presses and lifts it, and turns the view, without a mouse. */

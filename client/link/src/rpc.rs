@@ -1,11 +1,11 @@
-//! Questions and orders to the server. Each waits at most [`TIMEOUT`].
+//! Questions and orders to the server. Each waits at most [`TIMEOUT`], that for a state [`STATE_TIMEOUT`].
 
 use std::time::Duration;
 
 use bytes::Bytes;
 use scindo_proto::messages::{
-    Error, LoadRequest, ParamsReply, PauseRequest, ResetRequest, RestoreRequest, RpcReply, ScenesReply,
-    SchemaReply, SessionInfo, SetRequest, SnapshotRequest, StepRequest, UndoRequest,
+    Error, LoadRequest, ParamsReply, PauseRequest, RecordRequest, ResetRequest, RestoreRequest, RpcReply,
+    ScenesReply, SchemaReply, SessionInfo, SetRequest, SnapshotRequest, StateReply, StepRequest, UndoRequest,
 };
 use scindo_proto::{Topic, Verb, WireMessage, encode, encoding};
 use zenoh::query::ConsolidationMode;
@@ -15,6 +15,9 @@ use crate::link::{Link, decode_sample};
 
 /// Longest wait for an answer.
 pub const TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Longest wait for a state, which may have 64 MiB.
+pub const STATE_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Pause before a question that reached nobody is repeated.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -70,6 +73,17 @@ impl Link {
         self.order(Verb::Restore, &RestoreRequest { name: name.to_owned() }).await
     }
 
+    /// Begins (`true`) or ends a recording in the folder of the server. The reply's message is the name of the file.
+    pub async fn record(&self, on: bool) -> Result<RpcReply, LinkError> {
+        self.order(Verb::Record, &RecordRequest { on }).await
+    }
+
+    /// The present state as a recording without steps, at most 64 MiB. Waits at most [`STATE_TIMEOUT`].
+    pub async fn state(&self) -> Result<StateReply, LinkError> {
+        let key = self.keys().key(&Topic::Rpc(Verb::State));
+        self.ask_for(STATE_TIMEOUT, key, Bytes::new(), None).await
+    }
+
     /// The scenes that [`Self::load`] accepts.
     pub async fn scenes(&self) -> Result<ScenesReply, LinkError> {
         self.question(Verb::Scenes).await
@@ -119,9 +133,19 @@ impl Link {
         payload: Bytes,
         encoding: Option<String>,
     ) -> Result<R, LinkError> {
+        self.ask_for(TIMEOUT, key, payload, encoding).await
+    }
+
+    async fn ask_for<R: WireMessage>(
+        &self,
+        patience: Duration,
+        key: String,
+        payload: Bytes,
+        encoding: Option<String>,
+    ) -> Result<R, LinkError> {
         let started = std::time::Instant::now();
         let mut query =
-            self.bulk().get(&key).payload(payload).consolidation(ConsolidationMode::None).timeout(TIMEOUT);
+            self.bulk().get(&key).payload(payload).consolidation(ConsolidationMode::None).timeout(patience);
         if let Some(encoding) = encoding {
             query = query.encoding(encoding);
         }
@@ -131,7 +155,7 @@ impl Link {
         };
         match reply.result() {
             Ok(sample) => decode_sample(sample),
-            Err(_) if started.elapsed() >= TIMEOUT => Err(LinkError::Timeout { key, waited: TIMEOUT }),
+            Err(_) if started.elapsed() >= patience => Err(LinkError::Timeout { key, waited: patience }),
             Err(error) => {
                 let bytes = Bytes::from(error.payload().to_bytes().into_owned());
                 match prost::Message::decode(bytes) {

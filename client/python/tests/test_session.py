@@ -1,7 +1,9 @@
 """A session with a real server: mirror, tools, cuts, orders, and what goes wrong."""
 
 import os
+import tempfile
 import unittest
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -252,6 +254,16 @@ class Orders(WithServer):
         with self.refused("out-of-range"):
             self.session.snapshot("Not a name")
         self.session.resume()
+
+    def test_a_recording_and_a_state_in_a_file(self):
+        with tempfile.TemporaryDirectory() as folder:
+            state = Path(folder) / "state.mcap"
+            size = self.session.save_state(state)
+            self.assertEqual(state.stat().st_size, size)
+            self.assertEqual(state.read_bytes()[1:5], b"MCAP")
+        # The server of these tests has no folder for recordings.
+        with self.refused("cannot-record"):
+            self.session.record()
 
     def test_another_scene(self):
         self.assertIn("kidney", self.session.scenes)

@@ -287,6 +287,11 @@ async fn ask(link: &Link, call: ViewerRpc) -> ViewerRpcReply {
         Some(Call::Set(request)) => link.set(&request.key, &request.value).await,
         Some(Call::Undo(_)) => link.undo().await,
         Some(Call::Load(request)) => link.load(&request.name).await,
+        Some(Call::Record(request)) => link.record(request.on).await,
+        Some(Call::State(_)) => link.state().await.map(|state| {
+            answer.state = Some(state);
+            RpcReply { ok: true, ..RpcReply::default() }
+        }),
         Some(Call::Params(_)) => link.params().await.map(|params| {
             answer.params = Some(params);
             RpcReply { ok: true, ..RpcReply::default() }

@@ -6,13 +6,13 @@ use super::field::{Checked, In};
 use crate::codec::{CountLimit, DecodeError, WireMessage};
 use crate::limits::{
     MAX_BODIES, MAX_COORDINATE_M, MAX_LAYERS, MAX_OBSTACLE_TRIANGLES, MAX_OBSTACLES, MAX_PARAMS, MAX_PROBES,
-    MAX_REPORT_BYTES, MAX_REPORT_ENTRIES, MAX_RPC_STEPS, MAX_SCENES, MAX_SMALL_BYTES, MAX_TOOLS,
-    POSITION_BYTES, QUATERNION_TOLERANCE, TRIANGLE_BYTES,
+    MAX_REPORT_BYTES, MAX_REPORT_ENTRIES, MAX_RPC_STEPS, MAX_SCENES, MAX_SMALL_BYTES, MAX_STATE_BYTES,
+    MAX_TOOLS, POSITION_BYTES, QUATERNION_TOLERANCE, TRIANGLE_BYTES,
 };
 use crate::messages::{
-    BodyLook, Event, LoadRequest, Measures, ObstacleInfo, ParamsReply, PauseRequest, Plan, ResetRequest,
-    RestoreRequest, RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest, SnapshotRequest, Stats,
-    StepRequest, UndoRequest, event, obstacle_info, param,
+    BodyLook, Event, LoadRequest, Measures, ObstacleInfo, ParamsReply, PauseRequest, Plan, RecordRequest,
+    ResetRequest, RestoreRequest, RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest,
+    SnapshotRequest, StateReply, Stats, StepRequest, UndoRequest, event, obstacle_info, param,
 };
 
 const fn count(tag: u32, field: &'static str, allowed: usize) -> CountLimit {
@@ -119,6 +119,10 @@ impl WireMessage for Stats {
         for client in &self.clients {
             at.id("clients.client_id", &client.client_id)?;
             at.text("clients.role", &client.role)?;
+        }
+        if let Some(recording) = &self.recording {
+            at.text("recording.file", &recording.file)?;
+            at.finite("recording.seconds", recording.seconds)?;
         }
         self.refused.iter().try_for_each(|counter| at.text("refused.name", &counter.name))
     }
@@ -250,6 +254,22 @@ impl WireMessage for RestoreRequest {
 
     fn check(&self) -> Checked {
         In(Self::NAME).id("name", &self.name)
+    }
+}
+
+impl WireMessage for RecordRequest {
+    const MAX_BYTES: usize = MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        Ok(())
+    }
+}
+
+impl WireMessage for StateReply {
+    const MAX_BYTES: usize = MAX_STATE_BYTES + MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        In(Self::NAME).text("name", &self.name)
     }
 }
 

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::Sender;
-use scindo_proto::messages::{CutAck, Event, ParamsReply, Plan, event};
+use scindo_proto::messages::{CutAck, Event, ParamsReply, Plan, RecordingStats, event};
 use scindo_world::inputs::Wants;
 use scindo_world::simulation::Level;
 
@@ -83,6 +83,8 @@ pub struct Exchange {
     event_seq: AtomicU64,
     /// Parameters that `rpc/set` may change, after the last change.
     params: Mutex<ParamsReply>,
+    /// The recording under way.
+    recording: Mutex<Option<RecordingStats>>,
     /// By name of event: start of the current interval, and events since then.
     told: Mutex<BTreeMap<String, (Instant, u64)>>,
     outgoing: Sender<Outgoing>,
@@ -128,6 +130,7 @@ impl Exchange {
             answers_lost: AtomicU64::new(0),
             event_seq: AtomicU64::new(0),
             params: Mutex::default(),
+            recording: Mutex::default(),
             told: Mutex::default(),
             outgoing,
             answers,
@@ -147,6 +150,16 @@ impl Exchange {
     /// Replaces the parameters that `rpc/set` may change.
     pub fn set_params(&self, params: ParamsReply) {
         *self.params.lock().unwrap_or_else(PoisonError::into_inner) = params;
+    }
+
+    /// The recording under way.
+    pub fn recording(&self) -> Option<RecordingStats> {
+        self.recording.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Replaces what is known of the recording under way.
+    pub fn set_recording(&self, recording: Option<RecordingStats>) {
+        *self.recording.lock().unwrap_or_else(PoisonError::into_inner) = recording;
     }
 
     /// Records whether somebody subscribes to the surface of body `index`.

@@ -334,6 +334,7 @@ impl PublishThread {
             paused: self.exchange.paused.load(Ordering::Relaxed),
             clients,
             client_count,
+            recording: self.exchange.recording(),
         }
     }
 

@@ -3,6 +3,7 @@
 //! * [`inputs`]: inputs of a step ↔ messages.
 //! * [`writer`]: the thread that writes.
 //! * [`recorder`]: what the simulation hands to it.
+//! * [`on_demand`]: recordings that an operator begins and ends.
 //! * [`reader`]: a recording as a stream of messages, also if its end is missing.
 //! * [`replay`]: the same simulation again, step by step, held against the recorded hashes.
 //! * [`gltf`]: surfaces as key frames of a picture that moves.
@@ -15,6 +16,8 @@ pub mod inputs;
 pub mod writer;
 
 pub mod recorder;
+
+pub mod on_demand;
 
 pub mod reader;
 

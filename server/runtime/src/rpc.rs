@@ -4,14 +4,14 @@ pub mod catalogue;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use prost::Message as _;
 use scindo_proto::messages::{
-    Error, LoadRequest, PauseRequest, ResetRequest, RestoreRequest, RpcReply, SchemaReply, SessionInfo,
-    SetRequest, SnapshotRequest, StepRequest, UndoRequest,
+    Error, LoadRequest, PauseRequest, RecordRequest, ResetRequest, RestoreRequest, RpcReply, SchemaReply,
+    SessionInfo, SetRequest, SnapshotRequest, StateReply, StepRequest, UndoRequest,
 };
 use scindo_proto::{FILE_DESCRIPTOR_SET, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
 use scindo_world::inputs::{ToolInput, ToolShape};
@@ -19,7 +19,8 @@ use zenoh::Wait as _;
 use zenoh::query::Query;
 
 use crate::exchange::Exchange;
-use crate::sim::{Command, Order};
+use crate::record::on_demand::stem;
+use crate::sim::{Answer, Command, Order};
 use catalogue::Catalogue;
 
 /// Most questions that may wait. Further ones are refused at once.
@@ -78,6 +79,10 @@ impl RpcThread {
                 let file_descriptor_set = Bytes::from_static(FILE_DESCRIPTOR_SET);
                 reply(query, &SchemaReply { file_descriptor_set });
             }
+            Verb::State => match self.state() {
+                Ok(state) => reply(query, &state),
+                Err(error) => refuse(query, error),
+            },
             Verb::Load => match decode::<LoadRequest>(payload) {
                 Ok(request) => reply(query, &self.load(&request.name)),
                 Err(e) => refuse(query, error(e.code(), e.to_string(), "see rpc/schema")),
@@ -88,11 +93,28 @@ impl RpcThread {
             | Verb::Undo
             | Verb::Set
             | Verb::Snapshot
-            | Verb::Restore => match order(verb, payload) {
+            | Verb::Restore
+            | Verb::Record => match order(verb, payload) {
                 Ok(order) => reply(query, &self.carry_out(order)),
                 Err(error) => refuse(query, error),
             },
         }
+    }
+
+    /// Reads the state from the simulation, and packs it while that goes on.
+    fn state(&self) -> Result<StateReply, Error> {
+        let Answer { reply, state } = self.ask(Order::State);
+        let state = match (state, reply.error) {
+            (Some(state), _) => state,
+            (None, Some(error)) => return Err(error),
+            (None, None) => {
+                let message = "the simulation makes a long step".to_owned();
+                return Err(error("busy", message, "send it again later"));
+            }
+        };
+        let words = |reason| error("cannot-send-state", reason, "see the log of the server");
+        let name = format!("{}.mcap", stem(state.scene(), SystemTime::now()));
+        Ok(StateReply { name, file: state.file().map_err(words)?.into() })
     }
 
     /// Accepts the scene; it is built while the present one goes on. If that fails, an event says why.
@@ -126,6 +148,10 @@ impl RpcThread {
     }
 
     fn carry_out(&self, order: Order) -> RpcReply {
+        self.ask(order).reply
+    }
+
+    fn ask(&self, order: Order) -> Answer {
         let (answer, answers) = bounded(1);
         self.exchange.order_given();
         if self.commands.try_send(Command { order, answer }).is_err() {
@@ -134,13 +160,12 @@ impl RpcThread {
                 "too many commands are waiting for the simulation".into(),
                 "send it again later",
             );
-            return RpcReply { error: Some(error), ..RpcReply::default() };
+            return RpcReply { error: Some(error), ..RpcReply::default() }.into();
         }
-        answers.recv_timeout(PATIENCE).unwrap_or_else(|_| RpcReply {
-            ok: true,
-            sim_step: self.exchange.sim_step.load(Ordering::Relaxed),
-            message: "accepted; still running".to_owned(),
-            error: None,
+        answers.recv_timeout(PATIENCE).unwrap_or_else(|_| {
+            let sim_step = self.exchange.sim_step.load(Ordering::Relaxed);
+            let message = "accepted; still running".to_owned();
+            RpcReply { ok: true, sim_step, message, error: None }.into()
         })
     }
 }
@@ -158,6 +183,7 @@ fn order(verb: Verb, payload: Bytes) -> Result<Order, Error> {
             let SetRequest { key, value } = decode(payload).map_err(read)?;
             Order::Set { key, value }
         }
+        Verb::Record => Order::Record(decode::<RecordRequest>(payload).map_err(read)?.on),
         Verb::Snapshot => Order::Snapshot(decode::<SnapshotRequest>(payload).map_err(read)?.name),
         Verb::Restore => Order::Restore(decode::<RestoreRequest>(payload).map_err(read)?.name),
         _ => {

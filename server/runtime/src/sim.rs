@@ -10,7 +10,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender};
-use scindo_proto::messages::{BodyEpoch, RpcReply};
+use scindo_proto::messages::{BodyEpoch, RecordingStats, RpcReply};
 use scindo_world::inputs::{Inputs, Wants};
 use scindo_world::simulation::Level;
 use scindo_world::snapshot::Snapshot;
@@ -18,6 +18,7 @@ use triple_buffer::Input;
 
 use crate::exchange::{Exchange, Outgoing};
 use crate::inbox::{Answering, Refusal};
+use crate::record::recorder::StateMessages;
 use engine::Engine;
 
 /// How often a paused simulation checks for new listeners.
@@ -47,6 +48,10 @@ pub enum Order {
     Snapshot(String),
     /// Go back to the state with this name.
     Restore(String),
+    /// Begin (`true`) or end a recording.
+    Record(bool),
+    /// Hand the present state over.
+    State,
     /// Change a parameter of the scene.
     Set {
         /// Key, as in the scene file.
@@ -61,7 +66,21 @@ pub struct Command {
     /// The requested action.
     pub order: Order,
     /// Channel that takes one answer.
-    pub answer: Sender<RpcReply>,
+    pub answer: Sender<Answer>,
+}
+
+/// The answer to an order.
+pub struct Answer {
+    /// What the client receives.
+    pub reply: RpcReply,
+    /// The state, if that was the order and it could be read.
+    pub state: Option<StateMessages>,
+}
+
+impl From<RpcReply> for Answer {
+    fn from(reply: RpcReply) -> Self {
+        Self { reply, state: None }
+    }
 }
 
 /// How fast and how long the simulation runs.
@@ -86,7 +105,7 @@ pub struct SimThread {
     step: u64,
     next_step: Instant,
     /// Steps that a paused simulation still has to make, and the client that waits for them.
-    owed: Option<(u32, Sender<RpcReply>)>,
+    owed: Option<(u32, Sender<Answer>)>,
     panics: u32,
     next_plan: Instant,
     body_ids: Vec<String>,
@@ -196,10 +215,41 @@ impl SimThread {
             Order::Undo => self.undo(),
             Order::Snapshot(name) => self.snapshot(&name),
             Order::Restore(name) => self.restore(&name),
+            Order::Record(on) => self.record(on),
+            Order::State => {
+                let _ = answer.try_send(self.state());
+                return;
+            }
             Order::Set { key, value } => self.set(&key, &value),
         };
         // The client may have given up waiting.
-        let _ = answer.try_send(self.reply(reply));
+        let _ = answer.try_send(self.reply(reply).into());
+    }
+
+    fn record(&mut self, on: bool) -> Result<String, Refusal> {
+        let done = if on { self.engine.begin_recording() } else { self.engine.end_recording() };
+        let file = done.map_err(|message| Refusal {
+            code: "cannot-record",
+            message,
+            hint: "start the server with --recordings FOLDER, and record one at a time",
+        })?;
+        if on {
+            self.exchange.event(Level::Info, "recording", format!("{file} is being recorded"));
+        }
+        self.exchange.set_recording(self.engine.recording());
+        Ok(file)
+    }
+
+    fn state(&self) -> Answer {
+        let refusal = |message| Refusal {
+            code: "cannot-send-state",
+            message,
+            hint: "rpc/record writes states of any size to the disk of the server",
+        };
+        match self.engine.state_messages() {
+            Ok(state) => Answer { reply: self.reply(Ok("read".to_owned())), state: Some(state) },
+            Err(message) => self.reply(Err(refusal(message))).into(),
+        }
     }
 
     fn reset(&mut self) -> Result<String, Refusal> {
@@ -319,7 +369,7 @@ impl SimThread {
             if count > 1 {
                 self.owed = Some((count - 1, answer));
             } else {
-                let _ = answer.try_send(self.reply(Ok("stepped".to_owned())));
+                let _ = answer.try_send(self.reply(Ok("stepped".to_owned())).into());
             }
         }
     }
@@ -351,6 +401,7 @@ impl SimThread {
             let message = format!("the recording ends at this step, the simulation goes on: {reason}");
             self.exchange.event(Level::Error, "recording-ended", message);
         }
+        self.report_recordings();
         let report = self.engine.report();
         self.exchange.meter.step(report.seconds.iter());
         if let Some(metrics) = self.exchange.metrics.get() {
@@ -382,6 +433,18 @@ impl SimThread {
             self.exchange.event(level, name, message);
             self.exchange.answer(answer);
         }
+    }
+
+    /// Tells how long the recording is, and which files are complete.
+    fn report_recordings(&mut self) {
+        while let Some((RecordingStats { file, seconds, .. }, ended)) = self.engine.take_ended_recording() {
+            let (level, message) = match ended {
+                Ok(()) => (Level::Info, format!("{file} is complete, {seconds:.0} s")),
+                Err(error) => (Level::Error, error.to_string()),
+            };
+            self.exchange.event(level, "recording-ended", message);
+        }
+        self.exchange.set_recording(self.engine.recording());
     }
 
     /// Hands fresh snapshots to the publisher and, while somebody holds a tool, to the contact thread. A run

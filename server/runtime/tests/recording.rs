@@ -3,15 +3,16 @@
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Vector3};
 use prost::Message;
+use scindo::record::on_demand::RecordFolder;
 use scindo::record::reader::{Recorded, Recording};
 use scindo::record::recorder::RecordSettings;
-use scindo::record::replay::Replay;
+use scindo::record::replay::{Replay, newest};
 use scindo::record::writer::{Item, TOPICS, WriterThread};
 use scindo::sim::engine::Engine;
 use scindo_world::inputs::{CutRequest, Inputs, ToolInput, ToolMode, ToolShape};
@@ -144,6 +145,55 @@ fn a_session_with_a_hundred_cuts_is_the_same_on_one_two_and_three_threads() {
     let simulation = Simulation::new(&Scene::from_toml(SCENE).unwrap(), Path::new("")).unwrap();
     let refused = Engine::new(simulation, None).unwrap().record(settings).unwrap_err().to_string();
     assert!(refused.contains("must not exist yet"), "{refused}");
+}
+
+#[test]
+fn an_operator_records_a_part_and_takes_the_state_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = Scene::from_toml(SCENE).unwrap();
+    let begin = || Engine::new(Simulation::new(&scene, Path::new("")).unwrap(), None).unwrap();
+    let mut engine = begin();
+    assert!(engine.begin_recording().unwrap_err().contains("without a folder"));
+    let settings = RecordSettings {
+        file: PathBuf::new(),
+        checkpoint: Duration::from_millis(50),
+        surfaces: false,
+        patient: true,
+        threads: 1,
+    };
+    engine.let_record(RecordFolder { folder: folder.path().to_owned(), settings });
+    assert!(engine.end_recording().unwrap_err().contains("nothing is being recorded"));
+    (0..30).for_each(|step| engine.step(&inputs(step)));
+    let file = engine.begin_recording().unwrap();
+    assert!(engine.begin_recording().unwrap_err().contains(&file));
+    (30..70).for_each(|step| engine.step(&inputs(step)));
+    assert!(engine.recording().unwrap().bytes > 0);
+    let state = engine.state_messages().unwrap().file().unwrap();
+    assert_eq!(engine.end_recording().unwrap(), file);
+    assert_eq!(engine.recording(), None);
+    // Another one within the same second has a name of its own.
+    let other = engine.begin_recording().unwrap();
+    assert_ne!(other, file);
+    (70..80).for_each(|step| engine.step(&inputs(step)));
+    engine.finish("done").unwrap();
+    for (file, steps) in [(&file, 40), (&other, 10)] {
+        let found = replayed(&folder.path().join(file), 2, None);
+        assert_eq!((found.steps, found.compared, found.jumps.len()), (steps, steps, 1), "{found:?}");
+        assert_eq!((&found.first_difference, &found.truncated), (&None, &None));
+    }
+    let taken = folder.path().join("state.mcap");
+    fs::write(&taken, &state).unwrap();
+    let (from, step, state) = newest(&taken).unwrap();
+    let mut simulation = Simulation::new(&from, Path::new("")).unwrap();
+    simulation.restore(&state).unwrap();
+    assert_eq!((step, simulation.steps()), (70, 70));
+    (70..80).for_each(|step| {
+        simulation.step(&inputs(step));
+    });
+    assert_eq!(simulation.state_hash(), engine.simulation().state_hash());
+    let mut replay = Replay::open(&taken, 1, None).unwrap();
+    assert_eq!(replay.step().unwrap(), None);
+    assert_eq!(replay.simulation().steps(), 70);
 }
 
 #[test]

@@ -179,6 +179,8 @@ fn orders() {
         all::<LoadRequest>(bytes);
         all::<SnapshotRequest>(bytes);
         all::<RestoreRequest>(bytes);
+        all::<RecordRequest>(bytes);
+        all::<StateReply>(bytes);
     });
 }
 

@@ -1,8 +1,10 @@
-"""Orders to the server: pause, step, reset, set, undo, snapshot, restore, load."""
+"""Orders to the server: pause, step, reset, set, undo, snapshot, restore, record, load."""
 
 from __future__ import annotations
 
+import os
 import time
+from pathlib import Path
 from typing import Dict, Union
 
 import numpy as np
@@ -73,6 +75,21 @@ class Orders:
     def restore(self, name: str) -> None:
         """Goes back to a state that ``snapshot`` kept, with its cuts and its time. Epochs keep rising."""
         self._order("restore", server_pb2.RestoreRequest(name=name))
+
+    def record(self, on: bool = True) -> str:
+        """Begins or ends a recording, and returns the name of its file in the folder that the server was started with
+        (``--recordings FOLDER``).
+
+        Raises:
+            Refused: there is no such folder, something is being recorded already, or nothing is (``cannot-record``).
+        """
+        return self._order("record", server_pb2.RecordRequest(on=on)).message
+
+    def save_state(self, path: Union[str, "os.PathLike[str]"], timeout: float = 30.0) -> int:
+        """Writes the present state, with its cuts, to a file ``.mcap`` of this machine, and returns its size [bytes].
+        ``scindo run --resume FILE`` goes on from it. States of more than 64 MiB are refused."""
+        file = self.link.ask(self.link.keys.rpc("state"), server_pb2.StateReply, timeout=timeout).file
+        return Path(path).write_bytes(file)
 
     def set(self, key: str, value: Union[str, float, bool, Vector]) -> None:
         """Changes one of ``params``, such as ``session.set("body.liver.young_pa", 5e3)``."""

@@ -17,6 +17,7 @@ import { Obstacles } from "./obstacles";
 import { Overlays } from "./overlays";
 import { Params } from "./params";
 import { People } from "./people";
+import { Recording } from "./record";
 import { Probes } from "./probes";
 import { View } from "./view";
 import { exposeHooks } from "./hooks";
@@ -43,6 +44,7 @@ class Page {
   private readonly view: View;
   private readonly params = new Params(this.relay, this.session);
   private readonly people = new People(this.session, this.relay);
+  private readonly record = new Recording(this.session, this.relay);
   private readonly colours: Colours;
   private readonly curves = new Curves();
   private readonly forces: Forces;
@@ -87,6 +89,7 @@ class Page {
         this.session.operator = message.value.operator;
         this.panel.showHello(message.value);
         this.bar.refresh();
+        this.record.refresh();
         this.view.ask(true);
         this.people.tell();
         break;
@@ -132,11 +135,14 @@ class Page {
         this.colours.setStats(message.value);
         this.curves.stats(message.value);
         this.people.setStats(message.value);
+        this.record.setStats(message.value);
         this.bar.refresh();
         break;
       case "event": this.panel.event(message.value); break;
       case "rpc":
         this.panel.showRpc(message.value);
+        if (message.value.state) this.record.take(message.value.state);
+        else this.record.refresh();
         if (message.value.params) this.params.showParams(message.value.params);
         if (message.value.scenes) this.params.showScenes(message.value.scenes);
         break;
@@ -176,6 +182,7 @@ class Page {
     this.curves.restart();
     this.forces.restart();
     this.panel.showInfo(info);
+    this.record.setAllowed(info.records);
     this.params.setScene(info.scene);
     if (this.view.isOpen) this.params.ask();
     this.stage.setUp(info.up);

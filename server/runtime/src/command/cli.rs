@@ -157,11 +157,14 @@ pub struct ServeArgs {
     /// Record inputs, events, forces, hashes and checkpoints into a new file, for `scindo replay` and `export`.
     #[arg(long, value_name = "FILE.mcap")]
     pub record: Option<PathBuf>,
+    /// Let operators begin and end recordings into this folder, from the page or by rpc/record.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "record")]
+    pub recordings: Option<PathBuf>,
     /// Time between two checkpoints of a recording [s]; large scenes take longer.
-    #[arg(long, value_name = "S", default_value_t = 1.0, requires = "record")]
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
     pub checkpoint_s: f64,
     /// Record the surfaces of all bodies as well, in every step.
-    #[arg(long, requires = "record")]
+    #[arg(long)]
     pub record_surfaces: bool,
     /// First chunk of every network key; one per laboratory.
     #[arg(long, default_value = "scindo")]

@@ -22,6 +22,7 @@ use super::progress::{Progress, Share};
 use super::say::say;
 use crate::error::RuntimeError;
 use crate::metrics::{self, Metrics};
+use crate::record::on_demand::{RecordFolder, prepare};
 use crate::record::recorder::RecordSettings;
 use crate::record::replay::newest;
 use crate::rpc::catalogue::Catalogue;
@@ -98,8 +99,8 @@ fn serve(
     let keys = KeySpace::new(&args.realm, &args.session)?;
     let pace = pace(args, scene.checked().step_s)?;
     let mut engine = build(scene, args, state)?;
-    if let Some(settings) = record_settings(args)? {
-        engine.record(settings)?;
+    if args.record.is_some() {
+        engine.record(record_settings(args)?)?;
     }
     let foreground = foreground()?;
     let network = network(args, &keys, &engine)?;
@@ -178,8 +179,8 @@ fn pace(args: &ServeArgs, step_s: f64) -> Result<Pace, RuntimeError> {
     Ok(Pace { fast: args.fast, steps })
 }
 
-fn record_settings(args: &ServeArgs) -> Result<Option<RecordSettings>, RuntimeError> {
-    let Some(file) = &args.record else { return Ok(None) };
+/// Settings of recordings into the file that was asked for, or into another one.
+fn record_settings(args: &ServeArgs) -> Result<RecordSettings, RuntimeError> {
     let checkpoint = Duration::try_from_secs_f64(args.checkpoint_s).ok().filter(|s| !s.is_zero());
     let checkpoint = checkpoint.ok_or_else(|| RuntimeError::Option {
         option: "--checkpoint-s",
@@ -187,8 +188,9 @@ fn record_settings(args: &ServeArgs) -> Result<Option<RecordSettings>, RuntimeEr
         reason: "a time between two checkpoints must be positive".to_owned(),
         next: "Leave it out for one second".to_owned(),
     })?;
-    let (file, surfaces, threads) = (file.clone(), args.record_surfaces, u32::from(args.threads));
-    Ok(Some(RecordSettings { file, checkpoint, surfaces, patient: args.fast, threads }))
+    let file = args.record.clone().unwrap_or_default();
+    let (surfaces, threads) = (args.record_surfaces, u32::from(args.threads));
+    Ok(RecordSettings { file, checkpoint, surfaces, patient: args.fast, threads })
 }
 
 fn build(scene: &Scene, args: &ServeArgs, state: Option<&[u8]>) -> Result<Engine, RuntimeError> {
@@ -208,7 +210,13 @@ fn build(scene: &Scene, args: &ServeArgs, state: Option<&[u8]>) -> Result<Engine
         tracing::warn!("{warning}");
     }
     let results = args.out.as_deref().map(|directory| Results::begin(directory, scene, &simulation));
-    Engine::new(simulation, results.transpose()?)
+    let mut engine = Engine::new(simulation, results.transpose()?)?;
+    engine.note_threads(u32::from(args.threads));
+    if let Some(folder) = &args.recordings {
+        prepare(folder)?;
+        engine.let_record(RecordFolder { folder: folder.clone(), settings: record_settings(args)? });
+    }
+    Ok(engine)
 }
 
 fn network(args: &ServeArgs, keys: &KeySpace, engine: &Engine) -> Result<NetworkConfig, RuntimeError> {

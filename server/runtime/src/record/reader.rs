@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
+use mcap::read::ChunkReader;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use prost::Message;
@@ -18,6 +19,9 @@ use crate::error::RuntimeError;
 
 /// Most bytes that are read at a time.
 const READ: usize = 1 << 20;
+
+/// Number of the topic of checkpoints in [`TOPICS`].
+const CHECKPOINT: usize = 3;
 
 /// Longest record of a file [byte]: a checkpoint of the largest scenes.
 const LONGEST: usize = 4 << 30;
@@ -57,11 +61,17 @@ impl Recording {
     /// # Errors
     /// The file cannot be read, or does not begin like an MCAP file.
     pub fn open(path: &Path) -> Result<Self, RuntimeError> {
+        Self::open_with(path, false)
+    }
+
+    /// `packed`: chunks are not unpacked.
+    fn open_with(path: &Path, packed: bool) -> Result<Self, RuntimeError> {
         let name = path.display().to_string();
         let failed = |reason: String| RuntimeError::NoRecording { file: name.clone(), reason };
         let file = File::open(path).map_err(|e| failed(e.to_string()))?;
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(false)
+            .with_emit_chunks(packed)
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(LONGEST);
         Ok(Self {
@@ -93,6 +103,30 @@ impl Recording {
     /// # Errors
     /// A message that cannot be decoded.
     pub fn next_message(&mut self) -> Result<Option<Recorded>, RuntimeError> {
+        self.next_of(|channels, record| match record {
+            Record::Channel(channel) => {
+                let known = TOPICS.iter().position(|(topic, _)| *topic == channel.topic);
+                if let Some(topic) = known {
+                    channels.insert(channel.id, topic);
+                }
+                Ok(None)
+            }
+            Record::Message { header, data } => match channels.get(&header.channel_id) {
+                Some(&topic) => {
+                    let words = |error| format!("a message on {}: {error}", TOPICS[topic].0);
+                    decode(topic, &data).map_err(words)
+                }
+                None => Ok(None),
+            },
+            _ => Ok(None),
+        })
+    }
+
+    /// The next record of which `take` makes something; `None` at the end. It also gets the channels.
+    fn next_of<T>(
+        &mut self,
+        mut take: impl FnMut(&mut HashMap<u16, usize>, Record<'_>) -> Result<Option<T>, String>,
+    ) -> Result<Option<T>, RuntimeError> {
         while !self.ended {
             let Some(event) = self.reader.next_event() else {
                 self.ended = true;
@@ -111,37 +145,18 @@ impl Recording {
                         Err(error) => return Err(self.foreign(error.to_string())),
                     }
                 }
-                Ok(LinearReadEvent::Record { data, opcode }) => {
-                    let record = match mcap::parse_record(opcode, data) {
-                        Ok(record) => record,
-                        Err(error) => {
-                            let words = error.to_string();
-                            self.end_early(&words);
-                            break;
-                        }
-                    };
-                    match record {
-                        Record::Channel(channel) => {
-                            let known = TOPICS.iter().position(|(topic, _)| *topic == channel.topic);
-                            if let Some(topic) = known {
-                                self.channels.insert(channel.id, topic);
-                            }
-                        }
-                        Record::Message { header, data } => {
-                            let Some(&topic) = self.channels.get(&header.channel_id) else { continue };
-                            match decode(topic, &data) {
-                                Ok(None) => {}
-                                Ok(Some(message)) => return Ok(Some(message)),
-                                Err(error) => {
-                                    let reason = format!("a message on {}: {error}", TOPICS[topic].0);
-                                    return Err(self.foreign(reason));
-                                }
-                            }
-                        }
-                        Record::Footer(_) => self.ended = true,
-                        _ => {}
+                Ok(LinearReadEvent::Record { data, opcode }) => match mcap::parse_record(opcode, data) {
+                    Ok(Record::Footer(_)) => self.ended = true,
+                    Ok(record) => match take(&mut self.channels, record) {
+                        Ok(None) => {}
+                        Ok(taken) => return Ok(taken),
+                        Err(reason) => return Err(self.foreign(reason)),
+                    },
+                    Err(error) => {
+                        let words = error.to_string();
+                        self.end_early(&words);
                     }
-                }
+                },
                 Err(error) => {
                     let words = error.to_string();
                     self.end_early(&words);
@@ -166,12 +181,49 @@ impl Recording {
     }
 }
 
+/// The scene and the newest checkpoint of a recording. Unpacks only the chunks that hold them, so that a server which
+/// was killed after hours goes on within seconds.
+///
+/// # Errors
+/// No recording, or one without a checkpoint.
+pub fn newest_checkpoint(path: &Path) -> Result<(RecordedScene, RecordedCheckpoint), RuntimeError> {
+    let mut recording = Recording::open(path)?;
+    let scene = recording.scene()?;
+    let is_checkpoint = |channel| recording.channels.get(&channel) == Some(&CHECKPOINT);
+    let mut packed = Recording::open_with(path, true)?;
+    // The last chunk, and the last one whose index tells of checkpoints.
+    let (mut last, mut found) = (None, None);
+    packed.next_of(|_, record| {
+        match record {
+            Record::Chunk { header, data } => last = Some((header, data.into_owned())),
+            Record::MessageIndex(index) if is_checkpoint(index.channel_id) && !index.records.is_empty() => {
+                found = last.take().or(found.take());
+            }
+            _ => {}
+        }
+        Ok(None::<()>)
+    })?;
+    let (header, data) = found.ok_or_else(|| packed.foreign("it holds no checkpoint".to_owned()))?;
+    let words = |error: mcap::McapError| packed.foreign(error.to_string());
+    let mut newest = None;
+    for record in ChunkReader::new(header, &data).map_err(words)? {
+        if let Record::Message { header, data } = record.map_err(words)?
+            && is_checkpoint(header.channel_id)
+        {
+            newest = Some(data.into_owned());
+        }
+    }
+    let newest = newest.ok_or_else(|| packed.foreign("it holds no checkpoint".to_owned()))?;
+    let checkpoint = RecordedCheckpoint::decode(&newest[..]).map_err(|e| packed.foreign(e.to_string()))?;
+    Ok((scene, checkpoint))
+}
+
 fn decode(topic: usize, data: &[u8]) -> Result<Option<Recorded>, prost::DecodeError> {
     Ok(Some(match topic {
         0 => Recorded::Scene(RecordedScene::decode(data)?),
         1 => Recorded::Step(RecordedStep::decode(data)?),
         2 => Recorded::Order(RecordedOrder::decode(data)?),
-        3 => Recorded::Checkpoint(RecordedCheckpoint::decode(data)?),
+        CHECKPOINT => Recorded::Checkpoint(RecordedCheckpoint::decode(data)?),
         4 => Recorded::Event(RecordedEvent::decode(data)?),
         6 => Recorded::Forces(RecordedForces::decode(data)?),
         _ => return Ok(None),

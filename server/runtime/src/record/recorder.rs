@@ -7,19 +7,22 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use prost::Message;
 use scindo_proto::messages::{
     RecordedCheckpoint, RecordedEvent, RecordedForces, RecordedOrder, RecordedScene, RecordedStats,
-    RecordedStep, RecordedSurface, recorded_order::Order,
+    RecordedStep, RecordedSurface, RecordingStats, recorded_order::Order,
 };
 use scindo_world::inputs::{Inputs, Wants};
 use scindo_world::simulation::Simulation;
 use scindo_world::snapshot::Snapshot;
 
 use super::inputs;
-use super::writer::{Item, WriterThread};
+use super::writer::{Item, WriterThread, in_memory};
 use crate::error::RuntimeError;
 
 /// A checkpoint is not taken more often than this many times what the last one took, so that checkpoints of
 /// large scenes cost at most a twentieth of the time.
 const CHECKPOINT_SHARE: u32 = 20;
+
+/// Why a recording that begins after the first step cannot be computed from its scene alone.
+const IN_THE_MIDDLE: &str = "the recording begins in the middle of a scene";
 
 const SCENE: usize = 0;
 const STEP: usize = 1;
@@ -51,6 +54,9 @@ pub struct Recorder {
     writer: WriterThread,
     /// Steps so far.
     number: u64,
+    began: Instant,
+    /// Size of all messages so far, before compression.
+    bytes: u64,
     next_checkpoint: Instant,
     /// A checkpoint is due, whatever the time.
     due: bool,
@@ -70,6 +76,8 @@ impl Recorder {
         let mut recorder = Self {
             writer,
             number: 0,
+            began: Instant::now(),
+            bytes: 0,
             next_checkpoint: Instant::now() + settings.checkpoint,
             due: true,
             snapshot: Snapshot::default(),
@@ -77,20 +85,9 @@ impl Recorder {
             ended: None,
             settings,
         };
-        let scene = simulation.source();
-        let message = RecordedScene {
-            json: scene.to_json().to_string(),
-            file: scene.file().to_owned(),
-            base_dir: std::path::absolute(scene.base_dir())
-                .map_or_else(|_| String::new(), |folder| folder.display().to_string()),
-            name: scene.name().to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            step_s: simulation.step_s(),
-            threads: recorder.settings.threads,
-        };
-        recorder.send(SCENE, &message);
+        recorder.send(SCENE, &scene_message(simulation, recorder.settings.threads));
         if simulation.steps() > 0 {
-            recorder.jump("the recording begins in the middle of a scene");
+            recorder.jump(IN_THE_MIDDLE);
         }
         recorder.checkpoint(simulation);
         Ok(recorder)
@@ -165,6 +162,13 @@ impl Recorder {
         }
     }
 
+    /// Name of the file, time since it began [s], size of its messages [bytes].
+    pub fn progress(&self) -> RecordingStats {
+        let name = self.settings.file.file_name().unwrap_or_default();
+        let file = name.to_string_lossy().into_owned();
+        RecordingStats { file, seconds: self.began.elapsed().as_secs_f64(), bytes: self.bytes }
+    }
+
     /// Why the recording ended before the simulation, once.
     pub fn take_failure(&mut self) -> Option<String> {
         self.ended.as_mut().map(std::mem::take).filter(|reason| !reason.is_empty())
@@ -220,11 +224,70 @@ impl Recorder {
         if self.ended.is_some() {
             return;
         }
-        let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let unix_ns = u64::try_from(unix.as_nanos()).unwrap_or(u64::MAX);
-        let item = Item { topic, unix_ns, bytes: message.encode_to_vec() };
+        let item = item(topic, message);
+        self.bytes += item.bytes.len() as u64;
         if let Err(reason) = self.writer.send(item, self.settings.patient) {
             self.ended = Some(reason);
         }
+    }
+}
+
+/// A state as the messages of a recording without steps.
+pub struct StateMessages {
+    scene: String,
+    items: Vec<Item>,
+}
+
+impl StateMessages {
+    /// The present state.
+    ///
+    /// # Errors
+    /// The state cannot be written.
+    pub fn of(simulation: &Simulation, threads: u32) -> Result<Self, String> {
+        let (number, step) = (0, simulation.steps());
+        let state = simulation.checkpoint().map_err(|error| error.to_string())?;
+        let scene = scene_message(simulation, threads);
+        let jump = RecordedOrder { number, order: Some(Order::Jump(IN_THE_MIDDLE.to_owned())) };
+        let checkpoint = RecordedCheckpoint { number, step, state: state.into() };
+        let items = vec![item(SCENE, &scene), item(ORDER, &jump), item(CHECKPOINT, &checkpoint)];
+        Ok(Self { scene: scene.name, items })
+    }
+
+    /// Name of the scene.
+    pub fn scene(&self) -> &str {
+        &self.scene
+    }
+
+    /// Size of the messages, before compression [bytes].
+    pub fn bytes(&self) -> usize {
+        self.items.iter().map(|item| item.bytes.len()).sum()
+    }
+
+    /// The bytes of the file.
+    ///
+    /// # Errors
+    /// What the library says.
+    pub fn file(&self) -> Result<Vec<u8>, String> {
+        in_memory(&self.items)
+    }
+}
+
+fn item(topic: usize, message: &impl Message) -> Item {
+    let unix = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let unix_ns = u64::try_from(unix.as_nanos()).unwrap_or(u64::MAX);
+    Item { topic, unix_ns, bytes: message.encode_to_vec() }
+}
+
+fn scene_message(simulation: &Simulation, threads: u32) -> RecordedScene {
+    let scene = simulation.source();
+    RecordedScene {
+        json: scene.to_json().to_string(),
+        file: scene.file().to_owned(),
+        base_dir: std::path::absolute(scene.base_dir())
+            .map_or_else(|_| String::new(), |folder| folder.display().to_string()),
+        name: scene.name().to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        step_s: simulation.step_s(),
+        threads,
     }
 }

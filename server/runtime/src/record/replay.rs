@@ -12,7 +12,7 @@ use scindo_world::simulation::Simulation;
 use serde::Serialize;
 
 use super::inputs;
-use super::reader::{Recorded, Recording};
+use super::reader::{Recorded, Recording, newest_checkpoint};
 use crate::error::RuntimeError;
 
 /// What came of a replay.
@@ -204,20 +204,8 @@ impl Replay {
 /// # Errors
 /// No recording, or one without a checkpoint.
 pub fn newest(path: &Path) -> Result<(Scene, u64, Vec<u8>), RuntimeError> {
-    let mut recording = Recording::open(path)?;
-    let scene = read_scene(&recording.scene()?)?;
-    let mut newest = None;
-    while let Some(message) = recording.next_message()? {
-        if let Recorded::Checkpoint(checkpoint) = message {
-            newest = Some(checkpoint);
-        }
-    }
-    let missing = || RuntimeError::NoRecording {
-        file: path.display().to_string(),
-        reason: "it holds no checkpoint".to_owned(),
-    };
-    let newest = newest.ok_or_else(missing)?;
-    Ok((scene, newest.step, newest.state.to_vec()))
+    let (scene, newest) = newest_checkpoint(path)?;
+    Ok((read_scene(&scene)?, newest.step, newest.state.to_vec()))
 }
 
 fn read_scene(scene: &RecordedScene) -> Result<Scene, RuntimeError> {

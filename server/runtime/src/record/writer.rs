@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -60,19 +60,7 @@ impl WriterThread {
     pub fn begin(path: &Path) -> Result<Self, RuntimeError> {
         let failed = |reason: String| RuntimeError::Recording { file: path.display().to_string(), reason };
         let file = File::create_new(path).map_err(|e| failed(e.to_string()))?;
-        let options = WriteOptions::new()
-            .compression(Some(Compression::Zstd))
-            .compression_level(1)
-            .compression_threads(1)
-            .library(concat!("scindo ", env!("CARGO_PKG_VERSION")));
-        let mut writer = options.create(BufWriter::new(file)).map_err(|e| failed(e.to_string()))?;
-        let mut channels = [0; TOPICS.len()];
-        for (channel, (topic, name)) in channels.iter_mut().zip(TOPICS) {
-            let schema = writer.add_schema(name, "protobuf", FILE_DESCRIPTOR_SET);
-            *channel = schema
-                .and_then(|schema| writer.add_channel(schema, topic, "protobuf", &BTreeMap::new()))
-                .map_err(|e| failed(e.to_string()))?;
-        }
+        let (writer, channels) = open(BufWriter::new(file)).map_err(|e| failed(e.to_string()))?;
         let (queue, items) = bounded(WAITING);
         let waiting = Arc::new(AtomicUsize::new(0));
         let count = Arc::clone(&waiting);
@@ -130,6 +118,38 @@ impl Drop for WriterThread {
             tracing::error!(file = %self.path.display(), "recording: {reason}");
         }
     }
+}
+
+/// A whole recording in memory, as the bytes of its file.
+///
+/// # Errors
+/// What the library says.
+pub fn in_memory(items: &[Item]) -> Result<Vec<u8>, String> {
+    let words = |error: mcap::McapError| error.to_string();
+    let (mut writer, channels) = open(Cursor::new(Vec::new())).map_err(words)?;
+    for (sequence, Item { topic, unix_ns, bytes }) in (1..).zip(items) {
+        let (channel_id, log_time) = (channels[*topic], unix_ns + u64::from(sequence));
+        let header = MessageHeader { channel_id, sequence, log_time, publish_time: *unix_ns };
+        writer.write_to_known_channel(&header, bytes).map_err(words)?;
+    }
+    writer.finish().map_err(words)?;
+    Ok(writer.into_inner().into_inner())
+}
+
+/// Begins a recording, and adds a channel for every topic.
+fn open<W: Write + Seek>(target: W) -> mcap::McapResult<(Writer<W>, [u16; TOPICS.len()])> {
+    let options = WriteOptions::new()
+        .compression(Some(Compression::Zstd))
+        .compression_level(1)
+        .compression_threads(1)
+        .library(concat!("scindo ", env!("CARGO_PKG_VERSION")));
+    let mut writer = options.create(target)?;
+    let mut channels = [0; TOPICS.len()];
+    for (channel, (topic, name)) in channels.iter_mut().zip(TOPICS) {
+        let schema = writer.add_schema(name, "protobuf", FILE_DESCRIPTOR_SET)?;
+        *channel = writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())?;
+    }
+    Ok((writer, channels))
 }
 
 fn write(

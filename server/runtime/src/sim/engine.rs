@@ -5,10 +5,12 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use scindo_proto::limits::{HEADER_BYTES, MAX_PARAMS, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES};
+use scindo_proto::limits::{
+    HEADER_BYTES, MAX_PARAMS, MAX_STATE_BYTES, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES,
+};
 use scindo_proto::messages::{
-    BodyInfo, BodyLook, Effect, LookLayer, ParamsReply, Plan, SessionInfo, SetRequest, ToolInfo,
-    recorded_order,
+    BodyInfo, BodyLook, Effect, LookLayer, ParamsReply, Plan, RecordingStats, SessionInfo, SetRequest,
+    ToolInfo, recorded_order,
 };
 use scindo_proto::{Chunk, WIRE_VERSION};
 use scindo_world::inputs::{CutOutcome, Inputs, Wants};
@@ -20,7 +22,8 @@ use scindo_world::tool::SCRIPT;
 
 use super::snapshots::{self, Snapshots};
 use crate::error::RuntimeError;
-use crate::record::recorder::{RecordSettings, Recorder};
+use crate::record::on_demand::{Ending, RecordFolder};
+use crate::record::recorder::{RecordSettings, Recorder, StateMessages};
 use crate::wire::convert::{to_param, to_shape, to_vec3};
 use crate::wire::obstacle::to_obstacles;
 
@@ -33,6 +36,13 @@ pub struct Engine {
     /// First failure to write results. Later steps are not recorded.
     failure: Option<ResultsError>,
     recorder: Option<Recorder>,
+    /// Where operators may record; `None` if they may not.
+    record_folder: Option<RecordFolder>,
+    /// The present recording was begun by an operator.
+    on_demand: bool,
+    ending: Ending,
+    /// Threads of the simulation, for files; 0 if nobody said.
+    threads: u32,
     snapshots: Snapshots,
 }
 
@@ -45,8 +55,18 @@ impl Engine {
         for tool in &sim.scene().tools {
             Chunk::new("tool id", &tool.id)?;
         }
-        let (recorder, snapshots) = (None, Snapshots::default());
-        Ok(Self { sim, results, panics: 0, failure: None, recorder, snapshots })
+        Ok(Self {
+            sim,
+            results,
+            panics: 0,
+            failure: None,
+            recorder: None,
+            record_folder: None,
+            on_demand: false,
+            ending: Ending::default(),
+            snapshots: Snapshots::default(),
+            threads: 0,
+        })
     }
 
     /// Records everything from now on.
@@ -58,9 +78,78 @@ impl Engine {
         Ok(())
     }
 
+    /// Notes the number of threads of the simulation, which files tell.
+    pub fn note_threads(&mut self, threads: u32) {
+        self.threads = threads;
+    }
+
+    /// Lets operators record into a folder.
+    pub fn let_record(&mut self, folder: RecordFolder) {
+        self.record_folder = Some(folder);
+    }
+
+    /// Begins a recording of what follows, and returns the name of its file.
+    ///
+    /// # Errors
+    /// Recordings are not allowed here, one is under way, or the file cannot be made.
+    pub fn begin_recording(&mut self) -> Result<String, String> {
+        if let Some(recorder) = &self.recorder {
+            return Err(format!("{} is being recorded already", recorder.progress().file));
+        }
+        let folder = self.record_folder.as_ref();
+        let folder = folder.ok_or("the server was started without a folder for recordings".to_owned())?;
+        let recorder = folder.begin(&self.sim).map_err(|error| error.to_string())?;
+        let file = recorder.progress().file;
+        (self.recorder, self.on_demand) = (Some(recorder), true);
+        Ok(file)
+    }
+
+    /// Ends the recording that an operator began. Its last messages are written while the simulation goes on;
+    /// [`take_ended_recording`](Self::take_ended_recording) tells when the file is complete.
+    ///
+    /// # Errors
+    /// There is none, or it was asked for at the start of the server.
+    pub fn end_recording(&mut self) -> Result<String, String> {
+        if self.recorder.is_some() && !self.on_demand {
+            return Err("the recording that the server was started with lasts until its end".to_owned());
+        }
+        let recorder = self.recorder.take().ok_or("nothing is being recorded".to_owned())?;
+        let file = recorder.progress().file;
+        self.ending.end(recorder).map_err(|error| error.to_string())?;
+        Ok(file)
+    }
+
+    /// A recording whose file is complete since the last call, or why it is not.
+    pub fn take_ended_recording(&mut self) -> Option<(RecordingStats, Result<(), RuntimeError>)> {
+        self.ending.ended(false)
+    }
+
+    /// The recording under way.
+    pub fn recording(&self) -> Option<RecordingStats> {
+        self.recorder.as_ref().map(Recorder::progress)
+    }
+
+    /// The present state as the messages of a file.
+    ///
+    /// # Errors
+    /// The state cannot be written, or is too large to be sent.
+    pub fn state_messages(&self) -> Result<StateMessages, String> {
+        let messages = StateMessages::of(&self.sim, self.threads)?;
+        let (mib, most) = (messages.bytes() >> 20, MAX_STATE_BYTES >> 20);
+        if messages.bytes() > MAX_STATE_BYTES {
+            return Err(format!("the state has {mib} MiB, and at most {most} are sent"));
+        }
+        Ok(messages)
+    }
+
     /// Why the recording ended before the simulation, told once.
     pub fn take_recording_failure(&mut self) -> Option<String> {
-        self.recorder.as_mut()?.take_failure()
+        let failure = self.recorder.as_mut()?.take_failure()?;
+        if self.on_demand {
+            // Another one may be begun.
+            self.recorder = None;
+        }
+        Some(failure)
     }
 
     fn note(&mut self, order: impl FnOnce() -> recorded_order::Order) {
@@ -97,6 +186,7 @@ impl Engine {
             tools: tools.collect(),
             up: Some(to_vec3(&up(&scene.gravity_m_s2))),
             obstacles: to_obstacles(self.sim.obstacles()),
+            records: self.record_folder.is_some(),
             ..SessionInfo::default()
         }
     }
@@ -169,6 +259,9 @@ impl Engine {
     pub fn finish(&mut self, status: &str) -> Result<(), RuntimeError> {
         if let Some(recorder) = &mut self.recorder {
             recorder.end()?;
+        }
+        while let Some((_, ended)) = self.ending.ended(true) {
+            ended?;
         }
         if let Some(error) = self.failure.take() {
             return Err(error.into());

@@ -40,7 +40,7 @@ pub enum Fault {
         message: String,
     },
     /// A key that the format does not know.
-    #[error("unknown key `{key}`{}", hint(suggestion, known))]
+    #[error("unknown key `{key}`{}", hint(key, suggestion, known))]
     UnknownKey {
         /// The key found.
         key: String,
@@ -82,7 +82,7 @@ pub enum Fault {
         next: String,
     },
     /// A word out of a closed list that is not on the list.
-    #[error("unknown value `{found}`{}", hint(suggestion, known))]
+    #[error("unknown value `{found}`{}", hint(found, suggestion, known))]
     UnknownValue {
         /// Value that stands there.
         found: String,
@@ -108,7 +108,7 @@ pub enum Fault {
         among: &'static str,
     },
     /// A name that nothing in the scene has.
-    #[error("no {what} is called `{found}`{}", hint(suggestion, known))]
+    #[error("no {what} is called `{found}`{}", hint(found, suggestion, known))]
     UnknownName {
         /// What is looked for.
         what: &'static str,
@@ -167,8 +167,9 @@ pub enum Fault {
 }
 
 /// ", did you mean `x`?" or the list of what is known.
-fn hint(suggestion: &Option<String>, known: &[String]) -> String {
+fn hint(key: &str, suggestion: &Option<String>, known: &[String]) -> String {
     match suggestion {
+        Some(word) if word == key => format!("; `{key}` stands at the top level of a scene, in no table"),
         Some(word) => format!(", did you mean `{word}`?"),
         None if known.is_empty() => String::new(),
         None => format!("; known here: {}", known.join(", ")),

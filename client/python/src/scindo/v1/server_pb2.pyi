@@ -10,7 +10,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class SessionInfo(_message.Message):
-    __slots__ = ("server_version", "wire_version", "scene_name", "step_s", "bodies", "tools", "scene_seq", "scene", "up", "obstacles")
+    __slots__ = ("server_version", "wire_version", "scene_name", "step_s", "bodies", "tools", "scene_seq", "scene", "up", "obstacles", "records")
     SERVER_VERSION_FIELD_NUMBER: _ClassVar[int]
     WIRE_VERSION_FIELD_NUMBER: _ClassVar[int]
     SCENE_NAME_FIELD_NUMBER: _ClassVar[int]
@@ -21,6 +21,7 @@ class SessionInfo(_message.Message):
     SCENE_FIELD_NUMBER: _ClassVar[int]
     UP_FIELD_NUMBER: _ClassVar[int]
     OBSTACLES_FIELD_NUMBER: _ClassVar[int]
+    RECORDS_FIELD_NUMBER: _ClassVar[int]
     server_version: str
     wire_version: int
     scene_name: str
@@ -31,7 +32,8 @@ class SessionInfo(_message.Message):
     scene: str
     up: _common_pb2.Vec3
     obstacles: _containers.RepeatedCompositeFieldContainer[ObstacleInfo]
-    def __init__(self, server_version: _Optional[str] = ..., wire_version: _Optional[int] = ..., scene_name: _Optional[str] = ..., step_s: _Optional[float] = ..., bodies: _Optional[_Iterable[_Union[BodyInfo, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolInfo, _Mapping[str, object]]]] = ..., scene_seq: _Optional[int] = ..., scene: _Optional[str] = ..., up: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., obstacles: _Optional[_Iterable[_Union[ObstacleInfo, _Mapping[str, object]]]] = ...) -> None: ...
+    records: bool
+    def __init__(self, server_version: _Optional[str] = ..., wire_version: _Optional[int] = ..., scene_name: _Optional[str] = ..., step_s: _Optional[float] = ..., bodies: _Optional[_Iterable[_Union[BodyInfo, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolInfo, _Mapping[str, object]]]] = ..., scene_seq: _Optional[int] = ..., scene: _Optional[str] = ..., up: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., obstacles: _Optional[_Iterable[_Union[ObstacleInfo, _Mapping[str, object]]]] = ..., records: _Optional[bool] = ...) -> None: ...
 
 class ObstacleInfo(_message.Message):
     __slots__ = ("id", "half_space", "box", "capsule", "surface")
@@ -126,7 +128,7 @@ class ToolInfo(_message.Message):
     def __init__(self, id: _Optional[str] = ..., shape: _Optional[_Union[_tool_pb2.ToolShape, _Mapping[str, object]]] = ..., owner: _Optional[str] = ..., cuts: _Optional[bool] = ...) -> None: ...
 
 class Stats(_message.Message):
-    __slots__ = ("seq", "sim_step", "sim_time_s", "publish_unix_ns", "step_rate_hz", "real_time_factor", "stages", "bodies", "tools", "refused", "cuts_applied", "surface_subscribers", "haptic_clients", "paused", "clients", "client_count")
+    __slots__ = ("seq", "sim_step", "sim_time_s", "publish_unix_ns", "step_rate_hz", "real_time_factor", "stages", "bodies", "tools", "refused", "cuts_applied", "surface_subscribers", "haptic_clients", "paused", "clients", "client_count", "recording")
     SEQ_FIELD_NUMBER: _ClassVar[int]
     SIM_STEP_FIELD_NUMBER: _ClassVar[int]
     SIM_TIME_S_FIELD_NUMBER: _ClassVar[int]
@@ -143,6 +145,7 @@ class Stats(_message.Message):
     PAUSED_FIELD_NUMBER: _ClassVar[int]
     CLIENTS_FIELD_NUMBER: _ClassVar[int]
     CLIENT_COUNT_FIELD_NUMBER: _ClassVar[int]
+    RECORDING_FIELD_NUMBER: _ClassVar[int]
     seq: int
     sim_step: int
     sim_time_s: float
@@ -159,7 +162,18 @@ class Stats(_message.Message):
     paused: bool
     clients: _containers.RepeatedCompositeFieldContainer[ClientStats]
     client_count: int
-    def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., step_rate_hz: _Optional[float] = ..., real_time_factor: _Optional[float] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping[str, object]]]] = ..., bodies: _Optional[_Iterable[_Union[BodyStats, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolStats, _Mapping[str, object]]]] = ..., refused: _Optional[_Iterable[_Union[Counter, _Mapping[str, object]]]] = ..., cuts_applied: _Optional[int] = ..., surface_subscribers: _Optional[int] = ..., haptic_clients: _Optional[int] = ..., paused: _Optional[bool] = ..., clients: _Optional[_Iterable[_Union[ClientStats, _Mapping[str, object]]]] = ..., client_count: _Optional[int] = ...) -> None: ...
+    recording: RecordingStats
+    def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., step_rate_hz: _Optional[float] = ..., real_time_factor: _Optional[float] = ..., stages: _Optional[_Iterable[_Union[StageTime, _Mapping[str, object]]]] = ..., bodies: _Optional[_Iterable[_Union[BodyStats, _Mapping[str, object]]]] = ..., tools: _Optional[_Iterable[_Union[ToolStats, _Mapping[str, object]]]] = ..., refused: _Optional[_Iterable[_Union[Counter, _Mapping[str, object]]]] = ..., cuts_applied: _Optional[int] = ..., surface_subscribers: _Optional[int] = ..., haptic_clients: _Optional[int] = ..., paused: _Optional[bool] = ..., clients: _Optional[_Iterable[_Union[ClientStats, _Mapping[str, object]]]] = ..., client_count: _Optional[int] = ..., recording: _Optional[_Union[RecordingStats, _Mapping[str, object]]] = ...) -> None: ...
+
+class RecordingStats(_message.Message):
+    __slots__ = ("file", "seconds", "bytes")
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_FIELD_NUMBER: _ClassVar[int]
+    BYTES_FIELD_NUMBER: _ClassVar[int]
+    file: str
+    seconds: float
+    bytes: int
+    def __init__(self, file: _Optional[str] = ..., seconds: _Optional[float] = ..., bytes: _Optional[int] = ...) -> None: ...
 
 class ClientStats(_message.Message):
     __slots__ = ("client_id", "role")
@@ -410,6 +424,20 @@ class RestoreRequest(_message.Message):
     NAME_FIELD_NUMBER: _ClassVar[int]
     name: str
     def __init__(self, name: _Optional[str] = ...) -> None: ...
+
+class RecordRequest(_message.Message):
+    __slots__ = ("on",)
+    ON_FIELD_NUMBER: _ClassVar[int]
+    on: bool
+    def __init__(self, on: _Optional[bool] = ...) -> None: ...
+
+class StateReply(_message.Message):
+    __slots__ = ("name", "file")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    FILE_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    file: bytes
+    def __init__(self, name: _Optional[str] = ..., file: _Optional[bytes] = ...) -> None: ...
 
 class ScenesReply(_message.Message):
     __slots__ = ("scenes",)

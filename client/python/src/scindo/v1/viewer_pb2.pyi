@@ -181,7 +181,7 @@ class ViewerPong(_message.Message):
     def __init__(self, page_time_ms: _Optional[float] = ..., relay_unix_ns: _Optional[int] = ..., browsers: _Optional[int] = ..., frames_dropped: _Optional[int] = ...) -> None: ...
 
 class ViewerRpc(_message.Message):
-    __slots__ = ("call_id", "pause", "step", "reset", "set", "params", "undo", "scenes", "load")
+    __slots__ = ("call_id", "pause", "step", "reset", "set", "params", "undo", "scenes", "load", "record", "state")
     CALL_ID_FIELD_NUMBER: _ClassVar[int]
     PAUSE_FIELD_NUMBER: _ClassVar[int]
     STEP_FIELD_NUMBER: _ClassVar[int]
@@ -191,6 +191,8 @@ class ViewerRpc(_message.Message):
     UNDO_FIELD_NUMBER: _ClassVar[int]
     SCENES_FIELD_NUMBER: _ClassVar[int]
     LOAD_FIELD_NUMBER: _ClassVar[int]
+    RECORD_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
     call_id: int
     pause: _server_pb2.PauseRequest
     step: _server_pb2.StepRequest
@@ -200,7 +202,9 @@ class ViewerRpc(_message.Message):
     undo: _server_pb2.UndoRequest
     scenes: ViewerScenesCall
     load: _server_pb2.LoadRequest
-    def __init__(self, call_id: _Optional[int] = ..., pause: _Optional[_Union[_server_pb2.PauseRequest, _Mapping[str, object]]] = ..., step: _Optional[_Union[_server_pb2.StepRequest, _Mapping[str, object]]] = ..., reset: _Optional[_Union[_server_pb2.ResetRequest, _Mapping[str, object]]] = ..., set: _Optional[_Union[_server_pb2.SetRequest, _Mapping[str, object]]] = ..., params: _Optional[_Union[ViewerParamsCall, _Mapping[str, object]]] = ..., undo: _Optional[_Union[_server_pb2.UndoRequest, _Mapping[str, object]]] = ..., scenes: _Optional[_Union[ViewerScenesCall, _Mapping[str, object]]] = ..., load: _Optional[_Union[_server_pb2.LoadRequest, _Mapping[str, object]]] = ...) -> None: ...
+    record: _server_pb2.RecordRequest
+    state: ViewerStateCall
+    def __init__(self, call_id: _Optional[int] = ..., pause: _Optional[_Union[_server_pb2.PauseRequest, _Mapping[str, object]]] = ..., step: _Optional[_Union[_server_pb2.StepRequest, _Mapping[str, object]]] = ..., reset: _Optional[_Union[_server_pb2.ResetRequest, _Mapping[str, object]]] = ..., set: _Optional[_Union[_server_pb2.SetRequest, _Mapping[str, object]]] = ..., params: _Optional[_Union[ViewerParamsCall, _Mapping[str, object]]] = ..., undo: _Optional[_Union[_server_pb2.UndoRequest, _Mapping[str, object]]] = ..., scenes: _Optional[_Union[ViewerScenesCall, _Mapping[str, object]]] = ..., load: _Optional[_Union[_server_pb2.LoadRequest, _Mapping[str, object]]] = ..., record: _Optional[_Union[_server_pb2.RecordRequest, _Mapping[str, object]]] = ..., state: _Optional[_Union[ViewerStateCall, _Mapping[str, object]]] = ...) -> None: ...
 
 class ViewerParamsCall(_message.Message):
     __slots__ = ()
@@ -210,14 +214,20 @@ class ViewerScenesCall(_message.Message):
     __slots__ = ()
     def __init__(self) -> None: ...
 
+class ViewerStateCall(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
+
 class ViewerRpcReply(_message.Message):
-    __slots__ = ("call_id", "reply", "params", "scenes")
+    __slots__ = ("call_id", "reply", "params", "scenes", "state")
     CALL_ID_FIELD_NUMBER: _ClassVar[int]
     REPLY_FIELD_NUMBER: _ClassVar[int]
     PARAMS_FIELD_NUMBER: _ClassVar[int]
     SCENES_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
     call_id: int
     reply: _server_pb2.RpcReply
     params: _server_pb2.ParamsReply
     scenes: _server_pb2.ScenesReply
-    def __init__(self, call_id: _Optional[int] = ..., reply: _Optional[_Union[_server_pb2.RpcReply, _Mapping[str, object]]] = ..., params: _Optional[_Union[_server_pb2.ParamsReply, _Mapping[str, object]]] = ..., scenes: _Optional[_Union[_server_pb2.ScenesReply, _Mapping[str, object]]] = ...) -> None: ...
+    state: _server_pb2.StateReply
+    def __init__(self, call_id: _Optional[int] = ..., reply: _Optional[_Union[_server_pb2.RpcReply, _Mapping[str, object]]] = ..., params: _Optional[_Union[_server_pb2.ParamsReply, _Mapping[str, object]]] = ..., scenes: _Optional[_Union[_server_pb2.ScenesReply, _Mapping[str, object]]] = ..., state: _Optional[_Union[_server_pb2.StateReply, _Mapping[str, object]]] = ...) -> None: ...
