@@ -1,4 +1,5 @@
-//! Measures cuts of octree cells: `cargo bench -p scindo-physics --bench octree`. `-- --quick` makes short runs.
+//! Measures cuts of octree cells: `cargo bench -p scindo-physics --bench octree`. `-- --quick` makes short runs, and
+//! words choose parts: `grid`, `whole`, `advances`, `increments`, `same`.
 //!
 //! The model is the cube of Dick, Georgii and Westermann 2011, 80 finest cells across with four levels of coarser
 //! ones. First a grid of 22 blades cuts it to half its depth, then a blade goes through it in small advances. Times
@@ -38,6 +39,8 @@ fn main() {
     } else {
         (OctreeSettings { cells: 80, levels: 4 }, 5)
     };
+    let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let wanted = |part: &str| words.is_empty() || words.iter().any(|word| word == part);
     let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
     let uncut = Octree::fill(&shape, settings, &|_| 0).unwrap();
     println!("{} leaves, {} vertices", uncut.cells().len(), uncut.n_vertices());
@@ -45,14 +48,20 @@ fn main() {
         "  fill             {:8.1} ms",
         best(rounds, || Octree::fill(&shape, settings, &|_| 0).unwrap())
     );
-    grid(&uncut, rounds);
-    whole_cut(&uncut, rounds);
-    advances(uncut, rounds);
-    for cells in if quick { [8, 16] } else { [34, 58] } {
+    if wanted("grid") {
+        grid(&uncut, rounds);
+    }
+    if wanted("whole") {
+        whole_cut(&uncut, rounds);
+    }
+    if wanted("advances") {
+        advances(uncut, rounds);
+    }
+    for cells in if quick { [8, 16] } else { [34, 58] }.into_iter().filter(|_| wanted("increments")) {
         let settings = OctreeSettings { cells, levels: 0 };
         increment(Octree::fill(&shape, settings, &|_| 0).unwrap(), rounds);
     }
-    for cells in if quick { [12, 16, 20] } else { [34, 58, 74] } {
+    for cells in if quick { [12, 16, 20] } else { [34, 58, 74] }.into_iter().filter(|_| wanted("same")) {
         let h = 1.0 / f64::from(cells);
         let shape = BoxShape { min: Vector3::zeros(), max: Vector3::repeat(1.0) };
         let settings = OctreeSettings { cells, levels: 0 };
