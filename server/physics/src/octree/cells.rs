@@ -5,13 +5,13 @@
 //! links; both ends of a cut link are leaves of the finest level, so leaves of different size are always linked
 //! where they touch.
 
-use std::collections::HashMap;
 use std::fmt;
 
 use nalgebra::Vector3;
 
 use super::build::OctreeSettings;
 use super::lattice::{At, Lattice, LeafMap, OUTSIDE};
+use super::link_map::LinkMap;
 use crate::material::Region;
 
 /// The six directions of links: −x, +x, −y, +y, −z, +z.
@@ -46,6 +46,16 @@ impl Cell {
     #[inline]
     pub fn corner(&self, c: usize) -> At {
         [0, 1, 2].map(|k| self.at[k] + if c >> k & 1 == 1 { self.side() } else { 0 })
+    }
+
+    /// The corner at the lattice point `p`.
+    #[inline]
+    pub fn corner_at(&self, p: At) -> Option<usize> {
+        (0..3).try_fold(0, |corner, k| match p[k] - self.at[k] {
+            0 => Some(corner),
+            across if across == self.side() => Some(corner | 1 << k),
+            _ => None,
+        })
     }
 
     /// Which child of its parent it is; bit k is the half along axis k.
@@ -89,9 +99,9 @@ pub struct Octree {
     /// Constants of the materials 1, 2, …; material 0 is the body's own.
     pub(super) regions: Vec<Region>,
     /// Links that are cut by an incision.
-    pub(super) links: HashMap<LinkKey, CutLink>,
+    pub(super) links: LinkMap,
     /// Where links that lead out of the body meet its boundary; halfway if nothing is known.
-    pub(super) boundary: HashMap<LinkKey, CutLink>,
+    pub(super) boundary: LinkMap,
     /// Hanging corners do not follow cuts; only a mutation test sets it.
     pub(super) stale: bool,
 }
@@ -102,7 +112,7 @@ impl Octree {
         let n = cells.len();
         let (vertices, hanging) = (vec![[OUTSIDE; 8]; n], vec![0; n]);
         let (points, regions) = (Vec::new(), Vec::new());
-        let (links, boundary) = (HashMap::new(), HashMap::new());
+        let (links, boundary) = (LinkMap::default(), LinkMap::default());
         let stale = false;
         let mut octree =
             Self { lattice, map, cells, vertices, hanging, points, regions, links, boundary, stale };
@@ -189,7 +199,7 @@ impl Octree {
     }
 
     /// The links that incisions cut.
-    pub fn cut_links(&self) -> &HashMap<LinkKey, CutLink> {
+    pub fn cut_links(&self) -> &LinkMap {
         &self.links
     }
 

@@ -261,8 +261,7 @@ impl Octree {
         let mut within = None;
         for o in (0..8).filter(|&o| octants.class[o] == class && octants.leaf[o] != OUTSIDE) {
             let earlier = &history.earlier[history.part_of[octants.leaf[o] as usize] as usize - 1];
-            let corner = (0..8).find(|&c| earlier.hanging >> c & 1 == 0 && earlier.cell.corner(c) == p);
-            match corner {
+            match earlier.cell.corner_at(p).filter(|c| earlier.hanging >> c & 1 == 0) {
                 Some(c) => return Carrier::Vertex(earlier.vertices[c]),
                 None => within = within.or(Some(earlier)),
             }
@@ -324,6 +323,9 @@ impl Leaf {
         let N: [f64; 8] = std::array::from_fn(|c| {
             (0..3).map(|k| if c >> k & 1 == 1 { xi[k] } else { 1.0 - xi[k] }).product()
         });
+        if self.hanging == 0 {
+            return MaterialPoint::new(self.vertices.into_iter().zip(N).filter(|(_, w)| *w != 0.0));
+        }
         let mut weights = [0.0; 8];
         for (row, N) in corner_weights(&self.cell, self.hanging).iter().zip(N) {
             weights.iter_mut().zip(row).for_each(|(w, r)| *w += N * r);

@@ -157,7 +157,10 @@ impl OctreeSpace {
         if x.len() != expected {
             return Err(CutError::PositionCount { found: x.len(), expected });
         }
-        if let Some(copy) = x.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+        // Without an early end, so that several are examined at once.
+        let finite = |p: &Vector3<f64>| p.x.is_finite() & p.y.is_finite() & p.z.is_finite();
+        if !x.iter().fold(true, |all, p| all & finite(p)) {
+            let copy = x.iter().position(|p| !finite(p)).unwrap_or(0);
             return Err(CutError::NonFinitePosition { copy });
         }
         let limit = MOST_GROWTH * self.initial.cells().len() + 100_000;

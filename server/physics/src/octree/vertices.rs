@@ -33,17 +33,21 @@ impl Octree {
         for (o, leaf) in leaf.iter_mut().enumerate() {
             *leaf = self.map.leaf(cell_of(o));
         }
+        let is_linked = |o: usize, axis: usize| {
+            let (a, b) = (leaf[o], leaf[o | 1 << axis]);
+            let inside = a != OUTSIDE && b != OUTSIDE;
+            inside && (a == b || self.cells[a as usize].cut >> (2 * axis + 1) & 1 == 0)
+        };
+        let pairs =
+            (0..3).flat_map(|axis| (0..8).map(move |o| (o, axis))).filter(|(o, axis)| o >> axis & 1 == 0);
+        // Nothing is cut around most points.
+        if pairs.clone().all(|(o, axis)| is_linked(o, axis)) {
+            return Octants { leaf, class: [0; 8] };
+        }
         let mut class = [0, 1, 2, 3, 4, 5, 6, 7];
-        for axis in 0..3 {
-            for o in (0..8).filter(|o| o >> axis & 1 == 0) {
-                let (a, b) = (leaf[o], leaf[o | 1 << axis]);
-                let inside = a != OUTSIDE && b != OUTSIDE;
-                if inside && (a == b || self.cells[a as usize].cut >> (2 * axis + 1) & 1 == 0) {
-                    let (low, high) =
-                        (class[o].min(class[o | 1 << axis]), class[o].max(class[o | 1 << axis]));
-                    class.iter_mut().filter(|c| **c == high).for_each(|c| *c = low);
-                }
-            }
+        for (o, axis) in pairs.filter(|&(o, axis)| is_linked(o, axis)) {
+            let (low, high) = (class[o].min(class[o | 1 << axis]), class[o].max(class[o | 1 << axis]));
+            class.iter_mut().filter(|c| **c == high).for_each(|c| *c = low);
         }
         Octants { leaf, class }
     }
@@ -95,7 +99,7 @@ impl Octree {
             let coarse = coarse.map(|o| octants.leaf[o] as usize);
             if let Some(coarse) = coarse.filter(|&leaf| self.cells[leaf].level > cell.level).min() {
                 let q = parent_corner(&cell, c);
-                if let Some(at) = (0..8).find(|&k| self.cells[coarse].corner(k) == q) {
+                if let Some(at) = self.cells[coarse].corner_at(q) {
                     self.vertices[id][c] = self.vertices[coarse][at];
                 }
             }

@@ -75,15 +75,10 @@ impl CellChunk {
     /// Arranges the cells `members` in batches; `lane` gives what each of them is.
     pub fn new(members: &[u32], lane: &dyn Fn(u32) -> CellLane) -> Self {
         let cells: Vec<CellLane> = members.iter().map(|&id| lane(id)).collect();
-        let held: Vec<[u32; 8]> = cells.iter().map(|cell| cell.vertices).collect();
-        let mut vertices = held.as_flattened().to_vec();
-        vertices.sort_unstable();
-        vertices.dedup();
-        let mut kinds: BTreeMap<(CellMatrix, bool), (Vec<u32>, Vec<CellLane>)> = BTreeMap::new();
-        for (&id, cell) in members.iter().zip(&cells) {
-            let (members, lanes) = kinds.entry((cell.matrix, cell.hanging != 0)).or_default();
-            members.push(id);
-            lanes.push(*cell);
+        let (numbers, vertices) = LocalNumbers::of(&cells);
+        let mut kinds: BTreeMap<(CellMatrix, bool), Vec<usize>> = BTreeMap::new();
+        for (k, cell) in cells.iter().enumerate() {
+            kinds.entry((cell.matrix, cell.hanging != 0)).or_default().push(k);
         }
         let n = vertices.len();
         let mut chunk = Self {
@@ -97,24 +92,32 @@ impl CellChunk {
             weights: Vec::new(),
             inverted: 0,
         };
-        for ((matrix, hangs), (members, cells)) in kinds {
-            chunk.add_group(matrix, hangs, &members, &cells);
+        chunk.lanes.reserve_exact(cells.len() / LANES + 2 * kinds.len());
+        for ((matrix, hangs), group) in kinds {
+            let ids: Vec<[u16; 8]> =
+                group.iter().map(|&k| cells[k].vertices.map(|v| numbers.get(v))).collect();
+            let members: Vec<(u32, &CellLane)> = group.iter().map(|&k| (members[k], &cells[k])).collect();
+            chunk.add_group(matrix, hangs, &members, &ids);
         }
         chunk
     }
 
-    fn add_group(&mut self, matrix: CellMatrix, hangs: bool, members: &[u32], cells: &[CellLane]) {
-        let local = |vertex: u32| self.vertices.binary_search(&vertex).map_or(0, |local| local as u16);
-        let ids: Vec<[u16; 8]> = cells.iter().map(|cell| cell.vertices.map(local)).collect();
+    /// Adds batches of the cells `members`, on the vertices with the local numbers `ids`.
+    fn add_group(&mut self, matrix: CellMatrix, hangs: bool, members: &[(u32, &CellLane)], ids: &[[u16; 8]]) {
         let (first, first_weight) = (self.lanes.len(), self.weights.len());
-        for lanes in pack(&ids, self.vertices.len()) {
+        let packed = pack(ids, self.vertices.len());
+        match matrix {
+            CellMatrix::Table(_) => self.batches.reserve_exact(packed.len()),
+            CellMatrix::Stored => self.stored.reserve_exact(packed.len()),
+        }
+        for lanes in packed {
             let mut batch = BatchLanes { cells: [NO_PIECE; LANES], octants: [0; LANES], hanging: [0; LANES] };
             // Unused lanes compute with the first cell and a factor of 0: nothing in them is out of range.
             let of_lane = lanes.map(|k| ids[if k == NO_PIECE { lanes[0] } else { k } as usize]);
             let nodes = from_fn(|j| of_lane.map(|ids| ids[j]));
             let mut sectors = SectorBatch { rotation: Default::default(), root: Lanes::default(), nodes };
             for (lane, &k) in lanes.iter().enumerate().filter(|(_, k)| **k != NO_PIECE) {
-                let (id, cell) = (members[k as usize], &cells[k as usize]);
+                let (id, cell) = members[k as usize];
                 batch.cells[lane] = id;
                 (batch.octants[lane], batch.hanging[lane]) = (cell.octant, cell.hanging);
                 sectors.root.0[lane] = cell.factor.sqrt();
@@ -277,6 +280,51 @@ impl CellChunk {
         self.batches.len() * size_of::<SectorBatch>()
             + self.stored.len() * size_of::<StoredBatch>()
             + self.weights.len() * size_of::<HangingWeights>()
+    }
+}
+
+/// Local numbers by vertex: a table with open addressing.
+struct LocalNumbers {
+    /// Vertex and local number; [`NO_PIECE`] marks free entries.
+    entries: Vec<(u32, u16)>,
+    /// 32 minus the binary logarithm of the number of entries.
+    shift: u32,
+}
+
+impl LocalNumbers {
+    /// Numbers the vertices of `cells` in ascending order. Returns the vertices, too.
+    fn of(cells: &[CellLane]) -> (Self, Vec<u32>) {
+        // At least twice as many entries as there can be vertices.
+        let bits = (16 * cells.len()).max(2).next_power_of_two().ilog2();
+        let mut table = Self { entries: vec![(NO_PIECE, 0); 1 << bits], shift: u32::BITS - bits };
+        let mut vertices = Vec::with_capacity(2 * cells.len());
+        for vertex in cells.iter().flat_map(|cell| cell.vertices) {
+            let place = table.place(vertex);
+            let entry = &mut table.entries[place];
+            if entry.0 == NO_PIECE {
+                entry.0 = vertex;
+                vertices.push(vertex);
+            }
+        }
+        vertices.sort_unstable();
+        for (local, &vertex) in vertices.iter().enumerate() {
+            let place = table.place(vertex);
+            table.entries[place].1 = local as u16;
+        }
+        (table, vertices)
+    }
+
+    fn get(&self, vertex: u32) -> u16 {
+        self.entries[self.place(vertex)].1
+    }
+
+    /// Where `vertex` is, or would be.
+    fn place(&self, vertex: u32) -> usize {
+        let mut place = (vertex.wrapping_mul(0x9e37_79b9) >> self.shift) as usize;
+        while self.entries[place].0 != vertex && self.entries[place].0 != NO_PIECE {
+            place = (place + 1) % self.entries.len();
+        }
+        place
     }
 }
 
