@@ -14,7 +14,7 @@ use super::sectors::SectorTable;
 use super::update::RestChunk;
 use crate::element::Simd;
 use crate::material::Lame;
-use crate::octree::{Cell, OUTSIDE, Octree};
+use crate::octree::{Cell, Lattice, OUTSIDE, Octree};
 use crate::team::{Team, blocks, ranges};
 
 /// s K̂ of the cells of an octree, its internal forces and diagonal blocks. The law is linear or corotational with
@@ -30,8 +30,7 @@ pub struct CellStiffness {
     operator: CellOperator,
     rest: Vec<RestChunk>,
     cells: Vec<Cell>,
-    /// Side of a finest cell [m].
-    h: f64,
+    lattice: Lattice,
     materials: Materials,
     /// Parameters of the last update.
     made_with: Option<ElasticUpdate>,
@@ -46,8 +45,8 @@ impl CellStiffness {
     pub fn new(simd: Simd, octree: &Octree, materials: &[Lame]) -> Self {
         let materials = Materials::new(materials);
         let (operator, rest) = arrange(simd, octree, &materials);
-        let (cells, h) = (octree.cells().to_vec(), octree.lattice().h);
-        Self { operator, rest, cells, h, materials, made_with: None, cut: false, version: 0 }
+        let (cells, lattice) = (octree.cells().to_vec(), *octree.lattice());
+        Self { operator, rest, cells, lattice, materials, made_with: None, cut: false, version: 0 }
     }
 
     /// Bytes in use.
@@ -106,7 +105,7 @@ impl CellStiffness {
         for chunk in renewed {
             let arranged = &mut operator.chunks[chunk];
             arranged.set_rotations(&|id| kept.get(id));
-            let arranged = RestChunk::new(arranged, |v| octree.rest_position(v), side);
+            let arranged = RestChunk::new(arranged, octree.points(), side);
             if chunk < rest.len() {
                 rest[chunk] = arranged
             } else {
@@ -165,7 +164,7 @@ impl CellStiffness {
     /// Factors and tables for the parameters of an update.
     fn set(&mut self, team: &mut Team, with: &ElasticUpdate) {
         self.operator.set_tables(&self.materials.tables(with.lame));
-        let (cells, h, materials) = (&self.cells, self.h, &self.materials);
+        let (cells, h, materials) = (&self.cells, self.lattice.h, &self.materials);
         self.operator.set_factors(team, |id| materials.factor(&cells[id as usize], h, with));
         if !with.law.rotates() {
             self.operator.set_rotations(team, |_| Matrix3::identity());
@@ -209,11 +208,7 @@ fn arrange(simd: Simd, octree: &Octree, materials: &Materials) -> (CellOperator,
     let operator = CellOperator::new(simd, &tables, &lanes, &morton_order(cells), octree.n_vertices());
     let h = octree.lattice().h;
     let side = |id: u32| f64::from(cells[id as usize].side()) * h;
-    let rest = operator
-        .chunks
-        .iter()
-        .map(|chunk| RestChunk::new(chunk, |v| octree.rest_position(v), side))
-        .collect();
+    let rest = operator.chunks.iter().map(|chunk| RestChunk::new(chunk, octree.points(), side)).collect();
     (operator, rest)
 }
 
@@ -232,21 +227,19 @@ impl Stiffness for CellStiffness {
         let CellOperator { simd, tables, chunks, gather, sums, diagonals, .. } = &mut self.operator;
         let (simd, with) = (*simd, (&tables[..], with.scale as f32));
         let rows = (ranges(sums, &gather.first_row), ranges(diagonals, &gather.first_row));
-        team.for_blocks(
-            (blocks(chunks, 1), blocks(&mut self.rest, 1), rows),
-            |_, (chunk, rest, (f, diagonal))| {
-                let (chunk, rest): (&mut CellChunk, &mut RestChunk) = (&mut chunk[0], &mut rest[0]);
-                if rotates {
-                    rest.update(simd, chunk, with, positions, f);
-                } else {
-                    chunk.inverted = 0;
-                    rest.linear_forces(simd, chunk, with, positions, f);
-                }
-                if rotates || !same {
-                    chunk.diagonals(simd, with.0, diagonal);
-                }
-            },
-        );
+        let (rest, lattice) = (&self.rest, &self.lattice);
+        team.for_blocks((blocks(chunks, 1), rows), |k, (chunk, (f, diagonal))| {
+            let (chunk, rest): (&mut CellChunk, &RestChunk) = (&mut chunk[0], &rest[k]);
+            if rotates {
+                rest.update(simd, chunk, with, positions, f);
+            } else {
+                chunk.inverted = 0;
+                rest.linear_forces(simd, chunk, with, (positions, lattice), f);
+            }
+            if rotates || !same {
+                chunk.diagonals(simd, with.0, diagonal);
+            }
+        });
         self.operator.chunks.iter().map(|chunk| chunk.inverted).sum()
     }
 

@@ -3,6 +3,7 @@
 #![allow(unsafe_code)] // vector instructions behind run-time detection, and unchecked gathers
 
 use nalgebra::{Matrix3, Vector3};
+use smallvec::SmallVec;
 
 use super::super::chunks::NO_PIECE;
 use super::super::{Padded, padded};
@@ -13,22 +14,25 @@ use super::batch::{
 use super::chunk::{BatchLanes, CellChunk, Table};
 use super::lane::{CellMatrix, handedness};
 use crate::element::{LANES, Lanes, Mat3, Simd, Vector8, polar_newton, polar_rotation};
+use crate::octree::{At, Lattice};
 
 /// What only an update needs of a chunk.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct RestChunk {
-    /// Positions of the last update [m], by local number.
-    positions: Vec<[f64; 4]>,
-    /// Rest positions [m].
-    rest: Vec<Vector3<f64>>,
+    /// Lattice points, by local number.
+    points: Vec<At>,
     /// Of every batch.
     sides: Vec<RestBatch>,
 }
 
+/// Positions [m] by local number. They are on the stack: an update needs them for one chunk after the other, and the
+/// largest chunks, of 1024 cells without a common vertex, have no more.
+type Positions = SmallVec<[[f64; 4]; 0x2000]>;
+
 impl RestChunk {
     /// Bytes in use.
     pub fn memory(&self) -> usize {
-        size_of_val(&self.positions[..]) + size_of_val(&self.rest[..]) + size_of_val(&self.sides[..])
+        size_of_val(&self.points[..]) + size_of_val(&self.sides[..])
     }
 }
 
@@ -43,8 +47,8 @@ struct RestBatch {
 }
 
 impl RestChunk {
-    /// The rest state of `chunk`: the position of each vertex [m] and the side of each cell [m] by number.
-    pub fn new(chunk: &CellChunk, position: impl Fn(u32) -> Vector3<f64>, side: impl Fn(u32) -> f64) -> Self {
+    /// The rest state of `chunk`: the lattice point of each vertex and the side of each cell [m] by number.
+    pub fn new(chunk: &CellChunk, points: &[At], side: impl Fn(u32) -> f64) -> Self {
         let sides = chunk.lanes.iter().map(|lanes| {
             let mut batch = RestBatch { span: Lanes::default(), inverse: Lanes([-1.0; LANES]) };
             for (lane, &cell) in lanes.cells.iter().enumerate().filter(|(_, cell)| **cell != NO_PIECE) {
@@ -53,30 +57,27 @@ impl RestChunk {
             }
             batch
         });
-        Self {
-            positions: vec![[0.0; 4]; chunk.vertices.len()],
-            rest: chunk.vertices.iter().map(|&v| position(v)).collect(),
-            sides: sides.collect(),
-        }
+        Self { points: chunk.vertices.iter().map(|&v| points[v as usize]).collect(), sides: sides.collect() }
     }
 
     /// Updates the rotations of `chunk` and writes the internal forces [N] of its vertices. `scale` is the s in
     /// the factors of the cells.
     pub fn update(
-        &mut self,
+        &self,
         simd: Simd,
         chunk: &mut CellChunk,
         (tables, scale): (&[Table], f32),
         positions: &[Vector3<f64>],
         f: &mut [Padded],
     ) {
-        for (local, &vertex) in self.positions.iter_mut().zip(&chunk.vertices) {
+        let mut local = Positions::new();
+        local.extend(chunk.vertices.iter().map(|&vertex| {
             let x = &positions[vertex as usize];
-            *local = [x.x, x.y, x.z, 0.0];
-        }
+            [x.x, x.y, x.z, 0.0]
+        }));
         let f = &mut f[..chunk.vertices.len()];
         f.fill([0.0; 4]);
-        assert!(self.positions.len() == f.len());
+        assert!(local.len() == f.len());
         chunk.inverted = 0;
         for group in &chunk.groups {
             let CellMatrix::Table(t) = group.matrix else { continue };
@@ -89,8 +90,8 @@ impl RestChunk {
                 table: &tables[usize::from(t)].lanes,
                 per_scale: 1.0 / scale,
             };
-            // SAFETY: local numbers are indices into `vertices`, which is as long as `positions` and `f`.
-            chunk.inverted += unsafe { update(simd, &mut part, &self.positions, f) };
+            // SAFETY: local numbers are indices into `vertices`, which is as long as `local` and `f`.
+            chunk.inverted += unsafe { update(simd, &mut part, &local, f) };
         }
     }
 
@@ -101,10 +102,10 @@ impl RestChunk {
         simd: Simd,
         chunk: &mut CellChunk,
         (tables, scale): (&[Table], f32),
-        positions: &[Vector3<f64>],
+        (positions, lattice): (&[Vector3<f64>], &Lattice),
         f: &mut [Padded],
     ) {
-        let displacement = |k: usize| positions[chunk.vertices[k] as usize] - self.rest[k];
+        let displacement = |k: usize| positions[chunk.vertices[k] as usize] - lattice.point(self.points[k]);
         let origin = if chunk.vertices.is_empty() { Vector3::zeros() } else { displacement(0) };
         for (k, local) in chunk.x.iter_mut().enumerate() {
             *local = padded(&(displacement(k) - origin));
