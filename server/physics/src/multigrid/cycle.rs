@@ -96,7 +96,10 @@ impl Multigrid {
     }
 
     /// The same with equations on level `first`, if there is one, and else on the coarsest level.
-    pub(super) fn on_level(hierarchy: Hierarchy, settings: MultigridSettings, first: usize) -> Self {
+    pub(super) fn on_level(mut hierarchy: Hierarchy, settings: MultigridSettings, first: usize) -> Self {
+        if matches!(settings.smoother, Smoother::GaussSeidel { .. }) {
+            hierarchy.list_finest_slots();
+        }
         let first = first.min(hierarchy.n_levels() - 1);
         let mut galerkin = Galerkin::new(&hierarchy);
         galerkin.solve_on(&hierarchy, first);
@@ -104,8 +107,7 @@ impl Multigrid {
             let n = level.n_vertices;
             let if_needed = |needed: bool| if needed { vec![[0.0; 4]; n] } else { Vec::new() };
             let (zeros, inner) = (|| if_needed(l >= first), || if_needed(l > 0 && l != first));
-            let kernel =
-                (l > 0 && l >= first).then(|| LevelKernel::new(settings.simd, level, &galerkin.levels[l]));
+            let kernel = (l > 0 && l >= first).then(|| LevelKernel::new(settings.simd));
             Vectors {
                 inverse: if l > first { vec![Inverse3::default(); n] } else { Vec::new() },
                 largest: if l < first { 0.0 } else { 1.0 },
@@ -161,7 +163,7 @@ impl Multigrid {
                 kernel.follow_cut(change);
             }
         }
-        if changes.last().is_some_and(|change| change.moved) {
+        if changes.last().is_some_and(|change| !change.moved.is_empty()) {
             self.coarsest = Coarsest::new(&self.hierarchy);
         }
         self.partial.resize(self.hierarchy.levels[first].n_vertices.div_ceil(BLOCK), 0.0);

@@ -4,8 +4,6 @@
 //! therefore come apart, but never grow together. Each cell and each vertex keeps its number for one of its parts;
 //! the other parts get the numbers that follow. So all numbers stay in use, and lists only change around the cut.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use super::hierarchy::Step;
 use super::level::{Level, NONE};
 use crate::lists::disjoint::{find, join};
@@ -23,8 +21,8 @@ pub struct LevelChange {
     pub known: usize,
     /// For every new cell, the one before that it was part of.
     pub origin: Vec<u32>,
-    /// Whether any cell rests on other vertices than before.
-    pub moved: bool,
+    /// Those of `cells` that are new, elsewhere, or rest on other vertices or with other corners that hang.
+    pub moved: Vec<u32>,
 }
 
 /// The links of a level.
@@ -78,19 +76,19 @@ impl History {
 
 /// One bit per number.
 #[derive(Debug)]
-struct Bits(Vec<u64>);
+pub(super) struct Bits(Vec<u64>);
 
 impl Bits {
-    fn new(n: usize) -> Self {
+    pub(super) fn new(n: usize) -> Self {
         Self(vec![0; n.div_ceil(64)])
     }
 
-    fn has(&self, i: u32) -> bool {
+    pub(super) fn has(&self, i: u32) -> bool {
         self.0.get(i as usize / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
     }
 
     /// Returns whether the number was not there.
-    fn insert(&mut self, i: u32) -> bool {
+    pub(super) fn insert(&mut self, i: u32) -> bool {
         if self.0.len() <= i as usize / 64 {
             self.0.resize(i as usize / 64 + 1, 0);
         }
@@ -102,7 +100,7 @@ impl Bits {
 }
 
 /// A cell as it was before.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Earlier {
     cell: Cell,
     vertices: [u32; 8],
@@ -123,9 +121,13 @@ impl LevelChange {
         origin: Vec<u32>,
         history: &History,
     ) -> Self {
-        let (mut vertices, mut edits) = (Vec::new(), Vec::new());
+        let (mut vertices, mut edits, mut moved) = (Vec::new(), Vec::new(), Vec::new());
         for &id in &cells {
-            let now = level.vertices[id as usize];
+            let state = level.now(id);
+            if id as usize >= known || history.get(id).is_some_and(|earlier| *earlier != state) {
+                moved.push(id);
+            }
+            let now = state.vertices;
             let before = history.get(id).map_or(now, |earlier| earlier.vertices);
             vertices.extend(now);
             for c in 0..8 {
@@ -140,9 +142,11 @@ impl LevelChange {
         }
         vertices.sort_unstable();
         vertices.dedup();
-        level.slots.grow(level.n_vertices);
-        level.slots.edit(&mut edits, |slot| *slot);
-        Self { cells, vertices, known, origin, moved: !edits.is_empty() }
+        if level.has_slots() {
+            level.slots.grow(level.n_vertices);
+            level.slots.edit(&mut edits, |slot| *slot);
+        }
+        Self { cells, vertices, known, origin, moved }
     }
 }
 
@@ -159,7 +163,7 @@ impl Level {
             let at = id as usize;
             history.keep(id, self.now(id));
             self.cells[at] = Cell { cut: 0, ..octree.cells()[at] };
-            self.leaf[at] = id;
+            self.leaf[at] = true;
             (self.vertices[at], self.hanging[at]) = (octree.vertices()[at], octree.hanging()[at]);
         }
         LevelChange::new(self, (changed.to_vec(), known), origin, &history)
@@ -168,7 +172,7 @@ impl Level {
     /// Adds places for cells until there are `n`.
     fn grow(&mut self, n: usize) {
         self.cells.resize(n, Cell::new([0; 3], 0, 0));
-        self.leaf.resize(n, NONE);
+        self.leaf.resize(n, true);
         self.vertices.resize(n, [NONE; 8]);
         self.hanging.resize(n, 0);
     }
@@ -280,39 +284,42 @@ impl Follow<'_> {
                 }
             });
         }
-        let mut groups: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for i in 0..members.len() {
-            groups.entry(find(&mut root, i as u32)).or_default().push(i);
-        }
+        let mut by_root: Vec<(u32, usize)> =
+            (0..members.len()).map(|i| (find(&mut root, i as u32), i)).collect();
+        by_root.sort_unstable();
 
         step.parent.resize(fine.cells.len(), NONE);
-        let (mut taken, mut children) = (BTreeSet::new(), Vec::new());
-        for group in groups.values() {
-            let mut held = group.iter().filter(|&&i| (members[i] as usize) < change.known);
-            let first = held.next().map(|&i| parent_before[i]);
-            whole &= held.all(|&i| Some(parent_before[i]) == first);
-            let id = match first.filter(|&id| taken.insert(id)) {
+        let (mut taken, mut children) = (vec![false; renewed.len()], Vec::new());
+        for group in by_root.chunk_by(|a, b| a.0 == b.0) {
+            let mut held = group.iter().map(|g| g.1).filter(|&i| (members[i] as usize) < change.known);
+            let first = held.next().map(|i| parent_before[i]);
+            whole &= held.all(|i| Some(parent_before[i]) == first);
+            let is_free = |id: &u32| {
+                let taken = renewed.binary_search(id).ok().and_then(|at| taken.get_mut(at));
+                taken.is_some_and(|taken| !std::mem::replace(taken, true))
+            };
+            let id = match first.filter(is_free) {
                 Some(id) => id,
                 None => {
                     let id = (*known + origin.len()) as u32;
-                    origin.push(parent_before[group[0]]);
+                    origin.push(parent_before[group[0].1]);
                     coarse.grow(id as usize + 1);
                     step.children.grow(id as usize + 1);
                     id
                 }
             };
-            let (own, at) = (members[group[0]], id as usize);
+            let (own, at) = (members[group[0].1], id as usize);
             let merges = cell(own).level == size;
             let low = cell(own).at.map(|x| x >> (size + 1) << (size + 1));
             coarse.cells[at] =
                 if merges { Cell { at: low, level: size + 1, ..*cell(own) } } else { *cell(own) };
-            coarse.leaf[at] = if merges { NONE } else { fine.leaf[own as usize] };
+            coarse.leaf[at] = !merges;
             children.clear();
-            children.extend(group.iter().map(|&i| members[i]));
+            children.extend(group.iter().map(|g| members[g.1]));
             children.iter().for_each(|&child| step.parent[child as usize] = id);
             step.children.set(at, &children);
         }
-        whole &= taken.len() == renewed.len();
+        whole &= taken.iter().all(|taken| *taken);
         renewed.extend(*known as u32..coarse.cells.len() as u32);
         whole.then_some(renewed)
     }
@@ -322,8 +329,10 @@ impl Follow<'_> {
     fn relink(&mut self, renewed: &[u32], links: Links<'_>, step: &Step) -> Vec<u32> {
         let coarse = &mut *self.coarse;
         coarse.links.grow(coarse.cells.len());
-        let around: BTreeSet<u32> =
+        let mut around: Vec<u32> =
             renewed.iter().flat_map(|&id| coarse.links.get(id as usize)).map(|link| link / 8).collect();
+        around.sort_unstable();
+        around.dedup();
         let mut relinked = renewed.to_vec();
         let (mut list, mut known) = (Vec::new(), Vec::new());
         let beside = around.into_iter().filter(|id| renewed.binary_search(id).is_err());
@@ -431,7 +440,7 @@ impl Follow<'_> {
             return (hanging >> c & 1 == 0).then_some(vertices[c]);
         };
         let p = self.coarse.cells[id as usize].corner(c);
-        let k = (0..8).find(|&k| earlier.cell.corner(k) == p && earlier.hanging >> k & 1 == 0)?;
+        let k = earlier.cell.corner_at(p).filter(|k| earlier.hanging >> k & 1 == 0)?;
         Some(earlier.vertices[k])
     }
 

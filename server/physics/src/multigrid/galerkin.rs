@@ -82,7 +82,8 @@ pub struct LevelMatrices {
     pub matrix: Vec<CellMatrix>,
     pub stored: Vec<Stored>,
     free: Vec<u32>,
-    /// Lumped mass of the leaves with shared matrices times its factor, by vertex [kg].
+    /// Lumped mass of the leaves with shared matrices times its factor, by vertex [kg]. Empty on the finest level,
+    /// unless its slots are listed.
     pub mass: Vec<f32>,
     /// Whether prescribed vertices are below the cell, and whether some of them in some directions only.
     pub(super) holds: Vec<[bool; 2]>,
@@ -135,7 +136,7 @@ impl Galerkin {
                 frame: vec![Rotation::identity(); n],
                 // A cell without a kind is stored by the first update.
                 matrix: kinds.iter().map(|&kind| CellMatrix::Shared(kind)).collect(),
-                mass: vec![0.0; level.n_vertices],
+                mass: vec![0.0; if level.has_slots() { level.n_vertices } else { 0 }],
                 holds: vec![[false; 2]; n],
                 changed: vec![false; n],
                 ..LevelMatrices::default()
@@ -170,10 +171,9 @@ impl Galerkin {
         let finest = &mut self.levels[0];
         finest.changed.fill(anew);
         finest.mark_touched();
-        let leaves = &hierarchy.levels[0].leaf;
         team.for_blocks(blocks(&mut finest.frame, BLOCK), |block, frames| {
             for (i, frame) in frames.iter_mut().enumerate() {
-                let R = rotation(leaves[block * BLOCK + i]);
+                let R = rotation((block * BLOCK + i) as u32);
                 *frame = Rotation::from_rotation_matrix(&Rotation3::from_matrix_unchecked(R));
             }
         });
@@ -233,10 +233,10 @@ impl Galerkin {
             let kind = hierarchy.kind_of[l][id] as usize;
             shared_matrix(&hierarchy.levels[l], id, &shared[kind], eighth[kind])
         });
-        for (l, level) in hierarchy.levels.iter().enumerate() {
+        for (l, level) in hierarchy.levels.iter().enumerate().filter(|(_, level)| level.has_slots()) {
             let mass = &mut self.levels[l].mass;
             mass.fill(0.0);
-            for id in (0..level.cells.len()).filter(|&id| level.leaf[id] != NONE) {
+            for id in (0..level.cells.len()).filter(|&id| level.leaf[id]) {
                 if l > 0 && self.levels[l].holds[id][0] {
                     continue;
                 }
@@ -498,7 +498,7 @@ impl Context<'_> {
                 sum.add(&A);
             }
         }
-        if coarse.leaf[id] == NONE && coarse.hanging[id] != 0 {
+        if !coarse.leaf[id] && coarse.hanging[id] != 0 {
             sum = sum.carried(&weights(cell, coarse.hanging[id]));
         }
         stored.matrix = sum.packed();
@@ -538,7 +538,7 @@ fn cell_matrix(
 /// corner.
 pub(super) fn shared_matrix(level: &Level, id: usize, of_kind: &Dense, eighth: f32) -> Dense {
     let mut A = *of_kind;
-    if level.leaf[id] == NONE {
+    if !level.leaf[id] {
         return A;
     }
     if level.hanging[id] == 0 {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::follow::{LevelChange, Links, follow_level};
 use super::level::{Level, NONE};
-use super::transfer::Transfer;
+use super::transfer::{MOST_VERTICES, Transfer};
 use crate::lists::jagged::Jagged;
 use crate::material::Region;
 use crate::octree::{Lattice, Octree};
@@ -158,15 +158,10 @@ impl Hierarchy {
             let (below, above) = self.levels.split_at_mut(l + 1);
             let (fine, coarse) = (&below[l], &mut above[0]);
             let links = if l == 0 { Links::Leaves(octree) } else { Links::Cells(&fine.links) };
-            let of_fine = &changes[l];
-            let change = follow_level((fine, links, of_fine), step, coarse, l as u8)?;
+            let change = follow_level((fine, links, &changes[l]), step, coarse, l as u8)?;
             // A row follows from the fine vertex, its cell, and the parent of that.
             let below = change.cells.iter().flat_map(|&id| step.children.get(id as usize));
-            let mut rows: Vec<u32> = below.flat_map(|&id| fine.vertices[id as usize]).collect();
-            rows.extend(&of_fine.vertices);
-            rows.sort_unstable();
-            rows.dedup();
-            step.transfer.follow(fine, coarse, &step.parent, &rows);
+            step.transfer.follow(fine, coarse, &step.parent, below.copied());
             changes.push(change);
         }
         if !self.stalled && self.limits.goes_on(&self.levels) {
@@ -179,6 +174,11 @@ impl Hierarchy {
             change.cells.iter().for_each(|&id| self.find_kind(l, id as usize));
         }
         Some(changes)
+    }
+
+    /// Lists the slots of the finest level, too.
+    pub(super) fn list_finest_slots(&mut self) {
+        self.levels[0].list_slots();
     }
 
     /// Bytes in use.
@@ -212,7 +212,7 @@ impl Hierarchy {
         let level = &self.levels[l];
         let cell = &level.cells[id];
         let own = Kind { material: cell.material, side: cell.level, merged: 0 };
-        let found = if level.leaf[id] != NONE {
+        let found = if level.leaf[id] {
             Some((own, true))
         } else {
             let (children, fine) = (self.steps[l - 1].children_of(id), &self.levels[l - 1]);
@@ -243,7 +243,7 @@ impl Limits {
     fn goes_on(&self, levels: &[Level]) -> bool {
         let coarsest = &levels[levels.len() - 1];
         let enough = levels.len() > self.least && 3 * coarsest.n_vertices <= self.coarse_enough;
-        !enough && 1 << (levels.len() - 1) < self.across
+        !enough && 1 << (levels.len() - 1) < self.across && coarsest.n_vertices <= MOST_VERTICES
     }
 }
 

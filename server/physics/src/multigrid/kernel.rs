@@ -16,61 +16,83 @@ use crate::team::{Team, blocks};
 /// Places of xx, yy, zz in a block.
 const DIAGONAL: [usize; 3] = [0, 4, 6];
 
-/// The cells of a level, arranged for the kernels.
+/// The cells of a level, arranged for the kernels by the first update.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct LevelKernel {
+    simd: Simd,
     operator: CellOperator,
-    lanes: Vec<CellLane>,
+    /// Matrices that the cells were arranged with.
+    arranged: Vec<LaneMatrix>,
     /// Cells that were arranged anew in this update.
     moved: Vec<bool>,
     /// Of cells that cuts added since the last update, the ones they were part of; their numbers come last.
     origin: Vec<u32>,
-    /// Whether a cut changed cells since the last update.
-    cut: bool,
+    /// Cells that cuts moved to other vertices since the last update.
+    cut: Vec<u32>,
     /// Whether no matrix was given yet.
     fresh: bool,
 }
 
 impl LevelKernel {
-    /// Arranges the cells of `level`, as if all had the matrices of their kinds.
-    pub fn new(simd: Simd, level: &Level, matrices: &LevelMatrices) -> Self {
-        let lanes: Vec<CellLane> =
-            (0..level.cells.len()).map(|id| lane(level, id, matrices.matrix[id])).collect();
-        let order = morton_order(&level.cells);
-        let operator = CellOperator::new(simd, &[], &lanes, &order, level.n_vertices);
-        Self { operator, moved: vec![false; lanes.len()], lanes, origin: Vec::new(), cut: false, fresh: true }
+    /// No cells yet: which of them have a matrix of their own is known at the first update.
+    pub fn new(simd: Simd) -> Self {
+        Self {
+            simd,
+            operator: CellOperator::new(simd, &[], &[], &[], 0),
+            arranged: Vec::new(),
+            moved: Vec::new(),
+            origin: Vec::new(),
+            cut: Vec::new(),
+            fresh: true,
+        }
+    }
+
+    /// Arranges the cells of `level`.
+    fn arrange(&mut self, level: &Level, matrices: &LevelMatrices) {
+        let n = level.cells.len();
+        let lanes: Vec<CellLane> = (0..n).map(|id| lane(level, id, matrices.matrix[id])).collect();
+        self.operator =
+            CellOperator::new(self.simd, &[], &lanes, &morton_order(&level.cells), level.n_vertices);
+        self.arranged = lanes.iter().map(|lane| lane.matrix).collect();
+        self.moved.resize(n, true);
+        self.origin.clear();
+        self.cut.clear();
     }
 
     /// Takes note of a cut, which the next update follows.
     pub fn follow_cut(&mut self, change: &LevelChange) {
         self.origin.extend_from_slice(&change.origin);
-        self.cut |= !change.cells.is_empty();
+        self.cut.extend_from_slice(&change.moved);
     }
 
     /// Follows an update of the matrices of level `l`; `anew` if those of the kinds changed.
     pub fn follow(&mut self, team: &mut Team, level: &Level, (galerkin, l, anew): (&Galerkin, usize, bool)) {
+        if self.fresh {
+            self.arrange(level, &galerkin.levels[l]);
+        }
         if anew || self.operator.n_tables() != galerkin.shared.len() {
             let table = |shared: &super::dense::Dense| SectorTable::of_matrix(&shared.wide()).0;
             self.operator.set_tables(&galerkin.shared.iter().map(table).collect::<Vec<_>>());
         }
         let matrices = &galerkin.levels[l];
-        let Self { operator, lanes, moved, origin, cut, fresh } = self;
-        let known = lanes.len();
-        lanes.extend((known..level.cells.len()).map(|id| lane(level, id, matrices.matrix[id])));
-        moved.resize(lanes.len(), true);
-        let mut any = known < lanes.len();
-        for (id, (known, moved)) in lanes.iter_mut().zip(moved.iter_mut()).enumerate().take(known) {
-            let now = lane(level, id, matrices.matrix[id]);
-            *moved = *known != now;
+        let Self { operator, arranged, moved, origin, cut, fresh, .. } = self;
+        let (known, n) = (arranged.len(), level.cells.len());
+        moved.resize(n, true);
+        let mut any = !cut.is_empty();
+        for ((arranged, moved), &matrix) in arranged.iter_mut().zip(&mut *moved).zip(&matrices.matrix) {
+            let now = lane_matrix(matrix);
+            *moved = *arranged != now;
             if *moved {
-                (*known, any) = (now, true);
+                (*arranged, any) = (now, true);
             }
         }
+        arranged.extend(matrices.matrix[known..].iter().map(|matrix| lane_matrix(*matrix)));
         // All cells of a chunk that is arranged anew lose their matrices.
-        let cut = std::mem::take(cut);
         if any {
-            let renewed = if cut {
+            let lane = |id: u32| lane(level, id as usize, matrices.matrix[id as usize]);
+            let renewed = if !cut.is_empty() {
                 moved[known..].fill(true);
+                cut.drain(..).for_each(|id| moved[id as usize] = true);
                 let changed: Vec<u32> =
                     (0u32..).zip(&*moved).filter(|(_, moved)| **moved).map(|(id, _)| id).collect();
                 let source = |mut id: u32| {
@@ -79,10 +101,9 @@ impl LevelKernel {
                     }
                     id
                 };
-                let sizes = [lanes.len(), level.n_vertices];
-                operator.follow(&changed, sizes, &|id| lanes[id as usize], &source)
+                operator.follow(&changed, [n, level.n_vertices], &lane, &source)
             } else {
-                operator.rearrange(team, lanes, |id| moved[id as usize])
+                operator.rearrange(team, lane, |id| moved[id as usize])
             };
             for chunk in renewed {
                 operator.members(chunk).for_each(|id| moved[id as usize] = true);
@@ -114,7 +135,7 @@ impl LevelKernel {
     /// Bytes in use: all but stored matrices, and these.
     pub fn memory(&self) -> [usize; 2] {
         let [operator, stored] = self.operator.memory();
-        let lists = size_of_val(&self.lanes[..]) + size_of_val(&self.moved[..]);
+        let lists = size_of_val(&self.arranged[..]) + size_of_val(&self.moved[..]);
         [operator + lists, stored]
     }
 
@@ -187,18 +208,24 @@ pub fn noise(v: u32) -> Padded {
 }
 
 fn lane(level: &Level, id: usize, matrix: CellMatrix) -> CellLane {
-    let (octant, vertices) = (level.cells[id].octant() as u8, level.vertices[id]);
+    let (octant, vertices, matrix) =
+        (level.cells[id].octant() as u8, level.vertices[id], lane_matrix(matrix));
     match matrix {
-        CellMatrix::Shared(kind) => CellLane {
+        LaneMatrix::Table(_) => CellLane {
             vertices: slot_corners(vertices, octant),
             octant,
             hanging: slot_hanging(level.hanging[id], octant),
-            matrix: LaneMatrix::Table(kind as u16),
+            matrix,
             factor: 1.0,
         },
         // A stored matrix is over the vertices themselves.
-        CellMatrix::Stored(_) => {
-            CellLane { vertices, octant: 0, hanging: 0, matrix: LaneMatrix::Stored, factor: 1.0 }
-        }
+        LaneMatrix::Stored => CellLane { vertices, octant: 0, hanging: 0, matrix, factor: 1.0 },
+    }
+}
+
+fn lane_matrix(matrix: CellMatrix) -> LaneMatrix {
+    match matrix {
+        CellMatrix::Shared(kind) => LaneMatrix::Table(kind as u16),
+        CellMatrix::Stored(_) => LaneMatrix::Stored,
     }
 }

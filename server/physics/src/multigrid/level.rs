@@ -17,15 +17,16 @@ pub type Link = (u32, u32, u8);
 pub struct Level {
     /// Cells; several may be at one position. `cut` is not used.
     pub cells: Vec<Cell>,
-    /// Leaf of the octree that each cell is, or [`NONE`] for merged ones.
-    pub leaf: Vec<u32>,
+    /// Whether each cell is a leaf of the octree and not merged.
+    pub leaf: Vec<bool>,
     /// The eight vertices that carry each cell, as in [`Octree::vertices`].
     pub vertices: Vec<[u32; 8]>,
     /// Which corners of each cell hang, one bit per corner.
     pub hanging: Vec<u8>,
     /// Number of vertices.
     pub n_vertices: usize,
-    /// 8 · cell + corner, by vertex: where it carries a cell, ascending.
+    /// 8 · cell + corner, by vertex: where it carries a cell, ascending. Empty on the finest level, unless it is
+    /// [asked for](Self::list_slots).
     pub slots: Jagged<u32>,
     /// 8 · cell + direction, by cell: the cells that links lead to. Empty on the finest level, whose links the
     /// octree knows.
@@ -80,15 +81,14 @@ impl Level {
     pub fn finest(octree: &Octree) -> (Self, Vec<Link>) {
         let mut links = Vec::new();
         octree.for_links(|low, high, axis| links.push((low, high, axis as u8)));
-        let mut level = Self {
+        let level = Self {
             cells: octree.cells().iter().map(|cell| Cell { cut: 0, ..*cell }).collect(),
-            leaf: (0..octree.cells().len() as u32).collect(),
+            leaf: vec![true; octree.cells().len()],
             vertices: octree.vertices().to_vec(),
             hanging: octree.hanging().to_vec(),
             n_vertices: octree.n_vertices(),
             ..Self::default()
         };
-        level.list_slots();
         (level, links)
     }
 
@@ -126,10 +126,10 @@ impl Level {
             if merges(id) {
                 let at = cell.at.map(|x| x >> (size + 1) << (size + 1));
                 level.cells.push(Cell { at, level: size + 1, ..cell });
-                level.leaf.push(NONE);
+                level.leaf.push(false);
             } else {
                 level.cells.push(cell);
-                level.leaf.push(self.leaf[id as usize]);
+                level.leaf.push(true);
             }
         }
         let coarse = links.iter().map(|&(a, b, axis)| (parent[a as usize], parent[b as usize], axis));
@@ -216,16 +216,21 @@ impl Level {
 
     /// The corner of cell `id` at the lattice point `p`.
     pub fn corner_at(&self, id: u32, p: At) -> Option<usize> {
-        let cell = &self.cells[id as usize];
-        (0..8).find(|&k| cell.corner(k) == p)
+        self.cells[id as usize].corner_at(p)
     }
 
-    fn list_slots(&mut self) {
+    /// Lists the [slots](Self::slots).
+    pub fn list_slots(&mut self) {
         let vertices = &self.vertices;
         let slots = |visit: &mut dyn FnMut(u32, u32)| {
             (0u32..).zip(vertices.iter().flatten()).for_each(|(slot, &v)| visit(v, slot));
         };
         self.slots = Jagged::by_counting(self.n_vertices, slots, 0);
+    }
+
+    /// Whether the [slots](Self::slots) are listed.
+    pub fn has_slots(&self) -> bool {
+        self.slots.len() > 0
     }
 
     /// Where vertex `v` carries cells: cell and corner.

@@ -292,7 +292,7 @@ impl RowBuffers {
         for step in &hierarchy.steps[..level] {
             self.next.clear();
             for &(v, w) in &self.row {
-                for &(coarse, p) in step.transfer.row(v as usize) {
+                for (coarse, p) in step.transfer.row(v as usize) {
                     match self.next.iter_mut().find(|e| e.0 == coarse) {
                         Some(known) => known.1 += w * p,
                         None => self.next.push((coarse, w * p)),
@@ -314,9 +314,9 @@ fn on_axes(fixed: u8) -> u8 {
 impl Hierarchy {
     /// The vertex of level `level` that is the same as vertex `v` of the finest one, if there is one.
     pub(super) fn same_vertex(&self, v: u32, level: usize) -> Option<u32> {
-        self.steps[..level].iter().try_fold(v, |v, step| match step.transfer.row(v as usize) {
-            [(coarse, _)] => Some(*coarse),
-            _ => None,
+        self.steps[..level].iter().try_fold(v, |v, step| {
+            let mut row = step.transfer.row(v as usize);
+            row.next().filter(|_| row.len() == 0).map(|(coarse, _)| coarse)
         })
     }
 }

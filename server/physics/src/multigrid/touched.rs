@@ -1,7 +1,7 @@
 //! Galerkin operators that follow cuts and other prescribed directions: only matrices of touched cells are computed
 //! again, by the next update.
 
-use super::follow::LevelChange;
+use super::follow::{Bits, LevelChange};
 use super::galerkin::{CellMatrix, Galerkin, INCLINED, LevelMatrices, Rotation, held, shared_matrix};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
@@ -26,14 +26,17 @@ impl Galerkin {
             level.matrix.resize(n, CellMatrix::Shared(NONE));
             level.holds.resize(n, [false; 2]);
             level.changed.resize(n, false);
-            level.mass.resize(hierarchy.levels[l].n_vertices, 0.0);
+            let weighs = hierarchy.levels[l].has_slots();
+            if weighs {
+                level.mass.resize(hierarchy.levels[l].n_vertices, 0.0);
+            }
             for &id in &change.cells {
                 self.touch(hierarchy, l, id);
             }
             // The constants are known from the first update on.
             if self.coefficients.is_some() {
                 self.add_carried(hierarchy, l, &change.cells);
-                change.vertices.iter().for_each(|&v| self.weigh(hierarchy, l, v));
+                change.vertices.iter().filter(|_| weighs).for_each(|&v| self.weigh(hierarchy, l, v));
             }
         }
     }
@@ -54,15 +57,19 @@ impl Galerkin {
         self.known_fixed.extend(fixed.iter().map(|f| (f.copy, f.held)));
         self.enter_fixed(hierarchy);
         let mut released = false;
-        let mut cells: Vec<u32> = Vec::new();
+        let mut changed = Bits::new(self.fixed.len());
         for (&v, &before) in vertices.iter().zip(&before) {
             let now = self.bits(v);
             let inclined = before.max(now) >= INCLINED;
             released |= if inclined { before != now } else { before & !now != 0 };
             if before != now {
-                cells.extend(hierarchy.levels[0].slots_of(v as usize).map(|(id, _)| id as u32));
+                changed.insert(v);
             }
         }
+        let carried = (0u32..).zip(&hierarchy.levels[0].vertices);
+        let is_changed = |vertices: &[u32; 8]| vertices.iter().any(|&v| changed.has(v));
+        let mut cells: Vec<u32> =
+            carried.filter(|(_, vertices)| is_changed(vertices)).map(|(id, _)| id).collect();
         for l in 0..self.levels.len() {
             cells.sort_unstable();
             cells.dedup();
@@ -71,7 +78,8 @@ impl Galerkin {
             }
             // Leaves on coarse levels have their mass apart from their matrix, unless they are held.
             let level = &hierarchy.levels[l];
-            let leaves = cells.iter().filter(|&&id| level.leaf[id as usize] != NONE);
+            let weighed = cells.iter().filter(|_| level.has_slots());
+            let leaves = weighed.filter(|&&id| level.leaf[id as usize]);
             let mut vertices: Vec<u32> = leaves.flat_map(|&id| level.vertices[id as usize]).collect();
             vertices.sort_unstable();
             vertices.dedup();
@@ -130,7 +138,7 @@ impl Galerkin {
         let matrices = &mut self.levels[l];
         let mut sum = 0.0;
         for (id, c) in level.slots_of(v as usize) {
-            if level.leaf[id] != NONE && !(l > 0 && matrices.holds[id][0]) {
+            if level.leaf[id] && !(l > 0 && matrices.holds[id][0]) {
                 sum += mass_at(level, id, c, self.eighth[kinds[id] as usize]);
             }
         }

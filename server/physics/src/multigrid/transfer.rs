@@ -9,19 +9,48 @@ use crate::octree::corner_weights;
 use crate::operator::{BLOCK, Padded};
 use crate::team::{Team, blocks};
 
+/// Weights are multiples of 1/32: trilinear ones of 1/8, and a hanging corner divides them among up to four vertices.
+const PARTS: f32 = 32.0;
+/// Bits of an entry that hold its weight.
+const WEIGHT_BITS: u32 = 5;
+/// Vertices of a level that has coarser ones, at most: the other bits hold their numbers.
+pub const MOST_VERTICES: usize = 1 << (u32::BITS - WEIGHT_BITS);
+
+/// A vertex and its weight, exactly: number · 32 + 32 · weight − 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+struct Entry(u32);
+
+impl Entry {
+    fn new((vertex, weight): (u32, f32)) -> Self {
+        let entry = Self(vertex << WEIGHT_BITS | ((PARTS * weight) as u32 - 1));
+        debug_assert!((entry.vertex(), entry.weight()) == (vertex, weight), "{vertex}: {weight}");
+        entry
+    }
+
+    #[inline]
+    fn vertex(self) -> u32 {
+        self.0 >> WEIGHT_BITS
+    }
+
+    #[inline]
+    fn weight(self) -> f32 {
+        ((self.0 & ((1 << WEIGHT_BITS) - 1)) + 1) as f32 / PARTS
+    }
+}
+
 /// P by rows and by columns.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Transfer {
-    rows: Jagged<(u32, f32)>,
-    columns: Jagged<(u32, f32)>,
+    rows: Jagged<Entry>,
+    columns: Jagged<Entry>,
 }
 
 /// Σ w v of a list.
 #[inline]
-fn sum(list: &[(u32, f32)], v: &[Padded]) -> Padded {
+fn sum(list: &[Entry], v: &[Padded]) -> Padded {
     let mut sum = [0.0; 4];
-    for &(j, w) in list {
-        let v = v[j as usize];
+    for entry in list {
+        let (v, w) = (v[entry.vertex() as usize], entry.weight());
         (0..4).for_each(|k| sum[k] += w * v[k]);
     }
     sum
@@ -42,44 +71,51 @@ impl Transfer {
         for &slot in &home {
             if slot != NONE {
                 let (id, c) = (slot as usize / 8, slot as usize % 8);
-                entries.extend(carriers(fine, coarse, parent[id], (id, c)));
+                entries.extend(carriers(fine, coarse, parent[id], (id, c)).map(Entry::new));
             }
             first.push(entries.len() as u32);
         }
         let rows = Jagged::new(&first, entries);
-        let by_column = |visit: &mut dyn FnMut(u32, (u32, f32))| {
+        let by_column = |visit: &mut dyn FnMut(u32, Entry)| {
             for i in 0..rows.len() {
-                rows.get(i).iter().for_each(|&(j, w)| visit(j, (i as u32, w)));
+                rows.get(i).iter().for_each(|e| visit(e.vertex(), Entry::new((i as u32, e.weight()))));
             }
         };
-        let columns = Jagged::by_counting(coarse.n_vertices, by_column, (0, 0.0));
+        let columns = Jagged::by_counting(coarse.n_vertices, by_column, Entry::default());
         Self { rows, columns }
     }
 
-    /// Follows a cut that changed the rows of the fine `vertices`, ascending.
-    pub fn follow(&mut self, fine: &Level, coarse: &Level, parent: &[u32], vertices: &[u32]) {
+    /// Follows a cut that changed the fine `cells`, or the coarse ones that they belong to.
+    pub fn follow(&mut self, fine: &Level, coarse: &Level, parent: &[u32], cells: impl Iterator<Item = u32>) {
         self.rows.grow(fine.n_vertices);
         self.columns.grow(coarse.n_vertices);
+        // One cell and corner for every vertex: the first of these cells.
+        let stands = |(id, c): &(u32, usize)| fine.hanging[*id as usize] >> c & 1 == 0;
+        let corners = cells.flat_map(|id| (0..8).map(move |c| (id, c))).filter(stands);
+        let mut homes: Vec<(u32, u32)> =
+            corners.map(|(id, c)| (fine.vertices[id as usize][c], 8 * id + c as u32)).collect();
+        homes.sort_unstable();
+        homes.dedup_by_key(|home| home.0);
         let (mut edits, mut row) = (Vec::new(), Vec::new());
-        for &v in vertices {
-            let stands = |(id, c): &(usize, usize)| fine.hanging[*id] >> c & 1 == 0;
-            let home = fine.slots_of(v as usize).find(stands);
+        for (v, slot) in homes {
+            let (id, c) = (slot as usize / 8, slot as usize % 8);
             row.clear();
-            row.extend(home.into_iter().flat_map(|(id, c)| carriers(fine, coarse, parent[id], (id, c))));
+            row.extend(carriers(fine, coarse, parent[id], (id, c)).map(Entry::new));
             let known = self.rows.get(v as usize);
             if row != known {
-                edits.extend(known.iter().map(|&(j, w)| (j, (v, w), false)));
-                edits.extend(row.iter().map(|&(j, w)| (j, (v, w), true)));
+                let at_column = |e: &Entry| (e.vertex(), Entry::new((v, e.weight())));
+                edits.extend(known.iter().map(at_column).map(|(j, entry)| (j, entry, false)));
+                edits.extend(row.iter().map(at_column).map(|(j, entry)| (j, entry, true)));
                 self.rows.set(v as usize, &row);
             }
         }
-        self.columns.edit(&mut edits, |entry| entry.0);
+        self.columns.edit(&mut edits, |entry| entry.vertex());
     }
 
     /// Fine vertices that rest on coarse vertex `v`, and their weights.
     #[cfg(test)]
-    pub fn column(&self, v: usize) -> &[(u32, f32)] {
-        self.columns.get(v)
+    pub fn column(&self, v: usize) -> impl ExactSizeIterator<Item = (u32, f32)> {
+        self.columns.get(v).iter().map(|e| (e.vertex(), e.weight()))
     }
 
     /// Number of fine vertices.
@@ -89,8 +125,8 @@ impl Transfer {
     }
 
     /// Coarse vertices of fine vertex `v`, and their weights.
-    pub fn row(&self, v: usize) -> &[(u32, f32)] {
-        self.rows.get(v)
+    pub fn row(&self, v: usize) -> impl ExactSizeIterator<Item = (u32, f32)> {
+        self.rows.get(v).iter().map(|e| (e.vertex(), e.weight()))
     }
 
     /// Bytes in use.

@@ -73,9 +73,11 @@ pub fn matched(followed: &Hierarchy, new: &Hierarchy) -> Pairs {
         }
         for (v, &w) in vertices.iter().enumerate() {
             let slot = |(id, c): (usize, usize)| (cells[id] as usize, c);
-            let slots: BTreeSet<_> = a.slots_of(v).map(slot).collect();
-            assert!(slots.into_iter().eq(b.slots_of(w as usize)), "level {l}, vertex {v}");
-            assert!(a.slots.get(v).is_sorted());
+            if a.has_slots() || b.has_slots() {
+                let slots: BTreeSet<_> = a.slots_of(v).map(slot).collect();
+                assert!(slots.into_iter().eq(b.slots_of(w as usize)), "level {l}, vertex {v}");
+                assert!(a.slots.get(v).is_sorted());
+            }
         }
         pairs.cells.push(cells);
         pairs.vertices.push(vertices);
@@ -83,19 +85,17 @@ pub fn matched(followed: &Hierarchy, new: &Hierarchy) -> Pairs {
     for l in 0..n - 1 {
         let (a, b) = (&followed.steps[l].transfer, &new.steps[l].transfer);
         let (fine, coarse) = (&pairs.vertices[l], &pairs.vertices[l + 1]);
-        let same = |a: &[(u32, f32)], b: &[(u32, f32)], number: &[u32]| {
-            let sorted = |list: Vec<(u32, f32)>| {
-                let mut list = list;
-                list.sort_unstable_by_key(|entry| entry.0);
-                list
-            };
-            sorted(a.iter().map(|&(j, w)| (number[j as usize], w)).collect()) == sorted(b.to_vec())
+        let sorted = |mut list: Vec<(u32, f32)>| {
+            list.sort_unstable_by_key(|entry| entry.0);
+            list
         };
         for (v, &w) in fine.iter().enumerate() {
-            assert!(same(a.row(v), b.row(w as usize), coarse), "level {l}, row {v}");
+            let own = a.row(v).map(|(j, w)| (coarse[j as usize], w)).collect();
+            assert_eq!(sorted(own), sorted(b.row(w as usize).collect()), "level {l}, row {v}");
         }
         for (v, &w) in coarse.iter().enumerate() {
-            assert!(same(a.column(v), b.column(w as usize), fine), "level {l}, column {v}");
+            let own = a.column(v).map(|(i, w)| (fine[i as usize], w)).collect();
+            assert_eq!(sorted(own), sorted(b.column(w as usize).collect()), "level {l}, column {v}");
         }
     }
     pairs
@@ -131,13 +131,21 @@ pub fn cut_links(octree: &mut Octree, links: &[LinkKey]) -> Vec<u32> {
 fn levels_that_follow_cuts_are_those_made_anew() {
     for (seed, (cells, levels)) in [(8, 0), (13, 2), (16, 3), (16, 0), (24, 2)].into_iter().enumerate() {
         let mut octree = cube(cells, levels);
-        let mut followed = Hierarchy::with(&octree, 100, true);
+        // Gauss–Seidel sweeps need the slots of the finest level, too.
+        let made_of = |octree: &Octree| {
+            let mut hierarchy = Hierarchy::with(octree, 100, true);
+            if seed % 2 == 0 {
+                hierarchy.list_finest_slots();
+            }
+            hierarchy
+        };
+        let mut followed = made_of(&octree);
         let rounds = if cells == 8 { 60 } else { 25 };
         let mut made_anew = 0;
         for round in 0..rounds {
             let links = random_links(&octree, round, seed);
             let changed = cut_links(&mut octree, &links);
-            let new = Hierarchy::with(&octree, 100, true);
+            let new = made_of(&octree);
             match followed.follow(&octree, &changed) {
                 Some(changes) => assert_eq!(changes[0].cells, changed),
                 None => {
@@ -174,9 +182,12 @@ fn compare(team: &mut Team, followed: &mut Multigrid, new: &mut Multigrid, fine:
             let b = new.galerkin.cell_matrix(&new.hierarchy, l, other as usize);
             assert!(apart(a.0.into_iter(), b.0.into_iter()) < 1e-5, "{name}, level {l}, cell {id}");
         }
-        let mass = |m: &Multigrid, v: usize| [m.galerkin.levels[l].mass[v]];
-        let own = (0..vertices.len()).map(|v| mass(followed, v));
-        assert!(apart(own, vertices.iter().map(|&w| mass(new, w as usize))) < 1e-5, "{name}, level {l}");
+        assert_eq!(followed.galerkin.levels[l].mass.len(), new.galerkin.levels[l].mass.len());
+        if !new.galerkin.levels[l].mass.is_empty() {
+            let mass = |m: &Multigrid, v: usize| [m.galerkin.levels[l].mass[v]];
+            let own = (0..vertices.len()).map(|v| mass(followed, v));
+            assert!(apart(own, vertices.iter().map(|&w| mass(new, w as usize))) < 1e-5, "{name}, level {l}");
+        }
         if l == 0 {
             continue;
         }
@@ -225,7 +236,13 @@ fn operators_that_follow_cuts_are_those_made_anew() {
             // With a tolerance matrices would depend on earlier rotations, so these stay the same then.
             let (same_rotation_rad, turn) = if threads == 1 { (0.1, 0.0) } else { (0.0, 0.1) };
             let settings = MultigridSettings { same_rotation_rad, ..MultigridSettings::default() };
-            let made_anew = |octree: &Octree| Multigrid::new(Hierarchy::with(octree, 300, true), settings);
+            let made_anew = |octree: &Octree| {
+                let mut hierarchy = Hierarchy::with(octree, 300, true);
+                if threads == 2 {
+                    hierarchy.list_finest_slots();
+                }
+                Multigrid::new(hierarchy, settings)
+            };
             let mut followed = made_anew(&octree);
             for round in 0..12 {
                 let mut fixed = clamped(&octree, 0);

@@ -24,14 +24,14 @@ fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
         for step in hierarchy.steps[..l].iter().rev() {
             let n = step.transfer.n_rows();
             fine = (0..n)
-                .map(|v| step.transfer.row(v).iter().map(|&(c, w)| f64::from(w) * fine[c as usize]).sum())
+                .map(|v| step.transfer.row(v).map(|(c, w)| f64::from(w) * fine[c as usize]).sum())
                 .collect();
         }
         let mut y = exact.apply(&fine);
         for (s, step) in hierarchy.steps[..l].iter().enumerate() {
             let mut coarse = vec![V3::zeros(); hierarchy.levels[s + 1].n_vertices];
             for (v, y) in y.iter().enumerate() {
-                step.transfer.row(v).iter().for_each(|&(c, w)| coarse[c as usize] += f64::from(w) * y);
+                step.transfer.row(v).for_each(|(c, w)| coarse[c as usize] += f64::from(w) * y);
             }
             y = coarse;
         }
@@ -41,7 +41,7 @@ fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
         if l > 0 {
             galerkin.operator(level, l).apply(&mut team, &x32, &mut y32, &mut products);
             // The kernels do the same.
-            let mut kernel = LevelKernel::new(Simd::detect(), level, &galerkin.levels[l]);
+            let mut kernel = LevelKernel::new(Simd::detect());
             kernel.follow(&mut team, level, (galerkin, l, true));
             let mut by_kernel = vec![[0.0; 4]; x.len()];
             kernel.apply(&mut team, &galerkin.levels[l].mass, &x32, &mut by_kernel);

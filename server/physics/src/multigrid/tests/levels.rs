@@ -52,7 +52,7 @@ fn cells_that_share_a_vertex_agree_on_its_prolongation() {
                     let own: BTreeMap<u32, f32> = carriers(fine, coarse, step.parent[id], (id, c)).collect();
                     let row = step.transfer.row(fine.vertices[id][c] as usize);
                     assert!(row.len() <= 8);
-                    let shared: BTreeMap<u32, f32> = row.iter().copied().collect();
+                    let shared: BTreeMap<u32, f32> = row.collect();
                     assert_eq!(own, shared, "body {b}, level {l}, cell {id}, corner {c}");
                 }
             }
@@ -70,7 +70,7 @@ fn levels_rest_on_eight_vertices_and_prolong_linear_fields() {
                 distinct.sort_unstable();
                 distinct.dedup();
                 assert!(distinct.len() == 8 && distinct[7] < level.n_vertices as u32);
-                assert!(level.leaf[id] != u32::MAX || level.hanging[id] == 0);
+                assert!(level.leaf[id] || level.hanging[id] == 0);
             }
         }
         for (l, step) in hierarchy.steps.iter().enumerate() {
@@ -88,7 +88,7 @@ fn levels_rest_on_eight_vertices_and_prolong_linear_fields() {
             let (fine, coarse) = (points(l), points(l + 1));
             for (v, at) in fine.iter().enumerate() {
                 let row = step.transfer.row(v);
-                let sum: V3 = row.iter().map(|&(c, w)| f64::from(w) * coarse[c as usize]).sum();
+                let sum: V3 = row.map(|(c, w)| f64::from(w) * coarse[c as usize]).sum();
                 assert!((sum - at).norm() < 1e-6, "level {l}, vertex {v}: {sum} {at}");
             }
         }

@@ -184,7 +184,8 @@ pub struct Fine {
 
 impl Fine {
     pub fn new(team: &mut Team, exact: &Exact, with: &Coefficients) -> Self {
-        let hierarchy = Hierarchy::with(&exact.octree, usize::MAX, true);
+        let mut hierarchy = Hierarchy::with(&exact.octree, usize::MAX, true);
+        hierarchy.list_finest_slots();
         let mut galerkin = Galerkin::new(&hierarchy);
         galerkin.update(team, &hierarchy, (with, &exact.fixed), &|id| exact.rotation(id), 0.0);
         let mut jacobi = BlockJacobi::default();

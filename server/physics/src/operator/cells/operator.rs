@@ -13,7 +13,7 @@ use super::super::{BLOCK, LinearOperator, Padded, block_of};
 use super::batch::TableLanes;
 use super::blocks::BlockTable;
 use super::chunk::{CellChunk, Table};
-use super::lane::CellLane;
+use super::lane::{CellLane, CellMatrix};
 use super::sectors::SectorTable;
 use super::stored::STORED;
 use crate::element::Simd;
@@ -68,10 +68,16 @@ impl CellOperator {
         order: &[u32],
         n_vertices: usize,
     ) -> Self {
-        let chunks: Vec<CellChunk> = order
-            .chunks(CHUNK_CELLS)
-            .map(|members| CellChunk::new(members, &|id| cells[id as usize]))
-            .collect();
+        let lane = |id: u32| cells[id as usize];
+        let chunk = |members: &[u32]| {
+            let mut members = members.to_vec();
+            // As in chunks that are rearranged: cells in one order have the same sums to the bit.
+            if members.iter().any(|&id| lane(id).matrix == CellMatrix::Stored) {
+                members.sort_unstable();
+            }
+            CellChunk::new(&members, &lane)
+        };
+        let chunks: Vec<CellChunk> = order.chunks(CHUNK_CELLS).map(chunk).collect();
         let gather = Gather::without_room(chunks.iter().map(|chunk| &chunk.vertices[..]), n_vertices);
         let places = vec![Place::default(); cells.len()];
         let (mut sums, mut diagonals) = (Vec::new(), Vec::new());
@@ -121,19 +127,19 @@ impl CellOperator {
         team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].set_stored_rotations(&of));
     }
 
-    /// Takes other tables, matrices and hanging slots for the cells that `changed` names; their vertices stay.
-    /// Returns which chunks were arranged anew: these forget rotations and stored matrices.
+    /// Takes other tables, matrices and hanging slots for the cells that `changed` names; their vertices stay. `lane`
+    /// gives what each cell is now. Returns which chunks were arranged anew: these forget rotations and stored matrices.
     pub fn rearrange(
         &mut self,
         team: &mut Team,
-        cells: &[CellLane],
+        lane: impl Fn(u32) -> CellLane + Sync,
         changed: impl Fn(u32) -> bool + Sync,
     ) -> Vec<usize> {
         let is_changed = |chunk: &CellChunk| chunk.places().any(|(cell, ..)| changed(cell));
         let renewed: Vec<usize> = (0..self.chunks.len()).filter(|&k| is_changed(&self.chunks[k])).collect();
         team.for_blocks(blocks(&mut self.chunks, 1), |k, chunk| {
             if renewed.binary_search(&k).is_ok() {
-                chunk[0] = CellChunk::new(&members(&chunk[0]), &|id| cells[id as usize]);
+                chunk[0] = CellChunk::new(&members(&chunk[0]), &lane);
             }
         });
         renewed.iter().for_each(|&k| self.find_places(k));
