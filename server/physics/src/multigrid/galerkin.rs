@@ -15,7 +15,6 @@ use super::dense::{Dense, Packed};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use super::table::{self, Weights};
-use crate::lists::reserve::resize_reserving;
 use crate::material::Lame;
 use crate::octree::{Cell, corner_weights};
 use crate::operator::cells::unit_stiffness;
@@ -303,7 +302,15 @@ impl Galerkin {
                 *cube = !holds_any && is_kind && children.iter().all(near);
             }
         });
-        // Places for stored matrices.
+        // Places for stored matrices. They are large, so all new ones get their room at once.
+        let needed =
+            matrix.iter().zip(&*changed).filter(|(m, cube)| matches!(m, CellMatrix::Shared(_)) && !**cube);
+        let more = needed.count().saturating_sub(free.len());
+        if stored.len() + more > stored.capacity() {
+            // Where more come while the body bends, many more may follow.
+            let spare = if stored.is_empty() { 8 } else { 2 };
+            stored.reserve_exact(more + (stored.len() + more) / spare);
+        }
         for id in 0..matrix.len() {
             let cube = changed[id];
             changed[id] = anew;
@@ -317,7 +324,7 @@ impl Galerkin {
                 (CellMatrix::Shared(_), false) => {
                     let place = free.pop().unwrap_or(stored.len() as u32);
                     if place as usize == stored.len() {
-                        resize_reserving(stored, place as usize + 1, Stored::empty());
+                        stored.push(Stored::empty());
                     }
                     let new = &mut stored[place as usize];
                     (new.cell, new.stale) = (id as u32, true);
