@@ -15,7 +15,7 @@ use crate::octree::{Cell, Octree, parent_corner};
 pub struct LevelChange {
     /// Cells that are new or have other children, links, vertices or hanging corners, ascending.
     pub cells: Vec<u32>,
-    /// The vertices of these cells, now and before, ascending.
+    /// The vertices of these cells, now and before, ascending; none where the level has no slots.
     pub vertices: Vec<u32>,
     /// Number of cells before.
     pub known: usize,
@@ -121,13 +121,13 @@ impl LevelChange {
         origin: Vec<u32>,
         history: &History,
     ) -> Self {
-        let (mut vertices, mut edits, mut moved) = (Vec::new(), Vec::new(), Vec::new());
-        for &id in &cells {
-            let state = level.now(id);
-            if id as usize >= known || history.get(id).is_some_and(|earlier| *earlier != state) {
-                moved.push(id);
-            }
-            let now = state.vertices;
+        let is_moved = |&id: &u32| {
+            id as usize >= known || history.get(id).is_some_and(|earlier| *earlier != level.now(id))
+        };
+        let moved = cells.iter().copied().filter(is_moved).collect();
+        let (mut vertices, mut edits) = (Vec::new(), Vec::new());
+        for &id in cells.iter().filter(|_| level.has_slots()) {
+            let now = level.vertices[id as usize];
             let before = history.get(id).map_or(now, |earlier| earlier.vertices);
             vertices.extend(now);
             for c in 0..8 {
@@ -140,9 +140,9 @@ impl LevelChange {
                 }
             }
         }
-        vertices.sort_unstable();
-        vertices.dedup();
         if level.has_slots() {
+            vertices.sort_unstable();
+            vertices.dedup();
             level.slots.grow(level.n_vertices);
             level.slots.edit(&mut edits, |slot| *slot);
         }

@@ -159,9 +159,9 @@ impl Hierarchy {
             let (fine, coarse) = (&below[l], &mut above[0]);
             let links = if l == 0 { Links::Leaves(octree) } else { Links::Cells(&fine.links) };
             let change = follow_level((fine, links, &changes[l]), step, coarse, l as u8)?;
-            // A row follows from the fine vertex, its cell, and the parent of that.
-            let below = change.cells.iter().flat_map(|&id| step.children.get(id as usize));
-            step.transfer.follow(fine, coarse, &step.parent, below.copied());
+            // A row follows from the fine vertex, its cell, and the vertices of the parent of that.
+            let below = change.moved.iter().flat_map(|&id| step.children.get(id as usize));
+            step.transfer.follow(fine, coarse, &step.parent, below.chain(&changes[l].moved).copied());
             changes.push(change);
         }
         if !self.stalled && self.limits.goes_on(&self.levels) {

@@ -85,7 +85,7 @@ impl Transfer {
         Self { rows, columns }
     }
 
-    /// Follows a cut that changed the fine `cells`, or the coarse ones that they belong to.
+    /// Follows a cut that moved the fine `cells`, or the coarse ones that they belong to.
     pub fn follow(&mut self, fine: &Level, coarse: &Level, parent: &[u32], cells: impl Iterator<Item = u32>) {
         self.rows.grow(fine.n_vertices);
         self.columns.grow(coarse.n_vertices);
