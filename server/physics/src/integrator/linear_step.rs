@@ -31,8 +31,8 @@ use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport, Multigrid};
 use crate::octree::Octree;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, Held, LinearOperator, Padded, Spring,
-    StiffModes, Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, padded,
-    unpadded,
+    StiffModes, Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free,
+    padded, unpadded,
 };
 use crate::phase::Phase;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
@@ -482,9 +482,15 @@ impl LinearStep {
             if pass == 0 {
                 grid.follow(team, elastic, inputs);
             }
-            let mut A = system(elastic, &self.terms, inputs);
-            let blocks = (&self.diagonal[..], self.preconditioner.inverses());
-            grid.complete(team, &mut A, blocks, &self.terms);
+            let (diagonal, inverse) = (&self.diagonal, self.preconditioner.inverses());
+            if grid.sort(&self.terms, diagonal) {
+                let bare = |copy: u32| invert_free(&diagonal[copy as usize], inputs.held_of(copy));
+                let mut A = system(elastic, &[], inputs);
+                grid.complete_stiff(team, &mut A, (inverse, &bare), &self.terms);
+            } else {
+                let mut A = system(elastic, &self.terms, inputs);
+                grid.complete(team, &mut A, inverse, &self.terms);
+            }
         }
         if let Some(level) = &mut self.simulated {
             if pass == 0 {

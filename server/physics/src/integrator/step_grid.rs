@@ -7,9 +7,11 @@ use crate::octree::Octree;
 use crate::operator::{Block6, Inverse3, LinearOperator, Spring, Stiffness, invert};
 use crate::team::Team;
 
-/// Springs stiffer than this times the body at their point are left to block-Jacobi. Only the finest level has
-/// springs: corrections by the coarser ones overshoot along stiff ones, and single precision spoils the cycle.
-const STIFFEST_SPRING: f64 = 1.0;
+/// If a spring is stiffer than this times the body at its point, all levels take the springs: corrections by levels
+/// without them would overshoot along it. Softer ones are on the finest level only.
+const STIFF: f64 = 1.0;
+/// Springs stiffer than this times the body at their point are left to block-Jacobi: single precision spoils the cycle.
+const STIFFEST: f64 = 1e4;
 
 /// Multigrid, and what it was brought up to date with.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -62,22 +64,44 @@ impl StepGrid {
         multigrid.update(team, (coefficients, fixed), &|cell| elastic.rotation(places[cell as usize]));
     }
 
-    /// Decides whether the `springs` allow cycles, and estimates eigenvalues if they are not known for the
-    /// operator `A`. Its diagonal blocks are those in `diagonal`, without springs; with them they have the
-    /// inverses `inverse`.
+    /// Decides how cycles take the `springs`, if they can; `diagonal` has the diagonal blocks without them. Returns
+    /// whether all levels are to take them, and the eigenvalues are then those of the operator without springs.
+    pub fn sort(&mut self, springs: &[Spring], diagonal: &[Block6]) -> bool {
+        let stiffness = springs.iter().map(|spring| stiffness_at_point(spring, diagonal));
+        let stiffest = stiffness.fold(0.0, f64::max);
+        self.active = stiffest <= STIFFEST;
+        stiffest > STIFF
+    }
+
+    /// Estimates eigenvalues if they are not known for the operator `A` with the soft `springs`. Its diagonal blocks
+    /// have the inverses `inverse`.
     pub fn complete(
         &mut self,
         team: &mut Team,
         A: &mut dyn LinearOperator,
-        (diagonal, inverse): (&[Block6], &[Inverse3]),
+        inverse: &[Inverse3],
         springs: &[Spring],
     ) {
-        self.active = springs.iter().all(|spring| stiffness_at_point(spring, diagonal) <= STIFFEST_SPRING);
+        self.multigrid.clear_springs();
+        self.multigrid.estimate_eigenvalues(team, A, inverse);
+        self.largest = with_springs(self.multigrid.largest_eigenvalue(), inverse, springs);
+    }
+
+    /// The same with stiff `springs`, of which `A` has none. `bare` gives the inverse of the diagonal block of a copy
+    /// without springs.
+    pub fn complete_stiff(
+        &mut self,
+        team: &mut Team,
+        A: &mut dyn LinearOperator,
+        (inverse, bare): (&[Inverse3], &dyn Fn(u32) -> Inverse3),
+        springs: &[Spring],
+    ) {
         if !self.active {
             return;
         }
         self.multigrid.estimate_eigenvalues(team, A, inverse);
-        self.largest = with_springs(self.multigrid.largest_eigenvalue(), inverse, springs);
+        let bound = self.multigrid.set_springs(springs, bare);
+        (self.active, self.largest) = (bound.is_some(), bound.unwrap_or(0.0));
     }
 
     /// Whether the springs of the present solve allow cycles.

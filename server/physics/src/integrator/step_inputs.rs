@@ -8,7 +8,7 @@ use super::springs::{ActiveSpring, PointSpring};
 use super::state::State;
 use crate::element::Points;
 use crate::material::Material;
-use crate::operator::{ElasticUpdate, FixedCopy};
+use crate::operator::{ElasticUpdate, FixedCopy, Held};
 use crate::solver::{LinearReport, PcgSettings};
 
 /// Inputs of one step.
@@ -192,6 +192,12 @@ impl LinearInputs<'_> {
     /// 1 + rα; 0 without inertia.
     pub(super) fn mass_factor(&self) -> f64 {
         if self.moves() { 1.0 + self.r() * self.material.rayleigh.mass_1_s } else { 0.0 }
+    }
+
+    /// The prescribed directions of a copy.
+    pub(super) fn held_of(&self, copy: u32) -> Held {
+        let found = self.step.fixed.binary_search_by_key(&copy, |f| f.copy);
+        found.map_or(Held::NOT, |f| self.step.fixed[f].held)
     }
 
     /// Whether both steps have the same loads and prescribed positions, and none has springs.

@@ -4,6 +4,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::galerkin::Galerkin;
 use super::hierarchy::{COARSE_ENOUGH, Hierarchy};
+use super::stiff_springs::Columns;
 use crate::assembly::BlockCsr;
 use crate::operator::Padded;
 use crate::solver::{Cholesky, Filter};
@@ -39,6 +40,14 @@ pub struct Coarsest {
     /// Positions of the 64 blocks of every cell.
     #[serde(with = "crate::saved::arrays")]
     places: Vec<[u32; 64]>,
+    /// Prescribed directions, where this is the level that is solved on.
+    held: Filter,
+    /// Stiff springs that are in the matrix.
+    springs: Columns,
+    /// Blocks that have these, in the order in which they were changed, and what they were before.
+    before: Vec<(u32, [f64; 9])>,
+    /// Whether the matrix has changed since it was factored.
+    stale: bool,
 }
 
 impl Coarsest {
@@ -75,7 +84,7 @@ impl Coarsest {
         if self.factored { CoarsestSolve::Cholesky } else { CoarsestSolve::Sweeps { degree: SWEEPS } }
     }
 
-    /// Factorises anew if matrices changed or the frame of a cell turned by more than `tolerance` [rad].
+    /// Follows the matrices, if they changed or the frame of a cell turned by more than `tolerance` [rad].
     pub fn update(&mut self, hierarchy: &Hierarchy, galerkin: &Galerkin, changed: bool, tolerance: f64) {
         if !self.analysed {
             return;
@@ -89,7 +98,6 @@ impl Coarsest {
         }
         self.frames.clone_from(frames);
         self.matrix.clear();
-        let mut fixed = Filter::default();
         for (id, places) in self.places.iter().enumerate() {
             let R = frames[id].to_rotation_matrix().into_inner();
             let A = galerkin.cell_matrix(hierarchy, last, id).rotated(&R);
@@ -100,15 +108,67 @@ impl Coarsest {
                 }
             }
         }
+        self.held = Filter::default();
         // If it is the only one that is solved on, directions may be prescribed.
         if last == galerkin.first {
-            fixed.set_held(galerkin.held());
+            self.held.set_held(galerkin.held());
         }
-        self.factored = self.cholesky.factorise(&self.matrix, &fixed).is_ok();
+        self.before.clear();
+        self.stale = true;
+        // Those who have springs set them anew after an update.
+        if self.springs.is_empty() {
+            self.factorise();
+        }
+        self.springs.clear();
+    }
+
+    /// Adds these stiff springs to the matrix, in place of those that it has, and factorises it if they differ.
+    /// Returns `false` if a spring couples vertices of no common cell; the matrix has no springs then.
+    pub fn set_springs(&mut self, columns: &Columns) -> bool {
+        if !self.analysed {
+            return true;
+        }
+        let mut fits = true;
+        if self.springs != *columns {
+            for (at, block) in self.before.drain(..).rev() {
+                self.matrix.blocks[at as usize] = block;
+            }
+            self.springs.copy_from(columns);
+            self.stale = true;
+            fits = columns.iter().all(|column| self.add(column));
+            if !fits {
+                self.set_springs(&Columns::default());
+            }
+        }
+        self.factorise();
+        fits
+    }
+
+    /// A + u uᵀ. Returns whether the pattern has all entries of it.
+    fn add(&mut self, column: &[(u32, [f64; 3])]) -> bool {
+        for (a, u) in column {
+            for (b, w) in column {
+                let Some(at) = self.matrix.position(*a as usize, *b) else { return false };
+                let block = &mut self.matrix.blocks[at];
+                self.before.push((at as u32, *block));
+                for (e, entry) in block.iter_mut().enumerate() {
+                    *entry += u[e / 3] * w[e % 3];
+                }
+            }
+        }
+        true
+    }
+
+    /// Factorises the matrix if it has changed.
+    fn factorise(&mut self) {
+        if std::mem::take(&mut self.stale) {
+            self.factored = self.cholesky.factorise(&self.matrix, &self.held).is_ok();
+        }
     }
 
     /// x = A⁻¹ b with the factors.
     pub fn solve(&mut self, b: &[Padded], x: &mut [Padded]) {
+        self.factorise();
         for (r, b) in self.r.iter_mut().zip(b) {
             *r = Vector3::new(f64::from(b[0]), f64::from(b[1]), f64::from(b[2]));
         }

@@ -1,17 +1,18 @@
 //! V-cycles over the levels of a body.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::bounds::LeafBounds;
 use super::coarsest::{Coarsest, CoarsestSolve};
 use super::galerkin::{CellMatrix, Coefficients, Galerkin};
 use super::hierarchy::Hierarchy;
 use super::kernel::{LevelKernel, noise};
-use super::smoother::{Smoother, Smoothing, chebyshev, gauss_seidel};
+use super::smoother::{Diagonal, Smoother, Smoothing, chebyshev, gauss_seidel};
+use super::stiff_springs::{Columns, SpringBlocks, Sprung};
 use crate::element::Simd;
 use crate::lists::reserve::resize_reserving;
 use crate::octree::Octree;
-use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, block_of, filter, rows};
+use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, Spring, block_of, filter, rows};
 use crate::team::{Team, blocks};
 
 /// Power iterations for the largest eigenvalue of D⁻¹A.
@@ -87,7 +88,13 @@ pub struct Vectors {
     q: Vec<Padded>,
     /// Below the level that is solved on its operator.
     pub(super) kernel: Option<LevelKernel>,
+    /// Stiff springs.
+    columns: Columns,
+    spring_blocks: SpringBlocks,
 }
+
+/// Columns of stiff springs up to which cycles take them: their dense factors stay small beside the vectors.
+const MOST_COLUMNS: usize = 128;
 
 impl Multigrid {
     /// Multigrid on `hierarchy`. [`update`](Self::update) comes before the first cycle.
@@ -117,6 +124,8 @@ impl Multigrid {
                 d: zeros(),
                 q: zeros(),
                 kernel,
+                columns: Columns::default(),
+                spring_blocks: SpringBlocks::default(),
             }
         });
         let levels = levels.collect();
@@ -140,6 +149,7 @@ impl Multigrid {
     /// no more use.
     pub fn follow(&mut self, octree: &Octree, changed: &[u32]) -> bool {
         let Some(changes) = self.hierarchy.follow(octree, changed) else { return false };
+        self.forget_springs();
         self.galerkin.follow(&self.hierarchy, &changes);
         let first = self.first;
         for (l, (change, vectors)) in changes.iter().zip(&mut self.levels).enumerate() {
@@ -198,6 +208,52 @@ impl Multigrid {
         }
         coarsest.update(hierarchy, galerkin, updated.matrices, tolerance);
         self.estimate |= updated.constants || updated.released;
+    }
+
+    /// Lets the cycles take these stiff `springs` of the operator of the finest level on all levels, after an update.
+    /// `inverse` gives the inverse of its diagonal block of a vertex without springs. Returns a bound of the largest
+    /// eigenvalue of the smoother on that level, or `None` if the springs are too many; the cycles take none then.
+    pub fn set_springs(&mut self, springs: &[Spring], inverse: impl Fn(u32) -> Inverse3) -> Option<f64> {
+        let Self { hierarchy, levels, fixed, galerkin, leaf_bounds, coarsest, first, .. } = self;
+        if *first > 0 {
+            return None;
+        }
+        let free = |copy: u32, mut w: [f64; 3]| {
+            if let Ok(at) = fixed.binary_search_by_key(&copy, |f| f.copy) {
+                let mut v = Vector3::from(w);
+                fixed[at].held.clear(&mut v);
+                w = v.into();
+            }
+            w
+        };
+        levels[0].columns.set(springs, free);
+        let mut fits = levels[0].columns.len() <= MOST_COLUMNS;
+        for l in 0..levels.len() {
+            let (finer, level) = levels.split_at_mut(l);
+            let Vectors { inverse: own, columns, spring_blocks, .. } = &mut level[0];
+            if let Some(finer) = finer.last().filter(|_| fits) {
+                columns.restrict(&finer.columns, &hierarchy.steps[l - 1].transfer);
+            }
+            fits =
+                fits && spring_blocks.prepare(columns, |v| if l == 0 { inverse(v) } else { own[v as usize] });
+        }
+        fits = fits && levels.last().is_some_and(|last| coarsest.set_springs(&last.columns));
+        if !fits {
+            self.clear_springs();
+            return None;
+        }
+        let bound = galerkin.coefficients().map(|with| leaf_bounds.largest(&hierarchy.levels[0], &[], with));
+        Some(bound.unwrap_or(0.0).max(1.0))
+    }
+
+    /// Lets the cycles take no stiff springs.
+    pub fn clear_springs(&mut self) {
+        self.forget_springs();
+        self.coarsest.set_springs(&Columns::default());
+    }
+
+    fn forget_springs(&mut self) {
+        self.levels.iter_mut().for_each(|level| level.columns.clear());
     }
 
     /// Whether the last update had these constants and prescribed directions.
@@ -384,11 +440,15 @@ impl Multigrid {
     ) {
         let Self { settings, hierarchy, galerkin, levels, .. } = self;
         let operator = galerkin.operator(&hierarchy.levels[l], l);
-        let Vectors { largest: known, r, d, q, kernel, .. } = &mut levels[l];
+        let Vectors { largest: known, r, d, q, kernel, columns, spring_blocks, .. } = &mut levels[l];
         let largest = largest.max(*known);
         let mass = &galerkin.levels[l].mass;
+        let columns = &*columns;
         let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match kernel {
-            Some(kernel) => kernel.apply(team, mass, x, y),
+            Some(kernel) => {
+                kernel.apply(team, mass, x, y);
+                columns.add_to(x, y);
+            }
             None => A.apply(team, x, y),
         };
         if before {
@@ -409,7 +469,9 @@ impl Multigrid {
                 }
                 let degree = u32::from(degree.clamp(1, 4));
                 let v = Smoothing { x, r, d, q };
-                chebyshev(team, &mut multiply, (inverse, largest), degree, (v, before));
+                let sprung = (!columns.is_empty()).then_some(Sprung { columns, blocks: spring_blocks });
+                let diagonal = Diagonal { inverse, largest, sprung };
+                chebyshev(team, &mut multiply, diagonal, degree, (v, before));
             }
             Smoother::GaussSeidel { sweeps, omega } => {
                 (0..sweeps).for_each(|_| gauss_seidel(&operator, inverse, b, x, omega));
@@ -432,7 +494,9 @@ impl Multigrid {
         let Self { galerkin, coarsest, levels, .. } = self;
         let last = levels.len() - 1;
         let is_outer = outer.is_some();
-        let Vectors { inverse: own, largest: known, x, b, r, d, q, kernel } = &mut levels[last];
+        let Vectors { inverse: own, largest: known, x, b, r, d, q, kernel, columns, spring_blocks } =
+            &mut levels[last];
+        let columns = &*columns;
         let (b, x, inverse) = match outer {
             Some((b, x)) => (b, x, inverse),
             None => (&b[..], &mut x[..], &own[..]),
@@ -444,12 +508,16 @@ impl Multigrid {
                 r.copy_from_slice(b);
                 let mass = &galerkin.levels[last].mass;
                 let mut multiply = |team: &mut Team, x: &[Padded], y: &mut [Padded]| match kernel {
-                    Some(kernel) => kernel.apply(team, mass, x, y),
+                    Some(kernel) => {
+                        kernel.apply(team, mass, x, y);
+                        columns.add_to(x, y);
+                    }
                     None => A.apply(team, x, y),
                 };
                 let largest = known.max(if is_outer { largest } else { 0.0 });
                 let v = Smoothing { x, r, d, q };
-                chebyshev(team, &mut multiply, (inverse, largest), degree, (v, false));
+                let sprung = (!columns.is_empty()).then_some(Sprung { columns, blocks: spring_blocks });
+                chebyshev(team, &mut multiply, Diagonal { inverse, largest, sprung }, degree, (v, false));
             }
         }
     }

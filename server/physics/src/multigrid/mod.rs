@@ -20,6 +20,7 @@ mod operator;
 mod kernel;
 mod smoother;
 mod bounds;
+mod stiff_springs;
 mod coarsest;
 mod cycle;
 mod precondition;

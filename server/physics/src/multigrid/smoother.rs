@@ -6,6 +6,7 @@
 //! 2011, §6.
 
 use super::operator::LevelOperator;
+use super::stiff_springs::Sprung;
 use crate::operator::{BLOCK, Inverse3, Padded, block_of};
 use crate::team::{Team, blocks};
 
@@ -64,16 +65,28 @@ pub struct Smoothing<'a> {
     pub q: &'a mut [Padded],
 }
 
+/// What stands for the operator in a smoother.
+#[derive(Debug)]
+pub struct Diagonal<'a> {
+    /// Inverses of the diagonal blocks of A. At the vertices of stiff springs they may have these or not.
+    pub inverse: &'a [Inverse3],
+    /// A bound of the largest eigenvalue of D⁻¹A.
+    pub largest: f64,
+    /// Stiff springs, if there are any.
+    pub sprung: Option<Sprung<'a>>,
+}
+
 /// Chebyshev steps from `x` with residual `r`. `multiply` is A. The last residual is computed if `residual` is
 /// set; otherwise `r` belongs to the iterate before.
 pub fn chebyshev(
     team: &mut Team,
     multiply: &mut Multiply<'_>,
-    (inverse, largest): (&[Inverse3], f64),
+    diagonal: Diagonal<'_>,
     degree: u32,
     (v, residual): (Smoothing<'_>, bool),
 ) {
     let Smoothing { x, r, d, q } = v;
+    let Diagonal { inverse, largest, mut sprung } = diagonal;
     for i in 0..degree {
         let k = f64::from(i) + 1.0;
         // d ← (2k − 3)/(2k + 1) d + (8k − 4)/(2k + 1)/λ D⁻¹ r, x ← x + β d, r ← r − A d
@@ -91,6 +104,14 @@ pub fn chebyshev(
                 }
             }
         });
+        if let Some(Sprung { columns, blocks }) = &mut sprung {
+            blocks.correct(columns, (inverse, &*r), |v, z| {
+                for k in 0..4 {
+                    d[v][k] += gain * z[k];
+                    x[v][k] += beta * gain * z[k];
+                }
+            });
+        }
         if i + 1 < degree || residual {
             multiply(team, d, q);
             let q = &*q;

@@ -3,17 +3,14 @@
 use super::{LinearStep, SPRING_PASSES, system};
 use crate::integrator::springs::ActiveSpring;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::operator::{Held, Stiffness};
+use crate::operator::Stiffness;
 
 impl LinearStep {
     /// Adds the springs to the operator and to the preconditioner.
     pub(super) fn complete_operator(&mut self, elastic: &mut dyn Stiffness, inputs: &LinearInputs<'_>) {
         self.terms.clear();
         self.terms.extend(self.springs.springs.iter().flat_map(|s| s.terms(inputs.s())));
-        let held_of = |copy: u32| {
-            let found = inputs.step.fixed.binary_search_by_key(&copy, |f| f.copy);
-            found.map_or(Held::NOT, |f| inputs.step.fixed[f].held)
-        };
+        let held_of = |copy: u32| inputs.held_of(copy);
         // Springs of the last pass leave the preconditioner.
         for &copy in &self.sprung {
             self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], held_of(copy));

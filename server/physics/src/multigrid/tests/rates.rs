@@ -109,6 +109,38 @@ fn springs_cost_few_iterations() {
     }
 }
 
+/// Where all levels take springs, their stiffness hardly matters, and some may act on prescribed vertices.
+#[test]
+fn stiff_springs_on_all_levels_keep_the_rate() {
+    let mut octree = cube(16, 2);
+    blade_grid(&mut octree, &[8]);
+    let free = measured(scene(&octree, 0.3));
+    let weights = [0.3, 0.1, 0.05, 0.15, 0.1, 0.1, 0.12, 0.08_f32];
+    for (stiffness, n) in [(1e6, 1), (1e7, 12), (1e9, 12), (1e9, 40)] {
+        let of = |k: usize| {
+            let id = (k * octree.cells().len() / n + 7 * k) % octree.cells().len();
+            let carriers = octree.vertices()[id].into_iter().zip(weights);
+            let direction = [None, Some([0.6, 0.0, 0.8]), Some([0.0, 1.0, 0.0])][k % 3];
+            Spring { point: MaterialPoint::new(carriers), direction, stiffness }
+        };
+        let springs: Vec<Spring> = (0..n).map(of).collect();
+        let mut scene = scene(&octree, 0.3);
+        scene.add_stiff_springs(&springs);
+        let [u, w] = [vector(scene.exact.mass.len(), 1), vector(scene.exact.mass.len(), 2)].map(|mut v| {
+            scene.exact.filter(&mut v);
+            v
+        });
+        let (Vu, Vw) = (scene.cycle(&u), scene.cycle(&w));
+        let (one, other) = (dot(&w, &Vu), dot(&u, &Vw));
+        assert!((one - other).abs() < 1e-3 * (dot(&u, &Vu) * dot(&w, &Vw)).sqrt());
+        let b = scene.gravity();
+        let (iterations, _) = scene.mg_pcg(&b, 1e-6);
+        let found = format!("{n} springs of {stiffness:e}: {iterations} iterations, {} without", free.1);
+        println!("{found}");
+        assert!(iterations <= 2 * free.1, "{found}");
+    }
+}
+
 /// Where coarsening ends above the size for a factorisation, a polynomial of high degree takes its place.
 #[test]
 fn a_large_coarsest_level_is_smoothed() {

@@ -267,6 +267,14 @@ impl Scene {
         self.largest = largest;
     }
 
+    /// Adds springs to the finest level that all levels take.
+    pub fn add_stiff_springs(&mut self, springs: &[Spring]) {
+        self.exact.springs = springs.to_vec();
+        self.fine.springs = springs.to_vec();
+        let inverse = &self.inverse;
+        self.largest = self.multigrid.set_springs(springs, |v| inverse[v as usize]).unwrap();
+    }
+
     /// V r, scaled into the range of single precision.
     pub fn cycle(&mut self, r: &[V3]) -> Vec<V3> {
         let scale = 1.0 / r.iter().map(|r| r.amax()).fold(f64::MIN_POSITIVE, f64::max);
