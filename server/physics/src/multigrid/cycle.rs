@@ -104,7 +104,8 @@ impl Multigrid {
 
     /// The same with equations on level `first`, if there is one, and else on the coarsest level.
     pub(super) fn on_level(mut hierarchy: Hierarchy, settings: MultigridSettings, first: usize) -> Self {
-        if matches!(settings.smoother, Smoother::GaussSeidel { .. }) {
+        // Thin cells above the finest level are found by its slots.
+        if first == 0 || matches!(settings.smoother, Smoother::GaussSeidel { .. }) {
             hierarchy.list_finest_slots();
         }
         let first = first.min(hierarchy.n_levels() - 1);
@@ -232,7 +233,14 @@ impl Multigrid {
             let (finer, level) = levels.split_at_mut(l);
             let Vectors { inverse: own, columns, spring_blocks, .. } = &mut level[0];
             if let Some(finer) = finer.last().filter(|_| fits) {
-                columns.restrict(&finer.columns, &hierarchy.steps[l - 1].transfer);
+                let (fine, coarse, step) =
+                    (&hierarchy.levels[l - 1], &hierarchy.levels[l], &hierarchy.steps[l - 1]);
+                columns.restrict(&finer.columns, &step.transfer, |v, visit| {
+                    let child = if fine.has_slots() { fine.slots_of(v as usize).next() } else { None };
+                    if let Some((child, _)) = child {
+                        galerkin.levels[l].for_inner_row((coarse, step), (v, child), visit);
+                    }
+                });
             }
             fits =
                 fits && spring_blocks.prepare(columns, |v| if l == 0 { inverse(v) } else { own[v as usize] });
@@ -394,7 +402,9 @@ impl Multigrid {
                 self.smooth_inner(team, A, l, true);
             }
             let (fine, coarse) = self.levels.split_at_mut(l + 1);
-            self.hierarchy.steps[l].transfer.restrict(team, &fine[l].r, &mut coarse[0].b);
+            let (r, b) = (&fine[l].r, &mut coarse[0].b);
+            self.hierarchy.steps[l].transfer.restrict(team, r, b);
+            self.galerkin.levels[l + 1].restrict_inner(team, &self.hierarchy.levels[l + 1], r, b);
         }
         if last == first {
             z.fill([0.0; 4]);
@@ -408,6 +418,8 @@ impl Multigrid {
             let d = &mut fine[l].d;
             d.fill([0.0; 4]);
             transfer.prolong(team, &coarse[0].x, d);
+            let e = &coarse[0].x;
+            self.galerkin.levels[l + 1].prolong_inner(team, &self.hierarchy.levels[l + 1], e, d);
             if l == first {
                 filter(&self.fixed, d);
                 self.smooth(team, A, (l, inverse, largest), (r, z), false);

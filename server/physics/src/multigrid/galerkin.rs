@@ -2,7 +2,7 @@
 //!
 //! A coarse cell deforms its children trilinearly, so its matrix is the sum of theirs in the corners of the coarse
 //! cell. Eight whole children of one material and nearly one rotation give the matrix of a cube of twice the side,
-//! which all such cells share. Every other matrix is stored, in the frame of the cell's mean rotation: a rotation
+//! which all such cells share, unless the cell is [thin](super::thin). Every other matrix is stored, in the frame of the cell's mean rotation: a rotation
 //! of everything changes nothing that is stored.
 //!
 //! # Source
@@ -15,6 +15,7 @@ use super::dense::{Dense, Packed};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use super::table::{self, Weights};
+use super::thin::{Inner, Passed, Thin, is_thin};
 use crate::material::Lame;
 use crate::octree::{Cell, corner_weights};
 use crate::operator::cells::unit_stiffness;
@@ -70,6 +71,8 @@ pub struct Stored {
     /// Over the vertices that carry the cell, in its frame.
     #[serde(with = "crate::saved::array")]
     pub matrix: Packed,
+    /// Of a thin cell.
+    pub(super) inner: Inner,
 }
 
 /// The matrices of one level.
@@ -90,6 +93,9 @@ pub struct LevelMatrices {
     pub changed: Vec<bool>,
     /// Cells that a cut or other prescribed directions changed since the last update.
     pub(super) touched: Vec<u32>,
+    /// Places of thin cells among the stored ones.
+    pub(super) thin: Vec<u32>,
+    pub(super) passed: Vec<Passed>,
 }
 
 /// What an update of the operators changed.
@@ -123,6 +129,9 @@ pub struct Galerkin {
     pub(super) first: usize,
     pub(super) held: Vec<(u32, Held)>,
     pub(super) held_bits: Vec<u8>,
+    /// Whether thin cells move trilinearly, too; for comparison.
+    #[cfg(test)]
+    pub(super) trilinear: bool,
 }
 
 impl Galerkin {
@@ -283,6 +292,11 @@ impl Galerkin {
         let (below, level) = self.levels.split_at_mut(l);
         let (fine, level) = (&below[l - 1], &mut level[0]);
         let step = &hierarchy.steps[l - 1];
+        // Coarser levels that are solved on keep trilinear cells.
+        let cells = &hierarchy.levels[l];
+        let may_be_thin = l > self.first;
+        #[cfg(test)]
+        let may_be_thin = may_be_thin && !self.trilinear;
         let (kinds, exactness) = (&hierarchy.kind_of[l], &hierarchy.exact[l]);
         let LevelMatrices { frame, matrix, stored, free, holds, changed, touched, .. } = level;
         // Frames, and which cells are cubes.
@@ -299,7 +313,8 @@ impl Galerkin {
                         && frame.angle_to(&fine.frame[c]) <= tolerance
                 };
                 let is_kind = kinds[id] != NONE && (exactness[id] || !exact);
-                *cube = !holds_any && is_kind && children.iter().all(near);
+                let whole = !holds_any && is_kind && children.iter().all(near);
+                *cube = whole && !(may_be_thin && is_thin(cells, id));
             }
         });
         // Places for stored matrices. They are large, so all new ones get their room at once.
@@ -317,6 +332,7 @@ impl Galerkin {
             match (matrix[id], cube) {
                 (CellMatrix::Stored(place), true) => {
                     stored[place as usize].cell = NONE;
+                    stored[place as usize].inner.clear();
                     free.push(place);
                     matrix[id] = CellMatrix::Shared(kinds[id]);
                     changed[id] = true;
@@ -352,6 +368,7 @@ impl Galerkin {
             held,
             inclined: &self.inclined,
             eighth: &self.eighth,
+            may_be_thin,
         };
         let frame = &*frame;
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
@@ -364,13 +381,16 @@ impl Galerkin {
             any |= stored.stale;
             stored.stale = false;
         }
+        self.levels[l].list_thin();
         any
     }
 
     /// Bytes in use: all but stored matrices, and these.
     pub fn memory(&self) -> [usize; 2] {
         let of = |level: &LevelMatrices| {
-            let relative: usize = level.stored.iter().map(|s| size_of_val(&s.relative[..])).sum();
+            let own = |s: &Stored| size_of_val(&s.relative[..]) + s.inner.memory();
+            let relative: usize = level.stored.iter().map(own).sum();
+            let relative = relative + size_of_val(&level.passed[..]);
             let others = size_of_val(&level.frame[..])
                 + size_of_val(&level.matrix[..])
                 + size_of_val(&level.mass[..])
@@ -440,7 +460,8 @@ impl LevelMatrices {
 
 impl Stored {
     fn empty() -> Self {
-        Self { cell: NONE, stale: true, relative: Vec::new(), matrix: [0.0; super::dense::PACKED] }
+        let matrix = [0.0; super::dense::PACKED];
+        Self { cell: NONE, stale: true, relative: Vec::new(), matrix, inner: Inner::default() }
     }
 }
 
@@ -455,6 +476,8 @@ struct Context<'a> {
     held: &'a [u8],
     inclined: &'a [Held],
     eighth: &'a [f32],
+    /// Whether inner vertices of thin cells move as in equilibrium.
+    may_be_thin: bool,
 }
 
 impl Context<'_> {
@@ -475,12 +498,17 @@ impl Context<'_> {
         let (fine, coarse) = (&self.hierarchy.levels[self.l - 1], &self.hierarchy.levels[self.l]);
         let cell = &coarse.cells[id];
         let mut sum = Dense::default();
+        stored.inner.clear();
+        let is_held = |v: u32| self.held.get(v as usize).is_some_and(|&held| held != 0);
+        let mut thin = (self.may_be_thin && is_thin(coarse, id))
+            .then(|| Thin::new((fine, coarse), &self.hierarchy.steps[self.l - 1], id, is_held))
+            .flatten();
         for (&child, known) in children.iter().zip(&mut stored.relative) {
             *known = relative(child);
             let child = child as usize;
             let turn = (known.angle() > SAME).then(|| known.to_rotation_matrix().into_inner());
             let merges = fine.cells[child].level != cell.level;
-            if let Some(A) = self.carried(child).filter(|_| merges) {
+            if let Some(A) = self.carried(child).filter(|_| merges && thin.is_none()) {
                 match turn {
                     Some(Q) => sum.add(&A.rotated(&Q)),
                     None => sum.add(A),
@@ -499,6 +527,9 @@ impl Context<'_> {
                     }
                 }
             }
+            if let Some(thin) = &mut thin {
+                thin.add(fine, child, &A);
+            }
             if merges {
                 sum.add(&A.carried(&corners_in(fine, child, cell)));
             } else {
@@ -507,6 +538,9 @@ impl Context<'_> {
         }
         if !coarse.leaf[id] && coarse.hanging[id] != 0 {
             sum = sum.carried(&weights(cell, coarse.hanging[id]));
+        }
+        if let Some(thin) = thin {
+            thin.relax(&mut sum, &mut stored.inner);
         }
         stored.matrix = sum.packed();
     }

@@ -2,7 +2,8 @@
 //!
 //! Cells of a level are merged block by block into those of the next one; parts of a block that a cut separates
 //! become cells of their own, so that every level is cut where the body is. The operators of the levels are
-//! Galerkin products, cell by cell. One cycle smooths on every level and solves on the coarsest one.
+//! Galerkin products, cell by cell, and thin parts bend on them as softly as they are. One cycle smooths on every
+//! level and solves on the coarsest one.
 //!
 //! # Source
 //! Dick, Georgii, Westermann 2011, §6 (hierarchy and Galerkin operators on cut octrees); Lottes 2023 (smoother).
@@ -15,6 +16,7 @@ mod dense;
 mod table;
 mod carried;
 mod galerkin;
+mod thin;
 mod touched;
 mod operator;
 mod kernel;

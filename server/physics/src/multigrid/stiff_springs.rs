@@ -10,6 +10,8 @@
 //! leave λ as it is. The inverse is that of Sherman, Morrison and Woodbury,
 //! (D + U Uᵀ)⁻¹ = D⁻¹ − D⁻¹U (1 + UᵀD⁻¹U)⁻¹ UᵀD⁻¹, in double precision.
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::transfer::Transfer;
 use crate::operator::{Inverse3, Padded, Spring};
 
@@ -77,8 +79,14 @@ impl Columns {
         }
     }
 
-    /// PᵀU of the columns of the next finer level.
-    pub fn restrict(&mut self, fine: &Self, P: &Transfer) {
+    /// PᵀU of the columns of the next finer level. `inner` calls a function with the coarse vertices and the blocks of
+    /// P of a fine vertex that come to its trilinear weights.
+    pub fn restrict(
+        &mut self,
+        fine: &Self,
+        P: &Transfer,
+        inner: impl Fn(u32, &mut dyn FnMut(u32, Matrix3<f32>)),
+    ) {
         self.clear();
         for j in 0..fine.len() {
             let first = self.entries.len();
@@ -86,6 +94,10 @@ impl Columns {
                 for (coarse, p) in P.row(*v as usize) {
                     self.add(first, coarse, u.map(|u| f64::from(p) * u));
                 }
+                inner(*v, &mut |coarse, D| {
+                    let u = D.map(f64::from).tr_mul(&Vector3::from(*u));
+                    self.add(first, coarse, u.into());
+                });
             }
             self.ends.push(self.entries.len());
         }

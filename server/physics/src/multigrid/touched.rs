@@ -5,6 +5,7 @@ use super::follow::{Bits, LevelChange};
 use super::galerkin::{CellMatrix, Galerkin, INCLINED, LevelMatrices, Rotation, held, shared_matrix};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
+use super::thin::is_thin;
 use crate::octree::corner_weights;
 use crate::operator::FixedCopy;
 
@@ -32,6 +33,17 @@ impl Galerkin {
             }
             for &id in &change.cells {
                 self.touch(hierarchy, l, id);
+            }
+            // Vertices of a thin cell may have become inner ones without any other change of it.
+            let below = l.checked_sub(1).filter(|&below| hierarchy.levels[below].has_slots());
+            if let Some(step) = below.and_then(|below| hierarchy.steps.get(below)) {
+                let below = changes[l - 1].vertices.iter();
+                let children = below.flat_map(|&v| hierarchy.levels[l - 1].slots_of(v as usize));
+                let mut thin: Vec<u32> = children.map(|(child, _)| step.parent[child]).collect();
+                thin.sort_unstable();
+                thin.dedup();
+                thin.retain(|&id| is_thin(&hierarchy.levels[l], id as usize));
+                thin.into_iter().for_each(|id| self.touch(hierarchy, l, id));
             }
             // The constants are known from the first update on.
             if self.coefficients.is_some() {

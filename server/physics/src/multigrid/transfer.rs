@@ -1,7 +1,8 @@
 //! Prolongation P and restriction Pᵀ between two levels.
 //!
 //! A fine vertex moves as its coarse cell does: with the trilinear weights of that cell's corners, and where
-//! these hang, of the vertices that carry the cell. Coarse cells that share a fine vertex agree on it.
+//! these hang, of the vertices that carry the cell. Coarse cells that share a fine vertex agree on it. Inner vertices
+//! of [thin](super::thin) cells move otherwise; what comes to their trilinear weights is kept there.
 
 use super::level::{Level, NONE, place_in, trilinear};
 use crate::lists::jagged::Jagged;

@@ -142,8 +142,8 @@ fn iterations(bench: &mut ExperimentBench<'_>) -> Result<Table, Trouble> {
     let mut table = Table::new(
         "Iterations of conjugate gradients with multigrid",
         "From 16³ to 64³ cells, uncut and cut to half depth by a grid of blades along faces of cells and turned; and \
-         with other Poisson's ratios. Equilibria, and the first step of 20 ms. Blades turned by 37° leave rods that \
-         hang on few cells, whose sway the coarse levels do not see well without mass.",
+         with other Poisson's ratios. Equilibria, and the first step of 20 ms. Blades turned by 37° leave rods of \
+         few cells with stairs along their sides.",
         &[
             ("cells", Unit::Count),
             ("unknowns", Unit::Count),

@@ -2,7 +2,7 @@
 
 use crate::element::Simd;
 use crate::multigrid::kernel::LevelKernel;
-use nalgebra::Rotation3;
+use nalgebra::{Matrix3, Rotation3};
 
 use super::levels::random_cuts;
 use super::support::{Exact, V3, blade_grid, clamped, coefficients, cube, dot, vector};
@@ -13,6 +13,28 @@ use crate::octree::Octree;
 use crate::operator::{FixedCopy, Inverse3, padded};
 use crate::team::Team;
 
+/// Calls `visit` with the fine and coarse vertices and the blocks of P between levels `s` and `s` + 1.
+fn for_rows(
+    hierarchy: &Hierarchy,
+    galerkin: &Galerkin,
+    s: usize,
+    mut visit: impl FnMut(usize, usize, Matrix3<f64>),
+) {
+    let (step, coarse) = (&hierarchy.steps[s], &hierarchy.levels[s + 1]);
+    for v in 0..step.transfer.n_rows() {
+        for (c, w) in step.transfer.row(v) {
+            visit(v, c as usize, Matrix3::from_diagonal_element(f64::from(w)));
+        }
+        if !hierarchy.levels[s].has_slots() {
+            continue;
+        }
+        let (child, _) = hierarchy.levels[s].slots_of(v).next().unwrap();
+        galerkin.levels[s + 1].for_inner_row((coarse, step), (v as u32, child), |c, D| {
+            visit(v, c as usize, D.map(f64::from));
+        });
+    }
+}
+
 /// Largest relative difference of A^ℓ x and Pᵀ … A … P x over all levels.
 fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
     let mut team = Team::new(1).unwrap();
@@ -21,18 +43,15 @@ fn error(hierarchy: &Hierarchy, galerkin: &Galerkin, exact: &Exact) -> f64 {
         let level = &hierarchy.levels[l];
         let x = vector(level.n_vertices, l);
         let mut fine = x.clone();
-        for step in hierarchy.steps[..l].iter().rev() {
-            let n = step.transfer.n_rows();
-            fine = (0..n)
-                .map(|v| step.transfer.row(v).map(|(c, w)| f64::from(w) * fine[c as usize]).sum())
-                .collect();
+        for s in (0..l).rev() {
+            let mut finer = vec![V3::zeros(); hierarchy.levels[s].n_vertices];
+            for_rows(hierarchy, galerkin, s, |v, c, w| finer[v] += w * fine[c]);
+            fine = finer;
         }
         let mut y = exact.apply(&fine);
-        for (s, step) in hierarchy.steps[..l].iter().enumerate() {
+        for s in 0..l {
             let mut coarse = vec![V3::zeros(); hierarchy.levels[s + 1].n_vertices];
-            for (v, y) in y.iter().enumerate() {
-                step.transfer.row(v).for_each(|(c, w)| coarse[c as usize] += f64::from(w) * y);
-            }
+            for_rows(hierarchy, galerkin, s, |v, c, w| coarse[c] += w.transpose() * y[v]);
             y = coarse;
         }
         let x32: Vec<_> = x.iter().map(padded).collect();
@@ -89,7 +108,9 @@ fn diagonals(
 
 fn check(octree: &Octree, with: &Coefficients, fixed: &[FixedCopy], turn: impl Fn(V3) -> V3) -> f64 {
     let mut team = Team::new(1).unwrap();
-    let hierarchy = Hierarchy::with(octree, 60, true);
+    let mut hierarchy = Hierarchy::with(octree, 60, true);
+    // Thin cells on the finest level are found by its slots.
+    hierarchy.list_finest_slots();
     assert!(hierarchy.n_levels() > 2);
     let mut exact = Exact::new(octree, with, fixed);
     exact.turn(turn);

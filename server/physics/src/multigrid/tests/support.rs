@@ -251,6 +251,13 @@ impl Scene {
         multigrid.estimate_eigenvalues(team, fine, inverse);
     }
 
+    /// Prolongs trilinearly in thin cells, too.
+    pub fn lock(&mut self) {
+        self.multigrid.galerkin = Galerkin::new(self.multigrid.hierarchy());
+        self.multigrid.galerkin.trilinear = true;
+        self.update();
+    }
+
     /// Adds springs to the finest level; `largest` is the bound of its largest eigenvalue then.
     pub fn add_springs(&mut self, springs: &[Spring], largest: f64) {
         let mut diagonal = vec![[0.0; 8]; self.exact.mass.len()];

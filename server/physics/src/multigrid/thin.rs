@@ -1,0 +1,345 @@
+//! Thin cells, whose inner vertices move as in equilibrium instead of trilinearly.
+//!
+//! # Derivation
+//! Where cuts leave rods and slices, a coarse cell may have no neighbours on both sides of an axis. Cells of length a
+//! bend a part of thickness t only with a parasitic shear, which stiffens it by about 1 + (G/E)(a/t)². Under trilinear
+//! prolongation that is four times more on every level, and corrections by the coarse levels come out too small by
+//! as much: shear locking.
+//!
+//! An inner vertex belongs to children of one coarse cell alone. So its row of P can be anything that depends on the
+//! vertices of that cell, and the operator stays a sum over cells. It follows the other vertices as the equilibrium
+//! of the children does: P_i = W_i + D with A_ii D = −(A W)_i, for the trilinear weights W. That makes Pᵀ A P as soft
+//! as it can be, and the matrix of the cell becomes
+//!
+//! Pᵀ A P = Wᵀ A W − (A W)_iᵀ A_ii⁻¹ (A W)_i.
+//!
+//! Only vertices in the middle between two others are taken, so that those that remain still determine the coarse
+//! vertices.
+//!
+//! # Limit
+//! Vertices that several cells share move trilinearly. A rod that lies across the border of blocks is not thin before
+//! the level on which one block holds it, and bends too stiffly up to there.
+//!
+//! # Source
+//! Wan, Chan, Smith 2000: An energy-minimizing interpolation for robust multigrid methods. Nesme, Kry, Jeřábková,
+//! Faure 2009: Preserving topology and elasticity for embedded deformable models (shape functions of composite
+//! elements).
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::dense::Dense;
+use super::galerkin::{CellMatrix, LevelMatrices};
+use super::hierarchy::Step;
+use super::level::{Level, NONE, place_in, trilinear};
+use crate::operator::Padded;
+use crate::team::{Team, blocks};
+
+/// Vertices of the 2³ children of a cell.
+const VERTICES: usize = 27;
+/// Those of them in the middle between others.
+const INNER: usize = VERTICES - 8;
+const UNKNOWNS: usize = 3 * INNER;
+/// Pivots below this part of their diagonal entry are none: nothing holds the inner vertices then.
+const PIVOT: f64 = 1e-6;
+/// Thin cells per unit of work.
+const THIN_BLOCK: usize = 16;
+
+/// Inner vertices of a thin cell, and D.
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Inner {
+    /// Fine vertices.
+    vertices: Vec<u32>,
+    /// Rows of D in the frame of the coarse cell, three for each vertex, over the vertices that carry the cell.
+    change: Vec<[f32; 24]>,
+}
+
+/// Room for what passes between the vertices of a thin cell.
+pub type Passed = [Padded; INNER];
+
+impl Inner {
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.change.clear();
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.vertices.is_empty()
+    }
+
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.change[..])
+    }
+
+    /// R D Rᵀ between inner vertex `i` and vertex `c` of the cell.
+    fn block(&self, i: usize, c: usize, R: &Matrix3<f32>) -> Matrix3<f32> {
+        R * Matrix3::from_fn(|r, s| self.change[3 * i + r][3 * c + s]) * R.transpose()
+    }
+}
+
+/// Whether cell `id` is merged and has no neighbours on both sides of an axis.
+pub fn is_thin(level: &Level, id: usize) -> bool {
+    if level.leaf[id] || level.hanging[id] != 0 {
+        return false;
+    }
+    let linked = level.links.get(id).iter().fold(0_u8, |linked, link| linked | 1 << (link % 8));
+    (0..3).any(|axis| linked >> (2 * axis) & 3 == 0)
+}
+
+/// The bit of a place among the children, in halves of the side of their cell.
+fn bit(place: [i32; 3]) -> u32 {
+    1 << (place[0] + 3 * place[1] + 9 * place[2])
+}
+
+/// The equations of the inner vertices of a cell.
+pub struct Thin {
+    vertices: [u32; VERTICES],
+    /// Trilinear weights of the cell's corners.
+    weights: [[f32; 8]; VERTICES],
+    /// Number among the inner ones, or [`INNER`].
+    inner: [usize; VERTICES],
+    n: usize,
+    known: usize,
+    diagonal: [[f32; 3]; VERTICES],
+    /// A_ii and (A W)_i.
+    A: [[f64; UNKNOWNS]; UNKNOWNS],
+    AW: [[f64; 24]; UNKNOWNS],
+}
+
+impl Thin {
+    /// Those of thin cell `id` of `coarse`; `is_held` tells which fine vertices are held in some direction. `None` if
+    /// it has such, if it has no inner vertices, or if its children rest on others than their corners.
+    pub fn new(
+        (fine, coarse): (&Level, &Level),
+        step: &Step,
+        id: usize,
+        is_held: impl Fn(u32) -> bool,
+    ) -> Option<Self> {
+        if !fine.has_slots() {
+            return None;
+        }
+        let cell = &coarse.cells[id];
+        let children = step.children_of(id);
+        let mut thin = Self {
+            vertices: [NONE; VERTICES],
+            weights: [[0.0; 8]; VERTICES],
+            inner: [INNER; VERTICES],
+            n: 0,
+            known: 0,
+            diagonal: [[0.0; 3]; VERTICES],
+            A: [[0.0; UNKNOWNS]; UNKNOWNS],
+            AW: [[0.0; 24]; UNKNOWNS],
+        };
+        let mut places = [[0; 3]; VERTICES];
+        let (mut known, mut taken) = (0, 0_u32);
+        for child in children.iter().map(|&child| child as usize) {
+            if fine.hanging[child] != 0 || fine.cells[child].level == cell.level {
+                return None;
+            }
+            for (c, &v) in fine.vertices[child].iter().enumerate() {
+                let place = place_in(fine, child, c, cell);
+                taken |= bit(place);
+                if is_held(v) {
+                    return None;
+                }
+                if !thin.vertices[..known].contains(&v) {
+                    // Parts that touch without a link have more.
+                    if known == VERTICES {
+                        return None;
+                    }
+                    (thin.vertices[known], thin.weights[known], places[known]) = (v, trilinear(place), place);
+                    known += 1;
+                }
+            }
+        }
+        thin.known = known;
+        for i in 0..known {
+            let v = thin.vertices[i];
+            // A trilinear function is known here from two others, which are not between any along this axis. So the
+            // vertices that are never between others determine the coarse ones, as all of them did.
+            let between = (0..3).any(|k| {
+                let end = |at| bit([0, 1, 2].map(|a| if a == k { at } else { places[i][a] }));
+                places[i][k] == 1 && taken & end(0) != 0 && taken & end(2) != 0
+            });
+            let own = |(child, _): (usize, usize)| step.parent[child] as usize == id;
+            if between && fine.slots_of(v as usize).all(own) {
+                if thin.n == INNER {
+                    return None;
+                }
+                thin.inner[i] = thin.n;
+                thin.n += 1;
+            }
+        }
+        (thin.n > 0).then_some(thin)
+    }
+
+    /// Adds the matrix of a child, in the frame of the cell.
+    pub fn add(&mut self, fine: &Level, child: usize, A: &Dense) {
+        let places = fine.vertices[child].map(|v| self.vertices.iter().position(|w| *w == v).unwrap_or(0));
+        for (c, &place) in places.iter().enumerate() {
+            (0..3).for_each(|k| self.diagonal[place][k] += A.0[3 * c + k][3 * c + k]);
+        }
+        for (c, &row) in places.iter().enumerate().filter(|(_, row)| self.inner[**row] < INNER) {
+            let first = 3 * self.inner[row];
+            for (d, &column) in places.iter().enumerate() {
+                let block = A.block(c, d).map(f64::from);
+                if self.inner[column] < INNER {
+                    let at = 3 * self.inner[column];
+                    for (r, s) in (0..9).map(|e| (e / 3, e % 3)) {
+                        self.A[first + r][at + s] += block[(r, s)];
+                    }
+                }
+                for (q, &w) in self.weights[column].iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                    for (r, s) in (0..9).map(|e| (e / 3, e % 3)) {
+                        self.AW[first + r][3 * q + s] += f64::from(w) * block[(r, s)];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Makes Pᵀ A P of `sum` = Wᵀ A W, and writes the inner vertices and D. Leaves both as they are with no inner
+    /// vertices if A_ii is not positive definite, or if another vertex has no stiffness because it rests on held ones:
+    /// what moves that alone would then have none either.
+    pub fn relax(mut self, sum: &mut Dense, inner: &mut Inner) {
+        if self.diagonal[..self.known].iter().flatten().any(|d| *d <= 0.0) {
+            return;
+        }
+        let n = 3 * self.n;
+        let (L, X) = (&mut self.A, &mut self.AW);
+        for j in 0..n {
+            for i in j..n {
+                let (row, pivot) = (&L[i][..j], &L[j][..j]);
+                let rest = L[i][j] - row.iter().zip(pivot).map(|(a, b)| a * b).sum::<f64>();
+                if i > j {
+                    L[i][j] = rest / L[j][j];
+                } else if rest > PIVOT * L[j][j] {
+                    L[j][j] = rest.sqrt();
+                } else {
+                    return;
+                }
+            }
+        }
+        // X = L⁻¹ (A W)_i, so that (A W)_iᵀ A_ii⁻¹ (A W)_i = Xᵀ X.
+        for i in 0..n {
+            for k in 0..i {
+                let (l, known) = (L[i][k], X[k]);
+                X[i].iter_mut().zip(known).for_each(|(x, known)| *x -= l * known);
+            }
+            let l = L[i][i];
+            X[i].iter_mut().for_each(|x| *x /= l);
+        }
+        for p in 0..24 {
+            for q in p..24 {
+                let product: f64 = X[..n].iter().map(|x| x[p] * x[q]).sum();
+                sum.0[p][q] = (f64::from(sum.0[p][q]) - product) as f32;
+                sum.0[q][p] = sum.0[p][q];
+            }
+        }
+        // D = −L⁻ᵀ X.
+        for i in (0..n).rev() {
+            for k in i + 1..n {
+                let (l, known) = (L[k][i], X[k]);
+                X[i].iter_mut().zip(known).for_each(|(x, known)| *x -= l * known);
+            }
+            let l = L[i][i];
+            X[i].iter_mut().for_each(|x| *x /= l);
+        }
+        inner.change.extend(X[..n].iter().map(|row| row.map(|x| -x as f32)));
+        let numbers = self.vertices.iter().zip(self.inner).filter(|(_, number)| *number < INNER);
+        inner.vertices.extend(numbers.map(|(v, _)| *v));
+    }
+}
+
+impl LevelMatrices {
+    /// Lists the thin cells after an update.
+    pub(super) fn list_thin(&mut self) {
+        let Self { stored, thin, passed, .. } = self;
+        thin.clear();
+        let places = (0_u32..).zip(&*stored).filter(|(_, s)| s.cell != NONE && !s.inner.is_empty());
+        thin.extend(places.map(|(place, _)| place));
+        passed.resize(thin.len(), [[0.0; 4]; INNER]);
+    }
+
+    /// x += D e on the inner vertices, beside the trilinear part of the prolongation to this level's finer one.
+    pub(super) fn prolong_inner(&mut self, team: &mut Team, level: &Level, e: &[Padded], x: &mut [Padded]) {
+        let Self { frame, stored, thin, passed, .. } = self;
+        if thin.is_empty() {
+            return;
+        }
+        let (stored, thin) = (&*stored, &*thin);
+        team.for_blocks(blocks(passed, THIN_BLOCK), |block, passed| {
+            for (i, passed) in passed.iter_mut().enumerate() {
+                let of = &stored[thin[block * THIN_BLOCK + i] as usize];
+                let R = frame[of.cell as usize].to_rotation_matrix().into_inner();
+                let mut u = [0.0; 24];
+                for (c, &v) in level.vertices[of.cell as usize].iter().enumerate() {
+                    let e = e[v as usize];
+                    u[3 * c..3 * c + 3].copy_from_slice(R.tr_mul(&Vector3::new(e[0], e[1], e[2])).as_slice());
+                }
+                for (passed, rows) in passed.iter_mut().zip(of.inner.change.chunks_exact(3)) {
+                    let moved = R * Vector3::from_fn(|k, _| rows[k].iter().zip(&u).map(|(d, u)| d * u).sum());
+                    *passed = [moved.x, moved.y, moved.z, 0.0];
+                }
+            }
+        });
+        for (&place, passed) in thin.iter().zip(&*passed) {
+            for (&v, moved) in stored[place as usize].inner.vertices.iter().zip(passed) {
+                (0..3).for_each(|k| x[v as usize][k] += moved[k]);
+            }
+        }
+    }
+
+    /// b += Dᵀ r, beside the trilinear part of the restriction from this level's finer one.
+    pub(super) fn restrict_inner(&mut self, team: &mut Team, level: &Level, r: &[Padded], b: &mut [Padded]) {
+        let Self { frame, stored, thin, passed, .. } = self;
+        if thin.is_empty() {
+            return;
+        }
+        let (stored, thin) = (&*stored, &*thin);
+        team.for_blocks(blocks(passed, THIN_BLOCK), |block, passed| {
+            for (i, passed) in passed.iter_mut().enumerate() {
+                let of = &stored[thin[block * THIN_BLOCK + i] as usize];
+                let R = frame[of.cell as usize].to_rotation_matrix().into_inner();
+                let mut f = [0.0_f32; 24];
+                for (&v, rows) in of.inner.vertices.iter().zip(of.inner.change.chunks_exact(3)) {
+                    let r = r[v as usize];
+                    let r = R.tr_mul(&Vector3::new(r[0], r[1], r[2]));
+                    for (row, r) in rows.iter().zip(r.iter()) {
+                        f.iter_mut().zip(row).for_each(|(f, d)| *f += r * d);
+                    }
+                }
+                for c in 0..8 {
+                    let f = R * Vector3::new(f[3 * c], f[3 * c + 1], f[3 * c + 2]);
+                    passed[c] = [f.x, f.y, f.z, 0.0];
+                }
+            }
+        });
+        // One cell after the other: sums do not depend on the number of threads.
+        for (&place, passed) in thin.iter().zip(&*passed) {
+            for (&v, f) in level.vertices[stored[place as usize].cell as usize].iter().zip(passed) {
+                (0..3).for_each(|k| b[v as usize][k] += f[k]);
+            }
+        }
+    }
+
+    /// Calls `visit` with the vertices that carry the coarse cell of fine vertex `v`, and the block of D between them
+    /// and `v`, if it is an inner one. `child` is a cell that rests on `v`.
+    pub(super) fn for_inner_row(
+        &self,
+        (level, step): (&Level, &Step),
+        (v, child): (u32, usize),
+        mut visit: impl FnMut(u32, Matrix3<f32>),
+    ) {
+        let id = step.parent[child] as usize;
+        let CellMatrix::Stored(place) = self.matrix[id] else { return };
+        let inner = &self.stored[place as usize].inner;
+        let Some(i) = inner.vertices.iter().position(|known| *known == v) else { return };
+        let R = self.frame[id].to_rotation_matrix().into_inner();
+        for (c, &coarse) in level.vertices[id].iter().enumerate() {
+            visit(coarse, inner.block(i, c, &R));
+        }
+    }
+}
