@@ -42,7 +42,7 @@ pub const AGAIN: Case = Case {
 const CELL: f64 = 0.01;
 
 /// Rest area of the lips [m²] and their reach along x [m].
-fn wound(body: &Body) -> (f64, f64) {
+pub fn wound(body: &Body) -> (f64, f64) {
     let surface = body.surface();
     let place = |v: u32| surface.vertices[v as usize].position(body.rest_positions());
     let (mut area, mut reach) = (0.0, 0.0_f64);
@@ -55,7 +55,7 @@ fn wound(body: &Body) -> (f64, f64) {
 }
 
 /// Mass, momentum, angular momentum and both energies.
-fn measure(body: &Body) -> (f64, V, V, [f64; 2]) {
+pub fn measure(body: &Body) -> (f64, V, V, [f64; 2]) {
     let energies = [body.kinetic_energy(), body.elastic_energy()];
     (body.total_mass(), body.momentum(), body.angular_momentum(), energies)
 }

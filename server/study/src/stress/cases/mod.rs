@@ -4,6 +4,7 @@ mod flaws;
 mod blade;
 mod branches;
 mod cells;
+mod cells_small;
 mod critical_step;
 mod falling;
 mod crowd;
@@ -58,9 +59,13 @@ pub const ALL: &[Case] = &[
     overload::CASE,
     far::CASE,
     critical_step::CASE,
+    cells_small::SLIVER,
     cells::ALIGNED,
+    cells_small::HALVED,
     cells::BRANCHES,
+    cells_small::FREED,
     cells::FALLING,
+    cells_small::ADVANCE,
     cells::GROWTH,
     cells::ADAPTING,
     multigrid::PATCH,
