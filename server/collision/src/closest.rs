@@ -59,16 +59,27 @@ impl SurfaceBvh {
     }
 
     /// The point closest to `p` [m] on these triangles, no farther than `reach` [m]: as
-    /// [`closest_point_where`](Self::closest_point_where) accepts them, without a search.
+    /// [`closest_point_where`](Self::closest_point_where) accepts them, without a search. They come with a lower bound of
+    /// their distance [m], ascending, so that only the first of them are measured.
     pub fn closest_point_among(
         &self,
         p: V,
         reach: f64,
-        triangles: impl Iterator<Item = u32>,
+        triangles: impl Iterator<Item = (f64, u32)>,
     ) -> Option<ClosestPoint> {
-        let each = triangles.map(|t| (t, self.closest_on(t, p))).filter(|(_, (d, _))| *d <= limit(reach));
-        let (triangle, (_, w)) = each.min_by(|(t, (d, _)), (u, (e, _))| d.total_cmp(e).then(t.cmp(u)))?;
-        Some(self.closest(p, triangle, w))
+        let mut best: Option<(f64, u32, [f64; 3])> = None;
+        let mut least = limit(reach);
+        for (bound, t) in triangles {
+            if bound > 0.0 && bound * bound > least {
+                break;
+            }
+            let (squared, w) = self.closest_on(t, p);
+            let better = best.is_none_or(|(_, first, _)| squared < least || squared == least && t < first);
+            if squared <= least && better {
+                (least, best) = (squared, Some((squared, t, w)));
+            }
+        }
+        best.map(|(_, triangle, w)| self.closest(p, triangle, w))
     }
 
     /// Squared distance [m²] from `p` to a triangle, and the barycentric coordinates of the closest point.

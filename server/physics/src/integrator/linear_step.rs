@@ -15,7 +15,7 @@ mod equilibrium;
 mod spring_terms;
 pub mod together;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::descent::Descent;
 use super::parts::Translations;
@@ -84,8 +84,9 @@ pub struct LinearStep {
     partial: Vec<f64>,
     springs: ActiveSprings,
     terms: Vec<Spring>,
-    /// Diagonal parts of springs to other bodies, for the preconditioner of a step that is solved together.
-    shared: Vec<Spring>,
+    /// Nodes of springs to other bodies with their diagonal parts, for the preconditioner of a step that is solved
+    /// together.
+    shared: Vec<(u32, Matrix3<f64>)>,
     translations: Translations,
     reference: f64,
     /// For equilibria: internal forces [N] and energy [J] at the predictor in double precision.

@@ -203,11 +203,12 @@ impl SpringLaw {
     }
 
     /// Begins a step with the point at `point`: off without contact, linear otherwise. Friction begins with the
-    /// bound that the spring was given: the normal force at a predictor means nothing.
+    /// bound that the spring was given: the normal force at a predictor means nothing. What rubbed in the last step
+    /// begins in contact, wherever its predictor is: that is farther away than stiff contact is deep.
     pub fn begin(&mut self, point: Vector3<f64>) {
         self.mode = match self.pull(point) {
-            None => Mode::Off,
-            Some(_) => self.stick_or_slip(point),
+            None if self.grip_n <= 0.0 => Mode::Off,
+            _ => self.stick_or_slip(point),
         };
     }
 
@@ -326,8 +327,17 @@ impl SpringLaw {
     /// Whether another mode at `point`, where a solve has ended, would change the force by a notable part of the
     /// largest force `scale` [N] of all springs.
     pub fn would_change(&self, point: Vector3<f64>, scale: f64) -> bool {
+        self.notable_change(point, scale) > 0.0
+    }
+
+    /// By how much another mode would change the force [N]; 0 if that is no notable part of `scale`.
+    pub fn notable_change(&self, point: Vector3<f64>, scale: f64) -> f64 {
         let mut next = *self;
-        next.choose_mode(point) && (next.force(point) - self.force(point)).norm() > NOTABLE_FORCE * scale
+        if !next.choose_mode(point) {
+            return 0.0;
+        }
+        let change = (next.force(point) - self.force(point)).norm();
+        if change > NOTABLE_FORCE * scale { change } else { 0.0 }
     }
 
     /// k n nᵀ, k I, or k n nᵀ + k_t (I − n nᵀ) [N/m] while the spring is linear, else without its constant part.

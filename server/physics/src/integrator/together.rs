@@ -1,24 +1,25 @@
 //! One implicit step of several bodies that touch, solved as one system.
 //!
 //! Springs between the bodies are terms s k J Jᵀ of one matrix, whose other blocks are those of the bodies. Conjugate
-//! gradients run over the vectors of all bodies at once, preconditioned body by body; what the springs add to the
-//! diagonal is part of it. Both sides are implicit, so that stiff contact needs no small step. The translations of
+//! gradients run over the vectors of all bodies at once, preconditioned node by node; what the springs add to the
+//! diagonal is part of it, and nodes that they tie together are [`partners`]. Both sides are implicit, so that stiff contact needs no small step. The translations of
 //! free parts are balanced exactly before and after, so that momentum is exchanged to rounding, however few iterations
 //! are made.
 
+mod partners;
 mod translations;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::linear_step::LinearStep;
 use super::linear_step::together::Own;
 use super::pair_springs::{ActivePair, PairSpring, PairTerms};
 use super::state::State;
 use super::step_inputs::LinearInputs;
-use crate::element::MaterialPoint;
-use crate::operator::{Spring, Stiffness};
+use crate::operator::Stiffness;
 use crate::solver::{LinearReport, PcgSettings, StopReason};
 use crate::team::Team;
+use partners::Partners;
 use translations::SharedTranslations;
 
 /// Largest number of passes, repeated while springs open, close or slip.
@@ -28,6 +29,9 @@ const PASSES: usize = 8;
 /// A solve to the tolerance with springs in wrong modes is lost. Modes are right long before it: on a closed wound
 /// with 2,000 triangles on its lips this saves a quarter of the iterations. 0.01 costs 4 % more, 0.3 hardly saves more.
 const LOOSE: f64 = 0.1;
+
+/// The place of a node that no spring acts on.
+const NOWHERE: u32 = u32::MAX;
 
 /// One body of a group.
 pub struct Member<'a> {
@@ -54,7 +58,10 @@ pub struct Together {
     terms: PairTerms,
     /// Which of the springs given these are.
     accepted: Vec<bool>,
-    shared: Vec<Spring>,
+    /// Nodes of one body with the diagonal parts of the springs on them, and where each node stands in there.
+    shared: Vec<(u32, Matrix3<f64>)>,
+    place_of: Vec<u32>,
+    partners: Partners,
     translations: SharedTranslations,
 }
 
@@ -103,6 +110,7 @@ impl Together {
             member.inverted_pieces = inverted;
         }
         self.begin(members, pairs);
+        self.partners.choose(members, &self.pairs);
         let mut report = GroupReport { refused: pairs.len() - self.pairs.len(), ..GroupReport::default() };
         let mut reference = 0.0;
         for pass in 0..PASSES {
@@ -121,10 +129,14 @@ impl Together {
             if self.translations.balance(members, &self.pairs) {
                 place(&mut self.pairs, members);
             }
-            if solve.report.stop == StopReason::NonFinite || pass + 1 == PASSES || !self.changed(members) {
+            if solve.report.stop == StopReason::NonFinite
+                || pass + 1 == PASSES
+                || !self.changed(members, settings.tolerance * reference)
+            {
                 break;
             }
         }
+        self.partners.end();
         self.write(pair_forces);
         report.finite = report.solve.stop != StopReason::NonFinite;
         // No body moves unless all can.
@@ -156,18 +168,35 @@ impl Together {
     fn complete(&mut self, members: Members<'_, '_>) {
         self.terms.arrange(&self.pairs, |body| members[body as usize].inputs.s());
         for (number, member) in (0u32..).zip(members.iter_mut()) {
-            self.shared.clear();
-            let s = member.inputs.s();
-            for pair in &self.pairs {
-                for carrier in pair.carriers.iter().filter(|carrier| carrier.body == number) {
-                    let point = MaterialPoint::new([(carrier.copy, carrier.weight as f32)]);
-                    let of = |(direction, k)| Spring { point, direction, stiffness: (s * k) as f32 };
-                    self.shared.extend(pair.law.directions().map(of));
-                }
-            }
+            self.sum_diagonals(number, member);
             let (step, mut own) = member.split();
             step.complete_together(&mut own, &self.shared);
         }
+        self.partners.arrange(members, &self.pairs, |body| members[body as usize].inputs.s());
+    }
+
+    /// Writes the diagonal parts of the springs on the nodes of body `number` to `shared`, ascending by node.
+    fn sum_diagonals(&mut self, number: u32, member: &Member<'_>) {
+        let Self { pairs, shared, place_of, .. } = self;
+        let s = member.inputs.s();
+        shared.clear();
+        place_of.resize(place_of.len().max(member.state.x.len()), NOWHERE);
+        for pair in pairs.iter() {
+            let stiffness = s * pair.law.stiffness();
+            if stiffness == Matrix3::zeros() {
+                continue;
+            }
+            for carrier in pair.carriers.iter().filter(|carrier| carrier.body == number) {
+                let place = &mut place_of[carrier.copy as usize];
+                if *place == NOWHERE {
+                    *place = shared.len() as u32;
+                    shared.push((carrier.copy, Matrix3::zeros()));
+                }
+                shared[*place as usize].1 += carrier.weight * carrier.weight * stiffness;
+            }
+        }
+        shared.iter().for_each(|(copy, _)| place_of[*copy as usize] = NOWHERE);
+        shared.sort_unstable_by_key(|(copy, _)| *copy);
     }
 
     /// Writes the residuals of all members; returns rᵀM⁻¹r. The reference is set on the first pass.
@@ -190,6 +219,7 @@ impl Together {
             let (step, mut own) = member.split();
             rz += step.precondition_together(&mut own);
         }
+        rz += self.partners.precondition(members);
         if pass == 0 {
             *reference = loads.sqrt().max(rz.max(0.0).sqrt());
         }
@@ -215,7 +245,7 @@ impl Together {
         if first.stop != StopReason::Converged || first.residual <= settings.tolerance {
             return PassReport { report: first, modes_changed: false };
         }
-        if self.changed(members) {
+        if self.changed(members, settings.tolerance * search.reference) {
             return PassReport { report: first, modes_changed: true };
         }
         let iterations = settings.iterations - first.iterations;
@@ -276,6 +306,7 @@ impl Together {
                 let (step, mut own) = member.split();
                 next += step.descend_together(&mut own, alpha);
             }
+            next += self.partners.precondition(members);
             (*beta, *rz) = (next / *rz, next);
             report.iterations += 1;
         }
@@ -306,15 +337,16 @@ impl Together {
         curvature
     }
 
-    /// Lets springs change their modes where that matters; returns whether it does.
-    fn changed(&mut self, members: Members<'_, '_>) -> bool {
+    /// Lets springs change their modes where that matters; returns whether it does. Changes that together move the
+    /// residual by less than `negligible`, to which it is solved, do not.
+    fn changed(&mut self, members: Members<'_, '_>, negligible: f64) -> bool {
         let mut changed = false;
         for member in members.iter_mut() {
             changed |= member.step.own_springs_changed(&member.inputs);
         }
         let scale = self.pairs.iter().map(|pair| pair.law.force(pair.y).norm()).fold(0.0, f64::max);
-        let mut would = self.pairs.iter().map(|pair| pair.law.would_change(pair.y, scale));
-        if !changed && !would.any(|would| would) {
+        let moved = self.pairs.iter().map(|pair| moved_residual(pair, members, scale)).sum::<f64>();
+        if !changed && moved <= negligible * negligible {
             return false;
         }
         for pair in &mut self.pairs {
@@ -340,6 +372,19 @@ impl<'b> Member<'b> {
         let Self { step, team, elastic, state, inputs, .. } = self;
         (step, Own { team, elastic: &mut **elastic, state, inputs })
     }
+}
+
+/// rᵀM⁻¹r of the residual that a notable change of mode of `pair` would leave, as if no other changed.
+fn moved_residual(pair: &ActivePair, members: &[Member<'_>], scale: f64) -> f64 {
+    let change = pair.law.notable_change(pair.y, scale);
+    if change == 0.0 {
+        return 0.0;
+    }
+    let eases = pair.carriers.iter().map(|c| {
+        let member = &members[c.body as usize];
+        (member.inputs.s() * c.weight * change).powi(2) * member.step.ease_of(c.copy)
+    });
+    eases.sum()
 }
 
 /// Writes y of all pairs with the present δ.

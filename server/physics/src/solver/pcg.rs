@@ -24,7 +24,7 @@ pub struct Pcg {
     /// On input the residual b − A x of the start. On output that of the result, by recurrence, in the
     /// variables of the preconditioner.
     pub r: Vec<Padded>,
-    pub(super) z: Vec<Padded>,
+    pub(crate) z: Vec<Padded>,
     pub(crate) p: Vec<Padded>,
     pub(crate) q: Vec<Padded>,
     pub(super) partial: Vec<f64>,

@@ -113,6 +113,8 @@ pub struct PairContacts {
     group: Vec<u32>,
     /// Per body the box that its surface passes through in the step, and its largest speed.
     reach: Vec<([Vector3<f64>; 2], f64)>,
+    /// Per body the positions [m] and velocities [m/s] of its surface vertices.
+    paths: Vec<Vec<[Vector3<f64>; 2]>>,
     epochs: Vec<u32>,
     /// Per body and vertex: whether it is on a lip, and of which cut.
     lips: Vec<Vec<u32>>,
@@ -227,7 +229,9 @@ impl PairContacts {
     /// Boxes and speeds of the surfaces of all bodies in the step.
     fn measure(&mut self, bodies: &[SimBody], h: f64) {
         self.reach.clear();
-        for body in bodies {
+        self.paths.resize_with(bodies.len(), Vec::new);
+        for (body, paths) in bodies.iter().zip(&mut self.paths) {
+            paths.clear();
             let (x, v) = (body.body.positions(), body.body.velocities());
             let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
             let (mut bounds, mut fastest) = (none, 0.0f64);
@@ -236,6 +240,7 @@ impl PairContacts {
                 let to = from + h * v;
                 bounds = [bounds[0].inf(&from).inf(&to), bounds[1].sup(&from).sup(&to)];
                 fastest = fastest.max(v.norm());
+                paths.push([from, v]);
             }
             self.reach.push((bounds, fastest));
         }
@@ -260,7 +265,6 @@ impl PairContacts {
             return;
         }
         let (body, other) = (&bodies[a].body, &bodies[b].body);
-        let (x, v) = (body.positions(), body.velocities());
         let surface = body.surface();
         let stiffness = {
             let [soft, hard] = [a, b].map(|i| young_pa(i) / bodies[i].cell_m());
@@ -269,9 +273,9 @@ impl PairContacts {
         let first = self.kept.partition_point(|k| k.bodies < [a as u32, b as u32]);
         let mut next = first;
         for (vertex, point) in (0u32..).zip(&surface.vertices) {
-            let from = point.position(x);
+            let [from, velocity] = self.paths[a][vertex as usize];
             let inside = |p: &Vector3<f64>| (0..3).all(|k| p[k] >= low[k] && p[k] <= high[k]);
-            let to = from + h * point.position(v);
+            let to = from + h * velocity;
             if a != b && !inside(&from) && !inside(&to) {
                 continue;
             }
@@ -279,8 +283,11 @@ impl PairContacts {
                 next += 1;
             }
             let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
-            let approach = h * (fastest + point.position(v).norm());
+            let approach = h * (fastest + velocity.norm());
             let near_m = margin + approach;
+            if a == b && known.is_none() && self.own[a].is_free(vertex, (near_m, cell_m)) {
+                continue;
+            }
             // Whatever is deep inside has been followed from the surface, or overlaps from the start.
             let reach = match known {
                 Some(known) => near_m + known.depth_m.max(0.0),

@@ -1,9 +1,24 @@
 //! Springs in the operator of a step, and the modes in which a solve takes them.
 
 use super::{LinearStep, SPRING_PASSES, system};
+use crate::element::MaterialPoint;
 use crate::integrator::springs::ActiveSpring;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::operator::Stiffness;
+use crate::operator::{Block6, Spring, Stiffness};
+use nalgebra::Matrix3;
+
+/// A spring on one node, to see on which nodes it acts in other variables.
+fn at_node(copy: u32) -> Spring {
+    Spring { point: MaterialPoint::new([(copy, 1.0)]), direction: None, stiffness: 1.0 }
+}
+
+/// Adds a symmetric matrix to a block of the diagonal.
+fn add(matrix: Matrix3<f64>, block: &mut Block6) {
+    let m = matrix.map(|m| m as f32);
+    for (sum, m) in block.iter_mut().zip([m.m11, m.m12, m.m13, 0.0, m.m22, m.m23, m.m33, 0.0]) {
+        *sum += m;
+    }
+}
 
 impl LinearStep {
     /// Adds the springs to the operator and to the preconditioner.
@@ -18,31 +33,41 @@ impl LinearStep {
         self.sprung.clear();
         match &mut self.stiff {
             None => {
-                let all = self.terms.iter().chain(&self.shared);
-                self.sprung.extend(all.flat_map(|term| term.point.copies()));
+                self.sprung.extend(self.terms.iter().flat_map(|term| term.point.copies()));
+                self.sprung.extend(self.shared.iter().map(|(copy, _)| *copy));
             }
             // A spring also acts on the copies relative to which its own are moved.
             Some(stiff) => {
-                for term in self.terms.iter().chain(&self.shared) {
-                    term.expand(self.preconditioner.substitution(), &mut stiff.row);
+                let T = self.preconditioner.substitution();
+                for term in
+                    self.terms.iter().copied().chain(self.shared.iter().map(|(copy, _)| at_node(*copy)))
+                {
+                    term.expand(T, &mut stiff.row);
                     self.sprung.extend(stiff.row.iter().map(|r| r.0));
                 }
             }
         }
+        // Many springs act on the same nodes, and every block is inverted once.
+        self.sprung.sort_unstable();
+        self.sprung.dedup();
         // `diagonal` itself stays without springs: they are in it only while the blocks are inverted.
         self.bare.clear();
         self.bare.extend(self.sprung.iter().map(|&copy| self.diagonal[copy as usize]));
         if let Some(stiff) = &mut self.stiff {
-            for term in self.terms.iter().chain(&self.shared) {
+            for term in &self.terms {
                 term.expand(self.preconditioner.substitution(), &mut stiff.row);
                 stiff
                     .row
                     .iter()
                     .for_each(|&(copy, w)| term.add_to_block(w as f32, &mut self.diagonal[copy as usize]));
             }
+            for (copy, block) in &self.shared {
+                at_node(*copy).expand(self.preconditioner.substitution(), &mut stiff.row);
+                stiff.row.iter().for_each(|&(copy, w)| add(w * w * block, &mut self.diagonal[copy as usize]));
+            }
         } else {
             system(elastic, &self.terms, inputs).add_springs(&mut self.diagonal);
-            system(elastic, &self.shared, inputs).add_springs(&mut self.diagonal);
+            self.shared.iter().for_each(|(copy, block)| add(*block, &mut self.diagonal[*copy as usize]));
         }
         for &copy in &self.sprung {
             self.preconditioner.set(copy as usize, &self.diagonal[copy as usize], held_of(copy));

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{LinearStep, system};
 use crate::integrator::state::State;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::operator::{Padded, Spring, Stiffness, filter};
+use crate::operator::{Padded, Stiffness, filter};
 use crate::team::Team;
 
 /// A body's own part of a step that several bodies solve together.
@@ -38,9 +38,9 @@ impl LinearStep {
         self.update_operator(team, &mut **elastic, state, inputs)
     }
 
-    /// Completes the operator of a pass. `shared` are the diagonal parts of springs to other bodies, which belong to
-    /// the preconditioner only.
-    pub fn complete_together(&mut self, own: &mut Own<'_, '_>, shared: &[Spring]) {
+    /// Completes the operator of a pass. `shared` are the nodes of springs to other bodies, ascending, with their
+    /// diagonal parts, which belong to the preconditioner only.
+    pub fn complete_together(&mut self, own: &mut Own<'_, '_>, shared: &[(u32, Matrix3<f64>)]) {
         self.shared.clear();
         self.shared.extend_from_slice(shared);
         self.complete_operator(&mut *own.elastic, own.inputs);
@@ -57,6 +57,35 @@ impl LinearStep {
     pub fn add_to_residual(&mut self, copy: u32, force: &Vector3<f64>) {
         let r = &mut self.pcg.r[copy as usize];
         (0..3).for_each(|k| r[k] += force[k] as f32);
+    }
+
+    /// Whether the preconditioner consists of blocks of single nodes.
+    pub fn has_single_blocks(&self) -> bool {
+        self.preconditioner.substitution().is_empty()
+    }
+
+    /// The block of the preconditioner of one node, springs included; `None` if the node is held or has no mass.
+    pub fn single_block(&self, copy: u32) -> Option<Matrix3<f64>> {
+        let columns = self.preconditioner.inverses()[copy as usize].columns();
+        let inverse = Matrix3::from_fn(|i, j| f64::from(columns[j][i]));
+        let size = inverse.trace();
+        (size > 0.0).then(|| inverse / size)?.try_inverse().map(|block| block / size)
+    }
+
+    /// Mean of the diagonal of M⁻¹ of one node.
+    pub fn ease_of(&self, copy: u32) -> f64 {
+        let columns = self.preconditioner.inverses()[copy as usize].columns();
+        (0..3).map(|k| f64::from(columns[k][k])).sum::<f64>() / 3.0
+    }
+
+    /// The residual of one node.
+    pub fn residual_of(&self, copy: u32) -> &Padded {
+        &self.pcg.r[copy as usize]
+    }
+
+    /// M⁻¹ r of one node.
+    pub fn preconditioned_of(&mut self, copy: u32) -> &mut Padded {
+        &mut self.pcg.z[copy as usize]
     }
 
     /// z = M⁻¹ r after all forces are in the residual; returns rᵀz.

@@ -12,10 +12,11 @@ use smallvec::SmallVec;
 
 /// A triangle faces a vertex if their normals have at most this scalar product.
 const FACING: f64 = -0.2;
-/// Most triangles in the list of a vertex.
-const MOST: usize = 24;
-/// How far vertices look around, so that they need not look again soon, in cells.
-const LOOKOUT_CELLS: f64 = 0.5;
+/// Most triangles in the list of a vertex, and those for which it has room without memory of its own.
+const MOST: usize = 96;
+const ROOM: usize = 16;
+/// How far vertices look around, so that they need not look again soon, in cells; those that nothing faced, and others.
+const LOOKOUT_CELLS: [f64; 2] = [1.0, 0.5];
 /// An edge of the surface this sharp is the rim of a lip: scalar product of its normal and that of the lip.
 const RIM: f64 = 0.9;
 /// Distance beyond a rim over which the direction of contact turns from the normal of the lip to that of the rim, in
@@ -23,6 +24,9 @@ const RIM: f64 = 0.9;
 const TURN_CELLS: f64 = 0.05;
 /// Rounding of positions to single precision, in cells.
 const ROUNDING_CELLS: f64 = 1e-4;
+
+/// Triangles with their distances [m], ascending.
+type List = SmallVec<[(f64, u32); ROOM]>;
 
 /// What one body knows about itself.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
@@ -35,11 +39,14 @@ pub struct OwnSurface {
     /// Positions of the vertices at the last update [m].
     positions: Vec<[f32; 3]>,
     /// Per vertex the triangles near it to which it is not joined, with their distances when they were listed [m].
-    lists: Vec<SmallVec<[(f64, u32); MOST]>>,
+    lists: Vec<List>,
     /// All triangles count as facing; only for a mutation test.
     meets_joined: bool,
-    /// Per vertex a lower bound of the distance to all others [m].
+    /// Per vertex a lower bound of the distance to all others [m], and the same when they were listed.
     known_m: Vec<f64>,
+    listed_m: Vec<f64>,
+    /// The same to any triangle to which it is not joined.
+    free_m: Vec<f64>,
 }
 
 impl OwnSurface {
@@ -72,16 +79,23 @@ impl OwnSurface {
 
     /// No distance has shrunk by more than both sides have moved.
     fn follow(&mut self, tree: &SurfaceBvh, same: bool) {
-        let Self { positions, lists, known_m, .. } = self;
+        let Self { positions, lists, known_m, listed_m, free_m, .. } = self;
         let now = tree.positions();
         if same && positions.len() == now.len() {
             let moved = |(now, before): (&[f32; 3], &[f32; 3])| (point(now) - point(before)).norm();
             let each = || now.iter().zip(positions.iter()).map(moved);
             let farthest = each().fold(0.0, f64::max);
-            known_m.iter_mut().zip(each()).for_each(|(known, own)| *known -= farthest + own);
+            for ((known, free), own) in known_m.iter_mut().zip(free_m.iter_mut()).zip(each()) {
+                *known -= farthest + own;
+                *free -= farthest + own;
+            }
         } else {
             known_m.clear();
             known_m.resize(now.len(), 0.0);
+            for distances in [free_m, listed_m] {
+                distances.clear();
+                distances.resize(now.len(), 0.0);
+            }
             lists.resize_with(now.len(), SmallVec::new);
         }
         positions.clear();
@@ -120,6 +134,11 @@ impl OwnSurface {
         normal.try_normalize(0.1).unwrap_or(near.normal)
     }
 
+    /// Whether no triangle to which it is not joined can be within `reach` [m] of a vertex.
+    pub fn is_free(&self, vertex: u32, (reach, cell_m): (f64, f64)) -> bool {
+        self.free_m[vertex as usize] > reach + ROUNDING_CELLS * cell_m
+    }
+
     /// The closest of the triangles that face a vertex at `from` [m], of those no farther than `reach` [m] that it is
     /// not joined to.
     pub fn closest(
@@ -131,12 +150,17 @@ impl OwnSurface {
     ) -> Option<ClosestPoint> {
         let (v, needed) = (vertex as usize, reach + ROUNDING_CELLS * cell_m);
         if self.known_m[v] <= needed {
-            let lookout = (LOOKOUT_CELLS * cell_m).max(1.5 * needed);
+            let faced = self.lists[v].iter().any(|&(_, t)| self.faces(t, vertex));
+            let lookout = (LOOKOUT_CELLS[usize::from(faced)] * cell_m).max(1.5 * needed);
             self.known_m[v] = look_around(&mut self.lists[v], from, lookout, tree, &joined);
+            self.listed_m[v] = self.known_m[v];
+            self.free_m[v] = self.lists[v].first().map_or(self.known_m[v], |(nearest, _)| *nearest);
         }
         if self.known_m[v] > needed {
-            let facing = self.lists[v].iter().map(|&(_, t)| t).filter(|&t| self.faces(t, vertex));
-            return tree.closest_point_among(from, reach, facing);
+            // Both sides have moved since they were listed.
+            let moved = self.listed_m[v] - self.known_m[v] + ROUNDING_CELLS * cell_m;
+            let facing = self.lists[v].iter().filter(|(_, t)| self.faces(*t, vertex));
+            return tree.closest_point_among(from, reach, facing.map(|&(listed, t)| (listed - moved, t)));
         }
         tree.closest_point_where(from, reach, |t| self.faces(t, vertex) && !joined(t))
     }
@@ -145,7 +169,7 @@ impl OwnSurface {
 /// Lists the triangles nearest to a point, no farther than `lookout` [m], by their distance. Returns the distance up
 /// to which the list is complete [m].
 fn look_around(
-    list: &mut SmallVec<[(f64, u32); MOST]>,
+    list: &mut List,
     from: Vector3<f64>,
     lookout: f64,
     tree: &SurfaceBvh,
