@@ -76,6 +76,8 @@ impl LinkConfig {
         }
         if self.zenoh_file.is_none() {
             settings.extend([
+                // The server has none, and a client would need a /dev/shm that it may write to.
+                ("transport/shared_memory/enabled", "false"),
                 ("scouting/multicast/enabled", "false"),
                 ("scouting/gossip/enabled", "false"),
                 ("scouting/delay", "50"),

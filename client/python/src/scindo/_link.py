@@ -56,6 +56,9 @@ class Link:
             ) from None
         settings.insert_json5("mode", '"client"')
         settings.insert_json5("connect/timeout_ms", str(int(timeout * 1000)))
+        if not config:
+            # The server has none, and a client would need a /dev/shm that it may write to.
+            settings.insert_json5("transport/shared_memory/enabled", "false")
         settings.insert_json5("scouting/multicast/enabled", "false")
         settings.insert_json5("scouting/gossip/enabled", "false")
         if endpoint:
