@@ -10,7 +10,7 @@ use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
 
 use super::cells::{body, cells, volume_error};
 use super::flaws::tell;
-use super::growth::{measure, wound};
+use super::growth::{largest_change, measure, wound};
 use super::support::{DOWN, L, SOFT, V, clamp_left, nodes, plane, slice};
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::{Evidence, short};
@@ -254,15 +254,7 @@ fn advance(setting: &Setting) -> Result<Evidence, Trouble> {
         let before = measure(&watch.body);
         watch.cut(&BladeSweep { segments: vec![blade(x)] }, 1)?;
         let after = measure(&watch.body);
-        let flow = before.1.norm().max(1e-9);
-        let worst = [
-            (after.0 / before.0 - 1.0).abs(),
-            (after.1 - before.1).norm() / flow,
-            (after.2 - before.2).norm() / (flow * 10.0 * cell),
-            (after.3[0] - before.3[0]).abs() / before.3[0].max(1e-9),
-            (after.3[1] - before.3[1]).abs() / before.3[1].max(1e-9),
-        ];
-        change = worst.into_iter().fold(change, f64::max);
+        change = largest_change(&before, &after, 10.0 * cell).max(change);
         let (_, reach) = wound(&watch.body);
         let now = watch.body.surface().tags.iter().filter(|tag| **tag > 0).count();
         shrunk += usize::from(now < lips);

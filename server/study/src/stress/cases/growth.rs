@@ -55,9 +55,25 @@ pub fn wound(body: &Body) -> (f64, f64) {
 }
 
 /// Mass, momentum, angular momentum and both energies.
-pub fn measure(body: &Body) -> (f64, V, V, [f64; 2]) {
+pub type Measures = (f64, V, V, [f64; 2]);
+
+/// Those of a body.
+pub fn measure(body: &Body) -> Measures {
     let energies = [body.kinetic_energy(), body.elastic_energy()];
     (body.total_mass(), body.momentum(), body.angular_momentum(), energies)
+}
+
+/// The largest relative change from `before` to `after` in a body of this `length` [m].
+pub fn largest_change(before: &Measures, after: &Measures, length: f64) -> f64 {
+    let flow = before.1.norm().max(1e-9);
+    let changes = [
+        (after.0 / before.0 - 1.0).abs(),
+        (after.1 - before.1).norm() / flow,
+        (after.2 - before.2).norm() / (flow * length),
+        (after.3[0] - before.3[0]).abs() / before.3[0].max(1e-9),
+        (after.3[1] - before.3[1]).abs() / before.3[1].max(1e-9),
+    ];
+    changes.into_iter().fold(0.0, f64::max)
 }
 
 fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
@@ -77,15 +93,7 @@ fn growing(setting: &Setting) -> Result<Evidence, Trouble> {
         let before = measure(&watch.body);
         watch.cut(&BladeSweep { segments: vec![blade(x)] }, 1)?;
         let after = measure(&watch.body);
-        let flow = before.1.norm().max(1e-9);
-        let worst = [
-            (after.0 / before.0 - 1.0).abs(),
-            (after.1 - before.1).norm() / flow,
-            (after.2 - before.2).norm() / (flow * 10.0 * CELL),
-            (after.3[0] - before.3[0]).abs() / before.3[0].max(1e-9),
-            (after.3[1] - before.3[1]).abs() / before.3[1].max(1e-9),
-        ];
-        change = worst.into_iter().fold(change, f64::max);
+        change = largest_change(&before, &after, 10.0 * CELL).max(change);
         let (now, reach) = wound(&watch.body);
         shrunk += usize::from(now < area * (1.0 - 1e-12));
         area = now;
