@@ -2,9 +2,9 @@
 //!
 //! Springs between the bodies are terms s k J Jᵀ of one matrix, whose other blocks are those of the bodies. Conjugate
 //! gradients run over the vectors of all bodies at once, preconditioned node by node; what the springs add to the
-//! diagonal is part of it, and nodes that they tie together are [`partners`]. Both sides are implicit, so that stiff contact needs no small step. The translations of
-//! free parts are balanced exactly before and after, so that momentum is exchanged to rounding, however few iterations
-//! are made.
+//! diagonal is part of it, and nodes that they tie together are [`partners`]. Both sides are implicit, so that stiff
+//! contact needs no small step. The translations of free parts are balanced exactly before and after, so that momentum
+//! is exchanged to rounding, however few iterations are made.
 
 mod partners;
 mod translations;

@@ -18,6 +18,17 @@ fn measured(mut scene: Scene) -> (f64, u32) {
     (rate, iterations)
 }
 
+fn assert_cycle_is_symmetric(scene: &mut Scene) {
+    let [u, w] = [1, 2].map(|seed| {
+        let mut v = vector(scene.exact.mass.len(), seed);
+        scene.exact.filter(&mut v);
+        v
+    });
+    let (Vu, Vw) = (scene.cycle(&u), scene.cycle(&w));
+    let (one, other) = (dot(&w, &Vu), dot(&u, &Vw));
+    assert!((one - other).abs() < 1e-3 * (dot(&u, &Vu) * dot(&w, &Vw)).sqrt());
+}
+
 #[test]
 fn uncut_bodies_converge_at_a_rate_that_does_not_depend_on_their_size() {
     let small = measured(scene(&cube(16, 0), 0.3));
@@ -113,13 +124,7 @@ fn springs_cost_few_iterations() {
             },
         ];
         scene.add_springs(&springs, 4.0);
-        let [u, w] = [vector(scene.exact.mass.len(), 1), vector(scene.exact.mass.len(), 2)].map(|mut v| {
-            scene.exact.filter(&mut v);
-            v
-        });
-        let (Vu, Vw) = (scene.cycle(&u), scene.cycle(&w));
-        let (one, other) = (dot(&w, &Vu), dot(&u, &Vw));
-        assert!((one - other).abs() < 1e-3 * (dot(&u, &Vu) * dot(&w, &Vw)).sqrt());
+        assert_cycle_is_symmetric(&mut scene);
         let b = scene.gravity();
         let (iterations, _) = scene.mg_pcg(&b, 1e-6);
         assert!(iterations <= free.1 + 12, "springs of {stiffness:e} N/m: {iterations} iterations");
@@ -143,13 +148,7 @@ fn stiff_springs_on_all_levels_keep_the_rate() {
         let springs: Vec<Spring> = (0..n).map(of).collect();
         let mut scene = scene(&octree, 0.3);
         scene.add_stiff_springs(&springs);
-        let [u, w] = [vector(scene.exact.mass.len(), 1), vector(scene.exact.mass.len(), 2)].map(|mut v| {
-            scene.exact.filter(&mut v);
-            v
-        });
-        let (Vu, Vw) = (scene.cycle(&u), scene.cycle(&w));
-        let (one, other) = (dot(&w, &Vu), dot(&u, &Vw));
-        assert!((one - other).abs() < 1e-3 * (dot(&u, &Vu) * dot(&w, &Vw)).sqrt());
+        assert_cycle_is_symmetric(&mut scene);
         let b = scene.gravity();
         let (iterations, _) = scene.mg_pcg(&b, 1e-6);
         let found = format!("{n} springs of {stiffness:e}: {iterations} iterations, {} without", free.1);
