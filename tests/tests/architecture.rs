@@ -34,6 +34,7 @@ fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
         ("scindo-allocations", BTreeSet::new()),
         ("scindo-verification", BTreeSet::new()),
         ("scindo-fuzz", BTreeSet::new()),
+        ("scindo-schedules", BTreeSet::new()),
     ])
 }
 

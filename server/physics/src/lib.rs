@@ -17,6 +17,7 @@
 #![allow(clippy::needless_range_loop)] // i, j, k are tensor indices and lanes
 
 mod saved;
+mod sync;
 pub mod mesh;
 pub mod material;
 pub mod element;

@@ -4,7 +4,8 @@
 
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+
+use crate::sync::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 type Job = *const (dyn Fn(usize) + Sync);
 

@@ -20,16 +20,12 @@ mod threads;
 pub use blocks::{Blocks, BlocksMut, RangesMut, blocks, ranges};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::phase::{Marks, Phase, PhaseMark};
+use crate::sync::{Arc, AtomicBool, Ordering, SPINS_BEFORE_YIELD, spin_loop, thread};
 
 use gate::Gate;
 use threads::{Lookout, Threads};
-
-/// The caller gives up its time slice after this many looks at members that are still busy.
-const SPINS_BEFORE_YIELD: u32 = 2_000;
 
 /// Persistent threads that run phases for their owner; alone, or with other teams on the same threads.
 #[derive(Debug)]
@@ -150,7 +146,7 @@ unsafe fn run(
     let mut spins = 0_u32;
     while !gate.is_left() {
         spins = if meanwhile() { 0 } else { spins + 1 };
-        if spins < SPINS_BEFORE_YIELD { std::hint::spin_loop() } else { std::thread::yield_now() }
+        if spins < SPINS_BEFORE_YIELD { spin_loop() } else { thread::yield_now() }
     }
     if let Err(panic) = own {
         std::panic::resume_unwind(panic);

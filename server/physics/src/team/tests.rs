@@ -1,9 +1,9 @@
 //! Teams alone and side by side.
 
 use std::sync::Barrier;
-use std::sync::atomic::AtomicUsize;
 
 use super::*;
+use crate::sync::AtomicUsize;
 
 #[test]
 fn every_block_is_visited_once_by_any_number_of_members() {

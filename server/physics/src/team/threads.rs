@@ -1,22 +1,13 @@
 //! The threads that serve one team, or several that work side by side.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
-
 use super::gate::Gate;
-
-/// Idle members look for the next phase this many times before they sleep (about 30 µs).
-const LOOKS_BEFORE_SLEEP: u32 = 4_000;
-/// A member that has just helped a team looks only there this many times, since the team mostly goes on
-/// at once and its data is near the core.
-const LOOKS_BEFORE_WANDERING: u32 = 200;
+use crate::sync::{Arc, AtomicBool, LOOKS_BEFORE_SLEEP, LOOKS_BEFORE_WANDERING, Ordering, spin_loop, thread};
 
 /// Threads, and the gates of the teams that they serve.
 #[derive(Debug)]
 pub(super) struct Threads {
     shared: Arc<Shared>,
-    members: Vec<JoinHandle<()>>,
+    members: Vec<thread::JoinHandle<()>>,
 }
 
 #[derive(Debug)]
@@ -47,7 +38,7 @@ impl Threads {
         let mut threads = Self::room(members, sizes);
         for member in 1..members {
             let shared = Arc::clone(&threads.shared);
-            let thread = std::thread::Builder::new().name(format!("physics-{member}"));
+            let thread = thread::Builder::new().name(format!("physics-{member}"));
             threads.members.push(thread.spawn(move || shared.serve(member))?);
         }
         Ok(threads)
@@ -115,7 +106,7 @@ impl Shared {
             if self.gates[0].help(member, &mut lookout.done[0]) {
                 (lookout.at, lookout.idle) = (self.home[member], 0);
             } else if !self.help(&mut lookout) {
-                if lookout.idle < LOOKS_BEFORE_SLEEP { std::hint::spin_loop() } else { std::thread::park() }
+                if lookout.idle < LOOKS_BEFORE_SLEEP { spin_loop() } else { thread::park() }
             }
         }
     }

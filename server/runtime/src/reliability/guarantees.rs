@@ -53,7 +53,7 @@ pub const GUARANTEES: [Guarantee; 13] = [
     Guarantee {
         number: "G6",
         promise: "The same input gives the same bits on any number of threads",
-        tried_by: "`server/world/tests/side_by_side.rs`, and a test per effect",
+        tried_by: "`server/world/tests/side_by_side.rs`, and a test per effect; `tests/schedules` for the orders of its threads",
         simulated: false,
     },
     Guarantee {
