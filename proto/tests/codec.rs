@@ -111,13 +111,30 @@ fn contact() -> impl Strategy<Value = Contact> {
             patch_radius_m: 0.01,
             feature_id,
             friction: damping * 1e-3,
+            edge_of: 0,
         },
     )
 }
 
+/// A contact, or an edge of another one, which has no force.
+fn contact_or_edge() -> impl Strategy<Value = Contact> {
+    (contact(), 0..=6_u32).prop_map(|(contact, edge_of)| match edge_of {
+        0 => contact,
+        _ => Contact {
+            point_m: contact.point_m,
+            normal: contact.normal,
+            gap_m: contact.gap_m,
+            patch_radius_m: contact.patch_radius_m,
+            feature_id: contact.feature_id,
+            edge_of,
+            ..Contact::default()
+        },
+    })
+}
+
 fn haptic_contact() -> impl Strategy<Value = HapticContact> {
     let header = (any::<[u64; 5]>(), any::<u32>());
-    (header, id(), pose(), vec(contact(), 0..=6), 0..5_i32).prop_map(
+    (header, id(), pose(), vec(contact_or_edge(), 0..=6), 0..5_i32).prop_map(
         |(([seq, step, now, used, client], epoch), tool_id, pose, contacts, mode)| HapticContact {
             seq,
             sim_step: step,

@@ -62,7 +62,7 @@ pub struct Capability {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DeviceGone;
 
-/// A kinesthetic device with three degrees of freedom in force.
+/// A kinesthetic device with three degrees of freedom in force, and three in torque if it has motors for them.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -107,4 +107,10 @@ pub trait HapticDevice: Send {
 
     /// Sets the force on the hand [N], which holds until the next call.
     fn write(&mut self, force_n: Vector3<f64>);
+
+    /// Sets the torque on the hand about the tip [N·m], which holds until the next call. A device without motors for it
+    /// has nothing to do.
+    fn write_torque(&mut self, torque_nm: Vector3<f64>) {
+        let _ = torque_nm;
+    }
 }

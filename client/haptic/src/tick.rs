@@ -37,6 +37,8 @@ pub struct TickTime {
 pub struct TickOutput {
     /// Force on the hand [N].
     pub force_n: Vector3<f64>,
+    /// Torque on the hand about the tip [N·m].
+    pub torque_nm: Vector3<f64>,
     /// Flags of the tick, see [`flag`].
     pub flags: u32,
 }
@@ -138,6 +140,7 @@ impl HapticTick {
         let model = *self.ports.contacts.read();
         let alive = self.ports.server_alive.load(Ordering::Relaxed);
 
+        self.law.turn_to(state.orientation);
         let loads = self.law.loads(&model, &state.position_m, time.now_ns);
         let tissue_n = self.coupling.force(&state, &loads, model.max_stiffness_n_m);
         let blended_n = self.blend.apply(tissue_n, &model, time.now_ns);
@@ -148,7 +151,10 @@ impl HapticTick {
         let output = self.release(&permit, felt_n, &state.velocity_m_s, model.max_force_n);
         let output = TickOutput { flags: output.flags | if is_paid { 0 } else { flag::UNPAID }, ..output };
         self.tank.observe(&output.force_n, &charge);
+        let torque_nm = released_torque(&loads.torque_at(&state.position_m), &tissue_n, &output.force_n);
+        let output = TickOutput { torque_nm, ..output };
         self.device.write(output.force_n);
+        self.device.write_torque(output.torque_nm);
 
         let row = LogRow {
             time_s: time.now_ns as f64 * 1e-9,
@@ -191,7 +197,7 @@ impl HapticTick {
             (force_n, clamped | flags | if injected { flag::PASSIVITY } else { 0 })
         };
         self.passivity.observe(&force_n, v);
-        TickOutput { force_n, flags: flags | permit.flags }
+        TickOutput { force_n, torque_nm: Vector3::zeros(), flags: flags | permit.flags }
     }
 
     fn publish(&mut self, state: &DeviceState, row: &LogRow, now_ns: u64) {
@@ -236,6 +242,16 @@ impl HapticTick {
     pub fn close(self) -> LoopReport {
         self.report()
     }
+}
+
+/// The torque of the tissue [N·m], with the part that the safety stage let through of its force [N].
+fn released_torque(
+    torque_nm: &Vector3<f64>,
+    tissue_n: &Vector3<f64>,
+    released_n: &Vector3<f64>,
+) -> Vector3<f64> {
+    let whole = tissue_n.norm();
+    if whole > 0.0 { torque_nm * (released_n.norm() / whole).min(1.0) } else { Vector3::zeros() }
 }
 
 /// A contact stream and devices made for tests.

@@ -163,5 +163,10 @@ fn contact(at: In, c: &Contact) -> Checked {
     ] {
         at.positive(field, f64::from(value), f64::MAX)?;
     }
+    at.at_most("contacts.edge_of", c.edge_of as usize, MAX_CONTACTS)?;
+    if c.edge_of > 0 && (c.force_n.is_some() || c.surface_velocity_m_s.is_some() || c.stiffness_n_m > 0.0) {
+        let value = format!("edge of contact {} with a force", c.edge_of - 1);
+        return Err(at.range("contacts.edge_of", value, "an edge without force, stiffness and velocity"));
+    }
     at.positive("contacts.friction", f64::from(c.friction), MAX_FRICTION)
 }

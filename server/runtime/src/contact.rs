@@ -196,18 +196,20 @@ pub(crate) fn to_message(model: &LocalContact, input: &ToolInput, seq: u64) -> H
 }
 
 fn to_contact(plane: &ContactPlane) -> wire::Contact {
+    let pushes = plane.edge_of.is_none();
     wire::Contact {
         point_m: Some(to_vec3f(&plane.point_m)),
         normal: Some(to_vec3f(&plane.normal)),
         gap_m: plane.gap_m as f32,
-        force_n: Some(to_vec3f(&plane.force_n)),
+        force_n: pushes.then(|| to_vec3f(&plane.force_n)),
         stiffness_n_m: plane.stiffness_n_m as f32,
         tangential_stiffness_n_m: plane.tangential_stiffness_n_m as f32,
         friction: plane.friction as f32,
         damping_ns_m: plane.damping_ns_m as f32,
-        surface_velocity_m_s: Some(to_vec3f(&plane.surface_velocity_m_s)),
+        surface_velocity_m_s: pushes.then(|| to_vec3f(&plane.surface_velocity_m_s)),
         patch_radius_m: plane.patch_radius_m as f32,
         feature_id: plane.feature_id,
+        edge_of: plane.edge_of.map_or(0, |of| of as u32 + 1),
     }
 }
 

@@ -76,6 +76,7 @@ mod tests {
             two_sided: false,
             friction: 0.3,
             friction_n: Vector3::zeros(),
+            arm_m: Vector3::zeros(),
         }
     }
 

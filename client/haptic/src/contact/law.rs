@@ -13,6 +13,14 @@
 //! each on both sides. Where the plane names a coefficient of friction the tissue sticks and slips across the normal
 //! ([`friction`](super::friction)).
 //!
+//! Several planes meet in two ways. Those that push by themselves add up: together they hold a tool in a groove from
+//! both sides. An edge ends the tissue under another plane, and takes its load away as the tool passes beyond.
+//!
+//! # Turning
+//! A shaft or a blade touches at an arm a = point − tip. A small turn θ of the tool since the pose used moves the place
+//! of contact by θ × a, which loads the plane as if the tip had gone that way; a ball, whose arm lies along the normal,
+//! is not loaded by it. The force has the torque a × f about the tip.
+//!
 //! # Source
 //! The message `scindo.v1.Contact` (`proto/scindo/v1/tool.proto`).
 
@@ -21,7 +29,7 @@ use super::history::TipHistory;
 use super::model::{ContactModel, ContactPlane};
 use super::relaxation::{Response, Used};
 use crate::constants::{EXTRAPOLATION_STEPS, MAX_EXTRAPOLATION_S, PATCH_FADE};
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use scindo_proto::limits::MAX_CONTACTS;
 
 /// A plane as a load that is linear along its normal: max(0, offset − stiffness n·p) n.
@@ -43,6 +51,8 @@ pub struct PlaneLoad {
     pub friction: f64,
     /// Friction across the normal with the tip where it is [N].
     pub friction_n: Vector3<f64>,
+    /// From the tip to the place of contact [m].
+    pub arm_m: Vector3<f64>,
 }
 
 impl PlaneLoad {
@@ -82,6 +92,16 @@ impl PlaneLoads {
         self.iter().filter(|load| load.friction > 0.0).map(share).sum()
     }
 
+    /// Torque about a tip at `p` [N·m].
+    pub fn torque_at(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        let of = |load: &PlaneLoad| {
+            let along = load.at(p);
+            let across = load.friction_n.cap_magnitude(load.friction * along.max(0.0));
+            load.arm_m.cross(&(along * load.normal + across))
+        };
+        self.iter().map(of).sum()
+    }
+
     /// Stiffness along the unit vector `along` with the tip at `p` [N/m].
     pub fn stiffness_along(&self, p: &Vector3<f64>, along: &Vector3<f64>) -> f64 {
         let share = |load: &PlaneLoad| load.stiffness_n_m * load.normal.dot(along).powi(2);
@@ -109,6 +129,8 @@ pub struct ContactLaw {
     history: TipHistory,
     /// Stiffness across a plane that the device can render [N/m].
     stiffest_n_m: f64,
+    /// Tool axes to world axes.
+    turn: UnitQuaternion<f64>,
 }
 
 impl Default for ContactLaw {
@@ -120,8 +142,22 @@ impl Default for ContactLaw {
 impl ContactLaw {
     /// A law for a device that renders this stiffness at most [N/m].
     pub fn new(stiffest_n_m: f64) -> Self {
-        let history = TipHistory::default();
-        Self { horizon_s: MAX_EXTRAPOLATION_S, last_step: (0, 0.0), history, stiffest_n_m }
+        Self {
+            horizon_s: MAX_EXTRAPOLATION_S,
+            last_step: (0, 0.0),
+            history: TipHistory::default(),
+            stiffest_n_m,
+            turn: UnitQuaternion::identity(),
+        }
+    }
+
+    /// Turns the tool to the orientation x, y, z, w of the device, a unit quaternion from tool axes to world axes. Another
+    /// one is ignored.
+    pub fn turn_to(&mut self, [x, y, z, w]: [f64; 4]) {
+        let q = Quaternion::new(w, x, y, z);
+        if (q.norm() - 1.0).abs() < 0.1 {
+            self.turn = UnitQuaternion::new_normalize(q);
+        }
     }
 
     /// Loads on a tip near `tip_m` at loop time `now_ns`. Must be called once per tick.
@@ -129,10 +165,12 @@ impl ContactLaw {
         self.observe_step(model);
         let age_s = (model.age_ns(now_ns) as f64 * 1e-9).min(self.horizon_s);
         let mut out = PlaneLoads { loads: [NO_LOAD; MAX_CONTACTS], count: 0 };
-        for plane in model.planes() {
+        for (number, plane) in model.planes().iter().enumerate().filter(|(_, plane)| plane.edge_of.is_none())
+        {
+            let share = share_of_edges(model, number, tip_m);
             for plane in axes(plane, model.holds).into_iter().flatten() {
                 if let Some(slot) = out.loads.get_mut(out.count) {
-                    *slot = self.load(&plane, model, tip_m, age_s);
+                    *slot = self.load(&plane, (model, share), tip_m, age_s);
                     out.count += 1;
                 }
             }
@@ -144,13 +182,15 @@ impl ContactLaw {
     fn load(
         &self,
         plane: &ContactPlane,
-        model: &ContactModel,
+        (model, share): (&ContactModel, f64),
         tip_m: &Vector3<f64>,
         age_s: f64,
     ) -> PlaneLoad {
         let n = plane.normal;
         let moved = plane.surface_velocity_m_s * age_s;
-        let weight = patch_weight(plane, &(tip_m - moved));
+        let weight = share * patch_weight(plane, &(tip_m - moved));
+        let turn = self.turn_since(model);
+        let arm_m = plane.point_m - model.tip_used_m;
         let two_sided = model.holds && plane.stiffness_n_m > 0.0;
         let answer = match model.used_ns {
             Some(at_ns) if plane.relaxed_stiffness_n_m > 0.0 => {
@@ -162,15 +202,17 @@ impl ContactLaw {
                 stiffness_n_m: plane.stiffness_n_m,
             },
         };
+        let turned = answer.stiffness_n_m * n.dot(&turn.cross(&arm_m));
         let mut load = PlaneLoad {
             normal: n,
-            offset_n: weight * answer.offset_n,
+            offset_n: weight * (answer.offset_n - turned),
             stiffness_n_m: weight * answer.stiffness_n_m,
             damping_ns_m: weight * plane.damping_ns_m,
             surface_velocity_m_s: plane.surface_velocity_m_s,
             two_sided,
             friction: if two_sided { 0.0 } else { plane.friction },
             friction_n: Vector3::zeros(),
+            arm_m: plane.point_m + moved - tip_m,
         };
         if load.friction > 0.0 {
             let start = Start { tip_m: model.tip_used_m, at_ns: model.used_ns };
@@ -178,6 +220,12 @@ impl ContactLaw {
             load.friction_n = friction(plane, &load, stiffest, &start, &self.history, tip_m);
         }
         load
+    }
+
+    /// Small rotation vector of the tool since the pose of the model [rad].
+    fn turn_since(&self, model: &ContactModel) -> Vector3<f64> {
+        let turn = (self.turn * model.turn_used.inverse()).scaled_axis();
+        turn.cap_magnitude(MAX_TURN_RAD)
     }
 
     /// Updates the horizon to 1.5 simulation steps, once messages show the length of a step.
@@ -196,6 +244,16 @@ impl ContactLaw {
     }
 }
 
+/// Turn since the pose of a model up to which the places of contact are followed [rad].
+const MAX_TURN_RAD: f64 = 0.5;
+
+/// Part of the load of plane `number` that the edges of its tissue leave with the tip at `tip_m`.
+fn share_of_edges(model: &ContactModel, number: usize, tip_m: &Vector3<f64>) -> f64 {
+    let moved = tip_m - model.tip_used_m;
+    let edges = model.planes().iter().filter(|plane| plane.edge_of == Some(number));
+    edges.map(|edge| edge.edge_share(&moved)).product()
+}
+
 /// A load that does nothing.
 const NO_LOAD: PlaneLoad = PlaneLoad {
     normal: Vector3::new(0.0, 0.0, 1.0),
@@ -206,6 +264,7 @@ const NO_LOAD: PlaneLoad = PlaneLoad {
     two_sided: false,
     friction: 0.0,
     friction_n: Vector3::new(0.0, 0.0, 0.0),
+    arm_m: Vector3::new(0.0, 0.0, 0.0),
 };
 
 /// The plane itself, and the two axes across it if it holds.
@@ -298,6 +357,57 @@ mod tests {
             law.loads(&ContactModel { sim_step, sim_time_s, ..model(&[]) }, &Vector3::zeros(), 0);
         }
         assert!((law.horizon_s - 0.015).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_groove_holds_from_both_sides() {
+        let side = |x: f64| ContactPlane { normal: Vector3::x() * x, force_n: 0.0, ..plane() };
+        let loads =
+            ContactLaw::default().loads(&model(&[plane(), side(1.0), side(-1.0)]), &Vector3::zeros(), 0);
+        assert_eq!(loads.force_at(&Vector3::zeros()), Vector3::z());
+        for x in [-0.002, 0.003] {
+            let force = loads.force_at(&Vector3::new(x, 0.0, 0.0));
+            assert!((force - Vector3::new(-200.0 * x, 0.0, 1.0)).norm() < 1e-12, "{x} {force}");
+        }
+    }
+
+    #[test]
+    fn tissue_ends_at_its_edge() {
+        // The tool lies 1 mm before the edge, and the load falls to zero 2 mm beyond where it begins to fall.
+        let edge = ContactPlane {
+            normal: Vector3::x(),
+            gap_m: -0.003,
+            patch_radius_m: 0.002,
+            edge_of: Some(0),
+            ..ContactPlane::NONE
+        };
+        let model = model(&[plane(), edge]);
+        let force = |x: f64| {
+            let tip = Vector3::new(x, 0.0, 0.0);
+            ContactLaw::default().loads(&model, &tip, 0).force_at(&tip)
+        };
+        for (x, share) in [(-0.01, 1.0), (0.0, 1.0), (0.001, 1.0), (0.002, 0.5), (0.003, 0.0), (0.01, 0.0)] {
+            assert!((force(x) - Vector3::z() * share).norm() < 1e-9, "{x} {}", force(x));
+        }
+    }
+
+    #[test]
+    fn a_shaft_that_turns_presses_with_its_arm_and_a_ball_does_not() {
+        let arm = Vector3::new(0.05, 0.0, -0.004);
+        let touch = |point_m| model(&[ContactPlane { point_m, ..plane() }]);
+        let turned = |angle: f64, point_m: Vector3<f64>| {
+            let mut law = ContactLaw::default();
+            let turn = UnitQuaternion::new(Vector3::y() * angle);
+            law.turn_to([turn.i, turn.j, turn.k, turn.w]);
+            let loads = law.loads(&touch(point_m), &Vector3::zeros(), 0);
+            (loads.force_at(&Vector3::zeros()), loads.torque_at(&Vector3::zeros()))
+        };
+        // The place of contact goes down by 0.02 · 5 cm, into the tissue.
+        let (force, torque) = turned(0.02, arm);
+        assert!((force.z - (1.0 + 200.0 * 0.02 * 0.05)).abs() < 1e-12, "{force}");
+        assert!((torque - arm.cross(&force)).norm() < 1e-12 && torque.y < -0.05, "{torque}");
+        let (force, torque) = turned(0.3, Vector3::z() * -0.004);
+        assert!((force - Vector3::z()).norm() < 1e-12 && torque.norm() < 1e-12, "{force} {torque}");
     }
 
     #[test]

@@ -5,9 +5,9 @@
 
 use crate::constants::{DEFAULT_VALIDITY_NS, LOST_NS, MAX_VALIDITY_NS};
 use crate::statistics::{LinkReport, RoundTrips};
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 use scindo_proto::limits::{MAX_CONTACTS, MAX_FRICTION, MAX_RELAXATION_S};
-use scindo_proto::messages::{Contact, HapticContact, Vec3, Vec3f, haptic_contact};
+use scindo_proto::messages::{Contact, HapticContact, Pose, Vec3, Vec3f, haptic_contact};
 
 /// Largest plausible force of one plane [N].
 const MAX_PLANE_FORCE_N: f64 = 1.0e3;
@@ -45,8 +45,13 @@ pub struct ContactPlane {
     pub damping_ns_m: f64,
     /// Velocity of the surface [m/s].
     pub surface_velocity_m_s: Vector3<f64>,
-    /// Radius around `point_m` where the plane is trusted [m]; zero for everywhere.
+    /// Radius around `point_m` where the plane is trusted [m]; zero for everywhere. Of an edge: way over which the load
+    /// of the contact that it ends falls to zero [m].
     pub patch_radius_m: f64,
+    /// Distance of the tool from the plane at the pose used [m]; negative behind it.
+    pub gap_m: f64,
+    /// Number of the plane whose tissue ends here; `None` for a plane that pushes by itself.
+    pub edge_of: Option<usize>,
 }
 
 impl ContactPlane {
@@ -65,7 +70,15 @@ impl ContactPlane {
         damping_ns_m: 0.0,
         surface_velocity_m_s: Vector3::new(0.0, 0.0, 0.0),
         patch_radius_m: 0.0,
+        gap_m: 0.0,
+        edge_of: None,
     };
+
+    /// Share of the load that an edge leaves to the contact that it ends, after the tool has moved by `moved` [m].
+    pub fn edge_share(&self, moved: &Vector3<f64>) -> f64 {
+        let behind = -(self.gap_m + self.normal.dot(moved));
+        if self.patch_radius_m > 0.0 { (behind / self.patch_radius_m).clamp(0.0, 1.0) } else { 1.0 }
+    }
 }
 
 /// A contact message, ready for the loop. Fixed size: it is copied, never allocated.
@@ -83,6 +96,8 @@ pub struct ContactModel {
     pub received_ns: u64,
     /// Tip for which the model was computed [m].
     pub tip_used_m: Vector3<f64>,
+    /// Orientation for which it was computed.
+    pub turn_used: UnitQuaternion<f64>,
     /// Loop clock when the tip was there [ns]; `None` if the message names none of this client's poses.
     pub used_ns: Option<u64>,
     /// How long the server has kept the tip there before it sent the message, since no newer pose came [ns].
@@ -112,6 +127,7 @@ impl ContactModel {
         sim_time_s: 0.0,
         received_ns: 0,
         tip_used_m: Vector3::new(0.0, 0.0, 0.0),
+        turn_used: Unit::new_unchecked(Quaternion::new(1.0, 0.0, 0.0, 0.0)),
         used_ns: None,
         held_ns: 0,
         round_trip_ns: 0,
@@ -158,6 +174,7 @@ impl ContactModel {
             sim_time_s: message.sim_time_s,
             received_ns,
             tip_used_m: if free { pose.unwrap_or_default() } else { pose? },
+            turn_used: orientation(message.tool_pose_used.as_ref()),
             holds: message.mode() == haptic_contact::Mode::Hold,
             validity_ns: validity_ns(message.validity_ms)?,
             max_force_n: advice(message.max_force_n)?,
@@ -166,6 +183,8 @@ impl ContactModel {
         };
         for (slot, contact) in model.planes.iter_mut().zip(&message.contacts) {
             *slot = parse_plane(contact, relaxation)?;
+            let ended = slot.edge_of.is_none_or(|of| of < message.contacts.len());
+            ended.then_some(())?;
         }
         model.plane_count = message.contacts.len();
         Some(model)
@@ -176,7 +195,10 @@ fn parse_plane(contact: &Contact, [instant, relaxed, relaxation_s]: [f64; 3]) ->
     let normal = vector_f32(contact.normal.as_ref(), 2.0)?;
     let length = normal.norm();
     let normal = ((length - 1.0).abs() < 1e-2).then(|| normal / length)?;
-    let force = vector_f32(contact.force_n.as_ref(), MAX_PLANE_FORCE_N)?;
+    let force = match &contact.force_n {
+        None if contact.edge_of > 0 => Vector3::zeros(),
+        force => vector_f32(force.as_ref(), MAX_PLANE_FORCE_N)?,
+    };
     Some(ContactPlane {
         point_m: vector_f32(contact.point_m.as_ref(), MAX_COORDINATE)?,
         normal,
@@ -194,7 +216,16 @@ fn parse_plane(contact: &Contact, [instant, relaxed, relaxation_s]: [f64; 3]) ->
             velocity => vector_f32(velocity.as_ref(), MAX_COORDINATE)?,
         },
         patch_radius_m: within(contact.patch_radius_m, MAX_COORDINATE)?,
+        gap_m: within(contact.gap_m.abs(), MAX_COORDINATE)?.copysign(contact.gap_m.into()),
+        edge_of: (contact.edge_of as usize).checked_sub(1),
     })
+}
+
+/// The orientation of a pose; none if it is not a unit quaternion.
+fn orientation(pose: Option<&Pose>) -> UnitQuaternion<f64> {
+    let q = pose.map(|p| Quaternion::new(p.qw, p.qx, p.qy, p.qz));
+    let usable = q.filter(|q| (q.norm() - 1.0).abs() < 1e-2);
+    usable.map_or_else(UnitQuaternion::identity, UnitQuaternion::new_normalize)
 }
 
 fn vector_f32(v: Option<&Vec3f>, limit: f64) -> Option<Vector3<f64>> {

@@ -77,12 +77,17 @@ pub fn nearest(tool: &Capsule, surfaces: &[ContactSurface], reach: f64) -> Optio
     found.min_by(|a, b| a.gap.total_cmp(&b.gap))
 }
 
+/// Distance of a surface from a proxy of this radius up to which it counts as touched [m].
+pub fn touch_margin(radius: f64) -> f64 {
+    (MARGIN_RADII * radius).max(LEAST_MARGIN_M)
+}
+
 /// The place a proxy touches, if it touches one. A proxy that is kept from the device has met something, even if the
 /// surface has given way a little since.
 pub fn touched((proxy, device): (&Capsule, &Capsule), surfaces: &[ContactSurface]) -> Option<Nearest> {
     let away = |i: usize| (proxy.core[i] - device.core[i]).norm();
     let is_kept = away(0).max(away(1)) > CLEAR_OFFSET_M;
-    let margin = (MARGIN_RADII * proxy.radius).max(LEAST_MARGIN_M);
+    let margin = touch_margin(proxy.radius);
     nearest(proxy, surfaces, if is_kept { margin.max(proxy.radius) } else { margin })
 }
 

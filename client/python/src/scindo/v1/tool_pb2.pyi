@@ -235,7 +235,7 @@ class HapticContact(_message.Message):
     def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., tool_seq_used: _Optional[int] = ..., tool_client_time_ns: _Optional[int] = ..., epoch: _Optional[int] = ..., tool_id: _Optional[str] = ..., body_id: _Optional[str] = ..., tool_pose_used: _Optional[_Union[_common_pb2.Pose, _Mapping[str, object]]] = ..., mode: _Optional[_Union[HapticContact.Mode, str]] = ..., contacts: _Optional[_Iterable[_Union[Contact, _Mapping[str, object]]]] = ..., validity_ms: _Optional[float] = ..., max_force_n: _Optional[float] = ..., max_stiffness_n_m: _Optional[float] = ..., instant_stiffness_n_m: _Optional[float] = ..., relaxed_stiffness_n_m: _Optional[float] = ..., relaxation_s: _Optional[float] = ..., client_id: _Optional[str] = ...) -> None: ...
 
 class Contact(_message.Message):
-    __slots__ = ("point_m", "normal", "gap_m", "force_n", "stiffness_n_m", "tangential_stiffness_n_m", "damping_ns_m", "surface_velocity_m_s", "patch_radius_m", "feature_id", "friction")
+    __slots__ = ("point_m", "normal", "gap_m", "force_n", "stiffness_n_m", "tangential_stiffness_n_m", "damping_ns_m", "surface_velocity_m_s", "patch_radius_m", "feature_id", "friction", "edge_of")
     POINT_M_FIELD_NUMBER: _ClassVar[int]
     NORMAL_FIELD_NUMBER: _ClassVar[int]
     GAP_M_FIELD_NUMBER: _ClassVar[int]
@@ -247,6 +247,7 @@ class Contact(_message.Message):
     PATCH_RADIUS_M_FIELD_NUMBER: _ClassVar[int]
     FEATURE_ID_FIELD_NUMBER: _ClassVar[int]
     FRICTION_FIELD_NUMBER: _ClassVar[int]
+    EDGE_OF_FIELD_NUMBER: _ClassVar[int]
     point_m: _common_pb2.Vec3f
     normal: _common_pb2.Vec3f
     gap_m: float
@@ -258,4 +259,5 @@ class Contact(_message.Message):
     patch_radius_m: float
     feature_id: int
     friction: float
-    def __init__(self, point_m: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., normal: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., gap_m: _Optional[float] = ..., force_n: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., stiffness_n_m: _Optional[float] = ..., tangential_stiffness_n_m: _Optional[float] = ..., damping_ns_m: _Optional[float] = ..., surface_velocity_m_s: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., patch_radius_m: _Optional[float] = ..., feature_id: _Optional[int] = ..., friction: _Optional[float] = ...) -> None: ...
+    edge_of: int
+    def __init__(self, point_m: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., normal: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., gap_m: _Optional[float] = ..., force_n: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., stiffness_n_m: _Optional[float] = ..., tangential_stiffness_n_m: _Optional[float] = ..., damping_ns_m: _Optional[float] = ..., surface_velocity_m_s: _Optional[_Union[_common_pb2.Vec3f, _Mapping[str, object]]] = ..., patch_radius_m: _Optional[float] = ..., feature_id: _Optional[int] = ..., friction: _Optional[float] = ..., edge_of: _Optional[int] = ...) -> None: ...

@@ -23,6 +23,7 @@ impl FeatureNumbers {
         for plane in &mut new.planes {
             let same = |candidate: &ContactPlane| {
                 candidate.feature_id != BLEND_FEATURE
+                    && candidate.edge_of == plane.edge_of
                     && candidate.normal.dot(&plane.normal) > ALIKE
                     && (candidate.point_m - plane.point_m).norm() < 2.0 * plane.patch_radius_m
             };
@@ -58,18 +59,9 @@ pub fn limit_step(old: &LocalContact, new: &mut LocalContact, limit_n: f64) {
     new.planes.push(ContactPlane {
         point_m: new.pose_used.translation.vector,
         normal: made_up.normalize(),
-        gap_m: 0.0,
         force_n: made_up,
-        stiffness_n_m: 0.0,
-        instant_stiffness_n_m: 0.0,
-        relaxed_stiffness_n_m: 0.0,
-        relaxation_s: 0.0,
-        tangential_stiffness_n_m: 0.0,
-        friction: 0.0,
-        damping_ns_m: 0.0,
-        surface_velocity_m_s: Vector3::zeros(),
-        patch_radius_m: 0.0,
         feature_id: BLEND_FEATURE,
+        ..ContactPlane::NONE
     });
     if new.mode == ContactMode::Free {
         new.mode = ContactMode::Contact;

@@ -6,8 +6,9 @@
 //! 2. [`ContactModels::evaluate`] for every held tool with its newest pose. The result is sent as it is.
 //!
 //! # Force
-//! One plane represents the contact, and one each capsule of a compound tool. Its normal n is the line from device to proxy at the newest pose. The
-//! last solve gave the force f₀ for the pose p₀. A change of pose is answered by hand and tissue in series,
+//! One plane represents the contact, and one each capsule of a compound tool. Its normal n is the line from device to
+//! proxy at the newest pose. More planes beside it hold a tool in a groove, and end the tissue at an edge
+//! ([`neighbours`]). The last solve gave the force f₀ for the pose p₀. A change of pose is answered by hand and tissue in series,
 //! k_s:
 //!
 //! f = f₀·n + k_s (p₀ − p)·n, and k_s d at the depth d behind the surface if there was no force.
@@ -19,12 +20,14 @@
 pub mod plane;
 pub mod answer;
 pub mod continuity;
+pub mod neighbours;
 
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
+use smallvec::SmallVec;
 
-use crate::contact::press::{Nearest, followed_direction, nearest, push_direction, touched};
+use crate::contact::press::{Nearest, followed_direction, nearest, push_direction, touch_margin, touched};
 use crate::contact::proxy::Proxy;
 use crate::contact::surface::ContactSurface;
 use crate::inputs::{ToolMode, ToolShape};
@@ -33,6 +36,7 @@ use crate::tool::compound::MAX_PARTS;
 use crate::tool::geometry::{capsule, is_sane};
 use answer::{Answer, Tissue};
 use continuity::{FeatureNumbers, limit_step};
+use neighbours::{Poses, Pushed};
 pub use plane::{BLEND_FEATURE, ContactMode, ContactPlane, LocalContact};
 use scindo_collision::Capsule;
 
@@ -324,11 +328,12 @@ impl ToolModel {
         let Self { seen, proxy, limbs, now, .. } = self;
         let compound = seen.as_ref().filter(|seen| seen.shape == query.shape && !seen.limbs.is_empty());
         let Some(seen) = compound else {
-            let found = meet(query, (proxy, anchor), frame);
-            return found.into_iter().for_each(|found| now.add(found, frame));
+            let met = meet(query, (proxy, anchor), frame);
+            return now.add(met.as_slice(), frame);
         };
         proxy.release(&query.pose);
         let share = 1.0 / seen.limbs.len() as f64;
+        let mut all: SmallVec<[Met; MAX_PARTS]> = SmallVec::new();
         for (proxy, limb) in limbs.iter_mut().zip(&seen.limbs) {
             let own = ToolQuery {
                 id: Arc::clone(&query.id),
@@ -337,10 +342,10 @@ impl ToolModel {
                 ..*query
             };
             let anchor = anchor.of_limb(limb, share);
-            if let Some((place, plane)) = meet(&own, (proxy, &anchor), frame) {
-                now.add((place, about_the_tip(plane, query)), frame);
-            }
+            let met = meet(&own, (proxy, &anchor), frame);
+            all.extend(met.map(|met| Met { plane: about_the_tip(met.plane, query), ..met }));
         }
+        now.add(&all, frame);
     }
 
     /// Adds the resistance of the tissue to a blade: a plane across the load, whose force rises up to that at which the
@@ -360,15 +365,8 @@ impl ToolModel {
             gap_m: -force / anchor.series.max(f64::MIN_POSITIVE),
             force_n: force * normal,
             stiffness_n_m: anchor.series,
-            instant_stiffness_n_m: 0.0,
-            relaxed_stiffness_n_m: 0.0,
-            relaxation_s: 0.0,
-            tangential_stiffness_n_m: 0.0,
-            friction: 0.0,
             damping_ns_m: damping(anchor.series),
-            surface_velocity_m_s: Vector3::zeros(),
-            patch_radius_m: 0.0,
-            feature_id: 0,
+            ..ContactPlane::NONE
         });
     }
 
@@ -387,52 +385,88 @@ impl ToolModel {
             gap_m: 0.0,
             force_n: force,
             stiffness_n_m: anchor.series,
-            instant_stiffness_n_m: 0.0,
-            relaxed_stiffness_n_m: 0.0,
-            relaxation_s: 0.0,
             tangential_stiffness_n_m: anchor.series,
-            friction: 0.0,
             damping_ns_m: damping(anchor.series),
-            surface_velocity_m_s: Vector3::zeros(),
-            patch_radius_m: 0.0,
-            feature_id: 0,
+            ..ContactPlane::NONE
         });
     }
 }
 
 impl LocalContact {
-    /// Adds a plane at a surface place.
-    fn add(&mut self, (place, plane): (Nearest, ContactPlane), frame: &Frame<'_>) {
-        self.planes.push(plane);
+    /// Adds the planes of all places that were met, and then what is beside them as far as there is room.
+    fn add(&mut self, met: &[Met], frame: &Frame<'_>) {
+        let Some(first) = met.first() else { return };
         self.mode = ContactMode::Contact;
-        if self.body.is_none() {
-            self.body = Some(place.body);
-            self.epoch = frame.surfaces[place.body].epoch();
+        self.body = Some(first.place.body);
+        self.epoch = frame.surfaces[first.place.body].epoch();
+        self.planes.extend(met.iter().map(|met| met.plane));
+        let touched = || met.iter().enumerate().filter(|(_, met)| met.touched);
+        for (_, met) in touched() {
+            let margin = touch_margin(met.poses.proxy.radius);
+            neighbours::walls(
+                &met.place,
+                &met.poses,
+                (frame.surfaces, margin),
+                &met.pushed(),
+                &mut self.planes,
+            );
+        }
+        for (number, met) in touched() {
+            let reach = patch_radius(met.poses.device.radius);
+            neighbours::edges(&met.place, &met.poses, (frame.surfaces, reach), number, &mut self.planes);
         }
     }
 }
 
+/// A place that a capsule has met.
+#[derive(Debug, Clone, Copy)]
+struct Met {
+    /// The place, with the normal of the tissue there.
+    place: Nearest,
+    /// Whether the capsule touches it already.
+    touched: bool,
+    poses: Poses,
+    plane: ContactPlane,
+    /// Stiffness of the hand [N/m], the way of the tool since the last step, reversed [m], and whether that step pushed.
+    hand_n_m: f64,
+    back_m: Vector3<f64>,
+    pressed: bool,
+}
+
+impl Met {
+    fn pushed(&self) -> Pushed<'_> {
+        let Self { plane, hand_n_m, back_m, pressed, .. } = self;
+        Pushed { plane, hand_n_m: *hand_n_m, back_m: *back_m, pressed: *pressed }
+    }
+}
+
 /// Where a capsule touches tissue or may do so soon, and the plane there.
-fn meet(
-    query: &ToolQuery,
-    (proxy, anchor): (&mut Proxy, &Anchor),
-    frame: &Frame<'_>,
-) -> Option<(Nearest, ContactPlane)> {
+fn meet(query: &ToolQuery, (proxy, anchor): (&mut Proxy, &Anchor), frame: &Frame<'_>) -> Option<Met> {
     proxy.follow(query.shape, &query.pose, frame.surfaces);
     let ahead = (query.velocity_m_s.norm() * AHEAD_S).clamp(LEAST_AHEAD_M, MOST_AHEAD_M);
     let at_proxy = capsule(query.shape, proxy.pose());
     let at_device = capsule(query.shape, &query.pose);
-    let place = match touched((&at_proxy, &at_device), frame.surfaces) {
+    let met = touched((&at_proxy, &at_device), frame.surfaces);
+    let place = met.or_else(|| nearest(&at_proxy, frame.surfaces, ahead))?;
+    let normal = match met {
         Some(place) => {
             let target = push_direction(&place, &at_proxy, &at_device);
             // The model presses in the direction of the step, and turns as the next step will.
             let held = anchor.force.try_normalize(1e-6);
-            let normal = held.map_or(target, |held| followed_direction(held, target, frame.ahead_s));
-            Some(Nearest { normal, ..place })
+            held.map_or(target, |held| followed_direction(held, target, frame.ahead_s))
         }
-        None => nearest(&at_proxy, frame.surfaces, ahead),
-    }?;
-    Some((place, plane_of(&place, &at_device, query, anchor, frame)))
+        None => place.normal,
+    };
+    let before = capsule(query.shape, &anchor.pose).core_point(place.parameter);
+    Some(Met {
+        place,
+        touched: met.is_some(),
+        poses: Poses { proxy: at_proxy, device: at_device },
+        plane: plane_of(&Nearest { normal, ..place }, &at_device, query, anchor, frame),
+        hand_n_m: anchor.hand,
+        back_m: before - at_device.core_point(place.parameter),
+        pressed: anchor.force.dot(&normal) > 0.0,
+    })
 }
 
 /// The plane of a limb for clients, who measure from the tip of the tool.
@@ -440,6 +474,11 @@ fn about_the_tip(plane: ContactPlane, query: &ToolQuery) -> ContactPlane {
     let tip = query.pose.translation.vector - plane.point_m;
     let aside = (tip - plane.normal * plane.normal.dot(&tip)).norm();
     ContactPlane { patch_radius_m: plane.patch_radius_m + aside, ..plane }
+}
+
+/// Radius around the place of contact within which its plane is trusted, for a tool of this radius [m].
+fn patch_radius(radius: f64) -> f64 {
+    (2.0 * radius).max(LEAST_PATCH_M)
 }
 
 fn damping(stiffness: f64) -> f64 {
@@ -494,8 +533,9 @@ fn plane_of(
         damping_ns_m: damping(answer.in_step),
         surface_velocity_m_s: by_itself,
         // Clients measure from the tip, which may be far from the contact of a shaft.
-        patch_radius_m: aside + (2.0 * at_device.radius).max(LEAST_PATCH_M),
+        patch_radius_m: aside + patch_radius(at_device.radius),
         feature_id: 0,
+        edge_of: None,
     }
 }
 

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::tool::compound::MAX_PARTS;
 
-/// Most planes of one model: those of the capsules of a tool, and one that hides a change of model.
+/// Most planes of one model: those of the capsules of a tool first, then the walls and edges beside them, and one that
+/// hides a change of model.
 pub const MAX_CONTACTS: usize = 6;
 const _: () = assert!(MAX_CONTACTS > MAX_PARTS);
 
@@ -14,6 +15,9 @@ pub const BLEND_FEATURE: u64 = u64::MAX;
 /// One contact plane. The force on the tool with its tip at p is
 /// n · max(0, force·n − stiffness (p − tip used)·n), and with friction μ across n the force
 /// (I − n nᵀ) (force − tangential stiffness (p − tip used)), at most μ times that along n.
+///
+/// The forces of several planes add up. A plane that is the edge of another one has no force of its own, and takes that
+/// of the other away as the tool passes beyond it.
 ///
 /// Before contact `force_n`·n is negative, −stiffness · gap. The client's force therefore starts from zero in
 /// the very tick in which the tip crosses the plane.
@@ -44,10 +48,13 @@ pub struct ContactPlane {
     pub damping_ns_m: f64,
     /// Velocity of the surface without the push of the tool [m/s].
     pub surface_velocity_m_s: Vector3<f64>,
-    /// Distance of the tip from the point, across the normal, up to which the plane is trusted [m].
+    /// Distance of the tip from the point, across the normal, up to which the plane is trusted [m]. Of an edge: way over
+    /// which the load of the plane that it ends falls to zero [m].
     pub patch_radius_m: f64,
     /// Number that stays the same while the tool touches the same place.
     pub feature_id: u64,
+    /// Number of the plane whose tissue ends at this one; `None` for a plane that pushes.
+    pub edge_of: Option<usize>,
 }
 
 /// State of the contact of a tool.
@@ -110,11 +117,39 @@ impl LocalContact {
     /// Force of the tissue on a tool with its tip at `p` [N]. Clients evaluate the same law.
     pub fn force_at(&self, p: Vector3<f64>) -> Vector3<f64> {
         let moved = p - self.pose_used.translation.vector;
-        self.planes.iter().map(|plane| plane.force_at(moved)).sum()
+        let share = |number: usize| -> f64 {
+            let edges = self.planes.iter().filter(|plane| plane.edge_of == Some(number));
+            edges.map(|edge| edge.edge_share(moved)).product()
+        };
+        self.planes.iter().enumerate().map(|(number, plane)| share(number) * plane.force_at(moved)).sum()
     }
 }
 
 impl ContactPlane {
+    /// A plane without force.
+    pub const NONE: Self = Self {
+        point_m: Vector3::new(0.0, 0.0, 0.0),
+        normal: Vector3::new(0.0, 0.0, 1.0),
+        gap_m: 0.0,
+        force_n: Vector3::new(0.0, 0.0, 0.0),
+        stiffness_n_m: 0.0,
+        instant_stiffness_n_m: 0.0,
+        relaxed_stiffness_n_m: 0.0,
+        relaxation_s: 0.0,
+        tangential_stiffness_n_m: 0.0,
+        friction: 0.0,
+        damping_ns_m: 0.0,
+        surface_velocity_m_s: Vector3::new(0.0, 0.0, 0.0),
+        patch_radius_m: 0.0,
+        feature_id: 0,
+        edge_of: None,
+    };
+
+    /// Share of the load that an edge leaves to the plane that it ends, after the tip moved by `moved` [m].
+    fn edge_share(&self, moved: Vector3<f64>) -> f64 {
+        (-(self.gap_m + self.normal.dot(&moved)) / self.patch_radius_m).clamp(0.0, 1.0)
+    }
+
     /// Force on the tool [N] after its tip moved by `moved` [m] from the pose used.
     pub fn force_at(&self, moved: Vector3<f64>) -> Vector3<f64> {
         let n = &self.normal;
