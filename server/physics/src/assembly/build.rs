@@ -206,7 +206,7 @@ impl Model {
             lumped: vec![0.0; n],
             integrals: vec![0.0; n],
             products: Products::linear_tet(),
-            even_mass: false,
+            sharing: None,
             pattern: BlockCsr::default(),
             slots: Vec::new(),
             incident_first: Vec::new(),

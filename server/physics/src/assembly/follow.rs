@@ -68,8 +68,8 @@ impl Model {
                 self.integrals[copy as usize] += v;
             }
         }
-        if self.even_mass {
-            self.share_mass_evenly();
+        if let Some(sharing) = self.sharing {
+            self.share_mass(sharing);
         }
     }
 

@@ -4,6 +4,29 @@ use nalgebra::Vector3;
 
 use super::{BlockCsr, ElementKind, Model};
 
+/// Part of its even share that a node has at least. ω² grows by 1/FLOOR at most, so the critical step of the uncut
+/// element falls to √FLOOR = 0.71 of itself at most.
+const FLOOR: f64 = 0.5;
+
+/// How the mass of a cut linear tetrahedron is shared among its nodes where integrals of the shape functions would not
+/// do.
+///
+/// A thin piece has nodes whose shape functions are small everywhere in it. Integrals give these nodes almost no mass,
+/// and the critical time step vanishes with the thickness.
+///
+/// # Source
+/// Menouillard, Réthoré, Combescure, Bung 2006; Rozycki et al. 2008 (constant-strain elements).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum MassSharing {
+    /// Evenly. A piece then has the same fraction w of its element's mass as of its stiffness, so its highest frequency
+    /// is that of the whole element, however it is cut. The mass of a body, and with it momentum, is what it was before
+    /// the cut. Only the centre of mass within a cut element is not exact.
+    Even,
+    /// By the integrals, with a floor of half of the even share. Nodes of thin pieces get more mass than there is; all
+    /// others keep exactly theirs.
+    Floored,
+}
+
 /// ∫ N_a N_b dV of the elements, upper triangles packed by rows.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) enum Products {
@@ -28,27 +51,31 @@ pub(super) fn pack<const N: usize>(M: &[[f64; N]; N]) -> impl Iterator<Item = f6
 }
 
 impl Model {
-    /// Divides the mass of every piece evenly among its nodes instead of by ∫ N_a dV, for explicit schemes.
-    ///
-    /// A thin piece has nodes whose shape functions are small everywhere in it. Integrals give these
-    /// nodes almost no mass, and the critical time step vanishes with the thickness. With an even division
-    /// a piece has the same fraction w of its element's mass as of its stiffness. Its highest frequency is
-    /// then that of the whole element, however it is cut. The mass of every node, and with it momentum, is
-    /// what it was before the cut. Only the centre of mass within a cut element is not exact.
-    ///
-    /// # Source
-    /// Menouillard, Réthoré, Combescure, Bung 2006; Rozycki et al. 2008 (constant-strain elements).
-    pub fn share_mass_evenly(&mut self) {
+    /// Shares the mass of every piece among its nodes otherwise than by ∫ N_a dV. Other elements than linear
+    /// tetrahedra keep theirs.
+    pub fn share_mass(&mut self, sharing: MassSharing) {
         if self.kind != ElementKind::Tet4 {
             return;
         }
-        self.even_mass = true;
+        self.sharing = Some(sharing);
+        let by_integrals = match sharing {
+            MassSharing::Even => None,
+            MassSharing::Floored => Some(self.integrals.clone()),
+        };
         self.lumped.fill(0.0);
         for (nodes, volume) in self.connectivity.chunks_exact(4).zip(&self.volumes) {
             nodes.iter().for_each(|&node| self.lumped[node as usize] += volume / 4.0);
         }
-        self.integrals.clone_from(&self.lumped);
-        self.products = Products::linear_tet();
+        match by_integrals {
+            None => {
+                self.integrals.clone_from(&self.lumped);
+                self.products = Products::linear_tet();
+            }
+            // ∫ N_a dV stays the share of a node in the loads.
+            Some(exact) => {
+                self.lumped.iter_mut().zip(&exact).for_each(|(even, exact)| *even = exact.max(FLOOR * *even));
+            }
+        }
     }
 
     /// Mass [kg] of every node for a density [kg/m³].

@@ -29,6 +29,7 @@ mod rotated;
 pub use crate::material::Tangent;
 pub use block_csr::BlockCsr;
 pub use error::ModelError;
+pub use mass::MassSharing;
 pub use model::{ElementKind, Model, Volumetric};
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::averaging::NodeAverage;
-use super::mass::Products;
+use super::mass::{MassSharing, Products};
 use super::point::PointLaw;
 use super::scratch::Scratch;
 use super::{BlockCsr, ModelError};
@@ -100,8 +100,8 @@ pub struct Model {
     /// ∫ N_a dV of every node [m³].
     pub(super) integrals: Vec<f64>,
     pub(super) products: Products,
-    /// Whether mass is shared evenly instead of by the integrals of the shape functions.
-    pub(super) even_mass: bool,
+    /// How mass is shared, if not by the integrals of the shape functions.
+    pub(super) sharing: Option<MassSharing>,
     /// The tangent's pattern, without blocks.
     pub(super) pattern: BlockCsr<f64>,
     /// Position in the tangent of every block (a, b) of every element.

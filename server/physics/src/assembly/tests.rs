@@ -259,13 +259,15 @@ fn a_team_gives_the_bits_of_one_thread() {
 #[test]
 fn a_model_that_follows_cuts_is_the_one_built_anew() {
     let mesh = box_mesh(Vector3::zeros(), size(), [4; 3], BoxPattern::Tet6);
-    for (volumetric, even) in [(Volumetric::Full, false), (Volumetric::Full, true), (AVERAGED, false)] {
+    let [even, floored] = [MassSharing::Even, MassSharing::Floored].map(Some);
+    let kinds = [Volumetric::Full; 3].into_iter().zip([None, even, floored]).chain([(AVERAGED, None)]);
+    for (volumetric, sharing) in kinds {
         let material = material(Law::Corotational);
         let mut cut = CutMesh::new(mesh.clone()).unwrap();
         let fresh = |cut: &CutMesh| {
             let mut model = Model::tet4_cut(cut, &material, volumetric).unwrap();
-            if even {
-                model.share_mass_evenly();
+            if let Some(sharing) = sharing {
+                model.share_mass(sharing);
             }
             model
         };
@@ -290,7 +292,7 @@ fn a_model_that_follows_cuts_is_the_one_built_anew() {
                 (M, (K, energy, f, model.energy(&at)))
             });
             let [(M, of_followed), (expected, of_anew)] = &results;
-            assert!(of_followed == of_anew, "{volumetric:?} {even} incision {incision}");
+            assert!(of_followed == of_anew, "{volumetric:?} {sharing:?} incision {incision}");
             // A piece that is bisected, but not divided, sums its products over other fragments.
             let equal = |(a, b): (&[f64; 9], &[f64; 9])| (a[0] - b[0]).abs() <= 1e-14 * b[0].abs();
             assert!(M.blocks.iter().zip(&expected.blocks).all(equal), "{volumetric:?} incision {incision}");

@@ -38,7 +38,7 @@ pub struct BodySettings {
     pub volumetric: Volumetric,
     /// Time integration scheme; [`Scheme::Static`] for equilibria.
     pub scheme: Scheme,
-    /// Lumped or consistent mass.
+    /// How mass is distributed.
     pub mass: MassKind,
     /// Method of the linear solver.
     pub method: Method,
@@ -137,7 +137,11 @@ impl BodySettings {
                 self.method != Method::Pcg && !self.method.is_multigrid(),
                 "a solver other than pcg or multigrid",
             ),
-            (self.mass != MassKind::Lumped, "consistent mass"),
+            (self.mass == MassKind::Consistent, "consistent mass"),
+            (
+                matches!(self.mass, MassKind::Menouillard | MassKind::Floored),
+                "a mass that cut pieces share otherwise",
+            ),
             (self.volumetric != Volumetric::Full, "a locking remedy"),
             (
                 self.newton_steps.is_some_and(|steps| steps > 1) && !self.descends(law),

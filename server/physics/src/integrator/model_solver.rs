@@ -107,8 +107,8 @@ impl ModelSolver {
         settings: DynamicsSettings,
     ) -> Result<Self, ModelError> {
         let mut model = space.model(&material, volumetric)?;
-        if settings.scheme.is_explicit() {
-            model.share_mass_evenly();
+        if let Some(sharing) = settings.mass.sharing(settings.scheme.is_explicit()) {
+            model.share_mass(sharing);
         }
         let mut solver = Self::new(model, material, settings);
         solver.newton.set_stiff_modes(space.stiff_modes().map(Arc::new));

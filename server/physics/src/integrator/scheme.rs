@@ -1,6 +1,7 @@
 //! Time integration schemes.
 
 use super::DynamicsError;
+use crate::assembly::MassSharing;
 
 /// A time integration scheme. h is the step, a = M⁻¹ (f_ext − f_int − D v).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -83,9 +84,25 @@ impl Scheme {
 /// How mass is distributed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum MassKind {
-    /// One number per node.
+    /// One number per node. Explicit schemes take [`Menouillard`](Self::Menouillard) for it.
     #[default]
     Lumped,
+    /// One number per node: the mass of every piece, divided evenly among its copies. Only linear tetrahedra know it.
+    Menouillard,
+    /// One number per node: ρ ∫ N_a dV, but at least half of what [`Menouillard`](Self::Menouillard) gives it. Only
+    /// linear tetrahedra know it.
+    Floored,
     /// M_ab = ρ ∫ N_a N_b dV. Explicit schemes solve with it in every evaluation.
     Consistent,
+}
+
+impl MassKind {
+    /// How a model shares the mass of a piece for a scheme; `None` if by the integrals of the shape functions.
+    pub(super) fn sharing(self, explicit: bool) -> Option<MassSharing> {
+        match self {
+            Self::Menouillard => Some(MassSharing::Even),
+            Self::Floored => Some(MassSharing::Floored),
+            Self::Lumped | Self::Consistent => explicit.then_some(MassSharing::Even),
+        }
+    }
 }

@@ -8,7 +8,7 @@ use crate::solver::{LinearSettings, Method, NewtonSettings, Precision};
 pub struct DynamicsSettings {
     /// Time integration scheme.
     pub scheme: Scheme,
-    /// Lumped or consistent mass.
+    /// How mass is distributed.
     pub mass: MassKind,
     /// A step is a fixed number of linear solves by design. It is judged by how well the last of them was
     /// solved and not by the residual of Newton's method.

@@ -11,6 +11,7 @@ mod cutting;
 mod determinism;
 mod dynamics;
 mod equilibrium;
+mod explicit_slivers;
 mod foreign_space;
 mod friction;
 mod half_cut_beam;

@@ -150,6 +150,8 @@ impl Mechanics {
             },
             mass: match self.mass {
                 RawMass::Lumped => MassKind::Lumped,
+                RawMass::Menouillard => MassKind::Menouillard,
+                RawMass::Floored => MassKind::Floored,
                 RawMass::Consistent => MassKind::Consistent,
             },
             method: match self.method {

@@ -8,8 +8,8 @@
 //! # Force
 //! One plane represents the contact, and one each capsule of a compound tool. Its normal n is the line from device to
 //! proxy at the newest pose. More planes beside it hold a tool in a groove, and end the tissue at an edge
-//! ([`neighbours`]). The last solve gave the force f₀ for the pose p₀. A change of pose is answered by hand and tissue in series,
-//! k_s:
+//! ([`neighbours`]). The last solve gave the force f₀ for the pose p₀. A change of pose is answered by hand and tissue
+//! in series, k_s:
 //!
 //! f = f₀·n + k_s (p₀ − p)·n, and k_s d at the depth d behind the surface if there was no force.
 //!

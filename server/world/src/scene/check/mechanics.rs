@@ -34,6 +34,7 @@ impl Check<'_> {
         self.cutting(at, &mechanics);
         self.element(at, mechanics.element, mesh);
         self.locking(at, &mechanics);
+        self.mass(at, &mechanics);
         self.integrator(at, body);
         self.solver(at, &mechanics);
         self.precision(at, &mechanics);
@@ -117,6 +118,14 @@ impl Check<'_> {
         }
     }
 
+    fn mass(&mut self, at: &str, m: &Mechanics) {
+        let of_pieces = matches!(m.mass, RawMass::Menouillard | RawMass::Floored);
+        if of_pieces && m.element != RawElement::Tet4 {
+            let what = format!("found `{}` with {}, allowed: only tet4", word(&m.mass), word(&m.element));
+            self.conflict(format!("{at}.mass"), what, "write mass = \"lumped\", or take element = \"tet4\"");
+        }
+    }
+
     fn integrator(&mut self, at: &str, body: &RawBody) {
         if body.newmark.is_some() && body.integrator != RawIntegrator::Newmark {
             let what =
@@ -134,8 +143,8 @@ impl Check<'_> {
             let what = "found damping in a static body, allowed: none";
             self.conflict(format!("{at}.rayleigh"), what, "remove it; nothing moves in an equilibrium");
         }
-        if body.mass == RawMass::Consistent {
-            let what = "found `consistent` in a static body, allowed: lumped";
+        if body.mass != RawMass::Lumped {
+            let what = format!("found `{}` in a static body, allowed: lumped", word(&body.mass));
             self.conflict(format!("{at}.mass"), what, "remove it; an equilibrium has no inertia");
         }
         if body.fix.is_empty() {

@@ -103,9 +103,15 @@ impl Default for RawNewmark {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawMass {
-    /// Diagonal.
+    /// Diagonal. With an explicit integrator it is that of `menouillard`.
     #[default]
     Lumped,
+    /// Diagonal: every piece of a cut element divides its mass evenly among its nodes. Thin pieces then do not shorten
+    /// the stable step of explicit integrators. Only for `tet4`.
+    Menouillard,
+    /// Diagonal by the integrals of the shape functions, but at least half of what `menouillard` gives. The stable step
+    /// is at least 0.7 of that before the cut; nodes of thin pieces become heavier than they are. Only for `tet4`.
+    Floored,
     /// Integrated from the shape functions.
     Consistent,
 }

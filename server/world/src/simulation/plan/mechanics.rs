@@ -85,7 +85,12 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
         RawIntegrator::Bdf2 => "BDF2".into(),
         RawIntegrator::Newmark => format!("Newmark {} {}", m.newmark.beta, m.newmark.gamma),
     };
-    let mass = if m.mass == RawMass::Consistent { ", consistent mass" } else { "" };
+    let mass = match m.mass {
+        RawMass::Lumped => "",
+        RawMass::Menouillard => ", mass after Menouillard",
+        RawMass::Floored => ", floored mass",
+        RawMass::Consistent => ", consistent mass",
+    };
     let precision = match m.arithmetic() {
         Arithmetic::Single => "single",
         Arithmetic::Mixed => "mixed",
