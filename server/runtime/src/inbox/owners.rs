@@ -20,7 +20,8 @@ pub(super) const NO_TOKEN: &str = "no-token";
 /// Poses accepted per second and tool: twice what a 1 kHz device sends.
 pub const MAX_POSE_RATE: u32 = 2000;
 
-/// Most clients with a token at a time. The tokens themselves are not limited before they arrive here.
+/// Most clients with a token at a time. The tokens themselves are not limited before they arrive here. A newcomer takes
+/// the place of the oldest client that has done nothing yet, so invented clients shut nobody out.
 pub const MAX_CLIENTS: usize = 4096;
 
 // All tools of the world must fit into the messages that report them.
@@ -92,6 +93,14 @@ impl Held {
     }
 }
 
+/// A client with a token.
+#[derive(Debug)]
+struct Present {
+    tokens: usize,
+    /// Number of its arrival.
+    number: u64,
+}
+
 /// Last pose of a client before it lost a tool.
 #[derive(Debug)]
 struct LetGo {
@@ -103,8 +112,10 @@ struct LetGo {
 #[derive(Debug, Default)]
 pub(super) struct Owners {
     scene_tools: BTreeSet<Arc<str>>,
-    /// Number of tokens per client.
-    here: BTreeMap<String, usize>,
+    here: BTreeMap<String, Present>,
+    /// Clients that are here and have neither held a tool nor cut, by number of arrival.
+    idle: BTreeMap<u64, String>,
+    arrivals: u64,
     /// What the newest token of a client says that it is.
     roles: BTreeMap<String, Role>,
     early: EarlyPoses,
@@ -120,19 +131,40 @@ impl Owners {
 
     /// Registers a token of `client` and returns the poses that waited for it.
     pub fn came(&mut self, client: &str, now: Instant) -> Vec<ToolSample> {
-        if self.here.len() < MAX_CLIENTS || self.here.contains_key(client) {
-            *self.here.entry(client.to_owned()).or_default() += 1;
+        if let Some(known) = self.here.get_mut(client) {
+            known.tokens += 1;
+        } else if self.here.len() < MAX_CLIENTS || self.dismiss_idle() {
+            self.arrivals += 1;
+            self.idle.insert(self.arrivals, client.to_owned());
+            self.here.insert(client.to_owned(), Present { tokens: 1, number: self.arrivals });
         }
         self.early.take(client, now)
     }
 
+    /// Forgets the oldest client that has done nothing yet; false if there is none. It declares its token again before
+    /// it does something.
+    fn dismiss_idle(&mut self) -> bool {
+        let Some((_, client)) = self.idle.pop_first() else { return false };
+        self.here.remove(&client);
+        self.roles.remove(&client);
+        true
+    }
+
+    /// Notes that a client that is here has done something.
+    fn acted(&mut self, client: &str) {
+        if let Some(present) = self.here.get(client) {
+            self.idle.remove(&present.number);
+        }
+    }
+
     /// Removes a token of `client`. The last one releases its tools.
     pub fn went(&mut self, client: &str, now: Instant) -> Vec<Change> {
-        let Some(tokens) = self.here.get_mut(client) else { return Vec::new() };
-        *tokens -= 1;
-        if *tokens > 0 {
+        let Some(present) = self.here.get_mut(client) else { return Vec::new() };
+        present.tokens -= 1;
+        if present.tokens > 0 {
             return Vec::new();
         }
+        self.idle.remove(&present.number);
         self.here.remove(client);
         self.roles.remove(client);
         self.let_go.retain(|_, last| now.duration_since(last.at) < PATIENCE);
@@ -260,17 +292,21 @@ impl Owners {
             name: Arc::from(&*sample.name),
         };
         self.held.insert(id.clone(), held);
+        self.acted(&owner);
         Ok(Change::Taken { tool: id, owner })
     }
 
     /// Whether `client` may cut with a tool: the client is present, and nobody else holds the tool.
-    pub fn may_cut(&self, tool: &str, client: &str) -> Result<(), Refusal> {
+    pub fn may_cut(&mut self, tool: &str, client: &str) -> Result<(), Refusal> {
         if !self.is_here(client) {
             return Err(no_token(client));
         }
         match self.held.get(tool) {
             Some(held) if *held.input.owner != *client => Err(not_owner(tool, &held.input.owner)),
-            _ => Ok(()),
+            _ => {
+                self.acted(client);
+                Ok(())
+            }
         }
     }
 

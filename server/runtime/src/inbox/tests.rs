@@ -2,6 +2,7 @@
 
 use super::cut_log::{MAX_ANSWERS, MAX_WAITING_CUTS};
 use super::early::PATIENCE;
+use super::owners::{MAX_CLIENTS, NO_TOKEN};
 use super::*;
 use scindo_proto::messages::{BladeSegment, Pose, ToolShape, Vec3};
 use scindo_world::inputs::MAX_TOOLS;
@@ -340,4 +341,35 @@ fn one_client_does_not_take_the_places_of_others() {
     assert_eq!(codes.iter().filter(|code| code.is_none()).count(), 16);
     assert!(codes.into_iter().flatten().all(|code| code == "too-many-tools"));
     assert_eq!(cut(&mut inbox, &with("b", 1)), Cut::Queued);
+}
+
+#[test]
+fn invented_clients_shut_no_newcomer_out_and_nobody_who_works() {
+    let mut inbox = visited();
+    assert!(pose(&mut inbox, &sample("a", "scalpel", 1), start()).is_ok());
+    for k in 0..2 * MAX_CLIENTS {
+        inbox.client_came(&format!("invented-{k}"), start());
+    }
+    assert_eq!(figures(&inbox).client_count, MAX_CLIENTS);
+    assert_eq!(pose(&mut inbox, &sample("a", "scalpel", 2), start()), Ok(None));
+    // A newcomer works at once, and stays when more come.
+    inbox.client_came("new", start());
+    let theirs = ToolSample { shape: Some(ToolShape::default()), ..sample("new", "own", 1) };
+    assert!(matches!(pose(&mut inbox, &theirs, start()), Ok(Some(Change::Taken { .. }))));
+    for k in 0..MAX_CLIENTS {
+        inbox.client_came(&format!("more-{k}"), start());
+    }
+    assert!(pose(&mut inbox, &ToolSample { seq: 2, ..theirs }, start()).is_ok());
+    // Who has done nothing was forgotten, and comes back with its token.
+    let theirs = CutCommand { tool_id: "mouse".into(), ..command("b", 1) };
+    let Cut::Answer(ack) = cut(&mut inbox, &theirs) else { panic!() };
+    assert_eq!(ack.error.unwrap().code, NO_TOKEN);
+    inbox.client_came("b", start());
+    assert_eq!(cut(&mut inbox, &theirs), Cut::Queued);
+    // Tokens that go are those of clients that are still known, or of nobody.
+    for k in 0..2 * MAX_CLIENTS {
+        inbox.client_went(&format!("invented-{k}"), start());
+        inbox.client_went(&format!("more-{k}"), start());
+    }
+    assert_eq!(figures(&inbox).client_count, 3);
 }
