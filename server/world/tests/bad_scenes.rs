@@ -203,6 +203,11 @@ mass = "consistent""#,
             &["body.beam.mass", "static body"],
         ),
         (
+            r#"element = "tet10"
+mass = "floored""#,
+            &["body.beam.mass", "`floored` with tet10", "only tet4"],
+        ),
+        (
             r#"law = "neo-hookean"
 solver = { precision = "single" }"#,
             &["`single` with a law that is nonlinear", "mixed, double"],
