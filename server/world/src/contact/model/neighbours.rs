@@ -113,6 +113,16 @@ pub fn walls(
     }
 }
 
+/// A face behind an edge.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    /// Distance from the contact [m].
+    distance: f64,
+    normal: Vector3<f64>,
+    /// Its point closest to the contact [m].
+    at: Vector3<f64>,
+}
+
 /// Adds to `out` the planes at which the tissue under contact number `of`, at `place`, ends within `reach` [m].
 pub fn edges(
     place: &Nearest,
@@ -122,7 +132,7 @@ pub fn edges(
     out: &mut Vec<ContactPlane>,
 ) {
     let Some(tree) = surfaces.get(place.body).and_then(ContactSurface::tree) else { return };
-    let mut found: SmallVec<[(f64, Vector3<f64>, Vector3<f64>); MOST_EDGES]> = SmallVec::new();
+    let mut found: SmallVec<[Side; MOST_EDGES]> = SmallVec::new();
     tree.triangles_near(&Capsule { core: [place.point; 2], radius: 0.0 }, reach, |near| {
         let Some(normal) = tree.area_normal(near.triangle).try_normalize(f64::MIN_POSITIVE) else { return };
         let at = near.closest.on_triangle;
@@ -131,16 +141,16 @@ pub fn edges(
         if !is_side || !behind {
             return;
         }
-        let same = found.iter().position(|(_, known, _)| known.dot(&normal) > SAME);
-        match same {
-            Some(i) if near.distance < found[i].0 => found[i] = (near.distance, normal, at),
+        let side = Side { distance: near.distance, normal, at };
+        match found.iter().position(|known| known.normal.dot(&normal) > SAME) {
+            Some(i) if side.distance < found[i].distance => found[i] = side,
             Some(_) => {}
-            None if found.len() < MOST_EDGES => found.push((near.distance, normal, at)),
+            None if found.len() < MOST_EDGES => found.push(side),
             None => {}
         }
     });
     let (device, radius) = (poses.device.core_point(place.parameter), poses.device.radius);
-    for (_, normal, at) in found {
+    for Side { normal, at, .. } in found {
         let depth = radius - normal.dot(&(device - at));
         if depth > LEAST_DEPTH_M && out.len() < ROOM {
             out.push(ContactPlane {
