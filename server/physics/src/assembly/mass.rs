@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::{BlockCsr, ElementKind, Model};
 
-/// Part of its even share that a node has at least. ω² grows by 1/FLOOR at most, so the critical step of the uncut
-/// element falls to √FLOOR = 0.71 of itself at most.
+/// Part of its even share that a node has at least. ω² grows by 1/FLOOR at most, so the critical step is at least
+/// √FLOOR = 0.71 of that of the uncut element.
 const FLOOR: f64 = 0.5;
 
 /// How the mass of a cut linear tetrahedron is shared among its nodes where integrals of the shape functions would not
@@ -58,22 +58,18 @@ impl Model {
             return;
         }
         self.sharing = Some(sharing);
-        let by_integrals = match sharing {
-            MassSharing::Even => None,
-            MassSharing::Floored => Some(self.integrals.clone()),
-        };
         self.lumped.fill(0.0);
         for (nodes, volume) in self.connectivity.chunks_exact(4).zip(&self.volumes) {
             nodes.iter().for_each(|&node| self.lumped[node as usize] += volume / 4.0);
         }
-        match by_integrals {
-            None => {
+        match sharing {
+            MassSharing::Even => {
                 self.integrals.clone_from(&self.lumped);
                 self.products = Products::linear_tet();
             }
-            // ∫ N_a dV stays the share of a node in the loads.
-            Some(exact) => {
-                self.lumped.iter_mut().zip(&exact).for_each(|(even, exact)| *even = exact.max(FLOOR * *even));
+            MassSharing::Floored => {
+                let shares = self.lumped.iter_mut().zip(&self.integrals);
+                shares.for_each(|(even, exact)| *even = exact.max(FLOOR * *even));
             }
         }
     }
