@@ -104,7 +104,7 @@ impl Edit {
             }
             Self::Insert { at, bytes: new, count } => {
                 let at = place(at, bytes.len());
-                bytes.splice(at..at, new.into_iter().take(1 + usize::from(count) % new.len()));
+                replace(bytes, at, 0, &new[..1 + usize::from(count) % new.len()]);
             }
             Self::Remove { at, count } => {
                 let at = place(at, bytes.len());
@@ -113,28 +113,38 @@ impl Edit {
             Self::Repeat { at, count, times } => {
                 let at = place(at, bytes.len());
                 let part = bytes[at..(at + usize::from(count) % 256).min(bytes.len())].to_vec();
-                bytes.splice(at..at, part.repeat(usize::from(times)));
+                // Long repetitions are rare, as they take longest.
+                let times = usize::from(if times < 240 { times % 8 } else { times });
+                replace(bytes, at, 0, &part.repeat(times));
             }
             Self::End { at } => bytes.truncate(place(at, bytes.len())),
             Self::Number { at, which } => {
                 let number = NUMBERS[usize::from(which) % NUMBERS.len()];
                 let at = place(at, bytes.len());
-                bytes.splice(at..(at + number.len()).min(bytes.len()), number.iter().copied());
+                replace(bytes, at, number.len(), number);
             }
             Self::Word { at, which, replaces } => {
                 let word = WORDS[usize::from(which) % WORDS.len()].as_bytes();
                 let at = place(at, bytes.len());
-                bytes.splice(at..(at + usize::from(replaces) % 16).min(bytes.len()), word.iter().copied());
+                replace(bytes, at, usize::from(replaces) % 16, word);
             }
             Self::Splice { at, seed, from, count } => {
                 let other = pick(seeds, seed);
                 let from = place(from, other.len());
                 let part = &other[from..(from + usize::from(count)).min(other.len())];
                 let at = place(at, bytes.len());
-                bytes.splice(at..at, part.iter().copied());
+                replace(bytes, at, 0, part);
             }
         }
     }
+}
+
+/// Puts `new` in the place of `count` bytes at `at`, or of fewer where the input ends.
+fn replace(bytes: &mut Vec<u8>, at: usize, count: usize, new: &[u8]) {
+    let rest = bytes.split_off((at + count).min(bytes.len()));
+    bytes.truncate(at);
+    bytes.extend_from_slice(new);
+    bytes.extend_from_slice(&rest);
 }
 
 fn pick(seeds: &[Vec<u8>], which: u16) -> &[u8] {
