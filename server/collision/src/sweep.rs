@@ -28,7 +28,7 @@ pub const SWEEP_TOLERANCE_M: f64 = 1e-6;
 const SLIDING_M: f64 = 1e-9;
 
 /// Most advancement steps per triangle. What has not converged by then counts as hit, which is safe.
-const MAX_ADVANCES: usize = 96;
+const MAX_ADVANCES: usize = 512;
 
 /// A moving capsule. Both ends of its core move along straight lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
