@@ -345,6 +345,11 @@ impl KeySpace {
         format!("{}**", self.prefix)
     }
 
+    /// Expression for every key under which clients speak, and their tokens.
+    pub fn every_key_of_clients(&self) -> String {
+        format!("{}client/**", self.prefix)
+    }
+
     /// Expression for the keyframes of all bodies.
     pub fn every_keyframe(&self) -> String {
         format!("{}body/*/surface/keyframe", self.prefix)

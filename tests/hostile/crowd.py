@@ -5,8 +5,7 @@ viewer and an honest browser, which must not notice.
 
 SCINDO_HOSTILE_SECONDS: how long the attack lasts (default 20).
 
-`tests/run hostile` does it at the port of the page. At that of zenoh the bounds do not hold yet: where two cores are
-shared with a storm of tokens and poses, routing them starves the links of honest clients.
+`tests/run hostile` does it at both.
 """
 
 import json

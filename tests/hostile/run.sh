@@ -12,3 +12,4 @@ port=$(python3 tests/free_port.py)
 page=$(python3 tests/free_port.py)
 timeout $((600 + ${SCINDO_HOSTILE_SECONDS:-8})) "$python" tests/hostile/hostile.py "$bin/scindo" "$keep" "$port" "$page"
 timeout $((600 + 4 * ${SCINDO_HOSTILE_SECONDS:-20})) "$python" tests/hostile/crowd.py "$bin" "$keep" "$port" "$page" page
+timeout $((600 + 4 * ${SCINDO_HOSTILE_SECONDS:-20})) "$python" tests/hostile/crowd.py "$bin" "$keep" "$port" "$page" zenoh

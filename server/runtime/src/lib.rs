@@ -12,6 +12,7 @@
 //! * [`rpc`]: questions and orders.
 //! * [`metrics`]: figures for a monitor of the laboratory.
 //! * [`server`]: starts and ends all of these.
+//! * [`door`]: the pace of clients, before zenoh hears them.
 //! * [`lab`]: laboratories with certificates, and what each role may do.
 //! * [`doctor`]: what works on a machine, and what does not.
 //! * [`top`]: the screen of `scindo top`.
@@ -26,6 +27,7 @@
 //! | `publish` | surfaces, tools, answers, events, statistics | its period, or something to send |
 //! | `rpc` | one question after the other | the simulation, at most 1.7 s |
 //! | `record` | writes the recording, if there is one | something to write |
+//! | `door` | sets the pace of clients that connect over plain TCP ([`door`]) | a batch of a client, or of zenoh |
 //! | `watchdog` | breaks off steps that keep orders waiting; ends a process that does not end | its period |
 //! | zenoh's own | decode, check, store in the inbox | nothing |
 
@@ -34,6 +36,8 @@ pub mod command;
 pub mod error;
 
 pub mod wire;
+
+pub mod door;
 
 pub mod inbox;
 

@@ -182,10 +182,13 @@ impl Server {
     /// Waits for the simulation to end, then ends the other threads. Returns the engine for its results.
     pub fn join(self) -> Result<Engine, RuntimeError> {
         let (engine, sessions) = self.release()?;
-        for session in sessions.into_iter().flat_map(|sessions| [sessions.bulk, sessions.haptic]) {
-            if let Err(error) = session.close().wait() {
-                tracing::debug!(%error, "session not closed cleanly");
+        if let Some(Sessions { haptic, bulk, doors }) = sessions {
+            for session in [bulk, haptic] {
+                if let Err(error) = session.close().wait() {
+                    tracing::debug!(%error, "session not closed cleanly");
+                }
             }
+            drop(doors);
         }
         Ok(engine)
     }

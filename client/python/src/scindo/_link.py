@@ -36,6 +36,7 @@ class Link:
         self.refused = 0
         self._process = os.getpid()
         self._subscribers: List[Any] = []
+        self._declared: dict[str, zenoh.KeyExpr] = {}
         self._closed = False
         target = None if config and not endpoint else (endpoint or DEFAULT_ENDPOINT)
         self.haptic = self._connect(target, timeout, config)
@@ -128,8 +129,12 @@ class Link:
     def put(self, key: str, message: Message, priority: Any = zenoh.Priority.INTERACTIVE_HIGH) -> None:
         """Sends one message, reliably and at once."""
         self.check()
+        # A declared key is sent as a number, and finds its way at the server without a search.
+        declared = self._declared.get(key)
+        if declared is None:
+            declared = self._declared[key] = self.haptic.declare_keyexpr(key)
         self.haptic.put(
-            key,
+            declared,
             message.SerializeToString(),
             encoding=zenoh.Encoding(encoding(message)),
             congestion_control=zenoh.CongestionControl.BLOCK,

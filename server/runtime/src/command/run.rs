@@ -30,7 +30,7 @@ use crate::server::{Server, ServerConfig};
 use crate::sim::Pace;
 use crate::sim::engine::Engine;
 use crate::wire::orders::Operators;
-use crate::wire::session::{NetworkConfig, Sessions, local};
+use crate::wire::session::{NetworkConfig, Sessions};
 
 /// Default address of the demonstration's page.
 const DEMONSTRATION_VIEWER: &str = "127.0.0.1:8080";
@@ -106,7 +106,10 @@ fn serve(
     let network = network(args, &keys, &engine)?;
     let mut sessions =
         open_sessions(&network, args.listen.is_empty() && viewer.is_none() && pace.steps.is_some())?;
-    let viewer = viewer.map(|address| start_viewer(&foreground, address, (args, &network))).transpose()?;
+    let inside = |endpoint: &String| sessions.as_ref().and_then(|sessions| sessions.doors.inside(endpoint));
+    let inside: Vec<String> = network.listen.iter().filter_map(inside).collect();
+    let connect = if inside.is_empty() { network.connect.clone() } else { inside };
+    let viewer = viewer.map(|address| start_viewer(&foreground, address, (args, connect))).transpose()?;
     let metrics = args.metrics.map(|address| start_metrics(&foreground, address)).transpose()?;
     let listen: &[String] = if sessions.is_some() { &network.listen } else { &[] };
     let rates = scene.checked().publish;
@@ -224,7 +227,7 @@ fn network(args: &ServeArgs, keys: &KeySpace, engine: &Engine) -> Result<Network
         listen: args.listen.clone(),
         connect: args.connect.clone(),
         zenoh_file: args.zenoh.clone(),
-        access_control: args.operators.access_control(keys),
+        access_control: Some(args.operators.access_control(keys)),
         longest_surface: engine.longest_surface(),
     };
     asked.settled()
@@ -257,15 +260,14 @@ fn foreground() -> Result<Runtime, RuntimeError> {
 fn start_viewer(
     foreground: &Runtime,
     address: SocketAddr,
-    (args, network): (&ServeArgs, &NetworkConfig),
+    (args, connect): (&ServeArgs, Vec<String>),
 ) -> Result<SocketAddr, RuntimeError> {
     let mut config = ViewConfig::new(address);
     config.link.realm.clone_from(&args.realm);
     config.link.session.clone_from(&args.session);
     config.link.zenoh_file.clone_from(&args.zenoh);
     config.web.operators = args.operators.of_pages();
-    let listen: Vec<String> = network.listen.iter().filter_map(|e| local(e)).collect();
-    config.link.connect = if listen.is_empty() { network.connect.clone() } else { listen };
+    config.link.connect = connect;
     let failed = |e: scindo_view::ViewError| RuntimeError::Viewer {
         address: address.to_string(),
         reason: e.to_string(),

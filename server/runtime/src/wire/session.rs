@@ -3,13 +3,17 @@
 //!
 //! The haptic session listens at the requested endpoints and relays for clients that connect nowhere else.
 //! The bulk session listens one port above each of them ([`scindo_proto::endpoint::{DEFAULT_ENDPOINT,
-//! bulk_endpoint}`]). Clients that connect there as well need no relay.
+//! bulk_endpoint}`]). Clients that connect there as well need no relay. Plain TCP endpoints have a door in front of them
+//! ([`crate::door`]), unless a zenoh file has rules of its own or lets the server be discovered.
 
 use std::path::{Path, PathBuf};
 
 use scindo_proto::endpoint::{DEFAULT_ENDPOINT, bulk_endpoint};
+use zenoh::config::ZenohId;
 use zenoh::{Session, Wait as _};
 
+use super::orders;
+use crate::door::Doors;
 use crate::error::{RuntimeError, words};
 
 /// Network settings of a server.
@@ -103,6 +107,8 @@ pub struct Sessions {
     pub haptic: Session,
     /// Carries surfaces, tool states, reports and rpc.
     pub bulk: Session,
+    /// Who connects over plain TCP comes in here. They close after the sessions.
+    pub doors: Doors,
 }
 
 impl Sessions {
@@ -111,13 +117,27 @@ impl Sessions {
         network.listen.iter().try_for_each(|endpoint| check("--listen", endpoint))?;
         network.connect.iter().try_for_each(|endpoint| check("--connect", endpoint))?;
         let bulk_listen: Vec<String> = network.listen.iter().filter_map(|e| bulk_endpoint(e)).collect();
-        let relay: Vec<String> = network.listen.iter().filter_map(|e| local(e)).take(1).collect();
+        let doors = if has_doors(network)? { Doors::open(&network.listen)? } else { Doors::none() };
+        let relay: Vec<String> = network.listen.iter().filter_map(|e| doors.inside(e)).take(1).collect();
+        let behind =
+            |listen: &[String]| -> Vec<String> { listen.iter().flat_map(|e| doors.behind(e)).collect() };
+        let mut network = network.clone();
+        let id = ZenohId::default().to_string();
+        if let Some(rules) = &mut network.access_control {
+            orders::admit_server(rules, &id);
+            if !doors.is_empty() {
+                orders::behind_doors(rules);
+            }
+        }
         let mode = if network.listen.is_empty() { "peer" } else { "router" };
         let relayed = LONGEST_MESSAGE.max(SURFACES_GROW * network.longest_surface);
-        let haptic = open(network, (mode, Bounds::of_server(relayed)), &network.listen, &network.connect)?;
+        let at = behind(&network.listen);
+        let haptic = open(&network, (mode, Bounds::of_server(relayed)), (&at, &network.connect), None)?;
         let bulk_connect = if relay.is_empty() { &network.connect } else { &relay };
-        let bulk = open(network, ("peer", Bounds::of_server(LONGEST_MESSAGE)), &bulk_listen, bulk_connect)?;
-        Ok(Self { haptic, bulk })
+        let at = behind(&bulk_listen);
+        let bulk =
+            open(&network, ("peer", Bounds::of_server(LONGEST_MESSAGE)), (&at, bulk_connect), Some(&id))?;
+        Ok(Self { haptic, bulk, doors })
     }
 }
 
@@ -133,7 +153,7 @@ pub fn router(
     network.listen.iter().try_for_each(|endpoint| check("--listen", endpoint))?;
     network.connect.iter().try_for_each(|endpoint| check("--connect", endpoint))?;
     let bounds = Bounds { longest_message, connections };
-    open(network, ("router", bounds), &network.listen, &network.connect)
+    open(network, ("router", bounds), (&network.listen, &network.connect), None)
 }
 
 /// Checks the form of an endpoint, so that a typing mistake is not reported as a network failure.
@@ -171,8 +191,8 @@ fn check(option: &'static str, endpoint: &str) -> Result<(), RuntimeError> {
 fn open(
     network: &NetworkConfig,
     (mode, bounds): (&str, Bounds),
-    listen: &[String],
-    connect: &[String],
+    (listen, connect): (&[String], &[String]),
+    id: Option<&str>,
 ) -> Result<Session, RuntimeError> {
     let invalid = |what: String| move |e: zenoh::Error| RuntimeError::Zenoh { what, reason: words(&e) };
     let mut config = match &network.zenoh_file {
@@ -187,6 +207,9 @@ fn open(
     }
     if !from_file || !connect.is_empty() {
         settings.push(("connect/endpoints", list(connect)));
+    }
+    if let Some(id) = id {
+        settings.push(("id", format!("{id:?}")));
     }
     if !from_file {
         // Deterministic: only named endpoints, no discovery. No shared memory: each local client would map 16
@@ -232,6 +255,16 @@ fn limits(config: &zenoh::Config, bounds: Bounds) -> Vec<(&'static str, String)>
     all.filter(|(key, _)| config.get_json(key).ok() == plain.get_json(key).ok()).collect()
 }
 
+/// Behind a door, rules of the file that name interfaces would mean something else, and who discovers the server would be
+/// sent to the wrong side of the door.
+fn has_doors(network: &NetworkConfig) -> Result<bool, RuntimeError> {
+    let Some(path) = &network.zenoh_file else { return Ok(true) };
+    let config = load(path)?;
+    let is_off = |key: &str| config.get_json(key).is_ok_and(|value| value == "false");
+    let is_found = !is_off("scouting/multicast/enabled") || !is_off("scouting/gossip/enabled");
+    Ok(!controls_access(&config) && !is_found)
+}
+
 fn controls_access(config: &zenoh::Config) -> bool {
     let enabled = config.get_json("access_control/enabled").unwrap_or_default();
     enabled == "true"
@@ -271,6 +304,21 @@ mod tests {
             assert!(error.contains(says), "{endpoint}: {error}");
         }
         assert!(check("--listen", "quic/[::1]:7447").is_ok());
+    }
+
+    #[test]
+    fn a_zenoh_file_may_do_without_doors() {
+        let folder = tempfile::tempdir().unwrap();
+        let with = |text: &str| {
+            let file = folder.path().join("zenoh.json5");
+            std::fs::write(&file, text).unwrap();
+            has_doors(&NetworkConfig { zenoh_file: Some(file), ..NetworkConfig::default() }).unwrap()
+        };
+        let open_lab = include_str!("../../../../deploy/open-lab.json5");
+        assert!(with(open_lab));
+        assert!(!with(&open_lab.replace("gossip: { enabled: false }", "gossip: { enabled: true }")));
+        assert!(!with(&open_lab.replacen("mode:", "access_control: { enabled: true }, mode:", 1)));
+        assert!(has_doors(&NetworkConfig::default()).unwrap());
     }
 
     #[test]
