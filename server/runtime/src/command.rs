@@ -12,6 +12,8 @@ pub mod cli;
 
 mod say;
 
+mod signals;
+
 pub mod progress;
 
 pub mod run;

@@ -14,6 +14,7 @@ use serde_json::json;
 
 use super::cli::AccuracyArgs;
 use super::say::say;
+use super::signals::Signals;
 use super::study_progress::StudyProgress;
 use crate::error::RuntimeError;
 
@@ -85,16 +86,11 @@ pub(super) fn listen(stop: &Arc<AtomicBool>) -> Result<(), RuntimeError> {
     let signals = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
     let wait = move || {
         signals.block_on(async {
-            let kind = tokio::signal::unix::SignalKind::terminate();
-            let Ok(mut terminate) = tokio::signal::unix::signal(kind) else { return };
-            tokio::select! {
-                _ = tokio::signal::ctrl_c() => {}
-                _ = terminate.recv() => {}
-            }
+            let Ok(mut requests) = Signals::listen() else { return };
+            requests.either().await;
             stop.store(true, Ordering::Relaxed);
-            if tokio::signal::ctrl_c().await.is_ok() {
-                std::process::exit(130);
-            }
+            requests.interrupt().await;
+            std::process::exit(130);
         });
     };
     std::thread::Builder::new().name("signals".to_owned()).spawn(wait).map_err(failed)?;

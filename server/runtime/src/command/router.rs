@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use super::cli::RouterArgs;
 use super::say::say;
+use super::signals::Signals;
 use crate::error::RuntimeError;
 use crate::wire::session::{NetworkConfig, router};
 
@@ -24,15 +25,10 @@ pub fn route(args: &RouterArgs) -> Result<ExitCode, RuntimeError> {
     if !args.connect.is_empty() {
         say!("  joins    {}", args.connect.join(", "));
     }
-    waiting
-        .block_on(async {
-            let mut terminate = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?;
-            tokio::select! {
-                pressed = tokio::signal::ctrl_c() => pressed,
-                _ = terminate.recv() => Ok(()),
-            }
-        })
-        .map_err(failed)?;
+    waiting.block_on(async {
+        Signals::listen()?.either().await;
+        Ok::<_, RuntimeError>(())
+    })?;
     drop(session);
     Ok(ExitCode::SUCCESS)
 }

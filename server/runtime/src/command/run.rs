@@ -20,6 +20,7 @@ use tokio::task::JoinHandle;
 use super::cli::{DemoArgs, RunArgs, ServeArgs};
 use super::progress::{Progress, Share};
 use super::say::say;
+use super::signals::Signals;
 use crate::error::RuntimeError;
 use crate::metrics::{self, Metrics};
 use crate::record::on_demand::{RecordFolder, prepare};
@@ -127,6 +128,10 @@ fn serve(
         takes_orders: args.operators != Operators::None,
         give_up,
     };
+    let mut signals = {
+        let _entered = foreground.enter();
+        Signals::listen()?
+    };
     loop {
         let started = Instant::now();
         let server = Server::start(engine, sessions, &config)?;
@@ -134,7 +139,7 @@ fn serve(
             // Callers may wait for these lines, so they are written once the server answers.
             announce(scene, args, listen, (viewer, metrics.as_ref().map(|&(address, _)| address)));
         }
-        let ended = foreground.block_on(wait(&server, args, &config))?;
+        let ended = foreground.block_on(wait(&server, args, &config, &mut signals));
         let steps = server.steps();
         if let Ended::Next(next) = ended {
             sessions = server.release()?.1;
@@ -338,14 +343,8 @@ struct Next {
 }
 
 /// Waits until the simulation ends, is interrupted, or another scene is ready.
-async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig) -> Result<Ended, RuntimeError> {
+async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig, signals: &mut Signals) -> Ended {
     let progress = Progress::begin("steps", config.pace.steps, args.json);
-    let failed = |e: std::io::Error| RuntimeError::System {
-        what: "listening for signals".to_owned(),
-        reason: e.to_string(),
-    };
-    let kind = tokio::signal::unix::SignalKind::terminate();
-    let mut terminate = tokio::signal::unix::signal(kind).map_err(failed)?;
     let mut look = tokio::time::interval(LOOK);
     let mut building: Option<JoinHandle<Result<Next, RuntimeError>>> = None;
     let ended = loop {
@@ -369,16 +368,12 @@ async fn wait(server: &Server, args: &ServeArgs, config: &ServerConfig) -> Resul
                     }));
                 }
             }
-            pressed = tokio::signal::ctrl_c() => {
-                pressed.map_err(failed)?;
-                break Ended::Interrupted;
-            }
-            _ = terminate.recv() => break Ended::Interrupted,
+            () = signals.either() => break Ended::Interrupted,
         }
     };
     progress.end();
     server.stop();
-    Ok(ended)
+    ended
 }
 
 /// Ends a process whose threads do not end. Whatever they hold is lost.
