@@ -17,8 +17,8 @@ use scindo_proto::messages::{
 use super::writer::TOPICS;
 use crate::error::RuntimeError;
 
-/// Most bytes that are read at a time.
-const READ: usize = 1 << 20;
+/// Most bytes that are read at a time. Room for them is cleared first, however few there are.
+const READ: usize = 1 << 16;
 
 /// Number of the topic of checkpoints in [`TOPICS`].
 const CHECKPOINT: usize = 3;
@@ -43,9 +43,9 @@ pub enum Recorded {
     Forces(RecordedForces),
 }
 
-/// Reads a recording from its beginning.
-pub struct Recording {
-    file: BufReader<File>,
+/// Reads a recording from its beginning, from a file or from anything else.
+pub struct Recording<R = File> {
+    file: BufReader<R>,
     path: String,
     reader: LinearReader,
     /// Topic of every channel, as number in [`TOPICS`].
@@ -59,7 +59,7 @@ impl Recording {
     /// Opens a file.
     ///
     /// # Errors
-    /// The file cannot be read, or does not begin like an MCAP file.
+    /// The file cannot be opened.
     pub fn open(path: &Path) -> Result<Self, RuntimeError> {
         Self::open_with(path, false)
     }
@@ -67,21 +67,33 @@ impl Recording {
     /// `packed`: chunks are not unpacked.
     fn open_with(path: &Path, packed: bool) -> Result<Self, RuntimeError> {
         let name = path.display().to_string();
-        let failed = |reason: String| RuntimeError::NoRecording { file: name.clone(), reason };
-        let file = File::open(path).map_err(|e| failed(e.to_string()))?;
+        let failed =
+            |e: std::io::Error| RuntimeError::NoRecording { file: name.clone(), reason: e.to_string() };
+        let file = File::open(path).map_err(failed)?;
+        Ok(Self::read_with(file, name, packed))
+    }
+}
+
+impl<R: Read> Recording<R> {
+    /// Reads a recording that is called `name` in errors.
+    pub fn read(from: R, name: String) -> Self {
+        Self::read_with(from, name, false)
+    }
+
+    fn read_with(from: R, name: String, packed: bool) -> Self {
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(false)
             .with_emit_chunks(packed)
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(LONGEST);
-        Ok(Self {
-            file: BufReader::with_capacity(READ, file),
+        Self {
+            file: BufReader::with_capacity(READ, from),
             path: name,
             reader: LinearReader::new_with_options(options),
             channels: HashMap::new(),
             truncated: None,
             ended: false,
-        })
+        }
     }
 
     /// The scene, which is the first message.
