@@ -386,6 +386,9 @@ pub struct ReliabilityArgs {
     /// First seed. A seed repeats itself on every machine of one kind, on any number of threads.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub first: u64,
+    /// Also this many ticks of hands under made-up contacts, rounded up to whole seeds of 20000.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=1_000_000_000_000))]
+    pub drill_ticks: u64,
     /// Also take out one safeguard after the other, and show that the rules notice it.
     #[arg(long)]
     pub mutants: bool,

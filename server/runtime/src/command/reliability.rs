@@ -10,8 +10,9 @@ use super::cli::ReliabilityArgs;
 use super::say::say;
 use crate::error::RuntimeError;
 use crate::reliability::campaign::{self, Extent, Totals};
-use crate::reliability::episode::EpisodeError;
-use crate::reliability::guarantees::{GUARANTEES, Noticed, markdown, text};
+use crate::reliability::drill;
+use crate::reliability::episode::{self, EpisodeError};
+use crate::reliability::guarantees::{Found, GUARANTEES, Noticed, markdown, text};
 use crate::reliability::table::Mutant;
 
 /// Seeds with which each safeguard is taken out.
@@ -30,34 +31,41 @@ pub fn reliability(args: &ReliabilityArgs) -> Result<ExitCode, RuntimeError> {
     let extent = Extent { first: args.first, seeds, time, threads: usize::from(args.threads) };
     let bar = bar(args.json);
     bar.set_length(seeds.unwrap_or(0));
-    let totals = campaign::run(&extent, None, &stop, &|done| bar.set_position(done)).map_err(failed)?;
+    let network =
+        campaign::run(episode::run, &extent, None, &stop, &|done| bar.set_position(done)).map_err(failed)?;
+    let drills = Extent { seeds: Some(args.drill_ticks.div_ceil(drill::TICKS)), time: None, ..extent };
+    bar.set_length(drills.seeds.unwrap_or(0));
+    let hands =
+        campaign::run(drill::run, &drills, None, &stop, &|done| bar.set_position(done)).map_err(failed)?;
     let mut mutants = Vec::new();
     if args.mutants {
         let some = Extent { first: 1, seeds: Some(MUTANT_SEEDS), time: None, ..extent };
         for mutant in Mutant::ALL {
             bar.set_message(format!("{mutant:?}"));
             let Totals { seeds, violations, .. } =
-                campaign::run(&some, Some(mutant), &stop, &|_| ()).map_err(failed)?;
+                campaign::run(episode::run, &some, Some(mutant), &stop, &|_| ()).map_err(failed)?;
             mutants.push(Noticed { mutant, seeds, violations });
         }
     }
     bar.finish_and_clear();
+    let found = Found { network, hands, mutants };
     let interrupted = stop.load(Ordering::Relaxed);
     if let Some(path) = &args.write {
-        std::fs::write(path, markdown(&totals, &mutants)).map_err(|error| RuntimeError::System {
+        std::fs::write(path, markdown(&found)).map_err(|error| RuntimeError::System {
             what: format!("writing {}", path.display()),
             reason: format!("{error}; choose another file with --write"),
         })?;
     }
     if args.json {
         let report = serde_json::json!({
-            "interrupted": interrupted, "totals": totals, "mutants": mutants, "guarantees": GUARANTEES,
+            "interrupted": interrupted, "totals": found.network, "drill": found.hands, "mutants": found.mutants,
+            "guarantees": GUARANTEES,
         });
         say!("{report}");
     } else {
-        say!("{}", text(&totals, &mutants).trim_end());
+        say!("{}", text(&found).trim_end());
     }
-    let unnoticed = mutants.iter().any(|noticed| noticed.violations == 0);
-    let ok = totals.violations == 0 && !unnoticed && !interrupted;
+    let unnoticed = found.mutants.iter().any(|noticed| noticed.violations == 0);
+    let ok = found.violations() == 0 && !unnoticed && !interrupted;
     Ok(if ok { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

@@ -8,12 +8,15 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use tracing::subscriber::{NoSubscriber, with_default};
 
-use super::episode::{self, EpisodeError, Outcome};
+use super::episode::{EpisodeError, Outcome};
 use super::network::Hits;
 use super::table::Mutant;
 
 /// Most broken seeds that are kept.
 const MOST_BROKEN: usize = 20;
+
+/// What a seed does: an episode of the network, or a drill of hands.
+pub type Play = fn(u64, Option<Mutant>) -> Result<Outcome, EpisodeError>;
 
 /// How much to run.
 #[derive(Debug, Clone, Copy)]
@@ -69,11 +72,12 @@ impl Totals {
     }
 }
 
-/// Runs episodes and adds them up. `on_seed` is called with the number of finished ones.
+/// Plays seeds and adds up what they were. `on_seed` is called with the number of finished ones.
 ///
 /// # Errors
-/// If an episode cannot be set up.
+/// If one cannot be set up.
 pub fn run(
+    play: Play,
     extent: &Extent,
     mutant: Option<Mutant>,
     stop: &AtomicBool,
@@ -91,8 +95,7 @@ pub fn run(
             if enough {
                 return Ok(());
             }
-            let outcome =
-                with_default(NoSubscriber::default(), || episode::run(extent.first + number, mutant))?;
+            let outcome = with_default(NoSubscriber::default(), || play(extent.first + number, mutant))?;
             let mut totals = lock();
             totals.add(&outcome);
             on_seed(totals.seeds);

@@ -41,7 +41,7 @@ pub const GUARANTEES: [Guarantee; 13] = [
     Guarantee {
         number: "G4",
         promise: "The force on a hand is finite, within its limits of size and slew, and zero 200 ms after silence",
-        tried_by: "simulator (spoiled contacts, freezes, jumps of clocks); `client/haptic/src/tick/tests.rs`",
+        tried_by: "simulator (spoiled contacts, freezes, jumps of clocks; hands under made-up contacts); `client/haptic/src/tick/tests.rs`",
         simulated: true,
     },
     Guarantee {
@@ -111,8 +111,27 @@ pub struct Noticed {
     pub violations: u64,
 }
 
+/// What a campaign found.
+#[derive(Debug)]
+pub struct Found {
+    /// Episodes of the network.
+    pub network: Totals,
+    /// Drills of hands.
+    pub hands: Totals,
+    /// Safeguards that were taken out.
+    pub mutants: Vec<Noticed>,
+}
+
+impl Found {
+    /// Seeds that broke a rule.
+    pub fn violations(&self) -> u64 {
+        self.network.violations + self.hands.violations
+    }
+}
+
 /// The page `deploy/RELIABILITY.md`: all promises, and the figures of a campaign.
-pub fn markdown(totals: &Totals, mutants: &[Noticed]) -> String {
+pub fn markdown(found: &Found) -> String {
+    let Found { network: totals, hands, mutants } = found;
     let mut out = String::from(HEAD);
     for guarantee in GUARANTEES {
         out.push_str(&row(&guarantee));
@@ -125,6 +144,13 @@ pub fn markdown(totals: &Totals, mutants: &[Noticed]) -> String {
     ));
     for (class, count) in totals.hits.classes() {
         out.push_str(&format!("| {class} | {count} |\n"));
+    }
+    if hands.seeds > 0 {
+        out.push_str(&format!(
+            "\nHands alone, under contacts that are made up: {} ticks ({} of them felt something), {} contacts. \
+             **Broken rules: {}.**\n",
+            hands.ticks, hands.touched, hands.messages, hands.violations
+        ));
     }
     if !mutants.is_empty() {
         out.push_str("\nThe rules notice when a safeguard is taken out:\n\n| without | seeds that notice |\n|---|---|\n");
@@ -153,7 +179,8 @@ everything, so a broken rule can be repeated.
 ";
 
 /// The table for people, with the figures of a campaign.
-pub fn text(totals: &Totals, mutants: &[Noticed]) -> String {
+pub fn text(found: &Found) -> String {
+    let Found { network: totals, hands, mutants } = found;
     let mut out = String::new();
     let hits = &totals.hits;
     let mut line = |text: String| {
@@ -170,12 +197,21 @@ pub fn text(totals: &Totals, mutants: &[Noticed]) -> String {
     for (seed, violation) in &totals.broken {
         line(format!("  seed {seed} (scindo reliability --first {seed} --seeds 1): {violation}"));
     }
+    if hands.seeds > 0 {
+        line(format!(
+            "hands under made-up contacts: {} ticks ({} of them felt something), {} contacts, broken rules: {}",
+            hands.ticks, hands.touched, hands.messages, hands.violations
+        ));
+    }
+    for (seed, violation) in &hands.broken {
+        line(format!("  drill of seed {seed}: {violation}"));
+    }
     for noticed in mutants {
         let Noticed { mutant, seeds, violations } = noticed;
         line(format!("without {}: noticed by {violations} of {seeds} seeds", mutant.name()));
     }
     for Guarantee { number, promise, tried_by, simulated } in GUARANTEES {
-        let found = match (simulated, totals.violations) {
+        let found = match (simulated, found.violations()) {
             (true, 0) => "held",
             (true, _) => "see above",
             (false, _) => "not run here",

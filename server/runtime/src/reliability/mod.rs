@@ -13,6 +13,8 @@
 //!   soon after silence.
 //! * When the faults end, everybody can work again ([`episode`]).
 //!
+//! The rules of the force are also held against contacts that are made up ([`drill`]).
+//!
 //! # Sources
 //! The method is that of FoundationDB's simulation and TigerBeetle's VOPR.
 
@@ -27,6 +29,8 @@ pub mod table;
 pub mod checker;
 
 pub mod episode;
+
+pub mod drill;
 
 pub mod campaign;
 

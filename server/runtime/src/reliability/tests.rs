@@ -3,6 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use super::campaign::{Extent, run};
+use super::drill;
 use super::episode;
 use super::guarantees::{GUARANTEES, row};
 use super::table::Mutant;
@@ -11,7 +12,7 @@ const SOME: Extent = Extent { first: 1, seeds: Some(60), time: None, threads: 2 
 
 #[test]
 fn no_rule_is_broken_and_every_fault_is_tried() {
-    let totals = run(&SOME, None, &AtomicBool::new(false), &|_| ()).unwrap();
+    let totals = run(episode::run, &SOME, None, &AtomicBool::new(false), &|_| ()).unwrap();
     assert_eq!(totals.broken, []);
     assert_eq!(totals.seeds, 60);
     for (class, count) in totals.hits.classes() {
@@ -29,7 +30,8 @@ fn a_seed_repeats_itself_on_any_number_of_threads() {
     );
     let few = Extent { seeds: Some(6), ..SOME };
     let of = |threads| {
-        let totals = run(&Extent { threads, ..few }, None, &AtomicBool::new(false), &|_| ()).unwrap();
+        let totals =
+            run(episode::run, &Extent { threads, ..few }, None, &AtomicBool::new(false), &|_| ()).unwrap();
         serde_json::to_string(&totals).unwrap()
     };
     assert_eq!(of(1), of(3));
@@ -38,9 +40,19 @@ fn a_seed_repeats_itself_on_any_number_of_threads() {
 #[test]
 fn every_safeguard_that_is_taken_out_is_missed() {
     for mutant in Mutant::ALL {
-        let totals = run(&SOME, Some(mutant), &AtomicBool::new(false), &|_| ()).unwrap();
+        let totals = run(episode::run, &SOME, Some(mutant), &AtomicBool::new(false), &|_| ()).unwrap();
         assert!(totals.violations > 0, "{mutant:?} goes unnoticed");
     }
+}
+
+#[test]
+fn made_up_contacts_break_no_rule_of_the_force_unless_a_safeguard_is_missing() {
+    let totals = run(drill::run, &SOME, None, &AtomicBool::new(false), &|_| ()).unwrap();
+    assert_eq!(totals.broken, []);
+    assert_eq!(totals.ticks, 60 * drill::TICKS);
+    assert!(totals.touched > totals.ticks / 10 && totals.hits.restarts > 60, "{totals:?}");
+    let totals = run(drill::run, &SOME, Some(Mutant::NoValidity), &AtomicBool::new(false), &|_| ()).unwrap();
+    assert!(totals.violations > 30, "{totals:?}");
 }
 
 #[test]
