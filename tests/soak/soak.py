@@ -289,6 +289,8 @@ def main(bin_dir, out_dir, seconds, seed):
         programs.end()
 
     for recording, (surgeon, crowd, memory, promised) in zip(recordings, (first, second)):
+        lines = [f"{at:.1f},{kib}" for at, kib in memory.samples]
+        recording.with_suffix(".memory.csv").write_text("\n".join(["time_s,rss_kib", *lines, ""]))
         found = replay(programs, recording)
         cuts = cuts_of(recording)
         slope, over = memory.slope(warm_up(seconds / 2))
