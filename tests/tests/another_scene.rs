@@ -11,10 +11,8 @@ async fn runs(link: &Link, name: &str) -> (Vec<String>, u32) {
                 Ok(info) if info.scene == name => {
                     return (info.bodies.into_iter().map(|body| body.id).collect(), info.scene_seq);
                 }
-                // It is gone for a moment.
-                Ok(_) | Err(LinkError::NoServer { .. } | LinkError::Timeout { .. }) => {
-                    tokio::time::sleep(std::time::Duration::from_millis(50)).await;
-                }
+                // It is gone for a moment. Asking without a pause meets every moment of the change.
+                Ok(_) | Err(LinkError::NoServer { .. } | LinkError::Timeout { .. }) => {}
                 Err(error) => panic!("{error}"),
             }
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 
-use crossbeam_channel::bounded;
+use crossbeam_channel::{TrySendError, bounded};
 use scindo_proto::messages::SessionInfo;
 use scindo_proto::{Chunk, KeySpace, Topic, WIRE_VERSION};
 use scindo_world::body::Probe;
@@ -260,13 +260,14 @@ fn declare_rpc(
         .bulk
         .declare_queryable(keys.every_rpc())
         .callback(move |query| {
-            if let Err(full) = queries.try_send(query) {
+            // Between two scenes nobody waits for queries. One without an answer is asked again.
+            if let Err(TrySendError::Full(query)) = queries.try_send(query) {
                 let error = scindo_proto::messages::Error {
                     code: "busy".to_owned(),
                     message: "too many requests are waiting".to_owned(),
                     hint: "send it again later".to_owned(),
                 };
-                rpc::refuse(&full.into_inner(), error);
+                rpc::refuse(&query, error);
             }
         })
         .wait()
