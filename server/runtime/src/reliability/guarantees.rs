@@ -204,7 +204,9 @@ pub fn text(found: &Found) -> String {
         ));
     }
     for (seed, violation) in &hands.broken {
-        line(format!("  drill of seed {seed}: {violation}"));
+        line(format!(
+            "  seed {seed} (scindo reliability --first {seed} --seeds 1 --drill-ticks 1): {violation}"
+        ));
     }
     for noticed in mutants {
         let Noticed { mutant, seeds, violations } = noticed;
