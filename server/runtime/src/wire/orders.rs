@@ -46,10 +46,7 @@ impl Operators {
         let questions: Vec<String> =
             Verb::ALL.into_iter().filter(|verb| !verb.is_order()).map(|v| keys.key(&Topic::Rpc(v))).collect();
         let asked = [questions, vec![keys.every_keyframe()], foreign].concat();
-        let rule = |id: &str, flow: &str, messages: &[&str], keys: &[String]| {
-            let messages: Vec<&str> = messages.to_vec();
-            json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys })
-        };
+        let rule = |id: &str, flow: &str, messages: &[&str], keys: &[String]| json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys });
         let presence = ["liveliness_token", "liveliness_query", "declare_liveliness_subscriber"];
         let watching = [presence.as_slice(), &["declare_subscriber"]].concat();
         let answering = [presence.as_slice(), &["declare_queryable", "query", "reply"]].concat();
