@@ -11,8 +11,7 @@
 The memory of the server must not grow after a warm-up, in which the surgeon hardly pauses and bodies get more cuts
 than any later one: less than 1 MiB per hour by a straight line through all that follows, where the run is long enough to
 tell. In such a run the allocator of the server is told to give back at once what is free, since what it keeps goes up and
-down by many times more. What the index of the recording takes, which the server keeps until the file ends, is printed
-beside the slope and is part of it.
+down by many times more.
 """
 
 import json
@@ -29,7 +28,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
 
 import numpy as np  # noqa: E402
 from mcap.exceptions import McapError  # noqa: E402
-from mcap.records import Channel, Chunk, Message, Schema  # noqa: E402
+from mcap.records import Channel, Message, Schema  # noqa: E402
 from mcap.stream_reader import StreamReader  # noqa: E402
 from mcap_protobuf.decoder import DecoderFactory  # noqa: E402
 
@@ -49,8 +48,6 @@ WARM_UP_PAUSES_S = (0.1, 0.3)
 WARM_UP_CUTS = 2
 # Settings of the allocator of the server in a run whose slope is judged.
 GIVES_BACK = "GLIBC_TUNABLES=glibc.malloc.mmap_threshold=65536:glibc.malloc.trim_threshold=65536"
-# Memory that the index of a recording takes for a chunk [KiB]: its entry, the offsets of its channels, and room to grow.
-CHUNK_KIB = 0.45
 # A killed server loses at most this time of its recording [s].
 LOST_S = 1.0
 # A slope over less time than this says nothing [s].
@@ -237,18 +234,6 @@ def cuts_of(recording):
     return blades
 
 
-def chunks_of(recording):
-    """Number of chunks of a recording, which need not have an end."""
-    count = 0
-    try:
-        with open(recording, "rb") as stream:
-            for record in StreamReader(stream, emit_chunks=True, record_size_limit=LONGEST).records:
-                count += isinstance(record, Chunk)
-    except (McapError, EOFError):
-        pass
-    return count
-
-
 def part(programs, endpoint, server, seconds, seed):
     """Hands, cuts and passers-by for a while; the surgeon and the memory of the server."""
     memory = Memory(server)
@@ -307,11 +292,10 @@ def main(bin_dir, out_dir, seconds, seed):
         found = replay(programs, recording)
         cuts = cuts_of(recording)
         slope, over = memory.slope(warm_up(seconds / 2))
-        index = CHUNK_KIB * chunks_of(recording) / memory.samples[-1][0] * 3600
         rss = [kib for _, kib in memory.samples]
         growth = "too short for a slope"
         if over >= LONG_S:
-            growth = f"{slope / 1024:+.2f} MiB/h over {over:.0f} s, {index / 1024:.2f} MiB/h of it for the recording's index"
+            growth = f"{slope / 1024:+.2f} MiB/h over {over:.0f} s"
         print(
             f"{recording.stem}: {found['found']['compared']} steps repeated bit for bit; {len(promised)} cuts promised, "
             f"{len(cuts)} in the recording; refused {surgeon.refused or 'none'}, "

@@ -230,6 +230,40 @@ fn a_step_that_differs_is_named() {
     assert_ne!(difference.recorded, difference.found);
 }
 
+/// A record of an MCAP file.
+fn mcap_record(kind: u8, content: &[u8]) -> Vec<u8> {
+    [&[kind], &(content.len() as u64).to_le_bytes()[..], content].concat()
+}
+
+/// A chunk that is not packed, and says that its content is `size` bytes long.
+fn loose_chunk(content: &[u8], size: u64) -> Vec<u8> {
+    let head = [&[0; 16], &size.to_le_bytes()[..], &[0; 8], &(content.len() as u64).to_le_bytes()].concat();
+    mcap_record(6, &[&head, content].concat())
+}
+
+#[test]
+fn records_that_break_the_rules_end_the_reading() {
+    let long = [&[5u8], &1000u64.to_le_bytes()[..], &[0; 22]].concat();
+    let of_chunk = |chunk: Vec<u8>| (chunk, "chunk");
+    // An attachment that is shorter than its own head is of no interest, and is passed over.
+    let attachment = mcap_record(9, &[0; 33]);
+    let broken = [
+        of_chunk(loose_chunk(&long, long.len() as u64)),
+        of_chunk(loose_chunk(&mcap_record(5, &[0; 30]), 3)),
+        of_chunk(loose_chunk(&mcap_record(5, &[0; 30]), u64::MAX)),
+        of_chunk(loose_chunk(&loose_chunk(&[], 0)[..9], 9)),
+        (mcap_record(5, &[0; 3]), ""),
+        (attachment, "ends in the middle"),
+    ];
+    for (record, words) in broken {
+        let file = [mcap::MAGIC, &mcap_record(1, &[0; 8]), &record].concat();
+        let mut recording = Recording::read(&file[..], "broken.mcap".to_owned());
+        assert!(matches!(recording.next_message(), Ok(None)), "{record:?}");
+        let why = recording.truncated().unwrap();
+        assert!(why.contains(words), "{why}");
+    }
+}
+
 #[test]
 fn a_file_that_ends_anywhere_is_read_as_far_as_it_goes_and_others_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -6,14 +6,14 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use mcap::read::ChunkReader;
-use mcap::records::Record;
+use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use prost::Message;
 use scindo_proto::messages::{
     RecordedCheckpoint, RecordedEvent, RecordedForces, RecordedOrder, RecordedScene, RecordedStep,
 };
 
+use super::chunk::Chunk;
 use super::writer::TOPICS;
 use crate::error::RuntimeError;
 
@@ -23,8 +23,8 @@ const READ: usize = 1 << 16;
 /// Number of the topic of checkpoints in [`TOPICS`].
 const CHECKPOINT: usize = 3;
 
-/// Longest record of a file [byte]: a checkpoint of the largest scenes.
-const LONGEST: usize = 4 << 30;
+/// Longest record of a file, and longest chunk before it was packed [byte]: a checkpoint of the largest scenes.
+pub const LONGEST: usize = 4 << 30;
 
 /// A message of a recording.
 #[derive(Debug)]
@@ -48,6 +48,10 @@ pub struct Recording<R = File> {
     file: BufReader<R>,
     path: String,
     reader: LinearReader,
+    /// The chunk that is being read.
+    chunk: Chunk,
+    /// Whether chunks are handed on as they are.
+    packed: bool,
     /// Topic of every channel, as number in [`TOPICS`].
     channels: HashMap<u16, usize>,
     /// Why the file ends before its end, once it did.
@@ -83,13 +87,14 @@ impl<R: Read> Recording<R> {
     fn read_with(from: R, name: String, packed: bool) -> Self {
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(false)
-            .with_emit_chunks(packed)
-            .with_validate_chunk_crcs(true)
+            .with_emit_chunks(true)
             .with_record_length_limit(LONGEST);
         Self {
             file: BufReader::with_capacity(READ, from),
             path: name,
             reader: LinearReader::new_with_options(options),
+            chunk: Chunk::default(),
+            packed,
             channels: HashMap::new(),
             truncated: None,
             ended: false,
@@ -140,40 +145,56 @@ impl<R: Read> Recording<R> {
         mut take: impl FnMut(&mut HashMap<u16, usize>, Record<'_>) -> Result<Option<T>, String>,
     ) -> Result<Option<T>, RuntimeError> {
         while !self.ended {
+            while let Some(record) = self.chunk.next_record() {
+                let record = record.and_then(|(opcode, content)| parse(opcode, content));
+                match record.map(|record| record.map_or(Ok(None), |r| take(&mut self.channels, r))) {
+                    Ok(Ok(None)) => {}
+                    Ok(Ok(taken)) => return Ok(taken),
+                    Ok(Err(reason)) => return Err(self.foreign(reason)),
+                    Err(broken) => {
+                        self.end_early(&broken);
+                        return Ok(None);
+                    }
+                }
+            }
             let Some(event) = self.reader.next_event() else {
                 self.ended = true;
                 break;
             };
-            match event {
+            let broken = match event {
                 // Memory grows with what the file has, not with what a broken length claims.
                 Ok(LinearReadEvent::ReadRequest(n)) => {
                     match self.file.read(self.reader.insert(n.min(READ))) {
+                        Ok(0) => "it ends in the middle, as that of a server that was killed".to_owned(),
                         Ok(read) => {
                             self.reader.notify_read(read);
-                            if read == 0 {
-                                self.end_early("it ends in the middle, as that of a server that was killed");
-                            }
+                            continue;
                         }
                         Err(error) => return Err(self.foreign(error.to_string())),
                     }
                 }
-                Ok(LinearReadEvent::Record { data, opcode }) => match mcap::parse_record(opcode, data) {
-                    Ok(Record::Footer(_)) => self.ended = true,
-                    Ok(record) => match take(&mut self.channels, record) {
-                        Ok(None) => {}
+                Ok(LinearReadEvent::Record { opcode: op::FOOTER, .. }) => {
+                    self.ended = true;
+                    break;
+                }
+                Ok(LinearReadEvent::Record { data, opcode }) => match parse(opcode, data) {
+                    Ok(Some(Record::Chunk { header, data })) if !self.packed => {
+                        match self.chunk.unpack(&header, &data) {
+                            Ok(()) => continue,
+                            Err(broken) => broken,
+                        }
+                    }
+                    Ok(Some(record)) => match take(&mut self.channels, record) {
+                        Ok(None) => continue,
                         Ok(taken) => return Ok(taken),
                         Err(reason) => return Err(self.foreign(reason)),
                     },
-                    Err(error) => {
-                        let words = error.to_string();
-                        self.end_early(&words);
-                    }
+                    Ok(None) => continue,
+                    Err(broken) => broken,
                 },
-                Err(error) => {
-                    let words = error.to_string();
-                    self.end_early(&words);
-                }
-            }
+                Err(error) => error.to_string(),
+            };
+            self.end_early(&broken);
         }
         Ok(None)
     }
@@ -216,10 +237,11 @@ pub fn newest_checkpoint(path: &Path) -> Result<(RecordedScene, RecordedCheckpoi
         Ok(None::<()>)
     })?;
     let (header, data) = found.ok_or_else(|| packed.foreign("it holds no checkpoint".to_owned()))?;
-    let words = |error: mcap::McapError| packed.foreign(error.to_string());
-    let mut newest = None;
-    for record in ChunkReader::new(header, &data).map_err(words)? {
-        if let Record::Message { header, data } = record.map_err(words)?
+    let (mut chunk, mut newest) = (Chunk::default(), None);
+    chunk.unpack(&header, &data).map_err(|words| packed.foreign(words))?;
+    while let Some(record) = chunk.next_record() {
+        let record = record.and_then(|(opcode, content)| parse(opcode, content));
+        if let Some(Record::Message { header, data }) = record.map_err(|words| packed.foreign(words))?
             && is_checkpoint(header.channel_id)
         {
             newest = Some(data.into_owned());
@@ -228,6 +250,16 @@ pub fn newest_checkpoint(path: &Path) -> Result<(RecordedScene, RecordedCheckpoi
     let newest = newest.ok_or_else(|| packed.foreign("it holds no checkpoint".to_owned()))?;
     let checkpoint = RecordedCheckpoint::decode(&newest[..]).map_err(|e| packed.foreign(e.to_string()))?;
     Ok((scene, checkpoint))
+}
+
+/// A record of a kind that is read here; `None` for others, about whose content nothing is assumed.
+fn parse(opcode: u8, content: &[u8]) -> Result<Option<Record<'_>>, String> {
+    match opcode {
+        op::CHANNEL | op::MESSAGE | op::CHUNK | op::MESSAGE_INDEX => {
+            mcap::parse_record(opcode, content).map(Some).map_err(|error| error.to_string())
+        }
+        _ => Ok(None),
+    }
 }
 
 fn decode(topic: usize, data: &[u8]) -> Result<Option<Recorded>, prost::DecodeError> {

@@ -1,8 +1,7 @@
 //! The thread that writes a recording: a bounded queue in, an MCAP file out, flushed every second.
 
-use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Cursor, Seek, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,9 +10,10 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use mcap::records::MessageHeader;
-use mcap::{Compression, WriteOptions, Writer};
 use scindo_proto::FILE_DESCRIPTOR_SET;
+use tempfile::{SpooledTempFile, spooled_tempfile, spooled_tempfile_in};
 
+use super::mcap_writer::McapWriter;
 use crate::error::RuntimeError;
 
 /// Topics and the messages on them, in the order of their channels.
@@ -31,6 +31,8 @@ pub const TOPICS: [(&str, &str); 8] = [
 /// Messages and bytes that may wait to be written. A disk that is slower than this ends the recording.
 const WAITING: usize = 65_536;
 const WAITING_BYTES: usize = 1 << 30;
+/// Bytes of the index of a recording's chunks that stay in memory, a few minutes of it; more waits in a temporary file.
+const INDEX_IN_MEMORY: usize = 1 << 16;
 /// The file is complete up to what was handed over this long ago.
 const FLUSH: Duration = Duration::from_millis(500);
 
@@ -60,7 +62,10 @@ impl WriterThread {
     pub fn begin(path: &Path) -> Result<Self, RuntimeError> {
         let failed = |reason: String| RuntimeError::Recording { file: path.display().to_string(), reason };
         let file = File::create_new(path).map_err(|e| failed(e.to_string()))?;
-        let (writer, channels) = open(BufWriter::new(file)).map_err(|e| failed(e.to_string()))?;
+        // On the disk of the recording, which has room for it.
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let indexes = spooled_tempfile_in(INDEX_IN_MEMORY, folder.unwrap_or(Path::new(".")));
+        let (writer, channels) = open(BufWriter::new(file), indexes).map_err(|e| failed(e.to_string()))?;
         let (queue, items) = bounded(WAITING);
         let waiting = Arc::new(AtomicUsize::new(0));
         let count = Arc::clone(&waiting);
@@ -123,42 +128,35 @@ impl Drop for WriterThread {
 /// A whole recording in memory, as the bytes of its file.
 ///
 /// # Errors
-/// What the library says.
+/// What the system says.
 pub fn in_memory(items: &[Item]) -> Result<Vec<u8>, String> {
-    let words = |error: mcap::McapError| error.to_string();
-    let (mut writer, channels) = open(Cursor::new(Vec::new())).map_err(words)?;
+    let words = |error: io::Error| error.to_string();
+    let (mut writer, channels) = open(Vec::new(), spooled_tempfile(INDEX_IN_MEMORY)).map_err(words)?;
     for (sequence, Item { topic, unix_ns, bytes }) in (1..).zip(items) {
         let (channel_id, log_time) = (channels[*topic], unix_ns + u64::from(sequence));
         let header = MessageHeader { channel_id, sequence, log_time, publish_time: *unix_ns };
-        writer.write_to_known_channel(&header, bytes).map_err(words)?;
+        writer.add(&header, bytes).map_err(words)?;
     }
-    writer.finish().map_err(words)?;
-    Ok(writer.into_inner().into_inner())
+    writer.finish().map_err(words)
 }
 
 /// Begins a recording, and adds a channel for every topic.
-fn open<W: Write + Seek>(target: W) -> mcap::McapResult<(Writer<W>, [u16; TOPICS.len()])> {
-    let options = WriteOptions::new()
-        .compression(Some(Compression::Zstd))
-        .compression_level(1)
-        .compression_threads(1)
-        .library(concat!("scindo ", env!("CARGO_PKG_VERSION")));
-    let mut writer = options.create(target)?;
+fn open<W: Write>(target: W, indexes: SpooledTempFile) -> io::Result<(McapWriter<W>, [u16; TOPICS.len()])> {
+    let mut writer = McapWriter::begin(target, indexes)?;
     let mut channels = [0; TOPICS.len()];
     for (channel, (topic, name)) in channels.iter_mut().zip(TOPICS) {
-        let schema = writer.add_schema(name, "protobuf", FILE_DESCRIPTOR_SET)?;
-        *channel = writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())?;
+        *channel = writer.add_topic(topic, name, FILE_DESCRIPTOR_SET)?;
     }
     Ok((writer, channels))
 }
 
 fn write(
-    mut writer: Writer<BufWriter<File>>,
+    mut writer: McapWriter<BufWriter<File>>,
     channels: [u16; TOPICS.len()],
     items: &Receiver<Item>,
     waiting: &AtomicUsize,
 ) -> Result<(), String> {
-    let words = |error: mcap::McapError| error.to_string();
+    let words = |error: io::Error| error.to_string();
     let (mut sequence, mut last_ns) = (0u32, 0);
     let mut due = Instant::now() + FLUSH;
     loop {
@@ -169,7 +167,7 @@ fn write(
                 sequence = sequence.wrapping_add(1);
                 let (log_time, publish_time) = (last_ns, unix_ns);
                 let header = MessageHeader { channel_id: channels[topic], sequence, log_time, publish_time };
-                writer.write_to_known_channel(&header, &bytes).map_err(words)?;
+                writer.add(&header, &bytes).map_err(words)?;
                 waiting.fetch_sub(bytes.len(), Ordering::Relaxed);
             }
             Err(RecvTimeoutError::Timeout) => {}
