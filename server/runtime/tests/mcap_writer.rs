@@ -3,10 +3,11 @@
 #![allow(clippy::unwrap_used)]
 
 use std::io;
+use std::sync::Arc;
 
-use mcap::records::{MessageHeader, Record, op};
+use mcap::records::{MessageHeader, MessageIndexEntry, Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use mcap::{MessageStream, Summary};
+use mcap::{Channel, MessageStream, Summary};
 use scindo::record::mcap_writer::McapWriter;
 use scindo_allocations::{Counting, held_bytes};
 use tempfile::spooled_tempfile;
@@ -99,16 +100,21 @@ fn the_library_reads_every_message_and_finds_each_by_the_index() {
     );
     // The long message ends a chunk of its own accord.
     assert_eq!((summary.chunk_indexes.len(), statistics.chunk_count), (11, 11));
-    let mut seen = vec![false; 200];
+    let mut seen = [false; 200];
     for chunk in &summary.chunk_indexes {
         let times = chunk.message_start_time..=chunk.message_end_time;
-        for (channel, entries) in summary.read_message_indexes(&file, chunk).unwrap() {
-            for entry in entries {
-                let message = summary.seek_message(&file, chunk, &entry).unwrap();
-                assert_eq!((&message.channel.topic, message.log_time), (&channel.topic, entry.log_time));
-                assert!(times.contains(&entry.log_time));
-                assert!(!std::mem::replace(&mut seen[message.sequence as usize], true));
-            }
+        let indexes = summary.read_message_indexes(&file, chunk).unwrap();
+        let of_channel = |(channel, entries): (Arc<Channel<'_>>, Vec<MessageIndexEntry>)| {
+            let topic = channel.topic.clone();
+            entries.into_iter().map(move |entry| (topic.clone(), entry))
+        };
+        let mut entries: Vec<_> = indexes.into_iter().flat_map(of_channel).collect();
+        entries.sort_unstable_by_key(|(_, entry)| entry.offset);
+        for (topic, entry) in entries {
+            let message = summary.seek_message(&file, chunk, &entry).unwrap();
+            assert_eq!((&message.channel.topic, message.log_time), (&topic, entry.log_time));
+            assert!(times.contains(&entry.log_time));
+            assert!(!std::mem::replace(&mut seen[message.sequence as usize], true));
         }
     }
     assert!(seen.iter().all(|seen| *seen));
