@@ -21,6 +21,7 @@ await run(async () => {
     await page.goto(pathToFileURL(path.resolve(file)).href);
     if (colorScheme === "light") await isComplete(page);
     await isLegible(page, colorScheme);
+    if (colorScheme === "light") await answers(page);
     hold(asked.length === 0, `${colorScheme}: the page asks nobody for anything (${asked.join(", ") || "self-contained"})`);
     await page.screenshot({ path: path.join(artifacts, `accuracy-${colorScheme}.png`), fullPage: true });
     for (const section of await page.$$("section[id]")) {
@@ -41,12 +42,13 @@ await run(async () => {
 async function isComplete(page) {
   const sections = await page.$$eval("section[id]:not(#method)", (all) => all.map((section) => ({
     id: section.id,
-    plots: section.querySelectorAll("svg.plot").length,
-    marks: section.querySelectorAll("figure svg.plot .mark").length,
-    titled: [...section.querySelectorAll("svg.plot g:has(> .mark) > title")].filter((t) => t.textContent.includes("median")).length,
+    plots: section.querySelectorAll("[data-axes=logarithmic] > svg.plot").length,
+    hidden: section.querySelectorAll("[data-axes=linear][hidden] > svg.plot").length,
+    marks: section.querySelectorAll("figure [data-axes=logarithmic] .mark").length,
+    titled: [...section.querySelectorAll("[data-axes=logarithmic] g:has(> .mark)[data-tip]")].filter((g) => g.dataset.tip.includes("median")).length,
     front: section.querySelectorAll("table.front tbody tr").length,
     ranks: section.querySelector("svg.plot").querySelectorAll("text.rank").length,
-    line: section.querySelectorAll("svg.plot path.front").length,
+    line: section.querySelectorAll("[data-axes=logarithmic] path.front").length,
     failed: section.querySelector("svg.plot").querySelectorAll("g > path.failed").length,
     rows: section.querySelectorAll("table.all tbody tr").length,
     reasons: section.querySelectorAll("table.all td.reason").length,
@@ -54,7 +56,7 @@ async function isComplete(page) {
   })));
   for (const name of cases) hold(sections.some((s) => s.id === name), `case ${name} is on the page`);
   for (const s of sections) {
-    hold(s.plots === 3 && s.marks > 6 && s.titled > 3, `${s.id}: three pictures with marks that tell what they are (${s.marks} marks)`);
+    hold(s.plots === 3 && s.hidden === 3 && s.marks > 6 && s.titled > 3, `${s.id}: three pictures with marks that tell what they are (${s.marks} marks)`);
     hold(s.line >= 1 && s.front >= 1 && s.front === s.ranks, `${s.id}: a Pareto front, drawn and listed (${s.front} points)`);
     // One cross stands in the legend.
     hold(s.reasons === 0 || s.failed >= s.reasons, `${s.id}: every run without result is marked (${s.reasons} of ${s.rows}) and its reason is listed`);
@@ -64,13 +66,51 @@ async function isComplete(page) {
   hold(/Displacement error/.test(method) && /Machine/.test(method) && /commit/i.test(method), "method, machine and commit are named");
 }
 
+/** A plot tells what is under the pointer, switches its series and its axes, and prints what is shown. */
+async function answers(page) {
+  const plot = page.locator("section .axes").first();
+  const marks = () => plot.locator("[data-axes]:not([hidden]) g[data-tip]:has(> .mark)");
+  const seen = () => marks().evaluateAll((all) => all.filter((g) => g.style.display !== "none").length);
+  const tip = page.locator(".tip");
+  await plot.scrollIntoViewIfNeeded();
+  const best = plot.locator("[data-axes]:not([hidden]) g[data-tip]:has(> .best)").first();
+  const { x, y, width, height } = await best.boundingBox();
+  await page.mouse.move(x + width / 2 + 3, y + height / 2 + 2);
+  const told = await tip.textContent();
+  hold(await tip.isVisible() && told === (await best.getAttribute("data-tip")), `a mark under the pointer tells what it is ("${told.split("\n")[0]}")`);
+  await page.screenshot({ path: path.join(artifacts, "accuracy-pointed-at.png") });
+  await page.mouse.move(2, 2);
+  hold(await tip.isHidden(), "the words go with the pointer");
+
+  const all = await seen();
+  const key = plot.locator("[data-axes]:not([hidden]) [data-toggles^=c]").first();
+  const name = await key.getAttribute("data-toggles");
+  const of = await marks().evaluateAll((every, series) => every.filter((g) => g.dataset.series.split(" ").includes(series)).length, name);
+  await key.click();
+  hold(of > 0 && (await seen()) === all - of && (await key.getAttribute("aria-checked")) === "false", `the legend switches ${of} of ${all} marks off`);
+
+  const before = await marks().first().getAttribute("transform");
+  await plot.locator("button").click();
+  hold((await marks().first().getAttribute("transform")) !== before && (await seen()) === all - of, "on linear axes the same marks lie elsewhere");
+  await isLegible(page, "linear axes");
+  await plot.screenshot({ path: path.join(artifacts, "accuracy-linear.png") });
+  await page.emulateMedia({ media: "print" });
+  hold(await plot.locator("button").isHidden() && (await seen()) === all - of, "print has no button, and shows what is shown");
+  await page.emulateMedia({ media: "screen" });
+  await plot.locator("button").click();
+  await plot.locator("[data-axes]:not([hidden]) [data-toggles^=c]").first().press("Enter");
+  hold((await seen()) === all, "the keyboard switches them on again");
+}
+
 /** No text of a picture leaves it or covers another; text has contrast; nothing is tiny. */
 async function isLegible(page, scheme) {
   const found = await page.evaluate(() => {
     const faults = [];
-    for (const svg of document.querySelectorAll("svg.plot")) {
+    const shown = [...document.querySelectorAll("svg.plot")].filter((svg) => !svg.closest("[hidden]"));
+    for (const svg of shown) {
       const frame = svg.getBoundingClientRect();
-      const boxes = [...svg.querySelectorAll("text")].map((text) => ({ text: text.textContent, box: text.getBoundingClientRect() }));
+      const written = [...svg.querySelectorAll("text")].filter((text) => text.style.display !== "none");
+      const boxes = written.map((text) => ({ text: text.textContent, box: text.getBoundingClientRect() }));
       for (const { text, box } of boxes) {
         if (box.left < frame.left - 1 || box.right > frame.right + 1 || box.top < frame.top - 1 || box.bottom > frame.bottom + 1) {
           faults.push(`"${text}" leaves its picture`);
@@ -96,7 +136,7 @@ async function isLegible(page, scheme) {
       const c = contrast(getComputedStyle(element).color);
       if (c < 4.5) faults.push(`${element.tagName} has contrast ${c.toFixed(1)}`);
     }
-    for (const text of document.querySelectorAll("svg.plot text")) {
+    for (const text of shown.flatMap((svg) => [...svg.querySelectorAll("text")])) {
       const c = contrast(getComputedStyle(text).fill);
       if (c < 4.5) faults.push(`"${text.textContent}" has contrast ${c.toFixed(1)}`);
     }

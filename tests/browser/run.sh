@@ -46,3 +46,7 @@ node tests/browser/people.mjs "$(dirname "$bin")" tests/browser/people.toml \
 rm -rf "$artifacts/accuracy"
 "$bin" accuracy --quick --budget-ms 20 --out "$artifacts/accuracy"
 node tests/browser/accuracy.mjs "$artifacts/accuracy/index.html" r1 r2-tc1 bar-rest bar-motion
+
+rm -rf "$artifacts/stress"
+"$bin" stress --case step-sweep --out "$artifacts/stress"
+node tests/browser/charts.mjs "$artifacts/stress/index.html"

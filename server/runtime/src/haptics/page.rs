@@ -96,7 +96,7 @@ pub fn html(trials: &[Trial]) -> String {
     }
     body += "</tbody>\n</table></div>\n</section>\n<section>\n<h2>Force over time</h2>\n";
     for trial in trials.iter().filter(|trial| trial.cell.loss == 0.0) {
-        let _ = writeln!(body, "<figure>{}</figure>", forces(trial).svg());
+        let _ = writeln!(body, "<figure>{}</figure>", forces(trial).html());
     }
     body += "</section>\n";
     scindo_study::page::wrap("what the hand feels", &body)

@@ -34,10 +34,10 @@ pub fn section(result: &CaseResult) -> String {
     let main = plot(result, [1064.0, 580.0], |errors| errors.l2, "displacement error");
     let _ = writeln!(
         out,
-        "<figure>\n{}<figcaption>Each mark is one configuration; hover over it for its settings. Left is faster, \
-         down is more accurate. The numbered marks on the line are the Pareto front: no other configuration is \
+        "<figure>\n{}<figcaption>Each mark is one configuration; point at it to see its settings. Left is faster, \
+         down is more accurate. Names in the legend switch their marks off and on. The numbered marks on the line are the Pareto front: no other configuration is \
          both faster and more accurate.</figcaption>\n</figure>",
-        main.svg()
+        main.html()
     );
     let goal = format!("error of the goal: {}", case.goal.words);
     let (a, b) = (
@@ -49,9 +49,9 @@ pub fn section(result: &CaseResult) -> String {
         "<div class=\"pair\">\n<figure>{}<figcaption>The same points by the error of the {}. The line connects \
         the points of the front above.</figcaption></figure>\n<figure>{}<figcaption>The same points by the error \
         of their elastic energy, with the same line.</figcaption></figure>\n</div>",
-        a.svg(),
+        a.html(),
         escape(&goal),
-        b.svg()
+        b.html()
     );
     out += &wear::table(result);
     out += &front_table(result);

@@ -22,9 +22,9 @@ pub fn section(result: &ExperimentResult) -> String {
     result.tables.iter().for_each(|t| out += &table(t));
     for plots in &result.plots {
         out += "<figure>\n<div class=\"pair\">\n";
-        plots.plots.iter().for_each(|plot| out += &plot.svg());
+        plots.plots.iter().for_each(|plot| out += &plot.html());
         for chart in &plots.charts {
-            let _ = writeln!(out, "<div><strong>{}</strong>{}</div>", escape(&chart.title), chart.svg());
+            let _ = writeln!(out, "<div><strong>{}</strong>{}</div>", escape(&chart.title), chart.html());
         }
         let _ = writeln!(out, "</div>\n<figcaption>{}</figcaption>\n</figure>", prose(&plots.caption));
     }

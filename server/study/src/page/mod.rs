@@ -7,6 +7,8 @@ mod case;
 
 mod experiment;
 
+pub(crate) mod interactive;
+
 mod json;
 
 pub(crate) mod plot;
@@ -49,12 +51,14 @@ pub fn wrap(title: &str, body: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>scindo · {}</title>\n<style>\n{}{}{}{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+         <title>scindo · {}</title>\n<style>\n{}{}{}{}{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n{}</body>\n</html>\n",
         html::escape(title),
         style::PAGE,
         style::COLOURS,
         style::PLOT,
-        style::LINES
+        style::LINES,
+        interactive::STYLE,
+        interactive::SCRIPT
     )
 }
 
@@ -68,6 +72,7 @@ fn html(study: &StudyResult) -> String {
     out += style::COLOURS;
     out += style::PLOT;
     out += style::LINES;
+    out += interactive::STYLE;
     out += &crate::stress::view::style();
     out += "</style>\n</head>\n<body>\n<main>\n";
     out += &text::opening(study);
@@ -78,6 +83,8 @@ fn html(study: &StudyResult) -> String {
         out += &experiment::section(result);
     }
     out += &text::method(study);
-    out += "</main>\n</body>\n</html>\n";
+    out += "</main>\n";
+    out += interactive::SCRIPT;
+    out += "</body>\n</html>\n";
     out
 }

@@ -1,10 +1,11 @@
-//! A log–log plot of error over time: points, Pareto front, failures, and the error bar of the reference.
+//! A plot of error over time: points, Pareto front, failures, and the error bar of the reference.
 //! Colours are CSS classes, so that they follow the light or dark theme of the page.
 
 use std::fmt::Write as _;
 
 use super::html::{escape, time};
-use super::scale::Scale;
+use super::interactive;
+use super::scale::{Scale, Spacing};
 use crate::words::{percent, short};
 
 /// A run with a result.
@@ -66,12 +67,25 @@ const ROW: f64 = 24.0;
 /// Upper bound on the width of a character in a tick label [px].
 const CHARACTER: f64 = 8.5;
 
+/// Distance of a number from others that leaves both legible [px].
+const ROOM: f64 = 15.0;
+
 /// An error bar smaller than every error by this factor is not drawn.
 const FAR_BELOW: f64 = 20.0;
 
 impl Plot {
-    /// The picture as SVG, with classes of [`super::style`].
+    /// The plot for a page: with logarithmic axes, and with linear ones by a button.
+    pub fn html(&self) -> String {
+        let linear = self.draw(Spacing::Linear);
+        interactive::axes(&[("logarithmic", self.svg()), ("linear", linear)])
+    }
+
+    /// The picture as SVG with logarithmic axes, with classes of [`super::style`].
     pub fn svg(&self) -> String {
+        self.draw(Spacing::Logarithmic)
+    }
+
+    fn draw(&self, spacing: Spacing) -> String {
         let [width, height] = self.size;
         let legend = self.legend();
         let title = if self.title.is_some() { 34.0 } else { 0.0 };
@@ -82,9 +96,9 @@ impl Plot {
         let known = self.failures.iter().filter_map(|failure| failure.x);
         let budget = self.budget_ms.into_iter();
         let xs = self.marks.iter().map(|mark| mark.x).chain(known).chain(budget);
-        let x = Scale::around(xs, LEFT, width - RIGHT);
+        let x = Scale::around(xs, LEFT, width - RIGHT, spacing);
         let bar = Some(self.error_bar).filter(|_| self.shows_error_bar());
-        let y = Scale::around(self.marks.iter().map(|mark| mark.y).chain(bar), y0, y1);
+        let y = Scale::around(self.marks.iter().map(|mark| mark.y).chain(bar), y0, y1, spacing);
         let mut out = format!(
             "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">\n<rect class=\"ground\" width=\"{width}\" height=\"{height}\"/>\n",
             escape(&format!("{} over {}", self.y_label, self.x_label))
@@ -106,7 +120,7 @@ impl Plot {
         self.grid(&mut out, &x, &y, (y0, y1));
         self.bands(&mut out, &x, &y, (y0, y1));
         self.front(&mut out, &x, &y, y1);
-        self.points(&mut out, &x, &y);
+        self.points(&mut out, &x, &y, spacing == Spacing::Linear);
         if lane > 0.0 {
             self.lane(&mut out, &x, top);
         }
@@ -210,10 +224,11 @@ impl Plot {
             let _ = write!(path, " H{:.1} V{:.1}", x.at(mark.x), y.at(mark.y));
         }
         let _ = write!(path, " H{:.1}", self.size[0] - RIGHT);
-        let _ = writeln!(out, "<path class=\"front\" d=\"{path}\"/>");
+        let _ = writeln!(out, "<path class=\"front\" data-series=\"front\" d=\"{path}\"/>");
     }
 
-    fn points(&self, out: &mut String, x: &Scale, y: &Scale) {
+    /// Draws the marks. Where they may be `crowded`, those of the front without room for their number have none.
+    fn points(&self, out: &mut String, x: &Scale, y: &Scale, crowded: bool) {
         let (best, others): (Vec<&Mark>, Vec<&Mark>) =
             self.marks.iter().partition(|mark| mark.rank.is_some());
         let mut taken: Vec<[f64; 2]> = best.iter().map(|mark| [x.at(mark.x), y.at(mark.y)]).collect();
@@ -223,18 +238,23 @@ impl Plot {
             let radius = if mark.rank.is_some() { 6.5 } else { 5.0 };
             let _ = writeln!(
                 out,
-                "<g transform=\"translate({px:.1},{py:.1})\"><title>{}</title>{}</g>",
+                "<g data-series=\"{}\" transform=\"translate({px:.1},{py:.1})\"><title>{}</title>{}</g>",
+                series(mark),
                 escape(&mark.title),
                 shape(mark.shape, radius, &format!("{class} c{}", mark.colour % super::style::MARKS))
             );
         }
         for mark in &best {
             let (Some(rank), at) = (mark.rank, [x.at(mark.x), y.at(mark.y)]) else { continue };
-            let place = free_place(at, &taken, [self.size[0] - RIGHT, self.size[1] - BOTTOM]);
+            let Some(place) = free_place(at, &taken, [self.size[0] - RIGHT, self.size[1] - BOTTOM], crowded)
+            else {
+                continue;
+            };
             taken.push(place);
             let _ = writeln!(
                 out,
-                "<text class=\"rank\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{rank}</text>",
+                "<text class=\"rank\" data-series=\"{}\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{rank}</text>",
+                series(mark),
                 place[0],
                 place[1] + 4.0
             );
@@ -274,7 +294,8 @@ impl Plot {
 
     /// Rows of the legend: colours, shapes, and what lines and crosses mean.
     fn legend(&self) -> Vec<String> {
-        let mut items: Vec<(String, String)> = Vec::new();
+        // Mark, name, and the series that it switches.
+        let mut items: Vec<(String, String, Option<String>)> = Vec::new();
         let single = self.shapes.len() < 2;
         for (i, name) in &self.colours {
             let mark = shape(
@@ -282,37 +303,42 @@ impl Plot {
                 5.5,
                 &format!("mark c{}", i % super::style::MARKS),
             );
-            items.push((mark, name.clone()));
+            items.push((mark, name.clone(), Some(format!("c{i}"))));
         }
         if !single {
             for (i, name) in &self.shapes {
-                items.push((shape(*i, 5.5, "mark key"), name.clone()));
+                items.push((shape(*i, 5.5, "mark key"), name.clone(), Some(format!("k{i}"))));
             }
         }
         if self.size[0] > 600.0 {
-            items.push(("<path class=\"front\" d=\"M-9 -5H0V5H9\"/>".to_owned(), "Pareto front".to_owned()));
+            let front = "<path class=\"front\" d=\"M-9 -5H0V5H9\"/>";
+            items.push((front.to_owned(), "Pareto front".to_owned(), Some("front".to_owned())));
             if !self.failures.is_empty() {
                 items.push((
                     "<path class=\"failed\" d=\"M-4.5 -4.5L4.5 4.5M-4.5 4.5L4.5 -4.5\"/>".to_owned(),
                     "no result".to_owned(),
+                    None,
                 ));
             }
             if self.shows_error_bar() {
                 items.push((
                     "<rect class=\"unknown\" x=\"-9\" y=\"-6\" width=\"18\" height=\"12\"/>".to_owned(),
                     "within the error bar of the reference".to_owned(),
+                    None,
                 ));
             }
             if let Some(budget) = self.budget_ms {
                 items.push((
                     "<line class=\"budget\" x1=\"0\" x2=\"0\" y1=\"-9\" y2=\"9\"/>".to_owned(),
                     format!("budget {}", time(budget)),
+                    None,
                 ));
             }
         }
         let mut rows = Vec::new();
         let (mut row, mut at) = (String::new(), 0.0);
-        for (mark, name) in items {
+        for (mark, name, series) in items {
+            let toggles = series.map_or(String::new(), |series| format!("data-toggles=\"{series}\" "));
             let width = 24.0 + 7.6 * name.chars().count() as f64 + 18.0;
             if at + width > self.size[0] - LEFT - RIGHT && at > 0.0 {
                 rows.push(std::mem::take(&mut row));
@@ -320,7 +346,7 @@ impl Plot {
             }
             let _ = write!(
                 row,
-                "<g transform=\"translate({:.1},0)\">{mark}<text x=\"15\" y=\"4.5\">{}</text></g>",
+                "<g {toggles}transform=\"translate({:.1},0)\">{mark}<text x=\"15\" y=\"4.5\">{}</text></g>",
                 at + 9.0,
                 escape(&name)
             );
@@ -329,6 +355,11 @@ impl Plot {
         rows.push(row);
         rows
     }
+}
+
+/// The series of a mark, by which the legend switches it.
+fn series(mark: &Mark) -> String {
+    format!("c{} k{}", mark.colour, mark.shape)
 }
 
 /// Draws a shape around the origin.
@@ -357,8 +388,14 @@ fn shape(index: usize, r: f64, class: &str) -> String {
     }
 }
 
-/// A position beside `at` within the frame, away from the positions in `taken`.
-fn free_place(at: [f64; 2], taken: &[[f64; 2]], [right, bottom]: [f64; 2]) -> [f64; 2] {
+/// A position beside `at` within the frame, away from the positions in `taken`. Where it may be `crowded`, there is none
+/// if others are too near.
+fn free_place(
+    at: [f64; 2],
+    taken: &[[f64; 2]],
+    [right, bottom]: [f64; 2],
+    crowded: bool,
+) -> Option<[f64; 2]> {
     let around = [
         [-12.0, 12.0],
         [12.0, -12.0],
@@ -379,11 +416,18 @@ fn free_place(at: [f64; 2], taken: &[[f64; 2]], [right, bottom]: [f64; 2]) -> [f
         let c = clear(place);
         if best.is_none_or(|(_, b)| c > b) { Some((*place, c)) } else { best }
     });
-    best.map_or(places[0], |(place, _)| place)
+    match best {
+        Some((_, clear)) if crowded && clear < ROOM => None,
+        Some((place, _)) => Some(place),
+        None => Some(places[0]),
+    }
 }
 
-/// Label for a time on an axis, which is 1, 2 or 5 times a power of ten.
+/// Label for a time on an axis.
 fn tick_time(milliseconds: f64) -> String {
+    if milliseconds == 0.0 {
+        return "0".to_owned();
+    }
     let (value, unit) = if milliseconds >= 999.0 {
         (milliseconds / 1e3, "s")
     } else if milliseconds >= 0.0999 {
@@ -396,5 +440,5 @@ fn tick_time(milliseconds: f64) -> String {
 
 fn tick_percent(error: f64) -> String {
     let value = 100.0 * error;
-    if value < 0.9e-3 { format!("{value:.0e} %") } else { format!("{} %", short(value)) }
+    if value > 0.0 && value < 0.9e-3 { format!("{value:.0e} %") } else { format!("{} %", short(value)) }
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::page::html::escape;
+use crate::page::interactive;
 
 /// One line of a chart.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +25,7 @@ pub struct Chart {
     pub y_label: String,
     /// The lines.
     pub lines: Vec<Line>,
-    /// Whether the vertical axis is logarithmic.
+    /// Whether the vertical axis is logarithmic at first.
     pub logarithmic: bool,
 }
 
@@ -54,24 +55,45 @@ impl Chart {
         }
     }
 
+    /// The chart for a page; a button changes its vertical axis. Empty if there is nothing to draw.
+    pub fn html(&self) -> String {
+        let first = self.svg();
+        let other = self.draw(!self.logarithmic);
+        let name = |logarithmic| if logarithmic { "logarithmic" } else { "linear" };
+        let mut drawings = vec![(name(self.logarithmic), first), (name(!self.logarithmic), other)];
+        drawings.retain(|(_, svg)| !svg.is_empty());
+        match &drawings[..] {
+            [] => String::new(),
+            drawings => interactive::axes(drawings),
+        }
+    }
+
     /// The chart as SVG; empty if there is nothing to draw.
     pub fn svg(&self) -> String {
-        let usable =
-            |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite() && (!self.logarithmic || p[1] > 0.0);
+        self.draw(self.logarithmic)
+    }
+
+    fn draw(&self, logarithmic: bool) -> String {
+        let usable = |p: &&[f64; 2]| p[0].is_finite() && p[1].is_finite() && (!logarithmic || p[1] > 0.0);
         let points = || self.lines.iter().flat_map(|line| &line.points).filter(usable);
         if points().next().is_none() {
             return String::new();
         }
-        let height = |y: f64| if self.logarithmic { y.log10() } else { y };
+        let height = |y: f64| if logarithmic { y.log10() } else { y };
         let x = Axis::around(points().map(|p| p[0]), false, (LEFT, WIDTH - RIGHT));
         let legend = self.legend();
         let top = 10.0 + ROW * legend.len() as f64;
         let total = HEIGHT + top;
         let bottom = total - BOTTOM;
-        let y = Axis::around(points().map(|p| height(p[1])), !self.logarithmic, (bottom, top));
+        let y = Axis::around(points().map(|p| height(p[1])), !logarithmic, (bottom, top));
         let mut out = format!(
-            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {total}\" role=\"img\" aria-label=\"{}\">\n<rect class=\"ground\" width=\"{WIDTH}\" height=\"{total}\"/>\n",
-            escape(&self.title)
+            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {total}\" role=\"img\" aria-label=\"{}\" data-x=\"{}\" data-x-label=\"{}\" data-y=\"{}\" data-y-label=\"{}\"{}>\n<rect class=\"ground\" width=\"{WIDTH}\" height=\"{total}\"/>\n",
+            escape(&self.title),
+            x.words(),
+            escape(&self.x_label),
+            y.words(),
+            escape(&self.y_label),
+            if logarithmic { " data-y-power=\"10\"" } else { "" }
         );
         legend.iter().enumerate().for_each(|(i, row)| {
             let _ = writeln!(
@@ -91,7 +113,7 @@ impl Chart {
         }
         for tick in y.ticks() {
             let at = y.at(tick);
-            let words = if self.logarithmic { power(tick) } else { label(tick, y.step) };
+            let words = if logarithmic { power(tick) } else { label(tick, y.step) };
             let _ = writeln!(
                 out,
                 "<line class=\"fine\" x1=\"{LEFT}\" x2=\"{}\" y1=\"{at:.1}\" y2=\"{at:.1}\"/><text class=\"tick\" x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{words}</text>",
@@ -110,7 +132,11 @@ impl Chart {
                 let command = if k == 0 { 'M' } else { 'L' };
                 let _ = write!(path, "{command}{:.1} {:.1}", x.at(p[0]), y.at(height(p[1])));
             }
-            let _ = writeln!(out, "<path class=\"line {}\" d=\"{path}\"/>", classes[i]);
+            let (class, name, series) = (&classes[i], escape(&line.name), self.series(i));
+            let _ = writeln!(
+                out,
+                "<path class=\"line {class}\" data-name=\"{name}\" data-series=\"{series}\" d=\"{path}\"/>"
+            );
         }
         let _ = writeln!(
             out,
@@ -145,21 +171,36 @@ impl Chart {
         (0..self.lines.len()).map(&mut of_line).collect()
     }
 
+    /// The series of line `i`, by which the legend switches it: its run and, if the run has two energies, which one.
+    fn series(&self, i: usize) -> String {
+        let elastic = self.is_elastic_of_last(i);
+        let kinetic = i + 1 < self.lines.len() && self.is_elastic_of_last(i + 1);
+        let run = if elastic { i - 1 } else { i };
+        let energy = if elastic {
+            " elastic"
+        } else if kinetic {
+            " kinetic"
+        } else {
+            ""
+        };
+        format!("r{run}{energy}")
+    }
+
     fn legend(&self) -> Vec<String> {
         let classes = self.classes();
         let paired = |i: usize| i < self.lines.len() && self.is_elastic_of_last(i);
         let mut items = Vec::new();
         for (i, line) in self.lines.iter().enumerate().filter(|(i, _)| !paired(*i)) {
             let run = line.name.strip_suffix(KINETIC).filter(|_| paired(i + 1));
-            items.push((classes[i].as_str(), run.unwrap_or(&line.name)));
+            items.push((classes[i].as_str(), run.unwrap_or(&line.name), format!("r{i}")));
         }
         if items.len() < self.lines.len() {
-            items.push(("key", "kinetic"));
-            items.push(("key d1", "elastic"));
+            items.push(("key", "kinetic", "kinetic".to_owned()));
+            items.push(("key d1", "elastic", "elastic".to_owned()));
         }
         let mut rows = Vec::new();
         let (mut row, mut at) = (String::new(), 0.0);
-        for (class, name) in items {
+        for (class, name, series) in items {
             let width = 44.0 + 8.0 * name.chars().count() as f64;
             if at + width > WIDTH - LEFT && at > 0.0 {
                 rows.push(std::mem::take(&mut row));
@@ -167,7 +208,7 @@ impl Chart {
             }
             let _ = write!(
                 row,
-                "<g transform=\"translate({at:.0},0)\"><path class=\"line {class}\" d=\"M0 0H22\"/><text x=\"28\" y=\"4.5\">{}</text></g>",
+                "<g data-toggles=\"{series}\" transform=\"translate({at:.0},0)\"><path class=\"line {class}\" d=\"M0 0H22\"/><text x=\"28\" y=\"4.5\">{}</text></g>",
                 escape(name)
             );
             at += width;
@@ -206,6 +247,12 @@ impl Axis {
     fn at(&self, value: f64) -> f64 {
         let share = (value - self.low) / (self.high - self.low);
         self.pixels.0 + (self.pixels.1 - self.pixels.0) * share
+    }
+
+    /// Its range and pixels, for the script of the page.
+    fn words(&self) -> String {
+        let Self { low, high, pixels: (from, to), .. } = self;
+        format!("{low} {high} {from} {to}")
     }
 
     fn ticks(&self) -> Vec<f64> {
@@ -259,6 +306,23 @@ mod tests {
         assert!(svg.contains("a &lt; b") && !svg.contains("NaN"));
         chart.logarithmic = true;
         assert!(!chart.svg().contains("NaN"));
+        assert_eq!(chart.html().matches("<svg").count(), 2);
+        chart.lines[0].points = vec![[0.0, -1.0], [1.0, 0.0]];
+        assert_eq!(chart.html().matches("<svg").count(), 1, "nothing lies on a logarithmic axis");
+    }
+
+    #[test]
+    fn the_legend_switches_runs_and_energies() {
+        let mut chart = Chart::new("energy", "time [s]", "energy [J]");
+        for name in ["cut, kinetic", "cut, elastic", "all"] {
+            chart.lines.push(Line { name: name.to_owned(), points: vec![[0.0, 1.0], [1.0, 2.0]] });
+        }
+        let series: Vec<String> = (0..3).map(|i| chart.series(i)).collect();
+        assert_eq!(series, ["r0 kinetic", "r0 elastic", "r2"]);
+        let legend = chart.legend().concat();
+        for name in ["r0", "r2", "kinetic", "elastic"] {
+            assert!(legend.contains(&format!("data-toggles=\"{name}\"")), "{legend}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::mutation::Row;
 use super::suite::SuiteReport;
 use super::view;
 use crate::page::html::escape;
-use crate::page::style;
+use crate::page::{interactive, style};
 
 /// Style of status marks, chart lines and case cards.
 const STYLE: &str = "
@@ -36,6 +36,7 @@ pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
     out += style::COLOURS;
     out += style::PLOT;
     out += style::LINES;
+    out += interactive::STYLE;
     out += STYLE;
     out += &view::style();
     out += "</style>\n</head>\n<body>\n<main>\n";
@@ -46,7 +47,9 @@ pub fn html(report: &SuiteReport, table: Option<&[Row]>) -> String {
     }
     report.cases.iter().for_each(|case| out += &section(case));
     out += &closing(report);
-    out += "</main>\n</body>\n</html>\n";
+    out += "</main>\n";
+    out += interactive::SCRIPT;
+    out += "</body>\n</html>\n";
     out
 }
 
@@ -151,7 +154,7 @@ fn section(report: &CaseReport) -> String {
         }
         out += "</div>\n";
     }
-    let drawn: Vec<String> = evidence.charts.iter().map(|chart| chart.svg()).collect();
+    let drawn: Vec<String> = evidence.charts.iter().map(|chart| chart.html()).collect();
     if drawn.iter().any(|svg| !svg.is_empty()) {
         out += "<div class=\"charts\">\n";
         for (svg, chart) in drawn.iter().zip(&evidence.charts).filter(|(svg, _)| !svg.is_empty()) {
