@@ -10,8 +10,8 @@
 
 The memory of the server must not grow after a warm-up, in which the surgeon hardly pauses and bodies get more cuts
 than any later one: less than 1 MiB per hour by a straight line through all that follows, where the run is long enough to
-tell. In such a run the allocator of the server is told to give back at once what is free, since what it keeps goes up and
-down by many times more.
+tell. In such a run the allocator of the server is told to give back at once what is free, and to keep one pool for all
+threads, since what it keeps goes up and down by many times more. deploy/scindo.service names the same settings.
 """
 
 import json
@@ -47,7 +47,9 @@ WARM_UP_S = 240.0
 WARM_UP_PAUSES_S = (0.1, 0.3)
 WARM_UP_CUTS = 2
 # Settings of the allocator of the server in a run whose slope is judged.
-GIVES_BACK = "GLIBC_TUNABLES=glibc.malloc.mmap_threshold=65536:glibc.malloc.trim_threshold=65536"
+GIVES_BACK = (
+    "GLIBC_TUNABLES=glibc.malloc.arena_max=1:glibc.malloc.mmap_threshold=65536:glibc.malloc.trim_threshold=65536"
+)
 # A killed server loses at most this time of its recording [s].
 LOST_S = 1.0
 # A slope over less time than this says nothing [s].
