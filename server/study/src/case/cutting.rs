@@ -17,7 +17,7 @@ pub const METHODS: [&str; 3] = ["xfem", "snap", "precut"];
 pub const FRONTS: [&str; 2] = ["xfem-front", "snap-front"];
 
 /// How the beam is loaded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pull {
     /// Gravity across the beam.
     Gravity,
@@ -25,6 +25,22 @@ pub enum Pull {
     Force,
     /// The same strip, displaced by 20 mm along the beam.
     Strip,
+    /// The same strip, and one at the other side that is displaced by 30 mm outwards and 15 mm back; both by a part of it.
+    Strips(f64),
+}
+
+/// What of a cut lies inside elements, a third of a cell beside their faces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Inside {
+    /// Its plane.
+    pub plane: bool,
+    /// Its front.
+    pub front: bool,
+}
+
+impl Inside {
+    /// The mesh was made with the cut.
+    pub const NOTHING: Self = Self { plane: false, front: false };
 }
 
 /// Cells of 6×12×40 in the beam, of 3×6×20 for a quick study. The strip ends on a line of cells.
@@ -34,17 +50,13 @@ const COARSE: (&[f64], usize, usize) = (&[0.0, 0.005, 0.015, 0.03], 6, 10);
 /// Builds the case.
 pub fn case(pull: Pull, quick: bool) -> Case {
     let body = ["beam".to_owned()];
-    let gold = Gold::read(match pull {
-        Pull::Gravity => include_str!("../../cases/r2-tc1.gold.json"),
-        Pull::Force => include_str!("../../cases/r2-tc2force.gold.json"),
-        Pull::Strip => include_str!("../../cases/r2-tc2strip.gold.json"),
-    });
+    let gold = gold(pull);
     let (name, title, how, goal) = match pull {
         Pull::Gravity => ("cut-tc1", "gravity", "Gravity bends it sideways", [1.0, 0.0, 0.0]),
         Pull::Force => {
             ("cut-tc2force", "force", "A dead force of 5 N on a strip of its end pulls it", [0.0, 0.0, 1.0])
         }
-        Pull::Strip => {
+        Pull::Strip | Pull::Strips(_) => {
             ("cut-tc2strip", "displacement", "A strip of its end is moved by 20 mm along it", [1.0, 0.0, 0.0])
         }
     };
@@ -84,8 +96,17 @@ pub fn case(pull: Pull, quick: bool) -> Case {
     }
 }
 
+/// Stored solutions of the beam; for two strips, which have none, those for one.
+pub fn gold(pull: Pull) -> Gold {
+    Gold::read(match pull {
+        Pull::Gravity => include_str!("../../cases/r2-tc1.gold.json"),
+        Pull::Force => include_str!("../../cases/r2-tc2force.gold.json"),
+        Pull::Strip | Pull::Strips(_) => include_str!("../../cases/r2-tc2strip.gold.json"),
+    })
+}
+
 /// Overrides that set loads and constraints instead of gravity.
-fn pulled(pull: Pull) -> Vec<String> {
+pub fn pulled(pull: Pull) -> Vec<String> {
     let base = "{ where = { box = { min_m = [-1, -1, -1], max_m = [1, 1, 1e-6] } } }";
     let strip = "where = { box = { min_m = [-1, -1, 0.199999], max_m = [0.005001, 1, 1] } }";
     let weightless = "world.gravity_m_s2=[0.0, 0.0, 0.0]".to_owned();
@@ -98,33 +119,51 @@ fn pulled(pull: Pull) -> Vec<String> {
             weightless,
             format!("body.beam.fix=[{base}, {{ {strip}, axes = \"z\", displacement_m = [0, 0, 0.02] }}]"),
         ],
+        Pull::Strips(part) => {
+            let other = "where = { box = { min_m = [0.024999, -1, 0.199999], max_m = [1, 1, 1] } }";
+            let [along, out, back] = [0.02, 0.03, -0.015].map(|u| part * u);
+            vec![
+                weightless,
+                format!(
+                    "body.beam.fix=[{base}, {{ {strip}, axes = \"z\", displacement_m = [0, 0, {along:?}] }}, \
+                     {{ {other}, axes = \"xz\", displacement_m = [{out:?}, 0, {back:?}] }}]"
+                ),
+            ]
+        }
     }
+}
+
+/// The mesh of the beam as a table of a scene: lines `x_m` [m] across it, one of them at 0.015, `y` cells through it and
+/// `half_z` below and above the cut.
+pub fn beam_mesh(x_m: &[f64], y: usize, half_z: usize, inside: Inside) -> String {
+    let y_m: Vec<f64> = (0..=y).map(|j| 0.06 * j as f64 / y as f64).collect();
+    let n = half_z as f64;
+    let z_m: Vec<f64> = if inside.plane {
+        // The cut at z = 0.1 lies a third of a cell above line half_z.
+        let dz = 0.1 / (n + 1.0 / 3.0);
+        let below = (0..=half_z).map(|k| dz * k as f64);
+        below.chain((1..=half_z).map(|k| dz * n + (0.2 - dz * n) * k as f64 / n)).collect()
+    } else {
+        (0..=2 * half_z).map(|k| 0.1 * k as f64 / n).collect()
+    };
+    let mut x_m = x_m.to_vec();
+    if inside.front {
+        // The front at x = 0.015 lies a third of a cell before a line.
+        let front = x_m.iter().position(|x| (x - 0.015).abs() < 1e-9).unwrap_or(1);
+        x_m[front] += (x_m[front] - x_m[front - 1]) / 3.0;
+    }
+    format!("{{ grid = {{ x_m = {x_m:?}, y_m = {y_m:?}, z_m = {z_m:?}, pattern = \"tet5\" }} }}")
 }
 
 /// The axis of cutting methods, each with its mesh.
 fn methods(body: &[String], x_m: &[f64], y: usize, half_z: usize) -> Axis {
-    let y_m: Vec<f64> = (0..=y).map(|j| 0.06 * j as f64 / y as f64).collect();
-    let n = half_z as f64;
-    let aligned: Vec<f64> = (0..=2 * half_z).map(|k| 0.1 * k as f64 / n).collect();
-    // The cut at z = 0.1 lies a third of a cell above line half_z.
-    let dz = 0.1 / (n + 1.0 / 3.0);
-    let below = (0..=half_z).map(|k| dz * k as f64);
-    let above = (1..=half_z).map(|k| dz * n + (0.2 - dz * n) * k as f64 / n);
-    let beside: Vec<f64> = below.chain(above).collect();
-    // The front at x = 0.015 lies a third of a cell before a line.
-    let front = x_m.iter().position(|x| *x == 0.015).unwrap_or(1);
-    let mut x_beside = x_m.to_vec();
-    x_beside[front] += (x_m[front] - x_m[front - 1]) / 3.0;
-    let grid = |x: &[f64], z: &[f64]| {
-        let table = format!("{{ grid = {{ x_m = {x:?}, y_m = {y_m:?}, z_m = {z:?}, pattern = \"tet5\" }} }}");
-        on_bodies(body, "mesh", &table)
-    };
     let setting = |(i, label): (usize, &&str)| {
-        let mut set = match *label {
-            "precut" => grid(x_m, &aligned),
-            "xfem" | "snap" => grid(&x_beside, &beside),
-            _ => grid(x_m, &beside),
+        let inside = match *label {
+            "precut" => Inside::NOTHING,
+            "xfem" | "snap" => Inside { plane: true, front: true },
+            _ => Inside { plane: true, front: false },
         };
+        let mut set = on_bodies(body, "mesh", &beam_mesh(x_m, y, half_z, inside));
         let method = if label.starts_with("snap") { "snap" } else { "xfem" };
         set.extend(on_bodies(body, "cutting.method", &format!("\"{method}\"")));
         Setting::new(*label, i as f64, set)

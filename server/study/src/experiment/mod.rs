@@ -1,5 +1,5 @@
 //! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes; on methods of
-//! collision detection; on relaxation (Nienhuys 2003); and on threads.
+//! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -48,6 +48,8 @@ mod threads;
 
 mod nienhuys;
 
+mod schoch;
+
 pub use bench::ExperimentBench;
 pub use result::{Column, ExperimentResult, Picture, Plots, Row, Table, Unit};
 
@@ -58,7 +60,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 11] = [
+pub const NAMES: [&str; 12] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -70,6 +72,7 @@ pub const NAMES: [&str; 11] = [
     "collision",
     "threads",
     "nienhuys",
+    "schoch",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -90,6 +93,7 @@ fn find(name: &str) -> Option<Experiment> {
         "collision" => Some(collision::collision),
         "threads" => Some(threads::threads),
         "nienhuys" => Some(nienhuys::nienhuys),
+        "schoch" => Some(schoch::schoch),
         _ => None,
     }
 }

@@ -1,0 +1,293 @@
+//! Figure 10 of Schoch: error over degrees of freedom of his three test cases, for cuts inside elements and for meshes
+//! made with the cut.
+//!
+//! # Source
+//! Schoch et al. 2013: Simulation of surgical cutting in soft tissue using the extended finite element method, §6.
+
+use std::path::Path;
+
+use scindo_world::scene::Scene;
+
+use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit};
+use crate::case::Truth;
+use crate::case::cutting::{Inside, Pull, beam_mesh, gold, pulled};
+use crate::reference::richardson::extrapolate;
+use crate::stress::chart::{Chart, Line};
+use crate::trial::series::Series;
+use crate::trial::{self, Limits, Protocol};
+
+const SCENE: &str = include_str!("../../cases/r2-tc1.toml");
+const LAWS: [&str; 2] = ["linear", "corotational"];
+const METHODS: [(&str, Inside); 2] =
+    [("X-FEM", Inside { plane: true, front: true }), ("pre-cut", Inside::NOTHING)];
+/// Cells across the beam, 30 mm, and how they share its 5, 10, 10 and 5 mm. Strips end on lines of cells.
+const MESHES: [[usize; 4]; 8] = [
+    [1, 1, 1, 1],
+    [1, 2, 1, 1],
+    [1, 2, 2, 1],
+    [1, 2, 3, 1],
+    [1, 3, 3, 1],
+    [2, 3, 3, 1],
+    [2, 3, 3, 2],
+    [2, 4, 4, 2],
+];
+/// Those of a quick study.
+const QUICK: [usize; 3] = [0, 2, 4];
+/// Lines between which cells are of equal width [m].
+const LINES_M: [f64; 5] = [0.0, 0.005, 0.015, 0.025, 0.03];
+/// Steps over which the displacements of test case 3 grow.
+const STEPS: u32 = 10;
+/// Part of the printed displacements of test case 3.
+const PART: f64 = 0.5;
+/// A run may take this long [s].
+const LIMITS: Limits = Limits { run_s: 900.0, repeat_s: 0.0, repeats: 1 };
+
+/// Test cases: what pulls the beam, and whether a reference is stored.
+const CASES: [(&str, Pull); 3] =
+    [("test case 1", Pull::Gravity), ("test case 2", Pull::Force), ("test case 3", Pull::Strips(PART))];
+
+/// A run: degrees of freedom and displacements, or why there are none.
+struct Run {
+    mesh: usize,
+    unknowns: usize,
+    found: Result<Series, String>,
+}
+
+/// The experiment.
+///
+/// # Errors
+/// The user ended the study.
+pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble> {
+    let mut result = ExperimentResult {
+        name: "schoch",
+        title: "Convergence on a half-cut beam: figure 10 of Schoch".into(),
+        about: format!(
+            "The beam of 30 × 60 × 200 mm, E = 300 kPa, ν = 0.35, held at its base and cut through to half its depth, on \
+             meshes of five tetrahedra per cell. Test case 1: gravity across it. Test case 2: its end is pulled, by 5 N on \
+             a strip, because a line that is moved has no limit in three dimensions. Test case 3: two strips of its end are \
+             moved apart and sideways, by {PART} of what is printed; at all of it elements at the ends of the strips turn \
+             inside out. For `X-FEM` the plane of the cut and its front lie a third of a cell inside elements; the mesh of \
+             `pre-cut` has faces there. Errors are ‖u − u*‖/‖u*‖ over 24 points of the beam.",
+        ),
+        ..ExperimentResult::default()
+    };
+    let all: Vec<usize> = if bench.is_quick() { QUICK.to_vec() } else { (0..MESHES.len()).collect() };
+    let total = CASES.len() * LAWS.len() * METHODS.len() * all.len();
+    let mut orders = Table::new(
+        "Orders of convergence",
+        "The slope of the error over the size of cells, fitted to all meshes in logarithms; linear elements reach 1 at \
+         the front of a cut. References of test cases 1 and 2 are stored solutions by hexahedra of order 3 and 4; that of \
+         test case 3 is the limit of the three finest pre-cut meshes, which favours these.",
+        &[
+            ("order, X-FEM", Unit::Number),
+            ("order, pre-cut", Unit::Number),
+            ("finest error, X-FEM", Unit::Number),
+            ("finest error, pre-cut", Unit::Number),
+            ("X-FEM over pre-cut", Unit::Times),
+            ("± of the reference", Unit::Number),
+        ],
+    );
+    let mut points = Table::new(
+        "Errors",
+        "Every run that gave a result.",
+        &[
+            ("degrees of freedom", Unit::Count),
+            ("error, X-FEM", Unit::Number),
+            ("error, pre-cut", Unit::Number),
+        ],
+    );
+    for (case, pull) in CASES {
+        let mut chart = Chart::new(case, "degrees of freedom [log₁₀]", "error");
+        chart.logarithmic = true;
+        for law in LAWS {
+            let name = format!("{case} {law}");
+            let mut runs: Vec<Vec<Run>> = Vec::new();
+            for (method, inside) in METHODS {
+                let mut of_method = Vec::new();
+                for &mesh in &all {
+                    let cells = cells(mesh);
+                    bench.begin(format!("{name}, {method}, {cells} cells across"), total)?;
+                    of_method.push(run(bench, pull, law, mesh, inside)?);
+                }
+                runs.push(of_method);
+            }
+            let Some((truth, error_bar)) = reference(pull, law, &runs[1]) else {
+                result.notes.push(format!("{name}: no reference, because pre-cut meshes have no limit"));
+                continue;
+            };
+            for run in runs.iter().flatten() {
+                if let Err(reason) = &run.found {
+                    result.notes.push(format!("{name}, {} cells across: {reason}", cells(run.mesh)));
+                }
+            }
+            let courses = runs.iter().map(|runs| course(runs, &truth)).collect::<Vec<_>>();
+            for ((method, _), course) in METHODS.iter().zip(&courses) {
+                let points = course.iter().map(|[_, n, error]| [n.log10(), *error]).collect();
+                chart.lines.push(Line { name: format!("{law}, {method}"), points });
+            }
+            let order = courses.iter().map(|course| slope(course)).collect::<Vec<_>>();
+            let finest = courses.iter().map(|course| course.last().map(|point| point[2])).collect::<Vec<_>>();
+            let ratio = finest[0].zip(finest[1]).map(|(xfem, precut)| xfem / precut);
+            orders.row(&*name, &[order[0], order[1], finest[0], finest[1], ratio, Some(error_bar)]);
+            for &mesh in &all {
+                let at = |course: &[[f64; 3]]| course.iter().find(|p| p[0] == mesh as f64).copied();
+                let [xfem, precut] = [at(&courses[0]), at(&courses[1])];
+                let unknowns = xfem.or(precut).map(|p| p[1]);
+                let row = format!("{name}, {} across", cells(mesh));
+                points.row(row, &[unknowns, xfem.map(|p| p[2]), precut.map(|p| p[2])]);
+            }
+        }
+        let plots = Plots {
+            caption: format!("{case}: error over degrees of freedom."),
+            charts: vec![chart],
+            ..Plots::default()
+        };
+        result.plots.push(plots);
+    }
+    result.tables.extend([orders, points]);
+    Ok(result)
+}
+
+/// Cells across the beam.
+fn cells(mesh: usize) -> usize {
+    MESHES[mesh].iter().sum()
+}
+
+/// Solves a test case on a mesh.
+fn run(
+    bench: &ExperimentBench<'_>,
+    pull: Pull,
+    law: &str,
+    mesh: usize,
+    inside: Inside,
+) -> Result<Run, Trouble> {
+    let scene = scene(pull, law, mesh, inside)?;
+    let protocol = match pull {
+        Pull::Strips(_) => Protocol::Motion { frame_s: 1.0, frames: STEPS },
+        _ => Protocol::Static,
+    };
+    let trial = trial::run(&scene, Path::new("."), 1, protocol, LIMITS, bench.stop()).ok_or("interrupted")?;
+    let found = match trial.is_done() {
+        // Of a motion only where it arrives.
+        true => Ok(last(&trial.series)),
+        false => Err(trial.reason),
+    };
+    Ok(Run { mesh, unknowns: trial.unknowns, found })
+}
+
+fn scene(pull: Pull, law: &str, mesh: usize, inside: Inside) -> Result<Scene, Trouble> {
+    let n = cells(mesh);
+    let cell_m = 0.03 / n as f64;
+    let parts = LINES_M.windows(2).zip(MESHES[mesh]);
+    let along = |([from, to], count): ([f64; 2], usize)| {
+        (1..=count).map(move |k| from + (to - from) * k as f64 / count as f64)
+    };
+    let x_m: Vec<f64> = std::iter::once(0.0)
+        .chain(parts.flat_map(|(ends, count)| along(([ends[0], ends[1]], count))))
+        .collect();
+    let half_z = (0.1 / cell_m).round() as usize;
+    let mut set = vec![
+        gold(Pull::Force).probes("beam"),
+        format!("body.beam.law=\"{law}\""),
+        format!("body.beam.mesh={}", beam_mesh(&x_m, 2 * n, half_z, inside)),
+    ];
+    set.extend(pulled(pull));
+    if matches!(pull, Pull::Strips(_)) {
+        set.push(format!("body.beam.displacement_over_s={STEPS}"));
+    }
+    Ok(Scene::from_toml(SCENE)?.apply_sets(&set)?)
+}
+
+/// The last instant of a series.
+fn last(series: &Series) -> Series {
+    match series.frames.len().checked_sub(1) {
+        Some(i) => Series {
+            frames: vec![0],
+            displacement_m: series.at(i).to_vec(),
+            energy_j: vec![series.energy_j[i]],
+        },
+        None => Series::default(),
+    }
+}
+
+/// The solution that errors are measured against, and its relative error bar.
+fn reference(pull: Pull, law: &str, precut: &[Run]) -> Option<(Series, f64)> {
+    if !matches!(pull, Pull::Strips(_)) {
+        let Truth::Known { series, error_bar, .. } = gold(pull).truth(law, None, "") else { return None };
+        return Some((series, error_bar));
+    }
+    let done: Vec<(usize, &Series)> =
+        precut.iter().filter_map(|run| Some((run.mesh, run.found.as_ref().ok()?))).collect();
+    let [.., first, second, third] = &done[..] else { return None };
+    let sizes = [first, second, third].map(|(mesh, _)| 1.0 / cells(*mesh) as f64);
+    let limit = extrapolate(sizes, [first.1, second.1, third.1])?;
+    Some((limit.value, limit.error_bar))
+}
+
+/// Mesh, degrees of freedom and error of the runs that gave a result.
+fn course(runs: &[Run], truth: &Series) -> Vec<[f64; 3]> {
+    let point = |run: &Run| {
+        let series = run.found.as_ref().ok()?;
+        Some([run.mesh as f64, run.unknowns as f64, series.minus(truth).norm() / truth.norm()])
+    };
+    runs.iter().filter_map(point).collect()
+}
+
+/// Order of convergence per size of cells: the slope of least squares through all points in logarithms. `None` for fewer
+/// than three.
+fn slope(course: &[[f64; 3]]) -> Option<f64> {
+    let points: Vec<[f64; 2]> =
+        course.iter().map(|[mesh, _, e]| [-(cells(*mesh as usize) as f64).ln(), e.ln()]).collect();
+    let n = points.len() as f64;
+    let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / n;
+    let (x, y) = (mean(0), mean(1));
+    let spread: f64 = points.iter().map(|p| (p[0] - x).powi(2)).sum();
+    let common: f64 = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum();
+    (points.len() >= 3 && spread > 0.0).then(|| common / spread)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+
+    #[test]
+    fn slopes_are_orders_per_size_of_cells() {
+        let course: Vec<[f64; 3]> = (0..8)
+            .map(|mesh| [f64::from(mesh), 1.0, 0.3 * (cells(mesh as usize) as f64).powf(-1.5)])
+            .collect();
+        assert!((slope(&course).unwrap() - 1.5).abs() < 1e-9);
+        assert_eq!(slope(&course[..2]), None);
+    }
+
+    #[test]
+    fn meshes_become_finer_and_every_scene_is_one() {
+        assert!((1..8).all(|mesh| cells(mesh) > cells(mesh - 1)));
+        for (_, pull) in CASES {
+            for law in LAWS {
+                for (_, inside) in METHODS {
+                    for mesh in [0, 7] {
+                        scene(pull, law, mesh, inside).unwrap();
+                    }
+                }
+            }
+        }
+    }
+
+    /// On the coarsest mesh: each method within what linear elements of 7.5 mm can do, the pre-cut one better.
+    #[test]
+    fn a_cut_inside_elements_costs_accuracy_on_coarse_meshes() {
+        let stop = AtomicBool::new(false);
+        let error = |inside| {
+            let scene = scene(Pull::Force, "linear", 0, inside).unwrap();
+            let trial = trial::run(&scene, Path::new("."), 1, Protocol::Static, LIMITS, &stop).unwrap();
+            assert!(trial.is_done(), "{}", trial.reason);
+            let (truth, _) = reference(Pull::Force, "linear", &[]).unwrap();
+            trial.series.minus(&truth).norm() / truth.norm()
+        };
+        let [xfem, precut] = METHODS.map(|(_, inside)| error(inside));
+        assert!(precut < xfem && xfem < 0.6 && precut > 0.02, "{xfem} {precut}");
+    }
+}
