@@ -96,54 +96,48 @@ pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troub
             ("error, pre-cut", Unit::Number),
         ],
     );
+    let mut plots = Plots { caption: "Error over degrees of freedom.".into(), ..Plots::default() };
     for (case, pull) in CASES {
         let mut chart = Chart::new(case, "degrees of freedom [log₁₀]", "error");
         chart.logarithmic = true;
         for law in LAWS {
             let name = format!("{case} {law}");
-            let mut runs: Vec<Vec<Run>> = Vec::new();
-            for (method, inside) in METHODS {
-                let mut of_method = Vec::new();
-                for &mesh in &all {
-                    let cells = cells(mesh);
-                    bench.begin(format!("{name}, {method}, {cells} cells across"), total)?;
-                    of_method.push(run(bench, pull, law, mesh, inside)?);
-                }
-                runs.push(of_method);
-            }
-            let Some((truth, error_bar)) = reference(pull, law, &runs[1]) else {
-                result.notes.push(format!("{name}: no reference, because pre-cut meshes have no limit"));
-                continue;
-            };
+            let [xfem, precut] = METHODS.map(|(method, inside)| {
+                let each = |&mesh: &usize| {
+                    bench.begin(format!("{name}, {method}, {} cells across", cells(mesh)), total)?;
+                    run(bench, pull, law, mesh, inside)
+                };
+                all.iter().map(each).collect::<Result<Vec<Run>, Trouble>>()
+            });
+            let runs = [xfem?, precut?];
             for run in runs.iter().flatten() {
                 if let Err(reason) = &run.found {
                     result.notes.push(format!("{name}, {} cells across: {reason}", cells(run.mesh)));
                 }
             }
-            let courses = runs.iter().map(|runs| course(runs, &truth)).collect::<Vec<_>>();
+            let Some((truth, error_bar)) = reference(pull, law, &runs[1]) else {
+                result.notes.push(format!("{name}: no reference, because pre-cut meshes have no limit"));
+                continue;
+            };
+            let courses = runs.map(|runs| course(&runs, &truth));
             for ((method, _), course) in METHODS.iter().zip(&courses) {
-                let points = course.iter().map(|[_, n, error]| [n.log10(), *error]).collect();
+                let points = course.iter().map(|point| [point.unknowns.log10(), point.error]).collect();
                 chart.lines.push(Line { name: format!("{law}, {method}"), points });
             }
-            let order = courses.iter().map(|course| slope(course)).collect::<Vec<_>>();
-            let finest = courses.iter().map(|course| course.last().map(|point| point[2])).collect::<Vec<_>>();
-            let ratio = finest[0].zip(finest[1]).map(|(xfem, precut)| xfem / precut);
-            orders.row(&*name, &[order[0], order[1], finest[0], finest[1], ratio, Some(error_bar)]);
+            let [xfem, precut] = courses.each_ref().map(|course| course.last().map(|point| point.error));
+            let ratio = xfem.zip(precut).map(|(xfem, precut)| xfem / precut);
+            let [of_xfem, of_precut] = courses.each_ref().map(|course| slope(course));
+            orders.row(&*name, &[of_xfem, of_precut, xfem, precut, ratio, Some(error_bar)]);
             for &mesh in &all {
-                let at = |course: &[[f64; 3]]| course.iter().find(|p| p[0] == mesh as f64).copied();
-                let [xfem, precut] = [at(&courses[0]), at(&courses[1])];
-                let unknowns = xfem.or(precut).map(|p| p[1]);
-                let row = format!("{name}, {} across", cells(mesh));
-                points.row(row, &[unknowns, xfem.map(|p| p[2]), precut.map(|p| p[2])]);
+                let [xfem, precut] = courses.each_ref().map(|course| course.iter().find(|p| p.mesh == mesh));
+                let unknowns = xfem.or(precut).map(|point| point.unknowns);
+                let errors = [xfem, precut].map(|point| point.map(|point| point.error));
+                points.row(format!("{name}, {} across", cells(mesh)), &[unknowns, errors[0], errors[1]]);
             }
         }
-        let plots = Plots {
-            caption: format!("{case}: error over degrees of freedom."),
-            charts: vec![chart],
-            ..Plots::default()
-        };
-        result.plots.push(plots);
+        plots.charts.push(chart);
     }
+    result.plots.push(plots);
     result.tables.extend([orders, points]);
     Ok(result)
 }
@@ -224,20 +218,27 @@ fn reference(pull: Pull, law: &str, precut: &[Run]) -> Option<(Series, f64)> {
     Some((limit.value, limit.error_bar))
 }
 
-/// Mesh, degrees of freedom and error of the runs that gave a result.
-fn course(runs: &[Run], truth: &Series) -> Vec<[f64; 3]> {
+/// A run with a result.
+struct Point {
+    mesh: usize,
+    unknowns: f64,
+    error: f64,
+}
+
+/// The runs that gave a result, against the `truth`.
+fn course(runs: &[Run], truth: &Series) -> Vec<Point> {
     let point = |run: &Run| {
-        let series = run.found.as_ref().ok()?;
-        Some([run.mesh as f64, run.unknowns as f64, series.minus(truth).norm() / truth.norm()])
+        let error = run.found.as_ref().ok()?.minus(truth).norm() / truth.norm();
+        Some(Point { mesh: run.mesh, unknowns: run.unknowns as f64, error })
     };
     runs.iter().filter_map(point).collect()
 }
 
 /// Order of convergence per size of cells: the slope of least squares through all points in logarithms. `None` for fewer
 /// than three.
-fn slope(course: &[[f64; 3]]) -> Option<f64> {
+fn slope(course: &[Point]) -> Option<f64> {
     let points: Vec<[f64; 2]> =
-        course.iter().map(|[mesh, _, e]| [-(cells(*mesh as usize) as f64).ln(), e.ln()]).collect();
+        course.iter().map(|point| [-(cells(point.mesh) as f64).ln(), point.error.ln()]).collect();
     let n = points.len() as f64;
     let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / n;
     let (x, y) = (mean(0), mean(1));
@@ -255,9 +256,9 @@ mod tests {
 
     #[test]
     fn slopes_are_orders_per_size_of_cells() {
-        let course: Vec<[f64; 3]> = (0..8)
-            .map(|mesh| [f64::from(mesh), 1.0, 0.3 * (cells(mesh as usize) as f64).powf(-1.5)])
-            .collect();
+        let error = |mesh: usize| 0.3 * (cells(mesh) as f64).powf(-1.5);
+        let course: Vec<Point> =
+            (0..MESHES.len()).map(|mesh| Point { mesh, unknowns: 1.0, error: error(mesh) }).collect();
         assert!((slope(&course).unwrap() - 1.5).abs() < 1e-9);
         assert_eq!(slope(&course[..2]), None);
     }
