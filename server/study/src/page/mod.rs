@@ -13,7 +13,7 @@ mod json;
 
 pub(crate) mod plot;
 
-mod scale;
+pub(crate) mod scale;
 
 pub(crate) mod style;
 

@@ -65,10 +65,7 @@ impl Scale {
     /// at multiples of 1, 2 or 5 times a power of ten, all labelled.
     pub fn ticks(&self) -> Vec<Tick> {
         if self.spacing == Spacing::Linear {
-            let power = 10f64.powf((self.high / LABELS).log10().floor());
-            let step =
-                [1.0, 2.0, 5.0].map(|digit| digit * power).into_iter().find(|s| self.high / s <= LABELS);
-            let step = step.unwrap_or(10.0 * power);
+            let step = round_step(self.high / LABELS);
             let last = (self.high / step).floor() as u32;
             return (0..=last).map(|k| Tick { value: f64::from(k) * step, labelled: true }).collect();
         }
@@ -83,6 +80,12 @@ impl Scale {
         };
         all.filter_map(tick).collect()
     }
+}
+
+/// The smallest of 1, 2 and 5 times a power of ten that is at least `least`, up to rounding.
+pub fn round_step(least: f64) -> f64 {
+    let power = 10f64.powf(least.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().find(|digit| digit * power >= least).unwrap_or(10.0) * power
 }
 
 #[cfg(test)]

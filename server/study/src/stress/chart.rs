@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use crate::page::html::escape;
 use crate::page::interactive;
+use crate::page::scale::round_step;
 
 /// One line of a chart.
 #[derive(Debug, Clone, PartialEq)]
@@ -237,9 +238,7 @@ impl Axis {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
         let low = if from_zero && low > 0.0 { 0.0 } else { low };
         let span = if high > low { high - low } else { high.abs().max(1.0) };
-        let raw = span / 5.0;
-        let scale = 10f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|s| s * scale >= raw).unwrap_or(10.0) * scale;
+        let step = round_step(span / 5.0);
         let air = if pixels.0 > pixels.1 { 0.04 * span } else { 0.0 };
         Self { low: if low == 0.0 { 0.0 } else { low - air }, high: low + span + air, step, pixels }
     }
