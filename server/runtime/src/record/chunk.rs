@@ -4,10 +4,8 @@ use std::io::Read;
 
 use mcap::records::ChunkHeader;
 
+use super::mcap_writer::PREFIX;
 use super::reader::LONGEST;
-
-/// Bytes before the content of a record: what it is, and its length.
-const PREFIX: usize = 1 + 8;
 
 /// The records of a chunk, one after the other.
 #[derive(Default)]

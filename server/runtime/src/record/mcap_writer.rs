@@ -22,7 +22,7 @@ const COMPRESSION: &str = "zstd";
 const LEVEL: i32 = 1;
 
 /// Bytes before the content of a record: what it is, and its length.
-const PREFIX: usize = 1 + 8;
+pub(super) const PREFIX: usize = 1 + 8;
 
 /// Length of the footer: two offsets and a checksum.
 const FOOTER: u64 = 8 + 8 + 4;
@@ -31,7 +31,7 @@ const FOOTER: u64 = 8 + 8 + 4;
 pub struct McapWriter<W: Write> {
     file: Counted<W>,
     chunk: Chunk,
-    /// Records of the summary, which are written again or only at the end.
+    /// All schemas and channels, which the summary repeats.
     schemas: Vec<u8>,
     channels: Vec<u8>,
     chunk_indexes: SpooledTempFile,
