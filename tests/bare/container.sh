@@ -9,7 +9,7 @@ packages=$(cd "${1:-package}" && pwd)
 . tests/bare/root.sh
 
 list() { python3 -c 'import json, sys; print("\0".join(json.loads(sys.argv[1])), end="\0")' "$1"; }
-user=root folder=/ entry=() command=() health=()
+user=root folder=/ variables=() entry=() command=() health=()
 while read -r verb rest; do
   case $verb in
     ''|'#'*|ARG|FROM|EXPOSE|STOPSIGNAL) ;;
@@ -17,6 +17,7 @@ while read -r verb rest; do
       read -r what where <<<"$rest"
       for file in "$packages"/$what; do tar -xzf "$file" -C "$root$where"; done ;;
     RUN) in_root /bin/sh -c "$rest" ;;
+    ENV) variables+=("$rest") ;;
     USER) user=$rest ;;
     WORKDIR) folder=$rest ;;
     HEALTHCHECK) mapfile -d '' health < <(list "${rest#*CMD }") ;;
@@ -26,7 +27,7 @@ while read -r verb rest; do
   esac
 done <deploy/Containerfile
 
-as_user=(setpriv --reuid "$user" --regid "$user" --clear-groups --no-new-privs /bin/sh -c "cd $folder"' && exec "$@"' -)
+as_user=(setpriv --reuid "$user" --regid "$user" --clear-groups --no-new-privs env "${variables[@]}" /bin/sh -c "cd $folder"' && exec "$@"' -)
 become_in_root "${as_user[@]}" "${entry[@]}" "${command[@]}" &
 started=$!
 python3 tests/package/fetch.py http://127.0.0.1:8080

@@ -10,8 +10,8 @@
 
 The memory of the server must not grow after a warm-up, in which the surgeon hardly pauses and bodies get more cuts
 than any later one: less than 1 MiB per hour by a straight line through all that follows, where the run is long enough to
-tell. In such a run the allocator of the server is told to give back at once what is free, and to keep one pool for all
-threads, since what it keeps goes up and down by many times more. deploy/scindo.service names the same settings.
+tell. In such a run the allocator of the server has the settings of deploy/scindo.service, since what it keeps without
+them goes up and down by many times more.
 """
 
 import json
@@ -46,10 +46,6 @@ WARM_UP_PART = 0.15
 WARM_UP_S = 240.0
 WARM_UP_PAUSES_S = (0.1, 0.3)
 WARM_UP_CUTS = 2
-# Settings of the allocator of the server in a run whose slope is judged.
-GIVES_BACK = (
-    "GLIBC_TUNABLES=glibc.malloc.arena_max=1:glibc.malloc.mmap_threshold=65536:glibc.malloc.trim_threshold=65536"
-)
 # A killed server loses at most this time of its recording [s].
 LOST_S = 1.0
 # A slope over less time than this says nothing [s].
@@ -194,6 +190,14 @@ while True:
         self.thread.join(20)
 
 
+def settings_of_the_allocator():
+    """Those of the service, as `NAME=VALUE`."""
+    unit = (HERE.parents[1] / "deploy" / "scindo.service").read_text()
+    found = [line for line in unit.splitlines() if line.startswith("Environment=GLIBC_TUNABLES=")]
+    check(len(found) == 1, "deploy/scindo.service sets the allocator")
+    return found[0].removeprefix("Environment=")
+
+
 def start(programs, endpoint, recording, *what, before=()):
     log = f"{recording.stem}.log"
     arguments = [*what, "--listen", endpoint, "--record", recording, "--checkpoint-s", 2]
@@ -262,7 +266,7 @@ def main(bin_dir, out_dir, seconds, seed):
     for recording in recordings:
         recording.unlink(missing_ok=True)
     endpoint = free_endpoint()
-    before = ("env", GIVES_BACK) if seconds / 2 - warm_up(seconds / 2) >= LONG_S else ()
+    before = ("env", settings_of_the_allocator()) if seconds / 2 - warm_up(seconds / 2) >= LONG_S else ()
     try:
         server = start(programs, endpoint, recordings[0], HERE / "block.toml", before=before)
         haptic = programs.haptic(endpoint, "--seconds", seconds + 120, "--quiet", log="hand.log")
