@@ -107,8 +107,6 @@ fn an_organ_of_cells_follows_its_surface() {
 fn what_does_not_go_with_an_octree_is_refused() {
     refused("cells = [16, 8, 8]", "cells = [16, 8, 9]", &["mesh.box.cells", "are cubes", "[16, 8, 8]"]);
     refused("element = \"octree\"", "", &["body.block.octree", "write element = \"octree\""]);
-    let tets = ["body.block.material", "allowed: only octree"];
-    refused("element = \"octree\"\n    mesh", "mesh", &tets);
     refused("levels = 2", "levels = 9", &["body.block.octree.levels"]);
     let pcg = ["body.block.octree.simulate_level", "found 1 with solver.method = `pcg`", "mg-pcg"];
     let with_pcg = "octree = { levels = 2, simulate_level = 1 }\n    solver = { method = \"pcg\" }";

@@ -9,7 +9,7 @@ use super::scratch::Scratch;
 use super::{BlockCsr, ElementKind, Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
 use crate::element::{Points, hex8, quadrature, tet10};
-use crate::material::Material;
+use crate::material::{Material, Regions};
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
 use crate::octree::{Octree, corner_weights};
 
@@ -112,13 +112,12 @@ impl Model {
     /// hanging corners.
     pub fn octree(octree: &Octree, material: &Material, volumetric: Volumetric) -> Result<Self, ModelError> {
         let mut model = Self::begin(ElementKind::Octree, Vec::new(), material, volumetric)?;
-        model.regions = octree.regions().to_vec();
+        model.regions = Regions::without_elements(octree.regions().to_vec());
         model.fill_octree(octree, material.density_kg_m3);
         Ok(model)
     }
 
-    /// Takes the cells of `octree` in place of those there are. `density_kg_m3` is that of the body; regions of
-    /// another density stand for as much volume as would have their mass.
+    /// Takes the cells of `octree` in place of those there are. `density_kg_m3` is that of the body.
     pub fn fill_octree(&mut self, octree: &Octree, density_kg_m3: f64) {
         let rest = octree.rest_positions();
         for list in [&mut self.gradients, &mut self.mean_gradients] {
@@ -146,19 +145,15 @@ impl Model {
                 let mean: [Vector3<f64>; 8] = std::array::from_fn(mean);
                 self.mean_gradients.extend(mean);
             }
-            let region = usize::from(cell.material).checked_sub(1).and_then(|r| self.regions.get(r));
-            let heavier = region.map_or(1.0, |region| region.density_kg_m3 / density_kg_m3);
             let product = |a: usize, b: usize| -> f64 {
                 let row = |c: usize| (0..8).map(|d| unit[c][d] * W[d][b]).sum::<f64>();
-                heavier * volume * (0..8).map(|c| W[c][a] * row(c)).sum::<f64>()
+                volume * (0..8).map(|c| W[c][a] * row(c)).sum::<f64>()
             };
             let M: [[f64; 8]; 8] = std::array::from_fn(|a| std::array::from_fn(|b| product(a, b)));
             products.extend(pack(&M));
         }
-        self.region_of.clear();
-        if !self.regions.is_empty() {
-            self.region_of.extend(octree.cells().iter().map(|cell| cell.material));
-        }
+        self.regions.refill(octree.cells().iter().map(|cell| cell.material));
+        self.density_kg_m3 = density_kg_m3;
         self.lumped = octree.vertex_masses(density_kg_m3).into_iter().map(|m| m / density_kg_m3).collect();
         self.integrals.clone_from(&self.lumped);
         self.products = Products::PerElement(products);
@@ -193,8 +188,8 @@ impl Model {
             kind,
             volumetric,
             point,
-            regions: Vec::new(),
-            region_of: Vec::new(),
+            regions: Regions::default(),
+            density_kg_m3: material.density_kg_m3,
             rest,
             connectivity: Vec::new(),
             gradients: Vec::new(),

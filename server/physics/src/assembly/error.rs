@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::{ElementKind, Volumetric};
-use crate::material::{Law, MaterialError};
+use crate::material::{Law, MaterialError, RegionsError};
 use crate::mesh::MeshError;
 
 /// A combination of mesh, element, law and remedy for which no model can be built.
@@ -15,6 +15,14 @@ pub enum ModelError {
     /// A material constant is out of range.
     #[error(transparent)]
     Material(#[from] MaterialError),
+    /// The regions of other materials do not fit the mesh.
+    #[error(transparent)]
+    Regions(#[from] RegionsError),
+    /// Node-averaged volume has no meaning between elements of different materials.
+    #[error(
+        "node-averaged volume does not go with regions of other materials; take full integration or tet10"
+    )]
+    AveragedRegions,
     /// The remedy against locking belongs to another element.
     #[error(
         "{remedy:?} does not go with {element:?} elements; node-averaged volume goes with Tet4, \

@@ -3,12 +3,13 @@
 
 use super::averaging::NodeAverage;
 use super::mass::{Products, pack};
-use super::{BlockCsr, Model, Volumetric};
+use super::{BlockCsr, Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
+use crate::material::Regions;
 
 impl Model {
-    /// Follows the last cut of `cut`, from which the model was built.
-    pub fn follow_cut(&mut self, cut: &CutMesh) {
+    /// Follows the last cut of `cut`, from which the model was built; `regions` are those of its tetrahedra.
+    pub fn follow_cut(&mut self, cut: &CutMesh, regions: &Regions) {
         let (mesh, known, n_known) = (cut.mesh(), self.volumes.len(), self.rest.len());
         let node_of_copy = &cut.copy_node()[n_known..];
         self.rest.extend(node_of_copy.iter().map(|&node| mesh.nodes[node as usize]));
@@ -36,6 +37,7 @@ impl Model {
                 self.gradients.extend_from_slice(&mesh.gradients(piece.element as usize));
                 self.weights.push(volume);
                 self.volumes.push(volume);
+                self.regions.push(regions.of(piece.element as usize));
                 if packed > 0 {
                     products.extend(pack(&cut.piece_node_products(p)));
                 }
@@ -45,7 +47,7 @@ impl Model {
         if packed > 0 {
             self.products = Products::PerElement(products);
         }
-        self.follow_masses(cut);
+        self.sum_piece_volumes(cut);
         if let Volumetric::NodeAveraged { kept } = self.volumetric {
             let kept = NodeAverage::share(kept, self.point.lame);
             self.averaging = Some(NodeAverage::new(&self.connectivity, &self.volumes, self.rest.len(), kept));
@@ -56,16 +58,30 @@ impl Model {
         self.find_row_bounds();
     }
 
+    /// Gives the pieces of `cut`, from which the model was built, the constants of the `regions` of its tetrahedra.
+    ///
+    /// # Errors
+    /// As [`with_regions`](Self::with_regions).
+    pub fn with_regions_of_tets(mut self, cut: &CutMesh, regions: &Regions) -> Result<Self, ModelError> {
+        let of_pieces = regions.of_pieces(cut.pieces().iter().map(|piece| piece.element));
+        self = self.with_regions(of_pieces)?;
+        if !regions.is_empty() {
+            self.sum_piece_volumes(cut);
+        }
+        Ok(self)
+    }
+
     /// Sums the volumes of the nodes again, in the order in which they were summed at first.
-    fn follow_masses(&mut self, cut: &CutMesh) {
+    fn sum_piece_volumes(&mut self, cut: &CutMesh) {
         for sum in [&mut self.lumped, &mut self.integrals] {
             sum.clear();
             sum.resize(cut.n_copies(), 0.0);
         }
         for (p, piece) in cut.pieces().iter().enumerate() {
+            let relative = self.regions.relative_density(p, self.density_kg_m3);
             for (&copy, v) in piece.copies.iter().zip(cut.piece_node_volume(p)) {
-                self.lumped[copy as usize] += v;
-                self.integrals[copy as usize] += v;
+                self.lumped[copy as usize] += relative * v;
+                self.integrals[copy as usize] += relative * v;
             }
         }
         if let Some(sharing) = self.sharing {

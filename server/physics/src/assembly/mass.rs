@@ -59,8 +59,9 @@ impl Model {
         }
         self.sharing = Some(sharing);
         self.lumped.fill(0.0);
-        for (nodes, volume) in self.connectivity.chunks_exact(4).zip(&self.volumes) {
-            nodes.iter().for_each(|&node| self.lumped[node as usize] += volume / 4.0);
+        for (e, (nodes, volume)) in self.connectivity.chunks_exact(4).zip(&self.volumes).enumerate() {
+            let share = self.regions.relative_density(e, self.density_kg_m3) * volume / 4.0;
+            nodes.iter().for_each(|&node| self.lumped[node as usize] += share);
         }
         match sharing {
             MassSharing::Even => {
@@ -74,6 +75,30 @@ impl Model {
         }
     }
 
+    /// Sums the volumes of the nodes again, those of regions by their mass; nothing to do without regions.
+    pub(super) fn weigh_regions(&mut self) {
+        if self.regions.is_empty() {
+            return;
+        }
+        self.lumped.fill(0.0);
+        self.integrals.fill(0.0);
+        let N = self.kind.nodes();
+        let packed = N * (N + 1) / 2;
+        let mut shares = vec![[0.0; 2]; N];
+        for e in 0..self.n_elements() {
+            let heavier = self.regions.relative_density(e, self.density_kg_m3);
+            let (products, scale) = match &self.products {
+                Products::Scaled(products) => (&products[..], heavier * self.volumes[e]),
+                Products::PerElement(products) => (&products[e * packed..][..packed], heavier),
+            };
+            element_shares(self.kind, products, &mut shares);
+            for (&node, [lumped, integral]) in self.connectivity[e * N..][..N].iter().zip(&shares) {
+                self.lumped[node as usize] += scale * lumped;
+                self.integrals[node as usize] += scale * integral;
+            }
+        }
+    }
+
     /// Mass [kg] of every node for a density [kg/m³].
     ///
     /// Tet4: ρ ∫ N_a dV over the pieces of the copy; Tet10: diagonal scaling (HRZ), corner m/36, edge
@@ -83,7 +108,7 @@ impl Model {
     }
 
     /// ∫ N_a dV [m³] of every node: times ρ g it is the consistent load of gravity. Negative at the
-    /// corners of Tet10.
+    /// corners of Tet10. Regions of another density count by their mass.
     pub fn shape_integrals(&self) -> &[f64] {
         &self.integrals
     }
@@ -94,9 +119,10 @@ impl Model {
         let N = self.kind.nodes();
         let packed = N * (N + 1) / 2;
         for e in 0..self.n_elements() {
+            let density = density_kg_m3 * self.regions.relative_density(e, self.density_kg_m3);
             let (products, scale) = match &self.products {
-                Products::Scaled(products) => (&products[..], density_kg_m3 * self.volumes[e]),
-                Products::PerElement(products) => (&products[e * packed..][..packed], density_kg_m3),
+                Products::Scaled(products) => (&products[..], density * self.volumes[e]),
+                Products::PerElement(products) => (&products[e * packed..][..packed], density),
             };
             let slots = &self.slots[e * N * N..][..N * N];
             let mut next = products.iter();
@@ -114,9 +140,35 @@ impl Model {
         }
     }
 
-    /// Centre of mass [m] of a homogeneous body at the positions `x` [m].
+    /// Centre of mass [m] at the positions `x` [m].
     pub fn centre_of_mass(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
         let volume: f64 = self.integrals.iter().sum();
         x.iter().zip(&self.integrals).map(|(x, v)| *v * x).sum::<Vector3<f64>>() / volume
+    }
+}
+
+/// What the nodes of an element get of its mass, lumped and by ∫ N_a dV, from the packed products ∫ N_a N_b dV. The
+/// shape functions sum to one, so integrals are the row sums of the products.
+fn element_shares(kind: ElementKind, products: &[f64], shares: &mut [[f64; 2]]) {
+    let n = shares.len();
+    shares.fill([0.0; 2]);
+    let mut next = products.iter();
+    let mut diagonal = 0.0;
+    for a in 0..n {
+        for b in a..n {
+            let m = next.next().copied().unwrap_or_default();
+            shares[a][1] += m;
+            if b == a {
+                shares[a][0] = m;
+                diagonal += m;
+            } else {
+                shares[b][1] += m;
+            }
+        }
+    }
+    let whole: f64 = shares.iter().map(|share| share[1]).sum();
+    for share in shares {
+        // Diagonal scaling (HRZ), because row sums are negative at the corners of quadratic tetrahedra.
+        share[0] = if kind == ElementKind::Tet10 { share[0] * whole / diagonal } else { share[1] };
     }
 }

@@ -8,7 +8,7 @@ use super::point::PointLaw;
 use super::scratch::Scratch;
 use super::{BlockCsr, ModelError};
 use crate::element::{Point, Points, Spring, deformation_gradient};
-use crate::material::{Lame, Law, Region};
+use crate::material::{Lame, Law, Region, Regions};
 
 /// Finite element of a model, and the points at which its energy is integrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -79,9 +79,10 @@ pub struct Model {
     pub(super) volumetric: Volumetric,
     /// The law with the body's own constants.
     pub(super) point: PointLaw,
-    /// Regions with other constants, and the number of the region of every element; empty if there are none.
-    pub(super) regions: Vec<Region>,
-    pub(super) region_of: Vec<u16>,
+    /// Regions with other constants, and the region of every element (piece, where the mesh is cut).
+    pub(super) regions: Regions,
+    /// Density [kg/m³] of the body. Regions of another density stand for as much volume as would have their mass.
+    pub(super) density_kg_m3: f64,
     pub(super) rest: Vec<Vector3<f64>>,
     /// Nodes of every element, `kind.nodes()` each.
     pub(super) connectivity: Vec<u32>,
@@ -130,12 +131,12 @@ impl Model {
         self.point.law
     }
 
-    /// Lamé parameters [Pa], the same for all elements.
+    /// Lamé parameters [Pa] of the elements outside regions.
     pub fn lame(&self) -> Lame {
         self.point.lame
     }
 
-    /// Changes the elastic constants and recomputes nothing else.
+    /// Changes the elastic constants outside regions and recomputes nothing else.
     pub fn set_lame(&mut self, lame: Lame) {
         self.point.lame = lame;
     }
@@ -143,9 +144,32 @@ impl Model {
     /// The law with the constants of element `e`.
     #[inline]
     pub(super) fn point_of(&self, e: usize) -> PointLaw {
-        let region = self.region_of.get(e).copied().unwrap_or(0);
-        let other = usize::from(region).checked_sub(1).and_then(|r| self.regions.get(r));
-        other.map_or(self.point, |other| PointLaw { law: self.point.law, lame: other.lame() })
+        if self.regions.is_empty() {
+            return self.point;
+        }
+        let PointLaw { law, lame } = self.point;
+        PointLaw { law, lame: self.regions.lame(self.regions.of(e), lame) }
+    }
+
+    /// Gives the elements of regions the constants of these. `regions` has one entry per element (piece, where the
+    /// mesh is cut).
+    ///
+    /// # Errors
+    /// Another number of elements, or a remedy against locking that averages over neighbours, which may be of
+    /// another region.
+    pub fn with_regions(mut self, regions: Regions) -> Result<Self, ModelError> {
+        regions.check_length(self.n_elements())?;
+        if self.averaging.is_some() && !regions.is_empty() {
+            return Err(ModelError::AveragedRegions);
+        }
+        self.regions = regions;
+        self.weigh_regions();
+        Ok(self)
+    }
+
+    /// Regions of other materials, by element (piece, where the mesh is cut).
+    pub fn element_regions(&self) -> &Regions {
+        &self.regions
     }
 
     /// Number of nodes (copies, where the mesh is cut).
@@ -290,13 +314,13 @@ impl Points for Model {
             for (q, &weight) in self.weights(element).iter().enumerate() {
                 let (nodes, gradients) = (self.element(element), self.gradients(element, q));
                 let F = self.deformation_gradient(element, q, x);
-                let region = self.region_of.get(element).copied().unwrap_or(0);
+                let region = self.regions.of(element);
                 visit(Point { element, nodes, gradients, weight, F, region });
             }
         }
     }
 
     fn regions(&self) -> &[Region] {
-        &self.regions
+        self.regions.constants()
     }
 }

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::*;
 use crate::cut::{BladeSweep, CutMesh};
 use crate::element::Spring;
-use crate::material::{Law, Material, Rayleigh};
+use crate::material::{Law, Material, Rayleigh, Region, Regions};
 use crate::mesh::{BoxPattern, box_hexes, box_mesh};
 use crate::team::Team;
 
@@ -261,11 +261,17 @@ fn a_model_that_follows_cuts_is_the_one_built_anew() {
     let mesh = box_mesh(Vector3::zeros(), size(), [4; 3], BoxPattern::Tet6);
     let [even, floored] = [MassSharing::Even, MassSharing::Floored].map(Some);
     let kinds = [Volumetric::Full; 3].into_iter().zip([None, even, floored]).chain([(AVERAGED, None)]);
-    for (volumetric, sharing) in kinds {
+    let upper = mesh.tets.iter().map(|tet| u16::from(tet.iter().all(|&n| mesh.nodes[n as usize].z > 0.5)));
+    let dense = Region { young_pa: 30.0, poisson: 0.2, density_kg_m3: 5.0 };
+    let two = Regions::new(vec![dense], upper.collect()).unwrap();
+    assert!((20..mesh.tets.len() - 20).contains(&two.counts()[0]));
+    let kinds = kinds.map(|kind| (kind, Regions::default()));
+    for ((volumetric, sharing), regions) in kinds.chain([((Volumetric::Full, None), two)]) {
         let material = material(Law::Corotational);
         let mut cut = CutMesh::new(mesh.clone()).unwrap();
         let fresh = |cut: &CutMesh| {
-            let mut model = Model::tet4_cut(cut, &material, volumetric).unwrap();
+            let model = Model::tet4_cut(cut, &material, volumetric).unwrap();
+            let mut model = model.with_regions_of_tets(cut, &regions).unwrap();
             if let Some(sharing) = sharing {
                 model.share_mass(sharing);
             }
@@ -277,7 +283,7 @@ fn a_model_that_follows_cuts_is_the_one_built_anew() {
             let sweep = BladeSweep { segments: vec![segment(-0.3), segment(reach)] };
             let at_rest = cut.rest_positions();
             assert!(cut.sweep(&at_rest, &sweep, incision).unwrap().elements_cut > 0);
-            followed.follow_cut(&cut);
+            followed.follow_cut(&cut, &regions);
             let anew = fresh(&cut);
             assert_eq!(followed.lumped_mass(2.0), anew.lumped_mass(2.0));
             assert_eq!(followed.shape_integrals(), anew.shape_integrals());

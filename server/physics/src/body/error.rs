@@ -5,7 +5,7 @@ use thiserror::Error;
 use crate::assembly::ModelError;
 use crate::cut::CutError;
 use crate::integrator::DynamicsError;
-use crate::material::MaterialError;
+use crate::material::{MaterialError, RegionsError};
 use crate::mesh::MeshError;
 use crate::skin::SkinError;
 
@@ -18,6 +18,9 @@ pub enum BodyError {
     /// A material constant is out of range.
     #[error(transparent)]
     Material(#[from] MaterialError),
+    /// The regions of other materials do not fit the mesh.
+    #[error(transparent)]
+    Regions(#[from] RegionsError),
     /// The discrete model cannot be made.
     #[error(transparent)]
     Model(#[from] ModelError),

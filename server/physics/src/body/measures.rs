@@ -99,10 +99,21 @@ impl Body {
         of_element.into_iter().map(|(sum, weight)| sum / weight).collect()
     }
 
+    /// Region of the material of every element, numbered as in [`cauchy_stresses`](Self::cauchy_stresses): 0 for the
+    /// material of the body.
+    pub fn element_regions(&self) -> Vec<u16> {
+        let mut of_element = Vec::new();
+        self.space.for_points(&self.state.x, &mut |point| {
+            of_element.resize(point.element + 1, 0);
+            of_element[point.element] = point.region;
+        });
+        of_element
+    }
+
     /// Estimates the discretisation error of linear tetrahedra, cut or not; `None` for other elements.
     pub fn mesh_error(&self, recovery: &mut StressRecovery) -> Option<MeshError> {
         let tets = self.space.tets().filter(|tets| tets.is_linear())?;
-        let tets = CutTets::new(tets.mesh(), tets.pieces(), self.n_copies());
+        let tets = CutTets::new(tets.mesh(), tets.pieces(), self.n_copies(), tets.regions());
         Some(recovery.estimate(&tets, &self.state.x, self.material.law, self.material.lame()))
     }
 

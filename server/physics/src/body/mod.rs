@@ -44,7 +44,7 @@ pub use crate::integrator::{
     MassKind, Notice, Outcome, PairSpring, PointSpring, Scheme, SolveReport, SpringKind,
 };
 use crate::lists::reserve::{refill, resize_reserving};
-use crate::material::{Material, Rayleigh};
+use crate::material::{Material, Rayleigh, Regions};
 use crate::mesh::{HexMesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
@@ -146,6 +146,29 @@ impl Body {
         };
         tets.set_exact(!settings.ablation.exact_predicates);
         Self::at_rest(Box::new(tets), material, settings)
+    }
+
+    /// Likewise with regions of other materials, one entry of `regions` per tetrahedron of `mesh`.
+    ///
+    /// # Errors
+    /// Regions of another number of elements. Cutting along faces, which replaces the elements, and node-averaged
+    /// volume do not go with regions.
+    pub fn with_regions(
+        mesh: TetMesh,
+        regions: Regions,
+        material: Material,
+        settings: BodySettings,
+    ) -> Result<Self, BodyError> {
+        if regions.is_empty() {
+            return Self::new(mesh, material, settings);
+        }
+        let mut tets = match settings.element {
+            ElementKind::Tet10 => Tets::quadratic(mesh)?,
+            _ => Tets::linear(CutMesh::new(mesh)?),
+        };
+        tets.set_regions(regions)?;
+        tets.set_exact(!settings.ablation.exact_predicates);
+        Self::of_space(Box::new(tets), material, settings)
     }
 
     /// A body of trilinear hexahedra at rest in the configuration of `mesh`. Its surface is that of the

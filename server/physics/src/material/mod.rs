@@ -14,6 +14,7 @@ mod st_venant_kirchhoff;
 mod collapse_guard;
 mod neo_hookean;
 mod law;
+mod regions;
 mod split;
 #[cfg(test)]
 mod law_tests;
@@ -22,6 +23,7 @@ pub use corotational::Corotational;
 pub use law::{Law, Tangent};
 pub use linear::Linear;
 pub use neo_hookean::NeoHookean;
+pub use regions::{Regions, RegionsError};
 pub use split::Split;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use svd::SignedSvd;
@@ -84,6 +86,13 @@ impl Region {
         let (E, nu) = (self.young_pa, self.poisson);
         Lame { mu: E / (2.0 * (1.0 + nu)), lambda: E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)) }
     }
+
+    /// Checks that every constant is finite and in its range.
+    pub fn check(&self) -> Result<(), MaterialError> {
+        within("young_pa", self.young_pa, Material::YOUNG_PA)?;
+        within("poisson", self.poisson, Material::POISSON)?;
+        within("density_kg_m3", self.density_kg_m3, Material::DENSITY_KG_M3)
+    }
 }
 
 /// Coefficients of Rayleigh damping D = α M + β K̂. K̂ rotates with the material, so β does not damp rigid
@@ -131,8 +140,13 @@ impl Material {
 
     /// Lamé constants: μ = E / (2 (1+ν)), λ = E ν / ((1+ν)(1−2ν)).
     pub fn lame(&self) -> Lame {
+        self.constants().lame()
+    }
+
+    /// Elastic constants and density.
+    fn constants(&self) -> Region {
         let Self { young_pa, poisson, density_kg_m3, .. } = *self;
-        Region { young_pa, poisson, density_kg_m3 }.lame()
+        Region { young_pa, poisson, density_kg_m3 }
     }
 
     /// The material of a region of a body of this material.
@@ -143,16 +157,15 @@ impl Material {
 
     /// Checks that every constant is finite and in its range.
     pub fn check(&self) -> Result<(), MaterialError> {
-        let within = |quantity, found: f64, range: RangeInclusive<f64>| {
-            if range.contains(&found) { Ok(()) } else { Err(MaterialError { quantity, found, range }) }
-        };
+        self.constants().check()?;
         let Rayleigh { mass_1_s, stiffness_s } = self.rayleigh;
-        within("young_pa", self.young_pa, Self::YOUNG_PA)?;
-        within("poisson", self.poisson, Self::POISSON)?;
-        within("density_kg_m3", self.density_kg_m3, Self::DENSITY_KG_M3)?;
         within("rayleigh.mass_1_s", mass_1_s, Self::MASS_1_S)?;
         within("rayleigh.stiffness_s", stiffness_s, Self::STIFFNESS_S)
     }
+}
+
+fn within(quantity: &'static str, found: f64, range: RangeInclusive<f64>) -> Result<(), MaterialError> {
+    if range.contains(&found) { Ok(()) } else { Err(MaterialError { quantity, found, range }) }
 }
 
 #[cfg(test)]

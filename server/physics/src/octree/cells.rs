@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::build::OctreeSettings;
 use super::lattice::{At, Lattice, LeafMap, OUTSIDE};
 use super::link_map::LinkMap;
-use crate::material::Region;
+use crate::material::{Region, Regions};
 
 /// The six directions of links: −x, +x, −y, +y, −z, +z.
 pub const DIRECTIONS: [At; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
@@ -147,6 +147,14 @@ impl Octree {
     /// Gives the cells of material n the constants `regions[n − 1]`.
     pub fn set_regions(&mut self, regions: Vec<Region>) {
         self.regions = regions;
+    }
+
+    /// Gives every cell the material of the element of its number, and these their constants.
+    pub(crate) fn set_materials(&mut self, regions: &Regions) {
+        for (e, cell) in self.cells.iter_mut().enumerate() {
+            cell.material = regions.of(e);
+        }
+        self.regions = regions.constants().to_vec();
     }
 
     /// Constants of the materials 1, 2, …; cells of material 0 have those of the body.

@@ -1,4 +1,4 @@
-//! One chunk of the stiffness: the lanes of the pieces of one region, their local vectors, and how
+//! One chunk of the stiffness: the lanes of the pieces of one group, their local vectors, and how
 //! they follow a cut.
 
 use nalgebra::{Matrix3, Vector3};
@@ -15,8 +15,8 @@ use crate::mesh::TetMesh;
 
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Chunk {
-    /// Region of its elements.
-    pub region: usize,
+    /// Group of its elements.
+    pub group: usize,
     /// Numbers of lanes and copies when the chunk was planned; `n_lanes` is the present number.
     planned: [usize; 2],
     n_lanes: usize,
@@ -54,7 +54,7 @@ pub struct NewLane {
 
 impl Chunk {
     /// Arranges the carriers `members` (ascending) in batches.
-    pub fn new(region: usize, members: &[NewLane], mesh: &TetMesh, merged: &[Merged]) -> Self {
+    pub fn new(group: usize, members: &[NewLane], mesh: &TetMesh, merged: &[Merged]) -> Self {
         let pieces: Vec<u32> = members.iter().map(|lane| lane.piece).collect();
         let plan = plan_chunk(&pieces, |p| merged[p as usize].piece.copies);
         // Spare capacity for what cuts add before the next plan.
@@ -72,7 +72,7 @@ impl Chunk {
         resize_reserving(&mut x, n, [0.0; 4]);
         resize_reserving(&mut positions, n, [0.0; 4]);
         Self {
-            region,
+            group,
             batches: Batches::new(&plan.nodes, rest, n),
             pieces: plan.pieces,
             rest: rest_positions(&plan.copies, &pieces, mesh, merged),

@@ -1,19 +1,13 @@
-//! Division of the pieces into chunks that fit the first-level cache, and of chunks into batches of eight
-//! pieces. As far as possible the pieces of a batch share no copy, so that no sum waits for the one
+//! Division of chunks, which fit the first-level cache, into batches of eight pieces. As far as possible the pieces of a batch share no copy, so that no sum waits for the one
 //! before.
 //!
 //! The division depends on the mesh only, never on the number of threads. Every chunk sums into
 //! vectors of its own; copies on the border of chunks are then added up in chunk order.
 
-use nalgebra::Vector3;
-
 use super::BLOCK;
 use crate::element::{Ids, LANES};
 use crate::lists::reserve::resize_reserving;
 
-/// Pieces per chunk: local vectors, gradients and indices of a chunk stay near the core, and a
-/// body of a few thousand pieces still has work for several threads.
-const CHUNK_PIECES: usize = 1024;
 /// Number of batches kept open while pieces are packed, one bit each; more of them separate neighbours
 /// better.
 const OPEN_BATCHES: usize = 32;
@@ -31,43 +25,6 @@ pub struct ChunkPlan {
     pub pieces: Vec<[u32; LANES]>,
     /// Local numbers of the four copies of every lane.
     pub nodes: Vec<[Ids; 4]>,
-}
-
-/// Divides the elements into regions by recursive bisection of their rest centroids `centres`. Returns
-/// the region of every element and the number of regions. Cuts do not change them: a piece is in a chunk
-/// of its element's region.
-pub fn region_of_elements(centres: &[Vector3<f64>]) -> (Vec<u32>, usize) {
-    let mut order: Vec<u32> = (0..centres.len() as u32).collect();
-    let mut chunk_of = vec![0; centres.len()];
-    let mut n_chunks = 0;
-    bisect(&mut order, centres.len().div_ceil(CHUNK_PIECES), centres, &mut |chunk| {
-        chunk.iter().for_each(|&e| chunk_of[e as usize] = n_chunks);
-        n_chunks += 1;
-    });
-    (chunk_of, n_chunks as usize)
-}
-
-fn bisect(order: &mut [u32], parts: usize, centres: &[Vector3<f64>], emit: &mut dyn FnMut(&[u32])) {
-    if parts <= 1 {
-        if !order.is_empty() {
-            emit(order);
-        }
-        return;
-    }
-    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-    for &p in order.iter() {
-        low = low.inf(&centres[p as usize]);
-        high = high.sup(&centres[p as usize]);
-    }
-    let axis = (high - low).imax();
-    let left = parts / 2;
-    let middle = (order.len() * left / parts).min(order.len() - 1);
-    order.select_nth_unstable_by(middle, |&a, &b| {
-        centres[a as usize][axis].total_cmp(&centres[b as usize][axis]).then(a.cmp(&b))
-    });
-    let (first, second) = order.split_at_mut(middle);
-    bisect(first, left, centres, emit);
-    bisect(second, parts - left, centres, emit);
 }
 
 /// Packs the pieces `chunk`, ascending ids, into batches and numbers their copies.
@@ -351,7 +308,11 @@ impl Gather {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
+
+    use super::super::groups::Groups;
     use crate::cut::Piece;
+    use crate::material::Regions;
     use crate::mesh::{BoxPattern, box_mesh};
 
     #[test]
@@ -363,9 +324,9 @@ mod tests {
             .collect();
         let centres: Vec<_> =
             (0..mesh.tets.len()).map(|e| mesh.corners(e).iter().sum::<Vector3<f64>>() / 4.0).collect();
-        let (chunk_of, n_chunks) = region_of_elements(&centres);
-        let plans: Vec<ChunkPlan> = (0..n_chunks as u32)
-            .map(|k| (0..pieces.len() as u32).filter(|&p| chunk_of[p as usize] == k).collect::<Vec<u32>>())
+        let groups = Groups::new(&centres, &Regions::default());
+        let plans: Vec<ChunkPlan> = (0..groups.len())
+            .map(|k| (0..pieces.len() as u32).filter(|&p| groups.of(p) == k).collect::<Vec<u32>>())
             .map(|chunk| plan_chunk(&chunk, |p| pieces[p as usize].copies))
             .collect();
         let mut seen = vec![0; pieces.len()];

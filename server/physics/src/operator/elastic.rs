@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use nalgebra::{Matrix3, Vector3};
 
 use super::chunk::{Chunk, NewLane};
-use super::chunks::{Gather, NO_PIECE, region_of_elements};
+use super::chunks::{Gather, NO_PIECE};
+use super::groups::Groups;
 use super::kernel::{Block6, Coefficients, EnergyCoefficients};
 use super::rows::{self, Sum, gather_direction};
 use super::shared_lanes::{LaneChanges, SharedLanes};
@@ -15,6 +16,7 @@ use crate::cut::Piece;
 use crate::element::Simd;
 use crate::lists::numbering::Numbering;
 use crate::lists::reserve::resize_reserving;
+use crate::material::Regions;
 use crate::mesh::TetMesh;
 use crate::team::{Team, blocks, ranges};
 
@@ -40,10 +42,8 @@ pub struct Elastic {
     simd: Simd,
     /// Which pieces have a lane, and what it integrates.
     shared_lanes: SharedLanes,
-    /// Region of every element; cuts do not change it.
-    region_of_element: Vec<u32>,
-    n_regions: usize,
-    /// Ordered by region; a region has more than one only after very many cuts.
+    groups: Groups,
+    /// Ordered by group; a group has more than one only after very many cuts.
     chunks: Vec<Chunk>,
     gather: Gather,
     /// Sums of all chunks, rows as in `gather`: s K̂ x or internal forces.
@@ -61,16 +61,26 @@ pub struct Elastic {
 }
 
 impl Elastic {
-    /// Arranges `pieces` of `mesh` for the kernels, all rotations at rest.
+    /// Arranges `pieces` of `mesh`, all of one material, for the kernels, all rotations at rest.
     pub fn new(simd: Simd, mesh: &TetMesh, pieces: &[Piece], n_copies: usize) -> Self {
+        Self::with_regions(simd, (mesh, &Regions::default()), pieces, n_copies)
+    }
+
+    /// Likewise with `regions` of other materials, one entry per tetrahedron of `mesh`.
+    pub fn with_regions(
+        simd: Simd,
+        (mesh, regions): (&TetMesh, &Regions),
+        pieces: &[Piece],
+        n_copies: usize,
+    ) -> Self {
         let centre = |e: usize| mesh.corners(e).iter().sum::<Vector3<f64>>() / 4.0;
         let centres: Vec<Vector3<f64>> = (0..mesh.tets.len()).map(centre).collect();
-        let (region_of_element, n_regions) = region_of_elements(&centres);
+        let groups = Groups::new(&centres, regions);
+        let mut members = vec![Some(Vec::new()); groups.len()];
         let mut elastic = Self {
             simd,
             shared_lanes: SharedLanes::new(mesh.tets.len(), pieces),
-            region_of_element,
-            n_regions,
+            groups,
             chunks: Vec::new(),
             gather: Gather::default(),
             sums: Vec::new(),
@@ -82,10 +92,9 @@ impl Elastic {
             marks: Marks::default(),
         };
         elastic.marks.put_on(&LaneChanges::default(), pieces.len());
-        let mut members = vec![Some(Vec::new()); n_regions];
         for (p, merged) in (0u32..).zip(elastic.shared_lanes.merged()).filter(|(_, m)| m.count > 0) {
-            let region = elastic.region_of_element[merged.piece.element as usize] as usize;
-            members[region]
+            let group = elastic.groups.of(merged.piece.element);
+            members[group]
                 .iter_mut()
                 .for_each(|m| m.push(NewLane { piece: p, rotation: Matrix3::identity() }));
         }
@@ -100,39 +109,40 @@ impl Elastic {
     /// once they have grown by a quarter.
     pub fn follow(&mut self, mesh: &TetMesh, pieces: &[Piece], changed: &[u32], n_copies: usize) {
         let changes = self.shared_lanes.follow(pieces, changed);
-        let region_of = |p: u32| self.region_of_element[pieces[p as usize].element as usize] as usize;
-        let mut affected = vec![false; self.n_regions];
-        changes.amended.iter().for_each(|&p| affected[region_of(p)] = true);
-        changes.added.iter().for_each(|&[p, _]| affected[region_of(p)] = true);
+        let group_of = |p: u32| self.groups.of(pieces[p as usize].element);
+        let n_groups = self.groups.len();
+        let mut affected = vec![false; n_groups];
+        changes.amended.iter().for_each(|&p| affected[group_of(p)] = true);
+        changes.added.iter().for_each(|&[p, _]| affected[group_of(p)] = true);
         self.marks.put_on(&changes, pieces.len());
         let (sources, rotations) = self.rotations_of(&affected);
         self.numbering.note(&sources, 0);
-        let mut added = vec![Vec::new(); self.n_regions];
+        let mut added = vec![Vec::new(); n_groups];
         let rotation = |source: u32| {
             let found = self.numbering.find(&sources, source);
             found.map_or_else(Matrix3::identity, |at| rotations[at])
         };
         for &[piece, source] in &changes.added {
-            added[region_of(piece)].push(NewLane { piece, rotation: rotation(source) });
+            added[group_of(piece)].push(NewLane { piece, rotation: rotation(source) });
         }
-        // Chunks with new copies, and their number before; lanes of regions that are arranged anew.
-        let (mut grown, mut outgrown) = (Vec::new(), vec![None; self.n_regions]);
+        // Chunks with new copies, and their number before; lanes of groups that are arranged anew.
+        let (mut grown, mut outgrown) = (Vec::new(), vec![None; n_groups]);
         let merged = self.shared_lanes.merged();
-        for (k, chunk) in self.chunks.iter_mut().enumerate().rev().filter(|(_, c)| affected[c.region]) {
-            // New lanes go to the last chunk of their region.
-            let added = std::mem::take(&mut added[chunk.region]);
+        for (k, chunk) in self.chunks.iter_mut().enumerate().rev().filter(|(_, c)| affected[c.group]) {
+            // New lanes go to the last chunk of their group.
+            let added = std::mem::take(&mut added[chunk.group]);
             let known = chunk.copies.len();
             if chunk.follow(mesh, merged, &self.marks.amended, &added, &mut self.numbering) {
                 grown.push((k, known));
             } else {
-                outgrown[chunk.region].get_or_insert_with(Vec::new).extend(added);
+                outgrown[chunk.group].get_or_insert_with(Vec::new).extend(added);
             }
         }
         self.marks.take_off(&changes);
-        // A chunk that has outgrown its plan takes its whole region along.
+        // A chunk that has outgrown its plan takes its whole group along.
         if outgrown.iter().any(Option::is_some) {
             for chunk in &self.chunks {
-                if let Some(members) = &mut outgrown[chunk.region] {
+                if let Some(members) = &mut outgrown[chunk.group] {
                     members.extend(chunk.new_lanes());
                 }
             }
@@ -147,17 +157,17 @@ impl Elastic {
         }
     }
 
-    /// Divides the carriers `members` of regions into chunks, which replace those there were.
+    /// Divides the carriers `members` of groups into chunks, which replace those there were.
     fn plan(&mut self, mesh: &TetMesh, members: Vec<Option<Vec<NewLane>>>) {
-        self.chunks.retain(|chunk| members[chunk.region].is_none());
+        self.chunks.retain(|chunk| members[chunk.group].is_none());
         let merged = self.shared_lanes.merged();
-        for (region, members) in members.into_iter().enumerate() {
+        for (group, members) in members.into_iter().enumerate() {
             let Some(mut members) = members else { continue };
             members.sort_unstable_by_key(|lane| lane.piece);
-            let build = |part| Chunk::new(region, part, mesh, merged);
+            let build = |part| Chunk::new(group, part, mesh, merged);
             self.chunks.extend(members.chunks(MOST_LANES).map(build));
         }
-        self.chunks.sort_by_key(|chunk| chunk.region);
+        self.chunks.sort_by_key(|chunk| chunk.group);
     }
 
     /// Arranges the sums of the present chunks. Chunks keep their rows if these suffice. Otherwise
@@ -180,9 +190,9 @@ impl Elastic {
         }
     }
 
-    /// The marked sources in these regions, and their rotations.
-    fn rotations_of(&self, regions: &[bool]) -> (Vec<u32>, Vec<Matrix3<f32>>) {
-        let chunks = self.chunks.iter().filter(|chunk| regions[chunk.region]);
+    /// The marked sources in these groups, and their rotations.
+    fn rotations_of(&self, groups: &[bool]) -> (Vec<u32>, Vec<Matrix3<f32>>) {
+        let chunks = self.chunks.iter().filter(|chunk| groups[chunk.group]);
         let lanes = chunks.flat_map(|chunk| chunk.lanes().map(move |lane| (chunk, lane)));
         let lanes = lanes.filter(|(_, (p, ..))| self.marks.source[*p as usize]);
         lanes.map(|(chunk, (p, batch, lane))| (p, chunk.rotation(batch, lane))).unzip()
@@ -257,7 +267,7 @@ impl Stiffness for Elastic {
     /// Every chunk's own sums. Without rotations the stiffness changes only if
     /// `with` or the pieces do; otherwise one application is enough.
     fn update(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> usize {
-        let (simd, c) = (self.simd, coefficients(with));
+        let (simd, groups, c) = (self.simd, &self.groups, Coefficients::of(with, with.lame));
         let assembled = match self.choice {
             OperatorChoice::Auto => !c.rotates,
             OperatorChoice::MatrixFree => false,
@@ -271,6 +281,7 @@ impl Stiffness for Elastic {
             let sums = (ranges(&mut self.sums, first), ranges(&mut self.diagonals, first));
             team.for_blocks((blocks(&mut self.chunks, 1), sums.0, sums.1), |_, (chunk, y, diagonal)| {
                 if all || chunk[0].stale {
+                    let c = groups.coefficients(chunk[0].group, with);
                     chunk[0].update(simd, &c, positions, y, diagonal);
                     chunk[0].assemble(assembled);
                 }
@@ -286,9 +297,11 @@ impl Stiffness for Elastic {
     }
 
     fn energy(&mut self, team: &mut Team, with: &ElasticUpdate, positions: &[Vector3<f64>]) -> Option<f64> {
-        let (simd, Coefficients { mu, lambda, rotates, .. }) = (self.simd, coefficients(with));
-        let c = EnergyCoefficients { mu, lambda, rotates };
-        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| chunk[0].find_energy(simd, c, positions));
+        let (simd, groups) = (self.simd, &self.groups);
+        team.for_blocks(blocks(&mut self.chunks, 1), |_, chunk| {
+            let Coefficients { mu, lambda, rotates, .. } = groups.coefficients(chunk[0].group, with);
+            chunk[0].find_energy(simd, EnergyCoefficients { mu, lambda, rotates }, positions);
+        });
         Some(self.chunks.iter().map(|chunk| chunk.energy).sum())
     }
 
@@ -401,14 +414,5 @@ impl Marks {
 impl LinearOperator for Elastic {
     fn apply(&mut self, team: &mut Team, x: &[Padded], y: &mut [Padded]) {
         apply(self, team, x, y);
-    }
-}
-
-fn coefficients(with: &ElasticUpdate) -> Coefficients {
-    Coefficients {
-        mu: with.lame.mu as f32,
-        lambda: with.lame.lambda as f32,
-        scale: with.scale as f32,
-        rotates: with.law.rotates(),
     }
 }

@@ -8,6 +8,7 @@ mod composite_diagonal;
 mod elastic;
 mod kernel;
 mod edges;
+mod groups;
 mod held;
 mod precondition;
 mod preconditioner;

@@ -13,9 +13,10 @@ use crate::cut::{
     Surface, SweepUnderWay, Work, swept_area,
 };
 use crate::element::{MaterialPoint, Point, Points, Simd};
-use crate::material::Material;
+use crate::material::{Lame, Material, Region, Regions, RegionsError};
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
 use crate::multigrid::Hierarchy;
+use crate::octree::Octree;
 use crate::operator::cells::CellStiffness;
 use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
@@ -44,13 +45,16 @@ pub struct Tets {
     under_way: Option<(SweepUnderWay, Vec<Vector3<f64>>)>,
     /// Degenerate linear tetrahedra of the mesh, ascending.
     degenerate: Vec<u32>,
+    /// Regions of other materials, by element.
+    regions: Regions,
 }
 
 impl Tets {
     /// Linear tetrahedra whose uncut or cut state is `cut`.
     pub fn linear(cut: CutMesh) -> Self {
         let degenerate = degenerate_elements(cut.mesh());
-        Self { cut, element: Arc::new(LinearTets), skin: None, under_way: None, degenerate }
+        let (element, regions) = (Arc::new(LinearTets), Regions::default());
+        Self { cut, element, skin: None, under_way: None, degenerate, regions }
     }
 
     /// Quadratic tetrahedra on the corners of `mesh`.
@@ -68,7 +72,30 @@ impl Tets {
 
     fn with_element(mesh: TetMesh, element: Arc<dyn Element>) -> Result<Self, MeshError> {
         let cut = CutMesh::new(mesh)?;
-        Ok(Self { cut, element, skin: None, under_way: None, degenerate: Vec::new() })
+        let (degenerate, regions) = (Vec::new(), Regions::default());
+        Ok(Self { cut, element, skin: None, under_way: None, degenerate, regions })
+    }
+
+    /// Gives elements of other materials theirs; `regions` has one entry per element.
+    ///
+    /// # Errors
+    /// Another number of elements.
+    pub fn set_regions(&mut self, regions: Regions) -> Result<(), RegionsError> {
+        regions.check_length(self.n_elements())?;
+        self.regions = regions;
+        Ok(())
+    }
+
+    /// Regions of other materials, by element.
+    pub fn regions(&self) -> &Regions {
+        &self.regions
+    }
+
+    /// Equal cubes as cells of an octree.
+    fn cubes(&self) -> Option<Octree> {
+        let mut cubes = self.element.cubes()?;
+        cubes.set_materials(&self.regions);
+        Some(cubes)
     }
 
     /// Whether the signs of a sweep are exact; see [`CutMesh::set_exact`].
@@ -130,7 +157,18 @@ impl Tets {
 
 impl Points for Tets {
     fn for_points(&self, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {
-        self.element.for_points(&self.cut, x, visit);
+        if self.regions.is_empty() {
+            return self.element.for_points(&self.cut, x, visit);
+        }
+        let (pieces, is_linear) = (self.cut.pieces(), self.is_linear());
+        self.element.for_points(&self.cut, x, &mut |point| {
+            let element = if is_linear { pieces[point.element].element as usize } else { point.element };
+            visit(Point { region: self.regions.of(element), ..point });
+        });
+    }
+
+    fn regions(&self) -> &[Region] {
+        self.regions.constants()
     }
 }
 
@@ -190,6 +228,19 @@ impl Space for Tets {
     }
 
     fn copy_masses(&self, density_kg_m3: f64) -> Vec<f64> {
+        if !self.regions.is_empty() && self.is_linear() {
+            let mut mass = vec![0.0; self.cut.n_copies()];
+            for (p, piece) in self.cut.pieces().iter().enumerate() {
+                let relative = self.regions.relative_density(piece.element as usize, density_kg_m3);
+                for (&copy, volume) in piece.copies.iter().zip(self.cut.piece_node_volume(p)) {
+                    mass[copy as usize] += relative * density_kg_m3 * volume;
+                }
+            }
+            return mass;
+        }
+        if let Some(cubes) = self.cubes().filter(|_| !self.regions.is_empty()) {
+            return cubes.vertex_masses(density_kg_m3);
+        }
         if self.kind() == ElementKind::Hex8 {
             // The tetrahedra that a hexahedron is split into share it unevenly among its corners.
             let all = vec![true; self.cut.n_copies()];
@@ -376,9 +427,11 @@ impl Space for Tets {
 
     fn stiffness(&self, portable: bool) -> Option<Box<dyn Stiffness>> {
         let simd = if portable { Simd::Baseline } else { Simd::detect() };
-        let elastic = || Elastic::new(simd, self.cut.mesh(), self.cut.pieces(), self.cut.n_copies());
-        if let Some(cubes) = self.element.cubes() {
-            return Some(Box::new(CellStiffness::new(simd, &cubes, &[])));
+        let mesh = (self.cut.mesh(), &self.regions);
+        let elastic = || Elastic::with_regions(simd, mesh, self.cut.pieces(), self.cut.n_copies());
+        if let Some(cubes) = self.cubes() {
+            let lame: Vec<Lame> = self.regions.constants().iter().map(Region::lame).collect();
+            return Some(Box::new(CellStiffness::new(simd, &cubes, &lame)));
         }
         self.is_linear().then(|| Box::new(elastic()) as Box<dyn Stiffness>)
     }
@@ -388,7 +441,7 @@ impl Space for Tets {
     }
 
     fn hierarchy(&self, least: usize) -> Option<Hierarchy> {
-        self.element.cubes().map(|cubes| Hierarchy::with_level(&cubes, least))
+        self.cubes().map(|cubes| Hierarchy::with_level(&cubes, least))
     }
 
     fn follow_stiffness(&self, stiffness: &mut dyn Stiffness) {
@@ -404,11 +457,15 @@ impl Space for Tets {
     }
 
     fn model(&self, material: &Material, volumetric: Volumetric) -> Result<Model, ModelError> {
-        self.element.model(&self.cut, material, volumetric)
+        let model = self.element.model(&self.cut, material, volumetric)?;
+        match self.is_linear() {
+            true => model.with_regions_of_tets(&self.cut, &self.regions),
+            false => model.with_regions(self.regions.clone()),
+        }
     }
 
     fn follow_model(&self, model: &mut Model, _: &Material) {
-        model.follow_cut(&self.cut);
+        model.follow_cut(&self.cut, &self.regions);
     }
 }
 

@@ -23,6 +23,7 @@ mod octree;
 mod octree_statics;
 mod phases;
 mod reference;
+mod regions;
 mod repeated_solves;
 mod robustness;
 mod sensible;

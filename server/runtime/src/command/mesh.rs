@@ -32,7 +32,7 @@ pub fn mesh(args: &MeshArgs) -> Result<ExitCode, RuntimeError> {
     let progress = Share::begin(args.json);
     let (mesh, health) = load_any(&args.input, args.cells as usize, args.scale, &|at| progress.meshing(at))?;
     progress.end();
-    write_mesh(&args.output, &mesh).map_err(RuntimeError::Unwritten)?;
+    write_mesh(&args.output, &mesh, health.groups()).map_err(RuntimeError::Unwritten)?;
     if args.json {
         say!(
             "{:#}",

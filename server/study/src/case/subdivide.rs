@@ -53,15 +53,19 @@ impl Subdivisions {
         let mut bodies = BTreeMap::new();
         for (i, body) in scene.bodies.iter().enumerate() {
             let MeshSource::File { path, scale, weld } = &body.mesh else { continue };
-            let Ok((mut mesh, _)) = load_volume(&base_dir.join(path), *scale, *weld) else { continue };
+            let Ok((mut mesh, health)) = load_volume(&base_dir.join(path), *scale, *weld) else { continue };
             let mut levels = vec![Level { factor: 1.0, tets: mesh.tets.len(), path: None }];
             let mut factor = 2.0;
+            let mut groups = health.groups;
+            // Only files of Gmsh keep names.
+            let format = if groups.iter().any(|group| group.name.is_some()) { "msh" } else { "vtu" };
             while 8 * mesh.tets.len() <= MOST_TETS && factor <= 4.0 {
                 mesh = split(&mesh);
+                groups.iter_mut().for_each(|group| group.tets = parts_of(&group.tets));
                 std::fs::create_dir_all(directory).map_err(|e| format!("{}: {e}", directory.display()))?;
                 let whole = std::path::absolute(directory).map_err(|e| e.to_string())?;
-                let path = whole.join(format!("{}-x{factor}.vtu", body.id));
-                write_mesh(&path, &mesh).map_err(|error| error.to_string())?;
+                let path = whole.join(format!("{}-x{factor}.{format}", body.id));
+                write_mesh(&path, &mesh, &groups).map_err(|error| error.to_string())?;
                 levels.push(Level { factor, tets: mesh.tets.len(), path: Some(path) });
                 factor *= 2.0;
             }
@@ -76,7 +80,12 @@ impl Subdivisions {
     }
 }
 
-/// Splits every tetrahedron into eight.
+/// Numbers of the parts that [`split`] makes of these tetrahedra.
+fn parts_of(tets: &[u32]) -> Vec<u32> {
+    tets.iter().flat_map(|tet| 8 * tet..8 * tet + 8).collect()
+}
+
+/// Splits every tetrahedron into eight, which follow each other.
 pub fn split(mesh: &TetMesh) -> TetMesh {
     let mut nodes = mesh.nodes.clone();
     let mut middles = BTreeMap::new();

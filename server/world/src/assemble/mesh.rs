@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use scindo_physics::material;
+use scindo_physics::material::{self, Regions};
 use scindo_physics::mesh::{BoxPattern, HexMesh, TetMesh, box_hexes, box_mesh, graded_hexes};
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, Shape};
 
 use crate::body::region::holds;
-use crate::format::{MeshFile, MeshInError, read_mesh};
+use crate::format::{CellGroup, MeshFile, MeshInError, read_mesh};
 use crate::mesh_in::{
     MeshHealth, Observer, OctreeReport, SolidSurface, SurfaceHealth, VolumeHealth, body_bytes, check_scale,
     components, fill_observed, load_surface, load_volume, memory_for_meshes,
@@ -34,6 +34,21 @@ impl Mesh {
             Mesh::Tets(mesh) => mesh.nodes.len(),
             Mesh::Hexes(mesh) => mesh.nodes.len(),
             Mesh::Octree(octree) => octree.n_vertices(),
+        }
+    }
+
+    /// Centres of the tetrahedra or hexahedra [m]; cells of an octree have their materials already.
+    pub fn centres(&self) -> Vec<Vector3<f64>> {
+        match self {
+            Mesh::Tets(mesh) => {
+                let centre = |e: usize| mesh.corners(e).iter().sum::<Vector3<f64>>() / 4.0;
+                (0..mesh.tets.len()).map(centre).collect()
+            }
+            Mesh::Hexes(mesh) => {
+                let centre = |e: usize| mesh.corners(e).iter().sum::<Vector3<f64>>() / 8.0;
+                (0..mesh.hexes.len()).map(centre).collect()
+            }
+            Mesh::Octree(_) => Vec::new(),
         }
     }
 
@@ -131,24 +146,114 @@ pub fn fill(
         }
     };
     let bounds = shape.bounds();
-    let regions = body.materials.iter().map(|material| -> Result<Box<dyn Shape>, Fault> {
-        Ok(match &material.place {
-            MaterialPlace::Region(region) => Box::new(RegionShape { region: region.clone(), bounds }),
-            MaterialPlace::Surface { path, scale } => Box::new(enclosed(path, *scale, base_dir)?.0),
-        })
+    let regions = body.materials.iter().map(|material| match &material.place {
+        MaterialPlace::Region(region) => Ok(in_region(region, bounds)),
+        MaterialPlace::Surface { path, scale } => inside(path, *scale, base_dir),
+        MaterialPlace::Group { .. } => {
+            Err(Fault::Mesh { reason: "octree cells have no groups from a file".into() })
+        }
     });
     let regions: Vec<Box<dyn Shape>> = regions.collect::<Result<_, _>>()?;
     let regions: Vec<&dyn Shape> = regions.iter().map(|region| &**region).collect();
     let settings = OctreeSettings { cells: octree.cells, levels: octree.levels };
     let (mut octree, report) = fill_observed(&*shape, settings, &regions, observer)
         .map_err(|error| Fault::Mesh { reason: error.to_string() })?;
-    let constants = body.materials.iter().map(|material| {
-        let MaterialSpec { young_pa, poisson, density_kg_m3, .. } = *material;
-        material::Region { young_pa, poisson, density_kg_m3 }
-    });
-    octree.set_regions(constants.collect());
+    octree.set_regions(body.materials.iter().map(constants).collect());
     let health = MeshHealth::Octree(OctreeReport { surface, ..report });
     Ok(Opened { mesh: Mesh::Octree(Box::new(octree)), health: Some(health) })
+}
+
+/// The regions of other materials in a mesh of tetrahedra or hexahedra: the last one that holds the centre of an
+/// element, or whose group it belongs to, counts. Paths are relative to `base_dir`. The fault comes with the number of
+/// its region.
+pub fn regions(
+    body: &BodySpec,
+    centres: &[Vector3<f64>],
+    groups: &[CellGroup],
+    bounds: [Vector3<f64>; 2],
+    base_dir: &Path,
+) -> Result<Regions, (usize, Fault)> {
+    let mut of_element = vec![0; centres.len()];
+    for (i, material) in body.materials.iter().enumerate() {
+        let region = i as u16 + 1;
+        let shape = match &material.place {
+            MaterialPlace::Region(region) => in_region(region, bounds),
+            MaterialPlace::Surface { path, scale } => {
+                inside(path, *scale, base_dir).map_err(|fault| (i, fault))?
+            }
+            MaterialPlace::Group { group, array } => {
+                let found = group_named(groups, group, array.as_deref()).map_err(|fault| (i, fault))?;
+                found.tets.iter().for_each(|&tet| of_element[tet as usize] = region);
+                continue;
+            }
+        };
+        for (of_element, centre) in of_element.iter_mut().zip(centres) {
+            if shape.contains(centre) {
+                *of_element = region;
+            }
+        }
+    }
+    let constants = body.materials.iter().map(constants).collect();
+    Regions::new(constants, of_element).map_err(|error| (0, Fault::Mesh { reason: error.to_string() }))
+}
+
+/// The group of this name or number.
+fn group_named<'a>(
+    groups: &'a [CellGroup],
+    wanted: &str,
+    array: Option<&str>,
+) -> Result<&'a CellGroup, Fault> {
+    // A name that looks like a number counts as a name where there is one.
+    let is_name = groups.iter().any(|group| group.name.as_deref() == Some(wanted));
+    let number = wanted.parse().ok().filter(|_: &i64| !is_name);
+    let is_wanted = |group: &&CellGroup| match number {
+        Some(number) => group.number == number,
+        None => group.name.as_deref() == Some(wanted),
+    };
+    let of_array = |group: &&CellGroup| array.is_none_or(|array| group.array == array);
+    let mut found = groups.iter().filter(is_wanted).filter(of_array);
+    match (found.next(), found.next()) {
+        (Some(group), None) => Ok(group),
+        (Some(first), Some(second)) => Err(Fault::Conflict {
+            what: format!("found group \"{wanted}\" in the arrays {} and {}", first.array, second.array),
+            next: format!("write array = \"{}\" or \"{}\" beside it", first.array, second.array),
+        }),
+        (None, _) => Err(Fault::Conflict {
+            what: format!("found group \"{wanted}\", allowed here: {}", list(groups)),
+            next: "name one of them".into(),
+        }),
+    }
+}
+
+/// The groups of a file in a sentence.
+fn list(groups: &[CellGroup]) -> String {
+    const SHOWN: usize = 12;
+    if groups.is_empty() {
+        return "none, because the file has no groups of tetrahedra".into();
+    }
+    let one = |group: &CellGroup| match &group.name {
+        Some(name) => format!("\"{name}\""),
+        None => format!("\"{}\" ({})", group.number, group.array),
+    };
+    let mut shown: Vec<String> = groups.iter().take(SHOWN).map(one).collect();
+    if groups.len() > SHOWN {
+        shown.push(format!("{} more", groups.len() - SHOWN));
+    }
+    shown.join(", ")
+}
+
+/// Constants of a region.
+fn constants(material: &MaterialSpec) -> material::Region {
+    let MaterialSpec { young_pa, poisson, density_kg_m3, .. } = *material;
+    material::Region { young_pa, poisson, density_kg_m3 }
+}
+
+fn in_region(region: &Region, bounds: [Vector3<f64>; 2]) -> Box<dyn Shape> {
+    Box::new(RegionShape { region: region.clone(), bounds })
+}
+
+fn inside(path: &str, scale: f64, base_dir: &Path) -> Result<Box<dyn Shape>, Fault> {
+    Ok(Box::new(enclosed(path, scale, base_dir)?.0))
 }
 
 /// The solid inside a surface file.
@@ -157,7 +262,7 @@ fn enclosed(path: &str, scale: f64, base_dir: &Path) -> Result<(SolidSurface, Su
         MeshFile::Surface(surface) => SolidSurface::new(&surface, scale).map_err(fault),
         MeshFile::Volume(volume) => Err(Fault::Mesh {
             reason: format!(
-                "{} holds tetrahedra; octree cells fill a surface: .obj, .stl or .ply",
+                "{} holds tetrahedra; a closed surface is needed here: .obj, .stl or .ply",
                 volume.file
             ),
         }),
@@ -208,16 +313,17 @@ fn fits(source: &MeshSource) -> Result<(), Fault> {
     })
 }
 
-/// Leaves only the part of the largest volume.
-pub fn keep_largest_part(mesh: &mut TetMesh) -> bool {
+/// Leaves only the part of the largest volume. The tetrahedra that remain, if there was another part.
+pub fn keep_largest_part(mesh: &mut TetMesh) -> Option<Vec<u32>> {
     let (part, count) = components(mesh);
     let mut volumes = vec![0.0; count];
     (0..mesh.tets.len()).for_each(|e| volumes[part[e] as usize] += mesh.volume(e));
     let largest = (0..count).max_by(|&a, &b| volumes[a].total_cmp(&volumes[b]));
-    let mut parts = part.iter();
-    mesh.tets.retain(|_| parts.next().map(|&part| part as usize) == largest);
+    let inside = |e: &u32| Some(part[*e as usize] as usize) == largest;
+    let kept: Vec<u32> = (0..mesh.tets.len() as u32).filter(inside).collect();
+    mesh.tets = kept.iter().map(|&e| mesh.tets[e as usize]).collect();
     mesh.drop_unused_nodes();
-    count > 1
+    (count > 1).then_some(kept)
 }
 
 /// The tetrahedra that a cell is split into; none: it stays a hexahedron.

@@ -14,8 +14,10 @@ use std::path::Path;
 
 use scindo_physics::assembly::ModelError;
 use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants};
-use scindo_physics::material::{Material, MaterialError, Rayleigh};
+use scindo_physics::material::{Material, MaterialError, Rayleigh, Regions};
+use scindo_physics::mesh::HexMesh;
 use scindo_physics::octree::OctreeSpace;
+use scindo_physics::space::Tets;
 use scindo_physics::team::Lead;
 
 use crate::body::{Adaptation, Probe, SimBody, region};
@@ -97,6 +99,18 @@ pub fn build(
     }
 }
 
+/// A body of hexahedra with regions of other materials.
+fn hexahedra(
+    mesh: HexMesh,
+    regions: Regions,
+    material: Material,
+    settings: BodySettings,
+) -> Result<Body, BodyError> {
+    let mut space = Tets::hexahedra(mesh)?;
+    space.set_regions(regions)?;
+    Body::of_space(Box::new(space), material, settings)
+}
+
 struct Builder<'a> {
     base_dir: &'a Path,
     options: BuildOptions,
@@ -126,9 +140,9 @@ impl Builder<'_> {
         let repaired = mesh::doubts_about_repair(health.as_ref());
         self.warnings.extend(repaired.map(|doubt| format!("{at}.mesh: {doubt}")));
         if let (true, mesh::Mesh::Tets(tets)) = (spec.largest_part, &mut mesh)
-            && mesh::keep_largest_part(tets)
+            && let Some(kept) = mesh::keep_largest_part(tets)
         {
-            health.iter_mut().for_each(MeshHealth::keeps_one_part);
+            health.iter_mut().for_each(|health| health.keeps_one_part(&kept));
         }
         let doubts = mesh::doubts_about_scale(mesh.bounds(), spec);
         self.doubts.extend(doubts.into_iter().map(|doubt| (at.clone(), doubt)));
@@ -140,9 +154,16 @@ impl Builder<'_> {
             simulate_level: spec.octree.map_or(0, |octree| octree.simulate_level),
             ..spec.mechanics.body_settings()
         };
+        let regions = match self.regions(&at, spec, &mesh, health.as_ref()) {
+            Ok(regions) => regions,
+            Err((region, fault)) => {
+                self.findings.push((format!("{at}.material.{region}"), fault));
+                return None;
+            }
+        };
         let made = match mesh {
-            mesh::Mesh::Tets(mesh) => Body::new(mesh, material(spec), settings),
-            mesh::Mesh::Hexes(mesh) => Body::hex8(mesh, material(spec), settings),
+            mesh::Mesh::Tets(mesh) => Body::with_regions(mesh, regions, material(spec), settings),
+            mesh::Mesh::Hexes(mesh) => hexahedra(mesh, regions, material(spec), settings),
             mesh::Mesh::Octree(octree) => {
                 Body::of_space(Box::new(OctreeSpace::new(*octree)), material(spec), settings)
             }
@@ -183,6 +204,27 @@ impl Builder<'_> {
             self.refused(&format!("{at}.velocity_m_s"), &error);
         }
         Some(body)
+    }
+
+    /// Regions of other materials in a mesh of tetrahedra or hexahedra.
+    fn regions(
+        &mut self,
+        at: &str,
+        spec: &BodySpec,
+        mesh: &mesh::Mesh,
+        health: Option<&MeshHealth>,
+    ) -> Result<Regions, (usize, Fault)> {
+        if spec.materials.is_empty() || spec.octree.is_some() {
+            return Ok(Regions::default());
+        }
+        let groups = health.map_or(&[][..], MeshHealth::groups);
+        let regions = mesh::regions(spec, &mesh.centres(), groups, mesh.bounds(), self.base_dir)?;
+        let counts = regions.counts();
+        let is_empty = |i: &usize| counts.get(*i).is_none_or(|elements| *elements == 0);
+        for i in (0..spec.materials.len()).filter(is_empty) {
+            self.warnings.push(format!("{at}.material.{i}: {}", doubts::EMPTY_REGION));
+        }
+        Ok(regions)
     }
 
     fn refused(&mut self, at: &str, error: &BodyError) {

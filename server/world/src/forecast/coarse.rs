@@ -7,13 +7,14 @@
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, ElementKind, Volumetric};
+use scindo_physics::material::Regions;
 use scindo_physics::mesh::TetMesh;
 use scindo_physics::octree::OctreeSpace;
 use scindo_physics::space::Tets;
 
 use super::{BodyForecast, Effort, Ending, Run, Source};
 use crate::assemble::Built;
-use crate::assemble::mesh::{Mesh, fill};
+use crate::assemble::mesh::{Mesh, fill, regions};
 use crate::body::SimBody;
 use crate::body::region;
 use crate::format::SurfaceMesh;
@@ -87,8 +88,15 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
                     other => other,
                 };
                 let settings = BodySettings { element: ElementKind::Tet4, volumetric, ..wanted };
-                let mesh = coarser(&fine.body, elements)?;
-                Body::new(mesh, *fine.body.material(), settings).ok()?
+                let mesh = Mesh::Tets(coarser(&fine.body, elements)?);
+                // Groups belong to the elements of a file, which the copy does not have.
+                let base_dir = simulation.source().base_dir();
+                let found = match spec.materials.is_empty() {
+                    true => Regions::default(),
+                    false => regions(spec, &mesh.centres(), &[], mesh.bounds(), base_dir).ok()?,
+                };
+                let Mesh::Tets(mesh) = mesh else { return None };
+                Body::with_regions(mesh, found, *fine.body.material(), settings).ok()?
             }
         };
         if (body.rest_volume() / fine.rest_volume_m3 - 1.0).abs() > VOLUME {

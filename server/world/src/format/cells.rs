@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::error::MeshInError;
+use super::groups::Labels;
 use super::mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
 
 /// Contribution of a cell of a file to the mesh.
@@ -36,6 +37,11 @@ pub enum CellKind {
 pub struct CellSoup {
     tets: Vec<[i64; 4]>,
     triangles: Vec<[i64; 3]>,
+    /// Number of cells so far.
+    cells: u32,
+    /// Cell of every tetrahedron.
+    cell_of_tet: Vec<u32>,
+    labels: Vec<Labels>,
     ignored: BTreeMap<&'static str, usize>,
     high_order: usize,
 }
@@ -45,9 +51,11 @@ impl CellSoup {
     /// refused kinds.
     #[must_use]
     pub fn add(&mut self, kind: CellKind, nodes: &[i64]) -> bool {
+        self.cells += 1;
         match (kind, nodes) {
             (CellKind::Tetrahedron { order }, &[a, b, c, d, ..]) => {
                 self.tets.push([a, b, c, d]);
+                self.cell_of_tet.push(self.cells - 1);
                 self.high_order += usize::from(order > 1);
             }
             (CellKind::Triangle, &[a, b, c, ..]) => self.triangles.push([a, b, c]),
@@ -68,6 +76,19 @@ impl CellSoup {
             _ => return false,
         }
         true
+    }
+
+    /// Number of cells so far, used or not.
+    pub fn count(&self) -> u32 {
+        self.cells
+    }
+
+    /// Adds values of cells; those of an array that is known already are joined to it.
+    pub fn label(&mut self, labels: Labels) {
+        match self.labels.iter_mut().find(|known| known.array == labels.array) {
+            Some(known) => known.values.extend(labels.values),
+            None => self.labels.push(labels),
+        }
     }
 
     /// Shifts the node indices of everything added since `mark` by `first_node`, for files in several pieces.
@@ -112,7 +133,9 @@ impl CellSoup {
                 notes.push(format!("{} faces beside the tetrahedra not used", self.triangles.len()));
             }
             let tets = corners(&self.tets, index_of).map_err(|(i, n)| missing("tetrahedron", i, n))?;
-            return Ok(MeshFile::Volume(VolumeMesh { file: file.into(), nodes, tets, notes }));
+            let groups = self.labels.into_iter().flat_map(|labels| labels.groups(&self.cell_of_tet));
+            let groups = groups.collect();
+            return Ok(MeshFile::Volume(VolumeMesh { file: file.into(), nodes, tets, groups, notes }));
         }
         if self.triangles.is_empty() {
             return Err(MeshInError::Empty { file: file.into(), n_nodes });

@@ -3,10 +3,13 @@
 //! # Source
 //! Gmsh reference manual, "MSH file format" (4.1) and "Legacy formats" (1, 2).
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 
 use super::cells::{CellKind, CellSoup};
 use super::error::MeshInError;
+use super::groups::{GMSH_PHYSICAL, Labels};
 use super::mesh_file::MeshFile;
 use super::scanner::{ByteOrder, Encoding, Scanner};
 
@@ -23,6 +26,8 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
         let section = scanner.word("a section such as $Nodes")?;
         match section {
             "$MeshFormat" => format = mesh_format(&mut scanner)?,
+            "$PhysicalNames" => content.physical_names(&mut scanner)?,
+            "$Entities" if format.version == Version::V4 => content.entities(&mut scanner, format)?,
             "$NOD" => content.nodes_v1(&mut scanner)?,
             "$ELM" => content.elements_v1(&mut scanner)?,
             "$Nodes" if format.version == Version::V4 => content.nodes_v4(&mut scanner, format)?,
@@ -105,9 +110,70 @@ struct Content {
     nodes: Vec<Vector3<f64>>,
     tags: Vec<i64>,
     cells: CellSoup,
+    /// Physical groups of cells.
+    physical: Labels,
+    /// Physical groups of the volumes of a 4.1 file, by tag.
+    of_volume: BTreeMap<i64, Vec<i64>>,
 }
 
+/// Dimension of volumes.
+const VOLUME: i64 = 3;
+/// Physical groups that one entity may belong to.
+const MOST_GROUPS_OF_ENTITY: usize = 64;
+
 impl Content {
+    /// `$PhysicalNames`: count, then `dimension number "name"` lines; text in binary files too.
+    fn physical_names(&mut self, scanner: &mut Scanner) -> Result<(), MeshInError> {
+        let n = scanner.count("physical names", 5)?;
+        for _ in 0..n {
+            let dimension = scanner.integer("the dimension of a physical group")?;
+            let number = scanner.integer("the number of a physical group")?;
+            let name = String::from_utf8_lossy(scanner.line()).trim().trim_matches('"').to_owned();
+            if dimension == VOLUME {
+                self.physical.names.insert(number, name);
+            }
+        }
+        Ok(())
+    }
+
+    /// `$Entities`: numbers of points, curves, surfaces and volumes, then each with its tag, its box, its physical
+    /// groups and, beyond points, the entities that bound it.
+    fn entities(&mut self, scanner: &mut Scanner, format: Format) -> Result<(), MeshInError> {
+        binary_starts(scanner, format);
+        let mut counts = [0; 4];
+        for count in &mut counts {
+            *count = size(scanner, format, "entities", 1)?;
+        }
+        for (dimension, count) in (0..).zip(counts) {
+            for _ in 0..count {
+                let tag = scanner.stored_integer(format.encoding, 4, "an entity tag")?;
+                let coordinates = if dimension == 0 { 3 } else { 6 };
+                for _ in 0..coordinates {
+                    scanner.stored_real(format.encoding, 8, "a coordinate")?;
+                }
+                let at = scanner.clone();
+                let groups = entity_tags(scanner, format, "physical groups")?;
+                if groups.len() > MOST_GROUPS_OF_ENTITY {
+                    return Err(at.expected(format!("at most {MOST_GROUPS_OF_ENTITY} physical groups")));
+                }
+                if dimension > 0 {
+                    entity_tags(scanner, format, "bounding entities")?;
+                }
+                if dimension == VOLUME {
+                    self.of_volume.insert(tag, groups);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts the cell of this kind that comes next into a physical group; 0 is none.
+    fn put_into(&mut self, group: i64, kind: CellKind) {
+        if group != 0 && matches!(kind, CellKind::Tetrahedron { .. }) {
+            self.physical.values.push((self.cells.count(), group));
+        }
+    }
+
     fn node(&mut self, tag: i64, position: Vector3<f64>) {
         self.tags.push(tag);
         self.nodes.push(position);
@@ -146,7 +212,7 @@ impl Content {
             let at = scanner.clone();
             scanner.integer("an element number")?;
             let element_type = scanner.integer("an element type")?;
-            scanner.integer("a physical region")?;
+            let group = scanner.integer("a physical region")?;
             scanner.integer("an elementary region")?;
             let n_nodes = scanner.count("nodes of an element", 1)?;
             nodes.clear();
@@ -154,6 +220,7 @@ impl Content {
                 nodes.push(scanner.integer("a node number")?);
             }
             let kind = element_kind(element_type).map_or(CellKind::Ignored("unknown"), |(kind, _)| kind);
+            self.put_into(group, kind);
             self.element(&at, kind, &nodes)?;
         }
         Ok(())
@@ -202,8 +269,11 @@ impl Content {
                 if format.encoding != Encoding::Text {
                     scanner.stored_integer(format.encoding, 4, "an element number")?;
                 }
-                for _ in 0..n_tags {
-                    scanner.stored_integer(format.encoding, 4, "a tag")?;
+                for tag in 0..n_tags {
+                    let value = scanner.stored_integer(format.encoding, 4, "a tag")?;
+                    if tag == 0 {
+                        self.put_into(value, kind);
+                    }
                 }
                 nodes.clear();
                 for _ in 0..n_nodes {
@@ -249,13 +319,18 @@ impl Content {
         let mut nodes = Vec::new();
         for _ in 0..blocks {
             let at = scanner.clone();
-            scanner.stored_integer(format.encoding, 4, "an entity dimension")?;
-            scanner.stored_integer(format.encoding, 4, "an entity tag")?;
+            let dimension = scanner.stored_integer(format.encoding, 4, "an entity dimension")?;
+            let entity = scanner.stored_integer(format.encoding, 4, "an entity tag")?;
+            let groups = match dimension {
+                VOLUME => self.of_volume.get(&entity).cloned().unwrap_or_default(),
+                _ => Vec::new(),
+            };
             let element_type = scanner.stored_integer(format.encoding, 4, "an element type")?;
             let (kind, n_nodes) = known_element(&at, element_type)?;
             let n = size(scanner, format, "elements of a block", 4)?;
             for _ in 0..n {
                 scanner.stored_integer(format.encoding, format.size_width, "an element tag")?;
+                groups.iter().for_each(|&group| self.put_into(group, kind));
                 nodes.clear();
                 for _ in 0..n_nodes {
                     nodes.push(scanner.stored_integer(format.encoding, format.size_width, "a node tag")?);
@@ -266,7 +341,9 @@ impl Content {
         Ok(())
     }
 
-    fn finish(self, file: &str) -> Result<MeshFile, MeshInError> {
+    fn finish(mut self, file: &str) -> Result<MeshFile, MeshInError> {
+        self.physical.array = GMSH_PHYSICAL.to_owned();
+        self.cells.label(self.physical);
         let mut index: Vec<(i64, u32)> = self.tags.iter().copied().zip(0u32..).collect();
         index.sort_unstable();
         let index_of = |tag: i64| {
@@ -290,6 +367,12 @@ fn size(scanner: &mut Scanner, format: Format, what: &str, bytes_each: usize) ->
     let value =
         u64::try_from(value).map_err(|_| scanner.expected(format!("a non-negative number of {what}")))?;
     scanner.bounded(value, what, bytes_each)
+}
+
+/// A list of entity or group numbers of a 4.1 file: its length, then the numbers. Signs tell orientations.
+fn entity_tags(scanner: &mut Scanner, format: Format, what: &str) -> Result<Vec<i64>, MeshInError> {
+    let n = size(scanner, format, what, 1)?;
+    (0..n).map(|_| Ok(scanner.stored_integer(format.encoding, 4, what)?.abs())).collect()
 }
 
 /// Block count of a 4.1 section. The total and the tag range are not needed.

@@ -78,6 +78,39 @@ fn all_formats_give_the_same_tetrahedra() {
     }
 }
 
+/// Array, number, name and tetrahedra of every group.
+fn groups(bytes: &[u8]) -> Vec<(i64, Option<String>, Vec<u32>)> {
+    let groups = volume(bytes).groups.into_iter();
+    groups.map(|group| (group.number, group.name, group.tets)).collect()
+}
+
+#[test]
+fn physical_groups_of_volumes_become_groups_of_tetrahedra() {
+    let liver = |tets: &[u32]| (1, Some("liver".to_owned()), tets.to_vec());
+    assert_eq!(groups(V1.as_bytes()), [(1, None, vec![0, 1])]);
+    assert_eq!(groups(V22.as_bytes()), [liver(&[0, 1])]);
+    let two = V22
+        .replace("$PhysicalNames\n1\n3 1 \"liver\"", "$PhysicalNames\n2\n3 1 \"liver\"\n3 9 \"a tumour\"")
+        .replace("3 4 2 1 1 20 30 40 7", "3 4 2 9 1 20 30 40 7");
+    assert_eq!(groups(two.as_bytes()), [liver(&[0]), (9, Some("a tumour".into()), vec![1])]);
+    // A face's group of the same number is another group, and 0 is none.
+    let faces = V22.replace("3 1 \"liver\"", "2 1 \"skin\"").replace("3 4 2 1 1 20", "3 4 2 0 1 20");
+    assert_eq!(groups(faces.as_bytes()), [(1, None, vec![0])]);
+    assert!(groups(V41.as_bytes()).is_empty());
+    // A point, a surface in group 5, and two volumes, the second in two groups.
+    let entities = "$PhysicalNames\n2\n3 5 \"shell\"\n3 6 \"core\"\n$EndPhysicalNames\n$Entities\n1 0 1 2\n\
+        1 0 0 0 0\n1 0 0 0 1 1 1 1 5 2 1 -1\n1 0 0 0 1 1 1 1 5 1 -1\n2 0 0 0 1 1 1 2 5 6 1 1\n$EndEntities\n$Nodes\n2 5";
+    let two = V41
+        .replace("$Nodes\n2 5", entities)
+        .replace("$Elements\n2 3 1 3", "$Elements\n3 3 1 3")
+        .replace("3 1 4 2\n2 10 20 30 40\n3 20 30 40 7", "3 1 4 1\n2 10 20 30 40\n3 2 4 1\n3 20 30 40 7");
+    let (shell, core) = (Some("shell".to_owned()), Some("core".to_owned()));
+    assert_eq!(groups(two.as_bytes()), [(5, shell, vec![0, 1]), (6, core, vec![1])]);
+    for big in [false, true] {
+        assert_eq!(groups(&binary("2.2", big)), [(1, None, vec![0, 1])]);
+    }
+}
+
 #[test]
 fn faces_alone_are_a_surface() {
     let text = V22

@@ -2,6 +2,8 @@
 
 use nalgebra::Vector3;
 
+use super::groups::CellGroup;
+
 /// Tetrahedra as read from a file: not checked, not oriented.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VolumeMesh {
@@ -11,6 +13,8 @@ pub struct VolumeMesh {
     pub nodes: Vec<Vector3<f64>>,
     /// Four node indices per tetrahedron, all within range.
     pub tets: Vec<[u32; 4]>,
+    /// Groups that the file puts its tetrahedra into.
+    pub groups: Vec<CellGroup>,
     /// Contents that were read but not used.
     pub notes: Vec<String>,
 }

@@ -7,12 +7,14 @@
 //! was expected.
 
 mod error;
+mod groups;
 mod mesh_file;
 mod scanner;
 mod cells;
 mod gmsh;
 mod vtk_cells;
 mod vtk_legacy;
+mod vtk_legacy_data;
 mod vtk_array;
 mod vtk_xml;
 mod obj;
@@ -25,6 +27,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 pub use error::MeshInError;
+pub use groups::{CellGroup, GMSH_PHYSICAL, keep_tets};
 pub use mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
 
 /// Largest mesh file accepted [bytes].

@@ -31,6 +31,8 @@ pub struct DataArray {
     pub format: String,
     /// Offset into the appended data.
     pub offset: Option<usize>,
+    /// Values per entry.
+    pub components: usize,
     /// Text content.
     pub text: String,
 }

@@ -7,11 +7,13 @@ use nalgebra::Vector3;
 
 use super::cells::{CellSoup, zero_based};
 use super::error::MeshInError;
+use super::groups::Labels;
 use super::mesh_file::MeshFile;
 use super::scanner::{ByteOrder, Encoding, Scanner};
 use super::vtk_cells;
+use super::vtk_legacy_data::data;
 
-/// Reads a legacy VTK file. Point and cell data are ignored.
+/// Reads a legacy VTK file. Of its data only cell arrays of one whole number per cell are used.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let mut scanner = Scanner::new(file, bytes);
     let at = scanner.clone();
@@ -28,6 +30,7 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let mut content = Content { encoding, points: Vec::new(), cells: CellSoup::default() };
     let mut grid: Option<Lists> = None;
     let mut types: Option<Vec<i64>> = None;
+    let mut labels = Vec::new();
     while !scanner.at_end() {
         let at = scanner.clone();
         match scanner.word("a keyword such as POINTS")? {
@@ -52,11 +55,17 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
                 let n = scanner.count("cell types", 1)?;
                 types = Some(content.integers(&mut scanner, n, 4, "a cell type")?);
             }
-            "POINT_DATA" | "CELL_DATA" => break,
+            "POINT_DATA" | "CELL_DATA" => {
+                labels = data(at, encoding);
+                break;
+            }
             _ => return Err(at.expected("POINTS, CELLS, CELL_TYPES, POLYGONS, TRIANGLE_STRIPS or data")),
         }
     }
     content.grid_cells(&scanner, grid, types)?;
+    let whole = |labels: &Labels| labels.values.len() == content.cells.count() as usize;
+    labels.retain(whole);
+    labels.into_iter().for_each(|labels| content.cells.label(labels));
     let n = content.points.len();
     content.cells.finish(file, content.points, zero_based(n))
 }
@@ -220,17 +229,9 @@ impl Content {
                     scanner.word("a field value")?;
                 }
             } else {
-                let width = match type_name {
-                    "char" | "unsigned_char" => 1,
-                    "short" | "unsigned_short" => 2,
-                    "int" | "unsigned_int" | "float" | "vtktypeint32" => 4,
-                    "long" | "unsigned_long" | "double" | "vtktypeint64" | "vtkIdType" => 8,
-                    _ => {
-                        return Err(
-                            at.unsupported(format!("a field of type {type_name}"), "remove the field data")
-                        );
-                    }
-                };
+                let width = width_of(type_name).ok_or_else(|| {
+                    at.unsupported(format!("a field of type {type_name}"), "remove the field data")
+                })?;
                 scanner.take(values.saturating_mul(width), "field data")?;
             }
         }
@@ -238,8 +239,19 @@ impl Content {
     }
 }
 
+/// Bytes of a value of a type of the format.
+pub fn width_of(type_name: &str) -> Option<usize> {
+    Some(match type_name {
+        "char" | "unsigned_char" => 1,
+        "short" | "unsigned_short" => 2,
+        "int" | "unsigned_int" | "float" | "vtktypeint32" => 4,
+        "long" | "unsigned_long" | "double" | "vtktypeint64" | "vtkIdType" => 8,
+        _ => return None,
+    })
+}
+
 /// METADATA ends at the first blank line after its keyword line.
-fn skip_metadata(scanner: &mut Scanner) {
+pub fn skip_metadata(scanner: &mut Scanner) {
     scanner.line();
     while !scanner.line().is_empty() && scanner.remaining() > 0 {}
 }

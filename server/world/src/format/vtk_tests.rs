@@ -49,6 +49,40 @@ fn legacy_grids_text_and_binary_old_and_new() {
     assert_eq!(tets("a.vtk", &binary), expected);
 }
 
+/// Array, number and tetrahedra of every group.
+fn groups(file: &str, bytes: &[u8]) -> Vec<(String, i64, Vec<u32>)> {
+    let MeshFile::Volume(volume) = read_mesh_bytes(file, bytes).unwrap() else { panic!("a surface") };
+    volume.groups.into_iter().map(|group| (group.array, group.number, group.tets)).collect()
+}
+
+#[test]
+fn whole_numbers_in_cells_become_groups() {
+    // Behind the data of points, beside arrays that are no labels; the third cell is a line.
+    let data = "CELL_DATA 3\nSCALARS pressure float 1\nLOOKUP_TABLE default\n0.5 1 2\nVECTORS v float\n\
+        1 2 3 4 5 6 7 8 9\nSCALARS label int\nLOOKUP_TABLE default\n4 7 9\n\
+        FIELD more 2\npart 1 3 double\n2 2 2\npair 2 3 int\n1 2 3 4 5 6\n";
+    let whole = GRID
+        .replace("SCALARS a float\n", &format!("SCALARS a float\nLOOKUP_TABLE default\n1 2 3 4 5\n{data}"));
+    let expected = [("label", 4, vec![0]), ("label", 7, vec![1]), ("part", 2, vec![0, 1])]
+        .map(|(a, n, t)| (a.to_owned(), n, t));
+    assert_eq!(groups("a.vtk", whole.as_bytes()), expected);
+    // What is broken or unknown ends the data, not the mesh.
+    for (from, to) in [("FIELD more 2", "UNKNOWN"), ("part 1 3 double\n2", "part 1 3 double\ntwo")] {
+        assert_eq!(groups("a.vtk", whole.replace(from, to).as_bytes()), expected[..2]);
+    }
+    assert!(groups("a.vtk", GRID.as_bytes()).is_empty());
+    let mut binary =
+        b"# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n".to_vec();
+    POINTS.iter().flatten().for_each(|c| binary.extend(c.to_be_bytes()));
+    binary.extend(b"\nCELLS 2 10\n");
+    [4i32, 0, 1, 2, 3, 4, 1, 2, 3, 4].iter().for_each(|i| binary.extend(i.to_be_bytes()));
+    binary.extend(b"\nCELL_TYPES 2\n");
+    [10i32, 10].iter().for_each(|i| binary.extend(i.to_be_bytes()));
+    binary.extend(b"\nCELL_DATA 2\nSCALARS m short 1\nLOOKUP_TABLE default\n");
+    [3i16, -1].iter().for_each(|i| binary.extend(i.to_be_bytes()));
+    assert_eq!(groups("a.vtk", &binary), [("m".to_owned(), -1, vec![1]), ("m".to_owned(), 3, vec![0])]);
+}
+
 #[test]
 fn polygons_quads_and_strips_become_triangles() {
     let head = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 5 float\n0 0 0 1 0 0 1 1 0 0 1 0 0 0 1\n";
@@ -96,11 +130,13 @@ fn bytes_of(values: &[f64], is_real: bool) -> Vec<u8> {
 
 fn vtu(style: Style) -> Vec<u8> {
     let points: Vec<f64> = POINTS.iter().flatten().map(|&c| f64::from(c)).collect();
-    let arrays: [(&str, &str, &str, Vec<f64>); 4] = [
+    let arrays: [(&str, &str, &str, Vec<f64>); 6] = [
         ("Points", "Float64", "", points),
         ("Cells", "Int64", "connectivity", vec![0., 1., 2., 3., 1., 2., 3., 4.]),
         ("Cells", "Int64", "offsets", vec![4., 8.]),
         ("Cells", "Int64", "types", vec![10., 10.]),
+        ("CellData", "Int64", "label", vec![4., 7.]),
+        ("CellData", "Float64", "share", vec![0.5, 1.]),
     ];
     let compressor = if style == Style::Zlib { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
     let mut text = format!(
@@ -161,7 +197,10 @@ const STYLES: [Style; 6] =
 #[test]
 fn xml_grids_in_every_encoding() {
     for style in STYLES {
-        assert_eq!(tets("a.vtu", &vtu(style)), [[0, 1, 2, 3], [1, 2, 3, 4]]);
+        let bytes = vtu(style);
+        assert_eq!(tets("a.vtu", &bytes), [[0, 1, 2, 3], [1, 2, 3, 4]]);
+        let label = |number, tet| ("label".to_owned(), number, vec![tet]);
+        assert_eq!(groups("a.vtu", &bytes), [label(4, 0), label(7, 1)]);
     }
 }
 

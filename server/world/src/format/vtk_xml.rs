@@ -12,13 +12,14 @@ use quick_xml::events::{BytesStart, Event};
 
 use super::cells::{CellSoup, zero_based};
 use super::error::MeshInError;
+use super::groups::Labels;
 use super::mesh_file::MeshFile;
 use super::scanner::ByteOrder;
 use super::vtk_array::{Array, DataArray, Storage};
 use super::vtk_cells;
 use super::vtk_legacy::monotone_offsets;
 
-/// Reads a `.vtu` or `.vtp` file. Point and cell data are ignored.
+/// Reads a `.vtu` or `.vtp` file. Of its data only cell arrays of one whole number per cell are used.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
     let document = Document::parse(file, bytes)?;
     let mut points: Vec<Vector3<f64>> = Vec::new();
@@ -36,7 +37,9 @@ pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
             ));
         }
         points.extend(triples.iter().map(|&p| Vector3::from(p)));
+        let first_cell = cells.count();
         document.cells_of(piece, &mut cells)?;
+        document.labels_of(piece, first_cell, &mut cells)?;
         cells.shift_since(mark, first_node);
     }
     let n = points.len();
@@ -72,7 +75,7 @@ impl<'a> Document<'a> {
         let mut reader = Reader::from_str(text);
         let mut section = String::new();
         let mut open: Option<(String, DataArray)> = None;
-        let mut is_vtk = false;
+        let (mut is_vtk, mut is_whole) = (false, false);
         loop {
             let at = reader.buffer_position() as usize;
             match reader.read_event().map_err(|e| syntax(at, e.to_string()))? {
@@ -100,6 +103,7 @@ impl<'a> Document<'a> {
                         document.keep(&section, name, array);
                     }
                 }
+                Event::End(tag) if tag.name().as_ref() == "VTKFile" => is_whole = true,
                 Event::Eof => break,
                 _ => {}
             }
@@ -107,14 +111,14 @@ impl<'a> Document<'a> {
         if !is_vtk {
             return Err(syntax(0, "no <VTKFile> element".into()));
         }
-        if open.is_some() {
-            return Err(syntax(text.len(), "the end of the file inside a <DataArray>".into()));
+        if open.is_some() || !(is_whole || appended.is_some()) {
+            return Err(syntax(text.len(), "the end of the file before </VTKFile>".into()));
         }
         Ok(document)
     }
 
     fn keep(&mut self, section: &str, name: String, array: DataArray) {
-        if self.pieces > 0 && matches!(section, "Points" | "Cells" | "Polys" | "Strips") {
+        if self.pieces > 0 && matches!(section, "Points" | "Cells" | "Polys" | "Strips" | "CellData") {
             self.arrays.insert((self.pieces - 1, section.to_string(), name), array);
         }
     }
@@ -153,6 +157,7 @@ impl<'a> Document<'a> {
             type_name: attribute(tag, "type").unwrap_or_default(),
             format: attribute(tag, "format").unwrap_or_else(|| "ascii".into()),
             offset: attribute(tag, "offset").and_then(|o| o.parse().ok()),
+            components: attribute(tag, "NumberOfComponents").and_then(|n| n.parse().ok()).unwrap_or(1),
             text: String::new(),
         };
         Ok((name, array))
@@ -209,6 +214,31 @@ impl<'a> Document<'a> {
             }
             None => Err(self.fault(&place, &format!("a data array '{name}'"), "none".into())),
         }
+    }
+
+    /// Labels the cells from `first_cell` on by the arrays of one number per cell.
+    fn labels_of(&self, piece: usize, first_cell: u32, cells: &mut CellSoup) -> Result<(), MeshInError> {
+        let n = (cells.count() - first_cell) as usize;
+        let of_piece = (piece, "CellData".to_owned(), String::new())..;
+        let arrays = self.arrays.range(of_piece).take_while(|(key, _)| key.0 == piece && key.1 == "CellData");
+        // Texts and bits are no labels.
+        let is_number = |array: &DataArray| {
+            array.components == 1
+                && ["Int", "UInt", "Float"].iter().any(|kind| array.type_name.starts_with(kind))
+        };
+        for ((_, _, name), array) in arrays.filter(|(_, array)| is_number(array)) {
+            let place = format!("piece {piece}, <CellData> array '{name}'");
+            let decoded = self.storage.decode(array);
+            let decoded =
+                decoded.map_err(|found| self.fault(&place, "data that fits its declaration", found))?;
+            let values = decoded.into_reals();
+            if values.len() == n
+                && let Some(labels) = Labels::of_reals(name, first_cell, &values)
+            {
+                cells.label(labels);
+            }
+        }
+        Ok(())
     }
 
     fn cells_of(&self, piece: usize, cells: &mut CellSoup) -> Result<(), MeshInError> {

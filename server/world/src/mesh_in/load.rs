@@ -10,7 +10,7 @@ use super::cubes::OctreeReport;
 use super::health::volume::{VolumeHealth, repair_volume};
 use super::lattice::{LatticeReport, lattice_observed};
 use super::progress::Observer;
-use crate::format::{MeshFile, MeshInError, read_mesh};
+use crate::format::{CellGroup, MeshFile, MeshInError, keep_tets, read_mesh};
 use crate::quantity::coordinates;
 
 /// Faults found in a mesh file, and their repair. It prints as a few lines of text.
@@ -93,10 +93,21 @@ impl MeshHealth {
         }
     }
 
-    /// Records that all parts but one were dropped.
-    pub(crate) fn keeps_one_part(&mut self) {
+    /// Groups that the file puts its tetrahedra into.
+    pub fn groups(&self) -> &[CellGroup] {
         match self {
-            MeshHealth::Volume(health) => health.components = 1,
+            MeshHealth::Volume(health) => &health.groups,
+            MeshHealth::Surface(_) | MeshHealth::Octree(_) => &[],
+        }
+    }
+
+    /// Records that all parts but one were dropped, of whose tetrahedra those in `kept` remain, ascending.
+    pub(crate) fn keeps_one_part(&mut self, kept: &[u32]) {
+        match self {
+            MeshHealth::Volume(health) => {
+                health.components = 1;
+                keep_tets(&mut health.groups, kept);
+            }
             MeshHealth::Surface(report) => {
                 report.dropped_components += report.components - 1;
                 report.components = 1;
@@ -161,6 +172,11 @@ impl fmt::Display for VolumeHealth {
                 (self.components.saturating_sub(1), "separate parts beside the first"),
             ],
         )?;
+        for group in &self.groups {
+            let CellGroup { array, number, name, tets } = group;
+            let name = name.as_ref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
+            writeln!(f, "group {number}{name} of {array}: {} tetrahedra", tets.len())?;
+        }
         for note in &self.notes {
             writeln!(f, "note: {note}")?;
         }

@@ -2,8 +2,9 @@
 //!
 //! * `NAME.vtu`: the material as tetrahedra or hexahedra that fill it once. A tetrahedron that is cut is written as
 //!   those its pieces consist of, so that slices, volumes and integrals are right: their points are moved by the copies of
-//!   the piece, their stress is that of the piece. `element` and `piece` say where a cell belongs, `copy`
-//!   which copy of a node a point is.
+//!   the piece, their stress is that of the piece. `element` and `piece` say where a cell belongs, `region` which
+//!   material it has (0 that of the body, n that of its n-th `[[body.material]]`), `copy` which copy of a node a
+//!   point is.
 //! * `NAME-surface.vtp`: the surface that is shown, lips included, every triangle with its cut tag.
 //!
 //! Points are current positions; `displacement_m` leads there from `rest_position_m`.
@@ -41,6 +42,7 @@ struct Solid {
     body: Vec<i32>,
     element: Vec<i32>,
     piece: Vec<i32>,
+    region: Vec<i32>,
     fraction: Vec<f64>,
     von_mises: Vec<f64>,
     stress: Vec<[f64; 6]>,
@@ -121,7 +123,7 @@ impl Solid {
     fn add(&mut self, number: i32, sim: &SimBody) {
         let body = &sim.body;
         let solid = body.solid();
-        let stresses = body.cauchy_stresses();
+        let (stresses, regions) = (body.cauchy_stresses(), body.element_regions());
         let first = self.points.add(body, &solid.vertices);
         match &solid.cells {
             SolidCells::Tets(tets) => {
@@ -136,6 +138,7 @@ impl Solid {
             self.body.push(number);
             self.element.push(origin.element as i32);
             self.piece.push(origin.piece as i32);
+            self.region.push(i32::from(regions[origin.stress as usize]));
             self.fraction.push(origin.fraction);
             self.von_mises.push(von_mises(stress));
             self.stress.push(in_vtk_order(stress));
@@ -152,6 +155,7 @@ impl Solid {
                 field("body", FieldValues::Integers(&self.body)),
                 field("element", FieldValues::Integers(&self.element)),
                 field("piece", FieldValues::Integers(&self.piece)),
+                field("region", FieldValues::Integers(&self.region)),
                 field("volume_fraction", FieldValues::Scalars(&self.fraction)),
                 field("von_mises_pa", FieldValues::Scalars(&self.von_mises)),
                 field("cauchy_stress_pa", FieldValues::SymmetricTensors(&self.stress)),

@@ -4,6 +4,8 @@ mod held;
 
 mod look;
 
+mod material;
+
 mod mechanics;
 
 mod obstacle;

@@ -132,6 +132,13 @@ pub enum MaterialPlace {
         /// Metres per length unit of the file.
         scale: f64,
     },
+    /// In a group of elements of the mesh file.
+    Group {
+        /// Its name or number.
+        group: String,
+        /// Cell array that the number is a value of.
+        array: Option<String>,
+    },
 }
 
 /// How a body is drawn.

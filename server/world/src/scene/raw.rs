@@ -9,6 +9,8 @@ mod contact;
 
 mod look;
 
+mod material;
+
 mod mechanics;
 
 mod obstacle;
@@ -18,6 +20,7 @@ mod tool;
 
 pub use contact::*;
 pub use look::*;
+pub use material::*;
 pub use mechanics::*;
 pub use obstacle::*;
 pub use octree::*;
@@ -135,7 +138,7 @@ pub struct RawBody {
     #[schemars(extend("minimum" = *Material::DENSITY_KG_M3.start(), "maximum" = *Material::DENSITY_KG_M3.end(),
         "x-next" = "soft tissue has about 1000 kg/m3"))]
     pub density_kg_m3: f64,
-    /// Regions of another material, for `element = "octree"`. Law and damping are those of the body.
+    /// Regions of another material, such as a tumour. Law and damping are those of the body.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub material: Vec<RawMaterial>,
     /// Rayleigh damping: a mass term and a stiffness term.

@@ -17,6 +17,10 @@ const LOCKING: f64 = 0.485;
 /// A load that strains a body by more than this is hardly in newtons.
 const STRAIN: f64 = 1.0;
 
+/// What is odd about a region of another material that holds no element.
+pub const EMPTY_REGION: &str =
+    "no element has its centre in the region, or later regions cover it; make it larger or take a finer mesh";
+
 /// Doubts about the mesh of `body` and whether its material suits it.
 pub fn doubts(spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
     let at = format!("body.{}", spec.id);
@@ -49,10 +53,7 @@ fn octree(at: &str, report: &OctreeReport, doubts: &mut Vec<String>) {
             .push(format!("{at}.mesh: the cells {verb} {error} of the volume at {cells} cells; raise cells"));
     }
     for (i, _) in report.cells_of_region.iter().enumerate().filter(|(_, cells)| **cells == 0) {
-        doubts.push(format!(
-            "{at}.material.{i}: no cell has its centre in the region, or later regions cover it; make it larger or \
-             raise cells"
-        ));
+        doubts.push(format!("{at}.material.{i}: {EMPTY_REGION}"));
     }
 }
 

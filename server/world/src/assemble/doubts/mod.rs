@@ -20,6 +20,7 @@ use crate::scene::CheckedScene;
 use crate::tool::obstacle::Obstacle;
 
 pub use cuts::after_the_end;
+pub(crate) use meshes::EMPTY_REGION;
 
 /// All doubts, in the order of the scene.
 pub(crate) fn of(scene: &CheckedScene, bodies: &mut [SimBody], obstacles: &[Obstacle]) -> Vec<String> {

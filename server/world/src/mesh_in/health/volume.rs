@@ -7,7 +7,7 @@ use scindo_physics::mesh::{DEGENERATE_VOLUME, TetMesh};
 use serde::Serialize;
 
 use super::{connectivity, weld};
-use crate::format::{MeshInError, VolumeMesh};
+use crate::format::{CellGroup, MeshInError, VolumeMesh, keep_tets};
 
 /// Largest share of useless tetrahedra that is removed. A mesh with more is refused.
 pub const MAX_DEGENERATE_TETS: f64 = 0.01;
@@ -45,6 +45,9 @@ pub struct VolumeHealth {
     pub min_m: [f64; 3],
     /// Largest corner of the bounding box [m].
     pub max_m: [f64; 3],
+    /// Groups that the file puts its tetrahedra into.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<CellGroup>,
     /// Contents of the file that are not used.
     pub notes: Vec<String>,
 }
@@ -59,7 +62,8 @@ pub fn repair_volume(
     if !(scale.is_finite() && scale > 0.0) {
         return Err(MeshInError::Scale { file: volume.file.clone(), scale });
     }
-    let mut health = VolumeHealth { notes: volume.notes.clone(), ..VolumeHealth::default() };
+    let (notes, groups) = (volume.notes.clone(), volume.groups.clone());
+    let mut health = VolumeHealth { notes, groups, ..VolumeHealth::default() };
     let nodes: Vec<Vector3<f64>> = volume.nodes.iter().map(|x| x * scale).collect();
     let mut mesh = TetMesh { nodes, tets: volume.tets.clone() };
     if weld {
@@ -96,6 +100,7 @@ pub fn repair_volume(
 fn remove_useless(mesh: &mut TetMesh, health: &mut VolumeHealth) {
     let mut seen = BTreeSet::new();
     let mut kept = Vec::with_capacity(mesh.tets.len());
+    let mut numbers = Vec::with_capacity(mesh.tets.len());
     for e in 0..mesh.tets.len() {
         let mut key = mesh.tets[e];
         key.sort_unstable();
@@ -104,11 +109,13 @@ fn remove_useless(mesh: &mut TetMesh, health: &mut VolumeHealth) {
             health.degenerate_tets += 1;
         } else if seen.insert(key) {
             kept.push(mesh.tets[e]);
+            numbers.push(e as u32);
         } else {
             health.duplicate_tets += 1;
         }
     }
     mesh.tets = kept;
+    keep_tets(&mut health.groups, &numbers);
 }
 
 fn measure(mesh: &TetMesh, health: &mut VolumeHealth) {
@@ -133,7 +140,13 @@ mod tests {
 
     fn from_box() -> VolumeMesh {
         let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [4; 3], BoxPattern::Tet6);
-        VolumeMesh { file: "box.msh".into(), nodes: mesh.nodes, tets: mesh.tets, notes: Vec::new() }
+        VolumeMesh {
+            file: "box.msh".into(),
+            nodes: mesh.nodes,
+            tets: mesh.tets,
+            groups: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 
     #[test]
@@ -202,6 +215,7 @@ mod tests {
             file: "two".into(),
             nodes: mesh.nodes.clone(),
             tets: mesh.tets.clone(),
+            groups: Vec::new(),
             notes: vec![],
         };
         let first = volume.nodes.len() as u32;

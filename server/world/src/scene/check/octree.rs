@@ -1,10 +1,10 @@
-//! Bodies of octree cells, and regions of another material.
+//! Bodies of octree cells.
 
 use nalgebra::Vector3;
 use scindo_physics::body::Arithmetic;
 use scindo_physics::octree::{AdaptError, AdaptSettings};
 
-use super::super::checked::{AdaptSpec, MaterialPlace, MaterialSpec, MeshSource, OctreeSpec};
+use super::super::checked::{AdaptSpec, MeshSource, OctreeSpec};
 use super::super::mechanics::Mechanics;
 use super::super::problem::Fault;
 use super::super::raw::*;
@@ -130,46 +130,6 @@ impl Check<'_> {
             self.conflict(at.to_owned(), what, &format!("write {fit:?}"));
         }
         along
-    }
-
-    /// Regions of another material.
-    pub(super) fn materials(&mut self, at: &str, body: &RawBody) -> Vec<MaterialSpec> {
-        if !body.material.is_empty() && body.element != RawElement::Octree {
-            let what = format!(
-                "found regions of another material in a body of {} elements, allowed: only octree",
-                word(&body.element)
-            );
-            let next = "write element = \"octree\", or remove [[body.material]]";
-            self.conflict(format!("{at}.material"), what, next);
-            return Vec::new();
-        }
-        let spec = |(i, raw): (usize, &RawMaterial)| {
-            let at = format!("{at}.material.{i}");
-            if raw.scale.is_some() && raw.surface.is_none() {
-                let what = "`scale` only goes with `surface`";
-                self.conflict(format!("{at}.scale"), what, "give other regions in metres");
-            }
-            if raw.young_pa.is_none() && raw.poisson.is_none() && raw.density_kg_m3.is_none() {
-                let what = "the region has the material of the body";
-                self.conflict(at.clone(), what, "give young_pa, poisson or density_kg_m3, or remove it");
-            }
-            let place = match (&raw.surface, &raw.r#where) {
-                (Some(path), _) => {
-                    MaterialPlace::Surface { path: path.clone(), scale: raw.scale.unwrap_or(1.0) }
-                }
-                (None, region) => {
-                    let region = region.clone().unwrap_or_default();
-                    MaterialPlace::Region(self.region(&format!("{at}.where"), &region))
-                }
-            };
-            MaterialSpec {
-                place,
-                young_pa: raw.young_pa.unwrap_or(body.young_pa),
-                poisson: raw.poisson.unwrap_or(body.poisson),
-                density_kg_m3: raw.density_kg_m3.unwrap_or(body.density_kg_m3),
-            }
-        };
-        body.material.iter().enumerate().map(spec).collect()
     }
 }
 
