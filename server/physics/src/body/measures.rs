@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Body;
+use super::{Body, BodyError};
+use crate::assembly::Model;
 use crate::estimate::{CellRecovery, CutTets, MeshError, StressRecovery};
 use crate::multigrid::{CoarsestSolve, LevelReport};
 
@@ -97,6 +98,14 @@ impl Body {
             of_element[point.element].1 += point.weight;
         });
         of_element.into_iter().map(|(sum, weight)| sum / weight).collect()
+    }
+
+    /// The discrete model of the present topology, in double precision, whatever way steps are solved.
+    ///
+    /// # Errors
+    /// Settings for which there is none.
+    pub fn discrete_model(&self) -> Result<Model, BodyError> {
+        Ok(self.space.model(&self.material, self.settings.volumetric)?)
     }
 
     /// Region of the material of every element, numbered as in [`cauchy_stresses`](Self::cauchy_stresses): 0 for the

@@ -122,7 +122,7 @@ pub struct Body {
     spring_forces: Vec<Vector3<f64>>,
     /// How often coarsening has given vertices new numbers.
     renumbered: u32,
-    /// State of cutting along faces; `None` for other bodies.
+    /// State of cuts that change the mesh; `None` for other bodies.
     snap: Option<Box<SnapState>>,
     /// A cut along faces that was begun and is not complete.
     under_way: Option<FaceCut>,
@@ -134,7 +134,7 @@ impl Body {
     pub fn new(mesh: TetMesh, material: Material, settings: BodySettings) -> Result<Self, BodyError> {
         let mut tets = match (settings.element, settings.cutting) {
             (ElementKind::Tet4, CuttingMethod::Xfem) => Tets::linear(CutMesh::new(mesh)?),
-            (ElementKind::Tet4, CuttingMethod::Snap) => {
+            (ElementKind::Tet4, _) => {
                 mesh.check()?;
                 Tets::linear(CutMesh::new(Snapper::prepared(&mesh))?)
             }
@@ -188,8 +188,8 @@ impl Body {
         settings: BodySettings,
     ) -> Result<Self, BodyError> {
         let settings = BodySettings { element: space.kind(), cubes: space.is_of_cubes(), ..settings };
-        if settings.cutting == CuttingMethod::Snap && settings.element == ElementKind::Tet4 {
-            let (what, with) = ("cutting along faces", "a discretisation that was made beforehand");
+        if settings.cutting.mesh_cut().is_some() && settings.element == ElementKind::Tet4 {
+            let (what, with) = ("cutting that changes the mesh", "a discretisation that was made beforehand");
             return Err(BodyError::Combination {
                 what,
                 with,
@@ -212,9 +212,9 @@ impl Body {
         }
         let solver = step_solver(&*space, &material, &settings)?;
         let dynamics = Dynamics::new(settings.scheme, material.law, solver)?;
-        let snap = space.tets().filter(|_| settings.cutting == CuttingMethod::Snap);
+        let snap = space.tets().zip(settings.cutting.mesh_cut());
         let mut body = Self {
-            snap: snap.map(|tets| Box::new(SnapState::new(tets.mesh()))),
+            snap: snap.map(|(tets, how)| Box::new(SnapState::new(tets.mesh(), how))),
             rest: Vec::new(),
             state: State::default(),
             boundary: Boundary::default(),
@@ -350,7 +350,7 @@ impl Body {
         shape: &mut SkinShape<'_>,
     ) -> Result<(), BodyError> {
         if self.snap.is_some() {
-            let with = "cutting along element faces";
+            let with = "cutting that changes the mesh";
             return Err(BodyError::Combination { what: "a skin", with, instead: "cutting method xfem" });
         }
         if self.space.can_carry_skin() {

@@ -286,15 +286,16 @@ impl BodySettings {
             return setting("solver.newton_steps", self.newton_steps.map_or(0.0, f64::from), "1 … 10 000");
         }
         let refused = |what, with, instead| Err(BodyError::Combination { what, with, instead });
+        let changes = self.cutting.mesh_cut().is_some();
         match (self.cutting, self.element, self.loose) {
-            (CuttingMethod::Snap, ElementKind::Tet10, _) => {
-                return refused("cutting along faces", "element tet10", "tet4");
+            (_, ElementKind::Tet10, _) if changes => {
+                return refused("cutting that changes the mesh", "element tet10", "tet4");
             }
-            (CuttingMethod::Snap, ElementKind::Hex8, _) => {
-                return refused("cutting along faces", "element hex8", "tet4");
+            (_, ElementKind::Hex8, _) if changes => {
+                return refused("cutting that changes the mesh", "element hex8", "tet4");
             }
-            (CuttingMethod::Snap, ElementKind::Octree, _) => {
-                return refused("cutting along faces", "element octree", "cutting method links");
+            (_, ElementKind::Octree, _) if changes => {
+                return refused("cutting that changes the mesh", "element octree", "cutting method links");
             }
             (CuttingMethod::Xfem, _, LooseRule::Pinned) => {
                 return refused("pinning loose parts", "cutting method xfem", "cutting method snap");

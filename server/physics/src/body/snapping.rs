@@ -1,4 +1,4 @@
-//! Cutting along element faces: the mesh itself changes, and all data on it follows.
+//! Cuts that change the mesh itself; all data on it follows.
 
 use nalgebra::Vector3;
 
@@ -6,7 +6,7 @@ use super::boundary::Boundary;
 use super::{Body, BodyError};
 use crate::cut::{BladeSweep, CutMesh, CutReport, NewCopy};
 use crate::mesh::TetMesh;
-use crate::snap::{Nodes, SnapCut, SnapNode, SnapReport, Snapper};
+use crate::snap::{MeshCut, Nodes, SnapCut, SnapNode, SnapReport, Snapper};
 use crate::space::Tets;
 
 /// How cuts are made.
@@ -17,9 +17,25 @@ pub enum CuttingMethod {
     Xfem,
     /// Along element faces, with nodes moved onto the sweep ([`crate::snap`]); tet4 only.
     Snap,
+    /// Elements are divided along the sweep ([`crate::snap::subdivide`]); tet4 only. A baseline for comparisons.
+    Subdivide,
+    /// Elements that the sweep touches are removed ([`crate::snap::remove`]); tet4 only. A baseline for comparisons.
+    Remove,
 }
 
-/// What happens to a part that a cut leaves without any held node; for [`CuttingMethod::Snap`].
+impl CuttingMethod {
+    /// How it changes the mesh; `None` if it leaves the elements alone.
+    pub fn mesh_cut(self) -> Option<MeshCut> {
+        match self {
+            Self::Xfem => None,
+            Self::Snap => Some(MeshCut::Snap),
+            Self::Subdivide => Some(MeshCut::Subdivide),
+            Self::Remove => Some(MeshCut::Remove),
+        }
+    }
+}
+
+/// What happens to a part that a cut leaves without any held node, where cuts change the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum LooseRule {
     /// It becomes a free body.
@@ -29,7 +45,7 @@ pub enum LooseRule {
     Pinned,
 }
 
-/// State of a body that is cut along faces.
+/// State of a body whose mesh is cut.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct SnapState {
     snapper: Snapper,
@@ -57,9 +73,9 @@ struct Start {
 }
 
 impl SnapState {
-    pub fn new(mesh: &TetMesh) -> Self {
+    pub fn new(mesh: &TetMesh, how: MeshCut) -> Self {
         Self {
-            snapper: Snapper::default(),
+            snapper: Snapper::new(how),
             origins: (0..mesh.nodes.len() as u32).collect(),
             start: Start { mesh: mesh.clone(), boundary: None },
             carried: Boundary::default(),
@@ -77,7 +93,7 @@ impl SnapState {
 }
 
 impl Body {
-    /// Report of the last cut along faces; `None` if the body is cut otherwise.
+    /// Report of the last cut of the mesh; `None` if cuts leave it alone.
     pub fn snap_report(&self) -> Option<&SnapReport> {
         self.snap.as_deref().map(|snap| &snap.report)
     }
@@ -88,7 +104,7 @@ impl Body {
         self.snap.as_deref().map(|snap| &snap.origins[..])
     }
 
-    /// Cuts along faces. Held nodes stay in place, and all their duplicates are held. Loads of a
+    /// Cuts the mesh. Held nodes stay in place, and all their duplicates are held. Loads of a
     /// duplicated node are shared by volume.
     pub(super) fn snap_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<CutReport, BodyError> {
         let Some(mut snap) = self.snap.take() else { return Ok(CutReport::default()) };
@@ -149,7 +165,7 @@ impl Body {
         if let Some(boundary) = snap.start.boundary.take() {
             self.boundary = boundary;
         }
-        **snap = SnapState::new(&mesh);
+        **snap = SnapState::new(&mesh, snap.snapper.how());
         let cut_mesh = CutMesh::with_lips(mesh, snap.snapper.tags(), epoch)?;
         self.space = Box::new(Tets::linear(cut_mesh));
         self.return_to_rest();

@@ -10,11 +10,14 @@
 //! 3. [`dissect`]: nodes are duplicated by the connected components of the elements around them.
 //! 4. [`clean`]: degenerate elements are removed by splitting and collapsing edges.
 //!
+//! Two baselines share the last steps: [`subdivide`] divides elements where the sweep parts them, in place of 1, 2 and 4;
+//! [`remove`] takes elements out.
+//!
 //! [`Snapper`] runs them. Per incision it remembers what a sweep has crossed but not cut yet. It searches where
 //! a cut inside the elements does too, and copies only what it changes of the mesh.
 //!
 //! # Invariants
-//! A cut keeps the volume, hence the mass, and inverts no element. An element may become flat, but a moved
+//! A cut keeps the volume, hence the mass, unless it removes elements, and inverts no element. An element may become flat, but a moved
 //! node never makes it flatter than [`relocate::LEAST_ASPECT`]. Signs are exact and lengths are only compared
 //! with lengths, so the same cut in millimetres and in metres gives the same mesh.
 //!
@@ -34,10 +37,12 @@ pub mod dissect;
 pub mod shape;
 pub mod collapse;
 pub mod clean;
+pub mod subdivide;
+pub mod remove;
 mod snapper;
 
 pub use node::{Nodes, SnapNode};
-pub use snapper::{SnapCut, SnapReport, Snapper};
+pub use snapper::{MeshCut, SnapCut, SnapReport, Snapper};
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

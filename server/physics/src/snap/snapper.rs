@@ -1,35 +1,49 @@
-//! A cut along element faces, from the blade sweep to the new mesh.
+//! A cut that changes the mesh, from the blade sweep to the new mesh.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use super::clean::clean;
+use super::clean::{Cleaned, clean};
 use super::complex::{Before, Complex, FaceKey};
 use super::dissect::{Duplicate, dissect};
 use super::memory::Memory;
 use super::node::{NEW, Nodes, SnapNode};
 use super::relocate::relocate_all;
+use super::remove::remove;
 use super::select::{Selection, cross, select};
+use super::subdivide::subdivide;
 use crate::cut::{BladeSweep, CutError, CutMesh, ElementsAround, Front, sweep_bounds, sweep_triangles};
 use crate::mesh::TetMesh;
+
+/// How the mesh is changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum MeshCut {
+    /// It comes apart along its faces, whose nodes are moved onto the sweep.
+    #[default]
+    Snap,
+    /// Elements are divided where the sweep parts them.
+    Subdivide,
+    /// Elements that the sweep touches are removed.
+    Remove,
+}
 
 /// Counts of what one cut did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SnapReport {
     /// Faces selected by this sweep.
     pub faces: usize,
-    /// Elements next to these faces.
+    /// Elements next to these faces, or removed elements.
     pub elements: usize,
     /// Nodes moved onto the sweep.
     pub moved: usize,
-    /// Nodes of the cut surface that could not move and stay off the sweep.
+    /// Nodes of the cut surface that could not move and stay off the sweep, or edges that could not be divided.
     pub refused: usize,
     /// Nodes duplicated.
     pub duplicated: usize,
     /// Edges collapsed.
     pub collapses: usize,
-    /// Nodes added on edges and faces in order to collapse degenerate elements.
+    /// Nodes added on edges and faces: in order to collapse degenerate elements, or where the sweep crosses edges.
     pub splits: usize,
     /// Degenerate elements that remain because they could not be collapsed.
     pub degenerate: usize,
@@ -54,15 +68,21 @@ pub struct SnapCut {
     pub fronts: Vec<(u32, [Vector3<f64>; 2])>,
 }
 
-/// Cuts one body along its faces, and remembers unfinished incisions.
+/// Cuts the mesh of one body, and remembers unfinished incisions.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Snapper {
+    how: MeshCut,
     memories: BTreeMap<u32, Memory>,
     fronts: BTreeMap<u32, Front>,
     tags: BTreeMap<FaceKey, u32>,
 }
 
 impl Snapper {
+    /// Cuts in this way.
+    pub fn new(how: MeshCut) -> Self {
+        Self { how, ..Self::default() }
+    }
+
     /// A copy of the mesh in which only elements that share a face share nodes, as after a cut.
     pub fn prepared(mesh: &TetMesh) -> TetMesh {
         let (rest, v) = (&mesh.nodes[..], vec![Vector3::zeros(); mesh.nodes.len()]);
@@ -78,6 +98,11 @@ impl Snapper {
     /// Incision of every surface face that is a lip, and of selected faces that are still closed.
     pub fn tags(&self) -> &BTreeMap<FaceKey, u32> {
         &self.tags
+    }
+
+    /// How it cuts.
+    pub fn how(&self) -> MeshCut {
+        self.how
     }
 
     /// Cuts `mesh` along the surface that the blade swept, in the present configuration of `nodes`. Returns no
@@ -104,20 +129,30 @@ impl Snapper {
         // Nothing is cut inside the elements of this mesh, so its pieces are its elements.
         let near = near.to_vec();
         let before = Before { tets: &mesh.mesh().tets, around: mesh.elements_around(), nodes };
-        let complex = Complex::new(before, std::mem::take(&mut self.tags));
+        let mut complex = Complex::new(before, std::mem::take(&mut self.tags));
+        // Nodes may move before the faces open, so last blade positions are looked up first.
+        let fronts = self.last_blades(&complex, blade, incision);
+        let n_elements = mesh.mesh().tets.len();
         let memory = self.memories.entry(incision).or_default();
+        if self.how == MeshCut::Remove {
+            *memory = Memory::default();
+        }
         cross(&complex, &near, &triangles, memory);
-        let selection = select(&complex, memory);
-        if selection.faces.is_empty() {
+        let opened = match self.how {
+            MeshCut::Snap => snap(&mut complex, memory),
+            MeshCut::Subdivide => divide(&mut complex, memory),
+            MeshCut::Remove => take_out(&mut complex, memory, (incision, n_elements)),
+        };
+        let Some(opened) = opened else {
             self.tags = complex.into_tags();
             let report = SnapReport { pending: memory.crossings.len(), examined, ..SnapReport::default() };
             if let Some(last) = blade.segments.last() {
                 self.fronts.insert(incision, mesh.front_among_candidates(last, nodes.x));
             }
             return Ok((report, None));
-        }
-        let (report, cut) = self.open(complex, &selection, blade, incision);
-        Ok((SnapReport { examined, ..report }, Some(cut)))
+        };
+        let (report, cut) = self.open(complex, opened, incision);
+        Ok((SnapReport { examined, ..report }, Some(SnapCut { fronts, ..cut })))
     }
 
     /// Remembers the last blade positions by the material of the mesh after a cut, at the positions `x` [m] of
@@ -126,48 +161,33 @@ impl Snapper {
         self.fronts = cut.fronts.iter().map(|(incision, ends)| (*incision, mesh.front(ends, x))).collect();
     }
 
-    /// Moves nodes, opens the selected faces and removes degenerate elements.
-    fn open(
-        &mut self,
-        mut complex: Complex<'_>,
-        selection: &Selection,
-        blade: &BladeSweep,
-        incision: u32,
-    ) -> (SnapReport, SnapCut) {
-        let fronts = self.last_blades(&complex, blade, incision);
-        let mut report = SnapReport { faces: selection.faces.len(), ..SnapReport::default() };
-        let surface: BTreeSet<u32> = selection.faces.iter().flatten().copied().collect();
-        // Nodes move before the faces open: a node still has all of its elements then, and moves for both
-        // lips.
-        let wanted: Vec<u32> = surface.iter().copied().filter(|n| selection.marks.contains_key(n)).collect();
-        report.moved = wanted.len();
-        report.refused = relocate_all(&mut complex, wanted, &selection.marks);
-        report.moved -= report.refused;
+    /// Opens the selected faces, and removes degenerate elements where nodes were moved.
+    fn open(&mut self, mut complex: Complex<'_>, opened: Opened, incision: u32) -> (SnapReport, SnapCut) {
+        let Opened { mut report, faces, nodes: surface } = opened;
         let mut beside = BTreeSet::new();
-        for &key in &selection.faces {
+        for &key in &faces {
             complex.set_tag(key, Some(incision));
             beside.extend(around_face(&complex, key));
         }
-        report.elements = beside.len();
-        // A marked face with elements on both sides is still closed, and its nodes may have to be split.
-        let closed: BTreeSet<u32> = complex
-            .tags()
-            .keys()
-            .filter(|key| around_face(&complex, **key).len() == 2)
-            .flatten()
-            .copied()
-            .collect();
-        if let Some(memory) = self.memories.get_mut(&incision) {
-            memory.settle(surface.iter().filter_map(|n| Some((*n, selection.marks.get(n)?.normal))));
-        }
+        report.elements = report.elements.max(beside.len());
+        // A marked face with elements on both sides is still closed, and its nodes may have to be split. So may the
+        // nodes of elements that were taken out.
+        let tagged = complex.tags().keys().filter(|key| around_face(&complex, **key).len() == 2).flatten();
+        let taken = surface.iter().filter(|_| self.how == MeshCut::Remove);
+        let closed: BTreeSet<u32> = tagged.chain(taken).copied().collect();
         let mut memories: Vec<&mut Memory> = self.memories.values_mut().collect();
         let duplicates = dissect(&mut complex, &closed, &mut memories);
         report.duplicated = duplicates.len();
-        let touched = surface.iter().chain(duplicates.iter().map(|d| &d.node));
-        let region = touched.flat_map(|&n| complex.around(n).iter().copied()).collect();
-        let cleaned = clean(&mut complex, region);
+        let cleaned = match self.how {
+            MeshCut::Snap => {
+                let touched = surface.iter().chain(duplicates.iter().map(|d| &d.node));
+                let region = touched.flat_map(|&n| complex.around(n).iter().copied()).collect();
+                clean(&mut complex, region)
+            }
+            MeshCut::Subdivide | MeshCut::Remove => Cleaned::default(),
+        };
         report.collapses = cleaned.collapses;
-        report.splits = cleaned.splits;
+        report.splits += cleaned.splits;
         report.degenerate = cleaned.left;
 
         // Nodes that no element uses are dropped, so everything remembered by node number has to follow.
@@ -184,7 +204,7 @@ impl Snapper {
         self.memories
             .retain(|id, memory| *id == incision || !memory.crossings.is_empty() || !memory.on.is_empty());
         report.copied = complex.copied();
-        let cut = SnapCut { fronts, ..compact(&complex, &number, &duplicates) };
+        let cut = compact(&complex, &number, &duplicates);
         self.tags = tags_of(&complex, &number);
         report.pending = self.memories.get(&incision).map_or(0, |memory| memory.crossings.len());
         (report, cut)
@@ -202,6 +222,59 @@ impl Snapper {
         let others = others.map(|(id, front)| (*id, front.ends(complex.x_before())));
         others.chain(blade.segments.last().map(|last| (incision, *last))).collect()
     }
+}
+
+/// What a cut is about to open.
+struct Opened {
+    report: SnapReport,
+    /// Faces that open; none where elements were taken out.
+    faces: BTreeSet<FaceKey>,
+    /// Nodes of the cut surface.
+    nodes: BTreeSet<u32>,
+}
+
+/// Selects faces and moves their nodes; `None` if nothing can be cut. Nodes move before the faces open: a node still has
+/// all of its elements then, and moves for both lips.
+fn snap(complex: &mut Complex, memory: &mut Memory) -> Option<Opened> {
+    let Selection { marks, faces } = select(complex, memory);
+    if faces.is_empty() {
+        return None;
+    }
+    let mut report = SnapReport { faces: faces.len(), ..SnapReport::default() };
+    let nodes: BTreeSet<u32> = faces.iter().flatten().copied().collect();
+    let wanted: Vec<u32> = nodes.iter().copied().filter(|n| marks.contains_key(n)).collect();
+    report.moved = wanted.len();
+    report.refused = relocate_all(complex, wanted, &marks);
+    report.moved -= report.refused;
+    memory.settle(nodes.iter().filter_map(|n| Some((*n, marks.get(n)?.normal))));
+    Some(Opened { report, faces, nodes })
+}
+
+/// Divides the elements that the incision has parted; `None` if there are none.
+fn divide(complex: &mut Complex, memory: &mut Memory) -> Option<Opened> {
+    let divided = subdivide(complex, memory);
+    if divided.splits == 0 && divided.faces.is_empty() {
+        return None;
+    }
+    let nodes = divided.faces.iter().flatten().copied().collect();
+    let (splits, refused) = (divided.splits, divided.refused);
+    let report = SnapReport { faces: divided.faces.len(), splits, refused, ..SnapReport::default() };
+    Some(Opened { report, faces: divided.faces, nodes })
+}
+
+/// Takes out the elements that the sweep touches; `None` if there are none.
+fn take_out(
+    complex: &mut Complex,
+    memory: &mut Memory,
+    (incision, n_elements): (u32, usize),
+) -> Option<Opened> {
+    let removed = remove(complex, memory, incision, n_elements);
+    *memory = Memory::default();
+    if removed.elements == 0 {
+        return None;
+    }
+    let report = SnapReport { elements: removed.elements, ..SnapReport::default() };
+    Some(Opened { report, faces: BTreeSet::new(), nodes: removed.nodes })
 }
 
 fn around_face(complex: &Complex, [p, q, r]: FaceKey) -> Vec<u32> {

@@ -109,7 +109,7 @@ fn a_foreign_space_is_not_cut_along_faces() {
     let space = Box::new(Lattice { tets: Tets::linear(CutMesh::new(block()).unwrap()), says: true });
     let settings = BodySettings { cutting: CuttingMethod::Snap, ..settings(200, 1e-6) };
     let error = Body::of_space(space, SOFT, settings).unwrap_err().to_string();
-    assert!(error.contains("cutting along faces"), "{error}");
+    assert!(error.contains("cutting that changes the mesh"), "{error}");
 }
 
 /// Hands everything on to tetrahedra.

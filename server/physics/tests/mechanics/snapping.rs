@@ -1,4 +1,4 @@
-//! Bodies cut along their faces: state, constraints and loads follow the mesh.
+//! Bodies whose mesh is cut: state, constraints and loads follow it.
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, CuttingMethod, ElementKind, LooseRule, Outcome, Scheme};
@@ -56,6 +56,39 @@ fn a_moving_body_is_cut_and_goes_on() {
         assert!(body.least_volume_ratio() > 0.0);
         body.reset().unwrap();
         assert_eq!((body.rest_positions().len(), body.fixed_nodes().len()), (nodes, held));
+        assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
+    }
+}
+
+/// A body whose elements are divided or removed moves on, keeps what held it, and returns to its start.
+#[test]
+fn the_baselines_go_on_after_a_cut_and_return_to_the_start() {
+    for cutting in [CuttingMethod::Subdivide, CuttingMethod::Remove] {
+        let mut body = block(Law::Corotational, BodySettings { cutting, ..snap() });
+        for _ in 0..5 {
+            assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
+        }
+        let (mass, elements, held) = (body.total_mass(), body.n_elements(), body.fixed_nodes().len());
+        let nodes = body.rest_positions().len();
+        let report = body.cut(&sweep(0.107, 0.08), 1).unwrap();
+        assert!(report.elements_cut > 4, "{cutting:?} {report:?}");
+        let (now, left) = (body.n_elements(), body.total_mass() / mass);
+        match cutting {
+            CuttingMethod::Subdivide => assert!(now > elements && (left - 1.0).abs() < 1e-9),
+            _ => assert!(now < elements && left < 0.99 && left > 0.7, "{left}"),
+        }
+        assert_eq!(body.fixed_nodes().len(), held);
+        for _ in 0..3 {
+            assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced, "{cutting:?}");
+        }
+        body.cut(&sweep(0.157, 0.4), 2).unwrap();
+        assert_eq!(body.parts().len(), 2, "{cutting:?}");
+        for _ in 0..10 {
+            assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced, "{cutting:?}");
+        }
+        assert!(body.least_volume_ratio() > 0.0 && body.positions().iter().all(|x| x.norm() < 1.0));
+        body.reset().unwrap();
+        assert_eq!((body.rest_positions().len(), body.n_elements()), (nodes, elements));
         assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
     }
 }

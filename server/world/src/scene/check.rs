@@ -133,10 +133,12 @@ impl Check<'_> {
     }
 
     fn skin(&mut self, at: &str, skin: &RawSkin, body: &RawBody) -> SkinSpec {
-        if body.cut_method() == RawCutMethod::Snap {
+        if body.cut_method().changes_mesh() {
             let next = "write cutting.method = \"xfem\", or remove the skin";
-            let what =
-                "found a skin with cutting.method = `snap`, which moves the nodes below it; allowed: xfem";
+            let found = mechanics::word(&body.cut_method());
+            let what = format!(
+                "found a skin with cutting.method = `{found}`, which changes the mesh below it; allowed: xfem"
+            );
             self.conflict(format!("{at}.skin"), what, next);
         }
         if body.element != RawElement::Tet4 {

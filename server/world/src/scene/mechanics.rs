@@ -177,6 +177,8 @@ impl Mechanics {
                 // An octree has no other method.
                 RawCutMethod::Xfem | RawCutMethod::Links => CuttingMethod::Xfem,
                 RawCutMethod::Snap => CuttingMethod::Snap,
+                RawCutMethod::Subdivide => CuttingMethod::Subdivide,
+                RawCutMethod::Remove => CuttingMethod::Remove,
             },
             loose: match self.loose {
                 RawLoose::Free => LooseRule::Free,

@@ -503,6 +503,10 @@ pub enum RawCutMethod {
     Xfem,
     /// Nodes are moved onto the sweep, and the mesh is separated along element faces. For `tet4`.
     Snap,
+    /// Elements are divided along the sweep, whatever shape results. For `tet4`; a baseline for comparisons.
+    Subdivide,
+    /// Elements that the sweep touches are removed, with their mass. For `tet4`; a baseline for comparisons.
+    Remove,
     /// Cells are unlinked from each other, which divides those along the cut into the finest ones. For
     /// `octree`.
     Links,
@@ -512,7 +516,8 @@ pub enum RawCutMethod {
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawCutting {
-    /// Cutting method: inside elements (`xfem`), along element faces (`snap`) or between cells (`links`).
+    /// Cutting method: inside elements (`xfem`), along element faces (`snap`) or between cells (`links`). Baselines for
+    /// comparisons divide elements (`subdivide`) or take them out (`remove`).
     /// Default: `links` for `octree`, otherwise `xfem`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<RawCutMethod>,
@@ -524,6 +529,13 @@ pub struct RawCutting {
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "liver has about 100, skin about 2500"))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub toughness_j_m2: Option<f64>,
+}
+
+impl RawCutMethod {
+    /// Whether cuts change the elements of a body.
+    pub fn changes_mesh(self) -> bool {
+        matches!(self, Self::Snap | Self::Subdivide | Self::Remove)
+    }
 }
 
 impl RawBody {

@@ -12,7 +12,6 @@ use serde::Serialize;
 use crate::body::BodySize;
 use crate::contact::pairs::TouchSettings;
 use crate::inputs::Wants;
-use crate::scene::raw::RawCutMethod;
 use crate::scene::{AdaptSpec, BodySpec, CheckedScene};
 
 /// Seconds per element and step for energies.
@@ -144,12 +143,12 @@ impl Plan {
         let snapped: Vec<&str> = scene
             .bodies
             .iter()
-            .filter(|body| body.mechanics.cutting == RawCutMethod::Snap)
+            .filter(|body| body.mechanics.cutting.changes_mesh())
             .map(|body| &*body.id)
             .collect();
         let why = match (allowed, snapped.is_empty()) {
             (true, false) => {
-                format!("{why}; cuts along element faces rebuild the model: {}", snapped.join(", "))
+                format!("{why}; cuts that change the mesh rebuild the model: {}", snapped.join(", "))
             }
             _ => why,
         };

@@ -1,5 +1,6 @@
-//! Cuts along faces, each held against [`Sample::check`].
+//! Cuts of the mesh, each held against [`Sample::check`].
 
+mod baselines;
 mod cuts;
 mod degenerate;
 mod local;

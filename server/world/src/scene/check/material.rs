@@ -11,8 +11,8 @@ impl Check<'_> {
             return Vec::new();
         }
         let tets = matches!(body.element, RawElement::Tet4 | RawElement::Tet10);
-        if tets && body.cut_method() == RawCutMethod::Snap {
-            let what = "cutting along faces makes new elements, which would have no material";
+        if tets && body.cut_method().changes_mesh() {
+            let what = "cutting.method makes new elements, which would have no material";
             self.conflict(format!("{at}.material"), what, "write cutting.method = \"xfem\"");
         }
         if body.locking == RawLocking::NodeAveraged {

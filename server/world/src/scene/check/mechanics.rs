@@ -53,11 +53,11 @@ impl Check<'_> {
             let what = format!("found `{found}` with {element}, allowed: {allowed}");
             return self.conflict(key, what, next);
         }
-        if m.cutting == RawCutMethod::Snap && m.element != RawElement::Tet4 {
-            let what = format!("found `snap` with {}, allowed: tet4", word(&m.element));
-            self.conflict(key, what, "choose tet4, whose faces can be cut along, or remove cutting.method");
+        if m.cutting.changes_mesh() && m.element != RawElement::Tet4 {
+            let what = format!("found `{}` with {}, allowed: tet4", word(&m.cutting), word(&m.element));
+            self.conflict(key, what, "choose tet4, whose mesh can be cut, or remove cutting.method");
         }
-        if m.loose == RawLoose::Pinned && m.cutting != RawCutMethod::Snap {
+        if m.loose == RawLoose::Pinned && !m.cutting.changes_mesh() {
             let what = format!("found `pinned` with {}, allowed: snap", word(&m.cutting));
             let next = "write cutting.method = \"snap\" or cutting.loose = \"free\"";
             self.conflict(format!("{at}.cutting.loose"), what, next);
