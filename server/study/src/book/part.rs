@@ -36,10 +36,11 @@ pub struct Part {
 const SCENES: [&str; 4] = ["demonstration", "kidney", "brain", "fingertip"];
 
 /// Parts of the accuracy study, those that papers need first. The quick form ends with the bar at rest.
-const ACCURACY: [(&str, &str); 19] = [
+const ACCURACY: [(&str, &str); 20] = [
     ("threads", "Threads, shares of a step, and the largest mesh in real time"),
     ("nienhuys", "Relaxation: Nienhuys' table 3.1 and figure 3.12"),
     ("schoch", "Convergence on a half-cut beam: figure 10 of Schoch"),
+    ("slits", "Five ways to cut: 1, 10 and 100 slits"),
     ("dick-tables", "Octree cells: tables 1 and 2 of Dick"),
     ("dick-convergence", "Octree cells: rates of multigrid"),
     ("dick-sizes", "Octree cells: time per cell"),
@@ -58,7 +59,7 @@ const ACCURACY: [(&str, &str); 19] = [
     ("collision", "Methods of collision detection"),
 ];
 /// How many of them the quick form has.
-const QUICK: usize = 11;
+const QUICK: usize = 12;
 
 /// The parts of a book, in the order in which they run.
 pub fn parts(quick: bool) -> Vec<Part> {

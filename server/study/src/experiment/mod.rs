@@ -1,5 +1,5 @@
 //! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes; on methods of
-//! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); and on threads.
+//! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); on ways to cut; and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -50,6 +50,8 @@ mod nienhuys;
 
 mod schoch;
 
+mod slits;
+
 pub use bench::ExperimentBench;
 pub use result::{Column, ExperimentResult, Picture, Plots, Row, Table, Unit};
 
@@ -60,7 +62,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 12] = [
+pub const NAMES: [&str; 13] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -73,6 +75,7 @@ pub const NAMES: [&str; 12] = [
     "threads",
     "nienhuys",
     "schoch",
+    "slits",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -94,6 +97,7 @@ fn find(name: &str) -> Option<Experiment> {
         "threads" => Some(threads::threads),
         "nienhuys" => Some(nienhuys::nienhuys),
         "schoch" => Some(schoch::schoch),
+        "slits" => Some(slits::slits),
         _ => None,
     }
 }
