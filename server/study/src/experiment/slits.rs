@@ -119,7 +119,7 @@ pub fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
         let (sag, eta) = equilibrium_of_cells(&mut fine)?;
         truth.push(sag);
         result.notes.push(format!(
-            "Truth with {slits} {}: {} cells, estimated error {:.1} % in the energy norm.",
+            "Truth with {slits} {}: {} cells, estimated error {:.1} % in the energy norm; that of a displacement is about its square",
             if slits == 1 { "slit" } else { "slits" },
             fine.n_elements(),
             100.0 * eta

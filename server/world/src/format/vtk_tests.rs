@@ -31,6 +31,18 @@ fn triangles(bytes: &[u8]) -> Vec<[u32; 3]> {
     }
 }
 
+/// The two tetrahedra in a binary file.
+fn binary_grid() -> Vec<u8> {
+    let mut binary =
+        b"# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n".to_vec();
+    POINTS.iter().flatten().for_each(|c| binary.extend(c.to_be_bytes()));
+    binary.extend(b"\nCELLS 2 10\n");
+    [4i32, 0, 1, 2, 3, 4, 1, 2, 3, 4].iter().for_each(|i| binary.extend(i.to_be_bytes()));
+    binary.extend(b"\nCELL_TYPES 2\n");
+    [10i32, 10].iter().for_each(|i| binary.extend(i.to_be_bytes()));
+    binary
+}
+
 #[test]
 fn legacy_grids_text_and_binary_old_and_new() {
     let expected = vec![[0, 1, 2, 3], [1, 2, 3, 4]];
@@ -39,14 +51,7 @@ fn legacy_grids_text_and_binary_old_and_new() {
         0 0 0 1 0 0 0 1 0 0 0 1 1 1 1\nMETADATA\nINFORMATION 0\n\nCELLS 3 8\nOFFSETS vtktypeint64\n0 4 8\n\
         CONNECTIVITY vtktypeint64\n0 1 2 3 1 2 3 4\nCELL_TYPES 2\n10\n10\n";
     assert_eq!(tets("a.vtk", v5.as_bytes()), expected);
-    let mut binary =
-        b"# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n".to_vec();
-    POINTS.iter().flatten().for_each(|c| binary.extend(c.to_be_bytes()));
-    binary.extend(b"\nCELLS 2 10\n");
-    [4i32, 0, 1, 2, 3, 4, 1, 2, 3, 4].iter().for_each(|i| binary.extend(i.to_be_bytes()));
-    binary.extend(b"\nCELL_TYPES 2\n");
-    [10i32, 10].iter().for_each(|i| binary.extend(i.to_be_bytes()));
-    assert_eq!(tets("a.vtk", &binary), expected);
+    assert_eq!(tets("a.vtk", &binary_grid()), expected);
 }
 
 /// Array, number and tetrahedra of every group.
@@ -71,13 +76,7 @@ fn whole_numbers_in_cells_become_groups() {
         assert_eq!(groups("a.vtk", whole.replace(from, to).as_bytes()), expected[..2]);
     }
     assert!(groups("a.vtk", GRID.as_bytes()).is_empty());
-    let mut binary =
-        b"# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n".to_vec();
-    POINTS.iter().flatten().for_each(|c| binary.extend(c.to_be_bytes()));
-    binary.extend(b"\nCELLS 2 10\n");
-    [4i32, 0, 1, 2, 3, 4, 1, 2, 3, 4].iter().for_each(|i| binary.extend(i.to_be_bytes()));
-    binary.extend(b"\nCELL_TYPES 2\n");
-    [10i32, 10].iter().for_each(|i| binary.extend(i.to_be_bytes()));
+    let mut binary = binary_grid();
     binary.extend(b"\nCELL_DATA 2\nSCALARS m short 1\nLOOKUP_TABLE default\n");
     [3i16, -1].iter().for_each(|i| binary.extend(i.to_be_bytes()));
     assert_eq!(groups("a.vtk", &binary), [("m".to_owned(), -1, vec![1]), ("m".to_owned(), 3, vec![0])]);
