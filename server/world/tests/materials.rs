@@ -156,19 +156,24 @@ fn regions_that_cannot_be_found_are_explained() {
     );
 }
 
-/// Palpation: the finger presses equally deep beside the stiff ball and above it.
+/// Palpation: the finger presses equally deep beside the stiff ball and above it, and above soft tissue in its place.
 #[test]
 fn a_finger_feels_the_stiff_ball_in_the_example() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/tumour.toml");
-    let scene = Scene::load(&path).unwrap();
-    let mut simulation = Simulation::new(&scene, path.parent().unwrap()).unwrap();
+    let start = |set: &[String]| {
+        let scene = Scene::load_with(&path, set).unwrap();
+        Simulation::new(&scene, path.parent().unwrap()).unwrap()
+    };
+    let (mut stiff, mut soft) = (start(&[]), start(&["body.organ.material.0.young_pa=15e3".to_owned()]));
     let force_at = |simulation: &mut Simulation, time_s: f64| {
         while simulation.time_s() < time_s {
             simulation.step(&Inputs::default());
         }
         simulation.tools().iter().next().unwrap().force_n.norm()
     };
-    let beside = force_at(&mut simulation, 1.5);
-    let above = force_at(&mut simulation, 4.5);
-    assert!(beside > 0.1 && above > 1.3 * beside, "{beside} N and {above} N");
+    let beside = force_at(&mut stiff, 1.8);
+    let above = force_at(&mut stiff, 4.8);
+    let without = force_at(&mut soft, 4.8);
+    assert!(beside > 0.4 && above > 1.7 * beside, "{beside} N beside, {above} N above");
+    assert!(above > 1.35 * without, "{without} N without the ball, {above} N with it");
 }

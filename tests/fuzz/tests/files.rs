@@ -13,7 +13,7 @@ use scindo::record::reader::Recording;
 use scindo::record::recorder::RecordSettings;
 use scindo::sim::engine::Engine;
 use scindo_fuzz::attack;
-use scindo_world::format::read_mesh_bytes;
+use scindo_world::format::{MeshFile, read_mesh_bytes};
 use scindo_world::inputs::Inputs;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
@@ -53,10 +53,17 @@ fn scene_json() {
     });
 }
 
-/// What a reader takes has finite points and no node that is not there.
+/// What a reader takes has finite points, no node that is not there, and groups of tetrahedra that are.
 fn read(file: &str) -> impl Fn(&[u8]) + use<'_> {
     move |bytes: &[u8]| match read_mesh_bytes(file, bytes) {
-        Ok(mesh) => assert!(mesh.points().iter().all(|p| p.iter().all(|x| x.is_finite()))),
+        Ok(mesh) => {
+            assert!(mesh.points().iter().all(|p| p.iter().all(|x| x.is_finite())));
+            if let MeshFile::Volume(volume) = mesh {
+                let (tets, mut named) =
+                    (volume.tets.len(), volume.groups.iter().flat_map(|group| &group.tets));
+                assert!(named.all(|&tet| (tet as usize) < tets));
+            }
+        }
         Err(error) => assert!(!error.to_string().trim().is_empty()),
     }
 }
@@ -96,9 +103,10 @@ fn ply() {
 
 #[test]
 fn gmsh() {
-    let old = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n\
-               $Elements\n1\n1 4 2 0 1 1 2 3 4\n$EndElements\n";
-    let new = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n\
+    let old = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 7 \"a\"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n\
+               $Elements\n1\n1 4 2 7 1 1 2 3 4\n$EndElements\n";
+    let new = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n1 0 0 1\n1 0 0 0 0\n1 0 0 0 1 1 1 1 7 0\n\
+               $EndEntities\n$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n\
                0 0 1\n$EndNodes\n$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n";
     attack!(vec![old.as_bytes().to_vec(), new.as_bytes().to_vec()], RECIPES, read("a.msh"));
 }
@@ -106,7 +114,8 @@ fn gmsh() {
 #[test]
 fn vtk() {
     let text = "# vtk DataFile Version 3.0\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0 1 0 0 0 1 0 \
-                0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+                0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\nSCALARS a float\nLOOKUP_TABLE default\n1 2 3 4\nCELL_DATA 1\n\
+                SCALARS part int 1\nLOOKUP_TABLE default\n7\nVECTORS v float\n1 2 3\nFIELD f 1\nb 1 1 int\n2\n";
     let poly = "# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n\
                 POLYGONS 1 4\n3 0 1 2\n";
     attack!(vec![text.as_bytes().to_vec(), poly.as_bytes().to_vec()], RECIPES, read("a.vtk"));
@@ -119,7 +128,8 @@ fn vtu() {
 <DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
 <Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 2 3</DataArray>
 <DataArray type="Int64" Name="offsets" format="ascii">4</DataArray>
-<DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>"#;
+<DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells><CellData>
+<DataArray type="Int32" Name="part" format="ascii">7</DataArray></CellData></Piece></UnstructuredGrid></VTKFile>"#;
     attack!(vec![text.as_bytes().to_vec()], RECIPES, read("a.vtu"));
 }
 

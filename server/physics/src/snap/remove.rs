@@ -2,12 +2,12 @@
 //! baseline that other ways are measured against.
 //!
 //! # Source
-//! Cotin, Delingette, Ayache 2000, *A hybrid elastic model allowing real-time cutting, deformations and force-feedback
-//! for surgery training and simulation*.
+//! Cotin, Delingette, Ayache 2000, *A hybrid elastic model for real-time cutting, deformations, and force feedback for
+//! surgery training and simulation*.
 
 use std::collections::BTreeSet;
 
-use super::complex::Complex;
+use super::complex::{Complex, face_key};
 use super::memory::Memory;
 
 /// What the removal left.
@@ -30,8 +30,7 @@ pub fn remove(complex: &mut Complex, crossed: &Memory, incision: u32, n_elements
             break;
         }
         removed.nodes.extend(complex.tet(t));
-        let sides =
-            [0, 1, 2, 3].map(|k| (super::complex::face_key(complex.face(t, k)), complex.neighbour(t, k)));
+        let sides = [0, 1, 2, 3].map(|k| (face_key(complex.face(t, k)), complex.neighbour(t, k)));
         complex.remove_tet(t);
         removed.elements += 1;
         for (key, neighbour) in sides {

@@ -372,7 +372,7 @@ fn size(scanner: &mut Scanner, format: Format, what: &str, bytes_each: usize) ->
 /// A list of entity or group numbers of a 4.1 file: its length, then the numbers. Signs tell orientations.
 fn entity_tags(scanner: &mut Scanner, format: Format, what: &str) -> Result<Vec<i64>, MeshInError> {
     let n = size(scanner, format, what, 1)?;
-    (0..n).map(|_| Ok(scanner.stored_integer(format.encoding, 4, what)?.abs())).collect()
+    (0..n).map(|_| Ok(scanner.stored_integer(format.encoding, 4, what)?.wrapping_abs())).collect()
 }
 
 /// Block count of a 4.1 section. The total and the tag range are not needed.
