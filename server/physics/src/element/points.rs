@@ -35,8 +35,7 @@ pub trait Points: Debug + Sync {
 
     /// Lamé constants [Pa] of a region of a body of `material`.
     fn lame(&self, region: u16, material: &Material) -> Lame {
-        let other = usize::from(region).checked_sub(1).and_then(|r| self.regions().get(r));
-        other.map_or_else(|| material.lame(), Region::lame)
+        Region::numbered(self.regions(), region).map_or_else(|| material.lame(), Region::lame)
     }
 
     /// Elastic energy [J] with the nodes at `x` [m], without remedies against locking.

@@ -81,6 +81,12 @@ pub struct Region {
 }
 
 impl Region {
+    /// Region number `number` of these: they count from 1, and 0 is the body's own material.
+    #[inline]
+    pub fn numbered(regions: &[Self], number: u16) -> Option<&Self> {
+        usize::from(number).checked_sub(1).and_then(|at| regions.get(at))
+    }
+
     /// Lamé constants; see [`Material::lame`].
     pub fn lame(&self) -> Lame {
         let (E, nu) = (self.young_pa, self.poisson);

@@ -143,15 +143,12 @@ impl Regions {
 
     /// Lamé constants [Pa] of the elements of `region` in a body whose own are `lame`.
     pub fn lame(&self, region: u16, lame: Lame) -> Lame {
-        self.constants_of(region).map_or(lame, Region::lame)
+        Region::numbered(&self.constants, region).map_or(lame, Region::lame)
     }
 
     /// Density of element `e` relative to that of its body, `density_kg_m3`.
     pub fn relative_density(&self, e: usize, density_kg_m3: f64) -> f64 {
-        self.constants_of(self.of(e)).map_or(1.0, |region| region.density_kg_m3 / density_kg_m3)
-    }
-
-    fn constants_of(&self, region: u16) -> Option<&Region> {
-        usize::from(region).checked_sub(1).and_then(|region| self.constants.get(region))
+        Region::numbered(&self.constants, self.of(e))
+            .map_or(1.0, |region| region.density_kg_m3 / density_kg_m3)
     }
 }

@@ -84,7 +84,7 @@ impl Octree {
         let finest = self.lattice.h.powi(3);
         let mut out = vec![0.0; self.n_vertices()];
         for (id, cell) in (0u32..).zip(&self.cells) {
-            let region = usize::from(cell.material).checked_sub(1).and_then(|r| self.regions.get(r));
+            let region = Region::numbered(&self.regions, cell.material);
             let density = region.map_or(density_kg_m3, |region| region.density_kg_m3);
             self.now(id).for_shares(|v, share| out[v as usize] += density * finest * share);
         }

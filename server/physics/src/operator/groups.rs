@@ -53,8 +53,8 @@ impl Groups {
 
     /// Coefficients of a group in an update whose constants are those of the body.
     pub fn coefficients(&self, group: usize, with: &ElasticUpdate) -> Coefficients {
-        let region = usize::from(self.regions[group]).checked_sub(1);
-        Coefficients::of(with, region.map_or(with.lame, |region| self.constants[region].lame()))
+        let region = Region::numbered(&self.constants, self.regions[group]);
+        Coefficients::of(with, region.map_or(with.lame, Region::lame))
     }
 }
 
