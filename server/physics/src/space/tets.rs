@@ -238,7 +238,9 @@ impl Space for Tets {
             }
             return mass;
         }
-        if let Some(cubes) = self.cubes().filter(|_| !self.regions.is_empty()) {
+        if !self.regions.is_empty()
+            && let Some(cubes) = self.cubes()
+        {
             return cubes.vertex_masses(density_kg_m3);
         }
         if self.kind() == ElementKind::Hex8 {
