@@ -134,9 +134,6 @@ impl Snapper {
         let fronts = self.last_blades(&complex, blade, incision);
         let n_elements = mesh.mesh().tets.len();
         let memory = self.memories.entry(incision).or_default();
-        if self.how == MeshCut::Remove {
-            *memory = Memory::default();
-        }
         cross(&complex, &near, &triangles, memory);
         let opened = match self.how {
             MeshCut::Snap => snap(&mut complex, memory),
@@ -269,6 +266,7 @@ fn take_out(
     (incision, n_elements): (u32, usize),
 ) -> Option<Opened> {
     let removed = remove(complex, memory, incision, n_elements);
+    // What was crossed is gone: nothing is left for the next sweep.
     *memory = Memory::default();
     if removed.elements == 0 {
         return None;
