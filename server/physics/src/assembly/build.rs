@@ -5,10 +5,11 @@ use nalgebra::Vector3;
 use super::averaging::NodeAverage;
 use super::mass::{Products, pack};
 use super::point::PointLaw;
+use super::quadratic::QuadraticPiece;
 use super::scratch::Scratch;
 use super::{BlockCsr, ElementKind, Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
-use crate::element::{Points, hex8, quadrature, tet10};
+use crate::element::{Points, hex8, quadrature};
 use crate::material::{Material, Regions};
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
 use crate::octree::{Octree, corner_weights};
@@ -45,26 +46,13 @@ impl Model {
     pub fn tet10(mesh: &TetMesh, material: &Material) -> Result<Self, ModelError> {
         mesh.check()?;
         let quadratic = Tet10Mesh::new(mesh);
-        let mut model = Self::begin(ElementKind::Tet10, quadratic.nodes, material, Volumetric::Full)?;
-        let rule = quadrature::tet_degree_2();
-        for (e, tet) in quadratic.tets.iter().enumerate() {
-            let (volume, g) = (mesh.volume(e), mesh.gradients(e));
-            model.connectivity.extend_from_slice(tet);
-            model.volumes.push(volume);
-            for (xi, w) in &rule {
-                model.gradients.extend(tet10::gradients(xi, &g));
-                model.weights.push(w * volume);
-            }
-            for (a, &node) in tet.iter().enumerate() {
-                let corner = a < 4;
-                let lumped = if corner { tet10::HRZ_CORNER } else { tet10::HRZ_EDGE };
-                let integral = if corner { tet10::INTEGRAL_CORNER } else { tet10::INTEGRAL_EDGE };
-                model.lumped[node as usize] += lumped * volume;
-                model.integrals[node as usize] += integral * volume;
-            }
-        }
-        model.products = Products::Scaled(pack(&tet10::shape_products()).collect());
-        model.finish()
+        let points = quadrature::tet_degree_2();
+        let piece = |(e, &nodes): (usize, &[u32; 10])| {
+            let (volume, linear_gradients) = (mesh.volume(e), mesh.gradients(e));
+            QuadraticPiece { nodes, linear_gradients, volume, points, products: None }
+        };
+        let pieces: Vec<QuadraticPiece> = quadratic.tets.iter().enumerate().map(piece).collect();
+        Self::tet10_pieces(quadratic.nodes, &pieces, material)
     }
 
     /// Trilinear hexahedra.
@@ -160,7 +148,7 @@ impl Model {
         self.find_pattern();
     }
 
-    fn begin(
+    pub(super) fn begin(
         kind: ElementKind,
         rest: Vec<Vector3<f64>>,
         material: &Material,

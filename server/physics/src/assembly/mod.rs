@@ -6,7 +6,8 @@
 //! node a is f_a = Σ w P(F) ∇N_a, and the tangent block is K_ab = Σ w ∇N_a · ∂P/∂F · ∇N_b.
 //!
 //! On cut tetrahedra each material piece is an element of its own on its copies, with its volume as
-//! weight. This is exact, since F is constant in a linear tetrahedron.
+//! weight. This is exact, since F is constant in a linear tetrahedron. On quadratic ones a piece has quadrature points
+//! of its own ([`piece_rule`](crate::element::piece_rule)).
 //!
 //! # Source
 //! Zienkiewicz, Taylor, Zhu, *The Finite Element Method*; Bonet, Wood, *Nonlinear Continuum Mechanics
@@ -17,6 +18,7 @@ mod point;
 mod error;
 mod model;
 mod build;
+mod quadratic;
 mod follow;
 mod kernel;
 mod averaging;
@@ -31,6 +33,7 @@ pub use block_csr::BlockCsr;
 pub use error::ModelError;
 pub use mass::MassSharing;
 pub use model::{ElementKind, Model, Volumetric};
+pub use quadratic::QuadraticPiece;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

@@ -113,21 +113,26 @@ impl Boundary {
         share: f64,
         fixed: &mut Vec<FixedCopy>,
     ) {
-        // The first copy of a node has its number.
+        // The first copy of a node of the mesh has its number.
         let copies = (0u32..).zip(space.node_of_copy());
         let mut divided = vec![false; space.n_nodes()];
         copies.filter(|(copy, node)| copy != *node).for_each(|(_, &node)| divided[node as usize] = true);
+        for added in (space.n_copies()..space.n_copies() + space.n_added()).map(|number| number as u32) {
+            let node = space.node_of(added);
+            divided[node as usize] |= added != space.first_copy(node);
+        }
         fixed.clear();
         if self.fixed.len() > fixed.capacity() {
             fixed.reserve_exact(self.fixed.len() + self.fixed.len() / 2);
         }
         for f in &self.fixed {
-            let target = rest[f.node as usize] + share * f.displacement_m;
+            let first = space.first_copy(f.node);
+            let target = rest[first as usize] + share * f.displacement_m;
             let held = |copy: u32| FixedCopy { copy, held: f.held, position_m: target.into() };
-            fixed.push(held(f.node));
+            fixed.push(held(first));
             if divided[f.node as usize] {
                 let copies = space.copies_with_node(f.node).into_iter();
-                fixed.extend(copies.filter(|&copy| copy != f.node).map(held));
+                fixed.extend(copies.filter(|&copy| copy != first).map(held));
             }
         }
         fixed.sort_unstable_by_key(|f| f.copy);
@@ -218,23 +223,22 @@ impl Boundary {
     }
 
     fn add_loads(&self, space: &dyn Space, load: &mut [Vector3<f64>]) {
-        for (load, f) in load.iter_mut().zip(&self.point_force) {
-            *load += f;
+        for (node, f) in (0u32..).zip(&self.point_force) {
+            load[space.first_copy(node) as usize] += f;
         }
         if !self.spread_force.is_empty() {
-            // Nodes that an element adds have no copies, because such elements are not cut.
-            for (load, f) in load.iter_mut().zip(&self.spread_force).skip(space.n_copies()) {
-                *load += f;
-            }
+            let added = space.added_volumes();
+            let volumes = || space.copy_volumes().iter().chain(&added);
             let mut node_volume = vec![0.0; space.n_nodes()];
-            for (&node, &volume) in space.node_of_copy().iter().zip(space.copy_volumes()) {
-                node_volume[node as usize] += volume;
+            for (copy, &volume) in (0u32..).zip(volumes()) {
+                node_volume[space.node_of(copy) as usize] += volume;
             }
-            for (c, &node) in space.node_of_copy().iter().enumerate() {
+            for (copy, (load, volume)) in (0u32..).zip(load.iter_mut().zip(volumes())) {
+                let node = space.node_of(copy) as usize;
                 // Nodes that refinement added carry nothing: the load stays where it was put.
-                let Some(force) = self.spread_force.get(node as usize) else { continue };
-                let share = space.copy_volumes()[c] / node_volume[node as usize];
-                load[c] += share * force;
+                if let Some(force) = self.spread_force.get(node) {
+                    *load += volume / node_volume[node] * force;
+                }
             }
         }
     }
@@ -277,10 +281,10 @@ impl Body {
         }
         self.prescribed_share = share;
         for held in &mut self.fixed {
-            let node = self.space.node_of_copy().get(held.copy as usize).copied().unwrap_or(held.copy);
+            let node = self.space.node_of(held.copy);
             let asleep = self.asleep.binary_search_by_key(&held.copy, |held| held.copy).is_ok();
             if let (Some(asked), false) = (self.boundary.fixed_at(node), asleep) {
-                held.position_m = (self.rest[node as usize] + share * asked.displacement_m).into();
+                held.position_m = (self.rest[held.copy as usize] + share * asked.displacement_m).into();
             }
         }
         self.range.follow(&self.rest, &self.parts, &self.fixed);

@@ -64,7 +64,7 @@ impl Body {
     fn may_be_cut(&self) -> Result<(), BodyError> {
         if !self.space.can_be_cut() {
             let with = self.space.name();
-            return Err(BodyError::Combination { what: "a cut", with, instead: "tet4 or octree" });
+            return Err(BodyError::Combination { what: "a cut", with, instead: "tet4, tet10 or octree" });
         }
         if self.is_being_cut() {
             return Err(CutError::UnderWay.into());
@@ -90,7 +90,11 @@ impl Body {
         if self.space.has_changed() {
             self.inherit(&report.new_copies);
             self.dynamics.follow_cut(&*self.space, &report.new_copies)?;
-            self.follow_new_copies(&report.new_copies);
+            if self.space.n_added() == 0 {
+                self.follow_new_copies(&report.new_copies);
+            } else {
+                self.follow_topology();
+            }
         }
         Ok(())
     }
@@ -111,20 +115,28 @@ impl Body {
         0.5 * lips.map(|(triangle, _)| area(triangle)).sum::<f64>()
     }
 
+    /// Gives the nodes `new` the state of those they were split from. Nodes that the element adds move up behind the
+    /// new copies of the mesh's nodes.
     pub(super) fn inherit(&mut self, new: &[NewCopy]) {
-        let n = self.space.n_copies();
-        resize_reserving(&mut self.state.x, n, Vector3::zeros());
-        resize_reserving(&mut self.state.v, n, Vector3::zeros());
-        for new in new {
-            let copy = new.copy as usize;
-            self.state.x[copy] = new.inherited(&self.state.x);
-            self.state.v[copy] = new.inherited(&self.state.v);
-        }
         let known = self.split_from.len();
-        resize_reserving(&mut self.split_from, n, 0);
-        for (from, new) in self.split_from[known..].iter_mut().zip(new) {
-            *from = new.parent;
+        for values in [&mut self.state.x, &mut self.state.v] {
+            resize_reserving(values, known + new.len(), Vector3::zeros());
+            values.truncate(known);
+            NewCopy::inherit(new, values);
         }
+        let n_copies = self.space.n_copies() as u32;
+        let copies = new.iter().filter(|new| new.copy < n_copies).count() as u32;
+        let moved_up = |number: u32| if number < n_copies - copies { number } else { number + copies };
+        if self.space.n_added() > 0 {
+            self.split_from.iter_mut().for_each(|from| *from = moved_up(*from));
+            self.asleep.iter_mut().for_each(|held| held.copy = moved_up(held.copy));
+        }
+        resize_reserving(&mut self.split_from, known + new.len(), 0);
+        self.split_from.truncate(known);
+        let added = self.split_from.split_off((n_copies - copies) as usize);
+        self.split_from.extend(new[..copies as usize].iter().map(|new| new.parent));
+        self.split_from.extend(added);
+        self.split_from.extend(new[copies as usize..].iter().map(|new| new.parent));
     }
 
     /// Updates everything derived from pieces and copies.

@@ -149,8 +149,7 @@ impl Body {
     pub fn reaction(&self, nodes: &[u32], gravity: Vector3<f64>) -> Vector3<f64> {
         let f_int = self.internal_forces();
         let mut sum = Vector3::zeros();
-        let node_of = |copy: u32| self.space.node_of_copy().get(copy as usize).copied().unwrap_or(copy);
-        for fixed in self.fixed.iter().filter(|f| nodes.contains(&node_of(f.copy))) {
+        for fixed in self.fixed.iter().filter(|f| nodes.contains(&self.space.node_of(f.copy))) {
             let c = fixed.copy as usize;
             let held = f_int[c] - self.weight(c, gravity) - self.load[c];
             sum += fixed.held.part_of(&held);

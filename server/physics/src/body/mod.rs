@@ -111,7 +111,7 @@ pub struct Body {
     asleep: Vec<FixedCopy>,
     load: Vec<Vector3<f64>>,
     mass: Vec<f64>,
-    /// The copy that each copy was split from; itself if it was there from the start.
+    /// The number that each copy and added node was split from; its own if it was there from the start.
     split_from: Vec<u32>,
     parts: LooseParts,
     connectivity: LocalConnectivity,
@@ -258,8 +258,7 @@ impl Body {
         self.team.begin(Phase::Guards);
         if let Some(Notice::Pivot { displacement }) = &mut report.notice {
             let (copy, axis) = (*displacement / 3, *displacement % 3);
-            let node = self.space.node_of_copy().get(copy as usize).copied().unwrap_or(copy);
-            *displacement = 3 * node + axis;
+            *displacement = 3 * self.space.node_of(copy) + axis;
         }
         if report.outcome == Outcome::Advanced {
             self.hold_within_range(&mut report);
@@ -485,7 +484,7 @@ impl Body {
 
     fn return_to_rest(&mut self) {
         refill(&mut self.rest, self.space.rest_positions().into_iter());
-        refill(&mut self.split_from, 0..self.space.n_copies() as u32);
+        refill(&mut self.split_from, 0..self.rest.len() as u32);
         refill(&mut self.state.x, self.rest.iter().copied());
         self.state.v.fill(Vector3::zeros());
         resize_reserving(&mut self.state.v, self.rest.len(), Vector3::zeros());

@@ -65,7 +65,7 @@ impl Body {
         let state = match (&snap, space.tets()) {
             (Some(_), Some(tets)) => before.on_mesh(tets.mesh(), &x),
             _ if !same_numbers => before.at_places((&self.rest, &*self.space), (&space.rest_positions(), &x)),
-            _ => before.joined(&x, &self.split_from),
+            _ => before.joined(&x, &roots(&self.split_from, self.space.n_copies(), (space.n_copies(), x.len()))),
         };
         (self.space, self.snap) = (space, snap);
         self.space.set_epoch(epoch);
@@ -93,6 +93,23 @@ type Sum = (f64, Vector3<f64>, Vector3<f64>);
 
 fn mean((mass, mx, mv): &Sum) -> Option<(Vector3<f64>, Vector3<f64>)> {
     (*mass > 0.0).then(|| (mx / *mass, mv / *mass))
+}
+
+/// The number that every copy and added node had, or was split from, when there were `then.0` copies among `then.1`
+/// numbers; now there are `n_copies`. Added nodes come after the copies and move up with every new one.
+fn roots(split_from: &[u32], n_copies: usize, then: (usize, usize)) -> Vec<usize> {
+    let (copies_then, n_then) = then;
+    let number_then = |number: usize| match number.checked_sub(n_copies) {
+        None => Some(number).filter(|&copy| copy < copies_then),
+        Some(added) => Some(copies_then + added).filter(|&number| number < n_then),
+    };
+    let root = |mut number: usize| loop {
+        match number_then(number) {
+            Some(root) => return root,
+            None => number = split_from[number] as usize,
+        }
+    };
+    (0..split_from.len()).map(root).collect()
 }
 
 /// A place as a key; −0 is 0.
@@ -136,16 +153,12 @@ impl Moving {
         }
     }
 
-    /// Joins every first copy with all copies split from it, which `split_from` tells. A copy of which
-    /// nothing is left goes to `x` [m].
-    fn joined(&self, x: &[Vector3<f64>], split_from: &[u32]) -> Motion {
+    /// Joins every first copy with all copies split from it, which `roots` tells. A copy of which nothing is left
+    /// goes to `x` [m].
+    fn joined(&self, x: &[Vector3<f64>], roots: &[usize]) -> Motion {
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); x.len()];
         for copy in (0..self.x.len()).filter(|&copy| !self.lost[copy]) {
-            let mut root = copy;
-            while root >= x.len() {
-                root = split_from[root] as usize;
-            }
-            self.add(copy, &mut sums[root]);
+            self.add(copy, &mut sums[roots[copy]]);
         }
         sums.iter().zip(x).map(|(sum, x)| mean(sum).unwrap_or((*x, Vector3::zeros()))).unzip()
     }

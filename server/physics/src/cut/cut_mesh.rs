@@ -214,6 +214,16 @@ impl CutMesh {
         self.pieces.node_products(&self.mesh, p as u32, &self.fragments)
     }
 
+    /// The fragments of piece `p`: the barycentric coordinates of their corners in the element, and their volumes as
+    /// fractions of it.
+    pub(crate) fn piece_fragments(&self, p: usize) -> impl Iterator<Item = ([[f64; 4]; 4], f64)> + '_ {
+        let (fragments, nodes) = (&self.fragments, self.mesh.tets[self.pieces()[p].element as usize]);
+        self.pieces.fragments(p as u32, fragments).map(move |t| {
+            let corner = |v: u32| nodes.map(|node| fragments.vertices[v as usize].weight_of(node));
+            (fragments.tets[t as usize].map(corner), fragments.fraction[t as usize])
+        })
+    }
+
     /// Topology epoch: rises whenever the topology or its surface changes.
     pub fn epoch(&self) -> u32 {
         self.epoch

@@ -29,6 +29,7 @@ pub(crate) mod drawn;
 pub(crate) mod shell;
 mod sweep;
 mod cut_mesh;
+pub(crate) mod middles;
 mod incision_mark;
 mod solid;
 mod flaws;

@@ -9,6 +9,7 @@ mod polar_lanes;
 mod tet4;
 pub mod quadrature;
 pub mod tet10;
+pub mod piece_rule;
 pub mod hex8;
 mod spring;
 mod points;

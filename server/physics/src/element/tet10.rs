@@ -22,6 +22,11 @@ pub const INTEGRAL_CORNER: f64 = -1.0 / 20.0;
 /// ∫ N_a dV / V of a mid-edge node.
 pub const INTEGRAL_EDGE: f64 = 1.0 / 5.0;
 
+/// Share of node `a` in the lumped mass, and ∫ N_a dV / V.
+pub fn shares(a: usize) -> [f64; 2] {
+    if a < 4 { [HRZ_CORNER, INTEGRAL_CORNER] } else { [HRZ_EDGE, INTEGRAL_EDGE] }
+}
+
 fn barycentric(xi: &Vector3<f64>) -> [f64; 4] {
     [1.0 - xi.x - xi.y - xi.z, xi.x, xi.y, xi.z]
 }

@@ -90,10 +90,7 @@ impl History {
         }
         for kept in [&mut self.before, &mut self.last] {
             for values in [&mut kept.x, &mut kept.v] {
-                for copy in new {
-                    debug_assert_eq!(values.len(), copy.copy as usize);
-                    values.push(copy.inherited(values));
-                }
+                NewCopy::inherit(new, values);
             }
         }
     }

@@ -107,10 +107,7 @@ impl Multistep {
         self.forces_jump();
         self.history.inherit(new);
         if self.scheme.remembers() {
-            for copy in new {
-                let inherited = copy.inherited(&self.acceleration);
-                self.acceleration.push(inherited);
-            }
+            NewCopy::inherit(new, &mut self.acceleration);
         }
     }
 

@@ -6,6 +6,11 @@
 //! then nearly opposite, and the stiff motion is u_a relative to the mean of these. With this motion as a
 //! variable of its own the others have g_b + λ_b g_a, which is as small as in a sound element. All
 //! measures are relative to the element: nothing depends on units.
+//!
+//! Small pieces of quadratic tetrahedra have the opposite trouble. A piece far from corner b sees the shape functions
+//! of b and of the middles between b and the corners it is close to only where they are almost linear, hence almost
+//! parallel. With λ_b = L_b, N_b + ¼ Σ_a N_ab is quadratic in the small coordinates L_b; so each of these middles is
+//! moved relative to ¼ u_b, and the condition number no longer depends on the size of the piece.
 
 use nalgebra::Vector3;
 
@@ -58,7 +63,12 @@ pub struct StiffModes {
     degenerate: Vec<u32>,
     /// Σ w V |g_a|² of every copy, over the pieces in `near` [m].
     stiffness: Vec<f64>,
+    /// Mid-edge nodes of small pieces of quadratic tetrahedra, ascending, each with the far corner of its edge.
+    middles: Vec<[u32; 2]>,
 }
+
+/// Part of the displacement of a far corner by which the middles at it move along.
+const QUARTER: f64 = 0.25;
 
 impl StiffModes {
     /// The modes of `pieces`, whose degenerate elements are `elements` (ascending); `None` without any.
@@ -93,7 +103,15 @@ impl StiffModes {
         }
         // The sort is stable: equally stiff pieces stay in order.
         degenerate.sort_by(|a, b| b.1.total_cmp(&a.1));
-        Some(Self { near, degenerate: degenerate.into_iter().map(|d| d.0).collect(), stiffness })
+        let degenerate = degenerate.into_iter().map(|d| d.0).collect();
+        Some(Self { near, degenerate, stiffness, middles: Vec::new() })
+    }
+
+    /// The modes of small pieces of quadratic tetrahedra on `n` copies and added nodes: `middles` lists mid-edge nodes,
+    /// ascending, each with the far corner of its edge. `None` without any.
+    pub fn of_middles(n: usize, middles: Vec<[u32; 2]>) -> Option<Self> {
+        let (near, degenerate, stiffness) = (Vec::new(), Vec::new(), vec![0.0; n]);
+        (!middles.is_empty()).then_some(Self { near, degenerate, stiffness, middles })
     }
 
     /// Pieces that share a copy with a degenerate element, ascending.
@@ -148,6 +166,9 @@ impl StiffModes {
                 let lambda = |r: &(u32, Vector3<f64>)| (r.0, -r.1.dot(&g) / g.norm_squared());
                 T.push(a, row.iter().filter(takes_part).map(lambda));
             }
+        }
+        for &[middle, corner] in self.middles.iter().filter(|middle| !held(middle[0])) {
+            T.push(middle, std::iter::once((corner, QUARTER)));
         }
         T.finish();
         (T, left)

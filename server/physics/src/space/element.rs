@@ -3,15 +3,17 @@
 
 use std::any::Any;
 use std::fmt::Debug;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
-use crate::cut::CutMesh;
+use crate::cut::{CutMesh, NewCopy};
 use crate::element::Point;
-use crate::material::Material;
+use crate::material::{Material, Regions};
 use crate::mesh::TetMesh;
 use crate::octree::Octree;
+use crate::operator::StiffModes;
 
 /// A finite element on the nodes of a tet mesh, with the data it needs beside that.
 pub trait Element: Any + Debug + Send + Sync {
@@ -28,6 +30,48 @@ pub trait Element: Any + Debug + Send + Sync {
         mesh.nodes.len()
     }
 
+    /// Number of nodes that the element adds, their copies included. They are numbered after all copies of the mesh's
+    /// nodes.
+    fn n_added(&self) -> usize {
+        0
+    }
+
+    /// The node of the uncut body that entry `added` of the added nodes is a copy of.
+    fn node_of_added(&self, added: usize) -> u32 {
+        added as u32
+    }
+
+    /// Which of the added nodes are copies of `node` whose material contains its place, ascending.
+    fn added_with_node(&self, cut: &CutMesh, node: u32) -> Vec<u32> {
+        let _ = (cut, node);
+        Vec::new()
+    }
+
+    /// ∫ N_a dV [m³] of the added nodes.
+    fn added_volumes(&self, cut: &CutMesh) -> Vec<f64> {
+        let _ = cut;
+        Vec::new()
+    }
+
+    /// Motions for which the preconditioner needs other variables than the displacements; linear tetrahedra have theirs
+    /// from the mesh.
+    fn modes(&self, cut: &CutMesh) -> Option<StiffModes> {
+        let _ = cut;
+        None
+    }
+
+    /// The element after the last cut of `cut` and the added nodes that the cut made; `None` if it adds no nodes.
+    fn follow_cut(&self, cut: &CutMesh) -> Option<(Arc<dyn Element>, Vec<NewCopy>)> {
+        let _ = cut;
+        None
+    }
+
+    /// The element after a reset of `cut`; `None` if it adds no nodes.
+    fn uncut(&self, cut: &CutMesh) -> Option<Arc<dyn Element>> {
+        let _ = cut;
+        None
+    }
+
     /// Number of elements at rest.
     fn n_elements(&self, mesh: &TetMesh) -> usize {
         mesh.tets.len()
@@ -41,15 +85,20 @@ pub trait Element: Any + Debug + Send + Sync {
     /// The discrete model in double precision.
     fn model(&self, cut: &CutMesh, material: &Material, how: Volumetric) -> Result<Model, ModelError>;
 
+    /// Brings `model` up to date with the pieces of `cut`, whose materials are those of `regions`. Linear tetrahedra are
+    /// followed by the model itself.
+    fn follow_model(&self, model: &mut Model, cut: &CutMesh, regions: Regions) {
+        let _ = (model, cut, regions);
+    }
+
     /// ∫ N_a dA [m²] over the skin faces all of whose nodes are `selected`, by node.
     fn areas(&self, mesh: &TetMesh, selected: &[bool]) -> Vec<f64>;
 
     /// ∫ N_a dV [m³] of the `selected` nodes of the uncut body; 0 for the others.
     fn volumes(&self, mesh: &TetMesh, selected: &[bool]) -> Vec<f64>;
 
-    /// Nodes and shape functions of the point with barycentric coordinates `weights` in tet `tet`, whose
-    /// piece is on `copies`.
-    fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)>;
+    /// Nodes and shape functions of the point of `piece` with barycentric coordinates `weights` in its tetrahedron.
+    fn carriers(&self, cut: &CutMesh, piece: u32, weights: [f64; 4]) -> Vec<(u32, f64)>;
 
     /// The elements as cells of an octree, numbered alike, if they are equal cubes; for the kernels of cells.
     fn cubes(&self) -> Option<Octree> {

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::element::Element;
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
-use crate::cut::CutMesh;
+use crate::cut::{CutMesh, Piece};
 use crate::element::{Point, deformation_gradient, hex8, quadrature};
 use crate::material::Material;
 use crate::mesh::{HexMesh, TetMesh};
@@ -57,8 +57,9 @@ impl Element for Hexahedra {
         volume
     }
 
-    fn carriers(&self, tet: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
-        let hex = tet as usize / TETS_PER_HEX;
+    fn carriers(&self, cut: &CutMesh, piece: u32, weights: [f64; 4]) -> Vec<(u32, f64)> {
+        let Piece { element, copies, .. } = cut.pieces()[piece as usize];
+        let hex = element as usize / TETS_PER_HEX;
         let X = copies.iter().zip(weights).map(|(&n, w)| w * self.0.nodes[n as usize]).sum();
         let N = hex8::shape(&reference_point(&self.0.corners(hex), X));
         self.0.hexes[hex].into_iter().zip(N).collect()

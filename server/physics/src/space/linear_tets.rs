@@ -43,8 +43,8 @@ impl Element for LinearTets {
         volume
     }
 
-    fn carriers(&self, _: u32, copies: [u32; 4], weights: [f64; 4]) -> Vec<(u32, f64)> {
-        copies.into_iter().zip(weights).collect()
+    fn carriers(&self, cut: &CutMesh, piece: u32, weights: [f64; 4]) -> Vec<(u32, f64)> {
+        cut.pieces()[piece as usize].copies.into_iter().zip(weights).collect()
     }
 
     fn for_points(&self, cut: &CutMesh, x: &[Vector3<f64>], visit: &mut dyn FnMut(Point<'_>)) {

@@ -11,6 +11,10 @@ mod quadratic_tets;
 mod rest_point;
 mod tets;
 
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod quadratic_tests;
+
 pub use element::Element;
 pub use hexahedra::Hexahedra;
 pub use linear_tets::LinearTets;
@@ -103,6 +107,27 @@ pub trait Space: Any + Points + Send {
 
     /// For every copy the node that it is a copy of.
     fn node_of_copy(&self) -> &[u32];
+
+    /// Number of nodes that elements of higher order add, their copies included.
+    fn n_added(&self) -> usize {
+        0
+    }
+
+    /// The node of the uncut body that a copy or an added node is a copy of.
+    fn node_of(&self, number: u32) -> u32 {
+        self.node_of_copy().get(number as usize).copied().unwrap_or(number)
+    }
+
+    /// The number of the copy that a node of the uncut body keeps when it is split; it may change with every cut of
+    /// elements that add nodes.
+    fn first_copy(&self, node: u32) -> u32 {
+        node
+    }
+
+    /// ∫ N_a dV [m³] of the added nodes, computed anew at each call.
+    fn added_volumes(&self) -> Vec<f64> {
+        Vec::new()
+    }
 
     /// The copies whose material contains `node` itself, ascending. There is one, or more where a cut passes
     /// exactly through the node.

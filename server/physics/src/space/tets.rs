@@ -14,7 +14,7 @@ use crate::cut::{
 };
 use crate::element::{MaterialPoint, Point, Points, Simd};
 use crate::material::{Lame, Material, Region, Regions, RegionsError};
-use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
+use crate::mesh::{HexMesh, MeshError, TetMesh};
 use crate::multigrid::Hierarchy;
 use crate::octree::Octree;
 use crate::operator::cells::CellStiffness;
@@ -34,10 +34,10 @@ const INSIDE: f64 = 1e-9;
 const PIECE_BYTES: usize = 2000;
 const TRIANGLE_BYTES: usize = 400;
 
-/// Linear or quadratic tetrahedra, or hexahedra that are divided into tetrahedra. Only linear ones are cut.
+/// Linear or quadratic tetrahedra, which are cut, or hexahedra that are divided into tetrahedra.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Tets {
-    cut: CutMesh,
+    pub(super) cut: CutMesh,
     #[serde(with = "super::saved_element")]
     element: Arc<dyn Element>,
     skin: Option<Skin>,
@@ -60,20 +60,20 @@ impl Tets {
     /// Quadratic tetrahedra on the corners of `mesh`.
     pub fn quadratic(mesh: TetMesh) -> Result<Self, MeshError> {
         mesh.check()?;
-        let element = Arc::new(QuadraticTets(Tet10Mesh::new(&mesh)));
-        Self::with_element(mesh, element)
+        let cut = CutMesh::new(mesh)?;
+        let element = Arc::new(QuadraticTets::new(&cut));
+        Ok(Self::with_element(cut, element))
     }
 
     /// Trilinear hexahedra.
     pub fn hexahedra(mesh: HexMesh) -> Result<Self, MeshError> {
         mesh.check()?;
-        Self::with_element(mesh.to_tets(), Arc::new(Hexahedra(mesh)))
+        Ok(Self::with_element(CutMesh::new(mesh.to_tets())?, Arc::new(Hexahedra(mesh))))
     }
 
-    fn with_element(mesh: TetMesh, element: Arc<dyn Element>) -> Result<Self, MeshError> {
-        let cut = CutMesh::new(mesh)?;
+    fn with_element(cut: CutMesh, element: Arc<dyn Element>) -> Self {
         let (degenerate, regions) = (Vec::new(), Regions::default());
-        Ok(Self { cut, element, skin: None, under_way: None, degenerate, regions })
+        Self { cut, element, skin: None, under_way: None, degenerate, regions }
     }
 
     /// Gives elements of other materials theirs; `regions` has one entry per element.
@@ -91,6 +91,10 @@ impl Tets {
         &self.regions
     }
 
+    fn regions_of_pieces(&self) -> Regions {
+        self.regions.of_pieces(self.cut.pieces().iter().map(|piece| piece.element))
+    }
+
     /// Equal cubes as cells of an octree.
     fn cubes(&self) -> Option<Octree> {
         let mut cubes = self.element.cubes()?;
@@ -104,9 +108,14 @@ impl Tets {
         self.cut.set_exact(exact);
     }
 
-    /// Whether these are linear tetrahedra, which can be cut.
+    /// Whether these are linear tetrahedra.
     pub fn is_linear(&self) -> bool {
         self.kind() == ElementKind::Tet4
+    }
+
+    /// Whether every piece of a tetrahedron is a finite element; six tetrahedra make a hexahedron.
+    fn pieces_are_elements(&self) -> bool {
+        self.kind() != ElementKind::Hex8
     }
 
     /// The tetrahedra at rest that are cut and drawn: the elements, or six for every hexahedron. Only cuts
@@ -148,6 +157,16 @@ impl Tets {
         snapper.cut(&mut self.cut, nodes, blade, incision)
     }
 
+    /// Follows a cut with skin and added nodes.
+    fn follow_cut(&mut self, mut report: CutReport) -> CutReport {
+        if let Some((element, new)) = self.element.follow_cut(&self.cut) {
+            self.element = element;
+            report.new_copies.extend(new);
+        }
+        self.renew_skin();
+        report
+    }
+
     fn renew_skin(&mut self) {
         if let Some(skin) = &mut self.skin {
             skin.follow(&self.cut);
@@ -160,9 +179,9 @@ impl Points for Tets {
         if self.regions.is_empty() {
             return self.element.for_points(&self.cut, x, visit);
         }
-        let (pieces, is_linear) = (self.cut.pieces(), self.is_linear());
+        let (pieces, of_pieces) = (self.cut.pieces(), self.pieces_are_elements());
         self.element.for_points(&self.cut, x, &mut |point| {
-            let element = if is_linear { pieces[point.element].element as usize } else { point.element };
+            let element = if of_pieces { pieces[point.element].element as usize } else { point.element };
             visit(Point { region: self.regions.of(element), ..point });
         });
     }
@@ -178,7 +197,7 @@ impl Space for Tets {
     }
 
     fn can_be_cut(&self) -> bool {
-        self.is_linear()
+        self.pieces_are_elements()
     }
 
     fn can_carry_skin(&self) -> bool {
@@ -215,8 +234,31 @@ impl Space for Tets {
         self.cut.copy_node()
     }
 
+    fn n_added(&self) -> usize {
+        self.element.n_added()
+    }
+
+    fn node_of(&self, number: u32) -> u32 {
+        let added = || self.element.node_of_added(number as usize - self.cut.n_copies());
+        self.cut.copy_node().get(number as usize).copied().unwrap_or_else(added)
+    }
+
+    fn first_copy(&self, node: u32) -> u32 {
+        let n_corners = self.cut.mesh().nodes.len() as u32;
+        if node < n_corners { node } else { self.cut.n_copies() as u32 + (node - n_corners) }
+    }
+
     fn copies_with_node(&self, node: u32) -> Vec<u32> {
-        self.cut.copies_with_node(node)
+        if (node as usize) < self.cut.mesh().nodes.len() {
+            return self.cut.copies_with_node(node);
+        }
+        let mut added = self.element.added_with_node(&self.cut, node);
+        added.iter_mut().for_each(|number| *number += self.cut.n_copies() as u32);
+        added
+    }
+
+    fn added_volumes(&self) -> Vec<f64> {
+        self.element.added_volumes(&self.cut)
     }
 
     fn rest_positions(&self) -> Vec<Vector3<f64>> {
@@ -260,7 +302,7 @@ impl Space for Tets {
     }
 
     fn n_pieces(&self) -> usize {
-        if self.is_linear() { self.cut.pieces().len() } else { self.n_elements() }
+        if self.pieces_are_elements() { self.cut.pieces().len() } else { self.n_elements() }
     }
 
     fn for_pieces(&self, visit: &mut VisitPiece<'_>) {
@@ -315,8 +357,7 @@ impl Space for Tets {
         let corners = self.cut.mesh().corners(point.element as usize);
         let lookup = barycentric(&corners, point.rest_m + point.towards_m);
         let piece = self.cut.piece_at(point.element, lookup);
-        let copies = self.cut.pieces()[piece as usize].copies;
-        self.element.carriers(point.element, copies, barycentric(&corners, point.rest_m))
+        self.element.carriers(&self.cut, piece, barycentric(&corners, point.rest_m))
     }
 
     fn components(&self) -> Components {
@@ -383,14 +424,14 @@ impl Space for Tets {
     }
 
     fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
-        let report = self.cut.sweep(x, blade, incision)?;
-        self.renew_skin();
-        Ok(report)
+        let report = self.cut.sweep(&x[..self.cut.n_copies()], blade, incision)?;
+        Ok(self.follow_cut(report))
     }
 
     fn begin_cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<(), CutError> {
         let mesh = self.cut.mesh();
         let limits = CutLimits::of_mesh(mesh.tets.len(), mesh.nodes.len());
+        let x = &x[..self.cut.n_copies()];
         let sweep = self.cut.begin_sweep(x, blade, incision, limits)?;
         self.under_way = Some((sweep, x.to_vec()));
         Ok(())
@@ -403,8 +444,7 @@ impl Space for Tets {
             return None;
         }
         let report = self.cut.complete(sweep, work);
-        self.renew_skin();
-        Some(report)
+        Some(self.follow_cut(report))
     }
 
     fn is_being_cut(&self) -> bool {
@@ -414,6 +454,9 @@ impl Space for Tets {
     fn reset(&mut self) -> Result<(), MeshError> {
         self.under_way = None;
         self.cut.reset()?;
+        if let Some(element) = self.element.uncut(&self.cut) {
+            self.element = element;
+        }
         self.renew_skin();
         Ok(())
     }
@@ -455,19 +498,27 @@ impl Space for Tets {
 
     fn stiff_modes(&self) -> Option<StiffModes> {
         let Self { cut, degenerate, .. } = self;
+        if !self.is_linear() {
+            return self.element.modes(cut);
+        }
         StiffModes::new(cut.mesh(), cut.pieces(), cut.n_copies(), degenerate)
     }
 
     fn model(&self, material: &Material, volumetric: Volumetric) -> Result<Model, ModelError> {
         let model = self.element.model(&self.cut, material, volumetric)?;
-        match self.is_linear() {
-            true => model.with_regions_of_tets(&self.cut, &self.regions),
-            false => model.with_regions(self.regions.clone()),
+        match self.kind() {
+            ElementKind::Tet4 => model.with_regions_of_tets(&self.cut, &self.regions),
+            ElementKind::Tet10 => model.with_regions(self.regions_of_pieces()),
+            _ => model.with_regions(self.regions.clone()),
         }
     }
 
     fn follow_model(&self, model: &mut Model, _: &Material) {
-        model.follow_cut(&self.cut, &self.regions);
+        if self.is_linear() {
+            model.follow_cut(&self.cut, &self.regions);
+        } else {
+            self.element.follow_model(model, &self.cut, self.regions_of_pieces());
+        }
     }
 }
 

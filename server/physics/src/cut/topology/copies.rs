@@ -37,6 +37,17 @@ impl NewCopy {
     pub fn inherited(&self, values: &[Vector3<f64>]) -> Vector3<f64> {
         self.between.map_or_else(|| values[self.parent as usize], |between| between.position(values))
     }
+
+    /// Gives the copies `new` the values that they inherit, at their numbers. Values behind them move up.
+    pub fn inherit(new: &[NewCopy], values: &mut Vec<Vector3<f64>>) {
+        for run in new.chunk_by(|a, b| b.copy == a.copy + 1) {
+            let behind = values.split_off(run[0].copy as usize);
+            for copy in run {
+                values.push(copy.inherited(values));
+            }
+            values.extend(behind);
+        }
+    }
 }
 
 /// The copies of all nodes, and the elements around every node.

@@ -31,6 +31,8 @@ pub struct PieceTable {
     pub first_fragment: Vec<u32>,
     /// Next piece of the same element.
     pub next_in_element: Vec<u32>,
+    /// The piece that each piece was split from; itself if it was there from the start.
+    pub split_from: Vec<u32>,
     element_volume: Vec<f64>,
     label: Vec<u32>,
     stack: Vec<u32>,
@@ -51,6 +53,7 @@ impl PieceTable {
             node_volume: element_volume.iter().map(|v| [v / 4.0; 4]).collect(),
             first_fragment: (0..mesh.tets.len() as u32).collect(),
             next_in_element: vec![NONE; mesh.tets.len()],
+            split_from: (0..mesh.tets.len() as u32).collect(),
             element_volume,
             label: vec![NONE; mesh.tets.len()],
             stack: Vec::new(),
@@ -61,6 +64,7 @@ impl PieceTable {
         reserve_half_again(&mut table.node_volume);
         reserve_half_again(&mut table.first_fragment);
         reserve_half_again(&mut table.next_in_element);
+        reserve_half_again(&mut table.split_from);
         reserve_half_again(&mut table.label);
         table
     }
@@ -164,6 +168,7 @@ impl PieceTable {
         self.first_fragment.push(NONE);
         self.next_in_element.push(self.next_in_element[old as usize]);
         self.next_in_element[old as usize] = id;
+        self.split_from.push(old);
         id
     }
 
