@@ -149,7 +149,7 @@ const AT_ONCE: &[Mistake] = &[
     (SWEEP, "path_m = [[0.02, 0.05, 0.1], [0.08, 0.05, 0.1]]", &["cut.0", "key `depth_m` is missing"]),
     (SWEEP, "", &["needs exactly one of sweep_m, path_m"]),
     ("at_s = 0.2", "at_s = 7.5", &["cut.0.at_s: the cut comes at 7.5 s, after the end of the run at 5 s"]),
-    (BODY_END, "element = \"tet10\"", &["tet10", "tet4"]),
+    (BODY_END, "element = \"hex8\"", &["hex8", "tet4, tet10"]),
     // tools
     (
         "radius_m = 0.01",

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{BlockCsr, ElementKind, Model};
+use crate::element::tet10::HRZ;
 
 /// Part of its even share that a node has at least. ω² grows by 1/FLOOR at most, so the critical step is at least
 /// √FLOOR = 0.71 of that of the uncut element.
@@ -102,7 +103,7 @@ impl Model {
     /// Mass [kg] of every node for a density [kg/m³].
     ///
     /// Tet4: ρ ∫ N_a dV over the pieces of the copy; Tet10: diagonal scaling (HRZ), corner m/36, edge
-    /// 4m/27; Hex8: row sums. Exact in sum and centre of mass.
+    /// 4m/27, of every piece; Hex8: row sums. Exact in sum and, but for pieces of Tet10, in centre of mass.
     pub fn lumped_mass(&self, density_kg_m3: f64) -> Vec<f64> {
         self.lumped.iter().map(|v| density_kg_m3 * v).collect()
     }
@@ -153,22 +154,18 @@ fn element_shares(kind: ElementKind, products: &[f64], shares: &mut [[f64; 2]]) 
     let n = shares.len();
     shares.fill([0.0; 2]);
     let mut next = products.iter();
-    let mut diagonal = 0.0;
     for a in 0..n {
         for b in a..n {
             let m = next.next().copied().unwrap_or_default();
             shares[a][1] += m;
-            if b == a {
-                shares[a][0] = m;
-                diagonal += m;
-            } else {
+            if b != a {
                 shares[b][1] += m;
             }
         }
     }
     let whole: f64 = shares.iter().map(|share| share[1]).sum();
-    for share in shares {
+    for (a, share) in shares.iter_mut().enumerate() {
         // Diagonal scaling (HRZ), because row sums are negative at the corners of quadratic tetrahedra.
-        share[0] = if kind == ElementKind::Tet10 { share[0] * whole / diagonal } else { share[1] };
+        share[0] = if kind == ElementKind::Tet10 { HRZ[a] * whole } else { share[1] };
     }
 }

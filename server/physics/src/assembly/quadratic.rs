@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::mass::{Products, pack};
 use super::{ElementKind, Model, ModelError, Volumetric};
 use crate::element::quadrature::QuadraturePoint;
-use crate::element::tet10;
+use crate::element::tet10::{self, HRZ};
 use crate::material::{Material, Regions};
 
 /// A quadratic tetrahedron, or a piece of one. Its nodes are copies of its own.
@@ -19,13 +19,18 @@ pub struct QuadraticPiece {
     pub volume: f64,
     /// Quadrature points in reference coordinates; the weights sum to 1.
     pub points: [QuadraturePoint; 4],
-    /// ∫ N_a N_b dV [m³] over the piece; `None` for a whole element.
+    /// ∫ N_a N_b dV [m³] over the piece; `None` for a whole element. The lumped mass does not follow from it: every
+    /// piece shares its mass among its nodes as a whole element does, which keeps the momentum when an element is cut
+    /// and the critical time step about what it was.
     pub products: Option<Box<[[f64; 10]; 10]>>,
 }
 
 impl QuadraticPiece {
     /// ∫ N_a dV [m³] of its nodes. The shape functions are of degree 2, for which the points are exact.
     pub fn integrals(&self) -> [f64; 10] {
+        if self.products.is_none() {
+            return tet10::INTEGRALS.map(|integral| integral * self.volume);
+        }
         let mut integrals = [0.0; 10];
         for (xi, w) in &self.points {
             let N = tet10::shape(xi);
@@ -71,26 +76,14 @@ impl Model {
                 self.gradients.extend(tet10::gradients(xi, &piece.linear_gradients));
                 self.weights.push(w * piece.volume);
             }
+            for ((&node, lumped), integral) in piece.nodes.iter().zip(HRZ).zip(piece.integrals()) {
+                self.lumped[node as usize] += lumped * piece.volume;
+                self.integrals[node as usize] += integral;
+            }
             match &piece.products {
-                // Diagonal scaling (HRZ) keeps the mass of the piece.
-                Some(M) => {
-                    let diagonal: f64 = (0..10).map(|a| M[a][a]).sum();
-                    for (a, (&node, integral)) in piece.nodes.iter().zip(piece.integrals()).enumerate() {
-                        self.lumped[node as usize] += piece.volume * M[a][a] / diagonal;
-                        self.integrals[node as usize] += integral;
-                    }
-                    products.extend(pack(M));
-                }
-                None => {
-                    for (a, &node) in piece.nodes.iter().enumerate() {
-                        let [lumped, integral] = tet10::shares(a);
-                        self.lumped[node as usize] += lumped * piece.volume;
-                        self.integrals[node as usize] += integral * piece.volume;
-                    }
-                    if any_cut {
-                        products.extend(pack(&whole).map(|m| piece.volume * m));
-                    }
-                }
+                Some(M) => products.extend(pack(M)),
+                None if any_cut => products.extend(pack(&whole).map(|m| piece.volume * m)),
+                None => {}
             }
         }
         self.products =

@@ -149,6 +149,9 @@ fn edge_slot(cut: &CutMesh, p: u32, [a, b]: [u32; 2]) -> Option<usize> {
     TET_EDGES.iter().position(|&edge| edge == [a, b] || edge == [b, a])
 }
 
+/// How far, as a part of the edge, a cut may pass by the middle and count as exactly through it.
+const ROUNDING: f64 = 1e-9;
+
 /// Whether the material of piece `p` contains the middle between two nodes.
 fn holds_middle(cut: &CutMesh, p: u32, [a, b]: [u32; 2]) -> bool {
     let fragments = &cut.fragments;
@@ -162,6 +165,6 @@ fn holds_middle(cut: &CutMesh, p: u32, [a, b]: [u32; 2]) -> bool {
                 (least, greatest) = (least.min(along), greatest.max(along));
             }
         }
-        least <= 0.5 && greatest >= 0.5 && least < greatest
+        least <= 0.5 + ROUNDING && greatest >= 0.5 - ROUNDING && least < greatest
     })
 }

@@ -21,11 +21,16 @@ const ALTERNATING: [Vector3<f64>; 4] = [
     Vector3::new(-1.0, -1.0, 1.0),
 ];
 
+/// Least standard deviation of a piece in any direction, in reference coordinates. Curvature of the displacement
+/// across a thin piece costs energy in proportion to its square, and below this rounding would hide it. Centre and
+/// volume of the piece stay exact, hence so do all linear displacements.
+const LEAST_DEVIATION: f64 = 1e-4;
+
 /// Barycentric coordinates of the corners of a fragment, and its volume as a fraction of the element.
 pub type Fragment = ([[f64; 4]; 4], f64);
 
 /// Four points in reference coordinates, exact for quadratic polynomials on the piece that consists of these
-/// `fragments`; the weights sum to 1.
+/// `fragments`, if it is not extremely thin; the weights sum to 1.
 pub fn piece_degree_2<I: Iterator<Item = Fragment>>(fragments: &impl Fn() -> I) -> [QuadraturePoint; 4] {
     let (mut fraction, mut centre) = (0.0, Vector3::zeros());
     for (corners, part) in fragments() {
@@ -42,7 +47,7 @@ pub fn piece_degree_2<I: Iterator<Item = Fragment>>(fragments: &impl Fn() -> I) 
         covariance += part / (20.0 * fraction) * (sum * sum.transpose() + own);
     }
     let SymmetricEigen { eigenvectors, eigenvalues } = covariance.symmetric_eigen();
-    let L = eigenvectors * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
+    let L = eigenvectors * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(LEAST_DEVIATION.powi(2)).sqrt()));
     ALTERNATING.map(|s| (centre + L * s, 0.25))
 }
 

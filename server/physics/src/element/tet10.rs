@@ -17,14 +17,17 @@ use super::quadrature::tet_degree_5;
 pub const HRZ_CORNER: f64 = 1.0 / 36.0;
 /// Share of the lumped (HRZ) mass that each mid-edge node gets.
 pub const HRZ_EDGE: f64 = 4.0 / 27.0;
+/// Share of every node in the lumped (HRZ) mass.
+pub const HRZ: [f64; 10] = of_nodes(HRZ_CORNER, HRZ_EDGE);
 /// ∫ N_a dV / V of a corner.
 pub const INTEGRAL_CORNER: f64 = -1.0 / 20.0;
 /// ∫ N_a dV / V of a mid-edge node.
 pub const INTEGRAL_EDGE: f64 = 1.0 / 5.0;
+/// ∫ N_a dV / V of every node.
+pub const INTEGRALS: [f64; 10] = of_nodes(INTEGRAL_CORNER, INTEGRAL_EDGE);
 
-/// Share of node `a` in the lumped mass, and ∫ N_a dV / V.
-pub fn shares(a: usize) -> [f64; 2] {
-    if a < 4 { [HRZ_CORNER, INTEGRAL_CORNER] } else { [HRZ_EDGE, INTEGRAL_EDGE] }
+const fn of_nodes(corner: f64, edge: f64) -> [f64; 10] {
+    [corner, corner, corner, corner, edge, edge, edge, edge, edge, edge]
 }
 
 fn barycentric(xi: &Vector3<f64>) -> [f64; 4] {

@@ -251,3 +251,53 @@ fn the_error_falls_with_the_third_power_of_the_element_size() {
     let order = (found[1].0 / found[2].0).log2();
     assert!(order > 2.8, "{order}");
 }
+
+/// Iterations of block-Jacobi CG for the weight of a block that stands on its base, cut by a plane of this normal
+/// through this place.
+fn iterations(cells: usize, normal: &Vector3<f64>, through: &Vector3<f64>) -> u32 {
+    let mesh = box_mesh(Vector3::zeros(), Vector3::repeat(1.0), [cells; 3], BoxPattern::Tet6);
+    let mut tets = Tets::quadratic(mesh).unwrap();
+    let on_plane = |x: f64, y: f64| {
+        let at = Vector3::new(x, y, 0.0);
+        at + Vector3::z() * (normal.dot(&(through - at)) / normal.z)
+    };
+    let blade = |x: f64| [on_plane(x, -0.1), on_plane(x, 1.1)];
+    let x = tets.rest_positions();
+    // Not through the last cells, so that the block stays whole.
+    tets.cut(&x, &BladeSweep { segments: vec![blade(-0.1), blade(0.7)] }, 1).unwrap();
+    let model = tets.model(&material(Law::Linear), Volumetric::Full).unwrap();
+    let held = |(n, X): (u32, &Vector3<f64>)| {
+        (X.z == 0.0).then_some(FixedCopy { copy: n, held: Held::FULLY, position_m: (*X).into() })
+    };
+    let fixed: Vec<FixedCopy> = (0..).zip(model.rest()).filter_map(held).collect();
+    let load: Vec<Vector3<f64>> = model.shape_integrals().iter().map(|v| -*v * Vector3::z()).collect();
+    let mut K = model.pattern();
+    model.tangent(model.rest(), crate::material::Tangent::Exact, &mut K);
+    let (method, precision) = (Method::Pcg, Precision::Mixed);
+    let settings = LinearSettings { method, precision, iterations: 20_000, tolerance: 1e-8 };
+    let mut solver = LinearSolver::new(settings);
+    solver.set_stiff_modes(tets.stiff_modes().map(Arc::new));
+    solver.set_matrix(&K, &fixed);
+    let mut u = vec![Vector3::zeros(); load.len()];
+    let report = solver.solve(&mut Team::new(1).unwrap(), &K, &load, &mut u, None);
+    assert!(report.iterations == 20_000 || report.stop == StopReason::Converged, "{report:?}");
+    report.iterations
+}
+
+/// However thin the pieces are, the solution costs as many iterations.
+#[test]
+fn thin_pieces_cost_no_iterations() {
+    let uncut = iterations(4, &Vector3::z(), &Vector3::new(0.5, 0.5, 1.5));
+    // Along a layer of nodes, along edges of one, across it, and across all edges.
+    let normals = [[0.0, 0.0], [0.3, 0.0], [1.0, 0.01], [0.21, 0.34]];
+    for [x, y] in normals {
+        let mut counts = Vec::new();
+        for thickness in [1e-1_f64, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12] {
+            let through = Vector3::new(0.5, 0.5, 0.5 + 0.25 * thickness);
+            let normal = Vector3::new(x, y * thickness.max(0.01), 1.0);
+            counts.push(iterations(4, &normal, &through));
+        }
+        println!("{x} {y}: {counts:?}, uncut {uncut}");
+        assert!(counts.iter().all(|&n| n < 3 * uncut), "{x} {y}: {counts:?}, uncut {uncut}");
+    }
+}

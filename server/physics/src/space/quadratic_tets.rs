@@ -54,9 +54,12 @@ impl Element for QuadraticTets {
     fn added_volumes(&self, cut: &CutMesh) -> Vec<f64> {
         let mut volumes = vec![0.0; self.n_added()];
         for p in 0..cut.pieces().len() {
-            let integrals = self.piece(cut, p).integrals();
-            for (&middle, integral) in self.middles.of_piece[p].iter().zip(&integrals[4..]) {
-                volumes[middle as usize] += integral;
+            let QuadraticPiece { points, volume, .. } = self.piece(cut, p);
+            for (xi, w) in &points {
+                let N = tet10::shape(xi);
+                for (&middle, N) in self.middles.of_piece[p].iter().zip(&N[4..]) {
+                    volumes[middle as usize] += w * volume * N;
+                }
             }
         }
         volumes

@@ -155,14 +155,15 @@ fn both_paths_agree() {
 #[test]
 fn every_law_is_cut_on_the_general_path() {
     let averaged = Volumetric::NodeAveraged { kept: 0.05 };
-    for (law, volumetric) in Law::ALL
-        .into_iter()
-        .map(|law| (law, Volumetric::Full))
-        .chain([(Law::Corotational, averaged), (Law::NeoHookean, averaged)])
+    let full = |element| Law::ALL.into_iter().map(move |law| (element, law, Volumetric::Full));
+    for (element, law, volumetric) in full(ElementKind::Tet4)
+        .chain(full(ElementKind::Tet10))
+        .chain([Law::Corotational, Law::NeoHookean].map(|law| (ElementKind::Tet4, law, averaged)))
     {
         for scheme in SCHEMES {
-            let what = format!("{law:?} {volumetric:?} {}", scheme.name());
+            let what = format!("{element:?} {law:?} {volumetric:?} {}", scheme.name());
             let settings = BodySettings {
+                element,
                 scheme,
                 volumetric,
                 method: Method::Cholesky,
@@ -182,8 +183,10 @@ fn every_law_is_cut_on_the_general_path() {
             assert!((body.total_mass() / mass - 1.0).abs() < 1e-12, "{what}");
             assert!((body.momentum() - momentum).norm() <= 1e-12 * (1.0 + momentum.norm()), "{what}");
             let jump = (body.elastic_energy() - energy).abs();
+            // The points of quadrature are exact for quadratic tetrahedra of the linear law.
+            let exact = element == ElementKind::Tet4 || law == Law::Linear;
             assert!(
-                jump <= 1e-9 * energy || volumetric != Volumetric::Full,
+                jump <= if exact { 1e-9 } else { 1e-4 } * energy || volumetric != Volumetric::Full,
                 "{what}: {jump} J of {energy} J"
             );
             for _ in 0..10 {
@@ -221,11 +224,9 @@ fn what_does_not_go_together_is_refused() {
     assert!(Body::new(mesh, material(Law::Linear), hexes).unwrap_err().to_string().contains("tetrahedra"));
     let segment = |y: f64| [Vector3::new(0.07, y, -0.3), Vector3::new(0.07, y, 0.3)];
     let blade = BladeSweep { segments: vec![segment(0.3), segment(0.045)] };
-    for element in [ElementKind::Tet10, ElementKind::Hex8] {
-        let mut body = beam(Law::Linear, BodySettings { element, ..with }).unwrap();
-        let message = body.cut(&blade, 1).unwrap_err().to_string();
-        assert!(message.contains("a cut does not go with") && message.contains("tet4"), "{message}");
-    }
+    let mut body = beam(Law::Linear, hexes).unwrap();
+    let message = body.cut(&blade, 1).unwrap_err().to_string();
+    assert!(message.contains("a cut does not go with") && message.contains("tet4, tet10"), "{message}");
 }
 
 fn hash(body: &Body) -> u64 {

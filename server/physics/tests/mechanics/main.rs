@@ -22,6 +22,7 @@ mod multistep;
 mod octree;
 mod octree_statics;
 mod phases;
+mod quadratic_cuts;
 mod reference;
 mod regions;
 mod repeated_solves;

@@ -232,15 +232,19 @@ impl Check<'_> {
     /// Bodies whose mesh cannot be cut, against the cuts and blades of the scene.
     pub(super) fn cuttable(&mut self) {
         let raw = self.raw;
-        let whole = |body: &&RawBody| !matches!(body.element, RawElement::Tet4 | RawElement::Octree);
+        let whole = |body: &&RawBody| body.element == RawElement::Hex8;
         for (i, cut) in raw.cut.iter().enumerate() {
             if let Some(body) = raw.body.iter().filter(whole).find(|body| body.id == cut.body) {
                 let what = format!(
-                    "the cut goes through body `{}` of {} elements, allowed: tet4, octree",
+                    "the cut goes through body `{}` of {} elements, allowed: tet4, tet10, octree",
                     body.id,
                     word(&body.element)
                 );
-                self.conflict(format!("cut.{i}.body"), what, "write element = \"tet4\" or remove the cut");
+                self.conflict(
+                    format!("cut.{i}.body"),
+                    what,
+                    "take tetrahedra or an octree in place of hex8, or remove the cut",
+                );
             }
         }
         let Some(body) = raw.body.iter().find(whole) else { return };
@@ -249,14 +253,14 @@ impl Check<'_> {
                 tool.path.iter().position(|point| matches!(point.mode, RawMode::Cut | RawMode::Scalpel))
             {
                 let what = format!(
-                    "a blade cuts every body it meets, but body `{}` is of {} elements; allowed: tet4, octree",
+                    "a blade cuts every body it meets, but body `{}` is of {} elements; allowed: tet4, tet10, octree",
                     body.id,
                     word(&body.element)
                 );
                 self.conflict(
                     format!("tool.{}.path.{i}.mode", tool.id),
                     what,
-                    "write element = \"tet4\", or give the tool another mode",
+                    "take tetrahedra or an octree in place of hex8, or give the tool another mode",
                 );
             }
         }
