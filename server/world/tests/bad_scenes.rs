@@ -248,7 +248,16 @@ fn hexahedra_are_not_cut() {
     let path = "path = [{ at_s = 0, tip_m = [0, 0, 0], mode = \"cut\" }]\n";
     let text = GOOD.replace("tet5", "hex").replace("young_pa", "element = \"hex8\"\nyoung_pa") + path;
     let message = Scene::from_toml(&text).unwrap_err().to_string();
-    assert_says(&message, &["cut.0.body", "of hex8", "allowed: tet4, tet10, octree", "tool.scalpel.path.0.mode", "a blade cuts every body"]);
+    assert_says(
+        &message,
+        &[
+            "cut.0.body",
+            "of hex8",
+            "allowed: tet4, tet10, octree",
+            "tool.scalpel.path.0.mode",
+            "a blade cuts every body",
+        ],
+    );
 }
 
 #[test]

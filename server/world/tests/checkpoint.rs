@@ -140,6 +140,16 @@ fn a_session_with_a_hundred_cuts_goes_on_from_twenty_random_steps() {
     println!("checkpoint: {bytes} bytes of {} copies", counted.bodies()[0].body.n_copies());
 }
 
+#[test]
+fn quadratic_elements_that_are_cut_go_on() {
+    let block = BLOCK.replace("[14, 7, 7]", "[6, 3, 3]").replace("young_pa", "element = \"tet10\"\nyoung_pa");
+    let scene = Scene::from_toml(&block).unwrap();
+    let mut counted = start(&scene, 2);
+    run(&mut counted, 0..60);
+    assert!(counted.cuts_applied() >= 10, "only {} cuts were made", counted.cuts_applied());
+    goes_on(&scene, 60, &random(4, 55), &press_and_cut);
+}
+
 /// A scene of the folder `scenes`.
 fn example(name: &str) -> Scene {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");

@@ -29,6 +29,7 @@ const SNAP: &str = "cutting = { method = \"snap\" }";
 const PUSHED: &str =
     "load = [{ where = { slab = { axis = \"x\", from = 1, to = 1 } }, force_n = [0, 0, 0.02] }]";
 const GENERAL: &str = "law = \"neo-hookean\"";
+const QUADRATIC: &str = "element = \"tet10\"";
 
 fn steps(sim: &mut Simulation, n: usize) {
     for _ in 0..n {
@@ -62,7 +63,7 @@ fn surface(sim: &Simulation) -> (Vec<[u32; 3]>, Vec<u32>) {
 
 #[test]
 fn a_cut_that_is_taken_back_leaves_the_surface_the_mass_and_the_momentum() {
-    for how in ["", "skin = { divisions = 2 }", SNAP, GENERAL] {
+    for how in ["", "skin = { divisions = 2 }", SNAP, GENERAL, QUADRATIC] {
         // Pushed at one end, it flies and turns.
         let mut sim = block(&format!("{how}\n{PUSHED}"));
         steps(&mut sim, 10);
@@ -128,7 +129,7 @@ fn a_cut_in_the_air_is_none_and_a_scratch_is_one() {
 
 #[test]
 fn a_part_that_was_cut_off_and_fell_comes_back() {
-    for how in ["", SNAP] {
+    for how in ["", SNAP, QUADRATIC] {
         let held = "[world]\ngravity_m_s2 = [0, 0, -9.81]\n";
         let fix = "[[body.fix]]\nwhere = { slab = { axis = \"x\", from = 0, to = 0 } }\n";
         let mut sim = block_with(how, held, fix);

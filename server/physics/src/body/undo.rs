@@ -65,7 +65,8 @@ impl Body {
         let state = match (&snap, space.tets()) {
             (Some(_), Some(tets)) => before.on_mesh(tets.mesh(), &x),
             _ if !same_numbers => before.at_places((&self.rest, &*self.space), (&space.rest_positions(), &x)),
-            _ => before.joined(&x, &roots(&self.split_from, self.space.n_copies(), (space.n_copies(), x.len()))),
+            _ => before
+                .joined(&x, &roots(&self.split_from, self.space.n_copies(), (space.n_copies(), x.len()))),
         };
         (self.space, self.snap) = (space, snap);
         self.space.set_epoch(epoch);

@@ -100,7 +100,9 @@ impl MiddleCopies {
         for (i, &p) in (0u32..).zip(&pieces) {
             for t in cut.pieces.fragments(p, &cut.fragments) {
                 for n in cut.fragments.neighbour[t as usize] {
-                    if n != NONE && let Ok(j) = pieces.binary_search(&cut.fragments.piece[n as usize]) {
+                    if n != NONE
+                        && let Ok(j) = pieces.binary_search(&cut.fragments.piece[n as usize])
+                    {
                         join(&mut root, i, j as u32);
                     }
                 }
@@ -159,7 +161,8 @@ fn holds_middle(cut: &CutMesh, p: u32, [a, b]: [u32; 2]) -> bool {
         let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
         for v in fragments.tets[t as usize] {
             let vertex = &fragments.vertices[v as usize];
-            let others = |(&node, &weight): (&u32, &f64)| node != a && node != b && node != NONE && weight != 0.0;
+            let others =
+                |(&node, &weight): (&u32, &f64)| node != a && node != b && node != NONE && weight != 0.0;
             if !vertex.nodes.iter().zip(&vertex.weights).any(others) {
                 let along = vertex.weight_of(b);
                 (least, greatest) = (least.min(along), greatest.max(along));

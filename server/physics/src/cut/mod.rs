@@ -7,9 +7,10 @@
 //! 1. [`fragments`](topology::fragments): a conforming tet mesh *inside* the elements, at first one fragment
 //!    per element, refined by bisecting edges where a blade crosses them. Cut faces are opened only here.
 //! 2. [`pieces`](topology::pieces): the face-connected components of the fragments of one element. A linear
-//!    element has a constant deformation gradient per piece, so mechanics needs only its volume fraction.
+//!    element has a constant deformation gradient per piece, so mechanics needs only its volume fraction; a quadratic
+//!    one needs its second moments too.
 //! 3. [`copies`](topology::copies): the components of the pieces around a node. Each is one set of degrees of
-//!    freedom.
+//!    freedom. Mid-edge nodes of quadratic elements have theirs from the pieces around the edge ([`middles`]).
 //!
 //! Crack fronts, branches, crossings and repeated cuts need no case analysis: they follow from the
 //! connectivity.

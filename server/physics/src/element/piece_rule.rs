@@ -47,7 +47,8 @@ pub fn piece_degree_2<I: Iterator<Item = Fragment>>(fragments: &impl Fn() -> I) 
         covariance += part / (20.0 * fraction) * (sum * sum.transpose() + own);
     }
     let SymmetricEigen { eigenvectors, eigenvalues } = covariance.symmetric_eigen();
-    let L = eigenvectors * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(LEAST_DEVIATION.powi(2)).sqrt()));
+    let L = eigenvectors
+        * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(LEAST_DEVIATION.powi(2)).sqrt()));
     ALTERNATING.map(|s| (centre + L * s, 0.25))
 }
 
@@ -91,7 +92,8 @@ mod tests {
     /// Every product of two of 1, ξ, η, ζ has the same mean by four points and by the rule of degree 5.
     #[test]
     fn quadratic_polynomials_are_exact_on_any_piece() {
-        let apart = ([[0.0, 0.5, 0.5, 0.0], [0.1, 0.2, 0.7, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.3, 0.4, 0.3]], 0.02);
+        let apart =
+            ([[0.0, 0.5, 0.5, 0.0], [0.1, 0.2, 0.7, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.3, 0.4, 0.3]], 0.02);
         for fragments in [vec![whole()], vec![corner()], vec![corner(), apart]] {
             let volume: f64 = fragments.iter().map(|f| f.1).sum();
             let four = piece_degree_2(&|| fragments.iter().copied());

@@ -79,7 +79,8 @@ fn stress_along_a_cut_passes_the_patch_test() {
         .flat_map(|law| [(law, 1.1), (law, 0.55)])
     {
         let material = material(law);
-        let strain = 0.2 * ((1.0 + material.poisson) * t * t.transpose() - material.poisson * Matrix3::identity());
+        let strain =
+            0.2 * ((1.0 + material.poisson) * t * t.transpose() - material.poisson * Matrix3::identity());
         let F = match law {
             Law::Linear => Matrix3::identity() + strain,
             Law::Corotational => turn * (Matrix3::identity() + strain),
@@ -108,8 +109,12 @@ fn stress_along_a_cut_passes_the_patch_test() {
             iterations: 20,
             tolerance: 1e-12,
         };
-        let settings =
-            NewtonSettings { tolerance: 1e-11, curvature: Curvature::Exact, linear, ..NewtonSettings::default() };
+        let settings = NewtonSettings {
+            tolerance: 1e-11,
+            curvature: Curvature::Exact,
+            linear,
+            ..NewtonSettings::default()
+        };
         let load = vec![Vector3::zeros(); x.len()];
         let mut problem = StaticProblem::new(&model, &load);
         let (mut newton, mut team) = (Newton::new(settings), Team::new(1).unwrap());
@@ -144,10 +149,8 @@ impl Wave {
     }
 }
 
-const BELOW: Wave =
-    Wave { a: Vector3::new(0.1, -0.06, 0.08), k: Vector3::new(1.3, 0.7, -1.1), phase: 0.4 };
-const ABOVE: Wave =
-    Wave { a: Vector3::new(-0.05, 0.09, 0.04), k: Vector3::new(-0.6, 1.5, 0.9), phase: 1.9 };
+const BELOW: Wave = Wave { a: Vector3::new(0.1, -0.06, 0.08), k: Vector3::new(1.3, 0.7, -1.1), phase: 0.4 };
+const ABOVE: Wave = Wave { a: Vector3::new(-0.05, 0.09, 0.04), k: Vector3::new(-0.6, 1.5, 0.9), phase: 1.9 };
 
 /// Error of the solution [m] in the L² norm, its iterations with block-Jacobi, and how many numbers there are, on
 /// a block whose two parts move apart by different waves.
@@ -181,10 +184,13 @@ fn error_of_waves(cells: usize) -> (f64, u32, usize) {
     let mut K = model.pattern();
     model.tangent(model.rest(), crate::material::Tangent::Exact, &mut K);
     let mut u = vec![Vector3::zeros(); model.n_nodes()];
-    fixed.iter().for_each(|f| u[f.copy as usize] = Vector3::from(f.position_m) - model.rest()[f.copy as usize]);
+    fixed
+        .iter()
+        .for_each(|f| u[f.copy as usize] = Vector3::from(f.position_m) - model.rest()[f.copy as usize]);
     let solve = |method, u: &mut Vec<Vector3<f64>>| {
         let (precision, iterations) = (Precision::Double, 20_000);
-        let mut solver = LinearSolver::new(LinearSettings { method, precision, iterations, tolerance: 1e-10 });
+        let mut solver =
+            LinearSolver::new(LinearSettings { method, precision, iterations, tolerance: 1e-10 });
         solver.set_stiff_modes(tets.stiff_modes().map(Arc::new));
         solver.set_matrix(&K, &fixed);
         let report = solver.solve(&mut Team::new(1).unwrap(), &K, &load, u, None);
@@ -231,11 +237,19 @@ fn for_lips(tets: &Tets, visit: &mut dyn FnMut(usize, Vector3<f64>, Vector3<f64>
             let X = triangle.each_ref().map(place);
             let area = 0.5 * (X[1] - X[0]).cross(&(X[2] - X[0]));
             // Six points, exact to degree 4 (Strang, Fix 1973).
-            for (a, w) in [(0.445_948_490_915_965, 0.223_381_589_678_011), (0.091_576_213_509_771, 0.109_951_743_655_322)] {
+            for (a, w) in [
+                (0.445_948_490_915_965, 0.223_381_589_678_011),
+                (0.091_576_213_509_771, 0.109_951_743_655_322),
+            ] {
                 for k in 0..3 {
                     let L: [f64; 3] = std::array::from_fn(|v| if v == k { 1.0 - 2.0 * a } else { a });
                     let at: [f64; 4] = std::array::from_fn(|n| (0..3).map(|v| L[v] * triangle[v][n]).sum());
-                    visit(fragments.piece[t] as usize, Vector3::new(at[1], at[2], at[3]), place(&at), w * area);
+                    visit(
+                        fragments.piece[t] as usize,
+                        Vector3::new(at[1], at[2], at[3]),
+                        place(&at),
+                        w * area,
+                    );
                 }
             }
         }

@@ -40,7 +40,7 @@ const ACCURACY: [(&str, &str); 20] = [
     ("threads", "Threads, shares of a step, and the largest mesh in real time"),
     ("nienhuys", "Relaxation: Nienhuys' table 3.1 and figure 3.12"),
     ("schoch", "Convergence on a half-cut beam: figure 10 of Schoch"),
-    ("slits", "Five ways to cut: 1, 10 and 100 slits"),
+    ("slits", "Six ways to cut: 1, 10 and 100 slits"),
     ("dick-tables", "Octree cells: tables 1 and 2 of Dick"),
     ("dick-convergence", "Octree cells: rates of multigrid"),
     ("dick-sizes", "Octree cells: time per cell"),

@@ -1,4 +1,4 @@
-//! Five ways to cut one beam by 1, 10 and 100 slits: what each does to mesh, step and answer.
+//! Six ways to cut one beam by 1, 10 and 100 slits: what each does to mesh, step and answer.
 //!
 //! The slits are planes across the beam down to a depth inside elements, two millimetres from each other where there
 //! are a hundred of them, and the elements are five wide. They come one after the other, in an order that spreads
@@ -33,8 +33,10 @@ const SIZE: V = V::new(0.2, 0.04, 0.04);
 const FRONT_M: f64 = 0.018;
 /// Slits after which the beam is measured.
 const SLITS: [usize; 3] = [1, 10, 100];
-/// Tetrahedra are halves of cubes of 5 mm, octree cells half as wide.
+/// Linear tetrahedra are parts of cubes of 5 mm, quadratic ones of 10 mm, which have as many nodes; octree cells are
+/// 2.5 mm wide.
 const CUBES: [usize; 3] = [40, 8, 8];
+const QUADRATIC_CUBES: [usize; 3] = [20, 4, 4];
 const CELLS: u32 = 80;
 /// Cells of the truth are 1 mm wide.
 const FINE_CELLS: u32 = 200;
@@ -58,14 +60,16 @@ const MATERIAL: Material = Material {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     Xfem,
+    Quadratic,
     Subdivide,
     Snap,
     Remove,
     Links,
 }
 
-const WAYS: [(Way, &str); 5] = [
+const WAYS: [(Way, &str); 6] = [
     (Way::Xfem, "X-FEM"),
+    (Way::Quadratic, "X-FEM, quadratic"),
     (Way::Subdivide, "remeshing (subdivide)"),
     (Way::Snap, "along faces (snap)"),
     (Way::Remove, "removal"),
@@ -96,12 +100,13 @@ pub fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
     let [long, wide, high] = [SIZE.x, SIZE.y, SIZE.z].map(|side| 1e3 * side);
     let mut result = ExperimentResult {
         name: "slits",
-        title: "Five ways to cut: 1, 10 and 100 slits".into(),
+        title: "Six ways to cut: 1, 10 and 100 slits".into(),
         about: format!(
             "A beam of {long} × {wide} × {high} mm is held at both ends and slit from above to {:.0} mm of its height, \
              once, ten and a hundred times. Tetrahedra are parts of cubes of 5 mm, so the fronts lie inside elements and a \
              hundred slits lie closer than elements are wide; octree cells are 2.5 mm wide. `X-FEM` keeps the mesh and \
-             makes copies of nodes, which count as unknowns. `remeshing` divides elements exactly along the slit and does \
+             makes copies of nodes, which count as unknowns; quadratic tetrahedra are parts of cubes of 10 mm and have as \
+             many nodes at first. `remeshing` divides elements exactly along the slit and does \
              nothing for their shape. `along faces` moves nodes onto the slit and collapses what becomes flat. `removal` \
              takes out every element that a slit touches. The truth is made of octree cells of 1 mm, which favours the \
              coarser ones.",
@@ -191,9 +196,14 @@ pub fn slits(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
 /// The uncut beam.
 fn beam(way: Way) -> Result<Body, Trouble> {
     let solver = PcgSettings { iterations: 5000, tolerance: TOLERANCE };
-    let settings = BodySettings { scheme: Scheme::ImplicitEuler, solver, ..BodySettings::default() };
+    let mut settings = BodySettings { scheme: Scheme::ImplicitEuler, solver, ..BodySettings::default() };
+    let mut cubes = CUBES;
     let cutting = match way {
         Way::Xfem => CuttingMethod::Xfem,
+        Way::Quadratic => {
+            (settings.element, cubes) = (ElementKind::Tet10, QUADRATIC_CUBES);
+            CuttingMethod::Xfem
+        }
         Way::Subdivide => CuttingMethod::Subdivide,
         Way::Snap => CuttingMethod::Snap,
         Way::Remove => CuttingMethod::Remove,
@@ -202,7 +212,7 @@ fn beam(way: Way) -> Result<Body, Trouble> {
             return hold(cells(CELLS, BodySettings { method, ..settings })?);
         }
     };
-    let mesh = box_mesh(V::zeros(), SIZE, CUBES, BoxPattern::Tet5 { parity: false });
+    let mesh = box_mesh(V::zeros(), SIZE, cubes, BoxPattern::Tet5 { parity: false });
     hold(Body::new(mesh, MATERIAL, BodySettings { cutting, ..settings })?)
 }
 
@@ -356,13 +366,13 @@ mod tests {
             assert!(error < 0.3, "{name}: {error}");
             (elements, found)
         });
-        let [xfem, subdivide, snap, remove, links] = found;
-        assert_eq!(xfem.1.elements, xfem.0);
+        let [xfem, quadratic, subdivide, snap, remove, links] = found;
+        assert_eq!((xfem.1.elements, quadratic.1.elements), (xfem.0, quadratic.0));
         assert!(subdivide.1.elements > subdivide.0 && subdivide.1.quality < xfem.1.quality);
         assert!(snap.1.elements <= snap.0);
         assert!(remove.1.elements < remove.0 && remove.1.mass_lost > 0.005);
         assert!(links.1.elements >= links.0);
-        for whole in [&xfem.1, &subdivide.1, &snap.1, &links.1] {
+        for whole in [&xfem.1, &quadratic.1, &subdivide.1, &snap.1, &links.1] {
             assert!(whole.mass_lost.abs() < 1e-9);
         }
     }

@@ -11,9 +11,9 @@ pub enum RawElement {
     /// Linear tetrahedron. It can be cut anywhere.
     #[default]
     Tet4,
-    /// Quadratic tetrahedron, for accuracy.
+    /// Quadratic tetrahedron, for accuracy. It can be cut anywhere, and is computed in double precision.
     Tet10,
-    /// Trilinear hexahedron. It needs the pattern `hex`. A box of equal cubes takes the kernels of octree cells.
+    /// Trilinear hexahedron, which is not cut. It needs the pattern `hex`. A box of equal cubes takes the kernels of octree cells.
     Hex8,
     /// Cubes on an adaptive octree, for very fine cuts along the links between them. It fills a `box`, a
     /// `surface` or an `organ`.
