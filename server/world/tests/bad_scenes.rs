@@ -121,6 +121,12 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
     assert_says(&cut("snap"), &["found `snap`, but all cuts of `beam` are made by xfem", "[body.cutting]"]);
     let snap = "cutting = { method = \"snap\" }";
     assert_says(&with(&format!("{snap}\nelement = \"tet10\"")), &["found `snap` with tet10, allowed: tet4"]);
+    let slab = "where = { slab = { axis = \"z\", from = 1, to = 1 } }";
+    let growing = format!("{snap}\nload = [{{ {slab}, force_n = [1, 0, 0], ramp_s = 1 }}]");
+    assert_says(
+        &with(&growing),
+        &["load.0", "changes over time with cutting.method = `snap`", "constant loads"],
+    );
     assert_says(
         &with(&format!("{snap}\nskin = {{ divisions = 2 }}")),
         &["scene:10: body.beam.skin", "found a skin with cutting.method = `snap`", "remove the skin"],

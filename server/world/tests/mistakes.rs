@@ -150,6 +150,26 @@ const AT_ONCE: &[Mistake] = &[
     (SWEEP, "", &["needs exactly one of sweep_m, path_m"]),
     ("at_s = 0.2", "at_s = 7.5", &["cut.0.at_s: the cut comes at 7.5 s, after the end of the run at 5 s"]),
     (BODY_END, "element = \"hex8\"", &["hex8", "tet4, tet10"]),
+    (
+        "force_n = [0, 0.1, 0]",
+        "force_n = [0, 0.1, 0]\nramp_s = -1",
+        &["load.0.ramp_s: found -1", "at least 0"],
+    ),
+    (
+        "force_n = [0, 0.1, 0]",
+        "force_n = [0, 0.1, 0]\nramp_s = 1\ntable = [[0, 0], [1, 1]]",
+        &["load.0.table: found table beside ramp_s, allowed: one of them", "write the growth into the table"],
+    ),
+    (
+        "force_n = [0, 0.1, 0]",
+        "force_n = [0, 0.1, 0]\ntable = [[0, 0], [1, 1], [1, 0]]",
+        &["load.0.table.2: the time 1 does not lie above 1", "let the times rise"],
+    ),
+    (
+        BODY_END,
+        "displacement_table = [[0, 0], [-1, 1]]",
+        &["displacement_table.1: found [-1.0, 1.0]", "[time in seconds, share of the full value]"],
+    ),
     // tools
     (
         "radius_m = 0.01",
@@ -268,7 +288,7 @@ fn no_mistake_that_can_be_seen_in_the_scene_is_silent() {
     let empty = said(directory.path(), "schema = 1\n", false);
     assert!(empty.contains("the scene has no body"), "{empty}");
     // With the two that need steps, and the one above.
-    assert_eq!(AT_ONCE.len() + IN_THE_FIRST_STEPS.len() + 1, 47);
+    assert_eq!(AT_ONCE.len() + IN_THE_FIRST_STEPS.len() + 1, 51);
 }
 
 #[test]

@@ -289,6 +289,67 @@ fn an_effect_that_is_off_does_not_change_a_bit() {
     assert_eq!(plain, run_with("tool = [{ id = \"idle\", shape = { sphere = { radius_m = 0.01 } } }]"));
 }
 
+/// A linear body in equilibrium follows its loads and displacements in proportion, there and back.
+#[test]
+fn tables_of_loads_and_displacements_are_followed() {
+    let table = "[[0.1, 0], [0.2, 1], [0.3, -0.5]]";
+    let share = |t: f64| match t {
+        t if t < 0.1 => 0.0,
+        t if t < 0.2 => 10.0 * (t - 0.1),
+        t if t < 0.3 => 1.0 - 15.0 * (t - 0.2),
+        _ => -0.5,
+    };
+    let end = "where = { slab = { axis = \"z\", from = 1, to = 1 } }";
+    let load = |course: &str| format!("load = [{{ {end}, force_n = [0.05, 0, 0], {course} }}]");
+    let ways = [
+        (load(&format!("table = {table}")), String::new()),
+        (load("ramp_s = 0.3"), String::new()),
+        (
+            format!("displacement_table = {table}"),
+            format!("[[body.fix]]\n{end}\ndisplacement_m = [0.002, 0, 0]\n"),
+        ),
+    ];
+    let elements =
+        [("", "cells = [3, 6, 15]"), ("tet10", "cells = [3, 6, 15]"), ("octree", "cells = [3, 6, 20]")];
+    for ((element, cells), (keys, tables)) in elements.iter().flat_map(|e| ways.iter().map(move |w| (*e, w)))
+    {
+        let element = if element.is_empty() { String::new() } else { format!("element = \"{element}\"\n") };
+        let linear = "law = \"linear\"\nintegrator = \"static\"\nsolver = { tolerance = 1e-9 }";
+        let text = BEAM
+            .replace("[9.81, 0, 0]", "[0, 0, 0]")
+            .replace("cells = [3, 6, 15]", cells)
+            .replace("rayleigh = { stiffness_s = 0.01 }", &format!("{element}{linear}\n{keys}"));
+        let text = if cells.contains("20") { text.replace(", pattern = \"tet5\"", "") } else { text };
+        let mut sim = simulation(&format!("{text}{tables}"));
+        let tip = |sim: &Simulation| {
+            let body = &sim.bodies()[0].body;
+            let ends =
+                body.positions().iter().zip(body.rest_positions()).filter(|(_, rest)| rest.z > 0.2 - 1e-9);
+            let (sum, n) = ends.fold((0.0, 0.0), |(sum, n), (x, rest)| (sum + x.x - rest.x, n + 1.0));
+            sum / n
+        };
+        let mut found = Vec::new();
+        for step in 1..=35 {
+            run(&mut sim, 1);
+            let t = f64::from(step) * 0.01;
+            found.push((t, if keys.contains("ramp_s") { (t / 0.3).min(1.0) } else { share(t) }, tip(&sim)));
+        }
+        let full = found.iter().find(|(_, share, _)| (share - 1.0).abs() < 1e-9).unwrap().2;
+        assert!(full > 1e-3, "{element}{keys}: {full}");
+        for (t, share, tip) in found {
+            assert!(
+                (tip / full - share).abs() < 1e-5,
+                "{element}{keys} at {t} s: {tip} of {full}, not {share}"
+            );
+        }
+        // A reset begins the course anew.
+        sim.reset().unwrap();
+        run(&mut sim, 3);
+        let expected = if keys.contains("ramp_s") { 0.1 } else { 0.0 };
+        assert!((tip(&sim) / full - expected).abs() < 1e-5, "{element}{keys}: {}", tip(&sim));
+    }
+}
+
 /// Displacements that arrive in proportion, whatever computes the body.
 #[test]
 fn what_is_held_arrives_over_the_time_it_is_given() {

@@ -32,6 +32,19 @@ pub struct Boundary {
     point_force: Vec<Vector3<f64>>,
     /// Force spread over the material around a node [N], by node; empty if there is none.
     spread_force: Vec<Vector3<f64>>,
+    /// Spread forces of which a changing share acts.
+    varying: Vec<VaryingForce>,
+    /// Scratch: the volume around every node [m³].
+    #[serde(skip)]
+    node_volume: Vec<f64>,
+}
+
+/// A force spread over the material around nodes, of which a share acts.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+struct VaryingForce {
+    /// The whole force [N], by node.
+    force: Vec<Vector3<f64>>,
+    share: f64,
 }
 
 impl Boundary {
@@ -49,6 +62,7 @@ impl Boundary {
             fixed: held.collect(),
             point_force: forces(|n| n.point_force),
             spread_force: forces(|n| n.spread_force),
+            ..Self::default()
         }
     }
 
@@ -169,8 +183,10 @@ impl Boundary {
     /// Whether `node`, which lies between others with these `carriers`, has to stay when cells become coarse: it is
     /// loaded, or held in another way than the material between the carriers is.
     pub fn needs(&self, node: u32, carriers: &MaterialPoint, node_of_copy: &[u32]) -> bool {
+        let varying = self.varying.iter().map(|load| &load.force);
         let loaded = [&self.point_force, &self.spread_force]
-            .iter()
+            .into_iter()
+            .chain(varying)
             .any(|forces| forces.get(node as usize).is_some_and(|f| *f != Vector3::zeros()));
         let held = self.fixed_at(node).copied();
         let between = self.between(carriers, node_of_copy);
@@ -196,6 +212,7 @@ impl Boundary {
         });
         change.keep(&mut self.point_force);
         change.keep(&mut self.spread_force);
+        self.varying.iter_mut().for_each(|load| change.keep(&mut load.force));
     }
 
     /// Forgets the nodes that refinement had added to a body of `n_nodes` nodes.
@@ -206,7 +223,7 @@ impl Boundary {
     /// Writes the force [N] on every one of `n` copies and added nodes to `load`. A point force goes to
     /// the copy with the node's material. A spread force goes to all copies of the node, by the volume
     /// they carry. Totals are kept.
-    pub fn node_loads(&self, space: &dyn Space, n: usize, load: &mut Vec<Vector3<f64>>) {
+    pub fn node_loads(&mut self, space: &dyn Space, n: usize, load: &mut Vec<Vector3<f64>>) {
         load.clear();
         resize_reserving(load, n, Vector3::zeros());
         self.add_loads(space, load);
@@ -214,30 +231,38 @@ impl Boundary {
 
     /// The same after a cut, with `load` from before it. Point forces stay on their copies, so only
     /// spread forces are shared anew.
-    pub fn loads_of_new_copies(&self, space: &dyn Space, load: &mut Vec<Vector3<f64>>) {
-        if self.spread_force.is_empty() {
+    pub fn loads_of_new_copies(&mut self, space: &dyn Space, load: &mut Vec<Vector3<f64>>) {
+        if self.spread_force.is_empty() && self.varying.is_empty() {
             resize_reserving(load, space.n_copies(), Vector3::zeros());
         } else {
             self.node_loads(space, space.n_copies(), load);
         }
     }
 
-    fn add_loads(&self, space: &dyn Space, load: &mut [Vector3<f64>]) {
+    fn add_loads(&mut self, space: &dyn Space, load: &mut [Vector3<f64>]) {
         for (node, f) in (0u32..).zip(&self.point_force) {
             load[space.first_copy(node) as usize] += f;
         }
-        if !self.spread_force.is_empty() {
-            let added = space.added_volumes();
-            let volumes = || space.copy_volumes().iter().chain(&added);
-            let mut node_volume = vec![0.0; space.n_nodes()];
-            for (copy, &volume) in (0u32..).zip(volumes()) {
-                node_volume[space.node_of(copy) as usize] += volume;
+        if self.spread_force.is_empty() && self.varying.is_empty() {
+            return;
+        }
+        let Self { spread_force, varying, node_volume, .. } = self;
+        let volumes = || space.copy_volumes().iter().chain(space.added_volumes());
+        node_volume.clear();
+        node_volume.resize(space.n_nodes(), 0.0);
+        for (copy, &volume) in (0u32..).zip(volumes()) {
+            node_volume[space.node_of(copy) as usize] += volume;
+        }
+        for (copy, (load, volume)) in (0u32..).zip(load.iter_mut().zip(volumes())) {
+            let node = space.node_of(copy) as usize;
+            let part = volume / node_volume[node];
+            // Nodes that refinement added carry nothing: the load stays where it was put.
+            if let Some(force) = spread_force.get(node) {
+                *load += part * force;
             }
-            for (copy, (load, volume)) in (0u32..).zip(load.iter_mut().zip(volumes())) {
-                let node = space.node_of(copy) as usize;
-                // Nodes that refinement added carry nothing: the load stays where it was put.
-                if let Some(force) = self.spread_force.get(node) {
-                    *load += volume / node_volume[node] * force;
+            for VaryingForce { force, share } in &*varying {
+                if let Some(force) = force.get(node) {
+                    *load += part * *share * force;
                 }
             }
         }
@@ -315,14 +340,59 @@ impl Body {
     pub fn add_surface_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
         let selected = self.selection(nodes, &force_n)?;
         let area = self.space.areas(&selected);
-        self.spread("surface", &area, force_n)
+        self.add_constant(spread("surface", &area, force_n)?);
+        Ok(())
+    }
+
+    /// Like [`add_surface_force`](Self::add_surface_force), for a force of which a share acts that
+    /// [`set_load_shares`](Self::set_load_shares) sets; it is 1 at first.
+    ///
+    /// # Errors
+    /// Also a body whose cuts change the mesh, because there the nodes carry their forces along.
+    pub fn add_varying_surface_force(
+        &mut self,
+        nodes: &[u32],
+        force_n: Vector3<f64>,
+    ) -> Result<(), BodyError> {
+        let selected = self.selection(nodes, &force_n)?;
+        let area = self.space.areas(&selected);
+        self.add_varying(spread("surface", &area, force_n)?)
+    }
+
+    /// Like [`add_volume_force`](Self::add_volume_force), with a share as in
+    /// [`add_varying_surface_force`](Self::add_varying_surface_force).
+    ///
+    /// # Errors
+    /// As there.
+    pub fn add_varying_volume_force(
+        &mut self,
+        nodes: &[u32],
+        force_n: Vector3<f64>,
+    ) -> Result<(), BodyError> {
+        let selected = self.selection(nodes, &force_n)?;
+        let volume = self.space.volumes(&selected);
+        self.add_varying(spread("volume", &volume, force_n)?)
+    }
+
+    /// Sets how much of every [varying force](Self::add_varying_surface_force) acts from now on, in the order in which they were
+    /// added. Those without an entry keep their share. Allocates nothing.
+    pub fn set_load_shares(&mut self, shares: impl Iterator<Item = f64>) {
+        let mut changed = false;
+        for (load, share) in self.boundary.varying.iter_mut().zip(shares) {
+            changed |= load.share != share;
+            load.share = share;
+        }
+        if changed {
+            self.boundary.node_loads(&*self.space, self.rest.len(), &mut self.load);
+        }
     }
 
     /// Adds a total force [N] shared by volume over the tets around `nodes`.
     pub fn add_volume_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
         let selected = self.selection(nodes, &force_n)?;
         let volume = self.space.volumes(&selected);
-        self.spread("volume", &volume, force_n)
+        self.add_constant(spread("volume", &volume, force_n)?);
+        Ok(())
     }
 
     /// Load on every node [N], gravity not included.
@@ -334,6 +404,7 @@ impl Body {
     pub fn clear_loads(&mut self) {
         self.boundary.point_force.clear();
         self.boundary.spread_force.clear();
+        self.boundary.varying.clear();
         self.follow_boundary();
     }
 
@@ -345,20 +416,18 @@ impl Body {
         Ok(selected)
     }
 
-    fn spread(
-        &mut self,
-        carrier: &'static str,
-        weight: &[f64],
-        force_n: Vector3<f64>,
-    ) -> Result<(), BodyError> {
-        let total: f64 = weight.iter().sum();
-        if total <= 0.0 {
-            return Err(BodyError::NothingSelected { carrier, force_n: force_n.into() });
+    fn add_constant(&mut self, force: Vec<Vector3<f64>>) {
+        self.boundary.spread_force.resize(force.len(), Vector3::zeros());
+        self.boundary.spread_force.iter_mut().zip(force).for_each(|(sum, force)| *sum += force);
+        self.follow_boundary();
+    }
+
+    fn add_varying(&mut self, force: Vec<Vector3<f64>>) -> Result<(), BodyError> {
+        if self.snap.is_some() {
+            let (what, with) = ("a load that varies", "cutting that changes the mesh");
+            return Err(BodyError::Combination { what, with, instead: "cutting method xfem" });
         }
-        self.boundary.spread_force.resize(weight.len(), Vector3::zeros());
-        for (force, weight) in self.boundary.spread_force.iter_mut().zip(weight) {
-            *force += (weight / total) * force_n;
-        }
+        self.boundary.varying.push(VaryingForce { force, share: 1.0 });
         self.follow_boundary();
         Ok(())
     }
@@ -370,6 +439,19 @@ impl Body {
             None => Ok(()),
         }
     }
+}
+
+/// A total force [N] shared over nodes in proportion to their `weight`.
+fn spread(
+    carrier: &'static str,
+    weight: &[f64],
+    force_n: Vector3<f64>,
+) -> Result<Vec<Vector3<f64>>, BodyError> {
+    let total: f64 = weight.iter().sum();
+    if total <= 0.0 {
+        return Err(BodyError::NothingSelected { carrier, force_n: force_n.into() });
+    }
+    Ok(weight.iter().map(|weight| (weight / total) * force_n).collect())
 }
 
 fn check_vector(quantity: &'static str, v: &Vector3<f64>) -> Result<(), BodyError> {

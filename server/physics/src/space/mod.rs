@@ -124,9 +124,9 @@ pub trait Space: Any + Points + Send {
         node
     }
 
-    /// ∫ N_a dV [m³] of the added nodes, computed anew at each call.
-    fn added_volumes(&self) -> Vec<f64> {
-        Vec::new()
+    /// ∫ N_a dV [m³] of the added nodes.
+    fn added_volumes(&self) -> &[f64] {
+        &[]
     }
 
     /// The copies whose material contains `node` itself, ascending. There is one, or more where a cut passes

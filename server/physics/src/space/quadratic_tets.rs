@@ -21,6 +21,8 @@ const FAR: f64 = 0.125;
 pub struct QuadraticTets {
     mesh: Tet10Mesh,
     middles: MiddleCopies,
+    /// ∫ N_a dV [m³] of every copy of a mid-edge node.
+    volumes: Vec<f64>,
 }
 
 impl Element for QuadraticTets {
@@ -51,18 +53,8 @@ impl Element for QuadraticTets {
         self.middles.with_middle(&self.mesh, cut, node - self.mesh.n_corners() as u32)
     }
 
-    fn added_volumes(&self, cut: &CutMesh) -> Vec<f64> {
-        let mut volumes = vec![0.0; self.n_added()];
-        for p in 0..cut.pieces().len() {
-            let QuadraticPiece { points, volume, .. } = self.piece(cut, p);
-            for (xi, w) in &points {
-                let N = tet10::shape(xi);
-                for (&middle, N) in self.middles.of_piece[p].iter().zip(&N[4..]) {
-                    volumes[middle as usize] += w * volume * N;
-                }
-            }
-        }
-        volumes
+    fn added_volumes(&self) -> &[f64] {
+        &self.volumes
     }
 
     fn modes(&self, cut: &CutMesh) -> Option<StiffModes> {
@@ -72,6 +64,7 @@ impl Element for QuadraticTets {
     fn follow_cut(&self, cut: &CutMesh) -> Option<(Arc<dyn Element>, Vec<NewCopy>)> {
         let mut element = self.clone();
         let mut new = element.middles.follow(&self.mesh, cut);
+        element.measure(cut);
         let n_copies = cut.n_copies() as u32;
         new.iter_mut().for_each(|new| *new = NewCopy::split(n_copies + new.copy, n_copies + new.parent));
         Some((Arc::new(element), new))
@@ -152,7 +145,24 @@ impl QuadraticTets {
 
     fn on(mesh: Tet10Mesh, cut: &CutMesh) -> Self {
         let middles = MiddleCopies::new(&mesh, cut);
-        Self { mesh, middles }
+        let mut element = Self { mesh, middles, volumes: Vec::new() };
+        element.measure(cut);
+        element
+    }
+
+    /// Sums the volumes of the copies of mid-edge nodes.
+    fn measure(&mut self, cut: &CutMesh) {
+        let mut volumes = vec![0.0; self.middles.edge.len()];
+        for p in 0..cut.pieces().len() {
+            let QuadraticPiece { points, volume, .. } = self.piece(cut, p);
+            for (xi, w) in &points {
+                let N = tet10::shape(xi);
+                for (&middle, N) in self.middles.of_piece[p].iter().zip(&N[4..]) {
+                    volumes[middle as usize] += w * volume * N;
+                }
+            }
+        }
+        self.volumes = volumes;
     }
 
     /// Copies of the corners of piece `p`, then those of its mid-edge nodes.

@@ -1,7 +1,9 @@
 //! Momentum, energy and rigid motion.
 
 use nalgebra::{Rotation3, Vector3};
-use scindo_physics::body::{Body, Outcome};
+use scindo_allocations::allocations;
+use scindo_physics::body::{Body, BodySettings, CuttingMethod, ElementKind, Outcome};
+use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
@@ -177,6 +179,37 @@ fn loads_are_shared_and_their_total_is_kept() {
     assert!(body.add_surface_force(&[0, 1], force).is_err());
     assert!(body.add_nodal_force(9999, force).is_err());
     assert!(body.add_nodal_force(0, Vector3::repeat(f64::NAN)).is_err());
+}
+
+/// Shares act on their own loads, cuts keep them, and setting them allocates nothing.
+#[test]
+fn a_share_of_a_varying_load_acts() {
+    for element in [ElementKind::Tet4, ElementKind::Tet10] {
+        let mut body = cube(3, SOFT, BodySettings { element, ..settings(20, 1e-6) });
+        let all: Vec<u32> = (0..body.n_nodes() as u32).collect();
+        let [push, pull, lift] = [Vector3::x(), Vector3::y(), Vector3::z()];
+        body.add_volume_force(&all, push).unwrap();
+        body.add_varying_volume_force(&all, pull).unwrap();
+        body.add_varying_surface_force(&all, lift).unwrap();
+        let total = |body: &Body| body.loads().iter().sum::<Vector3<f64>>();
+        assert!((total(&body) - (push + pull + lift)).norm() < 1e-12, "whole loads at first");
+        let blade = |x: f64| [Vector3::new(x, 0.05, -0.01), Vector3::new(x, 0.05, 0.11)];
+        for shares in [[0.0, 0.0], [0.25, -2.0], [1.0, 0.5]] {
+            let before = allocations();
+            body.set_load_shares(shares.into_iter());
+            assert_eq!(allocations(), before);
+            assert!((total(&body) - (push + shares[0] * pull + shares[1] * lift)).norm() < 1e-12);
+            body.cut(&BladeSweep { segments: vec![blade(-0.01), blade(0.11)] }, 1).unwrap();
+            assert!((total(&body) - (push + shares[0] * pull + shares[1] * lift)).norm() < 1e-12);
+        }
+        assert_eq!(body.parts().len(), 2);
+        body.clear_loads();
+        body.set_load_shares([1.0, 1.0].into_iter());
+        assert_eq!(total(&body), Vector3::zeros());
+    }
+    let mut snap = cube(3, SOFT, BodySettings { cutting: CuttingMethod::Snap, ..settings(20, 1e-6) });
+    let refused = snap.add_varying_volume_force(&[0], Vector3::x()).unwrap_err().to_string();
+    assert!(refused.contains("a load that varies"), "{refused}");
 }
 
 #[test]

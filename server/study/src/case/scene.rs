@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use scindo_world::scene::{CheckedScene, Scene, SceneError};
+use scindo_world::scene::{BodySpec, CheckedScene, Scene, SceneError, ToolSpec};
 use scindo_world::simulation::Simulation;
 
 use super::definition::{Case, Truth};
@@ -83,7 +83,8 @@ pub fn from_scene(scene: &Scene, wishes: Wishes<'_>) -> Result<Case, SceneError>
 fn protocol(scene: &CheckedScene, of: Subject<'_>, wishes: Wishes<'_>) -> (Protocol, u32) {
     let cuts = scene.cuts.iter().map(|cut| cut.at_s).reduce(f64::max);
     let paths = scene.tools.iter().filter_map(|tool| Some(tool.path.last()?.at_s));
-    let path_s = paths.fold(0.0, f64::max);
+    let settled = scene.bodies.iter().map(BodySpec::settled_s);
+    let path_s = paths.chain(settled).fold(0.0, f64::max);
     let lies_still = of.word("integrator", "implicit-euler").as_deref() == Some("static");
     if lies_still && path_s == 0.0 && cuts.is_none_or(|at| at == 0.0) && wishes.seconds.is_none() {
         return (Protocol::Static, 0);
@@ -103,7 +104,7 @@ fn protocol(scene: &CheckedScene, of: Subject<'_>, wishes: Wishes<'_>) -> (Proto
 }
 
 /// Ways to the reference, best first. Quadratic tetrahedra converge faster, so they precede the scene's own
-/// element. Second order in time precedes the scene's own integrator. Ways that the scene's check refuses
+/// element; where a scene cuts, the front of the cut limits both, and the cheaper element comes first. Second order in time precedes the scene's own integrator. Ways that the scene's check refuses
 /// drop out when they are tried.
 fn ladders(of: Subject<'_>, axes: &[Axis]) -> Vec<Ladder> {
     let own = Configuration::base(axes);
@@ -117,9 +118,11 @@ fn ladders(of: Subject<'_>, axes: &[Axis]) -> Vec<Ladder> {
     } else if !moves {
         integrators[0].1 = "equilibrium";
     }
+    let cuts = !of.scene.cuts.is_empty() || of.scene.tools.iter().any(ToolSpec::cuts);
+    let elements = if cuts { [None, Some(&quadratic)] } else { [Some(&quadratic), None] };
     let mut ladders = Vec::new();
     for (integrator, how) in integrators {
-        for element in [Some(&quadratic), None].into_iter().filter(|e| e.is_none() || !explicit) {
+        for element in elements.into_iter().filter(|e| e.is_none() || !explicit) {
             let mut configuration = if explicit { own.clone() } else { tight(of, &own) };
             if let Some(bdf2) = integrator {
                 configuration = configuration.with(Factor::Integrator, bdf2);

@@ -12,6 +12,7 @@ mod threads;
 
 use std::path::Path;
 
+use nalgebra::Vector3;
 use scindo_physics::assembly::ModelError;
 use scindo_physics::body::{Arithmetic, Body, BodyError, BodySettings, Constants};
 use scindo_physics::material::{Material, MaterialError, Rayleigh, Regions};
@@ -188,7 +189,7 @@ impl Builder<'_> {
         }
         let mut body = SimBody::new(&spec.id, body, health);
         body.fixed_iterations = spec.mechanics.fixed_iterations;
-        body.displacement_over_s = spec.displacement_over_s;
+        body.displacement = spec.displacement.clone();
         if let Some(adapt) = spec.octree.and_then(|octree| octree.adapt) {
             let held = spec.fixes.iter().map(|fix| fix.region.clone()).collect();
             body.set_adaptation(Adaptation::new(adapt, held));
@@ -197,7 +198,7 @@ impl Builder<'_> {
             self.fix(&format!("{at}.fix.{i}"), fix, &mut body);
         }
         for (i, load) in spec.loads.iter().enumerate() {
-            self.load(&format!("{at}.load.{i}"), load, &mut body.body);
+            self.load(&format!("{at}.load.{i}"), load, &mut body);
         }
         body.velocity_m_s = spec.velocity_m_s;
         if let Err(error) = body.throw() {
@@ -239,23 +240,30 @@ impl Builder<'_> {
         body.fix_groups.push(nodes);
     }
 
-    fn load(&mut self, at: &str, load: &LoadSpec, body: &mut Body) {
-        let nodes = self.select(at, &load.region, body);
+    fn load(&mut self, at: &str, load: &LoadSpec, body: &mut SimBody) {
+        let nodes = self.select(at, &load.region, &body.body);
         if nodes.is_empty() {
             return;
         }
+        type Add = fn(&mut Body, &[u32], Vector3<f64>) -> Result<(), BodyError>;
+        let (over_area, over_volume): (Add, Add) = match load.course.is_constant() {
+            true => (Body::add_surface_force, Body::add_volume_force),
+            false => (Body::add_varying_surface_force, Body::add_varying_volume_force),
+        };
         let by_area = match load.share {
             Some(Share::Volume) => None,
-            _ => Some(body.add_surface_force(&nodes, load.force_n)),
+            _ => Some(over_area(&mut body.body, &nodes, load.force_n)),
         };
         let result = match (by_area, load.share) {
             (Some(Err(BodyError::NothingSelected { .. })), None) | (None, _) => {
-                body.add_volume_force(&nodes, load.force_n)
+                over_volume(&mut body.body, &nodes, load.force_n)
             }
             (Some(result), _) => result,
         };
         if let Err(error) = result {
             self.refused(at, &error);
+        } else if !load.course.is_constant() {
+            body.loads.push(load.course.clone());
         }
     }
 

@@ -19,6 +19,7 @@ use scindo_physics::estimate::{MeshError, StressRecovery};
 
 use crate::mesh_in::MeshHealth;
 use crate::report::{Energy, StepReport};
+use crate::scene::Course;
 pub use adaptation::AdaptCounts;
 pub(crate) use adaptation::Adaptation;
 pub use counts::StepCounts;
@@ -45,8 +46,10 @@ pub struct SimBody {
     pub rest_volume_m3: f64,
     /// Whether the scene sets a fixed number of iterations and accepts any residual.
     pub fixed_iterations: bool,
-    /// Time over which prescribed displacements grow to their full value [s].
-    pub displacement_over_s: f64,
+    /// What share of prescribed displacements is reached when.
+    pub displacement: Course,
+    /// What share of every load that changes over time acts when, in the order of the scene.
+    pub loads: Vec<Course>,
     /// Velocity at the start [m/s].
     pub velocity_m_s: Vector3<f64>,
     /// How its cells are adapted; none: they are not.
@@ -100,7 +103,8 @@ impl SimBody {
             health,
             rest_volume_m3,
             fixed_iterations: false,
-            displacement_over_s: 0.0,
+            displacement: Course::default(),
+            loads: Vec::new(),
             velocity_m_s: Vector3::zeros(),
             adaptation: None,
             watch: Watch::default(),
@@ -127,10 +131,15 @@ impl SimBody {
         self.as_it_ended(solve)
     }
 
-    /// Sets prescribed displacements to those of a step that ends at `time_s` [s].
+    /// Sets prescribed displacements and loads to those of a step that ends at `time_s` [s].
     pub(crate) fn prescribe(&mut self, time_s: f64) {
-        let over_s = self.displacement_over_s;
-        self.body.set_prescribed_share(if time_s < over_s { time_s / over_s } else { 1.0 });
+        self.body.set_prescribed_share(self.displacement.share(time_s));
+        self.body.set_load_shares(self.loads.iter().map(|load| load.share(time_s)));
+    }
+
+    /// From when on displacements and loads no longer change [s].
+    pub(crate) fn settled_s(&self) -> f64 {
+        self.loads.iter().map(Course::end_s).fold(self.displacement.end_s(), f64::max)
     }
 
     /// Gives all nodes that nothing holds the velocity of the start.

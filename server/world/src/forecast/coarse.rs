@@ -107,7 +107,7 @@ fn copy_of(simulation: &Simulation, elements: f64) -> Option<Simulation> {
         }
         load(&mut body, &fine.body)?;
         let mut body = SimBody::new(&spec.id, body, None);
-        body.displacement_over_s = fine.displacement_over_s;
+        body.displacement = fine.displacement.clone();
         bodies.push(body);
     }
     let obstacles = simulation.obstacles().to_vec();

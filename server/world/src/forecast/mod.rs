@@ -21,8 +21,8 @@ pub use cost::Cost;
 
 use crate::inputs::Inputs;
 use crate::report::Level;
-use crate::scene::CheckedScene;
 use crate::scene::raw::RawIntegrator;
+use crate::scene::{BodySpec, CheckedScene};
 use crate::simulation::{Simulation, processor_seconds};
 use cost::Prices;
 use watch::Watch;
@@ -293,9 +293,9 @@ impl<'a> Run<'a> {
     }
 }
 
-/// When the last cut happens, the last tool has gone through its path and what is held has arrived [s].
+/// When the last cut happens, the last tool has gone through its path and displacements and loads have arrived [s].
 fn last_event(scene: &CheckedScene) -> f64 {
-    let held = scene.bodies.iter().map(|body| body.displacement_over_s);
+    let held = scene.bodies.iter().map(BodySpec::settled_s);
     let cuts = scene.cuts.iter().map(|cut| cut.at_s);
     let tools = scene.tools.iter().filter_map(|tool| tool.path.last()).map(|point| point.at_s);
     cuts.chain(tools).chain(held).fold(0.0, f64::max)
@@ -310,9 +310,9 @@ fn next_event(scene: &CheckedScene, time_s: f64) -> Option<f64> {
     cuts.chain(tools).filter(|at| *at >= after).min_by(f64::total_cmp)
 }
 
-/// Whether a tool is on its path at `time_s` [s], or what is held on its way.
+/// Whether a tool is on its path at `time_s` [s], or a displacement or load changes.
 fn acts(scene: &CheckedScene, time_s: f64) -> bool {
-    let arriving = scene.bodies.iter().any(|body| time_s < body.displacement_over_s);
+    let arriving = scene.bodies.iter().any(|body| time_s < body.settled_s());
     arriving
         || scene.tools.iter().any(|tool| match &tool.path[..] {
             [first, .., last] => first.at_s <= time_s && (time_s <= last.at_s || tool.repeat_s.is_some()),

@@ -27,7 +27,7 @@ pub fn warnings(scene: &CheckedScene, forecast: &mut Forecast) {
             found.push(unconverged(&at, spec, body, forecast.steps));
         }
         if body.inverted_elements > 0 || body.least_volume_ratio <= 0.0 {
-            let at_once = spec.displacement_over_s == 0.0;
+            let at_once = spec.displacement.is_constant();
             let displaced = at_once && spec.fixes.iter().any(|fix| fix.displacement_m.norm() > 0.0);
             let slower = if displaced {
                 "; write displacement_over_s = 1 to apply displacements gradually"

@@ -12,6 +12,8 @@ mod fields;
 
 mod forces;
 
+mod reactions;
+
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
@@ -30,6 +32,7 @@ use crate::scene::Scene;
 use crate::simulation::Simulation;
 use fields::write_blocks;
 use forces::Forces;
+use reactions::Reactions;
 use summary::Running;
 
 /// How long recorded probes may stay in memory.
@@ -63,6 +66,7 @@ pub struct Results {
     scene: Value,
     probes: csv::Writer<BufWriter<File>>,
     forces: Option<Forces>,
+    reactions: Option<Reactions>,
     flushed: Instant,
     running: Running,
     series_steps: u64,
@@ -83,6 +87,7 @@ impl Results {
             scene: scene.to_json(),
             probes: csv::Writer::from_writer(BufWriter::new(file)),
             forces: Forces::begin(directory, simulation)?,
+            reactions: Reactions::begin(directory, simulation)?,
             flushed: Instant::now(),
             running: Running::default(),
             series_steps: u64::from(scene.checked().series_steps),
@@ -103,12 +108,14 @@ impl Results {
         self.running.add(simulation);
         self.record_probes(simulation)?;
         self.forces.as_mut().map_or(Ok(()), |forces| forces.record(simulation))?;
+        self.reactions.as_mut().map_or(Ok(()), |reactions| reactions.record(simulation))?;
         if self.series_steps > 0 && simulation.steps().is_multiple_of(self.series_steps) {
             self.record_fields(simulation)?;
         }
         if self.flushed.elapsed() > FLUSH_EVERY {
             self.probes.flush().map_err(at(&self.directory.join("probes.csv")))?;
             self.forces.as_mut().map_or(Ok(()), Forces::flush)?;
+            self.reactions.as_mut().map_or(Ok(()), Reactions::flush)?;
             self.flushed = Instant::now();
         }
         Ok(())
@@ -121,6 +128,7 @@ impl Results {
     pub fn finish(&mut self, simulation: &Simulation, status: &str) -> Result<Summary, ResultsError> {
         self.probes.flush().map_err(at(&self.directory.join("probes.csv")))?;
         self.forces.as_mut().map_or(Ok(()), Forces::flush)?;
+        self.reactions.as_mut().map_or(Ok(()), Reactions::flush)?;
         write_blocks(&self.directory, "final", simulation)
             .map_err(|(path, source)| ResultsError::Fields { path, source })?;
         if self.series_steps > 0 {

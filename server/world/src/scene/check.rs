@@ -21,6 +21,7 @@ use crate::inputs::{MAX_OBSTACLES, MAX_TOOLS, ToolMode};
 use crate::mesh_in::Organ;
 
 use super::checked::*;
+use super::course::Course;
 use super::problem::{Fault, nearest_word};
 use super::raw::*;
 use super::schema::{Finding, json_schema, validate};
@@ -126,8 +127,12 @@ impl Check<'_> {
             toughness_j_m2: body.cutting.toughness_j_m2.unwrap_or(0.0),
             velocity_m_s: Vector3::from(body.velocity_m_s),
             fixes: self.fixes(&at, &body.fix),
-            displacement_over_s: body.displacement_over_s,
-            loads: self.loads(&at, &body.load),
+            displacement: self.course(
+                &at,
+                ("displacement_over_s", body.displacement_over_s),
+                ("displacement_table", &body.displacement_table),
+            ),
+            loads: self.loads(&at, body),
             look: self.look(&format!("{at}.look"), body.look.as_ref()),
         }
     }
@@ -253,16 +258,64 @@ impl Check<'_> {
         fixes.iter().enumerate().map(fix).collect()
     }
 
-    fn loads(&mut self, at: &str, loads: &[RawLoad]) -> Vec<LoadSpec> {
-        let load = |(i, load): (usize, &RawLoad)| LoadSpec {
-            region: self.region(&format!("{at}.load.{i}.where"), &load.r#where),
-            force_n: Vector3::from(load.force_n),
-            share: load.share.map(|share| match share {
-                RawShare::Area => Share::Area,
-                RawShare::Volume => Share::Volume,
-            }),
-        };
-        loads.iter().enumerate().map(load).collect()
+    fn loads(&mut self, at: &str, body: &RawBody) -> Vec<LoadSpec> {
+        let mut loads = Vec::new();
+        for (i, load) in body.load.iter().enumerate() {
+            let at = format!("{at}.load.{i}");
+            let course = self.course(&at, ("ramp_s", load.ramp_s), ("table", &load.table));
+            if !course.is_constant() && body.cut_method().changes_mesh() {
+                let what = format!(
+                    "found a load that changes over time with cutting.method = `{}`, which changes the mesh; allowed \
+                     there: constant loads",
+                    mechanics::word(&body.cut_method())
+                );
+                self.conflict(
+                    at.clone(),
+                    what,
+                    "write cutting.method = \"xfem\", or remove ramp_s and table",
+                );
+            }
+            loads.push(LoadSpec {
+                region: self.region(&format!("{at}.where"), &load.r#where),
+                force_n: Vector3::from(load.force_n),
+                share: load.share.map(|share| match share {
+                    RawShare::Area => Share::Area,
+                    RawShare::Volume => Share::Volume,
+                }),
+                course,
+            });
+        }
+        loads
+    }
+
+    /// What share of a value acts when, by one of two keys: the time over which it grows, or a table.
+    fn course(&mut self, at: &str, ramp: (&str, f64), table: (&str, &[[f64; 2]])) -> Course {
+        let ((ramp_key, ramp_s), (table_key, points)) = (ramp, table);
+        if points.is_empty() {
+            return Course::ramp(ramp_s);
+        }
+        let at = format!("{at}.{table_key}");
+        if ramp_s != 0.0 {
+            let what = format!("found {table_key} beside {ramp_key}, allowed: one of them");
+            self.conflict(at.clone(), what, "write the growth into the table");
+        }
+        let finite = |[t, share]: &[f64; 2]| (0.0..=1e6).contains(t) && share.abs() <= 1e6;
+        if let Some(i) = points.iter().position(|point| !finite(point)) {
+            let what = format!(
+                "found {:?}, allowed: a time from 0 to 1e6 s and a share from -1e6 to 1e6",
+                points[i]
+            );
+            self.conflict(
+                format!("{at}.{i}"),
+                what,
+                "give each point as [time in seconds, share of the full value]",
+            );
+        }
+        if let Some(i) = (1..points.len()).find(|&i| points[i][0] <= points[i - 1][0]) {
+            let what = format!("the time {} does not lie above {}", points[i][0], points[i - 1][0]);
+            self.conflict(format!("{at}.{i}"), what, "let the times rise");
+        }
+        Course::table(points.to_vec())
     }
 
     fn region(&mut self, at: &str, raw: &RawWhere) -> Region {

@@ -5,6 +5,7 @@ use scindo_collision::Method;
 use scindo_physics::octree::AdaptSettings;
 use scindo_physics::operator::Held;
 
+use super::course::Course;
 use super::mechanics::Mechanics;
 use crate::inputs::{ToolMode, ToolShape};
 use crate::mesh_in::Organ;
@@ -75,12 +76,19 @@ pub struct BodySpec {
     pub velocity_m_s: Vector3<f64>,
     /// Held parts.
     pub fixes: Vec<FixSpec>,
-    /// Time over which displacements of held parts grow to their prescribed values [s].
-    pub displacement_over_s: f64,
-    /// Constant loads.
+    /// What share of the displacements of held parts is reached when.
+    pub displacement: Course,
+    /// Loads.
     pub loads: Vec<LoadSpec>,
     /// How it is drawn.
     pub look: LookSpec,
+}
+
+impl BodySpec {
+    /// From when on displacements and loads no longer change [s].
+    pub fn settled_s(&self) -> f64 {
+        self.loads.iter().map(|load| load.course.end_s()).fold(self.displacement.end_s(), f64::max)
+    }
 }
 
 /// Cells of an octree.
@@ -263,6 +271,8 @@ pub struct LoadSpec {
     pub force_n: Vector3<f64>,
     /// How it is shared; none: by area where possible, else by volume.
     pub share: Option<Share>,
+    /// What part of it acts when.
+    pub course: Course,
 }
 
 /// How a total force is shared over nodes.

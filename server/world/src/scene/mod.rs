@@ -15,6 +15,8 @@ mod schema;
 
 mod mechanics;
 
+mod course;
+
 pub mod checked;
 
 mod check;
@@ -30,6 +32,7 @@ pub use checked::{
     LookSpec, MaterialPlace, MaterialSpec, MeshSource, ObstacleSpec, OctreeSpec, PathPoint, ProbeSpec,
     PublishRates, Region, Share, SkinSpec, Solid, ToolSpec,
 };
+pub use course::Course;
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};
 pub use mechanics::{Mechanics, Newmark};
 pub use problem::{Fault, Place, Problem, SceneError};

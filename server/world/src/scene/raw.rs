@@ -174,7 +174,13 @@ pub struct RawBody {
     #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "1 often avoids inverted elements where a sudden \
         displacement would cause them"))]
     pub displacement_over_s: f64,
-    /// Constant loads.
+    /// In place of `displacement_over_s`, what share of every `displacement_m` is reached when: points of time [s] and
+    /// share, linear between them. The share may be negative or above 1, and is constant before the first point and after
+    /// the last.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 10000))]
+    pub displacement_table: Vec<[f64; 2]>,
+    /// Loads.
     #[serde(default)]
     pub load: Vec<RawLoad>,
     /// Appearance of the body.
@@ -364,7 +370,7 @@ pub enum RawAxes {
     Xyz,
 }
 
-/// A constant load.
+/// A load, constant or changing over time.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLoad {
@@ -376,6 +382,16 @@ pub struct RawLoad {
     /// boundary faces, otherwise by volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub share: Option<RawShare>,
+    /// Time over which the force grows from zero [s]. 0 applies it at once.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "some periods of the body's slowest vibration let it arrive \
+        without swinging"))]
+    pub ramp_s: f64,
+    /// In place of `ramp_s`, what share of the force acts when: points of time [s] and share, linear between them. The
+    /// share may be negative or above 1, and is constant before the first point and after the last.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 10000))]
+    pub table: Vec<[f64; 2]>,
 }
 
 /// How a total force is distributed over nodes.

@@ -92,7 +92,7 @@ impl Dormant {
     ) {
         let n = self.asleep.len();
         for (i, body) in bodies.iter().enumerate().take(n).filter(|(i, _)| !self.asleep[*i]) {
-            let is_quiet = time_s >= body.displacement_over_s
+            let is_quiet = time_s >= body.settled_s()
                 && !contacts.is_touched(i)
                 && !reports[i].solve.is_unconverged()
                 && is_slow(body);
