@@ -7,10 +7,11 @@
 //! variable of its own the others have g_b + λ_b g_a, which is as small as in a sound element. All
 //! measures are relative to the element: nothing depends on units.
 //!
-//! Small pieces of quadratic tetrahedra have the opposite trouble. A piece far from corner b sees the shape functions
-//! of b and of the middles between b and the corners it is close to only where they are almost linear, hence almost
-//! parallel. With λ_b = L_b, N_b + ¼ Σ_a N_ab is quadratic in the small coordinates L_b; so each of these middles is
-//! moved relative to ¼ u_b, and the condition number no longer depends on the size of the piece.
+//! Small pieces of quadratic tetrahedra have the opposite trouble. In a piece that is close to some corners a and far
+//! from others, the barycentric coordinates L_b of the far ones are small. There the shape functions of b and of the
+//! middles between a and b are almost linear in them, hence almost parallel, and some motions are far softer than their
+//! diagonal blocks. The sum N_b + ¼ Σ_a N_ab = L_b (L_b − Σ_c L_c), over the other far corners c, is quadratic. So each of
+//! these middles is moved relative to ¼ u_b, and iterations do not depend on the size of the piece.
 
 use nalgebra::Vector3;
 

@@ -59,7 +59,8 @@ impl BladeSweep {
 /// What a sweep did to the topology.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CutReport {
-    /// Copies appended, in ascending order of their id.
+    /// Copies appended to those of the mesh's nodes, in ascending order of their id; then those of nodes that the
+    /// element adds, which are numbered after all copies of the mesh's.
     pub new_copies: Vec<NewCopy>,
     /// Elements in which material was separated by this sweep.
     pub elements_cut: usize,
