@@ -47,6 +47,14 @@ class Runs(unittest.TestCase):
         self.assertLess(contact.normal[-1], stiff.contacts["script", ""].normal[-1])
         self.assertFalse(soft.folder.exists(), "without a folder nothing is left")
 
+    def test_force_over_displacement(self):
+        scene = ROOT / "server/world/scenes/tensile-test.toml"
+        results = scindo.run(scene, seconds=1.0)
+        left, right = (results.reactions["strip", fix] for fix in (0, 1))
+        np.testing.assert_allclose(right.displacement_share, np.linspace(0.05, 1.0, 20))
+        np.testing.assert_allclose(left.force, -right.force, rtol=0, atol=1e-4)
+        self.assertTrue((np.diff(right.force[:, 0]) > 0.0).all())
+
     def test_failures(self):
         scene = block()
         self.assertRaises(scindo.InvalidValue, scindo.run, scene)

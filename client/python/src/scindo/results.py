@@ -70,6 +70,17 @@ class Contact:
 
 
 @dataclass(frozen=True)
+class Reaction:
+    """What holds one place of a body, in the steps in which displacements or loads change."""
+
+    time_s: Array
+    #: Share of the prescribed displacements that is reached.
+    displacement_share: Array
+    #: Force on the body, n × 3 [N].
+    force: Array
+
+
+@dataclass(frozen=True)
 class Results:
     """What a run has written. ``solid.points`` and ``surface.points`` are the last positions."""
 
@@ -81,6 +92,8 @@ class Results:
     #: By what is pushed and what pushes it: ``contacts["block", "table"]``. What all tissue does to a tool is
     #: ``contacts["finger", ""]``.
     contacts: Dict[Tuple[str, str], Contact]
+    #: By body and number of the ``fix``, if displacements or loads change over time: ``reactions["strip", 1]``.
+    reactions: Dict[Tuple[str, int], Reaction]
     #: The material, where cut elements consist of the tetrahedra of their pieces.
     solid: Grid
     #: The surface; ``cell_data["cut_tag"]`` is 0 on the skin and the number of the cut on its faces.
@@ -109,6 +122,10 @@ class Results:
             json.loads((path / "summary.json").read_text(encoding="utf-8")),
             {key: _probe(rows) for key, rows in _table(path / "probes.csv", ("id",)).items()},
             {key: _contact(rows) for key, rows in _table(path / "contacts.csv", ("on", "by")).items()},
+            {
+                (body, int(fix)): _reaction(rows)
+                for (body, fix), rows in _table(path / "reactions.csv", ("body", "fix")).items()
+            },
             read_grid(path / "final.vtu"),
             read_grid(path / "final-surface.vtp"),
         )
@@ -174,6 +191,14 @@ def _columns(rows: List[Dict[str, str]], *names: str) -> Array:
 def _probe(rows: List[Dict[str, str]]) -> Probe:
     return Probe(
         _columns(rows, "time_s")[:, 0], _columns(rows, "x_m", "y_m", "z_m"), _columns(rows, "ux_m", "uy_m", "uz_m")
+    )
+
+
+def _reaction(rows: List[Dict[str, str]]) -> Reaction:
+    return Reaction(
+        _columns(rows, "time_s")[:, 0],
+        _columns(rows, "displacement_share")[:, 0],
+        _columns(rows, "fx_n", "fy_n", "fz_n"),
     )
 
 

@@ -374,8 +374,8 @@ impl Body {
         self.add_varying(spread("volume", &volume, force_n)?)
     }
 
-    /// Sets how much of every [varying force](Self::add_varying_surface_force) acts from now on, in the order in which they were
-    /// added. Those without an entry keep their share. Allocates nothing.
+    /// Sets how much of every [varying force](Self::add_varying_surface_force) acts from now on, in the order in which
+    /// they were added. Those without an entry keep their share. Allocates nothing.
     pub fn set_load_shares(&mut self, shares: impl Iterator<Item = f64>) {
         let mut changed = false;
         for (load, share) in self.boundary.varying.iter_mut().zip(shares) {

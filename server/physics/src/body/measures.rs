@@ -42,7 +42,8 @@ impl Body {
     }
 
     /// How the solver of the last step treated elements so flat that one of their motions is far stiffer
-    /// than the others. All 0 in a sound mesh; quadratic and hexahedral elements are not examined.
+    /// than the others. All 0 in a sound mesh. Quadratic and hexahedral elements are not examined; of cut quadratic
+    /// ones, `substituted` counts the mid-edge nodes of small pieces.
     pub fn stiff_motions(&self) -> StiffMotions {
         let [pieces, substituted, left] = self.dynamics.solver().stiff_motions();
         StiffMotions { pieces, substituted, left }
@@ -147,14 +148,26 @@ impl Body {
     /// [m/s²] and loads, without the inertia of the nodes themselves. Where a cut passes exactly through
     /// a held node, each lip has a held copy of it: all of them count.
     pub fn reaction(&self, nodes: &[u32], gravity: Vector3<f64>) -> Vector3<f64> {
+        self.reactions(std::iter::once(nodes), gravity).into_iter().sum()
+    }
+
+    /// [`reaction`](Self::reaction) of every one of some groups of nodes.
+    pub fn reactions<'a>(
+        &self,
+        groups: impl Iterator<Item = &'a [u32]>,
+        gravity: Vector3<f64>,
+    ) -> Vec<Vector3<f64>> {
         let f_int = self.internal_forces();
-        let mut sum = Vector3::zeros();
-        for fixed in self.fixed.iter().filter(|f| nodes.contains(&self.space.node_of(f.copy))) {
-            let c = fixed.copy as usize;
-            let held = f_int[c] - self.weight(c, gravity) - self.load[c];
-            sum += fixed.held.part_of(&held);
-        }
-        sum
+        let held_by = |nodes: &[u32]| {
+            let mut sum = Vector3::zeros();
+            for fixed in self.fixed.iter().filter(|f| nodes.contains(&self.space.node_of(f.copy))) {
+                let c = fixed.copy as usize;
+                let held = f_int[c] - self.weight(c, gravity) - self.load[c];
+                sum += fixed.held.part_of(&held);
+            }
+            sum
+        };
+        groups.map(held_by).collect()
     }
 
     /// Writes the position of every surface vertex [m] to `out`.

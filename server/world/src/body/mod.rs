@@ -137,6 +137,11 @@ impl SimBody {
         self.body.set_load_shares(self.loads.iter().map(|load| load.share(time_s)));
     }
 
+    /// Forces that hold the places of every `fix` of the scene [N].
+    pub(crate) fn reactions(&self, gravity_m_s2: Vector3<f64>) -> Vec<Vector3<f64>> {
+        self.body.reactions(self.fix_groups.iter().map(Vec::as_slice), gravity_m_s2)
+    }
+
     /// From when on displacements and loads no longer change [s].
     pub(crate) fn settled_s(&self) -> f64 {
         self.loads.iter().map(Course::end_s).fold(self.displacement.end_s(), f64::max)

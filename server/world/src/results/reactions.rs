@@ -1,4 +1,5 @@
-//! Forces that hold and displace places of bodies, on disk: a row per place and step.
+//! Forces that hold and displace places of bodies, on disk: a row per place and step, for as long as displacements or
+//! loads of the body change.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -21,7 +22,7 @@ impl Reactions {
     /// # Errors
     /// What the disk says.
     pub fn begin(directory: &Path, simulation: &Simulation) -> Result<Option<Self>, ResultsError> {
-        if !simulation.bodies().iter().any(changes) {
+        if !simulation.bodies().iter().any(|body| body.settled_s() > 0.0) {
             return Ok(None);
         }
         let path = directory.join("reactions.csv");
@@ -38,10 +39,12 @@ impl Reactions {
     /// What the disk says.
     pub fn record(&mut self, simulation: &Simulation) -> Result<(), ResultsError> {
         let when = (simulation.steps(), simulation.time_s());
-        for body in simulation.bodies().iter().filter(|body| changes(body)) {
+        // The step that reaches the end of a table may end an instant after it.
+        let changed = |body: &&SimBody| when.1 < body.settled_s() + simulation.scene().step_s;
+        for body in simulation.bodies().iter().filter(|body| body.settled_s() > 0.0).filter(changed) {
             let share = body.displacement.share(when.1);
-            for (fix, nodes) in body.fix_groups.iter().enumerate() {
-                let force: [f64; 3] = body.body.reaction(nodes, simulation.scene().gravity_m_s2).into();
+            for (fix, force) in body.reactions(simulation.scene().gravity_m_s2).into_iter().enumerate() {
+                let force: [f64; 3] = force.into();
                 let row = (when, &*body.id, fix, share, force);
                 self.file.serialize(row).map_err(|error| at(&self.path)(error.into()))?;
             }
@@ -56,8 +59,4 @@ impl Reactions {
     pub fn flush(&mut self) -> Result<(), ResultsError> {
         self.file.flush().map_err(at(&self.path))
     }
-}
-
-fn changes(body: &SimBody) -> bool {
-    body.settled_s() > 0.0
 }

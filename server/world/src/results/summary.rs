@@ -478,7 +478,7 @@ fn body_summary(
         largest_displacement_m: 0.0,
         kinetic_j: body.kinetic_energy(),
         elastic_j: body.elastic_energy(),
-        reactions_n: sim.fix_groups.iter().map(|nodes| body.reaction(nodes, gravity).into()).collect(),
+        reactions_n: sim.reactions(gravity).into_iter().map(Into::into).collect(),
         solver,
         mesh_error: mesh_error.map(|error| MeshErrorSummary {
             eta_sqrt_j: error.eta,
