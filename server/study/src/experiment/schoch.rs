@@ -25,8 +25,10 @@ const METHODS: [Way; 4] = [
     Way { name: "X-FEM quadratic", inside: INSIDE, element: "tet10" },
     Way { name: "pre-cut quadratic", inside: Inside::NOTHING, element: "tet10" },
 ];
-/// Meshes of quadratic elements; each has as many nodes as the linear ones of half the cell.
-const QUADRATIC: usize = 5;
+/// Degrees of the elements, two of [`METHODS`] each.
+const DEGREES: [&str; 2] = ["linear", "quadratic"];
+/// Meshes of quadratic elements, which have eight times the nodes, in a whole study and in a quick one.
+const QUADRATIC: [usize; 2] = [5, 1];
 /// Cells across the beam, 30 mm, and how they share its 5, 10, 10 and 5 mm. Strips end on lines of cells.
 const MESHES: [[usize; 4]; 8] = [
     [1, 1, 1, 1],
@@ -87,40 +89,38 @@ pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troub
         ),
         ..ExperimentResult::default()
     };
-    let all: Vec<usize> = if bench.is_quick() { QUICK.to_vec() } else { (0..MESHES.len()).collect() };
-    let total = CASES.len() * LAWS.len() * METHODS.iter().map(|way| meshes(way, &all).count()).sum::<usize>();
-    let mut orders = Table::new(
-        "Orders of convergence",
-        "The slope of the error over the size of cells, fitted to all meshes in logarithms; the front of a cut, where \
-         stress is singular, allows 1 for elements of any degree. Finest errors are those of the finest mesh that both \
-         methods solved, and the ratio is that of these. References of test cases 1 and 2 are stored solutions by hexahedra of order 3 and 4; that of \
-         test case 3 is the limit of the three finest pre-cut meshes, which favours these.",
-        &[
-            ("order, X-FEM", Unit::Number),
-            ("order, pre-cut", Unit::Number),
-            ("finest error, X-FEM", Unit::Number),
-            ("finest error, pre-cut", Unit::Number),
-            ("X-FEM over pre-cut", Unit::Times),
-            ("order, X-FEM quadratic", Unit::Number),
-            ("order, pre-cut quadratic", Unit::Number),
-            ("finest error, X-FEM quadratic", Unit::Number),
-            ("finest error, pre-cut quadratic", Unit::Number),
-            ("X-FEM over pre-cut, quadratic", Unit::Times),
-            ("± of the reference", Unit::Number),
-        ],
-    );
-    let mut points = Table::new(
-        "Errors",
-        "Every run that gave a result.",
-        &[
-            ("degrees of freedom", Unit::Count),
-            ("error, X-FEM", Unit::Number),
-            ("error, pre-cut", Unit::Number),
-            ("degrees of freedom, quadratic", Unit::Count),
-            ("error, X-FEM quadratic", Unit::Number),
-            ("error, pre-cut quadratic", Unit::Number),
-        ],
-    );
+    let all = |way: &Way| meshes(way, bench.is_quick());
+    let of_ways: Vec<Vec<usize>> = METHODS.iter().map(all).collect();
+    let total = CASES.len() * LAWS.len() * of_ways.iter().map(Vec::len).sum::<usize>();
+    let mut orders = DEGREES.map(|degree| {
+        Table::new(
+            &format!("Orders of convergence, {degree} elements"),
+            "The slope of the error over the size of cells, fitted to all meshes in logarithms; the front of a cut, where \
+             stress is singular, allows 1 for elements of any degree. Finest errors are those of the finest mesh that both \
+             methods solved, and the ratio is that of these. References of test cases 1 and 2 are stored solutions by \
+             hexahedra of order 3 and 4; that of test case 3 is the limit of the three finest pre-cut meshes of linear \
+             elements, which favours these.",
+            &[
+                ("order, X-FEM", Unit::Number),
+                ("order, pre-cut", Unit::Number),
+                ("finest error, X-FEM", Unit::Number),
+                ("finest error, pre-cut", Unit::Number),
+                ("X-FEM over pre-cut", Unit::Times),
+                ("± of the reference", Unit::Number),
+            ],
+        )
+    });
+    let mut points = DEGREES.map(|degree| {
+        Table::new(
+            &format!("Errors, {degree} elements"),
+            "Every run that gave a result.",
+            &[
+                ("degrees of freedom", Unit::Count),
+                ("error, X-FEM", Unit::Number),
+                ("error, pre-cut", Unit::Number),
+            ],
+        )
+    });
     let mut plots = Plots { caption: "Error over degrees of freedom.".into(), ..Plots::default() };
     for (case, pull) in CASES {
         let mut chart = Chart::new(case, "degrees of freedom [log₁₀]", "error");
@@ -128,9 +128,9 @@ pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troub
         for law in LAWS {
             let name = format!("{case} {law}");
             let mut runs = Vec::new();
-            for way in &METHODS {
+            for (way, meshes) in METHODS.iter().zip(&of_ways) {
                 let mut of_way = Vec::new();
-                for mesh in meshes(way, &all) {
+                for &mesh in meshes {
                     let what = format!("{name}, {}, {} cells across", way.name, cells(mesh));
                     bench.begin(what.clone(), total)?;
                     let run = run(bench, pull, law, mesh, way)?;
@@ -146,50 +146,48 @@ pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troub
                 continue;
             };
             let courses: Vec<Vec<Point>> = runs.iter().map(|runs| course(runs, &truth)).collect();
-            for (way, course) in METHODS.iter().zip(&courses) {
+            for (way, course) in METHODS.iter().zip(&courses).filter(|(_, course)| course.len() > 1) {
                 let points = course.iter().map(|point| [point.unknowns.log10(), point.error]).collect();
                 chart.lines.push(Line { name: format!("{law}, {}", way.name), points });
             }
-            let pairs: Vec<&[Vec<Point>]> = courses.chunks(2).collect();
-            let mut row: Vec<Option<f64>> =
-                pairs.iter().flat_map(|pair| summary(&pair[0], &pair[1])).collect();
-            row.push(Some(error_bar));
-            orders.row(&*name, &row);
-            for &mesh in &all {
-                let row: Vec<Option<f64>> =
-                    pairs.iter().flat_map(|pair| at_mesh(mesh, &pair[0], &pair[1])).collect();
-                points.row(format!("{name}, {} across", cells(mesh)), &row);
+            // Each degree has a course of X-FEM and one of pre-cut meshes.
+            for (degree, pair) in courses.chunks(2).enumerate() {
+                let (xfem, precut) = (&pair[0], &pair[1]);
+                let [of_xfem, of_precut] = [slope(xfem), slope(precut)];
+                let both = |mesh: usize| Some((at(xfem, mesh)?.error, at(precut, mesh)?.error));
+                let finest = (0..MESHES.len()).rev().find_map(both);
+                let [xfem_error, precut_error] = [finest.map(|both| both.0), finest.map(|both| both.1)];
+                let ratio = finest.map(|(xfem, precut)| xfem / precut);
+                let row = [of_xfem, of_precut, xfem_error, precut_error, ratio, Some(error_bar)];
+                orders[degree].row(&*name, &row);
+                for &mesh in &of_ways[2 * degree] {
+                    let [xfem, precut] = [at(xfem, mesh), at(precut, mesh)];
+                    let unknowns = xfem.or(precut).map(|point| point.unknowns);
+                    let errors = [xfem, precut].map(|point| point.map(|point| point.error));
+                    let row = [unknowns, errors[0], errors[1]];
+                    points[degree].row(format!("{name}, {} across", cells(mesh)), &row);
+                }
             }
         }
         plots.charts.push(chart);
     }
     result.plots.push(plots);
-    result.tables.extend([orders, points]);
+    result.tables.extend(orders.into_iter().chain(points));
     Ok(result)
 }
 
-/// Orders of two courses, their errors on the finest mesh that both have, and the ratio of these.
-fn summary(xfem: &[Point], precut: &[Point]) -> [Option<f64>; 5] {
-    let both = |mesh: usize| Some((at(xfem, mesh)?.error, at(precut, mesh)?.error));
-    let finest = (0..MESHES.len()).rev().find_map(both);
-    let [of_xfem, of_precut] = [finest.map(|both| both.0), finest.map(|both| both.1)];
-    [slope(xfem), slope(precut), of_xfem, of_precut, finest.map(|(xfem, precut)| xfem / precut)]
-}
-
-/// Degrees of freedom and errors of two courses on a mesh.
-fn at_mesh(mesh: usize, xfem: &[Point], precut: &[Point]) -> [Option<f64>; 3] {
-    let (xfem, precut) = (at(xfem, mesh), at(precut, mesh));
-    [xfem.or(precut).map(|p| p.unknowns), xfem.map(|p| p.error), precut.map(|p| p.error)]
-}
-
+/// The point of a course on a mesh.
 fn at(course: &[Point], mesh: usize) -> Option<&Point> {
     course.iter().find(|point| point.mesh == mesh)
 }
 
-/// The meshes among `all` that are solved in a way.
-fn meshes(way: &Way, all: &[usize]) -> impl Iterator<Item = usize> {
-    let most = if way.element == "tet10" { QUADRATIC } else { MESHES.len() };
-    all.iter().copied().filter(move |&mesh| mesh < most)
+/// The meshes that are solved in a way.
+fn meshes(way: &Way, quick: bool) -> Vec<usize> {
+    match (way.element, quick) {
+        ("tet10", quick) => (0..QUADRATIC[usize::from(quick)]).collect(),
+        (_, true) => QUICK.to_vec(),
+        (_, false) => (0..MESHES.len()).collect(),
+    }
 }
 
 /// Cells across the beam.
