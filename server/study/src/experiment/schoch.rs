@@ -85,7 +85,8 @@ pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troub
              a strip, because a line that is moved has no limit in three dimensions. Test case 3: two strips of its end are \
              moved apart and sideways, by {PART} of what is printed; at all of it elements at the ends of the strips turn \
              inside out. For `X-FEM` the plane of the cut and its front lie a third of a cell inside elements; the mesh of \
-             `pre-cut` has faces there. The paper has linear elements; quadratic ones are run on the coarser meshes. Errors are ‖u − u*‖/‖u*‖ over 24 points of the beam.",
+             `pre-cut` has faces there. The paper has linear elements; quadratic ones are run on the coarser meshes. \
+             Errors are ‖u − u*‖/‖u*‖ over 24 points of the beam.",
         ),
         ..ExperimentResult::default()
     };
@@ -96,7 +97,7 @@ pub fn schoch(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troub
         Table::new(
             &format!("Orders of convergence, {degree} elements"),
             "The slope of the error over the size of cells, fitted to all meshes in logarithms; the front of a cut, where \
-             stress is singular, allows 1 for elements of any degree. Finest errors are those of the finest mesh that both \
+             stress is singular, allows 1 in the limit for elements of any degree. Finest errors are those of the finest mesh that both \
              methods solved, and the ratio is that of these. References of test cases 1 and 2 are stored solutions by \
              hexahedra of order 3 and 4; that of test case 3 is the limit of the three finest pre-cut meshes of linear \
              elements, which favours these.",
