@@ -6,7 +6,7 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use crate::{DOWN, SOFT, cube, left_face, settings};
+use crate::{DOWN, SOFT, cube, left_face, settings, tumbling_blade};
 
 /// A blade along z that sweeps the plane x = `at` through a body of 0.1 m.
 fn slice(at: f64, from_y: f64, to_y: f64) -> BladeSweep {
@@ -247,14 +247,7 @@ fn thirty_cuts_in_all_directions_while_the_body_moves() {
     body.fix(&clamp, [true; 3], Vector3::zeros()).unwrap();
     let mass = body.total_mass();
     for k in 0..30_u32 {
-        let t = f64::from(k);
-        let normal = Vector3::new((1.3 * t).sin(), (2.1 * t).cos(), (0.7 * t + 1.0).sin()).normalize();
-        let along = normal.cross(&Vector3::new(0.3, 0.5, -0.8)).normalize();
-        let across = normal.cross(&along);
-        let centre = body.centre_of_mass() + 0.03 * (0.9 * t).sin() * normal;
-        let segment = |s: f64| [centre + s * along - 0.06 * across, centre + s * along + 0.06 * across];
-        let blade = BladeSweep { segments: vec![segment(-0.06), segment(-0.02), segment(0.03)] };
-        body.cut(&blade, k + 1).unwrap();
+        body.cut(&tumbling_blade(&body, k), k + 1).unwrap();
         for _ in 0..4 {
             let report = body.step(0.01, DOWN, &[]);
             assert_eq!(

@@ -36,6 +36,7 @@ mod verdicts;
 
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, PcgSettings};
+use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 
@@ -71,6 +72,17 @@ pub fn cube(cells: usize, material: Material, settings: BodySettings) -> Body {
 pub fn left_face(body: &Body) -> Vec<u32> {
     let nodes = &body.rest_positions()[..body.n_copies()];
     (0..nodes.len() as u32).filter(|&n| nodes[n as usize].x == 0.0).collect()
+}
+
+/// Blade number `k` of many in all directions, through the middle of a body of 0.1 m where it is now.
+pub fn tumbling_blade(body: &Body, k: u32) -> BladeSweep {
+    let t = f64::from(k);
+    let normal = Vector3::new((1.3 * t).sin(), (2.1 * t).cos(), (0.7 * t + 1.0).sin()).normalize();
+    let along = normal.cross(&Vector3::new(0.3, 0.5, -0.8)).normalize();
+    let across = normal.cross(&along);
+    let centre = body.centre_of_mass() + 0.03 * (0.9 * t).sin() * normal;
+    let segment = |s: f64| [centre + s * along - 0.06 * across, centre + s * along + 0.06 * across];
+    BladeSweep { segments: vec![segment(-0.06), segment(-0.02), segment(0.03)] }
 }
 
 /// Largest distance between the nodes of two bodies [m].
