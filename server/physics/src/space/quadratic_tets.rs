@@ -153,13 +153,11 @@ impl QuadraticTets {
     /// Sums the volumes of the copies of mid-edge nodes.
     fn measure(&mut self, cut: &CutMesh) {
         let mut volumes = vec![0.0; self.middles.edge.len()];
-        for p in 0..cut.pieces().len() {
-            let QuadraticPiece { points, volume, .. } = self.piece(cut, p);
-            for (xi, w) in &points {
-                let N = tet10::shape(xi);
-                for (&middle, N) in self.middles.of_piece[p].iter().zip(&N[4..]) {
-                    volumes[middle as usize] += w * volume * N;
-                }
+        for (p, middles) in self.middles.of_piece.iter().enumerate() {
+            let linear = cut.piece_node_products(p);
+            for (&middle, [a, b]) in middles.iter().zip(TET_EDGES) {
+                // N = 4 L_a L_b.
+                volumes[middle as usize] += 4.0 * linear[a][b];
             }
         }
         self.volumes = volumes;
