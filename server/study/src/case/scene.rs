@@ -103,9 +103,9 @@ fn protocol(scene: &CheckedScene, of: Subject<'_>, wishes: Wishes<'_>) -> (Proto
     (Protocol::Motion { frame_s, frames: most }, fewest)
 }
 
-/// Ways to the reference, best first. Quadratic tetrahedra converge faster, so they precede the scene's own
-/// element; where a scene cuts, the front of the cut limits both, and the cheaper element comes first. Second order in time precedes the scene's own integrator. Ways that the scene's check refuses
-/// drop out when they are tried.
+/// Ways to the reference, best first. Quadratic tetrahedra converge faster, so they precede the scene's own element;
+/// where a scene cuts, the front of the cut limits both, and the cheaper element comes first. Second order in time
+/// precedes the scene's own integrator. Ways that the scene's check refuses drop out when they are tried.
 fn ladders(of: Subject<'_>, axes: &[Axis]) -> Vec<Ladder> {
     let own = Configuration::base(axes);
     let explicit = of.scene.bodies.iter().any(|body| body.mechanics.integrator.is_explicit());
