@@ -36,6 +36,7 @@ use std::sync::atomic::AtomicBool;
 use nalgebra::Vector3;
 
 pub use crate::assembly::{ElementKind, Volumetric};
+pub use crate::cut::FrontRule;
 use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::integrator::{
     Dynamics, LinearlyImplicit, LocalConnectivity, LooseParts, ModelSolver, State, StepInputs, StepSolver,
@@ -145,6 +146,7 @@ impl Body {
             }
         };
         tets.set_exact(!settings.ablation.exact_predicates);
+        tets.set_front_rule(settings.front);
         Self::at_rest(Box::new(tets), material, settings)
     }
 
@@ -168,6 +170,7 @@ impl Body {
         };
         tets.set_regions(regions)?;
         tets.set_exact(!settings.ablation.exact_predicates);
+        tets.set_front_rule(settings.front);
         Self::of_space(Box::new(tets), material, settings)
     }
 

@@ -2,6 +2,7 @@
 
 use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
 use crate::assembly::{ElementKind, Volumetric};
+use crate::cut::FrontRule;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::Law;
 use crate::operator::OperatorChoice;
@@ -58,6 +59,8 @@ pub struct BodySettings {
     pub newton_steps: Option<u32>,
     /// Inside elements or along their faces.
     pub cutting: CuttingMethod,
+    /// How far a cut inside elements goes on ahead of the blade.
+    pub front: FrontRule,
     /// What happens to parts that a cut leaves without a held node.
     pub loose: LooseRule,
     /// Parts of the method that are switched off; only for checking the tests themselves.
@@ -108,6 +111,7 @@ impl Default for BodySettings {
             arithmetic: None,
             newton_steps: None,
             cutting: CuttingMethod::Xfem,
+            front: FrontRule::default(),
             loose: LooseRule::Free,
             ablation: Ablation::default(),
         }

@@ -15,6 +15,7 @@ use super::sweep::bit_marks::Ascending;
 use super::sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, Work};
 use super::sweep::detect::{Deformed, Detector, Place, Record};
 use super::sweep::front::{Front, Surroundings, sweep_triangles};
+use super::sweep::front_elements::{FrontElements, Meeting};
 use super::sweep::separate::{Separator, Sheet};
 use super::sweep::sweep_triangle::SweepTriangle;
 use super::topology::components::Components;
@@ -70,6 +71,8 @@ pub struct CutMesh {
     order: Ascending,
     epoch: u32,
     inexact: bool,
+    front_reach: f64,
+    front_elements: FrontElements,
 }
 
 impl CutMesh {
@@ -77,6 +80,12 @@ impl CutMesh {
     #[doc(hidden)]
     pub fn set_exact(&mut self, exact: bool) {
         self.inexact = !exact;
+    }
+
+    /// Sets how far incisions go on ahead of the blade, over the mean length of an element's edges; see
+    /// [`FrontRule`](super::FrontRule). They do not go ahead unless this is called.
+    pub fn set_front_reach(&mut self, reach: f64) {
+        self.front_reach = reach;
     }
 
     /// The uncut state of a mesh.
@@ -124,6 +133,8 @@ impl CutMesh {
             order: Ascending::default(),
             epoch,
             inexact: false,
+            front_reach: 0.0,
+            front_elements: FrontElements::default(),
         })
     }
 
@@ -279,9 +290,9 @@ impl CutMesh {
 
     /// Undoes all cuts. The epoch keeps rising.
     pub fn reset(&mut self) -> Result<(), MeshError> {
-        let (epoch, inexact) = (self.epoch + 1, self.inexact);
+        let (epoch, inexact, front_reach) = (self.epoch + 1, self.inexact, self.front_reach);
         *self = Self::new(std::mem::take(&mut self.mesh))?;
-        (self.epoch, self.inexact) = (epoch, inexact);
+        (self.epoch, self.inexact, self.front_reach) = (epoch, inexact, front_reach);
         Ok(())
     }
 
@@ -299,7 +310,7 @@ impl CutMesh {
         let mut sweep = self.begin_sweep(x, blade, incision, CutLimits::NONE)?;
         let mut work = Work::unlimited();
         self.detect(x, &mut sweep, &mut work);
-        Ok(self.complete(sweep, &mut work))
+        Ok(self.complete(x, sweep, &mut work))
     }
 
     /// Begins a sweep that is taken in parts. [`sweep`](Self::sweep) does the same in one call. Next come
@@ -348,13 +359,18 @@ impl CutMesh {
         self.detector.run(&body, &sweep.triangles, &mut record, (&mut sweep.place, work))
     }
 
-    /// Separates everything that the detection found to be cut, in one call.
-    pub fn complete(&mut self, sweep: SweepUnderWay, work: &mut Work) -> CutReport {
-        let SweepUnderWay { incision, most_fragments, .. } = sweep;
+    /// Separates everything that the detection found to be cut, in one call, with the positions `x` [m] the sweep began
+    /// with.
+    pub fn complete(&mut self, x: &[Vector3<f64>], sweep: SweepUnderWay, work: &mut Work) -> CutReport {
+        let SweepUnderWay { triangles, incision, most_fragments, .. } = sweep;
         let (fragments, sets, crossings) = (&mut self.fragments, &mut self.sets, &mut self.crossings);
         let (waiting, traces) = (&mut self.pending, &mut self.traces);
         let mut sheet = Sheet { fragments, sets, crossings, waiting, traces, incision, most_fragments };
-        self.separator.run(&self.detector.touched, &mut sheet);
+        let body = Deformed { mesh: &self.mesh, pieces: &self.pieces, x };
+        let meeting = Meeting { body: &body, triangles: &triangles, incision };
+        let (ahead, reach) = (&mut self.front_elements, self.front_reach);
+        let front = (reach > 0.0).then_some((ahead, reach, meeting));
+        self.separator.run(&self.detector.touched, front, &mut sheet);
         let report = self.follow_separation();
         if !self.traces.is_empty() {
             let opened = self.builder.faces_beside_lips(&self.surface, incision);

@@ -44,6 +44,7 @@ pub use shell::surface::Surface;
 pub use solid::{Solid, SolidCells, SolidOrigin};
 pub use sweep::blade::{BladeSweep, CutError, CutLimits, CutReport, MAX_SEGMENTS, Work};
 pub(crate) use sweep::front::{Front, Surroundings, sweep_from_behind, sweep_triangles};
+pub use sweep::front_elements::FrontRule;
 pub(crate) use sweep::sweep_triangle::SweepTriangle;
 pub use sweep::swept_area::swept_area;
 pub use topology::components::Components;

@@ -9,8 +9,8 @@ use super::deepest::{self, Bounds, deepest_of};
 use super::{Element, Hexahedra, LinearTets, QuadraticTets, RestPoint, Space, VisitPiece};
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{
-    BladeSweep, Components, CutError, CutLimits, CutMesh, CutReport, Flaws, IncisionMark, Piece, Solid,
-    Surface, SweepUnderWay, Work, swept_area,
+    BladeSweep, Components, CutError, CutLimits, CutMesh, CutReport, Flaws, FrontRule, IncisionMark, Piece,
+    Solid, Surface, SweepUnderWay, Work, swept_area,
 };
 use crate::element::{MaterialPoint, Point, Points, Simd};
 use crate::material::{Lame, Material, Region, Regions, RegionsError};
@@ -106,6 +106,11 @@ impl Tets {
     #[doc(hidden)]
     pub fn set_exact(&mut self, exact: bool) {
         self.cut.set_exact(exact);
+    }
+
+    /// Says how far incisions go on ahead of the blade.
+    pub fn set_front_rule(&mut self, rule: FrontRule) {
+        self.cut.set_front_reach(rule.reach(self.kind()));
     }
 
     /// Whether these are linear tetrahedra.
@@ -443,7 +448,7 @@ impl Space for Tets {
             self.under_way = Some((sweep, x));
             return None;
         }
-        let report = self.cut.complete(sweep, work);
+        let report = self.cut.complete(&x, sweep, work);
         Some(self.follow_cut(report))
     }
 

@@ -1,5 +1,6 @@
 //! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes; on methods of
-//! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); on ways to cut; and on threads.
+//! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); on ways to cut;
+//! on fronts of cuts; and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -52,6 +53,8 @@ mod schoch;
 
 mod slits;
 
+mod front;
+
 pub use bench::ExperimentBench;
 pub use result::{Column, ExperimentResult, Picture, Plots, Row, Table, Unit};
 
@@ -62,7 +65,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 13] = [
+pub const NAMES: [&str; 14] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -76,6 +79,7 @@ pub const NAMES: [&str; 13] = [
     "nienhuys",
     "schoch",
     "slits",
+    "front",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -98,6 +102,7 @@ fn find(name: &str) -> Option<Experiment> {
         "nienhuys" => Some(nienhuys::nienhuys),
         "schoch" => Some(schoch::schoch),
         "slits" => Some(slits::slits),
+        "front" => Some(front::front),
         _ => None,
     }
 }

@@ -1,14 +1,14 @@
 //! How a body is computed: the words of a scene, and the settings of a body that they stand for.
 
 use scindo_physics::body::{
-    Arithmetic, BodySettings, CuttingMethod, ElementKind, LooseRule, MassKind, Method, OperatorChoice,
-    PcgSettings, Scheme, Volumetric,
+    Arithmetic, BodySettings, CuttingMethod, ElementKind, FrontRule, LooseRule, MassKind, Method,
+    OperatorChoice, PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::material::Law;
 
 use super::raw::{
-    RawCutMethod, RawElement, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawOperator,
-    RawPrecision,
+    RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod,
+    RawOperator, RawPrecision,
 };
 
 /// Share of the volumetric energy that node averaging leaves with the elements, against checkerboards.
@@ -59,6 +59,8 @@ pub struct Mechanics {
     pub tolerance: f64,
     /// How cuts are made.
     pub cutting: RawCutMethod,
+    /// How far a cut goes on ahead of the blade; none: as by default.
+    pub front: Option<RawFront>,
     /// What becomes of parts without a held node.
     pub loose: RawLoose,
 }
@@ -179,6 +181,10 @@ impl Mechanics {
                 RawCutMethod::Snap => CuttingMethod::Snap,
                 RawCutMethod::Subdivide => CuttingMethod::Subdivide,
                 RawCutMethod::Remove => CuttingMethod::Remove,
+            },
+            front: match self.front {
+                None | Some(RawFront::Calibrated) => FrontRule::Calibrated,
+                Some(RawFront::Behind) => FrontRule::Behind,
             },
             loose: match self.loose {
                 RawLoose::Free => LooseRule::Free,

@@ -506,7 +506,7 @@ pub struct RawCut {
     pub path_m: Option<Vec<Vec3>>,
     /// Depth of the incision below the skin along `path_m` [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "only elements that the blade crosses completely open"))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "the cut ends with the elements around this depth"))]
     pub depth_m: Option<f64>,
 }
 
@@ -528,6 +528,16 @@ pub enum RawCutMethod {
     Links,
 }
 
+/// How far a cut goes on ahead of the blade.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawFront {
+    /// By a share of the size of elements that makes up for those that do not open.
+    Calibrated,
+    /// Not at all.
+    Behind,
+}
+
 /// How cuts act on a body.
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -537,6 +547,11 @@ pub struct RawCutting {
     /// Default: `links` for `octree`, otherwise `xfem`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<RawCutMethod>,
+    /// How far a cut goes on ahead of the blade. `calibrated`: by a share of the size of elements that makes up for those
+    /// at the front that do not open, so that the body opens as far as it should. `behind`: not at all; no element is
+    /// cut before the blade has left it, and the body is too stiff. Needs the method `xfem`. Default: `calibrated`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub front: Option<RawFront>,
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs
     /// the method `snap`.
     pub loose: RawLoose,

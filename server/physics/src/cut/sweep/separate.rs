@@ -13,6 +13,7 @@ use crate::lists::reserve::reserved;
 use crate::mesh::{TET_EDGES, TET_FACES};
 
 use super::bit_marks::{Ascending, BitMarks};
+use super::front_elements::{FrontElements, Meeting, State};
 use crate::cut::drawn::pending::Pending;
 use crate::cut::drawn::traces::{Bisection, Traces};
 use crate::cut::topology::crossings::{Crossings, EdgeSet, SNAP, edge_key};
@@ -102,8 +103,14 @@ impl Separator {
         }
     }
 
-    /// Separates what the sheet cuts completely, among the `touched` fragments and their neighbours.
-    pub fn run(&mut self, touched: &[u32], sheet: &mut Sheet) {
+    /// Separates what the sheet cuts completely, among the `touched` fragments and their neighbours. If it has a `front`,
+    /// it first goes on ahead of the blade, by the given reach.
+    pub fn run(
+        &mut self,
+        touched: &[u32],
+        front: Option<(&mut FrontElements, f64, Meeting<'_>)>,
+        sheet: &mut Sheet,
+    ) {
         self.elements.clear();
         self.changed.clear();
         self.moved.clear();
@@ -115,6 +122,16 @@ impl Separator {
         self.marks.restart(sheet.fragments.tets.len());
         self.active.clear();
         touched.iter().for_each(|&t| self.look_at_later(t));
+        self.bisect_queued(sheet);
+        if let Some((front, reach, meeting)) = front {
+            self.go_ahead(front, reach, &meeting, sheet);
+        }
+        self.open_faces(sheet);
+        self.count_pending(sheet);
+    }
+
+    /// Bisects queued fragments, and those that this queues, until the sheet cuts none of them completely.
+    fn bisect_queued(&mut self, sheet: &mut Sheet) {
         while let Some(t) = self.queue.pop_front() {
             while let Some((a, b, s)) = self.edge_to_bisect(t, sheet) {
                 if !self.bisect(t, [a, b], s, sheet) {
@@ -123,8 +140,24 @@ impl Separator {
             }
             self.marks.remove(t, QUEUED);
         }
-        self.open_faces(sheet);
-        self.count_pending(sheet);
+    }
+
+    /// Crosses edges ahead of the blade, from the pieces with active fragments.
+    fn go_ahead(&mut self, front: &mut FrontElements, reach: f64, meeting: &Meeting<'_>, sheet: &mut Sheet) {
+        let mut pieces: Vec<u32> = self.active.iter().map(|&t| sheet.fragments.piece[t as usize]).collect();
+        self.order.sort(&mut pieces);
+        for p in pieces {
+            let state =
+                State { fragments: &*sheet.fragments, sets: &*sheet.sets, crossings: &*sheet.crossings };
+            for (t, [a, b], s) in front.look_at(p, reach, meeting, state) {
+                sheet.crossings.insert(a, b, sheet.incision, s);
+                sheet.fragments.wedge(t, a, b, &mut self.wedge);
+                let around = std::mem::take(&mut self.wedge);
+                around.iter().for_each(|&t| self.look_at_later(t));
+                self.wedge = around;
+            }
+            self.bisect_queued(sheet);
+        }
     }
 
     /// Queues fragment `t`, unless it is queued already.

@@ -5,6 +5,7 @@ mod planes;
 mod kinds;
 mod branches;
 mod growth;
+mod fronts;
 mod parts;
 mod random;
 mod refusals;

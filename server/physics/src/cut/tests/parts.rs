@@ -33,7 +33,7 @@ fn sweep_in_parts(body: &mut Body, blade: &BladeSweep, incision: u32, fragments:
     while !body.cut.detect(&body.x, &mut sweep, &mut Work::new(fragments)) {
         parts += 1;
     }
-    let report = body.cut.complete(sweep, &mut Work::unlimited());
+    let report = body.cut.complete(&body.x, sweep, &mut Work::unlimited());
     for new in &report.new_copies {
         body.x.push(body.x[new.parent as usize]);
     }
@@ -71,7 +71,7 @@ fn a_body_takes_no_more_fragments_than_it_may_hold() {
         match body.cut.begin_sweep(&body.x, &blade, incision, limits) {
             Ok(mut sweep) => {
                 assert!(body.cut.detect(&body.x, &mut sweep, &mut Work::unlimited()));
-                let report = body.cut.complete(sweep, &mut Work::unlimited());
+                let report = body.cut.complete(&body.x, sweep, &mut Work::unlimited());
                 report.new_copies.iter().for_each(|new| body.x.push(body.x[new.parent as usize]));
                 refused += report.refused_edges;
             }

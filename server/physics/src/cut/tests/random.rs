@@ -21,12 +21,13 @@ fn twenty_random_planes_through_one_ring() {
 
 /// Random sweeps of random blades through one body, some continued, some exactly on lattice planes,
 /// while the copies move at random; all checks after every `check_every` sweeps.
-fn cut_at_random(seed: u64, sweeps: u32, check_every: u32) {
+fn cut_at_random(seed: u64, sweeps: u32, check_every: u32, reach: f64) {
     let mut random = Random(1000 + seed);
     let pattern =
         if seed.is_multiple_of(2) { BoxPattern::Tet6 } else { BoxPattern::Tet5 { parity: seed % 4 == 1 } };
     let cells = 2 + seed as usize % 3;
     let mut body = Body::new([1.0; 3], [cells; 3], pattern);
+    body.cut.set_front_reach(reach);
     let mut refused = 0;
     for k in 0..sweeps {
         let [mut tip, mut heel] = [random.vector(0.9), random.vector(0.9)].map(|r| r + Vector3::repeat(0.5));
@@ -56,7 +57,8 @@ fn cut_at_random(seed: u64, sweeps: u32, check_every: u32) {
 #[test]
 fn random_sweeps_keep_everything_whole() {
     for seed in 0..60 {
-        cut_at_random(seed, 12, 1);
+        cut_at_random(seed, 12, 1, 0.0);
+        cut_at_random(seed, 12, 1, 0.7);
     }
 }
 
@@ -66,7 +68,7 @@ fn random_sweeps_keep_everything_whole() {
 fn fifty_random_sweeps_through_each_body() {
     let bodies = if std::env::var_os("SCINDO_LONG_TESTS").is_some() { 200 } else { 4 };
     for seed in 0..bodies {
-        cut_at_random(10_000 + seed, 50, 10);
+        cut_at_random(10_000 + seed, 50, 10, 0.0);
     }
 }
 

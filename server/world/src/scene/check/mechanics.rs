@@ -28,6 +28,7 @@ impl Check<'_> {
             fixed_iterations: body.solver.fixed_iterations,
             tolerance: body.solver.tolerance,
             cutting: body.cut_method(),
+            front: body.cutting.front,
             loose: body.cutting.loose,
         }
         .with_method();
@@ -56,6 +57,14 @@ impl Check<'_> {
         if m.cutting.changes_mesh() && m.element != RawElement::Tet4 {
             let what = format!("found `{}` with {}, allowed: tet4", word(&m.cutting), word(&m.element));
             self.conflict(key, what, "choose tet4, whose mesh can be cut, or remove cutting.method");
+        }
+        if m.front.is_some() && m.cutting != RawCutMethod::Xfem {
+            let found = word(&m.cutting);
+            let what = format!(
+                "found cutting.front with cutting.method = `{found}`, whose fronts lie on faces; allowed: xfem"
+            );
+            let next = "remove cutting.front, or write cutting.method = \"xfem\"";
+            self.conflict(format!("{at}.cutting.front"), what, next);
         }
         if m.loose == RawLoose::Pinned && !m.cutting.changes_mesh() {
             let what = format!("found `pinned` with {}, allowed: snap", word(&m.cutting));
