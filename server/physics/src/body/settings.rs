@@ -5,6 +5,7 @@ use crate::assembly::{ElementKind, Volumetric};
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::Law;
 use crate::operator::OperatorChoice;
+use crate::snap::SnapSettings;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// Settings that are chosen when a body is made.
@@ -58,6 +59,8 @@ pub struct BodySettings {
     pub newton_steps: Option<u32>,
     /// Inside elements or along their faces.
     pub cutting: CuttingMethod,
+    /// What cuts along faces do besides opening them.
+    pub snap: SnapSettings,
     /// What happens to parts that a cut leaves without a held node.
     pub loose: LooseRule,
     /// Parts of the method that are switched off; only for checking the tests themselves.
@@ -108,6 +111,7 @@ impl Default for BodySettings {
             arithmetic: None,
             newton_steps: None,
             cutting: CuttingMethod::Xfem,
+            snap: SnapSettings::default(),
             loose: LooseRule::Free,
             ablation: Ablation::default(),
         }
@@ -299,6 +303,13 @@ impl BodySettings {
             }
             (CuttingMethod::Xfem, _, LooseRule::Pinned) => {
                 return refused("pinning loose parts", "cutting method xfem", "cutting method snap");
+            }
+            (method, ..) if method != CuttingMethod::Snap && self.snap != SnapSettings::default() => {
+                return refused(
+                    "a cut without moved or cleaned elements",
+                    "this cutting method",
+                    "cutting method snap",
+                );
             }
             _ => {}
         }
