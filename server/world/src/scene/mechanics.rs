@@ -5,10 +5,11 @@ use scindo_physics::body::{
     PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::material::Law;
+use scindo_physics::snap::{Moves, SnapSettings};
 
 use super::raw::{
-    RawCutMethod, RawElement, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawOperator,
-    RawPrecision,
+    RawCutMethod, RawElement, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawMoves,
+    RawOperator, RawPrecision,
 };
 
 /// Share of the volumetric energy that node averaging leaves with the elements, against checkerboards.
@@ -59,6 +60,10 @@ pub struct Mechanics {
     pub tolerance: f64,
     /// How cuts are made.
     pub cutting: RawCutMethod,
+    /// Which nodes cuts along faces move.
+    pub moves: RawMoves,
+    /// Whether cuts along faces remove degenerate elements.
+    pub clean: bool,
     /// What becomes of parts without a held node.
     pub loose: RawLoose,
 }
@@ -179,6 +184,14 @@ impl Mechanics {
                 RawCutMethod::Snap => CuttingMethod::Snap,
                 RawCutMethod::Subdivide => CuttingMethod::Subdivide,
                 RawCutMethod::Remove => CuttingMethod::Remove,
+            },
+            snap: SnapSettings {
+                moves: match self.moves {
+                    RawMoves::None => Moves::None,
+                    RawMoves::Sound => Moves::Sound,
+                    RawMoves::Press => Moves::Press,
+                },
+                clean: self.clean,
             },
             loose: match self.loose {
                 RawLoose::Free => LooseRule::Free,
