@@ -306,7 +306,7 @@ impl BodySettings {
             }
             (method, ..) if method != CuttingMethod::Snap && self.snap != SnapSettings::default() => {
                 return refused(
-                    "a cut without moved or cleaned elements",
+                    "a choice of moved nodes or of cleaning",
                     "this cutting method",
                     "cutting method snap",
                 );

@@ -48,6 +48,8 @@ mod threads;
 
 mod nienhuys;
 
+mod nienhuys_cut;
+
 mod schoch;
 
 mod slits;
@@ -62,7 +64,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 13] = [
+pub const NAMES: [&str; 14] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -74,6 +76,7 @@ pub const NAMES: [&str; 13] = [
     "collision",
     "threads",
     "nienhuys",
+    "nienhuys-cut",
     "schoch",
     "slits",
 ];
@@ -96,6 +99,7 @@ fn find(name: &str) -> Option<Experiment> {
         "collision" => Some(collision::collision),
         "threads" => Some(threads::threads),
         "nienhuys" => Some(nienhuys::nienhuys),
+        "nienhuys-cut" => Some(nienhuys_cut::cuts),
         "schoch" => Some(schoch::schoch),
         "slits" => Some(slits::slits),
         _ => None,
