@@ -135,6 +135,14 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
         &with("cutting = { loose = \"pinned\" }"),
         &["found `pinned` with xfem, allowed: snap", "cutting.method"],
     );
+    assert_says(
+        &with("cutting = { moves = \"press\" }"),
+        &["body.beam.cutting.moves", "found with xfem, allowed: snap", "remove moves"],
+    );
+    assert_says(
+        &with("cutting = { method = \"remove\", clean = false }"),
+        &["body.beam.cutting.clean", "found with remove, allowed: snap", "remove clean"],
+    );
     for (line, needed) in [
         ("integrator = \"rk4\"", "an implicit integrator of motion"),
         ("law = \"stvk\"", "steps by linear solves in single precision"),

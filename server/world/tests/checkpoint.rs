@@ -175,7 +175,14 @@ fn blades_forceps_and_scripts_go_on() {
 
 #[test]
 fn every_way_of_computing_goes_on() {
-    for name in ["ringing-bar", "swinging-bar", "relaxing-block", "fingertip", "half-cut-equilibrium"] {
+    for name in [
+        "ringing-bar",
+        "swinging-bar",
+        "relaxing-block",
+        "relaxing-cuts",
+        "fingertip",
+        "half-cut-equilibrium",
+    ] {
         goes_on(&example(name), 40, &random(3, 30), &nothing);
     }
 }

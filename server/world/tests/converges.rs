@@ -14,7 +14,7 @@ use scindo_world::simulation::Simulation;
 const STEPS: u64 = 40;
 
 /// Scenes that mean a fixed number of iterations per step.
-const FIXED: [&str; 1] = ["relaxing-block.toml"];
+const FIXED: [&str; 2] = ["relaxing-block.toml", "relaxing-cuts.toml"];
 
 fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")

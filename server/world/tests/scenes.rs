@@ -176,6 +176,35 @@ fn the_block_relaxes_step_by_step_to_where_newton_goes_at_once() {
     assert!((displacement(&sim, 0) - displacement(&newton, 0)).norm() < 1e-6);
 }
 
+/// Statics by relaxation, snapped cuts and pinned parts in one scene: after each cut the body comes to rest again, the
+/// first one opens it, and the corner that the second one takes off is held.
+#[test]
+fn a_block_relaxes_between_cuts_that_press_its_elements() {
+    let mut sim = start("relaxing-cuts.toml", &[]);
+    let width =
+        |sim: &Simulation| sim.probe_position(&sim.probes()[1]).x - sim.probe_position(&sim.probes()[0]).x;
+    let is_at_rest = |sim: &Simulation| {
+        let solve = &sim.report().bodies[0].solve;
+        solve.residual <= solve.tolerance
+    };
+    let mass = sim.bodies()[0].body.total_mass();
+    run(&mut sim, 0.58);
+    let whole = width(&sim);
+    assert!(is_at_rest(&sim) && whole > 0.101, "{whole}");
+    run(&mut sim, 0.62);
+    let cut = *sim.bodies()[0].body.snap_report().unwrap();
+    assert!(cut.faces > 20 && cut.refused == 0 && cut.degenerate == 0, "{cut:?}");
+    assert!(!is_at_rest(&sim));
+    run(&mut sim, 1.18);
+    let opened = width(&sim);
+    assert!(is_at_rest(&sim) && opened > whole + 1e-3, "{whole} {opened}");
+    run(&mut sim, 1.8);
+    let body = &sim.bodies()[0].body;
+    assert_eq!((body.parts().len(), &body.parts().free[..]), (2, &[false, false][..]));
+    assert!((body.total_mass() / mass - 1.0).abs() < 1e-9 && body.least_volume_ratio() > 0.0);
+    assert!(is_at_rest(&sim));
+}
+
 /// A wave of speed √(E/ρ) = 100 m/s runs from the loaded end to the held one and back in 20 ms; the
 /// end then stands at twice the static extension F L / (E A) = 1 mm.
 #[test]

@@ -217,7 +217,7 @@ impl Body {
         let dynamics = Dynamics::new(settings.scheme, material.law, solver)?;
         let snap = space.tets().zip(settings.cutting.mesh_cut());
         let mut body = Self {
-            snap: snap.map(|(tets, how)| Box::new(SnapState::new(tets.mesh(), how))),
+            snap: snap.map(|(tets, how)| Box::new(SnapState::new(tets.mesh(), how, settings.snap))),
             rest: Vec::new(),
             state: State::default(),
             boundary: Boundary::default(),

@@ -6,6 +6,7 @@ use crate::cut::FrontRule;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::Law;
 use crate::operator::OperatorChoice;
+use crate::snap::SnapSettings;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// Settings that are chosen when a body is made.
@@ -61,6 +62,8 @@ pub struct BodySettings {
     pub cutting: CuttingMethod,
     /// How far a cut inside elements goes on ahead of the blade.
     pub front: FrontRule,
+    /// What cuts along faces do besides opening them.
+    pub snap: SnapSettings,
     /// What happens to parts that a cut leaves without a held node.
     pub loose: LooseRule,
     /// Parts of the method that are switched off; only for checking the tests themselves.
@@ -112,6 +115,7 @@ impl Default for BodySettings {
             newton_steps: None,
             cutting: CuttingMethod::Xfem,
             front: FrontRule::default(),
+            snap: SnapSettings::default(),
             loose: LooseRule::Free,
             ablation: Ablation::default(),
         }
@@ -303,6 +307,13 @@ impl BodySettings {
             }
             (CuttingMethod::Xfem, _, LooseRule::Pinned) => {
                 return refused("pinning loose parts", "cutting method xfem", "cutting method snap");
+            }
+            (method, ..) if method != CuttingMethod::Snap && self.snap != SnapSettings::default() => {
+                return refused(
+                    "a choice of moved nodes or of cleaning",
+                    "this cutting method",
+                    "cutting method snap",
+                );
             }
             _ => {}
         }

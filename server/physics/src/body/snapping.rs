@@ -6,7 +6,7 @@ use super::boundary::Boundary;
 use super::{Body, BodyError};
 use crate::cut::{BladeSweep, CutMesh, CutReport, NewCopy};
 use crate::mesh::TetMesh;
-use crate::snap::{MeshCut, Nodes, SnapCut, SnapNode, SnapReport, Snapper};
+use crate::snap::{MeshCut, Nodes, SnapCut, SnapNode, SnapReport, SnapSettings, Snapper};
 use crate::space::Tets;
 
 /// How cuts are made.
@@ -73,9 +73,13 @@ struct Start {
 }
 
 impl SnapState {
-    pub fn new(mesh: &TetMesh, how: MeshCut) -> Self {
+    pub fn new(mesh: &TetMesh, how: MeshCut, settings: SnapSettings) -> Self {
+        Self::of(mesh, Snapper::new(how, settings))
+    }
+
+    fn of(mesh: &TetMesh, snapper: Snapper) -> Self {
         Self {
-            snapper: Snapper::new(how),
+            snapper,
             origins: (0..mesh.nodes.len() as u32).collect(),
             start: Start { mesh: mesh.clone(), boundary: None },
             carried: Boundary::default(),
@@ -165,7 +169,7 @@ impl Body {
         if let Some(boundary) = snap.start.boundary.take() {
             self.boundary = boundary;
         }
-        **snap = SnapState::new(&mesh, snap.snapper.how());
+        **snap = SnapState::of(&mesh, snap.snapper.afresh());
         let cut_mesh = CutMesh::with_lips(mesh, snap.snapper.tags(), epoch)?;
         self.space = Box::new(Tets::linear(cut_mesh));
         self.return_to_rest();

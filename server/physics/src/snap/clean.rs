@@ -9,8 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::collapse::{Collapse, collapse, split_edge, split_face};
-use super::complex::{Complex, barycentric};
-use super::shape::{FLAT, Kind, aspect, kind, opposite};
+use super::complex::{Complex, barycentric, face_key};
+use super::shape::{FLAT, Kind, aspect, kind, opposite, star_volume};
 use crate::mesh::TET_EDGES;
 
 /// Least distance of a new node from the ends of its edge, relative to the edge.
@@ -25,17 +25,42 @@ pub struct Cleaned {
     pub collapses: usize,
     /// New nodes on edges and faces.
     pub splits: usize,
+    /// Degenerate elements at the start.
+    pub found: usize,
     /// Degenerate elements that could not be removed.
     pub left: usize,
 }
 
+impl Cleaned {
+    /// The degenerate elements of `region` are counted and stay.
+    pub fn nothing(complex: &Complex, region: &BTreeSet<u32>) -> Self {
+        let found = region.iter().filter(|t| is_flat(complex, **t)).count();
+        Self { found, left: found, ..Self::default() }
+    }
+
+    /// The node that `n` was merged with, or `n`.
+    pub fn kept(&self, mut n: u32) -> u32 {
+        while let Some(&kept) = self.merged.get(&n) {
+            n = kept;
+        }
+        n
+    }
+
+    /// Adds what was done before this cleaning. What was left then is part of what was found now.
+    pub fn follow(&mut self, before: Self) {
+        self.merged.extend(before.merged);
+        self.collapses += before.collapses;
+        self.splits += before.splits;
+        self.found += before.found - before.left;
+    }
+}
+
 /// Removes degenerate elements in `region`, and among the elements that replace them.
 pub fn clean(complex: &mut Complex, region: BTreeSet<u32>) -> Cleaned {
-    let mut cleaned = Cleaned::default();
+    let mut cleaned = Cleaned::nothing(complex, &region);
     let mut region: Vec<u32> = region.into_iter().collect();
     let mut before = usize::MAX;
     loop {
-        let is_flat = |complex: &Complex, t: u32| complex.is_alive(t) && aspect(&complex.rest(t)) < FLAT;
         let flat: Vec<u32> = region.iter().copied().filter(|&t| is_flat(complex, t)).collect();
         cleaned.left = flat.len();
         if flat.is_empty() || flat.len() >= before {
@@ -50,6 +75,44 @@ pub fn clean(complex: &mut Complex, region: BTreeSet<u32>) -> Cleaned {
         }
         region.extend(first..complex.n_slots() as u32);
     }
+}
+
+/// Largest number of elements of a crumb.
+const CRUMB: usize = 16;
+
+/// Volume of a crumb over that of the element beside it, at most.
+const TINY: f64 = 0.01;
+
+/// Keeps the body free of crumbs: where collapses have left a few thin elements around `nodes` with nothing but cut
+/// surface and skin about them, they stay with an element beside them.
+pub fn spare_crumbs(complex: &mut Complex, nodes: &BTreeSet<u32>) {
+    let around: BTreeSet<u32> = nodes.iter().flat_map(|&n| complex.around(n).iter().copied()).collect();
+    for t in around {
+        let mut group = vec![t];
+        let mut border = None;
+        let mut at = 0;
+        while at < group.len() && group.len() <= CRUMB {
+            let s = group[at];
+            at += 1;
+            for k in 0..4 {
+                let Some(other) = complex.neighbour(s, k) else { continue };
+                let key = face_key(complex.face(s, k));
+                if complex.tag(&key).is_some() {
+                    border = border.or(Some((key, other)));
+                } else if !group.contains(&other) {
+                    group.push(other);
+                }
+            }
+        }
+        let Some((key, other)) = border.filter(|_| group.len() <= CRUMB) else { continue };
+        if star_volume(complex, &group) < TINY * star_volume(complex, &[other]) {
+            complex.set_tag(key, None);
+        }
+    }
+}
+
+fn is_flat(complex: &Complex, t: u32) -> bool {
+    complex.is_alive(t) && aspect(&complex.rest(t)) < FLAT
 }
 
 fn remove(complex: &mut Complex, t: u32, cleaned: &mut Cleaned) {

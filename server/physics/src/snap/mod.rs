@@ -10,6 +10,8 @@
 //! 3. [`dissect`]: nodes are duplicated by the connected components of the elements around them.
 //! 4. [`clean`]: degenerate elements are removed by splitting and collapsing edges.
 //!
+//! [`SnapSettings`] leaves out 2, 4 or both, for comparisons.
+//!
 //! Two baselines share the last steps: [`subdivide`] divides elements where the sweep parts them, in place of 1, 2 and 4;
 //! [`remove`] takes elements out.
 //!
@@ -42,7 +44,8 @@ pub mod remove;
 mod snapper;
 
 pub use node::{Nodes, SnapNode};
-pub use snapper::{MeshCut, SnapCut, SnapReport, Snapper};
+pub use relocate::Moves;
+pub use snapper::{MeshCut, SnapCut, SnapReport, SnapSettings, Snapper};
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]

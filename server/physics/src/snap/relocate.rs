@@ -42,6 +42,32 @@ const LEAST_ANGLE: f64 = 0.1;
 const OUTSIDE: f64 = 1e-9;
 const OUTSIDE_ON_SKIN: f64 = 0.1;
 
+/// Which nodes of a cut surface move onto the sweep.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Moves {
+    /// No node moves. The cut follows the faces where they are and is jagged (Nienhuys 2003, fig. 3.5).
+    None,
+    /// Nodes whose elements all stay well shaped; the others stay where they are, off the sweep.
+    #[default]
+    Sound,
+    /// These, and then the others as far as no element is inverted. What lies between nodes of the cut surface is pressed
+    /// flat, as in the source, and is for [`clean`](super::clean) to remove.
+    Press,
+}
+
+/// Parts of its way that a node stays short of the sweep when it presses an element flat. The first one that keeps
+/// [`LEAST_ASPECT`] is taken.
+const SHORT: [f64; 9] = [0.0, 1.0 / 256.0, 1.0 / 128.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
+
+/// What a move must leave of the elements around.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Bound {
+    /// [`LEAST_REMAINDER`] and [`LEAST_ASPECT`].
+    Sound,
+    /// [`LEAST_ASPECT`] in both configurations.
+    Upright,
+}
+
 /// Directions in which a node may move in the reference configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Freedom {
@@ -55,29 +81,45 @@ enum Freedom {
 
 /// Moves as many nodes onto the sweep as possible, the closest first. A move may make another one possible,
 /// so passes go on until none succeeds. Returns the number of nodes that stay off the sweep.
-pub fn relocate_all(complex: &mut Complex, nodes: Vec<u32>, marks: &BTreeMap<u32, NodeMark>) -> usize {
+pub fn relocate_all(
+    complex: &mut Complex,
+    nodes: Vec<u32>,
+    marks: &BTreeMap<u32, NodeMark>,
+    moves: Moves,
+) -> usize {
     let mut waiting = nodes;
     waiting.sort_by(|p, q| marks[p].distance.total_cmp(&marks[q].distance).then(p.cmp(q)));
     loop {
         let before = waiting.len();
-        waiting.retain(|n| !relocate(complex, *n, &marks[n]));
+        waiting.retain(|n| !relocate(complex, *n, &marks[n], (&[0.0], Bound::Sound)));
         if waiting.is_empty() || waiting.len() == before {
-            return waiting.len();
+            break;
         }
     }
+    if moves == Moves::Press {
+        waiting.retain(|n| !relocate(complex, *n, &marks[n], (&SHORT, Bound::Upright)));
+    }
+    waiting.len()
 }
 
-/// Moves node `n` onto the sweep near `mark`. Returns `false` if it has to stay.
-fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark) -> bool {
+/// Moves node `n` onto the sweep near `mark`, or as far as the first of the parts of its way allows that it may stay
+/// `short`. Returns `false` if it has to stay.
+fn relocate(complex: &mut Complex, n: u32, mark: &NodeMark, (short, bound): (&[f64], Bound)) -> bool {
     let node = complex.node(n);
     if node.fixed.is_some() {
         return false;
     }
     let freedom = freedom(complex, n);
-    let Some(moved) = target(complex, n, mark, freedom) else { return false };
-    if !moved.rest.iter().chain(moved.x.iter()).all(|c| c.is_finite()) || !stays_sound(complex, n, &moved) {
+    let Some(target) = target(complex, n, mark, freedom) else { return false };
+    if !target.rest.iter().chain(target.x.iter()).all(|c| c.is_finite()) {
         return false;
     }
+    // Node and target lie in one element, and so does everything between them.
+    let places = short.iter().map(|&part| match part {
+        0.0 => target,
+        part => SnapNode::between(&[&target, &node], &[1.0 - part, part]),
+    });
+    let Some(moved) = places.into_iter().find(|moved| keeps(complex, n, moved, bound)) else { return false };
     complex.set_node(n, node.placed_at(&moved));
     true
 }
@@ -175,8 +217,8 @@ fn freedom(complex: &Complex, n: u32) -> Freedom {
     }
 }
 
-/// Whether all elements around `n` keep enough of their volume and shape.
-fn stays_sound(complex: &Complex, n: u32, moved: &SnapNode) -> bool {
+/// Whether all elements around `n` keep as much of their volume and shape as the bound asks.
+fn keeps(complex: &Complex, n: u32, moved: &SnapNode, bound: Bound) -> bool {
     complex.around(n).iter().all(|&t| {
         let at = complex.tet(t).map(|m| m == n);
         let put = |mut x: [Vector3<f64>; 4], to: Vector3<f64>| {
@@ -189,8 +231,16 @@ fn stays_sound(complex: &Complex, n: u32, moved: &SnapNode) -> bool {
         };
         let (rest, now) = (complex.rest(t), complex.now(t));
         let (new_rest, new_now) = (put(rest, moved.rest), put(now, moved.x));
-        let sound_now = det(&now) <= 0.0 || det(&new_now) > LEAST_REMAINDER * det(&now);
-        let flat = aspect(&new_rest) < LEAST_ASPECT && aspect(&new_rest) < aspect(&rest);
-        sound_now && !flat && det(&new_rest) > LEAST_REMAINDER * det(&rest)
+        let flat = |new: &[Vector3<f64>; 4], old: &[Vector3<f64>; 4]| {
+            aspect(new) < LEAST_ASPECT && aspect(new) < aspect(old)
+        };
+        let is_inverted = det(&now) <= 0.0;
+        match bound {
+            Bound::Sound => {
+                let sound_now = is_inverted || det(&new_now) > LEAST_REMAINDER * det(&now);
+                sound_now && !flat(&new_rest, &rest) && det(&new_rest) > LEAST_REMAINDER * det(&rest)
+            }
+            Bound::Upright => (is_inverted || !flat(&new_now, &now)) && !flat(&new_rest, &rest),
+        }
     })
 }

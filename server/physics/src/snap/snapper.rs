@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use super::clean::{Cleaned, clean};
+use super::clean::{Cleaned, clean, spare_crumbs};
 use super::complex::{Before, Complex, FaceKey};
 use super::dissect::{Duplicate, dissect};
 use super::memory::Memory;
 use super::node::{NEW, Nodes, SnapNode};
-use super::relocate::relocate_all;
+use super::relocate::{Moves, relocate_all};
 use super::remove::remove;
 use super::select::{Selection, cross, select};
 use super::subdivide::subdivide;
@@ -26,6 +26,22 @@ pub enum MeshCut {
     Subdivide,
     /// Elements that the sweep touches are removed.
     Remove,
+}
+
+/// What a cut along faces does besides opening them. The defaults make smooth cuts without degenerate elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct SnapSettings {
+    /// Which nodes of the cut surface move.
+    pub moves: Moves,
+    /// Elements that became degenerate are removed by splits and collapses. Without it they stay, and iterative solvers
+    /// need more iterations.
+    pub clean: bool,
+}
+
+impl Default for SnapSettings {
+    fn default() -> Self {
+        Self { moves: Moves::default(), clean: true }
+    }
 }
 
 /// Counts of what one cut did.
@@ -45,7 +61,9 @@ pub struct SnapReport {
     pub collapses: usize,
     /// Nodes added on edges and faces: in order to collapse degenerate elements, or where the sweep crosses edges.
     pub splits: usize,
-    /// Degenerate elements that remain because they could not be collapsed.
+    /// Degenerate elements at the cut surface before any was collapsed.
+    pub flattened: usize,
+    /// Degenerate elements that remain, because they could not be collapsed or were not to be.
     pub degenerate: usize,
     /// Crossed edges that no selected face represents yet. The cut lags there.
     pub pending: usize,
@@ -72,15 +90,16 @@ pub struct SnapCut {
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Snapper {
     how: MeshCut,
+    settings: SnapSettings,
     memories: BTreeMap<u32, Memory>,
     fronts: BTreeMap<u32, Front>,
     tags: BTreeMap<FaceKey, u32>,
 }
 
 impl Snapper {
-    /// Cuts in this way.
-    pub fn new(how: MeshCut) -> Self {
-        Self { how, ..Self::default() }
+    /// Cuts in this way. The settings matter to [`MeshCut::Snap`] alone.
+    pub fn new(how: MeshCut, settings: SnapSettings) -> Self {
+        Self { how, settings, ..Self::default() }
     }
 
     /// A copy of the mesh in which only elements that share a face share nodes, as after a cut.
@@ -100,9 +119,9 @@ impl Snapper {
         &self.tags
     }
 
-    /// How it cuts.
-    pub fn how(&self) -> MeshCut {
-        self.how
+    /// This snapper before its first cut.
+    pub fn afresh(&self) -> Self {
+        Self::new(self.how, self.settings)
     }
 
     /// Cuts `mesh` along the surface that the blade swept, in the present configuration of `nodes`. Returns no
@@ -136,7 +155,7 @@ impl Snapper {
         let memory = self.memories.entry(incision).or_default();
         cross(&complex, &near, &triangles, memory);
         let opened = match self.how {
-            MeshCut::Snap => snap(&mut complex, memory),
+            MeshCut::Snap => snap(&mut complex, memory, self.settings.moves),
             MeshCut::Subdivide => divide(&mut complex, memory),
             MeshCut::Remove => take_out(&mut complex, memory, (incision, n_elements)),
         };
@@ -160,13 +179,14 @@ impl Snapper {
 
     /// Opens the selected faces, and removes degenerate elements where nodes were moved.
     fn open(&mut self, mut complex: Complex<'_>, opened: Opened, incision: u32) -> (SnapReport, SnapCut) {
-        let Opened { mut report, faces, nodes: surface } = opened;
+        let Opened { mut report, faces, nodes: mut surface } = opened;
         let mut beside = BTreeSet::new();
         for &key in &faces {
             complex.set_tag(key, Some(incision));
             beside.extend(around_face(&complex, key));
         }
         report.elements = report.elements.max(beside.len());
+        let pressed = self.clean_pressed(&mut complex, &mut surface);
         // A marked face with elements on both sides is still closed, and its nodes may have to be split. So may the
         // nodes of elements that were taken out.
         let tagged = complex.tags().keys().filter(|key| around_face(&complex, **key).len() == 2).flatten();
@@ -175,26 +195,24 @@ impl Snapper {
         let mut memories: Vec<&mut Memory> = self.memories.values_mut().collect();
         let duplicates = dissect(&mut complex, &closed, &mut memories);
         report.duplicated = duplicates.len();
-        let cleaned = match self.how {
+        let mut cleaned = match self.how {
             MeshCut::Snap => {
                 let touched = surface.iter().chain(duplicates.iter().map(|d| &d.node));
                 let region = touched.flat_map(|&n| complex.around(n).iter().copied()).collect();
-                clean(&mut complex, region)
+                match self.settings.clean {
+                    true => clean(&mut complex, region),
+                    false => Cleaned::nothing(&complex, &region),
+                }
             }
             MeshCut::Subdivide | MeshCut::Remove => Cleaned::default(),
         };
-        report.collapses = cleaned.collapses;
-        report.splits += cleaned.splits;
-        report.degenerate = cleaned.left;
+        cleaned.follow(pressed);
+        (report.collapses, report.flattened) = (cleaned.collapses, cleaned.found);
+        (report.splits, report.degenerate) = (report.splits + cleaned.splits, cleaned.left);
 
         // Nodes that no element uses are dropped, so everything remembered by node number has to follow.
         let number = numbers(&complex);
-        let find = |mut n: u32| {
-            while let Some(&kept) = cleaned.merged.get(&n) {
-                n = kept;
-            }
-            number[n as usize]
-        };
+        let find = |n: u32| number[cleaned.kept(n) as usize];
         for memory in self.memories.values_mut() {
             memory.renumber(&complex, find);
         }
@@ -205,6 +223,38 @@ impl Snapper {
         self.tags = tags_of(&complex, &number);
         report.pending = self.memories.get(&incision).map_or(0, |memory| memory.crossings.len());
         (report, cut)
+    }
+
+    /// Removes what [`Moves::Press`] has pressed flat, before the faces open: it lies inside the body then, where a
+    /// collapse keeps the volume. The nodes of the cut `surface` change with the mesh, and so does what incisions remember.
+    fn clean_pressed(&mut self, complex: &mut Complex, surface: &mut BTreeSet<u32>) -> Cleaned {
+        let SnapSettings { moves, clean: wanted } = self.settings;
+        if self.how != MeshCut::Snap || moves != Moves::Press || !wanted {
+            return Cleaned::default();
+        }
+        let n_nodes = complex.n_nodes() as u32;
+        let region = surface.iter().flat_map(|&n| complex.around(n).iter().copied()).collect();
+        let cleaned = clean(complex, region);
+        let kept = |n: u32| Some(cleaned.kept(n));
+        self.memories.values_mut().for_each(|memory| memory.renumber(complex, kept));
+        *surface = surface.iter().map(|&n| cleaned.kept(n)).collect();
+        spare_crumbs(complex, surface);
+        // Nodes added on faces of a cut surface lie on it too.
+        while let Some((tag, n, normal)) = self.added_on_surface(complex, n_nodes) {
+            surface.insert(n);
+            self.memories.entry(tag).or_default().on.insert(n, normal);
+        }
+        cleaned
+    }
+
+    /// A node from number `from` on that lies on the cut surface of an incision, which does not know it yet, and the
+    /// normal of a node beside it.
+    fn added_on_surface(&self, complex: &Complex<'_>, from: u32) -> Option<(u32, u32, Vector3<f64>)> {
+        complex.tags().iter().filter(|(key, _)| key.iter().any(|n| *n >= from)).find_map(|(key, &tag)| {
+            let on = &self.memories.get(&tag)?.on;
+            let n = key.iter().find(|n| **n >= from && !on.contains_key(n))?;
+            Some((tag, *n, *key.iter().find_map(|n| on.get(n))?))
+        })
     }
 
     /// The last blade position [m] of every incision, at present. The fronts are bound to elements, which have
@@ -232,7 +282,7 @@ struct Opened {
 
 /// Selects faces and moves their nodes; `None` if nothing can be cut. Nodes move before the faces open: a node still has
 /// all of its elements then, and moves for both lips.
-fn snap(complex: &mut Complex, memory: &mut Memory) -> Option<Opened> {
+fn snap(complex: &mut Complex, memory: &mut Memory, moves: Moves) -> Option<Opened> {
     let Selection { marks, faces } = select(complex, memory);
     if faces.is_empty() {
         return None;
@@ -240,9 +290,11 @@ fn snap(complex: &mut Complex, memory: &mut Memory) -> Option<Opened> {
     let mut report = SnapReport { faces: faces.len(), ..SnapReport::default() };
     let nodes: BTreeSet<u32> = faces.iter().flatten().copied().collect();
     let wanted: Vec<u32> = nodes.iter().copied().filter(|n| marks.contains_key(n)).collect();
-    report.moved = wanted.len();
-    report.refused = relocate_all(complex, wanted, &marks);
-    report.moved -= report.refused;
+    if moves != Moves::None {
+        report.moved = wanted.len();
+        report.refused = relocate_all(complex, wanted, &marks, moves);
+        report.moved -= report.refused;
+    }
     memory.settle(nodes.iter().filter_map(|n| Some((*n, marks.get(n)?.normal))));
     Some(Opened { report, faces, nodes })
 }

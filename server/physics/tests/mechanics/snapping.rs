@@ -5,6 +5,7 @@ use scindo_physics::body::{Body, BodySettings, CuttingMethod, ElementKind, Loose
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
+use scindo_physics::snap::{Moves, SnapSettings};
 
 fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
     Vector3::new(x, y, z)
@@ -136,6 +137,11 @@ fn loads_keep_their_sum_and_what_does_not_go_is_refused() {
     assert!(refused(BodySettings { element: ElementKind::Tet10, ..snap() }).contains("tet10"));
     let xfem = BodySettings { cutting: CuttingMethod::Xfem, loose: LooseRule::Pinned, ..snap() };
     assert!(refused(xfem).contains("pinning"));
+    let press = SnapSettings { moves: Moves::Press, clean: true };
+    assert!(BodySettings { snap: press, ..snap() }.check(Law::Corotational).is_ok());
+    for cutting in [CuttingMethod::Xfem, CuttingMethod::Subdivide, CuttingMethod::Remove] {
+        assert!(refused(BodySettings { cutting, snap: press, ..snap() }).contains("moved nodes"));
+    }
 }
 
 #[test]

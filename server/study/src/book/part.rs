@@ -36,9 +36,10 @@ pub struct Part {
 const SCENES: [&str; 4] = ["demonstration", "kidney", "brain", "fingertip"];
 
 /// Parts of the accuracy study, those that papers need first. The quick form ends with the bar at rest.
-const ACCURACY: [(&str, &str); 20] = [
+const ACCURACY: [(&str, &str); 21] = [
     ("threads", "Threads, shares of a step, and the largest mesh in real time"),
     ("nienhuys", "Relaxation: Nienhuys' table 3.1 and figure 3.12"),
+    ("nienhuys-cut", "Cuts along faces: Nienhuys' figures 3.13 to 3.16"),
     ("schoch", "Convergence on a half-cut beam: figure 10 of Schoch"),
     ("slits", "Six ways to cut: 1, 10 and 100 slits"),
     ("dick-tables", "Octree cells: tables 1 and 2 of Dick"),

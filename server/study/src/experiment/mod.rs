@@ -49,6 +49,8 @@ mod threads;
 
 mod nienhuys;
 
+mod nienhuys_cut;
+
 mod schoch;
 
 mod slits;
@@ -65,7 +67,7 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 14] = [
+pub const NAMES: [&str; 15] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -77,6 +79,7 @@ pub const NAMES: [&str; 14] = [
     "collision",
     "threads",
     "nienhuys",
+    "nienhuys-cut",
     "schoch",
     "slits",
     "front",
@@ -100,6 +103,7 @@ fn find(name: &str) -> Option<Experiment> {
         "collision" => Some(collision::collision),
         "threads" => Some(threads::threads),
         "nienhuys" => Some(nienhuys::nienhuys),
+        "nienhuys-cut" => Some(nienhuys_cut::cuts),
         "schoch" => Some(schoch::schoch),
         "slits" => Some(slits::slits),
         "front" => Some(front::front),

@@ -177,7 +177,8 @@ fn beam(cells: [usize; 3]) -> Result<Beam, Trouble> {
     tip.iter().for_each(|&n| f[n].y = -3.0 / tip.len() as f64);
     let solve = |preconditioned: bool| -> Result<(Vec<V>, u32, f64), Trouble> {
         let started = Instant::now();
-        let (u, iterations) = gradients(&K, &held, &f, TO[0], preconditioned)?;
+        let start = Start { u: &vec![V::zeros(); f.len()], f: &f };
+        let (u, iterations) = gradients(&K, &held, start, TO[0], preconditioned)?;
         Ok((u, iterations, started.elapsed().as_secs_f64()))
     };
     let (u, plain, plain_s) = solve(false)?;
@@ -194,12 +195,21 @@ fn beam(cells: [usize; 3]) -> Result<Beam, Trouble> {
     })
 }
 
-/// Conjugate gradients as in the thesis: entries of held nodes are zeroed, and ‖r‖₂ decides. The solvers of the program
+/// Where conjugate gradients start.
+#[derive(Clone, Copy)]
+pub(super) struct Start<'a> {
+    /// Displacements [m]; those of held nodes stay.
+    pub u: &'a [V],
+    /// Loads [N].
+    pub f: &'a [V],
+}
+
+/// Conjugate gradients as in the thesis, until ‖r‖ is below the part `to` of ‖f‖ of the nodes that are not held: entries of held nodes are zeroed, and ‖r‖₂ decides. The solvers of the program
 /// stop in the norm of their preconditioner instead, which would give other numbers of iterations.
-fn gradients(
+pub(super) fn gradients(
     K: &BlockCsr<f64>,
     held: &[bool],
-    f: &[V],
+    Start { u, f }: Start<'_>,
     to: f64,
     preconditioned: bool,
 ) -> Result<(Vec<V>, u32), Trouble> {
@@ -213,9 +223,12 @@ fn gradients(
         |v: &mut [V]| v.iter_mut().zip(held).filter(|(_, held)| **held).for_each(|(v, _)| *v = V::zeros());
     let dot = |a: &[V], b: &[V]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
     let precondition = |r: &[V]| -> Vec<V> { r.iter().zip(&inverses).map(|(r, M)| M * r).collect() };
-    let (mut x, mut r, mut q) = (vec![V::zeros(); n], f.to_vec(), vec![V::zeros(); n]);
+    let (mut x, mut r, mut q) = (u.to_vec(), f.to_vec(), vec![V::zeros(); n]);
     zero(&mut r);
     let target = to * dot(&r, &r).sqrt();
+    K.multiply(&x, &mut q);
+    r.iter_mut().zip(&q).for_each(|(r, q)| *r -= q);
+    zero(&mut r);
     let mut p = precondition(&r);
     let mut rz = dot(&r, &p);
     for iteration in 0..PATIENCE {

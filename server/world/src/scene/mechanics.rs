@@ -5,9 +5,10 @@ use scindo_physics::body::{
     OperatorChoice, PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::material::Law;
+use scindo_physics::snap::{Moves, SnapSettings};
 
 use super::raw::{
-    RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod,
+    RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawMoves,
     RawOperator, RawPrecision,
 };
 
@@ -61,6 +62,10 @@ pub struct Mechanics {
     pub cutting: RawCutMethod,
     /// How far a cut goes on ahead of the blade; none: as by default.
     pub front: Option<RawFront>,
+    /// Which nodes cuts along faces move.
+    pub moves: RawMoves,
+    /// Whether cuts along faces remove degenerate elements.
+    pub clean: bool,
     /// What becomes of parts without a held node.
     pub loose: RawLoose,
 }
@@ -185,6 +190,14 @@ impl Mechanics {
             front: match self.front {
                 None | Some(RawFront::Calibrated) => FrontRule::Calibrated,
                 Some(RawFront::Behind) => FrontRule::Behind,
+            },
+            snap: SnapSettings {
+                moves: match self.moves {
+                    RawMoves::None => Moves::None,
+                    RawMoves::Sound => Moves::Sound,
+                    RawMoves::Press => Moves::Press,
+                },
+                clean: self.clean,
             },
             loose: match self.loose {
                 RawLoose::Free => LooseRule::Free,

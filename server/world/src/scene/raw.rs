@@ -555,6 +555,12 @@ pub struct RawCutting {
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs
     /// the method `snap`.
     pub loose: RawLoose,
+    /// Which nodes of the cut surface the method `snap` moves onto the sweep. Default: `sound`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub moves: Option<RawMoves>,
+    /// Whether the method `snap` removes degenerate elements by splits and collapses. Default: true.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clean: Option<bool>,
     /// Fracture toughness [J/m²]: a blade cuts only where the load on its edge exceeds this much per metre [N/m], and
     /// deforms the body before it does. Without it a blade passes through the body without force.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "liver has about 100, skin about 2500"))]
@@ -577,6 +583,20 @@ impl RawBody {
             _ => RawCutMethod::Xfem,
         })
     }
+}
+
+/// Which nodes of a cut surface move onto the sweep.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawMoves {
+    /// None: the cut follows the faces where they are and is jagged.
+    None,
+    /// Those whose elements stay well shaped. Others stay off the sweep.
+    #[default]
+    Sound,
+    /// As many as can without inverting an element. Elements between them are pressed flat and then removed, if `clean`
+    /// is not switched off.
+    Press,
 }
 
 /// What happens to a part without held nodes.

@@ -1,14 +1,17 @@
 //! The baselines: elements that are divided, elements that are removed.
 
-use super::super::MeshCut;
+use super::super::{MeshCut, SnapSettings};
 use super::*;
 
 fn divided(pattern: BoxPattern) -> Sample {
-    Sample { snapper: Snapper::new(MeshCut::Subdivide), ..Sample::new([1.0; 3], [4; 3], pattern) }
+    Sample {
+        snapper: Snapper::new(MeshCut::Subdivide, SnapSettings::default()),
+        ..Sample::new([1.0; 3], [4; 3], pattern)
+    }
 }
 
 fn removing() -> Sample {
-    Sample { snapper: Snapper::new(MeshCut::Remove), ..Sample::unit(6) }
+    Sample { snapper: Snapper::new(MeshCut::Remove, SnapSettings::default()), ..Sample::unit(6) }
 }
 
 const PATTERNS: [BoxPattern; 3] =

@@ -5,6 +5,7 @@ mod cuts;
 mod degenerate;
 mod local;
 mod random;
+mod settings;
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -29,10 +29,13 @@ impl Check<'_> {
             tolerance: body.solver.tolerance,
             cutting: body.cut_method(),
             front: body.cutting.front,
+            moves: body.cutting.moves.unwrap_or_default(),
+            clean: body.cutting.clean.unwrap_or(true),
             loose: body.cutting.loose,
         }
         .with_method();
         self.cutting(at, &mechanics);
+        self.moved_faces(at, body);
         self.element(at, mechanics.element, mesh);
         self.locking(at, &mechanics);
         self.mass(at, &mechanics);
@@ -70,6 +73,17 @@ impl Check<'_> {
             let what = format!("found `pinned` with {}, allowed: snap", word(&m.cutting));
             let next = "write cutting.method = \"snap\" or cutting.loose = \"free\"";
             self.conflict(format!("{at}.cutting.loose"), what, next);
+        }
+    }
+
+    /// Only cuts along faces move nodes and have something to clean.
+    fn moved_faces(&mut self, at: &str, body: &RawBody) {
+        let given = [("moves", body.cutting.moves.is_some()), ("clean", body.cutting.clean.is_some())];
+        let method = body.cut_method();
+        for (key, _) in given.into_iter().filter(|(_, given)| *given && method != RawCutMethod::Snap) {
+            let what = format!("found with {}, allowed: snap", word(&method));
+            let next = format!("write cutting.method = \"snap\", or remove {key}");
+            self.conflict(format!("{at}.cutting.{key}"), what, &next);
         }
     }
 
