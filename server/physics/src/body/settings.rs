@@ -134,8 +134,8 @@ impl BodySettings {
                 "the static integrator with a law that rotates",
             ),
             (
-                self.method != Method::Pcg && !self.method.is_multigrid(),
-                "a solver other than pcg or multigrid",
+                !matches!(self.method, Method::Pcg | Method::TwoLevelPcg) && !self.method.is_multigrid(),
+                "a solver other than pcg, two-level-pcg or multigrid",
             ),
             (self.mass == MassKind::Consistent, "consistent mass"),
             (
@@ -230,7 +230,7 @@ impl BodySettings {
     /// How the fast path applies the stiffness of `pieces` pieces; never [`OperatorChoice::Auto`].
     pub fn operator(&self, law: Law, pieces: usize) -> OperatorChoice {
         match self.operator {
-            OperatorChoice::Auto => cost::cheapest(law, pieces, self.solver),
+            OperatorChoice::Auto => cost::cheapest(law, pieces, (self.solver, self.method)),
             asked => asked,
         }
     }
@@ -243,7 +243,7 @@ impl BodySettings {
             Scheme::Static => 1.0,
             _ => f64::from(self.solves(law)),
         };
-        solves * cost::step_seconds(law, pieces, self.solver, assembled)
+        solves * cost::step_seconds(law, pieces, (self.solver, self.method), assembled)
     }
 
     /// When the solvers of a step stop. An equilibrium by linear solves may use all the iterations that
@@ -301,6 +301,11 @@ impl BodySettings {
                 return refused("pinning loose parts", "cutting method xfem", "cutting method snap");
             }
             _ => {}
+        }
+        if self.method == Method::TwoLevelPcg
+            && matches!(self.element, ElementKind::Octree | ElementKind::Hex8)
+        {
+            return refused("the two-level preconditioner", self.element.name(), "mg-pcg");
         }
         self.check_level(law)?;
         match (self.arithmetic, self.why_general(law)) {
