@@ -145,7 +145,7 @@ impl CoarseMatrix {
     pub fn solve(&mut self, b: &[Padded], u: &mut [Padded]) {
         // Single precision could not hold the forces of a very heavy or a very light body.
         let scale = b.iter().flatten().fold(0.0_f32, |most, b| most.max(b.abs()));
-        if !self.factored || !(scale > 0.0 && scale.is_finite()) {
+        if !(self.factored && scale > 0.0 && scale.is_finite()) {
             return u.fill([0.0; 4]);
         }
         self.right.iter_mut().zip(b).for_each(|(right, b)| *right = unpadded(b));

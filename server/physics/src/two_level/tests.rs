@@ -73,7 +73,16 @@ fn problem(depth: f64, held: &[Held], springs: Vec<Spring>) -> Problem {
         .collect();
     let mut jacobi = BlockJacobi::default();
     jacobi.resize(n);
-    jacobi.update(&mut team, &diagonal, &fixed);
+    let mut sprung = diagonal.clone();
+    let A = SystemOperator {
+        elastic: &mut elastic,
+        mass: &mass,
+        mass_factor: 1.0,
+        springs: &springs,
+        fixed: &fixed,
+    };
+    A.add_springs(&mut sprung);
+    jacobi.update(&mut team, &sprung, &fixed);
     let mut coarse = CoarseSpace::new((&tets, &MATERIAL), (&rest, &masses), &|_| false).unwrap();
     coarse.follow(&CoarseSystem {
         x: &x,
