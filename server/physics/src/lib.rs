@@ -32,6 +32,7 @@ pub mod assembly;
 pub mod operator;
 pub mod solver;
 pub mod multigrid;
+pub mod two_level;
 pub mod space;
 pub mod integrator;
 pub mod estimate;

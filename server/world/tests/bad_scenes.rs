@@ -110,6 +110,15 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
             ["found `mg-pcg` with tet4, allowed: octree", "choose cg, pcg or cholesky"],
         ),
         (
+            r#"element = "tet10"
+            solver = { method = "two-level-pcg" }"#,
+            ["found `two-level-pcg` with tet10, allowed: tet4", "choose another solver.method"],
+        ),
+        (
+            r#"solver = { method = "two-level-pcg", tolerance = 1e-9 }"#,
+            ["found `two-level-pcg` with precision other than single", "choose cg, pcg or cholesky"],
+        ),
+        (
             r#"integrator = "implict-euler""#,
             ["unknown value `implict-euler`", "did you mean `implicit-euler`?"],
         ),

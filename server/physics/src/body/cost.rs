@@ -6,7 +6,7 @@
 
 use crate::material::Law;
 use crate::operator::OperatorChoice;
-use crate::solver::PcgSettings;
+use crate::solver::{Method, PcgSettings};
 
 /// Up to this many pieces the stiffness stays in the caches from one application to the next.
 const CACHED_PIECES: usize = 60_000;
@@ -29,27 +29,41 @@ const STEP: [f64; 2] = [33e-9, 12e-9];
 /// Iterations that take the residual down to a tenth, on meshes of some thousand nodes.
 const ITERATIONS_PER_DECADE: f64 = 12.0;
 
+/// The same with a two-level preconditioner, and seconds per piece and iteration for its coarse space.
+const TWO_LEVEL_ITERATIONS_PER_DECADE: f64 = 5.5;
+const COARSE_SPACE: f64 = 5e-9;
+
 /// Estimated time [s] of a step of a body of `pieces` pieces on one thread.
-pub fn step_seconds(law: Law, pieces: usize, solver: PcgSettings, assembled: bool) -> f64 {
+pub fn step_seconds(
+    law: Law,
+    pieces: usize,
+    (solver, method): (PcgSettings, Method),
+    assembled: bool,
+) -> f64 {
     let beyond = usize::from(pieces > CACHED_PIECES);
     let turns = law != Law::Linear;
     let application = if assembled { ASSEMBLED[beyond] } else { MATRIX_FREE[beyond] };
     // A stiffness that does not turn is assembled once.
     let assembly = if assembled && turns { ASSEMBLY } else { 0.0 };
     let step = STEP[usize::from(!turns)] + assembly;
-    pieces as f64 * (step + expected_iterations(solver) * (application + VECTORS))
+    let (per_decade, coarse) = match method {
+        Method::TwoLevelPcg => (TWO_LEVEL_ITERATIONS_PER_DECADE, COARSE_SPACE),
+        _ => (ITERATIONS_PER_DECADE, 0.0),
+    };
+    let iterations = expected_iterations(solver, per_decade);
+    pieces as f64 * (step + iterations * (application + VECTORS + coarse))
 }
 
 /// The cheaper of the two ways.
-pub fn cheapest(law: Law, pieces: usize, solver: PcgSettings) -> OperatorChoice {
+pub fn cheapest(law: Law, pieces: usize, solver: (PcgSettings, Method)) -> OperatorChoice {
     let [free, assembled] = [false, true].map(|way| step_seconds(law, pieces, solver, way));
     if assembled < free { OperatorChoice::Assembled } else { OperatorChoice::MatrixFree }
 }
 
 /// Iterations that a step is expected to make: those of the tolerance, but no more than allowed.
-fn expected_iterations(solver: PcgSettings) -> f64 {
+fn expected_iterations(solver: PcgSettings, per_decade: f64) -> f64 {
     let most = f64::from(solver.iterations);
-    if solver.tolerance > 0.0 { most.min(-ITERATIONS_PER_DECADE * solver.tolerance.log10()) } else { most }
+    if solver.tolerance > 0.0 { most.min(-per_decade * solver.tolerance.log10()) } else { most }
 }
 
 #[cfg(test)]
@@ -58,7 +72,9 @@ mod tests {
 
     #[test]
     fn a_stiffness_is_assembled_where_it_is_used_often_enough() {
-        let of = |law, pieces, iterations| cheapest(law, pieces, PcgSettings { iterations, tolerance: 0.0 });
+        let of = |law, pieces, iterations| {
+            cheapest(law, pieces, (PcgSettings { iterations, tolerance: 0.0 }, Method::Pcg))
+        };
         assert_eq!(of(Law::Linear, 5_000, 1), OperatorChoice::Assembled);
         assert_eq!(of(Law::Corotational, 12_800, 10), OperatorChoice::MatrixFree);
         assert_eq!(of(Law::Corotational, 12_800, 200), OperatorChoice::Assembled);
@@ -70,8 +86,13 @@ mod tests {
     #[test]
     fn a_coarse_tolerance_promises_few_iterations() {
         let solver = PcgSettings { iterations: 1000, tolerance: 1e-1 };
-        assert_eq!(cheapest(Law::Corotational, 12_800, solver), OperatorChoice::MatrixFree);
+        let of = |solver, method| cheapest(Law::Corotational, 12_800, (solver, method));
+        assert_eq!(of(solver, Method::Pcg), OperatorChoice::MatrixFree);
         let solver = PcgSettings { tolerance: 1e-8, ..solver };
-        assert_eq!(cheapest(Law::Corotational, 12_800, solver), OperatorChoice::Assembled);
+        assert_eq!(of(solver, Method::Pcg), OperatorChoice::Assembled);
+        // So does a coarse space.
+        let solver = PcgSettings { tolerance: 1e-5, ..solver };
+        assert_eq!(of(solver, Method::Pcg), OperatorChoice::Assembled);
+        assert_eq!(of(solver, Method::TwoLevelPcg), OperatorChoice::MatrixFree);
     }
 }

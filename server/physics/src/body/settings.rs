@@ -142,8 +142,8 @@ impl BodySettings {
                 "the static integrator with a law that rotates",
             ),
             (
-                self.method != Method::Pcg && !self.method.is_multigrid(),
-                "a solver other than pcg or multigrid",
+                !matches!(self.method, Method::Pcg | Method::TwoLevelPcg) && !self.method.is_multigrid(),
+                "a solver other than pcg, two-level-pcg or multigrid",
             ),
             (self.mass == MassKind::Consistent, "consistent mass"),
             (
@@ -238,7 +238,7 @@ impl BodySettings {
     /// How the fast path applies the stiffness of `pieces` pieces; never [`OperatorChoice::Auto`].
     pub fn operator(&self, law: Law, pieces: usize) -> OperatorChoice {
         match self.operator {
-            OperatorChoice::Auto => cost::cheapest(law, pieces, self.solver),
+            OperatorChoice::Auto => cost::cheapest(law, pieces, (self.solver, self.method)),
             asked => asked,
         }
     }
@@ -251,7 +251,7 @@ impl BodySettings {
             Scheme::Static => 1.0,
             _ => f64::from(self.solves(law)),
         };
-        solves * cost::step_seconds(law, pieces, self.solver, assembled)
+        solves * cost::step_seconds(law, pieces, (self.solver, self.method), assembled)
     }
 
     /// When the solvers of a step stop. An equilibrium by linear solves may use all the iterations that
@@ -316,6 +316,11 @@ impl BodySettings {
                 );
             }
             _ => {}
+        }
+        if self.method == Method::TwoLevelPcg
+            && matches!(self.element, ElementKind::Octree | ElementKind::Hex8)
+        {
+            return refused("the two-level preconditioner", self.element.name(), "mg-pcg");
         }
         self.check_level(law)?;
         match (self.arithmetic, self.why_general(law)) {

@@ -11,10 +11,12 @@
 //! r = h, x̂ = x + h v and v̂ = v. Linearised at x_n, a spinning body would gain energy; linearised at
 //! the predictor it never does. K̂ rotates with the material, so β does not damp rigid motion.
 
+mod coarse;
 mod equilibrium;
 mod spring_terms;
 pub mod together;
 
+use coarse::two_level;
 use nalgebra::{Matrix3, Vector3};
 
 use super::descent::Descent;
@@ -37,6 +39,7 @@ use crate::operator::{
 use crate::phase::Phase;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
 use crate::team::{Team, blocks};
+use crate::two_level::CoarseSpace;
 
 /// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
 /// one reaches the tolerance.
@@ -80,6 +83,9 @@ pub struct LinearStep {
     aside: Option<Box<StepGrid>>,
     /// The level that is simulated, if it is not the finest one; there is no `grid` then.
     simulated: Option<Box<SimulatedLevel>>,
+    /// The coarse space of the two-level preconditioner; the one aside is that of a body that is solved with others.
+    coarse: Option<Box<CoarseSpace>>,
+    coarse_aside: Option<Box<CoarseSpace>>,
     /// One entry per block of the vector loops.
     partial: Vec<f64>,
     springs: ActiveSprings,
@@ -135,6 +141,7 @@ impl LinearStep {
         self.partial.resize(n.div_ceil(BLOCK), 0.0);
         self.made_for = None;
         self.searched = None;
+        self.coarse = None;
         self.sprung.clear();
         self.preconditioner.resize(n);
         self.pcg.resize(n);
@@ -285,6 +292,7 @@ impl LinearStep {
             team.begin(Phase::Operator);
             self.complete_operator(elastic, inputs);
             self.complete_grid(team, elastic, inputs, pass);
+            self.complete_coarse(inputs);
             team.begin(Phase::Residual);
             self.balance_parts(state, inputs);
             self.residual(team, elastic, state, inputs, (pass, first));
@@ -462,6 +470,7 @@ impl LinearStep {
             stiff.composite = CompositeDiagonal::new(&stiff.modes, &T, elastic);
             (stiff.left, stiff.stale) = (left, false);
             self.preconditioner.set_substitution(T);
+            self.coarse = None;
         }
         let with = inputs.elastic_update();
         let mass = (inputs.mass_f32, inputs.mass_factor());
@@ -585,7 +594,8 @@ impl LinearStep {
         });
         // A substitution and cycles mix copies, so the norm of the loads then needs a pass of its own.
         if first && pass == 0 {
-            let by_copy = active(&mut self.grid).is_none() && self.simulated.is_none();
+            let by_copy =
+                active(&mut self.grid).is_none() && self.simulated.is_none() && self.coarse.is_none();
             let loads = if self.preconditioner.substitution().is_empty() && by_copy {
                 self.partial.iter().sum::<f64>().max(0.0).sqrt()
             } else {
@@ -593,11 +603,13 @@ impl LinearStep {
                     *load = padded(&(s * (inputs.step.mass[c] * inputs.step.gravity + inputs.step.load[c])));
                 }
                 filter(inputs.step.fixed, &mut self.scratch);
-                let Self { pcg, preconditioner, scratch, grid, simulated, terms, .. } = self;
+                let Self { pcg, preconditioner, scratch, grid, simulated, coarse, terms, .. } = self;
                 let mut A = system(elastic, terms, inputs);
                 match (active(grid), simulated) {
                     (_, Some(level)) => level.norm(team, scratch),
-                    (None, _) => pcg.norm(team, &mut A, preconditioner, scratch),
+                    (None, _) => {
+                        pcg.norm(team, &mut A, &mut two_level(preconditioner, coarse, inputs), scratch)
+                    }
                     (Some(grid), _) => {
                         pcg.norm(team, &mut A, &mut grid.cycle(preconditioner.inverses()), scratch)
                     }
@@ -634,11 +646,11 @@ impl LinearStep {
         inputs: &LinearInputs<'_>,
         (pass, first): (usize, bool),
     ) -> LinearReport {
-        let Self { pcg, preconditioner, terms, delta, grid, simulated, descent, .. } = self;
+        let Self { pcg, preconditioner, terms, delta, grid, simulated, descent, coarse, .. } = self;
         let mut A = system(elastic, terms, inputs);
         let mut rz = match (active(grid), &mut *simulated) {
             (_, Some(level)) => level.norm(team, &pcg.r).powi(2),
-            (None, _) => pcg.precondition(team, &mut A, preconditioner),
+            (None, _) => pcg.precondition(team, &mut A, &mut two_level(preconditioner, coarse, inputs)),
             (Some(grid), _) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
         };
         let norm = rz.max(0.0).sqrt();
@@ -659,7 +671,7 @@ impl LinearStep {
         let corrects = searches && pass == 0;
         if corrects && descent.memory.begin(&mut pcg.r) {
             rz = match active(grid) {
-                None => pcg.precondition(team, &mut A, preconditioner),
+                None => pcg.precondition(team, &mut A, &mut two_level(preconditioner, coarse, inputs)),
                 Some(grid) => pcg.precondition(team, &mut A, &mut grid.cycle(preconditioner.inverses())),
             };
         }
@@ -668,7 +680,7 @@ impl LinearStep {
         }
         let from = (rz, self.reference, until);
         let report = match active(grid) {
-            None => pcg.run(team, &mut A, preconditioner, delta, from),
+            None => pcg.run(team, &mut A, &mut two_level(preconditioner, coarse, inputs), delta, from),
             Some(grid) => {
                 let mut V = grid.cycle(preconditioner.inverses());
                 match self.method {

@@ -32,6 +32,7 @@ mod simulated;
 mod snapping;
 mod springs;
 mod together;
+mod two_level;
 mod verdicts;
 
 use nalgebra::Vector3;

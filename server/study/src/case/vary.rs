@@ -1,7 +1,8 @@
 //! The factors to vary in a scene. The base of every axis is the scene's own setting, untouched.
 
-use scindo_world::scene::raw::RawMethod;
-use scindo_world::scene::{CellSplit, CheckedScene, MeshSource};
+use scindo_physics::body::Arithmetic;
+use scindo_world::scene::raw::{RawElement, RawMethod};
+use scindo_world::scene::{BodySpec, CellSplit, CheckedScene, MeshSource};
 use serde_json::Value;
 
 use super::refine::{cells, levels};
@@ -65,7 +66,15 @@ pub fn axes(of: Subject<'_>, quick: bool, cells_wanted: &[usize], threads_wanted
     if !explicit {
         let multigrid = of.scene.bodies.iter().all(|body| body.mechanics.method == RawMethod::MgPcg);
         let own = if multigrid { "mg-pcg" } else { "pcg" };
-        axes.push(words(of, Factor::Solver, "solver.method", own, &["pcg", "cholesky"]));
+        let mut all = vec!["pcg", "cholesky"];
+        // A coarse space goes with tetrahedra on the fast path.
+        let tets = |body: &BodySpec| {
+            body.mechanics.element == RawElement::Tet4 && body.mechanics.arithmetic() == Arithmetic::Single
+        };
+        if of.scene.bodies.iter().all(tets) {
+            all.push("two-level-pcg");
+        }
+        axes.push(words(of, Factor::Solver, "solver.method", own, &all));
         axes.push(with_own(
             Factor::Tolerance,
             OWN,

@@ -165,6 +165,7 @@ impl Mechanics {
                 RawMethod::Cg => Method::Cg,
                 RawMethod::Cholesky => Method::Cholesky,
                 RawMethod::Pcg | RawMethod::Relaxation => Method::Pcg,
+                RawMethod::TwoLevelPcg => Method::TwoLevelPcg,
                 RawMethod::Multigrid => Method::Multigrid,
                 RawMethod::MgPcg => Method::MgPcg,
             },

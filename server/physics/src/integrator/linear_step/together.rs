@@ -30,6 +30,7 @@ impl LinearStep {
     pub fn begin_together(&mut self, own: &mut Own<'_, '_>) -> usize {
         let Own { team, elastic, state, inputs } = own;
         self.aside = self.grid.take();
+        self.coarse_aside = self.coarse.take();
         self.predict(team, state, inputs);
         self.springs.begin(&inputs.step, &self.predicted);
         self.searched = None;
@@ -172,6 +173,7 @@ impl LinearStep {
         }
         self.shared.clear();
         self.grid = self.aside.take();
+        self.coarse = self.coarse_aside.take();
         finite
     }
 }

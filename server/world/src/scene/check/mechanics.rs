@@ -195,6 +195,19 @@ impl Check<'_> {
                 return self.conflict(key, what, "change that, or choose cg, pcg or cholesky");
             }
         }
+        if m.method == RawMethod::TwoLevelPcg {
+            if m.element != RawElement::Tet4 {
+                let what = format!("found `{found}` with {}, allowed: tet4", word(&m.element));
+                return self.conflict(key, what, "write element = \"tet4\", or choose another solver.method");
+            }
+            // Its coarse space is made for the kernels of the fast path.
+            let precision =
+                || (m.arithmetic() != Arithmetic::Single).then_some("precision other than single");
+            if let Some(why) = m.why_general().or_else(precision) {
+                let what = format!("found `{found}` with {why}");
+                return self.conflict(key, what, "change that, or choose cg, pcg or cholesky");
+            }
+        }
         if m.method == RawMethod::Relaxation && m.integrator != RawIntegrator::Static {
             let what = format!("found `relaxation` with {}, allowed: static", word(&m.integrator));
             let next = "write integrator = \"static\", or choose cg, pcg or cholesky";
@@ -224,7 +237,7 @@ impl Check<'_> {
             Some(RawPrecision::Single) => {
                 if let Some(why) = m.why_general() {
                     let what = format!("found `single` with {why}, allowed: mixed, double");
-                    let next = "single precision needs tet4, octree or hex8 on equal cubes, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law, or octree), pcg or multigrid, \
+                    let next = "single precision needs tet4, octree or hex8 on equal cubes, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law, or octree), pcg, two-level-pcg or multigrid, \
                                 lumped mass, no locking remedy and one Newton step";
                     self.conflict(key, what, next);
                 }

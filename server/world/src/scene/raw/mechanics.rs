@@ -135,7 +135,8 @@ pub enum RawLocking {
 #[serde(deny_unknown_fields, default)]
 pub struct RawSolver {
     /// Linear solver. Default: `mg-pcg` for `octree` where law, integrator and precision allow it, otherwise
-    /// `pcg`. For a solution to round-off, take `cholesky` with precision `double` and tolerance
+    /// `pcg`. Bodies of tetrahedra whose steps take more than some fifty iterations are faster with
+    /// `two-level-pcg`. For a solution to round-off, take `cholesky` with precision `double` and tolerance
     /// 1e-12. It is also the fastest for equilibria with thin layers, where `pcg` needs hundreds of
     /// iterations.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -200,6 +201,9 @@ pub enum RawMethod {
     /// Conjugate gradients with block-Jacobi preconditioner.
     #[default]
     Pcg,
+    /// Conjugate gradients with a two-level preconditioner, block-Jacobi and a coarse space, for `tet4`. Iterations
+    /// hardly depend on the mesh, the stiffness and the step.
+    TwoLevelPcg,
     /// Sparse factorisation.
     Cholesky,
     /// Matrix-free static relaxation, for the integrator `static`. Each step makes a fixed number of

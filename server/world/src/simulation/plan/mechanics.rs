@@ -114,6 +114,10 @@ fn describe(m: &Mechanics, size: &BodySize) -> String {
             size.iterations,
             m.tolerance
         ),
+        RawMethod::TwoLevelPcg => format!(
+            "cg preconditioned by block-jacobi and a coarse space, at most {} iterations to {:e}, {precision}",
+            size.iterations, m.tolerance
+        ),
         RawMethod::Pcg => {
             format!("pcg, at most {} iterations to {:e}, {precision}", size.iterations, m.tolerance)
         }
