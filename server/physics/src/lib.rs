@@ -4,7 +4,7 @@
 //! constants, an [`element`] its resistance to deformation. [`cut`] divides elements into pieces and
 //! nodes into copies; [`snap`] cuts the mesh itself instead. A [`skin`] is a finer surface that follows
 //! the cuts, and [`enrichment`] views one cut element in the bases of the literature. An [`assembly`]
-//! gives the forces and matrices of any element with any law; an [`operator`] is the fast way from
+//! gives the forces and matrices of any element with any law; [`pressure`] follows the surface; an [`operator`] is the fast way from
 //! displacements to forces. A [`solver`] inverts it, and an [`integrator`] makes a step of it. A [`body`]
 //! holds all of this together for the world.
 //!
@@ -29,6 +29,7 @@ pub mod enrichment;
 pub mod phase;
 pub mod team;
 pub mod assembly;
+pub mod pressure;
 pub mod operator;
 pub mod solver;
 pub mod multigrid;

@@ -71,6 +71,7 @@ const AT_ONCE: &[Mistake] = &[
     ("= 1000", "= 1.06", &["given in g/cm³ or t/mm³?"]),
     ("-9.81", "-9810", &["world.gravity_m_s2", "mm/s²"]),
     ("force_n = [0, 0.1, 0]", "force_n = [0, 5e4, 0]", &["load.0.force_n", "in newtons"]),
+    ("force_n = [0, 0.1, 0]", "pressure_pa = 1e7", &["load.0.pressure_pa", "in pascals"]),
     (
         "max_m = [1, 1, 1e-6] } }\n",
         "max_m = [1, 1, 1e-6] } }\ndisplacement_m = [0, 0, 5]\n",

@@ -216,3 +216,20 @@ fn the_bar_rings_at_the_speed_of_sound() {
     run(&mut sim, 0.04);
     assert!(displacement(&sim, 0).x.abs() < 3e-4, "{}", displacement(&sim, 0));
 }
+
+/// The dome rises with the pressure and comes down with it, and every step finds its equilibrium.
+#[test]
+fn the_bulge_test_rises_and_comes_down() {
+    let mut sim = start("bulge-test.toml", &["body.sheet.mesh.box.cells=[6, 6, 1]"]);
+    assert!(sim.warnings().is_empty(), "{:?}", sim.warnings());
+    let mut heights = Vec::new();
+    while sim.time_s() < 2.0 - 1e-9 {
+        let until_s = sim.time_s() + 0.5;
+        run(&mut sim, until_s);
+        let solve = sim.report().bodies[0].solve;
+        assert!(solve.residual <= 1e-6, "{solve:?}");
+        heights.push(displacement(&sim, 0).z);
+    }
+    assert!(heights[1] > 0.01 && heights[0] > 0.6 * heights[1], "{heights:?}");
+    assert!((heights[2] - heights[0]).abs() < 1e-6 && heights[3].abs() < 1e-6, "{heights:?}");
+}

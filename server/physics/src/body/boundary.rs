@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::pressing::PressureLoad;
 use super::{Body, BodyError};
 use crate::cut::NewCopy;
 use crate::element::MaterialPoint;
@@ -34,6 +35,8 @@ pub struct Boundary {
     spread_force: Vec<Vector3<f64>>,
     /// Spread forces of which a changing share acts.
     varying: Vec<VaryingForce>,
+    /// Pressures on the skin.
+    pub(super) pressures: Vec<PressureLoad>,
     /// Scratch: the volume around every node [m³].
     #[serde(skip)]
     node_volume: Vec<f64>,
@@ -338,7 +341,7 @@ impl Body {
 
     /// Adds a total force [N] shared by area over the skin faces all of whose nodes are in `nodes`.
     pub fn add_surface_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
-        let selected = self.selection(nodes, &force_n)?;
+        let selected = self.selection(nodes, ("force_n", &force_n))?;
         let area = self.space.areas(&selected);
         self.add_constant(spread("surface", &area, force_n)?);
         Ok(())
@@ -354,7 +357,7 @@ impl Body {
         nodes: &[u32],
         force_n: Vector3<f64>,
     ) -> Result<(), BodyError> {
-        let selected = self.selection(nodes, &force_n)?;
+        let selected = self.selection(nodes, ("force_n", &force_n))?;
         let area = self.space.areas(&selected);
         self.add_varying(spread("surface", &area, force_n)?)
     }
@@ -369,7 +372,7 @@ impl Body {
         nodes: &[u32],
         force_n: Vector3<f64>,
     ) -> Result<(), BodyError> {
-        let selected = self.selection(nodes, &force_n)?;
+        let selected = self.selection(nodes, ("force_n", &force_n))?;
         let volume = self.space.volumes(&selected);
         self.add_varying(spread("volume", &volume, force_n)?)
     }
@@ -383,19 +386,20 @@ impl Body {
             load.share = share;
         }
         if changed {
-            self.boundary.node_loads(&*self.space, self.rest.len(), &mut self.load);
+            self.gather_loads();
         }
     }
 
     /// Adds a total force [N] shared by volume over the tets around `nodes`.
     pub fn add_volume_force(&mut self, nodes: &[u32], force_n: Vector3<f64>) -> Result<(), BodyError> {
-        let selected = self.selection(nodes, &force_n)?;
+        let selected = self.selection(nodes, ("force_n", &force_n))?;
         let volume = self.space.volumes(&selected);
         self.add_constant(spread("volume", &volume, force_n)?);
         Ok(())
     }
 
-    /// Load on every node [N], gravity not included.
+    /// Load on every node [N], gravity not included. Pressure is included only where it is a dead load in the step;
+    /// [`pressure_forces`](Self::pressure_forces) tells it everywhere.
     pub fn loads(&self) -> &[Vector3<f64>] {
         &self.load
     }
@@ -405,12 +409,17 @@ impl Body {
         self.boundary.point_force.clear();
         self.boundary.spread_force.clear();
         self.boundary.varying.clear();
+        self.boundary.pressures.clear();
         self.follow_boundary();
     }
 
-    fn selection(&self, nodes: &[u32], force_n: &Vector3<f64>) -> Result<Vec<bool>, BodyError> {
+    pub(super) fn selection(
+        &self,
+        nodes: &[u32],
+        (quantity, value): (&'static str, &Vector3<f64>),
+    ) -> Result<Vec<bool>, BodyError> {
         self.check_nodes(nodes)?;
-        check_vector("force_n", force_n)?;
+        check_vector(quantity, value)?;
         let mut selected = vec![false; self.space.n_nodes()];
         nodes.iter().for_each(|&n| selected[n as usize] = true);
         Ok(selected)

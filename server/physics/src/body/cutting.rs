@@ -156,7 +156,12 @@ impl Body {
         self.follow_masses();
         self.boundary.hold_between(new, self.space.node_of_copy());
         self.find_fixed();
-        self.boundary.loads_of_new_copies(&*self.space, &mut self.load);
+        if self.boundary.pressures.is_empty() {
+            self.boundary.loads_of_new_copies(&*self.space, &mut self.load);
+        } else {
+            self.bind_pressures();
+            self.gather_loads();
+        }
         self.connectivity.follow(&mut self.parts, &*self.space, new, &self.mass, &self.fixed);
         self.follow_parts();
     }
@@ -187,7 +192,8 @@ impl Body {
     /// Updates everything derived from constraints and loads.
     pub(super) fn follow_boundary(&mut self) {
         self.find_fixed();
-        self.boundary.node_loads(&*self.space, self.rest.len(), &mut self.load);
+        self.bind_pressures();
+        self.gather_loads();
         self.parts = LooseParts::connected(|visit| self.space.for_groups(visit), &self.mass, &self.fixed);
         self.follow_parts();
     }

@@ -102,6 +102,14 @@ pub enum BodyError {
         /// Total force [N].
         force_n: [f64; 3],
     },
+    /// A pressure on a selection that contains no face of the surface.
+    #[error(
+        "the selected nodes contain no whole face of the surface, so {pressure_pa} Pa act on nothing; select more nodes"
+    )]
+    NoSkinFace {
+        /// The pressure [Pa].
+        pressure_pa: f64,
+    },
     /// A list of errors with another length than that of the cells.
     #[error("{found} errors given for {expected} cells")]
     ErrorLength {

@@ -157,7 +157,10 @@ impl Body {
         groups: impl Iterator<Item = &'a [u32]>,
         gravity: Vector3<f64>,
     ) -> Vec<Vector3<f64>> {
-        let f_int = self.internal_forces();
+        let mut f_int = self.internal_forces();
+        if self.pressure_is_implicit() {
+            f_int.iter_mut().zip(self.pressure_forces()).for_each(|(f, pressure)| *f -= pressure);
+        }
         let held_by = |nodes: &[u32]| {
             let mut sum = Vector3::zeros();
             for fixed in self.fixed.iter().filter(|f| nodes.contains(&self.space.node_of(f.copy))) {

@@ -9,6 +9,7 @@ mod error;
 mod measures;
 mod phases;
 mod precision;
+mod pressing;
 mod range;
 mod settings;
 mod sleep;
@@ -50,6 +51,7 @@ use crate::mesh::{HexMesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
 use crate::phase::Phase;
+use crate::pressure::Pressure;
 use crate::skin::{Skin, SkinSettings, SkinShape};
 use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};
@@ -111,6 +113,11 @@ pub struct Body {
     /// Copies of parts that were put to sleep, ascending; they are among `fixed` too.
     asleep: Vec<FixedCopy>,
     load: Vec<Vector3<f64>>,
+    /// Faces under pressure, as the body is cut now.
+    pressure: Pressure,
+    /// Scratch: predicted positions [m].
+    #[serde(skip)]
+    ahead: Vec<Vector3<f64>>,
     mass: Vec<f64>,
     /// The number that each copy and added node was split from; its own if it was there from the start.
     split_from: Vec<u32>,
@@ -225,6 +232,8 @@ impl Body {
             prescribed_share: 1.0,
             asleep: Vec::new(),
             load: Vec::new(),
+            pressure: Pressure::default(),
+            ahead: Vec::new(),
             mass: Vec::new(),
             split_from: Vec::new(),
             parts: LooseParts::default(),
@@ -257,6 +266,7 @@ impl Body {
             return SolveReport { outcome: Outcome::Refused, ..SolveReport::default() };
         }
         self.team.begin(Phase::Guards);
+        self.predict_pressure(dt_s);
         let mut report = self.advance(dt_s, gravity, springs);
         self.team.begin(Phase::Guards);
         if let Some(Notice::Pivot { displacement }) = &mut report.notice {
@@ -270,9 +280,12 @@ impl Body {
     }
 
     fn advance(&mut self, dt_s: f64, gravity: Vector3<f64>, springs: &[PointSpring]) -> SolveReport {
+        let implicit = self.pressure_is_implicit();
         let Self { space, dynamics, team, state, spring_forces, load, fixed, mass, parts, rest, .. } = self;
         let points = &**space;
-        let inputs = StepInputs { h: dt_s, gravity, mass, load, fixed, parts, springs, rest, points };
+        let pressure = if implicit { &self.pressure } else { Pressure::none() };
+        let inputs =
+            StepInputs { h: dt_s, gravity, mass, load, pressure, fixed, parts, springs, rest, points };
         let report = dynamics.step(team, state, &inputs, spring_forces);
         let solves = !self.settings.scheme.is_explicit();
         let tolerance = if solves { self.settings.solver.tolerance } else { 0.0 };

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::{Body, BodyError};
 use crate::integrator::{StaticProblem, find_equilibrium};
+use crate::material::Law;
 use crate::solver::{Curvature, LinearSettings, Newton, NewtonSettings, PcgSettings, StopReason};
 
 /// Stopping criteria of a static solve.
@@ -50,6 +51,10 @@ impl Body {
             return Err(BodyError::LoosePart { part, mass_kg: self.parts.mass[part] });
         }
         self.state.v.fill(Vector3::zeros());
+        if self.pressure_lags() {
+            // Here the pressure follows the surface on every path, so it is none of the dead loads.
+            self.boundary.node_loads(&*self.space, self.rest.len(), &mut self.load);
+        }
         let made;
         let model = match self.dynamics.model() {
             Some(model) => model,
@@ -72,6 +77,9 @@ impl Body {
         });
         newton.set_stiff_modes(self.space.stiff_modes().map(Arc::new));
         let mut problem = StaticProblem::new(model, &load);
+        if self.material.law != Law::Linear {
+            problem = problem.under(&self.pressure, &self.state.x);
+        }
         let done =
             find_equilibrium(&mut newton, &mut self.team, &mut problem, &self.fixed, &mut self.state.x);
         Ok(StaticReport {

@@ -6,6 +6,7 @@ use smallvec::SmallVec;
 use super::{Body, Notice, Outcome, PointSpring, Scheme, SolveReport};
 use crate::integrator::{LooseParts, PairSpring, StepInputs, Together};
 use crate::operator::FixedCopy;
+use crate::pressure::Pressure;
 use crate::solver::{PcgSettings, StopReason};
 use crate::space::Space;
 
@@ -153,7 +154,18 @@ fn inputs<'a>(
     rest: &'a [Vector3<f64>],
     space: &'a dyn Space,
 ) -> StepInputs<'a> {
-    StepInputs { h, gravity, mass, load, fixed, parts, springs, rest, points: space }
+    StepInputs {
+        h,
+        gravity,
+        mass,
+        load,
+        pressure: Pressure::none(),
+        fixed,
+        parts,
+        springs,
+        rest,
+        points: space,
+    }
 }
 
 impl Body {
@@ -163,6 +175,7 @@ impl Body {
     }
 
     fn begin_together(&mut self, step: (f64, Vector3<f64>), springs: &[PointSpring]) -> bool {
+        self.predict_pressure(step.0);
         let Self { space, dynamics, state, load, fixed, mass, parts, rest, .. } = self;
         dynamics.begin_together(state, &inputs(step, (mass, load, fixed, parts), springs, rest, &**space))
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::lists::reserve::reserve_half_again;
-use crate::mesh::{MeshError, TetMesh};
+use crate::mesh::{MeshError, TET_FACES, TetMesh};
 
 use super::drawn::pending::{Pending, PendingFace, Pieces};
 use super::drawn::traces::{TraceLine, Traces};
@@ -22,7 +22,7 @@ use super::topology::components::Components;
 use super::topology::copies::CopyTable;
 use super::topology::crossings::Crossings;
 use super::topology::elements_around::ElementsAround;
-use super::topology::fragments::Fragments;
+use super::topology::fragments::{Fragments, NONE};
 use super::topology::incision_sets::IncisionSets;
 use super::topology::locate::piece_at;
 use super::topology::pieces::{Piece, PieceTable};
@@ -233,6 +233,21 @@ impl CutMesh {
             let corner = |v: u32| nodes.map(|node| fragments.vertices[v as usize].weight_of(node));
             (fragments.tets[t as usize].map(corner), fragments.fraction[t as usize])
         })
+    }
+
+    /// The faces of piece `p` on the skin, without lips of cuts: the barycentric coordinates of their corners in the
+    /// element, counter-clockwise from outside.
+    pub(crate) fn skin_fragments(&self, p: usize) -> impl Iterator<Item = [[f64; 4]; 3]> + '_ {
+        let (fragments, nodes) = (&self.fragments, self.mesh.tets[self.pieces()[p].element as usize]);
+        let of_fragment = move |t: u32| {
+            let t = t as usize;
+            let is_skin = move |k: &usize| fragments.neighbour[t][*k] == NONE && fragments.tag[t][*k] == 0;
+            (0..4).filter(is_skin).map(move |k| {
+                let corner = |v: u32| nodes.map(|node| fragments.vertices[v as usize].weight_of(node));
+                TET_FACES[k].map(|slot| corner(fragments.tets[t][slot]))
+            })
+        };
+        self.pieces.fragments(p as u32, fragments).flat_map(of_fragment)
     }
 
     /// Topology epoch: rises whenever the topology or its surface changes.

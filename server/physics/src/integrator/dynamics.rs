@@ -341,10 +341,12 @@ impl Dynamics {
         let weight = |c: usize| solver.weight(c, inputs.mass[c], inputs.gravity);
         let force = |c: usize| weight(c) + inputs.load[c];
         let exchanged: f64 = (0..state.x.len()).map(|c| force(c).dot(&(state.x[c] - before.x[c]))).sum();
-        let H =
-            solver.kinetic_energy(inputs.mass, &state.v) + elastic_j + inputs.load_energy(&state.x, weight);
+        // Pressure on a part of a surface has no potential. Its work in the step counts instead.
+        let pressed = inputs.pressure.work(&before.x, &state.x);
+        let kinetic = solver.kinetic_energy(inputs.mass, &state.v);
+        let H = kinetic + elastic_j + inputs.load_energy(&state.x, weight) - pressed;
         let driven = inputs.is_driven(before);
-        let end = (H, elastic_j, before_j + exchanged.abs());
+        let end = (H, elastic_j, before_j + exchanged.abs() + pressed.abs());
         multistep.end_energy(end, report.scheme, (driven, may_repeat))
     }
 
@@ -377,6 +379,7 @@ impl Dynamics {
         for (c, f_ext) in self.f_ext.iter_mut().enumerate() {
             *f_ext = self.solver.weight(c, inputs.mass[c], inputs.gravity) + inputs.load[c];
         }
+        inputs.pressure.add_forces(inputs.rest, &mut self.f_ext);
         let endless = |m: &&FreeMotion| m.is_translation() || self.law == Law::Linear;
         let driven = |m: &&FreeMotion| m.is_driven(parts, inputs.rest, &self.f_ext);
         let motion = self.free_motions.iter().filter(endless).find(driven);

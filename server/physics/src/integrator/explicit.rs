@@ -103,10 +103,10 @@ impl ModelSolver {
         let [mut x, mut v, mut a, mut dx, mut dv] = std::mem::take(&mut self.stages);
         match self.settings.scheme {
             Scheme::Midpoint => {
-                self.acceleration_at(team, [&next.x, &next.v], inputs.fixed, &mut a);
+                self.acceleration_at(team, [&next.x, &next.v], inputs, &mut a);
                 shifted(&next.x, h / 2.0, &next.v, &mut x);
                 shifted(&next.v, h / 2.0, &a, &mut v);
-                self.acceleration_at(team, [&x, &v], inputs.fixed, &mut a);
+                self.acceleration_at(team, [&x, &v], inputs, &mut a);
                 add(&mut next.x, h, &v);
                 add(&mut next.v, h, &a);
             }
@@ -117,7 +117,7 @@ impl ModelSolver {
                 x.copy_from_slice(&next.x);
                 v.copy_from_slice(&next.v);
                 for (weight, forward) in [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)] {
-                    self.acceleration_at(team, [&x, &v], inputs.fixed, &mut a);
+                    self.acceleration_at(team, [&x, &v], inputs, &mut a);
                     add(&mut dx, weight, &v);
                     add(&mut dv, weight, &a);
                     shifted(&next.x, h * forward, &v, &mut x);
@@ -127,7 +127,7 @@ impl ModelSolver {
                 add(&mut next.v, h / 6.0, &dv);
             }
             _ => {
-                self.acceleration_at(team, [&next.x, &next.v], inputs.fixed, &mut a);
+                self.acceleration_at(team, [&next.x, &next.v], inputs, &mut a);
                 add(&mut next.v, h, &a);
                 add(&mut next.x, h, &next.v);
             }
@@ -141,12 +141,12 @@ impl ModelSolver {
         self.stages = [x, v, a, dx, dv];
     }
 
-    /// a = M⁻¹ (f_ext + f_springs(x) − f_int(x) − α M v − β K̂(x) v) [m/s²], 0 where prescribed.
+    /// a = M⁻¹ (f_ext + f_pressure(x) + f_springs(x) − f_int(x) − α M v − β K̂(x) v) [m/s²], 0 where prescribed.
     pub(super) fn acceleration_at(
         &mut self,
         team: &mut Team,
         [x, v]: [&[Vector3<f64>]; 2],
-        fixed: &[FixedCopy],
+        inputs: &StepInputs<'_>,
         a: &mut [Vector3<f64>],
     ) {
         team.begin(Phase::Residual);
@@ -161,15 +161,16 @@ impl ModelSolver {
         for (f, f_ext) in self.force.iter_mut().zip(&self.f_ext) {
             *f = f_ext - *f;
         }
+        inputs.pressure.add_forces(x, &mut self.force);
         for spring in &self.active.springs {
             let force = spring.law().potential(spring.point(x)).force;
             spring.carriers().for_each(|(c, w)| self.force[c] += w * force);
         }
-        hold(fixed, &mut self.force);
+        hold(inputs.fixed, &mut self.force);
         team.begin(Phase::Solve);
         a.fill(Vector3::zeros());
         self.mass.solve(team, &self.force, a);
-        hold(fixed, a);
+        hold(inputs.fixed, a);
         team.begin(Phase::Commit);
     }
 }

@@ -35,7 +35,7 @@ const SAME_GRIP: f64 = 1e-3;
 
 /// Φ of the step whose history is `$history`.
 macro_rules! step_potential {
-    ($solver:ident, $history:ident, $definite:ident) => {{
+    ($solver:ident, ($inputs:ident, $history:ident), $definite:ident) => {{
         let StepHistory { increment, x_a, x_v } = *$history;
         let Rayleigh { mass_1_s: alpha, stiffness_s: beta } = $solver.material.rayleigh;
         StepPotential {
@@ -48,6 +48,7 @@ macro_rules! step_potential {
             damping: $solver.damping.as_ref().filter(|_| increment.B > 0.0).map(|K| (beta, K)),
             f_ext: &$solver.f_ext,
             springs: &$solver.active.springs,
+            pressure: ($inputs.pressure, &mut $solver.follower),
             definite: $definite,
             stored: 0.0,
             scratch: &mut $solver.scratch,
@@ -155,12 +156,14 @@ impl ModelSolver {
             self.balance_parts(x, (inputs, history));
         }
         let definite = if single { Tangent::Held } else { Tangent::Projected };
-        let mut phi = step_potential!(self, history, definite);
+        self.follower.begin(inputs.pressure, x);
+        let mut phi = step_potential!(self, (inputs, history), definite);
         team.begin(Phase::Residual);
         if !phi.value(team, x).is_finite() {
             // The velocity is so high that the predictor overflows: start from the present positions.
             x.copy_from_slice(&before.x);
             prescribe(inputs.fixed, x);
+            phi.pressure.1.begin(inputs.pressure, x);
         }
         if let (Scheme::Static, Some(iterations)) = (self.settings.scheme, self.settings.relaxation) {
             self.relaxation.tolerance = settings.tolerance;
@@ -181,7 +184,8 @@ impl ModelSolver {
             if changed <= SAME_GRIP || done.stop == StopReason::NonFinite {
                 break;
             }
-            let mut phi = step_potential!(self, history, definite);
+            self.follower.begin(inputs.pressure, x);
+            let mut phi = step_potential!(self, (inputs, history), definite);
             let again = self.newton.minimise(team, &mut phi, x, inputs.fixed);
             let (steps, backtracks) = (done.steps + again.steps, done.backtracks + again.backtracks);
             let linear_iterations = done.linear_iterations + again.linear_iterations;
@@ -221,6 +225,11 @@ impl ModelSolver {
                 *d = x - from;
             }
             mass.add_times(s, moved, g);
+        }
+        if !inputs.pressure.is_empty() {
+            moved.fill(Vector3::zeros());
+            inputs.pressure.add_forces(x, moved);
+            g.iter_mut().zip(&*moved).for_each(|(g, f)| *g -= f);
         }
         translations.restart(parts);
         translations.begin(parts, increment.A + alpha * increment.B);

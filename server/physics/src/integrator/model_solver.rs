@@ -25,6 +25,7 @@ use crate::element::Points;
 use crate::lists::reserve::resize_reserving;
 use crate::material::Material;
 use crate::operator::FixedCopy;
+use crate::pressure::Follower;
 use crate::solver::Newton;
 use crate::space::Space;
 use crate::team::Team;
@@ -46,6 +47,8 @@ pub struct ModelSolver {
     pub(super) translations: Translations,
     pub(super) active: ActiveSprings,
     pub(super) f_ext: Vec<Vector3<f64>>,
+    /// Pressure that follows the surface, around the iterate of Newton's method.
+    pub(super) follower: Follower,
     pub(super) scratch: Vec<Vector3<f64>>,
     pub(super) force: Vec<Vector3<f64>>,
     /// Buffers for the stages of explicit schemes.
@@ -68,6 +71,7 @@ impl ModelSolver {
             translations: Translations::default(),
             active: ActiveSprings::default(),
             f_ext: Vec::new(),
+            follower: Follower::default(),
             scratch: Vec::new(),
             force: Vec::new(),
             stages: Default::default(),
@@ -175,7 +179,7 @@ impl StepSolver for ModelSolver {
         acceleration: &mut [Vector3<f64>],
     ) {
         self.begin(state, inputs, &mut SolveReport::default());
-        self.acceleration_at(team, [&state.x, &state.v], inputs.fixed, acceleration);
+        self.acceleration_at(team, [&state.x, &state.v], inputs, acceleration);
     }
 
     fn elastic_energy(&mut self, team: &mut Team, x: &[Vector3<f64>], _: &dyn Points) -> f64 {

@@ -3,9 +3,9 @@
 //! Every implicit scheme sets a⁺ = A (x⁺ − x_a) and v⁺ = B (x⁺ − x_v) in
 //! M a⁺ + (α M + β K̂) v⁺ + f_int(x⁺) = f_ext + f_springs(x⁺), which is ∇Φ(x⁺) = 0 of
 //!
-//!   Φ(x) = A/2 ‖x − x_a‖²_M + αB/2 ‖x − x_v‖²_M + βB/2 ‖x − x_v‖²_K̂ + Ψ(x) − f_ext·(x − x_a) + Σ springs
+//!   Φ(x) = A/2 ‖x − x_a‖²_M + αB/2 ‖x − x_v‖²_M + βB/2 ‖x − x_v‖²_K̂ + Ψ(x) − f_ext·(x − x_a) + Σ springs + P(x)
 //!
-//! with K̂ held at the predictor.
+//! with K̂ held at the predictor, and [pressure](crate::pressure) as the potential P around the iterate.
 //!
 //! # Source
 //! Radovitzky, Ortiz 1999 (incremental potential of Newmark schemes); Martin et al. 2011.
@@ -16,6 +16,7 @@ use super::increment::Increment;
 use super::mass::Mass;
 use super::springs::ActiveSpring;
 use crate::assembly::{BlockCsr, Model, Tangent};
+use crate::pressure::{Follower, Pressure};
 use crate::solver::{Curvature, Potential};
 use crate::team::Team;
 
@@ -33,6 +34,8 @@ pub(super) struct StepPotential<'a> {
     /// Gravity and loads [N].
     pub f_ext: &'a [Vector3<f64>],
     pub springs: &'a [ActiveSpring],
+    /// Pressure that follows the surface, and its potential around the iterate.
+    pub pressure: (&'a Pressure, &'a mut Follower),
     /// The tangent to use where a positive semidefinite one is needed.
     pub definite: Tangent,
     /// Ψ [J] at the positions of the last gradient.
@@ -78,6 +81,8 @@ impl StepPotential<'_> {
                 g[c] -= f;
             }
         }
+        let (pressure, follower) = &self.pressure;
+        phi += follower.add_to(pressure, x, g.as_deref_mut());
         for spring in self.springs {
             let response = spring.law().potential(spring.point(x));
             phi += response.energy;
@@ -96,6 +101,8 @@ impl StepPotential<'_> {
             H.add_scaled(beta * B, K);
         }
         self.springs.iter().for_each(|spring| add_spring(spring, x, H));
+        let (pressure, follower) = &self.pressure;
+        follower.add_hessian(pressure, x, H);
     }
 }
 
@@ -138,6 +145,12 @@ impl Potential for StepPotential<'_> {
 
     fn loads(&mut self, loads: &mut [Vector3<f64>]) {
         loads.copy_from_slice(self.f_ext);
+        self.pressure.1.add_force(loads);
+    }
+
+    fn renew(&mut self, x: &[Vector3<f64>], g: &mut [Vector3<f64>]) -> f64 {
+        let (pressure, follower) = &mut self.pressure;
+        follower.renew(pressure, x, g)
     }
 
     fn stored(&self) -> f64 {

@@ -9,6 +9,7 @@ use super::state::State;
 use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{ElasticUpdate, FixedCopy, Held};
+use crate::pressure::Pressure;
 use crate::solver::{LinearReport, PcgSettings};
 
 /// Inputs of one step.
@@ -22,6 +23,8 @@ pub struct StepInputs<'a> {
     pub mass: &'a [f64],
     /// Load on every node [N], gravity not included.
     pub load: &'a [Vector3<f64>],
+    /// Pressure that follows the surface. Steps by linear solves leave it out: there `load` holds it as of the predictor.
+    pub pressure: &'a Pressure,
     /// Prescribed nodes, with their positions at the end of the step.
     pub fixed: &'a [FixedCopy],
     /// Connected parts of the body, and which of them are free.

@@ -37,7 +37,7 @@ impl Newton {
         (x, fixed): (&mut [Vector3<f64>], &[FixedCopy]),
         (report, first): (&mut NewtonReport, &mut Option<f64>),
     ) -> bool {
-        let start = report.potential;
+        let mut start = report.potential;
         let wanted = self.settings.curvature == Curvature::Exact && self.settings.steps > MOST_STEPS;
         if !wanted || !start.is_finite() || !potential.extrapolated_hessian(team, x, x, &mut self.hessian) {
             return false;
@@ -63,6 +63,8 @@ impl Newton {
             team.begin(Phase::Residual);
             x.iter_mut().zip(&self.p).for_each(|(x, p)| *x += p);
             report.potential = potential.gradient(team, x, &mut self.g);
+            let renewed = potential.renew(x, &mut self.g);
+            (report.potential, start) = (report.potential + renewed, start + renewed);
             report.steps += 1;
             team.begin(Phase::Operator);
             potential.extrapolated_hessian(team, &self.from, x, &mut self.hessian);
@@ -72,8 +74,9 @@ impl Newton {
             return converged;
         }
         x.copy_from_slice(&self.trial);
+        let renewed = potential.renew(x, &mut self.g);
         self.g.copy_from_slice(&self.trial_g);
-        report.potential = start;
+        report.potential = start + renewed;
         false
     }
 }

@@ -44,6 +44,12 @@ pub trait Potential {
         false
     }
 
+    /// Tells that `x` is the next iterate, for a potential that replaces another one around it. The gradient `g` at
+    /// `x` is changed accordingly; returns the change of Φ(x) [J].
+    fn renew(&mut self, _x: &[Vector3<f64>], _g: &mut [Vector3<f64>]) -> f64 {
+        0.0
+    }
+
     /// Elastic energy [J] at the last gradient; 0 if there is none. A body under prescribed displacements
     /// alone has no loads to measure the residual against, so this stands in.
     fn stored(&self) -> f64 {
@@ -290,6 +296,7 @@ impl Newton {
             largest = largest.max(phi.abs());
             x.copy_from_slice(&self.trial);
             std::mem::swap(&mut self.g, &mut self.trial_g);
+            phi += potential.renew(x, &mut self.g);
             report.steps += 1;
             curvature = self.settings.curvature;
             let full = report.backtracks == backtracks && report.gradient_steps == gradient_steps;

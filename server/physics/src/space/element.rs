@@ -6,14 +6,18 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use smallvec::SmallVec;
 
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{CutMesh, NewCopy};
-use crate::element::Point;
+use crate::element::{MaterialPoint, Point};
 use crate::material::{Material, Regions};
 use crate::mesh::TetMesh;
 use crate::octree::Octree;
 use crate::operator::StiffModes;
+
+/// A shape function below this is that of a node beside the face; the rest is rounding.
+const BESIDE: f64 = 1e-12;
 
 /// A finite element on the nodes of a tet mesh, with the data it needs beside that.
 pub trait Element: Any + Debug + Send + Sync {
@@ -92,6 +96,32 @@ pub trait Element: Any + Debug + Send + Sync {
 
     /// ∫ N_a dA [m²] over the skin faces all of whose nodes are `selected`, by node.
     fn areas(&self, mesh: &TetMesh, selected: &[bool]) -> Vec<f64>;
+
+    /// Calls `visit` for the faces of the skin; see [`Space::for_skin_faces`](super::Space::for_skin_faces). `is_chosen`
+    /// tells whether the node of a copy or added node is selected.
+    fn for_skin_faces(
+        &self,
+        cut: &CutMesh,
+        is_chosen: &dyn Fn(u32) -> bool,
+        visit: &mut dyn FnMut(&[MaterialPoint]),
+    ) {
+        for p in 0..cut.pieces().len() {
+            for corners in cut.skin_fragments(p) {
+                let middles = [[0, 1], [1, 2], [2, 0]]
+                    .map(|[a, b]| std::array::from_fn(|i| 0.5 * (corners[a][i] + corners[b][i])));
+                let quadratic = self.kind() == ElementKind::Tet10;
+                let weights = corners.into_iter().chain(middles).take(if quadratic { 6 } else { 3 });
+                let bound = |weights| {
+                    let carriers = self.carriers(cut, p as u32, weights).into_iter();
+                    MaterialPoint::new(carriers.filter(|(_, w)| w.abs() > BESIDE))
+                };
+                let points: SmallVec<[MaterialPoint; 6]> = weights.map(bound).collect();
+                if points.iter().all(|point| point.copies().iter().all(|&copy| is_chosen(copy))) {
+                    visit(&points);
+                }
+            }
+        }
+    }
 
     /// ∫ N_a dV [m³] of the `selected` nodes of the uncut body; 0 for the others.
     fn volumes(&self, mesh: &TetMesh, selected: &[bool]) -> Vec<f64>;

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::element::Element;
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{CutMesh, Piece};
-use crate::element::{Point, deformation_gradient, hex8, quadrature};
+use crate::element::{MaterialPoint, Point, deformation_gradient, hex8, quadrature};
 use crate::material::Material;
 use crate::mesh::{HexMesh, TetMesh};
 use crate::octree::Octree;
@@ -42,6 +42,19 @@ impl Element for Hexahedra {
             add_quad(&self.0, quad, &mut area);
         }
         area
+    }
+
+    fn for_skin_faces(
+        &self,
+        _: &CutMesh,
+        is_chosen: &dyn Fn(u32) -> bool,
+        visit: &mut dyn FnMut(&[MaterialPoint]),
+    ) {
+        for quad in skin_of(&self.0).into_iter().filter(|quad| quad.iter().all(|&n| is_chosen(n))) {
+            // The corners of the list run clockwise seen from outside.
+            let [a, b, c, d] = quad.map(|n| MaterialPoint::new([(n, 1.0)]));
+            visit(&[a, d, c, b]);
+        }
     }
 
     fn volumes(&self, _: &TetMesh, selected: &[bool]) -> Vec<f64> {

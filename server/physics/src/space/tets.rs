@@ -302,6 +302,11 @@ impl Space for Tets {
         self.element.areas(self.cut.mesh(), selected)
     }
 
+    fn for_skin_faces(&self, selected: &[bool], visit: &mut dyn FnMut(&[MaterialPoint])) -> bool {
+        self.element.for_skin_faces(&self.cut, &|copy| selected[self.node_of(copy) as usize], visit);
+        true
+    }
+
     fn volumes(&self, selected: &[bool]) -> Vec<f64> {
         self.element.volumes(self.cut.mesh(), selected)
     }

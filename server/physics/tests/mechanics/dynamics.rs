@@ -12,6 +12,7 @@ use scindo_physics::integrator::{
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
 use scindo_physics::operator::FixedCopy;
+use scindo_physics::pressure::Pressure;
 use scindo_physics::solver::{LinearSettings, Method, NewtonSettings};
 use scindo_physics::team::Team;
 
@@ -80,6 +81,7 @@ impl Rig {
             gravity: self.gravity,
             mass: &self.masses,
             load: &self.load,
+            pressure: Pressure::none(),
             fixed: &self.fixed,
             parts: &self.parts,
             springs: &self.springs,

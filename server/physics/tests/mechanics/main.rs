@@ -22,6 +22,7 @@ mod multistep;
 mod octree;
 mod octree_statics;
 mod phases;
+mod pressure;
 mod quadratic_cuts;
 mod reference;
 mod regions;

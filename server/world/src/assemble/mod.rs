@@ -23,7 +23,7 @@ use scindo_physics::team::Lead;
 
 use crate::body::{Adaptation, Probe, SimBody, region};
 use crate::mesh_in::{MeshHealth, Observer};
-use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadSpec, Scene, SceneError, Share};
+use crate::scene::{BodySpec, CheckedScene, Fault, FixSpec, LoadKind, LoadSpec, Scene, SceneError, Share};
 use crate::tool::obstacle::Obstacle;
 
 /// How bodies are computed; belongs to the machine, not to the scene.
@@ -245,18 +245,28 @@ impl Builder<'_> {
         if nodes.is_empty() {
             return;
         }
+        let (force_n, share) = match load.kind {
+            LoadKind::Force { force_n, share } => (force_n, share),
+            LoadKind::Pressure { pressure_pa } => {
+                match body.body.add_pressure(&nodes, pressure_pa) {
+                    Ok(()) => body.pressures.push(load.course.clone()),
+                    Err(error) => self.refused(at, &error),
+                }
+                return;
+            }
+        };
         type Add = fn(&mut Body, &[u32], Vector3<f64>) -> Result<(), BodyError>;
         let (over_area, over_volume): (Add, Add) = match load.course.is_constant() {
             true => (Body::add_surface_force, Body::add_volume_force),
             false => (Body::add_varying_surface_force, Body::add_varying_volume_force),
         };
-        let by_area = match load.share {
+        let by_area = match share {
             Some(Share::Volume) => None,
-            _ => Some(over_area(&mut body.body, &nodes, load.force_n)),
+            _ => Some(over_area(&mut body.body, &nodes, force_n)),
         };
-        let result = match (by_area, load.share) {
+        let result = match (by_area, share) {
             (Some(Err(BodyError::NothingSelected { .. })), None) | (None, _) => {
-                over_volume(&mut body.body, &nodes, load.force_n)
+                over_volume(&mut body.body, &nodes, force_n)
             }
             (Some(result), _) => result,
         };

@@ -48,8 +48,10 @@ pub struct SimBody {
     pub fixed_iterations: bool,
     /// What share of prescribed displacements is reached when.
     pub displacement: Course,
-    /// What share of every load that changes over time acts when, in the order of the scene.
+    /// What share of every force that changes over time acts when, in the order of the scene.
     pub loads: Vec<Course>,
+    /// What share of every pressure acts when, in the order of the scene.
+    pub pressures: Vec<Course>,
     /// Velocity at the start [m/s].
     pub velocity_m_s: Vector3<f64>,
     /// How its cells are adapted; none: they are not.
@@ -105,6 +107,7 @@ impl SimBody {
             fixed_iterations: false,
             displacement: Course::default(),
             loads: Vec::new(),
+            pressures: Vec::new(),
             velocity_m_s: Vector3::zeros(),
             adaptation: None,
             watch: Watch::default(),
@@ -135,6 +138,7 @@ impl SimBody {
     pub(crate) fn prescribe(&mut self, time_s: f64) {
         self.body.set_prescribed_share(self.displacement.share(time_s));
         self.body.set_load_shares(self.loads.iter().map(|load| load.share(time_s)));
+        self.body.set_pressure_shares(self.pressures.iter().map(|load| load.share(time_s)));
     }
 
     /// Forces that hold the places of every `fix` of the scene [N].
@@ -144,7 +148,7 @@ impl SimBody {
 
     /// From when on displacements and loads no longer change [s].
     pub(crate) fn settled_s(&self) -> f64 {
-        self.loads.iter().map(Course::end_s).fold(self.displacement.end_s(), f64::max)
+        self.loads.iter().chain(&self.pressures).map(Course::end_s).fold(self.displacement.end_s(), f64::max)
     }
 
     /// Gives all nodes that nothing holds the velocity of the start.

@@ -196,11 +196,12 @@ fn hold(copy: &mut Body, fine: &SimBody) -> Option<()> {
     Some(())
 }
 
-/// Puts the load of every node of `fine` on the nearest one of `copy`.
+/// Puts the load of every node of `fine`, with the pressure at its present place, on the nearest node of `copy`.
 fn load(copy: &mut Body, fine: &Body) -> Option<()> {
     let nodes: Vec<Vector3<f64>> = copy.rest_positions().to_vec();
     let mut forces = vec![Vector3::zeros(); nodes.len()];
-    for (x, force) in fine.rest_positions().iter().zip(fine.loads()).filter(|(_, f)| f.norm() > 0.0) {
+    let pressed = fine.present_loads();
+    for (x, force) in fine.rest_positions().iter().zip(&pressed).filter(|(_, f)| f.norm() > 0.0) {
         forces[nearest(x, nodes.iter().copied())?] += force;
     }
     for (node, force) in (0u32..).zip(forces).filter(|(_, f)| f.norm() > 0.0) {

@@ -263,7 +263,9 @@ impl Check<'_> {
         for (i, load) in body.load.iter().enumerate() {
             let at = format!("{at}.load.{i}");
             let course = self.course(&at, ("ramp_s", load.ramp_s), ("table", &load.table));
-            if !course.is_constant() && body.cut_method().changes_mesh() {
+            if load.pressure_pa.is_some() {
+                self.pressure(&at, load, body);
+            } else if !course.is_constant() && body.cut_method().changes_mesh() {
                 let what = format!(
                     "found a load that changes over time with cutting.method = `{}`, which changes the mesh; allowed \
                      there: constant loads",
@@ -277,15 +279,40 @@ impl Check<'_> {
             }
             loads.push(LoadSpec {
                 region: self.region(&format!("{at}.where"), &load.r#where),
-                force_n: Vector3::from(load.force_n),
-                share: load.share.map(|share| match share {
-                    RawShare::Area => Share::Area,
-                    RawShare::Volume => Share::Volume,
-                }),
+                kind: match load.pressure_pa {
+                    Some(pressure_pa) => LoadKind::Pressure { pressure_pa },
+                    None => LoadKind::Force {
+                        force_n: load.force_n.map_or(Vector3::zeros(), Vector3::from),
+                        share: load.share.map(|share| match share {
+                            RawShare::Area => Share::Area,
+                            RawShare::Volume => Share::Volume,
+                        }),
+                    },
+                },
                 course,
             });
         }
         loads
+    }
+
+    /// What a pressure does not go with.
+    fn pressure(&mut self, at: &str, load: &RawLoad, body: &RawBody) {
+        let key = format!("{at}.pressure_pa");
+        if load.share.is_some() {
+            let what = "found `share` beside pressure_pa, which acts on faces; allowed with force_n only";
+            self.conflict(format!("{at}.share"), what, "remove it");
+        }
+        if body.element == RawElement::Octree {
+            let what = "found a pressure on octree cells, whose faces are not their surface; allowed: tet4, tet10, hex8";
+            self.conflict(key.clone(), what, "choose another element, or give a force_n");
+        }
+        if body.cut_method().changes_mesh() {
+            let what = format!(
+                "found a pressure with cutting.method = `{}`, which changes the mesh; allowed there: constant forces",
+                mechanics::word(&body.cut_method())
+            );
+            self.conflict(key, what, "write cutting.method = \"xfem\", or give a force_n");
+        }
     }
 
     /// What share of a value acts when, by one of two keys: the time over which it grows, or a table.

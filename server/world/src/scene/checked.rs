@@ -267,12 +267,27 @@ pub struct FixSpec {
 pub struct LoadSpec {
     /// Which nodes.
     pub region: Region,
-    /// Total [N].
-    pub force_n: Vector3<f64>,
-    /// How it is shared; none: by area where possible, else by volume.
-    pub share: Option<Share>,
+    /// What acts there.
+    pub kind: LoadKind,
     /// What part of it acts when.
     pub course: Course,
+}
+
+/// What a load is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LoadKind {
+    /// A force that keeps its direction.
+    Force {
+        /// Total [N].
+        force_n: Vector3<f64>,
+        /// How it is shared; none: by area where possible, else by volume.
+        share: Option<Share>,
+    },
+    /// A pressure that follows the surface.
+    Pressure {
+        /// It pushes into the body if it is positive [Pa].
+        pressure_pa: f64,
+    },
 }
 
 /// How a total force is shared over nodes.

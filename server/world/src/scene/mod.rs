@@ -28,9 +28,9 @@ mod shipped;
 use std::path::{Path, PathBuf};
 
 pub use checked::{
-    AdaptSpec, BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadSpec,
-    LookSpec, MaterialPlace, MaterialSpec, MeshSource, ObstacleSpec, OctreeSpec, PathPoint, ProbeSpec,
-    PublishRates, Region, Share, SkinSpec, Solid, ToolSpec,
+    AdaptSpec, BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadKind,
+    LoadSpec, LookSpec, MaterialPlace, MaterialSpec, MeshSource, ObstacleSpec, OctreeSpec, PathPoint,
+    ProbeSpec, PublishRates, Region, Share, SkinSpec, Solid, ToolSpec,
 };
 pub use course::Course;
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};

@@ -370,24 +370,32 @@ pub enum RawAxes {
     Xyz,
 }
 
-/// A load, constant or changing over time.
+/// A load, constant or changing over time: a force or a pressure.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("oneOf" = [{"required": ["force_n"]}, {"required": ["pressure_pa"]}]))]
 pub struct RawLoad {
     /// Selection of nodes: exactly one of `box`, `sphere`, `half_space`, `slab`.
     pub r#where: RawWhere,
-    /// Total force [N], distributed over the selected nodes.
-    pub force_n: Vec3,
+    /// Total force [N], distributed over the selected nodes. It keeps its direction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<Vec3>,
+    /// Pressure [Pa] on the boundary faces all of whose nodes are selected. It pushes into the body; a negative one
+    /// pulls. It follows the deformed surface, except with the law `linear`, where it keeps the directions and areas
+    /// of the body at rest. Cut faces carry none. Not for octree cells, nor with cuts that change the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e9, max = 1e9), extend("x-next" = "blood in arteries has about 13000 (100 mmHg)"))]
+    pub pressure_pa: Option<f64>,
     /// Whether the force is distributed by area or by volume. Default: by area if the selection contains
     /// boundary faces, otherwise by volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub share: Option<RawShare>,
-    /// Time over which the force grows from zero [s]. 0 applies it at once.
+    /// Time over which force or pressure grows from zero [s]. 0 applies it at once.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e6), extend("x-next" = "some periods of the body's slowest vibration let it arrive \
         without swinging"))]
     pub ramp_s: f64,
-    /// In place of `ramp_s`, what share of the force acts when: points of time [s] and share, linear between them. The
+    /// In place of `ramp_s`, what share of force or pressure acts when: points of time [s] and share, linear between them. The
     /// share may be negative or above 1, and is constant before the first point and after the last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 10000))]

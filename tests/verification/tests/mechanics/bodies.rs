@@ -9,6 +9,7 @@ use scindo_physics::integrator::{
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 use scindo_physics::operator::FixedCopy;
+use scindo_physics::pressure::Pressure;
 use scindo_physics::solver::{LinearSettings, Method, NewtonSettings, Precision};
 use scindo_physics::team::Team;
 
@@ -94,7 +95,9 @@ impl Run {
         let Self { dynamics, model, masses: mass, state, fixed, load, gravity, team, .. } = self;
         let parts = &LooseParts::connected(|visit| model.for_groups(visit), mass, fixed);
         let (gravity, rest) = (*gravity, model.rest());
-        let inputs = StepInputs { h, gravity, mass, load, fixed, parts, springs: &[], rest, points: &*model };
+        let pressure = Pressure::none();
+        let inputs =
+            StepInputs { h, gravity, mass, load, pressure, fixed, parts, springs: &[], rest, points: &*model };
         let report = dynamics.step(team, state, &inputs, &mut Vec::new());
         assert!(state.x.iter().chain(&state.v).all(|c| c.iter().all(|c| c.is_finite())));
         self.reports.push(report);

@@ -3,8 +3,8 @@
 use crate::body::SimBody;
 use crate::mesh_in::{LatticeReport, MeshHealth, OctreeReport, VolumeHealth, most_cells};
 use crate::quantity::{coordinates, length, percent};
-use crate::scene::BodySpec;
 use crate::scene::raw::{RawElement, RawLocking};
+use crate::scene::{BodySpec, LoadKind};
 
 /// Share of its volume that a mesh may lose or gain.
 const VOLUME: f64 = 0.03;
@@ -96,14 +96,28 @@ fn volume(at: &str, health: &VolumeHealth, doubts: &mut Vec<String>) {
 fn forces(at: &str, spec: &BodySpec, body: &SimBody, doubts: &mut Vec<String>) {
     let area_m2 = body.rest_volume_m3.powf(2.0 / 3.0);
     for (i, load) in spec.loads.iter().enumerate() {
-        let strain = load.force_n.norm() / (spec.young_pa * area_m2);
-        if strain > STRAIN {
-            doubts.push(format!(
-                "{at}.load.{i}.force_n: {:.3e} N would strain a body of this size and stiffness by {} (F / E A); \
-                 is it in newtons, and young_pa in pascals?",
-                load.force_n.norm(),
-                percent(strain)
-            ));
+        match load.kind {
+            LoadKind::Force { force_n, .. } => {
+                let strain = force_n.norm() / (spec.young_pa * area_m2);
+                if strain > STRAIN {
+                    doubts.push(format!(
+                        "{at}.load.{i}.force_n: {:.3e} N would strain a body of this size and stiffness by {} (F / E \
+                         A); is it in newtons, and young_pa in pascals?",
+                        force_n.norm(),
+                        percent(strain)
+                    ));
+                }
+            }
+            LoadKind::Pressure { pressure_pa } => {
+                let strain = pressure_pa.abs() / spec.young_pa;
+                if strain > STRAIN {
+                    doubts.push(format!(
+                        "{at}.load.{i}.pressure_pa: {pressure_pa:.3e} Pa would strain a body of this stiffness by {} \
+                         (p / E); are it and young_pa in pascals?",
+                        percent(strain)
+                    ));
+                }
+            }
         }
     }
     let size_m = super::longest_side(body);
