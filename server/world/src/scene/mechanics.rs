@@ -8,8 +8,8 @@ use scindo_physics::material::Law;
 use scindo_physics::snap::{Moves, SnapSettings};
 
 use super::raw::{
-    RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod, RawMoves,
-    RawOperator, RawPrecision,
+    RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod,
+    RawMoves, RawOperator, RawPrecision,
 };
 
 /// Share of the volumetric energy that node averaging leaves with the elements, against checkerboards.

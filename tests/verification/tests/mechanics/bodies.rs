@@ -96,8 +96,18 @@ impl Run {
         let parts = &LooseParts::connected(|visit| model.for_groups(visit), mass, fixed);
         let (gravity, rest) = (*gravity, model.rest());
         let pressure = Pressure::none();
-        let inputs =
-            StepInputs { h, gravity, mass, load, pressure, fixed, parts, springs: &[], rest, points: &*model };
+        let inputs = StepInputs {
+            h,
+            gravity,
+            mass,
+            load,
+            pressure,
+            fixed,
+            parts,
+            springs: &[],
+            rest,
+            points: &*model,
+        };
         let report = dynamics.step(team, state, &inputs, &mut Vec::new());
         assert!(state.x.iter().chain(&state.v).all(|c| c.iter().all(|c| c.is_finite())));
         self.reports.push(report);
