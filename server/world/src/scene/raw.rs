@@ -557,7 +557,8 @@ pub struct RawCutting {
     pub method: Option<RawCutMethod>,
     /// How far a cut goes on ahead of the blade. `calibrated`: by a share of the size of elements that makes up for those
     /// at the front that do not open, so that the body opens as far as it should. `behind`: not at all; no element is
-    /// cut before the blade has left it, and the body is too stiff. Needs the method `xfem`. Default: `calibrated`.
+    /// cut before the blade has left it, and the body is too stiff; `tet10` knows only this. Needs the method `xfem`.
+    /// Default: `calibrated`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front: Option<RawFront>,
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs

@@ -3,8 +3,7 @@
 //! A piece is one element with one displacement, so it opens only when the sheet separates it, and nodes open only when
 //! all elements around them do. An incision that ends inside elements therefore acts as if it ended about one element
 //! before the blade, and the body is too stiff. So the incision goes on in its plane, by a share of the size of the
-//! elements. The share is calibrated, for each degree of elements, with beams whose solution is known (`scindo
-//! accuracy front`).
+//! elements. The share is calibrated with beams whose solution is known (`scindo accuracy front`).
 //!
 //! What the blade has covered is remembered as points of the material, so that a stroke of many small sweeps covers
 //! what one long sweep does, and a blade that trembles covers nothing twice.
@@ -24,7 +23,8 @@ use crate::mesh::{TET_EDGES, TET_FACES};
 /// How far an incision goes on ahead of the blade.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FrontRule {
-    /// As far as makes up for the elements that do not open at its front.
+    /// As far as makes up for the elements that do not open at its front. Only linear elements are calibrated; others
+    /// behave as with [`Behind`](Self::Behind).
     #[default]
     Calibrated,
     /// Not at all: no element is cut before the blade has left it.
@@ -35,18 +35,14 @@ impl FrontRule {
     /// Distance ahead of the blade, over the mean length of an element's edges.
     pub fn reach(self, kind: ElementKind) -> f64 {
         match (self, kind) {
-            (Self::Behind, _) => 0.0,
-            (Self::Calibrated, ElementKind::Tet10) => QUADRATIC,
-            (Self::Calibrated, _) => LINEAR,
+            (Self::Calibrated, ElementKind::Tet4) => LINEAR,
+            _ => 0.0,
         }
     }
 }
 
 /// Calibrated reach of linear elements.
 const LINEAR: f64 = 0.7;
-
-/// Calibrated reach of quadratic elements.
-const QUADRATIC: f64 = 0.5;
 
 /// Distance from its ends, relative to an edge, that a crossing ahead of the blade keeps.
 const MARGIN: f64 = 1e-3;
