@@ -158,6 +158,14 @@ fn what_is_not_supported_yet_is_refused_never_ignored() {
         &["found `pinned` with xfem, allowed: snap", "cutting.method"],
     );
     assert_says(
+        &with("cutting = { method = \"snap\", front = \"calibrated\" }"),
+        &["found `calibrated` with tet4 and cutting.method = `snap`", "cutting.front"],
+    );
+    assert_says(
+        &with("cutting = { front = \"calibrated\", toughness_j_m2 = 100.0 }"),
+        &["opens what no edge has pressed on", "remove cutting.front"],
+    );
+    assert_says(
         &with("cutting = { moves = \"press\" }"),
         &["body.beam.cutting.moves", "found with xfem, allowed: snap", "remove moves"],
     );

@@ -40,10 +40,10 @@ pub fn front(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
             "Schoch’s beam of 30 × 60 × 200 mm, cut through to half its depth, 6 cells of five linear tetrahedra across. The \
              plane of the cut lies a third of a cell inside elements, and its front at several places between two \
              lines of cells: at {:.1} the blade has only just entered the last cells, at {:.1} it has almost left them. \
-             With cutting.front = \"behind\" an element opens when the blade has left it; with \"calibrated\", the default, \
-             the cut goes on ahead of the blade by 0.7 of the mean length of an element’s edges. Quadratic elements are not calibrated. The mesh of \
-             `pre-cut` has as many cells, with faces at the true front. Errors are ‖u − u*‖/‖u*‖ over 24 points of the beam, against stored solutions by hexahedra of order \
-             3 and 4.",
+             With cutting.front = \"behind\", the default, an element opens when the blade has left it; with \
+             \"calibrated\" the cut goes on ahead of the blade by 0.7 of the mean length of an element’s edges. The mesh of \
+             `pre-cut` has as many cells, with faces at the true front. Errors are ‖u − u*‖/‖u*‖ over 24 points of \
+             the beam, against stored solutions by hexahedra of order 3 and 4.",
             PLACES[0],
             PLACES[PLACES.len() - 1],
         ),

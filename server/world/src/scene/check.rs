@@ -110,6 +110,12 @@ impl Check<'_> {
         let mesh = self.mesh(&format!("{at}.mesh"), body);
         let mechanics = self.mechanics(&at, body, &mesh);
         let octree = self.octree(&at, body, (&mesh, &mechanics));
+        if body.cutting.front == Some(RawFront::Calibrated) && body.cutting.toughness_j_m2.is_some() {
+            let what = "a cut that goes on ahead of the blade opens what no edge has pressed on, so its work is not that of \
+                        cutting.toughness_j_m2";
+            let next = "remove cutting.front or cutting.toughness_j_m2";
+            self.conflict(format!("{at}.cutting.front"), what, next);
+        }
         self.inclined(&at, body);
         BodySpec {
             id: body.id.clone(),

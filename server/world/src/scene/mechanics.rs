@@ -189,8 +189,8 @@ impl Mechanics {
                 RawCutMethod::Remove => CuttingMethod::Remove,
             },
             front: match self.front {
-                None | Some(RawFront::Calibrated) => FrontRule::Calibrated,
-                Some(RawFront::Behind) => FrontRule::Behind,
+                None | Some(RawFront::Behind) => FrontRule::Behind,
+                Some(RawFront::Calibrated) => FrontRule::Calibrated,
             },
             snap: SnapSettings {
                 moves: match self.moves {

@@ -514,7 +514,7 @@ pub struct RawCut {
     pub path_m: Option<Vec<Vec3>>,
     /// Depth of the incision below the skin along `path_m` [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "the cut ends with the elements around this depth"))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "x-next" = "only elements that the blade crosses completely open, unless cutting.front = calibrated"))]
     pub depth_m: Option<f64>,
 }
 
@@ -540,10 +540,10 @@ pub enum RawCutMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawFront {
-    /// By a share of the size of elements that makes up for those that do not open.
-    Calibrated,
     /// Not at all.
     Behind,
+    /// By a share of the size of elements that makes up for those that do not open.
+    Calibrated,
 }
 
 /// How cuts act on a body.
@@ -555,10 +555,10 @@ pub struct RawCutting {
     /// Default: `links` for `octree`, otherwise `xfem`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<RawCutMethod>,
-    /// How far a cut goes on ahead of the blade. `calibrated`: by a share of the size of elements that makes up for those
-    /// at the front that do not open, so that the body opens as far as it should. `behind`: not at all; no element is
-    /// cut before the blade has left it, and the body is too stiff; `tet10` knows only this. Needs the method `xfem`.
-    /// Default: `calibrated`.
+    /// How far a cut goes on ahead of the blade. `behind`: not at all; no element is cut before the blade has left it,
+    /// and the body is too stiff by that. `calibrated`: by a share of the size of elements that makes up for those at the
+    /// front that do not open; for `tet4` with the method `xfem`, without `toughness_j_m2`, and made for whole cuts.
+    /// Many small sweeps go ahead less far. Default: `behind`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front: Option<RawFront>,
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs

@@ -5,8 +5,12 @@
 //! before the blade, and the body is too stiff. So the incision goes on in its plane, by a share of the size of the
 //! elements. The share is calibrated with beams whose solution is known (`scindo accuracy front`).
 //!
-//! What the blade has covered is remembered as points of the material, so that a stroke of many small sweeps covers
-//! what one long sweep does, and a blade that trembles covers nothing twice.
+//! What the blade has covered is remembered as points of the material, so that many small sweeps cover what one long
+//! sweep does, and a blade that trembles covers nothing twice.
+//!
+//! # Limit
+//! A piece that the incision has separated ahead of the blade is no longer a source from which it goes on. A stroke of
+//! many small sweeps therefore ends between the blade and the front of one long sweep.
 
 use std::collections::BTreeMap;
 
@@ -23,12 +27,12 @@ use crate::mesh::{TET_EDGES, TET_FACES};
 /// How far an incision goes on ahead of the blade.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FrontRule {
+    /// Not at all: no element is cut before the blade has left it.
+    #[default]
+    Behind,
     /// As far as makes up for the elements that do not open at its front. Only linear elements are calibrated; others
     /// behave as with [`Behind`](Self::Behind).
-    #[default]
     Calibrated,
-    /// Not at all: no element is cut before the blade has left it.
-    Behind,
 }
 
 impl FrontRule {

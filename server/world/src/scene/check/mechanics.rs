@@ -61,12 +61,15 @@ impl Check<'_> {
             let what = format!("found `{}` with {}, allowed: tet4", word(&m.cutting), word(&m.element));
             self.conflict(key, what, "choose tet4, whose mesh can be cut, or remove cutting.method");
         }
-        if m.front.is_some() && m.cutting != RawCutMethod::Xfem {
+        if m.front == Some(RawFront::Calibrated)
+            && (m.cutting, m.element) != (RawCutMethod::Xfem, RawElement::Tet4)
+        {
             let found = word(&m.cutting);
             let what = format!(
-                "found cutting.front with cutting.method = `{found}`, whose fronts lie on faces; allowed: xfem"
+                "found `calibrated` with {} and cutting.method = `{found}`, allowed: tet4 with xfem",
+                word(&m.element)
             );
-            let next = "remove cutting.front, or write cutting.method = \"xfem\"";
+            let next = "remove cutting.front, or write element = \"tet4\" and cutting.method = \"xfem\"";
             self.conflict(format!("{at}.cutting.front"), what, next);
         }
         if m.loose == RawLoose::Pinned && !m.cutting.changes_mesh() {
