@@ -144,7 +144,7 @@ fn size(p: u32, meeting: &Meeting<'_>) -> f64 {
     TET_EDGES.iter().map(|&[i, j]| (x[i] - x[j]).norm()).sum::<f64>() / 6.0
 }
 
-/// Whether the incision has divided piece `p`: whether closed faces beside it no longer join all fragments.
+/// Whether the incision divides piece `p`: whether faces that it does not open no longer join all of its fragments.
 fn is_separated(p: u32, meeting: &Meeting<'_>, state: State<'_>) -> bool {
     let f = state.fragments;
     let members: Vec<u32> = meeting.body.pieces.fragments(p, f).collect();
