@@ -39,16 +39,7 @@ pub trait Preconditioner {
         (alpha, pq): (f32, [&[Padded]; 2]),
         iterate: Iterate<'_>,
     ) -> f64 {
-        let Iterate { x, r, z, partial } = iterate;
-        team.for_blocks((blocks(x, BLOCK), blocks(r, BLOCK)), |block, (x, r)| {
-            let [p, q] = pq.map(|v| block_of(v, block));
-            for ((x, r), (p, q)) in x.iter_mut().zip(r).zip(p.iter().zip(q)) {
-                for k in 0..4 {
-                    x[k] += alpha * p[k];
-                    r[k] -= alpha * q[k];
-                }
-            }
-        });
+        let Iterate { r, z, partial, .. } = iterate.along(team, alpha, pq);
         self.apply(team, A, r, z, partial)
     }
 
@@ -78,4 +69,21 @@ pub struct Iterate<'a> {
     pub z: &'a mut [Padded],
     /// Partial sums of rᵀz.
     pub partial: &'a mut [f64],
+}
+
+impl Iterate<'_> {
+    /// x ← x + α p, r ← r − α q.
+    pub fn along(self, team: &mut Team, alpha: f32, pq: [&[Padded]; 2]) -> Self {
+        let (x, r) = (&mut *self.x, &mut *self.r);
+        team.for_blocks((blocks(x, BLOCK), blocks(r, BLOCK)), |block, (x, r)| {
+            let [p, q] = pq.map(|v| block_of(v, block));
+            for ((x, r), (p, q)) in x.iter_mut().zip(r).zip(p.iter().zip(q)) {
+                for k in 0..4 {
+                    x[k] += alpha * p[k];
+                    r[k] -= alpha * q[k];
+                }
+            }
+        });
+        self
+    }
 }

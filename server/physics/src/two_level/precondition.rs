@@ -73,16 +73,7 @@ impl Preconditioner for TwoLevel<'_> {
         let Some(coarse) = &mut self.coarse else {
             return self.jacobi.advance(team, A, (alpha, pq), iterate);
         };
-        let Iterate { x, r, z, partial } = iterate;
-        team.for_blocks((blocks(x, BLOCK), blocks(r, BLOCK)), |block, (x, r)| {
-            let [p, q] = pq.map(|v| block_of(v, block));
-            for ((x, r), (p, q)) in x.iter_mut().zip(r).zip(p.iter().zip(q)) {
-                for k in 0..4 {
-                    x[k] += alpha * p[k];
-                    r[k] -= alpha * q[k];
-                }
-            }
-        });
+        let Iterate { r, z, partial, .. } = iterate.along(team, alpha, pq);
         Self::correct((self.jacobi, coarse, self.fixed), team, r, z, partial)
     }
 
