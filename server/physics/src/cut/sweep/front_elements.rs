@@ -87,27 +87,36 @@ pub struct State<'a> {
     pub crossings: &'a Crossings,
 }
 
-/// A crossing ahead of the blade: fragment, edge, and parameter from the first end of the edge.
-pub type Ahead = (u32, [u32; 2], f64);
+/// A crossing: edge, and parameter from its first end.
+type Crossing = ([u32; 2], f64);
+
+/// What lies ahead of the blade.
+#[derive(Debug, Default)]
+pub struct Ahead {
+    /// Crossings that are missing.
+    pub crossings: Vec<Crossing>,
+    /// Fragments around the crossed edges.
+    pub fragments: Vec<u32>,
+}
 
 impl FrontElements {
     /// Remembers what the sweep covers of piece `p`, unless it has separated it, and returns the crossings within `reach`
     /// ahead of that, over the mean length of the element's edges.
-    pub fn look_at(&mut self, p: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Vec<Ahead> {
+    pub fn look_at(&mut self, p: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Ahead {
         let key = u64::from(meeting.incision) << 32 | u64::from(p);
         if is_separated(p, meeting, state) {
             if !self.covered.is_empty() {
                 self.covered.remove(&key);
             }
-            return Vec::new();
+            return Ahead::default();
         }
         let new = newly_covered(p, meeting);
         if new.is_empty() {
-            return Vec::new();
+            return Ahead::default();
         }
         let covered = self.covered.entry(key).or_default();
         covered.extend(new);
-        let Some(plane) = Plane::through(covered) else { return Vec::new() };
+        let Some(plane) = Plane::through(covered) else { return Ahead::default() };
         let hull = plane.hull(covered);
         if covered.len() > MANY {
             covered.clone_from(&hull);
@@ -116,23 +125,22 @@ impl FrontElements {
         let border: Vec<Vector2<f64>> = hull.iter().map(|x| plane.project(x)).collect();
         let near = |x: &Vector3<f64>| distance(&plane.project(x), &border) <= reach;
         // Elements that the blade has not entered may lie within reach too; crossed edges lead to them.
-        let mut queue: Vec<u32> = meeting.body.pieces.fragments(p, state.fragments).collect();
-        let (mut found, mut wedge) = (Vec::<Ahead>::new(), Vec::new());
+        let mut fragments: Vec<u32> = meeting.body.pieces.fragments(p, state.fragments).collect();
+        let (mut crossings, mut wedge) = (Vec::<Crossing>::new(), Vec::new());
         let mut k = 0;
-        while let Some(&t) = queue.get(k) {
-            for new in crossings_ahead(&plane, t, meeting, state, near) {
-                let (_, [a, b], _) = new;
-                if found.iter().any(|(_, edge, _)| edge_key(edge[0], edge[1]) == edge_key(a, b)) {
+        while let Some(&t) = fragments.get(k) {
+            for ([a, b], s) in crossings_ahead(&plane, t, meeting, state, near) {
+                if crossings.iter().any(|([c, d], _)| edge_key(*c, *d) == edge_key(a, b)) {
                     continue;
                 }
-                found.push(new);
+                crossings.push(([a, b], s));
                 state.fragments.wedge(t, a, b, &mut wedge);
-                let further = wedge.iter().filter(|t| !queue.contains(t)).copied();
-                queue.extend(further.collect::<Vec<u32>>());
+                wedge.retain(|t| !fragments.contains(t));
+                fragments.append(&mut wedge);
             }
             k += 1;
         }
-        found
+        Ahead { crossings, fragments }
     }
 }
 
@@ -222,7 +230,7 @@ fn crossings_ahead(
     meeting: &Meeting<'_>,
     state: State<'_>,
     near: impl Fn(&Vector3<f64>) -> bool,
-) -> Vec<Ahead> {
+) -> Vec<Crossing> {
     let tet = state.fragments.tets[t as usize];
     let rest = tet.map(|v| rest_position(meeting.body, &state.fragments.vertices[v as usize]));
     let side = rest.map(|x| plane.distance(&x));
@@ -231,7 +239,7 @@ fn crossings_ahead(
     let is_new = |[i, j]: &[usize; 2]| state.crossings.get(tet[*i], tet[*j], meeting.incision).is_none();
     let ahead = |[i, j]: [usize; 2]| {
         let s = side[i] / (side[i] - side[j]);
-        near(&rest[i].lerp(&rest[j], s)).then(|| (t, [tet[i], tet[j]], s.clamp(MARGIN, 1.0 - MARGIN)))
+        near(&rest[i].lerp(&rest[j], s)).then(|| ([tet[i], tet[j]], s.clamp(MARGIN, 1.0 - MARGIN)))
     };
     TET_EDGES.into_iter().filter(apart).filter(is_new).filter_map(ahead).collect()
 }

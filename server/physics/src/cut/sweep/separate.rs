@@ -149,13 +149,14 @@ impl Separator {
         for p in pieces {
             let state =
                 State { fragments: &*sheet.fragments, sets: &*sheet.sets, crossings: &*sheet.crossings };
-            for (t, [a, b], s) in front.look_at(p, reach, meeting, state) {
-                sheet.crossings.insert(a, b, sheet.incision, s);
-                sheet.fragments.wedge(t, a, b, &mut self.wedge);
-                let around = std::mem::take(&mut self.wedge);
-                around.iter().for_each(|&t| self.look_at_later(t));
-                self.wedge = around;
+            let ahead = front.look_at(p, reach, meeting, state);
+            if ahead.crossings.is_empty() {
+                continue;
             }
+            for ([a, b], s) in ahead.crossings {
+                sheet.crossings.insert(a, b, sheet.incision, s);
+            }
+            ahead.fragments.into_iter().for_each(|t| self.look_at_later(t));
             self.bisect_queued(sheet);
         }
     }
