@@ -1,5 +1,6 @@
 //! Incisions that go on ahead of the blade.
 
+use super::growth::advance;
 use super::*;
 
 const REACH: f64 = 0.7;
@@ -8,17 +9,6 @@ fn ahead(cells: usize) -> Body {
     let mut body = Body::unit(cells);
     body.cut.set_front_reach(REACH);
     body
-}
-
-/// Cuts the slab z = `z` from x = −0.1 to `to` in `n` equal advances of a blade along y.
-fn advance(body: &mut Body, to: f64, z: f64, n: usize) {
-    let blade = |k: usize| {
-        let x = -0.1 + (to + 0.1) * k as f64 / n as f64;
-        [v(x, -0.1, z), v(x, 1.1, z)]
-    };
-    for k in 0..n {
-        body.sweep(&[blade(k), blade(k + 1)], 1);
-    }
 }
 
 /// Area of one lip at rest [m²].
@@ -45,7 +35,7 @@ fn an_incision_goes_ahead_by_its_reach_at_most() {
             let to = 0.3 + 2.0 * h * (f64::from(k) + 0.5) / f64::from(n);
             let mut body = Body::unit(cells);
             body.cut.set_front_reach(reach);
-            advance(&mut body, to, 0.47, 1);
+            advance(&mut body, to, 0.47, 1, 1);
             let (surface, x) = (body.cut.surface(), body.cut.rest_positions());
             let lips = surface.triangles.iter().zip(&surface.tags).filter(|(_, tag)| **tag == 1);
             let corners = lips.flat_map(|(triangle, _)| triangle);
@@ -64,9 +54,9 @@ fn an_incision_goes_ahead_by_its_reach_at_most() {
 fn small_advances_open_no_more_than_a_long_one() {
     for to in [0.37, 0.55, 0.63, 0.71] {
         let (mut behind, mut whole, mut grown) = (Body::unit(6), ahead(6), ahead(6));
-        advance(&mut behind, to, 0.51, 1);
-        advance(&mut whole, to, 0.51, 1);
-        advance(&mut grown, to, 0.51, 200);
+        advance(&mut behind, to, 0.51, 1, 1);
+        advance(&mut whole, to, 0.51, 1, 1);
+        advance(&mut grown, to, 0.51, 200, 1);
         check::everything(&whole.cut);
         check::everything(&grown.cut);
         let [behind, whole, grown] = [&behind, &whole, &grown].map(opened);
@@ -78,12 +68,12 @@ fn small_advances_open_no_more_than_a_long_one() {
 #[test]
 fn a_cut_goes_on_through_elements_that_were_cut_ahead_of_the_blade() {
     let mut body = ahead(5);
-    advance(&mut body, 0.55, 0.47, 1);
+    advance(&mut body, 0.55, 0.47, 1, 1);
     let blade = |x: f64| [v(x, -0.1, 0.47), v(x, 1.1, 0.47)];
     body.sweep(&[blade(0.55), blade(1.1)], 1);
     check::everything(&body.cut);
     let mut whole = ahead(5);
-    advance(&mut whole, 1.1, 0.47, 1);
+    advance(&mut whole, 1.1, 0.47, 1, 1);
     assert_eq!(body.topology(), whole.topology());
     assert_eq!((body.cut.components().len(), body.cut.pending_faces().len()), (2, 0));
 }
