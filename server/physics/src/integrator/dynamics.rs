@@ -18,7 +18,7 @@ use super::scheme::Scheme;
 use super::settings::DynamicsSettings;
 use super::state::State;
 use super::step_inputs::StepInputs;
-use super::step_solver::{SolverSettings, StepSolver};
+use super::step_solver::{SolverSettings, StepSolver, make_room};
 use super::together::Member;
 use crate::assembly::{Model, ModelError};
 use crate::cut::NewCopy;
@@ -181,6 +181,7 @@ impl Dynamics {
     ) -> SolveReport {
         let mut report = SolveReport { scheme: self.scheme, substeps: 1, ..SolveReport::default() };
         spring_forces.clear();
+        make_room(spring_forces, inputs.springs.len(), 1);
         spring_forces.resize(inputs.springs.len(), Vector3::zeros());
         let bad_input = self.solver.why_refused(state, inputs);
         if bad_input.is_none() {
@@ -243,6 +244,7 @@ impl Dynamics {
         spring_forces: &'a mut Vec<Vector3<f64>>,
     ) -> Option<Member<'a>> {
         spring_forces.clear();
+        make_room(spring_forces, inputs.springs.len(), 1);
         spring_forces.resize(inputs.springs.len(), Vector3::zeros());
         let Self { course, solver, .. } = self;
         Some(solver.linearly_implicit()?.member(team, (course, state), inputs, spring_forces))

@@ -147,6 +147,17 @@ pub struct SolverSettings {
     pub relaxation: Option<u32>,
 }
 
+/// Springs for which room is made when the first one acts: those of a ball that bears with all its points. A press that
+/// deepens then takes no memory.
+const SPRING_ROOM: usize = 64;
+
+/// Makes room in `list` for `each` entries per spring, if there are any springs.
+pub fn make_room<T>(list: &mut Vec<T>, springs: usize, each: usize) {
+    if springs > 0 {
+        list.reserve((each * SPRING_ROOM).saturating_sub(list.len()));
+    }
+}
+
 /// The springs of a step that can be used.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct ActiveSprings {
@@ -161,6 +172,8 @@ impl ActiveSprings {
     pub fn begin(&mut self, inputs: &StepInputs<'_>, x: &[Vector3<f64>]) {
         self.springs.clear();
         self.accepted.clear();
+        make_room(&mut self.springs, inputs.springs.len(), 1);
+        make_room(&mut self.accepted, inputs.springs.len(), 1);
         for spring in inputs.springs {
             let active = ActiveSpring::new(spring, x);
             self.accepted.push(active.is_some());

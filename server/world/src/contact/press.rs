@@ -2,9 +2,13 @@
 //!
 //! The tool's reaction is along the line from device to proxy, as for any god-object. The tissue is pushed
 //! against that direction at the points where rays from a stencil on the tool meet it: eight points along a
-//! shaft, the pole and a ring around it on a ball. Each point bears in proportion to its depth. Stencil,
+//! shaft, the pole and two rings around it on a ball. Each point bears in proportion to its depth. Stencil,
 //! direction and shares change smoothly with pose and surface, so a steady hand feels a steady force. The
 //! triangles on which the proxy happens to rest have no influence.
+//!
+//! A ball needs that many points. With the pole and one ring of six, tissue stood up between them, and the force on
+//! a slide at constant depth went up and down by 15 %, which no haptic client can foretell. With two rings the
+//! largest error of the haptic table at a delay of 50 ms fell from a fifth to a tenth.
 
 use nalgebra::{Isometry3, Vector3};
 use scindo_collision::{Capsule, CapsuleMotion};
@@ -15,7 +19,9 @@ use crate::inputs::ToolShape;
 use crate::tool::geometry::{capsule, core_length};
 
 /// Most bearing points of one tool.
-pub const MAX_POINTS: usize = 8;
+pub const MAX_POINTS: usize = 19;
+/// Points along a shaft.
+const SHAFT: usize = 8;
 /// Distance of a surface from the proxy beyond which it does not count as touched, in radii ...
 const MARGIN_RADII: f64 = 0.05;
 /// ... but at least this [m].
@@ -34,9 +40,8 @@ const TURN: Following = Following { time_s: 0.095, most: 0.1 };
 const FOLLOW: Following = Following { time_s: 0.028, most: 0.3 };
 /// Share below which a point is omitted.
 const LEAST_SHARE: f64 = 1e-3;
-/// Number of points on a ball's ring, and the ring's radius in ball radii.
-const RING: usize = 6;
-const RING_RADIUS: f64 = 0.6;
+/// Rings on a ball: number of points, and radius in radii of the ball.
+const RINGS: [(usize, f64); 2] = [(6, 0.4), (12, 0.75)];
 
 /// The surface place nearest to a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -274,25 +279,31 @@ struct StencilPoint {
     below: f64,
 }
 
-/// Point `i` of the stencil of a shape. A ball has one point fewer than a shaft.
+/// Point `i` of the stencil of a shape.
 fn stencil(i: usize, shape: ToolShape, direction: &Direction) -> Option<StencilPoint> {
     let ToolShape::Sphere { radius_m } = shape else {
-        let parameter = i as f64 / (MAX_POINTS - 1) as f64;
+        let parameter = i as f64 / (SHAFT - 1) as f64;
         let radius = crate::tool::geometry::core_radius(shape);
         let on_shaft = StencilPoint { parameter, aside: Vector3::zeros(), below: radius };
-        return (core_length(shape) > 0.0 || i == 0).then_some(on_shaft);
+        return (i < SHAFT && (core_length(shape) > 0.0 || i == 0)).then_some(on_shaft);
     };
     if i == 0 {
         return Some(StencilPoint { parameter: 0.0, aside: Vector3::zeros(), below: radius_m });
     }
-    let angle = std::f64::consts::TAU * (i - 1) as f64 / RING as f64;
-    let along = direction.normal.cross(&direction.across);
-    let ring = radius_m * RING_RADIUS;
-    (i <= RING).then(|| StencilPoint {
-        parameter: 0.0,
-        aside: (direction.across * angle.cos() + along * angle.sin()) * ring,
-        below: radius_m * (1.0 - RING_RADIUS * RING_RADIUS).sqrt(),
-    })
+    let mut number = i - 1;
+    for (points, radius) in RINGS {
+        if number < points {
+            let angle = std::f64::consts::TAU * number as f64 / points as f64;
+            let along = direction.normal.cross(&direction.across);
+            return Some(StencilPoint {
+                parameter: 0.0,
+                aside: (direction.across * angle.cos() + along * angle.sin()) * (radius_m * radius),
+                below: radius_m * (1.0 - radius * radius).sqrt(),
+            });
+        }
+        number -= points;
+    }
+    None
 }
 
 /// Casts a ray from the proxy against `normal`, down to the tool at the device pose, and returns the tissue

@@ -4,6 +4,7 @@ use super::{LinearStep, SPRING_PASSES, system};
 use crate::element::MaterialPoint;
 use crate::integrator::springs::ActiveSpring;
 use crate::integrator::step_inputs::LinearInputs;
+use crate::integrator::step_solver::make_room;
 use crate::operator::{Block6, Spring, Stiffness};
 use nalgebra::Matrix3;
 
@@ -24,6 +25,11 @@ impl LinearStep {
     /// Adds the springs to the operator and to the preconditioner.
     pub(super) fn complete_operator(&mut self, elastic: &mut dyn Stiffness, inputs: &LinearInputs<'_>) {
         self.terms.clear();
+        // A spring has two terms at most, each on four nodes.
+        let springs = self.springs.springs.len();
+        make_room(&mut self.terms, springs, 2);
+        make_room(&mut self.sprung, springs, 8);
+        make_room(&mut self.bare, springs, 8);
         self.terms.extend(self.springs.springs.iter().flat_map(|s| s.terms(inputs.s())));
         let held_of = |copy: u32| inputs.held_of(copy);
         // Springs of the last pass leave the preconditioner.
