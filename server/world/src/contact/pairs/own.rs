@@ -159,8 +159,10 @@ impl OwnSurface {
         if self.known_m[v] > needed {
             // Both sides have moved since they were listed.
             let moved = self.listed_m[v] - self.known_m[v] + ROUNDING_CELLS * cell_m;
-            let facing = self.lists[v].iter().filter(|(_, t)| self.faces(*t, vertex));
-            return tree.closest_point_among(from, reach, facing.map(|&(listed, t)| (listed - moved, t)));
+            let near = self.lists[v].iter().map(|&(listed, t)| (listed - moved, t));
+            let facing =
+                near.take_while(|(bound, _)| *bound <= needed).filter(|(_, t)| self.faces(*t, vertex));
+            return tree.closest_point_among(from, reach, facing);
         }
         tree.closest_point_where(from, reach, |t| self.faces(t, vertex) && !joined(t))
     }
