@@ -151,6 +151,26 @@ fn the_lips_of_a_cut_neither_stick_nor_pass_through_each_other() {
 }
 
 #[test]
+fn a_multiplier_joins_springs_that_are_too_soft() {
+    // The upper half of a block presses the springs between the lips down to 7 % of a cell.
+    let text = WORLD.replace("body_collision", "self_collision")
+        + "[world.contact]\nstiffness = 0.2\n"
+        + &block("split", [0.0, 0.0, 0.0], "")
+        + r#"
+        [[cut]]
+        body = "split"
+        sweep_m = [[[-0.01, -0.01, 0.031], [0.07, -0.01, 0.031]], [[-0.01, 0.07, 0.031], [0.07, 0.07, 0.031]]]
+    "#;
+    let mut sim = start(&text, 1);
+    steps(&mut sim, 300, 0.15);
+    steps(&mut sim, 300, 0.022);
+    let weight = 0.5 * 9.81 * sim.bodies()[0].body.total_mass();
+    let report = *sim.touch_reports().first().unwrap();
+    assert!((report.normal_n / weight - 1.0).abs() < 0.05, "{report:?} {weight}");
+    assert!(kinetic(&sim) < 1e-8, "{}", kinetic(&sim));
+}
+
+#[test]
 fn threads_change_no_bit_and_a_steady_step_allocates_nothing() {
     let text = [
         WORLD,

@@ -32,6 +32,11 @@ const BORN_CELLS: f64 = 1e-5;
 const BORN_LIP_CELLS: f64 = 0.25;
 /// Time in which a depth that a contact began with is pushed out [s].
 const EASE_S: f64 = 0.1;
+/// Depth above which a spring alone is too soft, in cells, and the steps after which a multiplier joins it.
+const SHALLOW_CELLS: f64 = 0.02;
+const DEEP_STEPS: u8 = 3;
+/// Largest multiplier over the stiffness of its spring, in cells.
+const MOST_CELLS: f64 = 1.0;
 /// Stiffness across the normal relative to that along it.
 const TANGENTIAL: f64 = 0.5;
 
@@ -75,6 +80,10 @@ struct Kept {
     eased_m: f64,
     /// Depth at the end of the last step, below the plane of that step [m].
     depth_m: f64,
+    /// Multiplier over the stiffness of the spring, by which its plane is shifted towards the vertex [m].
+    ahead_m: f64,
+    /// Steps in a row in which it was too deep.
+    deep: u8,
     /// Whether it slipped, so that it takes hold of another place.
     slipped: bool,
     /// Its spring in the last step.
@@ -116,6 +125,8 @@ pub struct PairContacts {
     /// Per body the positions [m] and velocities [m/s] of its surface vertices.
     paths: Vec<Vec<[Vector3<f64>; 2]>>,
     epochs: Vec<u32>,
+    /// Per body the size of its cells [m].
+    cells: Vec<f64>,
     /// Per body and vertex: whether it is on a lip, and of which cut.
     lips: Vec<Vec<u32>>,
     reports: Vec<TouchReport>,
@@ -256,7 +267,7 @@ impl PairContacts {
         (h, settings): (f64, TouchSettings),
     ) {
         let Some(tree) = surfaces[b].whole() else { return };
-        let cell_m = bodies[a].cell_m().min(bodies[b].cell_m());
+        let cell_m = self.cells[a].min(self.cells[b]);
         let margin = MARGIN_CELLS * cell_m;
         let ([low, high], fastest) = self.reach[b];
         let (low, high) = (low.add_scalar(-margin), high.add_scalar(margin));
@@ -267,7 +278,7 @@ impl PairContacts {
         let (body, other) = (&bodies[a].body, &bodies[b].body);
         let surface = body.surface();
         let stiffness = {
-            let [soft, hard] = [a, b].map(|i| young_pa(i) / bodies[i].cell_m());
+            let [soft, hard] = [a, b].map(|i| young_pa(i) / self.cells[i]);
             settings.stiffness * 2.0 * soft * hard / (soft + hard)
         };
         let first = self.kept.partition_point(|k| k.bodies < [a as u32, b as u32]);
@@ -383,6 +394,8 @@ impl PairContacts {
             force_n: Vector3::zeros(),
             eased_m: depth.max(0.0),
             depth_m: depth,
+            ahead_m: 0.0,
+            deep: 0,
             slipped: true,
             spring,
         })
@@ -402,7 +415,7 @@ impl PairContacts {
         // The plane goes through the closest place, which is another one than that where the vertex sticks.
         let closest = if contact.slipped || contact.grip_n == 0.0 { held } else { near.point };
         let normal = near.normal;
-        let offset_m = normal.dot(&(closest - held)) - contact.eased_m;
+        let offset_m = normal.dot(&(closest - held)) - contact.eased_m + contact.ahead_m;
         match settings.friction > 0.0 {
             true => SpringKind::Rough {
                 normal,
@@ -450,7 +463,7 @@ impl PairContacts {
     pub fn settle(&mut self, bodies: &[SimBody], asleep: &[bool]) {
         self.reports.clear();
         self.forces.resize(self.springs.len(), Vector3::zeros());
-        let Self { now, found, forces, reports, .. } = self;
+        let Self { now, found, forces, reports, cells, .. } = self;
         for (contact, spring) in now.iter_mut().zip(found) {
             let (SpringKind::Rough { normal, .. } | SpringKind::OneSided { normal, .. }) = spring.kind else {
                 continue;
@@ -458,7 +471,8 @@ impl PairContacts {
             if !sleeps(asleep, contact.bodies[0] as usize) {
                 contact.force_n = forces[contact.spring as usize];
                 let x = contact.bodies.map(|i| bodies[i as usize].body.positions());
-                contact.settle(spring, spring.relative(x));
+                let [a, b] = contact.bodies.map(|i| cells[i as usize]);
+                contact.settle(spring, spring.relative(x), a.min(b));
             }
             let push = contact.force_n.dot(&normal);
             if push > 0.0 {
@@ -478,6 +492,8 @@ impl PairContacts {
         }
         self.epochs.clear();
         self.epochs.extend(bodies.iter().map(SimBody::epoch));
+        self.cells.clear();
+        self.cells.extend(bodies.iter().map(SimBody::cell_m));
         self.lips.clear();
         for body in bodies {
             let surface = body.body.surface();
@@ -511,14 +527,15 @@ impl PairContacts {
 
 impl Kept {
     /// Evaluates a step in which the spring gave `force_n` and left the vertex at the relative place `y`.
-    fn settle(&mut self, spring: &PairSpring, y: Vector3<f64>) {
+    fn settle(&mut self, spring: &PairSpring, y: Vector3<f64>, cell_m: f64) {
         let (SpringKind::Rough { normal, offset_m, .. } | SpringKind::OneSided { normal, offset_m }) =
             spring.kind
         else {
             return;
         };
         let push = self.force_n.dot(&normal);
-        self.depth_m = offset_m + self.eased_m - normal.dot(&y);
+        self.depth_m = offset_m + self.eased_m - self.ahead_m - normal.dot(&y);
+        self.augment(cell_m);
         self.slipped = true;
         self.anchor_m = Vector3::zeros();
         self.grip_n = 0.0;
@@ -534,6 +551,20 @@ impl Kept {
             self.anchor_m = if self.slipped { across / tangential_n_m } else { before };
             self.grip_n = friction * push;
         }
+    }
+
+    /// Augments the spring by a multiplier, which takes over what the spring carries beyond a shallow depth, and gives
+    /// it back where the vertex has come off.
+    ///
+    /// # Source
+    /// Hestenes, Multiplier and gradient methods (1969): λ ← max(0, λ + k g), here with the gap g of each step.
+    fn augment(&mut self, cell_m: f64) {
+        let excess = self.depth_m - self.eased_m - SHALLOW_CELLS * cell_m;
+        self.deep = if excess > 0.0 { self.deep.saturating_add(1) } else { 0 };
+        if self.deep >= DEEP_STEPS {
+            self.ahead_m = (self.ahead_m + excess).min(MOST_CELLS * cell_m);
+        }
+        self.ahead_m = (self.ahead_m + self.depth_m.min(0.0)).max(0.0);
     }
 
     fn key(&self) -> ([u32; 2], u32) {
