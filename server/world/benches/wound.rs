@@ -1,7 +1,7 @@
 //! What contact of a body with itself costs: `cargo bench -p scindo-world --bench wound`. `-- --quick` makes short runs.
 //!
 //! A wound with about 2,000 triangles on its lips, with and without self-contact: pressed shut by plates and tools;
-//! held open in its middle, while its ends touch; and pulled open. The steps are made in turns, so that a busy moment
+//! held open in its middle, while its ends touch; pulled open; and opened and closed once per second. The steps are made in turns, so that a busy moment
 //! of the machine hits all of them.
 
 #![allow(clippy::disallowed_methods, clippy::unwrap_used)] // a bench reads the clock
@@ -36,6 +36,7 @@ fn main() {
         ("pressed shut", 0.006, [0.006, 0.008]),
         ("touching at its ends", 0.0, [-0.02, -0.022]),
         ("pulled open", -0.006, [-0.02, -0.022]),
+        ("opened and closed again and again", 0.0, [0.006, -0.02]),
     ] {
         let mut wounds = [false, true].map(|itself| Wound::new(itself, plates_m, by_m));
         for step in 0..steps[0] + steps[1] {
