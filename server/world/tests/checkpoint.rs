@@ -153,6 +153,13 @@ fn quadratic_elements_that_are_cut_go_on() {
     goes_on(&scene, 60, &random(4, 55), &press_and_cut);
 }
 
+#[test]
+fn a_pressure_that_changes_and_follows_the_surface_goes_on() {
+    let side = "[[body.load]]\nwhere = { slab = { axis = \"x\", from = 1, to = 1 } }\npressure_pa = 300\n";
+    let text = format!("{BLOCK}{side}table = [[0, 0], [0.1, 1], [0.3, 0.2]]\n");
+    goes_on(&Scene::from_toml(&text).unwrap(), 40, &random(4, 30), &press_and_cut);
+}
+
 /// A scene of the folder `scenes`.
 fn example(name: &str) -> Scene {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
