@@ -12,7 +12,11 @@ fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
 }
 
 fn block(law: Law, settings: BodySettings) -> Body {
-    let mesh = box_mesh(Vector3::zeros(), v(0.1, 0.1, 0.2), [4, 4, 8], BoxPattern::Tet6);
+    block_of([4, 4, 8], BoxPattern::Tet6, law, settings)
+}
+
+fn block_of(cells: [usize; 3], pattern: BoxPattern, law: Law, settings: BodySettings) -> Body {
+    let mesh = box_mesh(Vector3::zeros(), v(0.1, 0.1, 0.2), cells, pattern);
     let rayleigh = Rayleigh::default();
     let material = Material { young_pa: 2e4, poisson: 0.3, density_kg_m3: 1e3, rayleigh, law };
     let mut body = Body::new(mesh, material, settings).unwrap();
@@ -173,4 +177,48 @@ fn a_reset_keeps_what_was_asked_for_after_the_cut_and_drops_the_pins() {
     let lifted = body.reaction(&[held[1]], Vector3::zeros());
     body.clear_loads();
     assert!((body.reaction(&[held[1]], Vector3::zeros()) - lifted - v(0.0, 0.0, 0.5)).norm() < 1e-9);
+}
+
+/// A moving body whose cut presses elements keeps mass, momentum, loads and what holds it, moves on, and returns to its
+/// start, after which the same cut gives the same body.
+#[test]
+fn a_moving_body_whose_cut_presses_elements_goes_on() {
+    let press = SnapSettings { moves: Moves::Press, clean: true };
+    let settings = BodySettings { snap: press, ..snap() };
+    let mut body = block_of([8, 8, 16], BoxPattern::Octahedral6, Law::Corotational, settings);
+    let top: Vec<u32> =
+        (0u32..).zip(body.rest_positions()).filter(|(_, x)| x.z == 0.2).map(|(n, _)| n).collect();
+    body.add_surface_force(&top, v(0.0, 0.02, 0.0)).unwrap();
+    let oblique = BladeSweep {
+        segments: vec![
+            [v(-0.05, -0.1, 0.226), v(-0.05, 0.2, 0.1)],
+            [v(0.15, -0.1, 0.11), v(0.15, 0.2, -0.016)],
+        ],
+    };
+    let mut cut = || {
+        for _ in 0..5 {
+            assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
+        }
+        let (mass, held) = (body.total_mass(), body.fixed_nodes().len());
+        let momentum = |body: &Body| -> Vector3<f64> {
+            body.masses().iter().zip(body.velocities()).map(|(m, v)| v * *m).sum()
+        };
+        let before = momentum(&body);
+        body.cut(&oblique, 1).unwrap();
+        let report = *body.snap_report().unwrap();
+        assert!(report.flattened > 20 && report.collapses > 20 && report.refused < 5, "{report:?}");
+        assert!(4 * report.degenerate < report.flattened && body.fixed_nodes().len() == held, "{report:?}");
+        assert!((body.total_mass() / mass - 1.0).abs() < 1e-9 && body.parts().len() == 2);
+        assert!((momentum(&body) - before).norm() < 0.05 * before.norm(), "{before} {}", momentum(&body));
+        let loads: Vector3<f64> = body.loads().iter().sum();
+        assert!((loads - v(0.0, 0.02, 0.0)).norm() < 1e-12, "{loads}");
+        for _ in 0..20 {
+            assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
+        }
+        assert!(body.least_volume_ratio() > 0.0);
+        let end = body.positions().to_vec();
+        body.reset().unwrap();
+        end
+    };
+    assert_eq!(cut(), cut());
 }
