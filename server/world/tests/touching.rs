@@ -46,6 +46,18 @@ fn block(id: &str, at: [f64; 3], lines: &str) -> String {
     )
 }
 
+/// A block that is cut through across and touches itself.
+fn split(lines: &str) -> String {
+    WORLD.replace("body_collision", "self_collision")
+        + lines
+        + &block("split", [0.0, 0.0, 0.0], "")
+        + r#"
+        [[cut]]
+        body = "split"
+        sweep_m = [[[-0.01, -0.01, 0.031], [0.07, -0.01, 0.031]], [[-0.01, 0.07, 0.031], [0.07, 0.07, 0.031]]]
+    "#
+}
+
 fn start(text: &str, threads: usize) -> Simulation {
     let scene = Scene::from_toml(text).unwrap();
     Simulation::with_options(&scene, Path::new(""), BuildOptions { threads, portable: false }).unwrap()
@@ -123,13 +135,7 @@ fn two_bodies_exchange_momentum_exactly() {
 #[test]
 fn the_lips_of_a_cut_neither_stick_nor_pass_through_each_other() {
     // A block on its side is cut through and pressed together by its own weight, then pulled open.
-    let text = WORLD.replace("body_collision", "self_collision")
-        + &block("split", [0.0, 0.0, 0.0], "")
-        + r#"
-        [[cut]]
-        body = "split"
-        sweep_m = [[[-0.01, -0.01, 0.031], [0.07, -0.01, 0.031]], [[-0.01, 0.07, 0.031], [0.07, 0.07, 0.031]]]
-    "#;
+    let text = split("");
     let mut sim = start(&text, 1);
     steps(&mut sim, 300, 0.1);
     let report = *sim.touch_reports().first().unwrap();
@@ -153,15 +159,7 @@ fn the_lips_of_a_cut_neither_stick_nor_pass_through_each_other() {
 #[test]
 fn a_multiplier_joins_springs_that_are_too_soft() {
     // The upper half of a block presses the springs between the lips down to 7 % of a cell.
-    let text = WORLD.replace("body_collision", "self_collision")
-        + "[world.contact]\nstiffness = 0.2\n"
-        + &block("split", [0.0, 0.0, 0.0], "")
-        + r#"
-        [[cut]]
-        body = "split"
-        sweep_m = [[[-0.01, -0.01, 0.031], [0.07, -0.01, 0.031]], [[-0.01, 0.07, 0.031], [0.07, 0.07, 0.031]]]
-    "#;
-    let mut sim = start(&text, 1);
+    let mut sim = start(&split("[world.contact]\nstiffness = 0.2\n"), 1);
     steps(&mut sim, 300, 0.15);
     steps(&mut sim, 300, 0.022);
     let weight = 0.5 * 9.81 * sim.bodies()[0].body.total_mass();
