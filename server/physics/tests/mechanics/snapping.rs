@@ -179,8 +179,8 @@ fn a_reset_keeps_what_was_asked_for_after_the_cut_and_drops_the_pins() {
     assert!((body.reaction(&[held[1]], Vector3::zeros()) - lifted - v(0.0, 0.0, 0.5)).norm() < 1e-9);
 }
 
-/// A moving body whose cut presses elements keeps mass, momentum, loads and what holds it, moves on, and returns to its
-/// start, after which the same cut gives the same body.
+/// A moving body whose cut presses elements keeps mass, loads and what holds it, and its momentum within 5 %. It moves
+/// on and returns to its start, after which the same cut gives the same body.
 #[test]
 fn a_moving_body_whose_cut_presses_elements_goes_on() {
     let press = SnapSettings { moves: Moves::Press, clean: true };
@@ -200,16 +200,13 @@ fn a_moving_body_whose_cut_presses_elements_goes_on() {
             assert_eq!(body.step(0.01, G, &[]).outcome, Outcome::Advanced);
         }
         let (mass, held) = (body.total_mass(), body.fixed_nodes().len());
-        let momentum = |body: &Body| -> Vector3<f64> {
-            body.masses().iter().zip(body.velocities()).map(|(m, v)| v * *m).sum()
-        };
-        let before = momentum(&body);
+        let before = body.momentum();
         body.cut(&oblique, 1).unwrap();
         let report = *body.snap_report().unwrap();
         assert!(report.flattened > 20 && report.collapses > 20 && report.refused < 5, "{report:?}");
         assert!(4 * report.degenerate < report.flattened && body.fixed_nodes().len() == held, "{report:?}");
         assert!((body.total_mass() / mass - 1.0).abs() < 1e-9 && body.parts().len() == 2);
-        assert!((momentum(&body) - before).norm() < 0.05 * before.norm(), "{before} {}", momentum(&body));
+        assert!((body.momentum() - before).norm() < 0.05 * before.norm(), "{before} {}", body.momentum());
         let loads: Vector3<f64> = body.loads().iter().sum();
         assert!((loads - v(0.0, 0.02, 0.0)).norm() < 1e-12, "{loads}");
         for _ in 0..20 {
