@@ -1,8 +1,8 @@
 //! What contact of a body with itself costs: `cargo bench -p scindo-world --bench wound`. `-- --quick` makes short runs.
 //!
 //! A wound with about 2,000 triangles on its lips, with and without self-contact: pressed shut by plates and tools;
-//! held open in its middle, while its ends touch; pulled open; and opened and closed once per second. The steps are made in turns, so that a busy moment
-//! of the machine hits all of them.
+//! held open in its middle, while its ends touch; pulled open; and opened and closed once per second. The steps are
+//! made in turns, so that a busy moment of the machine hits all of them.
 
 #![allow(clippy::disallowed_methods, clippy::unwrap_used)] // a bench reads the clock
 
