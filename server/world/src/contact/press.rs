@@ -18,10 +18,12 @@ use crate::contact::surface::ContactSurface;
 use crate::inputs::ToolShape;
 use crate::tool::geometry::{capsule, core_length};
 
-/// Most bearing points of one tool.
-pub const MAX_POINTS: usize = 19;
 /// Points along a shaft.
 const SHAFT: usize = 8;
+/// Rings on a ball: number of points, and radius in radii of the ball.
+const RINGS: [(usize, f64); 2] = [(6, 0.4), (12, 0.75)];
+/// Most bearing points of one tool: the pole of a ball and its rings.
+pub const MAX_POINTS: usize = 1 + RINGS[0].0 + RINGS[1].0;
 /// Distance of a surface from the proxy beyond which it does not count as touched, in radii ...
 const MARGIN_RADII: f64 = 0.05;
 /// ... but at least this [m].
@@ -40,8 +42,6 @@ const TURN: Following = Following { time_s: 0.095, most: 0.1 };
 const FOLLOW: Following = Following { time_s: 0.028, most: 0.3 };
 /// Share below which a point is omitted.
 const LEAST_SHARE: f64 = 1e-3;
-/// Rings on a ball: number of points, and radius in radii of the ball.
-const RINGS: [(usize, f64); 2] = [(6, 0.4), (12, 0.75)];
 
 /// The surface place nearest to a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
