@@ -61,8 +61,8 @@ impl SpatialHash {
     fn cell(&self, aabb: &Aabb) -> Cell {
         let extent = aabb.extents().into_iter().fold(0.0, f32::max);
         let grid = exponent(extent).max(self.finest);
-        let inverse = (-f64::from(grid)).exp2();
-        Cell { grid, at: aabb.centre().map(|x| (f64::from(x) * inverse).floor() as i32) }
+        let inverse = power_of_two(-grid);
+        Cell { grid, at: aabb.centre().map(|x| floor(f64::from(x) * inverse)) }
     }
 
     fn measure(&mut self, boxes: &[Aabb]) {
@@ -128,7 +128,7 @@ impl SpatialHash {
         }
         for grid in self.grids() {
             let [low, high] = self.range(grid, &region);
-            let edge = f64::from(grid).exp2() as f32;
+            let edge = power_of_two(grid) as f32;
             // Layers and columns of cells that the search does not reach are skipped as a whole.
             let reached = |from: [i32; 3], to: [i32; 3], limit: f64| {
                 let min = from.map(|i| (i as f32 - 0.501) * edge);
@@ -168,9 +168,9 @@ impl SpatialHash {
 
     /// Lowest and highest cell of a grid whose triangles can reach into `region`.
     fn range(&self, grid: i32, region: &Aabb) -> [[i32; 3]; 2] {
-        let inverse = (-f64::from(grid)).exp2();
+        let inverse = power_of_two(-grid);
         // A triangle is centred at most half an edge away, and the centre is rounded.
-        let cell = |x: f32, side: f64| (f64::from(x) * inverse + side * 0.501).floor() as i32;
+        let cell = |x: f32, side: f64| floor(f64::from(x) * inverse + side * 0.501);
         [region.min.map(|x| cell(x, -1.0)), region.max.map(|x| cell(x, 1.0))]
     }
 
@@ -188,8 +188,21 @@ impl SpatialHash {
 
 /// The smallest grid whose cells are at least `extent` [m] wide.
 fn exponent(extent: f32) -> i32 {
-    let exponent = if extent > 0.0 { f64::from(extent).log2().ceil() as i32 } else { FINEST };
-    exponent.clamp(FINEST, FINEST + GRIDS as i32 - 1)
+    let bits = extent.max(0.0).to_bits();
+    let (below, mantissa) = ((bits >> 23) as i32 - 127, bits & ((1 << 23) - 1));
+    (below + i32::from(mantissa > 0)).clamp(FINEST, FINEST + GRIDS as i32 - 1)
+}
+
+/// 2 to the power of `exponent`, which is within the range of normal numbers.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((1023 + exponent) as u64) << 52)
+}
+
+/// The largest whole number that is at most `x`, within the range of its type. Many processors for which this is
+/// compiled have no instruction for it, so [`f64::floor`] is a call.
+fn floor(x: f64) -> i32 {
+    let towards_zero = x as i32;
+    towards_zero.saturating_sub(i32::from(f64::from(towards_zero) > x))
 }
 
 impl BroadPhase for SpatialHash {
@@ -239,7 +252,7 @@ impl BroadPhase for SpatialHash {
             && let Some(bounds) = &self.bounds
         {
             // The nearest is sought in regions that grow, until it lies inside the region.
-            let mut distance = self.grids().next().map_or(0.0, |grid| f64::from(grid).exp2());
+            let mut distance = self.grids().next().map_or(0.0, power_of_two);
             let farthest = bounds.extents().into_iter().fold(0.0, f32::max);
             while distance < f64::from(farthest) && probe.limit_at(distance) < limit {
                 let mut near = probe.limit_at(distance);
@@ -269,5 +282,33 @@ impl BroadPhase for SpatialHash {
 
     fn quality(&self) -> f64 {
         1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_is_as_wide_as_a_box() {
+        let grids = [(1.0, 0), (1.0f32.next_up(), 1), (0.75, 0), (0.5, -1), (3.0, 2), (2.0e-3, -8)];
+        for (extent, grid) in grids {
+            assert_eq!(exponent(extent), grid, "{extent}");
+        }
+        for extent in [0.0, -1.0, f32::MIN_POSITIVE / 2.0, f32::MIN_POSITIVE] {
+            assert_eq!(exponent(extent), FINEST);
+        }
+        assert_eq!(exponent(f32::MAX), FINEST + GRIDS as i32 - 1);
+        for grid in [FINEST, -3, 0, 7, FINEST + GRIDS as i32 - 1] {
+            assert_eq!(power_of_two(grid), f64::from(grid).exp2());
+        }
+    }
+
+    #[test]
+    fn whole_numbers_are_rounded_down() {
+        for x in [-2.5, -2.0, -0.1, -0.0, 0.0, 0.9, 1.0, 12_345.6, -12_345.6] {
+            assert_eq!(f64::from(floor(x)), x.floor(), "{x}");
+        }
+        assert_eq!([floor(1e300), floor(-1e300)], [i32::MAX, i32::MIN]);
     }
 }
