@@ -221,6 +221,29 @@ fn triangles_replaced_as_by_a_cut_are_found_and_the_old_ones_are_not() {
 }
 
 #[test]
+fn a_cut_leaves_an_arrangement_as_good_as_it_was() {
+    // Large enough that the spheres near the root of a tree overlap each other far beyond a triangle.
+    let (mut positions, mut triangles) = shapes::ball(0.1, 60);
+    let whole = (positions.clone(), triangles.clone());
+    for t in 20_000..20_100 {
+        let corners = triangles[t];
+        let middle = [0, 1, 2].map(|k| corners.iter().map(|&v| positions[v as usize][k] / 3.0).sum());
+        let m = positions.len() as u32;
+        positions.push(middle);
+        let [a, b, c] = corners;
+        triangles[t] = [a, b, m];
+        triangles.extend([[b, c, m], [c, a, m]]);
+    }
+    for method in Method::ALL {
+        let mut surface = SurfaceBvh::with_method(method, &whole.0, &whole.1).unwrap();
+        surface.change_topology(&positions, &triangles).unwrap();
+        let quality = surface.quality();
+        assert!((0.98..1.01).contains(&quality), "{}: {quality}", method.name());
+        assert_eq!(surface.rebuilds(), 0);
+    }
+}
+
+#[test]
 fn a_worn_tree_is_arranged_anew() {
     // Points of a plane are shuffled: every node then covers the whole plane.
     let n = 4000;

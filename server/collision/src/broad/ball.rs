@@ -1,6 +1,6 @@
 //! Bounding spheres in single precision.
 
-use super::aabb::{Aabb, round_up};
+use super::aabb::Aabb;
 
 /// A sphere around everything that it bounds.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -16,21 +16,23 @@ impl Ball {
     pub const EMPTY: Self = Self { centre: [0.0; 3], radius: -1.0 };
 
     /// The sphere around the middle of some boxes that holds all of them.
+    #[inline(always)]
     pub fn around<'a>(boxes: impl Iterator<Item = &'a Aabb> + Clone) -> Self {
         let whole = boxes.clone().fold(Aabb::EMPTY, |sum, aabb| sum.merged(aabb));
         if whole.extents()[0] < 0.0 {
             return Self::EMPTY;
         }
         let centre = whole.centre();
-        let far = |aabb: &Aabb, i: usize| {
-            let c = f64::from(centre[i]);
-            (f64::from(aabb.max[i]) - c).max(c - f64::from(aabb.min[i]))
+        let far = |aabb: &Aabb| {
+            let along = |i: usize| larger(aabb.max[i] - centre[i], centre[i] - aabb.min[i]);
+            let [x, y, z] = [along(0), along(1), along(2)];
+            x * x + y * y + z * z
         };
-        let squared = boxes.map(|aabb| (0..3).map(|i| far(aabb, i).powi(2)).sum::<f64>()).fold(0.0, f64::max);
-        Self { centre, radius: outer(squared.sqrt()) }
+        Self { centre, radius: outer(boxes.fold(0.0, |farthest, aabb| larger(farthest, far(aabb))).sqrt()) }
     }
 
     /// The smallest sphere around two, up to rounding.
+    #[inline(always)]
     pub fn merged(&self, other: &Self) -> Self {
         if self.radius < 0.0 {
             return *other;
@@ -38,8 +40,9 @@ impl Ball {
         if other.radius < 0.0 {
             return *self;
         }
-        let distance = self.distance(other);
-        let [r, s] = [f64::from(self.radius), f64::from(other.radius)];
+        let apart = [0, 1, 2].map(|i| other.centre[i] - self.centre[i]);
+        let distance = outer((apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2]).sqrt());
+        let [r, s] = [self.radius, other.radius];
         if distance + s <= r {
             return *self;
         }
@@ -47,18 +50,18 @@ impl Ball {
             return *other;
         }
         let radius = 0.5 * (distance + r + s);
-        let along = if distance > 0.0 { (radius - r) / distance } else { 0.0 };
-        let centre = [0, 1, 2].map(|i| {
-            let [a, b] = [f64::from(self.centre[i]), f64::from(other.centre[i])];
-            (a + (b - a) * along) as f32
-        });
-        // The centre was rounded, so the radius is measured from where it is now.
-        let at = Self { centre, radius: 0.0 };
-        Self { centre, radius: outer((at.distance(self) + r).max(at.distance(other) + s)) }
+        let along = (radius - r) / distance;
+        if !along.is_finite() {
+            return Self { centre: self.centre, radius: f32::INFINITY }; // squares beyond single precision
+        }
+        let centre = [0, 1, 2].map(|i| self.centre[i] + apart[i] * along);
+        // The centre was rounded by a unit in the last place of each coordinate at most.
+        let rounded = centre.iter().map(|c| c.abs()).sum::<f32>() * f32::EPSILON;
+        Self { centre, radius: outer(radius) + rounded }
     }
 
     /// Distance of the centres [m].
-    fn distance(&self, other: &Self) -> f64 {
+    pub fn distance(&self, other: &Self) -> f64 {
         let squared = |i: usize| (f64::from(self.centre[i]) - f64::from(other.centre[i])).powi(2);
         (squared(0) + squared(1) + squared(2)).sqrt()
     }
@@ -78,13 +81,20 @@ impl Ball {
     }
 
     /// A measure of the surface area [m²], comparable to half the area of a box.
+    #[inline(always)]
     pub fn half_area(&self) -> f32 {
         let r = self.radius.max(0.0);
         std::f32::consts::TAU * r * r
     }
 }
 
-/// A radius that covers the rounding of its computation.
-fn outer(radius: f64) -> f32 {
-    round_up(radius * (1.0 + 1e-12))
+/// A length that covers the rounding of its computation, and squares below single precision.
+#[inline(always)]
+fn outer(length: f32) -> f32 {
+    length * (1.0 + 3e-6) + 2e-19
+}
+
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }

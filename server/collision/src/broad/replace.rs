@@ -52,13 +52,12 @@ impl<B: Bound, S: Split> Tree<B, S> {
             let (first, len) = (node.first as usize, usize::from(node.len));
             let growth = |child: usize| {
                 let child = &self.nodes[child].bound;
-                let area = child.joined(&bound).area();
-                (area - child.area(), area)
+                (child.joined(&bound).area() - child.area(), child.tie_break(&bound))
             };
             at = (first..first + len)
                 .min_by(|&a, &b| {
-                    let ((a, area_a), (b, area_b)) = (growth(a), growth(b));
-                    a.total_cmp(&b).then(area_a.total_cmp(&area_b))
+                    let ((a, tie_a), (b, tie_b)) = (growth(a), growth(b));
+                    a.total_cmp(&b).then(tie_a.total_cmp(&tie_b))
                 })
                 .unwrap_or(first);
             depth += 1;

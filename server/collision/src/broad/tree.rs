@@ -36,6 +36,8 @@ pub(crate) trait Bound: Copy + PartialEq {
     fn cost<P: Probe>(&self, probe: &P) -> f64;
     /// Half the surface area [m²], up to a factor.
     fn area(&self) -> f32;
+    /// What decides between volumes that would grow equally when they take in `other`; the least wins.
+    fn tie_break(&self, other: &Self) -> f32;
 }
 
 impl Bound for Aabb {
@@ -64,15 +66,21 @@ impl Bound for Aabb {
     fn area(&self) -> f32 {
         self.half_area()
     }
+
+    fn tie_break(&self, other: &Self) -> f32 {
+        self.joined(other).area()
+    }
 }
 
 impl Bound for Ball {
     const EMPTY: Self = Self::EMPTY;
 
+    #[inline(always)]
     fn around<'a>(boxes: impl Iterator<Item = &'a Aabb> + Clone) -> Self {
         Self::around(boxes)
     }
 
+    #[inline(always)]
     fn joined(&self, other: &Self) -> Self {
         self.merged(other)
     }
@@ -85,8 +93,14 @@ impl Bound for Ball {
         if self.radius < 0.0 { f64::INFINITY } else { probe.to_ball(self) }
     }
 
+    #[inline(always)]
     fn area(&self) -> f32 {
         self.half_area()
+    }
+
+    /// Spheres overlap so much that a small one is in several: then the nearest centre counts.
+    fn tie_break(&self, other: &Self) -> f32 {
+        self.distance(other) as f32
     }
 }
 
