@@ -2,7 +2,7 @@
 
 use crate::Capsule;
 use crate::broad::BroadPhase;
-use crate::broad::probe::NearSegment;
+use crate::broad::probe::{NearPoint, NearSegment, Probe};
 use crate::distance::{
     SegmentTriangle, barycentric_point, closest_point_on_triangle, closest_segment_triangle,
 };
@@ -54,7 +54,8 @@ impl SurfaceBvh {
         reach: f64,
         accept: impl Fn(u32) -> bool,
     ) -> Option<ClosestPoint> {
-        let (triangle, w) = self.nearest([p, p], reach, |t| accept(t).then(|| self.closest_on(t, p)))?;
+        let distance = |t| accept(t).then(|| self.closest_on(t, p));
+        let (triangle, w) = self.nearest(&NearPoint::<true>(p), reach, distance)?;
         Some(self.closest(p, triangle, w))
     }
 
@@ -72,6 +73,9 @@ impl SurfaceBvh {
         for (bound, t) in triangles {
             if bound > 0.0 && bound * bound > least {
                 break;
+            }
+            if NearPoint::<true>(p).to_box(&self.boxes()[t as usize]) > least {
+                continue;
             }
             let (squared, w) = self.closest_on(t, p);
             let better = best.is_none_or(|(_, first, _)| squared < least || squared == least && t < first);
@@ -105,21 +109,22 @@ impl SurfaceBvh {
             let closest = closest_segment_triangle(capsule.core, &self.triangle(t));
             Some((closest.distance_squared, closest))
         };
-        let (triangle, closest) = self.nearest(capsule.core, capsule.radius + reach, distance)?;
+        let (triangle, closest) =
+            self.nearest(&NearSegment::<true>(capsule.core), capsule.radius + reach, distance)?;
         Some(NearTriangle { triangle, closest, distance: closest.distance_squared.sqrt() })
     }
 
-    /// The triangle with the smallest squared distance [m²] of all within `reach` [m] of a segment, and what was
-    /// found with the distance.
+    /// The triangle with the smallest squared distance [m²] of all within `reach` [m] of a segment or a point, and
+    /// what was found with the distance.
     fn nearest<T>(
         &self,
-        core: [V; 2],
+        probe: &impl Probe,
         reach: f64,
         distance: impl Fn(u32) -> Option<(f64, T)>,
     ) -> Option<(u32, T)> {
         let limit = limit(reach);
         let mut best: Option<(f64, u32, T)> = None;
-        self.index().search(self.boxes(), &NearSegment::<true>(core), limit, |t, now| {
+        self.index().search(self.boxes(), probe, limit, |t, now| {
             let Some((squared, value)) = distance(t) else { return };
             let better = best
                 .as_ref()
@@ -142,6 +147,27 @@ impl SurfaceBvh {
             if closest.distance_squared <= squared {
                 let distance = closest.distance_squared.sqrt();
                 visit(NearTriangle { triangle, closest, distance });
+            }
+        });
+    }
+
+    /// Visits every triangle that `accept` takes and that is no farther from `p` [m] than `reach` [m], with its
+    /// distance [m], once each. The order is the same in every run.
+    pub fn triangles_near_point(
+        &self,
+        p: V,
+        reach: f64,
+        accept: impl Fn(u32) -> bool,
+        mut visit: impl FnMut(u32, f64),
+    ) {
+        let limit = reach * reach;
+        self.index().search(self.boxes(), &NearPoint::<false>(p), limit, |triangle, _| {
+            if !accept(triangle) {
+                return;
+            }
+            let (squared, _) = self.closest_on(triangle, p);
+            if squared <= limit {
+                visit(triangle, squared.sqrt());
             }
         });
     }

@@ -66,6 +66,39 @@ impl<const NEAREST: bool> Probe for NearSegment<NEAREST> {
     }
 }
 
+/// Everything near a point. The cost is the squared distance [m²].
+///
+/// `NEAREST` tells whether only the nearest is wanted.
+pub(crate) struct NearPoint<const NEAREST: bool>(pub V);
+
+impl<const NEAREST: bool> Probe for NearPoint<NEAREST> {
+    const NEAREST: bool = NEAREST;
+
+    #[inline]
+    fn to_box(&self, aabb: &Aabb) -> f64 {
+        let squared = |i: usize| {
+            let (below, above) = (f64::from(aabb.min[i]) - self.0[i], self.0[i] - f64::from(aabb.max[i]));
+            let gap = if below > above { below } else { above };
+            if gap > 0.0 { gap * gap } else { 0.0 }
+        };
+        (squared(0) + squared(1) + squared(2)) * ROUNDED
+    }
+
+    fn to_ball(&self, ball: &Ball) -> f64 {
+        let gap = (self.0 - V::from(ball.centre.map(f64::from))).norm() - f64::from(ball.radius);
+        if gap > 0.0 { gap * gap * ROUNDED } else { 0.0 }
+    }
+
+    fn region(&self, limit: f64) -> [V; 2] {
+        let reach = V::repeat(limit.sqrt());
+        [self.0 - reach, self.0 + reach]
+    }
+
+    fn limit_at(&self, distance: f64) -> f64 {
+        distance * distance
+    }
+}
+
 /// Everything whose box is no farther than a margin [m] from a box along every axis. The cost is zero there.
 pub(crate) struct NearBox(pub Aabb, pub f32);
 

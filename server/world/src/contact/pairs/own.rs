@@ -7,10 +7,10 @@
 //! Verlet, Computer "experiments" on classical fluids I (1967): lists of neighbours.
 
 use nalgebra::Vector3;
-use scindo_collision::{Capsule, ClosestPoint, SurfaceBvh};
+use scindo_collision::{ClosestPoint, SurfaceBvh};
 use smallvec::SmallVec;
 
-/// A triangle faces a vertex if their normals have at most this scalar product.
+/// A triangle faces a vertex if their unit normals have at most this scalar product, which is negative.
 const FACING: f64 = -0.2;
 /// Most triangles in the list of a vertex, and those for which it has room without memory of its own.
 const MOST: usize = 96;
@@ -22,19 +22,19 @@ const RIM: f64 = 0.9;
 /// Distance beyond a rim over which the direction of contact turns from the normal of the lip to that of the rim, in
 /// cells.
 const TURN_CELLS: f64 = 0.05;
-/// Rounding of positions to single precision, in cells.
+/// Rounding of positions and distances to single precision, in cells.
 const ROUNDING_CELLS: f64 = 1e-4;
 
 /// Triangles with their distances [m], ascending.
-type List = SmallVec<[(f64, u32); ROOM]>;
+type List = SmallVec<[(f32, u32); ROOM]>;
 
 /// What one body knows about itself.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct OwnSurface {
-    /// Unit normals of triangles and vertices; zero where there is none.
+    /// Normals of triangles and vertices, as long as twice their area [m²].
     triangles: Vec<Vector3<f64>>,
     vertices: Vec<Vector3<f64>>,
-    /// Unit normals of the vertices over the triangles of lips alone; zero where there is none.
+    /// The same of vertices over the triangles of lips alone.
     lips: Vec<Vector3<f64>>,
     /// Positions of the vertices at the last update [m].
     positions: Vec<[f32; 3]>,
@@ -71,10 +71,8 @@ impl OwnSurface {
             if is_lip(t) {
                 tree.corners(t).iter().for_each(|&v| lips[v as usize] += normal);
             }
-            unit(&normal)
+            normal
         }));
-        vertices.iter_mut().for_each(|normal| *normal = unit(normal));
-        lips.iter_mut().for_each(|normal| *normal = unit(normal));
     }
 
     /// No distance has shrunk by more than both sides have moved.
@@ -82,12 +80,13 @@ impl OwnSurface {
         let Self { positions, lists, known_m, listed_m, free_m, .. } = self;
         let now = tree.positions();
         if same && positions.len() == now.len() {
-            let moved = |(now, before): (&[f32; 3], &[f32; 3])| (point(now) - point(before)).norm();
+            let moved = |(now, before): (&[f32; 3], &[f32; 3])| (point(now) - point(before)).norm_squared();
             let each = || now.iter().zip(positions.iter()).map(moved);
-            let farthest = each().fold(0.0, f64::max);
+            let farthest = each().fold(0.0, f64::max).sqrt();
             for ((known, free), own) in known_m.iter_mut().zip(free_m.iter_mut()).zip(each()) {
-                *known -= farthest + own;
-                *free -= farthest + own;
+                let shrunk = farthest + own.sqrt();
+                *known -= shrunk;
+                *free -= shrunk;
             }
         } else {
             known_m.clear();
@@ -108,7 +107,9 @@ impl OwnSurface {
             return true;
         }
         let [triangle, vertex] = [&self.triangles[t as usize], &self.vertices[vertex as usize]];
-        triangle.dot(vertex) <= FACING
+        let product = triangle.dot(vertex);
+        product < 0.0
+            && product * product >= FACING * FACING * triangle.norm_squared() * vertex.norm_squared()
     }
 
     /// The direction in which the surface at `near` pushes a vertex at `from` [m].
@@ -124,7 +125,7 @@ impl OwnSurface {
         cell_m: f64,
     ) -> Vector3<f64> {
         let corners = tree.corners(near.triangle).into_iter().zip(near.barycentric);
-        let lip = unit(&corners.map(|(v, w)| w * self.lips[v as usize]).sum());
+        let lip = unit(&corners.map(|(v, w)| w * unit(&self.lips[v as usize])).sum());
         if lip == Vector3::zeros() || lip.dot(&near.normal) > RIM {
             return near.normal;
         }
@@ -154,12 +155,13 @@ impl OwnSurface {
             let lookout = (LOOKOUT_CELLS[usize::from(faced)] * cell_m).max(1.5 * needed);
             self.known_m[v] = look_around(&mut self.lists[v], from, lookout, tree, &joined);
             self.listed_m[v] = self.known_m[v];
-            self.free_m[v] = self.lists[v].first().map_or(self.known_m[v], |(nearest, _)| *nearest);
+            self.free_m[v] =
+                self.lists[v].first().map_or(self.known_m[v], |(nearest, _)| f64::from(*nearest));
         }
         if self.known_m[v] > needed {
             // Both sides have moved since they were listed.
             let moved = self.listed_m[v] - self.known_m[v] + ROUNDING_CELLS * cell_m;
-            let near = self.lists[v].iter().map(|&(listed, t)| (listed - moved, t));
+            let near = self.lists[v].iter().map(|&(listed, t)| (f64::from(listed) - moved, t));
             let facing =
                 near.take_while(|(bound, _)| *bound <= needed).filter(|(_, t)| self.faces(*t, vertex));
             return tree.closest_point_among(from, reach, facing);
@@ -177,24 +179,30 @@ fn look_around(
     tree: &SurfaceBvh,
     joined: &impl Fn(u32) -> bool,
 ) -> f64 {
-    let mut complete_m = lookout;
+    let mut complete_m = lookout as f32;
     list.clear();
-    tree.triangles_near(&Capsule { core: [from; 2], radius: 0.0 }, lookout, |near| {
-        if near.distance >= complete_m || joined(near.triangle) {
-            return;
-        }
-        if let Some(&(farthest, _)) = list.get(MOST - 1) {
-            complete_m = farthest.max(near.distance);
-            if near.distance >= farthest {
+    tree.triangles_near_point(
+        from,
+        lookout,
+        |t| !joined(t),
+        |triangle, distance| {
+            let distance = distance as f32;
+            if distance >= complete_m {
                 return;
             }
-            list.pop();
-        }
-        let place = list.partition_point(|(distance, _)| *distance < near.distance);
-        list.insert(place, (near.distance, near.triangle));
-    });
+            if let Some(&(farthest, _)) = list.get(MOST - 1) {
+                complete_m = farthest.max(distance);
+                if distance >= farthest {
+                    return;
+                }
+                list.pop();
+            }
+            let place = list.partition_point(|(nearer, _)| *nearer < distance);
+            list.insert(place, (distance, triangle));
+        },
+    );
     list.retain(|(distance, _)| *distance < complete_m);
-    complete_m
+    f64::from(complete_m)
 }
 
 fn point(p: &[f32; 3]) -> Vector3<f64> {
