@@ -63,6 +63,8 @@ pub struct Together {
     place_of: Vec<u32>,
     partners: Partners,
     translations: SharedTranslations,
+    /// Whether the residuals are those of the present δ and modes.
+    is_current: bool,
 }
 
 /// How a step of a group went.
@@ -113,12 +115,18 @@ impl Together {
         self.partners.choose(members, &self.pairs);
         let mut report = GroupReport { refused: pairs.len() - self.pairs.len(), ..GroupReport::default() };
         let mut reference = 0.0;
+        self.is_current = false;
         for pass in 0..PASSES {
             self.complete(members);
             if self.translations.balance(members, &self.pairs) {
                 place(&mut self.pairs, members);
+                self.is_current = false;
             }
-            let rz = self.residual(members, pass, &mut reference);
+            let loads = if self.is_current { 0.0 } else { self.residual(members, pass) };
+            let rz = self.precondition(members);
+            if pass == 0 {
+                reference = loads.max(rz.max(0.0).sqrt());
+            }
             let mut search = Search { rz, beta: 0.0, reference };
             let solve = self.solve_pass(members, &mut search, settings, pass + 1 == PASSES);
             let iterations = report.solve.iterations + solve.report.iterations;
@@ -199,31 +207,27 @@ impl Together {
         shared.sort_unstable_by_key(|(copy, _)| *copy);
     }
 
-    /// Writes the residuals of all members; returns rᵀM⁻¹r. The reference is set on the first pass.
-    fn residual(&mut self, members: Members<'_, '_>, pass: usize, reference: &mut f64) -> f64 {
+    /// Writes the residuals of all members. Returns the norm of their loads on the first pass.
+    fn residual(&mut self, members: Members<'_, '_>, pass: usize) -> f64 {
         let mut loads = 0.0;
         for member in members.iter_mut() {
             let (step, mut own) = member.split();
             loads += step.residual_together(&mut own, pass).powi(2);
         }
         for pair in &self.pairs {
-            let force = pair.law.force(pair.y);
-            for carrier in &pair.carriers {
-                let member = &mut members[carrier.body as usize];
-                let s = member.inputs.s();
-                member.step.add_to_residual(carrier.copy, &(s * carrier.weight * force));
-            }
+            add_to_residual(members, pair, &pair.law.force(pair.y));
         }
+        loads.sqrt()
+    }
+
+    /// Preconditions the residuals of all members; returns rᵀM⁻¹r.
+    fn precondition(&mut self, members: Members<'_, '_>) -> f64 {
         let mut rz = 0.0;
         for member in members.iter_mut() {
             let (step, mut own) = member.split();
             rz += step.precondition_together(&mut own);
         }
-        rz += self.partners.precondition(members);
-        if pass == 0 {
-            *reference = loads.sqrt().max(rz.max(0.0).sqrt());
-        }
-        rz
+        rz + self.partners.precondition(members)
     }
 
     /// Solves loosely, and to the tolerance if the springs then stay in their modes. The last pass does not look.
@@ -339,6 +343,10 @@ impl Together {
 
     /// Lets springs change their modes where that matters; returns whether it does. Changes that together move the
     /// residual by less than `negligible`, to which it is solved, do not.
+    ///
+    /// Within a mode forces are linear in δ, so that after a solve the residual is still exact up to rounding, and only
+    /// what the new modes change is added to it. Where the members' own springs changed, or the variables are not
+    /// those of the nodes, it is to be written anew.
     fn changed(&mut self, members: Members<'_, '_>, negligible: f64) -> bool {
         let mut changed = false;
         for member in members.iter_mut() {
@@ -349,8 +357,12 @@ impl Together {
         if !changed && moved <= negligible * negligible {
             return false;
         }
+        self.is_current = !changed && members.iter().all(|member| member.step.has_single_blocks());
         for pair in &mut self.pairs {
-            pair.law.choose_mode(pair.y);
+            let before = pair.law.force(pair.y);
+            if pair.law.choose_mode(pair.y) && self.is_current {
+                add_to_residual(members, pair, &(pair.law.force(pair.y) - before));
+            }
         }
         true
     }
@@ -371,6 +383,15 @@ impl<'b> Member<'b> {
     fn split(&mut self) -> (&mut LinearStep, Own<'_, 'b>) {
         let Self { step, team, elastic, state, inputs, .. } = self;
         (step, Own { team, elastic: &mut **elastic, state, inputs })
+    }
+}
+
+/// Adds a force on the point of a pair [N] to the residuals.
+fn add_to_residual(members: Members<'_, '_>, pair: &ActivePair, force: &Vector3<f64>) {
+    for carrier in &pair.carriers {
+        let member = &mut members[carrier.body as usize];
+        let s = member.inputs.s();
+        member.step.add_to_residual(carrier.copy, &(s * carrier.weight * force));
     }
 }
 

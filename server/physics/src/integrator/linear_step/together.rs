@@ -65,12 +65,14 @@ impl LinearStep {
         self.preconditioner.substitution().is_empty()
     }
 
-    /// The block of the preconditioner of one node, springs included; `None` if the node is held or has no mass.
-    pub fn single_block(&self, copy: u32) -> Option<Matrix3<f64>> {
+    /// The block of the preconditioner of one node, springs included, and its inverse; `None` if the node is held or
+    /// has no mass.
+    pub fn single_block(&self, copy: u32) -> Option<[Matrix3<f64>; 2]> {
         let columns = self.preconditioner.inverses()[copy as usize].columns();
         let inverse = Matrix3::from_fn(|i, j| f64::from(columns[j][i]));
         let size = inverse.trace();
-        (size > 0.0).then(|| inverse / size)?.try_inverse().map(|block| block / size)
+        let block = (size > 0.0).then(|| inverse / size)?.try_inverse()? / size;
+        Some([block, inverse])
     }
 
     /// Mean of the diagonal of M⁻¹ of one node.

@@ -23,6 +23,9 @@ const NONE: u32 = u32::MAX;
 /// Product of weights below which two nodes are not tied.
 const LEAST_TIE: f64 = 0.05;
 
+/// Ties of a spring for which room is made: those between a node and the corners of a triangle whose edges are cut.
+const TIES: usize = 6;
+
 /// A body and a node of it.
 type Node = (u32, u32);
 
@@ -48,12 +51,15 @@ struct Block {
 }
 
 impl Partners {
-    /// Chooses the partners of a step, the stiffest ties first, whether or not the springs are in contact.
+    /// Chooses the partners of a step among the nodes of springs that begin it in contact, the stiffest ties first.
     pub fn choose(&mut self, members: &[Member<'_>], pairs: &[ActivePair]) {
         let Self { ties, chosen, number, .. } = self;
         chosen.clear();
         ties.clear();
-        for pair in pairs {
+        // Whatever closes later in a steady motion has room.
+        chosen.reserve(pairs.len());
+        ties.reserve(TIES * pairs.len());
+        for pair in pairs.iter().filter(|pair| pair.law.stiffness() != Matrix3::zeros()) {
             for (i, a) in pair.carriers.iter().enumerate() {
                 // Weights of both signs: the nodes are on both sides of the spring.
                 let others = pair.carriers[i + 1..].iter().filter(|b| a.weight * b.weight < -LEAST_TIE);
@@ -146,18 +152,25 @@ impl Partners {
 }
 
 impl Block {
-    /// Inverts the block; `None` if a node is held or the numbers do not let it.
+    /// Inverts the block by way of its Schur complement S = B − Oᵀ A⁻¹ O, of the blocks A and B of the nodes and O
+    /// between them; `None` if a node is held or the numbers do not let it.
     fn invert(&mut self, members: &[Member<'_>]) -> Option<()> {
         let single = |(body, node): Node| members[body as usize].step.single_block(node);
-        let (a, b) = (single(self.nodes[0])?, single(self.nodes[1])?);
-        let mut whole = Matrix6::zeros();
-        whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&a);
-        whole.fixed_view_mut::<3, 3>(3, 3).copy_from(&b);
-        whole.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.off);
-        whole.fixed_view_mut::<3, 3>(3, 0).copy_from(&self.off);
-        let scale = whole.trace();
-        let factor = (whole / scale).cholesky()?;
-        self.inverse = (factor.inverse() / scale).map(|m| m as f32);
-        self.inverse.iter().all(|m| m.is_finite()).then_some(())
+        let ([_, a], [B, _]) = (single(self.nodes[0])?, single(self.nodes[1])?);
+        let O = self.off;
+        let along = a * O;
+        let S = B - O.transpose() * along;
+        let scale = S.trace();
+        let b = (S / scale).cholesky()?.inverse() / scale;
+        let across = -along * b;
+        let whole = a - across * along.transpose();
+        let mut write = |row: usize, column: usize, block: Matrix3<f64>| {
+            self.inverse.fixed_view_mut::<3, 3>(row, column).copy_from(&block.map(|m| m as f32));
+        };
+        write(0, 0, whole);
+        write(0, 3, across);
+        write(3, 0, across.transpose());
+        write(3, 3, b);
+        (scale > 0.0 && self.inverse.iter().all(|m| m.is_finite())).then_some(())
     }
 }
