@@ -170,8 +170,10 @@ fn a_multiplier_joins_springs_that_are_too_soft() {
 
 #[test]
 fn threads_change_no_bit_and_a_steady_step_allocates_nothing() {
+    // Without friction the upper block would slide off.
     let text = [
         WORLD,
+        "[world.contact]\nfriction = 0.5\n",
         &block("low", [0.0, 0.0, 0.001], ""),
         &block("high", [0.01, 0.005, 0.063], "element = \"octree\""),
     ]
@@ -186,6 +188,7 @@ fn threads_change_no_bit_and_a_steady_step_allocates_nothing() {
     let before = allocations();
     steps(&mut sims[0], 20, 0.1);
     assert_eq!(allocations() - before, 0);
+    assert!(!sims[0].touch_reports().is_empty());
     let now = centre(&sims[0], 1);
     sims[0].reset().unwrap();
     assert!(sims[0].touch_reports().is_empty());

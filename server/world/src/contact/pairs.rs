@@ -284,19 +284,23 @@ impl PairContacts {
         let first = self.kept.partition_point(|k| k.bodies < [a as u32, b as u32]);
         let mut next = first;
         for (vertex, point) in (0u32..).zip(&surface.vertices) {
+            while next < self.kept.len() && self.kept[next].key() < ([a as u32, b as u32], vertex) {
+                next += 1;
+            }
+            let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
+            let is_new_to_itself = a == b && known.is_none();
+            if is_new_to_itself && self.own[a].is_free(vertex, (margin + 2.0 * h * fastest, cell_m)) {
+                continue;
+            }
             let [from, velocity] = self.paths[a][vertex as usize];
             let inside = |p: &Vector3<f64>| (0..3).all(|k| p[k] >= low[k] && p[k] <= high[k]);
             let to = from + h * velocity;
             if a != b && !inside(&from) && !inside(&to) {
                 continue;
             }
-            while next < self.kept.len() && self.kept[next].key() < ([a as u32, b as u32], vertex) {
-                next += 1;
-            }
-            let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
             let approach = h * (fastest + velocity.norm());
             let near_m = margin + approach;
-            if a == b && known.is_none() && self.own[a].is_free(vertex, (near_m, cell_m)) {
+            if is_new_to_itself && self.own[a].is_free(vertex, (near_m, cell_m)) {
                 continue;
             }
             // Whatever is deep inside has been followed from the surface, or overlaps from the start.
@@ -319,6 +323,12 @@ impl PairContacts {
             };
             let Some(mut near) = near else { continue };
             if near.signed_distance > near_m {
+                continue;
+            }
+            // What both sides do is known now.
+            let corners = tree.corners(near.triangle).into_iter().zip(near.barycentric);
+            let meets: Vector3<f64> = corners.map(|(v, w)| w * self.paths[b][v as usize][1]).sum();
+            if near.signed_distance > margin + h * (meets - velocity).norm() {
                 continue;
             }
             if a == b {
