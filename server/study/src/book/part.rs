@@ -36,13 +36,15 @@ pub struct Part {
 const SCENES: [&str; 4] = ["demonstration", "kidney", "brain", "fingertip"];
 
 /// Parts of the accuracy study, those that papers need first. The quick form ends with the bar at rest.
-const ACCURACY: [(&str, &str); 22] = [
+const ACCURACY: [(&str, &str); 24] = [
     ("threads", "Threads, shares of a step, and the largest mesh in real time"),
     ("nienhuys", "Relaxation: Nienhuys' table 3.1 and figure 3.12"),
     ("nienhuys-cut", "Cuts along faces: Nienhuys' figures 3.13 to 3.16"),
     ("schoch", "Convergence on a half-cut beam: figure 10 of Schoch"),
     ("slits", "Six ways to cut: 1, 10 and 100 slits"),
     ("front", "The front of a cut inside elements, over its place in them"),
+    ("enriched", "What an enriched element costs, by law"),
+    ("slice", "A falling slice, linear beside nonlinear"),
     ("dick-tables", "Octree cells: tables 1 and 2 of Dick"),
     ("dick-convergence", "Octree cells: rates of multigrid"),
     ("dick-sizes", "Octree cells: time per cell"),
@@ -61,7 +63,7 @@ const ACCURACY: [(&str, &str); 22] = [
     ("collision", "Methods of collision detection"),
 ];
 /// How many of them the quick form has.
-const QUICK: usize = 13;
+const QUICK: usize = 15;
 
 /// The parts of a book, in the order in which they run.
 pub fn parts(quick: bool) -> Vec<Part> {

@@ -149,7 +149,7 @@ pub fn measure(method: Method, mesh: &Mesh) -> Result<[f64; 8], Trouble> {
 }
 
 /// The least time of some repetitions [s].
-fn least(mut work: impl FnMut() -> Result<(), Trouble>) -> Result<f64, Trouble> {
+pub(super) fn least(mut work: impl FnMut() -> Result<(), Trouble>) -> Result<f64, Trouble> {
     let (mut best, begun, mut count) = (f64::INFINITY, Instant::now(), 0);
     while count < REPEATED.0 || begun.elapsed().as_secs_f64() < REPEATED.1 {
         let from = Instant::now();

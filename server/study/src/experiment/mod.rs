@@ -1,6 +1,6 @@
 //! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes; on methods of
 //! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); on ways to cut;
-//! on fronts of cuts; and on threads.
+//! on fronts of cuts; on what enriched elements cost and how a slice falls; and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -57,6 +57,12 @@ mod slits;
 
 mod front;
 
+mod enriched;
+
+mod slice;
+
+use scindo_physics::material::Law;
+
 pub use bench::ExperimentBench;
 pub use result::{Column, ExperimentResult, Picture, Plots, Row, Table, Unit};
 
@@ -66,8 +72,16 @@ pub type Trouble = Box<dyn std::error::Error + Send + Sync>;
 /// An experiment.
 pub type Experiment = fn(&mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble>;
 
+/// The laws, by their names in scenes.
+const LAWS: [(Law, &str); 4] = [
+    (Law::Linear, "linear"),
+    (Law::Corotational, "corotational"),
+    (Law::StVenantKirchhoff, "stvk"),
+    (Law::NeoHookean, "neo-hookean"),
+];
+
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 15] = [
+pub const NAMES: [&str; 17] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -83,6 +97,8 @@ pub const NAMES: [&str; 15] = [
     "schoch",
     "slits",
     "front",
+    "enriched",
+    "slice",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -107,6 +123,8 @@ fn find(name: &str) -> Option<Experiment> {
         "schoch" => Some(schoch::schoch),
         "slits" => Some(slits::slits),
         "front" => Some(front::front),
+        "enriched" => Some(enriched::enriched),
+        "slice" => Some(slice::slice),
         _ => None,
     }
 }
