@@ -1,11 +1,15 @@
-//! What an experiment gets from the study: the user's choices, and a way to report progress.
+//! What an experiment gets from the study: the user's choices, a way to report progress, and a clock.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use super::Trouble;
 use crate::bench::progress::Progress;
 use crate::settings::Settings;
+
+/// A measurement is made at least this often, and for at least this long [s]. The least time counts.
+const REPEATED: (usize, f64) = (3, 0.05);
 
 /// The surroundings of an experiment.
 pub struct ExperimentBench<'a> {
@@ -51,4 +55,16 @@ impl<'a> ExperimentBench<'a> {
         (self.tell)(&self.progress);
         Ok(())
     }
+}
+
+/// The least time of some repetitions [s].
+pub(super) fn least(mut work: impl FnMut() -> Result<(), Trouble>) -> Result<f64, Trouble> {
+    let (mut best, begun, mut count) = (f64::INFINITY, Instant::now(), 0);
+    while count < REPEATED.0 || begun.elapsed().as_secs_f64() < REPEATED.1 {
+        let from = Instant::now();
+        work()?;
+        best = best.min(from.elapsed().as_secs_f64());
+        count += 1;
+    }
+    Ok(best)
 }

@@ -2,11 +2,11 @@
 //! triangles.
 
 use std::f64::consts::PI;
-use std::time::Instant;
 
 use nalgebra::Vector3;
 use scindo_collision::{Capsule, CapsuleMotion, Method, SurfaceBvh};
 
+use super::bench::least;
 use super::result::Plots;
 use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 use crate::random::Random;
@@ -25,8 +25,6 @@ const PLACES: usize = 400;
 const CUTS: [usize; 2] = [100, 1_000];
 /// Radius of the surface [m].
 const RADIUS_M: f64 = 0.05;
-/// A measurement is made at least this often, and for at least this long [s]. The least time counts.
-const REPEATED: (usize, f64) = (3, 0.05);
 
 /// What is measured, in the order of the columns.
 const WORK: [&str; 8] = [
@@ -146,18 +144,6 @@ pub fn measure(method: Method, mesh: &Mesh) -> Result<[f64; 8], Trouble> {
     }
     let each = PLACES as f64;
     Ok([build, refit, cut[0], cut[1], near / each, closest / each, moving / each, itself])
-}
-
-/// The least time of some repetitions [s].
-pub(super) fn least(mut work: impl FnMut() -> Result<(), Trouble>) -> Result<f64, Trouble> {
-    let (mut best, begun, mut count) = (f64::INFINITY, Instant::now(), 0);
-    while count < REPEATED.0 || begun.elapsed().as_secs_f64() < REPEATED.1 {
-        let from = Instant::now();
-        work()?;
-        best = best.min(from.elapsed().as_secs_f64());
-        count += 1;
-    }
-    Ok(best)
 }
 
 /// A closed surface of 12 n² triangles: a sphere with dents, from the six faces of a cube.

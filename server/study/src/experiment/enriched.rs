@@ -10,12 +10,12 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::{Law, Material, Rayleigh, Tangent};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
-use super::collision::least;
-use super::{ExperimentBench, ExperimentResult, LAWS, Table, Trouble, Unit};
+use super::bench::least;
+use super::{ExperimentBench, ExperimentResult, LAWS, Table, Trouble, Unit, hold_left};
 
 type V = Vector3<f64>;
 
-/// Cells of the block, five tetrahedra each; fewer for the quick form. It is as long in cells as it is wide.
+/// Cells of the block along x, y and z, five tetrahedra each; the second is that of the quick form.
 const CELLS: [[usize; 3]; 2] = [[24, 12, 16], [12, 6, 8]];
 const CELL_M: f64 = 0.01;
 /// Blades come from above and leave this part of the height whole.
@@ -106,9 +106,7 @@ fn block(law: Law, cells: [usize; 3], is_cut: bool) -> Result<Body, Trouble> {
     let solver = PcgSettings { iterations: ITERATIONS, tolerance: 1e-30 };
     let settings = BodySettings { scheme: Scheme::ImplicitEuler, solver, ..BodySettings::default() };
     let mut body = Body::new(mesh, Material { law, ..MATERIAL }, settings)?;
-    let held: Vec<u32> =
-        (0..).zip(body.rest_positions()).filter(|(_, X)| X.x < 1e-9).map(|(n, _)| n).collect();
-    body.fix(&held, [true; 3], V::zeros())?;
+    hold_left(&mut body)?;
     for layer in 0..if is_cut { cells[0] } else { 0 } {
         let x = (layer as f64 + 0.5) * CELL_M;
         let at = |z: f64| [V::new(x, -0.1 * size.y, z), V::new(x, 1.1 * size.y, z)];

@@ -61,6 +61,8 @@ mod enriched;
 
 mod slice;
 
+use nalgebra::Vector3;
+use scindo_physics::body::Body;
 use scindo_physics::material::Law;
 
 pub use bench::ExperimentBench;
@@ -79,6 +81,13 @@ const LAWS: [(Law, &str); 4] = [
     (Law::StVenantKirchhoff, "stvk"),
     (Law::NeoHookean, "neo-hookean"),
 ];
+
+/// Holds the nodes of a body at x = 0.
+fn hold_left(body: &mut Body) -> Result<(), Trouble> {
+    let at_left = (0..).zip(body.rest_positions()).filter(|(_, X)| X.x < 1e-9);
+    let held: Vec<u32> = at_left.map(|(n, _)| n).collect();
+    Ok(body.fix(&held, [true; 3], Vector3::zeros())?)
+}
 
 /// Names of the experiments; those of the paper first.
 pub const NAMES: [&str; 17] = [

@@ -12,7 +12,7 @@ use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
 
 use super::result::Plots;
-use super::{ExperimentBench, ExperimentResult, LAWS, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, LAWS, Table, Trouble, Unit, hold_left};
 use crate::stress::chart::{Chart, Line};
 use crate::stress::view;
 
@@ -109,9 +109,7 @@ impl Fall {
         let solver = PcgSettings { iterations: 500, tolerance: 1e-6 };
         let settings = BodySettings { scheme: Scheme::ImplicitEuler, solver, ..BodySettings::default() };
         let mut body = Body::new(mesh, Material { law, ..MATERIAL }, settings)?;
-        let held: Vec<u32> =
-            (0..).zip(body.rest_positions()).filter(|(_, X)| X.x < 1e-9).map(|(n, _)| n).collect();
-        body.fix(&held, [true; 3], V::zeros())?;
+        hold_left(&mut body)?;
         let at = |x: f64, z: f64| [V::new(x, -0.01, z), V::new(x, SIDE_M + 0.01, z)];
         let [above, below] = CUT_M;
         // From a centimetre above the cube to one below it.
