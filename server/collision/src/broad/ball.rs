@@ -88,7 +88,7 @@ impl Ball {
     }
 }
 
-/// A length that covers the rounding of its computation, and squares below single precision.
+/// Enlarges a length by more than it was rounded, and by more than its squares lose below single precision.
 #[inline(always)]
 fn outer(length: f32) -> f32 {
     length * (1.0 + 3e-6) + 2e-19

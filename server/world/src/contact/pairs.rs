@@ -288,8 +288,8 @@ impl PairContacts {
                 next += 1;
             }
             let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
-            let is_new_to_itself = a == b && known.is_none();
-            if is_new_to_itself && self.own[a].is_free(vertex, (margin + 2.0 * h * fastest, cell_m)) {
+            let is_unmet = a == b && known.is_none();
+            if is_unmet && self.own[a].is_free(vertex, (margin + 2.0 * h * fastest, cell_m)) {
                 continue;
             }
             let [from, velocity] = self.paths[a][vertex as usize];
@@ -300,7 +300,7 @@ impl PairContacts {
             }
             let approach = h * (fastest + velocity.norm());
             let near_m = margin + approach;
-            if is_new_to_itself && self.own[a].is_free(vertex, (near_m, cell_m)) {
+            if is_unmet && self.own[a].is_free(vertex, (near_m, cell_m)) {
                 continue;
             }
             // Whatever is deep inside has been followed from the surface, or overlaps from the start.
@@ -325,7 +325,7 @@ impl PairContacts {
             if near.signed_distance > near_m {
                 continue;
             }
-            // What both sides do is known now.
+            // The speed of the nearest place is known now, and counts in place of the largest of the body.
             let corners = tree.corners(near.triangle).into_iter().zip(near.barycentric);
             let meets: Vector3<f64> = corners.map(|(v, w)| w * self.paths[b][v as usize][1]).sum();
             if near.signed_distance > margin + h * (meets - velocity).norm() {
