@@ -30,7 +30,7 @@ for root in "$scratch/tree" "$scratch/deb/usr"; do
   done
   wheel=$(echo "$root"/share/scindo/scindo-*-py3-none-any.whl)
   python3 -m zipfile -t "$wheel" >/dev/null || fail "no wheel of the Python package below $root"
-  zcat "$root/share/man/man1/scindo-run.1.gz" | grep -q viewer || fail "the man page of run does not tell of --viewer"
+  grep -q viewer <<<"$(zcat "$root/share/man/man1/scindo-run.1.gz")" || fail "the man page of run does not tell of --viewer"
   [ -z "$(find "$root" -name '*.rs' -o -name node_modules)" ] || fail "sources are inside"
 done
 for file in etc/scindo/scene.toml etc/scindo/open-lab.json5; do

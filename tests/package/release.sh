@@ -52,6 +52,8 @@ deploy/release "$version" --tests true "${packed[@]}" >"$scratch/said"
 [ "$(git tag)" = "v$version" ] || fail "no tag"
 [ -z "$(git status --porcelain)" ] || fail "files differ after a release"
 [ "$(git log -1 --format=%s)" = "Release $version" ] || fail "no commit"
-git tag -l --format='%(contents)' "v$version" | grep -q "^- " || fail "the tag does not say what is new"
+# Not through a pipe: grep would close it at its first match, and git would fail on what it still has to write.
+contents=$(git tag -l --format='%(contents)' "v$version")
+grep -q "^- " <<<"$contents" || fail "the tag does not say what is new: $contents"
 before=$(state) refuses "says nothing" "${version%.*}.99" --tests true "${packed[@]}"
-echo "release: $(cat "$scratch/said" | head -1)"
+echo "release: $(head -1 "$scratch/said")"
