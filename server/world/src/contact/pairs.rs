@@ -122,6 +122,8 @@ pub struct PairContacts {
     group: Vec<u32>,
     /// Per body the box that its surface passes through in the step, and its largest speed.
     reach: Vec<([Vector3<f64>; 2], f64)>,
+    /// Per body whether nothing of it can touch itself in the step.
+    apart: Vec<bool>,
     /// Per body the positions [m] and velocities [m/s] of its surface vertices.
     paths: Vec<Vec<[Vector3<f64>; 2]>>,
     epochs: Vec<u32>,
@@ -207,31 +209,49 @@ impl PairContacts {
         (h, settings): (f64, TouchSettings),
     ) {
         let same = self.follow(bodies);
-        self.know_themselves(surfaces, settings.itself, same);
+        self.know_themselves((bodies, surfaces), (settings.itself, same), h);
         std::mem::swap(&mut self.kept, &mut self.now);
         std::mem::swap(&mut self.known, &mut self.found);
         self.now.clear();
         self.found.clear();
-        self.measure(bodies, h);
+        if settings.others || self.apart.contains(&false) {
+            self.measure(bodies, h);
+        }
         for a in 0..bodies.len() {
             for b in 0..bodies.len() {
-                let wanted = if a == b { settings.itself } else { settings.others };
+                let wanted = if a == b { settings.itself && !self.apart[a] } else { settings.others };
                 if wanted && sleeps(asleep, a) && sleeps(asleep, b) {
                     self.keep([a as u32, b as u32]);
                 } else if wanted {
+                    let before = self.now.len();
                     self.between([a, b], bodies, surfaces, &young_pa, (h, settings));
+                    if a == b {
+                        self.own[a].is_settled(self.now.len() > before);
+                    }
                 }
             }
         }
         self.arrange(bodies.len());
     }
 
-    /// Follows the motion of the surfaces that may touch themselves.
-    fn know_themselves(&mut self, surfaces: &[ContactSurface], wanted: bool, same: bool) {
+    /// Follows the motion of the surfaces that may touch themselves in a step of `h` seconds.
+    fn know_themselves(
+        &mut self,
+        (bodies, surfaces): (&[SimBody], &[ContactSurface]),
+        (wanted, same): (bool, bool),
+        h: f64,
+    ) {
         self.own.resize_with(if wanted { surfaces.len() } else { 0 }, OwnSurface::default);
-        for (own, surface) in self.own.iter_mut().zip(surfaces) {
+        self.apart.clear();
+        self.apart.resize(surfaces.len(), !wanted);
+        for (i, (own, surface)) in self.own.iter_mut().zip(surfaces).enumerate() {
             own.meet_the_joined(self.meets_joined);
-            if let Some(tree) = surface.whole() {
+            let Some(tree) = surface.whole() else { continue };
+            // No point of the surface is faster than the fastest of its carriers.
+            let speeds = bodies[i].body.velocities().iter().map(Vector3::norm_squared);
+            let reach = MARGIN_CELLS * self.cells[i] + 2.0 * h * speeds.fold(0.0, f64::max).sqrt();
+            self.apart[i] = own.is_apart(tree, same, (reach, self.cells[i]));
+            if !self.apart[i] {
                 own.update(tree, same, |t| surface.tag(t) > 0);
             }
         }
@@ -283,13 +303,15 @@ impl PairContacts {
         };
         let first = self.kept.partition_point(|k| k.bodies < [a as u32, b as u32]);
         let mut next = first;
+        let touched = self.kept.get(first).is_some_and(|k| k.bodies == [a as u32, b as u32]);
+        let spare = if touched { 0.0 } else { OwnSurface::spare_m(2.0 * h * fastest, cell_m) };
         for (vertex, point) in (0u32..).zip(&surface.vertices) {
             while next < self.kept.len() && self.kept[next].key() < ([a as u32, b as u32], vertex) {
                 next += 1;
             }
             let known = self.kept.get(next).filter(|k| k.key() == ([a as u32, b as u32], vertex)).copied();
             let is_unmet = a == b && known.is_none();
-            if is_unmet && self.own[a].is_free(vertex, (margin + 2.0 * h * fastest, cell_m)) {
+            if is_unmet && self.own[a].is_free(vertex, (margin + 2.0 * h * fastest + spare, cell_m)) {
                 continue;
             }
             let [from, velocity] = self.paths[a][vertex as usize];
@@ -300,7 +322,7 @@ impl PairContacts {
             }
             let approach = h * (fastest + velocity.norm());
             let near_m = margin + approach;
-            if is_unmet && self.own[a].is_free(vertex, (near_m, cell_m)) {
+            if is_unmet && self.own[a].is_free(vertex, (near_m + spare, cell_m)) {
                 continue;
             }
             // Whatever is deep inside has been followed from the surface, or overlaps from the start.
@@ -317,7 +339,7 @@ impl PairContacts {
                         || !meets_joined
                             && corners.iter().any(|&c| joined(point, &surface.vertices[c as usize]))
                 };
-                own.closest((vertex, from), (reach, cell_m), tree, joined)
+                own.closest((vertex, from), (reach, spare, cell_m), tree, joined)
             } else {
                 tree.closest_point(from, reach)
             };
