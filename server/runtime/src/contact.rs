@@ -25,6 +25,9 @@ use crate::wire::convert::{to_pose, unix_ns};
 /// How often an idle thread checks whether somebody holds a tool.
 const IDLE: Duration = Duration::from_millis(5);
 
+/// Most ticks that are made up for after a delay. The rest is lost.
+const MOST_BEHIND: u32 = 16;
+
 /// Fixed settings of the contact thread.
 pub struct ContactConfig {
     /// Key space of the session.
@@ -44,6 +47,23 @@ struct Line {
     publisher: Publisher<'static>,
     wanted: Arc<AtomicBool>,
     seq: u64,
+}
+
+/// When ticks are due. Their mean rate is kept: after a delay they come at twice the rate until they are made up for.
+struct Beat {
+    period: Duration,
+    due: Instant,
+}
+
+impl Beat {
+    /// When the tick after one that began at `begun` is to begin.
+    fn after(&mut self, begun: Instant) -> Instant {
+        self.due += self.period;
+        if let Some(oldest) = begun.checked_sub(self.period * MOST_BEHIND) {
+            self.due = self.due.max(oldest);
+        }
+        self.due.max(begun + self.period / 2)
+    }
 }
 
 /// State of the contact thread.
@@ -75,13 +95,16 @@ impl ContactThread {
     pub fn run(mut self) {
         // Scenes allow 50 to 2000 Hz.
         let period = Duration::from_secs_f64(1.0 / self.config.rate_hz.max(1.0));
-        let mut next = Instant::now();
+        let mut beat = Beat { period, due: Instant::now() };
         while !self.exchange.stopping() {
-            let busy = self.look();
-            if busy {
+            let begun = Instant::now();
+            let next = if self.look() {
                 self.tick();
-            }
-            next = (next + if busy { period } else { IDLE }).max(Instant::now());
+                beat.after(begun)
+            } else {
+                beat.due = begun + IDLE;
+                beat.due
+            };
             std::thread::sleep(next.saturating_duration_since(Instant::now()));
         }
     }
@@ -224,4 +247,38 @@ fn heed_device(message: &mut HapticContact, exchange: &Exchange) {
     let least = |advice: f32, device: f64| if device > 0.0 { advice.min(device as f32) } else { advice };
     message.max_force_n = least(message.max_force_n, device.max_force_n);
     message.max_stiffness_n_m = least(message.max_stiffness_n_m, device.max_stiffness_n_m);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn late_ticks_are_made_up_for_within_bounds() {
+        let period = Duration::from_millis(2);
+        let start = Instant::now();
+        let mut beat = Beat { period, due: start };
+        // On time: on the beat, however late within a period a tick begins.
+        let mut begun = start;
+        for tick in 1..=5 {
+            let next = beat.after(begun);
+            assert_eq!(next, start + period * tick);
+            begun = next + Duration::from_micros(300);
+        }
+        // Eleven milliseconds late: at twice the rate until the beat has been caught up with.
+        begun += Duration::from_millis(11);
+        let mut ticks = 5;
+        while beat.after(begun) == begun + period / 2 {
+            (begun, ticks) = (begun + period / 2, ticks + 1);
+        }
+        assert_eq!(beat.due, start + period * (ticks + 1));
+        assert!((10..=20).contains(&ticks), "{ticks}");
+        // A second late: most of it is lost.
+        begun += Duration::from_secs(1);
+        let mut hurried = 0;
+        while beat.after(begun) == begun + period / 2 {
+            (begun, hurried) = (begun + period / 2, hurried + 1);
+        }
+        assert!((MOST_BEHIND..=2 * MOST_BEHIND + 2).contains(&hurried), "{hurried}");
+    }
 }

@@ -44,7 +44,7 @@ const CONNECTIONS: u32 = 256;
 const SURFACES_GROW: usize = 8;
 
 /// Limits that hold unless the zenoh file sets others.
-const LIMITS: [(&str, &str); 4] = [
+const LIMITS: [(&str, &str); 5] = [
     // A connection that stays silent is closed after this time [ms]. At most so many may be pending.
     ("transport/unicast/accept_timeout", "1000"),
     ("transport/unicast/accept_pending", "256"),
@@ -52,6 +52,9 @@ const LIMITS: [(&str, &str); 4] = [
     // long [µs]. A frame for a slow client is dropped when it has waited this long [µs].
     ("transport/link/tx/queue/congestion_control/block/wait_before_close", "1000000"),
     ("transport/link/tx/queue/congestion_control/drop/max_wait_before_drop_fragments", "20000"),
+    // So many contacts may wait while the thread that sends them waits for a processor. With zenoh's two, one is lost
+    // when that takes a few milliseconds.
+    ("transport/link/tx/queue/size/real_time", "16"),
 ];
 
 impl NetworkConfig {
