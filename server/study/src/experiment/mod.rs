@@ -1,6 +1,6 @@
 //! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes; on methods of
 //! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); on ways to cut;
-//! on fronts of cuts; on what enriched elements cost and how a slice falls; and on threads.
+//! on fronts of cuts; on what enriched elements cost and how a slice falls; on masses and springs; and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -61,6 +61,8 @@ mod enriched;
 
 mod slice;
 
+mod springs;
+
 use nalgebra::Vector3;
 use scindo_physics::body::Body;
 use scindo_physics::material::Law;
@@ -90,7 +92,7 @@ fn hold_left(body: &mut Body) -> Result<(), Trouble> {
 }
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 17] = [
+pub const NAMES: [&str; 18] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -108,6 +110,7 @@ pub const NAMES: [&str; 17] = [
     "front",
     "enriched",
     "slice",
+    "springs",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -134,6 +137,7 @@ fn find(name: &str) -> Option<Experiment> {
         "front" => Some(front::front),
         "enriched" => Some(enriched::enriched),
         "slice" => Some(slice::slice),
+        "springs" => Some(springs::springs),
         _ => None,
     }
 }
