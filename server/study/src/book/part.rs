@@ -45,7 +45,7 @@ const ACCURACY: [(&str, &str); 25] = [
     ("front", "The front of a cut inside elements, over its place in them"),
     ("enriched", "What an enriched element costs, by law"),
     ("slice", "A falling slice, linear beside nonlinear"),
-    ("springs", "Masses and springs: the same time, a worse answer"),
+    ("springs", "Masses and springs beside finite elements"),
     ("dick-tables", "Octree cells: tables 1 and 2 of Dick"),
     ("dick-convergence", "Octree cells: rates of multigrid"),
     ("dick-sizes", "Octree cells: time per cell"),

@@ -92,11 +92,6 @@ impl Network {
         self.springs.iter_mut().for_each(|spring| spring.k *= factor);
     }
 
-    /// Number of springs.
-    pub fn n_springs(&self) -> usize {
-        self.springs.len()
-    }
-
     /// Places of the masses [m].
     pub fn positions(&self) -> &[V] {
         &self.x
