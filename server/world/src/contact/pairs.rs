@@ -226,7 +226,7 @@ impl PairContacts {
                     let before = self.now.len();
                     self.between([a, b], bodies, surfaces, &young_pa, (h, settings));
                     if a == b {
-                        self.own[a].is_settled(self.now.len() > before);
+                        self.own[a].has_looked(self.now.len() > before);
                     }
                 }
             }

@@ -78,8 +78,8 @@ impl OwnSurface {
         self.least_free_m - 2.0 * f64::from(moved).sqrt() > needed
     }
 
-    /// Takes note whether the body touched itself in a step in which all of its vertices were looked at.
-    pub fn is_settled(&mut self, touched: bool) {
+    /// Takes note of a step in which all vertices were looked at: whether the body touched itself.
+    pub fn has_looked(&mut self, touched: bool) {
         let least = || self.free_m.iter().copied().fold(f64::INFINITY, f64::min);
         self.least_free_m = if touched { 0.0 } else { least() };
     }
@@ -305,7 +305,7 @@ mod tests {
                 assert_eq!(found, truth, "step {step}, vertex {v}");
                 met += usize::from(truth.is_some());
             }
-            own.is_settled(met > begin);
+            own.has_looked(met > begin);
         }
         assert!(apart > 400, "steps in which nothing had to be looked at: {apart}");
         assert!(met > 20, "the halves meet: {met}");
