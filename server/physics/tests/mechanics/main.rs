@@ -14,6 +14,7 @@ mod equilibrium;
 mod explicit_slivers;
 mod foreign_space;
 mod friction;
+mod fronts;
 mod half_cut_beam;
 mod hex8_cubes;
 mod inclined;

@@ -557,8 +557,8 @@ pub struct RawCutting {
     pub method: Option<RawCutMethod>,
     /// How far a cut goes on ahead of the blade. `behind`: not at all; no element is cut before the blade has left it,
     /// and the body is too stiff by that. `calibrated`: by a share of the size of elements that makes up for those at the
-    /// front that do not open; for `tet4` with the method `xfem`, without `toughness_j_m2`, and made for whole cuts.
-    /// Many small sweeps go ahead less far. Default: `behind`.
+    /// front that do not open; for `tet4` with the method `xfem`, without `toughness_j_m2`. A blade that advances step by
+    /// step ends within a tenth of a cell of where one stroke ends, on average. Default: `behind`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub front: Option<RawFront>,
     /// Whether a part that a cut separates from all held nodes moves freely or stays in place. `pinned` needs

@@ -8,9 +8,12 @@
 //! What the blade has covered is remembered as points of the material, so that many small sweeps cover what one long
 //! sweep does, and a blade that trembles covers nothing twice.
 //!
+//! A piece beside the opened incision, whether the blade or the front ahead of it opened it, is no source from which it
+//! goes on: the blade between two lips is inside both of their elements, and would divide the lips.
+//!
 //! # Limit
-//! A piece that the incision has separated ahead of the blade is no longer a source from which it goes on. A stroke of
-//! many small sweeps therefore ends between the blade and the front of one long sweep.
+//! Nor is a piece that the incision has separated ahead of the blade. A stroke of many small sweeps therefore does not end
+//! where one long sweep does, but within a tenth of a cell of that on average.
 
 use std::collections::BTreeMap;
 
@@ -104,7 +107,7 @@ impl FrontElements {
     /// ahead of that, over the mean length of the element's edges.
     pub fn look_at(&mut self, p: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Ahead {
         let key = u64::from(meeting.incision) << 32 | u64::from(p);
-        if is_separated(p, meeting, state) {
+        if is_separated(p, meeting, state) || has_lip(p, meeting, state) {
             if !self.covered.is_empty() {
                 self.covered.remove(&key);
             }
@@ -172,6 +175,16 @@ fn is_separated(p: u32, meeting: &Meeting<'_>, state: State<'_>) -> bool {
         k += 1;
     }
     reached.len() < members.len()
+}
+
+/// Whether piece `p` lies beside the incision, where that has opened before.
+fn has_lip(p: u32, meeting: &Meeting<'_>, state: State<'_>) -> bool {
+    let f = state.fragments;
+    let is_lip = |t: u32, face: usize| {
+        f.neighbour[t as usize][face] == NONE
+            && state.sets.contains(f.along[t as usize][face], meeting.incision)
+    };
+    meeting.body.pieces.fragments(p, f).any(|t| (0..4).any(|face| is_lip(t, face)))
 }
 
 impl State<'_> {
