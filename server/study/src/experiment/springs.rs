@@ -61,14 +61,14 @@ pub fn springs(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trou
         name: "springs",
         title: "Masses and springs beside finite elements".into(),
         about: format!(
-            "A beam of {:.0} × {:.0} × {:.0} cm, held at one end, is bent by its weight and stretched by an acceleration \
-             along it. Nodes of a mesh are masses and its edges springs (k = E Σ V / L², van Gelder 1998), or its \
+            "A beam of {:.0} × {:.0} × {:.0} cm, held at one end, is bent by an acceleration across it and stretched by \
+             one along it. Nodes of a mesh are masses and its edges springs (k = E Σ V / L², van Gelder 1998), or its \
              tetrahedra are finite elements. Springs in all directions behave like a material with ν = ¼, so the first \
-             table is their best case. Finer meshes bring elements closer to the truth; springs come closer to another \
-             material, which narrows by about 0.2 of what it lengthens by, whatever ν is. Springs can be calibrated: \
-             then they bend right on the mesh and under the load for which that was done. The truth are quadratic \
-             elements. Steps are implicit Euler's with {ITERATIONS} iterations, on one thread: elements as `scindo run` \
-             makes them, springs in plain double precision.",
+             table is their best case. Finer meshes bring elements closer to the truth, a mesh of quadratic elements; \
+             they bring springs closer to another material, which narrows by about 0.2 of what it lengthens by, \
+             whatever ν is. Springs can be calibrated: then they bend right on the mesh and under the load for which \
+             that was done. Steps are implicit Euler's with {ITERATIONS} iterations, on one thread: elements as \
+             `scindo run` makes them, springs in plain double precision.",
             100.0 * SIZE_M.x,
             100.0 * SIZE_M.y,
             100.0 * SIZE_M.z
