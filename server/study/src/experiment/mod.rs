@@ -91,6 +91,16 @@ fn hold_left(body: &mut Body) -> Result<(), Trouble> {
     Ok(body.fix(&held, [true; 3], Vector3::zeros())?)
 }
 
+/// ‖a − b‖ / ‖b‖; infinite if they are not of the same points.
+fn distance(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    if a.len() != b.len() {
+        return f64::INFINITY;
+    }
+    let sum = |of: &mut dyn Iterator<Item = f64>| of.sum::<f64>().sqrt();
+    let apart = sum(&mut a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()));
+    apart / sum(&mut b.iter().map(|b| b.norm_squared()))
+}
+
 /// Names of the experiments; those of the paper first.
 pub const NAMES: [&str; 18] = [
     "dick-tables",

@@ -22,7 +22,7 @@ use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace};
 use scindo_physics::space::Tets;
 use scindo_physics::team::Team;
 
-use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit};
+use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit, distance};
 use crate::stress::chart::{Chart, Line};
 
 type V = Vector3<f64>;
@@ -322,16 +322,6 @@ fn watched(body: &Body) -> Vec<V> {
     let mut found: Vec<(V, V)> = moved.filter(|(_, X)| is_watched(X)).map(|(x, X)| (*X, x - X)).collect();
     found.sort_by(|a, b| a.0.x.total_cmp(&b.0.x).then(a.0.y.total_cmp(&b.0.y)));
     found.into_iter().map(|(_, u)| u).collect()
-}
-
-/// ‖a − b‖ / ‖b‖; infinite if they are not of the same points.
-fn distance(a: &[V], b: &[V]) -> f64 {
-    if a.len() != b.len() {
-        return f64::INFINITY;
-    }
-    let sum = |of: &mut dyn Iterator<Item = f64>| of.sum::<f64>().sqrt();
-    let apart = sum(&mut a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()));
-    apart / sum(&mut b.iter().map(|b| b.norm_squared()))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 
 use super::bench::least;
 use super::result::Plots;
-use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit, hold_left};
+use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit, distance, hold_left};
 use crate::stress::chart::{Chart, Line};
 use network::Network;
 
@@ -193,11 +193,7 @@ impl Answer {
     }
 
     fn errors(&self, truth: &Self) -> [f64; 2] {
-        let error = |a: &[V], b: &[V]| {
-            let norm = |list: &mut dyn Iterator<Item = V>| list.map(|u| u.norm_squared()).sum::<f64>().sqrt();
-            norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
-        };
-        [error(&self.bent, &truth.bent), error(&self.stretched, &truth.stretched)]
+        [distance(&self.bent, &truth.bent), distance(&self.stretched, &truth.stretched)]
     }
 
     /// Strain across the beam over that along it in the middle of the stretched beam, with its sign changed.
