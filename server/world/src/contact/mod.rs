@@ -1,7 +1,8 @@
 //! Contact of tools and bodies in a step: surfaces, proxies, springs, reactions.
 //!
 //! # Order in a step
-//! 1. After all cuts, [`Contacts::update_surface`] per body with its present surface positions.
+//! 1. After all cuts, [`Contacts::watch`] finds which bodies can meet anything, and [`Contacts::update_surface`]
+//!    gives each of them its present surface.
 //! 2. [`Contacts::detect`]: proxies move, and touched points become springs.
 //! 3. Per body, the integrator's solve with [`Contacts::springs`].
 //! 4. Per body, [`Contacts::collect`] with the force of every spring from that solve.
@@ -191,6 +192,30 @@ impl Contacts {
     /// Whether bodies touch bodies.
     pub fn bodies_touch(&self) -> bool {
         self.touch.is_some()
+    }
+
+    /// Whether the surface of `body` is where an earlier step left it.
+    #[cfg(test)]
+    pub(crate) fn is_left(&self, body: usize) -> bool {
+        self.surfaces[body].is_old()
+    }
+
+    /// Finds which bodies may meet others or themselves in a step of `h` seconds.
+    pub fn watch(&mut self, bodies: &[SimBody], h: f64) {
+        if let Some(touch) = self.touch {
+            self.pairs.watch(bodies, (h, touch));
+        }
+    }
+
+    /// Whether the surface of `body` is to be updated: a tool may meet it, or it may meet another body or itself, and
+    /// it has moved since its last update.
+    pub fn needs_surface(&mut self, body: usize, (tools, sleeps): (bool, bool)) -> bool {
+        let is_met = tools || self.touch.is_some() && self.pairs.may_meet(body);
+        let surface = &mut self.surfaces[body];
+        if !is_met && !sleeps {
+            surface.leave();
+        }
+        is_met && (!sleeps || surface.is_old())
     }
 
     /// Contacts of bodies with each other and with themselves.
@@ -438,11 +463,6 @@ impl Contacts {
             }
         }
         self.sums.clear();
-    }
-
-    /// Box around the surface of `body` [m]; `None` when it has none or is switched off.
-    pub fn bounds(&self, body: usize) -> Option<[Vector3<f64>; 2]> {
-        self.surfaces[body].tree()?.bounds()
     }
 }
 

@@ -3,7 +3,7 @@
 //! A surface vertex that may meet a triangle in a step gets a one-sided spring with friction between the two. All
 //! bodies that such springs connect are solved as one system, so both sides are implicit and exchange momentum
 //! exactly. A vertex remembers the place on the triangle where it sticks. Bodies that are out of reach of each other
-//! have no springs and cost a comparison of boxes.
+//! have no springs and cost a comparison of boxes; their surfaces may stay where they are.
 //!
 //! # A body with itself
 //! Every point of a body lies behind some of its faces, so depth alone says nothing. A contact has to begin outside,
@@ -11,6 +11,7 @@
 //! and where the material between them and the vertex is not in one piece.
 
 mod own;
+mod watch;
 
 use nalgebra::Vector3;
 use scindo_collision::ClosestPoint;
@@ -21,6 +22,7 @@ use super::surface::ContactSurface;
 use crate::body::SimBody;
 use crate::scene::CheckedScene;
 use own::OwnSurface;
+use watch::{NOWHERE, Watch};
 
 /// Distance at which a vertex gets a spring beyond its path in the step, in cells of the body.
 const MARGIN_CELLS: f64 = 0.1;
@@ -120,15 +122,20 @@ pub struct PairContacts {
     order: Vec<u32>,
     /// Per body the first body of its group.
     group: Vec<u32>,
+    /// Per body what it can meet in the step.
+    watch: Vec<Watch>,
+    /// Whether no topology has changed since the step before.
+    same: bool,
     /// Per body the box that its surface passes through in the step, and its largest speed.
     reach: Vec<([Vector3<f64>; 2], f64)>,
-    /// Per body whether nothing of it can touch itself in the step.
-    apart: Vec<bool>,
     /// Per body the positions [m] and velocities [m/s] of its surface vertices.
     paths: Vec<Vec<[Vector3<f64>; 2]>>,
     epochs: Vec<u32>,
     /// Per body the size of its cells [m].
     cells: Vec<f64>,
+    /// Per body how much farther than its nodes a point of its surface can move; 1, or more where some weights are
+    /// negative.
+    spreads: Vec<f64>,
     /// Per body and vertex: whether it is on a lip, and of which cut.
     lips: Vec<Vec<u32>>,
     reports: Vec<TouchReport>,
@@ -208,21 +215,20 @@ impl PairContacts {
         young_pa: impl Fn(usize) -> f64,
         (h, settings): (f64, TouchSettings),
     ) {
-        let same = self.follow(bodies);
-        self.know_themselves((bodies, surfaces), (settings.itself, same), h);
+        self.know_themselves(bodies, surfaces);
         std::mem::swap(&mut self.kept, &mut self.now);
         std::mem::swap(&mut self.known, &mut self.found);
         self.now.clear();
         self.found.clear();
-        if settings.others || self.apart.contains(&false) {
+        if self.watch.iter().any(Watch::may_meet) {
             self.measure(bodies, h);
         }
         for a in 0..bodies.len() {
             for b in 0..bodies.len() {
-                let wanted = if a == b { settings.itself && !self.apart[a] } else { settings.others };
+                let wanted = if a == b { !self.watch[a].apart } else { settings.others };
                 if wanted && sleeps(asleep, a) && sleeps(asleep, b) {
                     self.keep([a as u32, b as u32]);
-                } else if wanted {
+                } else if wanted && (a == b || !self.watch[a].alone && !self.watch[b].alone) {
                     let before = self.now.len();
                     self.between([a, b], bodies, surfaces, &young_pa, (h, settings));
                     if a == b {
@@ -234,39 +240,25 @@ impl PairContacts {
         self.arrange(bodies.len());
     }
 
-    /// Follows the motion of the surfaces that may touch themselves in a step of `h` seconds.
-    fn know_themselves(
-        &mut self,
-        (bodies, surfaces): (&[SimBody], &[ContactSurface]),
-        (wanted, same): (bool, bool),
-        h: f64,
-    ) {
-        self.own.resize_with(if wanted { surfaces.len() } else { 0 }, OwnSurface::default);
-        self.apart.clear();
-        self.apart.resize(surfaces.len(), !wanted);
-        for (i, (own, surface)) in self.own.iter_mut().zip(surfaces).enumerate() {
-            own.meet_the_joined(self.meets_joined);
-            let Some(tree) = surface.whole() else { continue };
-            // No point of the surface is faster than the fastest of its carriers.
-            let speeds = bodies[i].body.velocities().iter().map(Vector3::norm_squared);
-            let reach = MARGIN_CELLS * self.cells[i] + 2.0 * h * speeds.fold(0.0, f64::max).sqrt();
-            self.apart[i] = own.is_apart(tree, same, (reach, self.cells[i]));
-            if !self.apart[i] {
-                own.update(tree, same, |t| surface.tag(t) > 0);
+    /// Follows the motion of the surfaces that may touch themselves.
+    fn know_themselves(&mut self, bodies: &[SimBody], surfaces: &[ContactSurface]) {
+        for (i, own) in self.own.iter_mut().enumerate().filter(|(i, _)| !self.watch[*i].apart) {
+            if let Some(tree) = surfaces[i].whole() {
+                own.update(tree, bodies[i].body.positions(), self.same, |t| surfaces[i].tag(t) > 0);
             }
         }
     }
 
-    /// Boxes and speeds of the surfaces of all bodies in the step.
+    /// Boxes and speeds of the surfaces that may meet anything in the step.
     fn measure(&mut self, bodies: &[SimBody], h: f64) {
         self.reach.clear();
         self.paths.resize_with(bodies.len(), Vec::new);
-        for (body, paths) in bodies.iter().zip(&mut self.paths) {
+        for ((body, paths), watch) in bodies.iter().zip(&mut self.paths).zip(&self.watch) {
             paths.clear();
             let (x, v) = (body.body.positions(), body.body.velocities());
-            let none = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
-            let (mut bounds, mut fastest) = (none, 0.0f64);
-            for vertex in &body.body.surface().vertices {
+            let (mut bounds, mut fastest) = (NOWHERE, 0.0f64);
+            let vertices = &body.body.surface().vertices;
+            for vertex in vertices.iter().filter(|_| watch.may_meet()) {
                 let (from, v) = (vertex.position(x), vertex.position(v));
                 let to = from + h * v;
                 bounds = [bounds[0].inf(&from).inf(&to), bounds[1].sup(&from).sup(&to)];
@@ -526,6 +518,8 @@ impl PairContacts {
         self.epochs.extend(bodies.iter().map(SimBody::epoch));
         self.cells.clear();
         self.cells.extend(bodies.iter().map(SimBody::cell_m));
+        self.spreads.clear();
+        self.spreads.extend(bodies.iter().map(watch::spread));
         self.lips.clear();
         for body in bodies {
             let surface = body.body.surface();

@@ -11,6 +11,8 @@ pub struct ContactSurface {
     method: Method,
     epoch: u32,
     off: bool,
+    /// Whether the body has moved on since the last update.
+    is_old: bool,
     /// Per triangle the incision it is a lip of, and per vertex its area [m²]; only where bodies touch bodies.
     tags: Vec<u32>,
     areas: Vec<f64>,
@@ -30,7 +32,7 @@ impl ContactSurface {
     }
 
     /// Moves the surface to `positions` [m]. It refits in place within an epoch, and takes over the triangles
-    /// when the epoch differs. Returns whether it did that.
+    /// when the epoch differs. Returns whether it did that. A surface that was [left](Self::leave) behind has no motion.
     ///
     /// # Errors
     /// If triangles and positions do not belong together. The surface is not changed then.
@@ -40,8 +42,15 @@ impl ContactSurface {
         triangles: &[[u32; 3]],
         positions: &[[f32; 3]],
     ) -> Result<bool, SurfaceError> {
+        let was_old = std::mem::take(&mut self.is_old);
         match &mut self.tree {
-            Some(tree) if self.epoch == epoch => tree.refit(positions).map(|()| false),
+            Some(tree) if self.epoch == epoch => {
+                tree.refit(positions)?;
+                if was_old {
+                    tree.forget_motion();
+                }
+                Ok(false)
+            }
             Some(tree) => {
                 tree.change_topology(positions, triangles)?;
                 self.epoch = epoch;
@@ -53,6 +62,16 @@ impl ContactSurface {
                 Ok(true)
             }
         }
+    }
+
+    /// Leaves the surface where it is, although the body moves on: nothing can meet it.
+    pub fn leave(&mut self) {
+        self.is_old = true;
+    }
+
+    /// Whether the body has moved on since the last update, or there was none.
+    pub fn is_old(&self) -> bool {
+        self.is_old || self.tree.is_none()
     }
 
     /// Takes over what contact of bodies needs of `surface`, with the positions of its vertices at rest [m].

@@ -18,6 +18,8 @@ mod dormant;
 mod incision;
 
 mod fill;
+
+mod touch;
 pub mod governor;
 
 mod sleep;
@@ -247,31 +249,6 @@ impl Simulation {
         cuts.work_off(at);
         if cuts.applied() > before {
             probes.iter_mut().for_each(|probe| probe.follow(&bodies[probe.body].body));
-        }
-    }
-
-    fn touch(&mut self) {
-        self.dormant.follow(&self.bodies);
-        if self.tools.any_active() || self.contacts.bodies_touch() {
-            for (i, body) in self.bodies.iter_mut().enumerate() {
-                if self.dormant.is_asleep(i) {
-                    continue;
-                }
-                let (shown, positions) = body.surface_now();
-                let (epoch, surface) = (shown.epoch(), (shown.surface(), shown.rest_positions()));
-                if let Err(error) = self.contacts.update_surface(i, epoch, surface, positions) {
-                    self.report.tell(Level::Error, "contact-surface", &body.id, error.to_string());
-                }
-            }
-        }
-        let h = self.scene.step_s;
-        self.contacts.detect(&self.tools, h);
-        self.contacts.press_edges(&self.tools, &mut self.bodies);
-        self.dormant.disturb(&self.contacts);
-        self.contacts.meet(&self.bodies, self.dormant.asleep(), h);
-        self.dormant.join(&self.contacts);
-        for (i, body) in self.bodies.iter().enumerate().filter(|(i, _)| !self.dormant.is_asleep(*i)) {
-            self.contacts.rest(i, body, h, self.scene.gravity_m_s2);
         }
     }
 

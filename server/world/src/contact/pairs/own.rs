@@ -41,8 +41,9 @@ pub struct OwnSurface {
     vertices: Vec<Vector3<f64>>,
     /// The same of vertices over the triangles of lips alone.
     lips: Vec<Vector3<f64>>,
-    /// Positions of the vertices at the last update [m].
+    /// Positions of the vertices and of the nodes that carry them at the last update [m].
     positions: Vec<[f32; 3]>,
+    nodes: Vec<Vector3<f64>>,
     /// Per vertex the triangles near it to which it is not joined, with their distances when they were listed [m].
     lists: Vec<List>,
     /// All triangles count as facing; only for a mutation test.
@@ -62,20 +63,23 @@ impl OwnSurface {
         self.meets_joined = on;
     }
 
-    /// Whether the body is still apart from itself: no vertex that did not touch can be within `reach` [m] of a triangle
-    /// to which it is not joined. It need not be updated then. `same` is as for [`update`](Self::update).
-    pub fn is_apart(&self, tree: &SurfaceBvh, same: bool, (reach, cell_m): (f64, f64)) -> bool {
+    /// Whether the body with its nodes at `x` [m] is still apart from itself: no vertex that did not touch can be within
+    /// `reach` [m] of a triangle to which it is not joined. It need not be updated then. No point of the surface moves
+    /// farther than `spread` times the farthest node. `same` is as for [`update`](Self::update).
+    pub fn is_apart(
+        &self,
+        (x, spread): (&[Vector3<f64>], f64),
+        same: bool,
+        (reach, cell_m): (f64, f64),
+    ) -> bool {
         let needed = reach + ROUNDING_CELLS * cell_m;
-        let now = tree.positions();
-        let known = same && !self.meets_joined && now.len() == self.positions.len();
+        let known = same && !self.meets_joined && x.len() == self.nodes.len();
         if !known || self.least_free_m <= needed {
             return false;
         }
-        let squared = |(now, before): (&[f32; 3], &[f32; 3])| {
-            (0..3).map(|k| (now[k] - before[k]) * (now[k] - before[k])).sum::<f32>()
-        };
-        let moved = now.iter().zip(&self.positions).map(squared).fold(0.0, f32::max);
-        self.least_free_m - 2.0 * f64::from(moved).sqrt() > needed
+        let moved = |(now, before): (&Vector3<f64>, &Vector3<f64>)| (now - before).norm_squared();
+        let farthest = x.iter().zip(&self.nodes).map(moved).fold(0.0, f64::max).sqrt();
+        self.least_free_m - 2.0 * spread * farthest > needed
     }
 
     /// Takes note of a step in which all vertices were looked at: whether the body touched itself.
@@ -89,10 +93,18 @@ impl OwnSurface {
         if loss < SPARE_LOSS * SPARE_CELLS * cell_m { SPARE_CELLS * cell_m } else { 0.0 }
     }
 
-    /// Follows a motion of the surface. `same` tells whether vertices and triangles are still those of the last
-    /// update, `is_lip` which triangles are of a lip.
-    pub fn update(&mut self, tree: &SurfaceBvh, same: bool, is_lip: impl Fn(u32) -> bool) {
+    /// Follows a motion of the surface and of the nodes that carry it, now at `x` [m]. `same` tells whether vertices and
+    /// triangles are still those of the last update, `is_lip` which triangles are of a lip.
+    pub fn update(
+        &mut self,
+        tree: &SurfaceBvh,
+        x: &[Vector3<f64>],
+        same: bool,
+        is_lip: impl Fn(u32) -> bool,
+    ) {
         self.follow(tree, same);
+        self.nodes.clear();
+        self.nodes.extend_from_slice(x);
         let Self { triangles, vertices, lips, .. } = self;
         triangles.clear();
         for normals in [&mut *vertices, &mut *lips] {
@@ -283,9 +295,10 @@ mod tests {
             // Folded shut and opened again, with a jerk in between.
             let angle = 3.1 * (0.0015 * step as f32).sin().abs() + if step % 500 == 7 { 0.3 } else { 0.0 };
             tree.refit(&strip(angle).0).unwrap();
+            let nodes: Vec<_> = tree.positions().iter().map(point).collect();
             let (reach, spare) = (0.002, if step < 1000 { 0.0 } else { 0.0015 });
             let begin = met;
-            if own.is_apart(&tree, step > 0, (reach, 0.01)) {
+            if own.is_apart((&nodes, 1.0), step > 0, (reach, 0.01)) {
                 apart += 1;
                 for v in 0..points.len() as u32 {
                     let from = point(&tree.positions()[v as usize]);
@@ -294,7 +307,7 @@ mod tests {
                 }
                 continue;
             }
-            own.update(&tree, step > 0, |_| false);
+            own.update(&tree, &nodes, step > 0, |_| false);
             for v in 0..points.len() as u32 {
                 let from = point(&tree.positions()[v as usize]);
                 let joined = |t: u32| tree.corners(t).contains(&v);
