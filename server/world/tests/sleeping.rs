@@ -129,6 +129,27 @@ fn a_touch_wakes_a_body_and_those_under_it_alone() {
     assert!(back < 1e-4, "and comes back: {back}");
 }
 
+/// Without tools, the surfaces of bodies that touch no bodies need not follow them: a first tool meets them where
+/// they sleep.
+#[test]
+fn a_body_that_slept_before_the_first_tool_is_felt() {
+    for effects in ["sleep = true\nbody_collision = false", "sleep = true"] {
+        let scene = SCENE.replace("sleep = true\n    body_collision = true", effects);
+        let text = scene + &block("high", [0.01, 0.005, 0.163]);
+        let mut sim = Simulation::new(&Scene::from_toml(&text).unwrap(), Path::new("")).unwrap();
+        run(&mut sim, 1000, &Inputs::default());
+        assert!(sim.is_asleep(0));
+        let top = Vector3::new(0.04, 0.035, 0.06);
+        let mut finger = finger(0.0);
+        // Held over the block, and then pressed on it.
+        for (above, touched) in [(0.05, false), (0.0045, true)] {
+            finger.tools[0].pose = Isometry3::translation(top.x, top.y, top.z + above);
+            run(&mut sim, 3, &finger);
+            assert_eq!(!sim.is_asleep(0), touched, "{effects}, {above} m above");
+        }
+    }
+}
+
 #[test]
 fn a_body_that_arrives_wakes_what_it_meets() {
     let text = [&SCENE.to_owned(), &block("below", [0.0, 0.0, 0.001]), &block("far", [0.3, 0.0, 0.001])];
