@@ -11,6 +11,8 @@ use nalgebra::Vector3;
 use scindo_collision::{ClosestPoint, SurfaceBvh};
 use smallvec::SmallVec;
 
+use super::watch::longest;
+
 /// A triangle faces a vertex if their unit normals have at most this scalar product, which is negative.
 const FACING: f64 = -0.2;
 /// Most triangles in the list of a vertex, and those for which it has room without memory of its own.
@@ -77,8 +79,7 @@ impl OwnSurface {
         if !known || self.least_free_m <= needed {
             return false;
         }
-        let moved = |(now, before): (&Vector3<f64>, &Vector3<f64>)| (now - before).norm_squared();
-        let farthest = x.iter().zip(&self.nodes).map(moved).fold(0.0, f64::max).sqrt();
+        let farthest = longest(x.iter().zip(&self.nodes).map(|(now, before)| now - before));
         self.least_free_m - 2.0 * spread * farthest > needed
     }
 

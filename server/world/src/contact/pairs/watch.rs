@@ -54,7 +54,7 @@ impl PairContacts {
             let (cell_m, spread) = (self.cells[i], self.spreads[i]);
             let margin = MARGIN_CELLS * cell_m;
             let apart = self.own.get_mut(i).is_none_or(|own| {
-                let fastest = v.iter().map(Vector3::norm_squared).fold(0.0, f64::max).sqrt();
+                let fastest = longest(v.iter().copied());
                 own.meet_the_joined(self.meets_joined);
                 own.is_apart((x, spread), self.same, (margin + 2.0 * h * spread * fastest, cell_m))
             });
@@ -66,6 +66,13 @@ impl PairContacts {
             self.watch[a].alone = !(settings.others && (0..self.watch.len()).any(meets));
         }
     }
+}
+
+/// The largest length; not a number where one is none.
+pub(super) fn longest(vectors: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    // Squares are ordered as their bits are, and whole numbers are compared faster.
+    let squares = vectors.map(|v| v.norm_squared().to_bits());
+    f64::from_bits(squares.max().unwrap_or(0)).sqrt()
 }
 
 /// The largest sum of absolute weights of a point of the surface.
