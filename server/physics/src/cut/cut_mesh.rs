@@ -385,7 +385,7 @@ impl CutMesh {
         let meeting = Meeting { body: &body, triangles: &triangles, incision };
         let (ahead, reach) = (&mut self.front_elements, self.front_reach);
         let front = (reach > 0.0).then_some((ahead, reach, meeting));
-        self.separator.run(&self.detector.touched, front, &mut sheet);
+        self.separator.run((&self.detector.touched, &self.detector.near), front, &mut sheet);
         let report = self.follow_separation();
         if !self.traces.is_empty() {
             let opened = self.builder.faces_beside_lips(&self.surface, incision);

@@ -8,12 +8,9 @@
 //! What the blade has covered is remembered as points of the material, so that many small sweeps cover what one long
 //! sweep does, and a blade that trembles covers nothing twice.
 //!
-//! A piece beside the opened incision, whether the blade or the front ahead of it opened it, is no source from which it
-//! goes on: the blade between two lips is inside both of their elements, and would divide the lips.
-//!
-//! # Limit
-//! Nor is a piece that the incision has separated ahead of the blade. A stroke of many small sweeps therefore does not end
-//! where one long sweep does, but within a tenth of a cell of that on average.
+//! The front opens elements before the blade reaches them. The blade between their lips is inside both of them, and would
+//! divide the lips. So it counts where it is seen from the middle between the lips, and the incision goes on in the plane
+//! that it has there.
 
 use std::collections::BTreeMap;
 
@@ -106,52 +103,125 @@ impl FrontElements {
     /// Remembers what the sweep covers of piece `p`, unless it has separated it, and returns the crossings within `reach`
     /// ahead of that, over the mean length of the element's edges.
     pub fn look_at(&mut self, p: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Ahead {
-        let key = u64::from(meeting.incision) << 32 | u64::from(p);
-        if is_separated(p, meeting, state) || has_lip(p, meeting, state) {
-            if !self.covered.is_empty() {
-                self.covered.remove(&key);
+        let e = meeting.body.pieces.pieces[p as usize].element;
+        let key = key(meeting.incision, p);
+        if is_parted(e, meeting, state) {
+            return Ahead::default();
+        }
+        if is_separated(p, meeting, state) {
+            if let Some(covered) = self.covered.remove(&key) {
+                self.covered.entry(key_between(meeting.incision, e)).or_default().extend(covered);
             }
             return Ahead::default();
         }
-        let new = newly_covered(p, meeting);
+        let x = meeting.body.pieces.pieces[p as usize].copies.map(|c| meeting.body.x[c as usize]);
+        let new = newly_covered((e, x), meeting);
         if new.is_empty() {
             return Ahead::default();
         }
         let covered = self.covered.entry(key).or_default();
         covered.extend(new);
         let Some(plane) = Plane::through(covered) else { return Ahead::default() };
-        let hull = plane.hull(covered);
-        if covered.len() > MANY {
-            covered.clone_from(&hull);
+        let border = shorten(covered, &plane);
+        let from = meeting.body.pieces.fragments(p, state.fragments).collect();
+        ahead((&plane, &border), from, reach * size(e, meeting), meeting, state, |_| true)
+    }
+
+    /// The same between the lips of element `e`, if the incision has parted it: ahead of the blade in the plane of the
+    /// lips, among elements that are not parted.
+    pub fn look_between(&mut self, e: u32, reach: f64, meeting: &Meeting<'_>, state: State<'_>) -> Ahead {
+        let Some(lips) = lips(e, meeting, state) else { return Ahead::default() };
+        let pieces = lips.map(|p| meeting.body.pieces.pieces[p as usize].copies);
+        let x = [0, 1, 2, 3]
+            .map(|k| 0.5 * pieces.iter().map(|c| meeting.body.x[c[k] as usize]).sum::<Vector3<f64>>());
+        let new = newly_covered((e, x), meeting);
+        if new.is_empty() {
+            return Ahead::default();
         }
-        let reach = reach * size(p, meeting);
-        let border: Vec<Vector2<f64>> = hull.iter().map(|x| plane.project(x)).collect();
-        let near = |x: &Vector3<f64>| distance(&plane.project(x), &border) <= reach;
-        // Elements that the blade has not entered may lie within reach too; crossed edges lead to them.
-        let mut fragments: Vec<u32> = meeting.body.pieces.fragments(p, state.fragments).collect();
-        let (mut crossings, mut wedge) = (Vec::<Crossing>::new(), Vec::new());
-        let mut k = 0;
-        while let Some(&t) = fragments.get(k) {
-            for ([a, b], s) in crossings_ahead(&plane, t, meeting, state, near) {
-                if crossings.iter().any(|([c, d], _)| edge_key(*c, *d) == edge_key(a, b)) {
-                    continue;
-                }
-                crossings.push(([a, b], s));
-                state.fragments.wedge(t, a, b, &mut wedge);
-                wedge.retain(|t| !fragments.contains(t));
-                fragments.append(&mut wedge);
-            }
-            k += 1;
-        }
-        Ahead { crossings, fragments }
+        let covered = self.covered.entry(key_between(meeting.incision, e)).or_default();
+        covered.extend(new);
+        let f = state.fragments;
+        let members: Vec<u32> = lips.iter().flat_map(|&p| meeting.body.pieces.fragments(p, f)).collect();
+        let on =
+            members.iter().flat_map(|&t| f.tets[t as usize]).filter(|&v| state.is_on(v, meeting.incision));
+        let rim: Vec<Vector3<f64>> =
+            on.map(|v| rest_position(meeting.body, &f.vertices[v as usize])).collect();
+        let Some(plane) = Plane::through(&rim) else { return Ahead::default() };
+        let border = shorten(covered, &plane);
+        let is_whole = |t: u32| !is_parted(f.element[t as usize], meeting, state);
+        let beside = members.iter().flat_map(|&t| f.neighbour[t as usize]).filter(|&n| n != NONE);
+        let mut from: Vec<u32> = beside.filter(|&n| f.element[n as usize] != e && is_whole(n)).collect();
+        from.sort_unstable();
+        from.dedup();
+        ahead((&plane, &border), from, reach * size(e, meeting), meeting, state, is_whole)
+    }
+
+    /// Forgets what the blade of `incision` covers between lips, except in the elements `near` it, in ascending order.
+    pub fn leave(&mut self, incision: u32, near: &[u32]) {
+        let is_old = |key: &u64| {
+            let (of, at) = ((key >> 32) as u32, *key as u32);
+            of == incision && at & BETWEEN != 0 && near.binary_search(&(at & !BETWEEN)).is_err()
+        };
+        self.covered.retain(|key, _| !is_old(key));
     }
 }
 
-/// Mean length [m] of the edges of a piece's element at rest.
-fn size(p: u32, meeting: &Meeting<'_>) -> f64 {
+/// Marks keys of elements, whose lips the blade is between, among those of pieces.
+const BETWEEN: u32 = 1 << 31;
+
+fn key(incision: u32, p: u32) -> u64 {
+    u64::from(incision) << 32 | u64::from(p)
+}
+
+fn key_between(incision: u32, e: u32) -> u64 {
+    key(incision, e | BETWEEN)
+}
+
+/// The border of what is covered, in a plane. Points within it are forgotten where there are many.
+fn shorten(covered: &mut Vec<Vector3<f64>>, plane: &Plane) -> Vec<Vector2<f64>> {
+    let hull = plane.hull(covered);
+    if covered.len() > MANY {
+        covered.clone_from(&hull);
+    }
+    hull.iter().map(|x| plane.project(x)).collect()
+}
+
+/// Crossings of the plane within `reach` [m] of the border, from the fragments `fragments` on, and in those alone that
+/// `may_change`.
+fn ahead(
+    (plane, border): (&Plane, &[Vector2<f64>]),
+    mut fragments: Vec<u32>,
+    reach: f64,
+    meeting: &Meeting<'_>,
+    state: State<'_>,
+    may_change: impl Fn(u32) -> bool,
+) -> Ahead {
+    let near = |x: &Vector3<f64>| distance(&plane.project(x), border) <= reach;
+    // Elements that the blade has not entered may lie within reach too; crossed edges lead to them.
+    let (mut crossings, mut wedge) = (Vec::<Crossing>::new(), Vec::new());
+    let mut k = 0;
+    while let Some(&t) = fragments.get(k) {
+        for ([a, b], s) in crossings_ahead(plane, t, meeting, state, near) {
+            if crossings.iter().any(|([c, d], _)| edge_key(*c, *d) == edge_key(a, b)) {
+                continue;
+            }
+            state.fragments.wedge(t, a, b, &mut wedge);
+            if !wedge.iter().all(|&t| may_change(t)) {
+                continue;
+            }
+            crossings.push(([a, b], s));
+            wedge.retain(|t| !fragments.contains(t));
+            fragments.append(&mut wedge);
+        }
+        k += 1;
+    }
+    Ahead { crossings, fragments }
+}
+
+/// Mean length [m] of the edges of element `e` at rest.
+fn size(e: u32, meeting: &Meeting<'_>) -> f64 {
     let mesh = meeting.body.mesh;
-    let nodes = mesh.tets[meeting.body.pieces.pieces[p as usize].element as usize];
-    let x = nodes.map(|n| mesh.nodes[n as usize]);
+    let x = mesh.tets[e as usize].map(|n| mesh.nodes[n as usize]);
     TET_EDGES.iter().map(|&[i, j]| (x[i] - x[j]).norm()).sum::<f64>() / 6.0
 }
 
@@ -177,6 +247,18 @@ fn is_separated(p: u32, meeting: &Meeting<'_>, state: State<'_>) -> bool {
     reached.len() < members.len()
 }
 
+/// Whether the incision has parted element `e`.
+fn is_parted(e: u32, meeting: &Meeting<'_>, state: State<'_>) -> bool {
+    meeting.body.pieces.of_element(e).filter(|&p| has_lip(p, meeting, state)).nth(1).is_some()
+}
+
+/// The two pieces of element `e` that the incision has parted; `None` if it has not, or if there are more.
+fn lips(e: u32, meeting: &Meeting<'_>, state: State<'_>) -> Option<[u32; 2]> {
+    let mut beside = meeting.body.pieces.of_element(e).filter(|&p| has_lip(p, meeting, state));
+    let lips = [beside.next()?, beside.next()?];
+    beside.next().is_none().then_some(lips)
+}
+
 /// Whether piece `p` lies beside the incision, where that has opened before.
 fn has_lip(p: u32, meeting: &Meeting<'_>, state: State<'_>) -> bool {
     let f = state.fragments;
@@ -198,12 +280,10 @@ fn rest_position(body: &Deformed<'_>, vertex: &FragmentVertex) -> Vector3<f64> {
     held.map(|(&node, weight)| body.mesh.nodes[node as usize] * weight).sum()
 }
 
-/// Corners [m], at rest, of the parts of the sweep's triangles inside the element of piece `p`, as it is deformed.
-fn newly_covered(p: u32, meeting: &Meeting<'_>) -> Vec<Vector3<f64>> {
+/// Corners [m], at rest, of the parts of the sweep's triangles inside element `e`, whose nodes are at `x` [m].
+fn newly_covered((e, x): (u32, [Vector3<f64>; 4]), meeting: &Meeting<'_>) -> Vec<Vector3<f64>> {
     let Meeting { body, triangles, .. } = meeting;
-    let piece = &body.pieces.pieces[p as usize];
-    let x = piece.copies.map(|c| body.x[c as usize]);
-    let rest = body.mesh.tets[piece.element as usize].map(|n| body.mesh.nodes[n as usize]);
+    let rest = body.mesh.tets[e as usize].map(|n| body.mesh.nodes[n as usize]);
     let (low, high) = x.iter().fold((x[0], x[0]), |(low, high), x| (low.inf(x), high.sup(x)));
     let Some(to_barycentric) = Matrix4::from_columns(&x.map(|x| x.push(1.0))).try_inverse() else {
         return Vec::new();

@@ -13,7 +13,7 @@ use crate::lists::reserve::reserved;
 use crate::mesh::{TET_EDGES, TET_FACES};
 
 use super::bit_marks::{Ascending, BitMarks};
-use super::front_elements::{FrontElements, Meeting, State};
+use super::front_elements::{Ahead, FrontElements, Meeting, State};
 use crate::cut::drawn::pending::Pending;
 use crate::cut::drawn::traces::{Bisection, Traces};
 use crate::cut::topology::crossings::{Crossings, EdgeSet, SNAP, edge_key};
@@ -78,6 +78,10 @@ pub struct Sheet<'a> {
 }
 
 impl Sheet<'_> {
+    fn state(&self) -> State<'_> {
+        State { fragments: &*self.fragments, sets: &*self.sets, crossings: &*self.crossings }
+    }
+
     fn is_on(&self, v: u32) -> bool {
         self.sets.contains(self.fragments.on[v as usize], self.incision)
     }
@@ -104,10 +108,10 @@ impl Separator {
     }
 
     /// Separates what the sheet cuts completely, among the `touched` fragments and their neighbours. If it has a `front`,
-    /// it first goes on ahead of the blade, by the given reach.
+    /// it first goes on ahead of the blade, by the given reach; `near` are the pieces that the blade may be in.
     pub fn run(
         &mut self,
-        touched: &[u32],
+        (touched, near): (&[u32], &[u32]),
         front: Option<(&mut FrontElements, f64, Meeting<'_>)>,
         sheet: &mut Sheet,
     ) {
@@ -124,7 +128,7 @@ impl Separator {
         touched.iter().for_each(|&t| self.look_at_later(t));
         self.bisect_queued(sheet);
         if let Some((front, reach, meeting)) = front {
-            self.go_ahead(front, reach, &meeting, sheet);
+            self.go_ahead((front, near), reach, &meeting, sheet);
         }
         self.open_faces(sheet);
         self.count_pending(sheet);
@@ -142,23 +146,41 @@ impl Separator {
         }
     }
 
-    /// Crosses edges ahead of the blade, from the pieces with active fragments.
-    fn go_ahead(&mut self, front: &mut FrontElements, reach: f64, meeting: &Meeting<'_>, sheet: &mut Sheet) {
+    /// Crosses edges ahead of the blade, from the pieces with active fragments and between the lips that the blade is
+    /// `near`.
+    fn go_ahead(
+        &mut self,
+        (front, near): (&mut FrontElements, &[u32]),
+        reach: f64,
+        meeting: &Meeting<'_>,
+        sheet: &mut Sheet,
+    ) {
         let mut pieces: Vec<u32> = self.active.iter().map(|&t| sheet.fragments.piece[t as usize]).collect();
         self.order.sort(&mut pieces);
         for p in pieces {
-            let state =
-                State { fragments: &*sheet.fragments, sets: &*sheet.sets, crossings: &*sheet.crossings };
-            let ahead = front.look_at(p, reach, meeting, state);
-            if ahead.crossings.is_empty() {
-                continue;
-            }
-            for ([a, b], s) in ahead.crossings {
-                sheet.crossings.insert(a, b, sheet.incision, s);
-            }
-            ahead.fragments.into_iter().for_each(|t| self.look_at_later(t));
-            self.bisect_queued(sheet);
+            let ahead = front.look_at(p, reach, meeting, sheet.state());
+            self.cross(ahead, sheet);
         }
+        let of = |&p: &u32| meeting.body.pieces.pieces[p as usize].element;
+        let mut elements: Vec<u32> = near.iter().map(of).collect();
+        self.order.sort(&mut elements);
+        for &e in &elements {
+            let ahead = front.look_between(e, reach, meeting, sheet.state());
+            self.cross(ahead, sheet);
+        }
+        front.leave(sheet.incision, &elements);
+    }
+
+    /// Adds crossings ahead of the blade.
+    fn cross(&mut self, ahead: Ahead, sheet: &mut Sheet) {
+        if ahead.crossings.is_empty() {
+            return;
+        }
+        for ([a, b], s) in ahead.crossings {
+            sheet.crossings.insert(a, b, sheet.incision, s);
+        }
+        ahead.fragments.into_iter().for_each(|t| self.look_at_later(t));
+        self.bisect_queued(sheet);
     }
 
     /// Queues fragment `t`, unless it is queued already.
