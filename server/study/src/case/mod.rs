@@ -22,7 +22,7 @@ mod refine;
 
 mod subdivide;
 
-mod gold;
+pub mod gold;
 
 mod shared;
 
