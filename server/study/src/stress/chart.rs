@@ -9,7 +9,7 @@ use crate::page::scale::round_step;
 /// One line of a chart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Name in the legend.
+    /// Name in the legend; empty: it does not stand there.
     pub name: String,
     /// Points (x, y), in the units of the axes.
     pub points: Vec<[f64; 2]>,
@@ -199,6 +199,10 @@ impl Chart {
             items.push(("key", "kinetic", "kinetic".to_owned()));
             items.push(("key d1", "elastic", "elastic".to_owned()));
         }
+        items.retain(|(_, name, _)| !name.is_empty());
+        if items.is_empty() {
+            return Vec::new();
+        }
         let mut rows = Vec::new();
         let (mut row, mut at) = (String::new(), 0.0);
         for (class, name, series) in items {
@@ -308,6 +312,14 @@ mod tests {
         assert_eq!(chart.html().matches("<svg").count(), 2);
         chart.lines[0].points = vec![[0.0, -1.0], [1.0, 0.0]];
         assert_eq!(chart.html().matches("<svg").count(), 1, "nothing lies on a logarithmic axis");
+    }
+
+    #[test]
+    fn a_line_without_a_name_has_no_legend() {
+        let line = Line { name: String::new(), points: vec![[0.0, 0.0], [1.0, 1.0]] };
+        let chart = Chart { lines: vec![line], ..Chart::new("depth", "time [s]", "depth [h]") };
+        assert!(chart.legend().is_empty());
+        assert!(chart.html().contains("class=\"plot\""));
     }
 
     #[test]

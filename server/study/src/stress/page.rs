@@ -7,7 +7,7 @@ use super::evidence::{Bound, Figure, short};
 use super::mutation::Row;
 use super::suite::SuiteReport;
 use super::view;
-use crate::page::html::escape;
+use crate::page::html::{escape, prose};
 use crate::page::{interactive, style};
 
 /// Style of status marks, chart lines and case cards.
@@ -20,7 +20,7 @@ table.glance td:nth-child(4) { white-space: normal; color: var(--soft); }
 td.out { color: var(--bad); font-weight: 600; }
 table.figures { width: auto; min-width: 60%; }
 table.figures td:first-child { white-space: normal; }
-.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 420px), 1fr)); gap: 18px 24px; }
+.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 420px), 1fr)); gap: 18px 24px; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(260px, 1fr)); gap: 12px 24px; }
 .pictures figure, .charts figure { margin: 8px 0 0; }
 h2 .state { vertical-align: 4px; margin-left: 10px; }
@@ -104,13 +104,18 @@ fn glance(report: &SuiteReport) -> String {
     out
 }
 
-/// Text whose powers of ten do not break at their sign.
+/// Prose whose powers of ten do not break at their sign.
 fn whole(text: &str) -> String {
-    let word = |word: &str| {
-        let escaped = escape(word);
-        if word.contains("e-") { format!("<span class=\"whole\">{escaped}</span>") } else { escaped }
+    let is_power = |word: &str| {
+        word.split_once("e-").is_some_and(|(digits, exponent)| {
+            [digits.chars().last(), exponent.chars().next()].iter().flatten().all(char::is_ascii_digit)
+        })
     };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+    let word = |word: &str| match is_power(word) {
+        true => format!("<span class=\"whole\">{word}</span>"),
+        false => word.to_owned(),
+    };
+    prose(text).split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// The figure that uses most of what its bound allows, preferably one of the case's own rule.
@@ -137,7 +142,7 @@ fn section(report: &CaseReport) -> String {
         state(report.status),
         whole(case.set_up),
         whole(case.rule),
-        escape(case.source),
+        prose(case.source),
         case.name
     );
     if let Some(reason) = &report.reason {
@@ -145,7 +150,7 @@ fn section(report: &CaseReport) -> String {
     }
     let evidence = &report.evidence;
     evidence.notes.iter().for_each(|note| {
-        let _ = writeln!(out, "<p>{}</p>", escape(note));
+        let _ = writeln!(out, "<p>{}</p>", prose(note));
     });
     if !evidence.pictures.is_empty() {
         out += "<div class=\"pictures\">\n";
@@ -232,4 +237,16 @@ fn closing(report: &SuiteReport) -> String {
         machine.threads,
         if machine.optimised { "release build" } else { "development build" },
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_of_ten_stay_whole_and_commands_are_code() {
+        let power = "<span class=\"whole\">1e-6</span>";
+        assert_eq!(whole("1e-6 of `scindo a dick-b`"), format!("{power} of <code>scindo a dick-b</code>"));
+        assert_eq!(whole("tree-trunk & root"), "tree-trunk &amp; root");
+    }
 }
