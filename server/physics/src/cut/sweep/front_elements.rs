@@ -106,6 +106,7 @@ impl FrontElements {
         let e = meeting.body.pieces.pieces[p as usize].element;
         let key = key(meeting.incision, p);
         if is_parted(e, meeting, state) {
+            self.covered.remove(&key);
             return Ahead::default();
         }
         if is_separated(p, meeting, state) {
