@@ -94,11 +94,13 @@ pub fn html(trials: &[Trial]) -> String {
             trial.failures().join(", ")
         );
     }
-    body += "</tbody>\n</table></div>\n</section>\n<section>\n<h2>Force over time</h2>\n";
+    body +=
+        "</tbody>\n</table></div>\n</section>\n<section>\n<h2>Force over time</h2>\n<div class=\"charts\">\n";
     for trial in trials.iter().filter(|trial| trial.cell.loss == 0.0) {
-        let _ = writeln!(body, "<figure>{}</figure>", forces(trial).html());
+        let chart = forces(trial);
+        let _ = writeln!(body, "<figure>{}<figcaption>{}</figcaption></figure>", chart.html(), chart.title);
     }
-    body += "</section>\n";
+    body += "</div>\n</section>\n";
     scindo_study::page::wrap("what the hand feels", &body)
 }
 
@@ -107,7 +109,7 @@ fn forces(trial: &Trial) -> Chart {
     let title = format!("{}, {} ms", trial.cell.hand.name, trial.cell.delay_ms);
     let mut chart = Chart::new(&title, "time [s]", "force [N]");
     let line = |name: &str, of: &dyn Fn(&super::measures::Sample) -> f64| Line {
-        name: format!("{name}: {title}"),
+        name: name.to_owned(),
         points: trial.samples.iter().map(|s| [s.time_s, of(s)]).collect(),
     };
     chart.lines.push(line("felt", &|s| s.felt_n.z));

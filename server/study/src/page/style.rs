@@ -75,6 +75,8 @@ pre { background: var(--panel); padding: 12px 18px; white-space: pre-wrap; overf
 figure { margin: 20px 0 8px; }
 figcaption { color: var(--soft); font-size: 14.5px; max-width: 90ch; margin-top: 6px; }
 .pair { display: grid; grid-template-columns: 1fr 1fr; gap: 24px; }
+.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 420px), 1fr)); gap: 18px 24px; }
+.charts figure { margin: 8px 0 0; }
 .scroll { overflow-x: auto; margin: 8px 0; }
 @media screen and (min-width: 1160px) { .scroll { width: max-content; min-width: 100%; max-width: calc(50vw + 484px); } }
 table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; width: 100%; }

@@ -20,9 +20,8 @@ table.glance td:nth-child(4) { white-space: normal; color: var(--soft); }
 td.out { color: var(--bad); font-weight: 600; }
 table.figures { width: auto; min-width: 60%; }
 table.figures td:first-child { white-space: normal; }
-.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 420px), 1fr)); gap: 18px 24px; }
 .pictures { display: grid; grid-template-columns: repeat(auto-fill, minmax(260px, 1fr)); gap: 12px 24px; }
-.pictures figure, .charts figure { margin: 8px 0 0; }
+.pictures figure { margin: 8px 0 0; }
 h2 .state { vertical-align: 4px; margin-left: 10px; }
 ";
 
