@@ -18,8 +18,8 @@ pub const CASE: Case = Case {
     name: "soak",
     title: "Random tools and cuts, with sleep and replay",
     set_up: "Two blocks on a table. In turns of 5 s a tool presses, holds and drags what it meets, a random sweep cuts, and then \
-             nothing happens until the blocks sleep. Every sixth turn the scene is reset. 40 s of simulated time; the long form \
-             takes an hour, and watches the memory of the process.",
+             nothing happens until the blocks sleep. Every sixth turn the scene is reset. 40 s of simulated time; \
+             in the long form an hour, with an eye on the memory of the process.",
     rule: "Every step advances and stays finite; bodies fall asleep and wake; memory does not grow after the first ten minutes; a \
            second run has the same bits.",
     source: "own",
