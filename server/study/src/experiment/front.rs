@@ -78,15 +78,16 @@ pub fn front(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
              With cutting.front = \"behind\", the default, an element opens when the blade has left it; with \
              \"calibrated\" the cut goes on ahead of the blade by 0.7 of the mean length of an element’s edges. These cuts \
              are made in one stroke, before the load. `advancing` is the calibrated cut of a blade that goes through the \
-             loaded beam in {ADVANCES} steps, with an equilibrium after each. The mesh of `pre-cut` has as many cells, with faces at the true front. Errors are ‖u − u*‖/‖u*‖ over 24 points of \
-             the beam, against stored solutions by hexahedra of order 3 and 4.",
+             loaded beam in {ADVANCES} steps, with an equilibrium after each. The mesh of `pre-cut` has as many cells, with \
+             faces at the true front. Errors are ‖u − u*‖/‖u*‖ over 24 points of the beam, against stored solutions by \
+             hexahedra of order 3 and 4.",
             PLACES[0],
             PLACES[PLACES.len() - 1],
         ),
         ..ExperimentResult::default()
     };
     let advancing = if bench.is_quick() { &QUICK[..] } else { &PLACES[..] };
-    let total = PULLS.len() * LAWS.len() * (1 + 2 * PLACES.len() + advancing.len());
+    let total = PULLS.len() * LAWS.len() * (1 + (WAYS.len() - 1) * PLACES.len() + advancing.len());
     let mut plots =
         Plots { caption: "Error over the place of the front in its cell.".into(), ..Plots::default() };
     let mut table = Table::new(

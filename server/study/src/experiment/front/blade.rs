@@ -46,23 +46,15 @@ struct Edge([[Probe; 2]; 2]);
 
 impl Edge {
     fn new(simulation: &Simulation, x: f64, plane_m: f64) -> Result<Self, Trouble> {
-        let body = &simulation.bodies()[0].body;
-        let bind = |y: f64, side: f64| {
-            let at = V::new(x, y, plane_m + side * BESIDE_M);
-            Probe::bind("edge", 0, body, at, None).map_err(|_| format!("{at:?} is outside of the beam"))
-        };
+        let bind = |y: f64, side: f64| bind(simulation, "edge", V::new(x, y, plane_m + side * BESIDE_M));
         let [a, b] = THROUGH_M;
         Ok(Self([[bind(a, -1.0)?, bind(a, 1.0)?], [bind(b, -1.0)?, bind(b, 1.0)?]]))
     }
 
     /// Where the line is now: tip and heel of a blade on it [m].
     fn now(&mut self, simulation: &Simulation) -> [V; 2] {
-        let body = &simulation.bodies()[0].body;
         let [a, b] = self.0.each_mut().map(|sides| {
-            let [below, above] = sides.each_mut().map(|probe| {
-                probe.follow(body);
-                probe.position(body.positions())
-            });
+            let [below, above] = sides.each_mut().map(|probe| place(simulation, probe));
             0.5 * (below + above)
         });
         [a - BEYOND * (b - a), b + BEYOND * (b - a)]
@@ -74,24 +66,29 @@ struct Mark([Probe; 2]);
 
 impl Mark {
     fn new(simulation: &Simulation, point: &Point) -> Result<Self, Trouble> {
-        let body = &simulation.bodies()[0].body;
         let (at, side) = (V::from(point.point_m), point.side.map_or(V::zeros(), V::from));
         let behind = BEHIND_M * side.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
-        let bind = |k: f64| {
-            let at = at + k * behind;
-            Probe::bind(&point.id, 0, body, at, None).map_err(|_| format!("{at:?} is outside of the beam"))
-        };
-        Ok(Self([bind(1.0)?, bind(2.0)?]))
+        let [near, far] = [1.0, 2.0].map(|k| bind(simulation, &point.id, at + k * behind));
+        Ok(Self([near?, far?]))
     }
 
     fn displacement(&mut self, simulation: &Simulation) -> V {
-        let body = &simulation.bodies()[0].body;
-        let [near, far] = self.0.each_mut().map(|probe| {
-            probe.follow(body);
-            probe.position(body.positions()) - probe.rest_m
-        });
+        let [near, far] = self.0.each_mut().map(|probe| place(simulation, probe) - probe.rest_m);
         2.0 * near - far
     }
+}
+
+/// A material point of the beam.
+fn bind(simulation: &Simulation, id: &str, at: V) -> Result<Probe, Trouble> {
+    let body = &simulation.bodies()[0].body;
+    Probe::bind(id, 0, body, at, None).map_err(|_| format!("{at:?} is outside of the beam").into())
+}
+
+/// Where a material point is now [m].
+fn place(simulation: &Simulation, probe: &mut Probe) -> V {
+    let body = &simulation.bodies()[0].body;
+    probe.follow(body);
+    probe.position(body.positions())
 }
 
 /// Lets the blade advance through the beam of `scene`, which is not cut yet. Returns the displacements of the points
@@ -121,23 +118,23 @@ pub fn advance(
         let cut =
             CutRequest { request: k as u64, tool: Arc::from("knife"), body: None, segments: vec![from, to] };
         let mut inputs = Inputs { cuts: vec![cut], ..Inputs::default() };
-        let mut made = false;
-        for _ in 0..MOST_STEPS {
+        let mut steps = 0;
+        loop {
             let report = simulation.step(&inputs);
+            steps += 1;
             if stop.load(Ordering::Relaxed) {
                 return Err("interrupted".into());
             }
             if let Some(reason) = trouble(report) {
                 return Ok(Err(format!("advance {}: {reason}", k + 1)));
             }
-            made |= !report.cuts.is_empty();
-            if made {
+            if !report.cuts.is_empty() {
                 break;
             }
+            if steps == MOST_STEPS {
+                return Ok(Err(format!("advance {} was not made within {MOST_STEPS} steps", k + 1)));
+            }
             inputs = Inputs::default();
-        }
-        if !made {
-            return Ok(Err(format!("advance {} was not made within {MOST_STEPS} steps", k + 1)));
         }
     }
     Ok(Ok(Series {
