@@ -208,7 +208,7 @@ impl Contacts {
     }
 
     /// Whether the surface of `body` is to be updated: a tool may meet it, or it may meet another body or itself, and
-    /// it has moved since its last update.
+    /// it has moved since its last update. A surface that nothing can meet is left where it is.
     pub fn needs_surface(&mut self, body: usize, (tools, sleeps): (bool, bool)) -> bool {
         let is_met = tools || self.touch.is_some() && self.pairs.may_meet(body);
         let surface = &mut self.surfaces[body];
