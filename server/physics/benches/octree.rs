@@ -23,6 +23,7 @@ use scindo_physics::octree::{
 };
 use scindo_physics::operator::cells::CellStiffness;
 use scindo_physics::space::Space;
+use scindo_physics::team::Team;
 
 const SOFT: Material = Material {
     young_pa: 1e5,
@@ -51,8 +52,8 @@ fn main() {
     if wanted("grid") {
         grid(&uncut, rounds);
     }
-    if wanted("whole") {
-        whole_cut(&uncut, rounds);
+    for threads in [1, 2].into_iter().filter(|_| wanted("whole")) {
+        whole_cut(&uncut, threads, rounds);
     }
     if wanted("advances") {
         advances(uncut, rounds);
@@ -71,9 +72,9 @@ fn main() {
 
 /// A blade that goes through a body to half its depth at once, with everything that the next step needs: the cut, and
 /// the next step beside one before. The body is held at its base and hangs under its weight.
-fn whole_cut(uncut: &Octree, rounds: usize) {
+fn whole_cut(uncut: &Octree, threads: usize, rounds: usize) {
     let solver = PcgSettings { iterations: 4, tolerance: 0.0 };
-    let settings = BodySettings { solver, method: Method::MgPcg, ..BodySettings::default() };
+    let settings = BodySettings { solver, method: Method::MgPcg, threads, ..BodySettings::default() };
     let mut times = [f64::INFINITY; 3];
     let mut pieces = (0, 0);
     for _ in 0..rounds {
@@ -102,7 +103,8 @@ fn whole_cut(uncut: &Octree, rounds: usize) {
     }
     let [plain, cut, next] = times;
     println!(
-        "a whole cut, {} -> {} cells, MgPcg: {cut:.1} ms, the next step {next:.1} ms, the one before {plain:.1} ms",
+        "a whole cut, {} -> {} cells, MgPcg, {threads} threads: {cut:.1} ms, the next step {next:.1} ms, the one \
+         before {plain:.1} ms",
         pieces.0, pieces.1
     );
 }
@@ -174,7 +176,8 @@ fn increment(uncut: Octree, rounds: usize) {
     };
     let sweep = BladeSweep { segments: vec![edge(0), edge(2)] };
     let space = OctreeSpace::new(uncut.clone());
-    let whole = prepared(rounds, || space.clone(), |space| space.cut(&x, &sweep, 1).unwrap());
+    let mut team = Team::alone();
+    let whole = prepared(rounds, || space.clone(), |space| space.cut(&mut team, &x, &sweep, 1).unwrap());
     report("search, division, volumes, surface", whole);
     let divided = prepared(rounds, || uncut.clone(), |octree| octree.cut(&links));
     report("division and numbering", divided);
@@ -212,7 +215,7 @@ fn grid(uncut: &Octree, rounds: usize) {
         let start = Instant::now();
         let mut at = x.clone();
         for (incision, blade) in (1..).zip(blades(0).into_iter().chain(blades(1))) {
-            let report = space.cut(&at, &blade, incision).unwrap();
+            let report = space.cut(&mut Team::alone(), &at, &blade, incision).unwrap();
             report.new_copies.iter().for_each(|new| at.push(new.inherited(&at)));
         }
         (start.elapsed().as_secs_f64(), space)
@@ -240,7 +243,7 @@ fn whole_of(
 ) -> (Vec<Vector3<f64>>, OctreeSpace) {
     let (mut space, mut at) = (OctreeSpace::new(uncut.clone()), x.to_vec());
     for (incision, blade) in (1..).zip(blades) {
-        let report = space.cut(&at, &blade, incision).unwrap();
+        let report = space.cut(&mut Team::alone(), &at, &blade, incision).unwrap();
         report.new_copies.iter().for_each(|new| at.push(new.inherited(&at)));
     }
     (at, space)

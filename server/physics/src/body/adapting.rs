@@ -107,7 +107,7 @@ impl Body {
         if !report.has_changed() {
             return Ok(report);
         }
-        self.dynamics.follow_elements(&*self.space)?;
+        self.dynamics.follow_elements(&mut self.team, &*self.space)?;
         self.follow_topology();
         report.kinetic_change_j = self.kinetic_energy() - kinetic_j;
         if let Some(elastic_j) = modelled_j {

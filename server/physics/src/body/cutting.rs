@@ -26,7 +26,7 @@ impl Body {
     pub fn begin_cut(&mut self, blade: &BladeSweep, incision: u32) -> Result<(), BodyError> {
         self.may_be_cut()?;
         if self.snap.is_none() {
-            return Ok(self.space.begin_cut(&self.state.x, blade, incision)?);
+            return Ok(self.space.begin_cut(&mut self.team, &self.state.x, blade, incision)?);
         }
         blade.check()?;
         let n_elements = self.space.n_elements();
@@ -49,7 +49,7 @@ impl Body {
             work.book(blade.segments.len() * self.space.n_elements() / SNAP_PAIRS_PER_FRAGMENT);
             return self.snap_cut(&blade, incision).map(Some);
         }
-        let report = self.space.go_on_cutting(work);
+        let report = self.space.go_on_cutting(&mut self.team, work);
         if let Some(report) = &report {
             self.follow_cut(report)?;
         }
@@ -79,7 +79,7 @@ impl Body {
         if self.snap.is_some() {
             return self.snap_cut(blade, incision);
         }
-        let report = self.space.cut(&self.state.x, blade, incision)?;
+        let report = self.space.cut(&mut self.team, &self.state.x, blade, incision)?;
         self.follow_cut(&report)?;
         Ok(report)
     }
@@ -89,7 +89,7 @@ impl Body {
         // While a cut is still on its way through an element, only the surface changes.
         if self.space.has_changed() {
             self.inherit(&report.new_copies);
-            self.dynamics.follow_cut(&*self.space, &report.new_copies)?;
+            self.dynamics.follow_cut(&mut self.team, &*self.space, &report.new_copies)?;
             if self.space.n_added() == 0 {
                 self.follow_new_copies(&report.new_copies);
             } else {

@@ -125,9 +125,14 @@ impl Dynamics {
     }
 
     /// Follows the last cut of `space`, which made the copies `new`. All material keeps its history.
-    pub fn follow_cut(&mut self, space: &dyn Space, new: &[NewCopy]) -> Result<(), ModelError> {
+    pub fn follow_cut(
+        &mut self,
+        team: &mut Team,
+        space: &dyn Space,
+        new: &[NewCopy],
+    ) -> Result<(), ModelError> {
         self.course.multistep.inherit(new);
-        self.solver.follow_cut(space)
+        self.solver.follow_cut(team, space)
     }
 
     /// Carries the history over a change of the elements; [`follow_elements`](Self::follow_elements) ends it.
@@ -136,8 +141,8 @@ impl Dynamics {
     }
 
     /// Follows the elements of `space` after all of them have [changed](Self::adapt).
-    pub fn follow_elements(&mut self, space: &dyn Space) -> Result<(), ModelError> {
-        self.solver.follow_cut(space)
+    pub fn follow_elements(&mut self, team: &mut Team, space: &dyn Space) -> Result<(), ModelError> {
+        self.solver.follow_cut(team, space)
     }
 
     /// Starts anew from `space` as it is now.

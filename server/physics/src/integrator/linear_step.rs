@@ -164,13 +164,21 @@ impl LinearStep {
         self.searched = None;
     }
 
-    /// Lets the levels follow a cut of `octree` that changed the leaves `changed`, ascending. Returns `false` if they
-    /// have to be [made anew](Self::set_hierarchy).
-    pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+    /// Lets the levels follow a cut of an octree that changed these leaves, ascending. The task `beside` is run
+    /// meanwhile. Returns `false` if the levels have to be [made anew](Self::set_hierarchy).
+    pub fn follow_cut(
+        &mut self,
+        team: &mut Team,
+        cut: (&Octree, &[u32]),
+        beside: &mut (dyn FnMut() + Send),
+    ) -> bool {
         match (&mut self.grid, &mut self.simulated) {
-            (Some(grid), _) => grid.follow_cut(octree, changed),
-            (None, Some(level)) => level.follow_cut(octree, changed),
-            (None, None) => false,
+            (Some(grid), _) => grid.follow_cut(team, cut, beside),
+            (None, Some(level)) => level.follow_cut(team, cut, beside),
+            (None, None) => {
+                beside();
+                false
+            }
         }
     }
 

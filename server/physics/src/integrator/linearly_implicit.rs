@@ -59,8 +59,8 @@ pub struct LinearlyImplicit {
     mass_f32: Vec<f32>,
     step: LinearStep,
     weightless: Vec<Weightless>,
-    /// Whether the topology was cut, and nothing else, since the levels were brought up to date.
-    cut: bool,
+    /// Whether the levels of multigrid have followed the last change of the topology.
+    levels_follow: bool,
 }
 
 /// A copy without mass, and the copies of its piece that carry it along.
@@ -94,7 +94,7 @@ impl LinearlyImplicit {
             mass_f32: Vec::new(),
             step: LinearStep::new(at_start, lagged),
             weightless: Vec::new(),
-            cut: false,
+            levels_follow: false,
         }
     }
 
@@ -163,12 +163,9 @@ impl LinearlyImplicit {
         self.pcg
     }
 
-    /// Brings the levels of multigrid up to date, or makes them anew where they cannot follow.
-    fn follow_levels(&mut self, space: &dyn Space) {
-        let cut = std::mem::take(&mut self.cut);
-        let follows = cut && self.method.is_multigrid();
-        let cut = space.octree().and_then(OctreeSpace::last_cut).filter(|_| follows);
-        if cut.is_some_and(|(octree, changed)| self.step.follow_cut(octree, changed)) {
+    /// Makes the levels of multigrid anew where they could not follow a cut.
+    fn complete_levels(&mut self, space: &dyn Space) {
+        if std::mem::take(&mut self.levels_follow) {
             return;
         }
         let hierarchy = if self.method.is_multigrid() { space.hierarchy(self.simulate_level) } else { None };
@@ -295,9 +292,17 @@ impl StepSolver for LinearlyImplicit {
         self.relaxes = settings.relaxation.is_some();
     }
 
-    fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
-        space.follow_stiffness(&mut *self.stiffness);
-        self.cut = true;
+    fn follow_cut(&mut self, team: &mut Team, space: &dyn Space) -> Result<(), ModelError> {
+        let Self { step, stiffness, .. } = self;
+        let mut follow = || space.follow_stiffness(&mut **stiffness);
+        let is_multigrid = self.method.is_multigrid();
+        self.levels_follow = match space.octree().and_then(OctreeSpace::last_cut).filter(|_| is_multigrid) {
+            Some(cut) => step.follow_cut(team, cut, &mut follow),
+            None => {
+                follow();
+                false
+            }
+        };
         Ok(())
     }
 
@@ -308,7 +313,7 @@ impl StepSolver for LinearlyImplicit {
             self.stiffness = stiffness;
         }
         self.stiffness.set_choice(choice);
-        self.cut = false;
+        self.levels_follow = false;
         Ok(())
     }
 
@@ -318,7 +323,7 @@ impl StepSolver for LinearlyImplicit {
         self.step.resize(mass.len());
         self.step.set_stiff_modes(space.stiff_modes());
         self.step.set_method(self.method);
-        self.follow_levels(space);
+        self.complete_levels(space);
     }
 
     fn lumped_masses(&self, space: &dyn Space, density_kg_m3: f64, mass: &mut Vec<f64>) {

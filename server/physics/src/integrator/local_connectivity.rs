@@ -97,6 +97,7 @@ mod tests {
     use crate::mesh::{BoxPattern, box_mesh};
     use crate::operator::Held;
     use crate::space::Tets;
+    use crate::team::Team;
 
     #[test]
     fn parts_that_follow_cuts_are_those_of_the_whole_body() {
@@ -113,7 +114,7 @@ mod tests {
         for ((x, depth), incision) in places.into_iter().zip(1..) {
             let at = |y: f64| [Vector3::new(x, y, -0.5), Vector3::new(x, y, 4.5)];
             let sweep = BladeSweep { segments: vec![at(-0.5), at(depth)] };
-            let report = cut.cut(&cut.rest_positions(), &sweep, incision).unwrap();
+            let report = cut.cut(&mut Team::alone(), &cut.rest_positions(), &sweep, incision).unwrap();
             let mass = cut.copy_volumes();
             connectivity.follow(&mut parts, &cut, &report.new_copies, mass, &fixed);
             let whole = LooseParts::connected(|visit| cut.for_groups(visit), mass, &fixed);

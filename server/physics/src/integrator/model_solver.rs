@@ -222,7 +222,7 @@ impl StepSolver for ModelSolver {
         (self.settings.newton, self.settings.relaxation) = (settings.newton, settings.relaxation);
     }
 
-    fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError> {
+    fn follow_cut(&mut self, _: &mut Team, space: &dyn Space) -> Result<(), ModelError> {
         space.follow_model(&mut self.model, &self.material);
         self.mass = Mass::new(&self.model, self.material.density_kg_m3, self.settings.mass);
         self.newton.forget_pattern();

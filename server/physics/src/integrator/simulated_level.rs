@@ -82,9 +82,14 @@ impl SimulatedLevel {
     }
 
     /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
-    pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+    pub fn follow_cut(
+        &mut self,
+        team: &mut Team,
+        (octree, changed): (&Octree, &[u32]),
+        beside: &mut (dyn FnMut() + Send),
+    ) -> bool {
         self.version = None;
-        if !self.composite.follow(octree, changed) {
+        if !self.composite.follow(team, (octree, changed), beside) {
             return false;
         }
         let n = self.composite.n_vertices();

@@ -45,9 +45,14 @@ impl StepGrid {
     }
 
     /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
-    pub fn follow_cut(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+    pub fn follow_cut(
+        &mut self,
+        team: &mut Team,
+        cut: (&Octree, &[u32]),
+        beside: &mut (dyn FnMut() + Send),
+    ) -> bool {
         self.version = None;
-        self.multigrid.follow(octree, changed)
+        self.multigrid.follow(team, cut, beside)
     }
 
     /// Follows the stiffness as it was last updated.

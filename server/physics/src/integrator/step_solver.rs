@@ -95,7 +95,7 @@ pub trait StepSolver: Any + Debug + Send {
     fn set_solver(&mut self, settings: SolverSettings);
 
     /// Follows the last cut of `space`.
-    fn follow_cut(&mut self, space: &dyn Space) -> Result<(), ModelError>;
+    fn follow_cut(&mut self, team: &mut Team, space: &dyn Space) -> Result<(), ModelError>;
 
     /// Starts anew from `space` as it is now.
     fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError>;

@@ -1,5 +1,6 @@
 //! Lists of different lengths in one vector, each of which can be replaced.
 
+use super::bits::Bits;
 use super::reserve::reserve_half_again;
 
 /// Lists by number. One that has grown moves to the end of the vector and leaves a gap; gaps are closed when they
@@ -90,11 +91,27 @@ impl<T: Copy> Jagged<T> {
 
     /// Applies `edits`: each names a list, an entry, and whether the entry comes to the list or leaves it. Lists are
     /// ordered by `key`, which tells entries of a list apart; one that comes replaces one with its key.
-    pub fn edit(&mut self, edits: &mut [(u32, T, bool)], key: impl Fn(&T) -> u32) {
-        // What leaves a list comes before what takes its place.
-        edits.sort_unstable_by_key(|(list, entry, comes)| (*list, key(entry), *comes));
+    pub fn edit(&mut self, edits: &[(u32, T, bool)], key: impl Fn(&T) -> u32) {
+        let Some(&none) = edits.first() else { return };
+        // Sorted by the lists in two passes, as `by_counting`.
+        let mut lists = Bits::new(self.len());
+        lists.extend(edits.iter().map(|edit| edit.0));
+        let ranks = lists.ranks();
+        let mut first = vec![0_u32; ranks.count() + 1];
+        edits.iter().for_each(|edit| first[ranks.of(edit.0) + 1] += 1);
+        for rank in 0..ranks.count() {
+            first[rank + 1] += first[rank];
+        }
+        let (mut next, mut sorted) = (first.clone(), vec![none; edits.len()]);
+        for edit in edits {
+            let place = &mut next[ranks.of(edit.0)];
+            sorted[*place as usize] = *edit;
+            *place += 1;
+        }
         let mut list = Vec::new();
-        for edits in edits.chunk_by(|a, b| a.0 == b.0) {
+        for ends in first.windows(2) {
+            let edits = &mut sorted[ends[0] as usize..ends[1] as usize];
+            edits.sort_unstable_by_key(|edit| key(&edit.1));
             let i = edits[0].0 as usize;
             list.clear();
             let is_edited = |entry: &T| edits.binary_search_by_key(&key(entry), |edit| key(&edit.1)).is_ok();
@@ -154,14 +171,14 @@ mod tests {
     #[test]
     fn edits_keep_lists_in_order() {
         let mut lists = Jagged::new(&[0, 3, 5], vec![(1, 'a'), (4, 'b'), (9, 'c'), (2, 'd'), (3, 'e')]);
-        let mut edits = [
+        let edits = [
             (1, (0, 'f'), true),
             (0, (4, 'g'), true),
             (0, (4, 'b'), false),
             (0, (9, 'c'), false),
             (1, (7, 'h'), true),
         ];
-        lists.edit(&mut edits, |entry| entry.0);
+        lists.edit(&edits, |entry| entry.0);
         assert_eq!(lists.get(0), [(1, 'a'), (4, 'g')]);
         assert_eq!(lists.get(1), [(0, 'f'), (2, 'd'), (3, 'e'), (7, 'h')]);
     }

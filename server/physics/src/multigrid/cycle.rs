@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::bounds::LeafBounds;
 use super::coarsest::{Coarsest, CoarsestSolve};
+use super::follow::LevelChange;
 use super::galerkin::{CellMatrix, Coefficients, Galerkin};
 use super::hierarchy::Hierarchy;
 use super::kernel::{LevelKernel, noise};
@@ -93,6 +94,25 @@ pub struct Vectors {
     spring_blocks: SpringBlocks,
 }
 
+impl Vectors {
+    /// Follows the `change` of level `l`, which has `n` vertices now; the equations are on level `first`.
+    fn follow(&mut self, (l, first): (usize, usize), n: usize, change: &LevelChange) {
+        let Self { inverse, x, b, r, d, q, kernel, .. } = self;
+        let inner = l > 0 && l != first;
+        for (vector, used) in [(x, inner), (b, inner), (r, l >= first), (d, l >= first), (q, l >= first)] {
+            if used {
+                resize_reserving(vector, n, [0.0; 4]);
+            }
+        }
+        if l > first {
+            resize_reserving(inverse, n, Inverse3::default());
+        }
+        if let Some(kernel) = kernel {
+            kernel.follow_cut(change);
+        }
+    }
+}
+
 /// Columns of stiff springs up to which cycles take them: their dense factors stay small beside the vectors.
 const MOST_COLUMNS: usize = 128;
 
@@ -146,38 +166,36 @@ impl Multigrid {
     }
 
     /// Follows a cut of `octree` that changed the leaves `changed`, ascending, and left the numbers of all others; an
-    /// [update](Self::update) comes next. Returns `false` if the levels have to be made anew, and this is then of
-    /// no more use.
-    pub fn follow(&mut self, octree: &Octree, changed: &[u32]) -> bool {
-        let Some(changes) = self.hierarchy.follow(octree, changed) else { return false };
-        self.forget_springs();
-        self.galerkin.follow(&self.hierarchy, &changes);
-        let first = self.first;
-        for (l, (change, vectors)) in changes.iter().zip(&mut self.levels).enumerate() {
-            let n = self.hierarchy.levels[l].n_vertices;
-            let Vectors { inverse, x, b, r, d, q, kernel, .. } = vectors;
-            for (vector, used) in [
-                (x, l > 0 && l != first),
-                (b, l > 0 && l != first),
-                (r, l >= first),
-                (d, l >= first),
-                (q, l >= first),
-            ] {
-                if used {
-                    resize_reserving(vector, n, [0.0; 4]);
-                }
+    /// [update](Self::update) comes next. The task `beside` is run meanwhile. Returns `false` if the levels have to be
+    /// made anew, and this is then of no more use.
+    pub fn follow(
+        &mut self,
+        team: &mut Team,
+        (octree, changed): (&Octree, &[u32]),
+        beside: &mut (dyn FnMut() + Send),
+    ) -> bool {
+        let Self { hierarchy, galerkin, levels, first, .. } = self;
+        let mut changes = None;
+        team.run(&mut [&mut || changes = hierarchy.follow(octree, changed), beside]);
+        let Some(changes) = changes else { return false };
+        let mut follow = |hierarchy: &Hierarchy| {
+            galerkin.follow(hierarchy, &changes);
+            for (l, (change, vectors)) in changes.iter().zip(&mut *levels).enumerate() {
+                vectors.follow((l, *first), hierarchy.levels[l].n_vertices, change);
             }
-            if l > first {
-                resize_reserving(inverse, n, Inverse3::default());
-            }
-            if let Some(kernel) = kernel {
-                kernel.follow_cut(change);
-            }
+        };
+        if *first == 0 {
+            hierarchy.follow_transfers(team, &changes, &mut follow);
+        } else {
+            // Directions that are held on a coarse level follow from the transfers.
+            hierarchy.follow_transfers(team, &changes, &mut |_| {});
+            follow(hierarchy);
         }
+        self.forget_springs();
         if changes.last().is_some_and(|change| !change.moved.is_empty()) {
             self.coarsest = Coarsest::new(&self.hierarchy);
         }
-        self.partial.resize(self.hierarchy.levels[first].n_vertices.div_ceil(BLOCK), 0.0);
+        self.partial.resize(self.hierarchy.levels[self.first].n_vertices.div_ceil(BLOCK), 0.0);
         changes.into_iter().zip(&mut self.cut).for_each(|(change, cut)| cut.extend(change.cells));
         true
     }

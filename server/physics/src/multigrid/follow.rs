@@ -6,6 +6,7 @@
 
 use super::hierarchy::Step;
 use super::level::{Level, NONE};
+use crate::lists::bits::Bits;
 use crate::lists::disjoint::{find, join};
 use crate::lists::jagged::Jagged;
 use crate::octree::{Cell, Octree, parent_corner};
@@ -74,31 +75,6 @@ impl History {
     }
 }
 
-/// One bit per number.
-#[derive(Debug)]
-pub(super) struct Bits(Vec<u64>);
-
-impl Bits {
-    pub(super) fn new(n: usize) -> Self {
-        Self(vec![0; n.div_ceil(64)])
-    }
-
-    pub(super) fn has(&self, i: u32) -> bool {
-        self.0.get(i as usize / 64).is_some_and(|word| word >> (i % 64) & 1 == 1)
-    }
-
-    /// Returns whether the number was not there.
-    pub(super) fn insert(&mut self, i: u32) -> bool {
-        if self.0.len() <= i as usize / 64 {
-            self.0.resize(i as usize / 64 + 1, 0);
-        }
-        let (word, bit) = (&mut self.0[i as usize / 64], 1 << (i % 64));
-        let new = *word & bit == 0;
-        *word |= bit;
-        new
-    }
-}
-
 /// A cell as it was before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Earlier {
@@ -125,7 +101,7 @@ impl LevelChange {
             id as usize >= known || history.get(id).is_some_and(|earlier| *earlier != level.now(id))
         };
         let moved = cells.iter().copied().filter(is_moved).collect();
-        let (mut vertices, mut edits) = (Vec::new(), Vec::new());
+        let (mut vertices, mut edits) = (Bits::new(level.n_vertices), Vec::new());
         for &id in cells.iter().filter(|_| level.has_slots()) {
             let now = level.vertices[id as usize];
             let before = history.get(id).map_or(now, |earlier| earlier.vertices);
@@ -135,18 +111,16 @@ impl LevelChange {
                 if id as usize >= known {
                     edits.push((now[c], slot, true));
                 } else if before[c] != now[c] {
-                    vertices.push(before[c]);
+                    vertices.insert(before[c]);
                     edits.extend([(before[c], slot, false), (now[c], slot, true)]);
                 }
             }
         }
         if level.has_slots() {
-            vertices.sort_unstable();
-            vertices.dedup();
             level.slots.grow(level.n_vertices);
-            level.slots.edit(&mut edits, |slot| *slot);
+            level.slots.edit(&edits, |slot| *slot);
         }
-        Self { cells, vertices, known, origin, moved }
+        Self { cells, vertices: vertices.iter().collect(), known, origin, moved }
     }
 }
 
@@ -428,7 +402,7 @@ impl Follow<'_> {
             let k = self.coarse.corner_at(big, q)?;
             self.enter(slot, self.coarse.vertices[big as usize][k], true);
         }
-        owed.0.iter().zip(&taken.0).all(|(owed, taken)| owed & !taken == 0).then_some(())
+        owed.is_within(&taken).then_some(())
     }
 
     /// The vertex that carried corner `slot` before, if it did not hang.

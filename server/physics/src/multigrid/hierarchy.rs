@@ -8,6 +8,7 @@ use super::transfer::{MOST_VERTICES, Transfer};
 use crate::lists::jagged::Jagged;
 use crate::material::Region;
 use crate::octree::{Lattice, Octree};
+use crate::team::Team;
 
 /// Coarsening ends at this number of unknowns.
 pub const COARSE_ENOUGH: usize = 3_000;
@@ -149,6 +150,8 @@ impl Hierarchy {
     ///
     /// `None` if all have to be made anew, because the coarsest level has become too large or the coarse levels do
     /// not see cuts; the hierarchy is then of no more use. Where coarsening stalls, the number of levels stays.
+    ///
+    /// [`follow_transfers`](Self::follow_transfers) comes next.
     pub fn follow(&mut self, octree: &Octree, changed: &[u32]) -> Option<Vec<LevelChange>> {
         if !self.limits.duplicates {
             return None;
@@ -158,11 +161,7 @@ impl Hierarchy {
             let (below, above) = self.levels.split_at_mut(l + 1);
             let (fine, coarse) = (&below[l], &mut above[0]);
             let links = if l == 0 { Links::Leaves(octree) } else { Links::Cells(&fine.links) };
-            let change = follow_level((fine, links, &changes[l]), step, coarse, l as u8)?;
-            // A row follows from the fine vertex, its cell, and the vertices of the parent of that.
-            let below = change.moved.iter().flat_map(|&id| step.children.get(id as usize));
-            step.transfer.follow(fine, coarse, &step.parent, below.chain(&changes[l].moved).copied());
-            changes.push(change);
+            changes.push(follow_level((fine, links, &changes[l]), step, coarse, l as u8)?);
         }
         if !self.stalled && self.limits.goes_on(&self.levels) {
             return None;
@@ -174,6 +173,29 @@ impl Hierarchy {
             change.cells.iter().for_each(|&id| self.find_kind(l, id as usize));
         }
         Some(changes)
+    }
+
+    /// Lets the transfers follow these changes of the levels. Meanwhile `with_levels` is given the levels and the steps
+    /// between them, as yet without transfers.
+    pub fn follow_transfers(
+        &mut self,
+        team: &mut Team,
+        changes: &[LevelChange],
+        with_levels: &mut (dyn FnMut(&Self) + Send),
+    ) {
+        let mut transfers: Vec<Transfer> =
+            self.steps.iter_mut().map(|step| std::mem::take(&mut step.transfer)).collect();
+        let levels = &*self;
+        let mut follow = || {
+            for (l, (step, transfer)) in levels.steps.iter().zip(&mut transfers).enumerate() {
+                // A row follows from the fine vertex, its cell, and the vertices of the parent of that.
+                let below = changes[l + 1].moved.iter().flat_map(|&id| step.children.get(id as usize));
+                let cells = below.chain(&changes[l].moved).copied();
+                transfer.follow(&levels.levels[l], &levels.levels[l + 1], &step.parent, cells);
+            }
+        };
+        team.run(&mut [&mut follow, &mut || with_levels(levels)]);
+        self.steps.iter_mut().zip(transfers).for_each(|(step, transfer)| step.transfer = transfer);
     }
 
     /// Lists the slots of the finest level, too.

@@ -145,10 +145,15 @@ impl Composite {
     }
 
     /// Follows a cut of `octree`, as [`Multigrid::follow`] does.
-    pub fn follow(&mut self, octree: &Octree, changed: &[u32]) -> bool {
+    pub fn follow(
+        &mut self,
+        team: &mut Team,
+        cut: (&Octree, &[u32]),
+        beside: &mut (dyn FnMut() + Send),
+    ) -> bool {
         let first = self.multigrid.first;
         self.multigrid.levels[first].kernel = self.kernel.take();
-        let follows = self.multigrid.follow(octree, changed);
+        let follows = self.multigrid.follow(team, cut, beside);
         self.kernel = self.multigrid.levels[first].kernel.take();
         self.jacobi.resize(self.multigrid.hierarchy.levels[first].n_vertices);
         // Their vertices are found again with the next solve.

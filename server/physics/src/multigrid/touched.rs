@@ -1,11 +1,12 @@
 //! Galerkin operators that follow cuts and other prescribed directions: only matrices of touched cells are computed
 //! again, by the next update.
 
-use super::follow::{Bits, LevelChange};
+use super::follow::LevelChange;
 use super::galerkin::{CellMatrix, Galerkin, INCLINED, LevelMatrices, Rotation, held, shared_matrix};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use super::thin::is_thin;
+use crate::lists::bits::Bits;
 use crate::octree::corner_weights;
 use crate::operator::FixedCopy;
 
@@ -39,11 +40,10 @@ impl Galerkin {
             if let Some(step) = below.and_then(|below| hierarchy.steps.get(below)) {
                 let below = changes[l - 1].vertices.iter();
                 let children = below.flat_map(|&v| hierarchy.levels[l - 1].slots_of(v as usize));
-                let mut thin: Vec<u32> = children.map(|(child, _)| step.parent[child]).collect();
-                thin.sort_unstable();
-                thin.dedup();
-                thin.retain(|&id| is_thin(&hierarchy.levels[l], id as usize));
-                thin.into_iter().for_each(|id| self.touch(hierarchy, l, id));
+                let mut around = Bits::new(n);
+                around.extend(children.map(|(child, _)| step.parent[child]));
+                let thin = around.iter().filter(|&id| is_thin(&hierarchy.levels[l], id as usize));
+                thin.for_each(|id| self.touch(hierarchy, l, id));
             }
             // The constants are known from the first update on.
             if self.coefficients.is_some() {

@@ -5,6 +5,7 @@
 //! of [thin](super::thin) cells move otherwise; what comes to their trilinear weights is kept there.
 
 use super::level::{Level, NONE, place_in, trilinear};
+use crate::lists::bits::Bits;
 use crate::lists::jagged::Jagged;
 use crate::octree::corner_weights;
 use crate::operator::{BLOCK, Padded};
@@ -90,16 +91,18 @@ impl Transfer {
     pub fn follow(&mut self, fine: &Level, coarse: &Level, parent: &[u32], cells: impl Iterator<Item = u32>) {
         self.rows.grow(fine.n_vertices);
         self.columns.grow(coarse.n_vertices);
-        // One cell and corner for every vertex: the first of these cells.
+        let mut moved = Bits::new(fine.cells.len());
+        moved.extend(cells);
         let stands = |(id, c): &(u32, usize)| fine.hanging[*id as usize] >> c & 1 == 0;
-        let corners = cells.flat_map(|id| (0..8).map(move |c| (id, c))).filter(stands);
-        let mut homes: Vec<(u32, u32)> =
-            corners.map(|(id, c)| (fine.vertices[id as usize][c], 8 * id + c as u32)).collect();
-        homes.sort_unstable();
-        homes.dedup_by_key(|home| home.0);
+        let corners = moved.iter().flat_map(|id| (0..8).map(move |c| (id, c))).filter(stands);
+        let mut done = Bits::new(fine.n_vertices);
         let (mut edits, mut row) = (Vec::new(), Vec::new());
-        for (v, slot) in homes {
-            let (id, c) = (slot as usize / 8, slot as usize % 8);
+        // One cell and corner for every vertex: the first of these cells.
+        for (id, c) in corners {
+            let (id, v) = (id as usize, fine.vertices[id as usize][c]);
+            if !done.insert(v) {
+                continue;
+            }
             row.clear();
             row.extend(carriers(fine, coarse, parent[id], (id, c)).map(Entry::new));
             let known = self.rows.get(v as usize);
@@ -110,7 +113,7 @@ impl Transfer {
                 self.rows.set(v as usize, &row);
             }
         }
-        self.columns.edit(&mut edits, |entry| entry.vertex());
+        self.columns.edit(&edits, |entry| entry.vertex());
     }
 
     /// Fine vertices that rest on coarse vertex `v`, and their weights.

@@ -13,6 +13,7 @@ use super::cells::{CutLink, LinkKey, Octree};
 use super::lattice::{At, OUTSIDE};
 use super::vertices::corner_weights;
 use crate::cut::SweepTriangle;
+use crate::team::{Team, blocks};
 
 /// Leaves whose triangles are selected together.
 const RUN: usize = 64;
@@ -25,7 +26,7 @@ struct Search<'a> {
     octree: &'a Octree,
     x: &'a [Vector3<f64>],
     incision: u32,
-    found: Vec<(LinkKey, CutLink)>,
+    found: &'a mut Vec<(LinkKey, CutLink)>,
 }
 
 impl Octree {
@@ -37,32 +38,32 @@ impl Octree {
         triangles: &[SweepTriangle],
         incision: u32,
     ) -> Vec<(LinkKey, CutLink)> {
-        self.crossed_links_in(&self.leaves_near(x, &swept_box(triangles)), x, triangles, incision)
+        let leaves = self.leaves_near(x, &swept_box(triangles));
+        self.crossed_links_in(&mut Team::alone(), &leaves, x, (triangles, incision))
     }
 
     /// The same among the links of some leaves, which hold all that may meet the triangles.
     pub(super) fn crossed_links_in(
         &self,
+        team: &mut Team,
         leaves: &[u32],
         x: &[Vector3<f64>],
-        triangles: &[SweepTriangle],
-        incision: u32,
+        (triangles, incision): (&[SweepTriangle], u32),
     ) -> Vec<(LinkKey, CutLink)> {
-        let mut search = Search { octree: self, x, incision, found: Vec::new() };
         let all: Vec<&SweepTriangle> = triangles.iter().collect();
-        for run in leaves.chunks(RUN) {
+        let mut of_runs: Vec<Vec<(LinkKey, CutLink)>> = vec![Vec::new(); leaves.len().div_ceil(RUN)];
+        team.for_blocks(blocks(&mut of_runs, 1), |k, found| {
+            let run = &leaves[k * RUN..leaves.len().min((k + 1) * RUN)];
             let near = among(
                 &all,
                 &bounds(run.iter().flat_map(|&id| self.vertices[id as usize].map(|v| x[v as usize]))),
             );
-            if near.is_empty() {
-                continue;
+            if !near.is_empty() {
+                let mut search = Search { octree: self, x, incision, found: &mut found[0] };
+                run.iter().for_each(|&id| search.leaf(id, &near));
             }
-            for &id in run {
-                search.leaf(id, &near);
-            }
-        }
-        let mut found = search.found;
+        });
+        let mut found = of_runs.concat();
         found.sort_by_key(|(key, _)| *key);
         found.dedup_by(|next, first| {
             let same = next.0 == first.0;

@@ -24,6 +24,7 @@ use crate::operator::{StiffModes, Stiffness};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 use crate::space::deepest::{Bounds, deepest_of};
 use crate::space::{RestPoint, Space, VisitPiece};
+use crate::team::Team;
 
 /// Most leaves that cuts by clients may make of one.
 const MOST_GROWTH: usize = 8;
@@ -145,6 +146,7 @@ impl OctreeSpace {
     /// The links that a blade crosses, after the checks of a cut.
     fn search(
         &mut self,
+        team: &mut Team,
         x: &[Vector3<f64>],
         blade: &BladeSweep,
         incision: u32,
@@ -172,7 +174,7 @@ impl OctreeSpace {
             sweep_from_behind(self.fronts.get(&incision), blade, x, BEHIND * self.octree.lattice().h);
         let swept = swept_box(&triangles);
         let leaves = self.octree.leaves_near(x, &swept);
-        let cuts = self.octree.crossed_links_in(&leaves, x, &triangles, incision);
+        let cuts = self.octree.crossed_links_in(team, &leaves, x, (&triangles, incision));
         self.remember(blade, incision, x, (&leaves, &swept));
         Ok(cuts)
     }
@@ -192,20 +194,27 @@ impl OctreeSpace {
     }
 
     /// Cuts these links and brings everything up to date.
-    fn open(&mut self, cuts: &[(LinkKey, CutLink)]) -> CutReport {
+    fn open(&mut self, team: &mut Team, cuts: &[(LinkKey, CutLink)]) -> CutReport {
         let known = self.octree.n_vertices() as u32;
         let change = self.octree.cut(cuts);
         let new_copies = self.number_copies(known, &change);
-        if change.links > 0 || change.divided > 0 {
-            self.octree.follow_volumes(&change, &mut self.volumes);
-        }
+        let Self { octree, volumes, surface, .. } = self;
+        let mut follow_volumes = || {
+            if change.links > 0 || change.divided > 0 {
+                octree.follow_volumes(&change, volumes);
+            }
+        };
+        // Another cut of a link that was cut before may show at another place.
+        let shows = !change.moved.is_empty() || !change.cells.is_empty();
+        let mut follow_surface = || {
+            if shows {
+                surface.follow(octree, &change.cells, &change.moved);
+            }
+        };
+        team.run(&mut [&mut follow_volumes, &mut follow_surface]);
         self.changed = change.cells;
         self.only_cut = true;
-        // Another cut of a link that was cut before may show at another place.
-        if !change.moved.is_empty() || !self.changed.is_empty() {
-            self.surface.follow(&self.octree, &self.changed, &change.moved);
-            self.epoch += 1;
-        }
+        self.epoch += u32::from(shows);
         CutReport {
             new_copies,
             elements_cut: self.changed.len(),
@@ -405,21 +414,33 @@ impl Space for OctreeSpace {
         swept_area(&tets, &corners, blade)
     }
 
-    fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
-        let cuts = self.search(x, blade, incision)?;
-        Ok(self.open(&cuts))
+    fn cut(
+        &mut self,
+        team: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<CutReport, CutError> {
+        let cuts = self.search(team, x, blade, incision)?;
+        Ok(self.open(team, &cuts))
     }
 
-    fn begin_cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<(), CutError> {
-        let cuts = self.search(x, blade, incision)?;
+    fn begin_cut(
+        &mut self,
+        team: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(), CutError> {
+        let cuts = self.search(team, x, blade, incision)?;
         self.under_way = Some((cuts, CutReport::default()));
         Ok(())
     }
 
-    fn go_on_cutting(&mut self, work: &mut Work) -> Option<CutReport> {
+    fn go_on_cutting(&mut self, team: &mut Team, work: &mut Work) -> Option<CutReport> {
         let (cuts, _) = self.under_way.take()?;
         work.book(cuts.len() / LINKS_PER_FRAGMENT);
-        Some(self.open(&cuts))
+        Some(self.open(team, &cuts))
     }
 
     fn is_being_cut(&self) -> bool {

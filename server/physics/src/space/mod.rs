@@ -37,6 +37,7 @@ use crate::octree::OctreeSpace;
 use crate::operator::{StiffModes, Stiffness};
 use crate::saved::saved_as;
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::team::Team;
 
 saved_as!(saved_space, Box, Space, Tets(Tets), Octree(OctreeSpace));
 saved_as!(saved_element, Arc, Element, Linear(LinearTets), Quadratic(QuadraticTets), Hexahedra(Hexahedra));
@@ -51,7 +52,7 @@ pub type VisitPiece<'a> = dyn FnMut(usize, &[u32], &[f64]) + 'a;
 /// of the uncut body; further ones are appended, and a reset removes them. Coarsening of an
 /// [octree](Self::octree_mut), and nothing else, removes some of the further ones, and the others close up. Copies
 /// come before the nodes that elements of higher order add.
-pub trait Space: Any + Points + Send {
+pub trait Space: Any + Points + Send + Sync {
     /// The finite element.
     fn kind(&self) -> ElementKind;
 
@@ -238,14 +239,26 @@ pub trait Space: Any + Points + Send {
     fn swept_area(&self, x: &[Vector3<f64>], blade: &BladeSweep) -> f64;
 
     /// Cuts along the surface that the blade swept, with the copies at `x` [m].
-    fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError>;
+    fn cut(
+        &mut self,
+        team: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<CutReport, CutError>;
 
     /// Begins a cut with the copies at `x` [m]; [`go_on_cutting`](Self::go_on_cutting) makes it in parts.
-    fn begin_cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<(), CutError>;
+    fn begin_cut(
+        &mut self,
+        team: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(), CutError>;
 
     /// Continues the cut that was begun until `work` is used up. Returns the report when it is complete;
     /// `None` before that, and if no cut was begun.
-    fn go_on_cutting(&mut self, work: &mut Work) -> Option<CutReport>;
+    fn go_on_cutting(&mut self, team: &mut Team, work: &mut Work) -> Option<CutReport>;
 
     /// Whether a cut was begun and is not complete.
     fn is_being_cut(&self) -> bool;

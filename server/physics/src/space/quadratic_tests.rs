@@ -37,7 +37,7 @@ fn block(cells: usize, end: f64) -> Tets {
     let blade = |x: f64| [on_plane(x, -0.1), on_plane(x, 1.1)];
     let sweep = BladeSweep { segments: vec![blade(-0.1), blade(end)] };
     let x = tets.rest_positions();
-    let report = tets.cut(&x, &sweep, 1).unwrap();
+    let report = tets.cut(&mut Team::alone(), &x, &sweep, 1).unwrap();
     assert!(report.elements_cut > 0 && report.new_copies.len() > 2 * report.elements_cut / 3);
     tets
 }
@@ -275,7 +275,7 @@ fn iterations(cells: usize, normal: &Vector3<f64>, through: &Vector3<f64>) -> u3
     let blade = |x: f64| [on_plane(x, -0.1), on_plane(x, 1.1)];
     let x = tets.rest_positions();
     // Not through the last cells, so that the block stays whole.
-    tets.cut(&x, &BladeSweep { segments: vec![blade(-0.1), blade(0.7)] }, 1).unwrap();
+    tets.cut(&mut Team::alone(), &x, &BladeSweep { segments: vec![blade(-0.1), blade(0.7)] }, 1).unwrap();
     let model = tets.model(&material(Law::Linear), Volumetric::Full).unwrap();
     let held = |(n, X): (u32, &Vector3<f64>)| {
         (X.z == 0.0).then_some(FixedCopy { copy: n, held: Held::FULLY, position_m: (*X).into() })

@@ -21,6 +21,7 @@ use crate::operator::cells::CellStiffness;
 use crate::operator::{Elastic, StiffModes, Stiffness, degenerate_elements};
 use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
 use crate::snap::{Nodes, SnapCut, SnapReport, Snapper};
+use crate::team::Team;
 
 /// Distance, relative to the element, by which a point is moved towards its side before its piece is looked
 /// up. Far above rounding, far below any piece that can be seen.
@@ -433,12 +434,24 @@ impl Space for Tets {
         swept_area(&tets, x, blade)
     }
 
-    fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
+    fn cut(
+        &mut self,
+        _: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<CutReport, CutError> {
         let report = self.cut.sweep(&x[..self.cut.n_copies()], blade, incision)?;
         Ok(self.follow_cut(report))
     }
 
-    fn begin_cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<(), CutError> {
+    fn begin_cut(
+        &mut self,
+        _: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(), CutError> {
         let mesh = self.cut.mesh();
         let limits = CutLimits::of_mesh(mesh.tets.len(), mesh.nodes.len());
         let x = &x[..self.cut.n_copies()];
@@ -447,7 +460,7 @@ impl Space for Tets {
         Ok(())
     }
 
-    fn go_on_cutting(&mut self, work: &mut Work) -> Option<CutReport> {
+    fn go_on_cutting(&mut self, _: &mut Team, work: &mut Work) -> Option<CutReport> {
         let (mut sweep, x) = self.under_way.take()?;
         if !self.cut.detect(&x, &mut sweep, work) {
             self.under_way = Some((sweep, x));

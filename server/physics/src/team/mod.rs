@@ -103,6 +103,11 @@ impl Team {
         self.run_blocks(state, task, || false);
     }
 
+    /// Runs these tasks, several at a time, and returns when all are done.
+    pub fn run(&mut self, tasks: &mut [&mut (dyn FnMut() + Send)]) {
+        self.for_blocks(blocks(tasks, 1), |_, task| task[0]());
+    }
+
     /// As [`for_blocks`](Self::for_blocks). While others are still busy the caller calls `meanwhile`, which
     /// returns whether it did anything.
     fn run_blocks<B: Blocks>(

@@ -32,7 +32,7 @@ fn block(depth: f64) -> Tets {
         let segment = |z: f64| [Vector3::new(0.151, -0.1, z), Vector3::new(0.158, 0.3, z)];
         let blade = BladeSweep { segments: vec![segment(0.3), segment(0.2 - depth)] };
         let x = tets.rest_positions();
-        assert!(tets.cut(&x, &blade, 1).unwrap().faces_opened > 0);
+        assert!(tets.cut(&mut Team::alone(), &x, &blade, 1).unwrap().faces_opened > 0);
     }
     tets
 }

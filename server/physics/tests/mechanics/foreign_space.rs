@@ -324,16 +324,28 @@ impl Space for Lattice {
         self.tets.swept_area(x, blade)
     }
 
-    fn cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<CutReport, CutError> {
-        self.tets.cut(x, blade, incision)
+    fn cut(
+        &mut self,
+        team: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<CutReport, CutError> {
+        self.tets.cut(team, x, blade, incision)
     }
 
-    fn begin_cut(&mut self, x: &[Vector3<f64>], blade: &BladeSweep, incision: u32) -> Result<(), CutError> {
-        self.tets.begin_cut(x, blade, incision)
+    fn begin_cut(
+        &mut self,
+        team: &mut Team,
+        x: &[Vector3<f64>],
+        blade: &BladeSweep,
+        incision: u32,
+    ) -> Result<(), CutError> {
+        self.tets.begin_cut(team, x, blade, incision)
     }
 
-    fn go_on_cutting(&mut self, work: &mut Work) -> Option<CutReport> {
-        self.tets.go_on_cutting(work)
+    fn go_on_cutting(&mut self, team: &mut Team, work: &mut Work) -> Option<CutReport> {
+        self.tets.go_on_cutting(team, work)
     }
 
     fn is_being_cut(&self) -> bool {

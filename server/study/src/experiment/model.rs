@@ -7,6 +7,7 @@ use scindo_physics::cut::BladeSweep;
 use scindo_physics::material::Region;
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings, OctreeSpace, Shape};
 use scindo_physics::space::Space;
+use scindo_physics::team::Team;
 
 use super::Trouble;
 use super::shape::Animal;
@@ -190,12 +191,12 @@ impl Model {
     /// # Errors
     /// A cut that is refused.
     pub fn cut(&self) -> Result<Cut, Trouble> {
-        let mut space = OctreeSpace::new(self.octree.clone());
+        let (mut team, mut space) = (Team::alone(), OctreeSpace::new(self.octree.clone()));
         let started = Instant::now();
         let mut links = 0;
         for (incision, blade) in (1..).zip(&self.blades) {
             let x = space.rest_positions();
-            links += space.cut(&x, blade, incision)?.faces_opened;
+            links += space.cut(&mut team, &x, blade, incision)?.faces_opened;
         }
         Ok(Cut { space, seconds: started.elapsed().as_secs_f64(), links })
     }

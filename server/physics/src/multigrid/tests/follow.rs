@@ -129,6 +129,7 @@ pub fn cut_links(octree: &mut Octree, links: &[LinkKey]) -> Vec<u32> {
 
 #[test]
 fn levels_that_follow_cuts_are_those_made_anew() {
+    let mut team = Team::new(2).unwrap();
     for (seed, (cells, levels)) in [(8, 0), (13, 2), (16, 3), (16, 0), (24, 2)].into_iter().enumerate() {
         let mut octree = cube(cells, levels);
         // Gauss–Seidel sweeps need the slots of the finest level, too.
@@ -147,7 +148,10 @@ fn levels_that_follow_cuts_are_those_made_anew() {
             let changed = cut_links(&mut octree, &links);
             let new = made_of(&octree);
             match followed.follow(&octree, &changed) {
-                Some(changes) => assert_eq!(changes[0].cells, changed),
+                Some(changes) => {
+                    assert_eq!(changes[0].cells, changed);
+                    followed.follow_transfers(&mut team, &changes, &mut |_| {});
+                }
                 None => {
                     made_anew += 1;
                     followed = new.clone();
@@ -263,7 +267,7 @@ fn operators_that_follow_cuts_are_those_made_anew() {
                 for part in 0..2 {
                     let links = random_links(&octree, 2 * round as usize + part, seed);
                     let changed = cut_links(&mut octree, &links);
-                    if !followed.follow(&octree, &changed) {
+                    if !followed.follow(&mut team, (&octree, &changed), &mut || {}) {
                         followed = made_anew(&octree);
                     }
                 }
@@ -300,7 +304,7 @@ fn eigenvalues_after_cuts_are_below_the_bounds() {
             }
             let links = random_links(&octree, round, 7);
             let changed = cut_links(&mut octree, &links);
-            assert!(followed.follow(&octree, &changed));
+            assert!(followed.follow(&mut team, (&octree, &changed), &mut || {}));
         }
         assert!(rose > 0);
     }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use scindo_physics::body::{Body, BodySettings, PcgSettings};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeError, OctreeSettings, OctreeSpace};
+use scindo_physics::team::Team;
 
 use super::flaws::tell;
 use super::support::{DOWN, L, SOFT, V, clamp_left, plane, slice};
@@ -176,13 +177,13 @@ fn branches(setting: &Setting) -> Result<Evidence, Trouble> {
     let (mut defects, mut apart, mut volume) = (0, 0, 0.0_f64);
     let mut cut = body(cells(12, 2)?, setting, 50, 1e-3)?;
     // The same cuts on an octree of their own, to count by.
-    let mut counted = OctreeSpace::new(cells(12, 2)?);
+    let (mut team, mut counted) = (Team::alone(), OctreeSpace::new(cells(12, 2)?));
     for incision in 1..=20 {
         let (through, normal) = (random.vector(0.3 * L), random.vector(1.0) + V::repeat(1e-3));
         let blade = plane(V::repeat(0.5 * L) + through, normal, 0.45 * L);
         cut.cut(&blade, incision)?;
         let x = scindo_physics::space::Space::rest_positions(&counted);
-        scindo_physics::space::Space::cut(&mut counted, &x, &blade, incision)?;
+        scindo_physics::space::Space::cut(&mut counted, &mut team, &x, &blade, incision)?;
         let [links, vertices] = [cut.components().len(), parts_by_vertices(counted.octree())];
         apart += links.abs_diff(vertices) + links.abs_diff(cut.parts().len());
         defects += cut.flaws().surface;

@@ -6,6 +6,7 @@ use scindo_physics::element::Points;
 use scindo_physics::multigrid::{Hierarchy, Smoother};
 use scindo_physics::octree::{At, CutLink, Octree, OctreeSpace};
 use scindo_physics::space::Space;
+use scindo_physics::team::Team;
 
 use super::support::{V, plane};
 use crate::experiment::model::{Grid, cube};
@@ -115,14 +116,14 @@ fn patch(setting: &Setting) -> Result<Evidence, Trouble> {
     let most =
         most.map(|(_, f)| f.amax()).fold(0.0, f64::max) / (MATERIAL.young_pa * uncut.lattice().h.powi(2));
     evidence.at_most("largest force on an inner vertex, in E h²", most, 1e-10, "");
-    let mut space = OctreeSpace::new(octree);
+    let (mut team, mut space) = (Team::alone(), OctreeSpace::new(octree));
     let mut random = Random(11);
     let (mut worst, mut apart) = (0.0_f64, 0);
     let density = strained();
     for incision in 1..=12 {
         let (through, normal) = (random.vector(0.3), random.vector(1.0) + V::repeat(1e-3));
         let x = space.rest_positions();
-        space.cut(&x, &plane(V::repeat(0.5) + through, normal, 0.35), incision)?;
+        space.cut(&mut team, &x, &plane(V::repeat(0.5) + through, normal, 0.35), incision)?;
         let cut = measured(space.octree());
         let volume: f64 = (0..cut.cells().len()).map(|id| cut.cell_volume(id)).sum();
         let energy = cut.energy(&MATERIAL, &displaced(&cut));
