@@ -172,13 +172,9 @@ impl Boundary {
     fn between(&self, point: &MaterialPoint, node_of_copy: &[u32]) -> Option<(Held, Vector3<f64>)> {
         let (mut shared, mut displacement_m) = (Held::FULLY, Vector3::zeros());
         for (copy, weight) in point.carriers() {
-            match self.fixed_at(node_of_copy[copy]) {
-                Some(held) => {
-                    shared = shared.shared(&held.held);
-                    displacement_m += weight * held.displacement_m;
-                }
-                None => shared = Held::NOT,
-            }
+            let held = self.fixed_at(node_of_copy[copy])?;
+            shared = shared.shared(&held.held);
+            displacement_m += weight * held.displacement_m;
         }
         shared.any().then_some((shared, displacement_m))
     }

@@ -17,7 +17,7 @@ use super::level::{Level, NONE};
 use super::table::{self, Weights};
 use super::thin::{Inner, Passed, Thin, is_thin};
 use crate::material::Lame;
-use crate::octree::{Cell, corner_weights};
+use crate::octree::{Cell, corner_shares, corner_weights};
 use crate::operator::cells::unit_stiffness;
 use crate::operator::{BLOCK, FixedCopy, Held};
 use crate::team::{Team, blocks};
@@ -250,14 +250,9 @@ impl Galerkin {
                 }
                 let share = self.eighth[hierarchy.kind_of[l][id] as usize];
                 let mass = &mut self.levels[l].mass;
-                if level.hanging[id] == 0 {
-                    level.vertices[id].iter().for_each(|&v| mass[v as usize] += share);
-                    continue;
-                }
-                for row in corner_weights(&level.cells[id], level.hanging[id]) {
-                    for (&v, w) in level.vertices[id].iter().zip(row) {
-                        mass[v as usize] += w as f32 * share;
-                    }
+                let corners = corner_shares(&level.cells[id], level.hanging[id]);
+                for (&v, corners) in level.vertices[id].iter().zip(corners) {
+                    mass[v as usize] += corners as f32 * share;
                 }
             }
         }

@@ -7,7 +7,7 @@ use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use super::thin::is_thin;
 use crate::lists::bits::Bits;
-use crate::octree::corner_weights;
+use crate::octree::corner_shares;
 use crate::operator::FixedCopy;
 
 impl Galerkin {
@@ -162,6 +162,6 @@ impl Galerkin {
 fn mass_at(level: &Level, id: usize, c: usize, eighth: f32) -> f32 {
     match level.hanging[id] {
         0 => eighth,
-        hanging => corner_weights(&level.cells[id], hanging).iter().map(|row| row[c] as f32 * eighth).sum(),
+        hanging => corner_shares(&level.cells[id], hanging)[c] as f32 * eighth,
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::cells::Octree;
 use super::change::{Leaf, OctreeChange};
 use super::lattice::{At, OUTSIDE};
-use super::vertices::corner_weights;
+use super::vertices::{corner_shares, corner_weights};
 use crate::cut::Components;
 use crate::element::{Point, Points, deformation_gradient, hex8, quadrature};
 use crate::lists::disjoint::{find, join};
@@ -27,13 +27,9 @@ impl Leaf {
     /// eighth for each corner.
     fn for_shares(&self, mut visit: impl FnMut(u32, f64)) {
         let share = f64::from(self.cell.side()).powi(3) / 8.0;
-        if self.hanging == 0 {
-            return self.vertices.iter().for_each(|&v| visit(v, share));
-        }
-        for row in corner_weights(&self.cell, self.hanging) {
-            let carriers = self.vertices.iter().zip(row).filter(|(_, w)| *w != 0.0);
-            carriers.for_each(|(&v, w)| visit(v, w * share));
-        }
+        let shares = corner_shares(&self.cell, self.hanging);
+        let carriers = self.vertices.iter().zip(shares).filter(|(_, corners)| *corners != 0.0);
+        carriers.for_each(|(&v, corners)| visit(v, corners * share));
     }
 }
 
@@ -180,14 +176,7 @@ impl Octree {
     /// ∫ N_a dV [m³] over a leaf, for each of its eight vertices.
     pub fn shape_integrals(&self, id: usize) -> [f64; 8] {
         let share = self.cell_volume(id) / 8.0;
-        let mut integrals = [share; 8];
-        if self.hanging[id] != 0 {
-            integrals = [0.0; 8];
-            for row in corner_weights(&self.cells[id], self.hanging[id]) {
-                integrals.iter_mut().zip(row).for_each(|(integral, w)| *integral += w * share);
-            }
-        }
-        integrals
+        corner_shares(&self.cells[id], self.hanging[id]).map(|corners| corners * share)
     }
 
     /// Vertices and weights (Σ = 1) of the point that rests at `p` [m], as part of the leaf `id`; beyond its

@@ -34,7 +34,7 @@ pub use restriction::Restriction;
 pub use shape::{BoxShape, Shape};
 pub use space::OctreeSpace;
 pub use surface::OctreeSurface;
-pub use vertices::{Octants, corner_weights, parent_corner};
+pub use vertices::{Octants, corner_shares, corner_weights, parent_corner};
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::iter_over_hash_type)] // links are checked one by one, in any order

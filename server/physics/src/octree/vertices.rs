@@ -16,6 +16,10 @@ use super::lattice::{At, OUTSIDE};
 /// Marks a corner that hangs, and octants outside the body.
 const NONE: u32 = u32::MAX;
 
+/// Octants that have a neighbour along an axis, and that axis.
+const PAIRS: [(usize, usize); 12] =
+    [(0, 0), (2, 0), (4, 0), (6, 0), (0, 1), (1, 1), (4, 1), (5, 1), (0, 2), (1, 2), (2, 2), (3, 2)];
+
 /// The eight octants around a lattice point and their connection. Bit k of an octant is its side along axis k.
 #[derive(Clone, Copy, Debug)]
 pub struct Octants {
@@ -38,14 +42,12 @@ impl Octree {
             let inside = a != OUTSIDE && b != OUTSIDE;
             inside && (a == b || self.cells[a as usize].cut >> (2 * axis + 1) & 1 == 0)
         };
-        let pairs =
-            (0..3).flat_map(|axis| (0..8).map(move |o| (o, axis))).filter(|(o, axis)| o >> axis & 1 == 0);
         // Nothing is cut around most points.
-        if pairs.clone().all(|(o, axis)| is_linked(o, axis)) {
+        if PAIRS.iter().all(|&(o, axis)| is_linked(o, axis)) {
             return Octants { leaf, class: [0; 8] };
         }
         let mut class = [0, 1, 2, 3, 4, 5, 6, 7];
-        for (o, axis) in pairs.filter(|&(o, axis)| is_linked(o, axis)) {
+        for &(o, axis) in PAIRS.iter().filter(|&&(o, axis)| is_linked(o, axis)) {
             let (low, high) = (class[o].min(class[o | 1 << axis]), class[o].max(class[o | 1 << axis]));
             class.iter_mut().filter(|c| **c == high).for_each(|c| *c = low);
         }
@@ -117,18 +119,28 @@ pub fn parent_corner(cell: &Cell, c: usize) -> At {
 
 /// W of a cell: row c holds the weights of its eight vertices in the displacement of corner c.
 pub fn corner_weights(cell: &Cell, hanging: u8) -> [[f64; 8]; 8] {
-    let own = cell.octant();
     let mut W = [[0.0; 8]; 8];
     for (c, row) in W.iter_mut().enumerate() {
-        if hanging >> c & 1 == 0 {
-            row[c] = 1.0;
-            continue;
-        }
-        // The corners of the parent's edge or face between the cell's own corner and the one towards c.
-        let towards = c ^ own;
-        let between = (0..8).filter(|s| s & !towards == 0);
-        let share = 1.0 / between.clone().count() as f64;
-        between.for_each(|s| row[own ^ s] = share);
+        for_weights(cell, hanging, c, |vertex, w| row[vertex] = w);
     }
     W
+}
+
+/// Sums of the columns of W: how many corners of a cell each of its eight vertices carries.
+pub fn corner_shares(cell: &Cell, hanging: u8) -> [f64; 8] {
+    let mut shares = [0.0; 8];
+    (0..8).for_each(|c| for_weights(cell, hanging, c, |vertex, w| shares[vertex] += w));
+    shares
+}
+
+/// Calls `visit` with the vertices of a cell that carry corner `c`, and their weights.
+fn for_weights(cell: &Cell, hanging: u8, c: usize, mut visit: impl FnMut(usize, f64)) {
+    if hanging >> c & 1 == 0 {
+        return visit(c, 1.0);
+    }
+    // The corners of the parent's edge or face between the cell's own corner and the one towards c.
+    let own = cell.octant();
+    let towards = c ^ own;
+    let share = 1.0 / f64::from(1 << towards.count_ones());
+    (0..8).filter(|s| s & !towards == 0).for_each(|s| visit(own ^ s, share));
 }

@@ -85,7 +85,7 @@ impl CellStiffness {
         };
         let source = |id: u32| octree.whole_of(known, id);
         // Rotations of all cells in the chunks that change.
-        let mut kept = Kept { number: vec![NONE; cells.len()], rotations: Vec::new() };
+        let mut kept = Kept { number: vec![NONE; cells.len()], rotations: Vec::with_capacity(changed.len()) };
         for &id in changed {
             let old = if (id as usize) < known.len() { id } else { source(id) };
             let chunk = &operator.chunks[operator.places()[old as usize].chunk as usize];
