@@ -215,13 +215,16 @@ fn steps_with_multigrid_have_the_same_bits_for_any_number_of_threads() {
     let run = |threads, method| {
         let settings = BodySettings { threads, ..with(method, Scheme::ImplicitEuler, 1e-4) };
         let mut body = cube(12, 2, Law::Corotational, settings);
-        for k in 0..6 {
-            if k == 3 {
-                body.cut(&slit(0.3), 1).unwrap();
+        let edge = |y: f64| [Vector3::new(-0.1, y, 0.4), Vector3::new(1.1, y, 0.52)];
+        for k in 0..8 {
+            match k {
+                3 => drop(body.cut(&slit(0.3), 1).unwrap()),
+                5 => drop(body.cut(&BladeSweep { segments: vec![edge(-0.1), edge(0.7)] }, 2).unwrap()),
+                _ => {}
             }
             advance(&mut body, 0.02, &[]);
         }
-        body.positions().to_vec()
+        (body.positions().to_vec(), body.surface().triangles.clone())
     };
     for method in [Method::Multigrid, Method::MgPcg] {
         assert_eq!(run(1, method), run(2, method));
