@@ -36,7 +36,7 @@ pub struct Part {
 const SCENES: [&str; 4] = ["demonstration", "kidney", "brain", "fingertip"];
 
 /// Parts of the accuracy study, those that papers need first. The quick form ends with the bar at rest.
-const ACCURACY: [(&str, &str); 25] = [
+const ACCURACY: [(&str, &str); 26] = [
     ("threads", "Threads, shares of a step, and the largest mesh in real time"),
     ("nienhuys", "Relaxation: Nienhuys' table 3.1 and figure 3.12"),
     ("nienhuys-cut", "Cuts along faces: Nienhuys' figures 3.13 to 3.16"),
@@ -46,6 +46,7 @@ const ACCURACY: [(&str, &str); 25] = [
     ("enriched", "What an enriched element costs, by law"),
     ("slice", "A falling slice, linear beside nonlinear"),
     ("springs", "Masses and springs beside finite elements"),
+    ("peers", "Steps of SOFA and MuJoCo beside scindo's"),
     ("dick-tables", "Octree cells: tables 1 and 2 of Dick"),
     ("dick-convergence", "Octree cells: rates of multigrid"),
     ("dick-sizes", "Octree cells: time per cell"),
@@ -64,7 +65,7 @@ const ACCURACY: [(&str, &str); 25] = [
     ("collision", "Methods of collision detection"),
 ];
 /// How many of them the quick form has.
-const QUICK: usize = 16;
+const QUICK: usize = 17;
 
 /// The parts of a book, in the order in which they run.
 pub fn parts(quick: bool) -> Vec<Part> {

@@ -1,6 +1,7 @@
 //! Experiments on octree cells and multigrid, those of Dick, Georgii, Westermann 2011 at their sizes; on methods of
 //! collision detection; on relaxation (Nienhuys 2003); on the convergence of cut meshes (Schoch et al. 2013); on ways to cut;
-//! on fronts of cuts; on what enriched elements cost and how a slice falls; on masses and springs; and on threads.
+//! on fronts of cuts; on what enriched elements cost and how a slice falls; on masses and springs; on other simulators;
+//! and on threads.
 //!
 //! Unlike the other cases of the study these are not scenes with changed keys, but measurements of the physics
 //! itself. [`shape`] and [`model`] build solids and blades, [`system`] is the linear system of a step, and [`solve`]
@@ -63,6 +64,8 @@ mod slice;
 
 mod springs;
 
+mod peers;
+
 use nalgebra::Vector3;
 use scindo_physics::body::Body;
 use scindo_physics::material::Law;
@@ -102,7 +105,7 @@ fn distance(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
 }
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 18] = [
+pub const NAMES: [&str; 19] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -121,6 +124,7 @@ pub const NAMES: [&str; 18] = [
     "enriched",
     "slice",
     "springs",
+    "peers",
 ];
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
@@ -148,6 +152,7 @@ fn find(name: &str) -> Option<Experiment> {
         "enriched" => Some(enriched::enriched),
         "slice" => Some(slice::slice),
         "springs" => Some(springs::springs),
+        "peers" => Some(peers::peers),
         _ => None,
     }
 }
