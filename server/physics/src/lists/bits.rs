@@ -1,4 +1,4 @@
-//! Sets of numbers, one bit each.
+//! Sets of numbers, one bit each. For sets of cells in space see [`octree::Bits`](crate::octree::Bits).
 
 /// A set of numbers.
 #[derive(Clone, Debug)]
@@ -78,9 +78,9 @@ impl Ranks<'_> {
 
     /// How many numbers of the set are below `i`, which is one of them.
     #[inline]
-    pub fn of(&self, i: u32) -> usize {
+    pub fn of(&self, i: u32) -> u32 {
         let (word, below) = (self.set.0[i as usize / 64], (1 << (i % 64)) - 1);
-        (self.before[i as usize / 64] + (word & below).count_ones()) as usize
+        self.before[i as usize / 64] + (word & below).count_ones()
     }
 }
 
@@ -101,7 +101,7 @@ mod tests {
         assert!((0..1200).all(|i| bits.has(i) == known.contains(&i)));
         let ranks = bits.ranks();
         assert_eq!(ranks.count(), known.len());
-        assert!(known.iter().enumerate().all(|(rank, i)| ranks.of(*i) == rank));
+        assert!(known.iter().enumerate().all(|(rank, i)| ranks.of(*i) == rank as u32));
         let mut part = Bits::new(1000);
         assert!(part.insert(known.iter().copied().next().unwrap_or(0)) && part.is_within(&bits));
         assert!(!bits.is_within(&part));

@@ -93,25 +93,18 @@ impl<T: Copy> Jagged<T> {
     /// ordered by `key`, which tells entries of a list apart; one that comes replaces one with its key.
     pub fn edit(&mut self, edits: &[(u32, T, bool)], key: impl Fn(&T) -> u32) {
         let Some(&none) = edits.first() else { return };
-        // Sorted by the lists in two passes, as `by_counting`.
         let mut lists = Bits::new(self.len());
         lists.extend(edits.iter().map(|edit| edit.0));
         let ranks = lists.ranks();
-        let mut first = vec![0_u32; ranks.count() + 1];
-        edits.iter().for_each(|edit| first[ranks.of(edit.0) + 1] += 1);
-        for rank in 0..ranks.count() {
-            first[rank + 1] += first[rank];
-        }
-        let (mut next, mut sorted) = (first.clone(), vec![none; edits.len()]);
-        for edit in edits {
-            let place = &mut next[ranks.of(edit.0)];
-            sorted[*place as usize] = *edit;
-            *place += 1;
-        }
-        let mut list = Vec::new();
-        for ends in first.windows(2) {
-            let edits = &mut sorted[ends[0] as usize..ends[1] as usize];
-            edits.sort_unstable_by_key(|edit| key(&edit.1));
+        let by_list = |visit: &mut dyn FnMut(u32, (u32, T, bool))| {
+            edits.iter().for_each(|edit| visit(ranks.of(edit.0), *edit));
+        };
+        let of_lists = Jagged::by_counting(ranks.count(), by_list, none);
+        let (mut edits, mut list) = (Vec::new(), Vec::new());
+        for rank in 0..of_lists.len() {
+            edits.clear();
+            edits.extend_from_slice(of_lists.get(rank));
+            edits.sort_unstable_by_key(|edit: &(u32, T, bool)| key(&edit.1));
             let i = edits[0].0 as usize;
             list.clear();
             let is_edited = |entry: &T| edits.binary_search_by_key(&key(entry), |edit| key(&edit.1)).is_ok();
