@@ -178,19 +178,13 @@ impl Multigrid {
         let mut changes = None;
         team.run(&mut [&mut || changes = hierarchy.follow(octree, changed), beside]);
         let Some(changes) = changes else { return false };
-        let mut follow = |hierarchy: &Hierarchy| {
+        hierarchy.follow_transfers(team, &changes, &mut |hierarchy| {
             galerkin.follow(hierarchy, &changes);
             for (l, (change, vectors)) in changes.iter().zip(&mut *levels).enumerate() {
                 vectors.follow((l, *first), hierarchy.levels[l].n_vertices, change);
             }
-        };
-        if *first == 0 {
-            hierarchy.follow_transfers(team, &changes, &mut follow);
-        } else {
-            // Directions that are held on a coarse level follow from the transfers.
-            hierarchy.follow_transfers(team, &changes, &mut |_| {});
-            follow(hierarchy);
-        }
+        });
+        galerkin.hold_coarse(hierarchy);
         self.forget_springs();
         if changes.last().is_some_and(|change| !change.moved.is_empty()) {
             self.coarsest = Coarsest::new(&self.hierarchy);
