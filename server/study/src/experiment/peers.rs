@@ -27,6 +27,8 @@ const MEASURED: &str = "SOFA v26.06 (built with -O3, double precision) and MuJoC
 const STEPS: usize = 125;
 const FEW: usize = 12;
 const FALLING: usize = 7;
+/// Measurements of the whole form, about.
+const MEASUREMENTS: usize = 30;
 
 /// A step of another simulator.
 #[derive(Clone, Copy, Debug)]
@@ -134,7 +136,7 @@ pub fn peers(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
 
     let ways = [ten("scindo, 1 thread", &BAR, 1), ten("scindo, 2 threads", &BAR, 2)];
     result.tables.push(beside(bench, "The bar, ten iterations in each step", steps, &ways, &BAR_TEN)?);
-    let ways = ["pcg", "two-level-pcg"].map(|method| converging(&with(method), bar(&to(method, 1e-6))));
+    let ways = ["pcg", "two-level-pcg"].map(|method| converging(&by(method), bar(&to(method, 1e-6))));
     let title = "The bar, each step to a millionth";
     result.tables.push(beside(bench, title, steps, &ways, &BAR_CONVERGED)?);
     at_equal_error(bench, steps, (&bar(&to("two-level-pcg", 1e-8)), &bar), &mut result)?;
@@ -170,7 +172,7 @@ fn converging(name: &str, scene: String) -> Own {
     Own { converges: true, ..own(name, 1, scene) }
 }
 
-fn with(method: &str) -> String {
+fn by(method: &str) -> String {
     format!("scindo, {method}")
 }
 
@@ -242,9 +244,6 @@ fn beside(
     Ok(table)
 }
 
-/// Measurements of the whole form, about.
-const MEASUREMENTS: usize = 30;
-
 /// Adds `peers` beside the fastest of `runs` with as many threads; these are given with their fastest step [s].
 fn add(table: &mut Table, runs: &[(usize, f64)], peers: &[Peer]) {
     for peer in peers {
@@ -288,12 +287,12 @@ fn at_equal_error(
                 let solver = format!(
                     "iterations = {iterations}, tolerance = 1e-30, precision = \"single\", method = \"{method}\""
                 );
-                let run = run(&own(&with(method), 1, scene(&solver)), steps, true)?;
+                let run = run(&own(&by(method), 1, scene(&solver)), steps, true)?;
                 let off = off(&run, &truth, &rest);
                 known.push((run, off));
             };
             let Some(run) = found else { continue };
-            table.row(with(method), &[Some(run.best_s), Some(run.median_s), Some(run.iterations), None]);
+            table.row(by(method), &[Some(run.best_s), Some(run.median_s), Some(run.iterations), None]);
             runs.push((1, run.best_s));
         }
         add(&mut table, &runs, peers);
@@ -305,7 +304,7 @@ fn at_equal_error(
     }
     for ((method, _), known) in TRIED.iter().zip(&known) {
         let points = known.iter().map(|(run, off)| [1e3 * run.best_s, *off]).collect();
-        chart.lines.push(Line { name: with(method), points });
+        chart.lines.push(Line { name: by(method), points });
     }
     result.plots.push(Plots {
         caption: "Errors of the bar. For scindo the fastest steps with more and more iterations; for others from the fastest \
