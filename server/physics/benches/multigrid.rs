@@ -9,10 +9,12 @@ use std::time::Instant;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use scindo_physics::element::Simd;
 use scindo_physics::material::{Lame, Law};
-use scindo_physics::multigrid::{CellMaterial, Coefficients, Hierarchy, Multigrid, MultigridSettings};
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
 use scindo_physics::operator::cells::CellStiffness;
 use scindo_physics::operator::{BLOCK, BlockJacobi, ElasticUpdate, FixedCopy, Stiffness};
+use scindo_physics::solver::multigrid::{
+    CellMaterial, Coefficients, Hierarchy, Multigrid, MultigridSettings,
+};
 use scindo_physics::team::{Team, blocks};
 
 const LAME: Lame = Lame { mu: 4e5, lambda: 6e5 };

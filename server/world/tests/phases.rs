@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use scindo_physics::phase::Phase;
+use scindo_physics::team::phase::Phase;
 use scindo_world::inputs::Inputs;
 use scindo_world::results::Results;
 use scindo_world::scene::Scene;

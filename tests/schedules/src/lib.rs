@@ -7,8 +7,6 @@
 
 #![allow(dead_code, unreachable_pub)] // the sources of the team also serve what is not tried here
 
-#[path = "../../../server/physics/src/phase.rs"]
-pub mod phase;
 pub mod sync;
 #[path = "../../../server/physics/src/team/mod.rs"]
 pub mod team;

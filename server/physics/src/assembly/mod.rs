@@ -14,6 +14,7 @@
 //! for Finite Element Analysis*.
 
 mod block_csr;
+pub mod pressure;
 mod point;
 mod error;
 mod model;

@@ -6,10 +6,10 @@ use super::{Body, BodyError};
 use crate::cut::NewCopy;
 use crate::element::Points;
 use crate::integrator::Adapted;
-use crate::lists::reserve::resize_reserving;
 use crate::octree::{
     Activity, AdaptSettings, Family, Leaf, OUTSIDE, OctreeRefinement, OctreeSpace, Restriction,
 };
+use crate::storage::reserve::resize_reserving;
 
 /// What an adaptation changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -5,13 +5,13 @@ use nalgebra::Vector3;
 use super::pressing::PressureLoad;
 use super::{Body, BodyError};
 use crate::cut::NewCopy;
+use crate::cut::remesh::SnapNode;
+use crate::cut::remesh::node::NEW;
 use crate::element::MaterialPoint;
-use crate::lists::reserve::resize_reserving;
 use crate::octree::{Coarsening, OUTSIDE};
 use crate::operator::{FixedCopy, Held};
-use crate::snap::SnapNode;
-use crate::snap::node::NEW;
 use crate::space::Space;
+use crate::storage::reserve::resize_reserving;
 
 /// A node whose displacement is prescribed in some directions.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -6,7 +6,7 @@ use super::snapping::FaceCut;
 use super::{Body, BodyError};
 use crate::cut::{BladeSweep, CutError, CutReport, NewCopy, Work};
 use crate::integrator::LooseParts;
-use crate::lists::reserve::{refill, resize_reserving};
+use crate::storage::reserve::{refill, resize_reserving};
 
 /// Pairs of sweep triangle and element that cost as much as one fragment, in a cut along faces.
 const SNAP_PAIRS_PER_FRAGMENT: usize = 4;

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Body, BodyError};
 use crate::assembly::Model;
-use crate::estimate::{CellRecovery, CutTets, MeshError, StressRecovery};
-use crate::multigrid::{CoarsestSolve, LevelReport};
+use crate::body::estimate::{CellRecovery, CutTets, MeshError, StressRecovery};
+use crate::solver::multigrid::{CoarsestSolve, LevelReport};
 
 /// Counts of elements so flat that one of their motions is far stiffer than the others.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,6 +6,7 @@ mod boundary;
 mod cost;
 mod cutting;
 mod error;
+pub mod estimate;
 mod measures;
 mod phases;
 mod precision;
@@ -36,8 +37,10 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::Vector3;
 
+use crate::assembly::pressure::Pressure;
 pub use crate::assembly::{ElementKind, Volumetric};
 pub use crate::cut::FrontRule;
+use crate::cut::remesh::Snapper;
 use crate::cut::{CutMesh, IncisionMark, Surface};
 use crate::integrator::{
     Dynamics, LinearlyImplicit, LocalConnectivity, LooseParts, ModelSolver, State, StepInputs, StepSolver,
@@ -45,18 +48,16 @@ use crate::integrator::{
 pub use crate::integrator::{
     MassKind, Notice, Outcome, PairSpring, PointSpring, Scheme, SolveReport, SpringKind,
 };
-use crate::lists::reserve::{refill, resize_reserving};
 use crate::material::{Material, Rayleigh, Regions};
 use crate::mesh::{HexMesh, TetMesh};
 use crate::operator::FixedCopy;
 pub use crate::operator::OperatorChoice;
-use crate::phase::Phase;
-use crate::pressure::Pressure;
-use crate::skin::{Skin, SkinSettings, SkinShape};
-use crate::snap::Snapper;
 pub use crate::solver::{Method, PcgSettings, StopReason};
+use crate::space::skin::{Skin, SkinSettings, SkinShape};
 use crate::space::{Space, Tets};
+use crate::storage::reserve::{refill, resize_reserving};
 use crate::team::Team;
+use crate::team::phase::Phase;
 use boundary::Boundary;
 use precision::too_flat_for_single;
 use range::{Beyond, Range};

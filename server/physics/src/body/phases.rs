@@ -1,10 +1,10 @@
 //! Who is told of the phases of a step.
 
 use super::Body;
-use crate::phase::PhaseMark;
+use crate::team::phase::PhaseMark;
 
 impl Body {
-    /// Calls `mark` with each [`Phase`](crate::phase::Phase) of a step when it begins, on the thread that
+    /// Calls `mark` with each [`Phase`](crate::team::phase::Phase) of a step when it begins, on the thread that
     /// steps; `None` ends that. The last phase ends when [`step`](Self::step) returns. Results do not
     /// change.
     ///

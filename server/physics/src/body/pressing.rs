@@ -3,7 +3,7 @@
 //! The force is −p n da of the present configuration, except with the linear law: its strains are those of the rest
 //! configuration, and so are n and da. How the force follows the surface depends on the way of a step:
 //!
-//! - On the general path it is a part of Newton's method, with its load stiffness ([`crate::pressure`]), and explicit
+//! - On the general path it is a part of Newton's method, with its load stiffness ([`crate::assembly::pressure`]), and explicit
 //!   schemes evaluate it in every stage. Their critical step leaves the load stiffness out, which is about p/E of the
 //!   elastic one.
 //! - On the fast path it is that at the predicted positions x + h v, and a dead load within the step. The error of

@@ -3,10 +3,10 @@
 use super::{Ablation, BodyError, CuttingMethod, LooseRule, cost};
 use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::FrontRule;
+use crate::cut::remesh::SnapSettings;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
 use crate::material::Law;
 use crate::operator::OperatorChoice;
-use crate::snap::SnapSettings;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
 /// Settings that are chosen when a body is made.

@@ -4,9 +4,9 @@ use nalgebra::Vector3;
 use smallvec::SmallVec;
 
 use super::{Body, Notice, Outcome, PointSpring, Scheme, SolveReport};
+use crate::assembly::pressure::Pressure;
 use crate::integrator::{LooseParts, PairSpring, StepInputs, Together};
 use crate::operator::FixedCopy;
-use crate::pressure::Pressure;
 use crate::solver::{PcgSettings, StopReason};
 use crate::space::Space;
 

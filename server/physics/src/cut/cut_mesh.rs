@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::lists::reserve::reserve_half_again;
 use crate::mesh::{MeshError, TET_FACES, TetMesh};
+use crate::storage::reserve::reserve_half_again;
 
 use super::drawn::pending::{Pending, PendingFace, Pieces};
 use super::drawn::traces::{TraceLine, Traces};

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::cut_mesh::CutMesh;
 use super::shell::surface::Surface;
-use crate::lists::disjoint::{find, join};
+use crate::storage::disjoint::{find, join};
 
 /// Violations of the invariants of cut states: counts must be zero, errors must be at rounding level.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

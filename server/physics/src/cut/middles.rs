@@ -7,8 +7,8 @@
 //! number of the edge.
 
 use crate::element::TET_EDGES;
-use crate::lists::disjoint::{find, join};
 use crate::mesh::Tet10Mesh;
+use crate::storage::disjoint::{find, join};
 
 use super::cut_mesh::CutMesh;
 use super::topology::copies::NewCopy;

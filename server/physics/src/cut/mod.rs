@@ -1,7 +1,7 @@
 //! Cutting: material pieces inside the elements, node copies that follow from connectivity, and
 //! the surface in between.
 //!
-//! A cut never edits the element mesh. Three layers follow from each other, each a pure function of
+//! Such a cut never edits the element mesh; a cut that does is in [`remesh`]. Three layers follow from each other, each a pure function of
 //! the one before:
 //!
 //! 1. [`fragments`](topology::fragments): a conforming tet mesh *inside* the elements, at first one fragment
@@ -30,6 +30,8 @@ pub(crate) mod drawn;
 pub(crate) mod shell;
 mod sweep;
 mod cut_mesh;
+pub mod enrichment;
+pub mod remesh;
 pub(crate) mod middles;
 mod incision_mark;
 mod solid;

@@ -13,8 +13,8 @@ use nalgebra::Vector3;
 use super::quasi_newton::QuasiNewton;
 use super::springs::ActiveSpring;
 use super::step_inputs::LinearInputs;
-use crate::lists::reserve::resize_reserving;
 use crate::operator::Padded;
+use crate::storage::reserve::resize_reserving;
 
 /// The part of the promised decrease that a step must keep (Armijo 1966).
 const ARMIJO: f64 = 1e-4;

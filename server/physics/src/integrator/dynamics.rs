@@ -22,10 +22,10 @@ use super::step_solver::{SolverSettings, StepSolver, make_room};
 use super::together::Member;
 use crate::assembly::{Model, ModelError};
 use crate::cut::NewCopy;
-use crate::lists::reserve::resize_reserving;
 use crate::material::{Law, Material};
 use crate::operator::{FixedCopy, Stiffness};
 use crate::space::Space;
+use crate::storage::reserve::resize_reserving;
 use crate::team::Team;
 
 /// Settings with which no step can be made.

@@ -13,8 +13,8 @@ use super::step_inputs::StepInputs;
 use crate::assembly::Tangent;
 use crate::material::Law;
 use crate::operator::FixedCopy;
-use crate::phase::Phase;
 use crate::team::Team;
+use crate::team::phase::Phase;
 
 /// Fraction of the longest stable step that is used.
 const MARGIN: f64 = 0.95;

@@ -15,9 +15,9 @@ use super::step_inputs::{StepHistory, StepInputs};
 use crate::assembly::Tangent;
 use crate::element::Points;
 use crate::material::{Law, Rayleigh};
-use crate::phase::Phase;
 use crate::solver::{NewtonReport, NewtonSettings, Potential, StopReason};
 use crate::team::Team;
+use crate::team::phase::Phase;
 
 /// An element whose ‖F‖ is below this has collapsed.
 const COLLAPSED: f64 = 0.05;

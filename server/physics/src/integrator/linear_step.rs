@@ -27,19 +27,19 @@ use super::state::{State, WEIGHTLESS, hold};
 use super::step_grid::StepGrid;
 use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
 use super::step_solver::ActiveSprings;
-use crate::lists::reserve::resize_reserving;
 use crate::material::Rayleigh;
-use crate::multigrid::{CoarsestSolve, Hierarchy, LevelReport, Multigrid};
 use crate::octree::Octree;
 use crate::operator::{
     BLOCK, Block6, BlockJacobi, CompositeDiagonal, FixedCopy, Held, LinearOperator, Padded, Spring,
     StiffModes, Stiffness, Substitution, Sum, SystemOperator, apply, block_of, filter, invert, invert_free,
     padded, unpadded,
 };
-use crate::phase::Phase;
+use crate::solver::multigrid::{CoarsestSolve, Hierarchy, LevelReport, Multigrid};
+use crate::solver::two_level::CoarseSpace;
 use crate::solver::{LEAST_REFERENCE, LinearReport, Method, Pcg, StopReason};
+use crate::storage::reserve::resize_reserving;
+use crate::team::phase::Phase;
 use crate::team::{Team, blocks};
-use crate::two_level::CoarseSpace;
 
 /// Part of the residual that a solve leaves on the way to an equilibrium of a law that rotates, at most; the last
 /// one reaches the tolerance.

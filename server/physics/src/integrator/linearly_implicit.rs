@@ -14,13 +14,13 @@ use super::step_solver::{SolverSettings, StepSolver};
 use super::together::Member;
 use crate::assembly::ModelError;
 use crate::element::Points;
-use crate::lists::reserve::refill;
 use crate::material::Material;
-use crate::multigrid::{CoarsestSolve, LevelReport};
 use crate::octree::OctreeSpace;
 use crate::operator::{ElasticUpdate, Stiffness};
+use crate::solver::multigrid::{CoarsestSolve, LevelReport};
 use crate::solver::{Method, PcgSettings};
 use crate::space::Space;
+use crate::storage::reserve::refill;
 use crate::team::Team;
 
 /// A step that fails is tried again in 2 and then in 4 parts.

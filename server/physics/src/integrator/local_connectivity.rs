@@ -6,11 +6,11 @@
 
 use super::parts::LooseParts;
 use crate::cut::NewCopy;
-use crate::lists::disjoint::{find, join};
-use crate::lists::numbering::Numbering;
-use crate::lists::reserve::resize_reserving;
 use crate::operator::FixedCopy;
 use crate::space::Space;
+use crate::storage::disjoint::{find, join};
+use crate::storage::numbering::Numbering;
+use crate::storage::reserve::resize_reserving;
 
 /// Buffers of the local search.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]

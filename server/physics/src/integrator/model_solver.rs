@@ -20,14 +20,14 @@ use super::settings::DynamicsSettings;
 use super::state::State;
 use super::step_inputs::StepInputs;
 use super::step_solver::{ActiveSprings, SolverSettings, StepSolver};
+use crate::assembly::pressure::Follower;
 use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
 use crate::element::Points;
-use crate::lists::reserve::resize_reserving;
 use crate::material::Material;
 use crate::operator::FixedCopy;
-use crate::pressure::Follower;
 use crate::solver::Newton;
 use crate::space::Space;
+use crate::storage::reserve::resize_reserving;
 use crate::team::Team;
 
 /// Positions beyond this [m] count as not finite.

@@ -12,10 +12,10 @@ use super::spin::SpinGuard;
 use super::state::State;
 use super::step_inputs::{StepHistory, StepInputs};
 use crate::cut::NewCopy;
-use crate::lists::reserve::resize_reserving;
 use crate::material::Law;
 use crate::octree::Restriction;
 use crate::operator::BLOCK;
+use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// A change of the elements that leaves the material whole.

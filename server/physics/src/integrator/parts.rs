@@ -7,9 +7,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::lists::disjoint::{find, join};
-use crate::lists::reserve::resize_reserving;
 use crate::operator::FixedCopy;
+use crate::storage::disjoint::{find, join};
+use crate::storage::reserve::resize_reserving;
 
 /// Connected parts of a body, by copy.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -13,14 +13,14 @@ use nalgebra::Vector3;
 
 use super::step_grid::set_coefficients;
 use super::step_inputs::{LinearInputs, StepInputs};
-use crate::lists::reserve::resize_reserving;
-use crate::multigrid::{Coefficients, Composite, Hierarchy, Multigrid, MultigridSettings};
 use crate::octree::Octree;
 use crate::operator::{
     BLOCK, FixedCopy, LinearOperator, Padded, Preconditioner, Spring, Stiffness, block_of, filter, padded,
     rows, unpadded,
 };
+use crate::solver::multigrid::{Coefficients, Composite, Hierarchy, Multigrid, MultigridSettings};
 use crate::solver::{LinearReport, Method, Pcg, PcgSettings, StopReason};
+use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// Largest number of inner solves. Where the norm of the residual does not halve in one, further ones do not pay.

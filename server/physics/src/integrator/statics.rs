@@ -6,9 +6,9 @@
 
 use nalgebra::Vector3;
 
+use crate::assembly::pressure::{Follower, Pressure};
 use crate::assembly::{BlockCsr, Model, Tangent};
 use crate::operator::FixedCopy;
-use crate::pressure::{Follower, Pressure};
 use crate::solver::{Curvature, Newton, NewtonReport, Potential};
 use crate::team::Team;
 

@@ -2,9 +2,9 @@
 
 use super::step_inputs::LinearInputs;
 use crate::material::Material;
-use crate::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
 use crate::octree::Octree;
 use crate::operator::{Block6, Inverse3, LinearOperator, Spring, Stiffness, invert};
+use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
 use crate::team::Team;
 
 /// If a spring is stiffer than this times the body at its point, all levels take the springs: corrections by levels

@@ -6,10 +6,10 @@ use super::increment::Increment;
 use super::parts::LooseParts;
 use super::springs::{ActiveSpring, PointSpring};
 use super::state::State;
+use crate::assembly::pressure::Pressure;
 use crate::element::Points;
 use crate::material::Material;
 use crate::operator::{ElasticUpdate, FixedCopy, Held};
-use crate::pressure::Pressure;
 use crate::solver::{LinearReport, PcgSettings};
 
 /// Inputs of one step.

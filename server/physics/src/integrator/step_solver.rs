@@ -17,11 +17,11 @@ use super::step_inputs::StepInputs;
 use crate::assembly::{Model, ModelError};
 use crate::element::Points;
 use crate::material::Material;
-use crate::multigrid::{CoarsestSolve, LevelReport};
 use crate::operator::{FixedCopy, Stiffness};
-use crate::saved::saved_as;
+use crate::solver::multigrid::{CoarsestSolve, LevelReport};
 use crate::solver::{Method, NewtonSettings, PcgSettings};
 use crate::space::Space;
+use crate::storage::saved::saved_as;
 use crate::team::Team;
 
 saved_as!(saved_solver, Box, StepSolver, Linear(LinearlyImplicit), Model(ModelSolver));

@@ -1,7 +1,7 @@
 //! The rest mesh: nodes, linear tetrahedra, their volumes and their orientation.
 //!
 //! The rest of the crate only *reads* a mesh. Cutting separates material inside the elements and never edits
-//! this structure; cutting along faces ([`crate::snap`]) makes a new mesh.
+//! this structure; cutting along faces ([`crate::cut::remesh`]) makes a new mesh.
 
 mod box_mesh;
 mod error;

@@ -57,7 +57,7 @@ pub struct LeafMap {
     bricks_along: [usize; 3],
     /// Per brick [`OUTSIDE`], the only leaf with [`WHOLE`], or the number of its entries in `leaves`.
     bricks: Vec<u32>,
-    #[serde(with = "crate::saved::arrays")]
+    #[serde(with = "crate::storage::saved::arrays")]
     leaves: Vec<[u32; BRICK_CELLS]>,
     /// Entries of `leaves` that no brick uses, since one leaf covers it again.
     free: Vec<u32>,

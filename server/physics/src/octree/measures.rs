@@ -10,9 +10,9 @@ use super::lattice::{At, OUTSIDE};
 use super::vertices::{corner_shares, corner_weights};
 use crate::cut::Components;
 use crate::element::{Point, Points, deformation_gradient, hex8, quadrature};
-use crate::lists::disjoint::{find, join};
-use crate::lists::reserve::resize_reserving;
 use crate::material::Region;
+use crate::storage::disjoint::{find, join};
+use crate::storage::reserve::resize_reserving;
 
 /// Corners of the faces in the directions −x, +x, −y, +y, −z, +z.
 pub const FACES: [[usize; 4]; 6] =

@@ -13,8 +13,8 @@
 use nalgebra::Vector3;
 
 use super::coarsen::Coarsening;
-use crate::lists::disjoint::{find, join};
 use crate::operator::FixedCopy;
+use crate::storage::disjoint::{find, join};
 
 /// The solver stops at this part of its first right-hand side.
 const TOLERANCE: f64 = 1e-15;

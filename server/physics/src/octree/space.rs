@@ -18,11 +18,11 @@ use crate::cut::{
 use crate::element::{MaterialPoint, Point, Points, Simd};
 use crate::material::{Lame, Material, Region};
 use crate::mesh::MeshError;
-use crate::multigrid::Hierarchy;
 use crate::operator::cells::CellStiffness;
 use crate::operator::{StiffModes, Stiffness};
-use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::solver::multigrid::Hierarchy;
 use crate::space::deepest::{Bounds, deepest_of};
+use crate::space::skin::{Skin, SkinError, SkinSettings, SkinShape};
 use crate::space::{RestPoint, Space, VisitPiece};
 use crate::team::Team;
 

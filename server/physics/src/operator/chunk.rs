@@ -9,9 +9,9 @@ use super::kernel::{Batches, Block6, Coefficients, EnergyCoefficients, Locals, R
 use super::shared_lanes::Merged;
 use super::{Padded, padded};
 use crate::element::{LANES, Simd};
-use crate::lists::numbering::Numbering;
-use crate::lists::reserve::resize_reserving;
 use crate::mesh::TetMesh;
+use crate::storage::numbering::Numbering;
+use crate::storage::reserve::resize_reserving;
 
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Chunk {

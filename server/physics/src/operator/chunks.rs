@@ -6,7 +6,7 @@
 
 use super::BLOCK;
 use crate::element::{Ids, LANES};
-use crate::lists::reserve::resize_reserving;
+use crate::storage::reserve::resize_reserving;
 
 /// Number of batches kept open while pieces are packed, one bit each; more of them separate neighbours
 /// better.

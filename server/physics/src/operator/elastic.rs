@@ -14,10 +14,10 @@ use super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
 use super::{BLOCK, LinearOperator, Padded, block_of};
 use crate::cut::Piece;
 use crate::element::Simd;
-use crate::lists::numbering::Numbering;
-use crate::lists::reserve::resize_reserving;
 use crate::material::Regions;
 use crate::mesh::TetMesh;
+use crate::storage::numbering::Numbering;
+use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks, ranges};
 
 /// Largest number of lanes of one chunk: four copies each must leave room in 16-bit local numbers.

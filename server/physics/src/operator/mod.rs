@@ -30,7 +30,7 @@ pub use stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
 pub use substitution::{Substitutable, Substitution};
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 
-use crate::saved::saved_as;
+use crate::storage::saved::saved_as;
 use crate::team::{Team, blocks};
 use cells::CellStiffness;
 

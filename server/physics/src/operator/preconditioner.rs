@@ -7,7 +7,7 @@ use super::{
     BLOCK, Block6, FixedCopy, Held, Iterate, LinearOperator, Padded, Preconditioner, Substitution, Sum,
     block_of, rows,
 };
-use crate::lists::reserve::resize_reserving;
+use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// Block-Jacobi preconditioner M⁻¹: one symmetric positive definite 3×3 matrix per copy.

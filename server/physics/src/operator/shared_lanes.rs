@@ -6,7 +6,7 @@
 
 use super::chunks::NO_PIECE;
 use crate::cut::Piece;
-use crate::lists::numbering::Numbering;
+use crate::storage::numbering::Numbering;
 
 /// Assignment of pieces to lanes. The *carrier* of a piece is the piece whose lane integrates it.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]

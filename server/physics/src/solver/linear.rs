@@ -30,7 +30,7 @@ pub enum Method {
     Multigrid,
     /// Conjugate gradients preconditioned by one cycle of multigrid; the same holds.
     MgPcg,
-    /// Conjugate gradients preconditioned by block-Jacobi and a [coarse space](crate::two_level). Steps of several
+    /// Conjugate gradients preconditioned by block-Jacobi and a [coarse space](crate::solver::two_level). Steps of several
     /// bodies that touch each other, and assembled matrices, are solved by [`Pcg`](Self::Pcg) instead.
     TwoLevelPcg,
     /// Sparse Cholesky factorisation; the analysis is kept while the pattern stays.

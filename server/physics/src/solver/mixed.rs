@@ -15,8 +15,8 @@ use nalgebra::Vector3;
 
 use super::newton::{Curvature, Newton, NewtonReport, Potential, ROUNDING};
 use crate::operator::FixedCopy;
-use crate::phase::Phase;
 use crate::team::Team;
+use crate::team::phase::Phase;
 
 /// Largest number of steps. Five are usual.
 const MOST_STEPS: u32 = 10;

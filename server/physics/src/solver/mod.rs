@@ -4,6 +4,8 @@
 //! plain norm is blind to slivers. Each reports its number of iterations, its residual and why it
 //! stopped. None iterates through a direction of non-positive curvature.
 
+pub mod multigrid;
+pub mod two_level;
 mod real;
 mod report;
 mod algebraic_error;

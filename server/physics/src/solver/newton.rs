@@ -12,8 +12,8 @@ use super::linear::{LinearSettings, LinearSolver, Method};
 use super::report::StopReason;
 use crate::assembly::BlockCsr;
 use crate::operator::{FixedCopy, StiffModes};
-use crate::phase::Phase;
 use crate::team::Team;
+use crate::team::phase::Phase;
 
 /// A function to minimise: potential energy, or that plus the inertia of a time step.
 pub trait Potential {

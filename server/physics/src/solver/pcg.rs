@@ -5,8 +5,8 @@
 
 use super::algebraic_error::AlgebraicError;
 use super::report::{LinearReport, StopReason};
-use crate::lists::reserve::resize_reserving;
 use crate::operator::{Advance, BLOCK, Iterate, LinearOperator, Padded, Preconditioner, block_of, rows};
+use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// Stopping criteria of a solve.

@@ -9,6 +9,7 @@ mod hexahedra;
 mod linear_tets;
 mod quadratic_tets;
 mod rest_point;
+pub mod skin;
 mod tets;
 
 #[cfg(test)]
@@ -32,11 +33,11 @@ use crate::cut::{BladeSweep, Components, CutError, CutReport, Flaws, IncisionMar
 use crate::element::{MaterialPoint, Points};
 use crate::material::Material;
 use crate::mesh::MeshError;
-use crate::multigrid::Hierarchy;
 use crate::octree::OctreeSpace;
 use crate::operator::{StiffModes, Stiffness};
-use crate::saved::saved_as;
-use crate::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::solver::multigrid::Hierarchy;
+use crate::space::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use crate::storage::saved::saved_as;
 use crate::team::Team;
 
 saved_as!(saved_space, Box, Space, Tets(Tets), Octree(OctreeSpace));
@@ -149,7 +150,7 @@ pub trait Space: Any + Points + Send + Sync {
     fn areas(&self, selected: &[bool]) -> Vec<f64>;
 
     /// Calls `visit` for every face of the skin all of whose nodes are `selected`, by node of the uncut body, as it is cut
-    /// now. The points are those of [`Pressure::add_face`](crate::pressure::Pressure::add_face). The faces of a
+    /// now. The points are those of [`Pressure::add_face`](crate::assembly::pressure::Pressure::add_face). The faces of a
     /// cut face are its parts; lips of cuts are not skin. Returns whether there are such faces at all: without
     /// them a body takes no pressure.
     fn for_skin_faces(&self, _selected: &[bool], _visit: &mut dyn FnMut(&[MaterialPoint])) -> bool {

@@ -15,14 +15,15 @@
 
 mod blocks;
 mod gate;
+pub mod phase;
 mod threads;
 
 pub use blocks::{Blocks, BlocksMut, RangesMut, blocks, ranges};
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::phase::{Marks, Phase, PhaseMark};
 use crate::sync::{Arc, AtomicBool, Ordering, SPINS_BEFORE_YIELD, spin_loop, thread};
+use crate::team::phase::{Marks, Phase, PhaseMark};
 
 use gate::Gate;
 use threads::{Lookout, Threads};

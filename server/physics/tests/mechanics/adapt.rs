@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
+use scindo_physics::body::estimate::CellRecovery;
 use scindo_physics::body::{
     AdaptReport, Arithmetic, Body, BodyError, BodySettings, Method, Outcome, PcgSettings, Scheme,
 };
 use scindo_physics::cut::BladeSweep;
-use scindo_physics::estimate::CellRecovery;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::octree::{AdaptSettings, BoxShape, Octree, OctreeSettings, OctreeSpace};
 

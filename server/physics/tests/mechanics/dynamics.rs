@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use scindo_allocations::allocations;
+use scindo_physics::assembly::pressure::Pressure;
 use scindo_physics::assembly::{Model, Volumetric};
 use scindo_physics::body::{PointSpring, SpringKind};
 use scindo_physics::cut::{BladeSweep, CutMesh};
@@ -12,7 +13,6 @@ use scindo_physics::integrator::{
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_hexes, box_mesh};
 use scindo_physics::operator::FixedCopy;
-use scindo_physics::pressure::Pressure;
 use scindo_physics::solver::{LinearSettings, Method, NewtonSettings};
 use scindo_physics::team::Team;
 

@@ -13,7 +13,7 @@ use scindo_physics::element::{Point, Points};
 use scindo_physics::material::{Law, Material};
 use scindo_physics::mesh::{BoxPattern, MeshError, TetMesh, box_mesh};
 use scindo_physics::operator::{Block6, Direction, ElasticUpdate, Padded, Place, StiffModes, Stiffness};
-use scindo_physics::skin::{Skin, SkinError, SkinSettings, SkinShape};
+use scindo_physics::space::skin::{Skin, SkinError, SkinSettings, SkinShape};
 use scindo_physics::space::{RestPoint, Space, Tets, VisitPiece};
 use scindo_physics::team::Team;
 

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use scindo_allocations::allocations;
 use scindo_physics::body::{Body, BodySettings, PcgSettings, Scheme};
 use scindo_physics::material::{Law, Material};
-use scindo_physics::phase::Phase;
+use scindo_physics::team::phase::Phase;
 
 use crate::{DOWN, SOFT, apart, cube, left_face};
 

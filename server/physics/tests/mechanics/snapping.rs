@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use scindo_physics::body::{Body, BodySettings, CuttingMethod, ElementKind, LooseRule, Outcome, Scheme};
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::remesh::{Moves, SnapSettings};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};
-use scindo_physics::snap::{Moves, SnapSettings};
 
 fn v(x: f64, y: f64, z: f64) -> Vector3<f64> {
     Vector3::new(x, y, z)

@@ -1,7 +1,7 @@
 //! Figure 10: how cycles converge on the cube uncut and cut by aligned and rotated blades, and with less and less
 //! mass.
 
-use scindo_physics::multigrid::Smoother;
+use scindo_physics::solver::multigrid::Smoother;
 
 use super::model::{CUBE, Grid, Model, animal, cube};
 use super::printed::RATES;

@@ -9,7 +9,7 @@ use super::solve::cholesky;
 use super::system::{MATERIAL, Problem, System};
 use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 use scindo_physics::material::Material;
-use scindo_physics::multigrid::Smoother;
+use scindo_physics::solver::multigrid::Smoother;
 
 type V = Vector3<f64>;
 

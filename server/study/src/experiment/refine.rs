@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use nalgebra::Vector3;
-use scindo_physics::multigrid::{Cycle, Multigrid};
+use scindo_physics::solver::multigrid::{Cycle, Multigrid};
 use scindo_physics::solver::{Pcg, PcgSettings, StopReason};
 
 use super::system::{System, norm};

@@ -9,12 +9,12 @@ use std::time::Instant;
 
 use nalgebra::Vector3;
 use scindo_physics::assembly::Model;
+use scindo_physics::body::estimate::CellRecovery;
 use scindo_physics::body::{
     Body, BodySettings, CuttingMethod, ElementKind, MassKind, Method, Outcome, PcgSettings, Scheme,
     StaticSettings,
 };
 use scindo_physics::cut::BladeSweep;
-use scindo_physics::estimate::CellRecovery;
 use scindo_physics::integrator::omega_max;
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, box_mesh};

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use nalgebra::Vector3;
 use scindo_physics::assembly::{Model, Tangent, Volumetric};
-use scindo_physics::multigrid::{Cycle, Multigrid};
 use scindo_physics::operator::{LinearOperator, Padded, Preconditioner};
+use scindo_physics::solver::multigrid::{Cycle, Multigrid};
 use scindo_physics::solver::{LinearSettings, LinearSolver, Method, Pcg, PcgSettings, Precision, StopReason};
 use scindo_physics::team::Team;
 

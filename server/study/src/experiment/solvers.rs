@@ -7,7 +7,7 @@ use super::tables::{S_BUNNY_2, S_BUNNY_3, S_CUBE};
 use super::{ExperimentBench, ExperimentResult, Plots, Table, Trouble, Unit};
 use crate::page::plot::{Mark, Plot};
 use crate::stress::chart::{Chart, Line};
-use scindo_physics::multigrid::Smoother;
+use scindo_physics::solver::multigrid::Smoother;
 
 /// Iterations at most: of conjugate gradients alone, with SOR cycles and with Chebyshev cycles.
 const PATIENCE: [usize; 3] = [8_000, 60, 200];

@@ -63,7 +63,7 @@ fn small_systems_are_solved_as_printed() {
     let three = Until { iterations: 3, error: 0.0, seconds: 0.0 };
     let reduction = run(&mut system, Solver::Cycles(&mut multigrid), &exact, three).error(3);
     assert!((reduction / BUNNY_3.reduction - 1.0).abs() < 0.05, "{reduction}");
-    let (mut multigrid, _) = system.multigrid(scindo_physics::multigrid::Smoother::default());
+    let (mut multigrid, _) = system.multigrid(scindo_physics::solver::multigrid::Smoother::default());
     let found = iterations(&mut system, &mut multigrid, 1e-6).unwrap();
     assert!(found <= 25, "{found} iterations");
     let until = Until { iterations: 600, error: 1e-4, seconds: 0.0 };
@@ -94,7 +94,7 @@ fn the_stored_cube_is_reached() {
     let material = Material { young_pa: 1e6, ..MATERIAL };
     let loads = (model.held, model.pull);
     let mut system = System::of_material(&model.octree, loads, Problem::Equilibrium, material).unwrap();
-    let (mut multigrid, _) = system.multigrid(scindo_physics::multigrid::Smoother::default());
+    let (mut multigrid, _) = system.multigrid(scindo_physics::solver::multigrid::Smoother::default());
     let rough = refine(&mut system, Some(&mut multigrid), 1e-6, [1e-4, 60.0]);
     assert!(
         rough.left <= 1e-6 && rough.iterations <= 12,

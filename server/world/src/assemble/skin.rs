@@ -5,8 +5,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 use scindo_physics::body::Body;
-use scindo_physics::skin::SkinSettings;
 use scindo_physics::space::Tets;
+use scindo_physics::space::skin::SkinSettings;
 
 use super::mesh::fault;
 use crate::format::{MeshFile, SurfaceMesh, read_mesh};

@@ -1,8 +1,8 @@
 //! Cells of a body that are divided and joined between steps, as its scene asks for.
 
 use nalgebra::Vector3;
+use scindo_physics::body::estimate::CellRecovery;
 use scindo_physics::body::{AdaptReport, Body, BodyError};
-use scindo_physics::estimate::CellRecovery;
 
 use super::region;
 use crate::scene::checked::{AdaptSpec, Region};

@@ -13,9 +13,9 @@ mod shown;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use scindo_physics::body::estimate::{MeshError, StressRecovery};
 use scindo_physics::body::{AdaptReport, Body, BodyError, Notice, PointSpring, SolveReport};
 use scindo_physics::cut::IncisionMark;
-use scindo_physics::estimate::{MeshError, StressRecovery};
 
 use crate::mesh_in::MeshHealth;
 use crate::report::{Energy, StepReport};

@@ -7,8 +7,8 @@ mod stages;
 use std::mem::discriminant;
 use std::sync::Arc;
 
+use scindo_physics::body::estimate::MeshError;
 use scindo_physics::body::{AdaptReport, Notice, Outcome, SolveReport};
-use scindo_physics::estimate::MeshError;
 
 use crate::inputs::CutOutcome;
 pub use phases::PhaseSeconds;

@@ -1,6 +1,6 @@
 //! Seconds per phase of the mechanics, within the stage that deforms bodies.
 
-use scindo_physics::phase::Phase;
+use scindo_physics::team::phase::Phase;
 
 /// Seconds per [`Phase`], over all bodies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use scindo_physics::estimate::MeshError;
+use scindo_physics::body::estimate::MeshError;
 use serde::Serialize;
 use serde_json::Value;
 

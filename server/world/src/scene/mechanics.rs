@@ -4,8 +4,8 @@ use scindo_physics::body::{
     Arithmetic, BodySettings, CuttingMethod, ElementKind, FrontRule, LooseRule, MassKind, Method,
     OperatorChoice, PcgSettings, Scheme, Volumetric,
 };
+use scindo_physics::cut::remesh::{Moves, SnapSettings};
 use scindo_physics::material::Law;
-use scindo_physics::snap::{Moves, SnapSettings};
 
 use super::raw::{
     RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod,

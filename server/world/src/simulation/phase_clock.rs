@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use scindo_physics::body::Body;
-use scindo_physics::phase::{Phase, PhaseMark};
+use scindo_physics::team::phase::{Phase, PhaseMark};
 use tracing::{Level, Span, trace_span};
 
 use crate::report::PhaseSeconds;

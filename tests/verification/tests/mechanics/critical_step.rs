@@ -1,7 +1,7 @@
 //! R5: critical time step of cut elements in four bases and five lumpings.
 
 use nalgebra::Vector3;
-use scindo_physics::enrichment::{CutElement, Enrichment, Lumping};
+use scindo_physics::cut::enrichment::{CutElement, Enrichment, Lumping};
 use scindo_physics::material::{Law, Material, Rayleigh};
 
 const REFERENCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../reference/R5/");

@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 use scindo_physics::assembly::{Model, Tangent, Volumetric};
+use scindo_physics::body::estimate::{CutTets, MeshError, StressRecovery, Tets};
 use scindo_physics::body::{Body, BodySettings};
 use scindo_physics::cut::BladeSweep;
 use scindo_physics::element::quadrature::tet_degree_5;
-use scindo_physics::estimate::{CutTets, MeshError, StressRecovery, Tets};
 use scindo_physics::material::{Lame, Law, Material, Rayleigh};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
 use scindo_physics::operator::FixedCopy;

@@ -1,7 +1,7 @@
 //! R4: ω_max and the critical time step; a free-spinning cube under explicit integration.
 
 use nalgebra::Vector3;
-use scindo_physics::enrichment::{largest_frequency, tet_stiffness};
+use scindo_physics::cut::enrichment::{largest_frequency, tet_stiffness};
 use scindo_physics::integrator::{DynamicsSettings, MassKind, Notice, Outcome, Scheme};
 use scindo_physics::material::Law;
 use scindo_physics::mesh::tet_volume;

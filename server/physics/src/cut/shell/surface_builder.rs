@@ -10,8 +10,8 @@
 //! fragments anew, and to walk the cycles through their corners.
 
 use crate::element::MaterialPoint;
-use crate::lists::reserve::reserve_half_again;
 use crate::mesh::{TET_FACES, TetMesh};
+use crate::storage::reserve::reserve_half_again;
 
 use super::joined::{Joined, Place};
 use super::surface::{Surface, bind};

@@ -1,6 +1,6 @@
 //! Marks on numbered items, cleared all at once, and a sort without comparisons.
 
-use crate::lists::reserve::reserved;
+use crate::storage::reserve::reserved;
 
 /// Up to eight kinds of marks per item, one bit each. One byte per item keeps the marks of a whole body in
 /// the cache. Clearing costs as much as setting did.

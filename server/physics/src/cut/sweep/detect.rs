@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::lists::reserve::{reserved, resize_reserving};
 use crate::mesh::{TET_EDGES, TET_FACES, TetMesh};
+use crate::storage::reserve::{reserved, resize_reserving};
 
 use super::bit_marks::{Ascending, BitMarks};
 use super::blade::Work;

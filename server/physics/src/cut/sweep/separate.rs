@@ -9,8 +9,8 @@
 
 use std::collections::VecDeque;
 
-use crate::lists::reserve::reserved;
 use crate::mesh::{TET_EDGES, TET_FACES};
+use crate::storage::reserve::reserved;
 
 use super::bit_marks::{Ascending, BitMarks};
 use super::front_elements::{Ahead, FrontElements, Meeting, State};

@@ -8,8 +8,8 @@
 use nalgebra::Vector3;
 
 use crate::element::MaterialPoint;
-use crate::lists::reserve::{reserve_half_again, reserved};
 use crate::mesh::TetMesh;
+use crate::storage::reserve::{reserve_half_again, reserved};
 
 use super::elements_around::ElementsAround;
 use super::fragments::{Fragments, NONE};

@@ -4,7 +4,7 @@
 //! every fragment around the edge. It is the same in the rest and in the deformed configuration, because the
 //! map is affine on a piece.
 
-use crate::lists::reserve::reserve_half_again;
+use crate::storage::reserve::reserve_half_again;
 use std::collections::hash_map::Entry;
 use std::collections::{HashMap, HashSet};
 use std::hash::{BuildHasherDefault, Hasher};

@@ -7,8 +7,8 @@
 
 use std::collections::BTreeMap;
 
-use crate::lists::reserve::reserve_half_again;
 use crate::mesh::{TET_FACES, TetMesh};
+use crate::storage::reserve::reserve_half_again;
 
 use super::incision_sets::IncisionSets;
 use super::slot::slot_of;

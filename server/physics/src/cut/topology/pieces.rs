@@ -1,7 +1,7 @@
 //! Material pieces: the face-connected components of the fragments of one element.
 
-use crate::lists::reserve::reserve_half_again;
 use crate::mesh::TetMesh;
+use crate::storage::reserve::reserve_half_again;
 
 use super::fragments::{Fragments, NONE};
 use super::slot::slot_of;

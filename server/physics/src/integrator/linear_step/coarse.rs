@@ -4,7 +4,7 @@ use super::LinearStep;
 use crate::integrator::step_inputs::LinearInputs;
 use crate::operator::BlockJacobi;
 use crate::solver::Method;
-use crate::two_level::{CoarseSpace, CoarseSystem, TwoLevel};
+use crate::solver::two_level::{CoarseSpace, CoarseSystem, TwoLevel};
 
 impl LinearStep {
     /// Brings the coarse space up to date with the operator, and makes it if the method asks for one that there is not.

@@ -8,9 +8,9 @@ use crate::integrator::descent::Start;
 use crate::integrator::state::State;
 use crate::integrator::step_inputs::{LinearInputs, StepOutcome};
 use crate::operator::Stiffness;
-use crate::phase::Phase;
 use crate::solver::{LinearReport, StopReason};
 use crate::team::Team;
+use crate::team::phase::Phase;
 
 impl LinearStep {
     /// Whether nothing has changed from outside since the last step.

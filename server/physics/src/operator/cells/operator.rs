@@ -17,8 +17,8 @@ use super::lane::{CellLane, CellMatrix};
 use super::sectors::SectorTable;
 use super::stored::STORED;
 use crate::element::Simd;
-use crate::lists::reserve::resize_reserving;
 use crate::octree::Cell;
+use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks, ranges};
 
 /// Cells per chunk: its vectors stay in the first cache, and a body of a few thousand cells still has work for

@@ -20,7 +20,7 @@ pub const fn stored_entry(r: usize, s: usize) -> usize {
 #[repr(C)]
 pub struct StoredBatch {
     /// Upper triangles; 0 in unused lanes.
-    #[serde(with = "crate::saved::array")]
+    #[serde(with = "crate::storage::saved::array")]
     pub entries: [Lanes; STORED],
     /// Rotation of every cell.
     pub rotation: Mat3<Lanes>,

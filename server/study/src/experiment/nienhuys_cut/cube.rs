@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 use scindo_physics::body::Body;
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::remesh::SnapSettings;
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_mesh};
-use scindo_physics::snap::SnapSettings;
 
 use super::cuts::{body, nodes, settle};
 use crate::experiment::Trouble;

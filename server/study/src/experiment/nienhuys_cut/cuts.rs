@@ -8,9 +8,9 @@ use scindo_physics::body::{
     Body, BodySettings, CuttingMethod, LooseRule, PcgSettings, Scheme, StaticSettings,
 };
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::remesh::{Moves, SnapReport, SnapSettings};
 use scindo_physics::material::{Law, Material, Rayleigh};
 use scindo_physics::mesh::TetMesh;
-use scindo_physics::snap::{Moves, SnapReport, SnapSettings};
 
 use crate::experiment::Trouble;
 use crate::experiment::nienhuys::{Start, gradients};

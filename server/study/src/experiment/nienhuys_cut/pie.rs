@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 use scindo_physics::body::Body;
 use scindo_physics::cut::BladeSweep;
+use scindo_physics::cut::remesh::SnapSettings;
 use scindo_physics::mesh::TetMesh;
-use scindo_physics::snap::SnapSettings;
 
 use super::cube::Plane;
 use super::cuts::body;

@@ -3,7 +3,7 @@
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::chart::{Chart, Line};
 use crate::stress::evidence::Evidence;
-use scindo_physics::enrichment::{CutElement, Enrichment, Lumping};
+use scindo_physics::cut::enrichment::{CutElement, Enrichment, Lumping};
 
 /// Shown beside the numbered cases.
 pub const CASE: Case = Case {

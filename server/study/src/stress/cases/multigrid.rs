@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use scindo_physics::element::Points;
-use scindo_physics::multigrid::{Hierarchy, Smoother};
 use scindo_physics::octree::{At, CutLink, Octree, OctreeSpace};
+use scindo_physics::solver::multigrid::{Hierarchy, Smoother};
 use scindo_physics::space::Space;
 use scindo_physics::team::Team;
 

@@ -13,9 +13,9 @@ use scindo_physics::body::{Arithmetic, Body, BodySettings, ElementKind, PcgSetti
 use scindo_physics::cut::CutMesh;
 use scindo_physics::material::{Law, Material, Rayleigh, Region};
 use scindo_physics::mesh::{BoxPattern, TetMesh, box_hexes, box_mesh};
-use scindo_physics::multigrid::Smoother;
 use scindo_physics::octree::{BoxShape, Octree, OctreeSettings};
 use scindo_physics::operator::FixedCopy;
+use scindo_physics::solver::multigrid::Smoother;
 use scindo_physics::solver::{LinearSettings, LinearSolver, Method, Precision, StopReason};
 use scindo_physics::team::Team;
 

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
 use crate::cut::ElementsAround;
-use crate::snap::clean::clean;
-use crate::snap::collapse::collapse;
-use crate::snap::complex::{Before, Complex};
-use crate::snap::shape::{FLAT, Kind, aspect, kind};
+use crate::cut::remesh::clean::clean;
+use crate::cut::remesh::collapse::collapse;
+use crate::cut::remesh::complex::{Before, Complex};
+use crate::cut::remesh::shape::{FLAT, Kind, aspect, kind};
 
 fn corners(height: f64, apex: [f64; 2]) -> [Vector3<f64>; 4] {
     [v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(0.0, 1.0, 0.0), v(apex[0], apex[1], height)]
@@ -85,8 +85,8 @@ fn what_is_undone_leaves_no_trace() {
     edited(&sample, |complex| {
         let mark = complex.mark();
         let before = elements(complex);
-        let m = crate::snap::collapse::split_edge(complex, 0, 13, 0.3);
-        crate::snap::collapse::split_face(complex, 0, 1, [0.2, 0.3, 0.5]);
+        let m = crate::cut::remesh::collapse::split_edge(complex, 0, 13, 0.3);
+        crate::cut::remesh::collapse::split_face(complex, 0, 1, [0.2, 0.3, 0.5]);
         assert!(complex.around(m).len() >= 6 && (volume(complex) - 1.0).abs() < 1e-12);
         complex.undo(mark);
         assert!(before == elements(complex) && complex.n_nodes() == sample.nodes.len());

@@ -6,10 +6,10 @@
 
 use super::hierarchy::Step;
 use super::level::{Level, NONE};
-use crate::lists::bits::Bits;
-use crate::lists::disjoint::{find, join};
-use crate::lists::jagged::Jagged;
 use crate::octree::{Cell, Octree, parent_corner};
+use crate::storage::bits::Bits;
+use crate::storage::disjoint::{find, join};
+use crate::storage::jagged::Jagged;
 
 /// What a cut did to a level.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use super::follow::{LevelChange, Links, follow_level};
 use super::level::{Level, NONE};
 use super::transfer::{MOST_VERTICES, Transfer};
-use crate::lists::jagged::Jagged;
 use crate::material::Region;
 use crate::octree::{Lattice, Octree};
+use crate::storage::jagged::Jagged;
 use crate::team::Team;
 
 /// Coarsening ends at this number of unknowns.

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::*;
+use crate::cut::remesh::complex::{Before, Complex};
+use crate::cut::remesh::memory::Memory;
+use crate::cut::remesh::select::cross;
 use crate::cut::{ElementsAround, sweep_bounds, sweep_triangles};
-use crate::snap::complex::{Before, Complex};
-use crate::snap::memory::Memory;
-use crate::snap::select::cross;
 
 #[test]
 fn a_small_cut_costs_as_much_in_a_mesh_of_sixteen_times_the_size() {

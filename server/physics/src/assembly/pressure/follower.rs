@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use super::Pressure;
 use crate::assembly::BlockCsr;
-use crate::lists::reserve::resize_reserving;
+use crate::storage::reserve::resize_reserving;
 
 /// P around the present iterate, with all its memory.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]

@@ -11,9 +11,9 @@ use super::kernel::{LevelKernel, noise};
 use super::smoother::{Diagonal, Smoother, Smoothing, chebyshev, gauss_seidel};
 use super::stiff_springs::{Columns, SpringBlocks, Sprung};
 use crate::element::Simd;
-use crate::lists::reserve::resize_reserving;
 use crate::octree::Octree;
 use crate::operator::{BLOCK, FixedCopy, Inverse3, LinearOperator, Padded, Spring, block_of, filter, rows};
+use crate::storage::reserve::resize_reserving;
 use crate::team::{Team, blocks};
 
 /// Power iterations for the largest eigenvalue of D⁻¹A.

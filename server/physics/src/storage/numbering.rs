@@ -1,6 +1,6 @@
 //! Positions of numbered items in a short list, found without a search.
 
-use crate::lists::reserve::resize_reserving;
+use crate::storage::reserve::resize_reserving;
 
 /// Position of every item in a list. It is never cleared: a position is valid if the list has the item there.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]

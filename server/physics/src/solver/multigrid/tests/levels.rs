@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::support::{V3, blade_grid, cube, cut_at, noise};
-use crate::multigrid::Hierarchy;
-use crate::multigrid::transfer::carriers;
 use crate::octree::Octree;
+use crate::solver::multigrid::Hierarchy;
+use crate::solver::multigrid::transfer::carriers;
 
 /// An adaptive body with cuts along random links.
 pub fn random_cuts(cells: u32, levels: u8, share: f64, seed: usize) -> Octree {

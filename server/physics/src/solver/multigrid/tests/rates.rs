@@ -2,9 +2,9 @@
 
 use super::support::{Exact, Scene, blade_grid, clamped, coefficients, cube, dot, vector};
 use crate::element::MaterialPoint;
-use crate::multigrid::{CoarsestSolve, Hierarchy, MultigridSettings, Smoother};
 use crate::octree::Octree;
 use crate::operator::Spring;
+use crate::solver::multigrid::{CoarsestSolve, Hierarchy, MultigridSettings, Smoother};
 
 fn scene(octree: &Octree, poisson: f64) -> Scene {
     let fixed = clamped(octree, 2);

@@ -1,8 +1,8 @@
 //! The reference cube R7: 40³ cells, clamped at x = 0, under its weight.
 
 use super::support::{Scene, V3, clamped, coefficients, cube, dot};
-use crate::multigrid::{Cycle, MultigridSettings};
 use crate::operator::padded;
+use crate::solver::multigrid::{Cycle, MultigridSettings};
 use crate::solver::{Pcg, PcgSettings, StopReason};
 
 /// Lattice point and displacement [m] of probes, from `tests/reference/R7/cube40.json`.

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::lattice::{Lattice, weights};
-use crate::lists::disjoint::{find, join};
 use crate::operator::Padded;
+use crate::storage::disjoint::{find, join};
 use crate::team::{Team, blocks};
 
 /// Calls what it is given with the nodes of one element after another.

@@ -6,9 +6,9 @@ use super::galerkin::{CellMatrix, Galerkin, INCLINED, LevelMatrices, Rotation, h
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
 use super::thin::is_thin;
-use crate::lists::bits::Bits;
 use crate::octree::corner_shares;
 use crate::operator::FixedCopy;
+use crate::storage::bits::Bits;
 
 impl Galerkin {
     /// Follows a cut that made these `changes` to the levels of `hierarchy`, whose transfers may still have to follow it.

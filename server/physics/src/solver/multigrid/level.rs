@@ -2,9 +2,9 @@
 
 use std::collections::HashMap;
 
-use crate::lists::disjoint::{find, join};
-use crate::lists::jagged::Jagged;
 use crate::octree::{At, Cell, Octree, parent_corner};
+use crate::storage::disjoint::{find, join};
+use crate::storage::jagged::Jagged;
 
 /// No number.
 pub const NONE: u32 = u32::MAX;

@@ -3,14 +3,14 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use crate::material::Lame;
-use crate::multigrid::galerkin::Galerkin;
-use crate::multigrid::operator::CellProducts;
-use crate::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
 use crate::octree::{BoxShape, CutLink, LinkKey, Octree, OctreeSettings, corner_weights};
 use crate::operator::cells::unit_stiffness;
 use crate::operator::{
     BlockJacobi, FixedCopy, Inverse3, LinearOperator, Padded, Preconditioner, Spring, filter, invert, padded,
 };
+use crate::solver::multigrid::galerkin::Galerkin;
+use crate::solver::multigrid::operator::CellProducts;
+use crate::solver::multigrid::{CellMaterial, Coefficients, Cycle, Hierarchy, Multigrid, MultigridSettings};
 use crate::team::Team;
 
 pub type V3 = Vector3<f64>;

@@ -38,7 +38,7 @@ pub struct Coarsest {
     r: Vec<Vector3<f64>>,
     z: Vec<Vector3<f64>>,
     /// Positions of the 64 blocks of every cell.
-    #[serde(with = "crate::saved::arrays")]
+    #[serde(with = "crate::storage::saved::arrays")]
     places: Vec<[u32; 64]>,
     /// Prescribed directions, where this is the level that is solved on.
     held: Filter,

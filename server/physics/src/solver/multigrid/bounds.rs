@@ -73,7 +73,7 @@ fn of_leaf(with: &Coefficients, material: u16, hanging: u8) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::multigrid::tests::support::coefficients;
+    use crate::solver::multigrid::tests::support::coefficients;
 
     #[test]
     fn a_single_cube_has_the_eigenvalue_that_power_iterations_find() {

@@ -4,11 +4,11 @@
 use std::collections::BTreeSet;
 
 use super::support::{Exact, Fine, V3, clamped, coefficients, cube, cut_at, noise, vector};
-use crate::multigrid::galerkin::CellMatrix;
-use crate::multigrid::level::NONE;
-use crate::multigrid::{Hierarchy, Multigrid, MultigridSettings};
 use crate::octree::{LinkKey, Octree};
 use crate::operator::{Inverse3, Padded, padded};
+use crate::solver::multigrid::galerkin::CellMatrix;
+use crate::solver::multigrid::level::NONE;
+use crate::solver::multigrid::{Hierarchy, Multigrid, MultigridSettings};
 use crate::team::Team;
 
 /// Cells of coarse levels, by level: `pairs[l][id]` is the number in the second hierarchy.

@@ -69,7 +69,7 @@ pub struct Stored {
     /// duplicates, there may be more than eight.
     pub(super) relative: Vec<Rotation>,
     /// Over the vertices that carry the cell, in its frame.
-    #[serde(with = "crate::saved::array")]
+    #[serde(with = "crate::storage::saved::array")]
     pub matrix: Packed,
     /// Of a thin cell.
     pub(super) inner: Inner,

@@ -1,16 +1,16 @@
 //! Operators of the levels against Pᵀ A P in double precision.
 
 use crate::element::Simd;
-use crate::multigrid::kernel::LevelKernel;
+use crate::solver::multigrid::kernel::LevelKernel;
 use nalgebra::{Matrix3, Rotation3};
 
 use super::levels::random_cuts;
 use super::support::{Exact, V3, blade_grid, clamped, coefficients, cube, dot, vector};
-use crate::multigrid::galerkin::{CellMatrix, Galerkin};
-use crate::multigrid::level::Level;
-use crate::multigrid::{CellMaterial, Coefficients, Hierarchy};
 use crate::octree::Octree;
 use crate::operator::{FixedCopy, Inverse3, padded};
+use crate::solver::multigrid::galerkin::{CellMatrix, Galerkin};
+use crate::solver::multigrid::level::Level;
+use crate::solver::multigrid::{CellMaterial, Coefficients, Hierarchy};
 use crate::team::Team;
 
 /// Calls `visit` with the fine and coarse vertices and the blocks of P between levels `s` and `s` + 1.

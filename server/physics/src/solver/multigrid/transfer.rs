@@ -5,10 +5,10 @@
 //! of [thin](super::thin) cells move otherwise; what comes to their trilinear weights is kept there.
 
 use super::level::{Level, NONE, place_in, trilinear};
-use crate::lists::bits::Bits;
-use crate::lists::jagged::Jagged;
 use crate::octree::corner_weights;
 use crate::operator::{BLOCK, Padded};
+use crate::storage::bits::Bits;
+use crate::storage::jagged::Jagged;
 use crate::team::{Team, blocks};
 
 /// Weights are multiples of 1/32: trilinear ones of 1/8, and a hanging corner divides them among up to four vertices.
