@@ -123,6 +123,33 @@ fn nothing_but_physics_and_its_studies_knows_the_state_of_the_cuts() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// A crate is seen at one glance: its `lib.rs` has at most fourteen modules, tests and re-exports not counted.
+#[test]
+fn no_crate_has_more_modules_than_a_reader_can_hold() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut seen = 0;
+    let mut wrong = Vec::new();
+    for side in ["server", "client"] {
+        for folder in std::fs::read_dir(root.join(side)).expect("readable").map(|e| e.expect("entry").path())
+        {
+            let Ok(face) = std::fs::read_to_string(folder.join("src/lib.rs")) else { continue };
+            let mut of_tests = false;
+            let mut modules = 0;
+            for line in face.lines() {
+                let module = line.trim_start_matches("pub ").trim_start_matches("pub(crate) ");
+                modules += usize::from(module.starts_with("mod ") && !of_tests);
+                of_tests = line.starts_with("#[cfg(test)]");
+            }
+            seen += 1;
+            if modules > 14 {
+                wrong.push(format!("{}: {modules}", folder.display()));
+            }
+        }
+    }
+    assert!(seen >= 9, "only {seen} crates were found");
+    assert!(wrong.is_empty(), "{}", wrong.join("; "));
+}
+
 /// `lib.rs` presents the rooms of the world in the order of the data, and each knows only those before it.
 #[test]
 fn the_rooms_of_the_world_form_a_stair() {

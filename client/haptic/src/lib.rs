@@ -17,8 +17,7 @@
 //! * [`log`]: every tick as a line of CSV, written by another thread, and the force plot at the end of the
 //!   run.
 //! * [`live`]: figures shown while the loop runs.
-//! * [`deadband`]: which poses are worth sending.
-//! * [`link`]: contact messages in, poses out, on threads of their own.
+//! * [`link`]: contact messages in, poses that are [worth sending](link::deadband) out, on threads of their own.
 //! * [`command`]: the command line and the summary.
 //!
 //! Invariants: the tick takes no lock, allocates nothing and waits for nothing · no rule of the
@@ -47,8 +46,6 @@ pub mod statistics;
 pub mod tick;
 
 pub mod haptic_loop;
-
-pub mod deadband;
 
 pub mod link;
 

@@ -1,11 +1,13 @@
 //! Contact messages in, poses out. Everything that may wait happens here, on separate threads. zenoh's
 //! receiving thread fills the contact slot, and the thread `haptic-pose` sends.
 
+pub mod deadband;
+
 use crate::clock::LoopClock;
 use crate::constants::{PERIOD_S, POSE_QUEUE};
 use crate::contact::model::{ContactInbox, ContactSlot, contact_slot};
-use crate::deadband::{Deadband, Withholding};
 use crate::device::{Capability, DeviceState, ToolMode};
+use crate::link::deadband::{Deadband, Withholding};
 use crate::log::row::LogRow;
 use crate::safety::flag;
 use crate::statistics::LinkReport;

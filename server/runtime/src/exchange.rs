@@ -13,7 +13,7 @@ use scindo_world::inputs::Wants;
 use scindo_world::simulation::Level;
 
 use crate::inbox::Inbox;
-use crate::metrics::Metrics;
+use crate::monitor::metrics::Metrics;
 use crate::wire::convert::unix_ns;
 use meter::Meter;
 

@@ -2,23 +2,19 @@
 //!
 //! # Layout, along the way of the data
 //! * [`command`]: the commands and their outcome.
-//! * [`wire`]: the two zenoh sessions (haptic and bulk), who may give orders through them, and conversion
-//!   between messages and the types of the world.
-//! * [`receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
+//! * [`wire`]: the two zenoh sessions (haptic and bulk), who may give orders through them, the
+//!   [pace](wire::door) of clients before zenoh hears them, and conversion between messages and the types of the world.
+//! * [`wire::receive`] → [`inbox`]: poses and cuts of clients; who holds which tool.
 //! * [`exchange`]: state shared by the threads.
 //! * [`sim`]: the simulation thread.
 //! * [`contact`]: the contact thread, 200 Hz or more beside the simulation.
 //! * [`publish`]: the publication thread, and the threads that answer late joiners.
 //! * [`rpc`]: questions and orders.
-//! * [`metrics`]: figures for a monitor of the laboratory.
-//! * [`server`]: starts and ends all of these.
-//! * [`door`]: the pace of clients, before zenoh hears them.
-//! * [`lab`]: laboratories with certificates, and what each role may do.
-//! * [`doctor`]: what works on a machine, and what does not.
-//! * [`top`]: the screen of `scindo top`.
 //! * [`record`]: recordings of all of this, and their replay.
-//! * [`haptics`]: what a hand feels over a link, against the truth; an experiment on virtual time.
-//! * [`reliability`]: all of this in a simulated network with faults, from a seed ([`chance`]).
+//! * [`server`]: starts and ends all of these, and watches over them.
+//! * [`lab`]: laboratories with certificates, and what each role may do.
+//! * [`monitor`]: what people see of a machine and of a server.
+//! * [`experiment`]: what a hand feels over a link, and all of this in a simulated network with faults.
 //!
 //! | thread | does | waits for |
 //! |---|---|---|
@@ -27,48 +23,21 @@
 //! | `publish` | surfaces, tools, answers, events, statistics | its period, or something to send |
 //! | `rpc` | one question after the other | the simulation, at most 1.7 s |
 //! | `record` | writes the recording, if there is one | something to write |
-//! | `door` | sets the pace of clients that connect over plain TCP ([`door`]) | a batch of a client, or of zenoh |
+//! | `door` | sets the pace of clients that connect over plain TCP ([`wire::door`]) | a batch of a client, or of zenoh |
 //! | `watchdog` | breaks off steps that keep orders waiting; ends a process that does not end | its period |
 //! | zenoh's own | decode, check, store in the inbox | nothing |
 
 pub mod command;
-
 pub mod error;
-
 pub mod wire;
-
-pub mod door;
-
 pub mod inbox;
-
 pub mod lab;
-
-pub mod doctor;
-
-pub mod receive;
-
 pub mod exchange;
-
 pub mod sim;
-
 pub mod contact;
-
 pub mod publish;
-
 pub mod rpc;
-
-pub mod watchdog;
-
-pub mod metrics;
-
-pub mod server;
-
-pub mod top;
-
-pub mod chance;
-
 pub mod record;
-
-pub mod haptics;
-
-pub mod reliability;
+pub mod server;
+pub mod monitor;
+pub mod experiment;

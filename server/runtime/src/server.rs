@@ -1,5 +1,7 @@
 //! A running server: which threads it starts, in which order, and how it ends.
 
+mod watchdog;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
@@ -17,15 +19,14 @@ use crate::contact::{ContactConfig, ContactThread};
 use crate::error::{RuntimeError, words};
 use crate::exchange::{ANSWERS, Exchange, OUTGOING};
 use crate::inbox::Inbox;
-use crate::metrics::Metrics;
+use crate::monitor::metrics::Metrics;
 use crate::publish::{PublishThread, Published, Sources};
-use crate::receive::Receivers;
 use crate::rpc::catalogue::Catalogue;
 use crate::rpc::{self, RpcThread};
 use crate::sim::engine::Engine;
 use crate::sim::{Command, Pace, SimThread};
-use crate::watchdog;
 use crate::wire::convert::ProbeName;
+use crate::wire::receive::Receivers;
 use crate::wire::session::Sessions;
 
 /// Most orders that may wait for the simulation thread.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use scindo_study::case::Truth;
-use scindo_study::distance::Errors;
+use scindo_study::trial::distance::Errors;
 use scindo_study::trial::{self, Limits, Trial};
 use scindo_study::words::percent;
 use scindo_study::{CaseResult, Settings, run};

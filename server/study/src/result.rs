@@ -7,10 +7,10 @@ use crate::advice::sources::Sources;
 use crate::bench::store::Origin;
 use crate::case::Case;
 use crate::design::Configuration;
-use crate::distance::Errors;
 use crate::experiment::ExperimentResult;
 use crate::reference::Reference;
 use crate::trial::Trial;
+use crate::trial::distance::Errors;
 
 /// A configuration and the result of its run.
 #[derive(Debug, Clone)]

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use scindo_study::effects::{EffectsReport, Off, Request, Saving, measure};
+use scindo_study::study::effects::{EffectsReport, Off, Request, Saving, measure};
 use scindo_world::scene::Scene;
 
 const BLOCK: &str = r#"

@@ -13,9 +13,9 @@ use scindo_program::Manual;
 
 use super::error::CommandError;
 use crate::constants::{DEFAULT_MAX_FORCE_N, DEFAULT_SLEW_N_S, RAMP_DOWN_NS};
-use crate::deadband::Deadband;
 use crate::device::haply::{self, HaplyAddress};
 use crate::device::{Capability, simulated};
+use crate::link::deadband::Deadband;
 use crate::tick::Limits;
 
 /// Touch soft tissue on a server with a haptic device or a simulated hand.

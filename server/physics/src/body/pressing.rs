@@ -3,9 +3,9 @@
 //! The force is −p n da of the present configuration, except with the linear law: its strains are those of the rest
 //! configuration, and so are n and da. How the force follows the surface depends on the way of a step:
 //!
-//! - On the general path it is a part of Newton's method, with its load stiffness ([`crate::assembly::pressure`]), and explicit
-//!   schemes evaluate it in every stage. Their critical step leaves the load stiffness out, which is about p/E of the
-//!   elastic one.
+//! - On the general path it is a part of Newton's method, with its load stiffness
+//!   ([`crate::assembly::pressure`]), and explicit schemes evaluate it in every stage. Their critical step leaves
+//!   the load stiffness out, which is about p/E of the elastic one.
 //! - On the fast path it is that at the predicted positions x + h v, and a dead load within the step. The error of
 //!   this lag falls with h². In a strip that bends by its own length it is an eighteenth of the error of BDF2, a
 //!   two-hundredth of that of implicit Euler, and 1.3 times that of Newmark's method (20 ms). It costs a pass over the

@@ -1,8 +1,8 @@
 //! Cutting: material pieces inside the elements, node copies that follow from connectivity, and
 //! the surface in between.
 //!
-//! Such a cut never edits the element mesh; a cut that does is in [`remesh`]. Three layers follow from each other, each a pure function of
-//! the one before:
+//! Such a cut never edits the element mesh; a cut that does is in [`remesh`]. Three layers follow from each
+//! other, each a pure function of the one before:
 //!
 //! 1. [`fragments`](topology::fragments): a conforming tet mesh *inside* the elements, at first one fragment
 //!    per element, refined by bisecting edges where a blade crosses them. Cut faces are opened only here.

@@ -11,8 +11,8 @@ use scindo_study::bench::store::Origin;
 use scindo_study::book::part::{Kind, Part, parts};
 use scindo_study::book::verdict::Verdict;
 use scindo_study::book::{self, Tally};
-use scindo_study::effects::{Request, measure};
 use scindo_study::stress::{self, cases};
+use scindo_study::study::effects::{Request, measure};
 use scindo_study::{Settings, run};
 use scindo_world::scene::ShippedScene;
 use serde_json::json;
@@ -22,8 +22,8 @@ use super::cli::BookArgs;
 use super::haptics::{put, write};
 use super::say::say;
 use crate::error::RuntimeError;
-use crate::haptics::cases::CASES;
-use crate::haptics::table;
+use crate::experiment::haptics::cases::CASES;
+use crate::experiment::haptics::table;
 
 /// Time limit of a case of the accuracy study in the quick form [s]. Experiments have none.
 const QUICK_CASE_S: f64 = 30.0;

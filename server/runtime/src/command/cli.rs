@@ -525,7 +525,7 @@ pub struct EffectsArgs {
     pub scene: PathBuf,
     /// Steps from the start of the scene, made anew for each effect.
     #[arg(long, value_name = "N", default_value_t = 100,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(scindo_study::effects::MOST_STEPS)))]
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(scindo_study::study::effects::MOST_STEPS)))]
     pub steps: u32,
     /// Override a key of the scene, such as body.liver.young_pa=5e3. May be repeated.
     #[arg(long, value_name = "KEY=VALUE")]

@@ -8,8 +8,8 @@ use scindo_proto::endpoint::bulk_endpoint;
 
 use super::cli::DoctorArgs;
 use super::say::say;
-use crate::doctor::{Finding, State, listen, machine, papers};
 use crate::error::RuntimeError;
+use crate::monitor::doctor::{Finding, State, listen, machine, papers};
 use crate::wire::session::{NetworkConfig, load};
 
 /// Looks at everything and prints it. Exit code 1 if something is wrong.

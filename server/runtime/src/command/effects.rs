@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use scindo_study::effects::{EffectsReport, Off, Request, Row, measure};
+use scindo_study::study::effects::{EffectsReport, Off, Request, Row, measure};
 use scindo_world::scene::Scene;
 
 use super::accuracy::{bar, listen};

@@ -12,8 +12,8 @@ use super::accuracy::{bar, listen};
 use super::cli::HapticsArgs;
 use super::say::say;
 use crate::error::RuntimeError;
-use crate::haptics::trial::Trial;
-use crate::haptics::{page, table};
+use crate::experiment::haptics::trial::Trial;
+use crate::experiment::haptics::{page, table};
 
 /// Runs the table and writes the page. Ctrl-C ends it after the cells that are under way.
 pub fn haptics(args: &HapticsArgs) -> Result<ExitCode, RuntimeError> {

@@ -9,11 +9,11 @@ use super::accuracy::{bar, listen};
 use super::cli::ReliabilityArgs;
 use super::say::say;
 use crate::error::RuntimeError;
-use crate::reliability::campaign::{self, Extent, Totals};
-use crate::reliability::drill;
-use crate::reliability::episode::{self, EpisodeError};
-use crate::reliability::guarantees::{Found, GUARANTEES, Noticed, markdown, text};
-use crate::reliability::table::Mutant;
+use crate::experiment::reliability::campaign::{self, Extent, Totals};
+use crate::experiment::reliability::drill;
+use crate::experiment::reliability::episode::{self, EpisodeError};
+use crate::experiment::reliability::guarantees::{Found, GUARANTEES, Noticed, markdown, text};
+use crate::experiment::reliability::table::Mutant;
 
 /// Seeds with which each safeguard is taken out.
 const MUTANT_SEEDS: u64 = 100;

@@ -22,7 +22,7 @@ use super::progress::{Progress, Share};
 use super::say::say;
 use super::signals::Signals;
 use crate::error::RuntimeError;
-use crate::metrics::{self, Metrics};
+use crate::monitor::metrics::{self, Metrics};
 use crate::record::on_demand::{RecordFolder, prepare};
 use crate::record::recorder::RecordSettings;
 use crate::record::replay::newest;

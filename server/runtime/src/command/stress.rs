@@ -12,7 +12,7 @@ use super::accuracy::{bar, listen};
 use super::cli::StressArgs;
 use super::say::say;
 use crate::error::RuntimeError;
-use crate::haptics::cases::CASES;
+use crate::experiment::haptics::cases::CASES;
 
 /// Runs the cases and writes the page. Ctrl-C ends it after the cases that are under way.
 pub fn stress(args: &StressArgs) -> Result<ExitCode, RuntimeError> {

@@ -12,7 +12,7 @@ use tokio::time::timeout;
 use super::cli::TopArgs;
 use super::say::say;
 use crate::error::RuntimeError;
-use crate::top::{View, report, screen};
+use crate::monitor::top::{View, report, screen};
 
 /// How long a key may wait for its effect.
 const PERIOD: Duration = Duration::from_millis(100);

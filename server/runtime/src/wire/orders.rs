@@ -98,7 +98,7 @@ pub fn admit_server(rules: &mut Value, id: &str) {
     }
 }
 
-/// Changes the rules for a server with doors ([`crate::door`]): a client that comes in over TCP on loopback is not on this
+/// Changes the rules for a server with doors ([`crate::wire::door`]): a client that comes in over TCP on loopback is not on this
 /// machine; those that are come in by a file.
 pub fn behind_doors(rules: &mut Value) {
     for subject in rules["subjects"].as_array_mut().into_iter().flatten() {

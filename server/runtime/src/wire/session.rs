@@ -4,7 +4,7 @@
 //! The haptic session listens at the requested endpoints and relays for clients that connect nowhere else.
 //! The bulk session listens one port above each of them ([`scindo_proto::endpoint::{DEFAULT_ENDPOINT,
 //! bulk_endpoint}`]). Clients that connect there as well need no relay. Plain TCP endpoints have a door in front of them
-//! ([`crate::door`]), unless a zenoh file has rules of its own or lets the server be discovered.
+//! ([`crate::wire::door`]), unless a zenoh file has rules of its own or lets the server be discovered.
 
 use std::path::{Path, PathBuf};
 
@@ -13,8 +13,8 @@ use zenoh::config::ZenohId;
 use zenoh::{Session, Wait as _};
 
 use super::orders;
-use crate::door::Doors;
 use crate::error::{RuntimeError, words};
+use crate::wire::door::Doors;
 
 /// Network settings of a server.
 #[derive(Debug, Clone, Default)]

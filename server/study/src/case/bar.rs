@@ -5,8 +5,8 @@ use super::gold::Gold;
 use super::shared::{LAWS, axes, labels, load, names};
 use crate::design::axes::{Axis, Factor, block, cells, elements, iterations, step, steps, tolerance, words};
 use crate::design::{Block, Configuration};
-use crate::distance::Goal;
 use crate::trial::Protocol;
+use crate::trial::distance::Goal;
 
 const SCENE: &str = include_str!("../../cases/bar.toml");
 

@@ -5,8 +5,8 @@ use super::gold::{Point, probes_override};
 use super::shared::{axes, labels, load, names};
 use crate::design::Block;
 use crate::design::axes::{Factor, cells, elements};
-use crate::distance::Goal;
 use crate::trial::Protocol;
+use crate::trial::distance::Goal;
 use crate::trial::series::Series;
 
 /// Length, height, depth [m]; Young's modulus [Pa]; load [N].

@@ -5,8 +5,8 @@ use super::gold::Gold;
 use super::shared::{LAWS, axes, labels, load, names};
 use crate::design::Block;
 use crate::design::axes::{Factor, cells, elements};
-use crate::distance::Goal;
 use crate::trial::Protocol;
+use crate::trial::distance::Goal;
 
 /// Builds the case.
 pub fn case(quick: bool) -> Case {

@@ -6,8 +6,8 @@ use super::gold::Gold;
 use super::shared::{load, names};
 use crate::design::Block;
 use crate::design::axes::{Axis, Factor, Setting, on_bodies, tolerances, words};
-use crate::distance::Goal;
 use crate::trial::Protocol;
+use crate::trial::distance::Goal;
 
 /// Names of the ways to cut, labels of [`Factor::Cutting`].
 pub const METHODS: [&str; 3] = ["xfem", "snap", "precut"];

@@ -5,8 +5,8 @@ use scindo_world::scene::Scene;
 use super::ladder::Ladder;
 use crate::design::axes::{Axis, Factor, Setting};
 use crate::design::{Block, Configuration};
-use crate::distance::Goal;
 use crate::trial::Protocol;
+use crate::trial::distance::Goal;
 use crate::trial::series::Series;
 
 /// A case of the study.

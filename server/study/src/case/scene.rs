@@ -13,8 +13,8 @@ use super::subdivide::Subdivisions;
 use super::vary::{self, OWN, Subject};
 use crate::design::Configuration;
 use crate::design::axes::{Axis, Factor, Setting, on_bodies, tolerance};
-use crate::distance::Goal;
 use crate::trial::Protocol;
+use crate::trial::distance::Goal;
 
 /// Compared points per body if the scene has no probes.
 const POINTS: usize = 8;

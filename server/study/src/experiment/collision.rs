@@ -9,8 +9,8 @@ use scindo_collision::{Capsule, CapsuleMotion, Method, SurfaceBvh};
 use super::bench::least;
 use super::result::Plots;
 use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
-use crate::random::Random;
 use crate::stress::chart::{Chart, Line};
+use crate::trial::random::Random;
 
 type V = Vector3<f64>;
 

@@ -8,9 +8,9 @@ use super::{style, wear};
 use crate::advice::sources::{Source, Sources};
 use crate::case::Case;
 use crate::design::axes::Factor;
-use crate::distance::Errors;
 use crate::result::{CaseResult, Outcome};
 use crate::trial::Protocol;
+use crate::trial::distance::Errors;
 use crate::words::{percent, short};
 
 /// A plot that stands alone, with its own style.

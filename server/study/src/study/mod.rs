@@ -1,5 +1,6 @@
 //! The study: runs every case and writes the pages.
 
+pub mod effects;
 mod survey;
 
 use std::io;

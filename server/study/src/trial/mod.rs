@@ -1,5 +1,9 @@
 //! One run of one configuration: set up, solve or step, measure the time, and classify the outcome.
 
+pub mod distance;
+
+pub(crate) mod random;
+
 pub mod series;
 
 pub mod sight;

@@ -15,7 +15,7 @@ use scindo_world::scene::Scene;
 use scindo_world::simulation::{Simulation, Stage};
 use serde::{Deserialize, Serialize};
 
-use crate::random::Random;
+use crate::trial::random::Random;
 
 /// Numbers of cuts after which the mesh is measured.
 pub const CUTS: [usize; 3] = [1, 10, 100];

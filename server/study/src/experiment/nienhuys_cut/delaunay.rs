@@ -14,7 +14,7 @@ use nalgebra::{Matrix4, Vector3};
 use scindo_physics::mesh::{TET_FACES, TetMesh};
 
 use crate::experiment::Trouble;
-use crate::random::Random;
+use crate::trial::random::Random;
 
 type V = Vector3<f64>;
 

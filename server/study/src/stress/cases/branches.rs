@@ -2,11 +2,11 @@
 
 use super::flaws::{mass_of_parts, tell};
 use super::support::{DOWN, L, SOFT, Shaped, V, clamp_left, cube, damped, nodes, plane, slice};
-use crate::random::Random;
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::Evidence;
 use crate::stress::view;
 use crate::stress::watch::{Common, Watch, charts};
+use crate::trial::random::Random;
 use scindo_physics::cut::{BladeSweep, Flaws, Piece};
 use scindo_physics::mesh::TetMesh;
 

@@ -10,11 +10,11 @@ use scindo_physics::team::Team;
 
 use super::flaws::tell;
 use super::support::{DOWN, L, SOFT, V, clamp_left, plane, slice};
-use crate::random::Random;
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::evidence::Evidence;
 use crate::stress::view;
 use crate::stress::watch::{Common, Watch, charts};
+use crate::trial::random::Random;
 
 /// Cases 2 to 5 on cells.
 pub const ALIGNED: Case = Case {

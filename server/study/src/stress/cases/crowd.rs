@@ -6,7 +6,7 @@ use scindo_world::inputs::Inputs;
 use super::super::case::{Case, Setting, Trouble};
 use super::super::evidence::Evidence;
 use super::touch::WORLD;
-use crate::random::Random;
+use crate::trial::random::Random;
 
 /// Fifty bodies in a heap.
 pub const CASE: Case = Case {

@@ -12,10 +12,10 @@ use super::support::{V, plane};
 use crate::experiment::model::{Grid, cube};
 use crate::experiment::solve::{Solver, Until, decay, rate, run};
 use crate::experiment::system::{MATERIAL, Problem, System};
-use crate::random::Random;
 use crate::stress::case::{Case, Setting, Trouble};
 use crate::stress::chart::{Chart, Line};
 use crate::stress::evidence::Evidence;
+use crate::trial::random::Random;
 
 /// Case 29.
 pub const BLADES: Case = Case {

@@ -10,7 +10,7 @@ use scindo_world::simulation::Simulation;
 use super::super::case::{Case, Setting, Trouble};
 use super::super::evidence::Evidence;
 use super::touch::{WORLD, block};
-use crate::random::Random;
+use crate::trial::random::Random;
 
 /// Case 30.
 pub const CASE: Case = Case {

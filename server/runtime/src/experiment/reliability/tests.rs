@@ -57,7 +57,7 @@ fn made_up_contacts_break_no_rule_of_the_force_unless_a_safeguard_is_missing() {
 
 #[test]
 fn the_page_of_promises_is_that_of_the_program() {
-    let page = include_str!("../../../../deploy/RELIABILITY.md");
+    let page = include_str!("../../../../../deploy/RELIABILITY.md");
     for guarantee in GUARANTEES {
         let row = row(&guarantee);
         assert!(

@@ -5,7 +5,7 @@ use scindo_proto::messages::{CutCommand, DeviceCapability, ToolSample};
 use scindo_proto::{Chunk, KeySpace, Topic, encode, encoding};
 
 use super::network::{Packet, spoiled};
-use crate::chance::Chance;
+use crate::experiment::chance::Chance;
 
 /// Packets of others that it remembers.
 const MEMORY: usize = 32;

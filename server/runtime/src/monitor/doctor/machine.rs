@@ -121,7 +121,7 @@ pub fn inside() -> Vec<Finding> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::State;
+    use crate::monitor::doctor::State;
 
     #[test]
     fn limits_of_the_system_are_read() {

@@ -16,7 +16,7 @@ use scindo_proto::messages::{
 use scindo_proto::{Chunk, KeySpace, Topic, decode_as, encode, encoding};
 
 use super::network::{MS, Packet};
-use crate::haptics::device::{BenchDevice, HANDS, Probe};
+use crate::experiment::haptics::device::{BenchDevice, HANDS, Probe};
 
 /// Limits of the force, as by default.
 pub const LIMITS: Limits = Limits { max_force_n: 2.5, slew_n_s: 50.0 };

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::chance::Chance;
+use crate::experiment::chance::Chance;
 
 /// What else a bad network does to messages.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use bytes::Bytes;
 use serde::Serialize;
 
-use crate::chance::Chance;
-use crate::receive::Arrival;
+use crate::experiment::chance::Chance;
+use crate::wire::receive::Arrival;
 
 /// One millisecond [ns].
 pub const MS: u64 = 1_000_000;

@@ -13,7 +13,7 @@ use super::hand::{Fate, HandClient};
 use super::network::{Hits, Line, MS, Packet, Weather};
 use super::rogue::Rogue;
 use super::table::{Mutant, SCENE_TOOL, STEP_MS, Table};
-use crate::chance::Chance;
+use crate::experiment::chance::Chance;
 
 /// Length of the bad weather, and of the good one after it [ms].
 const FOUL_MS: u64 = 2_000;

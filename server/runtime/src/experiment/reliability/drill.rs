@@ -13,8 +13,8 @@ use super::episode::{EpisodeError, Outcome};
 use super::hand::HandClient;
 use super::network::{MS, Packet, spoiled};
 use super::table::{Mutant, SCENE_TOOL};
-use crate::chance::Chance;
-use crate::haptics::device::HANDS;
+use crate::experiment::chance::Chance;
+use crate::experiment::haptics::device::HANDS;
 
 /// Ticks of one seed.
 pub const TICKS: u64 = 20_000;

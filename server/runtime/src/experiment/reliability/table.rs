@@ -20,7 +20,7 @@ use super::network::{MS, Packet};
 use crate::contact::to_message;
 use crate::exchange::{ANSWERS, Exchange, OUTGOING};
 use crate::inbox::{Answering, Inbox};
-use crate::receive;
+use crate::wire::receive;
 
 /// Name of the tool that the scene declares, for which clients compete.
 pub const SCENE_TOOL: &str = "scalpel";
