@@ -6,6 +6,8 @@ pub mod history;
 
 pub mod relaxation;
 
+pub mod load;
+
 pub mod friction;
 
 pub mod law;

@@ -25,4 +25,5 @@ pub mod encode;
 
 pub mod stream;
 
+mod unreadable;
 mod fields;

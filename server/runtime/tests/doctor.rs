@@ -10,7 +10,8 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-use scindo::lab::folder::{Folder, Lab};
+use scindo::lab::folder::Folder;
+use scindo::lab::members::Lab;
 use scindo::lab::roles::LabRole;
 use scindo_tests::free_pair;
 use serde_json::Value;

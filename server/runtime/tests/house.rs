@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use scindo::lab::folder::{Folder, Lab};
+use scindo::lab::folder::Folder;
 use scindo::lab::house::House;
+use scindo::lab::members::Lab;
 use scindo::lab::roles::LabRole;
 use scindo::server::{Server, ServerConfig};
 use scindo::sim::engine::Engine;

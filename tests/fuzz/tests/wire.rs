@@ -326,6 +326,6 @@ fn addresses() {
         let Ok(text) = std::str::from_utf8(bytes) else { return };
         let _ = scindo_view::listen_address(text);
         let _ = scindo_proto::endpoint::bulk_endpoint(text);
-        let _ = scindo::wire::session::local(text);
+        let _ = scindo::wire::door::local(text);
     });
 }

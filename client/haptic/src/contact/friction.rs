@@ -12,7 +12,7 @@
 //! Hayward and Armstrong 2000, *A new computational model of friction applied to haptic rendering*, eq. 4.
 
 use super::history::TipHistory;
-use super::law::PlaneLoad;
+use super::load::PlaneLoad;
 use super::model::ContactPlane;
 use nalgebra::Vector3;
 

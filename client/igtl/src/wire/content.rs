@@ -12,6 +12,7 @@
 
 use super::fields::Fields;
 use super::header::{Broken, Header, MAX_BODY_IN, MAX_SKIPPED, NAME_BYTES, TimeStamp, check_sum};
+use super::unreadable::Unreadable;
 
 /// Most tools of a `TDATA` message.
 pub const MAX_TRACKED: usize = 256;
@@ -93,57 +94,6 @@ pub enum Content {
     },
 }
 
-/// Why one message cannot be read. The next one can.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Unreadable {
-    /// The check sum is wrong.
-    #[error("{kind} '{device}': check sum {found:016x} instead of {stated:016x}")]
-    CheckSum {
-        /// Type of the message.
-        kind: String,
-        /// Name of the device.
-        device: String,
-        /// What the header says.
-        stated: u64,
-        /// What the body gives.
-        found: u64,
-    },
-    /// Less content than the type needs.
-    #[error("{kind}: {needed} more bytes are needed, {found} are left")]
-    Short {
-        /// Type of the message.
-        kind: &'static str,
-        /// Bytes of the next field.
-        needed: usize,
-        /// Bytes that are left.
-        found: usize,
-    },
-    /// The lengths in an extended header exceed the body.
-    #[error("extended header: {stated} bytes around the content of a body of {body}")]
-    Extended {
-        /// Length of extended header and metadata [bytes].
-        stated: u64,
-        /// Length of the body [bytes].
-        body: usize,
-    },
-    /// A number that is not finite.
-    #[error("{kind}: entry {entry} of a transform is {value}")]
-    NotFinite {
-        /// Type of the message.
-        kind: &'static str,
-        /// Number of the entry.
-        entry: usize,
-        /// The value, as text.
-        value: String,
-    },
-    /// Content whose length fits no number of tools, or too many.
-    #[error("TDATA: {bytes} bytes of content; allowed are 70 for each of at most {MAX_TRACKED} tools")]
-    Tracking {
-        /// Length of the content [bytes].
-        bytes: usize,
-    },
-}
-
 /// Whether messages of a type are read. Others are skipped without being kept.
 pub(super) fn is_read(kind: &str) -> bool {
     matches!(kind, "TRANSFORM" | "TDATA" | "STRING" | "STATUS")
@@ -209,7 +159,7 @@ fn transform(fields: &mut Fields<'_>, kind: &'static str) -> Result<Transform, U
 
 fn tracking(content: &[u8]) -> Result<Vec<Tracked>, Unreadable> {
     if !content.len().is_multiple_of(TRACKED_BYTES) || content.len() > MAX_TRACKED * TRACKED_BYTES {
-        return Err(Unreadable::Tracking { bytes: content.len() });
+        return Err(Unreadable::Tracking { bytes: content.len(), most: MAX_TRACKED });
     }
     let read = |one: &[u8]| {
         let mut fields = Fields::new("TDATA", one);

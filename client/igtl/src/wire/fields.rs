@@ -1,6 +1,6 @@
 //! Reads big-endian fields from bytes that may be too short.
 
-use super::content::Unreadable;
+use super::unreadable::Unreadable;
 
 /// What is left of the content of one message.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,8 @@
 //! Messages out of a stream of bytes, in bounded memory.
 
-use super::content::{Content, Message, Unreadable, checked_length, decode, is_read};
+use super::content::{Content, Message, checked_length, decode, is_read};
 use super::header::{Broken, HEADER_BYTES, Header};
+use super::unreadable::Unreadable;
 
 /// So many wrong check sums in a row end the connection.
 pub const MAX_SPOILT: u32 = 8;

@@ -7,6 +7,7 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use super::active_springs::make_room;
 use super::course::Course;
 use super::free_motion::{FreeMotion, free_motions};
 use super::model_solver::ModelSolver;
@@ -18,7 +19,7 @@ use super::scheme::Scheme;
 use super::settings::DynamicsSettings;
 use super::state::State;
 use super::step_inputs::StepInputs;
-use super::step_solver::{SolverSettings, StepSolver, make_room};
+use super::step_solver::{SolverSettings, StepSolver};
 use super::together::Member;
 use crate::assembly::{Model, ModelError};
 use crate::cut::NewCopy;
@@ -47,7 +48,7 @@ pub struct Dynamics {
     scheme: Scheme,
     law: Law,
     course: Course,
-    #[serde(with = "super::step_solver::saved_solver")]
+    #[serde(with = "super::saved_solver::saved")]
     solver: Box<dyn StepSolver>,
     /// Rigid motions of held parts that the constraints leave free; found for equilibria only.
     free_motions: Vec<FreeMotion>,
@@ -224,7 +225,7 @@ impl Dynamics {
     /// Begins a step that several bodies make together. Returns whether this body can: its steps are linear solves,
     /// and the inputs are usable.
     pub fn begin_together(&mut self, state: &State, inputs: &StepInputs<'_>) -> bool {
-        if self.solver.linearly_implicit().is_none() || self.solver.why_refused(state, inputs).is_some() {
+        if !self.solver.can_step_together() || self.solver.why_refused(state, inputs).is_some() {
             return false;
         }
         self.follow_fixed(inputs);
@@ -236,8 +237,8 @@ impl Dynamics {
     }
 
     /// Whether steps of this body can be solved together with those of others.
-    pub fn can_step_together(&mut self) -> bool {
-        self.solver.linearly_implicit().is_some()
+    pub fn can_step_together(&self) -> bool {
+        self.solver.can_step_together()
     }
 
     /// This body's part of the step that [`begin_together`](Self::begin_together) began.
@@ -252,7 +253,7 @@ impl Dynamics {
         make_room(spring_forces, inputs.springs.len(), 1);
         spring_forces.resize(inputs.springs.len(), Vector3::zeros());
         let Self { course, solver, .. } = self;
-        Some(solver.linearly_implicit()?.member(team, (course, state), inputs, spring_forces))
+        solver.member(team, (course, state), inputs, spring_forces)
     }
 
     /// Ends a step that several bodies made together; `finite` tells whether it moved them.
@@ -260,9 +261,7 @@ impl Dynamics {
         if !finite {
             return state.copy_from(&self.course.before);
         }
-        if let Some(solver) = self.solver.linearly_implicit() {
-            solver.carry_weightless(state, inputs);
-        }
+        self.solver.carry_weightless(state, inputs);
         self.course.multistep.push((&self.course.before, state), inputs, Scheme::ImplicitEuler);
         self.course.multistep.forget_energy();
     }

@@ -19,6 +19,7 @@ pub mod together;
 use coarse::two_level;
 use nalgebra::{Matrix3, Vector3};
 
+use super::active_springs::ActiveSprings;
 use super::descent::Descent;
 use super::parts::Translations;
 use super::simulated_level::SimulatedLevel;
@@ -26,7 +27,6 @@ use super::springs::ActiveSpring;
 use super::state::{State, WEIGHTLESS, hold};
 use super::step_grid::StepGrid;
 use super::step_inputs::{Inertia, KnownLoads, LinearInputs, StepOutcome};
-use super::step_solver::ActiveSprings;
 use crate::material::Rayleigh;
 use crate::octree::Octree;
 use crate::operator::{

@@ -137,27 +137,6 @@ impl LinearlyImplicit {
         true
     }
 
-    /// This body's part of a step of several bodies with implicit Euler.
-    pub fn member<'a>(
-        &'a mut self,
-        team: &'a mut Team,
-        (course, state): (&mut Course, &'a mut State),
-        inputs: StepInputs<'a>,
-        spring_forces: &'a mut [Vector3<f64>],
-    ) -> Member<'a> {
-        let _ = course.spin.limit(state, inputs.mass, inputs.parts, (inputs.h, LARGEST_TURN));
-        let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
-        let inputs = LinearInputs {
-            step: inputs,
-            mass_f32,
-            material,
-            solver: *pcg,
-            inertia: Inertia::Euler,
-            solves: 1,
-        };
-        Member { step, team, elastic: &mut **stiffness, state, inputs, spring_forces, inverted_pieces: 0 }
-    }
-
     /// Stopping criteria of its linear solves.
     pub fn solver(&self) -> PcgSettings {
         self.pcg
@@ -170,24 +149,6 @@ impl LinearlyImplicit {
         }
         let hierarchy = if self.method.is_multigrid() { space.hierarchy(self.simulate_level) } else { None };
         self.step.set_hierarchy(hierarchy, self.simulate_level);
-    }
-
-    /// Moves copies without mass along with the rest of their piece: no force would move them.
-    pub fn carry_weightless(&self, state: &mut State, inputs: &StepInputs<'_>) {
-        let rest = |c: u32| inputs.rest[c as usize];
-        for Weightless { copy, piece } in &self.weightless {
-            let (mut moved, mut v, mut hosts) = (Vector3::zeros(), Vector3::zeros(), 0.0);
-            for &host in piece.iter().filter(|&&c| inputs.mass[c as usize] > WEIGHTLESS) {
-                moved += state.x[host as usize] - rest(host);
-                v += state.v[host as usize];
-                hosts += 1.0;
-            }
-            let fixed = inputs.fixed.binary_search_by_key(copy, |f| f.copy).is_ok();
-            if hosts > 0.0 && !fixed {
-                state.x[*copy as usize] = rest(*copy) + moved / hosts;
-                state.v[*copy as usize] = v / hosts;
-            }
-        }
     }
 
     /// Kinetic and elastic energy of the free parts, and Σ f·x of gravity and loads on them [J].
@@ -338,9 +299,56 @@ impl StepSolver for LinearlyImplicit {
         self.step.levels()
     }
 
-    fn linearly_implicit(&mut self) -> Option<&mut LinearlyImplicit> {
-        let can = self.scheme != Scheme::Static && self.step.can_be_shared();
-        can.then_some(self)
+    fn can_step_together(&self) -> bool {
+        self.scheme != Scheme::Static && self.step.can_be_shared()
+    }
+
+    fn member<'a>(
+        &'a mut self,
+        team: &'a mut Team,
+        (course, state): (&mut Course, &'a mut State),
+        inputs: StepInputs<'a>,
+        spring_forces: &'a mut [Vector3<f64>],
+    ) -> Option<Member<'a>> {
+        if !self.can_step_together() {
+            return None;
+        }
+        let _ = course.spin.limit(state, inputs.mass, inputs.parts, (inputs.h, LARGEST_TURN));
+        let Self { step, stiffness, mass_f32, material, pcg, .. } = self;
+        let inputs = LinearInputs {
+            step: inputs,
+            mass_f32,
+            material,
+            solver: *pcg,
+            inertia: Inertia::Euler,
+            solves: 1,
+        };
+        Some(Member {
+            step,
+            team,
+            elastic: &mut **stiffness,
+            state,
+            inputs,
+            spring_forces,
+            inverted_pieces: 0,
+        })
+    }
+
+    fn carry_weightless(&self, state: &mut State, inputs: &StepInputs<'_>) {
+        let rest = |c: u32| inputs.rest[c as usize];
+        for Weightless { copy, piece } in &self.weightless {
+            let (mut moved, mut v, mut hosts) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+            for &host in piece.iter().filter(|&&c| inputs.mass[c as usize] > WEIGHTLESS) {
+                moved += state.x[host as usize] - rest(host);
+                v += state.v[host as usize];
+                hosts += 1.0;
+            }
+            let fixed = inputs.fixed.binary_search_by_key(copy, |f| f.copy).is_ok();
+            if hosts > 0.0 && !fixed {
+                state.x[*copy as usize] = rest(*copy) + moved / hosts;
+                state.v[*copy as usize] = v / hosts;
+            }
+        }
     }
 
     fn stiffness_mut(&mut self) -> Option<&mut dyn Stiffness> {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::active_springs::ActiveSprings;
 use super::course::Course;
 use super::critical_step::PowerIteration;
 use super::mass::Mass;
@@ -19,7 +20,7 @@ use super::scheme::Scheme;
 use super::settings::DynamicsSettings;
 use super::state::State;
 use super::step_inputs::StepInputs;
-use super::step_solver::{ActiveSprings, SolverSettings, StepSolver};
+use super::step_solver::{SolverSettings, StepSolver};
 use crate::assembly::pressure::Follower;
 use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
 use crate::element::Points;

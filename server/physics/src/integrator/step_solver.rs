@@ -6,14 +6,12 @@ use std::fmt::Debug;
 use nalgebra::Vector3;
 
 use super::course::Course;
-use super::linearly_implicit::LinearlyImplicit;
-use super::model_solver::ModelSolver;
 use super::notice::Notice;
 use super::report::SolveReport;
 use super::scheme::Scheme;
-use super::springs::ActiveSpring;
 use super::state::State;
 use super::step_inputs::StepInputs;
+use super::together::Member;
 use crate::assembly::{Model, ModelError};
 use crate::element::Points;
 use crate::material::Material;
@@ -21,10 +19,7 @@ use crate::operator::{FixedCopy, Stiffness};
 use crate::solver::multigrid::{CoarsestSolve, LevelReport};
 use crate::solver::{Method, NewtonSettings, PcgSettings};
 use crate::space::Space;
-use crate::storage::saved::saved_as;
 use crate::team::Team;
-
-saved_as!(saved_solver, Box, StepSolver, Linear(LinearlyImplicit), Model(ModelSolver));
 
 /// Solves the equations of one step, from the state before it. What all ways have in common (history,
 /// guards, energy balance, report) is in [`Dynamics`](super::Dynamics).
@@ -115,9 +110,27 @@ pub trait StepSolver: Any + Debug + Send {
         None
     }
 
-    /// This way as one that bodies can take together, if it is.
-    fn linearly_implicit(&mut self) -> Option<&mut LinearlyImplicit> {
+    /// Whether bodies can take this way together, as [`member`](Self::member)s of one step.
+    fn can_step_together(&self) -> bool {
+        false
+    }
+
+    /// This body's part of a step of several bodies with implicit Euler, if it can be part of one.
+    fn member<'a>(
+        &'a mut self,
+        team: &'a mut Team,
+        (course, state): (&mut Course, &'a mut State),
+        inputs: StepInputs<'a>,
+        spring_forces: &'a mut [Vector3<f64>],
+    ) -> Option<Member<'a>> {
+        let _ = (team, course, state, inputs, spring_forces);
         None
+    }
+
+    /// Moves copies without mass along with the rest of their piece, after a step that bodies made together: no
+    /// force would move them.
+    fn carry_weightless(&self, state: &mut State, inputs: &StepInputs<'_>) {
+        let _ = (state, inputs);
     }
 
     /// The discrete model in double precision, if this way has one.
@@ -145,53 +158,4 @@ pub struct SolverSettings {
     /// [`Scheme::Static`] only: number of iterations of matrix-free relaxation per step, in place of Newton's
     /// method. They continue from step to step.
     pub relaxation: Option<u32>,
-}
-
-/// Springs for which room is made when the first one acts: those of a ball that bears with all its points. A press that
-/// deepens then takes no memory.
-const SPRING_ROOM: usize = 64;
-
-/// Makes room in `list` for `each` entries per spring, if there are any springs.
-pub fn make_room<T>(list: &mut Vec<T>, springs: usize, each: usize) {
-    if springs > 0 {
-        list.reserve((each * SPRING_ROOM).saturating_sub(list.len()));
-    }
-}
-
-/// The springs of a step that can be used.
-#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct ActiveSprings {
-    /// Usable springs.
-    pub springs: Vec<ActiveSpring>,
-    /// Which springs of the inputs these are.
-    accepted: Vec<bool>,
-}
-
-impl ActiveSprings {
-    /// Takes the springs of `inputs`, whose points are at `x` [m] now.
-    pub fn begin(&mut self, inputs: &StepInputs<'_>, x: &[Vector3<f64>]) {
-        self.springs.clear();
-        self.accepted.clear();
-        make_room(&mut self.springs, inputs.springs.len(), 1);
-        make_room(&mut self.accepted, inputs.springs.len(), 1);
-        for spring in inputs.springs {
-            let active = ActiveSpring::new(spring, x);
-            self.accepted.push(active.is_some());
-            self.springs.extend(active);
-        }
-    }
-
-    /// Number of springs that were left out.
-    pub fn refused(&self) -> usize {
-        self.accepted.len() - self.springs.len()
-    }
-
-    /// Writes the force of every spring in the order of the inputs; 0 for those that were left out.
-    pub fn write(&self, forces: &mut [Vector3<f64>], force: impl Fn(&ActiveSpring) -> Vector3<f64>) {
-        let mut active = self.springs.iter();
-        for (out, &accepted) in forces.iter_mut().zip(&self.accepted) {
-            let spring = if accepted { active.next() } else { None };
-            *out = spring.map_or_else(Vector3::zeros, &force);
-        }
-    }
 }

@@ -9,8 +9,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::cells::{CutLink, LinkKey, Octree};
+use super::cells::Octree;
 use super::lattice::{At, OUTSIDE};
+use super::link_map::{CutLink, LinkKey};
 use super::vertices::corner_weights;
 use crate::cut::SweepTriangle;
 use crate::team::{Team, blocks};

@@ -5,21 +5,13 @@
 
 use nalgebra::Vector3;
 
-use super::cells::{Cell, CutLink, Octree, OctreeError};
-use super::lattice::{At, Lattice, LeafMap, OUTSIDE};
+use super::cells::{Cell, Octree, OctreeError};
+use super::lattice::{At, Lattice, LeafMap, OUTSIDE, OctreeSettings, neighbours};
+use super::link_map::CutLink;
 use super::shape::Shape;
 
 /// Largest number of finest cells of the lattice.
 const MOST_FINEST: u64 = 1 << 30;
-
-/// Size of the cells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OctreeSettings {
-    /// Finest cells along the longest side of the solid.
-    pub cells: u32,
-    /// The coarsest leaves have sides of 2^levels finest cells.
-    pub levels: u8,
-}
 
 /// Membership of finest cells, one bit each.
 #[derive(Clone, Debug)]
@@ -70,11 +62,6 @@ impl Bits {
             }
         }
     }
-}
-
-/// The six neighbours of a cell, in the order of [directions](super::cells::DIRECTIONS).
-pub fn neighbours(at: At) -> [At; 6] {
-    super::cells::DIRECTIONS.map(|d| [0, 1, 2].map(|k| at[k] + d[k]))
 }
 
 impl Lattice {

@@ -7,15 +7,9 @@
 
 use std::fmt;
 
-use nalgebra::Vector3;
-
-use super::build::OctreeSettings;
-use super::lattice::{At, Lattice, LeafMap, OUTSIDE};
-use super::link_map::LinkMap;
+use super::lattice::{At, Lattice, LeafMap, OUTSIDE, OctreeSettings, neighbours};
+use super::link_map::{CutLink, LinkKey, LinkMap};
 use crate::material::{Region, Regions};
-
-/// The six directions of links: −x, +x, −y, +y, −z, +z.
-pub const DIRECTIONS: [At; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
 
 /// A leaf of the octree: one finite element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -65,21 +59,6 @@ impl Cell {
     }
 }
 
-/// Where a link is cut. Fractions count from the lower end, which is the centre of the lower cell.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct CutLink {
-    /// Fraction of the way from the lower to the upper centre of the cut nearest to the lower one, and of
-    /// that nearest to the upper one.
-    pub at: [f64; 2],
-    /// Unit normals of the blade, or of the boundary, there, at rest.
-    pub normal: [Vector3<f64>; 2],
-    /// The incision; 0 is the boundary of the body.
-    pub incision: u32,
-}
-
-/// A link: its lower cell and its axis.
-pub type LinkKey = (At, u8);
-
 /// Cells, links and vertices of a body.
 ///
 /// Vertices are numbered; they are the copies of [`Space`](crate::space::Space). Those of the uncut body come
@@ -125,7 +104,7 @@ impl Octree {
     fn mark_boundary(&mut self) {
         for i in 0..self.cells.len() {
             if self.cells[i].level == 0 {
-                let near = super::build::neighbours(self.cells[i].at);
+                let near = neighbours(self.cells[i].at);
                 let out = |d: &usize| self.map.leaf(near[*d]) == OUTSIDE;
                 self.cells[i].cut = (0..6).filter(out).fold(0, |cut, d| cut | 1 << d);
             }

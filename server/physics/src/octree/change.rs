@@ -5,8 +5,9 @@
 //! stay too. A vertex whose leaves come apart is copied.
 
 use super::build::{child_corner, for_around};
-use super::cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree};
-use super::lattice::{At, OUTSIDE};
+use super::cells::{Cell, Octree};
+use super::lattice::{At, DIRECTIONS, OUTSIDE};
+use super::link_map::{CutLink, LinkKey};
 use super::vertices::{Octants, corner_weights};
 use crate::element::MaterialPoint;
 

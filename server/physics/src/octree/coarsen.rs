@@ -7,10 +7,10 @@
 //! Burstedde, Wilcox, Ghattas 2011: p4est, §3 (families, and balance after coarsening). The conditions are those
 //! of Dick, Georgii, Westermann 2011, §4.2, read backwards.
 
-use super::build::{child_corner, neighbours};
+use super::build::child_corner;
 use super::cells::{Cell, Octree};
 use super::change::Leaf;
-use super::lattice::{At, OUTSIDE};
+use super::lattice::{At, OUTSIDE, neighbours};
 use crate::element::MaterialPoint;
 
 /// Eight leaves of one level that fill a cell.

@@ -5,6 +5,14 @@ use nalgebra::Vector3;
 /// Integer coordinates of a finest cell or of a lattice point, in sides of a finest cell.
 pub type At = [i32; 3];
 
+/// The six directions of links: −x, +x, −y, +y, −z, +z.
+pub const DIRECTIONS: [At; 6] = [[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]];
+
+/// The six neighbours of a cell, in the order of [`DIRECTIONS`].
+pub fn neighbours(at: At) -> [At; 6] {
+    DIRECTIONS.map(|d| [0, 1, 2].map(|k| at[k] + d[k]))
+}
+
 /// No leaf: the cell is outside the body.
 pub const OUTSIDE: u32 = u32::MAX;
 
@@ -14,6 +22,15 @@ const BRICK: u32 = 3;
 const BRICK_CELLS: usize = 1 << (3 * BRICK);
 /// Marks a brick that one leaf covers.
 const WHOLE: u32 = 1 << 31;
+
+/// Size of the cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OctreeSettings {
+    /// Finest cells along the longest side of the solid.
+    pub cells: u32,
+    /// The coarsest leaves have sides of 2^levels finest cells.
+    pub levels: u8,
+}
 
 /// Place and size of the finest cells.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -3,7 +3,24 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::cells::{CutLink, LinkKey};
+use nalgebra::Vector3;
+
+use super::lattice::At;
+
+/// Where a link is cut. Fractions count from the lower end, which is the centre of the lower cell.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct CutLink {
+    /// Fraction of the way from the lower to the upper centre of the cut nearest to the lower one, and of
+    /// that nearest to the upper one.
+    pub at: [f64; 2],
+    /// Unit normals of the blade, or of the boundary, there, at rest.
+    pub normal: [Vector3<f64>; 2],
+    /// The incision; 0 is the boundary of the body.
+    pub incision: u32,
+}
+
+/// A link: its lower cell and its axis.
+pub type LinkKey = (At, u8);
 
 /// Where links are cut. Building a surface asks for every link that a cut crosses, so the hash is a fast one.
 pub type LinkMap = HashMap<LinkKey, CutLink, BuildHasherDefault<LinkHasher>>;

@@ -23,12 +23,12 @@ mod vertices;
 
 pub use adapt::{Activity, AdaptError, AdaptSettings, Plan};
 pub use adapt_space::OctreeRefinement;
-pub use build::{Bits, OctreeSettings};
-pub use cells::{Cell, CutLink, DIRECTIONS, LinkKey, Octree, OctreeError};
+pub use build::Bits;
+pub use cells::{Cell, Octree, OctreeError};
 pub use change::{Leaf, OctreeChange};
 pub use coarsen::{Coarsening, Family};
-pub use lattice::{At, Lattice, LeafMap, OUTSIDE};
-pub use link_map::{LinkHasher, LinkMap};
+pub use lattice::{At, DIRECTIONS, Lattice, LeafMap, OUTSIDE, OctreeSettings};
+pub use link_map::{CutLink, LinkHasher, LinkKey, LinkMap};
 pub use measures::Leaves;
 pub use restriction::Restriction;
 pub use shape::{BoxShape, Shape};

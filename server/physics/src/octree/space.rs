@@ -7,8 +7,9 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::blade::swept_box;
-use super::cells::{CutLink, LinkKey, Octree};
+use super::cells::Octree;
 use super::change::OctreeChange;
+use super::link_map::{CutLink, LinkKey};
 use super::surface::OctreeSurface;
 use crate::assembly::{ElementKind, Model, ModelError, Volumetric};
 use crate::cut::{

@@ -8,8 +8,9 @@ use std::time::Duration;
 use super::cli::CertsArgs;
 use super::say::say;
 use crate::error::RuntimeError;
-use crate::lab::folder::{Folder, Lab, LabError};
+use crate::lab::folder::{Folder, LabError};
 use crate::lab::house::House;
+use crate::lab::members::Lab;
 use crate::lab::roles::{ROUTER, SERVER};
 
 /// Makes what is missing, and prints how to use it.

@@ -20,8 +20,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::files::{LabError, make, of_client, of_server, put, put_papers, read_json, read_papers, wrong};
-use super::folder::Lab;
 use super::issue::{Holder, Papers, authority, issue};
+use super::members::Lab;
 use super::roles::{LabRole, ROUTER, SERVER};
 use super::rules::{Seats, router_access_control};
 

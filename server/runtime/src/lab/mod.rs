@@ -9,6 +9,8 @@ pub mod rules;
 
 pub mod issue;
 
+pub mod members;
+
 pub mod folder;
 
 pub mod files;

@@ -5,7 +5,9 @@ use std::io::Read;
 use mcap::records::ChunkHeader;
 
 use super::mcap_writer::PREFIX;
-use super::reader::LONGEST;
+
+/// Longest record of a file, and longest chunk before it was packed [byte]: a checkpoint of the largest scenes.
+pub const LONGEST: usize = 4 << 30;
 
 /// The records of a chunk, one after the other.
 #[derive(Default)]

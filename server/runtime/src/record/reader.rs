@@ -13,7 +13,7 @@ use scindo_proto::messages::{
     RecordedCheckpoint, RecordedEvent, RecordedForces, RecordedOrder, RecordedScene, RecordedStep,
 };
 
-use super::chunk::Chunk;
+use super::chunk::{Chunk, LONGEST};
 use super::writer::TOPICS;
 use crate::error::RuntimeError;
 
@@ -22,9 +22,6 @@ const READ: usize = 1 << 16;
 
 /// Number of the topic of checkpoints in [`TOPICS`].
 const CHECKPOINT: usize = 3;
-
-/// Longest record of a file, and longest chunk before it was packed [byte]: a checkpoint of the largest scenes.
-pub const LONGEST: usize = 4 << 30;
 
 /// A message of a recording.
 #[derive(Debug)]

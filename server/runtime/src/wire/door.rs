@@ -26,7 +26,6 @@ use tokio::sync::Semaphore;
 
 use self::pace::Turnstiles;
 use crate::error::RuntimeError;
-use crate::wire::session::local;
 
 pub mod pace;
 
@@ -152,6 +151,18 @@ impl Drop for Doors {
             runtime.shutdown_background();
         }
     }
+}
+
+/// The endpoint by which this process reaches its own `endpoint`. Only plain TCP works without a certificate.
+pub fn local(endpoint: &str) -> Option<String> {
+    let address = endpoint.strip_prefix("tcp/")?;
+    let (host, port) = address.rsplit_once(':')?;
+    let host = match host {
+        "0.0.0.0" => "127.0.0.1",
+        "[::]" => "[::1]",
+        host => host,
+    };
+    Some(format!("tcp/{host}:{port}"))
 }
 
 /// The address of an endpoint that can have a door: TCP without options.

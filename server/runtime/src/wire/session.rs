@@ -278,18 +278,6 @@ fn list(endpoints: &[String]) -> String {
     format!("[{}]", quoted.join(","))
 }
 
-/// The endpoint by which this process reaches its own `endpoint`. Only plain TCP works without a certificate.
-pub fn local(endpoint: &str) -> Option<String> {
-    let address = endpoint.strip_prefix("tcp/")?;
-    let (host, port) = address.rsplit_once(':')?;
-    let host = match host {
-        "0.0.0.0" => "127.0.0.1",
-        "[::]" => "[::1]",
-        host => host,
-    };
-    Some(format!("tcp/{host}:{port}"))
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {

@@ -3,13 +3,15 @@
 use std::time::Instant;
 
 use nalgebra::Vector3;
-use scindo_physics::solver::multigrid::{Cycle, Multigrid};
+use scindo_physics::solver::multigrid::{Cycle, Multigrid, Smoother};
 use scindo_physics::solver::{Pcg, PcgSettings, StopReason};
 
 use super::system::{System, norm};
 
 type V = Vector3<f64>;
 
+/// The residual of the converged solution over that at the start.
+const CONVERGED: f64 = 1e-9;
 /// Most rounds of a refinement.
 const ROUNDS: usize = 12;
 
@@ -81,4 +83,14 @@ pub fn refine(
         }
     }
     refined
+}
+
+impl System {
+    /// The converged solution, by conjugate gradients with multigrid inside and residuals in double precision
+    /// outside; and the residual that is left, relative to b.
+    pub fn converged(&mut self) -> (Vec<V>, f64) {
+        let (mut multigrid, _) = self.multigrid(Smoother::default());
+        let refined = refine(self, Some(&mut multigrid), CONVERGED, [1e-4, 60.0]);
+        (refined.u, refined.left)
+    }
 }

@@ -20,7 +20,6 @@ use scindo_physics::team::{Team, blocks};
 
 use super::Trouble;
 use super::model::{Held, Pull};
-use super::refine::refine;
 
 type V = Vector3<f64>;
 
@@ -40,9 +39,6 @@ pub const PAPERS: Smoother = Smoother::GaussSeidel { sweeps: 1, omega: 1.7 };
 pub fn smoothers() -> [(&'static str, Smoother); 2] {
     [("SOR", PAPERS), ("Chebyshev", Smoother::default())]
 }
-
-/// The residual of the converged solution over that at the start.
-const CONVERGED: f64 = 1e-9;
 
 /// Seconds that the parts of bringing a system up to date take.
 #[derive(Clone, Copy, Debug, Default)]
@@ -276,14 +272,6 @@ impl System {
         }
         hold(&self.fixed, &mut r);
         r
-    }
-
-    /// The converged solution, by conjugate gradients with multigrid inside and residuals in double precision
-    /// outside; and the residual that is left, relative to b.
-    pub fn converged(&mut self) -> (Vec<V>, f64) {
-        let (mut multigrid, _) = self.multigrid(Smoother::default());
-        let refined = refine(self, Some(&mut multigrid), CONVERGED, [1e-4, 60.0]);
-        (refined.u, refined.left)
     }
 }
 

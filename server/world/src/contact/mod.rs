@@ -14,6 +14,7 @@
 pub mod model;
 pub mod surface;
 pub mod proxy;
+pub mod rings;
 pub mod press;
 pub mod rub;
 pub mod spring;
@@ -41,8 +42,9 @@ use crate::tool::obstacle::Obstacle;
 use crate::tool::{Tool, Tools};
 use hand::Hand;
 use pairs::{PairContacts, TouchSettings};
-use press::{Bearing, MAX_POINTS, Press};
+use press::{Bearing, Press};
 use rest::{RestReport, Resting};
+use rings::MAX_POINTS;
 use rub::Roughness;
 use spring::material_points;
 use surface::ContactSurface;

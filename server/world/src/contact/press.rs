@@ -13,6 +13,7 @@
 use nalgebra::{Isometry3, Vector3};
 use scindo_collision::{Capsule, CapsuleMotion};
 
+use crate::contact::rings::{MAX_POINTS, RINGS};
 use crate::contact::rub::Rub;
 use crate::contact::surface::ContactSurface;
 use crate::inputs::ToolShape;
@@ -20,10 +21,6 @@ use crate::tool::geometry::{capsule, core_length};
 
 /// Points along a shaft.
 const SHAFT: usize = 8;
-/// Rings on a ball: number of points, and radius in radii of the ball.
-const RINGS: [(usize, f64); 2] = [(6, 0.4), (12, 0.75)];
-/// Most bearing points of one tool: the pole of a ball and its rings.
-pub const MAX_POINTS: usize = 1 + RINGS[0].0 + RINGS[1].0;
 /// Distance of a surface from the proxy beyond which it does not count as touched, in radii ...
 const MARGIN_RADII: f64 = 0.05;
 /// ... but at least this [m].

@@ -8,7 +8,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::contact::press::MAX_POINTS;
+use crate::contact::rings::MAX_POINTS;
 use crate::inputs::ToolShape;
 use crate::tool::geometry::capsule;
 

@@ -11,7 +11,7 @@ use super::groups::Labels;
 use super::mesh_file::MeshFile;
 use super::scanner::{ByteOrder, Encoding, Scanner};
 use super::vtk_cells;
-use super::vtk_legacy_data::data;
+use super::vtk_legacy_data::{data, skip_metadata, width_of};
 
 /// Reads a legacy VTK file. Of its data only cell arrays of one whole number per cell are used.
 pub fn read(file: &str, bytes: &[u8]) -> Result<MeshFile, MeshInError> {
@@ -237,23 +237,6 @@ impl Content {
         }
         Ok(())
     }
-}
-
-/// Bytes of a value of a type of the format.
-pub fn width_of(type_name: &str) -> Option<usize> {
-    Some(match type_name {
-        "char" | "unsigned_char" => 1,
-        "short" | "unsigned_short" => 2,
-        "int" | "unsigned_int" | "float" | "vtktypeint32" => 4,
-        "long" | "unsigned_long" | "double" | "vtktypeint64" | "vtkIdType" => 8,
-        _ => return None,
-    })
-}
-
-/// METADATA ends at the first blank line after its keyword line.
-pub fn skip_metadata(scanner: &mut Scanner) {
-    scanner.line();
-    while !scanner.line().is_empty() && scanner.remaining() > 0 {}
 }
 
 /// Offsets as indices, if they ascend and stay within `n_entries`.

@@ -6,7 +6,6 @@
 use super::error::MeshInError;
 use super::groups::Labels;
 use super::scanner::{Encoding, Scanner};
-use super::vtk_legacy::{skip_metadata, width_of};
 
 /// The cell arrays that follow in `scanner`, as far as they can be read.
 pub fn data(scanner: Scanner<'_>, encoding: Encoding) -> Vec<Labels> {
@@ -134,4 +133,21 @@ impl Reader<'_> {
             self.found.extend(Labels::of_reals(name, 0, values));
         }
     }
+}
+
+/// Bytes of a value of a type of the format.
+pub fn width_of(type_name: &str) -> Option<usize> {
+    Some(match type_name {
+        "char" | "unsigned_char" => 1,
+        "short" | "unsigned_short" => 2,
+        "int" | "unsigned_int" | "float" | "vtktypeint32" => 4,
+        "long" | "unsigned_long" | "double" | "vtktypeint64" | "vtkIdType" => 8,
+        _ => return None,
+    })
+}
+
+/// METADATA ends at the first blank line after its keyword line.
+pub fn skip_metadata(scanner: &mut Scanner) {
+    scanner.line();
+    while !scanner.line().is_empty() && scanner.remaining() > 0 {}
 }

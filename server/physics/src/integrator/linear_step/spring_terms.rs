@@ -2,9 +2,9 @@
 
 use super::{LinearStep, SPRING_PASSES, system};
 use crate::element::MaterialPoint;
+use crate::integrator::active_springs::make_room;
 use crate::integrator::springs::ActiveSpring;
 use crate::integrator::step_inputs::LinearInputs;
-use crate::integrator::step_solver::make_room;
 use crate::operator::{Block6, Spring, Stiffness};
 use nalgebra::Matrix3;
 

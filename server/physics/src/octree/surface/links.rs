@@ -4,7 +4,8 @@
 //! clockwise seen from outside. Edge k runs from corner k to the next, at the side of the face in direction
 //! [`SIDES`]\[d\]\[k\].
 
-use super::super::cells::{DIRECTIONS, Octree};
+use super::super::cells::Octree;
+use super::super::lattice::DIRECTIONS;
 
 /// Corners of the face of a cell in each direction, counter-clockwise seen from outside. Bit k is the end along
 /// axis k.

@@ -25,9 +25,10 @@ mod triangles;
 
 use nalgebra::Vector3;
 
-use super::cells::{DIRECTIONS, LinkKey, Octree};
+use super::cells::Octree;
 use super::coarsen::Coarsening;
-use super::lattice::OUTSIDE;
+use super::lattice::{DIRECTIONS, OUTSIDE};
+use super::link_map::LinkKey;
 use crate::cut::Surface;
 use links::partner;
 use patches::{Patches, Vertices};

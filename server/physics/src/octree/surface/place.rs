@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::cells::{DIRECTIONS, Octree};
-use super::super::lattice::At;
+use super::super::cells::Octree;
+use super::super::lattice::{At, DIRECTIONS};
 use crate::element::MaterialPoint;
 
 /// Eigenvalues of the normals' Σ n nᵀ below this part of the largest count as zero: planes that meet at less than

@@ -4,8 +4,8 @@
 //! therefore come apart, but never grow together. Each cell and each vertex keeps its number for one of its parts;
 //! the other parts get the numbers that follow. So all numbers stay in use, and lists only change around the cut.
 
-use super::hierarchy::Step;
 use super::level::{Level, NONE};
+use super::step::Step;
 use crate::octree::{Cell, Octree, parent_corner};
 use crate::storage::bits::Bits;
 use crate::storage::disjoint::{find, join};

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use super::follow::{LevelChange, Links, follow_level};
 use super::level::{Level, NONE};
+use super::step::Step;
 use super::transfer::{MOST_VERTICES, Transfer};
 use crate::material::Region;
 use crate::octree::{Lattice, Octree};
-use crate::storage::jagged::Jagged;
 use crate::team::Team;
 
 /// Coarsening ends at this number of unknowns.
@@ -51,17 +51,6 @@ struct Limits {
     duplicates: bool,
 }
 
-/// What leads from a level to the next coarser one.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Step {
-    /// Coarse cell of every fine cell.
-    pub parent: Vec<u32>,
-    /// Fine cells of every coarse cell, ascending.
-    pub children: Jagged<u32>,
-    /// P.
-    pub transfer: Transfer,
-}
-
 /// Cubes with the same matrix up to their rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub struct Kind {
@@ -71,14 +60,6 @@ pub struct Kind {
     pub side: u8,
     /// How often its leaves were merged; 0 for a leaf.
     pub merged: u8,
-}
-
-impl Step {
-    /// Fine cells of coarse cell `id`.
-    #[inline]
-    pub fn children_of(&self, id: usize) -> &[u32] {
-        self.children.get(id)
-    }
 }
 
 impl Hierarchy {
@@ -266,17 +247,6 @@ impl Limits {
         let coarsest = &levels[levels.len() - 1];
         let enough = levels.len() > self.least && 3 * coarsest.n_vertices <= self.coarse_enough;
         !enough && 1 << (levels.len() - 1) < self.across && coarsest.n_vertices <= MOST_VERTICES
-    }
-}
-
-impl Step {
-    fn new(fine: &Level, coarse: &Level, parent: Vec<u32>) -> Self {
-        let by_parent = |visit: &mut dyn FnMut(u32, u32)| {
-            (0u32..).zip(&parent).for_each(|(child, &parent)| visit(parent, child));
-        };
-        let children = Jagged::by_counting(coarse.cells.len(), by_parent, 0);
-        let transfer = Transfer::new(fine, coarse, &parent);
-        Self { parent, children, transfer }
     }
 }
 

@@ -9,14 +9,16 @@
 //! Dick, Georgii, Westermann 2011, §6 (hierarchy and Galerkin operators on cut octrees); Lottes 2023 (smoother).
 
 mod level;
+mod transfer;
+mod step;
 mod follow;
 mod hierarchy;
-mod transfer;
 mod dense;
 mod table;
 mod carried;
-mod galerkin;
 mod thin;
+mod galerkin;
+mod inner;
 mod touched;
 mod operator;
 mod kernel;

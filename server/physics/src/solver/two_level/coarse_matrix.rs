@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use smallvec::SmallVec;
 
 use super::interpolation::Interpolation;
-use super::space::CoarseSystem;
+use super::system::CoarseSystem;
 use crate::assembly::BlockCsr;
 use crate::operator::{Padded, Spring, padded, unpadded};
 use crate::solver::{Cholesky, Filter};

@@ -24,10 +24,12 @@ mod lattice;
 mod parts;
 mod precondition;
 mod space;
+mod system;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests;
 
 pub use precondition::TwoLevel;
-pub use space::{CoarseSpace, CoarseSystem};
+pub use space::CoarseSpace;
+pub use system::CoarseSystem;

@@ -6,9 +6,10 @@ use super::coarse_matrix::CoarseMatrix;
 use super::interpolation::Interpolation;
 use super::lattice::Lattice;
 use super::parts::Parts;
+use super::system::CoarseSystem;
 use crate::element::Points;
 use crate::material::{Lame, Material};
-use crate::operator::{Block6, FixedCopy, Held, Padded, Spring};
+use crate::operator::{Held, Padded, Spring};
 use crate::team::Team;
 
 /// Edge of a lattice cell over the mean distance of nodes. With 3 a converged step of 12 800 to 492 000 tetrahedra
@@ -37,25 +38,6 @@ pub struct CoarseSpace {
     u: Vec<Padded>,
     /// Number of factorisations so far.
     updates: u64,
-}
-
-/// A = `mass_factor` M + `scale` K̂ + springs at some positions, as far as a coarse space needs it.
-#[derive(Clone, Copy, Debug)]
-pub struct CoarseSystem<'a> {
-    /// Position of every copy [m].
-    pub x: &'a [Vector3<f64>],
-    /// Whether the stiffness turns with the material.
-    pub rotates: bool,
-    /// Factor of the stiffness.
-    pub scale: f64,
-    /// Factor of the mass.
-    pub mass_factor: f64,
-    /// Diagonal block of every copy, springs not included.
-    pub diagonal: &'a [Block6],
-    /// Prescribed directions.
-    pub fixed: &'a [FixedCopy],
-    /// Springs.
-    pub springs: &'a [Spring],
 }
 
 impl CoarseSpace {
