@@ -17,6 +17,7 @@ mod block_csr;
 pub mod pressure;
 mod point;
 mod error;
+mod kinds;
 mod model;
 mod build;
 mod quadratic;
@@ -27,13 +28,15 @@ mod scratch;
 mod elastic;
 mod parallel;
 mod mass;
+mod mass_matrix;
 mod rotated;
 
 pub use crate::material::Tangent;
 pub use block_csr::BlockCsr;
 pub use error::ModelError;
+pub use kinds::{ElementKind, Volumetric};
 pub use mass::MassSharing;
-pub use model::{ElementKind, Model, Volumetric};
+pub use model::Model;
 pub use quadratic::QuadraticPiece;
 
 #[cfg(test)]

@@ -5,7 +5,6 @@
 //! finite, and every departure from what was requested is reported.
 
 use nalgebra::Vector3;
-use thiserror::Error;
 
 use super::active_springs::make_room;
 use super::course::Course;
@@ -15,7 +14,7 @@ use super::multistep::{Adapted, Multistep};
 use super::notice::Notice;
 use super::parts::LooseParts;
 use super::report::{Outcome, SolveReport};
-use super::scheme::Scheme;
+use super::scheme::{DynamicsError, Scheme};
 use super::settings::DynamicsSettings;
 use super::state::State;
 use super::step_inputs::StepInputs;
@@ -28,19 +27,6 @@ use crate::operator::{FixedCopy, Stiffness};
 use crate::space::Space;
 use crate::storage::reserve::resize_reserving;
 use crate::team::Team;
-
-/// Settings with which no step can be made.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum DynamicsError {
-    /// Newmark's parameters are out of range.
-    #[error("Newmark parameters beta = {beta}, gamma = {gamma}: beta must be in (0, 1], gamma in [0.5, 2]")]
-    Newmark {
-        /// β.
-        beta: f64,
-        /// γ.
-        gamma: f64,
-    },
-}
 
 /// Integrates the motion of one body; owns all memory that a step needs.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]

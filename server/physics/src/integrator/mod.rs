@@ -38,7 +38,7 @@ mod critical_step;
 mod mass;
 
 pub use critical_step::{omega_max, stable_step};
-pub use dynamics::{Dynamics, DynamicsError};
+pub use dynamics::Dynamics;
 pub use free_motion::{FreeMotion, free_motions};
 pub use increment::Increment;
 pub use linearly_implicit::LinearlyImplicit;
@@ -50,7 +50,7 @@ pub use pair_springs::PairSpring;
 pub use parts::LooseParts;
 pub use relaxation::{Relaxation, RelaxationReport};
 pub use report::{Outcome, SolveReport};
-pub use scheme::{MassKind, Scheme};
+pub use scheme::{DynamicsError, MassKind, Scheme};
 pub use settings::{DynamicsSettings, LEAST_NEWTON_STEPS};
 pub use springs::{PointSpring, SpringKind};
 pub use state::{State, WEIGHTLESS};

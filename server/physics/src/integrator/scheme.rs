@@ -1,7 +1,21 @@
 //! Time integration schemes.
 
-use super::DynamicsError;
+use thiserror::Error;
+
 use crate::assembly::MassSharing;
+
+/// Settings with which no step can be made.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum DynamicsError {
+    /// Newmark's parameters are out of range.
+    #[error("Newmark parameters beta = {beta}, gamma = {gamma}: beta must be in (0, 1], gamma in [0.5, 2]")]
+    Newmark {
+        /// β.
+        beta: f64,
+        /// γ.
+        gamma: f64,
+    },
+}
 
 /// A time integration scheme. h is the step, a = M⁻¹ (f_ext − f_int − D v).
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -10,7 +10,7 @@ use super::groups::Groups;
 use super::kernel::{Block6, Coefficients, EnergyCoefficients};
 use super::rows::{self, Sum, gather_direction};
 use super::shared_lanes::{LaneChanges, SharedLanes};
-use super::stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
+use super::stiffness::{Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, apply};
 use super::{BLOCK, LinearOperator, Padded, block_of};
 use crate::cut::Piece;
 use crate::element::Simd;
@@ -22,19 +22,6 @@ use crate::team::{Team, blocks, ranges};
 
 /// Largest number of lanes of one chunk: four copies each must leave room in 16-bit local numbers.
 const MOST_LANES: usize = 8192;
-
-/// How K̂ is applied.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum OperatorChoice {
-    /// Assembled if the stiffness stays the same from step to step (the linear law), by the tets if it
-    /// rotates with the material.
-    #[default]
-    Auto,
-    /// By the tets: 44 bytes and 130 operations per tet, nothing to assemble.
-    MatrixFree,
-    /// Assembled: 40 bytes and 36 operations per pair of neighbours (1.2 to 1.6 per tet).
-    Assembled,
-}
 
 /// s K̂ of a body; also its internal forces and the diagonal blocks of s K̂.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]

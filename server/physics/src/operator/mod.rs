@@ -11,6 +11,7 @@ mod edges;
 mod groups;
 mod held;
 mod precondition;
+mod inverse;
 mod preconditioner;
 mod stiff_modes;
 mod stiffness;
@@ -19,14 +20,15 @@ pub mod rows;
 mod system;
 
 pub use composite_diagonal::CompositeDiagonal;
-pub use elastic::{Elastic, OperatorChoice};
+pub use elastic::Elastic;
 pub use held::Held;
+pub use inverse::{Inverse3, invert, invert_free};
 pub use kernel::Block6;
 pub use precondition::{Iterate, Preconditioner};
-pub use preconditioner::{BlockJacobi, Inverse3, invert, invert_free};
+pub use preconditioner::BlockJacobi;
 pub use rows::Sum;
 pub use stiff_modes::{NearPiece, StiffModes, degenerate_elements};
-pub use stiffness::{Direction, ElasticUpdate, Place, Stiffness, apply};
+pub use stiffness::{Direction, ElasticUpdate, OperatorChoice, Place, Stiffness, apply};
 pub use substitution::{Substitutable, Substitution};
 pub use system::{FixedCopy, Spring, SystemOperator, filter};
 

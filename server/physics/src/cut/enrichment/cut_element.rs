@@ -1,28 +1,11 @@
 //! One element cut in two: its stiffness in every basis, and its critical time step.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
-use thiserror::Error;
 
 use super::spectrum::largest_frequency;
-use super::{Enrichment, Lumping, Piece, Side, bar_pieces, tet_pieces};
+use super::{Enrichment, EnrichmentError, Lumping, Piece, Side, bar_pieces, tet_pieces};
 use crate::material::Lame;
 use crate::mesh::{tet_gradients, tet_volume};
-
-/// Why a cut element cannot be analysed.
-#[derive(Clone, Debug, Error, PartialEq)]
-pub enum EnrichmentError {
-    /// The cut leaves one side without material or goes through a node.
-    #[error("the cut does not separate the nodes of the element into two sides")]
-    NotCut,
-    /// The mass matrix is singular in double precision.
-    #[error("the mass matrix is singular: pivot {pivot} of the scaled matrix is {value:e}")]
-    SingularMass {
-        /// Index of the degree of freedom.
-        pivot: usize,
-        /// Its pivot. A mass matrix without coupling has pivots of 1.
-        value: f64,
-    },
-}
 
 /// A bar or a linear tet cut in two, in its rest configuration and for small strains.
 #[derive(Clone, Debug)]

@@ -41,6 +41,8 @@
 
 mod basis;
 mod claims;
+mod error;
+mod lumping;
 mod cut_element;
 mod enriched_tet;
 mod figures;
@@ -51,10 +53,11 @@ mod view;
 
 pub use basis::{Enrichment, Side};
 pub use claims::{Claim, thesis_claims};
-pub use cut_element::{CutElement, EnrichmentError, tet_stiffness};
+pub use cut_element::{CutElement, tet_stiffness};
 pub use enriched_tet::{EnrichedTangent, EnrichedTet, UA};
+pub use error::EnrichmentError;
 pub use figures::{StepCurve, StepFigure, cut_places, regular_tet, thesis_figures};
-pub use mass::Lumping;
+pub use lumping::Lumping;
 pub use pieces::{Piece, bar_pieces, tet_pieces};
 pub use spectrum::largest_frequency;
 pub use view::EnrichedView;
