@@ -27,6 +27,7 @@ impl Default for Dense {
 
 impl Dense {
     /// The matrix that `packed` holds.
+    #[inline(always)]
     pub fn unpacked(packed: &Packed) -> Self {
         let mut out = Self::default();
         let mut entry = 0;
@@ -45,6 +46,7 @@ impl Dense {
     }
 
     /// Its upper triangle.
+    #[inline(always)]
     pub fn packed(&self) -> Packed {
         let mut out = [0.0; PACKED];
         let mut entry = 0;
@@ -56,11 +58,13 @@ impl Dense {
     }
 
     /// Q A Qᵀ, with the rotation `Q` on every vertex.
+    #[inline(always)]
     pub fn rotated(&self, Q: &Matrix3<f32>) -> Self {
         self.times_rotation(Q).transposed().times_rotation(Q)
     }
 
     /// A Qᵀ.
+    #[inline(always)]
     fn times_rotation(&self, Q: &Matrix3<f32>) -> Self {
         let mut out = Self::default();
         for c in 0..8 {
@@ -74,11 +78,13 @@ impl Dense {
     }
 
     /// Tᵀ A T, where row c of `T` has the weights of the new vertices in the old vertex c.
+    #[inline(always)]
     pub fn carried(&self, T: &[[f32; 8]; 8]) -> Self {
         self.times_weights(T).transposed().times_weights(T)
     }
 
     /// A T.
+    #[inline(always)]
     fn times_weights(&self, T: &[[f32; 8]; 8]) -> Self {
         let mut out = Self::default();
         for (c, row) in T.iter().enumerate() {
@@ -91,6 +97,7 @@ impl Dense {
         out
     }
 
+    #[inline(always)]
     fn transposed(&self) -> Self {
         let mut out = Self::default();
         for j in 0..24 {
@@ -134,6 +141,7 @@ impl Dense {
     }
 
     /// Adds another matrix.
+    #[inline(always)]
     pub fn add(&mut self, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| add(a, 1.0, b));
     }
@@ -186,7 +194,7 @@ pub const fn at(i: usize, j: usize) -> usize {
     j * (j + 1) / 2 + i
 }
 
-#[inline]
+#[inline(always)]
 fn add(y: &mut [f32; 24], a: f32, x: &[f32; 24]) {
     y.iter_mut().zip(x).for_each(|(y, x)| *y += a * x);
 }

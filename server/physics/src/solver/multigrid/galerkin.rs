@@ -8,26 +8,27 @@
 //! # Source
 //! Dick, Georgii, Westermann 2011, §6.1 and eq. 2.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use nalgebra::{Matrix3, Rotation3};
 
-use super::carried::{Carried, corners_in};
-use super::dense::{Dense, Packed};
+use super::carried::Carried;
+use super::dense::Dense;
 use super::hierarchy::Hierarchy;
-use super::level::{Level, NONE};
-use super::table::{self, Weights};
-use super::thin::{Inner, Passed, Thin, is_thin};
+use super::level::NONE;
+use super::matrices::{
+    CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, cell_matrix, shared_matrix,
+};
+use super::refresh::Context;
+use super::table;
+use super::thin::is_thin;
+use crate::element::Simd;
 use crate::material::Lame;
-use crate::octree::{Cell, corner_shares, corner_weights};
+use crate::octree::corner_shares;
 use crate::operator::cells::unit_stiffness;
 use crate::operator::{BLOCK, FixedCopy, Held};
 use crate::team::{Team, blocks};
 
-/// Rotations that differ by less [rad] are the same; single precision tells them apart no better.
-const SAME: f32 = 2e-6;
 /// Stored cells per unit of work.
 const STORED_BLOCK: usize = 8;
-
-pub(super) type Rotation = UnitQuaternion<f32>;
 
 /// Constants of the material of cells.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -47,55 +48,6 @@ pub struct Coefficients {
     pub scale: f64,
     /// Factor of the lumped mass.
     pub mass_factor: f64,
-}
-
-/// The matrix of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum CellMatrix {
-    /// That of its kind.
-    Shared(u32),
-    /// Its number among the stored ones of the level.
-    Stored(u32),
-}
-
-/// A matrix that belongs to one cell.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Stored {
-    /// The cell, or [`NONE`] if the place is free.
-    pub cell: u32,
-    /// Whether it has to be computed again.
-    pub(super) stale: bool,
-    /// Rotations of the children in the frame of the cell when it was computed. Where cells at one place are
-    /// duplicates, there may be more than eight.
-    pub(super) relative: Vec<Rotation>,
-    /// Over the vertices that carry the cell, in its frame.
-    #[serde(with = "crate::storage::saved::array")]
-    pub matrix: Packed,
-    /// Of a thin cell.
-    pub(super) inner: Inner,
-}
-
-/// The matrices of one level.
-#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub struct LevelMatrices {
-    /// Frame of every cell: its rotation, or the mean one of its children; I where vertices are prescribed in
-    /// some directions only.
-    pub frame: Vec<Rotation>,
-    pub matrix: Vec<CellMatrix>,
-    pub stored: Vec<Stored>,
-    free: Vec<u32>,
-    /// Lumped mass of the leaves with shared matrices times its factor, by vertex [kg]. Empty on the finest level,
-    /// unless its slots are listed.
-    pub mass: Vec<f32>,
-    /// Whether prescribed vertices are below the cell, and whether some of them in some directions only.
-    pub(super) holds: Vec<[bool; 2]>,
-    /// Whether the matrix in the frame of the cell changed in this update.
-    pub changed: Vec<bool>,
-    /// Cells that a cut or other prescribed directions changed since the last update.
-    pub(super) touched: Vec<u32>,
-    /// Places of thin cells among the stored ones.
-    pub(super) thin: Vec<u32>,
-    pub(super) passed: Vec<Passed>,
 }
 
 /// What an update of the operators changed.
@@ -366,10 +318,9 @@ impl Galerkin {
             may_be_thin,
         };
         let frame = &*frame;
+        let simd = Simd::detect();
         team.for_blocks(blocks(stored, STORED_BLOCK), |_, stored| {
-            for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
-                context.refresh(stored, &frame[stored.cell as usize], (tolerance, anew));
-            }
+            context.refresh(simd, stored, frame, (tolerance, anew));
         });
         for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
             changed[stored.cell as usize] |= stored.stale;
@@ -416,9 +367,6 @@ impl Galerkin {
     }
 }
 
-/// Number of the first entry of `inclined` among the bits of prescribed directions: bits of axes are below it.
-pub(super) const INCLINED: u8 = 8;
-
 /// The number that stands for `held`, which is added to `inclined` if it is new there.
 ///
 /// Where a body is held in more different directions than numbers are left, coarse levels leave further vertices to
@@ -444,154 +392,6 @@ fn code(inclined: &mut Vec<Held>, held: Held) -> u8 {
 pub(super) fn held(fixed: &[u8], vertices: &[u32; 8]) -> [bool; 2] {
     let fixed = vertices.map(|v| fixed[v as usize]);
     [fixed.iter().any(|&f| f != 0), fixed.iter().any(|&f| f != 0 && f != 7)]
-}
-
-impl LevelMatrices {
-    /// Marks the cells that were touched since the last update as changed.
-    fn mark_touched(&mut self) {
-        self.touched.drain(..).for_each(|id| self.changed[id as usize] = true);
-    }
-}
-
-impl Stored {
-    fn empty() -> Self {
-        let matrix = [0.0; super::dense::PACKED];
-        Self { cell: NONE, stale: true, relative: Vec::new(), matrix, inner: Inner::default() }
-    }
-}
-
-/// What the matrices of level `l` are computed from.
-struct Context<'a> {
-    hierarchy: &'a Hierarchy,
-    l: usize,
-    fine: &'a LevelMatrices,
-    shared: &'a [Dense],
-    carried: &'a Carried,
-    /// Prescribed directions of the fine vertices; empty where they are in the matrices already.
-    held: &'a [u8],
-    inclined: &'a [Held],
-    eighth: &'a [f32],
-    /// Whether inner vertices of thin cells move as in equilibrium.
-    may_be_thin: bool,
-}
-
-impl Context<'_> {
-    /// Computes a stored matrix if anything below it changed.
-    fn refresh(&self, stored: &mut Stored, frame: &Rotation, (tolerance, anew): (f32, bool)) {
-        let id = stored.cell as usize;
-        let children = self.hierarchy.steps[self.l - 1].children_of(id);
-        let to_frame = frame.inverse();
-        let relative = |c: u32| to_frame * self.fine.frame[c as usize];
-        stored.stale |= anew
-            || children
-                .iter()
-                .zip(&stored.relative)
-                .any(|(&c, known)| self.fine.changed[c as usize] || relative(c).angle_to(known) > tolerance);
-        if !stored.stale {
-            return;
-        }
-        let (fine, coarse) = (&self.hierarchy.levels[self.l - 1], &self.hierarchy.levels[self.l]);
-        let cell = &coarse.cells[id];
-        let mut sum = Dense::default();
-        stored.inner.clear();
-        let is_held = |v: u32| self.held.get(v as usize).is_some_and(|&held| held != 0);
-        let mut thin = (self.may_be_thin && is_thin(coarse, id))
-            .then(|| Thin::new((fine, coarse), &self.hierarchy.steps[self.l - 1], id, is_held))
-            .flatten();
-        for (&child, known) in children.iter().zip(&mut stored.relative) {
-            *known = relative(child);
-            let child = child as usize;
-            let turn = (known.angle() > SAME).then(|| known.to_rotation_matrix().into_inner());
-            let merges = fine.cells[child].level != cell.level;
-            if let Some(A) = self.carried(child).filter(|_| merges && thin.is_none()) {
-                match turn {
-                    Some(Q) => sum.add(&A.rotated(&Q)),
-                    None => sum.add(A),
-                }
-                continue;
-            }
-            let mut A = cell_matrix(self.hierarchy, (self.l - 1, child), self.fine, self.shared, self.eighth);
-            if let Some(Q) = turn {
-                A = A.rotated(&Q);
-            }
-            if !self.held.is_empty() {
-                for (c, &v) in fine.vertices[child].iter().enumerate() {
-                    match self.held[v as usize] {
-                        fixed @ 0..INCLINED => A.hold(c, fixed),
-                        fixed => A.filter(c, &self.inclined[usize::from(fixed - INCLINED)]),
-                    }
-                }
-            }
-            if let Some(thin) = &mut thin {
-                thin.add(fine, child, &A);
-            }
-            if merges {
-                sum.add(&A.carried(&corners_in(fine, child, cell)));
-            } else {
-                sum.add(&A);
-            }
-        }
-        if !coarse.leaf[id] && coarse.hanging[id] != 0 {
-            sum = sum.carried(&weights(cell, coarse.hanging[id]));
-        }
-        if let Some(thin) = thin {
-            thin.relax(&mut sum, &mut stored.inner);
-        }
-        stored.matrix = sum.packed();
-    }
-}
-
-impl Context<'_> {
-    /// The matrix of a child in the corners of its parent, if its kind and place alone give it.
-    #[inline]
-    fn carried(&self, child: usize) -> Option<&Dense> {
-        let CellMatrix::Shared(kind) = self.fine.matrix[child] else { return None };
-        let fine = &self.hierarchy.levels[self.l - 1];
-        if !self.held.is_empty() && fine.vertices[child].iter().any(|&v| self.held[v as usize] != 0) {
-            return None;
-        }
-        self.carried.get(kind, &fine.cells[child], fine.hanging[child])
-    }
-}
-
-fn cell_matrix(
-    hierarchy: &Hierarchy,
-    (l, id): (usize, usize),
-    of: &LevelMatrices,
-    shared: &[Dense],
-    eighth: &[f32],
-) -> Dense {
-    match of.matrix[id] {
-        CellMatrix::Stored(place) => Dense::unpacked(&of.stored[place as usize].matrix),
-        CellMatrix::Shared(kind) => {
-            let kind = kind as usize;
-            shared_matrix(&hierarchy.levels[l], id, &shared[kind], eighth[kind])
-        }
-    }
-}
-
-/// The matrix of a cell of a kind over the vertices that carry it, with an `eighth` of the mass of a leaf at every
-/// corner.
-pub(super) fn shared_matrix(level: &Level, id: usize, of_kind: &Dense, eighth: f32) -> Dense {
-    let mut A = *of_kind;
-    if !level.leaf[id] {
-        return A;
-    }
-    if level.hanging[id] == 0 {
-        (0..8).for_each(|c| A.add_mass(c, eighth));
-        return A;
-    }
-    let W = weights(&level.cells[id], level.hanging[id]);
-    A = A.carried(&W);
-    for row in W {
-        row.iter().enumerate().for_each(|(c, w)| A.add_mass(c, w * eighth));
-    }
-    A
-}
-
-/// Weights of the vertices of a cell in its corners.
-fn weights(cell: &Cell, hanging: u8) -> Weights {
-    corner_weights(cell, hanging).map(|row| row.map(|w| w as f32))
 }
 
 /// The mean of rotations that are near each other.

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::galerkin::{CellMatrix, LevelMatrices};
 use super::level::{Level, NONE};
+use super::matrices::{CellMatrix, LevelMatrices};
 use super::step::Step;
 use super::thin::INNER;
 use crate::operator::Padded;

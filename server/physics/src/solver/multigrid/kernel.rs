@@ -4,8 +4,9 @@ use nalgebra::Matrix3;
 
 use super::dense::at;
 use super::follow::LevelChange;
-use super::galerkin::{CellMatrix, Galerkin, LevelMatrices};
+use super::galerkin::Galerkin;
 use super::level::Level;
+use super::matrices::{CellMatrix, LevelMatrices};
 use crate::element::Simd;
 use crate::operator::cells::{
     CellLane, CellMatrix as LaneMatrix, CellOperator, SectorTable, morton_order, slot_corners, slot_hanging,

@@ -17,6 +17,8 @@ mod dense;
 mod table;
 mod carried;
 mod thin;
+mod matrices;
+mod refresh;
 mod galerkin;
 mod inner;
 mod touched;

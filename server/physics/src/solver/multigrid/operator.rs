@@ -6,8 +6,9 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::dense::{Dense, rows_packed, times_packed};
-use super::galerkin::{CellMatrix, Galerkin, LevelMatrices};
+use super::galerkin::Galerkin;
 use super::level::Level;
+use super::matrices::{CellMatrix, LevelMatrices};
 use crate::octree::Cell;
 #[cfg(test)]
 use crate::operator::{BLOCK, Inverse3, invert};

@@ -12,10 +12,11 @@
 use nalgebra::Matrix3;
 
 use super::cycle::{Multigrid, MultigridSettings};
-use super::galerkin::{Coefficients, Galerkin, INCLINED};
+use super::galerkin::{Coefficients, Galerkin};
 use super::hierarchy::Hierarchy;
 use super::kernel::LevelKernel;
 use super::level::NONE;
+use super::matrices::INCLINED;
 use super::precondition::Cycle;
 use super::restricted::RestrictedSprings;
 use crate::octree::Octree;

@@ -37,6 +37,8 @@ const VERTICES: usize = 27;
 /// Those of them in the middle between others.
 pub(super) const INNER: usize = VERTICES - 8;
 const UNKNOWNS: usize = 3 * INNER;
+/// Entries of a row: a whole number of vectors.
+const ROW: usize = UNKNOWNS.next_multiple_of(4);
 /// Pivots below this part of their diagonal entry are none: nothing holds the inner vertices then.
 const PIVOT: f64 = 1e-6;
 
@@ -89,8 +91,22 @@ fn bit(place: [i32; 3]) -> u32 {
     1 << (place[0] + 3 * place[1] + 9 * place[2])
 }
 
-/// The equations of the inner vertices of a cell.
-pub struct Thin {
+/// Room for the equations of the inner vertices of one cell after the other.
+pub struct Equations {
+    /// A_ii, of which the upper triangle is used.
+    A: [[f64; ROW]; UNKNOWNS],
+    /// (A W)_i.
+    AW: [[f64; 24]; UNKNOWNS],
+}
+
+impl Default for Equations {
+    fn default() -> Self {
+        Self { A: [[0.0; ROW]; UNKNOWNS], AW: [[0.0; 24]; UNKNOWNS] }
+    }
+}
+
+/// The inner vertices of a cell.
+pub struct Thin<'a> {
     vertices: [u32; VERTICES],
     /// Trilinear weights of the cell's corners.
     weights: [[f32; 8]; VERTICES],
@@ -99,12 +115,10 @@ pub struct Thin {
     n: usize,
     known: usize,
     diagonal: [[f32; 3]; VERTICES],
-    /// A_ii and (A W)_i.
-    A: [[f64; UNKNOWNS]; UNKNOWNS],
-    AW: [[f64; 24]; UNKNOWNS],
+    equations: &'a mut Equations,
 }
 
-impl Thin {
+impl<'a> Thin<'a> {
     /// Those of thin cell `id` of `coarse`; `is_held` tells which fine vertices are held in some direction. `None` if
     /// it has such, if it has no inner vertices, or if its children rest on others than their corners.
     pub fn new(
@@ -112,6 +126,7 @@ impl Thin {
         step: &Step,
         id: usize,
         is_held: impl Fn(u32) -> bool,
+        equations: &'a mut Equations,
     ) -> Option<Self> {
         if !fine.has_slots() {
             return None;
@@ -125,8 +140,7 @@ impl Thin {
             n: 0,
             known: 0,
             diagonal: [[0.0; 3]; VERTICES],
-            A: [[0.0; UNKNOWNS]; UNKNOWNS],
-            AW: [[0.0; 24]; UNKNOWNS],
+            equations,
         };
         let mut places = [[0; 3]; VERTICES];
         let (mut known, mut taken) = (0, 0_u32);
@@ -168,28 +182,32 @@ impl Thin {
                 thin.n += 1;
             }
         }
-        (thin.n > 0).then_some(thin)
+        let n = 3 * thin.n;
+        thin.equations.A[..n].iter_mut().for_each(|row| row[..n].fill(0.0));
+        thin.equations.AW[..n].fill([0.0; 24]);
+        (n > 0).then_some(thin)
     }
 
     /// Adds the matrix of a child, in the frame of the cell.
+    #[inline(always)]
     pub fn add(&mut self, fine: &Level, child: usize, A: &Dense) {
         let places = fine.vertices[child].map(|v| self.vertices.iter().position(|w| *w == v).unwrap_or(0));
         for (c, &place) in places.iter().enumerate() {
             (0..3).for_each(|k| self.diagonal[place][k] += A.0[3 * c + k][3 * c + k]);
         }
         for (c, &row) in places.iter().enumerate().filter(|(_, row)| self.inner[**row] < INNER) {
-            let first = 3 * self.inner[row];
-            for (d, &column) in places.iter().enumerate() {
-                let block = A.block(c, d).map(f64::from);
-                if self.inner[column] < INNER {
-                    let at = 3 * self.inner[column];
-                    for (r, s) in (0..9).map(|e| (e / 3, e % 3)) {
-                        self.A[first + r][at + s] += block[(r, s)];
+            for r in 0..3 {
+                let entries = A.0[3 * c + r].map(f64::from);
+                let at = 3 * self.inner[row] + r;
+                let (of_inner, of_corners) = (&mut self.equations.A[at], &mut self.equations.AW[at]);
+                for (entries, &column) in entries.chunks_exact(3).zip(&places) {
+                    if self.inner[column] < INNER {
+                        let first = 3 * self.inner[column];
+                        of_inner[first..first + 3].iter_mut().zip(entries).for_each(|(a, entry)| *a += entry);
                     }
-                }
-                for (q, &w) in self.weights[column].iter().enumerate().filter(|(_, w)| **w != 0.0) {
-                    for (r, s) in (0..9).map(|e| (e / 3, e % 3)) {
-                        self.AW[first + r][3 * q + s] += f64::from(w) * block[(r, s)];
+                    let weights = self.weights[column].iter().zip(of_corners.chunks_exact_mut(3));
+                    for (&w, aw) in weights.filter(|(w, _)| **w != 0.0) {
+                        aw.iter_mut().zip(entries).for_each(|(a, entry)| *a += f64::from(w) * entry);
                     }
                 }
             }
@@ -199,52 +217,63 @@ impl Thin {
     /// Makes Pᵀ A P of `sum` = Wᵀ A W, and writes the inner vertices and D. Leaves both as they are with no inner
     /// vertices if A_ii is not positive definite, or if another vertex has no stiffness because it rests on held ones:
     /// what moves that alone would then have none either.
-    pub fn relax(mut self, sum: &mut Dense, inner: &mut Inner) {
+    #[inline(always)]
+    pub fn relax(self, sum: &mut Dense, inner: &mut Inner) {
         if self.diagonal[..self.known].iter().flatten().any(|d| *d <= 0.0) {
             return;
         }
         let n = 3 * self.n;
-        let (L, X) = (&mut self.A, &mut self.AW);
+        let Equations { A: U, AW: X } = self.equations;
+        // A_ii = Uᵀ U, row by row, in place.
+        let mut least = [0.0; UNKNOWNS];
+        (0..n).for_each(|j| least[j] = PIVOT * U[j][j]);
         for j in 0..n {
-            for i in j..n {
-                let (row, pivot) = (&L[i][..j], &L[j][..j]);
-                let rest = L[i][j] - row.iter().zip(pivot).map(|(a, b)| a * b).sum::<f64>();
-                if i > j {
-                    L[i][j] = rest / L[j][j];
-                } else if rest > PIVOT * L[j][j] {
-                    L[j][j] = rest.sqrt();
-                } else {
-                    return;
-                }
+            if U[j][j] <= least[j] || U[j][j].is_nan() {
+                return;
+            }
+            let root = U[j][j].sqrt();
+            U[j][j..n].iter_mut().for_each(|u| *u /= root);
+            let pivot = U[j];
+            for i in j + 1..n {
+                subtract(&mut U[i][i..n], pivot[i], &pivot[i..n]);
             }
         }
-        // X = L⁻¹ (A W)_i, so that (A W)_iᵀ A_ii⁻¹ (A W)_i = Xᵀ X.
-        for i in 0..n {
-            for k in 0..i {
-                let (l, known) = (L[i][k], X[k]);
-                X[i].iter_mut().zip(known).for_each(|(x, known)| *x -= l * known);
+        // X = U⁻ᵀ (A W)_i, so that (A W)_iᵀ A_ii⁻¹ (A W)_i = Xᵀ X.
+        for j in 0..n {
+            let u = U[j][j];
+            X[j].iter_mut().for_each(|x| *x /= u);
+            let known = X[j];
+            for i in j + 1..n {
+                subtract(&mut X[i], U[j][i], &known);
             }
-            let l = L[i][i];
-            X[i].iter_mut().for_each(|x| *x /= l);
+        }
+        let mut product = [[0.0; 24]; 24];
+        for x in &X[..n] {
+            product.iter_mut().zip(x).for_each(|(row, &f)| subtract(row, -f, x));
         }
         for p in 0..24 {
             for q in p..24 {
-                let product: f64 = X[..n].iter().map(|x| x[p] * x[q]).sum();
-                sum.0[p][q] = (f64::from(sum.0[p][q]) - product) as f32;
+                sum.0[p][q] = (f64::from(sum.0[p][q]) - product[p][q]) as f32;
                 sum.0[q][p] = sum.0[p][q];
             }
         }
-        // D = −L⁻ᵀ X.
+        // D = −U⁻¹ X.
         for i in (0..n).rev() {
             for k in i + 1..n {
-                let (l, known) = (L[k][i], X[k]);
-                X[i].iter_mut().zip(known).for_each(|(x, known)| *x -= l * known);
+                let known = X[k];
+                subtract(&mut X[i], U[i][k], &known);
             }
-            let l = L[i][i];
-            X[i].iter_mut().for_each(|x| *x /= l);
+            let u = U[i][i];
+            X[i].iter_mut().for_each(|x| *x /= u);
         }
         inner.change.extend(X[..n].iter().map(|row| row.map(|x| -x as f32)));
         let numbers = self.vertices.iter().zip(self.inner).filter(|(_, number)| *number < INNER);
         inner.vertices.extend(numbers.map(|(v, _)| *v));
     }
+}
+
+/// a −= f b.
+#[inline(always)]
+fn subtract(a: &mut [f64], f: f64, b: &[f64]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a -= f * b);
 }

@@ -2,9 +2,10 @@
 //! again, by the next update.
 
 use super::follow::LevelChange;
-use super::galerkin::{CellMatrix, Galerkin, INCLINED, LevelMatrices, Rotation, held, shared_matrix};
+use super::galerkin::{Galerkin, held};
 use super::hierarchy::Hierarchy;
 use super::level::{Level, NONE};
+use super::matrices::{CellMatrix, INCLINED, LevelMatrices, Rotation, shared_matrix};
 use super::thin::is_thin;
 use crate::octree::corner_shares;
 use crate::operator::FixedCopy;

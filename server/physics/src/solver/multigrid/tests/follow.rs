@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 use super::support::{Exact, Fine, V3, clamped, coefficients, cube, cut_at, noise, vector};
 use crate::octree::{LinkKey, Octree};
 use crate::operator::{Inverse3, Padded, padded};
-use crate::solver::multigrid::galerkin::CellMatrix;
 use crate::solver::multigrid::level::NONE;
+use crate::solver::multigrid::matrices::CellMatrix;
 use crate::solver::multigrid::{Hierarchy, Multigrid, MultigridSettings};
 use crate::team::Team;
 

@@ -8,8 +8,9 @@ use super::levels::random_cuts;
 use super::support::{Exact, V3, blade_grid, clamped, coefficients, cube, dot, vector};
 use crate::octree::Octree;
 use crate::operator::{FixedCopy, Inverse3, padded};
-use crate::solver::multigrid::galerkin::{CellMatrix, Galerkin};
+use crate::solver::multigrid::galerkin::Galerkin;
 use crate::solver::multigrid::level::Level;
+use crate::solver::multigrid::matrices::CellMatrix;
 use crate::solver::multigrid::{CellMaterial, Coefficients, Hierarchy};
 use crate::team::Team;
 

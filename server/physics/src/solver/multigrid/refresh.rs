@@ -1,0 +1,152 @@
+//! Stored matrices, computed anew where something below them changed.
+
+#![allow(unsafe_code)] // vector instructions behind run-time detection
+
+use super::carried::{Carried, corners_in};
+use super::dense::Dense;
+use super::hierarchy::Hierarchy;
+use super::level::NONE;
+use super::matrices::{CellMatrix, INCLINED, LevelMatrices, Rotation, SAME, Stored, cell_matrix, weights};
+use super::thin::{Equations, Thin, is_thin};
+use crate::element::Simd;
+use crate::operator::Held;
+
+/// What the matrices of level `l` are computed from.
+pub struct Context<'a> {
+    pub hierarchy: &'a Hierarchy,
+    pub l: usize,
+    pub fine: &'a LevelMatrices,
+    pub shared: &'a [Dense],
+    pub carried: &'a Carried,
+    /// Prescribed directions of the fine vertices; empty where they are in the matrices already.
+    pub held: &'a [u8],
+    pub inclined: &'a [Held],
+    pub eighth: &'a [f32],
+    /// Whether inner vertices of thin cells move as in equilibrium.
+    pub may_be_thin: bool,
+}
+
+impl Context<'_> {
+    /// Computes stored matrices of this level, whose cells have these frames, if anything below them changed.
+    pub fn refresh(&self, simd: Simd, stored: &mut [Stored], frame: &[Rotation], with: (f32, bool)) {
+        match simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::Avx2` comes from `Simd::detect` only.
+            Simd::Avx2 => unsafe { avx2::refresh(self, stored, frame, with) },
+            _ => self.refresh_all(stored, frame, with),
+        }
+    }
+
+    #[inline(always)]
+    fn refresh_all(&self, stored: &mut [Stored], frame: &[Rotation], with: (f32, bool)) {
+        let mut equations = None;
+        for stored in stored.iter_mut().filter(|stored| stored.cell != NONE) {
+            self.refresh_one(stored, &frame[stored.cell as usize], with, &mut equations);
+        }
+    }
+
+    #[inline(always)]
+    fn refresh_one(
+        &self,
+        stored: &mut Stored,
+        frame: &Rotation,
+        (tolerance, anew): (f32, bool),
+        equations: &mut Option<Equations>,
+    ) {
+        let id = stored.cell as usize;
+        let children = self.hierarchy.steps[self.l - 1].children_of(id);
+        let to_frame = frame.inverse();
+        let relative = |c: u32| to_frame * self.fine.frame[c as usize];
+        stored.stale |= anew
+            || children
+                .iter()
+                .zip(&stored.relative)
+                .any(|(&c, known)| self.fine.changed[c as usize] || relative(c).angle_to(known) > tolerance);
+        if !stored.stale {
+            return;
+        }
+        let (fine, coarse) = (&self.hierarchy.levels[self.l - 1], &self.hierarchy.levels[self.l]);
+        let cell = &coarse.cells[id];
+        let mut sum = Dense::default();
+        stored.inner.clear();
+        let is_held = |v: u32| self.held.get(v as usize).is_some_and(|&held| held != 0);
+        let mut thin = (self.may_be_thin && is_thin(coarse, id))
+            .then(|| {
+                let room = equations.get_or_insert_default();
+                Thin::new((fine, coarse), &self.hierarchy.steps[self.l - 1], id, is_held, room)
+            })
+            .flatten();
+        for (&child, known) in children.iter().zip(&mut stored.relative) {
+            *known = relative(child);
+            let child = child as usize;
+            let turn = (known.angle() > SAME).then(|| known.to_rotation_matrix().into_inner());
+            let merges = fine.cells[child].level != cell.level;
+            if let Some(A) = self.carried(child).filter(|_| merges && thin.is_none()) {
+                match turn {
+                    Some(Q) => sum.add(&A.rotated(&Q)),
+                    None => sum.add(A),
+                }
+                continue;
+            }
+            let mut A = cell_matrix(self.hierarchy, (self.l - 1, child), self.fine, self.shared, self.eighth);
+            if let Some(Q) = turn {
+                A = A.rotated(&Q);
+            }
+            if !self.held.is_empty() {
+                for (c, &v) in fine.vertices[child].iter().enumerate() {
+                    match self.held[v as usize] {
+                        fixed @ 0..INCLINED => A.hold(c, fixed),
+                        fixed => A.filter(c, &self.inclined[usize::from(fixed - INCLINED)]),
+                    }
+                }
+            }
+            if let Some(thin) = &mut thin {
+                thin.add(fine, child, &A);
+            }
+            if merges {
+                sum.add(&A.carried(&corners_in(fine, child, cell)));
+            } else {
+                sum.add(&A);
+            }
+        }
+        if !coarse.leaf[id] && coarse.hanging[id] != 0 {
+            sum = sum.carried(&weights(cell, coarse.hanging[id]));
+        }
+        if let Some(thin) = thin {
+            thin.relax(&mut sum, &mut stored.inner);
+        }
+        stored.matrix = sum.packed();
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    //! The same compiled for AVX2. Nothing is contracted, so the bits are the same, too.
+
+    use super::{Context, Rotation, Stored};
+
+    /// # Safety
+    /// The machine has AVX2.
+    #[target_feature(enable = "avx2")]
+    pub unsafe fn refresh(
+        context: &Context<'_>,
+        stored: &mut [Stored],
+        frame: &[Rotation],
+        with: (f32, bool),
+    ) {
+        context.refresh_all(stored, frame, with);
+    }
+}
+
+impl Context<'_> {
+    /// The matrix of a child in the corners of its parent, if its kind and place alone give it.
+    #[inline(always)]
+    fn carried(&self, child: usize) -> Option<&Dense> {
+        let CellMatrix::Shared(kind) = self.fine.matrix[child] else { return None };
+        let fine = &self.hierarchy.levels[self.l - 1];
+        if !self.held.is_empty() && fine.vertices[child].iter().any(|&v| self.held[v as usize] != 0) {
+            return None;
+        }
+        self.carried.get(kind, &fine.cells[child], fine.hanging[child])
+    }
+}
