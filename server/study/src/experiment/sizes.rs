@@ -21,7 +21,8 @@ pub fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
         title: "Time per cell, and what adaptivity saves".into(),
         about: "The cube with rotated blades, from few cells to many, with the default smoother on one thread: a \
             step is rotations, operators of all levels, and three cycles. Uniform grids have the finest cells \
-            everywhere and the same cuts."
+            everywhere and the same cuts. All cubes have the same blades, so rods of the smallest one are two cells \
+            wide, and thin rods have more coarse matrices per cell."
             .into(),
         ..ExperimentResult::default()
     };
