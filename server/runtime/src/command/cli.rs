@@ -254,10 +254,10 @@ pub struct AccuracyArgs {
     /// Cases (r1, r2-tc1, bar-rest, bar-motion; bar is both; cut-tc1, cut-tc2force and cut-tc2strip compare
     /// methods of cutting; cutting is all three), experiments on octree cells and multigrid (dick-tables,
     /// dick-convergence, dick-solvers, dick-layer, dick-sizes; dick is all of them; cells-cube,
-    /// cells-elements, cells-levels; cells is all of these), on methods of collision detection (collision), on
+    /// cells-elements, cells-levels, cells-skin; cells is all of these), on methods of collision detection (collision), on
     /// relaxation (nienhuys), on cuts along faces (nienhuys-cut), on the convergence of cut meshes (schoch), on ways to cut
     /// (slits), on fronts of cuts (front), on what enriched elements cost (enriched), on a falling slice (slice), on
-    /// threads (threads), and scene files.
+    /// masses and springs (springs), on other simulators (peers), on threads (threads), and scene files.
     #[arg(value_name = "CASE|SCENE", default_values = ["r1", "r2-tc1", "bar"])]
     pub cases: Vec<String>,
     /// Recommend a configuration that fits into this time, per static solution or per frame of a motion.

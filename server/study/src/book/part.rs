@@ -36,7 +36,7 @@ pub struct Part {
 const SCENES: [&str; 4] = ["demonstration", "kidney", "brain", "fingertip"];
 
 /// Parts of the accuracy study, those that papers need first. The quick form ends with the bar at rest.
-const ACCURACY: [(&str, &str); 26] = [
+const ACCURACY: [(&str, &str); 27] = [
     ("threads", "Threads, shares of a step, and the largest mesh in real time"),
     ("nienhuys", "Relaxation: Nienhuys' table 3.1 and figure 3.12"),
     ("nienhuys-cut", "Cuts along faces: Nienhuys' figures 3.13 to 3.16"),
@@ -62,6 +62,7 @@ const ACCURACY: [(&str, &str); 26] = [
     ("cells-cube", "Octree cells: the converged cube"),
     ("cells-elements", "Octree cells against tetrahedra at equal error"),
     ("cells-levels", "Octree cells: coarse levels as a dial"),
+    ("cells-skin", "Octree cells: their surface beside the solid's own"),
     ("collision", "Methods of collision detection"),
 ];
 /// How many of them the quick form has.

@@ -44,6 +44,8 @@ mod elements;
 
 mod levels;
 
+mod skin;
+
 mod collision;
 
 mod threads;
@@ -105,7 +107,7 @@ fn distance(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
 }
 
 /// Names of the experiments; those of the paper first.
-pub const NAMES: [&str; 19] = [
+pub const NAMES: [&str; 20] = [
     "dick-tables",
     "dick-convergence",
     "dick-solvers",
@@ -114,6 +116,7 @@ pub const NAMES: [&str; 19] = [
     "cells-cube",
     "cells-elements",
     "cells-levels",
+    "cells-skin",
     "collision",
     "threads",
     "nienhuys",
@@ -129,7 +132,7 @@ pub const NAMES: [&str; 19] = [
 /// How many of them are those of the paper.
 pub const PAPERS: usize = 5;
 /// How many of them are about octree cells.
-pub const CELLS: usize = 8;
+pub const CELLS: usize = 9;
 
 /// The experiment `name`.
 fn find(name: &str) -> Option<Experiment> {
@@ -142,6 +145,7 @@ fn find(name: &str) -> Option<Experiment> {
         "cells-cube" => Some(cube::cubes),
         "cells-elements" => Some(elements::elements),
         "cells-levels" => Some(levels::levels),
+        "cells-skin" => Some(skin::skin),
         "collision" => Some(collision::collision),
         "threads" => Some(threads::threads),
         "nienhuys" => Some(nienhuys::nienhuys),

@@ -49,6 +49,16 @@ pub fn surface(
     Picture { caption: caption.into(), svg }
 }
 
+/// Triangles between `points` [m], drawn with `up` upwards.
+pub fn triangles(
+    points: &[Vector3<f64>],
+    triangles: &[[u32; 3]],
+    up: Vector3<f64>,
+    caption: impl Into<String>,
+) -> Picture {
+    Picture { caption: caption.into(), svg: draw(points, triangles, &[], up) }
+}
+
 fn draw(points: &[Vector3<f64>], triangles: &[[u32; 3]], tags: &[u32], up: Vector3<f64>) -> String {
     // The viewer stands in front, to the right and above with respect to `up`.
     let side = if up.y.abs() > 0.5 { Vector3::z() } else { -Vector3::y() };
