@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 use scindo_collision::SurfaceBvh;
 use scindo_physics::octree::{Octree, OctreeSettings, OctreeSurface};
-use scindo_world::format::SurfaceMesh;
 use scindo_world::mesh_in::{Organ, SolidSurface};
 
 use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
@@ -55,11 +54,12 @@ pub fn skin(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Trouble
     );
     let cells = if bench.is_quick() { &CELLS[..2] } else { &CELLS[..] };
     for organ in ORGANS {
-        let own = organ.surface();
-        let own = Triangles::of_solid(&own)?;
+        let surface = organ.surface();
+        let (solid, _) = SolidSurface::new(&surface, 1.0)?;
+        let own = Triangles::new(surface.vertices, surface.triangles);
         for &across in cells {
             bench.begin(format!("{}, {across} across", organ.name()), ORGANS.len() * cells.len())?;
-            let (of_cells, h) = own.filled(across)?;
+            let (of_cells, h) = filled(&solid, across)?;
             let apart = of_cells.apart(&own)?;
             table.row(
                 format!("{}, {across} across", organ.name()),
@@ -97,7 +97,19 @@ pub struct Triangles {
     triangles: Vec<[u32; 3]>,
     /// Mean normals of the triangles around every vertex, by area.
     normals: Vec<V>,
-    solid: Option<SolidSurface>,
+}
+
+/// The surface of the cells that fill a solid, and the side of a finest one [m].
+///
+/// # Errors
+/// The solid has no cells of this size.
+pub fn filled(solid: &SolidSurface, cells: u32) -> Result<(Triangles, f64), Trouble> {
+    let octree = Octree::fill(solid, OctreeSettings { cells, levels: LEVELS }, &|_| 0)?;
+    let built = OctreeSurface::build(&octree);
+    let x = octree.rest_positions();
+    let surface = built.surface();
+    let vertices = surface.vertices.iter().map(|v| v.position(&x)).collect();
+    Ok((Triangles::new(vertices, surface.triangles.clone()), octree.lattice().h))
 }
 
 /// How far two surfaces are apart [m], and their normals [°].
@@ -121,31 +133,7 @@ impl Triangles {
             triangle.iter().for_each(|&v| normals[v as usize] += area);
         }
         normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or_default());
-        Self { vertices, triangles, normals, solid: None }
-    }
-
-    /// The surface of a solid.
-    ///
-    /// # Errors
-    /// It encloses nothing.
-    pub fn of_solid(surface: &SurfaceMesh) -> Result<Self, Trouble> {
-        let (solid, _) = SolidSurface::new(surface, 1.0)?;
-        let own = Self::new(surface.vertices.clone(), surface.triangles.clone());
-        Ok(Self { solid: Some(solid), ..own })
-    }
-
-    /// The surface of the cells that fill the solid, and the side of a finest one [m].
-    ///
-    /// # Errors
-    /// The solid has no cells of this size.
-    pub fn filled(&self, cells: u32) -> Result<(Self, f64), Trouble> {
-        let solid = self.solid.as_ref().ok_or("this surface has no solid")?;
-        let octree = Octree::fill(solid, OctreeSettings { cells, levels: LEVELS }, &|_| 0)?;
-        let built = OctreeSurface::build(&octree);
-        let x = octree.rest_positions();
-        let surface = built.surface();
-        let vertices = surface.vertices.iter().map(|v| v.position(&x)).collect();
-        Ok((Self::new(vertices, surface.triangles.clone()), octree.lattice().h))
+        Self { vertices, triangles, normals }
     }
 
     /// The distances of this surface from `other`.
@@ -216,8 +204,10 @@ mod tests {
 
     #[test]
     fn the_cells_of_an_organ_lie_near_its_surface() {
-        let own = Triangles::of_solid(&Organ::Kidney.surface()).unwrap();
-        let (of_cells, h) = own.filled(24).unwrap();
+        let surface = Organ::Kidney.surface();
+        let (solid, _) = SolidSurface::new(&surface, 1.0).unwrap();
+        let own = Triangles::new(surface.vertices, surface.triangles);
+        let (of_cells, h) = filled(&solid, 24).unwrap();
         let apart = of_cells.apart(&own).unwrap();
         assert!(apart.mean < 0.04 * h && apart.far < 0.2 * h && apart.normals_deg < 3.0);
     }
