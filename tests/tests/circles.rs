@@ -40,14 +40,14 @@ fn paths(tree: &str, before: &Segments, out: &mut Vec<Segments>) {
         return;
     };
     let before = before.iter().cloned().chain(segments(&tree[..open])).collect();
-    let inner = tree[open + 1..].trim_end().trim_end_matches('}');
-    // The last brace may belong to a tree inside; it is not needed to end it.
+    let inner = tree[open + 1..].trim_end();
+    let inner = inner.strip_suffix('}').unwrap_or(inner);
     let (mut depth, mut start) = (0, 0);
     for (i, c) in inner.char_indices().chain([(inner.len(), ',')]) {
         match c {
             '{' => depth += 1,
             '}' => depth -= 1,
-            ',' if depth == 0 || i == inner.len() => {
+            ',' if depth == 0 => {
                 paths(&inner[start..i], &before, out);
                 start = i + 1;
             }

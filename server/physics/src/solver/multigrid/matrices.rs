@@ -11,6 +11,8 @@ use crate::octree::{Cell, corner_weights};
 
 /// Rotations that differ by less [rad] are the same; single precision tells them apart no better.
 pub(super) const SAME: f32 = 2e-6;
+
+/// Rotation of a cell.
 pub(super) type Rotation = UnitQuaternion<f32>;
 
 /// Number of the first entry of `inclined` among the bits of prescribed directions: bits of axes are below it.
