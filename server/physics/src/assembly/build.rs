@@ -10,7 +10,7 @@ use super::scratch::Scratch;
 use super::{BlockCsr, ElementKind, Model, ModelError, Volumetric};
 use crate::cut::CutMesh;
 use crate::element::{Points, hex8, quadrature};
-use crate::material::{Material, Regions};
+use crate::material::{Fibres, Material, Regions};
 use crate::mesh::{HexMesh, MeshError, Tet10Mesh, TetMesh};
 use crate::octree::{Octree, corner_weights};
 
@@ -176,6 +176,7 @@ impl Model {
             kind,
             volumetric,
             point,
+            fibres: Fibres::default(),
             regions: Regions::default(),
             density_kg_m3: material.density_kg_m3,
             rest,

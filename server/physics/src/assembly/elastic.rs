@@ -147,10 +147,14 @@ impl Model {
         };
         let Q = self.kind.points();
         let law = self.point_of(e);
-        let Some(split) = self.remedy(e) else {
-            return (0..Q).map(|q| point(q, &|F| law.energy(F))).sum();
+        let fibres: f64 = match self.fibres.is_empty() {
+            true => 0.0,
+            false => (0..Q).map(|q| point(q, &|F| self.fibres.energy(law.law, F))).sum(),
         };
-        let shear: f64 = (0..Q).map(|q| point(q, &|F| split.shear_energy(F))).sum();
+        let Some(split) = self.remedy(e) else {
+            return fibres + (0..Q).map(|q| point(q, &|F| law.energy(F))).sum::<f64>();
+        };
+        let shear: f64 = fibres + (0..Q).map(|q| point(q, &|F| split.shear_energy(F))).sum::<f64>();
         let (F, share) = match &self.averaging {
             Some(averaging) => (deformation_gradient::<N>(&x, self.gradients(e, 0)), averaging.kept),
             None => (self.mean_gradient::<N>(e, &x), 1.0),
@@ -202,7 +206,7 @@ impl Model {
         for q in 0..self.kind.points() {
             let (g, w) = (self.gradients(e, q), weights[q]);
             let F = deformation_gradient::<N>(&x, g);
-            let P = match &split {
+            let mut P = match &split {
                 None => {
                     let (psi, P) = law.energy_and_stress(&F);
                     energy += w * psi;
@@ -221,6 +225,10 @@ impl Model {
                     }
                 }
             };
+            if !self.fibres.is_empty() {
+                energy += w * self.fibres.energy(law.law, &F);
+                P += self.fibres.stress(law.law, &F);
+            }
             add_forces(&P, g, w, f);
         }
         // Volume at one point: at all eight it would lock.
@@ -273,6 +281,9 @@ impl Model {
         for q in 0..self.kind.points() {
             let g = self.gradients(e, q);
             let F = deformation_gradient::<N>(&x, g);
+            if !self.fibres.is_empty() {
+                add_upper_blocks::<N>(&self.fibres.tangent(law.law, &F), g, weights[q], K);
+            }
             if kind == Tangent::Exact {
                 let D = from.map_or(Matrix3::zeros(), |from| F - deformation_gradient::<N>(&from, g));
                 if let Some([_, S]) = law.green(&F, &D) {

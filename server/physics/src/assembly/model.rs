@@ -8,7 +8,7 @@ use super::point::PointLaw;
 use super::scratch::Scratch;
 use super::{BlockCsr, ElementKind, ModelError, Volumetric};
 use crate::element::{Point, Points, Spring, deformation_gradient};
-use crate::material::{Lame, Law, Region, Regions};
+use crate::material::{Fibres, Lame, Law, Region, Regions};
 
 /// A discretised elastic body in double precision.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -17,6 +17,8 @@ pub struct Model {
     pub(super) volumetric: Volumetric,
     /// The law with the body's own constants.
     pub(super) point: PointLaw,
+    /// Families of fibres in all elements.
+    pub(super) fibres: Fibres,
     /// Regions with other constants, and the region of every element (piece, where the mesh is cut).
     pub(super) regions: Regions,
     /// Density [kg/m³] of the body. Regions of another density stand for as much volume as would have their mass.
@@ -77,6 +79,21 @@ impl Model {
     /// Changes the elastic constants outside regions and recomputes nothing else.
     pub fn set_lame(&mut self, lame: Lame) {
         self.point.lame = lame;
+    }
+
+    /// Puts families of fibres into all elements.
+    ///
+    /// # Errors
+    /// A constant of them out of range.
+    pub fn with_fibres(mut self, fibres: Fibres) -> Result<Self, ModelError> {
+        fibres.check()?;
+        self.fibres = fibres;
+        Ok(self)
+    }
+
+    /// Families of fibres in all elements.
+    pub fn fibres(&self) -> &Fibres {
+        &self.fibres
     }
 
     /// The law with the constants of element `e`.

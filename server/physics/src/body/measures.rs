@@ -93,8 +93,8 @@ impl Body {
             let J = point.F.determinant();
             if J > 1e-9 {
                 let lame = self.space.lame(point.region, &self.material);
-                let stress = law.stress(&point.F, lame) * point.F.transpose() / J;
-                of_element[point.element].0 += point.weight * stress;
+                let P = law.stress(&point.F, lame) + self.settings.fibres.stress(law, &point.F);
+                of_element[point.element].0 += point.weight * (P * point.F.transpose() / J);
             }
             of_element[point.element].1 += point.weight;
         });
@@ -106,7 +106,8 @@ impl Body {
     /// # Errors
     /// Settings for which there is none.
     pub fn discrete_model(&self) -> Result<Model, BodyError> {
-        Ok(self.space.model(&self.material, self.settings.volumetric)?)
+        let model = self.space.model(&self.material, self.settings.volumetric)?;
+        Ok(model.with_fibres(self.settings.fibres)?)
     }
 
     /// Region of the material of every element, numbered as in [`cauchy_stresses`](Self::cauchy_stresses): 0 for the
@@ -120,9 +121,10 @@ impl Body {
         of_element
     }
 
-    /// Estimates the discretisation error of linear tetrahedra, cut or not; `None` for other elements.
+    /// Estimates the discretisation error of linear tetrahedra, cut or not; `None` for other elements and for bodies with
+    /// fibres.
     pub fn mesh_error(&self, recovery: &mut StressRecovery) -> Option<MeshError> {
-        let tets = self.space.tets().filter(|tets| tets.is_linear())?;
+        let tets = self.space.tets().filter(|tets| tets.is_linear() && self.settings.fibres.is_empty())?;
         let tets = CutTets::new(tets.mesh(), tets.pieces(), self.n_copies(), tets.regions());
         Some(recovery.estimate(&tets, &self.state.x, self.material.law, self.material.lame()))
     }

@@ -522,7 +522,8 @@ fn step_solver(
     };
     let Some(mut stiffness) = stiffness else {
         let dynamics = settings.dynamics(law);
-        return Ok(Box::new(ModelSolver::of_space(space, *material, settings.volumetric, dynamics)?));
+        let of_model = (settings.volumetric, settings.fibres);
+        return Ok(Box::new(ModelSolver::of_space(space, *material, of_model, dynamics)?));
     };
     stiffness.set_choice(settings.operator(law, space.n_pieces()));
     let (solver, ablation) = (settings.step_solver(law), settings.ablation);

@@ -5,7 +5,7 @@ use crate::assembly::{ElementKind, Volumetric};
 use crate::cut::FrontRule;
 use crate::cut::remesh::SnapSettings;
 use crate::integrator::{DynamicsSettings, MassKind, Multistep, Scheme, SolverSettings};
-use crate::material::Law;
+use crate::material::{Fibres, Law};
 use crate::operator::OperatorChoice;
 use crate::solver::{Curvature, LinearSettings, Method, NewtonSettings, PcgSettings, Precision};
 
@@ -36,6 +36,8 @@ pub struct BodySettings {
     /// Whether the hexahedra of [`ElementKind::Hex8`] are equal cubes, which the kernels of cells take. A body finds
     /// out itself.
     pub cubes: bool,
+    /// Families of fibres in the whole body.
+    pub fibres: Fibres,
     /// Integration of the volumetric energy: a remedy against locking, or none.
     pub volumetric: Volumetric,
     /// Time integration scheme; [`Scheme::Static`] for equilibria.
@@ -104,6 +106,7 @@ impl Default for BodySettings {
             portable: false,
             element: ElementKind::Tet4,
             cubes: false,
+            fibres: Fibres::default(),
             volumetric: Volumetric::Full,
             scheme: Scheme::ImplicitEuler,
             mass: MassKind::Lumped,
@@ -136,6 +139,7 @@ impl BodySettings {
             (self.element == ElementKind::Tet10, "element tet10"),
             (self.element == ElementKind::Hex8 && !self.cubes, "element hex8 without equal cubes"),
             (!matches!(law, Law::Linear | Law::Corotational), "a law that is nonlinear in the stretch"),
+            (!self.fibres.is_empty(), "fibres"),
             (self.scheme.is_explicit(), "an explicit integrator"),
             (
                 self.scheme == Scheme::Static && law.rotates() && !self.descends(law),
@@ -165,6 +169,7 @@ impl BodySettings {
         self.scheme == Scheme::Static
             && self.element == ElementKind::Octree
             && law == Law::Corotational
+            && self.fibres.is_empty()
             && self.simulate_level == 0
             && !self.relaxation
     }
@@ -188,13 +193,18 @@ impl BodySettings {
     /// Largest number of Newton steps per time step. Laws that are linear in the stretch need one linear
     /// solve from the predictor; Newmark's method needs two.
     pub fn newton_steps(&self, law: Law) -> u32 {
-        let easy = matches!(law, Law::Linear | Law::Corotational);
+        let easy = self.is_easy(law);
         self.newton_steps.unwrap_or(match self.scheme {
             Scheme::Static => STATIC_NEWTON_STEPS,
             Scheme::Newmark { .. } if easy => 2,
             _ if easy => 1,
             _ => NEWTON_STEPS,
         })
+    }
+
+    /// Whether the material is linear in the stretch. Fibres are in the linear law only.
+    fn is_easy(&self, law: Law) -> bool {
+        law == Law::Linear || (law == Law::Corotational && self.fibres.is_empty())
     }
 
     /// Largest number of linear solves in a step of the fast path.
@@ -211,7 +221,7 @@ impl BodySettings {
     /// them has. This holds for the motion of laws that are linear in the stretch, unless more than one
     /// Newton step is requested. Every other step has converged when Newton's method has.
     pub fn is_linearised(&self, law: Law) -> bool {
-        let easy = matches!(law, Law::Linear | Law::Corotational) && self.newton_steps.is_none();
+        let easy = self.is_easy(law) && self.newton_steps.is_none();
         let implicit = !self.scheme.is_explicit() && self.scheme != Scheme::Static;
         implicit && (easy || self.newton_steps == Some(1))
     }

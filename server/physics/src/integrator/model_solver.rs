@@ -24,7 +24,7 @@ use super::step_solver::{SolverSettings, StepSolver};
 use crate::assembly::pressure::Follower;
 use crate::assembly::{BlockCsr, Model, ModelError, Volumetric};
 use crate::element::Points;
-use crate::material::Material;
+use crate::material::{Fibres, Material};
 use crate::operator::FixedCopy;
 use crate::solver::Newton;
 use crate::space::Space;
@@ -108,10 +108,10 @@ impl ModelSolver {
     pub fn of_space(
         space: &dyn Space,
         material: Material,
-        volumetric: Volumetric,
+        (volumetric, fibres): (Volumetric, Fibres),
         settings: DynamicsSettings,
     ) -> Result<Self, ModelError> {
-        let mut model = space.model(&material, volumetric)?;
+        let mut model = space.model(&material, volumetric)?.with_fibres(fibres)?;
         if let Some(sharing) = settings.mass.sharing(settings.scheme.is_explicit()) {
             model.share_mass(sharing);
         }
@@ -234,7 +234,8 @@ impl StepSolver for ModelSolver {
     }
 
     fn rebuild(&mut self, space: &dyn Space) -> Result<(), ModelError> {
-        *self = Self::of_space(space, self.material, self.model.volumetric(), self.settings)?;
+        let kept = (self.model.volumetric(), *self.model.fibres());
+        *self = Self::of_space(space, self.material, kept, self.settings)?;
         Ok(())
     }
 

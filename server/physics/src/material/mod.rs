@@ -14,12 +14,14 @@ mod st_venant_kirchhoff;
 mod collapse_guard;
 mod neo_hookean;
 mod law;
+mod fibres;
 mod regions;
 mod split;
 #[cfg(test)]
 mod law_tests;
 
 pub use corotational::Corotational;
+pub use fibres::{Fibre, Fibres, MAX_FIBRES};
 pub use law::{Law, Tangent};
 pub use linear::Linear;
 pub use neo_hookean::NeoHookean;

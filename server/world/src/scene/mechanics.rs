@@ -5,7 +5,7 @@ use scindo_physics::body::{
     OperatorChoice, PcgSettings, Scheme, Volumetric,
 };
 use scindo_physics::cut::remesh::{Moves, SnapSettings};
-use scindo_physics::material::Law;
+use scindo_physics::material::{Fibres, Law};
 
 use super::raw::{
     RawCutMethod, RawElement, RawFront, RawIntegrator, RawLaw, RawLocking, RawLoose, RawMass, RawMethod,
@@ -34,6 +34,8 @@ pub struct Mechanics {
     pub cubes: bool,
     /// Constitutive law.
     pub law: RawLaw,
+    /// Families of fibres.
+    pub fibres: Fibres,
     /// Time integration.
     pub integrator: RawIntegrator,
     /// Parameters of Newmark's method, used by it alone.
@@ -139,6 +141,7 @@ impl Mechanics {
                 RawElement::Octree => ElementKind::Octree,
             },
             cubes: self.element == RawElement::Hex8 && self.cubes,
+            fibres: self.fibres,
             volumetric: match self.locking {
                 RawLocking::None => Volumetric::Full,
                 RawLocking::NodeAveraged => Volumetric::NodeAveraged { kept: KEPT },

@@ -141,6 +141,10 @@ pub struct RawBody {
     /// Regions of another material, such as a tumour. Law and damping are those of the body.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub material: Vec<RawMaterial>,
+    /// Families of parallel fibres in the whole body, such as muscle.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 3))]
+    pub fibre: Vec<RawFibre>,
     /// Rayleigh damping: a mass term and a stiffness term.
     #[serde(default)]
     pub rayleigh: RawRayleigh,

@@ -13,6 +13,7 @@ mod eigenfrequencies;
 mod enriched_bodies;
 mod estimates;
 mod explicit;
+mod fibres;
 mod field;
 mod half_cut_beam;
 mod manufactured;

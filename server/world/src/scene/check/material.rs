@@ -1,8 +1,15 @@
 //! Regions of another material.
 
+use nalgebra::Vector3;
+use scindo_physics::material::{Fibre, Fibres};
+
 use super::super::checked::{MaterialPlace, MaterialSpec};
+use super::super::problem::Fault;
 use super::super::raw::*;
 use super::Check;
+
+/// Length of a direction below which it says nothing.
+const SHORTEST: f64 = 1e-9;
 
 impl Check<'_> {
     /// Regions of another material.
@@ -21,6 +28,29 @@ impl Check<'_> {
             self.conflict(format!("{at}.material"), what, next);
         }
         body.material.iter().enumerate().map(|(i, raw)| self.material(at, i, raw, body)).collect()
+    }
+
+    /// Families of fibres.
+    pub(super) fn fibres(&mut self, at: &str, body: &RawBody) -> Fibres {
+        let mut families = Vec::new();
+        for (i, raw) in body.fibre.iter().enumerate() {
+            let direction = Vector3::from(raw.direction);
+            if direction.norm() < SHORTEST {
+                let (found, allowed) = (format!("{:?}", raw.direction), "a vector with a length".to_owned());
+                let next = "write for example [1, 0, 0]".to_owned();
+                self.report(format!("{at}.fibre.{i}.direction"), Fault::OutOfRange { found, allowed, next });
+                continue;
+            }
+            if raw.stiffening > 0.0 && body.law == RawLaw::Linear {
+                let what =
+                    "fibres do not stiffen in the linear law, whose stress is linear in the displacement";
+                let next = "remove it, or write law = \"corotational\"";
+                self.conflict(format!("{at}.fibre.{i}.stiffening"), what, next);
+            }
+            let (stiffness_pa, stiffening) = (raw.stiffness_pa, raw.stiffening);
+            families.push(Fibre { direction, stiffness_pa, stiffening });
+        }
+        Fibres::new(families)
     }
 
     fn material(&mut self, at: &str, i: usize, raw: &RawMaterial, body: &RawBody) -> MaterialSpec {

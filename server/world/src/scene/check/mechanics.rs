@@ -15,6 +15,7 @@ impl Check<'_> {
             element: body.element,
             cubes: mesh.has_cubes(),
             law: body.law,
+            fibres: self.fibres(at, body),
             integrator: body.integrator,
             newmark: Newmark { beta: newmark.beta, gamma: newmark.gamma },
             mass: body.mass,
@@ -241,7 +242,7 @@ impl Check<'_> {
                 if let Some(why) = m.why_general() {
                     let what = format!("found `single` with {why}, allowed: mixed, double");
                     let next = "single precision needs tet4, octree or hex8 on equal cubes, linear or corotational, implicit-euler, bdf2 or newmark (static with the linear law, or octree), pcg, two-level-pcg or multigrid, \
-                                lumped mass, no locking remedy and one Newton step";
+                                lumped mass, no fibres, no locking remedy and one Newton step";
                     self.conflict(key, what, next);
                 }
             }

@@ -1,10 +1,10 @@
 //! Keys of regions of another material.
 
 use schemars::JsonSchema;
-use scindo_physics::material::Material;
+use scindo_physics::material::{Fibres, Material};
 use serde::{Deserialize, Serialize};
 
-use super::RawWhere;
+use super::{RawWhere, Vec3};
 
 /// A region of another material: exactly one of `where`, `surface`, `group`. What is not given is that of the body.
 /// Where regions overlap, the last one counts. An element belongs to one region as a whole.
@@ -47,4 +47,23 @@ pub struct RawMaterial {
     #[schemars(extend("minimum" = *Material::DENSITY_KG_M3.start(), "maximum" = *Material::DENSITY_KG_M3.end(),
         "x-next" = "soft tissue has about 1000 kg/m3"))]
     pub density_kg_m3: Option<f64>,
+}
+
+/// A family of parallel fibres. It adds to the stiffness along them. Two or three perpendicular families make the body
+/// orthotropic.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFibre {
+    /// Direction of the fibres at rest. Its length does not matter.
+    pub direction: Vec3,
+    /// Stiffness k₁ [Pa], added to Young's modulus along the fibres at small strains. In tension only, except in the
+    /// linear law.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = *Fibres::STIFFNESS_PA.end(),
+        "x-next" = "muscle has a few times its young_pa, tendon a thousand times"))]
+    pub stiffness_pa: f64,
+    /// Stiffening k₂: the energy is k₁ (exp(k₂ ε²) − 1)/(2 k₂) with the Green strain ε along the fibres, after Holzapfel,
+    /// Gasser and Ogden 2000. 0 is linear in ε.
+    #[serde(default)]
+    #[schemars(range(min = *Fibres::STIFFENING.start(), max = *Fibres::STIFFENING.end()), extend("x-next" = "arteries have 1 to 100"))]
+    pub stiffening: f64,
 }
