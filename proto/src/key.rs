@@ -121,7 +121,7 @@ impl Role {
 /// Questions and orders under `rpc/`. Requests and replies: `PauseRequest`, `StepRequest`, `ResetRequest`,
 /// `SetRequest`, `UndoRequest`, `LoadRequest`, `SnapshotRequest`, `RestoreRequest`, `RecordRequest` → `RpcReply`;
 /// `info` → `SessionInfo`; `params` → `ParamsReply`; `scenes` → `ScenesReply`; `schema` → `SchemaReply`; `state` →
-/// `StateReply`.
+/// `StateReply`; `TextureRequest` → `TextureReply`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verb {
     /// Describe the scene, its bodies and its tools.
@@ -150,13 +150,15 @@ pub enum Verb {
     Record,
     /// Return the present state as a file.
     State,
+    /// Return the image on the skin of a body.
+    Texture,
     /// Return the descriptors of the messages.
     Schema,
 }
 
 impl Verb {
     /// Every verb.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Info,
         Self::Load,
         Self::Reset,
@@ -170,13 +172,14 @@ impl Verb {
         Self::Restore,
         Self::Record,
         Self::State,
+        Self::Texture,
         Self::Schema,
     ];
 
     /// Whether the verb changes what everybody sees, or takes time from the simulation. Anybody may ask the others,
     /// which are questions.
     pub fn is_order(self) -> bool {
-        !matches!(self, Self::Info | Self::Schema | Self::Params | Self::Scenes)
+        !matches!(self, Self::Info | Self::Schema | Self::Params | Self::Scenes | Self::Texture)
     }
 
     /// The chunk that stands for the verb in a key.
@@ -195,6 +198,7 @@ impl Verb {
             Self::Restore => "restore",
             Self::Record => "record",
             Self::State => "state",
+            Self::Texture => "texture",
             Self::Schema => "schema",
         }
     }

@@ -32,6 +32,12 @@ pub const TRIANGLE_BYTES: usize = 12;
 /// Bytes of a triangle tag: one little-endian `u32`.
 pub const TAG_BYTES: usize = 4;
 
+/// Bytes of the texture coordinates of a triangle: two little-endian `f32` for each corner.
+pub const TEXTURE_BYTES: usize = 24;
+
+/// Largest image on a body, as the file that it comes in [bytes].
+pub const MAX_IMAGE_BYTES: usize = 16 << 20;
+
 /// Fields beside the arrays of a surface message [bytes].
 pub const HEADER_BYTES: usize = 512;
 
@@ -41,6 +47,7 @@ pub const MAX_FRAME_BYTES: usize =
 
 /// Largest surface topology [bytes].
 pub const MAX_TOPOLOGY_BYTES: usize = MAX_TRIANGLES as usize * (TRIANGLE_BYTES + TAG_BYTES)
+    + MAX_TRIANGLES as usize * TEXTURE_BYTES
     + MAX_VERTICES as usize * (POSITION_BYTES + 1)
     + HEADER_BYTES;
 

@@ -169,6 +169,9 @@ fn keyframe() -> impl Strategy<Value = SurfaceKeyframe> {
                 positions.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
             let bytes_of_triangles: Vec<u8> =
                 triangles.iter().flat_map(|(t, _)| t).flat_map(|i| (i % n).to_le_bytes()).collect();
+            let skin = triangles.iter().filter(|(_, tag)| *tag == 0).count();
+            let texture_coordinates: Vec<u8> =
+                (0..6 * skin).flat_map(|k| (0.25 * k as f32).to_le_bytes()).collect();
             let bytes_of_tags: Vec<u8> = triangles.iter().flat_map(|(_, tag)| tag.to_le_bytes()).collect();
             let topology = SurfaceTopology {
                 seq,
@@ -184,6 +187,7 @@ fn keyframe() -> impl Strategy<Value = SurfaceKeyframe> {
                 rest_positions: bytes_of_positions.clone().into(),
                 held: vec![1; n.div_ceil(8) as usize].into(),
                 hangs: Bytes::new(),
+                texture_coordinates: texture_coordinates.into(),
             };
             let frame = SurfaceFrame {
                 seq,
@@ -222,6 +226,7 @@ fn session_info() -> impl Strategy<Value = SessionInfo> {
             colour: Some(b),
             opacity: 0.5,
             layers: vec![LookLayer { depth_m: 0.01, colour: c }],
+            textured: b % 2 == 0,
         }),
     });
     let tool = (id(), shape(), any::<bool>()).prop_map(|(id, shape, cuts)| ToolInfo {
@@ -461,6 +466,8 @@ proptest! {
         let _ = decode::<ParamsReply>(bytes.clone());
         let _ = decode::<ScenesReply>(bytes.clone());
         let _ = decode::<LoadRequest>(bytes.clone());
+        let _ = decode::<TextureRequest>(bytes.clone());
+        let _ = decode::<TextureReply>(bytes.clone());
         let _ = decode::<RpcReply>(bytes);
     }
 
@@ -598,7 +605,28 @@ fn values_out_of_range_are_refused_with_what_and_where() {
         refusal(&rest).to_string(),
         "SurfaceTopology: rest_positions is 11 bytes, allowed 36 bytes (3 x 12)"
     );
-    assert_eq!(refusal(&SurfaceTopology { held: short.into(), ..topology }).code(), "out-of-range");
+    assert_eq!(refusal(&SurfaceTopology { held: short.into(), ..topology.clone() }).code(), "out-of-range");
+    let tags: Vec<u8> = [0_u32, 7].iter().flat_map(|tag| tag.to_le_bytes()).collect();
+    let two = SurfaceTopology {
+        triangle_count: 2,
+        triangles: vec![0; 24].into(),
+        tags: tags.into(),
+        texture_coordinates: vec![0; 48].into(),
+        ..topology
+    };
+    assert_eq!(
+        refusal(&two).to_string(),
+        "SurfaceTopology: texture_coordinates is 48 bytes, allowed 24 bytes (1 x 24)",
+        "a lip has none"
+    );
+    let nowhere = f32::NAN.to_le_bytes().repeat(6);
+    let nowhere = refusal(&SurfaceTopology { texture_coordinates: nowhere.into(), ..two });
+    assert_eq!(nowhere.code(), "non-finite");
+    let picture = TextureReply { body_id: "b".into(), media_type: "text/html".into(), image: Bytes::new() };
+    assert_eq!(
+        refusal(&picture).to_string(),
+        "TextureReply: media_type is text/html, allowed image/png or image/jpeg"
+    );
     let field = SurfaceField {
         body_id: "b".into(),
         name: "von-mises".into(),

@@ -35,6 +35,9 @@ stop
 serve hands run tests/browser/hands.toml
 node tests/browser/hands.mjs "$url"
 stop
+serve textured run tests/browser/textured.toml
+node tests/browser/textured.mjs "$url"
+stop
 serve headset run tests/browser/people.toml
 node tests/browser/headset.mjs "$url"
 stop

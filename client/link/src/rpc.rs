@@ -1,11 +1,12 @@
-//! Questions and orders to the server. Each waits at most [`TIMEOUT`], that for a state [`STATE_TIMEOUT`].
+//! Questions and orders to the server. Each waits at most [`TIMEOUT`], that for a state or an image [`STATE_TIMEOUT`].
 
 use std::time::Duration;
 
 use bytes::Bytes;
 use scindo_proto::messages::{
     Error, LoadRequest, ParamsReply, PauseRequest, RecordRequest, ResetRequest, RestoreRequest, RpcReply,
-    ScenesReply, SchemaReply, SessionInfo, SetRequest, SnapshotRequest, StateReply, StepRequest, UndoRequest,
+    ScenesReply, SchemaReply, SessionInfo, SetRequest, SnapshotRequest, StateReply, StepRequest,
+    TextureReply, TextureRequest, UndoRequest,
 };
 use scindo_proto::{Topic, Verb, WireMessage, encode, encoding};
 use zenoh::query::ConsolidationMode;
@@ -16,7 +17,7 @@ use crate::link::{Link, decode_sample};
 /// Longest wait for an answer.
 pub const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Longest wait for a state, which may have 64 MiB.
+/// Longest wait for a state, which may have 64 MiB, or an image.
 pub const STATE_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Pause before a question that reached nobody is repeated.
@@ -82,6 +83,13 @@ impl Link {
     pub async fn state(&self) -> Result<StateReply, LinkError> {
         let key = self.keys().key(&Topic::Rpc(Verb::State));
         self.ask_for(STATE_TIMEOUT, key, Bytes::new(), None).await
+    }
+
+    /// The image on the skin of a body that has one. Waits at most [`STATE_TIMEOUT`].
+    pub async fn texture(&self, body: &str) -> Result<TextureReply, LinkError> {
+        let request = TextureRequest { body_id: body.to_owned() };
+        let key = self.keys().key(&Topic::Rpc(Verb::Texture));
+        self.ask_for(STATE_TIMEOUT, key, encode(&request), Some(encoding::<TextureRequest>())).await
     }
 
     /// The scenes that [`Self::load`] accepts.

@@ -25,7 +25,7 @@ const MAX_WAITING: usize = 256;
 const MAX_EVENTS: usize = 7;
 
 /// Most state slots: link, people, info, plan, stats, measures and forces, and those of bodies and tools.
-const MAX_SLOTS: usize = 7 + 3 * MAX_BODIES + 2 * MAX_TOOLS;
+const MAX_SLOTS: usize = 7 + 4 * MAX_BODIES + 2 * MAX_TOOLS;
 
 /// Topics that browsers watch. The viewer subscribes to nothing else.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -146,6 +146,7 @@ impl Hub {
             matches!(
                 slot,
                 Slot::Tool(_)
+                    | Slot::Texture(_)
                     | Slot::Topology(_)
                     | Slot::Frame(_)
                     | Slot::Field(_)
@@ -347,6 +348,7 @@ fn slot_of(message: &Down) -> Option<Slot> {
         Down::Plan(_) => Slot::Plan,
         Down::Stats(_) => Slot::Stats,
         Down::Tool(state) => Slot::Tool(state.tool_id.clone()),
+        Down::Texture(texture) => Slot::Texture(texture.body_id.clone()),
         Down::Topology(topology) => Slot::Topology(topology.body_id.clone()),
         Down::Frame(frame) => Slot::Frame(frame.body_id.clone()),
         Down::CoarseFrame(coarse) => Slot::Frame(coarse.frame.as_ref()?.body_id.clone()),

@@ -35,6 +35,8 @@ pub enum Slot {
     Topology(String),
     /// Stress on the surface of one body.
     Field(String),
+    /// Image on the skin of one body.
+    Texture(String),
     /// Positions of one body.
     Frame(String),
 }

@@ -26,6 +26,9 @@ const RETRY: Duration = Duration::from_millis(700);
 /// A tool that has sent nothing for this long has left.
 const TOOL_SILENCE: Duration = Duration::from_millis(1500);
 
+/// How often the image on a body is asked for.
+const TEXTURE_ATTEMPTS: usize = 5;
+
 /// Longest time between the appearance of a server and its answer to `info`.
 const INFO_PATIENCE: Duration = Duration::from_secs(10);
 
@@ -192,11 +195,25 @@ async fn follow_scene(hub: &Arc<Hub>, link: &Link) -> Result<(Vec<String>, JoinS
     let mut tasks = JoinSet::new();
     for body in &info.bodies {
         tasks.spawn(follow_body(Arc::clone(hub), link.mirror(&body.id).await?));
+        if body.look.as_ref().is_some_and(|look| look.textured) {
+            tasks.spawn(fetch_texture(Arc::clone(hub), link.clone(), body.id.clone()));
+        }
     }
     tasks.spawn(follow_tools(Arc::clone(hub), link.tool_states().await?));
     let bodies = info.bodies.iter().map(|body| body.id.clone()).collect();
     hub.publish(Down::Info(info));
     Ok((bodies, tasks))
+}
+
+/// Forwards the image on the skin of one body. Until it arrives, the body has one colour.
+async fn fetch_texture(hub: Arc<Hub>, link: Link, body: String) {
+    for _ in 0..TEXTURE_ATTEMPTS {
+        match link.texture(&body).await {
+            Ok(texture) => return hub.publish(Down::Texture(texture)),
+            Err(error) => tracing::warn!(%error, body, "no image for the skin of the body"),
+        }
+        sleep(RETRY).await;
+    }
 }
 
 /// Forwards the surface of one body: the topology if it changed, then the frame.

@@ -5,15 +5,19 @@ use prost::Name as _;
 use super::field::{Checked, In};
 use crate::codec::{CountLimit, DecodeError, WireMessage};
 use crate::limits::{
-    MAX_BODIES, MAX_COORDINATE_M, MAX_LAYERS, MAX_OBSTACLE_TRIANGLES, MAX_OBSTACLES, MAX_PARAMS, MAX_PROBES,
-    MAX_REPORT_BYTES, MAX_REPORT_ENTRIES, MAX_RPC_STEPS, MAX_SCENES, MAX_SMALL_BYTES, MAX_STATE_BYTES,
-    MAX_TOOLS, POSITION_BYTES, QUATERNION_TOLERANCE, TRIANGLE_BYTES,
+    MAX_BODIES, MAX_COORDINATE_M, MAX_ID_BYTES, MAX_IMAGE_BYTES, MAX_LAYERS, MAX_OBSTACLE_TRIANGLES,
+    MAX_OBSTACLES, MAX_PARAMS, MAX_PROBES, MAX_REPORT_BYTES, MAX_REPORT_ENTRIES, MAX_RPC_STEPS, MAX_SCENES,
+    MAX_SMALL_BYTES, MAX_STATE_BYTES, MAX_TOOLS, POSITION_BYTES, QUATERNION_TOLERANCE, TRIANGLE_BYTES,
 };
 use crate::messages::{
     BodyLook, Event, LoadRequest, Measures, ObstacleInfo, ParamsReply, PauseRequest, Plan, RecordRequest,
     ResetRequest, RestoreRequest, RpcReply, ScenesReply, SchemaReply, SessionInfo, SetRequest,
-    SnapshotRequest, StateReply, Stats, StepRequest, UndoRequest, event, obstacle_info, param,
+    SnapshotRequest, StateReply, Stats, StepRequest, TextureReply, TextureRequest, UndoRequest, event,
+    obstacle_info, param,
 };
+
+/// Kinds of images that every browser can show, and a glTF file may hold.
+pub const MEDIA_TYPES: [&str; 2] = ["image/png", "image/jpeg"];
 
 const fn count(tag: u32, field: &'static str, allowed: usize) -> CountLimit {
     CountLimit { tag, field, allowed }
@@ -270,6 +274,29 @@ impl WireMessage for StateReply {
 
     fn check(&self) -> Checked {
         In(Self::NAME).text("name", &self.name)
+    }
+}
+
+impl WireMessage for TextureRequest {
+    const MAX_BYTES: usize = MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        In(Self::NAME).id("body_id", &self.body_id)
+    }
+}
+
+impl WireMessage for TextureReply {
+    const MAX_BYTES: usize = MAX_IMAGE_BYTES + MAX_SMALL_BYTES;
+
+    fn check(&self) -> Checked {
+        let at = In(Self::NAME);
+        at.id("body_id", &self.body_id)?;
+        at.at_most("image", self.image.len(), MAX_IMAGE_BYTES)?;
+        if MEDIA_TYPES.contains(&self.media_type.as_str()) {
+            return Ok(());
+        }
+        let found: String = self.media_type.chars().take(MAX_ID_BYTES).collect();
+        Err(at.range("media_type", found, MEDIA_TYPES.join(" or ")))
     }
 }
 

@@ -6,7 +6,7 @@ use super::field::{Checked, In};
 use crate::codec::{DecodeError, WireMessage};
 use crate::limits::{
     MARK_BYTES, MAX_FIELD_BYTES, MAX_FRAME_BYTES, MAX_KEYFRAME_BYTES, MAX_MARKS, MAX_TOPOLOGY_BYTES,
-    MAX_TRIANGLES, MAX_VERTICES, POSITION_BYTES, TAG_BYTES, TRIANGLE_BYTES, VALUE_BYTES,
+    MAX_TRIANGLES, MAX_VERTICES, POSITION_BYTES, TAG_BYTES, TEXTURE_BYTES, TRIANGLE_BYTES, VALUE_BYTES,
 };
 use crate::messages::{SurfaceField, SurfaceFrame, SurfaceKeyframe, SurfaceTopology};
 
@@ -52,6 +52,13 @@ impl WireMessage for SurfaceTopology {
             if !bits.is_empty() {
                 array_length(at, field, bits.len(), self.vertex_count.div_ceil(8), 1)?;
             }
+        }
+        if !self.texture_coordinates.is_empty() {
+            let skin = words(&self.tags).filter(|tag| *tag == [0; 4]).count() as u32;
+            array_length(at, "texture_coordinates", self.texture_coordinates.len(), skin, TEXTURE_BYTES)?;
+        }
+        if let Some(found) = first_non_finite(&self.texture_coordinates) {
+            return at.finite("texture_coordinates", found);
         }
         match largest_index(&self.triangles) {
             Some(index) if index >= self.vertex_count => {

@@ -11,7 +11,8 @@ use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use prost::Message as _;
 use scindo_proto::messages::{
     Error, LoadRequest, PauseRequest, RecordRequest, ResetRequest, RestoreRequest, RpcReply, SchemaReply,
-    SessionInfo, SetRequest, SnapshotRequest, StateReply, StepRequest, UndoRequest,
+    SessionInfo, SetRequest, SnapshotRequest, StateReply, StepRequest, TextureReply, TextureRequest,
+    UndoRequest,
 };
 use scindo_proto::{FILE_DESCRIPTOR_SET, KeySpace, Topic, Verb, WireMessage, decode, encode, encoding};
 use scindo_world::inputs::{ToolInput, ToolShape};
@@ -44,6 +45,8 @@ pub struct RpcThread {
     pub commands: Sender<Command>,
     /// The constant part of the answer to `info`.
     pub info: SessionInfo,
+    /// The images on the skins of bodies.
+    pub textures: Vec<TextureReply>,
     /// Scenes that may be loaded.
     pub catalogue: Arc<Catalogue>,
     /// Whether orders are taken at all.
@@ -82,6 +85,20 @@ impl RpcThread {
             Verb::State => match self.state() {
                 Ok(state) => reply(query, &state),
                 Err(error) => refuse(query, error),
+            },
+            Verb::Texture => match decode::<TextureRequest>(payload) {
+                Ok(TextureRequest { body_id }) => match self.textures.iter().find(|of| of.body_id == body_id)
+                {
+                    Some(texture) => reply(query, texture),
+                    None => {
+                        let message = format!("no body `{body_id}` with an image on its skin");
+                        refuse(
+                            query,
+                            error("no-texture", message, "rpc/info says which bodies are textured"),
+                        );
+                    }
+                },
+                Err(e) => refuse(query, error(e.code(), e.to_string(), "see rpc/schema")),
             },
             Verb::Load => match decode::<LoadRequest>(payload) {
                 Ok(request) => reply(query, &self.load(&request.name)),

@@ -105,6 +105,7 @@ impl Server {
         config: &ServerConfig,
     ) -> Result<Self, RuntimeError> {
         let keys = KeySpace::new(&config.realm, &config.session)?;
+        let textures = engine.textures();
         let info = SessionInfo { scene: config.scene.clone(), scene_seq: config.scene_seq, ..engine.info() };
         let plan = engine.plan();
         let (outgoing, outgoing_rx) = bounded(OUTGOING);
@@ -141,6 +142,7 @@ impl Server {
                 queries,
                 commands,
                 info,
+                textures,
                 catalogue: config.catalogue.clone(),
                 takes_orders,
             };

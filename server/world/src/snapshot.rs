@@ -12,6 +12,7 @@ use nalgebra::{Isometry3, Vector3};
 use scindo_collision::Method;
 
 pub use crate::body::SurfaceTopology;
+use crate::body::texture::Texture;
 use crate::body::{AdaptCounts, StepCounts};
 use crate::inputs::{ToolMode, ToolShape};
 use crate::report::Energy;
@@ -78,6 +79,8 @@ pub struct BodySnapshot {
     pub epoch: u32,
     /// Triangles that the positions belong to; of this epoch whenever there are positions.
     pub topology: Arc<SurfaceTopology>,
+    /// Image on the skin.
+    pub texture: Option<Arc<Texture>>,
     /// Surface positions [m]; empty when nobody asked.
     pub positions: Vec<[f32; 3]>,
     /// Ends [m] of the lines on the surface where incisions have not opened yet; empty when nobody asked.

@@ -66,6 +66,7 @@ fn topology() -> SurfaceTopology {
         triangle_count: 1,
         triangles: [0u32, 1, 2].iter().flat_map(|i| i.to_le_bytes()).collect::<Vec<_>>().into(),
         tags: vec![0; 4].into(),
+        texture_coordinates: vec![0; 24].into(),
         ..SurfaceTopology::default()
     }
 }
@@ -181,6 +182,8 @@ fn orders() {
         all::<RestoreRequest>(bytes);
         all::<RecordRequest>(bytes);
         all::<StateReply>(bytes);
+        all::<TextureRequest>(bytes);
+        all::<TextureReply>(bytes);
     });
 }
 

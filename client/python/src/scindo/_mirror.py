@@ -41,6 +41,9 @@ class Surface:
     tags: NDArray[np.uint32]
     #: Vertices at rest, n × 3 [m]; empty if the server does not send them.
     rest_positions: NDArray[np.float32]
+    #: Places on the image of the skin, for the three corners of every triangle with tag 0, in order: k × 3 × 2; empty for a
+    #: body without a texture.
+    texture_coordinates: NDArray[np.float32]
     #: Number of the frame, which rises while one server runs.
     seq: int
 
@@ -57,9 +60,10 @@ def to_surface(topology: surface_pb2.SurfaceTopology, frame: surface_pb2.Surface
         return None
     rest = np.frombuffer(topology.rest_positions if len(topology.rest_positions) == 12 * n else b"", "<f4")
     tags = np.frombuffer(topology.tags, "<u4")
-    return Surface(
-        topology.epoch, frame.sim_step, frame.sim_time_s, positions, triangles, tags, rest.reshape(-1, 3), frame.seq
-    )
+    fits = len(topology.texture_coordinates) == 24 * int((tags == 0).sum())
+    image = np.frombuffer(topology.texture_coordinates if fits else b"", "<f4").reshape(-1, 3, 2)
+    arrays = (positions, triangles, tags, rest.reshape(-1, 3), image)
+    return Surface(topology.epoch, frame.sim_step, frame.sim_time_s, *arrays, frame.seq)
 
 
 class Assembly:

@@ -12,7 +12,7 @@ from ._mirror import Mirror, Surface
 from ._newest import Newest
 from .errors import TimedOut
 from .forces import Force
-from .v1 import surface_pb2
+from .v1 import server_pb2, surface_pb2
 
 if TYPE_CHECKING:
     from .session import Session
@@ -45,6 +45,18 @@ class Body:
     def triangles(self) -> NDArray[np.uint32]:
         """Triangles of the newest surface, m × 3. Take both from one ``surface`` while somebody cuts."""
         return self.surface.triangles
+
+    @property
+    def texture(self) -> Tuple[str, bytes]:
+        """The image on its skin: ``image/png`` or ``image/jpeg``, and the file.
+
+        Raises:
+            Refused: the body has none; ``session.info`` says which bodies are textured.
+        """
+        link = self._session.link
+        request = server_pb2.TextureRequest(body_id=self.id)
+        reply = link.ask(link.keys.rpc("texture"), server_pb2.TextureReply, request, timeout=30.0)
+        return reply.media_type, reply.image
 
     @property
     def forces(self) -> List[Force]:

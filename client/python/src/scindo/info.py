@@ -23,6 +23,8 @@ class BodyInfo:
     #: Corners of the box around it at the start [m].
     low: Array
     high: Array
+    #: Whether its skin has an image: ``Body.texture``.
+    textured: bool
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,8 @@ class Stats:
 
 def to_info(m: server_pb2.SessionInfo) -> SessionInfo:
     bodies = tuple(
-        BodyInfo(b.id, b.epoch, b.elements, b.nodes, from_vec3(b.min_m), from_vec3(b.max_m)) for b in m.bodies
+        BodyInfo(b.id, b.epoch, b.elements, b.nodes, from_vec3(b.min_m), from_vec3(b.max_m), b.look.textured)
+        for b in m.bodies
     )
     tools = tuple(ToolInfo(t.id, t.owner, t.cuts) for t in m.tools)
     obstacles = tuple(o.id for o in m.obstacles)

@@ -53,6 +53,7 @@ export class BodySurface {
   private skinDepth: SkinDepth | null = null;
   private parted: Parts | null = null;
   private look: Look | null = null;
+  private isTextured = false;
   private stale = false;
 
   constructor(readonly id: string, readonly order: number) {
@@ -67,6 +68,13 @@ export class BodySurface {
   setLook(look: Look): void {
     this.look = look;
     this.applyLook();
+  }
+
+  /** Shows an image on the skin; `null` takes it away. */
+  setTexture(image: ImageBitmap | null): void {
+    this.tissue.setImage(image);
+    this.applyLook();
+    this.stale = true;
   }
 
   /** Colours the body by a painter; `null` restores the look of tissue. */
@@ -186,7 +194,9 @@ export class BodySurface {
     this.rest = topology.restPositions.length === 12 * topology.vertexCount
       ? floats(topology.restPositions, new Float32Array(3 * topology.vertexCount)) : new Float32Array(0);
     const first = this.render === null;
-    this.render = smoothTopology(triangles, tags, this.positions, this.vertexCount);
+    const image = floats(topology.textureCoordinates, new Float32Array(topology.textureCoordinates.length / 4));
+    this.render = smoothTopology(triangles, tags, this.positions, this.vertexCount, image);
+    this.isTextured = image.length > 0;
     this.lipTriangles = this.triangleCount - this.render.skinTriangles;
     this.reserve(this.render.source.length, this.render.index.length);
     const index = this.geometry.index as BufferAttribute;
@@ -199,6 +209,7 @@ export class BodySurface {
     this.geometry.addGroup(0, skin, 0);
     this.geometry.addGroup(skin, this.render.index.length - skin, 1);
     this.geometry.setDrawRange(0, this.render.index.length);
+    if (this.isTextured) this.placeImage(image);
     this.parted = null;
     this.findCore(topology.hangs);
     this.findDepth();
@@ -207,6 +218,16 @@ export class BodySurface {
       this.applyLook();
     }
     return true;
+  }
+
+  /** Sends the texture coordinates of the skin to the GPU: u v of the three corners of every skin triangle. */
+  private placeImage(image: Float32Array): void {
+    const uv = this.geometry.getAttribute("uv") as BufferAttribute;
+    const values = uv.array as Float32Array;
+    this.render!.corner.forEach((corner, v) => {
+      if (2 * corner + 1 < image.length) values.set(image.subarray(2 * corner, 2 * corner + 2), 2 * v);
+    });
+    this.send(uv, 2);
   }
 
   /** Finds the vertices that the camera keeps in view. */
@@ -252,7 +273,7 @@ export class BodySurface {
     const grows = !position || position.count < vertices;
     const room = grows ? Math.ceil(vertices * 1.5) : position.count;
     if (grows && position) this.geometry.dispose();
-    const named = { position: 3, normal: 3, depth: 1, ...(this.painter ? { color: 3 } : {}) };
+    const named = { position: 3, normal: 3, depth: 1, ...(this.painter ? { color: 3 } : {}), ...(this.isTextured ? { uv: 2 } : {}) };
     for (const [name, size] of Object.entries(named)) {
       if (!grows && this.geometry.hasAttribute(name)) continue;
       const attribute = new BufferAttribute(new Float32Array(size * room), size);

@@ -44,6 +44,7 @@ export function exposeHooks(session: Session, stage: Stage, relay: Relay, hand: 
       stressPa: body.stress?.epoch === body.epoch ? Math.max(...body.stress.values) : null,
       colour: body.tissue.skin.color.getHex(),
       opacity: body.tissue.skin.opacity,
+      textured: body.tissue.skin.map !== null,
     })),
     /** A copy of a body's surface positions [m], x y z interleaved. */
     positions: (id: string) => Array.from(session.bodies.get(id)?.positions ?? []),

@@ -46,6 +46,15 @@ export function accumulateNormals(render: RenderTopology, x: Float32Array, n: Fl
     n[j] += nx; n[j + 1] += ny; n[j + 2] += nz;
     n[k] += nx; n[k + 1] += ny; n[k + 2] += nz;
   }
+  const { seams } = render;
+  for (let s = 0; s < seams.length; s += 2) {
+    const from = 3 * seams[s], to = 3 * seams[s + 1];
+    n[to] += n[from]; n[to + 1] += n[from + 1]; n[to + 2] += n[from + 2];
+  }
+  for (let s = 0; s < seams.length; s += 2) {
+    const to = 3 * seams[s];
+    n.copyWithin(to, 3 * seams[s + 1], 3 * seams[s + 1] + 3);
+  }
   for (let r = 0; r < 3 * render.source.length; r += 3) {
     const length = Math.hypot(n[r], n[r + 1], n[r + 2]);
     if (length > 0) { n[r] /= length; n[r + 1] /= length; n[r + 2] /= length; }

@@ -22,7 +22,7 @@ import { Probes } from "./probes";
 import { View } from "./view";
 import { exposeHooks } from "./hooks";
 import type { Session } from "./session";
-import type { BodyInfo, SessionInfo } from "../gen/scindo/v1/server_pb";
+import type { BodyInfo, SessionInfo, TextureReply } from "../gen/scindo/v1/server_pb";
 import type { ViewerDown } from "../gen/scindo/v1/viewer_pb";
 
 export function start(canvas: HTMLCanvasElement): void {
@@ -105,6 +105,7 @@ class Page {
         this.bodyOf(message.value.bodyId).setTopology(message.value);
         this.bar.refresh();
         break;
+      case "texture": void this.takeTexture(message.value); break;
       case "frame":
         if (!this.belongs(message.value.bodyId)) break;
         if (this.bodyOf(message.value.bodyId).setFrame(message.value)) this.stage.invalidate();
@@ -204,6 +205,20 @@ class Page {
   private takeLook({ id, look }: BodyInfo): void {
     const layers = look?.layers.map(({ depthM, colour }) => ({ depthM, colour })) ?? [];
     this.bodyOf(id).setLook({ colour: look?.colour, opacity: look?.opacity ?? 1, layers });
+    if (!look?.textured) this.bodyOf(id).setTexture(null);
+  }
+
+  /** Decodes the image on a body. Textures of WebGL begin at the lower left corner, images at the upper left one. */
+  private async takeTexture({ bodyId, mediaType, image }: TextureReply): Promise<void> {
+    try {
+      const file = new Blob([image as Uint8Array<ArrayBuffer>], { type: mediaType });
+      const bitmap = await createImageBitmap(file, { imageOrientation: "flipY", premultiplyAlpha: "none" });
+      if (!this.belongs(bodyId)) return;
+      this.bodyOf(bodyId).setTexture(bitmap);
+      this.stage.invalidate();
+    } catch (error) {
+      this.panel.log.line(`the image on ${bodyId} cannot be shown: ${String(error)}`, "error");
+    }
   }
 
   /** Whether a body may belong to the scene. A late message may still speak of the scene before it. */

@@ -45,6 +45,12 @@ function meshOf(body: BodySurface): Mesh | null {
   geometry.setIndex(new BufferAttribute(render.index.slice(), 1));
   const skin = 3 * render.skinTriangles, lips = render.index.length - skin;
   const materials = [material("skin", body.tissue.skin.color, body.tissue.skin.opacity)];
+  const { map } = body.tissue.skin;
+  if (map && drawn.hasAttribute("uv")) {
+    const values = drawn.getAttribute("uv").array as Float32Array;
+    geometry.setAttribute("uv", new BufferAttribute(values.slice(0, 2 * render.source.length), 2));
+    materials[0].map = map;
+  }
   geometry.addGroup(0, skin, 0);
   if (lips > 0) {
     geometry.addGroup(skin, lips, 1);

@@ -7,12 +7,16 @@ const CREASE_COS = Math.cos((52 * Math.PI) / 180);
 /** Triangles below this fraction of the mean area have no reliable normal and never form a crease. */
 const SLIVER = 0.02;
 
-/** A surface ready for drawing. Corners that share a normal share a render vertex. */
+/** A surface ready for drawing. Corners that share a normal share a render vertex, except on the seams of an image. */
 export interface RenderTopology {
   /** Three render vertices per triangle, skin triangles first. */
   index: Uint32Array;
   /** Surface vertex of every render vertex. */
   source: Uint32Array;
+  /** First corner (of `index`) at every render vertex. */
+  corner: Uint32Array;
+  /** Render vertices on the seams of an image, each before the one that it shares its normal with. */
+  seams: Uint32Array;
   /** Triangles with tag 0; the rest are lips of cuts. */
   skinTriangles: number;
   /** Tag of every triangle, in the order of `index`. */
@@ -25,9 +29,13 @@ export interface RenderTopology {
  * Groups corners by union-find over edges. The two triangles of an edge are joined if they have the same tag
  * and meet below the crease angle at the given positions. A new slit is still closed there: its lips fold by
  * 180° at the front and stay apart.
+ *
+ * `image` holds u v of the three corners of every skin triangle, in their order, or nothing. Where an image does not go
+ * on, corners share the normal, but not the render vertex.
  */
 export function smoothTopology(
   given: Uint32Array, givenTags: Uint32Array, positions: Float32Array, vertexCount: number,
+  image: Float32Array = new Float32Array(0),
 ): RenderTopology {
   const { triangles, tags, skinTriangles } = skinFirst(given, givenTags);
   const corners = triangles.length;
@@ -56,19 +64,32 @@ export function smoothTopology(
   }
 
   const index = new Uint32Array(corners);
-  const id = new Int32Array(corners).fill(-1);
-  const source = new Uint32Array(corners);
+  const first = new Int32Array(corners).fill(-1), next = new Int32Array(corners).fill(-1);
+  const source = new Uint32Array(corners), corner = new Uint32Array(corners), seams: number[] = [];
+  const onImage = (c: number) => 2 * c + 1 < image.length;
+  const same = (c: number, d: number) =>
+    !onImage(c) || (image[2 * c] === image[2 * d] && image[2 * c + 1] === image[2 * d + 1]);
   let count = 0;
   for (let c = 0; c < corners; c++) {
     const root = find(parent, c);
-    if (id[root] < 0) {
-      id[root] = count;
-      source[count] = triangles[c];
-      count += 1;
+    let id = first[root], last = -1;
+    while (id >= 0 && !same(c, corner[id])) [last, id] = [id, next[id]];
+    if (id < 0) {
+      id = count++;
+      source[id] = triangles[c];
+      corner[id] = c;
+      if (last < 0) first[root] = id;
+      else {
+        next[last] = id;
+        seams.push(id, first[root]);
+      }
     }
-    index[c] = id[root];
+    index[c] = id;
   }
-  return { index, source: source.slice(0, count), skinTriangles, tags, rims: Uint32Array.from(rims) };
+  return {
+    index, source: source.slice(0, count), corner: corner.slice(0, count), seams: Uint32Array.from(seams),
+    skinTriangles, tags, rims: Uint32Array.from(rims),
+  };
 }
 
 /** Stable partition into skin, then lips, so that each kind is one draw range. */

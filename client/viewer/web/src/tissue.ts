@@ -3,13 +3,15 @@
 // a wound the colour follows the depth below the skin. It starts with a pale rim where the skin is cut. Then
 // come layers that darken inwards, where less light enters.
 
-import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, MeshStandardMaterial, RGBAFormat, SRGBColorSpace, type Plane } from "three";
+import { Color, DataTexture, DoubleSide, FrontSide, LinearFilter, MeshStandardMaterial, RepeatWrapping, RGBAFormat, SRGBColorSpace, Texture, type Plane } from "three";
 
 /** Skin colours of successive bodies: liver, muscle, kidney, fat, gut. */
 const SKIN = [0x8f4038, 0xb5713f, 0x6d4a86, 0xc9a064, 0x4f7f86];
 /** Default layers from the rim inwards, with depths as fractions of the body's radius. */
 const FLESH: [number, number][] = [[0.012, 0xd98a78], [0.05, 0xb3122f], [0.3, 0x8d0d26]];
 const TEXELS = 128;
+/** Samples across an image that is seen at a flat angle. */
+const ANISOTROPY = 8;
 
 /** The look of a body, as the scene sets it. */
 export interface Look {
@@ -37,7 +39,7 @@ export class Tissue {
 
   /** `radius`: half the diagonal of the body [m]. */
   setLook(look: Look, order: number, radius: number): void {
-    this.skin.color.setHex(look.colour ?? SKIN[order % SKIN.length]);
+    this.skin.color.setHex(look.colour ?? (this.skin.map ? 0xffffff : SKIN[order % SKIN.length]));
     const opacity = look.opacity > 0 ? Math.min(1, look.opacity) : 1;
     for (const material of [this.skin, this.lip]) {
       if (material.transparent !== opacity < 1) material.needsUpdate = true;
@@ -45,6 +47,22 @@ export class Tissue {
       material.opacity = opacity;
     }
     this.setLayers(look.layers.map((layer) => [layer.depthM, layer.colour]), radius);
+  }
+
+  /** Shows an image on the skin, which the colour of the look tints; `null` takes it away. Its rows run upwards. */
+  setImage(image: ImageBitmap | null): void {
+    this.skin.map?.dispose();
+    this.skin.map = null;
+    if (image) {
+      const map = new Texture(image);
+      map.flipY = false;
+      map.colorSpace = SRGBColorSpace;
+      map.wrapS = map.wrapT = RepeatWrapping;
+      map.anisotropy = ANISOTROPY;
+      map.needsUpdate = true;
+      this.skin.map = map;
+    }
+    this.skin.needsUpdate = true;
   }
 
   /** Clips by planes. The inside of the skin is then visible as well. */
@@ -62,6 +80,7 @@ export class Tissue {
   }
 
   dispose(): void {
+    this.skin.map?.dispose();
     this.skin.dispose();
     this.lip.dispose();
     this.texture?.dispose();

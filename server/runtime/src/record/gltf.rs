@@ -3,31 +3,43 @@
 //! Cuts change the number of vertices, so a frame is a mesh of its own. An animation scales the mesh of the present
 //! frame to 1 and all others to 0, in steps. Triangles are shared between frames of one topology epoch.
 //!
+//! A skin with an image is drawn apart from the lips of cuts. Where the image does not go on, a surface vertex becomes
+//! several vertices of the file.
+//!
 //! # Source
-//! Khronos, glTF 2.0 Specification, sections 3.6 (buffers), 3.11 (animations) and 4 (GLB).
+//! Khronos, glTF 2.0 Specification, sections 3.6 (buffers), 3.8 (textures), 3.11 (animations) and 4 (GLB).
 
+mod split;
+
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::animation::{self, Interpolation, Property};
 use gltf_json::buffer::{self, Target};
+use gltf_json::image::MimeType;
 use gltf_json::material::{PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor};
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::scene::{Node, Scene};
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Accessor, Animation, Asset, Buffer, Index, Material, Mesh, Root};
+use gltf_json::{Accessor, Animation, Asset, Buffer, Image, Index, Material, Mesh, Root, Texture, texture};
+use scindo_world::body::SimBody;
 use scindo_world::inputs::Wants;
+use scindo_world::scene::LookSpec;
 use scindo_world::simulation::Simulation;
-use scindo_world::snapshot::Snapshot;
+use scindo_world::snapshot::{BodySnapshot, Snapshot};
 use serde_json::{Value, json};
 
 use crate::error::RuntimeError;
+use split::Split;
 
 /// Most key frames of a file.
 pub const MAX_FRAMES: usize = 50;
 /// Colour of a body without one, 0xRRGGBB.
 const PLAIN: u32 = 0x00b5_523f;
+/// Colour that leaves an image as it is.
+const WHITE: u32 = 0x00ff_ffff;
 /// First word of a GLB file, and the types of its two chunks.
 const MAGIC: u32 = 0x4654_6c67;
 const JSON: u32 = 0x4e4f_534a;
@@ -40,10 +52,20 @@ pub struct Gltf {
     bytes: Vec<u8>,
     /// Simulated time of every frame [s], and its nodes.
     frames: Vec<(f32, Vec<Index<Node>>)>,
-    /// Per body its epoch and the triangles of it.
-    triangles: Vec<Option<(u32, Index<Accessor>)>>,
-    materials: Vec<Index<Material>>,
+    /// Per body what its frames of one epoch share.
+    shapes: Vec<Option<Shape>>,
+    /// Per body the materials of its skin and of its lips.
+    materials: Vec<[Index<Material>; 2]>,
     snapshot: Snapshot,
+}
+
+/// What the frames of one epoch of a body share.
+struct Shape {
+    epoch: u32,
+    /// Triangles with their material.
+    parts: Vec<(Index<Accessor>, Index<Material>)>,
+    /// For an image: the surface vertex of every vertex, and the coordinates on the image.
+    image: Option<(Vec<u32>, Index<Accessor>)>,
 }
 
 impl Gltf {
@@ -66,11 +88,10 @@ impl Gltf {
         let mut snapshot = std::mem::take(&mut self.snapshot);
         simulation.snapshot_into(&wants, &mut snapshot);
         if self.materials.is_empty() {
-            self.triangles.resize(n, None);
-            for body in &simulation.scene().bodies {
-                let colour = body.look.colour.unwrap_or(PLAIN);
-                let material = material(&body.id, colour, body.look.opacity as f32);
-                self.materials.push(self.root.push(material));
+            self.shapes.resize_with(n, || None);
+            for (body, spec) in simulation.bodies().iter().zip(&simulation.scene().bodies) {
+                let materials = self.add_materials(body, &spec.look);
+                self.materials.push(materials);
             }
         }
         let mut nodes = Vec::new();
@@ -78,32 +99,16 @@ impl Gltf {
             if body.positions.is_empty() || body.topology.triangles.is_empty() {
                 continue;
             }
-            let known = self.triangles[index].filter(|(epoch, _)| *epoch == body.topology.epoch);
-            let indices = match known {
-                Some((_, indices)) => indices,
-                None => {
-                    let indices = self.indices(&body.topology.triangles);
-                    self.triangles[index] = Some((body.topology.epoch, indices));
-                    indices
-                }
-            };
-            let positions = self.positions(&body.positions);
-            let attributes = [(Valid(Semantic::Positions), positions)].into();
-            let primitive = Primitive {
-                attributes,
-                extensions: None,
-                extras: Default::default(),
-                indices: Some(indices),
-                material: Some(self.materials[index]),
-                mode: Valid(Mode::Triangles),
-                targets: None,
-            };
+            let known = self.shapes[index].take().filter(|shape| shape.epoch == body.topology.epoch);
+            let shape = known.unwrap_or_else(|| self.shape(body, self.materials[index]));
+            let primitives = self.primitives(body, &shape);
+            self.shapes[index] = Some(shape);
             let name = Some(format!("{} at {:.3} s", body.id, snapshot.time_s));
             let mesh = self.root.push(Mesh {
                 extensions: None,
                 extras: Default::default(),
                 name: name.clone(),
-                primitives: vec![primitive],
+                primitives,
                 weights: None,
             });
             // A viewer without animations shows the first frame.
@@ -112,6 +117,66 @@ impl Gltf {
         }
         self.frames.push((snapshot.time_s as f32, nodes));
         self.snapshot = snapshot;
+    }
+
+    /// Materials of the skin and of the lips of a body.
+    fn add_materials(&mut self, body: &SimBody, look: &LookSpec) -> [Index<Material>; 2] {
+        let (colour, opacity) = (look.colour.unwrap_or(PLAIN), look.opacity as f32);
+        let plain = self.root.push(material(&body.id, colour, opacity));
+        let Some(texture) = &body.texture else { return [plain; 2] };
+        let (name, extensions, extras) = (None, None, Default::default());
+        let buffer_view = Some(self.view(&texture.image.bytes, None));
+        let mime_type = Some(MimeType(texture.image.media_type.to_owned()));
+        let source = self.root.push(Image { buffer_view, mime_type, name, uri: None, extensions, extras });
+        let (name, extensions, extras, sampler) = (None, None, Default::default(), None);
+        let index = self.root.push(Texture { name, sampler, source, extensions, extras });
+        // The colour of the look tints the image.
+        let tint = look.colour.unwrap_or(WHITE);
+        let mut skin = material(&format!("{} (skin)", body.id), tint, opacity);
+        let (tex_coord, extensions, extras) = (0, None, Default::default());
+        skin.pbr_metallic_roughness.base_color_texture =
+            Some(texture::Info { index, tex_coord, extensions, extras });
+        [self.root.push(skin), plain]
+    }
+
+    /// What the frames of the present epoch share.
+    fn shape(&mut self, body: &BodySnapshot, [skin, lips]: [Index<Material>; 2]) -> Shape {
+        let topology = &body.topology;
+        let epoch = topology.epoch;
+        let Some(texture) = &body.texture else {
+            return Shape { epoch, parts: vec![(self.indices(&topology.triangles), skin)], image: None };
+        };
+        let split = Split::new(topology, &texture.coordinates(topology.skin_at_rest()));
+        let mut parts = vec![(self.indices(&split.skin), skin)];
+        if !split.lips.is_empty() {
+            parts.push((self.indices(&split.lips), lips));
+        }
+        let view = self.view(&bytes_of(&split.coordinates), Some(Target::ArrayBuffer));
+        let (component, kind) = (ComponentType::F32, Type::Vec2);
+        let coordinates = self.accessor(view, component, kind, split.coordinates.len(), None);
+        Shape { epoch, parts, image: Some((split.source, coordinates)) }
+    }
+
+    /// The triangles of a frame.
+    fn primitives(&mut self, body: &BodySnapshot, shape: &Shape) -> Vec<Primitive> {
+        let attributes = match &shape.image {
+            None => [(Valid(Semantic::Positions), self.positions(&body.positions))].into(),
+            Some((source, coordinates)) => {
+                let positions: Vec<[f32; 3]> = source.iter().map(|&v| body.positions[v as usize]).collect();
+                let positions = (Valid(Semantic::Positions), self.positions(&positions));
+                [positions, (Valid(Semantic::TexCoords(0)), *coordinates)].into()
+            }
+        };
+        let primitive = |&(indices, material): &(Index<Accessor>, Index<Material>)| Primitive {
+            attributes: BTreeMap::clone(&attributes),
+            extensions: None,
+            extras: Default::default(),
+            indices: Some(indices),
+            material: Some(material),
+            mode: Valid(Mode::Triangles),
+            targets: None,
+        };
+        shape.parts.iter().map(primitive).collect()
     }
 
     /// Writes the file.
@@ -232,6 +297,8 @@ impl Gltf {
         }
         let offset = self.bytes.len();
         self.bytes.extend_from_slice(bytes);
+        // Numbers stand at multiples of their size, whatever length an image has.
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         self.root.push(buffer::View {
             buffer: Index::new(0),
             byte_length: bytes.len().into(),
@@ -270,7 +337,7 @@ impl Gltf {
     }
 }
 
-fn bytes_of(vectors: &[[f32; 3]]) -> Vec<u8> {
+fn bytes_of<const N: usize>(vectors: &[[f32; N]]) -> Vec<u8> {
     vectors.iter().flatten().flat_map(|x| x.to_le_bytes()).collect()
 }
 

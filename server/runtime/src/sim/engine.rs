@@ -10,7 +10,7 @@ use scindo_proto::limits::{
 };
 use scindo_proto::messages::{
     BodyInfo, BodyLook, Effect, LookLayer, ParamsReply, Plan, RecordingStats, SessionInfo, SetRequest,
-    ToolInfo, recorded_order,
+    TextureReply, ToolInfo, recorded_order,
 };
 use scindo_proto::{Chunk, WIRE_VERSION};
 use scindo_world::inputs::{CutOutcome, Inputs, Wants};
@@ -189,6 +189,19 @@ impl Engine {
             records: self.record_folder.is_some(),
             ..SessionInfo::default()
         }
+    }
+
+    /// The images on the skins of bodies.
+    pub fn textures(&self) -> Vec<TextureReply> {
+        let image = |body: &SimBody| {
+            let image = &body.texture.as_ref()?.image;
+            Some(TextureReply {
+                body_id: body.id.to_string(),
+                media_type: image.media_type.to_owned(),
+                image: image.bytes.clone(),
+            })
+        };
+        self.sim.bodies().iter().filter_map(image).collect()
     }
 
     /// All effects of the scene: whether each is on, why, and what it costs.
@@ -379,6 +392,7 @@ fn to_look(look: &LookSpec) -> BodyLook {
         colour: look.colour,
         opacity: look.opacity as f32,
         layers: look.layers.iter().map(layer).collect(),
+        textured: look.texture.is_some(),
     }
 }
 

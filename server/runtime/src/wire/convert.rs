@@ -182,6 +182,7 @@ pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::Sur
 /// Triangles of a body. `seq` counts the topologies of the body.
 pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceTopology {
     let SurfaceTopology { epoch, vertex_count, triangles, tags, rest, held, hangs } = &*body.topology;
+    let on_image = body.texture.iter().flat_map(|texture| texture.coordinates(body.topology.skin_at_rest()));
     let coordinates = rest.iter().flatten().flat_map(|c| c.to_le_bytes());
     wire::SurfaceTopology {
         seq,
@@ -197,6 +198,10 @@ pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::
         rest_positions: coordinates.collect::<Vec<u8>>().into(),
         held: bits(held),
         hangs: bits(hangs),
+        texture_coordinates: on_image
+            .flat_map(|corners| corners.into_iter().flatten().flat_map(f32::to_le_bytes))
+            .collect::<Vec<u8>>()
+            .into(),
     }
 }
 

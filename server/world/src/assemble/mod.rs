@@ -7,6 +7,7 @@ pub(crate) mod mesh;
 mod obstacles;
 
 mod skin;
+mod texture;
 
 mod threads;
 
@@ -188,6 +189,12 @@ impl Builder<'_> {
             self.findings.push((format!("{at}.skin"), fault));
         }
         let mut body = SimBody::new(&spec.id, body, health);
+        if let Some(texture) = &spec.look.texture {
+            match texture::load(texture, &spec.mesh, self.base_dir) {
+                Ok(texture) => body.texture = Some(texture.into()),
+                Err((key, fault)) => self.findings.push((format!("{at}.look.texture.{key}"), fault)),
+            }
+        }
         body.fixed_iterations = spec.mechanics.fixed_iterations;
         body.displacement = spec.displacement.clone();
         if let Some(adapt) = spec.octree.and_then(|octree| octree.adapt) {

@@ -10,6 +10,8 @@ pub mod region;
 
 mod shown;
 
+pub mod texture;
+
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -27,6 +29,7 @@ use counts::Watch;
 pub use probe::Probe;
 pub use shown::SurfaceTopology;
 pub(crate) use shown::von_mises;
+use texture::Texture;
 
 /// A deformable body with its name and its groups of held nodes.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -42,6 +45,9 @@ pub struct SimBody {
     /// Faults found and repaired in its mesh file. `None` for a body without a file.
     #[serde(skip)]
     pub health: Option<MeshHealth>,
+    /// Image on its skin.
+    #[serde(skip)]
+    pub texture: Option<Arc<Texture>>,
     /// Volume at rest [m³].
     pub rest_volume_m3: f64,
     /// Whether the scene sets a fixed number of iterations and accepts any residual.
@@ -103,6 +109,7 @@ impl SimBody {
             fix_groups: Vec::new(),
             fix_groups_uncut: None,
             health,
+            texture: None,
             rest_volume_m3,
             fixed_iterations: false,
             displacement: Course::default(),

@@ -26,6 +26,14 @@ pub struct SurfaceTopology {
     pub hangs: Vec<bool>,
 }
 
+impl SurfaceTopology {
+    /// Rest positions of the corners [m] of every triangle of the skin, in their order.
+    pub fn skin_at_rest(&self) -> impl Iterator<Item = [[f32; 3]; 3]> {
+        let skin = self.triangles.iter().zip(&self.tags).filter(|(_, tag)| **tag == 0);
+        skin.map(|(triangle, _)| triangle.map(|vertex| self.rest[vertex as usize]))
+    }
+}
+
 /// Triangles of the present epoch, their rest positions, and what holds them. Sleeping parts are not shown.
 pub fn topology(body: &Body) -> SurfaceTopology {
     let surface = body.surface();

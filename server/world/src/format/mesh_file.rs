@@ -32,6 +32,17 @@ pub struct SurfaceMesh {
     pub notes: Vec<String>,
 }
 
+/// Triangles with texture coordinates at every corner, as read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TexturedSurface {
+    /// Vertex positions, in the file's unit.
+    pub vertices: Vec<Vector3<f64>>,
+    /// Three vertex indices per triangle, all within range.
+    pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of the corners of every triangle; (0, 0) is the lower left corner of the image.
+    pub coordinates: Vec<[[f32; 2]; 3]>,
+}
+
 /// The contents of a mesh file: a volume or a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshFile {

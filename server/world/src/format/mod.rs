@@ -28,13 +28,18 @@ use nalgebra::Vector3;
 
 pub use error::MeshInError;
 pub use groups::{CellGroup, GMSH_PHYSICAL, keep_tets};
-pub use mesh_file::{MeshFile, SurfaceMesh, VolumeMesh};
+pub use mesh_file::{MeshFile, SurfaceMesh, TexturedSurface, VolumeMesh};
+pub use obj::read_textured;
 
 /// Largest mesh file accepted [bytes].
 pub const MAX_FILE_BYTES: u64 = 2 << 30;
 
 /// Reads a mesh file. The format follows from the extension, or from the first bytes if there is none.
 pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
+    read_mesh_bytes(&path.display().to_string(), &read_bytes(path)?)
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, MeshInError> {
     let io = |source| MeshInError::Io { path: path.to_path_buf(), source };
     let file = path.display().to_string();
     let length = std::fs::metadata(path).map_err(io)?.len();
@@ -48,8 +53,7 @@ pub fn read_mesh(path: &Path) -> Result<MeshFile, MeshInError> {
             reason: "no mesh file may be larger".into(),
         });
     }
-    let bytes = std::fs::read(path).map_err(io)?;
-    read_mesh_bytes(&file, &bytes)
+    std::fs::read(path).map_err(io)
 }
 
 /// Reads a mesh from memory. `file` is its name, whose extension chooses the format.

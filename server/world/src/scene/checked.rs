@@ -158,6 +158,27 @@ pub struct LookSpec {
     pub opacity: f64,
     /// Layers inside wounds: where each ends below the skin [m], rising, and its colour.
     pub layers: Vec<(f64, u32)>,
+    /// Image on the skin.
+    pub texture: Option<TextureSpec>,
+}
+
+/// An image on the skin of a body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TextureSpec {
+    /// Path of the image as written.
+    pub image: String,
+    /// Where the skin lies on it.
+    pub mapping: TextureMapping,
+}
+
+/// Where the skin lies on an image.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TextureMapping {
+    /// As on a surface with texture coordinates: its path as written and metres per length unit; none: the surface that
+    /// the mesh was made from.
+    Surface(Option<(String, f64)>),
+    /// Along the axes, repeated after this length [m].
+    Axes(f64),
 }
 
 /// A skin finer than the elements.

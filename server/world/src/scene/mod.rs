@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 pub use checked::{
     AdaptSpec, BodySpec, CellSplit, CheckedScene, CutPath, CutSpec, EffectSwitches, FixSpec, LoadKind,
     LoadSpec, LookSpec, MaterialPlace, MaterialSpec, MeshSource, ObstacleSpec, OctreeSpec, PathPoint,
-    ProbeSpec, PublishRates, Region, Share, SkinSpec, Solid, ToolSpec,
+    ProbeSpec, PublishRates, Region, Share, SkinSpec, Solid, TextureMapping, TextureSpec, ToolSpec,
 };
 pub use course::Course;
 pub use live::{BodyKey, LiveKey, LiveParameter, LiveValue};

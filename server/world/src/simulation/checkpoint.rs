@@ -217,6 +217,7 @@ impl Simulation {
         for (body, other) in self.bodies.iter_mut().zip(&mut other) {
             body.body.take_team_of(&mut other.body);
             body.health = other.health.take();
+            body.texture = other.texture.take();
             body.follow_epoch_of(other);
         }
         let Read { tools, cuts, mut contacts, groups, sleep, dormant, governor, probes, reports, .. } = read;

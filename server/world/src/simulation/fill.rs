@@ -83,6 +83,7 @@ fn fill_body(
     out.velocities.clear();
     if surface {
         out.topology = body.topology();
+        out.texture.clone_from(&body.texture);
         out.positions.extend_from_slice(body.surface_positions());
         hide_sleepers(&body.body, &mut out.positions);
         body.incision_marks(&mut out.marks);

@@ -98,14 +98,16 @@ class BodyInfo(_message.Message):
     def __init__(self, id: _Optional[str] = ..., epoch: _Optional[int] = ..., elements: _Optional[int] = ..., nodes: _Optional[int] = ..., min_m: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., max_m: _Optional[_Union[_common_pb2.Vec3, _Mapping[str, object]]] = ..., look: _Optional[_Union[BodyLook, _Mapping[str, object]]] = ...) -> None: ...
 
 class BodyLook(_message.Message):
-    __slots__ = ("colour", "opacity", "layers")
+    __slots__ = ("colour", "opacity", "layers", "textured")
     COLOUR_FIELD_NUMBER: _ClassVar[int]
     OPACITY_FIELD_NUMBER: _ClassVar[int]
     LAYERS_FIELD_NUMBER: _ClassVar[int]
+    TEXTURED_FIELD_NUMBER: _ClassVar[int]
     colour: int
     opacity: float
     layers: _containers.RepeatedCompositeFieldContainer[LookLayer]
-    def __init__(self, colour: _Optional[int] = ..., opacity: _Optional[float] = ..., layers: _Optional[_Iterable[_Union[LookLayer, _Mapping[str, object]]]] = ...) -> None: ...
+    textured: bool
+    def __init__(self, colour: _Optional[int] = ..., opacity: _Optional[float] = ..., layers: _Optional[_Iterable[_Union[LookLayer, _Mapping[str, object]]]] = ..., textured: _Optional[bool] = ...) -> None: ...
 
 class LookLayer(_message.Message):
     __slots__ = ("depth_m", "colour")
@@ -452,6 +454,22 @@ class SceneEntry(_message.Message):
     name: str
     description: str
     def __init__(self, name: _Optional[str] = ..., description: _Optional[str] = ...) -> None: ...
+
+class TextureRequest(_message.Message):
+    __slots__ = ("body_id",)
+    BODY_ID_FIELD_NUMBER: _ClassVar[int]
+    body_id: str
+    def __init__(self, body_id: _Optional[str] = ...) -> None: ...
+
+class TextureReply(_message.Message):
+    __slots__ = ("body_id", "media_type", "image")
+    BODY_ID_FIELD_NUMBER: _ClassVar[int]
+    MEDIA_TYPE_FIELD_NUMBER: _ClassVar[int]
+    IMAGE_FIELD_NUMBER: _ClassVar[int]
+    body_id: str
+    media_type: str
+    image: bytes
+    def __init__(self, body_id: _Optional[str] = ..., media_type: _Optional[str] = ..., image: _Optional[bytes] = ...) -> None: ...
 
 class LoadRequest(_message.Message):
     __slots__ = ("name",)

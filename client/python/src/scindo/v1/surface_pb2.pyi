@@ -30,7 +30,7 @@ class SurfaceFrame(_message.Message):
     def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., body_id: _Optional[str] = ..., epoch: _Optional[int] = ..., vertex_count: _Optional[int] = ..., positions: _Optional[bytes] = ..., mark_count: _Optional[int] = ..., marks: _Optional[bytes] = ...) -> None: ...
 
 class SurfaceTopology(_message.Message):
-    __slots__ = ("seq", "sim_step", "sim_time_s", "publish_unix_ns", "body_id", "epoch", "vertex_count", "triangle_count", "triangles", "tags", "rest_positions", "held", "hangs")
+    __slots__ = ("seq", "sim_step", "sim_time_s", "publish_unix_ns", "body_id", "epoch", "vertex_count", "triangle_count", "triangles", "tags", "rest_positions", "held", "hangs", "texture_coordinates")
     SEQ_FIELD_NUMBER: _ClassVar[int]
     SIM_STEP_FIELD_NUMBER: _ClassVar[int]
     SIM_TIME_S_FIELD_NUMBER: _ClassVar[int]
@@ -44,6 +44,7 @@ class SurfaceTopology(_message.Message):
     REST_POSITIONS_FIELD_NUMBER: _ClassVar[int]
     HELD_FIELD_NUMBER: _ClassVar[int]
     HANGS_FIELD_NUMBER: _ClassVar[int]
+    TEXTURE_COORDINATES_FIELD_NUMBER: _ClassVar[int]
     seq: int
     sim_step: int
     sim_time_s: float
@@ -57,7 +58,8 @@ class SurfaceTopology(_message.Message):
     rest_positions: bytes
     held: bytes
     hangs: bytes
-    def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., body_id: _Optional[str] = ..., epoch: _Optional[int] = ..., vertex_count: _Optional[int] = ..., triangle_count: _Optional[int] = ..., triangles: _Optional[bytes] = ..., tags: _Optional[bytes] = ..., rest_positions: _Optional[bytes] = ..., held: _Optional[bytes] = ..., hangs: _Optional[bytes] = ...) -> None: ...
+    texture_coordinates: bytes
+    def __init__(self, seq: _Optional[int] = ..., sim_step: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., publish_unix_ns: _Optional[int] = ..., body_id: _Optional[str] = ..., epoch: _Optional[int] = ..., vertex_count: _Optional[int] = ..., triangle_count: _Optional[int] = ..., triangles: _Optional[bytes] = ..., tags: _Optional[bytes] = ..., rest_positions: _Optional[bytes] = ..., held: _Optional[bytes] = ..., hangs: _Optional[bytes] = ..., texture_coordinates: _Optional[bytes] = ...) -> None: ...
 
 class SurfaceField(_message.Message):
     __slots__ = ("seq", "sim_step", "sim_time_s", "publish_unix_ns", "body_id", "epoch", "vertex_count", "name", "values")

@@ -11,7 +11,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class ViewerDown(_message.Message):
-    __slots__ = ("hello", "link", "info", "plan", "topology", "frame", "tool", "stats", "event", "pong", "rpc", "tool_gone", "field", "measures", "forces", "people", "coarse_frame")
+    __slots__ = ("hello", "link", "info", "plan", "topology", "frame", "tool", "stats", "event", "pong", "rpc", "tool_gone", "field", "measures", "forces", "people", "coarse_frame", "texture")
     HELLO_FIELD_NUMBER: _ClassVar[int]
     LINK_FIELD_NUMBER: _ClassVar[int]
     INFO_FIELD_NUMBER: _ClassVar[int]
@@ -29,6 +29,7 @@ class ViewerDown(_message.Message):
     FORCES_FIELD_NUMBER: _ClassVar[int]
     PEOPLE_FIELD_NUMBER: _ClassVar[int]
     COARSE_FRAME_FIELD_NUMBER: _ClassVar[int]
+    TEXTURE_FIELD_NUMBER: _ClassVar[int]
     hello: ViewerHello
     link: ViewerLink
     info: _server_pb2.SessionInfo
@@ -46,7 +47,8 @@ class ViewerDown(_message.Message):
     forces: _force_pb2.Forces
     people: ViewerPeople
     coarse_frame: ViewerFrame
-    def __init__(self, hello: _Optional[_Union[ViewerHello, _Mapping[str, object]]] = ..., link: _Optional[_Union[ViewerLink, _Mapping[str, object]]] = ..., info: _Optional[_Union[_server_pb2.SessionInfo, _Mapping[str, object]]] = ..., plan: _Optional[_Union[_server_pb2.Plan, _Mapping[str, object]]] = ..., topology: _Optional[_Union[_surface_pb2.SurfaceTopology, _Mapping[str, object]]] = ..., frame: _Optional[_Union[_surface_pb2.SurfaceFrame, _Mapping[str, object]]] = ..., tool: _Optional[_Union[_tool_pb2.ToolState, _Mapping[str, object]]] = ..., stats: _Optional[_Union[_server_pb2.Stats, _Mapping[str, object]]] = ..., event: _Optional[_Union[_server_pb2.Event, _Mapping[str, object]]] = ..., pong: _Optional[_Union[ViewerPong, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpcReply, _Mapping[str, object]]] = ..., tool_gone: _Optional[_Union[ViewerToolGone, _Mapping[str, object]]] = ..., field: _Optional[_Union[_surface_pb2.SurfaceField, _Mapping[str, object]]] = ..., measures: _Optional[_Union[_server_pb2.Measures, _Mapping[str, object]]] = ..., forces: _Optional[_Union[_force_pb2.Forces, _Mapping[str, object]]] = ..., people: _Optional[_Union[ViewerPeople, _Mapping[str, object]]] = ..., coarse_frame: _Optional[_Union[ViewerFrame, _Mapping[str, object]]] = ...) -> None: ...
+    texture: _server_pb2.TextureReply
+    def __init__(self, hello: _Optional[_Union[ViewerHello, _Mapping[str, object]]] = ..., link: _Optional[_Union[ViewerLink, _Mapping[str, object]]] = ..., info: _Optional[_Union[_server_pb2.SessionInfo, _Mapping[str, object]]] = ..., plan: _Optional[_Union[_server_pb2.Plan, _Mapping[str, object]]] = ..., topology: _Optional[_Union[_surface_pb2.SurfaceTopology, _Mapping[str, object]]] = ..., frame: _Optional[_Union[_surface_pb2.SurfaceFrame, _Mapping[str, object]]] = ..., tool: _Optional[_Union[_tool_pb2.ToolState, _Mapping[str, object]]] = ..., stats: _Optional[_Union[_server_pb2.Stats, _Mapping[str, object]]] = ..., event: _Optional[_Union[_server_pb2.Event, _Mapping[str, object]]] = ..., pong: _Optional[_Union[ViewerPong, _Mapping[str, object]]] = ..., rpc: _Optional[_Union[ViewerRpcReply, _Mapping[str, object]]] = ..., tool_gone: _Optional[_Union[ViewerToolGone, _Mapping[str, object]]] = ..., field: _Optional[_Union[_surface_pb2.SurfaceField, _Mapping[str, object]]] = ..., measures: _Optional[_Union[_server_pb2.Measures, _Mapping[str, object]]] = ..., forces: _Optional[_Union[_force_pb2.Forces, _Mapping[str, object]]] = ..., people: _Optional[_Union[ViewerPeople, _Mapping[str, object]]] = ..., coarse_frame: _Optional[_Union[ViewerFrame, _Mapping[str, object]]] = ..., texture: _Optional[_Union[_server_pb2.TextureReply, _Mapping[str, object]]] = ...) -> None: ...
 
 class ViewerFrame(_message.Message):
     __slots__ = ("frame", "min_x", "min_y", "min_z", "size_x", "size_y", "size_z", "positions")

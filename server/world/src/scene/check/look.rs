@@ -1,14 +1,16 @@
 //! Checks of how bodies are drawn.
 
-use crate::scene::checked::LookSpec;
+use crate::scene::checked::{LookSpec, TextureMapping, TextureSpec};
 use crate::scene::problem::Fault;
-use crate::scene::raw::RawLook;
+use crate::scene::raw::{RawLook, RawTexture};
 
 use super::Check;
 
 impl Check<'_> {
     pub(super) fn look(&mut self, at: &str, look: Option<&RawLook>) -> LookSpec {
-        let Some(look) = look else { return LookSpec { colour: None, opacity: 1.0, layers: Vec::new() } };
+        let Some(look) = look else {
+            return LookSpec { colour: None, opacity: 1.0, layers: Vec::new(), texture: None };
+        };
         let colour = look.colour.as_ref().map(|text| self.colour(format!("{at}.colour"), text));
         let mut layers: Vec<(f64, u32)> = Vec::new();
         for (i, layer) in look.layers.iter().enumerate() {
@@ -22,7 +24,23 @@ impl Check<'_> {
             }
             layers.push((layer.depth_m, self.colour(format!("{at}.layers.{i}.colour"), &layer.colour)));
         }
-        LookSpec { colour, opacity: look.opacity, layers }
+        let texture = look.texture.as_ref().map(|texture| self.texture(&format!("{at}.texture"), texture));
+        LookSpec { colour, opacity: look.opacity, layers, texture }
+    }
+
+    fn texture(&mut self, at: &str, texture: &RawTexture) -> TextureSpec {
+        let next = "keep `surface` for an image made for it, `repeat_m` for a pattern";
+        if texture.surface.is_some() && texture.repeat_m.is_some() {
+            self.conflict(format!("{at}.repeat_m"), "`repeat_m` does not go with `surface`", next);
+        }
+        if texture.scale.is_some() && texture.surface.is_none() {
+            let next = "remove it; `scale` of the mesh applies to its texture too";
+            self.conflict(format!("{at}.scale"), "`scale` only goes with `surface`", next);
+        }
+        let of_surface = || texture.surface.clone().map(|path| (path, texture.scale.unwrap_or(1.0)));
+        let mapping =
+            texture.repeat_m.map_or_else(|| TextureMapping::Surface(of_surface()), TextureMapping::Axes);
+        TextureSpec { image: texture.image.clone(), mapping }
     }
 
     /// 0xRRGGBB of `#rrggbb`.

@@ -20,6 +20,31 @@ pub struct RawLook {
     #[serde(default)]
     #[schemars(length(max = 8))]
     pub layers: Vec<RawLayer>,
+    /// Image on the skin. Without it, the skin has one colour.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texture: Option<RawTexture>,
+}
+
+/// An image on the skin of a body. It moves and is cut with the body.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawTexture {
+    /// File of the image: PNG or JPEG, relative to the scene file.
+    #[schemars(length(min = 1))]
+    pub image: String,
+    /// File of a surface with texture coordinates: .obj, relative to the scene file. The skin takes those of the
+    /// closest point. Default: the surface that the mesh was made from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub surface: Option<String>,
+    /// Factor from the length unit of `surface` to metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6, "x-next" = "0.001 for a file in millimetres"))]
+    pub scale: Option<f64>,
+    /// Size of the image on the body [m], in place of a surface. The image is repeated along the axes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e3, "x-next" = "0.05 repeats tissue every 5 cm"))]
+    pub repeat_m: Option<f64>,
 }
 
 fn opaque() -> f64 {

@@ -1,0 +1,157 @@
+//! Images on skins: their coordinates on every kind of mesh and after cuts, and what is refused.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+
+use scindo_world::inputs::{Inputs, Wants};
+use scindo_world::scene::Scene;
+use scindo_world::simulation::Simulation;
+use scindo_world::snapshot::{BodySnapshot, Snapshot};
+
+/// Two by two pixels.
+const PNG: [u8; 75] = [
+    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00,
+    0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x02, 0x08, 0x02, 0x00, 0x00, 0x00, 0xfd, 0xd4, 0x9a, 0x73, 0x00,
+    0x00, 0x00, 0x12, 0x49, 0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0xf8, 0xcf, 0xc0, 0xc0, 0x00, 0xc2, 0x0c,
+    0xff, 0x81, 0x00, 0x00, 0x1f, 0xee, 0x05, 0xfb, 0xf1, 0xab, 0xba, 0x77, 0x00, 0x00, 0x00, 0x00, 0x49,
+    0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82,
+];
+
+const SIDE: f64 = 0.1;
+
+/// A cube whose corners lie on the image as they are seen from above: u = x, v = y in parts of the side.
+fn cube() -> String {
+    let corner = |i: usize| [0, 1, 2].map(|axis| (i >> axis & 1) as f64);
+    let mut text = String::new();
+    for [x, y, z] in (0..8).map(corner) {
+        text += &format!("v {} {} {}\n", SIDE * x, SIDE * y, SIDE * z);
+    }
+    for [x, y, _] in (0..8).map(corner) {
+        text += &format!("vt {x} {y}\n");
+    }
+    for face in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
+        text += &format!("f{}\n", face.map(|v| format!(" {v}/{v}")).concat());
+    }
+    text
+}
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("skin.png"), PNG).unwrap();
+    fs::write(folder.path().join("cube.obj"), cube()).unwrap();
+    fs::write(folder.path().join("bare.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    fs::write(folder.path().join("text.png"), "no image").unwrap();
+    fs::write(folder.path().join("torn.png"), &PNG[..12]).unwrap();
+    folder
+}
+
+fn scene(body: &str, texture: &str) -> Scene {
+    let text = format!(
+        "schema = 1\nname = \"textured\"\n[world]\nstep_s = 0.01\n[[body]]\nid = \"cube\"\n{body}\n\
+         young_pa = 1e4\npoisson = 0.4\ndensity_kg_m3 = 1000\nrayleigh = {{ mass_1_s = 5 }}\n\
+         look = {{ texture = {{ {texture} }} }}\n"
+    );
+    let cut = "[[cut]]\nbody = \"cube\"\nat_s = 0.005\n\
+         sweep_m = [[[-0.01, 0.048, 0.04], [-0.01, 0.048, 0.12]], [[0.065, 0.048, 0.04], [0.065, 0.048, 0.12]]]\n";
+    let text = if body == HEX { text } else { text + cut };
+    Scene::from_toml(&text).unwrap()
+}
+
+fn shown(simulation: &mut Simulation) -> BodySnapshot {
+    let mut snapshot = Snapshot::default();
+    simulation.snapshot_into(&Wants { surface: vec![true], ..Wants::default() }, &mut snapshot);
+    snapshot.bodies.remove(0)
+}
+
+const BOX: &str =
+    "mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [6, 6, 6], pattern = \"tet5\" } }";
+const HEX: &str = "mesh = { box = { min_m = [0, 0, 0], max_m = [0.1, 0.1, 0.1], cells = [6, 6, 6], pattern = \"hex\" } }\n\
+    element = \"hex8\"";
+const LATTICE: &str = "mesh = { surface = \"cube.obj\", cells = 8 }";
+const SKIN: &str = "mesh = { surface = \"cube.obj\", cells = 8 }\nskin = { divisions = 3 }";
+const OCTREE: &str =
+    "mesh = { surface = \"cube.obj\", cells = 12 }\nelement = \"octree\"\nlaw = \"corotational\"";
+
+/// Furthest that a corner of the skin lies from its place on the image, in sides of the image.
+fn error(body: &BodySnapshot) -> f64 {
+    let found = body.texture.as_ref().unwrap().coordinates(body.topology.skin_at_rest());
+    let skin = body.topology.tags.iter().filter(|tag| **tag == 0).count();
+    assert_eq!(found.len(), skin);
+    let corners = body.topology.skin_at_rest().flatten().zip(found.into_iter().flatten());
+    let away = corners.map(|(rest, on)| {
+        (0..2)
+            .map(|k| (f64::from(rest[k]) / SIDE).clamp(0.0, 1.0) - f64::from(on[k]))
+            .fold(0.0, |a: f64, b| a.max(b.abs()))
+    });
+    away.fold(0.0, f64::max)
+}
+
+#[test]
+fn the_image_lies_where_it_belongs_on_every_mesh_and_stays_there_when_it_is_cut() {
+    let folder = folder();
+    let own = "image = \"skin.png\"";
+    let given = "image = \"skin.png\", surface = \"cube.obj\"";
+    for (body, texture, bound) in
+        [(BOX, given, 1e-5), (HEX, given, 1e-5), (LATTICE, own, 1e-5), (SKIN, own, 1e-5), (OCTREE, own, 0.02)]
+    {
+        let mut simulation = Simulation::new(&scene(body, texture), folder.path()).unwrap();
+        let before = shown(&mut simulation);
+        assert!(before.topology.tags.iter().all(|tag| *tag == 0), "{body}");
+        assert!(error(&before) < bound, "{body}: {}", error(&before));
+        for _ in 0..5 {
+            simulation.step(&Inputs::default());
+        }
+        let after = shown(&mut simulation);
+        if body != HEX {
+            assert!(after.topology.tags.iter().any(|tag| *tag != 0), "{body}: it is cut");
+        }
+        assert!(error(&after) < bound, "{body}, cut: {}", error(&after));
+    }
+}
+
+#[test]
+fn an_image_survives_a_checkpoint() {
+    let folder = folder();
+    let mut simulation = Simulation::new(&scene(LATTICE, "image = \"skin.png\""), folder.path()).unwrap();
+    let state = simulation.checkpoint().unwrap();
+    simulation.step(&Inputs::default());
+    simulation.restore(&state).unwrap();
+    let body = shown(&mut simulation);
+    assert_eq!(body.texture.as_ref().unwrap().image.bytes[..], PNG);
+    assert!(error(&body) < 1e-5);
+}
+
+#[test]
+fn what_is_wrong_with_an_image_is_said_with_its_key() {
+    let folder = folder();
+    for (body, texture, key, words) in [
+        (LATTICE, "image = \"none.png\"", "image", "check the path"),
+        (LATTICE, "image = \"text.png\"", "image", "no PNG and no JPEG"),
+        (LATTICE, "image = \"torn.png\"", "image", "save it again"),
+        (LATTICE, "image = \"cube.obj\"", "image", "no PNG and no JPEG"),
+        (BOX, "image = \"skin.png\"", "surface", "add `surface`"),
+        (BOX, "image = \"skin.png\", surface = \"bare.obj\"", "surface", "line 4"),
+        (BOX, "image = \"skin.png\", surface = \"skin.png\"", "surface", "an .obj file"),
+        (BOX, "image = \"skin.png\", surface = \"none.obj\"", "surface", "check the path"),
+    ] {
+        let error = Simulation::new(&scene(body, texture), folder.path()).unwrap_err().to_string();
+        assert!(error.contains(&format!("body.cube.look.texture.{key}")) && error.contains(words), "{error}");
+    }
+    let text = |texture: &str| {
+        format!(
+            "schema = 1\n[[body]]\nid = \"a\"\n{BOX}\nyoung_pa = 1e4\npoisson = 0.4\ndensity_kg_m3 = 1000\n\
+             look = {{ texture = {{ image = \"a.png\", {texture} }} }}\n"
+        )
+    };
+    for (texture, key) in [
+        ("surface = \"a.obj\", repeat_m = 0.1", "repeat_m"),
+        ("scale = 2.0", "scale"),
+        ("repeat_m = 0.0", "repeat_m"),
+        ("repeat = 0.1", "repeat"),
+    ] {
+        let error = Scene::from_toml(&text(texture)).unwrap_err().to_string();
+        assert!(error.contains(&format!("look.texture.{key}")) || error.contains("repeat_m"), "{error}");
+    }
+    assert!(Simulation::new(&scene(BOX, "image = \"skin.png\", repeat_m = 0.05"), folder.path()).is_ok());
+}
