@@ -8,7 +8,7 @@ from unittest import mock
 
 import numpy as np
 import scindo
-from common import ACROSS, PATIENCE, block, until
+from common import ACROSS, PATIENCE, ROOT, block, until
 from google.protobuf import descriptor_pb2
 from scindo.v1 import _files, server_pb2
 
@@ -72,6 +72,29 @@ class Watching(WithServer):
         self.assertGreater(self.session.stats(wait=True).step_rate_hz, 0.0)
         with self.refused("unknown-body"):
             self.session.body("blok")
+        self.assertFalse(info.bodies[0].textured)
+        self.assertEqual(surface.texture_coordinates.shape, (0, 3, 2))
+        with self.refused("no-texture"):
+            _ = body.texture
+
+    def test_an_image_on_the_skin(self):
+        image = ROOT / "tests/browser/quarters.png"
+        scene = scindo.Scene("textured", step_s=0.01)
+        scene.add_body(
+            "cube",
+            mesh={"box": {"min_m": (0.0, 0.0, 0.0), "max_m": (0.1, 0.1, 0.1), "cells": [3, 3, 3]}},
+            young_pa=4e4,
+            poisson=0.4,
+            density_kg_m3=1000.0,
+            look={"texture": {"image": str(image), "repeat_m": 0.05}},
+        )
+        session = self.enterContext2(self.enterContext2(scindo.serve(scene)).connect(timeout=PATIENCE))
+        self.assertTrue(session.info.bodies[0].textured)
+        body = session.body("cube")
+        self.assertEqual(body.texture, ("image/png", image.read_bytes()))
+        surface = body.surface
+        self.assertEqual(surface.texture_coordinates.shape, (len(surface.triangles), 3, 2))
+        self.assertAlmostEqual(float(np.ptp(surface.texture_coordinates)), 2.0, places=5)
 
     def test_a_missed_epoch_is_made_good_by_the_keyframe(self):
         body = self.session.body("block")

@@ -103,7 +103,10 @@ sweep_m = [[[0.03, 0.015, -0.05], [0.03, 0.015, 0.05]], [[0.11, 0.015, -0.05], [
     };
     let plain = stretch("");
     let with = stretch("fibre = [{ direction = [1, 0, 0], stiffness_pa = 16e3, stiffening = 5 }]");
-    assert!(with < 0.3 * plain && with > 0.1 * plain, "it stretches by {with} m with fibres, by {plain} m without");
+    assert!(
+        with < 0.3 * plain && with > 0.1 * plain,
+        "it stretches by {with} m with fibres, by {plain} m without"
+    );
 }
 
 #[test]
