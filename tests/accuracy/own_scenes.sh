@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Whether `scindo accuracy SCENE --budget-ms 10 --within 3m` keeps its word on twenty scenes that are no
-# reference case: each recommendation is run again and compared with a run on a mesh four times finer.
+# reference case: each recommendation is run again and compared with runs on meshes up to eight times finer.
 # Run by a person on a quiet machine: an hour for the studies, and the finer runs.
 #
 #   tests/accuracy/own_scenes.sh [SCENE]...      default: the scenes below, five that ship and fifteen here

@@ -4,6 +4,7 @@
 //! fronts of cuts, must be the same on every mesh. A block is therefore made from explicit coordinates. The
 //! nearest of them are moved onto the faces of those regions ([`aligned`]).
 
+use scindo_world::scene::raw::RawElement;
 use scindo_world::scene::{BodySpec, CellSplit, CheckedScene, CutPath, MeshSource, Region};
 
 use super::subdivide::Subdivisions;
@@ -88,9 +89,12 @@ pub fn cells(scene: &CheckedScene, files: &Subdivisions, factor: f64) -> Option<
 }
 
 /// Like [`cells`], with blocks whose coordinates lie on the faces of all regions of the scene. `split`
-/// decides how their cells are split. `None` if there are too few cells for the faces.
+/// decides how their cells are split. Octree cells stay cubes. `None` if there are too few cells for the faces.
 pub fn aligned(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Split) -> Option<Setting> {
     refined(scene, files, factor, &|body, counts| match &body.mesh {
+        MeshSource::Box { .. } if split.keeps_cubes(body) => {
+            Some(format!("body.{}.mesh.box.cells={counts:?}", body.id))
+        }
         MeshSource::Box { min_m, max_m, split: own, .. } => {
             let even = |i: usize| {
                 let (n, low, high) = (counts[i], min_m[i], max_m[i]);
@@ -113,6 +117,7 @@ pub fn uneven(scene: &CheckedScene, files: &Subdivisions, factor: f64, split: Sp
     let mut setting = cells(scene, files, factor)?;
     for body in &scene.bodies {
         let (kind, own) = match &body.mesh {
+            MeshSource::Box { .. } if split.keeps_cubes(body) => continue,
             MeshSource::Box { split, .. } => ("box", *split),
             MeshSource::Grid { split, .. } => ("grid", *split),
             _ => continue,
@@ -132,6 +137,11 @@ pub enum Split {
 }
 
 impl Split {
+    /// Whether a body keeps its octree cells.
+    fn keeps_cubes(self, body: &BodySpec) -> bool {
+        self == Split::Own && body.mechanics.element == RawElement::Octree
+    }
+
     fn pattern(self, own: CellSplit) -> &'static str {
         match (self, own) {
             (Split::Own, CellSplit::Hex) => "hex",
@@ -307,6 +317,21 @@ mod tests {
             // Eight cells: the coordinate nearest to the face of the region has moved onto it.
             assert!(setting.set[0].contains("0.125, 0.3, 0.375"), "{}", setting.set[0]);
             assert!(setting.set[0].contains(pattern), "{}", setting.set[0]);
+        }
+    }
+
+    #[test]
+    fn octree_cells_stay_cubes() {
+        let mesh = "{ box = { min_m = [0,0,0], max_m = [1,1,0.5], cells = [8,8,4] } }";
+        let fixed = "[[body.fix]]\nwhere = { box = { min_m = [-1,-1,-1], max_m = [2,2,0.3] } }";
+        let scene = scene(mesh, &format!("element = \"octree\"\n{fixed}"));
+        let files = Subdivisions::default();
+        for make in [aligned, uneven] {
+            let own = make(scene.checked(), &files, 2.0, Split::Own).unwrap();
+            assert_eq!(own.set, ["body.b.mesh.box.cells=[16, 16, 8]"]);
+            assert!(scene.apply_sets(&own.set).is_ok());
+            let tets = make(scene.checked(), &files, 2.0, Split::Tets).unwrap();
+            assert!(tets.set.concat().contains("tet"), "{tets:?}");
         }
     }
 
