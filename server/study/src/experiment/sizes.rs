@@ -1,6 +1,6 @@
 //! Adaptive against uniform cells, and the time per cell from eight thousand cells on.
 
-use super::model::{Grid, cube};
+use super::model::{Grid, Model, animal, cube};
 use super::solve::{Solver, Until, run};
 use super::system::{Problem, System, smoothers};
 use super::tables::S_CUBE;
@@ -8,6 +8,8 @@ use super::{ExperimentBench, ExperimentResult, Table, Trouble, Unit};
 
 /// Finest cells across, and levels.
 const SIZES: [(u32, u8); 4] = [(24, 3), (48, 4), (80, 4), (120, 3)];
+/// The same of the animal.
+const ANIMALS: [(u32, u8); 4] = [(39, 2), (77, 3), (155, 4), (290, 5)];
 /// Uniform grids up to this many cells across.
 const UNIFORM: u32 = 80;
 
@@ -19,29 +21,30 @@ pub fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
     let mut result = ExperimentResult {
         name: "dick-sizes",
         title: "Time per cell, and what adaptivity saves".into(),
-        about: "The cube with rotated blades, from few cells to many, with the default smoother on one thread: a \
-            step is rotations, operators of all levels, and three cycles. Uniform grids have the finest cells \
-            everywhere and the same cuts. All cubes have the same blades, so rods of the smallest one are two cells \
-            wide, and thin rods have more coarse matrices per cell."
+        about: "The cube with rotated blades and the animal with its curved cuts, from few cells to many, with the default \
+            smoother on one thread: a step is rotations, operators of all levels, and three cycles. Uniform grids have the \
+            finest cells everywhere and the same cuts. All cubes have the same blades, so rods of the smallest one are two \
+            cells wide, and thin rods have more coarse matrices per cell. The animal is the same body at every size."
             .into(),
         ..ExperimentResult::default()
     };
+    let columns = [
+        ("cells", Unit::Count),
+        ("cutting", Unit::Seconds),
+        ("levels", Unit::Seconds),
+        ("step", Unit::Seconds),
+        ("step per cell", Unit::Seconds),
+        ("multigrid per cell", Unit::Seconds),
+    ];
+    let uniform =
+        [("uniform cells", Unit::Count), ("uniform step", Unit::Seconds), ("faster by", Unit::Times)];
     let mut table = Table::new(
         "Steps of cubes",
         "The paper has 11.2 to 13.6 µs per cell and step (6.4 to 8.4 µs of them multigrid), and steps 1.4 to 5.7 \
          times as fast as on uniform grids.",
-        &[
-            ("cells", Unit::Count),
-            ("cutting", Unit::Seconds),
-            ("levels", Unit::Seconds),
-            ("step", Unit::Seconds),
-            ("step per cell", Unit::Seconds),
-            ("multigrid per cell", Unit::Seconds),
-            ("uniform cells", Unit::Count),
-            ("uniform step", Unit::Seconds),
-            ("faster by", Unit::Times),
-        ],
+        &[columns.as_slice(), &uniform].concat(),
     );
+    let mut animals = Table::new("Steps of the animal", "One body, cut alike at every size.", &columns);
     let mut memory = Table::new(
         "Bytes per cell",
         "Finest level: octree, kernels, positions, velocities and vectors. Coarse levels: cells, transfers, kernels \
@@ -54,31 +57,30 @@ pub fn sizes(bench: &mut ExperimentBench<'_>) -> Result<ExperimentResult, Troubl
             ("stored matrices", Unit::Number),
         ],
     );
-    let sizes = if bench.is_quick() { &SIZES[..3] } else { &SIZES[..] };
-    for &(across, levels) in sizes {
-        bench.begin(format!("{across} cells across"), sizes.len())?;
-        let own = step(across, levels)?;
-        memory.row(
-            format!("{across} across, {levels} levels"),
-            &[Some(own.cells), Some(own.bytes[0]), Some(own.bytes[1]), Some(own.bytes[2])],
-        );
-        let uniform = if across <= UNIFORM { Some(step(across, 0)?) } else { None };
-        table.row(
-            format!("{across} across, {levels} levels"),
-            &[
-                Some(own.cells),
-                Some(own.cutting_s),
-                Some(own.levels_s),
-                Some(own.step_s),
-                Some(own.step_s / own.cells),
-                Some(own.multigrid_s / own.cells),
-                uniform.as_ref().map(|u| u.cells),
-                uniform.as_ref().map(|u| u.step_s),
-                uniform.as_ref().map(|u| u.step_s / own.step_s),
-            ],
-        );
+    let sizes = |all: &'static [(u32, u8); 4]| if bench.is_quick() { &all[..3] } else { &all[..] };
+    let (cubes, bodies) = (sizes(&SIZES), sizes(&ANIMALS));
+    let runs = cubes.len() + bodies.len();
+    for &(across, levels) in cubes {
+        let label = format!("{across} across, {levels} levels");
+        bench.begin(format!("cube, {across} cells across"), runs)?;
+        let own = step(&cube(across, levels, Grid::Rotated)?)?;
+        memory.row(format!("cube, {label}"), &own.memory());
+        let uniform = if across <= UNIFORM { Some(step(&cube(across, 0, Grid::Rotated)?)?) } else { None };
+        let beside = [
+            uniform.as_ref().map(|u| u.cells),
+            uniform.as_ref().map(|u| u.step_s),
+            uniform.as_ref().map(|u| u.step_s / own.step_s),
+        ];
+        table.row(label, &[own.times().as_slice(), &beside].concat());
     }
-    result.tables.extend([table, memory]);
+    for &(across, levels) in bodies {
+        let label = format!("{across} across, {levels} levels");
+        bench.begin(format!("animal, {across} cells across"), runs)?;
+        let own = step(&animal(None, across, levels, true)?)?;
+        memory.row(format!("animal, {label}"), &own.memory());
+        animals.row(label, &own.times());
+    }
+    result.tables.extend([table, animals, memory]);
     Ok(result)
 }
 
@@ -92,8 +94,20 @@ struct Step {
     bytes: [f64; 3],
 }
 
-fn step(across: u32, levels: u8) -> Result<Step, Trouble> {
-    let model = cube(across, levels, Grid::Rotated)?;
+impl Step {
+    /// Cells, and times of cutting, levels, step; then per cell.
+    fn times(&self) -> [Option<f64>; 6] {
+        let Self { cells, cutting_s, levels_s, step_s, multigrid_s, .. } = *self;
+        [cells, cutting_s, levels_s, step_s, step_s / cells, multigrid_s / cells].map(Some)
+    }
+
+    fn memory(&self) -> [Option<f64>; 4] {
+        let [finest, levels, stored] = self.bytes;
+        [self.cells, finest, levels, stored].map(Some)
+    }
+}
+
+fn step(model: &Model) -> Result<Step, Trouble> {
     let cut = model.cut()?;
     let mut system = System::new(cut.space.octree(), (model.held, model.pull), Problem::Step(S_CUBE))?;
     let operator_s = system.update();
