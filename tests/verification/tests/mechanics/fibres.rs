@@ -81,7 +81,8 @@ fn a_lamina_pulled_off_its_axis_stretches_and_shears_as_its_compliance_says() {
         }
     }
     assert!((moduli[0] - (YOUNG + 12.0)).abs() < 1e-9, "along the fibres: {moduli:?}");
-    assert!(moduli.windows(2).all(|pair| pair[0] > pair[1]), "{moduli:?}");
+    assert!(moduli[..5].windows(2).all(|pair| pair[0] > pair[1]), "{moduli:?}");
+    assert!(moduli[5] > 1.05 * YOUNG, "fibres across the tension hinder the contraction: {moduli:?}");
 }
 
 #[test]
@@ -121,7 +122,9 @@ fn finite_tension_along_fibres_has_the_stress_of_their_energy() {
         let fibres = if strain > 0.0 { k1 * strain * (k2 * strain * strain).exp() } else { 0.0 };
         let expected = stretch * (YOUNG * strain + fibres) * SIZE.y * SIZE.z;
         for model in models(Law::StVenantKirchhoff, Fibres::new([along([3.0, 0.0, 0.0], k1, k2)])) {
-            let x = equilibrium(&model, &[], &drawn(&model, stretch), model.rest());
+            // A sudden displacement would stretch the elements at the ends so far that exp(k₂ ε²) rules everything.
+            let start: Vec<_> = model.rest().iter().map(|X| Vector3::new(stretch * X.x, X.y, X.z)).collect();
+            let x = equilibrium(&model, &[], &drawn(&model, stretch), &start);
             let mut f = vec![Vector3::zeros(); x.len()];
             model.internal_forces(&x, &mut f);
             let ends = model.rest().iter().zip(&f).filter(|(X, _)| X.x > SIZE.x - 1e-9);
