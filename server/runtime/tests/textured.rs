@@ -17,13 +17,7 @@ use scindo_world::simulation::Simulation;
 use serde_json::Value;
 
 /// Two by two pixels: an odd number of bytes, after which numbers have to be aligned again.
-const PNG: [u8; 75] = [
-    0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0x00, 0x00, 0x00, 0x0d, 0x49, 0x48, 0x44, 0x52, 0x00,
-    0x00, 0x00, 0x02, 0x00, 0x00, 0x00, 0x02, 0x08, 0x02, 0x00, 0x00, 0x00, 0xfd, 0xd4, 0x9a, 0x73, 0x00,
-    0x00, 0x00, 0x12, 0x49, 0x44, 0x41, 0x54, 0x78, 0xda, 0x63, 0xf8, 0xcf, 0xc0, 0xc0, 0x00, 0xc2, 0x0c,
-    0xff, 0x81, 0x00, 0x00, 0x1f, 0xee, 0x05, 0xfb, 0xf1, 0xab, 0xba, 0x77, 0x00, 0x00, 0x00, 0x00, 0x49,
-    0x45, 0x4e, 0x44, 0xae, 0x42, 0x60, 0x82,
-];
+const PNG: &[u8] = include_bytes!("../../../tests/browser/quarters.png");
 
 const SCENE: &str = r##"
 schema = 1
@@ -69,7 +63,7 @@ async fn a_client_gets_the_image_and_the_places_on_it() {
     let textured: Vec<bool> = info.bodies.iter().map(|body| body.look.as_ref().unwrap().textured).collect();
     assert_eq!(textured, [true, false]);
     let texture = link.texture("block").await.unwrap();
-    assert_eq!((texture.media_type.as_str(), &texture.image[..]), ("image/png", &PNG[..]));
+    assert_eq!((texture.media_type.as_str(), &texture.image[..]), ("image/png", PNG));
     for (body, code) in [("plain", "no-texture"), ("none", "no-texture"), ("No body", "out-of-range")] {
         match link.texture(body).await.unwrap_err() {
             LinkError::Refused { code: found, .. } => assert_eq!(found, code, "{body}"),

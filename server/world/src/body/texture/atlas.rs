@@ -5,7 +5,7 @@
 //! even meet itself, as the side of a cylinder does. Such a triangle takes its coordinates from the side that its centre
 //! lies on: from the triangles that can be reached from there without crossing a seam.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::Vector3;
 use scindo_collision::{SurfaceBvh, SurfaceError, barycentric_point, closest_point_on_triangle};
@@ -116,11 +116,11 @@ impl Atlas {
     /// Triangles that reach into a ball [m], and can be reached from `first` without crossing a seam or leaving it.
     fn around(&self, first: u32, centre: V, radius: f64) -> Vec<u32> {
         let reach = radius + self.distance(centre, first);
-        let mut around = vec![first];
+        let (mut around, mut known) = (vec![first], HashSet::from([first]));
         let mut next = 0;
         while next < around.len() && around.len() < MOST {
             for &other in &self.across[around[next] as usize] {
-                if other != SEAM && !around.contains(&other) && self.distance(centre, other) <= reach {
+                if other != SEAM && known.insert(other) && self.distance(centre, other) <= reach {
                     around.push(other);
                 }
             }
