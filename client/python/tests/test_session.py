@@ -1,6 +1,8 @@
 """A session with a real server: mirror, tools, cuts, orders, and what goes wrong."""
 
 import os
+import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -323,6 +325,17 @@ class Connections(WithServer):
         for use in (lambda: other.info, lambda: body.surface, other.pause, other.forces, lambda: other.cut(ACROSS)):
             with self.refused("closed"):
                 use()
+
+    def test_a_script_that_leaves_its_session_open_ends(self):
+        script = (
+            "import sys, scindo\n"
+            "session = scindo.connect(sys.argv[1], timeout=60.0)\n"
+            "print(len(session.body('block').surface.triangles))\n"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", script, self.session.link.endpoint], capture_output=True, text=True, timeout=PATIENCE
+        )
+        self.assertEqual((done.returncode, done.stdout), (0, f"{len(self.session.body('block').surface.triangles)}\n"))
 
     def test_a_forked_session_says_so(self):
         child = os.fork()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import threading
 import time
 import weakref
 from typing import Any, Callable, List, Optional, Type, TypeVar
@@ -24,6 +25,8 @@ QUERY_S = 2.0
 PAUSE_S = 0.05
 
 _open: "weakref.WeakSet[Link]" = weakref.WeakSet()
+# Waits for the end of the main thread.
+_watch: Optional[threading.Thread] = None
 
 
 class Link:
@@ -47,6 +50,7 @@ class Link:
             # A router has one port only. It relays surfaces as well.
             self.bulk = self.haptic
         _open.add(self)
+        _watch_main_thread()
 
     def _connect(self, endpoint: Optional[str], timeout: float, config: Optional[str]) -> zenoh.Session:
         try:
@@ -216,3 +220,17 @@ def _close_all() -> None:
     # zenoh's threads call into Python; none may be left when the interpreter ends.
     for link in list(_open):
         link.close()
+
+
+def _watch_main_thread() -> None:
+    # The interpreter waits for zenoh's threads before it runs what `atexit` knows, so a script that leaves its session
+    # open would never end.
+    def wait() -> None:
+        threading.main_thread().join()
+        _close_all()
+
+    global _watch
+    if _watch is None or not _watch.is_alive():
+        # No daemon: it must not be stopped halfway.
+        _watch = threading.Thread(target=wait, name="scindo-end")
+        _watch.start()
