@@ -13,7 +13,8 @@ use scindo::record::reader::Recording;
 use scindo::record::recorder::RecordSettings;
 use scindo::sim::engine::Engine;
 use scindo_fuzz::attack;
-use scindo_world::format::{MeshFile, read_mesh_bytes};
+use scindo_world::body::texture::{Atlas, Image, Mapping, Texture};
+use scindo_world::format::{MeshFile, read_mesh_bytes, read_textured_bytes};
 use scindo_world::inputs::Inputs;
 use scindo_world::scene::Scene;
 use scindo_world::simulation::Simulation;
@@ -73,6 +74,26 @@ const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nf 1 2 3\nf 1//1
 #[test]
 fn obj() {
     attack!(vec![OBJ.as_bytes().to_vec()], RECIPES, read("a.obj"));
+}
+
+/// What is taken has coordinates at every corner, and makes no trouble when a body asks where it lies on the image.
+#[test]
+fn obj_with_texture_coordinates() {
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1 4/4/1\nf -4/-4 -3/-3 -2/-2\n";
+    attack!(vec![square.as_bytes().to_vec()], RECIPES, |bytes: &[u8]| match read_textured_bytes(
+        "a.obj", bytes
+    ) {
+        Ok(surface) => {
+            assert_eq!(surface.coordinates.len(), surface.triangles.len());
+            let image = Image { media_type: "image/png", bytes: Default::default() };
+            let Ok(atlas) = Atlas::new(&surface, 1.0) else { return };
+            let texture = Texture::new(image, Mapping::Atlas(Box::new(atlas)));
+            let asked = [[[0.0, 0.0, 0.1], [1.0, 0.0, 0.0], [0.5, 2.0, 0.0]]];
+            let found = texture.coordinates(asked.into_iter());
+            assert!(found.iter().flatten().flatten().all(|c| c.is_finite()), "{found:?}");
+        }
+        Err(error) => assert!(!error.to_string().is_empty()),
+    });
 }
 
 #[test]

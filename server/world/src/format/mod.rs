@@ -29,7 +29,7 @@ use nalgebra::Vector3;
 pub use error::MeshInError;
 pub use groups::{CellGroup, GMSH_PHYSICAL, keep_tets};
 pub use mesh_file::{MeshFile, SurfaceMesh, TexturedSurface, VolumeMesh};
-pub use obj::read_textured;
+pub use obj::{read_textured, read_textured_bytes};
 
 /// Largest mesh file accepted [bytes].
 pub const MAX_FILE_BYTES: u64 = 2 << 30;

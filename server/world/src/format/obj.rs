@@ -36,10 +36,14 @@ pub fn read_textured(path: &Path) -> Result<TexturedSurface, MeshInError> {
             instead: "give that file as `surface`, or `repeat_m` in its place",
         });
     }
-    textured(&file, &super::read_bytes(path)?)
+    read_textured_bytes(&file, &super::read_bytes(path)?)
 }
 
-fn textured(file: &str, bytes: &[u8]) -> Result<TexturedSurface, MeshInError> {
+/// Reads such a surface from memory. `file` is its name.
+///
+/// # Errors
+/// As [`read_textured`].
+pub fn read_textured_bytes(file: &str, bytes: &[u8]) -> Result<TexturedSurface, MeshInError> {
     every_corner_has_coordinates(file, bytes)?;
     let models = models(file, bytes, &without(&["vn"], bytes))?;
     let Gathered { vertices, cells, coordinates } = gather(&models);
@@ -185,11 +189,13 @@ mod tests {
 
     #[test]
     fn a_face_becomes_a_fan_with_its_texture_coordinates() {
-        let mesh = textured("a.obj", format!("{SQUARE}f 1/4/1 2/3/1 3/2/1 4/1/1\n").as_bytes()).unwrap();
+        let mesh =
+            read_textured_bytes("a.obj", format!("{SQUARE}f 1/4/1 2/3/1 3/2/1 4/1/1\n").as_bytes()).unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         let expected: [[[f32; 2]; 3]; 2] = [[[0., 1.], [1., 1.], [1., 0.]], [[0., 1.], [1., 0.], [0., 0.]]];
         assert_eq!(mesh.coordinates, expected);
-        let backwards = textured("a.obj", format!("{SQUARE}f 1/-1 2/-2 3/-3\n").as_bytes()).unwrap();
+        let backwards =
+            read_textured_bytes("a.obj", format!("{SQUARE}f 1/-1 2/-2 3/-3\n").as_bytes()).unwrap();
         assert_eq!(backwards.coordinates, expected[..1]);
     }
 
@@ -197,7 +203,8 @@ mod tests {
     fn a_corner_without_texture_coordinates_is_named() {
         for corner in ["3", "3//1", "3/0", "3/-5", "3/9223372036854775807", "3/-9223372036854775808", "3/99"]
         {
-            let wrong = textured("a.obj", format!("{SQUARE}f 1/1 2/2 {corner}\n").as_bytes()).unwrap_err();
+            let wrong =
+                read_textured_bytes("a.obj", format!("{SQUARE}f 1/1 2/2 {corner}\n").as_bytes()).unwrap_err();
             let wrong = wrong.to_string();
             assert!(wrong.contains("line 10") && wrong.contains("texture coordinates"), "{wrong}");
         }
