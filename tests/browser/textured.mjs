@@ -20,8 +20,6 @@ await run(async () => {
   await page.goto(url);
   await until(page, "three bodies have their images", MINUTE, () => window.scindo?.bodies().length === 3 && window.scindo.bodies().every((b) => b.vertices > 0 && b.textured));
   await page.evaluate(() => window.scindo.camera([0.2, 0.0499, 1.0], [0.2, 0.05, 0.1]));
-  await page.keyboard.press("v");
-  await page.keyboard.press("v");
   await imageIsInPlace(page, "at rest");
   await until(page, "both are cut", MINUTE, () => window.scindo.bodies().slice(0, 2).every((b) => b.lipTriangles > 0) && window.scindo.bodies()[0].simTimeS > 8.2);
   await imageIsInPlace(page, "after a cut");
@@ -35,7 +33,7 @@ await run(async () => {
 
 /** The quarters as they are seen from above. */
 async function imageIsInPlace(page, when) {
-  // Two pictures later everything that has arrived is drawn.
+  // By then the page has drawn what has arrived.
   await page.waitForTimeout(500);
   for (const [body, left] of [["tets", 0], ["cells", 0.15]]) {
     const places = Object.values(QUARTERS).map(([u, v]) => [left + SIDE * u, SIDE * v, SIDE]);

@@ -17,7 +17,7 @@ use crate::messages::{
 };
 
 /// Kinds of images that every browser can show, and a glTF file may hold.
-pub const MEDIA_TYPES: [&str; 2] = ["image/png", "image/jpeg"];
+const MEDIA_TYPES: [&str; 2] = ["image/png", "image/jpeg"];
 
 const fn count(tag: u32, field: &'static str, allowed: usize) -> CountLimit {
     CountLimit { tag, field, allowed }

@@ -69,10 +69,12 @@ const OCTREE: &str =
 
 /// Furthest that a corner of the skin lies from its place on the image, in sides of the image.
 fn error(body: &BodySnapshot) -> f64 {
-    let found = body.texture.as_ref().unwrap().coordinates(body.topology.skin_at_rest());
+    let found = body.topology.on_image(body.texture.as_ref().unwrap());
     let skin = body.topology.tags.iter().filter(|tag| **tag == 0).count();
     assert_eq!(found.len(), skin);
-    let corners = body.topology.skin_at_rest().flatten().zip(found.into_iter().flatten());
+    let triangles = body.topology.triangles.iter().zip(&body.topology.tags).filter(|(_, tag)| **tag == 0);
+    let corners = triangles.flat_map(|(t, _)| t.map(|v| body.topology.rest[v as usize]));
+    let corners = corners.zip(found.into_iter().flatten());
     let away = corners.map(|(rest, on)| {
         (0..2)
             .map(|k| (f64::from(rest[k]) / SIDE).clamp(0.0, 1.0) - f64::from(on[k]))

@@ -88,8 +88,8 @@ fn obj_with_texture_coordinates() {
             let image = Image { media_type: "image/png", bytes: Default::default() };
             let Ok(atlas) = Atlas::new(&surface, 1.0) else { return };
             let texture = Texture::new(image, Mapping::Atlas(Box::new(atlas)));
-            let asked = [[[0.0, 0.0, 0.1], [1.0, 0.0, 0.0], [0.5, 2.0, 0.0]]];
-            let found = texture.coordinates(asked.into_iter());
+            let rest = [[0.0, 0.0, 0.1], [1.0, 0.0, 0.0], [0.5, 2.0, 0.0]];
+            let found = texture.coordinates(&rest, [[0, 1, 2]].into_iter());
             assert!(found.iter().flatten().flatten().all(|c| c.is_finite()), "{found:?}");
         }
         Err(error) => assert!(!error.to_string().is_empty()),

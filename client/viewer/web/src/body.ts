@@ -67,11 +67,13 @@ export class BodySurface {
 
   setLook(look: Look): void {
     this.look = look;
+    if (!look.textured) this.tissue.setImage(null);
     this.applyLook();
   }
 
-  /** Shows an image on the skin; `null` takes it away. */
-  setTexture(image: ImageBitmap | null): void {
+  /** Shows an image on the skin, unless the scene to which it belonged has gone meanwhile. */
+  setTexture(image: ImageBitmap): void {
+    if (!this.look?.textured) return;
     this.tissue.setImage(image);
     this.applyLook();
     this.stale = true;
@@ -180,7 +182,7 @@ export class BodySurface {
 
   private applyLook(): void {
     const radius = this.bounds.isEmpty() ? 0.1 : 0.5 * this.bounds.min.distanceTo(this.bounds.max);
-    this.tissue.setLook(this.look ?? { opacity: 1, layers: [] }, this.order, radius);
+    this.tissue.setLook(this.look ?? { opacity: 1, textured: false, layers: [] }, this.order, radius);
   }
 
   private adopt(topology: SurfaceTopology): boolean {

@@ -204,8 +204,7 @@ class Page {
 
   private takeLook({ id, look }: BodyInfo): void {
     const layers = look?.layers.map(({ depthM, colour }) => ({ depthM, colour })) ?? [];
-    this.bodyOf(id).setLook({ colour: look?.colour, opacity: look?.opacity ?? 1, layers });
-    if (!look?.textured) this.bodyOf(id).setTexture(null);
+    this.bodyOf(id).setLook({ colour: look?.colour, opacity: look?.opacity ?? 1, textured: look?.textured ?? false, layers });
   }
 
   /** Decodes the image on a body. Textures of WebGL begin at the lower left corner, images at the upper left one. */

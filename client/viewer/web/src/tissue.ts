@@ -17,6 +17,8 @@ const ANISOTROPY = 8;
 export interface Look {
   colour?: number | undefined;
   opacity: number;
+  /** Whether an image belongs on the skin. */
+  textured: boolean;
   layers: { depthM: number; colour: number }[];
 }
 
@@ -51,6 +53,7 @@ export class Tissue {
 
   /** Shows an image on the skin, which the colour of the look tints; `null` takes it away. Its rows run upwards. */
   setImage(image: ImageBitmap | null): void {
+    if (!image && !this.skin.map) return;
     this.skin.map?.dispose();
     this.skin.map = null;
     if (image) {

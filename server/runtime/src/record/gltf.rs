@@ -146,7 +146,7 @@ impl Gltf {
         let Some(texture) = &body.texture else {
             return Shape { epoch, parts: vec![(self.indices(&topology.triangles), skin)], image: None };
         };
-        let split = Split::new(topology, &texture.coordinates(topology.skin_at_rest()));
+        let split = Split::new(topology, &topology.on_image(texture));
         let mut parts = vec![(self.indices(&split.skin), skin)];
         if !split.lips.is_empty() {
             parts.push((self.indices(&split.lips), lips));

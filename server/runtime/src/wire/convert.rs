@@ -182,7 +182,7 @@ pub fn to_frame(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::Sur
 /// Triangles of a body. `seq` counts the topologies of the body.
 pub fn to_topology(snapshot: &Snapshot, body: &BodySnapshot, seq: u64) -> wire::SurfaceTopology {
     let SurfaceTopology { epoch, vertex_count, triangles, tags, rest, held, hangs } = &*body.topology;
-    let on_image = body.texture.iter().flat_map(|texture| texture.coordinates(body.topology.skin_at_rest()));
+    let on_image = body.texture.iter().flat_map(|texture| body.topology.on_image(texture));
     let coordinates = rest.iter().flatten().flat_map(|c| c.to_le_bytes());
     wire::SurfaceTopology {
         seq,

@@ -4,6 +4,8 @@ use nalgebra::{Matrix3, Vector3};
 use scindo_physics::body::Body;
 use scindo_physics::element::MaterialPoint;
 
+use super::texture::{Corners, Texture};
+
 /// Share of a vertex's weight on held nodes above which the vertex counts as held.
 const MOSTLY: f64 = 0.5;
 
@@ -27,10 +29,10 @@ pub struct SurfaceTopology {
 }
 
 impl SurfaceTopology {
-    /// Rest positions of the corners [m] of every triangle of the skin, in their order.
-    pub fn skin_at_rest(&self) -> impl Iterator<Item = [[f32; 3]; 3]> {
+    /// Places of the skin on an image: of every triangle with tag 0, in their order.
+    pub fn on_image(&self, texture: &Texture) -> Vec<Corners> {
         let skin = self.triangles.iter().zip(&self.tags).filter(|(_, tag)| **tag == 0);
-        skin.map(|(triangle, _)| triangle.map(|vertex| self.rest[vertex as usize]))
+        texture.coordinates(&self.rest, skin.map(|(triangle, _)| *triangle))
     }
 }
 

@@ -8,7 +8,9 @@
 use std::collections::{HashMap, HashSet};
 
 use nalgebra::Vector3;
-use scindo_collision::{SurfaceBvh, SurfaceError, barycentric_point, closest_point_on_triangle};
+use scindo_collision::{
+    ClosestPoint, SurfaceBvh, SurfaceError, barycentric_point, closest_point_on_triangle,
+};
 
 use super::Corners;
 use crate::format::TexturedSurface;
@@ -60,9 +62,11 @@ impl Atlas {
 
     /// The place closest to a point [m].
     pub fn place(&self, x: V) -> Place {
-        let Some(closest) = self.tree.closest_point(x, f64::MAX) else {
-            return Place { triangle: SEAM, at: [0.0; 2] };
-        };
+        self.place_of(self.tree.closest_point(x, f64::MAX))
+    }
+
+    fn place_of(&self, closest: Option<ClosestPoint>) -> Place {
+        let Some(closest) = closest else { return Place { triangle: SEAM, at: [0.0; 2] } };
         Place { triangle: closest.triangle, at: self.at(closest.triangle, closest.barycentric) }
     }
 
@@ -77,7 +81,8 @@ impl Atlas {
         let centre = (x[0] + x[1] + x[2]) / 3.0;
         let radius = x.iter().map(|x| (x - centre).norm()).fold(0.0, f64::max);
         let around = self.around(self.place(centre).triangle, centre, radius);
-        x.map(|x| self.closest_among(x, &around))
+        let among = || around.iter().map(|&triangle| (0.0, triangle));
+        x.map(|x| self.place_of(self.tree.closest_point_among(x, f64::MAX, among())).at)
     }
 
     /// Whether the places of the other corners are where the triangle of the first one extrapolates them to.
@@ -132,20 +137,6 @@ impl Atlas {
     fn distance(&self, x: V, triangle: u32) -> f64 {
         let corners = &self.corners[triangle as usize];
         (barycentric_point(corners, closest_point_on_triangle(x, corners)) - x).norm()
-    }
-
-    /// Coordinates of the point closest to `x` [m] on some triangles; of equally close ones those of the first.
-    fn closest_among(&self, x: V, triangles: &[u32]) -> [f32; 2] {
-        let mut best = (f64::INFINITY, [0.0; 2]);
-        for &triangle in triangles {
-            let corners = &self.corners[triangle as usize];
-            let weights = closest_point_on_triangle(x, corners);
-            let distance = (barycentric_point(corners, weights) - x).norm_squared();
-            if distance < best.0 {
-                best = (distance, self.at(triangle, weights));
-            }
-        }
-        best.1
     }
 }
 

@@ -57,24 +57,27 @@ impl Texture {
         Self { image, mapping, known: Mutex::default() }
     }
 
-    /// Texture coordinates of triangles whose corners rest here [m]. Places that were asked for before are not looked up
-    /// again.
-    pub fn coordinates(&self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Vec<Corners> {
-        match &self.mapping {
-            Mapping::Axes { repeat_m } => triangles.map(|triangle| along_axes(triangle, *repeat_m)).collect(),
-            Mapping::Atlas(atlas) => {
-                let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut place =
-                    |x: [f32; 3]| *known.entry(x.map(f32::to_bits)).or_insert_with(|| atlas.place(wide(x)));
-                let on = |x: [[f32; 3]; 3]| atlas.corners(x.map(wide), x.map(&mut place));
-                let corners: Vec<Corners> = triangles.map(on).collect();
-                // Most of the places were left behind by cuts and adaptations.
-                if known.len() > MOST_KNOWN + 4 * corners.len() {
-                    known.clear();
-                }
-                corners
+    /// Texture coordinates of triangles over vertices that rest here [m]. Places that were asked for before are not looked
+    /// up again.
+    pub fn coordinates(&self, rest: &[[f32; 3]], triangles: impl Iterator<Item = [u32; 3]>) -> Vec<Corners> {
+        let atlas = match &self.mapping {
+            Mapping::Atlas(atlas) => atlas,
+            Mapping::Axes { repeat_m } => {
+                return triangles.map(|t| along_axes(t.map(|v| rest[v as usize]), *repeat_m)).collect();
             }
+        };
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        // Most of the places were left behind by cuts and adaptations.
+        if known.len() > MOST_KNOWN + 4 * rest.len() {
+            known.clear();
         }
+        let mut places: Vec<Option<Place>> = vec![None; rest.len()];
+        let mut place = |v: u32| {
+            let x = rest[v as usize];
+            let look_up = || *known.entry(x.map(f32::to_bits)).or_insert_with(|| atlas.place(wide(x)));
+            *places[v as usize].get_or_insert_with(look_up)
+        };
+        triangles.map(|t| atlas.corners(t.map(|v| wide(rest[v as usize])), t.map(&mut place))).collect()
     }
 }
 
