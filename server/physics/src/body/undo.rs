@@ -65,8 +65,14 @@ impl Body {
         let state = match (&snap, space.tets()) {
             (Some(_), Some(tets)) => before.on_mesh(tets.mesh(), &x),
             _ if !same_numbers => before.at_places((&self.rest, &*self.space), (&space.rest_positions(), &x)),
-            _ => before
-                .joined(&x, &roots(&self.split_from, self.space.n_copies(), (space.n_copies(), x.len()))),
+            _ => {
+                let roots = roots(&self.split_from, self.space.n_copies(), (space.n_copies(), x.len()));
+                // A vertex that refinement made lies elsewhere than the one it comes from, which must not move there.
+                let is_copy =
+                    |(number, root): (u32, &usize)| self.space.node_of(number) == space.node_of(*root as u32);
+                let copies: Vec<bool> = (0..).zip(&roots).map(is_copy).collect();
+                before.joined(&x, &roots, &copies)
+            }
         };
         (self.space, self.snap) = (space, snap);
         self.space.set_epoch(epoch);
@@ -154,11 +160,11 @@ impl Moving {
         }
     }
 
-    /// Joins every first copy with all copies split from it, which `roots` tells. A copy of which nothing is left
-    /// goes to `x` [m].
-    fn joined(&self, x: &[Vector3<f64>], roots: &[usize]) -> Motion {
+    /// Joins every first copy with all copies split from it, which `roots` tells; `copies` tells which numbers are
+    /// copies of their root's node. A copy of which nothing is left goes to `x` [m].
+    fn joined(&self, x: &[Vector3<f64>], roots: &[usize], copies: &[bool]) -> Motion {
         let mut sums = vec![(0.0, Vector3::zeros(), Vector3::zeros()); x.len()];
-        for copy in (0..self.x.len()).filter(|&copy| !self.lost[copy]) {
+        for copy in (0..self.x.len()).filter(|&copy| !self.lost[copy] && copies[copy]) {
             self.add(copy, &mut sums[roots[copy]]);
         }
         sums.iter().zip(x).map(|(sum, x)| mean(sum).unwrap_or((*x, Vector3::zeros()))).unzip()

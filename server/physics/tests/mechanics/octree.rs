@@ -303,3 +303,30 @@ fn steps_have_the_same_bits_for_any_number_of_threads() {
     assert_eq!(run(1), run(2));
     assert_eq!(run(1), run(3));
 }
+
+/// A cut divides leaves around the blade; undone at once, the body is as it was.
+#[test]
+fn undoing_a_cut_leaves_the_field_of_the_leaves_it_divided() {
+    for scheme in [Scheme::ImplicitEuler, Scheme::Bdf2] {
+        let material = Material { young_pa: 2e5, law: Law::Corotational, ..LINEAR };
+        let mut body = body(unit_cube(16, 2), material, direct(scheme));
+        let held = at(&body, |X| X.x < 1e-9);
+        body.fix(&held, [true; 3], Vector3::zeros()).unwrap();
+        for _ in 0..5 {
+            body.step(0.02, FALL, &[]);
+        }
+        let before = (body.positions().to_vec(), body.velocities().to_vec(), body.elastic_energy());
+        let topology = body.topology();
+        let segment = |y: f64| [Vector3::new(0.2, y, 0.52), Vector3::new(1.5, y, 0.47)];
+        body.cut(&BladeSweep { segments: vec![segment(-0.5), segment(1.5)] }, 1).unwrap();
+        assert!(body.n_copies() > before.0.len());
+        body.restore(topology).unwrap();
+        assert_eq!(body.n_copies(), before.0.len());
+        let apart = |a: &[Vector3<f64>], b: &[Vector3<f64>]| {
+            a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+        };
+        let (x, v) = (apart(body.positions(), &before.0), apart(body.velocities(), &before.1));
+        assert!(x < 1e-12 && v < 1e-12, "{x} m, {v} m/s");
+        assert!((body.elastic_energy() / before.2 - 1.0).abs() < 1e-9);
+    }
+}
